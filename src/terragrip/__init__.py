@@ -1,0 +1,52 @@
+"""Terragrip: what the ground does under the wheels, from signals that a machine already has.
+
+The public names load on first use, so that ``import terragrip`` stays quick.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+__version__ = "0.1.0"
+
+if TYPE_CHECKING:
+    from terragrip.errors import InputError as InputError
+    from terragrip.estimation import Estimates as Estimates
+    from terragrip.estimation import TractionEstimator as TractionEstimator
+    from terragrip.estimation import calibrate as calibrate
+    from terragrip.estimation import estimate as estimate
+    from terragrip.formats import Profile as Profile
+    from terragrip.formats import read as read
+    from terragrip.recording import Recording as Recording
+    from terragrip.simulation import simulate as simulate
+    from terragrip.vehicle import Vehicle as Vehicle
+
+_HOME = {
+    "Vehicle": "terragrip.vehicle",
+    "Recording": "terragrip.recording",
+    "Profile": "terragrip.formats",
+    "read": "terragrip.formats",
+    "Estimates": "terragrip.estimation",
+    "TractionEstimator": "terragrip.estimation",
+    "estimate": "terragrip.estimation",
+    "calibrate": "terragrip.estimation",
+    "simulate": "terragrip.simulation",
+    "InputError": "terragrip.errors",
+}
+
+__all__ = ["__version__", *_HOME]
+
+
+def __getattr__(name: str) -> Any:
+    """Load a public name from its home (PEP 562)."""
+    if name not in _HOME:
+        raise AttributeError(f"module 'terragrip' has no attribute {name!r}")
+    from importlib import import_module
+
+    value = getattr(import_module(_HOME[name]), name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})

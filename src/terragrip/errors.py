@@ -1,0 +1,45 @@
+"""The one error that a user's input can raise."""
+
+from __future__ import annotations
+
+import os
+from typing import Any
+
+
+class InputError(ValueError):
+    """An input or a call is unusable. The text is one line: what, where, and how to mend it.
+
+    Parameters
+    ----------
+    problem: what is wrong, without the place.
+    file: the file it is in, if it came from one.
+    place: where in the file (``"column ground_speed, row 17"``, ``"axles.front.mass"``).
+    mend: what the user can do about it.
+
+    The command line prints ``str(error)`` and exits with 2.
+    """
+
+    def __init__(
+        self,
+        problem: str,
+        *,
+        file: str | os.PathLike[str] | None = None,
+        place: str | None = None,
+        mend: str | None = None,
+    ) -> None:
+        self.problem = problem
+        self.file = None if file is None else os.fspath(file)
+        self.place = place
+        self.mend = mend
+        text = ": ".join(part for part in (self.file, place, problem) if part)
+        if mend:
+            text = f"{text}; {mend}"
+        super().__init__(" ".join(text.split()))
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Pickle by the arguments, so that the error survives a worker process."""
+        return _rebuild, (self.problem, self.file, self.place, self.mend)
+
+
+def _rebuild(problem: str, file: str | None, place: str | None, mend: str | None) -> InputError:
+    return InputError(problem, file=file, place=place, mend=mend)
