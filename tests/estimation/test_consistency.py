@@ -1,0 +1,108 @@
+"""Agreement, coverage, NIS and whiteness against closed forms and known laws."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from terragrip.errors import InputError
+from terragrip.estimation.consistency import (
+    agreement,
+    coverage,
+    mean_absolute_error,
+    nis_bounds,
+    nis_consistency,
+    nrmse,
+    r_squared,
+    whiteness,
+)
+
+
+def test_agreement_by_hand() -> None:
+    observed = [1.0, 2.0, 3.0, 4.0]
+    predicted = [1.0, 2.0, 3.0, 5.0]
+    got = agreement(observed, predicted)
+    # SSE 1, SST 5, range 3, RMSE sqrt(1/4)
+    assert got.r2 == pytest.approx(0.8)
+    assert got.rmse == pytest.approx(0.5)
+    assert got.nrmse == pytest.approx(0.5 / 3)
+    assert got.bias == pytest.approx(0.25)
+    assert r_squared(observed, predicted) == got.r2
+    assert nrmse(observed, predicted) == got.nrmse
+
+
+def test_r_squared_is_not_symmetric_and_can_be_negative() -> None:
+    observed, predicted = [0.0, 1.0], [10.0, 11.0]
+    assert r_squared(observed, predicted) == pytest.approx(1 - 200 / 0.5)
+    # the normalisation is by the observations: swapping the arguments changes NRMSE
+    assert nrmse([0.0, 1.0, 2.0], [0.0, 1.0, 8.0]) != nrmse([0.0, 1.0, 8.0], [0.0, 1.0, 2.0])
+
+
+def test_rows_with_nan_and_outside_the_mask_are_left_out() -> None:
+    observed = np.array([1.0, np.nan, 3.0, 4.0, 100.0])
+    predicted = np.array([1.0, 2.0, np.nan, 4.0, 0.0])
+    got = agreement(observed, predicted, mask=[True, True, True, True, False])
+    assert (got.count, got.r2) == (2, 1.0)
+    assert mean_absolute_error(observed, predicted) == pytest.approx(100 / 3)
+
+
+@pytest.mark.parametrize(
+    ("observed", "predicted"),
+    [([], []), ([1.0], [1.0]), ([np.nan, np.nan], [1.0, 2.0]), ([2.0, 2.0], [1.0, 3.0]), ([1.0, 2.0], [1.0])],
+)
+def test_what_cannot_be_scored_is_refused(observed: list[float], predicted: list[float]) -> None:
+    with pytest.raises(InputError):
+        agreement(observed, predicted)
+
+
+@pytest.mark.parametrize("probability", [0.5, 0.9, 0.95])
+def test_coverage_of_honest_and_of_too_narrow_intervals(probability: float) -> None:
+    rng = np.random.default_rng(1)
+    truth = rng.normal(size=40_000)
+    estimate = truth + 0.3 * rng.normal(size=truth.size)
+    honest = coverage(truth, estimate, np.full(truth.size, 0.3), probability)
+    assert honest == pytest.approx(probability, abs=0.006)  # 2.4 binomial SDs at .5
+    assert coverage(truth, estimate, np.full(truth.size, 0.15), probability) < probability - 0.1
+
+
+def test_coverage_refuses_a_probability_of_one() -> None:
+    with pytest.raises(InputError, match="inside"):
+        coverage([1.0], [1.0], [1.0], 1.0)
+
+
+def test_nis_bounds_hold_the_mean_of_chi_square_draws() -> None:
+    # tabulated: chi-square 5, 2.5 % and 97.5 %
+    assert nis_bounds(5) == pytest.approx((0.8312, 12.8325), abs=1e-4)
+    rng = np.random.default_rng(2)
+    low, high = nis_bounds(5, 0.95, count=50)
+    means = rng.chisquare(5, size=(4000, 50)).mean(axis=1)
+    assert np.mean((means > low) & (means < high)) == pytest.approx(0.95, abs=0.011)
+
+
+def test_nis_consistency_tells_a_right_from_a_too_sure_filter() -> None:
+    rng = np.random.default_rng(3)
+    channels = rng.integers(0, 6, size=30_000)
+    nis = np.where(channels > 0, rng.chisquare(np.maximum(channels, 1)), 0.0)
+    right = nis_consistency(nis, channels)
+    assert right.count == int((channels > 0).sum())
+    assert right.ratio == pytest.approx(1.0, abs=0.02)
+    assert right.within == pytest.approx(0.95, abs=0.004)
+    too_sure = nis_consistency(2.0 * nis, channels)
+    assert too_sure.ratio == pytest.approx(2.0, abs=0.04)
+    assert too_sure.within < 0.85
+    with pytest.raises(InputError):
+        nis_consistency([0.0, 0.0], [0, 0])
+
+
+def test_whiteness_of_white_and_of_coloured_noise() -> None:
+    rng = np.random.default_rng(4)
+    white = rng.normal(size=5000)
+    assert whiteness(white).p_value > 0.01
+    coloured = np.convolve(white, [1.0, 0.5], mode="valid")
+    got = whiteness(coloured, lags=5)
+    # MA(1) with 0.5: autocorrelation 0.4 at lag 1, none beyond
+    assert got.autocorrelation[0] == pytest.approx(0.4, abs=0.03)
+    assert np.all(np.abs(got.autocorrelation[1:]) < 0.05)
+    assert got.p_value < 1e-6
+    with pytest.raises(InputError):
+        whiteness(np.ones(100))
