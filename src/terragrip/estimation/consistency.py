@@ -152,9 +152,9 @@ def nis_consistency(
 def whiteness(residual: ArrayLike, lags: int = 20) -> Whiteness:
     """Autocorrelation of an evenly sampled `residual` (n,) at 1..lags, and the Ljung-Box test.
 
-    Source: Ljung and Box, Biometrika 65, 1978. A small p-value says that the residual is not white. Non-finite rows are dropped, which shifts lags
-    across them: cut the residual at gaps first. Raises InputError with fewer than lags + 2 rows or a
-    residual that does not vary.
+    Source: Ljung and Box, Biometrika 65, 1978. A small p-value says that the residual is not white.
+    Non-finite rows are dropped, which shifts lags across them: cut the residual at gaps first. Raises
+    InputError with fewer than lags + 2 rows or a residual that does not vary.
     """
     from scipy.stats import chi2
 
