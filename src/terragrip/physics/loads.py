@@ -1,0 +1,117 @@
+"""Vertical loads of axles and wheels from plain mechanics (PHYSICS §3).
+
+The paper takes the front load as an input whose source is not public. A measured axle load, where there is
+one, replaces these formulas.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+GRAVITY = 9.80665
+"""Standard gravity, m/s²."""
+
+
+def axle_loads(
+    axle_mass: ArrayLike,
+    axle_position: ArrayLike,
+    *,
+    center_of_gravity_height: float,
+    hitch_height: float = 0.0,
+    hitch_overhang: float = 0.0,
+    drawbar: ArrayLike = 0.0,
+    hitch_load: ArrayLike = 0.0,
+    acceleration: ArrayLike = 0.0,
+    slope: ArrayLike = 0.0,
+    spin_torque: ArrayLike = 0.0,
+    gravity: float = GRAVITY,
+) -> NDArray[Any]:
+    """Vertical load of each axle, N, along the normal of the ground (PHYSICS §3).
+
+    Two axles, moments about the rear contact, L the wheelbase, l_r from there to the centre of gravity::
+
+        F_zf L = m g cosθ l_r - m (dv/dt + g sinθ) h - F_dx h_d - F_dz c - Σ J dω/dt
+        F_zr   = m g cosθ + F_dz - F_zf
+
+    One axle carries the whole weight and the hitch load; moments go into the hitch. More than two axles are a
+    rigid body on equal springs: each axle carries its own mass, and the change is a straight line over its
+    position, fixed by the sum and the moment (R). For two axles that is the formula above.
+
+    Parameters
+    ----------
+    axle_mass: (axles,) kg, weighed on each axle of the level, standing, uncoupled vehicle, front to rear.
+    axle_position: (axles,) m ahead of the rear axle, which is 0; strictly falling.
+    center_of_gravity_height, hitch_height: h and h_d, m above ground. hitch_overhang: c, m behind the rear
+        axle.
+    drawbar: F_dx, N, backward pull positive. hitch_load: F_dz, N, downwards positive.
+    acceleration: dv/dt, m/s². slope: θ, rad, uphill positive. spin_torque: Σ J dω/dt, N m. These five
+        broadcast.
+
+    Returns
+    -------
+    (..., axles): the broadcast shape of the last five, then the axles. A negative value says that the axle
+    would lift: it is not clipped here.
+
+    Raises
+    ------
+    ValueError: masses and positions differ in number, a mass is not positive, or positions do not fall to 0.
+    """
+    mass = np.asarray(axle_mass)
+    position = np.asarray(axle_position)
+    if mass.ndim != 1 or mass.shape != position.shape or mass.size == 0:
+        raise ValueError(f"one mass and one position an axle, got shapes {mass.shape} and {position.shape}")
+    if not np.all(mass > 0):
+        raise ValueError(f"axle masses must be positive, got {mass}")
+    if position[-1] != 0 or not np.all(np.diff(position) < 0):
+        raise ValueError(f"axle positions must fall from front to rear and end at 0, got {position}")
+
+    drawbar, hitch_load, acceleration, slope, spin_torque = (
+        np.asarray(value)[..., np.newaxis]
+        for value in (drawbar, hitch_load, acceleration, slope, spin_torque)
+    )
+    static = mass * gravity * np.cos(slope)
+    if mass.size == 1:
+        shape = np.broadcast_shapes(
+            *(v.shape for v in (drawbar, hitch_load, acceleration, slope, spin_torque))
+        )
+        return np.broadcast_to(static + hitch_load, shape).copy()
+    moment = (  # about the rear contact, nose down positive, of all that is added to the static weight
+        -np.sum(mass) * (acceleration + gravity * np.sin(slope)) * center_of_gravity_height
+        - drawbar * hitch_height
+        - hitch_load * hitch_overhang
+        - spin_torque
+    )
+    offset = position - np.mean(position)
+    tilt = (moment - hitch_load * np.mean(position)) / np.sum(offset**2)
+    return static + hitch_load / mass.size + tilt * offset
+
+
+def lateral_shares(
+    wheels: int,
+    lateral_acceleration: ArrayLike,
+    *,
+    center_of_gravity_height: float,
+    track: float,
+    gravity: float = GRAVITY,
+) -> NDArray[Any]:
+    """Each wheel's share of its axle's load, left to right: 1/2 ∓ (a_y/g) h/track (PHYSICS §3).
+
+    Parameters
+    ----------
+    wheels: on the axle, from left to right. One wheel takes all; more than two stand at equal distances
+        across the track and share as equal springs (R).
+    lateral_acceleration: a_y, m/s², to the left positive; (...).
+    center_of_gravity_height: h, m. track: m between the outermost wheels.
+
+    Returns
+    -------
+    (..., wheels), each row's sum 1. A negative share says that the wheel would lift.
+    """
+    lateral = np.asarray(lateral_acceleration)[..., np.newaxis]
+    if wheels == 1:
+        return np.ones(lateral.shape)
+    left = np.linspace(track / 2, -track / 2, wheels)
+    return 1 / wheels - lateral / gravity * center_of_gravity_height * left / np.sum(left**2)

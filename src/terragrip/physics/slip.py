@@ -1,0 +1,43 @@
+"""Slip of a driven wheel (paper eq. 5)."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+STANDSTILL_SPEED = 0.05
+"""Default speed [m/s] up to which vehicle and wheel count as standing."""
+
+
+def slip(
+    wheel_speed: ArrayLike,
+    ground_speed: ArrayLike,
+    rolling_radius: ArrayLike,
+    *,
+    standstill_speed: float = STANDSTILL_SPEED,
+) -> NDArray[Any]:
+    """Slip s between -1 (locked wheel) and 1 (spinning on the spot), paper eq. 5.
+
+    s = 1 - |v|/(r|ω|) if |v| <= r|ω|, else -1 + r|ω|/|v|. ASABE S296 calls it slip or travel reduction ratio,
+    there over a zero condition of the user's choice, here over the rolling radius.
+
+    Parameters
+    ----------
+    wheel_speed: ω, rad/s, any shape. ground_speed: v, m/s. rolling_radius: r, m. They broadcast.
+    standstill_speed: m/s; where both |v| and r|ω| are at or under it, slip is undefined and the
+        result is NaN.
+
+    Returns
+    -------
+    The broadcast shape. As in the paper only magnitudes enter: a wheel that turns against the travel gets the
+    slip of one that turns with it.
+    """
+    travel = np.abs(np.asarray(ground_speed))
+    rim = np.abs(np.asarray(rolling_radius) * np.asarray(wheel_speed))
+    travel, rim = np.broadcast_arrays(travel, rim)
+    faster = np.maximum(travel, rim)
+    moving = faster > standstill_speed  # also False for NaN and for 0/0
+    change = (rim - travel) / np.where(moving, faster, 1)
+    return np.where(moving, change, np.nan)
