@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Iterable
 from typing import Any
 
 
@@ -43,3 +44,16 @@ class InputError(ValueError):
 
 def _rebuild(problem: str, file: str | None, place: str | None, mend: str | None) -> InputError:
     return InputError(problem, file=file, place=place, mend=mend)
+
+
+def nearest(name: str, known: Iterable[str]) -> str | None:
+    """The known name most like ``name`` (case and underscores aside), or None if none comes near."""
+    from difflib import get_close_matches
+
+    plain = {_plain(k): k for k in known}
+    match = get_close_matches(_plain(name), list(plain), n=1, cutoff=0.6)
+    return plain[match[0]] if match else None
+
+
+def _plain(name: str) -> str:
+    return "".join(name.casefold().split()).replace("_", "")

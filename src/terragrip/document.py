@@ -1,0 +1,192 @@
+"""A YAML file of the user's, read so that every complaint names the key, the line and the mend."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, TypeVar
+
+import yaml
+from pydantic import BaseModel, ConfigDict, ValidationError, model_validator
+from pydantic_core import PydanticCustomError
+
+from terragrip.errors import InputError, nearest
+from terragrip.files import refuse_missing, unreadable
+from terragrip.units import UnitError
+
+Place = tuple[str | int, ...]
+
+_PLAIN = {
+    "string_type": ("is not text", "put it in quotes"),
+    "bool_type": ("is not true or false", "write true or false"),
+    "bool_parsing": ("is not true or false", "write true or false"),
+    "dict_type": ("is not a mapping", "write it as 'key: value' lines, or '{key: value}'"),
+    "model_type": ("is not a mapping", "write it as 'key: value' lines, or '{key: value}'"),
+    "model_attributes_type": ("is not a mapping", "write it as 'key: value' lines, or '{key: value}'"),
+}
+
+
+class Fault(ValueError):
+    """A fault that a validator finds: problem, mend, and the place within the part that was validated."""
+
+    def __init__(self, problem: str, mend: str, place: Place = ()) -> None:
+        self.problem, self.mend, self.place = problem, mend, place
+        super().__init__(problem)
+
+
+class Part(BaseModel):
+    """A frozen part of a document: unknown keys are refused, and the nearest known key is named."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", arbitrary_types_allowed=True)
+
+    @model_validator(mode="before")
+    @classmethod
+    def _refuse_unknown_keys(cls, data: Any) -> Any:
+        if not isinstance(data, dict):
+            return data
+        known = [info.alias or name for name, info in cls.model_fields.items()]
+        for key in data:
+            if key not in known:
+                close = nearest(str(key), known)
+                mend = f"did you mean {close!r}?" if close else f"known keys are {', '.join(known)}"
+                raise PydanticCustomError("unknown_key", "unknown key", {"key": str(key), "mend": mend})
+        return data
+
+
+ModelT = TypeVar("ModelT", bound=BaseModel)
+
+
+@dataclass(frozen=True)
+class Document:
+    """The content of a YAML file, and the line of every key by its place."""
+
+    data: Any
+    file: str
+    lines: dict[Place, int] = field(default_factory=dict)
+
+
+def read_yaml(path: str | os.PathLike[str]) -> Document:
+    """Read a YAML mapping; raises InputError if it is missing, not YAML, not a mapping, or repeats a key."""
+    file = os.fspath(path)
+    text = _read_text(file)
+    loader = getattr(yaml, "CSafeLoader", yaml.SafeLoader)(text)
+    try:
+        node = loader.get_single_node()
+        lines: dict[Place, int] = {}
+        _collect_lines(node, (), lines, file)
+        data = None if node is None else loader.construct_document(node)
+    except yaml.YAMLError as error:
+        mark = getattr(error, "problem_mark", None) or getattr(error, "context_mark", None)
+        problem = getattr(error, "problem", None) or "cannot be read"
+        place = None if mark is None else f"line {mark.line + 1}"
+        raise InputError(
+            f"not YAML: {problem}", file=file, place=place, mend="write it as 'key: value' lines"
+        ) from error
+    except InputError:
+        raise
+    except (RecursionError, ValueError, OverflowError) as error:  # too deep, or an impossible date
+        raise InputError(
+            f"not YAML that can be read: {error}", file=file, mend="simplify the file"
+        ) from error
+    finally:
+        loader.dispose()
+    if not isinstance(data, dict):
+        problem = "the file is empty" if data is None else "the file is not a mapping"
+        raise InputError(problem, file=file, mend="write it as 'key: value' lines")
+    return Document(data, file, lines)
+
+
+def validate(model: type[ModelT], document: Document | Any, *, file: str | None = None) -> ModelT:
+    """Build ``model`` from a document or plain data; raises InputError for the first fault found."""
+    if not isinstance(document, Document):
+        document = Document(document, file or "")
+    try:
+        return model.model_validate(document.data)
+    except ValidationError as error:
+        raise _input_error(error, document) from error
+
+
+def _read_text(file: str) -> str:
+    refuse_missing(file, suffixes=(".yaml", ".yml"))
+    try:
+        return Path(file).read_text(encoding="utf-8-sig")
+    except UnicodeDecodeError as error:
+        raise InputError("is not text", file=file, mend="give a YAML file in UTF-8") from error
+    except OSError as error:
+        raise unreadable(file, error) from error
+
+
+def _collect_lines(node: Any, place: Place, lines: dict[Place, int], file: str) -> None:
+    """Note the line of every key under ``node``; raises InputError on a key that stands twice."""
+    if isinstance(node, yaml.MappingNode):
+        for key, value in node.value:
+            here = (*place, str(key.value))
+            line = key.start_mark.line + 1
+            if here in lines and lines[here] != line:
+                raise InputError(
+                    "the key stands twice", file=file, place=f"{_dotted(here)} (line {line})",
+                    mend=f"keep one; the other is on line {lines[here]}",
+                )  # fmt: skip
+            lines[here] = line
+            _collect_lines(value, here, lines, file)
+    elif isinstance(node, yaml.SequenceNode):
+        for index, value in enumerate(node.value):
+            lines[(*place, index)] = value.start_mark.line + 1
+            _collect_lines(value, (*place, index), lines, file)
+
+
+def _input_error(error: ValidationError, document: Document) -> InputError:
+    """The fault a user should mend first, as one InputError."""
+    faults = error.errors(include_url=False)
+    order = {"unknown_key": 0, "missing": 2}
+    fault = min(faults, key=lambda f: order.get(f["type"], 1))
+    place = _place_in(document.data, fault["loc"])
+    context = fault.get("ctx", {})
+    cause = context.get("error")
+    problem, mend = fault["msg"].removeprefix("Value error, "), context.get("mend")
+    if isinstance(cause, UnitError):
+        problem, mend = cause.problem, cause.mend
+    elif isinstance(cause, Fault):
+        problem, mend, place = cause.problem, cause.mend, (*place, *cause.place)
+    elif fault["type"] == "unknown_key":
+        place = (*place, context["key"])
+    elif fault["type"] == "missing":
+        problem, mend = "is missing", "add it"
+    elif fault["type"] in ("union_tag_not_found", "union_tag_invalid"):
+        problem = "has no known name"
+        mend = (
+            f"known names are {context['expected_tags']}" if "expected_tags" in context else "add its 'name:'"
+        )
+    elif fault["type"] in _PLAIN:
+        problem, mend = _PLAIN[fault["type"]]
+    return InputError(problem, file=document.file or None, place=_located(place, document), mend=mend)
+
+
+def _place_in(data: Any, location: Place) -> Place:
+    """``location`` without the tags that pydantic adds for unions: the keys the user wrote, or misses."""
+    place: list[str | int] = []
+    for index, key in enumerate(location):
+        inside = (isinstance(data, dict) and key in data) or (
+            isinstance(data, list | tuple) and isinstance(key, int) and key < len(data)
+        )
+        if inside:
+            data = data[key]
+            place.append(key)
+        elif index == len(location) - 1 and isinstance(data, dict):
+            place.append(key)
+    return tuple(place)
+
+
+def _located(place: Place, document: Document) -> str | None:
+    if not place:
+        return None
+    for end in range(len(place), 0, -1):
+        line = document.lines.get(place[:end])
+        if line is not None:
+            return f"{_dotted(place)} (line {line})"
+    return _dotted(place)
+
+
+def _dotted(place: Place) -> str:
+    return ".".join(str(key) for key in place)

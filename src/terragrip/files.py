@@ -1,0 +1,85 @@
+"""Files on disk: a helpful refusal, a fingerprint, and writing that never leaves half a file."""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from terragrip.errors import InputError, nearest
+
+
+@contextmanager
+def replacing(path: str | os.PathLike[str]) -> Iterator[Path]:
+    """Give a temporary path beside ``path``, renamed to it at the end, so that no file is ever half-written.
+
+    Raises InputError if the folder cannot be written or the disk is full.
+    """
+    target = Path(path)
+    try:
+        handle, name = tempfile.mkstemp(prefix=f".{target.name}.", suffix=target.suffix, dir=target.parent)
+        os.close(handle)
+    except OSError as error:
+        raise InputError(
+            f"cannot be written ({error.strerror})",
+            file=path,
+            mend="choose another folder, or make it writable",
+        ) from error
+    temporary = Path(name)
+    try:
+        yield temporary
+        umask = os.umask(0)
+        os.umask(umask)
+        temporary.chmod(0o666 & ~umask)
+        temporary.replace(target)
+    except OSError as error:
+        raise InputError(
+            f"cannot be written ({error.strerror})", file=path, mend="free space or choose another folder"
+        ) from error
+    finally:
+        temporary.unlink(missing_ok=True)
+
+
+def refuse_missing(path: str | os.PathLike[str], *, suffixes: tuple[str, ...] = ()) -> None:
+    """Raise InputError if ``path`` is no file; names the nearest one, or one of ``suffixes`` in a folder."""
+    target = Path(path)
+    try:
+        if target.is_file():
+            return
+        if target.is_dir():
+            inside = sorted(p.name for p in target.iterdir() if p.name.lower().endswith(suffixes or ""))
+            mend = f"name a file in it, such as {inside[0]}" if inside else "name a file"
+            raise InputError("is a folder", file=path, mend=mend)
+        if target.exists():
+            raise InputError("is not a regular file", file=path, mend="name a file on disk")
+        if not target.parent.is_dir():
+            raise InputError("no such file", file=path, mend=f"there is no folder {target.parent}")
+        close = nearest(target.name, (p.name for p in target.parent.iterdir() if p.is_file()))
+    except InputError:
+        raise
+    except (OSError, ValueError) as error:  # no permission; a name too long or with a NUL
+        raise InputError(
+            f"cannot be opened ({error})", file=path, mend="check the path and its permissions"
+        ) from error
+    raise InputError("no such file", file=path, mend=f"did you mean {close}?" if close else "check the path")
+
+
+def sha256(path: str | os.PathLike[str]) -> str:
+    """SHA-256 of a file's content in hexadecimal, read in pieces; raises InputError if it cannot be read."""
+    import hashlib
+
+    refuse_missing(path)
+    try:
+        with Path(path).open("rb") as stream:
+            return hashlib.file_digest(stream, "sha256").hexdigest()
+    except OSError as error:
+        raise unreadable(path, error) from error
+
+
+def unreadable(path: str | os.PathLike[str], error: OSError) -> InputError:
+    """The InputError for a file that exists but cannot be read."""
+    return InputError(
+        f"cannot be read ({error.strerror})", file=path, mend="check its permissions and the disk"
+    )

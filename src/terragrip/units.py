@@ -1,0 +1,194 @@
+"""Units: a text such as ``"2 N m"`` becomes a number in SI.
+
+A table of the units that vehicle files and logs use is read here; only a unit outside it wakes pint, whose
+registry takes a fifth of a second to build. Angles are dimensionless, so ``N s/rad`` is ``N s``.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from dataclasses import dataclass
+
+Dimension = tuple[int, int, int, int]  # powers of kg, m, s, A
+
+STANDARD_GRAVITY = 9.80665  # m/s², exact by definition (CGPM 1901)
+
+_ONE: Dimension = (0, 0, 0, 0)
+_BASE: dict[str, tuple[float, Dimension]] = {
+    "kg": (1.0, (1, 0, 0, 0)), "g": (1e-3, (1, 0, 0, 0)), "t": (1e3, (1, 0, 0, 0)),
+    "lb": (0.45359237, (1, 0, 0, 0)),
+    "m": (1.0, (0, 1, 0, 0)), "km": (1e3, (0, 1, 0, 0)),
+    "cm": (1e-2, (0, 1, 0, 0)), "mm": (1e-3, (0, 1, 0, 0)),
+    "in": (0.0254, (0, 1, 0, 0)), "ft": (0.3048, (0, 1, 0, 0)), "mi": (1609.344, (0, 1, 0, 0)),
+    "s": (1.0, (0, 0, 1, 0)), "ms": (1e-3, (0, 0, 1, 0)),
+    "us": (1e-6, (0, 0, 1, 0)), "µs": (1e-6, (0, 0, 1, 0)),
+    "ns": (1e-9, (0, 0, 1, 0)), "min": (60.0, (0, 0, 1, 0)), "h": (3600.0, (0, 0, 1, 0)),
+    "A": (1.0, (0, 0, 0, 1)), "mA": (1e-3, (0, 0, 0, 1)),
+    "V": (1.0, (1, 2, -3, -1)),
+    "N": (1.0, (1, 1, -2, 0)), "kN": (1e3, (1, 1, -2, 0)), "daN": (10.0, (1, 1, -2, 0)),
+    "kgf": (STANDARD_GRAVITY, (1, 1, -2, 0)), "lbf": (0.45359237 * STANDARD_GRAVITY, (1, 1, -2, 0)),
+    "Nm": (1.0, (1, 2, -2, 0)), "kNm": (1e3, (1, 2, -2, 0)), "J": (1.0, (1, 2, -2, 0)),
+    "W": (1.0, (1, 2, -3, 0)), "kW": (1e3, (1, 2, -3, 0)),
+    "Pa": (1.0, (1, -1, -2, 0)), "kPa": (1e3, (1, -1, -2, 0)), "MPa": (1e6, (1, -1, -2, 0)),
+    "hPa": (1e2, (1, -1, -2, 0)), "bar": (1e5, (1, -1, -2, 0)), "mbar": (1e2, (1, -1, -2, 0)),
+    "psi": (0.45359237 * STANDARD_GRAVITY / 0.0254**2, (1, -1, -2, 0)),
+    "rad": (1.0, _ONE), "mrad": (1e-3, _ONE), "deg": (math.pi / 180, _ONE), "degree": (math.pi / 180, _ONE),
+    "degrees": (math.pi / 180, _ONE), "°": (math.pi / 180, _ONE), "rev": (2 * math.pi, _ONE),
+    "turn": (2 * math.pi, _ONE), "%": (1e-2, _ONE), "percent": (1e-2, _ONE), "1": (1.0, _ONE),
+    "rpm": (2 * math.pi / 60, (0, 0, -1, 0)),
+    "kmh": (1 / 3.6, (0, 1, -1, 0)), "kph": (1 / 3.6, (0, 1, -1, 0)), "mph": (0.44704, (0, 1, -1, 0)),
+    "knot": (1852 / 3600, (0, 1, -1, 0)), "knots": (1852 / 3600, (0, 1, -1, 0)),
+    "g_0": (STANDARD_GRAVITY, (0, 1, -2, 0)), "g0": (STANDARD_GRAVITY, (0, 1, -2, 0)),
+}  # fmt: skip
+_SUPERSCRIPTS = str.maketrans(
+    {"²": "^2", "³": "^3", "¹": "^1", "⁻": "^-", "·": "*", "⋅": "*", "×": "*", "μ": "µ"}
+)
+_TOKEN = re.compile(r"\s*(?:(\*\*|\^)\s*\(?([+-]?\d+)\)?|([*/])|([A-Za-z%°µ][A-Za-z0-9_%°µ]*|1))")
+_NUMBER = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(.*?)\s*$", re.DOTALL)
+_HARMLESS = re.compile(r"[A-Za-z0-9_%°µ^*/(). +-]{1,60}$")
+_KINDS: dict[Dimension, str] = {
+    (1, 0, 0, 0): "a mass", (0, 1, 0, 0): "a length", (0, 0, 1, 0): "a time", (0, 1, -1, 0): "a speed",
+    (0, 1, -2, 0): "an acceleration", (1, 1, -2, 0): "a force", (1, 2, -2, 0): "a torque",
+    (1, -1, -2, 0): "a pressure", (0, 0, -1, 0): "an angular velocity", (1, 2, 0, 0): "a moment of inertia",
+    (1, 1, -1, 0): "a bearing resistance", _ONE: "an angle or plain number", (0, 0, 0, 1): "a current",
+    (1, 2, -3, 0): "a power", (1, 2, -3, -1): "a voltage",
+}  # fmt: skip
+
+
+class UnitError(ValueError):
+    """A quantity cannot be read: ``problem`` says why, ``mend`` what to write."""
+
+    def __init__(self, problem: str, mend: str | None = None) -> None:
+        self.problem, self.mend = problem, mend
+        super().__init__(problem)
+
+
+@dataclass(frozen=True)
+class Unit:
+    """A unit: ``factor`` to SI and the powers of kg, m, s and A."""
+
+    factor: float
+    dimension: Dimension
+
+    @property
+    def kind(self) -> str:
+        """What is measured in it, for a message."""
+        return _KINDS.get(self.dimension, "another quantity")
+
+
+def parse_unit(text: str) -> Unit:
+    """Read a unit such as ``"kg m^2"``, ``"N s/rad"`` or ``"km/h"``; raises UnitError if there is none such.
+
+    Products and quotients are read from the left, as pint does: ``N/m s`` is ``N s/m``.
+    """
+    unit = _from_table(text)
+    return _from_pint(text) if unit is None else unit
+
+
+def factor_to(text: str, si_unit: str) -> float:
+    """Factor that takes a number in unit ``text`` to ``si_unit``; raises UnitError if they are unlike.
+
+    ``g`` stands for standard gravity where an acceleration is asked for. Hz is refused for an angular
+    velocity: it could mean rad/s or revolutions per second.
+    """
+    target = parse_unit(si_unit)
+    if text.strip() == "g" and target.dimension == (0, 1, -2, 0):
+        return STANDARD_GRAVITY
+    if target.dimension == (0, 0, -1, 0) and re.fullmatch(r"\s*[kM]?(Hz|hertz)\s*", text):
+        raise UnitError(f"{text.strip()!r} is ambiguous for an angular velocity", "write rad/s, deg/s or rpm")
+    unit = parse_unit(text)
+    if unit.dimension != target.dimension:
+        raise UnitError(
+            f"{text.strip()!r} measures {unit.kind}, where {target.kind} is needed",
+            f"use a unit such as {si_unit!r}",
+        )
+    return unit.factor / target.factor
+
+
+def quantity(value: object, si_unit: str) -> float:
+    """Read a number (already in ``si_unit``) or a text with a unit; raises UnitError on anything else."""
+    example = f"write e.g. '1.5 {si_unit}'" if si_unit != "1" else "write a number such as 0.02"
+    if isinstance(value, bool) or not isinstance(value, int | float | str):
+        raise UnitError(f"{_short(value)} is not a number", example)
+    if isinstance(value, str):
+        match = _NUMBER.match(value)
+        if match is None or match[2].startswith(","):
+            raise UnitError(f"{_short(value)} is not a number with a unit", example)
+        number = float(match[1]) * (factor_to(match[2], si_unit) if match[2] else 1.0)
+    else:
+        try:
+            number = float(value)
+        except OverflowError:
+            number = math.inf
+    if not math.isfinite(number):
+        raise UnitError(f"{_short(value)} is not a finite number", example)
+    return number
+
+
+def _short(value: object) -> str:
+    text = repr(value)
+    return text if len(text) <= 40 else text[:37] + "..."
+
+
+def _from_table(text: str) -> Unit | None:
+    """Read ``text`` with the table; None if a symbol or the grammar is beyond it."""
+    text = text.translate(_SUPERSCRIPTS).strip()
+    factor, powers, sign, last, position = 1.0, [0, 0, 0, 0], 1, None, 0
+    while position < len(text):
+        match = _TOKEN.match(text, position)
+        if match is None:
+            return None
+        position = match.end()
+        if match[1]:
+            if last is None or abs(int(match[2])) > 9:
+                return None
+            # The symbol counted once already, so the exponent adds the rest.
+            extra = last[2] * (int(match[2]) - 1)
+            factor *= last[0] ** extra
+            powers = [p + extra * d for p, d in zip(powers, last[1], strict=True)]
+            last = None
+        elif match[3]:
+            if position == len(text) or (last is None and factor == 1.0 and not any(powers)):
+                return None
+            sign = -1 if match[3] == "/" else 1
+        else:
+            if match[4] not in _BASE:
+                return None
+            size, dimension = _BASE[match[4]]
+            factor *= size**sign
+            powers = [p + sign * d for p, d in zip(powers, dimension, strict=True)]
+            last, sign = (size, dimension, sign), 1
+    return Unit(factor, (powers[0], powers[1], powers[2], powers[3])) if text else None
+
+
+def _from_pint(text: str) -> Unit:
+    """Read ``text`` with pint; raises UnitError if pint does not know it either."""
+    from tokenize import TokenError
+
+    unknown = UnitError(
+        f"{_short(text.strip())} is not a unit", "write units as in 'N m', 'km/h' or 'kg m^2'"
+    )
+    plain = text.translate(_SUPERSCRIPTS).strip()
+    towering = plain.count("^") + plain.count("**") > 4 or re.search(r"[\^*]\s*\(?-?\d{2}", plain)
+    if towering or not _HARMLESS.match(plain):  # a power tower would keep pint busy for ever
+        raise unknown
+    import pint
+
+    try:
+        size = pint.application_registry.parse_expression(plain)
+        if isinstance(size, int | float):
+            raise unknown
+        size = (1.0 * size).to_base_units()
+        powers = {str(name): float(power) for name, power in size.dimensionality.items()}
+        factor = float(size.magnitude)
+    except (
+        pint.PintError, ArithmeticError, AssertionError, AttributeError, LookupError, SyntaxError, TokenError,
+        TypeError, ValueError,
+    ) as error:  # fmt: skip
+        raise unknown from error
+    wanted = ("[mass]", "[length]", "[time]", "[current]")
+    if set(powers) - set(wanted) or any(p != int(p) for p in powers.values()) or not math.isfinite(factor):
+        raise unknown
+    kg, m, s, ampere = (int(powers.get(name, 0)) for name in wanted)
+    return Unit(factor, (kg, m, s, ampere))
