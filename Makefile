@@ -1,0 +1,105 @@
+# Terragrip: `make demo` and `make test` each work alone on a fresh clone with Python 3.11+, make and a C compiler.
+# Everything lives in .venv and build; nothing outside the clone is written or read, save pip's own configuration.
+SHELL := /bin/sh
+.DEFAULT_GOAL := help
+.DELETE_ON_ERROR:
+.NOTPARALLEL:
+
+VENV := .venv
+BIN := $(VENV)/bin
+PIP := $(BIN)/python -m pip --disable-pip-version-check --no-input
+WORKERS ?= 2
+# PYTHON=... names the interpreter; otherwise the first of these that is 3.11 or newer.
+PYTHON ?=
+CANDIDATES := python3 python3.11 python3.12 python3.13 python3.14
+
+unexport PYTHONPATH PYTHONHOME
+export PYTHONNOUSERSITE := 1
+
+KERNEL_SOURCES := $(wildcard kernel/src/*.c)
+KERNEL_HEADERS := $(wildcard kernel/include/*.h kernel/src/*.h kernel/tests/*.h)
+KERNEL_TESTS := $(patsubst kernel/tests/%.c,%,$(wildcard kernel/tests/*.c))
+BUILD_INPUTS := pyproject.toml setup.py cffi_build.py $(KERNEL_SOURCES) $(KERNEL_HEADERS) \
+	$(wildcard kernel/python/*.c src/terragrip/*/*.c src/terragrip/*/*.h)
+
+.PHONY: help demo test lint kernel-test pytest bench lock clean
+
+help: ## show this list
+	@sed -n 's/^\([a-z-]*\):[^#]*## /  make \1\t/p' $(MAKEFILE_LIST)
+
+demo: $(VENV)/package ## set up, simulate the campaign, estimate every run, and say where the report is
+	@$(BIN)/terragrip demo
+
+test: lint kernel-test pytest ## set up, then lint, type checks, import rules, C tests and Python tests
+
+lint: $(VENV)/package $(VENV)/dev ## ruff, mypy and import-linter
+	$(BIN)/ruff check
+	$(BIN)/mypy
+	$(BIN)/lint-imports
+
+pytest: $(VENV)/package $(VENV)/dev ## the Python tests alone
+	$(BIN)/python -m pytest -n $(WORKERS)
+
+bench: $(VENV)/package $(VENV)/dev ## every benchmark: ratios against a peer in the same run
+	@for script in benchmarks/bench_*.py; do echo "== $$script"; $(BIN)/python "$$script" || exit 1; done
+
+lock: $(VENV)/made ## resolve the dependencies anew into requirements.lock and requirements-dev.lock
+	$(PIP) install --quiet uv
+	echo 'setuptools>=77' | $(BIN)/uv pip compile $(LOCK_FLAGS) --extra all pyproject.toml - -o requirements.lock
+	$(BIN)/uv pip compile $(LOCK_FLAGS) --extra dev -c requirements.lock pyproject.toml -o requirements-dev.lock
+LOCK_FLAGS := --quiet --upgrade --universal --python-version 3.11 --no-annotate --no-emit-index-url \
+	--no-emit-find-links --fork-strategy fewest --custom-compile-command "make lock"
+
+clean: ## remove everything that was built or installed
+	rm -rf $(VENV) build dist src/*.egg-info .mypy_cache .pytest_cache .ruff_cache .import_linter_cache .hypothesis
+	find src tests -name __pycache__ -prune -exec rm -rf {} +
+	rm -f src/terragrip/*.so src/terragrip/*/*.so
+
+# --- the environment -------------------------------------------------------------------------------------------------
+# Each file below is a stamp: it is newer than what it was made from, so a second run does nothing.
+$(VENV)/made:
+	@python=""; for candidate in $(if $(PYTHON),$(PYTHON),$(CANDIDATES)); do \
+	  if "$$candidate" -c 'import sys; sys.exit(sys.version_info < (3, 11))' >/dev/null 2>&1; then python="$$candidate"; break; fi; \
+	done; \
+	if [ -z "$$python" ]; then \
+	  echo "make: no Python 3.11 or newer among: $(if $(PYTHON),$(PYTHON),$(CANDIDATES)); install one, or name it: make PYTHON=/path/to/python3" >&2; exit 1; fi; \
+	if ! "$$python" -c 'import venv, ensurepip' >/dev/null 2>&1; then \
+	  echo "make: $$python cannot make a virtual environment; on Debian and Ubuntu: apt-get install python3-venv" >&2; exit 1; fi; \
+	if ! command -v $(CC) >/dev/null 2>&1; then \
+	  echo "make: no C compiler named $(CC); on Debian and Ubuntu: apt-get install gcc libc6-dev, or name one: make CC=clang" >&2; exit 1; fi; \
+	echo "Setting up $(VENV) with $$("$$python" -c 'import sys; print(sys.executable, sys.version.split()[0])')"; \
+	"$$python" -m venv --clear $(VENV)
+	@$(BIN)/python -c 'import sys; print(sys._base_executable, sys.version)' > $@
+
+$(VENV)/runtime: $(VENV)/made requirements.lock
+	@echo "Installing the packages of requirements.lock"
+	@$(PIP) install --quiet -r requirements.lock
+	@touch $@
+
+$(VENV)/dev: $(VENV)/runtime requirements-dev.lock
+	@echo "Installing the packages of requirements-dev.lock"
+	@$(PIP) install --quiet -r requirements-dev.lock
+	@touch $@
+
+$(VENV)/package: $(VENV)/runtime $(BUILD_INPUTS)
+	@echo "Compiling the kernel and installing terragrip into $(VENV)"
+	@$(PIP) install --quiet --no-deps --no-build-isolation --editable .
+	@touch $@
+
+# --- the kernel's own tests, in double and in single precision ---------------------------------------------------------
+KERNEL_FLAGS := -std=c99 -O2 -Wall -Wextra -pedantic -Werror -Ikernel/include -Ikernel/src -Ikernel/tests
+
+define kernel_rules
+build/kernel/$(1)/%.o: kernel/src/%.c $$(KERNEL_HEADERS) Makefile
+	@mkdir -p $$(@D)
+	$$(CC) $$(KERNEL_FLAGS) $(2) -c -o $$@ $$<
+
+build/kernel/$(1)/%: kernel/tests/%.c $$(patsubst kernel/src/%.c,build/kernel/$(1)/%.o,$$(KERNEL_SOURCES)) $$(KERNEL_HEADERS)
+	@mkdir -p $$(@D)
+	$$(CC) $$(KERNEL_FLAGS) $(2) -o $$@ $$(filter %.c %.o,$$^) -lm
+endef
+$(eval $(call kernel_rules,double,))
+$(eval $(call kernel_rules,float,-DTG_FLOAT))
+
+kernel-test: $(foreach real,double float,$(KERNEL_TESTS:%=build/kernel/$(real)/%)) ## compile the kernel with every warning an error, run its C tests
+	@for program in $^; do echo "$$program"; ./$$program || exit 1; done

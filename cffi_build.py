@@ -1,0 +1,130 @@
+"""The C extensions: what each is compiled from, with which flags, and what Python sees of it.
+
+``setup.py`` and nothing else imports this. Each extension is bound in cffi's API mode. Where Python's own C headers are
+missing (a Debian machine without ``python3-dev``) the same sources become a plain shared library, bound in ABI mode:
+slower by well under a microsecond a call, otherwise the same.
+"""
+
+from __future__ import annotations
+
+import platform
+import re
+import sysconfig
+from dataclasses import dataclass
+from pathlib import Path
+
+from cffi import FFI
+from setuptools import Extension
+
+ROOT = Path(__file__).resolve().parent
+CPU_CHECK = "int tg_cpu_has_avx2(void);"
+
+# -O3 without -ffast-math: NaN means "missing" here. errno and floating-point traps are read by nobody. Contraction to
+# fused multiply-add stays off, so that the portable and the AVX2 build give the same bits.
+FLAGS = ("-std=c99", "-O3", "-g0", "-fno-math-errno", "-fno-trapping-math", "-ffp-contract=off")
+HIDDEN = "-fvisibility=hidden"
+
+
+@dataclass(frozen=True)
+class Binding:
+    """One extension module: ``name``, its public ``header``, its C ``sources``, extra ``flags``, extra declarations."""
+
+    name: str
+    header: Path
+    sources: tuple[Path, ...]
+    real: str = "double"
+    flags: tuple[str, ...] = ()
+    declarations: str = ""
+
+    @property
+    def macros(self) -> list[tuple[str, str | None]]:
+        return [("TG_FLOAT", None)] if self.real == "float" else []
+
+    def ffi(self, *, api: bool) -> FFI:
+        """Parse the header's declarations; in API mode also the C code that includes it."""
+        builder = FFI()
+        builder.cdef(declarations(self.header, self.real) + self.declarations)
+        builder.set_source(self.name, f'#include "{self.header.name}"\n{self.declarations}' if api else None)
+        return builder
+
+
+def declarations(header: Path, real: str) -> str:
+    """Return the text between ``/* cdef begin */`` and ``/* cdef end */``, with TG_REAL put in."""
+    match = re.search(r"/\* cdef begin \*/(.*?)/\* cdef end \*/", header.read_text(encoding="utf-8"), re.DOTALL)
+    if match is None:
+        raise SystemExit(f"{header}: no /* cdef begin */ ... /* cdef end */ section")
+    return match.group(1).replace("TG_REAL", real)
+
+
+def bindings() -> list[Binding]:
+    """Return every extension of this machine, in build order."""
+    return [*kernel_bindings(), *plant_bindings()]
+
+
+def kernel_bindings() -> list[Binding]:
+    """Return the kernel three times: for any processor, for AVX2 (x86-64 only), and in single precision for the tests."""
+    header = ROOT / "kernel/include/terragrip.h"
+    sources = tuple(sorted((ROOT / "kernel/src").glob("*.c")))
+    if not sources:
+        return []
+    cpu_check = ROOT / "kernel/python/cpu.c"
+    found = [
+        Binding("terragrip._kernel_portable", header, (*sources, cpu_check), declarations=CPU_CHECK),
+        Binding("terragrip._kernel_float", header, sources, real="float"),
+    ]
+    if platform.machine() in ("x86_64", "AMD64"):
+        found.append(Binding("terragrip._kernel_avx2", header, sources, flags=("-mavx2", "-mfma")))
+    return found
+
+
+def plant_bindings() -> list[Binding]:
+    """Return the simulation's plant."""
+    folder = ROOT / "src/terragrip/simulation"
+    if not (folder / "plant.c").exists():
+        return []
+    return [Binding("terragrip.simulation._plant", folder / "plant.h", (folder / "plant.c",))]
+
+
+def python_headers_exist() -> bool:
+    """Tell whether Python.h is there, which API mode needs."""
+    return any(Path(sysconfig.get_path(key), "Python.h").exists() for key in ("include", "platinclude"))
+
+
+def extension(binding: Binding, generated: Path) -> Extension:
+    """Write the binding's generated file and return the extension to compile.
+
+    API mode writes C under ``generated``. ABI mode writes the Python module beside the package's own, which loads the
+    shared library named ``<module>_library``.
+    """
+    api = python_headers_exist()
+    name, sources, flags = binding.name, list(binding.sources), [*FLAGS, *binding.flags]
+    if api:
+        glue = generated / f"{binding.name}.c"
+        glue.parent.mkdir(parents=True, exist_ok=True)
+        binding.ffi(api=True).emit_c_code(str(glue))
+        sources.insert(0, glue)
+        flags.append(HIDDEN)
+    else:
+        emit_abi_module(binding)
+        name = f"{binding.name}_library"
+    limited = not sysconfig.get_config_var("Py_GIL_DISABLED")
+    return Extension(
+        name,
+        sources=[str(source.relative_to(ROOT)) for source in sources],
+        include_dirs=sorted({str(path.parent.relative_to(ROOT)) for path in (binding.header, *binding.sources)}),
+        define_macros=[*binding.macros, *([] if limited else [("_CFFI_NO_LIMITED_API", None)])],
+        extra_compile_args=flags,
+        libraries=["m"],
+        py_limited_api=limited,
+    )
+
+
+def emit_abi_module(binding: Binding) -> None:
+    """Write the Python module of an ABI-mode binding; it exposes ``ffi`` and ``lib`` as an API-mode module does."""
+    path = ROOT / "src" / Path(*binding.name.split(".")).with_suffix(".py")
+    binding.ffi(api=False).emit_python_code(str(path))
+    with path.open("a", encoding="utf-8") as module:
+        module.write(
+            "\nfrom pathlib import Path as _Path\n\n"
+            f"lib = ffi.dlopen(str(next(_Path(__file__).parent.glob('{path.stem}_library*.so'))))\n"
+        )

@@ -1,0 +1,32 @@
+"""Build the C extensions; everything else about the package stands in pyproject.toml."""
+
+from __future__ import annotations
+
+import os
+import sys
+from pathlib import Path
+
+from setuptools import Extension, setup
+from setuptools.command.build_ext import build_ext
+
+sys.path.insert(0, str(Path(__file__).resolve().parent))
+from cffi_build import ROOT, bindings, extension
+
+
+class BuildBindings(build_ext):
+    """Compile each extension in a folder of its own: the kernel's files are compiled with several sets of flags."""
+
+    def build_extension(self, ext: Extension) -> None:
+        shared = self.build_temp
+        self.build_temp = os.path.join(shared, ext.name)
+        try:
+            super().build_extension(ext)
+        finally:
+            self.build_temp = shared
+
+
+setup(
+    cmdclass={"build_ext": BuildBindings},
+    ext_modules=[extension(binding, ROOT / "build" / "glue") for binding in bindings()],
+    options={"bdist_wheel": {"py_limited_api": "cp311"}},
+)

@@ -1,0 +1,32 @@
+"""What every test shares: a deterministic hypothesis profile, and the way to the data that lies beside the repository."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from hypothesis import HealthCheck, settings
+
+# `ci` gives the same examples on every run. HYPOTHESIS_PROFILE=explore searches anew, and longer.
+settings.register_profile(
+    "ci", derandomize=True, deadline=None, database=None, suppress_health_check=[HealthCheck.too_slow]
+)
+settings.register_profile("explore", deadline=None, max_examples=1000)
+settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "ci"))
+
+SHARED = Path(os.environ.get("TERRAGRIP_SHARED") or Path(__file__).resolve().parents[2] / "shared")
+
+
+@pytest.fixture
+def shared() -> Callable[[str], Path]:
+    """Return a function from a path inside ``../shared`` to the real path; it skips the test where that is absent."""
+
+    def locate(inside: str) -> Path:
+        path = SHARED / inside
+        if not path.exists():
+            pytest.skip(f"NOT TESTED: {path} is absent (TERRAGRIP_SHARED names another place)")
+        return path
+
+    return locate
