@@ -1,0 +1,331 @@
+/* Terragrip kernel: traction estimation for wheeled machines. C99, no allocation, no globals, no I/O.
+ *
+ * Two floors. The filter floor (tg_filter_*) is the Kalman filter of PHYSICS 1 and 6 for one machine. The estimator floor
+ * (tg_estimator_*) takes raw samples with missing channels and gives traction estimates: it adds vertical loads, input
+ * noise, standstill, gaps, soft outlier weighting and the considered constants. Both are plain data: copy to clone.
+ *
+ * State order, n wheels:  x = (omega_1..omega_n, v, mu_1..mu_n, rho_s), nx = 2n+2.
+ * Channel order:          y = (omega_1..omega_n, v, a_x), ny = n+2. A NaN channel is missing at that instant.
+ * Matrices are row-major, nx by nx. SI units. Every function returns a tg_status; on any status but TG_OK the object is
+ * unchanged, and outputs are not written.
+ */
+#ifndef TERRAGRIP_H
+#define TERRAGRIP_H
+#include <stddef.h>
+#include <stdint.h>
+
+#define TG_MAX_WHEELS 8
+#define TG_MAX_STATES 18
+#define TG_MAX_CHANNELS 10
+#define TG_MODES 4
+#define TG_MAX_CONSIDERED 14
+
+#ifndef TG_NAME
+#define TG_NAME(name) name /* a binding may compile the kernel twice under other names */
+#endif
+
+#ifdef TG_FLOAT
+#define TG_REAL float
+#else
+#define TG_REAL double
+#endif
+
+/* cdef begin */
+typedef TG_REAL tg_real;
+
+typedef enum {
+    TG_OK = 0,
+    TG_BAD_ARGUMENT = 1,  /* a null pointer, a count or a constant out of range */
+    TG_NOT_FINITE = 2,    /* an infinite or NaN value where a number is needed */
+    TG_NOT_POSITIVE = 3,  /* a variance, load or covariance that is not positive (definite) */
+    TG_TIME_REVERSED = 4, /* dt or time runs back */
+    TG_DIVERGED = 5,      /* the step would leave the finite numbers */
+    TG_BAD_SNAPSHOT = 6   /* not a snapshot, of another version or precision, or damaged */
+} tg_status;
+
+typedef enum { TG_EXACT = 0, TG_UNSCENTED = 1 } tg_engine;
+typedef enum { TG_FIXED = 0, TG_ADAPTIVE = 1, TG_SUPERVISED = 2, TG_BANK = 3 } tg_policy;
+
+typedef struct { /* constants of the machine */
+    int32_t wheels;                 /* 1..8 */
+    tg_real mass;                   /* kg */
+    tg_real gravity;                /* m/s^2 */
+    tg_real tire_rolling_resistance; /* rho_t */
+    tg_real radius[8];              /* m, torque arm = rolling unless the estimator floor says otherwise */
+    tg_real inertia[8];             /* kg m^2 */
+    tg_real bearing_resistance[8];  /* rho_w, N s/rad: torque r rho_w omega */
+} tg_machine;
+
+typedef struct { /* inputs held over one step */
+    tg_real torque[8]; /* N m at the wheel */
+    tg_real load[8];   /* N, vertical, > 0 */
+    tg_real drawbar;   /* N, backward pull positive */
+    tg_real slope;     /* rad, uphill positive */
+} tg_input;
+
+typedef struct {
+    int32_t engine;          /* tg_engine */
+    int32_t policy;          /* tg_policy; TG_BANK needs TG_EXACT */
+    tg_real walk[18];        /* Q0 as a density: variance per second of each state's random walk, state order */
+    tg_real huber;           /* soft weighting beyond this many SDs of a channel's innovation; 0 = off */
+    tg_real alpha, beta, kappa; /* unscented; 1, 2, 0. The centre weight must not be negative */
+    tg_real rate;            /* adaptation: eta, 0.05 */
+    tg_real memory;          /* adaptation: exponential memory of C, s, 3 */
+    int32_t stride;          /* adaptation: a step of A every `stride` updates, 5 */
+    tg_real window;          /* supervisor: W, s, 0.5 */
+    tg_real wheel_speed_min; /* supervisor: omega_min, rad/s */
+    tg_real ground_speed_min; /* supervisor: v_min, m/s */
+    int32_t supervisor;      /* 0: wheel-speed and ground-speed changes (paper); 1: drive-torque and slip changes */
+    tg_real scales[4];       /* bank: factors on Q0, .03 .3 3 30 */
+    tg_real dwell;           /* bank: mean time in a mode, s */
+    int32_t mix_stride;      /* bank: IMM mixing every `mix_stride` updates, 5 */
+} tg_tuning;
+
+typedef struct { /* what one update did; arrays in channel or state order, unused places 0 */
+    int32_t channels;        /* how many channels were taken */
+    tg_real nis;             /* normalised innovation squared, with the weighted R */
+    tg_real log_likelihood;
+    tg_real innovation[10];  /* NaN where the channel was missing */
+    tg_real innovation_variance[10]; /* prior: (H P H')_jj + R_j, before weighting */
+    tg_real weight[10];      /* 1 = full trust, < 1 = softened */
+    tg_real gamma;           /* supervisor, 1 for adaptive, 0 for fixed and bank */
+    tg_real adaptation[18];  /* a_j used in this step */
+    tg_real mode[4];         /* bank probabilities after the update */
+} tg_step;
+
+typedef struct tg_filter tg_filter;
+size_t tg_filter_size(void);
+tg_tuning tg_default_tuning(void);
+tg_status tg_filter_init(tg_filter *f, const tg_machine *machine, const tg_tuning *tuning, const tg_real *x0, const tg_real *P0);
+/* Predict over dt with `before` held (Q once, at the end), then update with y. `q_input`: extra variance added to each state in this
+ * step (input noise), never adapted or scaled. `r`: channel variances. `now`: the inputs at the instant of y (for a_x). */
+tg_status tg_filter_step(tg_filter *f, tg_real dt, const tg_input *before, const tg_input *now, const tg_real *q_input,
+                         const tg_real *y, const tg_real *r, tg_step *out);
+tg_status tg_filter_predict(tg_filter *f, tg_real dt, const tg_input *before, const tg_real *q_input);
+/* Keep the marginal of (mu, rho_s), add `walk_time` seconds of their random walk, and start (omega, v) anew at `outputs`
+ * (n+1 values) with variances `variances`, uncorrelated: standstill (walk_time 0), a long gap, a change of direction. */
+tg_status tg_filter_restart(tg_filter *f, tg_real walk_time, const tg_real *outputs, const tg_real *variances);
+/* Mean (nx) and covariance (nx*nx); of the bank: the mixture's. Either pointer may be null. */
+tg_status tg_filter_moments(const tg_filter *f, tg_real *x, tg_real *P);
+/* The sensitivities of adaptation, for tests: dP/d ln a_j, nx*nx, and dx/d ln a_j, nx. */
+tg_status tg_filter_sensitivity(const tg_filter *f, int32_t j, tg_real *dx, tg_real *dP);
+
+/* The covariance as P = U diag(D) U': U nx*nx with its rows in state order (a permuted unit triangle), D nx, all positive. `mode` is
+ * the bank's, 0..3, else 0. Exact where P itself, in single precision, may round to an indefinite matrix. */
+tg_status tg_filter_factors(const tg_filter *f, int32_t mode, tg_real *U, tg_real *D);
+
+/* Considered constants (Schmidt-Kalman): constants that the data cannot tell, each with a spread. A column is d x / d p times one SD of
+ * p. The reported covariance is P + sum of column column'. The columns pass through the very gains of the filter. */
+typedef struct { /* what one SD of a constant adds to what the filter computes, over one step; all 0: nothing */
+    tg_real wheel_acceleration[8]; /* rad/s^2, to d omega_i/dt */
+    tg_real acceleration;          /* m/s^2, to dv/dt */
+    tg_real accelerometer;         /* m/s^2, to the computed a_x, less what the sensor itself reads too much */
+} tg_deviation;
+typedef struct tg_consider tg_consider;
+size_t tg_consider_size(void);
+tg_status tg_consider_init(tg_consider *c, const tg_filter *f, int32_t columns); /* columns of 0 */
+/* Call after every tg_filter_step, _predict and _restart. `deviations`: one a column; null: none. */
+tg_status tg_consider_step(tg_consider *c, const tg_filter *f, const tg_deviation *deviations);
+tg_status tg_consider_columns(const tg_consider *c, tg_real *s); /* columns by nx, state order */
+
+/* Smoother (Rauch-Tung-Striebel). Forwards: after every tg_filter_step, _predict and _restart call tg_track_step; once a row, after at
+ * most one step that took a channel, tg_record_take writes a record of tg_record_length reals and starts the next track. Backwards:
+ * tg_record_moments at the last row, then tg_smooth_step row by row; x, P and s hold `next` when called and `here` on return. */
+typedef struct tg_track tg_track;
+size_t tg_track_size(void);
+tg_status tg_track_init(tg_track *t, const tg_filter *f);
+tg_status tg_track_step(tg_track *t, const tg_filter *f);
+size_t tg_record_length(int32_t wheels, int32_t columns);
+tg_status tg_record_take(tg_real *record, tg_track *t, const tg_filter *f, const tg_consider *c); /* c may be null: 0 columns */
+tg_status tg_record_moments(int32_t wheels, int32_t columns, const tg_real *record, tg_real *x, tg_real *P, tg_real *s);
+tg_status tg_smooth_step(int32_t wheels, int32_t columns, const tg_real *here, const tg_real *next, tg_real *x, tg_real *P, tg_real *s);
+
+/* ---- Estimator floor: one raw sample in, one row of estimates out. A whole recording is its samples, one after another. ---- */
+
+/* Places of a sample's channels. Wheels and axles in the vehicle's order, front to rear, left to right. */
+enum {
+    TG_WHEEL_SPEED = 0,      /* + wheel, rad/s */
+    TG_GROUND_SPEED = 8,     /* m/s */
+    TG_DRIVE_TORQUE = 9,     /* + wheel, N m at the wheel */
+    TG_DRAWBAR_FORCE = 17,   /* N, backward pull positive */
+    TG_ACCELERATION_X = 18,  /* m/s^2, specific force */
+    TG_ACCELERATION_Y = 19,  /* m/s^2, specific force, left positive */
+    TG_PITCH = 20,           /* rad, nose up positive */
+    TG_ROLL = 21,            /* rad, left side up positive */
+    TG_VERTICAL_LOAD = 22,   /* + axle, N */
+    TG_SLOTS = 30
+};
+
+/* Places of an estimate's values. Each `_STD` holds the considered constants. */
+enum {
+    TG_OUT_GROUND_SPEED = 0,
+    TG_OUT_GROUND_SPEED_STD = 1,
+    TG_OUT_SOIL_RESISTANCE = 2,
+    TG_OUT_SOIL_RESISTANCE_STD = 3,
+    TG_OUT_NIS = 4,          /* of the channels taken; 0 where none was */
+    TG_OUT_CHANNELS = 5,     /* how many channels were taken: the expectation of NIS */
+    TG_OUT_SUPERVISOR = 6,   /* gamma; of the bank: its expected log scale, 0 at the smallest and 1 at the largest */
+    TG_OUT_DISTANCE = 7,     /* m travelled since the first sample, either way */
+    TG_OUT_WHEEL_SPEED = 8,  /* + wheel; so are the next ones */
+    TG_OUT_WHEEL_SPEED_STD = 16,
+    TG_OUT_ADHESION = 24,
+    TG_OUT_ADHESION_STD = 32,
+    TG_OUT_SLIP = 40,
+    TG_OUT_SLIP_STD = 48,
+    TG_OUT_NET_TRACTION = 56,
+    TG_OUT_NET_TRACTION_STD = 64,
+    TG_OUT_EFFICIENCY = 72,
+    TG_OUT_EFFICIENCY_STD = 80,
+    TG_OUT_VERTICAL_LOAD = 88, /* + axle */
+    TG_OUT_SLOTS = 96
+};
+
+typedef enum {
+    TG_EVENT_NONE = 0,
+    TG_EVENT_OUTLIER = 1,    /* a value far from what the filter or its own past expects, taken softly */
+    TG_EVENT_STANDSTILL = 2, /* slip and efficiency are undefined (NaN); adhesion and resistance are held */
+    TG_EVENT_GAP = 3         /* nothing measured for longer than `gap`, or nothing yet: values before the first are NaN */
+} tg_event;
+
+typedef enum { TG_FILTERED = 0, TG_ALGEBRAIC = 1 } tg_method;
+
+typedef struct {
+    double time;            /* s, rising */
+    tg_real value[30];      /* NaN = not measured at that instant */
+} tg_sample;
+
+typedef struct {
+    double time;
+    double distance;
+    int32_t event;          /* tg_event */
+    tg_real value[96];
+} tg_estimate;
+
+typedef struct { /* spreads (1 SD) of constants that the data cannot tell; 0 = known */
+    tg_real drive_torque_gain;      /* relative, each wheel its own */
+    tg_real drive_torque_offset;    /* N m, each wheel its own */
+    tg_real drawbar_gain;           /* relative */
+    tg_real drawbar_offset;         /* N */
+    tg_real slope;                  /* rad: an unmeasured slope, or the pitch sensor's mounting */
+    tg_real tire_rolling_resistance;
+    tg_real vertical_load;          /* relative: what the front gains, the rear loses */
+    tg_real wheel_radius;           /* relative */
+    tg_real acceleration_bias;      /* m/s^2 */
+} tg_uncertainty;
+
+typedef struct {
+    int32_t method;                 /* tg_method */
+    int32_t axles;                  /* 1..8 */
+    int32_t towing;                 /* 1: a drawbar force is measured, so it is unknown until its first value; 0: none until then */
+    int32_t wheel_axle[8];          /* which axle a wheel is on */
+    int32_t driven[8];              /* 0: its torque is 0 */
+    tg_machine machine;
+    tg_tuning tuning;
+    tg_real load_share[8];          /* axle: part of the weight it carries at rest on level ground */
+    tg_real load_transfer[8];       /* axle, 1/m: load gained per N m of nose-down moment (two axles: 1/L, -1/L) */
+    tg_real wheel_share[8];         /* wheel: part of its axle's load */
+    tg_real lateral_share[8];       /* wheel, s^2/m: part of its axle's load it loses per m/s^2 to the left */
+    tg_real center_of_gravity_height; /* m */
+    tg_real hitch_height;           /* m */
+    tg_real offset[30], gain[30];   /* calibration: value = (raw - offset) / gain */
+    tg_real noise[30];              /* SD of each channel after calibration */
+    tg_real held_period[30];        /* s; > 0: the channel repeats its last value between updates this far apart */
+    tg_uncertainty uncertainty;
+    tg_real prior_adhesion, prior_adhesion_std;     /* before the first sample */
+    tg_real prior_resistance, prior_resistance_std;
+    tg_real standstill_speed;       /* m/s */
+    tg_real gap;                    /* s without any wheel or ground speed after which the motion starts anew */
+    tg_real max_step;               /* s; a longer step is predicted in pieces */
+    tg_real outlier_weight;         /* a channel weighted below this flags the row */
+    tg_real load_filter;            /* s, low-pass of the acceleration that moves the loads */
+    tg_real algebraic_filter;       /* s, low-pass of every signal of the algebraic method */
+} tg_settings;
+
+typedef struct tg_estimator tg_estimator;
+size_t tg_estimator_size(void);
+/* Tuned thresholds, tuning and priors; the machine is left empty. */
+tg_settings tg_default_settings(void);
+tg_status tg_estimator_init(tg_estimator *e, const tg_settings *settings);
+tg_status tg_estimator_update(tg_estimator *e, const tg_sample *sample, tg_estimate *out);
+/* `rows` samples from columns (a null pointer: never measured) to columns (null: not wanted); doubles on either build. `done` tells
+ * how many rows went through before a status other than TG_OK. */
+tg_status tg_estimator_block(tg_estimator *e, size_t rows, const double *time, const double *const *in, double *const *out,
+                             uint8_t *event, size_t *done);
+/* Bytes that continue bit for bit, with this kernel's version and precision only. */
+size_t tg_snapshot_size(void);
+tg_status tg_estimator_snapshot(const tg_estimator *e, uint8_t *bytes);
+tg_status tg_estimator_restore(tg_estimator *e, const uint8_t *bytes, size_t size);
+tg_status tg_estimator_settings(const tg_estimator *e, tg_settings *settings);
+/* cdef end */
+
+/* ---- What a filter is made of, so that C code can hold one without allocation. Read and write it by the functions above only. ----
+ * Inside, states run (mu_1..mu_n, rho_s, v, omega_1..omega_n) and covariances are factors P = U D U' by columns; see src/filter.h. */
+#define TG_ROWS 20       /* TG_MAX_STATES in whole lanes of four */
+#define TG_SNAPSHOTS 56  /* of the supervisor's window: 50, one before it, and room */
+#define TG_PAIRS 171     /* TG_MAX_STATES (TG_MAX_STATES + 1)/2 */
+
+typedef struct { /* an affine map of the state: omega' = phi omega + b mu, v' = keep v + sum c mu - g rho, with noise q */
+    tg_real phi[8], b[8], psi[8], c[8];
+    tg_real keep, g, dt;
+    tg_real q[TG_ROWS];
+} tg_passage;
+
+typedef struct { /* one lane a mode of the bank */
+    tg_real x[TG_ROWS][TG_MODES], d[TG_ROWS][TG_MODES], u[TG_MAX_STATES][TG_ROWS][TG_MODES];
+    tg_real gain[TG_MAX_CHANNELS][TG_ROWS][TG_MODES];
+    tg_real probability[TG_MODES];
+    tg_real prior_probability[TG_MODES];
+    double mixed;     /* clock of the last mixing */
+    int32_t updates;  /* since then */
+} tg_bank_state;
+
+typedef struct { /* sensitivities to ln a_j, one lane a parameter */
+    tg_real scale[TG_ROWS];              /* a_j */
+    tg_real dx[TG_MAX_STATES][TG_ROWS];
+    tg_real dP[TG_PAIRS][TG_ROWS];       /* the triangle row >= column of dP, row by row */
+    tg_real C[TG_MAX_WHEELS + 1][TG_MAX_WHEELS + 1]; /* mean of the innovations' products */
+    int32_t seen[TG_MAX_WHEELS + 1][TG_MAX_WHEELS + 1];
+    int32_t updates;                     /* with every wheel and ground speed */
+} tg_adaptation_state;
+
+typedef struct {
+    tg_real value[TG_SNAPSHOTS][TG_MAX_WHEELS + 1]; /* by rule 0: omega, v; by rule 1: torque, mean slip */
+    double time[TG_SNAPSHOTS];
+    tg_real last[TG_MAX_WHEELS + 1];     /* last known omega, v */
+    int32_t first, count;
+    tg_real gamma;
+} tg_supervisor_state;
+
+struct tg_filter {
+    tg_machine machine;
+    tg_tuning tuning;
+    int32_t wheels, states, channels, stride;
+    double clock;                        /* s, the sum of dt */
+    tg_real stiffness;                   /* 1/s, largest r rho_w/J */
+    tg_real slope[2], cosine[2], sine[2]; /* of the last two slopes */
+    tg_real walk[TG_ROWS];
+    tg_real x[TG_ROWS], d[TG_ROWS], u[TG_MAX_STATES * TG_ROWS]; /* without a bank */
+    tg_real x_prior[TG_ROWS];            /* of the last step, before its update */
+    tg_passage passage;                  /* of the last step */
+    int32_t taken;                       /* channels of the last step, in the order taken */
+    int32_t channel[TG_MAX_CHANNELS];
+    tg_real gain[TG_MAX_CHANNELS][TG_ROWS]; /* each after the ones before it; without a bank */
+    tg_real accelerometer[TG_ROWS];      /* row of H of a_x in the last step */
+    tg_supervisor_state supervisor;
+    union {
+        tg_adaptation_state adaptation;
+        tg_bank_state bank;
+    } policy;
+};
+
+struct tg_consider {
+    int32_t columns, wheels, states;
+    tg_real s[TG_MAX_CONSIDERED][TG_ROWS], prior[TG_MAX_CONSIDERED][TG_ROWS];
+};
+
+struct tg_track {
+    int32_t wheels, states, taken;
+    tg_passage passage;                  /* composite; its q is not used */
+    tg_real Q[TG_MAX_STATES * TG_MAX_STATES];
+};
+#endif
