@@ -1,0 +1,149 @@
+"""Are the intervals honest? Coverage against the truth, and NIS against its chi-square law."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from terragrip.estimation.consistency import coverage, nis_consistency
+from terragrip.report.page import Table, number, percent
+from terragrip.report.runs import FloatArray, Run
+from terragrip.report.style import BLUE, GREEN, INK, ORANGE, new_figure, styled, to_svg
+
+LEVELS = (0.5, 0.6, 0.7, 0.8, 0.9, 0.95, 0.99)
+
+
+@dataclass(frozen=True)
+class Calibration:
+    """Observed coverage of one quantity at each of LEVELS, pooled over runs, and by run at 95 %."""
+
+    quantity: str
+    observed: tuple[float, ...]
+    by_run: tuple[float, ...]
+
+
+def calibrations(runs: Sequence[Run]) -> list[Calibration]:
+    """Coverage of mu (every wheel), slip (every wheel) and rho_s over `runs` with a truth, while moving."""
+    wheels = runs[0].wheels
+    groups = {
+        "adhesion µ": [f"adhesion_{wheel}" for wheel in wheels],
+        "slip s": [f"slip_{wheel}" for wheel in wheels],
+        "soil resistance ρs": ["soil_resistance"],
+    }
+    result = []
+    for quantity, columns in groups.items():
+        parts = [_triples(run, columns) for run in runs]
+        truth, estimate, std = (np.concatenate([part[i] for part in parts]) for i in range(3))
+        observed = tuple(coverage(truth, estimate, std, level) for level in LEVELS)
+        result.append(
+            Calibration(quantity, observed, tuple(coverage(*part) for part in parts if len(part[0])))
+        )
+    return result
+
+
+def draw_calibration(found: Sequence[Calibration]) -> str:
+    """An SVG: observed against nominal coverage. Above the diagonal is careful, under it is too sure."""
+    figure = new_figure(width=5.6, height=4.4)
+    with styled():
+        plot = figure.subplots()
+        plot.plot([0.45, 1], [0.45, 1], color=INK, linewidth=0.9, linestyle="--", label="honest")
+        for item, color, marker in zip(found, (BLUE, ORANGE, GREEN), ("o", "s", "^"), strict=False):
+            plot.plot(LEVELS, item.observed, color=color, marker=marker, markersize=5, label=item.quantity)
+        plot.set_xlabel("probability the interval claims")
+        plot.set_ylabel("share of rows it holds the truth in")
+        plot.set_xlim(0.45, 1.0)
+        plot.legend(loc="upper left")
+        return to_svg(figure)
+
+
+def calibration_table(found: Sequence[Calibration]) -> Table:
+    """Coverage at 95 %: pooled, and the spread over runs."""
+    return Table(
+        "Coverage of the 95 % intervals over all simulated runs while moving. Gains and offsets are drawn "
+        "once a run and stay, so single runs scatter around the pooled share more than their many rows "
+        "suggest.",
+        ("quantity", "pooled", "median run", "worst run", "runs under 90 %"),
+        tuple(
+            (
+                item.quantity,
+                percent(item.observed[LEVELS.index(0.95)]),
+                percent(float(np.median(item.by_run))),
+                percent(min(item.by_run)),
+                f"{sum(share < 0.9 for share in item.by_run)} of {len(item.by_run)}",
+            )
+            for item in found
+        ),
+    )
+
+
+def nis_by_channels(run: Run) -> tuple[FloatArray, FloatArray]:
+    """NIS and number of channels of the rows of `run` that took any."""
+    nis, channels = run.estimated("nis"), run.estimated("channels")
+    rows = np.isfinite(nis) & (channels > 0)
+    return nis[rows], channels[rows]
+
+
+def draw_nis(run: Run) -> str:
+    """An SVG: the histogram of NIS for each common number of channels, with the chi-square law."""
+    from scipy.stats import chi2
+
+    nis, channels = nis_by_channels(run)
+    counts = {int(c): int((channels == c).sum()) for c in np.unique(channels)}
+    common = sorted(sorted(counts, key=lambda c: -counts[c])[:3])
+    figure = new_figure(width=8.4, height=3.2)
+    with styled():
+        plots = figure.subplots(1, len(common), squeeze=False)[0]
+        for plot, degrees in zip(plots, common, strict=True):
+            top = float(chi2.ppf(0.9999, degrees))
+            values = nis[channels == degrees]
+            heights, edges = np.histogram(np.minimum(values, top), bins=40, range=(0.0, top))
+            width = edges[1] - edges[0]
+            plot.bar(
+                edges[:-1], heights / (len(values) * width), width=width, align="edge", color=BLUE, alpha=0.55
+            )
+            grid = np.linspace(width / 4, top, 200)
+            density = chi2.pdf(grid, degrees)
+            plot.plot(grid, density, color=INK, linewidth=1.2)
+            # one degree of freedom has an infinite density at 0: keep the axis to what can be read
+            plot.set_ylim(
+                0, 1.25 * max(float((heights / (len(values) * width)).max()), float(chi2.pdf(1, degrees)))
+            )
+            plot.set_title(f"{degrees} channel{'s' if degrees > 1 else ''}, {len(values)} rows")
+            plot.set_xlabel("NIS")
+        plots[0].set_ylabel("density")
+        return to_svg(figure)
+
+
+def nis_table(runs: Sequence[Run]) -> Table:
+    """NIS over its expectation, and the share inside its 95 % bounds, for each run."""
+    rows = []
+    for run in runs:
+        found = nis_consistency(*nis_by_channels(run))
+        rows.append(
+            (f"{run.name}, {run.method}", number(found.ratio, 2), percent(found.within), str(found.count))
+        )
+    return Table(
+        "Normalised innovation squared over its expectation (1 for noise settings that are right) and the "
+        "share of rows inside its two-sided 95 % bounds.",
+        ("run, method", "NIS / channels", "within 95 %", "rows"),
+        tuple(rows),
+    )
+
+
+def _triples(run: Run, columns: Sequence[str]) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Truth, estimate and SD of `columns` of `run`, moving and finite rows, one after the other."""
+    truth, estimate, std = [], [], []
+    for name in columns:
+        true = run.true(name)
+        if true is None:
+            continue
+        said, sd = run.estimated(name), run.estimated(f"{name}_std")
+        rows = run.moving & np.isfinite(true) & np.isfinite(said) & np.isfinite(sd)
+        truth.append(true[rows])
+        estimate.append(said[rows])
+        std.append(sd[rows])
+    if not truth:
+        return np.empty(0), np.empty(0), np.empty(0)
+    return np.concatenate(truth), np.concatenate(estimate), np.concatenate(std)

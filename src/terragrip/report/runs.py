@@ -1,0 +1,155 @@
+"""What a report is made from: one run's estimates, and whatever they can be compared with."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from terragrip.errors import InputError
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+FloatArray = NDArray[np.float64]
+BoolArray = NDArray[np.bool_]
+
+LEAST_SENSOR_LOAD = 0.1
+"""A reference sensor's ratio counts where it carries at least this share of its median load: a wheel in the
+air has no adhesion, only noise over nothing."""
+
+
+@dataclass(frozen=True)
+class Run:
+    """One recorded or simulated drive.
+
+    `estimates` is an Estimates table (DESIGN §3). `truth`, of a simulation, and `recording`, what was
+    measured, have the same rows; either may be absent.
+    """
+
+    name: str
+    estimates: pd.DataFrame
+    method: str
+    truth: pd.DataFrame | None = None
+    recording: pd.DataFrame | None = None
+
+    def __post_init__(self) -> None:
+        for what, table in (("truth", self.truth), ("recording", self.recording)):
+            if table is None:
+                continue
+            time = table["time"].to_numpy()
+            if len(time) != len(self.estimates) or not np.array_equal(time, self.time):
+                raise InputError(
+                    f"the {what} and the estimates of one run need the same rows", place=self.name
+                )
+
+    @cached_property
+    def time(self) -> FloatArray:
+        """Time of each row [s]."""
+        return self.estimates["time"].to_numpy(dtype=np.float64)
+
+    @cached_property
+    def wheels(self) -> tuple[str, ...]:
+        """The wheels with an estimated adhesion, in the table's order."""
+        columns = (str(name) for name in self.estimates.columns)
+        named = (name for name in columns if name.startswith("adhesion_") and not name.endswith("_std"))
+        return tuple(name.removeprefix("adhesion_") for name in named)
+
+    @cached_property
+    def sensor_wheel(self) -> str | None:
+        """The wheel that carries a reference force sensor, or None."""
+        columns = set(self._measured.columns)
+        for wheel in self.wheels:
+            if {f"wheel_force_x_{wheel}", f"wheel_force_z_{wheel}"} <= columns:
+                return wheel
+        return None
+
+    @property
+    def shown_wheel(self) -> str:
+        """The wheel to draw: the one with the sensor, else the last (rear right by custom)."""
+        return self.sensor_wheel or self.wheels[-1]
+
+    def estimated(self, name: str) -> FloatArray:
+        """An estimated column as (n,) floats."""
+        return self.estimates[name].to_numpy(dtype=np.float64)
+
+    def true(self, name: str) -> FloatArray | None:
+        """The true column `true_<name>`, or None without a truth."""
+        if self.truth is None or f"true_{name}" not in self.truth:
+            return None
+        return self.truth[f"true_{name}"].to_numpy(dtype=np.float64)
+
+    def measured_ratio(self) -> FloatArray | None:
+        """F_x/F_z of the reference sensor (paper eq. 4), (n,), NaN where it has no sample or no load.
+
+        The sensor sits on the axle: it reads the net force (no soil resistance in it) over a load without
+        the wheel's weight (PHYSICS §2), so it lies between mu and kappa of the ground.
+        """
+        wheel = self.sensor_wheel
+        if wheel is None:
+            return None
+        force = self._measured[f"wheel_force_x_{wheel}"].to_numpy(dtype=np.float64)
+        load = self._measured[f"wheel_force_z_{wheel}"].to_numpy(dtype=np.float64)
+        typical = np.nanmedian(load) if np.isfinite(load).any() else np.nan
+        with np.errstate(divide="ignore", invalid="ignore"):
+            return np.where(load > LEAST_SENSOR_LOAD * typical, force / load, np.nan)
+
+    def measured_slip(self, wheel: str, radius: float) -> FloatArray | None:
+        """Slip from the recorded wheel and ground speed (paper eq. 5), (n,), NaN where either is missing."""
+        if self.recording is None:
+            return None
+        from terragrip.physics.slip import slip
+
+        turning = self.recording[f"wheel_speed_{wheel}"].to_numpy(dtype=np.float64)
+        return slip(turning, self.recording["ground_speed"].to_numpy(dtype=np.float64), radius)
+
+    @cached_property
+    def soil(self) -> NDArray[np.object_]:
+        """The soil's label at each row, "" where there is none (a transition, or a run without labels)."""
+        for table in (self.estimates, self.recording, self.truth):
+            if table is not None and "soil" in table:
+                labels = table["soil"].to_numpy(dtype=object)
+                return np.array([x if isinstance(x, str) else "" for x in labels], dtype=object)
+        return np.full(len(self.time), "", dtype=object)
+
+    @cached_property
+    def soils(self) -> tuple[str, ...]:
+        """The soils of the run in order of their first appearance."""
+        return tuple(dict.fromkeys(label for label in self.soil if label))
+
+    @cached_property
+    def stuck(self) -> BoolArray:
+        """Where the vehicle is stuck: by the simulation's truth, else nowhere."""
+        if self.truth is not None and "stuck" in self.truth:
+            return self.truth["stuck"].to_numpy(dtype=np.bool_)
+        return np.zeros(len(self.time), dtype=np.bool_)
+
+    @cached_property
+    def moving(self) -> BoolArray:
+        """Rows with an estimate of slip: the others stand still or follow a gap."""
+        return np.isfinite(self.estimated(f"slip_{self.shown_wheel}"))
+
+    @property
+    def _measured(self) -> pd.DataFrame:
+        """The table that carries the references: the recording where it is there, else the estimates."""
+        return self.estimates if self.recording is None else self.recording
+
+
+def stretches(mask: BoolArray) -> list[tuple[int, int]]:
+    """First and last row of each unbroken stretch of True in `mask` (n,)."""
+    edges = np.diff(np.concatenate(([0], mask.astype(np.int8), [0])))
+    return list(
+        zip(np.flatnonzero(edges == 1).tolist(), (np.flatnonzero(edges == -1) - 1).tolist(), strict=True)
+    )
+
+
+def label_stretches(labels: NDArray[np.object_]) -> list[tuple[str, int, int]]:
+    """(label, first row, last row) of each unbroken stretch of one non-empty label."""
+    if not len(labels):
+        return []
+    starts = np.flatnonzero(np.concatenate(([True], labels[1:] != labels[:-1])))
+    ends = np.concatenate((starts[1:], [len(labels)])) - 1
+    return [(str(labels[a]), int(a), int(b)) for a, b in zip(starts, ends, strict=True) if labels[a]]

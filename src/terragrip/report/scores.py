@@ -1,0 +1,176 @@
+"""Scores of estimates against a reference force sensor and, in simulation, against the truth."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from terragrip.errors import InputError
+from terragrip.estimation.consistency import Agreement, agreement, coverage, mean_absolute_error
+from terragrip.report.page import Table, number, percent
+from terragrip.report.runs import FloatArray, Run
+
+PAPER_R2_WHOLE, PAPER_R2_WITHOUT_STUCK, PAPER_NRMSE = 0.445, 0.848, 0.09
+"""The paper's figures for its field run `multi2`: R² whole, R² and NRMSE without 245-255 s."""
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """One estimated quantity of one run against one reference, whole and without the stuck spells.
+
+    `quantity` is ``adhesion`` (mu, as the paper compares) or ``net_traction`` (kappa); `against` is
+    ``sensor`` or ``truth``. A part is None where it cannot be scored.
+    """
+
+    run: str
+    method: str
+    quantity: str
+    against: str
+    whole: Agreement | None
+    without_stuck: Agreement | None
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain values, ready for JSON."""
+        return {
+            "run": self.run,
+            "method": self.method,
+            "quantity": self.quantity,
+            "against": self.against,
+            "whole": self.whole.to_dict() if self.whole else None,
+            "without_stuck": self.without_stuck.to_dict() if self.without_stuck else None,
+        }
+
+
+@dataclass(frozen=True)
+class TruthScore:
+    """Errors and 95 % coverage against the truth, while moving and not stuck. mu, slip: the shown wheel."""
+
+    run: str
+    method: str
+    mu_r2: float
+    mu_mae: float
+    slip_mae: float
+    rho_s_mae: float
+    mu_coverage: float
+    slip_coverage: float
+    rho_s_coverage: float
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain values, ready for JSON."""
+        return dict(vars(self))
+
+
+def compare(run: Run) -> list[Comparison]:
+    """Every comparison that `run` allows: mu and kappa of the sensor's wheel, against sensor and truth."""
+    wheel, sensor = run.shown_wheel, run.measured_ratio()
+    result = []
+    for quantity in ("adhesion", "net_traction"):
+        estimate = run.estimated(f"{quantity}_{wheel}")
+        for against, reference in (("sensor", sensor), ("truth", run.true(f"{quantity}_{wheel}"))):
+            if reference is None:
+                continue
+            whole = _agreement(reference, estimate, np.ones(len(estimate), dtype=np.bool_))
+            without = _agreement(reference, estimate, ~run.stuck)
+            result.append(Comparison(run.name, run.method, quantity, against, whole, without))
+    return result
+
+
+def truth_score(run: Run) -> TruthScore | None:
+    """Errors and coverage of `run` against its truth, None without one."""
+    if run.truth is None:
+        return None
+    wheel, rows = run.shown_wheel, run.moving & ~run.stuck
+    columns = (f"adhesion_{wheel}", f"slip_{wheel}", "soil_resistance")
+    errors, covered = [], []
+    for name in columns:
+        truth, estimate, std = run.true(name), run.estimated(name), run.estimated(f"{name}_std")
+        if truth is None:
+            return None
+        errors.append(mean_absolute_error(truth, estimate, rows))
+        covered.append(coverage(truth, estimate, std, mask=rows))
+    mu = agreement(_present(run.true(columns[0])), run.estimated(columns[0]), rows)
+    return TruthScore(run.name, run.method, mu.r2, *errors, *covered)
+
+
+def method_tables(comparisons: Sequence[Comparison], default: str) -> list[Table]:
+    """Methods against the sensor and against the truth, a table each; the default method's rows set off."""
+    tables = []
+    for against, what in (("sensor", "the reference force sensor"), ("truth", "the simulated truth")):
+        for quantity, symbol in (("adhesion", "µ"), ("net_traction", "κ")):
+            rows = [c for c in comparisons if c.against == against and c.quantity == quantity]
+            if rows:
+                tables.append(_table(rows, f"Estimated {symbol} against {what}", default))
+    return tables
+
+
+def truth_table(scores: Iterable[TruthScore], default: str) -> Table:
+    """Mean absolute errors and 95 % coverage of every method and run."""
+    listed = list(scores)
+    return Table(
+        "Errors against the simulated truth and share of rows whose 95 % interval holds it, while moving, "
+        "stuck spells left out.",
+        ("run, method", "R² of µ", "MAE µ", "MAE slip", "MAE ρs", "95 % µ", "95 % slip", "95 % ρs"),
+        tuple(
+            (
+                f"{s.run}, {s.method}",
+                number(s.mu_r2),
+                number(s.mu_mae, 4),
+                number(s.slip_mae, 4),
+                number(s.rho_s_mae, 4),
+                percent(s.mu_coverage),
+                percent(s.slip_coverage),
+                percent(s.rho_s_coverage),
+            )
+            for s in listed
+        ),
+        frozenset(i for i, s in enumerate(listed) if s.method == default),
+    )
+
+
+def find(
+    comparisons: Iterable[Comparison], *, run: str, method: str, quantity: str, against: str
+) -> Comparison | None:
+    """The one comparison with these four names, None where there is none."""
+    wanted = (run, method, quantity, against)
+    return next((c for c in comparisons if (c.run, c.method, c.quantity, c.against) == wanted), None)
+
+
+def _table(rows: list[Comparison], caption: str, default: str) -> Table:
+    cells = []
+    for c in rows:
+        whole, without = c.whole, c.without_stuck
+        cells.append(
+            (
+                f"{c.run}, {c.method}",
+                number(whole.r2 if whole else None),
+                number(whole.nrmse if whole else None),
+                number(without.r2 if without else None),
+                number(without.nrmse if without else None),
+                number(without.bias if without else None, 4),
+            )
+        )
+    strong = {i for i, c in enumerate(rows) if c.method == default}
+    if rows[0].against == "sensor":
+        paper = ("multi2 of the paper, aukf-fs, field", number(PAPER_R2_WHOLE), "–")
+        cells.append((*paper, number(PAPER_R2_WITHOUT_STUCK), number(PAPER_NRMSE), "–"))
+    return Table(
+        caption + ", whole and without the stuck spell.",
+        ("run, method", "R² whole", "NRMSE whole", "R² without", "NRMSE without", "bias without"),
+        tuple(cells),
+        frozenset(strong),
+    )
+
+
+def _agreement(reference: FloatArray, estimate: FloatArray, rows: Any) -> Agreement | None:
+    try:
+        return agreement(reference, estimate, rows)
+    except InputError:
+        return None
+
+
+def _present(values: FloatArray | None) -> FloatArray:
+    assert values is not None
+    return values

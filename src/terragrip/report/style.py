@@ -1,0 +1,135 @@
+"""The one look of all figures: colours that colour-blind readers can tell apart, one font, SVG out.
+
+The palette is Okabe and Ito's (jfly.uni-koeln.de/color). In a page the colours become CSS variables, so a
+figure follows the reader's light or dark scheme; a figure on disk keeps fixed colours on white.
+"""
+
+from __future__ import annotations
+
+import io
+import re
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+from terragrip.errors import InputError
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+INK, MUTED, GRID, PAPER = "#1b1f24", "#68707a", "#dfe3e8", "#ffffff"
+ON_COLOR = "#101214"
+"""Text on a patch of the palette, in either scheme."""
+ORANGE, SKY, GREEN, YELLOW = "#e69f00", "#56b4e9", "#009e73", "#f0e442"
+BLUE, VERMILLION, PURPLE = "#0072b2", "#d55e00", "#cc79a7"
+
+MEASURED, ESTIMATED, TRUE = ORANGE, BLUE, INK
+"""Colours of the three voices in every figure: the reference sensor, the estimate, the truth."""
+
+SOIL_COLORS = {"hard": PURPLE, "fine": ORANGE, "wet": SKY, "coarse": VERMILLION, "grass": GREEN}
+_SPARE_COLORS = (BLUE, YELLOW, MUTED)
+
+CSS_VARIABLES = {
+    INK: "ink", MUTED: "muted", GRID: "grid", PAPER: "paper", ORANGE: "orange", SKY: "sky", GREEN: "green",
+    YELLOW: "yellow", BLUE: "blue", VERMILLION: "vermillion", PURPLE: "purple",
+}  # fmt: skip
+"""Which CSS variable takes the place of which colour in a page."""
+
+PAGE_SCALE = 1.52
+"""Pixels of a page that a point of a figure may grow to: 9.6 inches fill the text's width."""
+
+_RC: Any = {
+    "figure.facecolor": "none",
+    "savefig.facecolor": "none",
+    "axes.facecolor": "none",
+    "axes.edgecolor": MUTED,
+    "axes.labelcolor": INK,
+    "axes.titlecolor": INK,
+    "axes.titlelocation": "left",
+    "axes.titlesize": 10.5,
+    "axes.labelsize": 9.5,
+    "axes.linewidth": 0.8,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.grid": True,
+    "axes.axisbelow": True,
+    "grid.color": GRID,
+    "grid.linewidth": 0.7,
+    "text.color": INK,
+    "xtick.color": MUTED,
+    "ytick.color": MUTED,
+    "xtick.labelcolor": INK,
+    "ytick.labelcolor": INK,
+    "xtick.labelsize": 9,
+    "ytick.labelsize": 9,
+    "legend.frameon": False,
+    "legend.fontsize": 9,
+    "lines.linewidth": 1.3,
+    "lines.solid_joinstyle": "round",
+    "path.simplify": True,
+    "path.simplify_threshold": 0.3,
+    "font.size": 9.5,
+    "font.family": "sans-serif",
+    "font.sans-serif": ["DejaVu Sans", "Verdana", "Segoe UI", "Helvetica", "Arial", "sans-serif"],
+    "svg.fonttype": "none",  # text stays text: small files, searchable, readable by a screen reader
+    "svg.hashsalt": "terragrip",  # the same figure gives the same bytes
+}
+
+
+def new_figure(width: float = 9.6, height: float = 3.4) -> Figure:
+    """An empty figure in the report's style, size in inches. Raises InputError without matplotlib."""
+    try:
+        from matplotlib import rc_context
+        from matplotlib.figure import Figure
+    except ImportError:
+        raise InputError("matplotlib is not installed", mend="pip install 'terragrip[report]'") from None
+    with rc_context(_RC):
+        return Figure(figsize=(width, height), layout="constrained")
+
+
+def styled() -> Any:
+    """A context in which axes and artists take the report's style; draw and save inside it."""
+    from matplotlib import rc_context
+
+    return rc_context(_RC)
+
+
+def to_svg(figure: Figure) -> str:
+    """The figure as an SVG document, transparent, with the palette's literal colours."""
+    buffer = io.StringIO()
+    with styled():
+        figure.savefig(buffer, format="svg", metadata={"Date": None, "Creator": "terragrip"})
+    return buffer.getvalue()
+
+
+def on_paper(svg: str) -> str:
+    """A stand-alone SVG file: `svg` with a white sheet under it, so that it reads on any background."""
+    return re.sub(r"(<svg\b[^>]*>)", rf'\1\n <rect width="100%" height="100%" fill="{PAPER}"/>', svg, count=1)
+
+
+def in_page(svg: str, label: str, prefix: str) -> str:
+    """`svg` for inlining in HTML: no prologue, scales with the page, colours as CSS variables.
+
+    `label` is what a screen reader says; `prefix` keeps ids apart between the figures of one page.
+    """
+    from html import escape
+
+    body = svg[svg.index("<svg") :]
+    body = re.sub(r"<metadata>.*?</metadata>", "", body, count=1, flags=re.DOTALL)
+    width = re.search(r'\bwidth="([\d.]+)pt"', body)
+    limit = f' style="max-width: {float(width[1]) * PAGE_SCALE:.0f}px"' if width else ""
+    body = re.sub(r'\b(width|height)="[\d.]+pt" ?', "", body, count=2)
+    body = body.replace("<svg", f'<svg role="img" aria-label="{escape(label, quote=True)}"{limit}', 1)
+    body = re.sub(r'\bid="', f'id="{prefix}-', body)
+    body = re.sub(r'(xlink:href|href)="#', rf'\1="#{prefix}-', body)
+    body = body.replace("url(#", f"url(#{prefix}-")
+    for color, name in CSS_VARIABLES.items():
+        body = re.sub(color, f"var(--{name})", body, flags=re.IGNORECASE)
+    return body
+
+
+def soil_color(soil: str, soils: Sequence[str] = ()) -> str:
+    """The colour of a soil: fixed for the paper's five, for others a spare one by its place in `soils`."""
+    if soil in SOIL_COLORS:
+        return SOIL_COLORS[soil]
+    others = [name for name in soils if name not in SOIL_COLORS]
+    return _SPARE_COLORS[others.index(soil) % len(_SPARE_COLORS)] if soil in others else MUTED

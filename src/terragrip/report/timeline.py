@@ -1,0 +1,163 @@
+"""Quantities over time: estimate with interval, sensor and truth; soils as a strip, stuck spells shaded."""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from terragrip.report.runs import BoolArray, FloatArray, Run, label_stretches, stretches
+from terragrip.report.style import (
+    ESTIMATED,
+    INK,
+    MEASURED,
+    MUTED,
+    ON_COLOR,
+    TRUE,
+    new_figure,
+    soil_color,
+    styled,
+    to_svg,
+)
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+COLUMNS = 900
+"""Time slots a line is drawn with: about its pixels, so that a file stays small and spikes stay in."""
+
+
+@dataclass(frozen=True)
+class Lane:
+    """One quantity of a run, ready to draw: (n,) each, None where there is none."""
+
+    label: str
+    estimate: FloatArray
+    std: FloatArray | None = None
+    measured: FloatArray | None = None
+    truth: FloatArray | None = None
+    limits: tuple[float, float] | None = None
+
+
+def timeline(run: Run, lanes: list[Lane], window: tuple[float, float] | None = None) -> str:
+    """An SVG with one plot a lane over a common time axis.
+
+    `window` zooms to (start, end) seconds. The interval drawn is ±1.96 SD, so about 95 %.
+    """
+    rows = np.ones(len(run.time), dtype=np.bool_)
+    if window is not None:
+        rows = (run.time >= window[0]) & (run.time <= window[1])
+    figure = new_figure(height=0.75 + 2.65 * len(lanes))
+    with styled():
+        plots = figure.subplots(len(lanes), 1, sharex=True, squeeze=False)[:, 0]
+        for plot, lane in zip(plots, lanes, strict=True):
+            _draw_lane(plot, run.time[rows], lane, rows)
+            _shade(plot, run, rows)
+        soil_strip(plots[0], run.time[rows], run.soil[rows], run.soils)
+        plots[0].legend(
+            loc="lower left", bbox_to_anchor=(0.0, 1.10), ncols=5, borderaxespad=0.0, handlelength=1.6
+        )
+        plots[-1].set_xlabel("time [s]")
+        plots[-1].set_xlim(float(run.time[rows][0]), float(run.time[rows][-1]))
+        return to_svg(figure)
+
+
+def soil_strip(plot: Axes, time: FloatArray, soil: NDArray[np.object_], soils: tuple[str, ...]) -> None:
+    """A strip of soils above `plot`, named where there is room, grey on a transition or without a label."""
+    if not len(time) or not any(soil):
+        return
+    across = plot.get_xaxis_transform()
+    span = float(time[-1] - time[0]) or 1.0
+    bar: dict[str, Any] = {"transform": across, "clip_on": False, "linewidth": 0}
+    plot.broken_barh([(float(time[0]), span)], (1.015, 0.055), facecolor=MUTED, alpha=0.25, **bar)
+    for label, first, last in label_stretches(soil):
+        start, width = float(time[first]), float(time[last] - time[first])
+        plot.broken_barh([(start, width)], (1.015, 0.055), facecolor=soil_color(label, soils), **bar)
+        if width / span > 0.011 * len(label) + 0.01:
+            plot.text(
+                start + width / 2,
+                1.0405,
+                label,
+                transform=across,
+                ha="center",
+                va="center",
+                fontsize=7.5,
+                color=ON_COLOR,
+            )
+
+
+def slots(time: FloatArray, values: FloatArray, columns: int = COLUMNS) -> tuple[FloatArray, FloatArray]:
+    """At most 2 x `columns` points that draw like all of them: each slot's extremes, in order of time.
+
+    A slot without a finite value becomes one NaN, so that a gap stays a gap; a lone missing sample does not
+    break a line of a slower channel.
+    """
+    finite = np.flatnonzero(np.isfinite(values))
+    if len(finite) <= 2 * columns:
+        return _with_gaps(time[finite], values[finite])
+    edges = np.linspace(time[0], time[-1], columns + 1)
+    bounds = np.searchsorted(time[finite], edges)
+    bounds[-1] = len(finite)
+    keep: list[int] = []
+    for first, last in itertools.pairwise(bounds):
+        if last > first:
+            part = values[finite[first:last]]
+            keep += sorted({int(finite[first + part.argmin()]), int(finite[first + part.argmax()])})
+    return _with_gaps(time[keep], values[keep])
+
+
+def _with_gaps(time: FloatArray, values: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Put a NaN where the step in time is far beyond the usual one (over 1 s and ten times the median)."""
+    if len(time) < 3:
+        return time, values
+    steps = np.diff(time)
+    breaks = np.flatnonzero(steps > max(1.0, 10.0 * float(np.median(steps)))) + 1
+    middle = (time[breaks - 1] + time[breaks]) / 2.0
+    return np.insert(time, breaks, middle), np.insert(values, breaks, np.nan)
+
+
+def _draw_lane(plot: Axes, time: FloatArray, lane: Lane, rows: BoolArray) -> None:
+    if lane.measured is not None:
+        plot.plot(
+            *slots(time, lane.measured[rows]),
+            color=MEASURED,
+            linewidth=0.7,
+            alpha=0.75,
+            label="force sensor" if lane.truth is None else "simulated force sensor",
+        )
+    if lane.std is not None:
+        half = 1.96 * lane.std[rows]
+        at, low = _thin(time, lane.estimate[rows] - half)
+        _, high = _thin(time, lane.estimate[rows] + half)
+        plot.fill_between(
+            at, low, high, color=ESTIMATED, alpha=0.22, linewidth=0, label="95 % interval of the estimate"
+        )
+    plot.plot(*slots(time, lane.estimate[rows]), color=ESTIMATED, label="estimate")
+    if lane.truth is not None:
+        plot.plot(*slots(time, lane.truth[rows]), color=TRUE, linewidth=0.8, label="truth")
+    plot.set_ylabel(lane.label)
+    if lane.limits is not None:
+        plot.set_ylim(*lane.limits)
+
+
+def _thin(time: FloatArray, values: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Every k-th row, for bands that vary slowly."""
+    step = max(1, len(time) // COLUMNS)
+    return time[::step], values[::step]
+
+
+def _shade(plot: Axes, run: Run, rows: BoolArray) -> None:
+    for first, last in stretches(run.stuck & rows):
+        plot.axvspan(float(run.time[first]), float(run.time[last]), color=INK, alpha=0.10, linewidth=0)
+        plot.text(
+            float(run.time[first] + run.time[last]) / 2,
+            0.97,
+            "stuck",
+            transform=plot.get_xaxis_transform(),
+            ha="center",
+            va="top",
+            fontsize=8,
+        )

@@ -1,0 +1,91 @@
+"""What a run offers to compare, and the scores that come of it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from terragrip.errors import InputError
+from terragrip.report.runs import Run, label_stretches, stretches
+from terragrip.report.scores import compare, find, method_tables, truth_score, truth_table
+
+Drive = Callable[..., Run]
+
+
+def test_stretches_cover_the_mask_and_nothing_else() -> None:
+    mask = np.array([True, False, True, True, False, True])
+    assert stretches(mask) == [(0, 0), (2, 3), (5, 5)]
+    assert stretches(np.zeros(3, dtype=bool)) == []
+    labels = np.array(["a", "a", "", "b", "a"], dtype=object)
+    assert label_stretches(labels) == [("a", 0, 1), ("b", 3, 3), ("a", 4, 4)]
+    assert label_stretches(np.array([], dtype=object)) == []
+
+
+def test_a_run_refuses_a_truth_of_other_rows(drive: Drive) -> None:
+    run = drive()
+    with pytest.raises(InputError, match="same rows"):
+        Run(run.name, run.estimates.iloc[1:].reset_index(drop=True), run.method, run.truth)
+
+
+def test_a_lifted_wheel_has_no_measured_ratio(drive: Drive) -> None:
+    run = drive()
+    assert run.recording is not None
+    run.recording.loc[10, "wheel_force_z_rr"] = 1.0
+    run.recording.loc[11, "wheel_force_z_rr"] = np.nan
+    ratio = run.measured_ratio()
+    assert ratio is not None
+    assert np.flatnonzero(np.isnan(ratio)).tolist() == [10, 11]
+    assert run.sensor_wheel == "rr"
+
+
+def test_scores_know_what_was_put_in(drive: Drive) -> None:
+    run = drive(seconds=600.0)
+    score = truth_score(run)
+    assert score is not None
+    # the drive errs by 0.02, 0.01 and 0.01; a normal error's mean magnitude is sqrt(2/pi) of its SD
+    size = np.sqrt(2 / np.pi)
+    assert score.mu_mae == pytest.approx(0.02 * size, rel=0.03)
+    assert score.slip_mae == pytest.approx(0.01 * size, rel=0.03)
+    assert score.rho_s_mae == pytest.approx(0.01 * size, rel=0.03)
+    for share in (score.mu_coverage, score.slip_coverage, score.rho_s_coverage):
+        assert share == pytest.approx(0.95, abs=0.008)
+
+
+def test_kappa_follows_the_sensor_and_mu_lies_above_it_by_the_soil_resistance(drive: Drive) -> None:
+    comparisons = compare(drive())
+    kappa = find(comparisons, run="multi2", method="bank", quantity="net_traction", against="sensor")
+    mu = find(comparisons, run="multi2", method="bank", quantity="adhesion", against="sensor")
+    assert kappa is not None
+    assert mu is not None
+    assert kappa.whole is not None
+    assert kappa.without_stuck is not None
+    assert mu.without_stuck is not None
+    assert kappa.without_stuck.bias == pytest.approx(0.0, abs=0.002)
+    assert mu.without_stuck.bias == pytest.approx(0.08, abs=0.002)
+    # the stuck spell, where the sensor turns negative, must cost agreement
+    assert kappa.without_stuck.r2 > kappa.whole.r2 + 0.1
+    assert kappa.whole.count - kappa.without_stuck.count == 100
+
+
+def test_without_references_there_is_nothing_to_compare(drive: Drive) -> None:
+    run = drive()
+    bare = Run(run.name, run.estimates, run.method)
+    assert compare(bare) == []
+    assert truth_score(bare) is None
+    assert bare.sensor_wheel is None
+    assert bare.shown_wheel == "rr"
+    assert not bare.stuck.any()
+
+
+def test_tables_set_off_the_default_and_carry_the_papers_figures(drive: Drive) -> None:
+    runs = [drive(method="bank"), drive(method="ukf")]
+    tables = method_tables([c for run in runs for c in compare(run)], "bank")
+    assert len(tables) == 4  # mu and kappa, sensor and truth
+    sensor = tables[0]
+    assert sensor.strong == {0}
+    assert sensor.rows[-1][1:5] == ("0.445", "–", "0.848", "0.090")
+    assert not any("paper" in row[0] for row in tables[-1].rows)
+    scores = [score for run in runs if (score := truth_score(run))]
+    assert truth_table(scores, "ukf").strong == {1}
