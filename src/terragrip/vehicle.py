@@ -166,7 +166,8 @@ class Sensors(Part):
 class Uncertainty(Part):
     """Prior standard deviations of constants that data cannot tell: they widen the intervals (PHYSICS §6)."""
 
-    drive_torque_gain: _Ratio | None = None
+    drive_torque_gain: _Ratio | None = None  # of each wheel by itself
+    drive_torque_gain_common: _Ratio | None = None  # of all wheels together
     drive_torque_offset: _Torque | None = None
     drawbar_gain: _Ratio | None = None
     drawbar_offset: _Force | None = None
@@ -178,13 +179,17 @@ class Uncertainty(Part):
 
 
 class Calibration(Part):
-    """Gains and offsets found by ``terragrip calibrate``: corrected value = (raw value - offset) / gain."""
+    """Gains and offsets found by ``terragrip calibrate``: corrected value = (raw value - offset) / gain.
+
+    ``wheel_radius`` [m] takes the place of ``wheel.radius`` for the wheels it names.
+    """
 
     drive_torque_gain: dict[str, _Gain] = Field(default_factory=dict)
     drive_torque_offset: dict[str, _SignedTorque] = Field(default_factory=dict)
     drawbar_offset: _SignedForce = 0.0
     acceleration_bias_x: _SignedAcceleration = 0.0
     pitch_offset: _SignedAngle = 0.0
+    wheel_radius: dict[str, _Radius] = Field(default_factory=dict)
 
 
 class Vehicle(Part):
@@ -266,7 +271,7 @@ class Vehicle(Part):
         for key in ("wheelbase", "center_of_gravity_height") if len(self.axles) > 1 else ():
             if getattr(self, key) is None or key not in self.model_fields_set:
                 raise Fault("is missing", f"two or more axles need it: add e.g. '{key}: 0.6 m'", (key,))
-        for key in ("drive_torque_gain", "drive_torque_offset"):
+        for key in ("drive_torque_gain", "drive_torque_offset", "wheel_radius"):
             unknown = next((name for name in getattr(self.calibration, key) if name not in names), None)
             if unknown is not None:
                 raise Fault(
@@ -301,8 +306,11 @@ class Vehicle(Part):
 
     @cached_property
     def wheel_radius(self) -> Floats:
-        """Radius of each wheel (n,) [m]; unloaded where the wheel has a radius model."""
-        return _frozen(np.array([wheel.radius for wheel in self.wheel_data]))
+        """Radius of each wheel (n,) [m], calibrated where it is; unloaded where the wheel has a radius model."""
+        found = self.calibration.wheel_radius
+        return _frozen(
+            np.array([found.get(n, w.radius) for n, w in zip(self.wheels, self.wheel_data, strict=True)])
+        )
 
     @cached_property
     def wheel_inertia(self) -> Floats:
