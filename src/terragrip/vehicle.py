@@ -306,7 +306,7 @@ class Vehicle(Part):
 
     @cached_property
     def wheel_radius(self) -> Floats:
-        """Radius of each wheel (n,) [m], calibrated where it is; unloaded where the wheel has a radius model."""
+        """Radius of each wheel (n,) [m], calibrated where known; unloaded where it has a radius model."""
         found = self.calibration.wheel_radius
         return _frozen(
             np.array([found.get(n, w.radius) for n, w in zip(self.wheels, self.wheel_data, strict=True)])
