@@ -1,0 +1,19 @@
+"""What was measured: the schema, the checks, and what the log says of its own sensors."""
+
+from terragrip.recording.held import fresh_samples, held_periods, without_held
+from terragrip.recording.noise import sensor_noise
+from terragrip.recording.plausibility import unit_warnings
+from terragrip.recording.schema import is_channel, unit_of, wheel_names_in
+from terragrip.recording.table import Recording
+
+__all__ = [
+    "Recording",
+    "fresh_samples",
+    "held_periods",
+    "is_channel",
+    "sensor_noise",
+    "unit_of",
+    "unit_warnings",
+    "wheel_names_in",
+    "without_held",
+]

@@ -1,0 +1,152 @@
+"""Columns of any table as NumPy arrays, without copies where the type allows."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from terragrip.errors import InputError
+from terragrip.recording.checks import place
+from terragrip.recording.schema import TIME
+
+Floats = npt.NDArray[np.float64]
+
+
+def columns_of(frame: Any, source: str | None) -> dict[str, npt.NDArray[Any]]:
+    """The columns of a pandas or polars frame, an Arrow table or a mapping, by name.
+
+    Raises InputError on anything else, on a name that stands twice and on columns of unlike length.
+    """
+    package = type(frame).__module__.partition(".")[0]
+    pairs: list[tuple[Any, Any]]
+    if isinstance(frame, Mapping):
+        pairs = list(frame.items())
+    elif package == "pandas" and hasattr(frame, "columns"):
+        pairs = [(name, _from_pandas(frame.iloc[:, k])) for k, name in enumerate(frame.columns)]
+    elif package == "polars" and hasattr(frame, "get_columns"):
+        pairs = [(series.name, series.to_numpy()) for series in frame.get_columns()]
+    elif package == "pyarrow" and hasattr(frame, "column_names"):
+        pairs = [(name, frame.column(k).to_numpy()) for k, name in enumerate(frame.column_names)]
+    else:
+        raise InputError(
+            f"{type(frame).__name__} is not a table",
+            file=source,
+            mend="give a DataFrame or a dict of arrays",
+        )
+    columns: dict[str, npt.NDArray[Any]] = {}
+    for name, values in pairs:
+        if str(name) in columns:
+            raise InputError("stands twice", file=source, place=f"column {name}", mend="keep one of them")
+        column = _array(str(name), values, source)
+        if columns and len(column) != len(next(iter(columns.values()))):
+            problem = f"has {len(column)} rows, the first column {len(next(iter(columns.values())))}"
+            raise InputError(problem, file=source, place=f"column {name}", mend="give columns of one length")
+        columns[str(name)] = column
+    return columns
+
+
+def numbers(name: str, column: npt.NDArray[Any], time: Floats | None, source: str | None) -> Floats:
+    """A column as float64, missing = NaN; raises InputError at the first cell that is no number."""
+    if time is not None and len(column) != len(time):
+        problem = f"has {len(column)} rows, time has {len(time)}"
+        raise InputError(problem, file=source, place=f"column {name}", mend="give one value an instant")
+    if column.dtype.kind in "fiub":
+        return column.astype(np.float64, copy=False)
+    if column.dtype.kind in "OUST":
+        try:
+            return column.astype(np.float64)
+        except (TypeError, ValueError, OverflowError):
+            return _cell_by_cell(name, column, time, source)
+    raise InputError(
+        f"holds {column.dtype}, not numbers",
+        file=source,
+        place=f"column {name}",
+        mend="give plain numbers in SI",
+    )
+
+
+def seconds(column: npt.NDArray[Any], source: str | None) -> tuple[Floats, list[str]]:
+    """The time column [s], with a note where dates became seconds since the first."""
+    if column.dtype.kind == "m":
+        return np.where(np.isnat(column), np.nan, column / np.timedelta64(1, "s")), []
+    if column.dtype.kind != "M":
+        return numbers(TIME, column, None, source), []
+    since = column - column[0] if len(column) else column.astype("timedelta64[ns]")
+    found = np.where(np.isnat(since), np.nan, since / np.timedelta64(1, "s"))
+    return found.astype(np.float64), ["time was a date; it counts seconds from the first row."]
+
+
+def texts(name: str, column: npt.NDArray[Any], rows: int, source: str | None) -> npt.NDArray[np.object_]:
+    """A label column as text (n,), empty where there is none; equal labels share one string."""
+    if len(column) != rows:
+        problem = f"has {len(column)} rows, time has {rows}"
+        raise InputError(problem, file=source, place=f"column {name}", mend="give one label an instant")
+    if column.dtype.kind == "f" and np.isnan(column).all():
+        return np.full(rows, "", dtype=object)
+    shared: dict[Any, str] = {}
+    found = np.empty(rows, dtype=object)
+    for row, label in enumerate(column.tolist()):
+        try:
+            found[row] = shared[label]
+        except KeyError:
+            found[row] = shared[label] = _label(label)
+        except TypeError:  # an unhashable cell
+            raise InputError(
+                f"holds a {type(label).__name__}",
+                file=source,
+                place=place(name, row),
+                mend="give text labels",
+            ) from None
+    return found
+
+
+def _label(value: Any) -> str:
+    missing = value is None or value != value or type(value).__name__ == "NAType"
+    return "" if missing else str(value)
+
+
+def _from_pandas(series: Any) -> Any:
+    if getattr(series.dtype, "tz", None) is not None:
+        series = series.dt.tz_convert("UTC").dt.tz_localize(None)
+    return series.to_numpy()
+
+
+def _array(name: str, values: Any, source: str | None) -> npt.NDArray[Any]:
+    try:
+        array = (
+            np.ma.filled(values.astype(float), np.nan) if np.ma.isMaskedArray(values) else np.asarray(values)
+        )
+    except (TypeError, ValueError) as error:
+        raise InputError(
+            f"is not a column ({error})",
+            file=source,
+            place=f"column {name}",
+            mend="give a 1-D array of numbers",
+        ) from error
+    if array.ndim != 1:
+        problem = f"has {array.ndim} dimensions"
+        raise InputError(problem, file=source, place=f"column {name}", mend="give a 1-D array of numbers")
+    return array
+
+
+def _cell_by_cell(name: str, column: npt.NDArray[Any], time: Floats | None, source: str | None) -> Floats:
+    """Convert a column of mixed objects; missing cells become NaN."""
+    found = np.full(len(column), np.nan)
+    for row, cell in enumerate(column.tolist()):
+        blank = isinstance(cell, str) and not cell.strip()
+        if cell is None or blank or type(cell).__name__ in ("NAType", "NaTType"):
+            continue
+        try:
+            found[row] = float(cell)
+        except (TypeError, ValueError, OverflowError):
+            text = repr(cell) if len(repr(cell)) <= 30 else repr(cell)[:27] + "..."
+            raise InputError(
+                f"{text} is not a number",
+                file=source,
+                place=place(name, row, time),
+                mend="give numbers in SI",
+            ) from None
+    return found

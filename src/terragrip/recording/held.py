@@ -1,0 +1,124 @@
+"""Held channels: values that a logger repeats between true updates.
+
+How a held channel is told from a fresh one. A fresh sample repeats its predecessor exactly only when the
+signal moved by less than one quantum (the smallest step of the channel), so a run of equal values ends
+in a step of about one quantum, or belongs to a standstill that happens a few times a log. A held channel
+shows run after run of two and more equal values that begin and end with steps of several quanta, alike
+in length. So only runs between two large steps are judged (standstill and slow quantised signals drop
+out), there must be eight of them, repeats must be commoner among them than the size of the steps allows
+by chance, and three fifths must last between half and twice the median.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+import numpy.typing as npt
+
+from terragrip.recording.schema import REFERENCE
+
+if TYPE_CHECKING:
+    from terragrip.recording.table import Recording
+
+Floats = npt.NDArray[np.float64]
+
+_FEWEST_RUNS = 8
+_REGULAR_SHARE = 0.6
+_LARGE_STEP = 1.5  # quanta: one and a half parts a single step from a double one
+_WORTH_A_LOOK = 0.01  # share of exact repeats under which a channel is taken to be fresh
+_BLOCK, _BLOCKS = 25_000, 8  # a long log is judged on this many samples, spread over it
+
+
+def held_periods(recording: Recording) -> dict[str, float]:
+    """Update period [s] of each channel whose values are held between updates; fresh channels are absent."""
+    found = {}
+    for name, values in recording.channels.items():
+        if name.startswith(REFERENCE):
+            continue
+        period = held_period(recording.time, values)
+        if period is not None:
+            found[name] = period
+    return found
+
+
+def held_period(time: Floats, values: Floats) -> float | None:
+    """Mean time [s] between true updates of one channel (n,), or None if it is fresh (see above)."""
+    time, values = measured_part(time, values)
+    if len(values) < 2 or np.count_nonzero(values[1:] == values[:-1]) < _WORTH_A_LOOK * len(values):
+        return None
+    starts = _run_starts(values)
+    steps = np.abs(np.diff(values[starts]))
+    if len(steps) < _FEWEST_RUNS + 1:
+        return None
+    in_quanta = steps / quantum(values)
+    large = in_quanta > _LARGE_STEP
+    between = large[:-1] & large[1:]
+    lengths = np.diff(starts)[1:][between]
+    lasting = np.diff(time[starts])[1:][between]
+    if len(lengths) < _FEWEST_RUNS:
+        return None
+    # A Gaussian increment of median size m quanta repeats with probability 0.27/m; thrice that is no chance.
+    by_chance = 0.8 / float(np.median(in_quanta))
+    typical = float(np.median(lasting))
+    alike = (lasting > 0.49 * typical) & (lasting < 2.1 * typical)
+    if np.mean(lengths >= 2) <= max(0.2, by_chance) or alike.mean() < _REGULAR_SHARE:
+        return None
+    # Twice the median is a missed update, unless updates come almost with every row.
+    return float(lasting[alike & ((lasting < 1.7 * typical) | (np.median(lengths) < 2))].mean())
+
+
+def fresh_samples(time: Floats, values: Floats, period: float) -> npt.NDArray[np.bool_]:
+    """Which samples (n,) of a channel held for ``period`` [s] are true updates.
+
+    A changed value is one. A value held for longer than 1.5 periods counts again, once a period, where
+    it is 0 (standstill) or where the channel's steps are so coarse that equal updates are to be
+    expected; elsewhere the sensor is taken to be silent.
+    """
+    fresh = np.zeros(len(values), dtype=bool)
+    rows = np.flatnonzero(np.isfinite(values))
+    if not len(rows):
+        return fresh
+    known, when = values[rows], time[rows]
+    starts = _run_starts(known)
+    steps = np.abs(np.diff(known[starts]))
+    coarse = len(steps) > 0 and bool(np.mean(steps < _LARGE_STEP * quantum(known)) >= 0.1)
+    since = when - np.repeat(when[starts], np.diff(np.r_[starts, len(known)]))
+    updates = np.maximum(np.floor(since / period - 0.5 + 1e-9), 0)
+    again = np.r_[False, np.diff(updates) > 0] & ((known == 0) | coarse)
+    again[starts] = True
+    fresh[rows] = again
+    return fresh
+
+
+def without_held(recording: Recording, held: dict[str, float] | None = None) -> Recording:
+    """The recording with held samples missing (NaN); ``held`` from `held_periods`, None: find it."""
+    held = held_periods(recording) if held is None else held
+    channels = dict(recording.channels)
+    for name, period in held.items():
+        fresh = fresh_samples(recording.time, channels[name], period)
+        channels[name] = np.where(fresh, channels[name], np.nan)
+    return replace(recording, channels=channels)
+
+
+def quantum(values: Floats) -> float:
+    """The smallest step between neighbours (n,), 0 if there is none: the resolution of a quantised channel."""
+    steps = np.abs(np.diff(values))
+    # Scaling leaves rounding errors between equal values; they are no steps.
+    steps = steps[steps > 1e-12 * np.max(np.abs(values), initial=0.0)]
+    return float(steps.min()) if len(steps) else 0.0
+
+
+def measured_part(time: Floats, values: Floats) -> tuple[Floats, Floats]:
+    """The measured samples of a channel: all of a short one, blocks spread over a long one."""
+    if len(values) > _BLOCK * _BLOCKS:
+        first = np.linspace(0, len(values) - _BLOCK, _BLOCKS).astype(int)
+        rows = (first[:, None] + np.arange(_BLOCK)).ravel()
+        time, values = time[rows], values[rows]
+    known = np.isfinite(values)
+    return (time, values) if known.all() else (time[known], values[known])
+
+
+def _run_starts(values: Floats) -> npt.NDArray[np.intp]:
+    return np.r_[0, np.flatnonzero(values[1:] != values[:-1]) + 1]

@@ -1,0 +1,73 @@
+"""White noise of the sensors, estimated from the log itself."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+import numpy.typing as npt
+
+from terragrip.recording.held import fresh_samples, held_periods, measured_part, quantum
+from terragrip.recording.schema import REFERENCE
+
+if TYPE_CHECKING:
+    from terragrip.recording.table import Recording
+
+Floats = npt.NDArray[np.float64]
+
+_FEWEST = 20
+_MAD_TO_SD = 1.482602218505602  # of a normal distribution
+_NOT_SENSED = ("latitude", "longitude", "altitude")
+
+
+def sensor_noise(recording: Recording, held: dict[str, float] | None = None) -> dict[str, float]:
+    """Standard deviation of each channel's white noise, in the channel's unit.
+
+    From third differences of the fresh samples (see `white_noise`); where the reader of the log knew better
+    (``recording.noise``), that stands. ``held`` as `held_periods` gives it, None: find it. A channel with too
+    few samples, or one that never changes, is absent.
+    """
+    held = held_periods(recording) if held is None else held
+    found = {}
+    for name, values in recording.channels.items():
+        if name.startswith(REFERENCE) or name in _NOT_SENSED:
+            continue
+        known = recording.noise.get(name)
+        if known is None:
+            time, sample = measured_part(recording.time, values)
+            if name in held:
+                fresh = fresh_samples(time, sample, held[name])
+                time, sample = time[fresh], sample[fresh]
+            known = white_noise(time, sample)
+        if known is not None:
+            found[name] = known
+    return found
+
+
+def white_noise(time: Floats, values: Floats) -> float | None:
+    """Robust standard deviation of the white noise on a smooth signal (n,); None if it cannot be told.
+
+    The third divided difference Σ c_j x_j, c_j = Π 1/(t_j - t_i), of four samples is blind to any motion
+    that is quadratic over them; over √Σc² it has the noise's variance, and its median absolute value
+    keeps spikes out. Four samples that are all equal (standstill) or straddle a gap do not count. The
+    result is never under q/√12 for a resolution q, nor under 1e-4 of the signal's size. Noise with
+    memory (a filtered channel) is underestimated.
+    """
+    if len(values) < _FEWEST:
+        return None
+    step = quantum(values)
+    if step == 0.0:
+        return None
+    spacing = np.lib.stride_tricks.sliding_window_view(np.diff(time), 3)
+    even = spacing.max(axis=1) < 4 * spacing.min(axis=1)
+    moving = (values[:-3] != values[1:-2]) | (values[1:-2] != values[2:-1]) | (values[2:-1] != values[3:])
+    first = np.flatnonzero(even & moving)
+    if len(first) < _FEWEST:
+        return None
+    four = np.arange(4)
+    when, sample = time[first[:, None] + four], values[first[:, None] + four]
+    apart = when[:, :, None] - when[:, None, :] + np.eye(4)
+    weight = 1.0 / apart.prod(axis=2)
+    third = (weight * sample).sum(axis=1) / np.sqrt((weight**2).sum(axis=1))
+    scale = _MAD_TO_SD * float(np.median(np.abs(third)))
+    return max(scale, step / np.sqrt(12.0), 1e-4 * float(np.quantile(np.abs(values), 0.95)))

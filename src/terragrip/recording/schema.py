@@ -1,0 +1,55 @@
+"""The columns of a recording (DESIGN §3): their names and their units."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+TIME = "time"
+WHEEL_CHANNELS = {"wheel_speed": "rad/s", "drive_torque": "N m", "wheel_force_x": "N", "wheel_force_z": "N"}
+AXLE_CHANNELS = {"vertical_load": "N"}
+CHANNELS = {
+    "ground_speed": "m/s",
+    "drawbar_force": "N",
+    "acceleration_x": "m/s^2",
+    "acceleration_y": "m/s^2",
+    "acceleration_z": "m/s^2",
+    "angular_velocity_x": "rad/s",
+    "angular_velocity_y": "rad/s",
+    "angular_velocity_z": "rad/s",
+    "pitch": "rad",
+    "roll": "rad",
+    "latitude": "deg",
+    "longitude": "deg",
+    "altitude": "m",
+}
+LABELS = ("soil",)
+REFERENCE = "true_"  # columns that begin so pass through untouched
+
+
+def split_channel(name: str) -> tuple[str, str] | None:
+    """``("wheel_speed", "fl")`` for ``wheel_speed_fl``, likewise for axles; None for any other name."""
+    for quantity in (*WHEEL_CHANNELS, *AXLE_CHANNELS):
+        if name.startswith(f"{quantity}_") and len(name) > len(quantity) + 1:
+            return quantity, name[len(quantity) + 1 :]
+    return None
+
+
+def is_channel(name: str) -> bool:
+    """Whether ``name`` is a measured channel or a reference of the schema (not time, not a label)."""
+    return name in CHANNELS or name.startswith(REFERENCE) or split_channel(name) is not None
+
+
+def unit_of(name: str) -> str | None:
+    """The unit of a column of the schema, None for a label, a reference or a foreign column."""
+    if name == TIME:
+        return "s"
+    parts = split_channel(name)
+    return CHANNELS.get(name) if parts is None else {**WHEEL_CHANNELS, **AXLE_CHANNELS}[parts[0]]
+
+
+def wheel_names_in(columns: Iterable[str]) -> tuple[str, ...]:
+    """The wheels that the columns speak of, in the order they first appear."""
+    parts = (split_channel(name) for name in columns)
+    return tuple(
+        dict.fromkeys(wheel for quantity, wheel in filter(None, parts) if quantity in WHEEL_CHANNELS)
+    )

@@ -1,0 +1,163 @@
+"""The table of what was measured: one row an instant, SI units, NaN where a channel was not measured."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Any, Self
+
+import numpy as np
+import numpy.typing as npt
+
+from terragrip.errors import InputError
+from terragrip.recording import checks
+from terragrip.recording.columns import columns_of, numbers, seconds, texts
+from terragrip.recording.schema import LABELS, REFERENCE, TIME, is_channel, split_channel, wheel_names_in
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from terragrip.vehicle import Vehicle
+
+Floats = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Recording:
+    """Measured channels on one time base (columns and units: DESIGN §3).
+
+    ``time`` (n,) [s] runs forward; ``channels`` hold float64 (n,) by name, NaN = not measured at that
+    instant; ``labels`` hold text (n,), empty = unlabelled; ``notes`` are plain sentences for the user;
+    ``noise`` is the standard deviation of a channel where the reader knows it (a derived one). Arrays
+    may be read-only.
+    """
+
+    time: Floats
+    channels: dict[str, Floats]
+    labels: dict[str, npt.NDArray[np.object_]] = field(default_factory=dict)
+    source: str | None = None
+    sha256: str | None = None
+    notes: tuple[str, ...] = ()
+    noise: dict[str, float] = field(default_factory=dict)
+
+    @classmethod
+    def from_frame(
+        cls,
+        frame: Any,
+        source: str | None = None,
+        *,
+        sha256: str | None = None,
+        notes: Sequence[str] = (),
+        noise: Mapping[str, float] | None = None,
+    ) -> Self:
+        """Take a pandas or polars frame, an Arrow table or a mapping of arrays; float64 is not copied.
+
+        Raises InputError with column and row on a missing required column (time, ground_speed, a wheel
+        speed), text or infinities in a channel, a required channel without any value, time that is NaN,
+        repeats or runs back, and on an empty table. ``source`` is the file that errors name.
+        """
+        columns, said = columns_of(frame, source), list(notes)
+        checks.require_columns(columns, source)
+        time, remark = seconds(columns[TIME], source)
+        said += remark
+        checks.check_time(time, source)
+        channels: dict[str, Floats] = {}
+        labels: dict[str, npt.NDArray[np.object_]] = {}
+        unused = []
+        for name, column in columns.items():
+            if name in LABELS:
+                labels[name] = texts(name, column, len(time), source)
+            elif is_channel(name):
+                values = numbers(name, column, time, source)
+                if checks.check_channel(name, values, time, source):
+                    channels[name] = values
+                else:
+                    said.append(f"{name} holds no value and is left out.")
+            elif name != TIME:
+                unused.append(name)
+        if unused:
+            shown = ", ".join(unused[:8]) + (f" and {len(unused) - 8} more" if len(unused) > 8 else "")
+            said.append(f"Columns that are not used: {shown}.")
+        if "drawbar_force" not in channels:
+            said.append("There is no drawbar_force: the vehicle is taken to tow nothing.")
+        return cls(time, channels, labels, source, sha256, tuple(dict.fromkeys(said)), dict(noise or {}))
+
+    def __len__(self) -> int:
+        return len(self.time)
+
+    def __contains__(self, name: str) -> bool:
+        return name == TIME or name in self.channels or name in self.labels
+
+    def __getitem__(self, name: str) -> npt.NDArray[Any]:
+        """The column ``name``: time, a channel or a label; raises KeyError if there is none."""
+        if name == TIME:
+            return self.time
+        return self.labels[name] if name in self.labels else self.channels[name]
+
+    @property
+    def wheels(self) -> tuple[str, ...]:
+        """Names of the wheels that have a wheel speed, in the order of the columns."""
+        return tuple(name for name in wheel_names_in(self.channels) if f"wheel_speed_{name}" in self.channels)
+
+    @property
+    def references(self) -> tuple[str, ...]:
+        """Names of the columns that no filter may look at: measured wheel forces and ``true_`` columns."""
+        return tuple(n for n in self.channels if n.startswith((REFERENCE, "wheel_force_")))
+
+    def select(self, rows: Any) -> Self:
+        """The rows of a mask, a slice or an array of increasing indices; a slice copies nothing."""
+        return replace(
+            self,
+            time=self.time[rows],
+            channels={name: values[rows] for name, values in self.channels.items()},
+            labels={name: values[rows] for name, values in self.labels.items()},
+        )
+
+    def with_channels(self, **channels: npt.ArrayLike) -> Self:
+        """The same recording with channels (n,) added or replaced; raises InputError on another length."""
+        added = {name: numbers(name, np.asarray(c), self.time, self.source) for name, c in channels.items()}
+        return replace(self, channels={**self.channels, **added})
+
+    def with_notes(self, *notes: str) -> Self:
+        """The same recording with notes added, each once."""
+        return replace(self, notes=tuple(dict.fromkeys((*self.notes, *notes))))
+
+    def to_pandas(self) -> pd.DataFrame:
+        """The whole table as a pandas DataFrame, time first."""
+        import pandas as pd
+
+        return pd.DataFrame({TIME: self.time, **self.channels, **self.labels}, copy=False)
+
+    def check_against(self, vehicle: Vehicle) -> None:
+        """Raise InputError unless the log's wheels and axles are the vehicle's, with all that estimates need.
+
+        A driven wheel needs a torque; an undriven one without a torque column has torque 0. A drawbar force
+        on two or more axles needs the vehicle's ``hitch_height``, since it moves load between them.
+        """
+        known = ", ".join(vehicle.wheels)
+        for name in self.channels:
+            quantity, owner = split_channel(name) or ("", "")
+            if quantity == "vertical_load" and owner not in vehicle.axle_names:
+                axles = ", ".join(vehicle.axle_names)
+                raise self._unfit(name, f"the vehicle has no axle {owner}", f"its axles are {axles}")
+            if quantity not in ("", "vertical_load") and owner not in vehicle.wheels:
+                raise self._unfit(name, f"the vehicle has no wheel {owner}", f"its wheels are {known}")
+        for wheel, driven in zip(vehicle.wheels, vehicle.driven, strict=True):
+            if wheel not in self.wheels:
+                mend = (
+                    f"the log has wheel speeds for {', '.join(self.wheels)}; the vehicle has wheels {known}"
+                )
+                raise self._unfit(f"wheel_speed_{wheel}", "is missing", mend)
+            if driven and f"drive_torque_{wheel}" not in self.channels:
+                mend = "add it, or say 'driven: false' for its axle in the vehicle file"
+                raise self._unfit(
+                    f"drive_torque_{wheel}", f"is missing, but the wheel {wheel} is driven", mend
+                )
+        towing = "drawbar_force" in self.channels and len(vehicle.axles) > 1
+        if towing and "hitch_height" not in vehicle.model_fields_set:
+            mend = "add e.g. 'hitch_height: 0.25 m' to the vehicle file"
+            problem = "the pull moves load between the axles, but the vehicle has no hitch_height"
+            raise self._unfit("drawbar_force", problem, mend)
+
+    def _unfit(self, column: str, problem: str, mend: str) -> InputError:
+        return InputError(problem, file=self.source, place=f"column {column}", mend=mend)
