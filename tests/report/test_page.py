@@ -12,6 +12,7 @@ import pytest
 
 from terragrip.errors import InputError
 from terragrip.report import sections
+from terragrip.report.intervals import pooled, run_coverage
 from terragrip.report.page import Headline, Page, Picture, Section, Table, number, percent, render, write_page
 from terragrip.report.runs import Run
 from terragrip.report.scores import compare, truth_score
@@ -35,7 +36,7 @@ def page_fixture(drive: Drive) -> Page:
             sections.slip_and_resistance(second),
             sections.methods(comparisons, scores, "bank"),
             sections.soils(second, [first, second], 0.2),
-            sections.honesty([first, second], second),
+            sections.honesty(second, [*run_coverage(first), *run_coverage(second)]),
         ),
         (Headline("0.9", "R²", "paper 0.8"),),
         simulated=True,
@@ -111,7 +112,7 @@ def test_an_absent_input_leaves_a_sentence_not_an_error(drive: Drive, missing: s
         sections.slip_and_resistance(run),
         sections.methods(compare(run), scores, "bank"),
         sections.soils(run, [run], 0.2),
-        sections.honesty([run], run),
+        sections.honesty(run, run_coverage(run)),
     )
     html = render(Page("t", "l", made))
     assert "simulated data" not in html
@@ -126,7 +127,17 @@ def test_with_nothing_to_compare_the_sections_say_so(drive: Drive) -> None:
     estimates = run.estimates.assign(nis=np.nan)
     bare = Run(run.name, estimates, "algebraic")
     assert sections.methods([], [], "bank").omitted
-    assert sections.honesty([bare], bare).omitted
+    assert sections.honesty(bare, run_coverage(bare)).omitted
+
+
+def test_coverage_pools_rows_not_runs(drive: Drive) -> None:
+    found = [*run_coverage(drive("a", seconds=30.0)), *run_coverage(drive("b", seconds=300.0, seed=3))]
+    together = {item.quantity: item for item in pooled(found)}
+    mu = together["adhesion µ"]
+    assert mu.rows == 4 * (600 + 6000)
+    assert mu.share() == pytest.approx(0.95, abs=0.006)
+    assert mu.share(0.5) == pytest.approx(0.5, abs=0.013)
+    assert together["soil resistance ρs"].rows == 6600
 
 
 def test_slots_keep_spikes_and_gaps_in_few_points() -> None:

@@ -15,42 +15,57 @@ from terragrip.report.style import BLUE, GREEN, INK, ORANGE, new_figure, styled,
 LEVELS = (0.5, 0.6, 0.7, 0.8, 0.9, 0.95, 0.99)
 
 
+QUANTITIES = {"adhesion µ": "adhesion_", "slip s": "slip_", "soil resistance ρs": "soil_resistance"}
+"""What is judged, and how its columns begin; of the wheels' quantities every wheel counts."""
+
+
 @dataclass(frozen=True)
-class Calibration:
-    """Observed coverage of one quantity at each of LEVELS, pooled over runs, and by run at 95 %."""
+class Coverage:
+    """How often the intervals of one run hold the truth: rows judged, and rows held at each of LEVELS."""
 
+    run: str
     quantity: str
-    observed: tuple[float, ...]
-    by_run: tuple[float, ...]
+    rows: int
+    held: tuple[int, ...]
+
+    def share(self, level: float = 0.95) -> float:
+        """Share of rows held at `level`, one of LEVELS; NaN where no row was judged."""
+        return self.held[LEVELS.index(level)] / self.rows if self.rows else float("nan")
 
 
-def calibrations(runs: Sequence[Run]) -> list[Calibration]:
-    """Coverage of mu (every wheel), slip (every wheel) and rho_s over `runs` with a truth, while moving."""
-    wheels = runs[0].wheels
-    groups = {
-        "adhesion µ": [f"adhesion_{wheel}" for wheel in wheels],
-        "slip s": [f"slip_{wheel}" for wheel in wheels],
-        "soil resistance ρs": ["soil_resistance"],
-    }
+def run_coverage(run: Run) -> list[Coverage]:
+    """Coverage of mu and slip (every wheel) and rho_s of `run` against its truth, while moving."""
     result = []
-    for quantity, columns in groups.items():
-        parts = [_triples(run, columns) for run in runs]
-        truth, estimate, std = (np.concatenate([part[i] for part in parts]) for i in range(3))
-        observed = tuple(coverage(truth, estimate, std, level) for level in LEVELS)
-        result.append(
-            Calibration(quantity, observed, tuple(coverage(*part) for part in parts if len(part[0])))
+    for quantity, beginning in QUANTITIES.items():
+        columns = [beginning] if beginning == "soil_resistance" else [beginning + w for w in run.wheels]
+        truth, estimate, std = _triples(run, columns)
+        held = tuple(
+            round(coverage(truth, estimate, std, x) * len(truth)) if len(truth) else 0 for x in LEVELS
         )
+        result.append(Coverage(run.name, quantity, len(truth), held))
     return result
 
 
-def draw_calibration(found: Sequence[Calibration]) -> str:
+def pooled(found: Sequence[Coverage]) -> list[Coverage]:
+    """Coverage of each quantity over all runs together."""
+    result = []
+    for quantity in QUANTITIES:
+        parts = [item for item in found if item.quantity == quantity and item.rows]
+        if parts:
+            held = tuple(sum(item.held[i] for item in parts) for i in range(len(LEVELS)))
+            result.append(Coverage("all", quantity, sum(item.rows for item in parts), held))
+    return result
+
+
+def draw_coverage(found: Sequence[Coverage]) -> str:
     """An SVG: observed against nominal coverage. Above the diagonal is careful, under it is too sure."""
     figure = new_figure(width=5.6, height=4.4)
     with styled():
         plot = figure.subplots()
         plot.plot([0.45, 1], [0.45, 1], color=INK, linewidth=0.9, linestyle="--", label="honest")
-        for item, color, marker in zip(found, (BLUE, ORANGE, GREEN), ("o", "s", "^"), strict=False):
-            plot.plot(LEVELS, item.observed, color=color, marker=marker, markersize=5, label=item.quantity)
+        for item, color, marker in zip(pooled(found), (BLUE, ORANGE, GREEN), ("o", "s", "^"), strict=False):
+            shares = [item.share(level) for level in LEVELS]
+            plot.plot(LEVELS, shares, color=color, marker=marker, markersize=5, label=item.quantity)
         plot.set_xlabel("probability the interval claims")
         plot.set_ylabel("share of rows it holds the truth in")
         plot.set_xlim(0.45, 1.0)
@@ -58,23 +73,27 @@ def draw_calibration(found: Sequence[Calibration]) -> str:
         return to_svg(figure)
 
 
-def calibration_table(found: Sequence[Calibration]) -> Table:
+def coverage_table(found: Sequence[Coverage]) -> Table:
     """Coverage at 95 %: pooled, and the spread over runs."""
+    rows = []
+    for item in pooled(found):
+        shares = [part.share() for part in found if part.quantity == item.quantity and part.rows]
+        low = f"{sum(share < 0.9 for share in shares)} of {len(shares)}"
+        rows.append(
+            (
+                item.quantity,
+                percent(item.share()),
+                percent(float(np.median(shares))),
+                percent(min(shares)),
+                low,
+            )
+        )
     return Table(
         "Coverage of the 95 % intervals over all simulated runs while moving. Gains and offsets are drawn "
         "once a run and stay, so single runs scatter around the pooled share more than their many rows "
         "suggest.",
         ("quantity", "pooled", "median run", "worst run", "runs under 90 %"),
-        tuple(
-            (
-                item.quantity,
-                percent(item.observed[LEVELS.index(0.95)]),
-                percent(float(np.median(item.by_run))),
-                percent(min(item.by_run)),
-                f"{sum(share < 0.9 for share in item.by_run)} of {len(item.by_run)}",
-            )
-            for item in found
-        ),
+        tuple(rows),
     )
 
 

@@ -7,9 +7,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from terragrip.report.intervals import (
-    calibration_table,
-    calibrations,
-    draw_calibration,
+    Coverage,
+    coverage_table,
+    draw_coverage,
     draw_nis,
     nis_table,
 )
@@ -116,40 +116,39 @@ def soils(run: Run, together: Sequence[Run], radius: float) -> Section:
     return Section("soils", title, (), (sections_picture, pooled_picture, cross_table(pooled)))
 
 
-def honesty(runs: Sequence[Run], shown: Run) -> Section:
-    """Coverage of the intervals (where there is a truth) and NIS against chi-square."""
+def honesty(shown: Run, covered: Sequence[Coverage]) -> Section:
+    """Coverage of the intervals (of runs with a truth) and NIS of one run against chi-square."""
+    title = "Are the intervals honest?"
     content: list[Picture | Table] = []
-    known = [run for run in runs if run.truth is not None]
-    if known:
-        found = calibrations(known)
+    judged = len({item.run for item in covered if item.rows})
+    if judged:
         content += [
             Picture(
                 "coverage",
-                draw_calibration(found),
-                f"How often the intervals hold the simulated truth, against what they claim, over "
-                f"{len(known)} runs while moving. Above the dashed line they are careful, under it too sure.",
+                draw_coverage(covered),
+                f"How often the intervals hold the simulated truth, against what they claim, over {judged} "
+                f"run{'s' if judged > 1 else ''} while moving. Above the dashed line they are careful, under "
+                "it too sure.",
                 "Observed against nominal coverage of the intervals",
             ),
-            calibration_table(found),
+            coverage_table(covered),
         ]
-    filtered = [run for run in (shown,) if np.isfinite(run.estimated("nis")).any()]
-    for run in filtered:
+    if (np.nan_to_num(shown.estimated("nis")) > 0).any():
+        simulated = "the simulated run " if shown.truth is not None else ""
         content += [
             Picture(
-                f"nis-{run.name}",
-                draw_nis(run),
-                f"Normalised innovation squared of {run.name}, method {run.method}, for the most common "
-                "numbers of channels taken (bars; the last bar holds all beyond), and the chi-square law "
-                "that it follows when the noise settings are right (line).",
-                f"Histogram of NIS of {run.name} with the chi-square density",
+                f"nis-{shown.name}",
+                draw_nis(shown),
+                f"Normalised innovation squared of {simulated}{shown.name}, method {shown.method}, for the most "
+                "common numbers of channels taken (bars; the last bar holds all beyond), and the chi-square "
+                "law that it follows when the noise settings are right (line).",
+                f"Histogram of NIS of {shown.name} with the chi-square density",
             ),
-            nis_table([run]),
+            nis_table([shown]),
         ]
     if not content:
-        return Section(
-            "honesty", "Are the intervals honest?", omitted="Left out: no truth, and a method without NIS."
-        )
-    return Section("honesty", "Are the intervals honest?", (), tuple(content))
+        return Section("honesty", title, omitted="Left out: no truth, and a method without innovations.")
+    return Section("honesty", title, (), tuple(content))
 
 
 def _clipped(lane: Lane) -> Lane:
