@@ -1,0 +1,141 @@
+"""Which form can follow the data: cross-validation over runs, and a plain verdict on the form that was asked for."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from terragrip.errors import InputError
+from terragrip.physics.adhesion import CURVES
+from terragrip.soil.bins import Bins
+from terragrip.soil.least_squares import INTERCEPT, solve, starts
+
+Array = NDArray[np.float64]
+
+FORMS: Mapping[str, tuple[str, bool]] = {
+    "exponential": ("exponential", False),
+    "effective": ("effective", False),
+    "pacejka": ("pacejka", False),
+    "exponential with intercept": ("exponential", True),
+    "effective with intercept": ("effective", True),
+}
+"""The candidates by label: (model, with intercept). Burckhardt's form is the effective one; Schreiber-Kutzbach's the last."""
+
+MARGIN = 0.25
+"""A form is called unfit where another's cross-validated error is lower by this share, beyond the folds' spread."""
+
+
+@dataclass(frozen=True)
+class FormScore:
+    """Cross-validated root-mean-square error of bin means [-], its standard error over folds, and the parameters it fits."""
+
+    form: str
+    error: float
+    standard_error: float
+    parameters: int
+
+
+@dataclass(frozen=True)
+class FormVerdict:
+    """Ranking of forms, best first; `follows`: the asked form can follow the data; `proposal`: the form to take instead, or None."""
+
+    asked: str
+    ranking: tuple[FormScore, ...]
+    follows: bool
+    proposal: str | None
+    sentence: str
+
+
+def compare_forms(
+    bins: Bins, asked: str = "exponential", folds: int = 5, candidates: Sequence[str] | None = None
+) -> FormVerdict:
+    """Leave whole clusters (runs) out in turn, fit each form on the rest, judge it on the bin means of those left out.
+
+    Bins with fewer clusters than 2: the folds are alternate bins instead (said in the sentence). Raises InputError on an unknown form or
+    with fewer than 6 used bins.
+    """
+    names = tuple(candidates or FORMS)
+    if asked not in FORMS:
+        raise InputError(f"no curve form {asked!r}", mend=f"take one of {', '.join(FORMS)}")
+    if asked not in names:
+        names = (asked, *names)
+    used = bins.used
+    if np.count_nonzero(used) < 6:
+        raise InputError(
+            f"{np.count_nonzero(used)} slip bins are too few to compare forms", mend="drive at more slips"
+        )
+    splits = list(_run_folds(bins, folds) or _bin_folds(bins, folds))
+    by_run = bins.clusters >= 2
+    scores = sorted(
+        (_score(name, splits) for name in names), key=lambda score: (score.error, score.parameters)
+    )
+    mine = next(score for score in scores if score.form == asked)
+    best = scores[0]
+    spread = np.hypot(mine.standard_error, best.standard_error)
+    follows = mine.error <= max((1 + MARGIN) * best.error, best.error + spread)
+    way = "leaving runs out" if by_run else "leaving bins out (one run only)"
+    if follows:
+        sentence = f"The {asked} form follows the data ({way}: error {mine.error:.3g}, the best form {best.form} {best.error:.3g})."
+    else:
+        sentence = (
+            f"The {asked} form cannot follow these data: {way}, its error is {mine.error:.3g} against {best.error:.3g} "
+            f"of the {best.form} form; take that one."
+        )
+    return FormVerdict(asked, tuple(scores), follows, None if follows else best.form, sentence)
+
+
+Split = tuple[Array, Array, Array, Array, Array, Array]
+
+
+def _run_folds(bins: Bins, folds: int) -> list[Split]:
+    """(slip, mean, weight) of the training and the test bins, by folds of clusters."""
+    alive = np.flatnonzero(bins.cluster_count.sum(axis=1) > 0)
+    if alive.size < 2:
+        return []
+    fold = np.arange(alive.size) % min(folds, alive.size)
+    return [_split(bins, alive[fold != k], alive[fold == k]) for k in range(int(fold.max()) + 1)]
+
+
+def _split(bins: Bins, train: NDArray[np.int64], test: NDArray[np.int64]) -> Split:
+    parts: list[Array] = []
+    for rows, least in ((train, bins.settings.minimum), (test, max(bins.settings.minimum // 2, 1))):
+        n = bins.cluster_count[rows].sum(axis=0)
+        enough = n >= least
+        safe = np.where(enough, n, 1.0)
+        slip = bins.cluster_slip[rows].sum(axis=0) / safe
+        parts += [slip, bins.cluster_sum[rows].sum(axis=0) / safe, enough.astype(float)]
+    return tuple(parts)  # type: ignore[return-value]
+
+
+def _bin_folds(bins: Bins, folds: int) -> list[Split]:
+    used = np.flatnonzero(bins.used)
+    fold = np.arange(used.size) % folds
+    out: list[Split] = []
+    for k in range(folds):
+        train, test = np.zeros(len(bins.used)), np.zeros(len(bins.used))
+        train[used[fold != k]], test[used[fold == k]] = 1.0, 1.0
+        slip, mean = np.where(bins.used, bins.slip, 0.1), np.where(bins.used, bins.mean, 0.0)
+        out.append((slip, mean, train, slip, mean, test))
+    return out
+
+
+def _score(form: str, splits: Sequence[Split]) -> FormScore:
+    name, intercept = FORMS[form]
+    model = CURVES[name]
+    held = {p.name: p.start for p in model.parameters if p.name in model.fixed}
+    free = [n for n in model.names if n not in held] + ([INTERCEPT] if intercept else [])
+    errors = []
+    for slip, mean, weight, test_slip, test_mean, test_weight in splits:
+        begin = starts(model, free, np.where(weight > 0, mean, np.nan))
+        many = np.ones((len(begin), 1))
+        x, cost = solve(model, free, held, many * slip, many * mean, many * weight, begin)
+        found = {**held, **dict(zip(free, x[int(np.argmin(cost))], strict=True))}
+        drop = found.pop(INTERCEPT, 0.0)
+        off = (model.value(test_slip, found, drop) - test_mean)[test_weight > 0]
+        if off.size:
+            errors.append(float(np.sqrt(np.mean(off**2))))
+    error = float(np.mean(errors))
+    return FormScore(form, error, float(np.std(errors) / np.sqrt(len(errors))), len(free))

@@ -1,0 +1,116 @@
+"""Digitised points of a printed curve: CSV as WebPlotDigitizer, Engauge and others write it."""
+
+from __future__ import annotations
+
+import csv
+import os
+import re
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from terragrip.errors import InputError
+from terragrip.files import refuse_missing, unreadable
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class DigitisedCurve:
+    """Points of one curve: slip (n,) as a fraction, value (n,) [-], the curve's name, notes on what was assumed."""
+
+    name: str
+    slip: Array
+    value: Array
+    notes: tuple[str, ...] = ()
+
+
+def read_points(path: str | os.PathLike[str]) -> list[DigitisedCurve]:
+    """Read pairs of columns (slip, value), several curves side by side as WebPlotDigitizer writes them; header rows are optional.
+
+    Comma, semicolon, tab or spaces; decimal comma where the separator is not a comma. Slips beyond 1.5 are taken as per cent (noted).
+    InputError: no such file, not text, no numbers, a cell that is not a number (row and cell named), an odd number of columns.
+    """
+    file = os.fspath(path)
+    refuse_missing(file)
+    try:
+        with open(file, encoding="utf-8-sig") as stream:
+            text = stream.read()
+    except UnicodeDecodeError:
+        raise InputError("is not a text file", file=file, mend="export the points as CSV") from None
+    except OSError as error:
+        raise unreadable(file, error) from error
+    rows = _rows(text)
+    first = next((i for i, row in enumerate(rows) if any(_plain(cell) is not None for cell in row)), None)
+    if first is None:
+        raise InputError(
+            "holds no numbers", file=file, mend="export the points as CSV, a pair of columns a curve"
+        )
+    body, head = rows[first:], rows[:first]
+    width = max(len(row) for row in body)
+    if width % 2:
+        raise InputError(
+            f"has {width} columns", file=file, mend="give a pair of columns (slip, value) for each curve"
+        )
+    columns = [_numbers(body, i, first, file) for i in range(width)]
+    return [_curve(columns[i], columns[i + 1], _title(head, i), file) for i in range(0, width, 2)]
+
+
+def _rows(text: str) -> list[list[str]]:
+    lines = [line for line in text.splitlines() if line.strip() and not line.lstrip().startswith("#")]
+    sample = "\n".join(lines[:20])
+    for separator in (";", "\t", ","):
+        if separator in sample:
+            decimal = separator != ","
+            split = csv.reader(lines, delimiter=separator)
+            return [
+                [cell.strip().replace(",", ".") if decimal else cell.strip() for cell in row] for row in split
+            ]
+    return [re.split(r"\s+", line.strip()) for line in lines]
+
+
+def _plain(cell: str) -> float | None:
+    try:
+        return float(cell)
+    except ValueError:
+        return None
+
+
+def _numbers(body: list[list[str]], column: int, first: int, file: str) -> Array:
+    out = []
+    for i, row in enumerate(body):
+        cell = row[column] if column < len(row) else ""
+        value = _plain(cell) if cell else float("nan")
+        if value is None or np.isinf(value):
+            place = f"row {first + i + 1}, column {column + 1}"
+            raise InputError(
+                f"{cell!r} is not a number", file=file, place=place, mend="mend or delete that row"
+            )
+        out.append(value)
+    return np.array(out)
+
+
+def _title(head: list[list[str]], column: int) -> str:
+    for row in head:
+        if column < len(row) and row[column] and row[column].casefold() not in ("x", "slip", "s"):
+            return row[column]
+    return f"curve {column // 2 + 1}"
+
+
+def _curve(slip: Array, value: Array, name: str, file: str) -> DigitisedCurve:
+    good = np.isfinite(slip) & np.isfinite(value)
+    slip, value = slip[good], value[good]
+    if slip.size < 2:
+        raise InputError(f"{name} has {slip.size} points", file=file, mend="digitise at least two")
+    notes: tuple[str, ...] = ()
+    if np.abs(slip).max() > 1.5:
+        slip, notes = slip / 100, ("slip was read as per cent",)
+    if np.abs(slip).max() > 1.05:
+        raise InputError(
+            f"{name} has a slip of {np.abs(slip).max():g}",
+            file=file,
+            mend="slip lies between -1 and 1 (or -100 and 100 %)",
+        )
+    order = np.argsort(slip, kind="stable")
+    return DigitisedCurve(name, slip[order], value[order], notes)

@@ -1,0 +1,221 @@
+"""Fits of adhesion-slip curves to bins, with intervals from a bootstrap over runs, in scikit-learn's manner."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from terragrip.errors import InputError
+from terragrip.physics.adhesion import CURVES, CurveModel, effective_parameters
+from terragrip.soil.bins import Bins, BinSettings, bin_pairs
+from terragrip.soil.identifiability import Identifiability, judge
+from terragrip.soil.least_squares import INTERCEPT, solve, starts
+
+Array = NDArray[np.float64]
+FREE = "free"
+
+
+class AdhesionCurve:
+    """One adhesion-slip curve, fitted to bin means (paper, section on soil characteristics).
+
+    Parameters
+    ----------
+    model : a name of `terragrip.physics.adhesion.CURVES`; "exponential" is the paper's eq. 8.
+    fixed : parameters held, e.g. {"p": .52}; None = the model's own choice (the paper's prototype shape), "free" = hold none.
+    intercept : also fit a constant, for a sensor that sees net traction (kappa = mu - rho).
+    weights : None (the paper: each bin counts alike) or "count" (by the samples' standard error of the mean).
+    bins : BinSettings.
+    bootstrap : repetitions for the 95 % intervals, 0 = none. Runs are drawn, not samples: samples of one run are not independent.
+    seed : of the bootstrap.
+
+    After `fit`: `parameters_` (all of the model's, and intercept), `free_`, `interval_` {name: (low, high)}, `r2_`, `nrmse_`, `bins_`,
+    `identifiability_`, `notes_` (plain sentences). Where the data do not fix the four parameters of eq. 8 one by one, `interval_`
+    holds the effective A, k, d instead (PHYSICS 5).
+    """
+
+    def __init__(
+        self,
+        model: str = "exponential",
+        fixed: Mapping[str, float] | str | None = None,
+        intercept: bool = False,
+        weights: str | None = None,
+        bins: BinSettings | None = None,
+        bootstrap: int = 1000,
+        seed: int = 0,
+    ) -> None:
+        if model not in CURVES:
+            raise InputError(f"no curve model {model!r}", mend=f"take one of {', '.join(CURVES)}")
+        if weights not in (None, "count"):
+            raise InputError(f"no weighting {weights!r}", mend="take None or 'count'")
+        self.model, self.fixed, self.intercept, self.weights = model, fixed, intercept, weights
+        self.bins, self.bootstrap, self.seed = bins or BinSettings(), bootstrap, seed
+
+    def fit(self, slip: ArrayLike, adhesion: ArrayLike, run: ArrayLike | None = None) -> AdhesionCurve:
+        """Fit to pairs, each of shape (n,); `run` (n,) are integer or string labels of what is not independent.
+
+        Raises InputError where the data hold fewer used bins than free parameters, or only one.
+        """
+        labels = None if run is None else np.unique(np.ravel(np.asarray(run)), return_inverse=True)[1]
+        return self.fit_bins(bin_pairs(slip, adhesion, labels, self.bins))
+
+    def fit_bins(self, bins: Bins) -> AdhesionCurve:
+        """Fit to bins that stand already. Raises as `fit`."""
+        curve = CURVES[self.model]
+        held = self._held(curve)
+        free = [name for name in curve.names if name not in held] + ([INTERCEPT] if self.intercept else [])
+        used = bins.used
+        need = max(len(free), 2)
+        if np.count_nonzero(used) < need:
+            raise InputError(
+                f"{np.count_nonzero(used)} slip bins between {bins.settings.lower:.0%} and {bins.settings.upper:.0%} hold "
+                f"{bins.settings.minimum} samples or more, too few to fit {', '.join(free)}",
+                mend="drive at more slips, or widen the bins",
+            )
+        slip, mean = bins.slip[used], bins.mean[used]
+        weights = self._bin_weights(bins)[used]
+        begin = starts(curve, free, mean)
+        many = np.ones((len(begin), 1))
+        x, cost = solve(curve, free, held, many * slip, many * mean, many * weights, begin)
+        best = x[int(np.argmin(cost))]
+        self.free_ = tuple(free)
+        self.parameters_ = {**held, **dict(zip(free, best.tolist(), strict=True))}
+        self.bins_ = bins
+        residual = mean - self.predict(slip)
+        spread = mean - mean.mean()
+        self.r2_ = float(1 - residual @ residual / max(float(spread @ spread), 1e-300))
+        self.nrmse_ = float(np.sqrt(np.mean(residual**2)) / max(float(np.ptp(mean)), 1e-300))
+        self.identifiability_: Identifiability = judge(curve, self._of_model(), free, slip)
+        self.notes_: list[str] = (
+            [] if self.identifiability_.identifiable else [self.identifiability_.sentence]
+        )
+        self.samples_: Array | None = None
+        self.interval_: dict[str, tuple[float, float]] = {}
+        if self.bootstrap:
+            self._resample(curve, free, held, best)
+        return self
+
+    def predict(self, slip: ArrayLike) -> Array:
+        """mu (or kappa, with an intercept) at the slips, same shape."""
+        return CURVES[self.model].value(slip, self._of_model(), self.parameters_.get(INTERCEPT, 0.0))
+
+    def band(self, slip: ArrayLike, level: float = 0.95) -> tuple[Array, Array]:
+        """Pointwise interval of the curve at slips (n,) from the bootstrap. Raises ValueError where there was none."""
+        if self.samples_ is None:
+            raise ValueError("this curve was fitted without a bootstrap")
+        s = np.asarray(slip, dtype=float)
+        given = {name: self.samples_[:, i, None] for i, name in enumerate(self.free_)}
+        intercept = given.pop(INTERCEPT, self.parameters_.get(INTERCEPT, 0.0))
+        held = {n: v for n, v in self.parameters_.items() if n not in self.free_ and n != INTERCEPT}
+        values = CURVES[self.model].value(s[None, :], {**held, **given}, intercept)
+        tail = 50 * (1 - level)
+        low, high = np.percentile(values, [tail, 100 - tail], axis=0)
+        return low, high
+
+    def peak(self) -> tuple[float, float]:
+        """(slip, mu) of the maximum on 0 to 1, without the intercept."""
+        return CURVES[self.model].peak(self._of_model())
+
+    def to_dict(self) -> dict[str, Any]:
+        """The fit as soils.json holds it (DESIGN 3)."""
+        badge = self.identifiability_
+        return {
+            "model": self.model,
+            "parameters": {k: float(v) for k, v in self.parameters_.items()},
+            "free": list(self.free_),
+            "interval": {k: [float(a), float(b)] for k, (a, b) in self.interval_.items()},
+            "r2": self.r2_,
+            "nrmse": self.nrmse_,
+            "bins": self.bins_.to_list(),
+            "settings": self.bins_.settings.to_dict(),
+            "clusters": self.bins_.clusters,
+            "identifiability": {
+                "condition": badge.condition,
+                "identifiable": badge.identifiable,
+                "effective": badge.effective,
+                "twin": badge.twin,
+                "sentence": badge.sentence,
+            },
+            "notes": list(self.notes_),
+        }
+
+    def _of_model(self) -> dict[str, float]:
+        return {name: value for name, value in self.parameters_.items() if name != INTERCEPT}
+
+    def _held(self, curve: CurveModel) -> dict[str, float]:
+        if self.fixed is None:
+            return {p.name: p.start for p in curve.parameters if p.name in curve.fixed}
+        if isinstance(self.fixed, str):
+            if self.fixed != FREE:
+                raise InputError(
+                    f"fixed={self.fixed!r} is no choice", mend="give a mapping of names to numbers, or 'free'"
+                )
+            return {}
+        try:
+            curve.complete(self.fixed)
+        except ValueError as error:
+            raise InputError(str(error)) from None
+        return {name: float(value) for name, value in self.fixed.items()}
+
+    def _bin_weights(self, bins: Bins) -> Array:
+        if self.weights is None:
+            return bins.used.astype(float)
+        with np.errstate(invalid="ignore", divide="ignore"):
+            weight = bins.count / np.maximum(bins.std, 1e-3) ** 2
+        return np.where(bins.used, weight / np.nanmax(np.where(bins.used, weight, np.nan)), 0.0)
+
+    def _resample(
+        self, curve: CurveModel, free: Sequence[str], held: Mapping[str, float], best: Array
+    ) -> None:
+        """Intervals from drawing clusters with replacement, widened by t and n/(n-1) for few clusters."""
+        bins = self.bins_
+        alive = bins.cluster_count.sum(axis=1) > 0
+        count, total, slips = bins.cluster_count[alive], bins.cluster_sum[alive], bins.cluster_slip[alive]
+        clusters = len(count)
+        if clusters < 3:
+            self.notes_.append(
+                f"All samples come from {clusters} run{'s' * (clusters != 1)}: no interval can be told; "
+                "give the runs, or drive more of them."
+            )
+            return
+        rng = np.random.default_rng(self.seed)
+        draws = rng.multinomial(clusters, np.full(clusters, 1 / clusters), size=self.bootstrap).astype(float)
+        n = draws @ count
+        used = bins.used & (n > 0)
+        safe = np.where(used, n, 1.0)
+        weights = self._bin_weights(bins) * used
+        enough = np.count_nonzero(used, axis=1) >= max(len(free), 2)
+        slip, mean, weight = (
+            (draws @ slips / safe)[enough],
+            (draws @ total / safe)[enough],
+            weights[enough],
+        )
+        begin = np.repeat(best[None, :], len(slip), axis=0)
+        x, _ = solve(curve, free, held, slip, mean, weight, begin, iterations=25)
+        widen = _student(clusters - 1) / 1.959964 * np.sqrt(clusters / (clusters - 1))
+        self.samples_ = best + (x - best) * widen
+        samples = self.samples_
+        columns = {name: samples[:, i] for i, name in enumerate(free)}
+        if not self.identifiability_.identifiable and self.model == "exponential":
+            columns = effective_parameters({**held, **columns})
+        self.interval_ = {
+            name: (float(low), float(high))
+            for name, (low, high) in ((k, np.percentile(v, [2.5, 97.5])) for k, v in columns.items())
+        }
+
+    def with_bins(self, **changes: float) -> AdhesionCurve:
+        """The same curve, not fitted, with other bin settings."""
+        other = replace(self.bins, **changes)  # type: ignore[arg-type]
+        return AdhesionCurve(
+            self.model, self.fixed, self.intercept, self.weights, other, self.bootstrap, self.seed
+        )
+
+
+def _student(freedom: int) -> float:
+    """97.5 % point of Student's t."""
+    from scipy.special import stdtrit
+
+    return float(stdtrit(freedom, 0.975))

@@ -1,0 +1,89 @@
+"""What a fit's data can tell of its parameters: condition number, what stays fixed, a twin set that draws the same curve."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from terragrip.physics.adhesion import CurveModel, effective_parameters
+
+Array = NDArray[np.float64]
+
+LIMIT = 1e4
+"""Condition number (columns scaled to unit change of each parameter's own size) beyond which parameters are not told apart."""
+
+
+@dataclass(frozen=True)
+class Identifiability:
+    """The badge of a fit.
+
+    `condition`: ratio of the largest to the smallest singular value of the scaled sensitivities d curve/d ln parameter.
+    `identifiable`: condition below LIMIT. `effective`: parameters that the data do fix (A, k, d), for the paper's form.
+    `twin`: another parameter set, `twin_difference` away at most over the data's slips; None where there is none.
+    """
+
+    condition: float
+    identifiable: bool
+    effective: dict[str, float] | None
+    twin: dict[str, float] | None
+    twin_difference: float | None
+    sentence: str
+
+
+def judge(
+    model: CurveModel, parameters: Mapping[str, float], free: Sequence[str], slip: Array
+) -> Identifiability:
+    """Badge of a fit of `free` parameters on bins at `slip` (bins,), all other parameters held."""
+    names = [name for name in free if name != "intercept"]
+    columns = [_sensitivity(model, parameters, name, slip) for name in names]
+    if "intercept" in free:
+        columns.append(np.full(slip.shape, max(abs(float(np.ptp(model.value(slip, parameters)))), 1e-3)))
+        names.append("intercept")
+    matrix = np.stack(columns, axis=-1)
+    _, values, rows = np.linalg.svd(matrix, full_matrices=False)
+    condition = float(values[0] / max(values[-1], values[0] * 1e-16))
+    effective = effective_parameters(parameters) if model.name == "exponential" else None
+    if condition < LIMIT:
+        sentence = f"The data fix {', '.join(names)} (condition number {condition:.3g})."
+        return Identifiability(condition, True, effective, None, None, sentence)
+    twin, difference = _twin(model, parameters, names, rows[-1], slip)
+    sentence = (
+        f"The data do not fix {', '.join(names)} one by one (condition number {condition:.2g}): "
+        + ", ".join(f"{n} = {twin[n]:.4g}" for n in names if n in twin)
+        + f" draws the same curve to {difference:.1g}."
+    )
+    return Identifiability(condition, False, effective, twin, difference, sentence)
+
+
+def _sensitivity(model: CurveModel, parameters: Mapping[str, float], name: str, slip: Array) -> Array:
+    """d curve/d ln|parameter|; a parameter at 0 is moved by a hundredth of 1."""
+    size = max(abs(parameters[name]), 1e-2)
+    h = 1e-5 * size
+    up, down = {**parameters, name: parameters[name] + h}, {**parameters, name: parameters[name] - h}
+    return np.asarray((model.value(slip, up) - model.value(slip, down)) / (2e-5))
+
+
+def _twin(
+    model: CurveModel, parameters: Mapping[str, float], names: Sequence[str], direction: Array, slip: Array
+) -> tuple[dict[str, float], float]:
+    """Walk along the flattest direction in ln(parameter), refitting nothing else, as far as the curve moves by 1e-4 at most."""
+    bounds = {p.name: (p.lower, p.upper) for p in model.parameters}
+    base = model.value(slip, parameters)
+    best, difference = dict(parameters), 0.0
+    for length in np.geomspace(1e-3, 3.0, 60):
+        for sign in (1.0, -1.0):
+            trial = dict(parameters)
+            for name, share in zip(names, direction, strict=True):
+                if name in bounds:
+                    size = max(abs(parameters[name]), 1e-2)
+                    moved = parameters[name] + np.sign(parameters[name] or 1.0) * size * np.expm1(
+                        sign * length * share
+                    )
+                    trial[name] = float(np.clip(moved, *bounds[name]))
+            off = float(np.max(np.abs(model.value(slip, trial) - base)))
+            if 1e-12 < off <= 1e-4:
+                best, difference = trial, off
+    return best, difference

@@ -1,0 +1,263 @@
+"""The soil library: soils by name with curve, interval, bins and provenance; soils.json (DESIGN 3)."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from terragrip.errors import InputError
+from terragrip.files import refuse_missing, replacing
+from terragrip.physics.adhesion import CURVES
+from terragrip.soil.fit import AdhesionCurve
+
+VERSION = 1
+
+
+@dataclass(frozen=True)
+class Soil:
+    """One soil: the curve's model and parameters, and how well they are known.
+
+    `resistance` and `spread`: (mean, SD) of rho_s, and the SD of adhesion about the curve; None where not known.
+    `fit`: the rest of a fit as `AdhesionCurve.to_dict` gives it (settings, badge, notes).
+    """
+
+    name: str
+    model: str
+    parameters: Mapping[str, float]
+    interval: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    r2: float | None = None
+    nrmse: float | None = None
+    bins: tuple[Mapping[str, float], ...] = ()
+    resistance: tuple[float, float] | None = None
+    spread: float | None = None
+    source: str = ""
+    fit: Mapping[str, Any] = field(default_factory=dict)
+
+    @classmethod
+    def from_curve(
+        cls, name: str, curve: AdhesionCurve, source: str = "", resistance: tuple[float, float] | None = None
+    ) -> Soil:
+        """A soil from a fitted curve."""
+        whole = curve.to_dict()
+        rest = {k: whole[k] for k in ("free", "settings", "clusters", "identifiability", "notes")}
+        used = curve.bins_.used
+        weight = curve.bins_.count[used]
+        off = curve.bins_.mean[used] - curve.predict(curve.bins_.slip[used])
+        spread = float(np.sqrt(np.average(curve.bins_.std[used] ** 2 + off**2, weights=weight)))
+        interval = {k: (a, b) for k, (a, b) in whole["interval"].items()}
+        return cls(
+            name, curve.model, whole["parameters"], interval, curve.r2_, curve.nrmse_, tuple(whole["bins"]), resistance, spread,
+            source, rest,
+        )  # fmt: skip
+
+    def value(self, slip: ArrayLike) -> NDArray[np.float64]:
+        """mu (or kappa, where the fit has an intercept) at slips of any shape."""
+        given = {k: v for k, v in self.parameters.items() if k != "intercept"}
+        return CURVES[self.model].value(slip, given, self.parameters.get("intercept", 0.0))
+
+    def to_dict(self) -> dict[str, Any]:
+        """As soils.json holds it; what is not known is null."""
+        return {
+            "model": self.model,
+            "parameters": dict(self.parameters),
+            "interval": {k: list(v) for k, v in self.interval.items()},
+            "r2": self.r2,
+            "nrmse": self.nrmse,
+            "bins": [dict(b) for b in self.bins],
+            "resistance": None
+            if self.resistance is None
+            else {"mean": self.resistance[0], "std": self.resistance[1]},
+            "spread": self.spread,
+            "source": self.source,
+            **self.fit,
+        }
+
+
+@dataclass(frozen=True)
+class SoilLibrary(Mapping[str, Soil]):
+    """Soils by name, read from and written to soils.json. A mapping."""
+
+    soils: Mapping[str, Soil]
+    provenance: Mapping[str, Any] = field(default_factory=dict)
+    not_fitted: Mapping[str, str] = field(default_factory=dict)
+
+    def __getitem__(self, name: str) -> Soil:
+        return self.soils[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.soils)
+
+    def __len__(self) -> int:
+        return len(self.soils)
+
+    @classmethod
+    def load(cls, path: str | os.PathLike[str]) -> SoilLibrary:
+        """Read soils.json. InputError: no such file, not JSON, a newer version, two soils of one name, a number that is none."""
+        file = os.fspath(path)
+        refuse_missing(file)
+        try:
+            with open(file, encoding="utf-8") as stream:
+                data = json.load(stream, object_pairs_hook=_refuse_twins)
+        except _Twin as twin:
+            raise InputError(f"two entries are named {twin}", file=file, mend="rename one") from None
+        except (UnicodeDecodeError, json.JSONDecodeError, RecursionError) as error:
+            raise InputError(
+                f"not JSON ({error})", file=file, mend="give a soils.json written by 'terragrip soils'"
+            ) from None
+        except OSError as error:
+            raise InputError(f"cannot be read ({error.strerror})", file=file) from None
+        return cls._from_data(data, file)
+
+    @classmethod
+    def _from_data(cls, data: Any, file: str) -> SoilLibrary:
+        if not isinstance(data, dict) or not isinstance(data.get("soils"), dict):
+            raise InputError(
+                "holds no 'soils'", file=file, mend="give a soils.json written by 'terragrip soils'"
+            )
+        version = data.get("version", VERSION)
+        if not isinstance(version, int) or version > VERSION:
+            raise InputError(
+                f"library version {version}, this terragrip reads up to {VERSION}",
+                file=file,
+                mend="update terragrip",
+            )
+        soils = {name: _soil(name, entry, file) for name, entry in data["soils"].items()}
+        return cls(soils, data.get("provenance") or {}, data.get("not_fitted") or {})
+
+    def write(self, path: str | os.PathLike[str]) -> None:
+        """Write soils.json, whole or not at all. InputError where it cannot be written."""
+        text = json.dumps(self.to_dict(), indent=1, allow_nan=False)
+        with replacing(path) as temporary, open(temporary, "w", encoding="utf-8") as stream:
+            stream.write(text + "\n")
+
+    def to_dict(self) -> dict[str, Any]:
+        """The library as plain data."""
+        return {
+            "version": VERSION,
+            "soils": {name: soil.to_dict() for name, soil in self.soils.items()},
+            "not_fitted": dict(self.not_fitted),
+            "provenance": dict(self.provenance),
+        }
+
+    def merge(self, other: SoilLibrary, clash: str = "refuse") -> SoilLibrary:
+        """Both libraries' soils. `clash`: "refuse" two soils of one name (InputError), "keep" ours, or "replace" by theirs."""
+        if clash not in ("refuse", "keep", "replace"):
+            raise InputError(f"clash={clash!r} is no choice", mend="take 'refuse', 'keep' or 'replace'")
+        twins = sorted(set(self.soils) & set(other.soils))
+        if twins and clash == "refuse":
+            raise InputError(
+                f"both libraries hold a soil {twins[0]!r}", mend="choose which to keep, or rename one"
+            )
+        both = {**self.soils, **other.soils} if clash == "replace" else {**other.soils, **self.soils}
+        order = [*self.soils, *(name for name in other.soils if name not in self.soils)]
+        return SoilLibrary({name: both[name] for name in order}, {**other.provenance, **self.provenance})
+
+    def compare(self, other: SoilLibrary) -> list[dict[str, Any]]:
+        """For each soil in both: the largest and the mean difference of mu over slips 5-60 %, and whether intervals of one model meet."""
+        slip = np.linspace(0.05, 0.60, 111)
+        rows = []
+        for name in self.soils:
+            if name not in other.soils:
+                continue
+            mine, theirs = self.soils[name], other.soils[name]
+            off = theirs.value(slip) - mine.value(slip)
+            shared = set(mine.interval) & set(theirs.interval) if mine.model == theirs.model else set()
+            meet = {
+                k: mine.interval[k][0] <= theirs.interval[k][1]
+                and theirs.interval[k][0] <= mine.interval[k][1]
+                for k in sorted(shared)
+            }
+            rows.append(
+                {
+                    "soil": name,
+                    "largest": float(np.abs(off).max()),
+                    "mean": float(off.mean()),
+                    "intervals_meet": meet,
+                }
+            )
+        return rows
+
+
+class _Twin(ValueError):
+    pass
+
+
+def _refuse_twins(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    out: dict[str, Any] = {}
+    for key, value in pairs:
+        if key in out:
+            raise _Twin(repr(key))
+        out[key] = value
+    return out
+
+
+def _soil(name: str, entry: Any, file: str) -> Soil:
+    place = f"soils.{name}"
+    if not isinstance(entry, dict) or entry.get("model") not in CURVES:
+        model = entry.get("model") if isinstance(entry, dict) else None
+        raise InputError(
+            f"curve model {model!r} is not known",
+            file=file,
+            place=place,
+            mend=f"take one of {', '.join(CURVES)}",
+        )
+    parameters = entry.get("parameters")
+    if not isinstance(parameters, dict):
+        raise InputError("has no parameters", file=file, place=place)
+    values = {k: _number(v, file, f"{place}.parameters.{k}") for k, v in parameters.items()}
+    try:
+        CURVES[entry["model"]].complete({k: v for k, v in values.items() if k != "intercept"})
+    except ValueError as error:
+        raise InputError(str(error), file=file, place=place) from None
+    interval = {}
+    for key, pair in (entry.get("interval") or {}).items():
+        where = f"{place}.interval.{key}"
+        if not isinstance(pair, list) or len(pair) != 2:
+            raise InputError("is not a pair of numbers", file=file, place=where)
+        interval[key] = (_number(pair[0], file, where), _number(pair[1], file, where))
+    bins = entry.get("bins") or []
+    if not isinstance(bins, list) or not all(isinstance(b, dict) for b in bins):
+        raise InputError("is not a list of bins", file=file, place=f"{place}.bins")
+    for i, row in enumerate(bins):
+        for key, value in row.items():
+            _number(value, file, f"{place}.bins[{i}].{key}")
+    resistance = entry.get("resistance")
+    known = {"model", "parameters", "interval", "r2", "nrmse", "bins", "resistance", "spread", "source"}
+    return Soil(
+        name=name,
+        model=entry["model"],
+        parameters=values,
+        interval=interval,
+        r2=_optional(entry.get("r2"), file, f"{place}.r2"),
+        nrmse=_optional(entry.get("nrmse"), file, f"{place}.nrmse"),
+        bins=tuple(bins),
+        resistance=_pair(resistance, file, f"{place}.resistance"),
+        spread=_optional(entry.get("spread"), file, f"{place}.spread"),
+        source=str(entry.get("source") or ""),
+        fit={k: v for k, v in entry.items() if k not in known},
+    )
+
+
+def _pair(value: Any, file: str, place: str) -> tuple[float, float] | None:
+    if value is None:
+        return None
+    if not isinstance(value, dict):
+        raise InputError("is not {mean, std}", file=file, place=place)
+    return _number(value.get("mean"), file, f"{place}.mean"), _number(value.get("std"), file, f"{place}.std")
+
+
+def _optional(value: Any, file: str, place: str) -> float | None:
+    return None if value is None else _number(value, file, place)
+
+
+def _number(value: Any, file: str, place: str) -> float:
+    if isinstance(value, bool) or not isinstance(value, (int, float)) or not math.isfinite(value):
+        raise InputError(f"{value!r} is not a number", file=file, place=place, mend="write a finite number")
+    return float(value)
