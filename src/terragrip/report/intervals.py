@@ -39,10 +39,9 @@ def run_coverage(run: Run) -> list[Coverage]:
     for quantity, beginning in QUANTITIES.items():
         columns = [beginning] if beginning == "soil_resistance" else [beginning + w for w in run.wheels]
         truth, estimate, std = _triples(run, columns)
-        held = tuple(
-            round(coverage(truth, estimate, std, x) * len(truth)) if len(truth) else 0 for x in LEVELS
-        )
-        result.append(Coverage(run.name, quantity, len(truth), held))
+        rows = len(truth)
+        held = (round(coverage(truth, estimate, std, level) * rows) if rows else 0 for level in LEVELS)
+        result.append(Coverage(run.name, quantity, rows, tuple(held)))
     return result
 
 
@@ -79,15 +78,8 @@ def coverage_table(found: Sequence[Coverage]) -> Table:
     for item in pooled(found):
         shares = [part.share() for part in found if part.quantity == item.quantity and part.rows]
         low = f"{sum(share < 0.9 for share in shares)} of {len(shares)}"
-        rows.append(
-            (
-                item.quantity,
-                percent(item.share()),
-                percent(float(np.median(shares))),
-                percent(min(shares)),
-                low,
-            )
-        )
+        figures = (item.share(), float(np.median(shares)), min(shares))
+        rows.append((item.quantity, *(percent(share) for share in figures), low))
     return Table(
         "Coverage of the 95 % intervals over all simulated runs while moving. Gains and offsets are drawn "
         "once a run and stay, so single runs scatter around the pooled share more than their many rows "

@@ -139,9 +139,9 @@ def honesty(shown: Run, covered: Sequence[Coverage]) -> Section:
             Picture(
                 f"nis-{shown.name}",
                 draw_nis(shown),
-                f"Normalised innovation squared of {simulated}{shown.name}, method {shown.method}, for the most "
-                "common numbers of channels taken (bars; the last bar holds all beyond), and the chi-square "
-                "law that it follows when the noise settings are right (line).",
+                f"Normalised innovation squared of {simulated}{shown.name}, method {shown.method}, for the "
+                "most common numbers of channels taken (bars; the last bar holds all beyond), and the "
+                "chi-square law that it follows when the noise settings are right (line).",
                 f"Histogram of NIS of {shown.name} with the chi-square density",
             ),
             nis_table([shown]),
