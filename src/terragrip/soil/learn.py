@@ -1,0 +1,175 @@
+"""From estimates of many runs to a soil library."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from terragrip.errors import InputError
+from terragrip.soil.bins import PAPER_BINS, Bins, BinSettings, bin_pairs
+from terragrip.soil.choice import FormVerdict, compare_forms
+from terragrip.soil.fit import AdhesionCurve
+from terragrip.soil.library import Soil, SoilLibrary
+from terragrip.soil.missing import Gap, in_words, what_to_drive
+from terragrip.soil.slip_noise import SlipNoise, correct_slip_noise
+from terragrip.soil.transitions import settled
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class RunPairs:
+    """The usable pairs of one run on one soil: slip, adhesion and slip noise (n,), wheel after wheel; rho_s (rows,)."""
+
+    run: str
+    soil: str
+    slip: Array
+    adhesion: Array
+    slip_std: Array
+    resistance: Array
+    speed: Array
+
+
+@dataclass(frozen=True)
+class LearnedSoil:
+    """One soil's fit with all that the report shows beside it."""
+
+    soil: Soil
+    curve: AdhesionCurve
+    verdict: FormVerdict | None
+    slip_noise: SlipNoise | None
+    gaps: tuple[Gap, ...]
+    pairs: tuple[RunPairs, ...] = field(repr=False)
+
+
+@dataclass(frozen=True)
+class Campaign:
+    """All soils of a set of estimates: what was fitted, what was not and why, sentences for the user."""
+
+    soils: Mapping[str, LearnedSoil]
+    not_fitted: Mapping[str, str]
+    words: tuple[str, ...]
+
+    def library(self, provenance: Mapping[str, Any] | None = None) -> SoilLibrary:
+        """As a soil library."""
+        soils = {name: learned.soil for name, learned in self.soils.items()}
+        return SoilLibrary(soils, dict(provenance or {}), dict(self.not_fitted))
+
+
+def usable_pairs(
+    columns: Mapping[str, Any], wheels: Sequence[str], length: float, run: str
+) -> list[RunPairs]:
+    """Pairs of one estimates table by soil: labelled, settled (vehicle and tool on one soil), no event.
+
+    columns: `distance`, `soil`, `event`, `soil_resistance`, `ground_speed` and, of each wheel, `slip_<w>`, `slip_<w>_std`, `adhesion_<w>`,
+    arrays of shape (rows,). `length` [m] from the label's reference point to the rearmost wheel or tool.
+    """
+    soil = np.asarray(columns["soil"], dtype=object)
+    good = settled(columns["distance"], soil, length) & (np.asarray(columns["event"], dtype=object) == "")
+    out = []
+    for name in sorted(set(soil[good])):
+        rows = good & (soil == name)
+        out.append(
+            RunPairs(
+                run,
+                str(name),
+                np.concatenate([np.asarray(columns[f"slip_{w}"], dtype=float)[rows] for w in wheels]),
+                np.concatenate([np.asarray(columns[f"adhesion_{w}"], dtype=float)[rows] for w in wheels]),
+                np.concatenate([np.asarray(columns[f"slip_{w}_std"], dtype=float)[rows] for w in wheels]),
+                np.asarray(columns["soil_resistance"], dtype=float)[rows],
+                np.asarray(columns["ground_speed"], dtype=float)[rows],
+            )
+        )
+    return out
+
+
+def learn_soils(
+    pairs: Iterable[RunPairs],
+    curve: AdhesionCurve | None = None,
+    bins: Mapping[str, BinSettings] | None = None,
+    mass: float | None = None,
+    sample_period: float = 0.01,
+    wheels: int = 4,
+    source: str = "",
+) -> Campaign:
+    """Fit a curve to each soil of the pairs; compare forms, correct for slip noise, say what to drive next.
+
+    `curve`: an unfitted AdhesionCurve with the settings to use (default: the paper's). `bins` by soil; default the curve's,
+    on grass the paper's up to 40 %. `mass` [kg] gives the pulls of the advice. Raises InputError where no pair is labelled.
+    """
+    template = curve or AdhesionCurve()
+    special = PAPER_BINS if bins is None else bins
+    grouped: dict[str, list[RunPairs]] = {}
+    for part in pairs:
+        grouped.setdefault(part.soil, []).append(part)
+    if not grouped:
+        raise InputError(
+            "no sample has a soil label", mend="give a 'soil' column, or name the soil with --soil"
+        )
+    soils, missed, words = {}, {}, []
+    for name, parts in sorted(grouped.items()):
+        settings = special.get(name, template.bins)
+        try:
+            learned = _learn(name, parts, template, settings, mass, sample_period, wheels, source)
+        except InputError as error:
+            missed[name] = str(error)
+            words.append(f"{name}: not fitted, {error}.")
+            continue
+        soils[name] = learned
+        words += [f"{name}: {note}" for note in learned.curve.notes_]
+        words += (
+            [f"{name}: {learned.verdict.sentence}"] if learned.verdict and not learned.verdict.follows else []
+        )
+        words += (
+            [f"{name}: {learned.slip_noise.sentence}"]
+            if learned.slip_noise and learned.slip_noise.matters
+            else []
+        )
+        words += in_words(name, learned.gaps) if learned.gaps else []
+    return Campaign(soils, missed, tuple(words))
+
+
+def _learn(
+    name: str,
+    parts: Sequence[RunPairs],
+    template: AdhesionCurve,
+    settings: BinSettings,
+    mass: float | None,
+    sample_period: float,
+    wheels: int,
+    source: str,
+) -> LearnedSoil:
+    slip = np.concatenate([part.slip for part in parts])
+    adhesion = np.concatenate([part.adhesion for part in parts])
+    noise = np.concatenate([part.slip_std for part in parts])
+    run = np.repeat(np.arange(len(parts)), [part.slip.size for part in parts])
+    curve = AdhesionCurve(
+        template.model,
+        template.fixed,
+        template.intercept,
+        template.weights,
+        settings,
+        template.bootstrap,
+        template.seed,
+    )
+    binned: Bins = bin_pairs(slip, adhesion, run, settings)
+    curve.fit_bins(binned)
+    resistance = np.concatenate([part.resistance for part in parts])
+    speed = np.concatenate([part.speed for part in parts])
+    soil = Soil.from_curve(name, curve, source, (float(np.nanmean(resistance)), float(np.nanstd(resistance))))
+    verdict = compare_forms(binned) if np.count_nonzero(binned.used) >= 6 else None
+    corrected = correct_slip_noise(curve, slip, adhesion, noise) if np.isfinite(noise).any() else None
+    if corrected is not None:
+        shown = {
+            "plain": dict(corrected.plain),
+            "corrected": dict(corrected.corrected),
+            "slip_std": corrected.slip_std,
+        }
+        soil = replace(soil, fit={**soil.fit, "slip_noise": shown})
+    usual = float(np.nanmedian(speed))
+    gaps = what_to_drive(soil, binned, mass, sample_period, wheels, usual) if mass else []
+    return LearnedSoil(soil, curve, verdict, corrected, tuple(gaps), tuple(parts))
