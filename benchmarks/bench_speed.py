@@ -1,0 +1,187 @@
+"""How fast: the kernel, whole estimates, single samples, start-up and long logs, beside filterpy in one run.
+
+    python benchmarks/bench_speed.py [--rows 10000000]
+
+Times are the best of a few passes on this machine; `x` is how many times faster than filterpy's UKF a step.
+The targets are those of the project's plan, for a machine where filterpy needs 850 us.
+"""
+
+from __future__ import annotations
+
+import argparse
+import importlib.util
+import json
+import os
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+import kernel_step
+import peer
+import pull
+from terragrip.estimation import TractionEstimator, estimate
+from terragrip.estimation.methods import METHODS
+from terragrip.recording import Recording
+from terragrip.vehicle import Vehicle
+
+PEER_STEPS = 1500
+KERNEL_TARGETS = {"kalman": 0.3, "ukf": 2.0, "bank": 1.5}
+WHOLE_TARGETS = {"kalman": 1000, "ukf": 200, "aukf-fs": 60}
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
+    parser.add_argument("--rows", type=int, default=10_000_000, help="rows of the long log; 0 leaves it out")
+    rows = parser.parse_args().rows
+    with tempfile.TemporaryDirectory(prefix="terragrip-bench-") as name:
+        folder = Path(name)
+        vehicle, vehicle_file = pull.vehicle(folder)
+        log, load = pull.recording(vehicle, 600.0)
+        peer_step = bench_kernel(vehicle, log, load, folder)
+        bench_whole(vehicle, log, peer_step)
+        bench_single(vehicle, log, peer_step)
+        bench_start(log, vehicle_file, folder)
+        if rows:
+            bench_long(log, vehicle_file, folder, rows, peer_step)
+
+
+def best(function: Callable[[], object], passes: int) -> float:
+    """Seconds of the fastest of `passes` calls."""
+    times = []
+    for _ in range(passes):
+        begin = time.perf_counter()
+        function()
+        times.append(time.perf_counter() - begin)
+    return min(times)
+
+
+def bench_kernel(vehicle: Vehicle, log: pd.DataFrame, load: np.ndarray, folder: Path) -> float:
+    """Steps inside C against steps of filterpy, and that both compute the same; filterpy's seconds a step."""
+    whole = pull.problem(vehicle, log, load)
+    first = pull.problem(vehicle, log.iloc[: PEER_STEPS + 1], load[: PEER_STEPS + 1])
+    peer_state, peer_step = peer.run(first, PEER_STEPS)
+    ours = kernel_step.run(first, folder)
+    timed = kernel_step.run(whole, folder)
+    print(f"filterpy UKF: {1e6 * peer_step:.0f} us a step ({PEER_STEPS} steps, 10 states, 5 channels)\n")
+    print("kernel, one step inside C        us        x   target us   apart from filterpy")
+    for name, (state, _) in ours.items():
+        step = timed[name][1]
+        target = f"{KERNEL_TARGETS[name]:.1f}" if name in KERNEL_TARGETS else ""
+        same = name in ("kalman", "ukf")
+        apart = f"{np.max(np.abs(state - peer_state) / np.abs(peer_state)):.0e}" if same else "other noise"
+        print(f"  {name:<26}{1e6 * step:>9.3f}{peer_step / step:>9.0f}{target:>10}     {apart}")
+    return peer_step
+
+
+def bench_whole(vehicle: Vehicle, log: pd.DataFrame, peer_step: float) -> None:
+    """`estimate` from recording to table, a sample, every method."""
+    recording = Recording.from_frame(log)
+    print(f"\ntg.estimate, whole ({len(log)} rows)  us        x    target x")
+    for name in METHODS:
+        step = best(lambda name=name: estimate(recording, vehicle, method=name).to_pandas(), 3) / len(log)  # type: ignore[misc]
+        target = str(WHOLE_TARGETS.get(name, ""))
+        print(f"  {name:<26}{1e6 * step:>9.3f}{peer_step / step:>9.0f}{target:>10}")
+
+
+def bench_single(vehicle: Vehicle, log: pd.DataFrame, peer_step: float) -> None:
+    """`update(sample)`, one call from Python, the default method."""
+    samples = log.iloc[:5000].to_dict("records")
+
+    def run() -> None:
+        estimator = TractionEstimator(vehicle)
+        for sample in samples:
+            estimator.update(sample)
+
+    step = best(run, 3) / len(samples)
+    print(f"\nupdate(sample), default method: {1e6 * step:.1f} us (target 15), x {peer_step / step:.0f}")
+
+
+def bench_start(log: pd.DataFrame, vehicle_file: Path, folder: Path) -> None:
+    """Seconds to import, and for the command on a 60 s log, each in a fresh process."""
+    nothing = best(lambda: _run(sys.executable, "-c", "pass"), 5)
+    imported = best(lambda: _run(sys.executable, "-c", "import terragrip"), 5)
+    print(
+        f"\nimport terragrip: {imported - nothing:.3f} s (target 0.25; the bare interpreter takes {nothing:.3f})"
+    )
+    csv = folder / "log.csv"
+    log.iloc[:6000].to_csv(csv, index=False)
+    command = [
+        *_command(),
+        "estimate",
+        str(csv),
+        "--vehicle",
+        str(vehicle_file),
+        "-o",
+        str(folder / "e.parquet"),
+    ]
+    peer_import = best(lambda: _run(sys.executable, "-c", "import filterpy.kalman, pandas"), 3)
+    spent = best(lambda: _run(*command), 3)
+    print(f"terragrip estimate, 60 s log, fresh process: {spent:.2f} s (target 1.5)")
+    print(f"  filterpy and pandas need {peer_import:.2f} s to import alone")
+
+
+def bench_long(log: pd.DataFrame, vehicle_file: Path, folder: Path, rows: int, peer_step: float) -> None:
+    """`terragrip estimate` on a long Parquet log: seconds and peak memory of the process."""
+    path = folder / "long.parquet"
+    _write_long(log, path, rows)
+    arguments = ["estimate", str(path), "--vehicle", str(vehicle_file), "-o", str(folder / "long-e.parquet")]
+    # the child measures itself, so that the memory of this process is not in the figure
+    watch = (
+        "import json, resource, subprocess, sys, time\n"
+        "begin = time.perf_counter()\n"
+        "code = subprocess.run(sys.argv[1:], stdout=subprocess.DEVNULL).returncode\n"
+        "used = resource.getrusage(resource.RUSAGE_CHILDREN)\n"
+        "print(json.dumps([code, time.perf_counter() - begin, used.ru_maxrss * 1024]))"
+    )
+    printed = subprocess.run(
+        [sys.executable, "-c", watch, *_command(), *arguments], check=True, capture_output=True, text=True
+    )
+    code, seconds, peak = json.loads(printed.stdout)
+    if code:
+        raise SystemExit(f"terragrip estimate on the long log: exit {code}\n{printed.stderr}")
+    print(
+        f"\n{rows} samples from Parquet to Parquet: {seconds:.0f} s (target 60), peak {peak / 1e9:.2f} GB (target 3), "
+        f"x {peer_step * rows / seconds:.0f}"
+    )
+
+
+def _write_long(log: pd.DataFrame, path: Path, rows: int) -> None:
+    """The log end to end until there are `rows`, with time running on."""
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    length = float(log["time"].iloc[-1]) + 1.0 / pull.RATE
+    writer = None
+    for k, start in enumerate(range(0, rows, len(log))):
+        part = log.iloc[: min(len(log), rows - start)].copy()
+        part["time"] += k * length
+        table = pa.Table.from_pandas(part, preserve_index=False)
+        if writer is None:
+            writer = pq.ParquetWriter(path, table.schema)
+        writer.write_table(table)
+    if writer is not None:
+        writer.close()
+
+
+def _run(*command: str) -> None:
+    subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
+
+
+def _command() -> list[str]:
+    """The installed command beside this interpreter, else the module."""
+    beside = Path(sys.executable).with_name("terragrip")
+    if os.access(beside, os.X_OK):
+        return [str(beside)]
+    if importlib.util.find_spec("terragrip.cli.__main__"):
+        return [sys.executable, "-m", "terragrip.cli"]
+    raise SystemExit("terragrip is not installed beside this Python: pip install -e .")
+
+
+if __name__ == "__main__":
+    main()
