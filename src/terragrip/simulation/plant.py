@@ -1,0 +1,146 @@
+"""The plant in C, called from Python: a scenario's machine and ground in, a trace out."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from terragrip.errors import InputError
+from terragrip.simulation.scenario import Scenario
+from terragrip.simulation.terrain import CURVE_INTERVALS, SPACING, Terrain
+from terragrip.units import STANDARD_GRAVITY
+from terragrip.vehicle import Vehicle
+
+Floats = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Plant:
+    """A machine on its ground, as C structures. ``kept`` holds the arrays that C only points to."""
+
+    machine: Any
+    ground: Any
+    kept: tuple[Any, ...]
+
+
+def check_layout(vehicle: Vehicle) -> None:
+    """Raise InputError unless the vehicle has two axles of two wheels, left before right: what the plant knows."""
+    if [len(axle.wheels) for axle in vehicle.axles.values()] != [2, 2] or not vehicle.track:
+        raise InputError(
+            "only a vehicle with two axles of two wheels and a track can be simulated",
+            place="vehicle",
+            mend="give axles front and rear with two wheels each, and 'track:'",
+        )
+
+
+def make_plant(scenario: Scenario, vehicle: Vehicle, radius: Floats, terrain: Terrain) -> Plant:
+    """The C structures of a scenario; ``radius`` (4,) [m] is the true one. Raises InputError on an unfit vehicle."""
+    from terragrip.simulation._plant import ffi
+
+    check_layout(vehicle)
+    kept: list[Any] = []
+
+    def pointer(values: Any, kind: str = "double") -> Any:
+        array = np.ascontiguousarray(values, dtype=np.float64 if kind == "double" else np.int32)
+        handle = ffi.from_buffer(f"{kind}[]", array)
+        kept.extend((array, handle))
+        return ffi.cast(f"{kind} *", handle)
+
+    ground = _ground(ffi, terrain, pointer)
+    machine = _machine(ffi, scenario, vehicle, radius)
+    _tools(machine, scenario, terrain, pointer)
+    _spots_and_driver(machine, scenario)
+    speeds = np.array([np.nan if speed == "off" else float(speed) for _, speed in scenario.speed])
+    machine.commands = len(speeds)
+    machine.command_time = pointer([time for time, _ in scenario.speed])
+    machine.command = pointer(speeds / float(vehicle.wheel_radius[0]))
+    return Plant(machine, ground, tuple(kept))
+
+
+def run(plant: Plant, duration: float, step: float, stride: int) -> Floats:
+    """Integrate from rest at position 0; the trace (rows, PLANT_COLUMNS), a row every ``stride`` steps.
+
+    Ends early where the path ends. Raises FloatingPointError if the state left the finite numbers (a defect of ours).
+    """
+    from terragrip.simulation._plant import ffi, lib
+
+    steps = round(duration / step)
+    trace = np.empty((steps // stride + 1, lib.PLANT_COLUMNS))
+    rows = ffi.new("int32_t *")
+    status = lib.plant_run(
+        plant.machine, plant.ground, 0.0, step, steps, stride, ffi.cast("double *", ffi.from_buffer("double[]", trace)), rows
+    )
+    if status != lib.PLANT_OK:
+        raise FloatingPointError(f"the plant stopped with status {status} after {rows[0]} rows")
+    return trace[: rows[0]]
+
+
+def _ground(ffi: Any, terrain: Terrain, pointer: Any) -> Any:
+    ground = ffi.new("plant_ground *")
+    ground.count = len(terrain.path.x)
+    ground.start = float(terrain.path.x[0])
+    ground.spacing = SPACING
+    ground.soils = len(terrain.names)
+    ground.curve_intervals = CURVE_INTERVALS
+    ground.curve = pointer(terrain.curve)
+    for k, track in enumerate(terrain.tracks):
+        ground.soil_from[k] = pointer(track.soils.start, "int32_t")
+        ground.soil_to[k] = pointer(track.soils.end, "int32_t")
+        ground.blend[k] = pointer(track.soils.blend)
+        for name in ("adhesion_scale", "resistance", "slip_resistance", "elevation", "gradient"):
+            getattr(ground, name)[k] = pointer(getattr(track, name))
+    ground.slope = pointer(terrain.slope)
+    ground.curvature = pointer(terrain.path.curvature)
+    return ground
+
+
+def _machine(ffi: Any, scenario: Scenario, vehicle: Vehicle, radius: Floats) -> Any:
+    machine = ffi.new("plant_machine *")
+    machine.mass = vehicle.mass
+    machine.gravity = STANDARD_GRAVITY
+    machine.wheelbase = vehicle.wheelbase
+    machine.rear_to_cg = vehicle.center_of_gravity_to_rear
+    machine.cg_height = vehicle.center_of_gravity_height
+    machine.hitch_height = vehicle.hitch_height
+    machine.hitch_overhang = vehicle.hitch_overhang
+    machine.track = vehicle.track
+    machine.tire_resistance = vehicle.tire_rolling_resistance
+    for i in range(4):
+        machine.radius[i] = float(radius[i])
+        machine.inertia[i] = float(vehicle.wheel_inertia[i])
+        machine.bearing[i] = vehicle.bearing_resistance
+        machine.driven[i] = int(vehicle.driven[i])
+    for name in (
+        "tire_stiffness", "tire_damping", "resistance_length", "slip_speed", "wheel_rest_speed", "speed_gain",
+        "speed_integral", "motor_lag", "antiwindup_time", "torque_limit", "power_limit",
+    ):  # fmt: skip
+        setattr(machine, name, getattr(scenario.robot, name))
+    return machine
+
+
+def _tools(machine: Any, scenario: Scenario, terrain: Terrain, pointer: Any) -> None:
+    machine.tools = len(scenario.tools)
+    for k, tool in enumerate(scenario.tools):
+        out = machine.tool[k]
+        out.mass, out.length, out.bar_slack = tool.mass, tool.length, tool.slack
+        out.bar_stiffness, out.bar_damping = tool.stiffness, tool.damping
+        out.draught_speed, out.shear_length = tool.draught_speed, tool.shear_length
+        out.friction, out.dig_in = pointer(terrain.friction[k]), pointer(terrain.dig_in[k])
+
+
+def _spots_and_driver(machine: Any, scenario: Scenario) -> None:
+    machine.spots = len(scenario.soft_spots)
+    for k, spot in enumerate(scenario.soft_spots):
+        out = machine.spot[k]
+        out.position = np.nan if spot.at is None else spot.at
+        out.time = 0.0 if spot.at_time is None else spot.at_time
+        out.ahead, out.length, out.adhesion_loss = spot.ahead, spot.length, spot.adhesion_loss
+        out.resistance[0], out.resistance[1] = spot.front, spot.rear
+    driver, out = scenario.driver, machine.driver
+    out.enabled = int(driver.acts)
+    for name in ("stuck_ratio", "patience", "boost", "boost_time", "ease", "ease_time", "free_ratio", "free_time"):
+        setattr(out, name, getattr(driver, name))
+    out.assist_rate, out.assist_limit = driver.push_rate, driver.push_limit

@@ -1,0 +1,357 @@
+"""What is simulated: the validated scenario file. Every number is SI; a text may carry a unit (``"30 cm"``).
+
+Where an entry stands in the library, ``use: NAME`` takes it and the keys beside it override: see
+:mod:`terragrip.simulation.library`.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from typing import Annotated, Any, Literal, Self
+
+from pydantic import BeforeValidator, Field, field_validator, model_validator
+
+from terragrip.document import Fault as Refusal
+from terragrip.document import Part, validate
+from terragrip.physics.adhesion import CURVES
+from terragrip.units import UnitError, quantity
+from terragrip.vehicle import Vehicle
+
+
+def _number(unit: str, low: float = 0.0, high: float = 1e6, *, above: bool = False) -> Any:
+    """Field metadata: a number or a text with a unit, within limits."""
+
+    def read(value: Any) -> float:
+        number = quantity(value, unit)
+        if number > high or (number <= low if above else number < low):
+            bound = "exceed" if above else "be at least"
+            raise UnitError(f"{number:g} is impossible", f"it must {bound} {low:g} and not exceed {high:g}")
+        return number
+
+    return BeforeValidator(read)
+
+
+Mass = Annotated[float, _number("kg", 0, 1e5, above=True)]
+Length = Annotated[float, _number("m")]
+PositiveLength = Annotated[float, _number("m", above=True)]
+Coordinate = Annotated[float, _number("m", -1e5, 1e5)]
+Time = Annotated[float, _number("s")]
+PositiveTime = Annotated[float, _number("s", above=True)]
+Force = Annotated[float, _number("N")]
+Share = Annotated[float, _number("1", 0, 1)]
+Ratio = Annotated[float, _number("1", 0, 10)]
+Number = Annotated[float, _number("1", 0, 1e9)]
+Signed = Annotated[float, _number("1", -1e9, 1e9)]
+Angle = Annotated[float, _number("rad", -0.6, 0.6)]
+Rate = Annotated[float, _number("1/s", 0, 1000, above=True)]
+
+
+class Clods(Part):
+    """Earth clumps: how many per metre of track, and the mean height and length [m] of the bump a tyre makes of one."""
+
+    density: Number
+    height: PositiveLength
+    length: PositiveLength
+
+
+class Soil(Part):
+    """A soil: its adhesion curve, rolling resistance ratio (``resistance`` + ``resistance_slip`` |s|), and how they vary.
+
+    Variations are relative standard deviations over ``correlation_length`` [m]; ``roughness`` is the standard
+    deviation [m] of the elevation that the tyre feels.
+    """
+
+    curve: dict[str, Any]
+    resistance: Ratio
+    resistance_slip: Ratio = 0.0
+    adhesion_variation: Ratio = 0.0
+    resistance_variation: Ratio = 0.0
+    draught_variation: Ratio = 0.0
+    correlation_length: PositiveLength = 1.0
+    roughness: Length = 0.0
+    clods: Clods | None = None
+
+    @field_validator("curve")
+    @classmethod
+    def _known_curve(cls, value: dict[str, Any]) -> dict[str, Any]:
+        name = value.get("name")
+        model = CURVES.get(str(name))
+        if model is None:
+            raise Refusal("no such curve", f"curves are {', '.join(CURVES)}", ("name",))
+        for key, number in value.items():
+            if key != "name" and key not in model.names:
+                raise Refusal(f"{name} has no such parameter", f"its parameters are {', '.join(model.names)}", (key,))
+            if key != "name" and (isinstance(number, bool) or not isinstance(number, int | float)):
+                raise Refusal("is not a number", "write a number", (key,))
+        return value
+
+
+class Tool(Part):
+    """A towed tool. Draught = (friction x weight + dig_in + added) (1 + draught_speed v), built up over ``shear_length``.
+
+    ``friction`` (draught over weight) and ``dig_in`` [N] are a number or a mapping by soil; ``added`` is extra draught
+    [N] by the tool's position: ``[[position, force], ...]``. ``slack`` is the total play of its bar [m].
+    """
+
+    mass: Mass
+    length: PositiveLength = 2.0
+    friction: Ratio | dict[str, Ratio] = 0.0
+    dig_in: Force | dict[str, Force] = 0.0
+    added: tuple[tuple[Coordinate, Force], ...] = ()
+    draught_speed: Ratio = 0.0
+    shear_length: PositiveLength = 0.01
+    slack: Length = 0.04
+    stiffness: Annotated[float, _number("N/m", above=True)] = 4e4
+    damping: Annotated[float, _number("N s/m")] = 800.0
+
+
+class Segment(Part):
+    """A stretch of one soil; ``length`` [m]."""
+
+    soil: str
+    length: PositiveLength
+
+
+class Plot(Part):
+    """A plot of a field: a polygon of one soil, ``corners`` [m, m]."""
+
+    soil: str
+    corners: tuple[tuple[Coordinate, Coordinate], ...] = Field(min_length=3)
+
+
+class Slope(Part):
+    """The slope of the ground: ``mean`` along a straight route, and hills of slope ``sd`` over ``length`` [m]."""
+
+    mean: Angle = 0.0
+    sd: Angle = 0.0
+    length: PositiveLength = 10.0
+
+
+class Route(Part):
+    """Where it drives: straight over ``segments``, or along ``path`` over ``plots`` on the soil ``around``.
+
+    A border between two soils is a ramp of ``border`` [m]; ``skew`` [m] is how much later the right track meets it on
+    a straight route. Corners of the path are rounded by ``turn_radius``.
+    """
+
+    segments: tuple[Segment, ...] = ()
+    plots: tuple[Plot, ...] = ()
+    around: str | None = None
+    path: tuple[tuple[Coordinate, Coordinate], ...] = ()
+    turn_radius: PositiveLength = 2.0
+    border: PositiveLength = 0.4
+    skew: Coordinate = 0.1
+    slope: Slope = Field(default_factory=Slope)
+    start: tuple[Coordinate, Coordinate] = (0.0, 0.0)
+    heading: Annotated[float, _number("rad", -10, 10)] = 0.0
+    latitude: Annotated[float, _number("1", -80, 80)] = 51.0
+    longitude: Annotated[float, _number("1", -180, 180)] = 13.5
+
+    @model_validator(mode="after")
+    def _one_way(self) -> Self:
+        if bool(self.segments) == bool(self.path):
+            raise Refusal("needs either segments or a path", "give 'segments:' or 'path:' with 'around:'")
+        if self.path and (len(self.path) < 2 or self.around is None):
+            raise Refusal("a path needs two points and the soil around", "add 'around: grass'")
+        if any(segment.length < 2 * self.border for segment in self.segments):
+            raise Refusal("is shorter than two borders", "lengthen it or narrow 'border:'", ("segments",))
+        return self
+
+    def soils(self) -> tuple[str, ...]:
+        """Names of the soils on it, each once, in order of appearance."""
+        names = [s.soil for s in self.segments] or [str(self.around), *(p.soil for p in self.plots)]
+        return tuple(dict.fromkeys(names))
+
+
+class SoftSpot(Part):
+    """A place where wheels sink: at position ``at`` [m], or just before the machine when time ``at_time`` [s] comes.
+
+    Added rolling resistance of the ``front`` and the ``rear`` axle, and the adhesion lost, over ``length`` [m].
+    """
+
+    at: Coordinate | None = None
+    at_time: Time | None = None
+    ahead: Coordinate = 0.3
+    length: PositiveLength = 0.6
+    front: Ratio = 0.0
+    rear: Ratio = 0.0
+    adhesion_loss: Share = 0.0
+
+    @model_validator(mode="after")
+    def _one_place(self) -> Self:
+        if (self.at is None) == (self.at_time is None):
+            raise Refusal("needs one place", "give 'at:' [m] or 'at_time:' [s]")
+        return self
+
+
+class Driver(Part):
+    """What the operator does when the machine is stuck: waits, more speed, less speed, then pushes until it runs."""
+
+    acts: bool = True
+    stuck_ratio: Share = 0.15
+    patience: Time = 2.0
+    boost: Ratio = 1.4
+    boost_time: Time = 2.0
+    ease: Ratio = 0.5
+    ease_time: Time = 1.0
+    push_rate: Force = 100.0
+    push_limit: Force = 400.0
+    free_ratio: Share = 0.4
+    free_time: Time = 1.0
+
+
+class Robot(Part):
+    """What a vehicle file does not hold: tyres, motors, control, and how far the true machine is from its file.
+
+    ``power_limit`` [W] holds for all motors together, ``torque_limit`` [N m] for each wheel. ``wheel_radius_sd`` is
+    relative, common to all wheels. ``slip_speed`` [m/s]: slower than this, slip is taken over this speed.
+    """
+
+    wheel_mass: Mass = 5.4
+    tire_stiffness: Annotated[float, _number("N/m", above=True)] = 8e4
+    tire_damping: Annotated[float, _number("N s/m")] = 600.0
+    resistance_length: PositiveLength = 0.02
+    slip_speed: Annotated[float, _number("m/s", 1e-3, 1)] = 0.05
+    wheel_rest_speed: Annotated[float, _number("rad/s", 1e-4, 1)] = 0.02
+    speed_gain: Annotated[float, _number("N m s/rad")] = 20.0
+    speed_integral: Annotated[float, _number("N m/rad")] = 100.0
+    motor_lag: PositiveTime = 0.01
+    antiwindup_time: PositiveTime = 0.1
+    torque_limit: Annotated[float, _number("N m", above=True)] = 130.0
+    power_limit: Annotated[float, _number("W", above=True)] = 1600.0
+    wheel_radius_sd: Share = 0.0
+
+
+class Sensor(Part):
+    """A sensor: reading = gain x true + offset + drift + noise, at ``rate`` [1/s], ``delay`` [s] late, rounded to
+    ``resolution``; per channel, gain - 1 and offset have spreads ``gain_sd`` and ``offset_sd``.
+
+    ``declared_delay`` is what the reader of the log takes off its time stamps. ``dropout``: share of samples lost, in
+    spells of mean ``dropout_length`` [s]. ``bandwidth`` [Hz]: first-order low pass. ``drift``: standard deviation of a
+    slow error of time constant ``drift_time`` [s]. ``wheels``: only these.
+    """
+
+    rate: Rate
+    delay: Time = 0.0
+    declared_delay: Time = 0.0
+    noise: Number = 0.0
+    resolution: Number = 0.0
+    gain: Signed = 1.0
+    gain_sd: Ratio = 0.0
+    offset: Signed = 0.0
+    offset_sd: Number = 0.0
+    drift: Number = 0.0
+    drift_time: PositiveTime = 30.0
+    bandwidth: Number | None = None
+    dropout: Share = 0.0
+    dropout_length: Time = 0.0
+    wheels: tuple[str, ...] | None = None
+
+
+class Sensors(Part):
+    """The sensors on board; absent: no such channel. Position noise is in metres."""
+
+    wheel_speed: Sensor
+    drive_torque: Sensor | None = None
+    ground_speed: Sensor | None = None
+    drawbar_force: Sensor | None = None
+    acceleration: Sensor | None = None
+    angular_velocity: Sensor | None = None
+    pitch: Sensor | None = None
+    vertical_load: Sensor | None = None
+    wheel_force: Sensor | None = None
+    position: Sensor | None = None
+
+
+FaultKind = Literal["gap", "loss", "held", "spike", "sign", "dead", "jitter"]
+
+
+class Fault(Part):
+    """A fault on demand, in ``channel`` (a column or a sensor; absent: all) from ``at`` for ``duration`` [s].
+
+    gap: no rows at all; loss: the channel is not measured; held: it repeats its last value; spike: ``count`` single
+    samples off by ``size``; sign: it is negated; dead: it reads ``size``; jitter: its stamps scatter by ``size`` [s].
+    Without ``at``, ``count`` of them lie anywhere in the run; without ``duration``, it lasts to the end.
+    """
+
+    kind: FaultKind
+    channel: str | None = None
+    at: Time | None = None
+    duration: PositiveTime | None = None
+    count: Annotated[int, Field(ge=1, le=10000)] = 1
+    size: Signed = 0.0
+
+    @model_validator(mode="after")
+    def _complete(self) -> Self:
+        if self.kind == "gap" and self.duration is None:
+            raise Refusal("a gap needs a duration", "add 'duration: 3 s'")
+        if self.kind in ("spike", "jitter") and self.size == 0:
+            raise Refusal(f"a {self.kind} needs a size", "add 'size:'")
+        return self
+
+
+class Scenario(Part):
+    """One drive. ``speed``: points ``[time, speed]`` of the wheels' circumferential speed [m/s], linear between them;
+    ``off`` for a speed switches the motors off until the next point."""
+
+    name: str = ""
+    description: str = ""
+    seed: Annotated[int, Field(ge=0)] = 0
+    vehicle: dict[str, Any]
+    robot: Robot = Field(default_factory=Robot)
+    route: Route
+    soils: dict[str, Soil]
+    tools: Annotated[tuple[Tool, ...], Field(max_length=2)] = ()
+    speed: tuple[tuple[Time, Annotated[float, _number("m/s", -5, 5)] | Literal["off"]], ...]
+    duration: PositiveTime
+    soft_spots: Annotated[tuple[SoftSpot, ...], Field(max_length=8)] = ()
+    driver: Driver = Field(default_factory=Driver)
+    sensors: Sensors
+    faults: tuple[Fault, ...] = ()
+    step: Annotated[float, _number("s", 1e-6, 0.005)] = 0.001
+    log_rate: Rate = 200.0
+
+    @field_validator("speed", mode="before")
+    @classmethod
+    def _yaml_off(cls, value: Any) -> Any:
+        """YAML reads a bare ``off`` as false."""
+        if not isinstance(value, list | tuple):
+            raise Refusal("is not a list of points", "write e.g. '[[0, 0], [2, 0.6]]'")
+        return [[p[0], "off"] if isinstance(p, list) and len(p) == 2 and p[1] is False else p for p in value]
+
+    @model_validator(mode="after")
+    def _consistent(self) -> Self:
+        times = [time for time, _ in self.speed]
+        if not times or times[0] != 0 or any(b <= a for a, b in zip(times, times[1:], strict=False)):
+            raise Refusal("times must start at 0 and rise", "put the points in order", ("speed",))
+        missing = next((s for s in self.route.soils() if s not in self.soils), None)
+        if missing is not None:
+            raise Refusal(f"the route's soil {missing!r} is not known", f"soils are {', '.join(self.soils)}", ("route",))
+        per_row = 1.0 / (self.log_rate * self.step)
+        if abs(per_row - round(per_row)) > 1e-6 or per_row < 0.5:
+            raise Refusal("must be a whole number of steps", "e.g. step 0.001, log_rate 200", ("log_rate",))
+        return self
+
+    @classmethod
+    def load(cls, path_or_name: str | os.PathLike[str]) -> Self:
+        """Read a scenario of the package by name, or a file (a path, or a name ending in .yaml).
+
+        Raises InputError with the file, the key, its line and the mend.
+        """
+        from terragrip.simulation.library import scenario_document
+
+        return validate(cls, scenario_document(path_or_name))
+
+    @classmethod
+    def from_dict(cls, data: Mapping[str, Any], file: str | None = None) -> Self:
+        """Build from a mapping as a scenario file holds; raises InputError, which names ``file`` if given."""
+        from terragrip.simulation.library import resolve
+
+        return validate(cls, resolve(dict(data), file), file=file)
+
+    def nominal_vehicle(self) -> Vehicle:
+        """The vehicle as its user wrote it down, without the simulated machine's errors; raises InputError."""
+        return Vehicle.from_dict(self.vehicle, file=self.name or None)
+
+

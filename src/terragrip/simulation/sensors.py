@@ -1,0 +1,164 @@
+"""Sensors: what each channel reads of the truth, with its rate, delay, noise, gain, offset, resolution and drop-outs."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from terragrip.simulation.fields import stream
+from terragrip.simulation.route import geographic
+from terragrip.simulation.scenario import Scenario, Sensor, Sensors
+from terragrip.simulation.trace import Trace
+
+Floats = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Series:
+    """Samples of one sensor: its instants (k,) and its channels (k,), NaN = lost."""
+
+    sensor: str
+    rate: float
+    time: Floats
+    values: dict[str, Floats]
+
+
+@dataclass(frozen=True)
+class Errors:
+    """True gain and offset of each channel of a machine: reading = gain x true + offset."""
+
+    gain: dict[str, float]
+    offset: dict[str, float]
+
+
+def signals(sensor: str, trace: Trace) -> dict[str, Floats]:
+    """True values (n,) of a sensor's channels, in the recording's units and signs (DESIGN §3)."""
+    wheels, axles = trace.vehicle.wheels, trace.vehicle.axle_names
+    pitch, turn = trace["body_pitch"], trace["curvature"] * trace["speed"]
+    if sensor in ("wheel_speed", "drive_torque"):
+        column = trace["wheel_speed" if sensor == "wheel_speed" else "torque"]
+        return {f"{sensor}_{wheel}": column[:, i] for i, wheel in enumerate(wheels)}
+    if sensor == "ground_speed":
+        return {sensor: trace["speed"]}
+    if sensor == "drawbar_force":
+        return {sensor: trace["drawbar"]}
+    if sensor == "acceleration":
+        along, normal = trace.specific_force
+        return {
+            "acceleration_x": along * np.cos(pitch) + normal * np.sin(pitch),
+            "acceleration_y": trace["speed"] * turn,
+            "acceleration_z": normal * np.cos(pitch) - along * np.sin(pitch),
+        }
+    if sensor == "angular_velocity":
+        time, height = trace["time"], trace["height"]
+        roll = (height[:, [0, 2]] - height[:, [1, 3]]).mean(axis=1) / (trace.vehicle.track or 1.0)
+        nodding = trace["body_pitch_rate"] + np.gradient(trace["slope"], time)
+        return {
+            "angular_velocity_x": np.gradient(roll, time),
+            "angular_velocity_y": -nodding,  # about y to the left: positive is nose down
+            "angular_velocity_z": turn,
+        }
+    if sensor == "pitch":
+        return {sensor: trace["slope"] + pitch}
+    if sensor == "vertical_load":
+        return {f"{sensor}_{axle}": trace["load"][:, 2 * k : 2 * k + 2].sum(axis=1) for k, axle in enumerate(axles)}
+    if sensor == "wheel_force":
+        forces = (("x", trace.wheel_force_x), ("z", trace.wheel_force_z))
+        return {f"{sensor}_{axis}_{wheel}": force[:, i] for axis, force in forces for i, wheel in enumerate(wheels)}
+    return dict(zip(("east", "north", "altitude"), trace.location, strict=True))
+
+
+def draw_errors(sensors: Sensors, trace: Trace, seed: int) -> Errors:
+    """Gains and offsets of every channel on board, drawn from the machine's ``seed``."""
+    gain: dict[str, float] = {}
+    offset: dict[str, float] = {}
+    for name, sensor in _fitted(sensors):
+        for channel in _channels(name, sensor, trace):
+            g, o = stream(seed, f"errors {channel}").standard_normal(2)
+            gain[channel] = sensor.gain + sensor.gain_sd * float(g)
+            offset[channel] = sensor.offset + sensor.offset_sd * float(o)
+    return Errors(gain, offset)
+
+
+def measure(scenario: Scenario, trace: Trace, errors: Errors, seed: int) -> list[Series]:
+    """What every sensor reads of a run."""
+    series = [_read(name, sensor, trace, errors, seed) for name, sensor in _fitted(scenario.sensors)]
+    return [_located(scenario, one) if one.sensor == "position" else one for one in series]
+
+
+def _fitted(sensors: Sensors) -> list[tuple[str, Sensor]]:
+    pairs = [(name, getattr(sensors, name)) for name in type(sensors).model_fields]
+    return [(name, sensor) for name, sensor in pairs if sensor is not None]
+
+
+def _channels(name: str, sensor: Sensor, trace: Trace) -> list[str]:
+    keep = sensor.wheels
+    short = replace(trace, rows=trace.rows[:2])
+    return [c for c in signals(name, short) if keep is None or c.rsplit("_", 1)[1] in keep]
+
+
+def _read(name: str, sensor: Sensor, trace: Trace, errors: Errors, seed: int) -> Series:
+    end = float(trace["time"][-1])
+    stamp = np.round(np.arange(int(np.floor(end * sensor.rate + 1e-6)) + 1) / sensor.rate, 6)
+    source = _smoothed(signals(name, trace), sensor, trace)
+    seen = trace["time"]
+    values = {}
+    for channel in _channels(name, sensor, trace):
+        rng = stream(seed, f"sensor {channel}")
+        reading = errors.gain[channel] * np.interp(stamp - sensor.delay, seen, source[channel])
+        reading += errors.offset[channel] + sensor.noise * rng.standard_normal(len(stamp))
+        if sensor.drift > 0:
+            reading += _drift(rng, sensor, len(stamp))
+        if sensor.resolution > 0:
+            reading = np.round(reading / sensor.resolution) * sensor.resolution
+        values[channel] = reading
+    lost = _lost(stream(seed, f"dropout {name}"), sensor, len(stamp))
+    stamp = np.round(stamp - sensor.declared_delay, 6)
+    keep = ~lost & (stamp >= 0)
+    return Series(name, sensor.rate, stamp[keep], {channel: v[keep] for channel, v in values.items()})
+
+
+def _smoothed(source: dict[str, Floats], sensor: Sensor, trace: Trace) -> dict[str, Floats]:
+    if not sensor.bandwidth:
+        return source
+    from scipy.signal import lfilter
+
+    step = float(trace["time"][1] - trace["time"][0])
+    keep = float(np.exp(-2 * np.pi * sensor.bandwidth * step))
+    return {c: lfilter([1 - keep], [1.0, -keep], v, zi=[keep * v[0]])[0] for c, v in source.items()}
+
+
+def _drift(rng: np.random.Generator, sensor: Sensor, count: int) -> Floats:
+    """A first-order Gauss-Markov error (count,)."""
+    from scipy.signal import lfilter
+
+    keep = float(np.exp(-1.0 / (sensor.rate * sensor.drift_time)))
+    drive = sensor.drift * np.sqrt(1 - keep**2) * rng.standard_normal(count)
+    start = sensor.drift * rng.standard_normal()
+    return np.asarray(lfilter([1.0], [1.0, -keep], drive, zi=[keep * start])[0])
+
+
+def _lost(rng: np.random.Generator, sensor: Sensor, count: int) -> npt.NDArray[np.bool_]:
+    """Samples lost (count,): spells of geometric length, their share as the sensor says."""
+    lost = np.zeros(count, dtype=bool)
+    if sensor.dropout <= 0:
+        return lost
+    spell = max(1.0, sensor.rate * sensor.dropout_length)
+    between = spell * (1 - sensor.dropout) / sensor.dropout
+    k = 0
+    while k < count:
+        k += int(rng.geometric(1 / max(between, 1.0)))
+        length = int(rng.geometric(1 / spell))
+        lost[k : k + length] = True
+        k += length
+    return lost
+
+
+def _located(scenario: Scenario, series: Series) -> Series:
+    """Local position as latitude and longitude."""
+    local: dict[str, Any] = series.values
+    latitude, longitude = geographic(scenario.route, local["east"], local["north"])
+    return replace(series, values={"latitude": latitude, "longitude": longitude, "altitude": local["altitude"]})

@@ -1,0 +1,152 @@
+"""The ground of one drive: every field the plant needs, on one grid along the path."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from terragrip.physics.adhesion import CURVES
+from terragrip.simulation.fields import Field, clods, on_grid, roughness, stream
+from terragrip.simulation.route import Path, Soils, lay, soils_along
+from terragrip.simulation.scenario import Scenario, Soil, Tool
+
+Floats = npt.NDArray[np.float64]
+
+SPACING = 0.02  # m
+CURVE_INTERVALS = 1024
+_STRIDE = 5  # fields vary over decimetres: every fifth point will do
+
+
+@dataclass(frozen=True)
+class Track:
+    """The ground under one wheel track, per grid point (n,); names as in plant.h."""
+
+    soils: Soils
+    adhesion_scale: Floats
+    resistance: Floats
+    slip_resistance: Floats
+    elevation: Floats
+    gradient: Floats
+
+
+@dataclass(frozen=True)
+class Terrain:
+    """The ground along a path: two tracks (left, right), the middle where tools run, slope, and the soils' curves.
+
+    ``curve`` is (soils, intervals + 1, 2): adhesion and its derivative at equally spaced slips 0..1.
+    ``friction`` and ``dig_in`` hold an array (n,) per tool.
+    """
+
+    names: tuple[str, ...]
+    path: Path
+    tracks: tuple[Track, Track]
+    middle: Soils
+    slope: Floats
+    altitude: Floats
+    curve: Floats
+    friction: tuple[Floats, ...]
+    dig_in: tuple[Floats, ...]
+
+
+def build(scenario: Scenario, track_width: float, wheelbase: float, seed: int) -> Terrain:
+    """The ground of a scenario for one seed."""
+    route = scenario.route
+    names = route.soils()
+    trail = sum(tool.length + tool.slack for tool in scenario.tools)
+    path = lay(route, before=trail + 2.0, after=wheelbase + 1.0, spacing=SPACING)
+    sides = (0.5 * track_width, -0.5 * track_width)
+    tracks = tuple(
+        _track(scenario, names, path, offset, track_width, seed, ("left", "right")[k])
+        for k, offset in enumerate(sides)
+    )
+    middle = soils_along(route, names, path, 0.0, track_width)
+    hills = Field(stream(seed, "slope"), route.slope.length, smooth=True)
+    height = route.slope.sd * route.slope.length  # a Gaussian covariance has slope SD sd/length
+    slope = route.slope.mean + np.arctan(height * hills.slope(path.east, path.north, path.heading))
+    altitude = height * hills.at(path.east, path.north) + np.sin(route.slope.mean) * path.x
+    friction, dig_in = zip(*(_draught(scenario, tool, k, names, path, middle, seed) for k, tool in enumerate(scenario.tools)), strict=True) if scenario.tools else ((), ())
+    curve = np.array([_curve(scenario.soils[name]) for name in names])
+    return Terrain(names, path, (tracks[0], tracks[1]), middle, slope, altitude, curve, friction, dig_in)
+
+
+def _curve(soil: Soil) -> Floats:
+    model = CURVES[str(soil.curve["name"])]
+    parameters = {key: float(value) for key, value in soil.curve.items() if key != "name"}
+    slip = np.linspace(0.0, 1.0, CURVE_INTERVALS + 1)
+    # Just above 0: some curves jump to their native intercept there, and none is wanted in adhesion.
+    value = model.positive(slip, model.complete(parameters))
+    return np.stack([np.broadcast_to(value, slip.shape), np.broadcast_to(model.slope(slip, parameters), slip.shape)], axis=1)
+
+
+def _varied(
+    scenario: Scenario, names: tuple[str, ...], soils: Soils, place: tuple[Floats, Floats], seed: int, what: str
+) -> Floats:
+    """A factor of mean 1 (n,) that varies as each soil's ``<what>_variation`` says (log-normal: never negative)."""
+    out = np.ones(len(soils.blend))
+    for k, name in enumerate(names):
+        soil = scenario.soils[name]
+        spread = np.sqrt(np.log1p(getattr(soil, f"{what}_variation") ** 2))
+        if spread > 0:
+            field = Field(stream(seed, f"{what} {name}"), soil.correlation_length)
+            share = soils.share(k)
+            value = on_grid(field, *place, share > 0, _STRIDE)
+            out += share * np.expm1(spread * value - 0.5 * spread**2)
+    return out
+
+
+def _mixed(scenario: Scenario, names: tuple[str, ...], soils: Soils, attribute: str) -> Floats:
+    return sum((soils.share(k) * getattr(scenario.soils[name], attribute) for k, name in enumerate(names)), np.zeros(1))
+
+
+def _track(
+    scenario: Scenario, names: tuple[str, ...], path: Path, offset: float, width: float, seed: int, side: str
+) -> Track:
+    soils = soils_along(scenario.route, names, path, offset, width)
+    place = path.beside(offset)
+    resistance = _varied(scenario, names, soils, place, seed, "resistance")
+    elevation = _mixed(scenario, names, soils, "roughness") * roughness(
+        stream(seed, f"roughness {side}"), len(path.x), path.spacing
+    )
+    elevation = elevation + _clods(scenario, names, soils, path, seed, side)
+    return Track(
+        soils=soils,
+        adhesion_scale=_varied(scenario, names, soils, place, seed, "adhesion"),
+        resistance=resistance * _mixed(scenario, names, soils, "resistance"),
+        slip_resistance=resistance * _mixed(scenario, names, soils, "resistance_slip"),
+        elevation=elevation,
+        gradient=np.gradient(elevation, path.spacing),
+    )
+
+
+def _clods(
+    scenario: Scenario, names: tuple[str, ...], soils: Soils, path: Path, seed: int, side: str
+) -> Floats:
+    out = np.zeros(len(path.x))
+    for k, name in enumerate(names):
+        spec = scenario.soils[name].clods
+        if spec is not None:
+            ones = np.ones(len(path.x))
+            rng = stream(seed, f"clods {name} {side}")
+            out += clods(rng, path.x, spec.density * soils.share(k), spec.height * ones, spec.length * ones)
+    return out
+
+
+def _draught(
+    scenario: Scenario, tool: Tool, index: int, names: tuple[str, ...], path: Path, middle: Soils, seed: int
+) -> tuple[Floats, Floats]:
+    factor = _varied(scenario, names, middle, (path.east, path.north), seed + index, "draught")
+    by_soil = {
+        key: sum((middle.share(k) * _of(getattr(tool, key), name) for k, name in enumerate(names)), np.zeros(1))
+        for key in ("friction", "dig_in")
+    }
+    added = np.interp(path.x, *zip(*tool.added, strict=True)) if tool.added else 0.0
+    return factor * by_soil["friction"], factor * (by_soil["dig_in"] + added)
+
+
+def _of(value: float | dict[str, float], soil: str) -> float:
+    """A tool's figure on a soil; a soil that a tool has no figure for is taken as the mean of those it has."""
+    if isinstance(value, dict):
+        return value[soil] if soil in value else float(np.mean(list(value.values())))
+    return value
