@@ -53,7 +53,7 @@ LOCK_FLAGS := --quiet --upgrade --universal --python-version 3.11 --no-annotate 
 clean: ## remove everything that was built or installed
 	rm -rf $(VENV) build dist src/*.egg-info .mypy_cache .pytest_cache .ruff_cache .import_linter_cache .hypothesis
 	find src tests -name __pycache__ -prune -exec rm -rf {} +
-	rm -f src/terragrip/*.so src/terragrip/*/*.so
+	rm -f src/terragrip/*.so src/terragrip/*/*.so src/terragrip/_kernel_*.py src/terragrip/simulation/_plant.py
 
 # --- the environment -------------------------------------------------------------------------------------------------
 # Each file below is a stamp: it is newer than what it was made from, so a second run does nothing.
@@ -98,6 +98,7 @@ build/kernel/$(1)/%: kernel/tests/%.c $$(patsubst kernel/src/%.c,build/kernel/$(
 	@mkdir -p $$(@D)
 	$$(CC) $$(KERNEL_FLAGS) $(2) -o $$@ $$(filter %.c %.o,$$^) -lm
 endef
+.SECONDARY:
 $(eval $(call kernel_rules,double,))
 $(eval $(call kernel_rules,float,-DTG_FLOAT))
 

@@ -1,8 +1,8 @@
 """The C extensions: what each is compiled from, with which flags, and what Python sees of it.
 
-``setup.py`` and nothing else imports this. Each extension is bound in cffi's API mode. Where Python's own C headers are
-missing (a Debian machine without ``python3-dev``) the same sources become a plain shared library, bound in ABI mode:
-slower by well under a microsecond a call, otherwise the same.
+``setup.py`` and nothing else imports this. Each extension is bound in cffi's API mode. Where Python's own C
+headers are missing (a Debian machine without ``python3-dev``) the same sources become a plain shared library,
+bound in ABI mode: a slower call, the same numbers.
 """
 
 from __future__ import annotations
@@ -19,15 +19,15 @@ from setuptools import Extension
 ROOT = Path(__file__).resolve().parent
 CPU_CHECK = "int tg_cpu_has_avx2(void);"
 
-# -O3 without -ffast-math: NaN means "missing" here. errno and floating-point traps are read by nobody. Contraction to
-# fused multiply-add stays off, so that the portable and the AVX2 build give the same bits.
+# -O3 without -ffast-math: NaN means "missing" here. errno and floating-point traps are read by nobody.
+# Contraction to fused multiply-add stays off, so that the portable and the AVX2 build give the same bits.
 FLAGS = ("-std=c99", "-O3", "-g0", "-fno-math-errno", "-fno-trapping-math", "-ffp-contract=off")
 HIDDEN = "-fvisibility=hidden"
 
 
 @dataclass(frozen=True)
 class Binding:
-    """One extension module: ``name``, its public ``header``, its C ``sources``, extra ``flags``, extra declarations."""
+    """One extension module: its name, public header, C sources, extra flags and extra declarations."""
 
     name: str
     header: Path
@@ -50,7 +50,8 @@ class Binding:
 
 def declarations(header: Path, real: str) -> str:
     """Return the text between ``/* cdef begin */`` and ``/* cdef end */``, with TG_REAL put in."""
-    match = re.search(r"/\* cdef begin \*/(.*?)/\* cdef end \*/", header.read_text(encoding="utf-8"), re.DOTALL)
+    text = header.read_text(encoding="utf-8")
+    match = re.search(r"/\* cdef begin \*/(.*?)/\* cdef end \*/", text, re.DOTALL)
     if match is None:
         raise SystemExit(f"{header}: no /* cdef begin */ ... /* cdef end */ section")
     return match.group(1).replace("TG_REAL", real)
@@ -62,7 +63,7 @@ def bindings() -> list[Binding]:
 
 
 def kernel_bindings() -> list[Binding]:
-    """Return the kernel three times: for any processor, for AVX2 (x86-64 only), and in single precision for the tests."""
+    """Return the kernel's builds: any processor, AVX2 (x86-64 only), and single precision for tests."""
     header = ROOT / "kernel/include/terragrip.h"
     sources = tuple(sorted((ROOT / "kernel/src").glob("*.c")))
     if not sources:
@@ -93,10 +94,11 @@ def python_headers_exist() -> bool:
 def extension(binding: Binding, generated: Path) -> Extension:
     """Write the binding's generated file and return the extension to compile.
 
-    API mode writes C under ``generated``. ABI mode writes the Python module beside the package's own, which loads the
-    shared library named ``<module>_library``.
+    API mode writes C under ``generated``. ABI mode writes the Python module beside the package's own, which
+    loads the shared library named ``<module>_library``.
     """
     api = python_headers_exist()
+    folders = {path.parent.relative_to(ROOT) for path in (binding.header, *binding.sources)}
     name, sources, flags = binding.name, list(binding.sources), [*FLAGS, *binding.flags]
     if api:
         glue = generated / f"{binding.name}.c"
@@ -111,7 +113,7 @@ def extension(binding: Binding, generated: Path) -> Extension:
     return Extension(
         name,
         sources=[str(source.relative_to(ROOT)) for source in sources],
-        include_dirs=sorted({str(path.parent.relative_to(ROOT)) for path in (binding.header, *binding.sources)}),
+        include_dirs=sorted(map(str, folders)),
         define_macros=[*binding.macros, *([] if limited else [("_CFFI_NO_LIMITED_API", None)])],
         extra_compile_args=flags,
         libraries=["m"],
@@ -120,7 +122,7 @@ def extension(binding: Binding, generated: Path) -> Extension:
 
 
 def emit_abi_module(binding: Binding) -> None:
-    """Write the Python module of an ABI-mode binding; it exposes ``ffi`` and ``lib`` as an API-mode module does."""
+    """Write an ABI-mode binding's Python module, with ``ffi`` and ``lib`` as an API-mode module has."""
     path = ROOT / "src" / Path(*binding.name.split(".")).with_suffix(".py")
     binding.ffi(api=False).emit_python_code(str(path))
     with path.open("a", encoding="utf-8") as module:

@@ -14,7 +14,7 @@ from cffi_build import ROOT, bindings, extension
 
 
 class BuildBindings(build_ext):
-    """Compile each extension in a folder of its own: the kernel's files are compiled with several sets of flags."""
+    """Compile each extension in a folder of its own: the kernel's files are compiled with several flags."""
 
     def build_extension(self, ext: Extension) -> None:
         shared = self.build_temp

@@ -1,4 +1,4 @@
-"""What every test shares: a deterministic hypothesis profile, and the way to the data that lies beside the repository."""
+"""What every test shares: a deterministic hypothesis profile, and the way to the shared data."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ SHARED = Path(os.environ.get("TERRAGRIP_SHARED") or Path(__file__).resolve().par
 
 @pytest.fixture
 def shared() -> Callable[[str], Path]:
-    """Return a function from a path inside ``../shared`` to the real path; it skips the test where that is absent."""
+    """Return a function from a path inside ``../shared`` to the real one; where absent it skips the test."""
 
     def locate(inside: str) -> Path:
         path = SHARED / inside

@@ -1,4 +1,4 @@
-"""The choice among the kernel's builds: by processor, overridden by TERRAGRIP_KERNEL, refused where it cannot run."""
+"""The choice among the kernel's builds: by processor, by TERRAGRIP_KERNEL, refused where it cannot run."""
 
 from __future__ import annotations
 

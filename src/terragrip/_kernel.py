@@ -1,7 +1,8 @@
 """The compiled kernel: ``ffi`` and ``lib`` of the fastest build that this processor runs.
 
-Two builds hold the same functions: ``portable`` runs anywhere, ``avx2`` on x86-64 processors with AVX2 and FMA. Both give
-the same bits. The environment variable ``TERRAGRIP_KERNEL`` (``portable`` or ``avx2``) overrides the choice.
+Two builds hold the same functions: ``portable`` runs anywhere, ``avx2`` on x86-64 processors with AVX2 and
+FMA. Both give the same bits. The environment variable ``TERRAGRIP_KERNEL`` (``portable`` or ``avx2``) overrides
+the choice.
 """
 
 from __future__ import annotations
