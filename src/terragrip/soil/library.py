@@ -200,8 +200,8 @@ def _refuse_twins(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
 
 def _soil(name: str, entry: Any, file: str) -> Soil:
     place = f"soils.{name}"
-    if not isinstance(entry, dict) or entry.get("model") not in CURVES:
-        model = entry.get("model") if isinstance(entry, dict) else None
+    model = entry.get("model") if isinstance(entry, dict) else None
+    if not isinstance(model, str) or model not in CURVES:
         raise InputError(
             f"curve model {model!r} is not known",
             file=file,
@@ -213,7 +213,7 @@ def _soil(name: str, entry: Any, file: str) -> Soil:
         raise InputError("has no parameters", file=file, place=place)
     values = {k: _number(v, file, f"{place}.parameters.{k}") for k, v in parameters.items()}
     try:
-        CURVES[entry["model"]].complete({k: v for k, v in values.items() if k != "intercept"})
+        CURVES[model].complete({k: v for k, v in values.items() if k != "intercept"})
     except ValueError as error:
         raise InputError(str(error), file=file, place=place) from None
     interval = {}
@@ -232,7 +232,7 @@ def _soil(name: str, entry: Any, file: str) -> Soil:
     known = {"model", "parameters", "interval", "r2", "nrmse", "bins", "resistance", "spread", "source"}
     return Soil(
         name=name,
-        model=entry["model"],
+        model=model,
         parameters=values,
         interval=interval,
         r2=_optional(entry.get("r2"), file, f"{place}.r2"),

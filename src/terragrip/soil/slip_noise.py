@@ -41,6 +41,7 @@ def correct_slip_noise(
     """Refit `curve` (already fitted to these pairs) with added slip noise and follow the parameters back to none.
 
     slip, adhesion, slip_std: shape (n,); slip_std is the SD of the random part of each slip (a wrong radius is not noise).
+    Good for noise up to about half the lowest bin's slip; beyond it, samples from below the range spoil the trend.
     At most 60 000 pairs are used, evenly taken. A quadratic in the added variance is extrapolated to -1.
     Raises InputError where a noisy set holds too few bins.
     """

@@ -1,0 +1,145 @@
+"""Fits against closed forms, scipy and repeated sampling."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.optimize import least_squares
+
+from soil_campaign import pairs
+from terragrip.errors import InputError
+from terragrip.physics.adhesion import CURVES, PROTOTYPE
+from terragrip.soil.bins import BinSettings
+from terragrip.soil.fit import AdhesionCurve
+
+
+def test_default_fit_is_the_closed_form():
+    slip, mu, run = pairs(1, a=0.85)
+    curve = AdhesionCurve(bootstrap=0).fit(slip, mu, run)
+    used = curve.bins_.used
+    g = CURVES["exponential"].value(curve.bins_.slip[used], {**PROTOTYPE, "a": 1.0})
+    mean = curve.bins_.mean[used]
+    assert curve.parameters_["a"] == pytest.approx(np.sum(mean * g) / np.sum(g**2), rel=1e-8)
+    off = mean - curve.parameters_["a"] * g
+    assert curve.r2_ == pytest.approx(1 - np.sum(off**2) / np.sum((mean - mean.mean()) ** 2))
+    assert curve.nrmse_ == pytest.approx(np.sqrt(np.mean(off**2)) / (mean.max() - mean.min()))
+
+
+@pytest.mark.parametrize(
+    "name", ["effective", "burckhardt", "pacejka", "schreiber_kutzbach", "brixius", "wismer_luth"]
+)
+def test_fits_reach_scipys_minimum(name):
+    slip, mu, run = pairs(2, "effective", A=0.6, k=12.0, d=0.3)
+    curve = AdhesionCurve(name, bootstrap=0).fit(slip, mu, run)
+    model, used = CURVES[name], curve.bins_.used
+
+    def off(x):
+        return (
+            model.value(curve.bins_.slip[used], dict(zip(model.names, x, strict=True)))
+            - curve.bins_.mean[used]
+        )
+
+    lower, upper = [p.lower for p in model.parameters], [p.upper for p in model.parameters]
+    peer = min(
+        (
+            least_squares(
+                off, np.clip([p.start * f for p in model.parameters], lower, upper), bounds=(lower, upper)
+            )
+            for f in (0.5, 1, 2)
+        ),
+        key=lambda r: r.cost,
+    )
+    ours = np.sum(off([curve.parameters_[n] for n in model.names]) ** 2)
+    assert ours <= 2 * peer.cost * (1 + 1e-4) + 1e-12
+
+
+@pytest.mark.parametrize(
+    ("name", "truth", "asked"),
+    [("exponential", {"a": 0.85}, "a"), ("effective", {"A": 0.5, "k": 11.0, "d": 0.1}, "A")],
+)
+def test_intervals_hold_in_85_of_100_repetitions(name, truth, asked):
+    held = 0
+    for seed in range(5000, 5100):
+        slip, mu, run = pairs(seed, name, runs=12, samples=250, **truth)
+        low, high = AdhesionCurve(name, bootstrap=300).fit(slip, mu, run).interval_[asked]
+        held += low <= truth[asked] <= high
+    assert held >= 85
+
+
+def test_interval_comes_from_runs_not_samples():
+    slip, mu, run = pairs(3, a=0.85, run_spread=0.15, scatter=0.01)
+    by_run = AdhesionCurve().fit(slip, mu, run).interval_["a"]
+    by_sample = AdhesionCurve().fit(slip, mu, np.arange(slip.size) % 400).interval_["a"]
+    assert by_run[1] - by_run[0] > 4 * (by_sample[1] - by_sample[0])
+
+
+def test_one_run_gives_no_interval_and_says_so():
+    slip, mu, _ = pairs(4, a=0.85)
+    curve = AdhesionCurve().fit(slip, mu)
+    assert curve.interval_ == {}
+    assert "no interval" in curve.notes_[0]
+    with pytest.raises(ValueError, match="without a bootstrap"):
+        curve.band([0.1])
+
+
+def test_all_four_parameters_warn_and_give_the_effective_ones():
+    slip, mu, run = pairs(5, a=0.85)
+    curve = AdhesionCurve(fixed="free").fit(slip, mu, run)
+    badge = curve.identifiability_
+    assert not badge.identifiable
+    assert badge.condition > 1e5
+    assert set(curve.interval_) == {"A", "k", "d"}
+    low, high = curve.interval_["A"]
+    assert low <= 0.85 * 0.48 <= high
+    assert badge.twin is not None
+    grid = np.linspace(0.05, 0.6, 100)
+    twin = CURVES["exponential"].value(grid, badge.twin)
+    assert np.abs(twin - curve.predict(grid)).max() < 2e-4
+    assert "same curve" in curve.notes_[0]
+
+
+def test_net_traction_needs_its_intercept():
+    slip, mu, run = pairs(6, a=0.85)
+    with_rho = AdhesionCurve(intercept=True).fit(slip, mu - 0.12, run)
+    assert with_rho.parameters_["intercept"] == pytest.approx(-0.12, abs=0.01)
+    assert with_rho.r2_ > AdhesionCurve().fit(slip, mu - 0.12, run).r2_
+
+
+def test_weights_follow_the_count():
+    slip, mu, run = pairs(7, a=0.85)
+    keep = (slip < 0.3) | (np.arange(slip.size) % 40 == 0)
+    plain = AdhesionCurve(bootstrap=0).fit(slip[keep], mu[keep], run[keep])
+    weighted = AdhesionCurve(bootstrap=0, weights="count").fit(slip[keep], mu[keep], run[keep])
+    assert plain.parameters_["a"] != weighted.parameters_["a"]
+    assert weighted.parameters_["a"] == pytest.approx(0.85, abs=0.06)
+
+
+def test_band_holds_the_curve():
+    slip, mu, run = pairs(8, a=0.85)
+    curve = AdhesionCurve().fit(slip, mu, run)
+    low, high = curve.band(np.linspace(0.05, 0.6, 30))
+    assert np.all(low <= curve.predict(np.linspace(0.05, 0.6, 30)))
+    assert np.all(high >= curve.predict(np.linspace(0.05, 0.6, 30)))
+
+
+@pytest.mark.parametrize(
+    "slip",
+    [np.full(500, 0.2), np.linspace(-0.5, -0.1, 500), np.full(500, np.nan), np.zeros(0)],
+    ids=["one bin", "negative slip only", "NaN", "nothing"],
+)
+def test_nothing_comes_from_nothing(slip):
+    with pytest.raises(InputError, match="too few to fit a"):
+        AdhesionCurve().fit(slip, np.full(slip.size, 0.3))
+
+
+def test_calls_that_cannot_be():
+    for bad in ({"model": "cubic"}, {"weights": "much"}, {"fixed": "some"}, {"fixed": {"zz": 1.0}}):
+        with pytest.raises(InputError):
+            AdhesionCurve(**bad).fit(np.linspace(0, 0.6, 2000), np.linspace(0, 0.6, 2000))
+
+
+def test_grass_has_its_own_range():
+    slip, mu, run = pairs(9, a=0.4)
+    curve = AdhesionCurve(bins=BinSettings(upper=0.40)).fit(slip, mu, run)
+    assert np.nanmax(curve.bins_.slip) < 0.40
+    assert curve.to_dict()["settings"]["upper"] == 0.40

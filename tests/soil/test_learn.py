@@ -1,0 +1,84 @@
+"""From tables of estimates to a library: transitions and events stay out, what is missing is said."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from terragrip.errors import InputError
+from terragrip.physics.adhesion import CURVES
+from terragrip.soil.learn import learn_soils, usable_pairs
+from terragrip.soil.transitions import settled
+
+WHEELS = ("l", "r")
+
+
+def table(seed, upper=0.55):
+    """A drive of 60 m over `fine`, `coarse` and an unlabelled end; a spell of wrong values flagged as an event."""
+    rng = np.random.default_rng(seed)
+    n = 6000
+    distance = np.linspace(0, 60, n)
+    soil = np.where(distance < 25, "fine", np.where(distance < 50, "coarse", "")).astype(object)
+    event = np.full(n, "", dtype=object)
+    event[1000:1200] = "stuck"
+    columns = {"distance": distance, "soil": soil, "event": event}
+    columns |= {"soil_resistance": np.full(n, 0.1), "ground_speed": np.full(n, 0.6)}
+    for w in WHEELS:
+        slip = rng.uniform(0.0, upper, n)
+        a = np.where(soil == "coarse", 0.91, 0.85) * (1 + 0.03 * rng.standard_normal())
+        mu = CURVES["exponential"].value(slip, {"a": a}) + 0.02 * rng.standard_normal(n)
+        mu[1000:1200] = 5.0
+        mu[(distance > 25) & (distance < 27.5)] = -5.0
+        columns |= {f"slip_{w}": slip, f"adhesion_{w}": mu, f"slip_{w}_std": np.full(n, 0.003)}
+    return columns
+
+
+def test_settled_is_the_geometry():
+    distance = np.array([0.0, 1, 2, 3, 4, 5, 6, 7])
+    soil = np.array(["a", "a", "b", "b", "b", "", "", "a"], dtype=object)
+    np.testing.assert_array_equal(settled(distance, soil, 1.5), [1, 1, 0, 0, 1, 0, 0, 0])
+    assert settled([], [], 1.0).size == 0
+
+
+def test_learned_soils_hold_the_truth_though_flagged_rows_are_wild():
+    pairs = [p for seed in range(8) for p in usable_pairs(table(seed), WHEELS, 2.6, f"run {seed}")]
+    campaign = learn_soils(pairs, mass=139)
+    assert set(campaign.soils) == {"fine", "coarse"}
+    for name, truth in (("fine", 0.85), ("coarse", 0.91)):
+        learned = campaign.soils[name]
+        assert learned.soil.parameters["a"] == pytest.approx(truth, rel=0.03)
+        low, high = learned.soil.interval["a"]
+        assert low < truth < high
+        assert learned.curve.r2_ > 0.97
+        assert learned.soil.resistance[0] == pytest.approx(0.1)
+        assert learned.gaps[-1].slip[1] == pytest.approx(0.60)
+    assert any("no data between" in words for words in campaign.words)
+    library = campaign.library({"files": 8})
+    assert library["fine"].to_dict()["slip_noise"]["slip_std"] == pytest.approx(0.003)
+
+
+def test_pull_of_the_advice_brings_the_vehicle_there():
+    pairs = [p for seed in range(4) for p in usable_pairs(table(seed, upper=0.3), WHEELS, 2.6, f"run {seed}")]
+    gap = learn_soils(pairs, mass=139).soils["fine"].gaps[0]
+    low, high = gap.slip
+    assert (low, high) == pytest.approx((0.30, 0.60))
+    mu = CURVES["exponential"].value(np.array([low, high]), {"a": 0.85})
+    assert gap.pull == pytest.approx(tuple((mu - 0.1) * 139 * 9.81), rel=0.05)
+
+
+def test_no_labels():
+    columns = table(1)
+    columns["soil"] = np.full(len(columns["soil"]), "", dtype=object)
+    assert usable_pairs(columns, WHEELS, 2.6, "run") == []
+    with pytest.raises(InputError, match="no sample has a soil label"):
+        learn_soils([])
+
+
+def test_a_soil_that_cannot_be_fitted_is_named_not_invented():
+    columns = table(1)
+    for w in WHEELS:
+        columns[f"slip_{w}"] = np.where(columns["soil"] == "coarse", -0.2, columns[f"slip_{w}"])
+    campaign = learn_soils(usable_pairs(columns, WHEELS, 2.6, "run"))
+    assert "coarse" in campaign.not_fitted
+    assert "coarse" not in campaign.soils
+    assert any(w.startswith("coarse: not fitted") for w in campaign.words)

@@ -1,0 +1,122 @@
+"""soils.json: round trip, merging, comparing, and every way a file can be wrong."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from soil_campaign import pairs
+from terragrip.errors import InputError
+from terragrip.soil.digitised import read_points
+from terragrip.soil.fit import AdhesionCurve
+from terragrip.soil.library import Soil, SoilLibrary
+from terragrip.soil.literature import brixius_soil, literature_soils, paper_soils
+
+
+def fitted(name="fine", seed=1):
+    return Soil.from_curve(
+        name, AdhesionCurve(bootstrap=200).fit(*pairs(seed, a=0.85)), "simulated", (0.12, 0.01)
+    )
+
+
+def test_round_trip(tmp_path):
+    library = SoilLibrary({"fine": fitted()}, {"files": ["a.parquet"]}, {"wet": "too few bins"})
+    library.write(tmp_path / "soils.json")
+    again = SoilLibrary.load(tmp_path / "soils.json")
+    assert again.to_dict() == library.to_dict()
+    np.testing.assert_array_equal(again["fine"].value([0.1, -0.1]), library["fine"].value([0.1, -0.1]))
+    raw = json.loads((tmp_path / "soils.json").read_text())["soils"]["fine"]
+    assert {"model", "parameters", "interval", "r2", "nrmse", "bins"} <= set(raw)
+    assert set(raw["bins"][0]) == {"slip", "mean", "std", "count"}
+
+
+def test_literature_is_as_printed():
+    soils = literature_soils()
+    assert len(soils) == 12
+    assert soils["hard"].value(0.2) == pytest.approx(
+        1.42 * (1 - 0.52 * np.exp(0.002) - 0.48 * np.exp(-2.272))
+    )
+    assert soils["ice"].value(0.1) == pytest.approx(0.05, abs=1e-9)
+    assert all(soil.source for soil in soils.values())
+    assert brixius_soil(900e3, 0.1, 0.4, 340).resistance[0] > 0
+    with pytest.raises(InputError, match="positive"):
+        brixius_soil(-1, 0.1, 0.4, 340)
+
+
+def test_merge_refuses_twins_unless_told():
+    with pytest.raises(InputError, match="both libraries hold a soil 'fine'"):
+        paper_soils().merge(SoilLibrary({"fine": fitted()}))
+    assert paper_soils().merge(SoilLibrary({"fine": fitted()}), "keep")["fine"].source.startswith("Kobelski")
+    assert paper_soils().merge(SoilLibrary({"fine": fitted()}), "replace")["fine"].source == "simulated"
+    with pytest.raises(InputError):
+        paper_soils().merge(paper_soils(), "both")
+
+
+def test_compare_says_how_far_apart():
+    row = SoilLibrary({"fine": fitted()}).compare(paper_soils())[0]
+    assert row["soil"] == "fine"
+    assert row["largest"] < 0.05
+    other = SoilLibrary({"fine": fitted(seed=2)})
+    assert SoilLibrary({"fine": fitted()}).compare(other)[0]["intervals_meet"] == {"a": True}
+
+
+BAD = {
+    "two soils of one name": '{"soils": {"a": {"model": "exponential", "parameters": {"a": 1}}, "a": {}}}',
+    "newer version": '{"version": 9, "soils": {}}',
+    "not JSON": "[",
+    "empty": "",
+    "no soils": '{"soil": {}}',
+    "unknown model": '{"soils": {"a": {"model": "x"}}}',
+    "unknown parameter": '{"soils": {"a": {"model": "exponential", "parameters": {"q": 1}}}}',
+    "text for a number": '{"soils": {"a": {"model": "exponential", "parameters": {"a": "x"}}}}',
+    "NaN": '{"soils": {"a": {"model": "exponential", "parameters": {"a": NaN}}}}',
+    "interval of three": '{"soils": {"a": {"model": "exponential", "parameters": {"a": 1}, "interval": {"a": [1, 2, 3]}}}}',
+    "bins that are none": '{"soils": {"a": {"model": "exponential", "parameters": {"a": 1}, "bins": 3}}}',
+    "points that are not numbers": '{"soils": {"a": {"model": "exponential", "parameters": {"a": 1}, "bins": [{"slip": "x"}]}}}',
+}
+
+
+@pytest.mark.parametrize("text", BAD.values(), ids=BAD)
+def test_bad_libraries_are_named_in_one_line(tmp_path, text):
+    (tmp_path / "s.json").write_text(text)
+    with pytest.raises(InputError) as caught:
+        SoilLibrary.load(tmp_path / "s.json")
+    assert "\n" not in str(caught.value)
+    assert "s.json" in str(caught.value)
+
+
+@given(st.recursive(st.none() | st.booleans() | st.floats(allow_nan=False) | st.text(max_size=5), lambda x: st.lists(x, max_size=3)
+                    | st.dictionaries(st.sampled_from(["soils", "a", "model", "parameters", "bins", "version", "interval", "resistance"]),
+                                      x, max_size=4), max_leaves=12))  # fmt: skip
+def test_any_json_is_a_library_or_an_input_error(tmp_path_factory, data):
+    path = tmp_path_factory.mktemp("any") / "s.json"
+    path.write_text(json.dumps({"soils": {"x": data}} if isinstance(data, dict) else data))
+    try:
+        assert isinstance(SoilLibrary.load(path), SoilLibrary)
+    except InputError as error:
+        assert "s.json" in str(error)
+
+
+def test_digitised_points(tmp_path):
+    (tmp_path / "p.csv").write_text("clay,,sand,\nX,Y,X,Y\n5,0.1,7,0.2\n60,.5,30,.4\n20,.3,,\n")
+    clay, sand = read_points(tmp_path / "p.csv")
+    assert (clay.name, sand.name) == ("clay", "sand")
+    np.testing.assert_allclose(clay.slip, [0.05, 0.2, 0.6])
+    assert "per cent" in clay.notes[0]
+    (tmp_path / "q.csv").write_text("0,05;0,1\n0,2;0,3\n")
+    np.testing.assert_allclose(read_points(tmp_path / "q.csv")[0].slip, [0.05, 0.2])
+
+
+@pytest.mark.parametrize(
+    ("text", "say"),
+    [("", "no numbers"), ("a,b\n", "no numbers"), ("1,2\n3,x\n", "row 2, column 2"), ("1,2,3\n4,5,6\n", "3 columns"),
+     ("0.1,0.2\n", "1 points"), ("500,1\n600,2\n", "slip lies between"), ("0.1,inf\n0.2,1\n", "not a number")],
+)  # fmt: skip
+def test_digitised_points_that_are_none(tmp_path, text, say):
+    (tmp_path / "p.csv").write_text(text)
+    with pytest.raises(InputError, match=say):
+        read_points(tmp_path / "p.csv")
