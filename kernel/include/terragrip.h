@@ -203,6 +203,7 @@ typedef struct {
 
 typedef struct { /* spreads (1 SD) of constants that the data cannot tell; 0 = known */
     tg_real drive_torque_gain;      /* relative, each wheel its own */
+    tg_real drive_torque_gain_common; /* relative, all wheels together */
     tg_real drive_torque_offset;    /* N m, each wheel its own */
     tg_real drawbar_gain;           /* relative */
     tg_real drawbar_offset;         /* N */
@@ -227,6 +228,7 @@ typedef struct {
     tg_real lateral_share[8];       /* wheel, s^2/m: part of its axle's load it loses per m/s^2 to the left */
     tg_real center_of_gravity_height; /* m */
     tg_real hitch_height;           /* m */
+    tg_real rolling_radius[8];      /* wheel, m: travel per radian; machine.radius is the torque arm */
     tg_real offset[30], gain[30];   /* calibration: value = (raw - offset) / gain */
     tg_real noise[30];              /* SD of each channel after calibration */
     tg_real held_period[30];        /* s; > 0: the channel repeats its last value between updates this far apart */
@@ -281,8 +283,8 @@ typedef struct { /* one lane a mode of the bank */
 
 typedef struct { /* sensitivities to ln a_j, one lane a parameter */
     tg_real scale[TG_ROWS];              /* a_j */
-    tg_real dx[TG_MAX_STATES][TG_ROWS];
-    tg_real dP[TG_PAIRS][TG_ROWS];       /* the triangle row >= column of dP, row by row */
+    tg_real dx[TG_MAX_STATES * TG_ROWS]; /* state by parameter, `stride` apart */
+    tg_real dP[TG_PAIRS * TG_ROWS];      /* the triangle row >= column, row by row, by parameter */
     tg_real C[TG_MAX_WHEELS + 1][TG_MAX_WHEELS + 1]; /* mean of the innovations' products */
     int32_t seen[TG_MAX_WHEELS + 1][TG_MAX_WHEELS + 1];
     int32_t updates;                     /* with every wheel and ground speed */
@@ -301,7 +303,9 @@ struct tg_filter {
     tg_tuning tuning;
     int32_t wheels, states, channels, stride;
     double clock;                        /* s, the sum of dt */
-    tg_real stiffness;                   /* 1/s, largest r rho_w/J */
+    tg_real drag[8], arm[8];             /* r rho_w/J, 1/s, and r/J, 1/(kg m) */
+    tg_real inverse_inertia[8], inverse_mass;
+    tg_real stiffness;                   /* 1/s, largest drag */
     tg_real slope[2], cosine[2], sine[2]; /* of the last two slopes */
     tg_real walk[TG_ROWS];
     tg_real x[TG_ROWS], d[TG_ROWS], u[TG_MAX_STATES * TG_ROWS]; /* without a bank */

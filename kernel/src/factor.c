@@ -1,0 +1,46 @@
+/* Between covariances and their factors P = U diag(d) U'. */
+#include "factor.h"
+
+/* Bierman 1977, III.4: upper triangular factors of a positive definite matrix, row-major with `rows` columns. */
+tg_status tgi_factorise(int rows, int stride, const tg_real *P, tg_real *u, tg_real *d)
+{
+    tg_real A[TG_MAX_STATES][TG_MAX_STATES];
+    for (int i = 0; i < rows; i++)
+        for (int j = 0; j < rows; j++) {
+            A[i][j] = (P[i * rows + j] + P[j * rows + i]) / 2;
+            if (!tgi_finite(A[i][j])) return TG_NOT_FINITE;
+        }
+    for (int j = rows - 1; j >= 0; j--) {
+        if (!(A[j][j] > 0)) return TG_NOT_POSITIVE;
+        d[j] = A[j][j];
+        for (int i = 0; i < stride; i++) u[j * stride + i] = i < j ? A[i][j] / d[j] : i == j;
+        for (int k = 0; k < j; k++)
+            for (int i = 0; i <= k; i++) A[i][k] -= u[j * stride + i] * d[j] * u[j * stride + k];
+    }
+    return TG_OK;
+}
+
+TG_INLINE void covariance(int rows, int stride, const tg_real *u, const tg_real *d, tg_real *P)
+{
+    const int lanes = stride / TG_LANES;
+    for (int i = 0; i < rows; i++) { /* row i of P: sum over the columns that reach it */
+        tg_lanes sum[TG_MOST_LANES];
+        for (int l = 0; l < lanes; l++) sum[l] = lanes_all(0);
+        for (int k = i; k < rows; k++) {
+            const tg_lanes v = lanes_all(d[k] * u[k * stride + i]);
+            for (int l = 0; l < lanes; l++) sum[l] = lanes_mul_add(v, lanes_load(u + k * stride + TG_LANES * l), sum[l]);
+        }
+        for (int l = 0; l < lanes; l++) lanes_store(P + i * stride + TG_LANES * l, sum[l]);
+    }
+}
+
+/* P by rows of `stride`; only columns 0..i of row i hold, the others repeat them in part. */
+void tgi_covariance(int rows, int stride, const tg_real *u, const tg_real *d, tg_real *P)
+{
+    switch (rows) {
+    case 4: covariance(4, 4, u, d, P); break;
+    case 6: covariance(6, 8, u, d, P); break;
+    case 10: covariance(10, 12, u, d, P); break;
+    default: covariance(rows, stride, u, d, P); break;
+    }
+}

@@ -1,0 +1,355 @@
+/* The filter: set-up, one step, restart, moments. Engines and policies are in files of their own. */
+#include "factor.h"
+#include "plan.h"
+
+size_t tg_filter_size(void) { return sizeof(tg_filter); }
+
+/* Settings of PHYSICS 6; `walk` stays 0 and is the caller's. */
+tg_tuning tg_default_tuning(void)
+{
+    tg_tuning t;
+    memset(&t, 0, sizeof t);
+    t.engine = TG_EXACT;
+    t.policy = TG_FIXED;
+    t.alpha = 1;
+    t.beta = 2;
+    t.rate = (tg_real)0.05;
+    t.memory = 3;
+    t.stride = 5;
+    t.window = (tg_real)0.5;
+    t.wheel_speed_min = (tg_real)0.5;
+    t.ground_speed_min = (tg_real)0.1;
+    t.scales[0] = (tg_real)0.03;
+    t.scales[1] = (tg_real)0.3;
+    t.scales[2] = 3;
+    t.scales[3] = 30;
+    t.dwell = 5;
+    t.mix_stride = 5;
+    return t;
+}
+
+static int positive(tg_real x) { return x > 0 && tgi_finite(x); }
+static int not_negative(tg_real x) { return x >= 0 && tgi_finite(x); }
+
+static int machine_is_sound(const tg_machine *m)
+{
+    if (m->wheels < 1 || m->wheels > TG_MAX_WHEELS) return 0;
+    if (!positive(m->mass) || !positive(m->gravity) || !not_negative(m->tire_rolling_resistance)) return 0;
+    for (int i = 0; i < m->wheels; i++)
+        if (!positive(m->radius[i]) || !positive(m->inertia[i]) || !not_negative(m->bearing_resistance[i])) return 0;
+    return 1;
+}
+
+static int tuning_is_sound(const tg_tuning *t, int n)
+{
+    if (t->engine != TG_EXACT && t->engine != TG_UNSCENTED) return 0;
+    if (t->policy < TG_FIXED || t->policy > TG_BANK || (t->policy == TG_BANK && t->engine != TG_EXACT)) return 0;
+    for (int e = 0; e < TG_TWICE(n); e++)
+        if (!not_negative(t->walk[e])) return 0;
+    if (!not_negative(t->huber) || !not_negative(t->rate) || !positive(t->memory) || t->stride < 1) return 0;
+    if (!positive(t->window) || !positive(t->wheel_speed_min) || !positive(t->ground_speed_min)) return 0;
+    if ((t->supervisor != 0 && t->supervisor != 1) || !positive(t->dwell) || t->mix_stride < 1) return 0;
+    for (int b = 0; b < TG_MODES; b++)
+        if (!positive(t->scales[b])) return 0;
+    /* weights of the sigma points: the spread positive, neither centre weight negative */
+    const tg_real spread = t->alpha * t->alpha * ((tg_real)TG_TWICE(n) + t->kappa), centre = spread - (tg_real)TG_TWICE(n);
+    return positive(spread) && tgi_finite(t->beta) && centre >= 0 && centre / spread + 1 - t->alpha * t->alpha + t->beta >= 0;
+}
+
+tg_status tg_filter_init(tg_filter *f, const tg_machine *machine, const tg_tuning *tuning, const tg_real *x0, const tg_real *P0)
+{
+    if (!f || !machine || !tuning || !x0 || !P0) return TG_BAD_ARGUMENT;
+    if (!machine_is_sound(machine) || !tuning_is_sound(tuning, machine->wheels)) return TG_BAD_ARGUMENT;
+    const int n = machine->wheels, rows = TG_TWICE(n), stride = tgi_stride(n);
+    tg_real P[TG_MAX_STATES * TG_MAX_STATES], d[TG_ROWS] = {0}, u[TG_MAX_STATES * TG_ROWS] = {0};
+    for (int e = 0; e < rows; e++) {
+        if (!tgi_finite(x0[e])) return TG_NOT_FINITE;
+        for (int k = 0; k < rows; k++) P[tgi_row(n, e) * rows + tgi_row(n, k)] = P0[e * rows + k];
+    }
+    const tg_status status = tgi_factorise(rows, stride, P, u, d);
+    if (status != TG_OK) return status;
+    memset(f, 0, sizeof *f);
+    f->machine = *machine;
+    f->tuning = *tuning;
+    f->wheels = n;
+    f->states = rows;
+    f->channels = n + 2;
+    f->stride = stride;
+    f->inverse_mass = 1 / machine->mass;
+    for (int i = 0; i < n; i++) {
+        f->inverse_inertia[i] = 1 / machine->inertia[i];
+        f->arm[i] = machine->radius[i] * f->inverse_inertia[i];
+        f->drag[i] = f->arm[i] * machine->bearing_resistance[i];
+        if (f->drag[i] > f->stiffness) f->stiffness = f->drag[i];
+    }
+    f->cosine[0] = f->cosine[1] = 1; /* of slope 0 */
+    for (int e = 0; e < rows; e++) {
+        f->walk[tgi_row(n, e)] = tuning->walk[e];
+        f->x[tgi_row(n, e)] = x0[e];
+        f->x_prior[tgi_row(n, e)] = x0[e];
+    }
+    memcpy(f->d, d, sizeof d);
+    memcpy(f->u, u, sizeof u);
+    if (tuning->policy == TG_BANK)
+        tgi_bank_init(f);
+    else
+        for (int j = 0; j < rows; j++) f->policy.adaptation.scale[j] = 1;
+    return TG_OK;
+}
+
+/* Q of this step (PHYSICS 6): [I + gamma (A - I)] Q0 on top of the inputs' noise. */
+static void scale_noise(const tg_filter *f, tg_real gamma, tgi_plan *plan)
+{
+    const tg_real *const a = f->policy.adaptation.scale, dt = plan->passage.dt;
+    for (int j = 0; j < f->states; j++) plan->passage.q[j] += (1 + gamma * (a[j] - 1)) * f->walk[j] * dt;
+}
+
+/* ln N of the residuals, which are independent of each other. */
+static void judge(tgi_result *result)
+{
+    tg_real nis = 0, volume = 1, logs = 0;
+    for (int c = 0; c < result->taken; c++) {
+        nis += result->residual[c] * result->residual[c] / result->residual_variance[c];
+        volume *= result->residual_variance[c];
+    }
+    if (volume > TG_TINY && volume < 1 / TG_TINY)
+        logs = tgi_log(volume);
+    else
+        for (int c = 0; c < result->taken; c++) logs += tgi_log(result->residual_variance[c]);
+    result->nis = nis;
+    result->log_likelihood = -(nis + logs + (tg_real)result->taken * TG_LN_2PI) / 2;
+}
+
+TG_INLINE int result_is_finite(const tgi_result *result, const int n, const int stride)
+{
+    tg_lanes zero[2] = {lanes_all(0), lanes_all(result->nis * 0 + result->log_likelihood * 0)};
+    for (int i = 0; i < TG_TWICE(n) * stride; i += TG_LANES)
+        zero[0] = lanes_mul_add(lanes_load(result->u + i), lanes_all(0), zero[0]);
+    for (int i = 0; i < stride; i += TG_LANES) {
+        zero[1] = lanes_mul_add(lanes_load(result->x + i), lanes_all(0), zero[1]);
+        if (i < TG_TWICE(n)) zero[0] = lanes_mul_add(lanes_load(result->d + i), lanes_all(0), zero[0]);
+    }
+    return lanes_sum(lanes_add(zero[0], zero[1])) == 0;
+}
+
+TG_INLINE void commit(tg_filter *f, const tgi_plan *plan, const tgi_result *result, const int n, const int stride)
+{
+    for (int i = 0; i < TG_TWICE(n) * stride; i += TG_LANES) lanes_store(f->u + i, lanes_load(result->u + i));
+    for (int i = 0; i < stride; i += TG_LANES) {
+        lanes_store(f->x + i, lanes_load(result->x + i));
+        lanes_store(f->d + i, lanes_load(result->d + i));
+        lanes_store(f->x_prior + i, lanes_load(result->x_prior + i));
+    }
+    for (int c = 0; c < result->taken; c++) {
+        f->channel[c] = result->channel[c];
+        for (int i = 0; i < stride; i += TG_LANES) lanes_store(f->gain[c] + i, lanes_load(result->gain[c] + i));
+    }
+    for (int i = 0; i <= n; i++) f->accelerometer[i] = plan->accelerometer[i];
+}
+
+/* What bank and single filter remember alike. */
+static void remember(tg_filter *f, const tgi_call *call, const tgi_plan *plan, int taken)
+{
+    f->passage = plan->passage;
+    f->taken = taken;
+    f->clock += (double)call->dt;
+    f->slope[0] = call->before->slope;
+    f->cosine[0] = plan->cosine[0];
+    f->sine[0] = plan->sine[0];
+    if (!call->y || !plan->present[f->wheels + 1]) return;
+    f->slope[1] = call->now->slope;
+    f->cosine[1] = plan->cosine[1];
+    f->sine[1] = plan->sine[1];
+}
+
+static void report(const tg_filter *f, const tgi_plan *plan, const tgi_result *result, tg_real gamma, tg_step *out)
+{
+    memset(out, 0, sizeof *out);
+    out->channels = result->taken;
+    out->nis = result->nis;
+    out->log_likelihood = result->log_likelihood;
+    out->gamma = gamma;
+    for (int o = 0; o < f->channels; o++) {
+        const int c = tgi_channel(f->wheels, o), present = plan->count && plan->present[o];
+        out->innovation[c] = present ? result->innovation[o] : (tg_real)NAN;
+        out->innovation_variance[c] = present ? result->variance[o] : 0;
+        out->weight[c] = present ? result->weight[o] : 1;
+    }
+    for (int e = 0; e < f->states; e++) out->adaptation[e] = f->policy.adaptation.scale[tgi_row(f->wheels, e)];
+}
+
+static tg_status advance_one(tg_filter *f, const tgi_call *call, tgi_plan *plan, tg_step *out)
+{
+    const int32_t policy = f->tuning.policy, n = f->wheels;
+    const tg_real gamma = policy == TG_FIXED      ? 0
+                          : policy == TG_ADAPTIVE ? 1
+                          : call->y               ? tgi_supervise(f, plan, call->now)
+                                                  : f->supervisor.gamma;
+    tgi_result result;
+    scale_noise(f, gamma, plan);
+    plan->gamma = gamma;
+    if (f->tuning.engine == TG_EXACT)
+        tgi_exact_step(f, plan, &result);
+    else
+        tgi_unscented_step(f, plan, &result);
+    judge(&result);
+#define FINITE(n, stride) finite = result_is_finite(&result, n, stride)
+    int finite = 0;
+    TG_BY_WHEELS(n, FINITE)
+#undef FINITE
+    if (!finite) return TG_DIVERGED;
+    tg_step step;
+    if (out) report(f, plan, &result, gamma, &step);
+    if (policy != TG_FIXED) {
+        const tg_status status = tgi_adapt(f, plan, &result);
+        if (status != TG_OK) return status;
+    }
+    if (policy == TG_SUPERVISED && call->y) tgi_supervisor_remember(f, plan, call->now);
+    if (out) *out = step;
+#define COMMIT(n, stride) commit(f, plan, &result, n, stride)
+    TG_BY_WHEELS(n, COMMIT)
+#undef COMMIT
+    remember(f, call, plan, result.taken);
+    return TG_OK;
+}
+
+static tg_status advance(tg_filter *f, const tgi_call *call, tg_step *out)
+{
+    tgi_plan plan;
+    tg_status status = TG_OK;
+#define PLAN(n, stride) status = plan_step(f, call, &plan, n)
+    TG_BY_WHEELS(f->wheels, PLAN)
+#undef PLAN
+    if (status != TG_OK) return status;
+    return advance_one(f, call, &plan, out);
+}
+
+tg_status tg_filter_step(tg_filter *f, tg_real dt, const tg_input *before, const tg_input *now, const tg_real *q_input,
+                         const tg_real *y, const tg_real *r, tg_step *out)
+{
+    if (!f || !before || !now || !y || !r) return TG_BAD_ARGUMENT;
+    const tgi_call call = {dt, before, now, q_input, y, r};
+    return advance(f, &call, out);
+}
+
+tg_status tg_filter_predict(tg_filter *f, tg_real dt, const tg_input *before, const tg_real *q_input)
+{
+    if (!f || !before) return TG_BAD_ARGUMENT;
+    const tgi_call call = {dt, before, before, q_input, NULL, NULL};
+    return advance(f, &call, NULL);
+}
+
+/* Row order to state order. */
+static void to_state_order(int n, int stride, const tg_real *rows_x, const tg_real *rows_P, tg_real *x, tg_real *P)
+{
+    const int states = TG_TWICE(n);
+    for (int e = 0; e < states; e++) {
+        const int i = tgi_row(n, e);
+        if (x) x[e] = rows_x[i];
+        if (!P) continue;
+        for (int k = 0; k <= e; k++) {
+            const int j = tgi_row(n, k);
+            P[e * states + k] = P[k * states + e] = i > j ? rows_P[i * stride + j] : rows_P[j * stride + i];
+        }
+    }
+}
+
+tg_status tg_filter_moments(const tg_filter *f, tg_real *x, tg_real *P)
+{
+    if (!f) return TG_BAD_ARGUMENT;
+    tg_real rows_x[TG_ROWS], rows_P[TG_MAX_STATES * TG_ROWS];
+    if (f->tuning.policy == TG_BANK) {
+        tgi_bank_moments(f, rows_x, P ? rows_P : NULL);
+        to_state_order(f->wheels, f->stride, rows_x, rows_P, x, P);
+        return TG_OK;
+    }
+    if (P) tgi_covariance(f->states, f->stride, f->u, f->d, rows_P);
+    to_state_order(f->wheels, f->stride, f->x, rows_P, x, P);
+    return TG_OK;
+}
+
+tg_status tg_filter_factors(const tg_filter *f, int32_t mode, tg_real *U, tg_real *D)
+{
+    if (!f || !U || !D) return TG_BAD_ARGUMENT;
+    const int bank = f->tuning.policy == TG_BANK;
+    if (mode < 0 || mode >= (bank ? TG_MODES : 1)) return TG_BAD_ARGUMENT;
+    for (int k = 0; k < f->states; k++) {
+        D[k] = bank ? f->policy.bank.d[k][mode] : f->d[k];
+        for (int e = 0; e < f->states; e++) {
+            const int i = tgi_row(f->wheels, e);
+            U[e * f->states + k] = i > k ? 0 : bank ? f->policy.bank.u[k][i][mode] : f->u[k * f->stride + i];
+        }
+    }
+    return TG_OK;
+}
+
+tg_status tg_filter_sensitivity(const tg_filter *f, int32_t j, tg_real *dx, tg_real *dP)
+{
+    if (!f || j < 0 || j >= f->states || (f->tuning.policy != TG_ADAPTIVE && f->tuning.policy != TG_SUPERVISED)) return TG_BAD_ARGUMENT;
+    const tg_adaptation_state *const s = &f->policy.adaptation;
+    const int n = f->wheels, parameter = tgi_row(n, j);
+    for (int e = 0; e < f->states; e++) {
+        const int i = tgi_row(n, e);
+        if (dx) dx[e] = s->dx[i * f->stride + parameter];
+        for (int k = 0; dP && k < f->states; k++) {
+            const int l = tgi_row(n, k), pair = i > l ? i * (i + 1) / 2 + l : l * (l + 1) / 2 + i;
+            dP[e * f->states + k] = s->dP[pair * f->stride + parameter];
+        }
+    }
+    return TG_OK;
+}
+
+/* The factors of the parameters' marginal with `walk_time` seconds of walk, then of fresh outputs. */
+void tgi_restart(int n, int stride, const tg_real *q, tg_real *u, tg_real *d)
+{
+    tg_real W[2 * TG_MAX_STATES * TG_ROWS], weight[2 * TG_MAX_STATES];
+    tg_lanes product[TG_MOST_LANES];
+    const int rows = TG_TWICE(n);
+    int columns = rows;
+    memcpy(W, u, (size_t)(rows * stride) * sizeof *u);
+    memcpy(weight, d, (size_t)rows * sizeof *d);
+    factor_sweep(W, weight, columns, n, n / TG_LANES + 1, stride, 0, product, product);
+    for (int j = n; j >= 0; j--) columns = factor_take(W, weight, columns, j, 1, q[j], stride, u + j * stride, d + j, product);
+    for (int j = n + 1; j < rows; j++) {
+        d[j] = q[j];
+        for (int i = 0; i < stride; i++) u[j * stride + i] = i == j;
+    }
+}
+
+/* Forget the outputs' sensitivities: their variances are given now. */
+static void restart_sensitivities(tg_filter *f)
+{
+    tg_adaptation_state *const s = &f->policy.adaptation;
+    const int first = f->wheels + 1;
+    for (int i = first; i < f->states; i++) {
+        memset(s->dx + i * f->stride, 0, (size_t)f->stride * sizeof *s->dx);
+        memset(s->dP + i * (i + 1) / 2 * f->stride, 0, (size_t)((i + 1) * f->stride) * sizeof *s->dP);
+    }
+}
+
+tg_status tg_filter_restart(tg_filter *f, tg_real walk_time, const tg_real *outputs, const tg_real *variances)
+{
+    if (!f || !outputs || !variances) return TG_BAD_ARGUMENT;
+    if (!(walk_time >= 0)) return TG_TIME_REVERSED;
+    if (!tgi_finite(walk_time)) return TG_NOT_FINITE;
+    const int n = f->wheels;
+    for (int c = 0; c <= n; c++) {
+        if (!tgi_finite(outputs[c]) || !tgi_finite(variances[c])) return TG_NOT_FINITE;
+        if (!(variances[c] > 0)) return TG_NOT_POSITIVE;
+    }
+    tg_passage passage;
+    memset(&passage, 0, sizeof passage);
+    for (int j = 0; j <= n; j++) passage.q[j] = f->walk[j] * walk_time;
+    for (int o = 0; o <= n; o++) passage.q[n + 1 + o] = variances[tgi_channel(n, o)];
+    if (f->tuning.policy == TG_BANK)
+        tgi_bank_restart(f, outputs, &passage);
+    else {
+        tgi_restart(n, f->stride, passage.q, f->u, f->d);
+        for (int o = 0; o <= n; o++) f->x[n + 1 + o] = outputs[tgi_channel(n, o)];
+        memcpy(f->x_prior, f->x, sizeof f->x);
+        if (f->tuning.policy != TG_FIXED) restart_sensitivities(f);
+    }
+    f->passage = passage;
+    f->taken = 0;
+    return TG_OK;
+}

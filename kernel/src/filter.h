@@ -1,0 +1,125 @@
+/* Inside the filter floor: what its files share.
+ *
+ * Rows run (mu_1..mu_n, rho_s, v, omega_1..omega_n), "row order": parameters first, because then a measured output touches only the
+ * last columns of an upper triangular factor. The covariance is P = U diag(d) U', U unit upper triangular, kept by columns of `stride`
+ * reals with zeros below the diagonal. */
+#ifndef TG_FILTER_H
+#define TG_FILTER_H
+#include "lanes.h"
+#include <float.h>
+#include <math.h>
+
+#ifdef TG_FLOAT
+#define tgi_sqrt sqrtf
+#define tgi_fabs fabsf
+#define tgi_log logf
+#define tgi_exp expf
+#define tgi_expm1 expm1f
+#define tgi_cos cosf
+#define tgi_sin sinf
+#define tgi_ceil ceilf
+#define TG_TINY 1e-36f /* keeps a factor's d above zero; far below the rounding of any variance */
+#define TG_LARGEST FLT_MAX
+#else
+#define tgi_sqrt sqrt
+#define tgi_fabs fabs
+#define tgi_log log
+#define tgi_exp exp
+#define tgi_expm1 expm1
+#define tgi_cos cos
+#define tgi_sin sin
+#define tgi_ceil ceil
+#define TG_TINY 1e-290
+#define TG_LARGEST DBL_MAX
+#endif
+
+#define TG_SUBSTEP ((tg_real)0.25)  /* largest r rho_w/J h of one Runge-Kutta step */
+#define TG_SUBSTEPS_MAX 1000000     /* a longer dt is refused */
+#define TG_LN_2PI ((tg_real)1.8378770664093454836)
+#define TG_TWICE(n) (2 * (n) + 2)
+
+typedef struct { /* one step, worked out before any state is touched; rows in row order */
+    tg_passage passage;          /* its q: without the walk's share in a bank */
+    tg_real shift[TG_ROWS];      /* what the inputs add to omega and v */
+    tg_real accelerometer[TG_ROWS];
+    tg_real accelerometer_shift;
+    tg_real y[TG_MAX_CHANNELS], r[TG_MAX_CHANNELS]; /* channels run as rows do, see tgi_channel */
+    int32_t present[TG_MAX_CHANNELS];
+    int32_t count;               /* channels present */
+    tg_real cosine[2], sine[2];  /* of the slopes before and now */
+    int32_t substeps;
+    tg_real gamma;
+    const tg_input *before;
+} tgi_plan;
+
+typedef struct { /* what a step comes to, before it is known to be sound */
+    tg_real x[TG_ROWS], d[TG_ROWS], u[TG_MAX_STATES * TG_ROWS];
+    tg_real x_prior[TG_ROWS];
+    int32_t taken;
+    int32_t channel[TG_MAX_CHANNELS];
+    tg_real gain[TG_MAX_CHANNELS][TG_ROWS];  /* each after the channels before it */
+    tg_real residual[TG_MAX_CHANNELS];       /* innovation after the channels before it, and its variance */
+    tg_real residual_variance[TG_MAX_CHANNELS];
+    tg_real innovation[TG_MAX_CHANNELS], variance[TG_MAX_CHANNELS], weight[TG_MAX_CHANNELS]; /* prior */
+    tg_real nis, log_likelihood;
+} tgi_result;
+
+/* Row of the state's place e (omega, v, mu, rho_s). */
+TG_INLINE int tgi_row(int n, int e) { return e < n ? n + 2 + e : e == n ? n + 1 : e - n - 1; }
+/* Channels inside run like their rows: v, omega_1..omega_n, a_x; the first n + 1 measure row n + 1 + o. Place in the public order: */
+TG_INLINE int tgi_channel(int n, int o) { return o == 0 ? n : o <= n ? o - 1 : o; }
+/* Distance between columns for n wheels; must agree with the cases of TG_BY_WHEELS. */
+TG_INLINE int tgi_stride(int n) { return n == 1 ? 4 : n == 2 ? 8 : n == 4 ? 12 : TG_ROWS; }
+
+/* Call the inlined function with the wheel count as a constant where that is worth the code. */
+#define TG_BY_WHEELS(n, call)                  \
+    switch (n) {                               \
+    case 1: call(1, 4); break;                 \
+    case 2: call(2, 8); break;                 \
+    case 4: call(4, 12); break;                \
+    default: call((n), TG_ROWS); break;        \
+    }
+
+/* Rows from the last to the first, unrolled: the row is then a constant too. */
+#define TG_ROWS_DOWN_FROM_17(take) \
+    take(17) take(16) take(15) take(14) take(13) take(12) take(11) take(10) take(9) \
+    take(8) take(7) take(6) take(5) take(4) take(3) take(2) take(1) take(0)
+#define TG_ROWS_DOWN_FROM_27(take) \
+    take(27) take(26) take(25) take(24) take(23) take(22) take(21) take(20) take(19) take(18) TG_ROWS_DOWN_FROM_17(take)
+
+TG_INLINE int tgi_finite(tg_real x) { return x - x == 0; }
+
+/* Innovation weight of PHYSICS 6 (Huber): 1 within `huber` SDs, then falling. */
+TG_INLINE tg_real tgi_weight(tg_real huber, tg_real innovation, tg_real variance)
+{
+    if (!(huber > 0) || innovation * innovation <= huber * huber * variance) return 1;
+    return huber * tgi_sqrt(variance) / tgi_fabs(innovation);
+}
+
+/* model.c */
+void tgi_rates(const tg_machine *m, const tg_input *u, tg_real cosine, tg_real sine, const tg_real *x, tg_real *rate);
+
+/* exact.c, unscented.c: the prior and posterior of a filter with one lane. */
+void tgi_exact_step(const tg_filter *f, const tgi_plan *plan, tgi_result *result);
+void tgi_unscented_step(const tg_filter *f, const tgi_plan *plan, tgi_result *result);
+
+/* adaptation.c: sensitivities and noise scales over this step; TG_DIVERGED and nothing changed where they leave the finite numbers. */
+tg_status tgi_adapt(tg_filter *f, const tgi_plan *plan, const tgi_result *result);
+
+/* supervisor.c: gamma of this step, and what to remember of it once the step stands. */
+tg_real tgi_supervise(const tg_filter *f, const tgi_plan *plan, const tg_input *now);
+void tgi_supervisor_remember(tg_filter *f, const tgi_plan *plan, const tg_input *now);
+
+/* bank.c: initial lanes from one; the whole step; mixture. */
+void tgi_bank_init(tg_filter *f);
+tg_status tgi_bank_step(tg_filter *f, tgi_plan *plan, tg_step *out);
+void tgi_bank_moments(const tg_filter *f, tg_real *x, tg_real *P); /* row order, P by rows of `stride` */
+void tgi_bank_restart(tg_filter *f, const tg_real *outputs, tg_passage *passage);
+
+/* filter.c: the outputs anew with variances q, the parameters kept and widened by q. */
+void tgi_restart(int n, int stride, const tg_real *q, tg_real *u, tg_real *d);
+
+/* factor.c */
+tg_status tgi_factorise(int rows, int stride, const tg_real *P, tg_real *u, tg_real *d);
+void tgi_covariance(int rows, int stride, const tg_real *u, const tg_real *d, tg_real *P);
+#endif

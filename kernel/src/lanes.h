@@ -1,0 +1,60 @@
+/* Four numbers that are computed on at once. Where the compiler has vectors this wide they are one register; elsewhere plain C99, with
+ * the same order of operations and so the same bits. */
+#ifndef TG_LANES_H
+#define TG_LANES_H
+#include "terragrip.h"
+#include <string.h>
+
+#if defined(__GNUC__)
+#define TG_INLINE static inline __attribute__((always_inline, unused))
+#else
+#define TG_INLINE static inline
+#endif
+
+#define TG_LANES 4
+
+#if defined(__GNUC__) && !defined(TG_PLAIN_LANES) && \
+    (defined(__AVX__) || (defined(TG_FLOAT) && (defined(__SSE2__) || defined(__ARM_NEON))))
+typedef tg_real tg_lanes __attribute__((vector_size(TG_LANES * sizeof(tg_real))));
+
+TG_INLINE tg_lanes lanes_all(tg_real x) { return (tg_lanes){x, x, x, x}; }
+TG_INLINE tg_lanes lanes_add(tg_lanes a, tg_lanes b) { return a + b; }
+TG_INLINE tg_lanes lanes_sub(tg_lanes a, tg_lanes b) { return a - b; }
+TG_INLINE tg_lanes lanes_mul(tg_lanes a, tg_lanes b) { return a * b; }
+TG_INLINE tg_lanes lanes_div(tg_lanes a, tg_lanes b) { return a / b; }
+TG_INLINE tg_lanes lanes_mul_add(tg_lanes a, tg_lanes b, tg_lanes c) { return c + a * b; }
+TG_INLINE tg_lanes lanes_mul_sub(tg_lanes a, tg_lanes b, tg_lanes c) { return c - a * b; }
+TG_INLINE tg_real lanes_at(tg_lanes a, int i) { return a[i]; }
+#else
+typedef struct {
+    tg_real at[TG_LANES];
+} tg_lanes;
+
+#define LANES_EACH(expression)                                    \
+    do {                                                          \
+        for (int i = 0; i < TG_LANES; i++) a.at[i] = expression; \
+        return a;                                                 \
+    } while (0)
+TG_INLINE tg_lanes lanes_all(tg_real x) { return (tg_lanes){{x, x, x, x}}; }
+TG_INLINE tg_lanes lanes_add(tg_lanes a, tg_lanes b) { LANES_EACH(a.at[i] + b.at[i]); }
+TG_INLINE tg_lanes lanes_sub(tg_lanes a, tg_lanes b) { LANES_EACH(a.at[i] - b.at[i]); }
+TG_INLINE tg_lanes lanes_mul(tg_lanes a, tg_lanes b) { LANES_EACH(a.at[i] * b.at[i]); }
+TG_INLINE tg_lanes lanes_div(tg_lanes a, tg_lanes b) { LANES_EACH(a.at[i] / b.at[i]); }
+TG_INLINE tg_lanes lanes_mul_add(tg_lanes a, tg_lanes b, tg_lanes c) { LANES_EACH(c.at[i] + a.at[i] * b.at[i]); }
+TG_INLINE tg_lanes lanes_mul_sub(tg_lanes a, tg_lanes b, tg_lanes c) { LANES_EACH(c.at[i] - a.at[i] * b.at[i]); }
+TG_INLINE tg_real lanes_at(tg_lanes a, int i) { return a.at[i]; }
+#undef LANES_EACH
+#endif
+
+TG_INLINE tg_lanes lanes_load(const tg_real *p)
+{
+    tg_lanes a;
+    memcpy(&a, p, sizeof a);
+    return a;
+}
+TG_INLINE void lanes_store(tg_real *p, tg_lanes a) { memcpy(p, &a, sizeof a); }
+TG_INLINE tg_real lanes_sum(tg_lanes a)
+{
+    return (lanes_at(a, 0) + lanes_at(a, 1)) + (lanes_at(a, 2) + lanes_at(a, 3));
+}
+#endif
