@@ -86,6 +86,11 @@ def parse_unit(text: str) -> Unit:
     return _from_pint(text) if unit is None else unit
 
 
+def is_common(text: str) -> bool:
+    """Whether ``text`` is written in the everyday units of the table, which needs no pint."""
+    return _from_table(text) is not None
+
+
 def factor_to(text: str, si_unit: str) -> float:
     """Factor that takes a number in unit ``text`` to ``si_unit``; raises UnitError if they are unlike.
 

@@ -8,18 +8,19 @@ import numpy as np
 import numpy.typing as npt
 
 from terragrip.errors import InputError, nearest
-from terragrip.recording.schema import TIME
+from terragrip.recording.schema import LABELS, TIME, is_channel
 
 Floats = npt.NDArray[np.float64]
 
 _ESSENTIAL = ("wheel_speed_", "drive_torque_", "ground_speed", "drawbar_force")
 
 
-def place(column: str, row: int, time: Floats | None = None) -> str:
+def place(column: str, row: int, time: Floats | None = None, *, first_row: int = 0) -> str:
     """Where a cell stands: data rows count from 1, as below a header."""
+    where = f"column {column}, row {first_row + row + 1}"
     if time is None or not np.isfinite(time[row]):
-        return f"column {column}, row {row + 1}"
-    return f"column {column}, row {row + 1} (time {time[row]:.10g} s)"
+        return where
+    return f"{where} (time {time[row]:.10g} s)"
 
 
 def require_columns(columns: Collection[str], source: str | None) -> None:
@@ -39,42 +40,59 @@ def require_columns(columns: Collection[str], source: str | None) -> None:
     raise InputError("is missing", file=source, place=f"column {name}", mend=mend)
 
 
-def check_time(time: Floats, source: str | None) -> None:
-    """Raise InputError unless there is a row and time is finite and runs forward."""
+def remarks(columns: Collection[str]) -> list[str]:
+    """Sentences on what the columns of a table are not used for."""
+    said = []
+    unused = [c for c in columns if c != TIME and c not in LABELS and not is_channel(c)]
+    if unused:
+        more = f" and {len(unused) - 8} more" if len(unused) > 8 else ""
+        said.append(f"Columns that are not used: {', '.join(unused[:8])}{more}.")
+    if "drawbar_force" not in columns:
+        said.append("There is no drawbar_force: the vehicle is taken to tow nothing.")
+    return said
+
+
+def check_time(time: Floats, source: str | None, *, first_row: int = 0, after: float | None = None) -> None:
+    """Raise InputError unless there is a row and time is finite and runs forward.
+
+    A block of a longer table says how many rows stand before it, and the time of the last of them.
+    """
     if len(time) == 0:
         raise InputError("the table is empty", file=source, mend="give a log with at least one row")
+    before = time[0] - 1.0 if after is None else after
     with np.errstate(invalid="ignore"):
-        forward = np.diff(time) > 0
-    if forward.all() and np.isfinite(time[0]) and np.isfinite(time[-1]):
+        forward = np.diff(time, prepend=before) > 0
+    if forward.all() and np.isfinite(time[-1]):
         return
     unknown = np.flatnonzero(~np.isfinite(time))
     if len(unknown):
-        problem = "time is not a finite number"
-        raise InputError(problem, file=source, place=place(TIME, unknown[0]), mend="drop the row, or mend it")
-    row = int(np.argmin(forward)) + 1
-    if time[row] == time[row - 1]:
+        where = place(TIME, unknown[0], first_row=first_row)
+        raise InputError(
+            "time is not a finite number", file=source, place=where, mend="drop the row, or mend it"
+        )
+    row = int(np.argmin(forward))
+    last = before if row == 0 else time[row - 1]
+    if time[row] == last:
         problem, mend = "time repeats", "keep one row an instant"
     else:
-        problem, mend = f"time runs back from {time[row - 1]:.10g} s", "sort the rows, or split the log there"
-    raise InputError(problem, file=source, place=place(TIME, row, time), mend=mend)
+        problem, mend = f"time runs back from {last:.10g} s", "sort the rows, or split the log there"
+    raise InputError(problem, file=source, place=place(TIME, row, time, first_row=first_row), mend=mend)
 
 
-def check_channel(name: str, values: Floats, time: Floats, source: str | None) -> bool:
-    """Whether a channel holds a value; raises InputError on infinities, or if an essential one holds none."""
+def refuse_infinite(
+    name: str, values: Floats, time: Floats, source: str | None, *, first_row: int = 0
+) -> None:
+    """Raise InputError at the first infinite value of a channel."""
     if np.isfinite(values).all():
-        return True
+        return
     infinite = np.flatnonzero(np.isinf(values))
     if len(infinite):
-        raise InputError(
-            "is infinite",
-            file=source,
-            place=place(name, infinite[0], time),
-            mend="leave the cell empty instead",
-        )
-    if not np.isnan(values).all():
-        return True
+        where = place(name, infinite[0], time, first_row=first_row)
+        raise InputError("is infinite", file=source, place=where, mend="leave the cell empty instead")
+
+
+def refuse_empty(name: str, source: str | None) -> None:
+    """Raise InputError where a channel that holds no value at all is one that estimates rest on."""
     if name.startswith(_ESSENTIAL):
-        raise InputError(
-            "holds no value", file=source, place=f"column {name}", mend="fill it, or leave the column out"
-        )
-    return False
+        mend = "fill it, or leave the column out"
+        raise InputError("holds no value", file=source, place=f"column {name}", mend=mend)

@@ -55,9 +55,6 @@ def white_noise(time: Floats, values: Floats) -> float | None:
     """
     if len(values) < _FEWEST:
         return None
-    step = quantum(values)
-    if step == 0.0:
-        return None
     spacing = np.lib.stride_tricks.sliding_window_view(np.diff(time), 3)
     even = spacing.max(axis=1) < 4 * spacing.min(axis=1)
     moving = (values[:-3] != values[1:-2]) | (values[1:-2] != values[2:-1]) | (values[2:-1] != values[3:])
@@ -70,4 +67,5 @@ def white_noise(time: Floats, values: Floats) -> float | None:
     weight = 1.0 / apart.prod(axis=2)
     third = (weight * sample).sum(axis=1) / np.sqrt((weight**2).sum(axis=1))
     scale = _MAD_TO_SD * float(np.median(np.abs(third)))
-    return max(scale, step / np.sqrt(12.0), 1e-4 * float(np.quantile(np.abs(values), 0.95)))
+    floor = quantum(values) / np.sqrt(12.0)
+    return max(scale, floor, 1e-4 * float(np.quantile(np.abs(values), 0.95)))

@@ -56,30 +56,24 @@ class Recording:
         speed), text or infinities in a channel, a required channel without any value, time that is NaN,
         repeats or runs back, and on an empty table. ``source`` is the file that errors name.
         """
-        columns, said = columns_of(frame, source), list(notes)
+        columns = columns_of(frame, source)
         checks.require_columns(columns, source)
         time, remark = seconds(columns[TIME], source)
-        said += remark
+        said = [*notes, *remark, *checks.remarks(columns)]
         checks.check_time(time, source)
         channels: dict[str, Floats] = {}
         labels: dict[str, npt.NDArray[np.object_]] = {}
-        unused = []
         for name, column in columns.items():
             if name in LABELS:
                 labels[name] = texts(name, column, len(time), source)
             elif is_channel(name):
                 values = numbers(name, column, time, source)
-                if checks.check_channel(name, values, time, source):
-                    channels[name] = values
-                else:
+                checks.refuse_infinite(name, values, time, source)
+                if np.isnan(values).all():
+                    checks.refuse_empty(name, source)
                     said.append(f"{name} holds no value and is left out.")
-            elif name != TIME:
-                unused.append(name)
-        if unused:
-            shown = ", ".join(unused[:8]) + (f" and {len(unused) - 8} more" if len(unused) > 8 else "")
-            said.append(f"Columns that are not used: {shown}.")
-        if "drawbar_force" not in channels:
-            said.append("There is no drawbar_force: the vehicle is taken to tow nothing.")
+                else:
+                    channels[name] = values
         return cls(time, channels, labels, source, sha256, tuple(dict.fromkeys(said)), dict(noise or {}))
 
     def __len__(self) -> int:

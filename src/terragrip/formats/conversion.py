@@ -1,0 +1,186 @@
+"""Apply a profile to a log."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from terragrip.errors import InputError, nearest
+from terragrip.formats.derivation import derivative, fresh_positions, pitch_of, roll_of, yaw_of
+from terragrip.formats.profile import Profile, Rows, Source, TimeSource, rate_unit
+from terragrip.formats.table import LogTable
+from terragrip.formats.timebase import spread, union
+from terragrip.recording import Recording
+from terragrip.recording.columns import columns_of, numbers, seconds, texts
+from terragrip.recording.schema import LABELS, TIME, unit_of
+from terragrip.units import UnitError, factor_to, quantity
+
+Floats = npt.NDArray[np.float64]
+Column = npt.NDArray[Any]
+
+
+def convert(profile: Profile, log: Any, source: str | None = None) -> Recording:
+    """The recording that ``profile`` makes of ``log`` (see `Profile.apply`)."""
+    if not isinstance(log, LogTable):
+        columns = columns_of(log, source)
+        log = LogTable(tuple(columns), columns, source=source)
+    _require(profile, log)
+    time, notes = _time(profile.time, log)
+    channels: dict[str, Column] = {}
+    noise: dict[str, float] = {}
+    for name, origin in profile.channels.items():
+        channels[name], deviation = _channel(name, origin, log, time)
+        if deviation is not None:
+            noise[name] = deviation
+            notes.append(
+                f"{name} is the derivative of {', '.join(origin.derivative_of or ())} over {origin.window:g} s, "
+                f"with a standard deviation of about {deviation:.2g} {unit_of(name)}."
+            )
+    if profile.rows is not None:
+        keep = _kept(profile.rows, log)
+        time, channels = time[keep], {name: values[keep] for name, values in channels.items()}
+    delays = {name: origin.delay for name, origin in profile.channels.items()}
+    # A faulty time base is left as it is, for the recording's own checks to name.
+    if len(time) and np.isfinite(time).all() and bool((np.diff(time) > 0).all()):
+        instants, rows = union(time, delays)
+        channels = {n: spread(v, rows[delays[n]], len(instants)) for n, v in channels.items()}
+        time = instants
+    frame = {TIME: time, **channels}
+    return Recording.from_frame(frame, log.source, sha256=log.sha256, notes=(*log.notes, *notes), noise=noise)
+
+
+def _require(profile: Profile, log: LogTable) -> None:
+    """Raise InputError at the first column that the profile names and the log lacks."""
+    for column in sorted(profile.sources - set(log.columns)):
+        close = nearest(column, log.names)
+        mend = f"the nearest column is {close!r}" if close else f"its columns are {', '.join(log.names[:12])}"
+        problem = "is missing, but the profile names it"
+        raise InputError(problem, file=log.source, place=f"column {column}", mend=mend)
+
+
+def _time(origin: TimeSource, log: LogTable) -> tuple[Floats, list[str]]:
+    """The time base [s] and the notes on it."""
+    stamps = log.columns[origin.column]
+    notes: list[str] = []
+    if stamps.dtype.kind in "Mm":
+        time, notes = seconds(stamps, log.source)
+    else:
+        if origin.zero == "first" and stamps.dtype.kind in "iu" and len(stamps):
+            stamps = stamps.astype(np.int64) - np.int64(stamps[0])  # nanoseconds since 1970 need all 64 bits
+        time = numbers(origin.column, stamps, None, log.source) * factor_to(origin.unit, "s")
+    if origin.zero == "first" and len(time):
+        time = time - time[0]
+    return time, notes
+
+
+def _channel(name: str, origin: Source, log: LogTable, time: Floats) -> tuple[Column, float | None]:
+    """One channel (n,) in the schema's unit, and its standard deviation where it is a derived one."""
+    if name in LABELS:
+        if origin.constant is not None:
+            return np.full(len(time), str(origin.constant), dtype=object), None
+        if origin.column is None:
+            mend = "write 'from: <column>' or 'constant: <label>'"
+            raise InputError("is a label", file=log.source, place=f"column {name}", mend=mend)
+        return texts(name, log.columns[origin.column], len(time), log.source), None
+    deviation = None
+    if origin.constant is not None:
+        raw = np.full(len(time), quantity(origin.constant, unit_of(name) or "1"))
+    elif origin.derivative_of is not None:
+        raw, deviation = _rate(origin, log, time)
+    elif origin.pitch_of is not None:
+        raw = pitch_of(_raw(origin.pitch_of, log, time))
+    elif origin.roll_of is not None:
+        raw = roll_of(_raw(origin.roll_of, log, time))
+    else:
+        raw = _without_invalid(_raw((str(origin.column),), log, time)[0], origin)
+    factor = _factor(name, origin, log)
+    if deviation is not None:
+        deviation *= abs(factor * origin.scale)
+    if (factor, origin.scale, origin.offset, origin.sign) == (1.0, 1.0, 0.0, 1):
+        return raw, deviation
+    return (origin.sign * factor) * (origin.scale * raw + origin.offset), deviation
+
+
+def _factor(name: str, origin: Source, log: LogTable) -> float:
+    """Factor to the schema's unit: from the profile's unit, else from the one that the log itself states."""
+    target = unit_of(name)
+    if target is None:
+        return 1.0
+    if origin.unit is not None:
+        return factor_to(rate_unit(origin.unit) if origin.derivative_of else origin.unit, target)
+    stated = log.units.get(origin.column or "") if origin.scale == 1.0 else None
+    if stated is None:
+        return 1.0
+    try:
+        return factor_to(stated, target)
+    except UnitError as error:
+        mend = f"give {name} a unit or a scale in the profile"
+        raise InputError(
+            error.problem, file=log.source, place=f"column {origin.column}", mend=mend
+        ) from error
+
+
+def _raw(columns: tuple[str, ...], log: LogTable, time: Floats) -> list[Floats]:
+    return [numbers(column, log.columns[column], time, log.source) for column in columns]
+
+
+def _without_invalid(values: Floats, origin: Source) -> Floats:
+    """Values (n,) with the declared invalid ones and ranges missing."""
+    if not origin.invalid:
+        return values
+    bad = np.zeros(len(values), dtype=bool)
+    for item in origin.invalid:
+        low, high = item if isinstance(item, tuple) else (item, item)
+        bad |= (values >= low) & (values <= high)
+    return np.where(bad, np.nan, values)
+
+
+def _rate(origin: Source, log: LogTable, time: Floats) -> tuple[Floats, float | None]:
+    """Speed (n,) along the positions' path, at the instants of fresh positions, and its standard deviation."""
+    positions = _raw(origin.derivative_of or (), log, time)
+    fresh = fresh_positions(time, positions) & np.isfinite(time)
+    rates, deviations = zip(
+        *(derivative(time[fresh], p[fresh], origin.window) for p in positions), strict=True
+    )
+    found = np.full(len(time), np.nan)
+    if origin.forward is not None:
+        heading = _heading(origin, log, time)[fresh]
+        found[fresh] = rates[0] * np.cos(heading) + rates[1] * np.sin(heading)
+    elif len(rates) == 1:
+        found[fresh] = rates[0]
+    else:
+        found[fresh] = np.sqrt(sum(rate**2 for rate in rates))
+    known = [deviation for deviation in deviations if deviation is not None]
+    return found, float(np.mean(known)) if known else None
+
+
+def _heading(origin: Source, log: LogTable, time: Floats) -> Floats:
+    forward = origin.forward
+    assert forward is not None
+    if forward.quaternion is not None:
+        return yaw_of(_raw(forward.quaternion, log, time))
+    return _raw((str(forward.yaw),), log, time)[0] * factor_to(forward.unit, "rad")
+
+
+def _kept(rows: Rows, log: LogTable) -> npt.NDArray[np.bool_]:
+    """Which rows (n,) the profile keeps; raises InputError if none."""
+    column = log.columns[rows.column]
+    if column.dtype.kind in "fiub" and isinstance(rows.equals, int | float):
+        keep = column == rows.equals
+    else:
+        labels = texts(rows.column, column, len(column), log.source)
+        keep = np.array([label.strip() == str(rows.equals) for label in labels], dtype=bool)
+        if not keep.any():
+            present = ", ".join(sorted({str(label) for label in labels})[:8])
+            mend = f"the column holds {present}"
+            raise InputError(
+                f"no row equals {rows.equals!r}", file=log.source, place=f"column {rows.column}", mend=mend
+            )
+    if not keep.any():
+        mend = "mend 'rows:' in the profile"
+        raise InputError(
+            f"no row equals {rows.equals!r}", file=log.source, place=f"column {rows.column}", mend=mend
+        )
+    return np.asarray(keep)

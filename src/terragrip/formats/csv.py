@@ -1,0 +1,181 @@
+"""Text tables: CSV and its cousins, plain or gzipped."""
+
+from __future__ import annotations
+
+import os
+import re
+import zlib
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+
+from terragrip.errors import InputError
+from terragrip.files import refuse_missing, unreadable
+from terragrip.formats.dialect import Dialect, detect, split, to_text
+from terragrip.formats.table import LogTable, Wanted, from_arrow
+from terragrip.recording.schema import LABELS, TIME, is_channel
+
+if TYPE_CHECKING:
+    import pyarrow as pa
+
+SUFFIXES = (".csv", ".txt", ".tsv", ".dat", ".csv.gz", ".txt.gz", ".tsv.gz")
+_GZIP = b"\x1f\x8b"
+_BLANKS = re.compile(rb"[ \t]+")
+_MISSING = [
+    *("", "NaN", "nan", "NAN", "-nan", "-NaN", "NA", "N/A", "n/a", "#N/A", "<NA>", "null", "NULL", "None"),
+    *("-", "--", "1.#QNAN", "-1.#IND", "nan(ind)", "-nan(ind)"),
+]
+
+
+def read_csv(path: str | os.PathLike[str], wanted: Wanted | None = None) -> LogTable:
+    """Read a text table, gzipped or not; separator, decimal sign, encoding and a units row are detected.
+
+    ``wanted`` says which columns to read (None: all, numbers where every cell is one). A column of the
+    recording's schema must hold numbers. Raises InputError with row and content: no such file, empty, not a
+    text table, no header, a row of another width, text in a number column.
+    """
+    import hashlib
+
+    source = os.fspath(path)
+    refuse_missing(source, suffixes=SUFFIXES)
+    try:
+        raw = Path(source).read_bytes()
+    except OSError as error:
+        raise unreadable(source, error) from error
+    digest = hashlib.sha256(raw).hexdigest()
+    if raw.startswith(_GZIP):
+        raw = _unzip(raw, source)
+    if not raw.strip():
+        raise InputError("is empty", file=source, mend="give a table with a header and rows")
+    data = to_text(raw, source)
+    dialect = detect(data, source)
+    body, notes = _body(data, dialect)
+    names = dialect.names
+    chosen = [k for k, name in enumerate(names) if name and (wanted is None or wanted(name))]
+    twice = next((names[k] for k in chosen if names.count(names[k]) > 1), None)
+    if twice is not None:
+        raise InputError("stands twice", file=source, place=f"column {twice}", mend="keep one of them")
+    columns = _parse(body, dialect, chosen, source)
+    return LogTable(tuple(n for n in names if n), columns, dialect.units, source, digest, tuple(notes))
+
+
+def _unzip(raw: bytes, source: str) -> bytes:
+    import gzip
+
+    try:
+        return gzip.decompress(raw)
+    except (OSError, EOFError, zlib.error) as error:
+        raise InputError(
+            f"is a damaged gzip file ({error})", file=source, mend="copy or pack it again"
+        ) from error
+
+
+def _body(data: bytes, dialect: Dialect) -> tuple[bytes | memoryview, list[str]]:
+    """The rows under the header; a last line that was cut off while writing is left out, with a note."""
+    body: bytes | memoryview = memoryview(data)[dialect.start :]
+    notes = []
+    if not data.endswith(b"\n"):
+        last = data.rfind(b"\n") + 1
+        cells = split(data[last:].decode("utf-8", "replace"), dialect.separator)
+        if last > dialect.start and data[last:].strip() and len(cells) < len(dialect.names):
+            body = memoryview(data)[dialect.start : last]
+            notes.append("The last row is cut off and was left out.")
+    if dialect.separator == " ":
+        body = b"\n".join(_BLANKS.sub(b"\t", line.strip()) for line in bytes(body).splitlines())
+    return body, notes
+
+
+def _parse(
+    body: bytes | memoryview, dialect: Dialect, chosen: list[int], source: str
+) -> dict[str, npt.NDArray[Any]]:
+    """The chosen columns by name."""
+    import pyarrow as pa
+
+    names = dialect.names
+    if not bytes(body[:1024]).strip() and not bytes(body).strip():
+        return {names[k]: np.empty(0) for k in chosen}
+    types = {_field(k): pa.float64() for k in chosen if _is_number_column(names[k], body, dialect, k)}
+    types |= {_field(k): pa.string() for k in chosen if names[k] in LABELS}
+    try:
+        table = _arrow(body, dialect, chosen, types)
+    except (pa.ArrowInvalid, pa.ArrowKeyError) as error:
+        texts = _arrow_of_texts(body, dialect, chosen, error, source)
+        return {names[k]: _numbers_of_texts(names[k], texts.column(_field(k)), source) for k in chosen}
+    return {names[k]: from_arrow(names[k], table.column(_field(k)), source) for k in chosen}
+
+
+def _is_number_column(name: str, body: bytes | memoryview, dialect: Dialect, index: int) -> bool:
+    if name == TIME:  # may be dates: leave those to Arrow
+        line = bytes(body[:4096]).lstrip().partition(b"\n")[0].decode("utf-8", "replace")
+        cells = split(line, "\t" if dialect.separator == " " else dialect.separator)
+        return not (index < len(cells) and re.match(r"\d{4}-\d\d-\d\d", cells[index]))
+    return is_channel(name)
+
+
+def _field(index: int) -> str:
+    return f"c{index}"  # by position, since names may repeat or be empty
+
+
+def _arrow(body: bytes | memoryview, dialect: Dialect, chosen: list[int], types: dict[str, Any]) -> pa.Table:
+    import pyarrow as pa
+    from pyarrow import csv
+
+    separator = "\t" if dialect.separator == " " else dialect.separator
+    return csv.read_csv(
+        pa.BufferReader(pa.py_buffer(body)),
+        read_options=csv.ReadOptions(column_names=[_field(k) for k in range(len(dialect.names))]),
+        parse_options=csv.ParseOptions(delimiter=separator),
+        convert_options=csv.ConvertOptions(
+            column_types=types,
+            include_columns=[_field(k) for k in chosen],
+            null_values=_MISSING,
+            strings_can_be_null=True,
+            decimal_point=dialect.decimal,
+        ),
+    )
+
+
+def _arrow_of_texts(
+    body: bytes | memoryview, dialect: Dialect, chosen: list[int], error: Exception, source: str
+) -> pa.Table:
+    """The columns as texts, where they cannot be read as numbers; raises InputError where rows do not fit."""
+    import pyarrow as pa
+
+    try:
+        return _arrow(body, dialect, chosen, {_field(k): pa.string() for k in chosen})
+    except (pa.ArrowInvalid, pa.ArrowKeyError):
+        raise _ragged(bytes(body), dialect, error, source) from error
+
+
+def _ragged(body: bytes, dialect: Dialect, error: Exception, source: str) -> InputError:
+    """The InputError that names the first row of another width than the header."""
+    separator, width = "\t" if dialect.separator == " " else dialect.separator, len(dialect.names)
+    lines = (line for line in body.decode("utf-8", "replace").splitlines() if line.strip())
+    for row, line in enumerate(lines, start=1):
+        cells = len(split(line, separator))
+        if cells != width:
+            problem = f"has {cells} cells, the header {width}"
+            return InputError(problem, file=source, place=f"row {row}", mend="give every row as many cells")
+    problem = f"is not a regular table ({str(error)[:80]})"
+    return InputError(problem, file=source, mend="look for unbalanced quotes")
+
+
+def _numbers_of_texts(name: str, column: pa.ChunkedArray, source: str) -> npt.NDArray[Any]:
+    """Texts as numbers; a schema column raises InputError at the first that is none, another stays text."""
+    cells = column.to_pylist()
+    found = np.full(len(cells), np.nan)
+    for row, cell in enumerate(cells):
+        if cell is None:
+            continue
+        try:
+            found[row] = float(cell.replace(",", "."))
+        except ValueError:
+            if name in LABELS or not (is_channel(name) or name == TIME):
+                return np.array(cells, dtype=object)
+            shown = repr(cell) if len(cell) <= 30 else repr(cell[:27] + "...")
+            place = f"column {name}, row {row + 1}"
+            mend = "leave the cell empty or give a number"
+            raise InputError(f"{shown} is not a number", file=source, place=place, mend=mend) from None
+    return found

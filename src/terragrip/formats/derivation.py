@@ -1,0 +1,116 @@
+"""Channels that a log holds only indirectly: a speed from positions, a pitch from a quaternion."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from terragrip.recording.held import fresh_samples, held_period, quantum
+
+Floats = npt.NDArray[np.float64]
+
+_FEWEST = 4  # points for a parabola with one to spare
+_ROUNDS = 3  # of reweighting, after which outlying positions no longer move
+_WIDEST = 100  # samples to either side of a window
+_BLOCK = 20_000  # instants at once, to bound memory
+_MAD_TO_SD = 1.482602218505602  # of a normal distribution
+
+
+def fresh_positions(time: Floats, positions: list[Floats]) -> npt.NDArray[np.bool_]:
+    """Rows (n,) where a position was truly measured: all of them, unless the coordinates are held."""
+    fresh = np.all([np.isfinite(p) for p in positions], axis=0)
+    held = [(p, held_period(time, p)) for p in positions]
+    if any(period is not None for _, period in held):
+        # A pose is one measurement: whichever coordinate moved shows it.
+        moved = [fresh_samples(time, p, period) for p, period in held if period is not None]
+        fresh &= np.any(moved, axis=0)
+    return fresh
+
+
+def derivative(time: Floats, position: Floats, window: float) -> tuple[Floats, float | None]:
+    """Time derivative (n,) of a position (n,) at its own instants, and its median standard deviation.
+
+    A parabola is fitted by least squares to the samples within ``window`` [s] around each instant, five or more
+    (Savitzky and Golay 1964, on the actual instants); Tukey's biweight keeps jumps of the position out. NaN
+    where fewer than four samples lie within the window (at gaps). The deviation follows from the residuals while
+    moving, or the position's resolution where that is coarser, for white noise; None if it cannot be told.
+    """
+    n = len(time)
+    speed, deviation = np.full(n, np.nan), np.full(n, np.nan)
+    spacing = float(np.median(np.diff(time))) if n > 1 else 0.0
+    if spacing <= 0.0:
+        return speed, None
+    half = int(np.clip(round(0.5 * window / spacing), 2, _WIDEST))
+    floor = quantum(position) / np.sqrt(12.0)
+    for first in range(0, n, _BLOCK):
+        low, high = max(first - half, 0), min(first + _BLOCK + half, n)
+        found = _parabolas(time[low:high], position[low:high], half, (half + 0.5) * spacing, floor)
+        inner = slice(first - low, min(first + _BLOCK, n) - low)
+        speed[first : first + _BLOCK], deviation[first : first + _BLOCK] = found[0][inner], found[1][inner]
+    # At rest a tracker is quieter than in motion, and motion is what counts.
+    pace = np.abs(speed)
+    moving = pace >= 0.2 * np.nanquantile(pace, 0.95) if np.isfinite(pace).any() else np.zeros(n, dtype=bool)
+    known = deviation[moving & (deviation > 0)]
+    return speed, float(np.median(known)) if len(known) else None
+
+
+def _parabolas(
+    time: Floats, position: Floats, half: int, reach: float, floor: float
+) -> tuple[Floats, Floats]:
+    """Slope (n,) of the parabola around each sample, and its standard deviation (n,), NaN where there is none."""
+    n = len(time)
+    index = np.arange(n)[:, None] + np.arange(-half, half + 1)
+    inside = (index >= 0) & (index < n)
+    index = np.clip(index, 0, n - 1)
+    u = (time[index] - time[:, None]) / reach
+    inside &= np.abs(u) <= 1.0
+    y = position[index] - position[:, None]
+    basis = np.stack([np.ones_like(u), u, u**2], axis=2)
+    enough = inside.sum(axis=1) >= _FEWEST
+    weight, fit, scale = inside.astype(np.float64), np.zeros((n, 3)), floor
+    for _ in range(_ROUNDS):
+        fit = np.linalg.solve(
+            _normal(basis, weight), np.einsum("nk,nki,nk->ni", weight, basis, y)[:, :, None]
+        )[..., 0]
+        residual = y - np.einsum("nki,ni->nk", basis, fit)
+        kept = np.abs(residual[enough][inside[enough]])
+        if not len(kept):
+            break
+        # Three parameters were fitted to each window, which shrinks its residuals.
+        shrink = np.sqrt(max(1.0 - 3.0 / float(np.median(inside[enough].sum(axis=1))), 0.2))
+        scale = max(_MAD_TO_SD * float(np.median(kept)) / shrink, floor)
+        if scale == 0.0:
+            break
+        weight = inside * np.clip(1.0 - (residual / (6.0 * scale)) ** 2, 0.0, None) ** 2
+        enough &= (weight > 0.05).sum(axis=1) >= _FEWEST
+    spread = np.sqrt(np.linalg.inv(_normal(basis, weight + 1e-9 * inside))[:, 1, 1])
+    squares = np.einsum("nk,nk->n", weight, (y - np.einsum("nki,ni->nk", basis, fit)) ** 2)
+    own = np.sqrt(squares / np.maximum(weight.sum(axis=1) - 3.0, 0.5))
+    deviation = np.maximum(own, floor) * spread / reach
+    return np.where(enough, fit[:, 1] / reach, np.nan), np.where(enough, deviation, np.nan)
+
+
+def _normal(basis: Floats, weight: Floats) -> Floats:
+    """Normal matrices (n, 3, 3); the ridge only serves windows that are too empty to count."""
+    return np.einsum("nk,nki,nkj->nij", weight, basis, basis) + 1e-12 * np.eye(3)
+
+
+def yaw_of(quaternion: list[Floats]) -> Floats:
+    """Yaw [rad] (n,), left positive, of quaternions x, y, z, w (n,)."""
+    x, y, z, w = quaternion
+    return np.arctan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))
+
+
+def pitch_of(quaternion: list[Floats]) -> Floats:
+    """Pitch [rad] (n,), nose up positive, of quaternions x, y, z, w (n,) in axes forward, left, up.
+
+    A turn about the left axis lowers the nose, hence the sign.
+    """
+    x, y, z, w = quaternion
+    return -np.arcsin(np.clip(2 * (w * y - z * x), -1.0, 1.0))
+
+
+def roll_of(quaternion: list[Floats]) -> Floats:
+    """Roll [rad] (n,), right side down positive, of quaternions x, y, z, w (n,) in axes forward, left, up."""
+    x, y, z, w = quaternion
+    return np.arctan2(2 * (w * x + y * z), 1 - 2 * (x * x + y * y))

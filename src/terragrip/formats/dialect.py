@@ -1,0 +1,202 @@
+"""How a text table is written: encoding, separator, decimal sign, header, units row."""
+
+from __future__ import annotations
+
+import csv
+import io
+import re
+from dataclasses import dataclass
+
+from terragrip.errors import InputError
+from terragrip.units import is_common
+
+HEAD = 1 << 16  # bytes that are looked at
+_SEPARATORS = (",", ";", "\t", "|")
+_NUMBER = re.compile(r"[+-]?(\d+[.,]?\d*|[.,]\d+)([eE][+-]?\d+)?$")
+_EMPTY = ("", "nan", "na", "n/a", "null", "none", "-", "--", "inf", "-inf")
+_WITH_UNIT = re.compile(r"(.+?)\s*(?:\[\s*([^\]]*?)\s*\]|\(\s*([^)]*?)\s*\))$")
+_BINARY = bytes(range(9)) + bytes(range(14, 32)) + b"\x7f"
+_MAGIC = (
+    (b"PK\x03\x04", "is a zip or an Excel workbook", "save the sheet as CSV"),
+    (b"\xd0\xcf\x11\xe0", "is an old Excel workbook", "save the sheet as CSV"),
+    (b"MDF ", "is an MDF measurement", "export it as CSV or Parquet"),
+    (b"UnFinMF ", "is an unfinished MDF measurement", "export it as CSV or Parquet"),
+    (b"#ROSBAG", "is a ROS bag", "export its topics as CSV or Parquet"),
+    (b"\x89MCAP0", "is an MCAP log", "export its topics as CSV or Parquet"),
+    (b"\x89HDF", "is an HDF5 or MATLAB 7.3 file", "export it as CSV or Parquet"),
+    (b"MATLAB 5.0", "is a MATLAB file", "export it as CSV or Parquet"),
+    (b"SQLite format 3", "is an SQLite database", "export it as CSV or Parquet"),
+    (b"ARROW1", "is an Arrow or Feather file", "save it as Parquet"),
+    (b"\x93NUMPY", "is a NumPy array without column names", "save it as CSV or Parquet with a header"),
+)
+
+
+@dataclass(frozen=True)
+class Dialect:
+    """How a text table is written. ``separator`` " " stands for any run of blanks; ``start`` is where rows begin."""
+
+    separator: str
+    decimal: str
+    names: tuple[str, ...]
+    units: dict[str, str]
+    start: int
+
+
+def to_text(data: bytes, source: str) -> bytes:
+    """The content as UTF-8 without a byte order mark; raises InputError if it is no text."""
+    if data.startswith(b"\xef\xbb\xbf"):
+        return data[3:]
+    for magic, problem, mend in _MAGIC:
+        if data.startswith(magic):
+            raise InputError(problem, file=source, mend=mend)
+    head = data[:HEAD]
+    encoding = None
+    if data.startswith((b"\xff\xfe", b"\xfe\xff")):
+        encoding = "utf-16"
+    elif len(head) >= 4 and head.count(0) > 0.2 * len(head):
+        encoding = "utf-16-le" if head[1::2].count(0) > head[::2].count(0) else "utf-16-be"
+    if encoding is not None:
+        try:
+            data = data.decode(encoding).encode()
+            head = data[:HEAD]
+        except (UnicodeDecodeError, UnicodeEncodeError) as error:
+            raise _binary(source) from error
+    if head.translate(None, _BINARY) != head:
+        raise _binary(source)
+    if b"\n" not in data:
+        data = data.replace(b"\r", b"\n")
+    if data.isascii():
+        return data
+    try:
+        data.decode("utf-8")
+    except UnicodeDecodeError:
+        return data.decode("latin-1").encode()
+    return data
+
+
+def detect(data: bytes, source: str) -> Dialect:
+    """Detect how the table in ``data`` (UTF-8) is written; raises InputError where it is none.
+
+    The separator and decimal sign that make the most cells of the first rows numbers win; lines that begin with
+    ``#`` before the header are passed over.
+    """
+    start = _skip_comments(data)
+    head = data[start : start + HEAD]
+    if len(head) == HEAD and b"\n" in head:
+        head = head[: head.rindex(b"\n")]
+    lines = [line for line in head.decode("utf-8", "replace").splitlines() if line.strip()][:60]
+    if not lines:
+        raise InputError("is empty", file=source, mend="give a table with a header and rows")
+    if lines[0].lower().startswith("sep="):  # Excel's own hint
+        start = _after_lines(data, start, 1)
+        lines = lines[1:] or [""]
+    separator, decimal = _best(lines)
+    header = split(lines[0], separator)
+    second = split(lines[1], separator) if len(lines) > 1 else []
+    if sum(_is_number(cell, decimal) for cell in header) > len(header) / 2:
+        raise InputError(
+            "the first row holds numbers, not column names",
+            file=source,
+            mend="put a header row above the numbers",
+        )
+    rows = 1
+    units: dict[str, str] = {}
+    if len(lines) > 2 and _is_units_row(second, split(lines[2], separator), decimal):
+        rows, units = 2, dict(zip(header, (_bare(cell) for cell in second), strict=False))
+    if len(second) == len(header) + 1 and not second[-1]:
+        header.append("")
+    names, said = _names_and_units(header)
+    units = {names[header.index(h)]: u for h, u in units.items() if u}
+    return Dialect(separator, decimal, names, {**said, **units}, _after_lines(data, start, rows))
+
+
+def split(line: str, separator: str) -> list[str]:
+    """The cells of one line, without quotes and surrounding blanks."""
+    if separator == " ":
+        return line.split()
+    try:
+        cells = next(csv.reader(io.StringIO(line), delimiter=separator, skipinitialspace=True), [""])
+    except csv.Error:  # a cell beyond the csv module's limit
+        cells = line.split(separator)
+    return [cell.strip() for cell in cells]
+
+
+def _best(lines: list[str]) -> tuple[str, str]:
+    """Separator and decimal sign under which the lines make the best table."""
+    best, chosen = (-1.0, -1.0, -1.0), (",", ".")
+    for separator in (*_SEPARATORS, " "):
+        table = [split(line, separator) for line in lines]
+        width = len(table[0])
+        body = table[1:]
+        fitting = sum(abs(len(row) - width) <= 1 for row in body) / len(body) if body else 1.0
+        for decimal in (".",) if separator == "," else (".", ","):
+            cells = [cell for row in body[:20] for cell in row]
+            numbers = sum(_is_number(cell, decimal) or cell.lower() in _EMPTY for cell in cells)
+            share = round(numbers / len(cells), 2) if cells else 0.0
+            score = (round(fitting, 1) * (width > 1), share if width > 1 else 0.0, float(width))
+            if score > best:
+                best, chosen = score, (separator, decimal)
+    # One column has no separator: a comma in its numbers is the decimal sign.
+    if best[0] <= 0:
+        return ";", "," if any("," in line for line in lines[1:]) else "."
+    # Quoted numbers may hold a decimal comma between commas.
+    if chosen[0] == ",":
+        cells = [cell for line in lines[1:20] for cell in split(line, ",")]
+        if any("," in cell and _is_number(cell, ",") for cell in cells):
+            return ",", ","
+    return chosen
+
+
+def _is_number(cell: str, decimal: str) -> bool:
+    return bool(_NUMBER.match(cell)) and ("," if decimal == "." else ".") not in cell
+
+
+def _is_units_row(cells: list[str], below: list[str], decimal: str) -> bool:
+    """Whether the row under the header holds units: no number in it, numbers under it, and units among its cells."""
+    if any(_is_number(cell, decimal) for cell in cells):
+        return False
+    under = [cell for cell, number in zip(cells, below, strict=False) if _is_number(number, decimal)]
+    return any(cell.lower() not in _EMPTY for cell in under) and any(is_common(_bare(cell)) for cell in under)
+
+
+def _bare(cell: str) -> str:
+    cell = cell.strip("[]() ")
+    return "" if cell in ("-", "--", "none") else cell
+
+
+def _names_and_units(header: list[str]) -> tuple[tuple[str, ...], dict[str, str]]:
+    """Column names without ``[unit]`` or ``(unit)`` behind them, where what stands there is a unit."""
+    bare: list[tuple[str, str]] = []
+    for cell in header:
+        match = _WITH_UNIT.match(cell)
+        unit = (match[2] or match[3] or "") if match else ""
+        bare.append((match[1], unit) if match and unit and is_common(unit) else (cell, ""))
+    names = [name for name, _ in bare]
+    chosen = [cell if names.count(name) > 1 else name for cell, name in zip(header, names, strict=True)]
+    return tuple(chosen), {c: u for c, (_, u) in zip(chosen, bare, strict=True) if u}
+
+
+def _skip_comments(data: bytes) -> int:
+    start = 0
+    while start < len(data):
+        end = data.find(b"\n", start)
+        end = len(data) if end < 0 else end + 1
+        line = data[start:end].strip()
+        if line and not line.startswith(b"#"):
+            return start
+        start = end
+    return start
+
+
+def _after_lines(data: bytes, start: int, count: int) -> int:
+    """Position after ``count`` lines that are not blank."""
+    while count and start < len(data):
+        end = data.find(b"\n", start)
+        end = len(data) if end < 0 else end + 1
+        count -= bool(data[start:end].strip())
+        start = end
+    return start
+
+
+def _binary(source: str) -> InputError:
+    return InputError("is not a table of text", file=source, mend="give a CSV or Parquet file")

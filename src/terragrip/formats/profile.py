@@ -1,0 +1,215 @@
+"""A profile: how the columns of a foreign log become those of a recording. A YAML file.
+
+    time: {from: unix_ns, unit: ns, zero: first}
+    rows: {column: calib_state, equals: calib}              # optional: only these rows
+    channels:
+      wheel_speed_left: {from: meas_left_vel, unit: rad/s}
+      drive_torque_left: {from: left_current, scale: 2.079, unit: N m, invalid: [0, [900, 1000]], delay: 50 ms}
+      ground_speed: {derivative_of: [x, y], unit: m, window: 0.5 s, forward: {yaw: heading, unit: deg}}
+      pitch: {pitch_of: [qx, qy, qz, qw]}
+      soil: {constant: grass}
+
+A value is ``sign * (scale * raw + offset)`` in ``unit``; ``invalid`` values and ranges are judged on the raw one.
+"""
+
+from __future__ import annotations
+
+import os
+from typing import Annotated, Any, Literal, Self
+
+from pydantic import BeforeValidator, Field, field_validator, model_validator
+
+from terragrip.document import Fault, Part, read_yaml, validate
+from terragrip.errors import nearest
+from terragrip.recording import Recording
+from terragrip.recording.schema import (
+    AXLE_CHANNELS,
+    CHANNELS,
+    LABELS,
+    TIME,
+    WHEEL_CHANNELS,
+    is_channel,
+    unit_of,
+)
+from terragrip.units import UnitError, factor_to, quantity
+
+Seconds = Annotated[float, BeforeValidator(lambda value: quantity(value, "s"))]
+Quaternion = tuple[str, str, str, str]
+
+
+class Forward(Part):
+    """What tells forward from backward: a yaw column and its unit, or the columns of a quaternion x, y, z, w."""
+
+    yaw: str | None = None
+    unit: str = "rad"
+    quaternion: Quaternion | None = None
+
+    @model_validator(mode="after")
+    def _one_of_them(self) -> Self:
+        if (self.yaw is None) == (self.quaternion is None):
+            raise Fault("needs a yaw or a quaternion", "write e.g. 'forward: {yaw: heading, unit: deg}'")
+        unit_factor(self.unit, "rad")
+        return self
+
+
+class Source(Part):
+    """Where one channel comes from, and what is done to it."""
+
+    column: str | None = Field(None, alias="from")
+    derivative_of: Annotated[tuple[str, ...], Field(min_length=1, max_length=3)] | None = None
+    pitch_of: Quaternion | None = None
+    roll_of: Quaternion | None = None
+    constant: str | float | None = None
+    unit: str | None = None
+    scale: float = Field(1.0, allow_inf_nan=False)
+    offset: float = Field(0.0, allow_inf_nan=False)
+    sign: Literal[1, -1] = 1
+    delay: Seconds = 0.0
+    invalid: tuple[float | tuple[float, float], ...] = ()
+    window: Seconds = 0.5
+    forward: Forward | None = None
+
+    @model_validator(mode="after")
+    def _one_source(self) -> Self:
+        given = [
+            k
+            for k in ("column", "derivative_of", "pitch_of", "roll_of", "constant")
+            if getattr(self, k) is not None
+        ]
+        if len(given) != 1:
+            raise Fault(
+                "needs exactly one source", "write one of from, derivative_of, pitch_of, roll_of, constant"
+            )
+        for key in ("window", "forward"):
+            if key in self.model_fields_set and self.derivative_of is None:
+                raise Fault("serves derivative_of only", "leave it out", (key,))
+        if self.forward is not None and len(self.derivative_of or ()) != 2:
+            raise Fault("needs derivative_of two columns, x and y", "leave it out", ("forward",))
+        if self.window <= 0:
+            raise Fault("is not a span of time", "write e.g. '0.5 s'", ("window",))
+        return self
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """The log's columns that it reads."""
+        heading = () if self.forward is None else (self.forward.yaw, *(self.forward.quaternion or ()))
+        every = (
+            self.column,
+            *(self.derivative_of or ()),
+            *(self.pitch_of or ()),
+            *(self.roll_of or ()),
+            *heading,
+        )
+        return tuple(name for name in every if name is not None)
+
+
+class TimeSource(Part):
+    """The column of the stamps, its unit, and whether time begins with 0 at the first row."""
+
+    column: str = Field(TIME, alias="from")
+    unit: str = "s"
+    zero: Literal["first"] | None = None
+
+    @field_validator("unit")
+    @classmethod
+    def _is_a_time(cls, value: str) -> str:
+        unit_factor(value, "s")
+        return value
+
+
+class Rows(Part):
+    """The rows to keep: those whose ``column`` equals a value."""
+
+    column: str
+    equals: str | float | bool
+
+
+class Profile(Part):
+    """How a foreign log becomes a recording; the module's text shows the file."""
+
+    name: str = ""
+    description: str = ""
+    time: TimeSource = Field(default_factory=lambda: TimeSource.model_validate({}))
+    rows: Rows | None = None
+    channels: dict[str, Source]
+
+    @classmethod
+    def load(cls, path: str | os.PathLike[str]) -> Self:
+        """Read a profile file; raises InputError with the file, the key, its line and the mend."""
+        return validate(cls, read_yaml(path))
+
+    @classmethod
+    def from_dict(cls, data: dict[str, Any], file: str | None = None) -> Self:
+        """Build from a mapping as a profile file holds; raises InputError, which names ``file`` if given."""
+        return validate(cls, data, file=file)
+
+    @field_validator("channels", mode="before")
+    @classmethod
+    def _short_forms(cls, value: Any) -> Any:
+        """``ground_speed: speed`` is short for ``ground_speed: {from: speed}``."""
+        if not isinstance(value, dict):
+            return value
+        return {k: {"from": v} if isinstance(v, str) else v for k, v in value.items()}
+
+    @model_validator(mode="after")
+    def _known_channels(self) -> Self:
+        for name, source in self.channels.items():
+            if name == TIME:
+                raise Fault(
+                    "time is no channel",
+                    "write it as 'time: {from: ...}' beside channels",
+                    ("channels", name),
+                )
+            if name not in LABELS and not is_channel(name):
+                close = nearest(
+                    name, (*CHANNELS, *LABELS, *(f"{q}_fl" for q in (*WHEEL_CHANNELS, *AXLE_CHANNELS)))
+                )
+                mend = (
+                    f"did you mean {close!r}?"
+                    if close
+                    else "the names are in DESIGN section 3, e.g. wheel_speed_fl"
+                )
+                raise Fault("no such channel", mend, ("channels", name))
+            _check_unit(name, source)
+        return self
+
+    @property
+    def sources(self) -> frozenset[str]:
+        """All columns of the log that the profile reads."""
+        named = {column for source in self.channels.values() for column in source.columns}
+        return frozenset({self.time.column, *named, *([self.rows.column] if self.rows else [])})
+
+    def apply(self, log: Any, source: str | None = None) -> Recording:
+        """Turn a log (a `LogTable`, a DataFrame or a mapping of columns) into a Recording.
+
+        Raises InputError where a column is missing (and names the nearest), where it holds text, where no row
+        is left, and for whatever `Recording.from_frame` refuses. ``source`` is the file that errors name.
+        """
+        from terragrip.formats.conversion import convert
+
+        return convert(self, log, source)
+
+
+def unit_factor(unit: str, target: str) -> float:
+    """Factor from a profile's unit to the schema's; raises Fault, for a validator to place."""
+    try:
+        return factor_to(unit, target)
+    except UnitError as error:
+        raise Fault(error.problem, error.mend or "") from error
+
+
+def _check_unit(name: str, origin: Source) -> None:
+    """Raise Fault unless the unit, or the constant with its unit, fits the channel."""
+    target = unit_of(name)
+    try:
+        if origin.unit is not None and target is not None:
+            factor_to(rate_unit(origin.unit) if origin.derivative_of else origin.unit, target)
+        if origin.constant is not None and name not in LABELS:
+            quantity(origin.constant, target or "1")
+    except UnitError as error:
+        raise Fault(error.problem, error.mend or "write an SI unit", ("channels", name)) from error
+
+
+def rate_unit(unit: str) -> str:
+    """The unit of the time derivative of what is measured in ``unit``."""
+    return f"{unit} s^-1"
