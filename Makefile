@@ -83,7 +83,7 @@ $(VENV)/dev: $(VENV)/runtime requirements-dev.lock
 
 $(VENV)/package: $(VENV)/runtime $(BUILD_INPUTS)
 	@echo "Compiling the kernel and installing terragrip into $(VENV)"
-	@$(PIP) install --quiet --no-deps --no-build-isolation --editable .
+	@CC="$(CC)" $(PIP) install --quiet --no-deps --no-build-isolation --editable .
 	@touch $@
 
 # --- the kernel's own tests, in double and in single precision ---------------------------------------------------------
