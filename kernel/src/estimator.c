@@ -1,0 +1,240 @@
+/* One raw sample in, one row of estimates out. */
+#include "estimator.h"
+
+#define TG_LONGEST_WALK 30 /* s of random walk that a gap adds at most: beyond it the ground is simply unknown */
+
+/* ---- the filter ---- */
+
+/* Start the outputs anew at `outputs`, the parameters having walked for `walk` seconds. */
+static void restart(tg_estimator *e, tg_real walk, const tg_real *outputs, const tg_real *variances)
+{
+    if (walk > TG_LONGEST_WALK) walk = TG_LONGEST_WALK;
+    if (tg_filter_restart(&e->filter, walk, outputs, variances) != TG_OK) {
+        tgi_filter_anew(&e->filter, &e->consider, &e->settings);
+        tg_filter_restart(&e->filter, 0, outputs, variances);
+    }
+    tg_consider_step(&e->consider, &e->filter, NULL);
+}
+
+/* Outputs as this row measures them, along the travel. What it does not measure follows from the rest, broadly: a wheel from the
+ * ground speed, the ground speed from the wheels. */
+static void restart_from(tg_estimator *e, const tg_row *row, tg_real walk)
+{
+    const tg_settings *s = &e->settings;
+    const int32_t n = s->machine.wheels;
+    const tg_real d = (tg_real)e->direction, *y = row->value;
+    tg_real x[9], P[9], rim = 0, v = y[TG_GROUND_SPEED];
+    int32_t seen = 0;
+    for (int32_t i = 0; i < n; i++) {
+        if (isnan(y[TG_WHEEL_SPEED + i])) continue;
+        rim += s->rolling_radius[i] * y[TG_WHEEL_SPEED + i];
+        seen++;
+    }
+    int32_t late = isnan(v) && e->ground_speed.seen && row->time - e->ground_speed.time <= 1;
+    if (late) v = e->ground_speed.value;
+    else if (isnan(v)) v = seen ? rim / (tg_real)seen : 0;
+    tg_real broad = tgi_square((tg_real)0.3 * tgi_fabs(v) + (tg_real)0.1), noise = tgi_square(s->noise[TG_GROUND_SPEED]);
+    x[n] = d * v;
+    P[n] = isnan(y[TG_GROUND_SPEED]) ? (late ? noise + (tg_real)0.01 : broad) : noise;
+    for (int32_t i = 0; i < n; i++) {
+        tg_real omega = y[TG_WHEEL_SPEED + i], r = s->rolling_radius[i];
+        x[i] = d * (isnan(omega) ? v / r : omega);
+        P[i] = isnan(omega) ? broad / (r * r) : tgi_square(s->noise[TG_WHEEL_SPEED + i]);
+    }
+    restart(e, walk, x, P);
+}
+
+/* At standstill the low-passed speeds stand for the outputs. */
+static void rest(tg_estimator *e)
+{
+    const tg_settings *s = &e->settings;
+    const int32_t n = s->machine.wheels;
+    tg_real d = (tg_real)e->direction, x[9], P[9];
+    for (int32_t i = 0; i < n; i++) {
+        x[i] = d * e->wheel_speed[i].value;
+        P[i] = tgi_square(s->noise[TG_WHEEL_SPEED + i]);
+    }
+    x[n] = d * e->ground_speed.value;
+    P[n] = tgi_square(s->noise[TG_GROUND_SPEED]);
+    restart(e, 0, x, P);
+}
+
+/* Nothing measured for too long: the estimate stays and its spread grows, since old torques must not be integrated. */
+static void drift(tg_estimator *e, tg_real dt)
+{
+    const int32_t n = e->settings.machine.wheels, stride = tgi_stride(n);
+    tg_real x[9], P[9], step = dt > TG_LONGEST_WALK ? TG_LONGEST_WALK : dt;
+    for (int32_t j = 0; j <= n; j++) {
+        tg_real r = j < n ? e->settings.rolling_radius[j] : 1;
+        int32_t row = tgi_row(n, j);
+        x[j] = e->belief.x[row];
+        P[j] = e->belief.P[row * stride + row] + step / (r * r); /* 1 m/s after 1 s */
+    }
+    restart(e, dt, x, P);
+}
+
+static void measured(const tg_estimator *e, const tg_row *row, tg_real *y, tg_real *r)
+{
+    const tg_settings *s = &e->settings;
+    const int32_t n = s->machine.wheels;
+    const tg_real d = (tg_real)e->direction;
+    for (int32_t i = 0; i < n; i++) {
+        y[i] = d * row->value[TG_WHEEL_SPEED + i];
+        r[i] = tgi_square(s->noise[TG_WHEEL_SPEED + i]);
+    }
+    y[n] = d * row->value[TG_GROUND_SPEED];
+    r[n] = tgi_square(s->noise[TG_GROUND_SPEED]);
+    y[n + 1] = d * row->value[TG_ACCELERATION_X];
+    r[n + 1] = tgi_square(s->noise[TG_ACCELERATION_X]) + tgi_square(s->noise[TG_DRAWBAR_FORCE] / s->machine.mass);
+}
+
+static tg_real supervisor_of(const tg_settings *s, const tg_step *step)
+{
+    if (s->tuning.policy != TG_BANK) return step->gamma;
+    tg_real low = tgi_log(s->tuning.scales[0]), high = low, mean = 0;
+    for (int32_t b = 0; b < TG_MODES; b++) {
+        tg_real scale = tgi_log(s->tuning.scales[b]);
+        mean += step->mode[b] * scale;
+        if (scale < low) low = scale;
+        if (scale > high) high = scale;
+    }
+    return high > low ? (mean - low) / (high - low) : 0;
+}
+
+/* Predict over dt, in pieces where it is long, and update. Returns 0 where the filter had to start anew. */
+static int32_t advance(tg_estimator *e, tg_row *row, const tg_drive *drive, tg_real dt, tg_real *q)
+{
+    const tg_settings *s = &e->settings;
+    tg_real y[TG_MAX_CHANNELS], r[TG_MAX_CHANNELS];
+    tg_input before = tgi_along(e, &e->before), now = tgi_along(e, drive);
+    tg_deviation deviation[TG_MAX_CONSIDERED];
+    tg_step step;
+    int32_t pieces = 1;
+    if (dt > s->max_step) pieces = dt / s->max_step < 300 ? (int32_t)(dt / s->max_step) + 1 : 300;
+    dt /= (tg_real)pieces;
+    for (int32_t j = 0; j < TG_MAX_STATES; j++) q[j] /= (tg_real)pieces;
+    measured(e, row, y, r);
+    tgi_deviations(s, &before, e->belief.x, deviation);
+    tg_status status = TG_OK;
+    for (int32_t k = 1; k < pieces && status == TG_OK; k++) {
+        status = tg_filter_predict(&e->filter, dt, &before, q);
+        tg_consider_step(&e->consider, &e->filter, deviation);
+    }
+    if (status == TG_OK) status = tg_filter_step(&e->filter, dt, &before, &now, q, y, r, &step);
+    if (status != TG_OK) {
+        tgi_filter_anew(&e->filter, &e->consider, s);
+        restart_from(e, row, 0);
+        return 0;
+    }
+    tg_consider_step(&e->consider, &e->filter, deviation);
+    e->belief.nis = step.nis;
+    e->belief.channels = step.channels;
+    e->belief.supervisor = supervisor_of(s, &step);
+    for (int32_t j = 0; j < s->machine.wheels + 2; j++) row->outlier |= step.weight[j] < s->outlier_weight && !isnan(y[j]);
+    return 1;
+}
+
+/* ---- a row ---- */
+
+typedef enum { TG_WAIT, TG_ANEW, TG_DRIFT, TG_REST, TG_GO } tg_course;
+
+static tg_course course_of(const tg_estimator *e, const tg_row *row, int32_t was_standing, int32_t turned, int32_t *gap)
+{
+    double silence = row->time - e->measured_time;
+    *gap = e->seen_motion && silence > (double)e->settings.gap;
+    if (!e->seen_motion) return row->measured ? (e->standing ? TG_REST : TG_ANEW) : TG_WAIT;
+    if (*gap && !row->measured) return TG_DRIFT;
+    if (e->standing) return TG_REST;
+    return *gap || turned || was_standing ? TG_ANEW : TG_GO;
+}
+
+static void balance_forces(tg_estimator *e, const tg_drive *drive, double time)
+{
+    const tg_machine *m = &e->settings.machine;
+    const int32_t n = m->wheels;
+    const tg_real d = (tg_real)e->direction;
+    tg_real force = -d * drive->drawbar - e->belief.x[n] * m->mass * m->gravity * tgi_cos(drive->slope);
+    for (int32_t i = 0; i < n; i++) force += e->belief.x[i] * drive->load[i];
+    tgi_lowpass(&e->balance, e->standing ? 0 : d * force / m->mass, time, e->settings.load_filter);
+}
+
+static int32_t go_on(tg_estimator *e, tg_row *row, const tg_drive *drive, tg_course course, tg_real dt, tg_real *q)
+{
+    int32_t sound = 1;
+    tg_belief *b = &e->belief;
+    b->nis = b->supervisor = 0;
+    b->channels = 0;
+    if (e->settings.method == TG_ALGEBRAIC) {
+        if (course == TG_ANEW || course == TG_GO) tgi_algebraic(e, row, drive, course == TG_ANEW);
+        return 1;
+    }
+    if (course == TG_ANEW) restart_from(e, row, dt);
+    else if (course == TG_DRIFT) drift(e, dt);
+    else if (course == TG_REST) rest(e);
+    else if (course == TG_GO) sound = advance(e, row, drive, dt, q);
+    tgi_believe(e);
+    return sound;
+}
+
+tg_status tg_estimator_update(tg_estimator *e, const tg_sample *sample, tg_estimate *out)
+{
+    if (!e || !sample || !out) return TG_BAD_ARGUMENT;
+    if (isnan(sample->time) || isinf(sample->time)) return TG_NOT_FINITE;
+    if (e->started && !(sample->time > e->time)) return TG_TIME_REVERSED;
+    tg_row row;
+    tg_drive drive;
+    tg_status status = tgi_clean(e, sample, &row);
+    if (status != TG_OK) return status;
+
+    int32_t was_standing = e->standing, gap, n = e->settings.machine.wheels;
+    tg_real dt = e->started ? (tg_real)(row.time - e->time) : 0, travelled = tgi_fabs(e->belief.x[n + 1]);
+    int32_t turned = tgi_track_motion(e, &row);
+    tg_real q[TG_MAX_STATES];
+    tgi_input_noise(e, row.time, dt, q); /* of the inputs held so far: before this row's are taken */
+    tgi_take_inputs(e, &row, &drive);
+    tgi_loads(e, &row, &drive);
+    tg_course course = course_of(e, &row, was_standing, turned, &gap);
+    if (!go_on(e, &row, &drive, course, dt, q)) gap = 1;
+    balance_forces(e, &drive, row.time);
+
+    if (course == TG_GO && !gap) e->distance += (double)((travelled + tgi_fabs(e->belief.x[n + 1])) / 2 * dt);
+    if (row.measured) {
+        e->seen_motion = 1;
+        e->measured_time = row.time;
+    }
+    e->started = 1;
+    e->time = row.time;
+    e->before = drive;
+    out->time = row.time;
+    out->distance = e->distance;
+    out->event = gap || course == TG_WAIT ? TG_EVENT_GAP : e->standing ? TG_EVENT_STANDSTILL
+               : row.outlier ? TG_EVENT_OUTLIER : TG_EVENT_NONE;
+    tgi_traction(e, &drive, out);
+    return TG_OK;
+}
+
+tg_status tg_estimator_block(tg_estimator *e, size_t rows, const double *time, const double *const *in, double *const *out,
+                             uint8_t *event, size_t *done)
+{
+    if (!e || !time || !in || !out || !event || !done) return TG_BAD_ARGUMENT;
+    tg_sample sample;
+    tg_estimate estimate;
+    int32_t given[TG_SLOTS], wanted[TG_OUT_SLOTS], n_given = 0, n_wanted = 0;
+    for (int32_t k = 0; k < TG_SLOTS; k++) {
+        sample.value[k] = (tg_real)NAN;
+        if (in[k]) given[n_given++] = k;
+    }
+    for (int32_t k = 0; k < TG_OUT_SLOTS; k++)
+        if (out[k]) wanted[n_wanted++] = k;
+    for (*done = 0; *done < rows; ++*done) {
+        size_t row = *done;
+        sample.time = time[row];
+        for (int32_t k = 0; k < n_given; k++) sample.value[given[k]] = (tg_real)in[given[k]][row];
+        tg_status status = tg_estimator_update(e, &sample, &estimate);
+        if (status != TG_OK) return status;
+        for (int32_t k = 0; k < n_wanted; k++) out[wanted[k]][row] = (double)estimate.value[wanted[k]];
+        if (out[TG_OUT_DISTANCE]) out[TG_OUT_DISTANCE][row] = estimate.distance; /* unrounded on the float build */
+        event[row] = (uint8_t)estimate.event;
+    }
+    return TG_OK;
+}

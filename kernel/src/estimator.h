@@ -1,0 +1,107 @@
+/* Inside the estimator floor. Signals here are calibrated; "along" means in the direction of travel (PHYSICS 2). */
+#ifndef TG_ESTIMATOR_H
+#define TG_ESTIMATOR_H
+#include "filter.h"
+#include <math.h>
+#include <string.h>
+
+#define TG_SPIKE 4 /* an increment beyond this many of its usual SDs is a spike */
+
+typedef struct { /* an input between its samples */
+    tg_real value;
+    tg_real level;    /* mean square of its increments, spikes clipped */
+    tg_real interval; /* s between its last two samples */
+    tg_real spike;    /* square of the last increment where that was a spike, else 0 */
+    double time;      /* of the last sample */
+    int32_t count;    /* samples seen, saturating */
+} tg_hold;
+
+typedef struct { /* a low-passed signal */
+    tg_real value;
+    double time; /* of its last sample */
+    int32_t seen;
+} tg_lowpass;
+
+typedef struct { /* one row, calibrated and checked, in the vehicle's own directions; NaN = missing */
+    double time;
+    tg_real value[TG_SLOTS];
+    int32_t measured; /* any wheel or ground speed */
+    int32_t outlier;
+} tg_row;
+
+typedef struct { /* what drives the model between two rows, in the vehicle's own directions */
+    tg_real load[8];      /* wheel, N */
+    tg_real axle_load[8]; /* N */
+    tg_real torque[8];
+    tg_real drawbar;
+    tg_real slope;
+} tg_drive;
+
+typedef struct { /* the estimate with its spreads, along the travel; the filter's row order (mu, rho_s, v, omega), see filter.h */
+    tg_real x[TG_ROWS];
+    tg_real P[TG_MAX_STATES * TG_ROWS]; /* the lower triangle, rows of tgi_stride(n) */
+    int32_t columns;                    /* of considered constants, in the consider object */
+    int32_t channels;
+    tg_real nis, supervisor;
+} tg_belief;
+
+typedef struct { /* low-passed signals of the algebraic method */
+    tg_lowpass wheel[8], ground, torque[8], drawbar;
+    tg_real wheel_rate[8], ground_rate; /* derivatives of the low-passed signals */
+    tg_real gain;                       /* of this row's low-pass: dt/(tau + dt) */
+} tg_algebra;
+
+struct tg_estimator {
+    tg_settings settings;
+    int32_t slots;             /* channels this machine can have */
+    int32_t slot[TG_SLOTS];
+    int32_t holds;             /* some channel is held */
+    tg_real spin_inertia;      /* sum J/r */
+    tg_real inverse_weight;    /* 1/(m g) */
+    int32_t started;           /* a sample was seen */
+    int32_t seen_motion;       /* a wheel or ground speed was seen: the outputs are numbers */
+    int32_t standing;          /* at standstill */
+    int32_t direction;         /* of travel: 1 forward, -1 in reverse */
+    double first_time, time, measured_time, distance;
+    tg_real last_raw[TG_SLOTS];
+    double last_raw_time[TG_SLOTS];
+    tg_hold torque[8], drawbar, pitch, axle_load[8];
+    tg_lowpass wheel_speed[8], ground_speed, acceleration, lateral, balance;
+    tg_drive before;           /* inputs of the last row */
+    tg_belief belief;
+    tg_algebra algebra;
+    tg_filter filter;
+    tg_consider consider;
+};
+
+TG_INLINE tg_real tgi_square(tg_real x) { return x * x; }
+
+/* quality.c */
+tg_status tgi_clean(tg_estimator *e, const tg_sample *sample, tg_row *row);
+tg_real tgi_lowpass(tg_lowpass *f, tg_real x, double time, tg_real tau);
+void tgi_hold_update(tg_hold *h, tg_real x, double time, tg_real noise);
+tg_real tgi_hold_variance(const tg_hold *h, double time, tg_real noise);
+int32_t tgi_track_motion(tg_estimator *e, const tg_row *row);
+
+/* loads.c */
+void tgi_loads(tg_estimator *e, const tg_row *row, tg_drive *drive);
+
+/* inputs.c */
+void tgi_take_inputs(tg_estimator *e, tg_row *row, tg_drive *drive);
+void tgi_input_noise(const tg_estimator *e, double time, tg_real dt, tg_real *q);
+tg_input tgi_along(const tg_estimator *e, const tg_drive *drive);
+
+/* deviations.c */
+int32_t tgi_deviation_columns(const tg_settings *s);
+void tgi_deviations(const tg_settings *s, const tg_input *u, const tg_real *mu, tg_deviation *d);
+
+/* settings.c */
+void tgi_believe(tg_estimator *e);
+tg_status tgi_filter_anew(tg_filter *f, tg_consider *c, const tg_settings *s);
+
+/* algebraic.c */
+void tgi_algebraic(tg_estimator *e, const tg_row *row, const tg_drive *drive, int32_t anew);
+
+/* traction.c */
+void tgi_traction(const tg_estimator *e, const tg_drive *drive, tg_estimate *out);
+#endif

@@ -1,0 +1,160 @@
+/* Settings of the estimator: defaults, checks, and an estimator made from them. */
+#include "estimator.h"
+
+static int is_number(tg_real x)
+{
+    return !isnan(x) && !isinf(x);
+}
+
+static int is_positive(tg_real x)
+{
+    return is_number(x) && x > 0;
+}
+
+static int is_spread(tg_real x)
+{
+    return is_number(x) && x >= 0;
+}
+
+/* Densities and priors were tuned on the simulation's development seeds alone (benchmarks/). */
+tg_settings tg_default_settings(void)
+{
+    tg_settings s;
+    memset(&s, 0, sizeof s);
+    s.tuning = tg_default_tuning();
+    s.axles = 1;
+    s.load_share[0] = 1;
+    for (int32_t k = 0; k < TG_SLOTS; k++) s.gain[k] = 1;
+    s.prior_adhesion = (tg_real)0.2;
+    s.prior_adhesion_std = (tg_real)0.3;
+    s.prior_resistance = (tg_real)0.05;
+    s.prior_resistance_std = (tg_real)0.05;
+    s.standstill_speed = (tg_real)0.03;
+    s.gap = 2;
+    s.max_step = (tg_real)0.1;
+    s.outlier_weight = (tg_real)0.5;
+    s.load_filter = (tg_real)0.2;
+    s.algebraic_filter = (tg_real)0.25;
+    return s;
+}
+
+static tg_status check_wheels(const tg_settings *s)
+{
+    for (int32_t i = 0; i < s->machine.wheels; i++) {
+        if (s->wheel_axle[i] < 0 || s->wheel_axle[i] >= s->axles) return TG_BAD_ARGUMENT;
+        if (!is_positive(s->rolling_radius[i]) || !is_positive(s->wheel_share[i])) return TG_NOT_POSITIVE;
+        if (!is_number(s->lateral_share[i])) return TG_NOT_FINITE;
+        if (!is_positive(s->noise[TG_WHEEL_SPEED + i])) return TG_NOT_POSITIVE;
+    }
+    for (int32_t k = 0; k < s->axles; k++) {
+        if (!is_positive(s->load_share[k])) return TG_NOT_POSITIVE;
+        if (!is_number(s->load_transfer[k])) return TG_NOT_FINITE;
+    }
+    return TG_OK;
+}
+
+static tg_status check_numbers(const tg_settings *s)
+{
+    const tg_uncertainty *u = &s->uncertainty;
+    const tg_real spreads[] = {u->drive_torque_gain, u->drive_torque_gain_common, u->drive_torque_offset, u->drawbar_gain, u->drawbar_offset, u->slope,
+                               u->tire_rolling_resistance, u->vertical_load, u->wheel_radius, u->acceleration_bias,
+                               s->standstill_speed, s->outlier_weight, s->load_filter, s->center_of_gravity_height,
+                               s->hitch_height};
+    const tg_real positive[] = {s->prior_adhesion_std, s->prior_resistance_std, s->gap, s->max_step, s->algebraic_filter,
+                                s->noise[TG_GROUND_SPEED], s->noise[TG_ACCELERATION_X]};
+    for (size_t k = 0; k < sizeof spreads / sizeof *spreads; k++)
+        if (!is_spread(spreads[k])) return TG_NOT_POSITIVE;
+    for (size_t k = 0; k < sizeof positive / sizeof *positive; k++)
+        if (!is_positive(positive[k])) return TG_NOT_POSITIVE;
+    if (!is_number(s->prior_adhesion) || !is_number(s->prior_resistance)) return TG_NOT_FINITE;
+    for (int32_t k = 0; k < TG_SLOTS; k++) {
+        if (!is_number(s->offset[k])) return TG_NOT_FINITE;
+        if (!is_positive(s->gain[k]) || !is_spread(s->noise[k]) || !is_spread(s->held_period[k])) return TG_NOT_POSITIVE;
+    }
+    return TG_OK;
+}
+
+static tg_status check(const tg_settings *s)
+{
+    if (s->machine.wheels < 1 || s->machine.wheels > TG_MAX_WHEELS || s->axles < 1 || s->axles > TG_MAX_WHEELS)
+        return TG_BAD_ARGUMENT;
+    if (s->method != TG_FILTERED && s->method != TG_ALGEBRAIC) return TG_BAD_ARGUMENT;
+    tg_status status = check_wheels(s);
+    return status == TG_OK ? check_numbers(s) : status;
+}
+
+static void list_slots(tg_estimator *e)
+{
+    const tg_settings *s = &e->settings;
+    for (int32_t slot = 0; slot < TG_SLOTS; slot++) {
+        int32_t torque = slot - TG_DRIVE_TORQUE, axle = slot - TG_VERTICAL_LOAD;
+        if (slot < TG_GROUND_SPEED && slot >= s->machine.wheels) continue;
+        if (torque >= 0 && torque < TG_MAX_WHEELS && (torque >= s->machine.wheels || !s->driven[torque])) continue;
+        if (axle >= s->axles) continue;
+        e->slot[e->slots++] = slot;
+    }
+}
+
+/* A filter that knows the priors only, and its considered columns. */
+tg_status tgi_filter_anew(tg_filter *f, tg_consider *c, const tg_settings *s)
+{
+    const int32_t n = s->machine.wheels, nx = 2 * n + 2;
+    tg_real x[TG_MAX_STATES] = {0}, P[TG_MAX_STATES * TG_MAX_STATES] = {0};
+    for (int32_t i = 0; i < n; i++) {
+        x[n + 1 + i] = s->prior_adhesion;
+        P[i * nx + i] = 1;
+        P[(n + 1 + i) * (nx + 1)] = tgi_square(s->prior_adhesion_std);
+    }
+    P[n * (nx + 1)] = 1;
+    x[nx - 1] = s->prior_resistance;
+    P[(nx - 1) * (nx + 1)] = tgi_square(s->prior_resistance_std);
+    tg_status status = tg_filter_init(f, &s->machine, &s->tuning, x, P);
+    return status == TG_OK ? tg_consider_init(c, f, tgi_deviation_columns(s)) : status;
+}
+
+/* The filter's moments as the belief. */
+void tgi_believe(tg_estimator *e)
+{
+    const tg_filter *f = &e->filter;
+    if (f->tuning.policy == TG_BANK) {
+        tgi_bank_moments(f, e->belief.x, e->belief.P);
+        return;
+    }
+    memcpy(e->belief.x, f->x, sizeof e->belief.x);
+    tgi_covariance(f->states, f->stride, f->u, f->d, e->belief.P);
+}
+
+/* The machine and the tuning are checked by the filter. */
+tg_status tg_estimator_init(tg_estimator *e, const tg_settings *settings)
+{
+    if (!e || !settings) return TG_BAD_ARGUMENT;
+    tg_status status = check(settings);
+    if (status != TG_OK) return status;
+    tg_filter filter;
+    tg_consider consider;
+    memset(&filter, 0, sizeof filter);
+    memset(&consider, 0, sizeof consider);
+    status = tgi_filter_anew(&filter, &consider, settings);
+    if (status != TG_OK) return status;
+    memset(e, 0, sizeof *e); /* padding too: a snapshot is these bytes */
+    e->settings = *settings;
+    memcpy(&e->filter, &filter, sizeof filter);
+    memcpy(&e->consider, &consider, sizeof consider);
+    e->belief.columns = tgi_deviation_columns(settings);
+    e->direction = 1;
+    for (int32_t i = 0; i < settings->machine.wheels; i++)
+        e->spin_inertia += settings->machine.inertia[i] / settings->rolling_radius[i];
+    for (int32_t k = 0; k < TG_SLOTS; k++) e->last_raw[k] = (tg_real)NAN;
+    list_slots(e);
+    e->inverse_weight = 1 / (settings->machine.mass * settings->machine.gravity);
+    for (int32_t k = 0; k < TG_SLOTS; k++) e->holds |= settings->held_period[k] > 0;
+    tgi_believe(e);
+    return TG_OK;
+}
+
+tg_status tg_estimator_settings(const tg_estimator *e, tg_settings *settings)
+{
+    if (!e || !settings) return TG_BAD_ARGUMENT;
+    *settings = e->settings;
+    return TG_OK;
+}

@@ -1,0 +1,142 @@
+/* From the belief over the state to what a user reads: slip, net traction, efficiency (PHYSICS 2), each with its spread. */
+#include "estimator.h"
+
+typedef struct { /* second moments of (omega_i, v, mu_i, rho_s): the filter's and the considered constants' */
+    tg_real ww[8], wv[8], wm[8], wr[8], mm[8], mr[8], vm[8], vv, vr, rr;
+} tgi_moments;
+
+TG_INLINE void gather(const tg_belief *b, const tg_real (*S)[TG_ROWS], const int n, const int stride, tgi_moments *c)
+{
+    const int r = n, v = n + 1, w = n + 2;
+    const tg_real *P = b->P, *Pr = P + r * stride, *Pv = P + v * stride;
+    for (int i = 0; i < n; i++) {
+        const tg_real *Pw = P + (w + i) * stride;
+        c->mm[i] = P[i * stride + i];
+        c->mr[i] = Pr[i];
+        c->vm[i] = Pv[i];
+        c->wm[i] = Pw[i];
+        c->wr[i] = Pw[r];
+        c->wv[i] = Pw[v];
+        c->ww[i] = Pw[w + i];
+    }
+    c->rr = Pr[r];
+    c->vr = Pv[r];
+    c->vv = Pv[v];
+    for (int k = 0; k < b->columns; k++) {
+        const tg_real *s = S[k], sr = s[r], sv = s[v];
+        for (int i = 0; i < n; i++) {
+            const tg_real sm = s[i], sw = s[w + i];
+            c->mm[i] += sm * sm;
+            c->mr[i] += sm * sr;
+            c->vm[i] += sm * sv;
+            c->wm[i] += sm * sw;
+            c->wr[i] += sw * sr;
+            c->wv[i] += sw * sv;
+            c->ww[i] += sw * sw;
+        }
+        c->rr += sr * sr;
+        c->vr += sv * sr;
+        c->vv += sv * sv;
+    }
+}
+
+TG_INLINE tg_real root(tg_real variance) { return tgi_sqrt(variance > 0 ? variance : 0); }
+
+/* Slip lies in [-1, 1], so no spread above 1 says more than 1 does; the same is said of the efficiency. */
+TG_INLINE tg_real bounded_root(tg_real variance) { return root(variance < 1 ? variance : 1); }
+
+typedef struct { /* slip, and its change with omega, v and the relative radius */
+    tg_real slip, wheel, ground, radius;
+} tgi_slip;
+
+/* Slip by paper eq. 5: (rim - travel)/larger. Where wheel and vehicle both creep, the divisor is floored. */
+TG_INLINE tgi_slip slip_of(tg_real omega, tg_real v, tg_real radius, tg_real least)
+{
+    const tg_real rim = radius * tgi_fabs(omega), travel = tgi_fabs(v), larger = rim > travel ? rim : travel;
+    const tg_real inverse = 1 / (larger > least ? larger : least), s = (rim - travel) * inverse;
+    const tg_real moving = larger > least ? s : 0; /* the divisor moves too, unless floored */
+    const tg_real by_rim = inverse * (1 - (rim >= travel ? moving : 0)), by_travel = -inverse * (1 + (rim >= travel ? 0 : moving));
+    const tgi_slip found = {s, omega < 0 ? -radius * by_rim : radius * by_rim, v < 0 ? -by_travel : by_travel, rim * by_rim};
+    return found;
+}
+
+/* All wheels, delta method. `mean` is the mean adhesion over the load: what a common radius error does to rho_s. */
+TG_INLINE void traction(const tg_estimator *e, const tgi_moments *c, tg_real mean, tg_real *o, const int n)
+{
+    const tg_settings *s = &e->settings;
+    const tg_real *x = e->belief.x, rho = x[n], v = x[n + 1], error = s->uncertainty.wheel_radius;
+    const tg_real tire = s->machine.tire_rolling_resistance, least = (tg_real)0.02;
+    for (int i = 0; i < n; i++) {
+        const tg_real mu = x[i], kappa = mu - rho;
+        o[TG_OUT_WHEEL_SPEED + i] = x[n + 2 + i];
+        o[TG_OUT_WHEEL_SPEED_STD + i] = root(c->ww[i]);
+        o[TG_OUT_ADHESION + i] = mu;
+        o[TG_OUT_ADHESION_STD + i] = root(c->mm[i] + tgi_square(mu * error));
+        o[TG_OUT_NET_TRACTION + i] = kappa;
+        o[TG_OUT_NET_TRACTION_STD + i] = root(c->mm[i] - 2 * c->mr[i] + c->rr + tgi_square((mu - mean) * error));
+    }
+    for (int i = 0; i < n; i++) {
+        const tgi_slip g = slip_of(x[n + 2 + i], v, s->rolling_radius[i], s->standstill_speed);
+        const tg_real slip_variance = g.wheel * (g.wheel * c->ww[i] + 2 * g.ground * c->wv[i]) + g.ground * g.ground * c->vv;
+        o[TG_OUT_SLIP + i] = g.slip;
+        o[TG_OUT_SLIP_STD + i] = bounded_root(slip_variance + tgi_square(g.radius * error));
+
+        const tg_real mu = x[i], gross = mu + tire, kappa = mu - rho, pull = kappa > 0 ? kappa : 0, travel = 1 - g.slip;
+        const tg_real inverse = 1 / (gross > least ? gross : least), share = pull * inverse;
+        const tg_real by_mu = (1 - share) * inverse * travel, by_rho = -inverse * travel;
+        const tg_real by_wheel = -share * g.wheel, by_ground = -share * g.ground;
+        const tg_real cross = c->wm[i] * by_mu + c->wr[i] * by_rho, cross_v = c->vm[i] * by_mu + c->vr * by_rho;
+        const tg_real by_radius = -share * g.radius - by_mu * mu - by_rho * mean;
+        o[TG_OUT_EFFICIENCY + i] = gross > 0 ? share * travel : 0;
+        o[TG_OUT_EFFICIENCY_STD + i] = bounded_root(share * share * slip_variance + 2 * (by_wheel * cross + by_ground * cross_v)
+                                                    + by_mu * (by_mu * c->mm[i] + 2 * by_rho * c->mr[i]) + by_rho * by_rho * c->rr
+                                                    + tgi_square(by_radius * error));
+    }
+    o[TG_OUT_GROUND_SPEED] = v;
+    o[TG_OUT_GROUND_SPEED_STD] = root(c->vv);
+    o[TG_OUT_SOIL_RESISTANCE] = rho;
+    o[TG_OUT_SOIL_RESISTANCE_STD] = root(c->rr + tgi_square(mean * error));
+}
+
+static void blank(tg_real *out, int32_t place, int32_t n)
+{
+    for (int32_t i = 0; i < n; i++) out[place + i] = (tg_real)NAN;
+}
+
+/* What is not known: slip and efficiency at standstill, and they and the speeds before anything was measured. */
+static void leave_open(const tg_estimator *e, tg_real *o)
+{
+    const int32_t n = e->settings.machine.wheels;
+    const int32_t undefined[] = {TG_OUT_SLIP, TG_OUT_SLIP_STD, TG_OUT_EFFICIENCY, TG_OUT_EFFICIENCY_STD};
+    for (int32_t k = 0; k < 4; k++) blank(o, undefined[k], n);
+    if (e->seen_motion) return;
+    blank(o, TG_OUT_GROUND_SPEED, 2);
+    blank(o, TG_OUT_WHEEL_SPEED, n);
+    blank(o, TG_OUT_WHEEL_SPEED_STD, n);
+}
+
+/* All values of a row. Speeds get back the vehicle's own signs; mu, rho_s, slip and kappa stay in the direction of travel. */
+void tgi_traction(const tg_estimator *e, const tg_drive *drive, tg_estimate *out)
+{
+    const tg_settings *s = &e->settings;
+    const tg_belief *b = &e->belief;
+    const int32_t n = s->machine.wheels;
+    tg_real *o = out->value, thrust = 0;
+    tgi_moments c;
+    for (int32_t i = 0; i < n; i++) thrust += b->x[i] * drive->load[i];
+#define TRACTION(n, stride)                        \
+    gather(b, e->consider.s, n, stride, &c);       \
+    traction(e, &c, thrust * e->inverse_weight, o, n)
+    TG_BY_WHEELS(n, TRACTION)
+#undef TRACTION
+    if (e->direction < 0) {
+        o[TG_OUT_GROUND_SPEED] = -o[TG_OUT_GROUND_SPEED];
+        for (int32_t i = 0; i < n; i++) o[TG_OUT_WHEEL_SPEED + i] = -o[TG_OUT_WHEEL_SPEED + i];
+    }
+    o[TG_OUT_NIS] = b->nis;
+    o[TG_OUT_CHANNELS] = (tg_real)b->channels;
+    o[TG_OUT_SUPERVISOR] = b->supervisor;
+    o[TG_OUT_DISTANCE] = (tg_real)out->distance;
+    for (int32_t k = 0; k < s->axles; k++) o[TG_OUT_VERTICAL_LOAD + k] = drive->axle_load[k];
+    if (e->standing || !e->seen_motion) leave_open(e, o);
+}

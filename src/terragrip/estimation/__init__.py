@@ -1,0 +1,40 @@
+"""Traction estimates from measured signals: one sample at a time, or a whole recording.
+
+The names load on first use: consistency measures and the reference filters need no compiled kernel.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from terragrip.estimation.batch import estimate as estimate
+    from terragrip.estimation.estimates import Estimates as Estimates
+    from terragrip.estimation.estimator import Estimate as Estimate
+    from terragrip.estimation.estimator import TractionEstimator as TractionEstimator
+    from terragrip.estimation.methods import DEFAULT as DEFAULT
+    from terragrip.estimation.methods import METHODS as METHODS
+    from terragrip.estimation.methods import Method as Method
+
+_HOME = {
+    "estimate": "batch",
+    "Estimates": "estimates",
+    "Estimate": "estimator",
+    "TractionEstimator": "estimator",
+    "DEFAULT": "methods",
+    "METHODS": "methods",
+    "Method": "methods",
+}
+
+__all__ = list(_HOME)
+
+
+def __getattr__(name: str) -> Any:
+    """Load a public name from its home (PEP 562)."""
+    if name not in _HOME:
+        raise AttributeError(f"module 'terragrip.estimation' has no attribute {name!r}")
+    from importlib import import_module
+
+    value = getattr(import_module(f"terragrip.estimation.{_HOME[name]}"), name)
+    globals()[name] = value
+    return value

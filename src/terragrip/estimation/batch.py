@@ -1,0 +1,152 @@
+"""A whole recording at once."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+
+from terragrip.errors import InputError
+from terragrip.estimation.engine import EVENTS, sample_slots
+from terragrip.estimation.estimates import Estimates
+from terragrip.estimation.estimator import TractionEstimator
+from terragrip.estimation.methods import DEFAULT, method_named
+from terragrip.recording import Recording, unit_warnings
+
+if TYPE_CHECKING:
+    from terragrip.vehicle import Vehicle
+
+Floats = npt.NDArray[np.float64]
+Progress = Callable[[int, int], None]
+
+_PASSED_ON = ("latitude", "longitude", "altitude")
+_GAP = EVENTS.index("gap")
+
+
+def estimate(
+    recording: Recording | Any,
+    vehicle: Vehicle,
+    method: str = DEFAULT,
+    *,
+    smooth: bool = False,
+    sensors: Mapping[str, float] | None = None,
+    held: Mapping[str, float] | None = None,
+    gap: float | None = None,
+    standstill_speed: float | None = None,
+    progress: Progress | None = None,
+) -> Estimates:
+    """Estimate a whole recording.
+
+    Parameters
+    ----------
+    recording: a Recording, or a table that :meth:`Recording.from_frame` takes.
+    vehicle, method, gap, standstill_speed: see :class:`TractionEstimator`.
+    smooth: run the recording backwards too: every row then knows the rows after it.
+    sensors: SDs of the noise [SI] by channel or sensor; what neither they nor the vehicle file give is
+        estimated from the log, else guessed with a note.
+    held: update periods [s] of held channels; None finds them.
+    progress: called with rows done and rows in all.
+
+    Raises
+    ------
+    InputError: the recording or the vehicle is unusable, there is no such method, or `algebraic` is to smooth.
+    """
+    log = recording if isinstance(recording, Recording) else Recording.from_frame(recording)
+    log.check_against(vehicle)
+    if smooth and not method_named(method).can_smooth:
+        raise InputError(
+            f"the method {method} cannot smooth", mend="take another method, or leave out smooth"
+        )
+    estimator = TractionEstimator.for_recording(
+        log, vehicle, method, sensors=sensors, held=held, gap=gap, standstill_speed=standstill_speed
+    )
+    if smooth:
+        from terragrip.estimation.smoothing import run_smoothed
+
+        return run_smoothed(estimator, log, progress)
+    return run(estimator, log, progress)
+
+
+def run(estimator: TractionEstimator, recording: Recording, progress: Progress | None = None) -> Estimates:
+    """All rows of the recording through the estimator as it stands."""
+    time, columns = prepared(estimator, recording)
+    out = table_of(estimator.columns, len(time))
+    event = np.empty(len(time), dtype=np.uint8)
+    estimator.engine.run(time, columns, out, event, progress)
+    return finished(estimator, recording, out, event, smooth=False)
+
+
+def prepared(estimator: TractionEstimator, recording: Recording) -> tuple[Floats, dict[str, Floats]]:
+    """Time and those channels that the estimator looks at, each contiguous."""
+    wanted = sample_slots(estimator.vehicle)
+    columns = {
+        name: np.ascontiguousarray(values) for name, values in recording.channels.items() if name in wanted
+    }
+    return np.ascontiguousarray(recording.time), columns
+
+
+def table_of(names: tuple[str, ...], rows: int) -> dict[str, Floats]:
+    """Empty columns (rows,) in one block.
+
+    An odd number of cache lines a column keeps columns that are written side by side out of the same cache set.
+    """
+    lines = (rows + 7) // 8 | 1
+    block = np.empty((len(names), 8 * lines))
+    return {name: block[k, :rows] for k, name in enumerate(names)}
+
+
+def finished(
+    estimator: TractionEstimator,
+    recording: Recording,
+    out: dict[str, Floats],
+    event: npt.NDArray[np.uint8],
+    *,
+    smooth: bool,
+) -> Estimates:
+    """Estimates from the kernel's columns: with what is passed on, the row before each gap flagged, and notes."""
+    flag_before_gaps(event)
+    for name in (*_PASSED_ON, *recording.references):
+        if name in recording.channels:
+            out[name] = recording.channels[name]
+    labels = dict(recording.labels)
+    about = about_run(estimator, recording.source, recording.sha256, smooth=smooth)
+    notes = (*recording.notes, *unit_warnings(recording, estimator.vehicle), *notes_of(estimator, recording))
+    return Estimates(recording.time, out, event, labels, about, tuple(dict.fromkeys(notes)))
+
+
+def flag_before_gaps(event: npt.NDArray[np.uint8]) -> None:
+    """The row before a gap is the last one before the unknown: flag it too, unless it stands still."""
+    before = np.flatnonzero((event[1:] == _GAP) & (event[:-1] != _GAP))
+    event[before] = _GAP
+
+
+def about_run(
+    estimator: TractionEstimator, source: str | None, sha256: str | None, *, smooth: bool
+) -> dict[str, Any]:
+    """What the table was made from, ready for JSON."""
+    from terragrip import __version__
+
+    return {
+        "version": __version__,
+        "method": estimator.method,
+        "smooth": smooth,
+        "vehicle": estimator.vehicle.to_dict(),
+        "recording": {"source": source, "sha256": sha256},
+        "settings": {
+            "noise": estimator.noise,
+            "held": estimator.held,
+            "gap": estimator.thresholds.gap,
+            "standstill_speed": estimator.thresholds.standstill_speed,
+        },
+    }
+
+
+def notes_of(estimator: TractionEstimator, recording: Recording) -> list[str]:
+    """Sentences on what the estimator had to assume."""
+    guessed = [name for name in estimator.guessed if name in recording.channels]
+    if not guessed:
+        return []
+    shown = ", ".join(f"{name} ({estimator.noise[name]:.3g})" for name in guessed)
+    return [f"The noise of {shown} is a guess from the vehicle's size: give it under 'sensors'."]

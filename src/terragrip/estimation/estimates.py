@@ -1,0 +1,221 @@
+"""The table of estimates: one row a recording row, SI units (DESIGN §3)."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, Self
+
+import numpy as np
+import numpy.typing as npt
+
+from terragrip.errors import InputError
+from terragrip.estimation.engine import EVENTS
+
+if TYPE_CHECKING:
+    import pandas as pd
+    import pyarrow as pa
+
+    from terragrip.vehicle import Vehicle
+
+Floats = npt.NDArray[np.float64]
+
+METADATA_KEY = b"terragrip"
+"""Under it a Parquet file holds, as JSON, what the table was made from."""
+
+
+@dataclass(frozen=True, eq=False)
+class Estimates:
+    """Estimates of one recording.
+
+    ``time`` (n,) [s]; ``columns`` float64 (n,) by name in the table's order, then what was passed through from
+    the recording (position, references); ``event_codes`` (n,) index
+    :data:`~terragrip.estimation.engine.EVENTS`; ``labels`` text (n,), such as ``soil``; ``about``: version,
+    method, smooth, vehicle, recording (source, sha256), settings (noise, held, thresholds); ``notes``: plain
+    sentences for the user.
+
+    Quantities have a twin ``_std``: one standard deviation that holds the filter's own variance and the
+    constants that data cannot tell. ``channels`` is how many channels an update took, the expectation of
+    ``nis``. ``supervisor`` is γ of the supervised policy, 1 under `aukf`, 0 under a fixed policy; under `bank`
+    it is where the expected scale of the noise stands between the smallest (0) and the largest (1), on a
+    logarithmic scale. NaN stands only where ``event`` says why: slip and efficiency at ``standstill``, and
+    speeds in a ``gap`` before anything was measured.
+    """
+
+    time: Floats
+    columns: dict[str, Floats]
+    event_codes: npt.NDArray[np.uint8]
+    labels: dict[str, npt.NDArray[np.object_]] = field(default_factory=dict)
+    about: dict[str, Any] = field(default_factory=dict)
+    notes: tuple[str, ...] = ()
+
+    def __len__(self) -> int:
+        return len(self.time)
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.names)
+
+    def __contains__(self, name: object) -> bool:
+        return name in self.names
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """All columns in the table's order."""
+        return ("time", *self.columns, *self.labels, "event")
+
+    def __getitem__(self, name: str) -> npt.NDArray[Any]:
+        """One column (n,); raises KeyError if there is none."""
+        if name == "time":
+            return self.time
+        if name == "event":
+            return np.array(EVENTS, dtype=object)[self.event_codes]
+        return self.labels[name] if name in self.labels else self.columns[name]
+
+    @property
+    def wheels(self) -> tuple[str, ...]:
+        """Names of the wheels, in the vehicle's order."""
+        return tuple(
+            name.removeprefix("adhesion_")
+            for name in self.columns
+            if name.startswith("adhesion_") and not name.endswith("_std")
+        )
+
+    @property
+    def method(self) -> str:
+        """Name of the method."""
+        return str(self.about.get("method", ""))
+
+    @property
+    def vehicle(self) -> Vehicle:
+        """The vehicle that the estimates were made for; raises InputError if the table does not hold one."""
+        from terragrip.vehicle import Vehicle
+
+        if "vehicle" not in self.about:
+            raise InputError("the estimates hold no vehicle", mend="estimate the log anew with this version")
+        return Vehicle.from_dict(self.about["vehicle"])
+
+    def to_pandas(self) -> pd.DataFrame:
+        """The whole table as a pandas DataFrame; ``event`` and labels are text."""
+        import pandas as pd
+
+        table: dict[str, Any] = {"time": self.time, **self.columns}
+        table.update(
+            {
+                name: pd.Series(values, dtype=pd.StringDtype(na_value=np.nan))
+                for name, values in self.labels.items()
+            }
+        )
+        events = pd.Categorical.from_codes(self.event_codes.astype(np.int8), list(EVENTS))
+        table["event"] = pd.Series(events).astype(pd.StringDtype(na_value=np.nan))
+        return pd.DataFrame(table, copy=False)
+
+    def to_arrow(self) -> pa.Table:
+        """The whole table as an Arrow table without copies, with its metadata."""
+        import pyarrow as pa
+
+        arrays: dict[str, Any] = {name: pa.array(values) for name, values in self._numbers()}
+        arrays |= {name: _text_array(values) for name, values in self.labels.items()}
+        codes = pa.array(self.event_codes.view(np.int8))
+        arrays["event"] = pa.DictionaryArray.from_arrays(codes, list(EVENTS)).cast(pa.string())
+        return pa.table(arrays).replace_schema_metadata({METADATA_KEY: self.metadata()})
+
+    def _numbers(self) -> Iterator[tuple[str, Floats]]:
+        yield "time", self.time
+        yield from self.columns.items()
+
+    def metadata(self) -> bytes:
+        """What a Parquet file says of the table: `about` and `notes` as JSON."""
+        return json.dumps({**self.about, "notes": list(self.notes)}).encode()
+
+    def write(self, path: str | os.PathLike[str]) -> None:
+        """Write a Parquet file, whole or not at all; raises InputError if it cannot be written."""
+        import pyarrow.parquet as pq
+
+        from terragrip.files import replacing
+
+        table = self.to_arrow()
+        with replacing(path) as temporary:
+            pq.write_table(table, temporary, **parquet_options(table.schema))
+
+    @classmethod
+    def read(cls, path: str | os.PathLike[str]) -> Self:
+        """Read a Parquet file of estimates; raises InputError if it is missing, damaged or no such table."""
+        import pyarrow as pa
+        import pyarrow.parquet as pq
+
+        from terragrip.files import refuse_missing, unreadable
+
+        refuse_missing(path, suffixes=(".parquet",))
+        try:
+            table = pq.read_table(path)
+        except pa.ArrowInvalid as error:
+            raise InputError(
+                "is no Parquet file, or is damaged", file=path, mend="write it anew with terragrip estimate"
+            ) from error
+        except OSError as error:
+            raise unreadable(path, error) from error
+        return cls.from_arrow(table, source=os.fspath(path))
+
+    @classmethod
+    def from_arrow(cls, table: pa.Table, source: str | None = None) -> Self:
+        """Take an Arrow table of estimates; raises InputError if columns are missing or of another type."""
+        missing = [
+            n for n in ("time", "event", "soil_resistance", "ground_speed") if n not in table.column_names
+        ]
+        if missing:
+            raise InputError(
+                "this is no table of estimates", file=source, place=f"column {missing[0]}", mend="is missing"
+            )
+        about = json.loads((table.schema.metadata or {}).get(METADATA_KEY, b"{}"))
+        notes = tuple(about.pop("notes", ()))
+        columns: dict[str, Floats] = {}
+        labels: dict[str, npt.NDArray[np.object_]] = {}
+        for name in table.column_names:
+            if name == "event":
+                continue
+            values = table.column(name).to_numpy()
+            if values.dtype.kind in "fiu":
+                columns[name] = values.astype(np.float64, copy=False)
+            else:
+                labels[name] = np.where(values == None, "", values)  # noqa: E711  (elementwise)
+        return cls(columns.pop("time"), columns, _event_codes(table, source), labels, about, notes)
+
+    def summary(self) -> str:
+        """What a user wants to know first, in a few lines of text."""
+        from terragrip.estimation.summary import summary
+
+        return summary(self)
+
+
+def parquet_options(schema: pa.Schema) -> dict[str, Any]:
+    """How estimates are stored: noisy floats do not repeat, so no dictionary; split by bytes they compress."""
+    import pyarrow as pa
+
+    floats = [f.name for f in schema if pa.types.is_floating(f.type)]
+    texts = [f.name for f in schema if not pa.types.is_floating(f.type)]
+    return {
+        "compression": "zstd",
+        "compression_level": 1,
+        "use_dictionary": texts or False,
+        "use_byte_stream_split": floats,
+    }
+
+
+def _text_array(values: npt.NDArray[np.object_]) -> Any:
+    import pyarrow as pa
+
+    return pa.array(values, type=pa.string())
+
+
+def _event_codes(table: pa.Table, source: str | None) -> npt.NDArray[np.uint8]:
+    import pyarrow as pa
+    import pyarrow.compute as pc
+
+    column = table.column("event").combine_chunks()
+    found = pc.index_in(column.cast(pa.string()), value_set=pa.array(EVENTS))
+    if found.null_count:
+        unknown = column.filter(pc.is_null(found))[0]
+        raise InputError(f"there is no event {unknown!s}", file=source, place="column event")
+    return found.to_numpy().astype(np.uint8)

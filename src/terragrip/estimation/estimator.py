@@ -1,0 +1,265 @@
+"""One sample in, one estimate out; a whole recording is its samples one after another, with identical results."""
+
+from __future__ import annotations
+
+import json
+import math
+import struct
+import zlib
+from collections.abc import Collection, Iterator, Mapping
+from typing import TYPE_CHECKING, Any, Self
+
+from terragrip.errors import InputError
+from terragrip.estimation.engine import EVENTS, Engine, Thresholds, refusal, settings_of
+from terragrip.estimation.methods import DEFAULT, method_named
+from terragrip.estimation.noise import channel_noise
+from terragrip.vehicle import Vehicle
+
+if TYPE_CHECKING:
+    from terragrip.estimation.estimates import Estimates
+    from terragrip.recording import Recording
+
+_SNAPSHOT_MAGIC = b"TGRIPSN1"
+
+
+class Estimate:
+    """The estimate at one instant: a column of DESIGN §3 by ``e["slip_fl"]`` or ``e.slip_fl``.
+
+    ``time`` [s], ``event`` (a text of :data:`~terragrip.estimation.engine.EVENTS`), and the columns of
+    :attr:`TractionEstimator.columns` as plain floats; NaN only where ``event`` says why.
+    """
+
+    __slots__ = ("_places", "_values", "event", "time")
+
+    def __init__(self, time: float, event: str, values: list[float], places: dict[str, int]) -> None:
+        self.time = time
+        self.event = event
+        self._values = values
+        self._places = places
+
+    def __getitem__(self, name: str) -> Any:
+        if name in self._places:
+            return self._values[self._places[name]]
+        if name in ("time", "event"):
+            return getattr(self, name)
+        raise KeyError(name)
+
+    def __getattr__(self, name: str) -> float:
+        try:
+            return self._values[self._places[name]]
+        except KeyError:
+            raise AttributeError(f"an estimate has no {name!r}") from None
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(("time", *self._places, "event"))
+
+    def to_dict(self) -> dict[str, float | str]:
+        """All columns by name."""
+        return {name: self[name] for name in self}
+
+    def __repr__(self) -> str:
+        shown = ", ".join(
+            f"{name}={self[name]:.4g}"
+            for name in self._places
+            if name.startswith(("adhesion", "slip", "soil"))
+        )
+        return f"Estimate(time={self.time:.6g}, event={self.event!r}, {shown})"
+
+
+class TractionEstimator:
+    """Estimates adhesion, soil resistance, slip and efficiency while the samples come in.
+
+    Parameters
+    ----------
+    vehicle: the machine; its ``calibration`` corrects the samples.
+    method: a name of :data:`~terragrip.estimation.methods.METHODS`.
+    sensors: standard deviations of the noise [SI], by channel (``wheel_speed_fl``) or sensor
+        (``wheel_speed``); they win over the vehicle file's. Where neither knows one it is guessed from the
+        vehicle's size (``guessed`` lists those): better give it, or let :func:`estimate` read it from a log.
+    held: update period [s] of channels whose values are repeated between updates.
+    channels: the columns that samples carry. It decides whether a drawbar force is unknown before its first
+        value (in ``channels``) or taken as 0, and whether an undriven wheel has a torque. Default: wheel
+        speeds, ground speed and torques of driven wheels.
+    gap: s without any wheel or ground speed after which the motion starts anew.
+    standstill_speed: m/s under which vehicle and wheels count as standing.
+
+    Raises InputError on an unknown method or sensor, or a vehicle that the kernel cannot work with.
+
+    A row before a gap is flagged in a whole-recording run only: while streaming nobody knows that a gap follows.
+    """
+
+    def __init__(
+        self,
+        vehicle: Vehicle,
+        method: str = DEFAULT,
+        *,
+        sensors: Mapping[str, float] | None = None,
+        held: Mapping[str, float] | None = None,
+        channels: Collection[str] | None = None,
+        gap: float | None = None,
+        standstill_speed: float | None = None,
+    ) -> None:
+        self.vehicle = vehicle
+        self.method = method_named(method).name
+        self.held = dict(held or {})
+        self.channels = _channels(vehicle, channels)
+        self.thresholds = Thresholds(gap=gap, standstill_speed=standstill_speed)
+        self._start(sensors)
+
+    def _start(self, sensors: Mapping[str, float] | None) -> None:
+        from terragrip.estimation.engine import sample_slots
+
+        names = tuple(sample_slots(self.vehicle))
+        self.noise, self.guessed = channel_noise(self.vehicle, names, sensors)
+        settings = settings_of(
+            self.vehicle,
+            method_named(self.method),
+            noise=self.noise,
+            held=self.held,
+            channels=self.channels,
+            thresholds=self.thresholds,
+        )
+        self._engine = Engine(self.vehicle, settings)
+
+    @classmethod
+    def for_recording(
+        cls,
+        recording: Recording,
+        vehicle: Vehicle,
+        method: str = DEFAULT,
+        *,
+        sensors: Mapping[str, float] | None = None,
+        held: Mapping[str, float] | None = None,
+        gap: float | None = None,
+        standstill_speed: float | None = None,
+    ) -> Self:
+        """An estimator set up as :func:`estimate` does it: noise and held channels found in the log where not given."""
+        from terragrip.estimation.noise import logged_noise, sensor_of
+        from terragrip.recording import held_periods
+
+        periods = dict(held_periods(recording) if held is None else held)
+        logged = logged_noise(recording, vehicle, periods)
+        mine = dict(sensors or {})
+        logged = {name: sd for name, sd in logged.items() if sensor_of(name) not in mine}
+        return cls(
+            vehicle,
+            method,
+            sensors={**logged, **mine},
+            held=periods,
+            channels=tuple(recording.channels),
+            gap=gap,
+            standstill_speed=standstill_speed,
+        )
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """Names of an estimate's columns besides ``time`` and ``event``."""
+        return self._engine.outputs
+
+    @property
+    def engine(self) -> Engine:
+        """The kernel's estimator behind this one."""
+        return self._engine
+
+    def update(self, sample: Mapping[str, float | None]) -> Estimate:
+        """Take one sample and return the estimate at its instant.
+
+        ``sample`` maps ``time`` [s] and recording columns to SI numbers; a column that is absent, None or NaN
+        was not measured at that instant; columns that the estimator does not use are passed over. Raises
+        InputError, and stays as it was, where time does not run forward, is missing, or a value is no finite
+        number.
+        """
+        engine = self._engine
+        row, get = engine.sample, sample.get
+        values = row.value
+        try:
+            time = get("time")
+            row.time = math.nan if time is None else time
+            for name, slot in engine.places_in:
+                value = get(name)
+                values[slot] = math.nan if value is None else value
+        except TypeError:
+            raise _unusable(sample, engine.inputs) from None
+        status = engine.update()
+        if status:
+            raise self._refused(status, sample)
+        out = engine.estimate
+        return Estimate(out.time, EVENTS[out.event], engine.unpack(out.value), engine.index_out)
+
+    def update_block(self, recording: Recording) -> Estimates:
+        """Take all rows of a recording; the same as `update` row by row. Raises InputError as `update` does."""
+        from terragrip.estimation.batch import run
+
+        return run(self, recording)
+
+    def snapshot(self) -> bytes:
+        """Everything needed to go on later, bit for bit: vehicle, settings and state."""
+        about = {
+            "vehicle": self.vehicle.to_dict(),
+            "method": self.method,
+            "noise": self.noise,
+            "guessed": self.guessed,
+            "held": self.held,
+            "channels": self.channels,
+            "gap": self.thresholds.gap,
+            "standstill_speed": self.thresholds.standstill_speed,
+        }
+        text = json.dumps(about).encode()
+        body = struct.pack("<I", len(text)) + text + self._engine.snapshot()
+        return _SNAPSHOT_MAGIC + struct.pack("<I", zlib.crc32(body)) + body
+
+    @classmethod
+    def restore(cls, data: bytes) -> Self:
+        """The estimator of a snapshot; raises InputError if the bytes are damaged or of another version."""
+        start = len(_SNAPSHOT_MAGIC) + 4
+        if data[: len(_SNAPSHOT_MAGIC)] != _SNAPSHOT_MAGIC or len(data) < start + 4:
+            raise refusal(6, None)
+        body = data[start:]
+        if struct.unpack("<I", data[start - 4 : start])[0] != zlib.crc32(body):
+            raise refusal(6, None)
+        length = struct.unpack("<I", body[:4])[0]
+        about = json.loads(body[4 : 4 + length])
+        found = cls(
+            Vehicle.from_dict(about["vehicle"]),
+            about["method"],
+            sensors=about["noise"],
+            held=about["held"],
+            channels=about["channels"],
+            gap=about["gap"],
+            standstill_speed=about["standstill_speed"],
+        )
+        found.guessed = tuple(about["guessed"])
+        found._engine.restore(body[4 + length :])
+        return found
+
+    def _refused(self, status: int, sample: Mapping[str, float | None]) -> InputError:
+        if status == 2:
+            return _unusable(sample, ("time", *self._engine.inputs))
+        return refusal(status, f"time {sample.get('time')}")
+
+
+def _channels(vehicle: Vehicle, given: Collection[str] | None) -> tuple[str, ...]:
+    if given is not None:
+        return tuple(given)
+    torques = [f"drive_torque_{w}" for w, on in zip(vehicle.wheels, vehicle.driven, strict=True) if on]
+    return (*(f"wheel_speed_{w}" for w in vehicle.wheels), "ground_speed", *torques)
+
+
+def _unusable(sample: Mapping[str, Any], names: Collection[str]) -> InputError:
+    """Name the value in a sample that is no finite number."""
+    for name in ("time", *names):
+        value = sample.get(name)
+        try:
+            sound = value is None or (not math.isinf(value) and (name != "time" or not math.isnan(value)))
+        except TypeError:
+            sound = False
+        if not sound or (name == "time" and value is None):
+            mend = (
+                "every sample needs a time in s"
+                if name == "time"
+                else "give SI numbers, NaN where not measured"
+            )
+            return InputError(
+                f"{name} is {value!r}", place=f"sample at time {sample.get('time')!r}", mend=mend
+            )
+    return InputError("the sample holds a value that is no finite number", mend="give SI numbers")

@@ -1,0 +1,60 @@
+"""The named methods: an engine and a noise policy each (DESIGN §4)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from terragrip.errors import InputError, nearest
+
+# Values of tg_engine, tg_policy and tg_method in kernel/include/terragrip.h.
+EXACT, UNSCENTED = 0, 1
+FIXED, ADAPTIVE, SUPERVISED, BANK = 0, 1, 2, 3
+FILTERED, ALGEBRAIC = 0, 1
+
+
+@dataclass(frozen=True)
+class Method:
+    """A way to estimate. ``kind`` is tg_method, ``engine`` tg_engine, ``policy`` tg_policy of the kernel."""
+
+    name: str
+    meaning: str
+    kind: int = FILTERED
+    engine: int = EXACT
+    policy: int = FIXED
+
+    @property
+    def can_smooth(self) -> bool:
+        """Whether a backward pass exists: it needs a filter."""
+        return self.kind == FILTERED
+
+
+METHODS: dict[str, Method] = {
+    method.name: method
+    for method in (
+        Method("algebraic", "the equations of motion on low-passed signals, no filter", kind=ALGEBRAIC),
+        # The model is affine in the state, so the extended Kalman filter is the Kalman filter (PHYSICS §1).
+        Method("ekf", "extended Kalman filter; on this model the same as kalman"),
+        Method("ukf", "unscented Kalman filter, fixed noise", engine=UNSCENTED),
+        Method("aukf", "adaptive unscented Kalman filter", engine=UNSCENTED, policy=ADAPTIVE),
+        Method(
+            "aukf-fs",
+            "adaptive unscented, fuzzy supervisor: the paper's",
+            engine=UNSCENTED,
+            policy=SUPERVISED,
+        ),
+        Method("kalman", "exact Kalman filter, fixed noise"),
+        Method("bank", "four exact filters over the scale of the noise, mixed as an IMM", policy=BANK),
+    )
+}
+DEFAULT = "bank"
+
+
+def method_named(name: str) -> Method:
+    """The method of that name; raises InputError, which names the nearest one."""
+    if name in METHODS:
+        return METHODS[name]
+    near = nearest(name, METHODS)
+    raise InputError(
+        f"there is no method {name!r}",
+        mend=f"did you mean {near}?" if near else f"choose one of {', '.join(METHODS)}",
+    )

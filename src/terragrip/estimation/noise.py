@@ -1,0 +1,92 @@
+"""How noisy each channel is: as the vehicle file says, else as the log shows, else a cautious guess."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from terragrip.errors import InputError, nearest
+from terragrip.physics.loads import GRAVITY
+
+if TYPE_CHECKING:
+    from terragrip.recording import Recording
+    from terragrip.vehicle import Vehicle
+
+_SENSOR_OF = {"acceleration_x": "acceleration", "acceleration_y": "acceleration", "roll": "pitch"}
+
+
+def channel_noise(
+    vehicle: Vehicle, channels: tuple[str, ...], sensors: Mapping[str, float] | None = None
+) -> tuple[dict[str, float], tuple[str, ...]]:
+    """SD of every channel in ``channels``, SI, and the channels that had to be guessed.
+
+    ``sensors`` (by channel, ``ground_speed``, or by sensor, ``wheel_speed`` for all wheels) wins over the
+    vehicle file, that over a guess from the vehicle's size. Raises InputError on a name that is neither, or an
+    SD that is not positive.
+    """
+    given = dict(sensors or {})
+    _check(given, channels)
+    guesses = _guesses(vehicle)
+    found, guessed = {}, []
+    for name in channels:
+        sensor = sensor_of(name)
+        value = given.get(name, given.get(sensor, getattr(vehicle.sensors, sensor, None)))
+        if value is None:
+            value = guesses[sensor]
+            guessed.append(name)
+        found[name] = float(value)
+    return found, tuple(guessed)
+
+
+def logged_noise(recording: Recording, vehicle: Vehicle, held: dict[str, float]) -> dict[str, float]:
+    """SDs that the log gives where the vehicle file is silent, by channel."""
+    from terragrip.recording import sensor_noise
+
+    silent = {
+        name: values
+        for name, values in recording.channels.items()
+        if getattr(vehicle.sensors, sensor_of(name), None) is None and sensor_of(name) in _guesses(vehicle)
+    }
+    if not silent:
+        return {}
+    from dataclasses import replace
+
+    return sensor_noise(replace(recording, channels=silent), {k: v for k, v in held.items() if k in silent})
+
+
+def sensor_of(channel: str) -> str:
+    """The sensor of a channel, as the vehicle file names it: ``wheel_speed`` for ``wheel_speed_fl``."""
+    for prefix in ("wheel_speed", "drive_torque", "vertical_load"):
+        if channel.startswith(f"{prefix}_"):
+            return prefix
+    return _SENSOR_OF.get(channel, channel)
+
+
+def _check(given: Mapping[str, float], channels: tuple[str, ...]) -> None:
+    known = {*channels, *(sensor_of(name) for name in channels)}
+    for name, value in given.items():
+        if name not in known:
+            near = nearest(name, known)
+            raise InputError(
+                f"there is no sensor {name!r}", mend=f"did you mean {near}?" if near else "name a channel"
+            )
+        if not (np.isfinite(value) and value > 0):
+            raise InputError(
+                f"the noise of {name} is {value!r}", mend="give a positive standard deviation in SI"
+            )
+
+
+def _guesses(vehicle: Vehicle) -> dict[str, float]:
+    """Cautious SDs from the vehicle's size, by sensor."""
+    radius, weight = float(vehicle.wheel_radius.mean()), vehicle.mass * GRAVITY
+    return {
+        "wheel_speed": 0.02 / radius,
+        "ground_speed": 0.05,
+        "drive_torque": 0.01 * weight * radius,
+        "drawbar_force": 0.01 * weight,
+        "acceleration": 0.3,
+        "pitch": 0.01,
+        "vertical_load": 0.02 * weight,
+    }
