@@ -34,6 +34,7 @@ test: lint kernel-test pytest ## set up, then lint, type checks, import rules, C
 
 lint: $(VENV)/package $(VENV)/dev ## ruff, mypy and import-linter
 	$(BIN)/ruff check
+	$(BIN)/ruff format --check
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 
