@@ -15,7 +15,7 @@ enum { NORMAL = 0, BOOST = 1, EASE = 2, ASSIST = 3 };
 typedef struct { /* what changes seldom: the driver and where soft spots came to lie */
     int32_t mode;
     double mode_since, trouble_since, free_since, assist;
-    double spot_position[8];
+    double spot_position[8], spot_left[8]; /* where each soft spot lies, and how much of it is left */
     int32_t command_index;
 } conduct;
 
@@ -59,13 +59,14 @@ static void curve_at(const plant_ground *g, int32_t soil, double slip, double *m
 
 static double spot_share(const plant_machine *m, const conduct *c, int32_t k, double x) {
     const double d = (x - c->spot_position[k]) / m->spot[k].length;
-    return fabs(d) < 0.5 ? 0.5 * (1.0 + cos(6.283185307179586 * d)) : 0.0;
+    return fabs(d) < 0.5 ? c->spot_left[k] * 0.5 * (1.0 + cos(6.283185307179586 * d)) : 0.0;
 }
 
 /* Friction that builds up over a travel K (Dahl's model; for soil, Janosi and Hanamoto's shear displacement K), with a
  * damping that lives only while it builds up, so that the force never passes its limit. */
 static double friction(double limit, double held, double speed, double length, double *rate) {
     const double lag = 0.03;
+    if (held * speed < 0.0) length *= 0.2; /* soil springs back far stiffer than it gives way */
     *rate = speed / length * (limit - (speed < 0 ? -held : held));
     return held + *rate * lag * length / (length + lag * fabs(speed));
 }
@@ -259,6 +260,16 @@ static void advance(const plant_machine *m, const plant_ground *g, const conduct
     for (int j = 0; j < PLANT_STATES; j++) y[j] += h * (1.5 * k1[j] + 0.5 * k2[j]);
 }
 
+/* Wheels that spin in a soft spot grind it away. */
+static void grind(const plant_machine *m, conduct *c, double h, const double *y) {
+    for (int k = 0; k < m->spots; k++)
+        for (int i = 0; m->spot[k].wear > 0 && i < 4; i++) {
+            const double d = y[X] + (i < 2 ? m->wheelbase : 0.0) - c->spot_position[k];
+            if (fabs(d) < 0.5 * m->spot[k].length)
+                c->spot_left[k] *= exp(-0.5 * h * fabs(m->radius[i] * y[OMEGA + i] - y[V]) / m->spot[k].wear);
+        }
+}
+
 static void enter(conduct *c, int32_t mode, double time) {
     c->mode = mode;
     c->mode_since = time;
@@ -273,6 +284,7 @@ static void drive(const plant_machine *m, conduct *c, double time, double h, con
             const int front_sinks = m->spot[k].resistance[0] > m->spot[k].resistance[1];
             c->spot_position[k] = y[X] + (front_sinks ? m->wheelbase : 0.0) + m->spot[k].ahead;
         }
+    grind(m, c, h, y);
     const double want = command_at(m, c->command_index, time) * m->radius[0];
     const double share = want > 0.05 ? y[V] / want : 1.0;
     const double in_mode = time - c->mode_since;
@@ -338,7 +350,10 @@ static int usable(const plant_machine *m, const plant_ground *g) {
 
 static void settle(const plant_machine *m, conduct *c) {
     memset(c, 0, sizeof *c);
-    for (int k = 0; k < 8; k++) c->spot_position[k] = k < m->spots ? m->spot[k].position : NAN;
+    for (int k = 0; k < 8; k++) {
+        c->spot_position[k] = k < m->spots ? m->spot[k].position : NAN;
+        c->spot_left[k] = 1.0;
+    }
 }
 
 plant_status plant_start(const plant_machine *m, const plant_ground *g, double position, double *y) {

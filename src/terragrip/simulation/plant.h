@@ -95,6 +95,7 @@ typedef struct { /* a place where the wheels sink; triggered by time or lying at
     double length;
     double resistance[2];   /* added rho_s, front and rear */
     double adhesion_loss;   /* 0..1 */
+    double wear;            /* m of wheel slippage over which it falls to 1/e, ground away; 0: never */
 } plant_spot;
 
 typedef struct {

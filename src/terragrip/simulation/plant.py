@@ -138,6 +138,7 @@ def _spots_and_driver(machine: Any, scenario: Scenario) -> None:
         out.position = np.nan if spot.at is None else spot.at
         out.time = 0.0 if spot.at_time is None else spot.at_time
         out.ahead, out.length, out.adhesion_loss = spot.ahead, spot.length, spot.adhesion_loss
+        out.wear = spot.wear or 0.0
         out.resistance[0], out.resistance[1] = spot.front, spot.rear
     driver, out = scenario.driver, machine.driver
     out.enabled = int(driver.acts)

@@ -167,7 +167,8 @@ class Route(Part):
 class SoftSpot(Part):
     """A place where wheels sink: at position ``at`` [m], or just before the machine when time ``at_time`` [s] comes.
 
-    Added rolling resistance of the ``front`` and the ``rear`` axle, and the adhesion lost, over ``length`` [m].
+    Added rolling resistance of the ``front`` and the ``rear`` axle, and the adhesion lost, over ``length`` [m]. With
+    ``wear``, spinning wheels grind it away: to 1/e after that much slippage [m].
     """
 
     at: Coordinate | None = None
@@ -177,6 +178,7 @@ class SoftSpot(Part):
     front: Ratio = 0.0
     rear: Ratio = 0.0
     adhesion_loss: Share = 0.0
+    wear: PositiveLength | None = None
 
     @model_validator(mode="after")
     def _one_place(self) -> Self:
