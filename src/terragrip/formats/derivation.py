@@ -47,10 +47,7 @@ def derivative(time: Floats, position: Floats, window: float) -> tuple[Floats, f
         found = _parabolas(time[low:high], position[low:high], half, (half + 0.5) * spacing, floor)
         inner = slice(first - low, min(first + _BLOCK, n) - low)
         speed[first : first + _BLOCK], deviation[first : first + _BLOCK] = found[0][inner], found[1][inner]
-    # At rest a tracker is quieter than in motion, and motion is what counts.
-    pace = np.abs(speed)
-    moving = pace >= 0.2 * np.nanquantile(pace, 0.95) if np.isfinite(pace).any() else np.zeros(n, dtype=bool)
-    known = deviation[moving & (deviation > 0)]
+    known = deviation[_moving(speed, np.isfinite(speed)) & (deviation > 0)]
     return speed, float(np.median(known)) if len(known) else None
 
 
@@ -73,7 +70,8 @@ def _parabolas(
             _normal(basis, weight), np.einsum("nk,nki,nk->ni", weight, basis, y)[:, :, None]
         )[..., 0]
         residual = y - np.einsum("nki,ni->nk", basis, fit)
-        kept = np.abs(residual[enough][inside[enough]])
+        judged = enough & _moving(fit[:, 1], enough)
+        kept = np.abs(residual[judged][inside[judged]])
         if not len(kept):
             break
         # Three parameters were fitted to each window, which shrinks its residuals.
@@ -88,6 +86,12 @@ def _parabolas(
     own = np.sqrt(squares / np.maximum(weight.sum(axis=1) - 3.0, 0.5))
     deviation = np.maximum(own, floor) * spread / reach
     return np.where(enough, fit[:, 1] / reach, np.nan), np.where(enough, deviation, np.nan)
+
+
+def _moving(speed: Floats, known: npt.NDArray[np.bool_]) -> npt.NDArray[np.bool_]:
+    """Rows (n,) in motion: at rest a tracker is quieter, and a scale found there would reject motion itself."""
+    pace = np.where(known, np.abs(speed), 0.0)
+    return pace >= max(0.2 * float(np.quantile(pace[known], 0.95)), 1e-12) if known.any() else known
 
 
 def _normal(basis: Floats, weight: Floats) -> Floats:

@@ -1,4 +1,216 @@
-class Inspection: ...
+"""What is in a log: columns, rates, gaps, ranges, held values, noise, and a profile to begin with."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from terragrip.errors import InputError
+from terragrip.formats.profile import Profile
+from terragrip.formats.proposal import is_ready, missing_channels, profile_text
+from terragrip.formats.reading import read, read_table
+from terragrip.formats.recognition import find_time, propose
+from terragrip.formats.table import LogTable
+from terragrip.recording import Recording, unit_warnings
+from terragrip.recording.held import fresh_samples, held_period, measured_part
+from terragrip.recording.noise import white_noise
+from terragrip.recording.schema import TIME, unit_of
+from terragrip.units import factor_to
+from terragrip.vehicle import Vehicle
+
+Floats = npt.NDArray[np.float64]
 
 
-def inspect(path): ...
+@dataclass(frozen=True)
+class ColumnSummary:
+    """One column: what it holds. Numbers are in the log's own unit; absent ones are None."""
+
+    name: str
+    kind: str  # "number", "text", "date" or "empty"
+    unit: str | None
+    count: int
+    missing_share: float
+    rate: float | None = None  # true updates a second
+    held_period: float | None = None  # s, where values are repeated between updates
+    noise: float | None = None  # standard deviation
+    minimum: float | None = None
+    quantile_05: float | None = None
+    median: float | None = None
+    quantile_95: float | None = None
+    maximum: float | None = None
+    examples: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class TimeSummary:
+    """The time base: ``spacing_*`` are quantiles between rows [s], ``gaps`` the longest as (start, length) [s]."""
+
+    column: str
+    unit: str
+    start: float
+    duration: float
+    spacing_05: float
+    spacing_50: float
+    spacing_95: float
+    gaps: tuple[tuple[float, float], ...]
+    gap_count: int
+    repeated: int
+    backward: int
+    missing: int
+
+
+@dataclass(frozen=True)
+class Inspection:
+    """What a log holds (see `inspect`)."""
+
+    file: str
+    sha256: str
+    rows: int
+    time: TimeSummary | None
+    columns: tuple[ColumnSummary, ...]
+    recognised: dict[str, tuple[str, ...]]  # channel: the columns it may come from
+    missing: tuple[str, ...]
+    warnings: tuple[str, ...]
+    ready: bool  # the log can be estimated as it is, or with the profile that was given
+    profile: str  # a proposed profile, YAML
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain data, for JSON."""
+        return asdict(self)
+
+    def to_text(self) -> str:
+        """A report to read, lines of text without colour."""
+        from terragrip.formats.inspection_text import text_of
+
+        return text_of(self)
+
+
+def inspect(
+    path: str | os.PathLike[str],
+    profile: Profile | str | os.PathLike[str] | None = None,
+    vehicle: Vehicle | str | os.PathLike[str] | None = None,
+) -> Inspection:
+    """Tell what is in a log, which of our channels it holds or lacks, and propose a profile.
+
+    With a profile, what the log becomes through it is told. With a vehicle, wheels and units are held against
+    it. Nothing is required of the log but that it is a table; raises InputError if it is none.
+    """
+    machine = vehicle if isinstance(vehicle, Vehicle) or vehicle is None else Vehicle.load(vehicle)
+    table = read_table(path)
+    warnings, recording = list(table.notes), None
+    try:
+        recording = read(path, profile)
+        warnings += [note for note in recording.notes if note not in warnings]
+    except InputError as error:
+        if profile is not None:
+            raise
+        warnings.append(_cause(error))
+    if recording is not None and machine is not None:
+        warnings += unit_warnings(recording, machine)
+        try:
+            recording.check_against(machine)
+        except InputError as error:
+            warnings.append(_cause(error))
+    if recording is not None and profile is not None:
+        table = _as_table(recording, table)
+    numbers = {n: c.astype(np.float64) for n, c in table.columns.items() if c.dtype.kind in "fiub"}
+    dates = tuple(n for n, c in table.columns.items() if c.dtype.kind == "M")
+    texts = tuple(n for n, c in table.columns.items() if c.dtype.kind == "O")
+    stamp = find_time(numbers, dates)
+    base = None if stamp is None else _seconds(table.columns[stamp[0]], stamp[1])
+    proposals = propose(
+        {n: v for n, v in numbers.items() if stamp is None or n != stamp[0]}, texts, table.units
+    )
+    rows = len(next(iter(table.columns.values()), ()))
+    return Inspection(
+        file=str(table.source),
+        sha256=str(table.sha256),
+        rows=rows,
+        time=None if stamp is None or base is None else _time_summary(stamp[0], stamp[1], base),
+        columns=tuple(_column_summary(n, c, table.units.get(n), base) for n, c in table.columns.items()),
+        recognised={channel: proposal.columns for channel, proposal in proposals.items()},
+        missing=tuple(missing_channels(proposals, stamp is not None)),
+        warnings=tuple(warnings),
+        ready=recording is not None and is_ready(recording),
+        profile=profile_text(os.path.basename(str(table.source)), stamp, proposals, table, base),
+    )
+
+
+def _cause(error: InputError) -> str:
+    """An error as a sentence without the file, which the report names once."""
+    place = f"{error.place}: " if error.place else ""
+    return f"{place}{error.problem}" + (f"; {error.mend}" if error.mend else "")
+
+
+def _as_table(recording: Recording, table: LogTable) -> LogTable:
+    columns = {TIME: recording.time, **recording.channels, **recording.labels}
+    units = {name: unit for name in columns if (unit := unit_of(name)) is not None}
+    return LogTable(tuple(columns), columns, units, table.source, table.sha256)
+
+
+def _seconds(column: npt.NDArray[Any], unit: str) -> Floats:
+    if column.dtype.kind == "M":
+        return np.asarray((column - column[0]) / np.timedelta64(1, "s"), dtype=np.float64)
+    if column.dtype.kind in "iu" and len(column):
+        column = column.astype(np.int64) - np.int64(column[0])
+    return np.asarray(column, dtype=np.float64) * factor_to(unit, "s")
+
+
+def _time_summary(name: str, unit: str, time: Floats) -> TimeSummary | None:
+    known = time[np.isfinite(time)]
+    if len(known) < 2:
+        return None
+    spacing = np.diff(known)
+    low, middle, high = (float(q) for q in np.quantile(spacing, [0.05, 0.5, 0.95]))
+    wide = np.flatnonzero(spacing > max(5 * middle, 0.5))
+    longest = wide[np.argsort(spacing[wide])[::-1][:5]]
+    return TimeSummary(
+        column=name,
+        unit=unit,
+        start=float(known[0]),
+        duration=float(known[-1] - known[0]),
+        spacing_05=low,
+        spacing_50=middle,
+        spacing_95=high,
+        gaps=tuple((float(known[k]), float(spacing[k])) for k in longest),
+        gap_count=len(wide),
+        repeated=int(np.sum(spacing == 0)),
+        backward=int(np.sum(spacing < 0)),
+        missing=len(time) - len(known),
+    )
+
+
+def _column_summary(
+    name: str, column: npt.NDArray[Any], unit: str | None, time: Floats | None
+) -> ColumnSummary:
+    rows = max(len(column), 1)
+    if column.dtype.kind == "O":
+        present = [str(cell) for cell in column if cell not in (None, "")]
+        kind = "text" if present else "empty"
+        examples = tuple(dict.fromkeys(present))[:5]
+        return ColumnSummary(name, kind, unit, len(present), 1 - len(present) / rows, examples=examples)
+    if column.dtype.kind not in "fiub":
+        return ColumnSummary(name, "date", unit, len(column), 0.0)
+    values = column.astype(np.float64)
+    known = np.isfinite(values)
+    count = int(known.sum())
+    if not count:
+        return ColumnSummary(name, "empty", unit, 0, 1.0)
+    low, q05, middle, q95, high = (float(q) for q in np.quantile(values[known], [0, 0.05, 0.5, 0.95, 1]))
+    rate = held = noise = None
+    forward = time is not None and len(time) > 2 and bool((np.diff(time) > 0).all())
+    if time is not None and forward and high > low and time is not values:
+        held = held_period(time, values)
+        when, sample = measured_part(time, values)
+        if held is not None:
+            fresh = fresh_samples(when, sample, held)
+            when, sample = when[fresh], sample[fresh]
+        noise = white_noise(when, sample)
+        rate = 1 / held if held is not None else count / float(time[-1] - time[0])
+    return ColumnSummary(
+        name, "number", unit, count, 1 - count / rows, rate, held, noise, low, q05, middle, q95, high
+    )
