@@ -5,4 +5,12 @@ from terragrip.simulation.library import scenario_names, set_names, set_runs
 from terragrip.simulation.scenario import Scenario
 from terragrip.simulation.simulate import SimulationResult, simulate
 
-__all__ = ["Scenario", "SimulationResult", "scenario_names", "set_names", "set_runs", "simulate", "simulate_campaign"]
+__all__ = [
+    "Scenario",
+    "SimulationResult",
+    "scenario_names",
+    "set_names",
+    "set_runs",
+    "simulate",
+    "simulate_campaign",
+]

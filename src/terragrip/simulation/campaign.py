@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import zlib
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Generator, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from contextlib import closing
 
@@ -50,7 +50,7 @@ def _results(
             yield name, result
 
 
-def _each(jobs: list[tuple[Scenario, int, int]], workers: int) -> Iterator[SimulationResult]:
+def _each(jobs: list[tuple[Scenario, int, int]], workers: int) -> Generator[SimulationResult, None, None]:
     if workers <= 1:
         yield from map(_one, jobs)
         return

@@ -47,7 +47,9 @@ def _windows(fault: Fault, duration: float, rng: np.random.Generator) -> list[tu
     return [(start, start + length) for start in np.sort(rng.uniform(low, high, fault.count))]
 
 
-def _struck(fault: Fault, series: Series, windows: list[tuple[float, float]], rng: np.random.Generator) -> Series:
+def _struck(
+    fault: Fault, series: Series, windows: list[tuple[float, float]], rng: np.random.Generator
+) -> Series:
     named = [c for c in series.values if fault.channel in (None, series.sensor, c)]
     if not named:
         return series
@@ -57,9 +59,14 @@ def _struck(fault: Fault, series: Series, windows: list[tuple[float, float]], rn
     if fault.kind == "jitter":
         return _jittered(fault, series, rows, rng)
     if fault.kind == "gap":
-        return replace(series, time=series.time[~rows], values={c: v[~rows] for c, v in series.values.items()})
+        return replace(
+            series, time=series.time[~rows], values={c: v[~rows] for c, v in series.values.items()}
+        )
     change = _CHANGES[fault.kind]
-    return replace(series, values={c: change(fault, v.copy(), rows, rng) if c in named else v for c, v in series.values.items()})
+    return replace(
+        series,
+        values={c: change(fault, v.copy(), rows, rng) if c in named else v for c, v in series.values.items()},
+    )
 
 
 def _jittered(fault: Fault, series: Series, rows: Rows, rng: np.random.Generator) -> Series:

@@ -80,7 +80,11 @@ def clods(rng: np.random.Generator, x: Floats, density: Floats, height: Floats, 
     out = np.zeros(len(x))
     spacing = x[1] - x[0]
     number = rng.poisson(density.max() * (x[-1] - x[0])) if density.max() > 0 else 0
-    places, keep, size = rng.uniform(x[0], x[-1], number), rng.uniform(0, 1, number), rng.uniform(0.5, 1.5, number)
+    places, keep, size = (
+        rng.uniform(x[0], x[-1], number),
+        rng.uniform(0, 1, number),
+        rng.uniform(0.5, 1.5, number),
+    )
     for place, share, factor in zip(places, keep, size, strict=True):
         k = int((place - x[0]) / spacing)
         if share * density.max() > density[k]:

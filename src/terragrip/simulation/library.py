@@ -46,7 +46,11 @@ def scenario_document(path_or_name: str | os.PathLike[str]) -> Document:
     if found is None:
         if not name.endswith((".yaml", ".yml")) and not Path(name).exists():
             close = nearest(name, scenario_names())
-            mend = f"did you mean {close!r}?" if close else "give a file, or a name that `terragrip simulate --list` shows"
+            mend = (
+                f"did you mean {close!r}?"
+                if close
+                else "give a file, or a name that `terragrip simulate --list` shows"
+            )
             raise InputError(f"no scenario {name!r}", mend=mend)
         found = read_yaml(path_or_name)
     tree = resolve({"name": Path(name).stem, **found.data}, found.file)
@@ -77,7 +81,9 @@ def _extended(tree: Tree, file: str | None, depth: int) -> Tree:
     if found is None or depth > _DEPTH:
         close = nearest(str(parent), scenario_names())
         problem = f"no scenario {parent!r}" if found is None else "extends itself"
-        raise InputError(problem, file=file, place="extends", mend=f"did you mean {close!r}?" if close else None)
+        raise InputError(
+            problem, file=file, place="extends", mend=f"did you mean {close!r}?" if close else None
+        )
     inherited = {key: value for key, value in found.data.items() if key not in ("name", "description")}
     return _merged(_extended(inherited, found.file, depth + 1), own)
 
@@ -101,7 +107,9 @@ def _entry(section: str, value: Any, file: str | None, place: str) -> Any:
     if name not in entries:
         close = nearest(name, entries)
         mend = f"did you mean {close!r}?" if close else f"known are {', '.join(entries)}"
-        raise InputError(f"nothing called {name!r} in the library's {section}", file=file, place=place, mend=mend)
+        raise InputError(
+            f"nothing called {name!r} in the library's {section}", file=file, place=place, mend=mend
+        )
     return _merged(entries[name], {key: item for key, item in value.items() if key != "use"})
 
 

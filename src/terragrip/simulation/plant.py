@@ -71,7 +71,14 @@ def run(plant: Plant, duration: float, step: float, stride: int) -> Floats:
     trace = np.empty((steps // stride + 1, lib.PLANT_COLUMNS))
     rows = ffi.new("int32_t *")
     status = lib.plant_run(
-        plant.machine, plant.ground, 0.0, step, steps, stride, ffi.cast("double *", ffi.from_buffer("double[]", trace)), rows
+        plant.machine,
+        plant.ground,
+        0.0,
+        step,
+        steps,
+        stride,
+        ffi.cast("double *", ffi.from_buffer("double[]", trace)),
+        rows,
     )
     if status != lib.PLANT_OK:
         raise FloatingPointError(f"the plant stopped with status {status} after {rows[0]} rows")
@@ -142,6 +149,15 @@ def _spots_and_driver(machine: Any, scenario: Scenario) -> None:
         out.resistance[0], out.resistance[1] = spot.front, spot.rear
     driver, out = scenario.driver, machine.driver
     out.enabled = int(driver.acts)
-    for name in ("stuck_ratio", "patience", "boost", "boost_time", "ease", "ease_time", "free_ratio", "free_time"):
+    for name in (
+        "stuck_ratio",
+        "patience",
+        "boost",
+        "boost_time",
+        "ease",
+        "ease_time",
+        "free_ratio",
+        "free_time",
+    ):
         setattr(out, name, getattr(driver, name))
     out.assist_rate, out.assist_limit = driver.push_rate, driver.push_limit

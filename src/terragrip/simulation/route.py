@@ -67,7 +67,7 @@ def lay(route: Route, before: float, after: float, spacing: float) -> Path:
         pieces, heading, origin = _rounded(route)
         end = sum(length for length, _ in pieces)
     n = int(np.ceil((before + end + after) / spacing)) + 1
-    x = spacing * np.arange(n) - before
+    x = np.arange(n, dtype=np.float64) * spacing - before
     bounds = np.cumsum([0.0, *(length for length, _ in pieces)])
     piece = np.clip(np.searchsorted(bounds, x, side="right") - 1, 0, len(pieces) - 1)
     curvature = np.where((x >= 0) & (x < end), np.array([k for _, k in pieces])[piece], 0.0)
@@ -106,7 +106,9 @@ def soils_along(route: Route, names: tuple[str, ...], path: Path, offset: float,
     """Soils under the line ``offset`` m left of the path; borders are ramps of the route's width."""
     if route.segments:
         bounds = np.cumsum([segment.length for segment in route.segments])[:-1]
-        later = -route.skew * offset / track if track else 0.0  # the right track (negative offset) comes later
+        later = (
+            -route.skew * offset / track if track else 0.0
+        )  # the right track (negative offset) comes later
         index = np.searchsorted(bounds + later, path.x, side="right")
         ids = np.array([names.index(segment.soil) for segment in route.segments], dtype=np.int32)[index]
     else:

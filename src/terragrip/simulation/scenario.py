@@ -8,6 +8,8 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping
+from itertools import pairwise
+from math import dist
 from typing import Annotated, Any, Literal, Self
 
 from pydantic import BeforeValidator, Field, field_validator, model_validator
@@ -47,6 +49,10 @@ Angle = Annotated[float, _number("rad", -0.6, 0.6)]
 Rate = Annotated[float, _number("1/s", 0, 1000, above=True)]
 
 
+LONGEST_ROUTE = 20_000.0  # m
+LONGEST_RUN = 7200.0  # s: a trace takes 100 kB a second
+
+
 class Clods(Part):
     """Earth clumps: how many per metre of track, and the mean height and length [m] of the bump a tyre makes of one."""
 
@@ -81,7 +87,9 @@ class Soil(Part):
             raise Refusal("no such curve", f"curves are {', '.join(CURVES)}", ("name",))
         for key, number in value.items():
             if key != "name" and key not in model.names:
-                raise Refusal(f"{name} has no such parameter", f"its parameters are {', '.join(model.names)}", (key,))
+                raise Refusal(
+                    f"{name} has no such parameter", f"its parameters are {', '.join(model.names)}", (key,)
+                )
             if key != "name" and (isinstance(number, bool) or not isinstance(number, int | float)):
                 raise Refusal("is not a number", "write a number", (key,))
         return value
@@ -155,8 +163,17 @@ class Route(Part):
         if self.path and (len(self.path) < 2 or self.around is None):
             raise Refusal("a path needs two points and the soil around", "add 'around: grass'")
         if any(segment.length < 2 * self.border for segment in self.segments):
-            raise Refusal("is shorter than two borders", "lengthen it or narrow 'border:'", ("segments",))
+            raise Refusal("one is shorter than two borders", "lengthen it or narrow 'border:'", ("segments",))
+        if self.length > LONGEST_ROUTE:
+            raise Refusal(f"is {self.length:g} m long", f"{LONGEST_ROUTE:g} m is the longest", ())
         return self
+
+    @property
+    def length(self) -> float:
+        """Length [m], corners not yet rounded."""
+        if self.segments:
+            return sum(segment.length for segment in self.segments)
+        return sum(dist(a, b) for a, b in pairwise(self.path))
 
     def soils(self) -> tuple[str, ...]:
         """Names of the soils on it, each once, in order of appearance."""
@@ -306,7 +323,7 @@ class Scenario(Part):
     soils: dict[str, Soil]
     tools: Annotated[tuple[Tool, ...], Field(max_length=2)] = ()
     speed: tuple[tuple[Time, Annotated[float, _number("m/s", -5, 5)] | Literal["off"]], ...]
-    duration: PositiveTime
+    duration: Annotated[float, _number("s", 0, LONGEST_RUN, above=True)]
     soft_spots: Annotated[tuple[SoftSpot, ...], Field(max_length=8)] = ()
     driver: Driver = Field(default_factory=Driver)
     sensors: Sensors
@@ -325,11 +342,25 @@ class Scenario(Part):
     @model_validator(mode="after")
     def _consistent(self) -> Self:
         times = [time for time, _ in self.speed]
-        if not times or times[0] != 0 or any(b <= a for a, b in zip(times, times[1:], strict=False)):
+        if not times or times[0] != 0 or any(b <= a for a, b in pairwise(times)):
             raise Refusal("times must start at 0 and rise", "put the points in order", ("speed",))
         missing = next((s for s in self.route.soils() if s not in self.soils), None)
         if missing is not None:
-            raise Refusal(f"the route's soil {missing!r} is not known", f"soils are {', '.join(self.soils)}", ("route",))
+            raise Refusal(
+                f"the route's soil {missing!r} is not known", f"soils are {', '.join(self.soils)}", ("route",)
+            )
+        for k, tool in enumerate(self.tools):
+            for key in ("friction", "dig_in"):
+                figures = getattr(tool, key)
+                odd = (
+                    next((s for s in figures if s not in self.soils), None)
+                    if isinstance(figures, dict)
+                    else None
+                )
+                if odd is not None:
+                    raise Refusal(
+                        "no such soil", f"soils are {', '.join(self.soils)}", ("tools", k, key, odd)
+                    )
         per_row = 1.0 / (self.log_rate * self.step)
         if abs(per_row - round(per_row)) > 1e-6 or per_row < 0.5:
             raise Refusal("must be a whole number of steps", "e.g. step 0.001, log_rate 200", ("log_rate",))
@@ -355,5 +386,3 @@ class Scenario(Part):
     def nominal_vehicle(self) -> Vehicle:
         """The vehicle as its user wrote it down, without the simulated machine's errors; raises InputError."""
         return Vehicle.from_dict(self.vehicle, file=self.name or None)
-
-

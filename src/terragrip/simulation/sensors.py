@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from terragrip.errors import InputError
 from terragrip.simulation.fields import stream
 from terragrip.simulation.route import geographic
 from terragrip.simulation.scenario import Scenario, Sensor, Sensors
@@ -64,10 +65,17 @@ def signals(sensor: str, trace: Trace) -> dict[str, Floats]:
     if sensor == "pitch":
         return {sensor: trace["slope"] + pitch}
     if sensor == "vertical_load":
-        return {f"{sensor}_{axle}": trace["load"][:, 2 * k : 2 * k + 2].sum(axis=1) for k, axle in enumerate(axles)}
+        return {
+            f"{sensor}_{axle}": trace["load"][:, 2 * k : 2 * k + 2].sum(axis=1)
+            for k, axle in enumerate(axles)
+        }
     if sensor == "wheel_force":
         forces = (("x", trace.wheel_force_x), ("z", trace.wheel_force_z))
-        return {f"{sensor}_{axis}_{wheel}": force[:, i] for axis, force in forces for i, wheel in enumerate(wheels)}
+        return {
+            f"{sensor}_{axis}_{wheel}": force[:, i]
+            for axis, force in forces
+            for i, wheel in enumerate(wheels)
+        }
     return dict(zip(("east", "north", "altitude"), trace.location, strict=True))
 
 
@@ -96,6 +104,13 @@ def _fitted(sensors: Sensors) -> list[tuple[str, Sensor]]:
 
 def _channels(name: str, sensor: Sensor, trace: Trace) -> list[str]:
     keep = sensor.wheels
+    odd = next((wheel for wheel in keep or () if wheel not in trace.vehicle.wheels), None)
+    if odd is not None:
+        raise InputError(
+            f"no wheel {odd!r}",
+            place=f"sensors.{name}.wheels",
+            mend=f"wheels are {', '.join(trace.vehicle.wheels)}",
+        )
     short = replace(trace, rows=trace.rows[:2])
     return [c for c in signals(name, short) if keep is None or c.rsplit("_", 1)[1] in keep]
 
@@ -161,4 +176,6 @@ def _located(scenario: Scenario, series: Series) -> Series:
     """Local position as latitude and longitude."""
     local: dict[str, Any] = series.values
     latitude, longitude = geographic(scenario.route, local["east"], local["north"])
-    return replace(series, values={"latitude": latitude, "longitude": longitude, "altitude": local["altitude"]})
+    return replace(
+        series, values={"latitude": latitude, "longitude": longitude, "altitude": local["altitude"]}
+    )

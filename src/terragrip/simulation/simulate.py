@@ -53,7 +53,9 @@ class SimulationResult:
         try:
             target.mkdir(parents=True, exist_ok=True)
         except OSError as error:
-            raise InputError(f"cannot be made ({error.strerror})", file=target, mend="choose another folder") from error
+            raise InputError(
+                f"cannot be made ({error.strerror})", file=target, mend="choose another folder"
+            ) from error
         with replacing(target / "recording.parquet") as temporary:
             self.recording.to_pandas().to_parquet(temporary, index=False)
         with replacing(target / "truth.parquet") as temporary:
@@ -130,8 +132,12 @@ def _true_parameters(vehicle: Vehicle, errors: Errors, radius: Floats) -> dict[s
     wheels = vehicle.wheels
     torque = [f"drive_torque_{wheel}" for wheel in wheels]
     calibration: dict[str, Any] = {
-        "drive_torque_gain": {w: errors.gain[c] for w, c in zip(wheels, torque, strict=True) if c in errors.gain},
-        "drive_torque_offset": {w: errors.offset[c] for w, c in zip(wheels, torque, strict=True) if c in errors.gain},
+        "drive_torque_gain": {
+            w: errors.gain[c] for w, c in zip(wheels, torque, strict=True) if c in errors.gain
+        },
+        "drive_torque_offset": {
+            w: errors.offset[c] for w, c in zip(wheels, torque, strict=True) if c in errors.gain
+        },
         "drawbar_offset": errors.offset.get("drawbar_force", 0.0),
         "acceleration_bias_x": errors.offset.get("acceleration_x", 0.0),
         "pitch_offset": errors.offset.get("pitch", 0.0),

@@ -66,22 +66,37 @@ def build(scenario: Scenario, track_width: float, wheelbase: float, seed: int) -
     height = route.slope.sd * route.slope.length  # a Gaussian covariance has slope SD sd/length
     slope = route.slope.mean + np.arctan(height * hills.slope(path.east, path.north, path.heading))
     altitude = height * hills.at(path.east, path.north) + np.sin(route.slope.mean) * path.x
-    friction, dig_in = zip(*(_draught(scenario, tool, k, names, path, middle, seed) for k, tool in enumerate(scenario.tools)), strict=True) if scenario.tools else ((), ())
-    curve = np.array([_curve(scenario.soils[name]) for name in names])
-    return Terrain(names, path, (tracks[0], tracks[1]), middle, slope, altitude, curve, friction, dig_in)
+    draught = [
+        _draught(scenario, tool, names, path, middle, seed) for tool in scenario.tools
+    ]
+    return Terrain(
+        names=names,
+        path=path,
+        tracks=(tracks[0], tracks[1]),
+        middle=middle,
+        slope=slope,
+        altitude=altitude,
+        curve=np.array([_curve(scenario.soils[name]) for name in names]),
+        friction=tuple(friction for friction, _ in draught),
+        dig_in=tuple(dig_in for _, dig_in in draught),
+    )
 
 
 def _curve(soil: Soil) -> Floats:
     model = CURVES[str(soil.curve["name"])]
     parameters = {key: float(value) for key, value in soil.curve.items() if key != "name"}
     slip = np.linspace(0.0, 1.0, CURVE_INTERVALS + 1)
-    # Just above 0: some curves jump to their native intercept there, and none is wanted in adhesion.
-    value = model.positive(slip, model.complete(parameters))
-    return np.stack([np.broadcast_to(value, slip.shape), np.broadcast_to(model.slope(slip, parameters), slip.shape)], axis=1)
+    value = model.positive(slip, model.complete(parameters))  # without the intercept of a net-traction form
+    return np.stack([value, model.slope(slip, parameters)], axis=1)
 
 
 def _varied(
-    scenario: Scenario, names: tuple[str, ...], soils: Soils, place: tuple[Floats, Floats], seed: int, what: str
+    scenario: Scenario,
+    names: tuple[str, ...],
+    soils: Soils,
+    place: tuple[Floats, Floats],
+    seed: int,
+    what: str,
 ) -> Floats:
     """A factor of mean 1 (n,) that varies as each soil's ``<what>_variation`` says (log-normal: never negative)."""
     out = np.ones(len(soils.blend))
@@ -97,7 +112,16 @@ def _varied(
 
 
 def _mixed(scenario: Scenario, names: tuple[str, ...], soils: Soils, attribute: str) -> Floats:
-    return sum((soils.share(k) * getattr(scenario.soils[name], attribute) for k, name in enumerate(names)), np.zeros(1))
+    figures = [float(getattr(scenario.soils[name], attribute)) for name in names]
+    return _shared(soils, figures)
+
+
+def _shared(soils: Soils, figures: list[float]) -> Floats:
+    """A figure of each soil, mixed as the soils are (n,)."""
+    out = np.zeros(len(soils.blend))
+    for k, figure in enumerate(figures):
+        out += figure * soils.share(k)
+    return out
 
 
 def _track(
@@ -134,15 +158,15 @@ def _clods(
 
 
 def _draught(
-    scenario: Scenario, tool: Tool, index: int, names: tuple[str, ...], path: Path, middle: Soils, seed: int
+    scenario: Scenario, tool: Tool, names: tuple[str, ...], path: Path, middle: Soils, seed: int
 ) -> tuple[Floats, Floats]:
-    factor = _varied(scenario, names, middle, (path.east, path.north), seed + index, "draught")
-    by_soil = {
-        key: sum((middle.share(k) * _of(getattr(tool, key), name) for k, name in enumerate(names)), np.zeros(1))
-        for key in ("friction", "dig_in")
-    }
-    added = np.interp(path.x, *zip(*tool.added, strict=True)) if tool.added else 0.0
-    return factor * by_soil["friction"], factor * (by_soil["dig_in"] + added)
+    factor = _varied(scenario, names, middle, (path.east, path.north), seed, "draught")
+    friction = _shared(middle, [_of(tool.friction, name) for name in names])
+    dig_in = _shared(middle, [_of(tool.dig_in, name) for name in names])
+    if tool.added:
+        positions, forces = np.array(tool.added).T
+        dig_in += np.interp(path.x, positions, forces)
+    return factor * friction, factor * dig_in
 
 
 def _of(value: float | dict[str, float], soil: str) -> float:

@@ -67,7 +67,9 @@ class Trace:
     def rolling_force(self) -> Floats:
         """Rolling resistance force of each axle [N], signed against forward (n, 2)."""
         front = self["load_front"]
-        return np.stack([self["resistance_front"] * front, self["resistance_rear"] * (self.normal_force - front)], axis=1)
+        return np.stack(
+            [self["resistance_front"] * front, self["resistance_rear"] * (self.normal_force - front)], axis=1
+        )
 
     @cached_property
     def specific_force(self) -> tuple[Floats, Floats]:

@@ -50,12 +50,17 @@ def truth_frame(trace: Trace, whole: Trace) -> pd.DataFrame:
     columns["true_soil_resistance"] = resistance
     axles = vehicle.axle_names
     for k, axle in enumerate(axles):
-        columns[f"true_soil_resistance_{axle}"] = direction * trace["resistance_front" if k == 0 else "resistance_rear"]
+        columns[f"true_soil_resistance_{axle}"] = (
+            direction * trace["resistance_front" if k == 0 else "resistance_rear"]
+        )
         columns[f"true_vertical_load_{axle}"] = trace["load"][:, 2 * k : 2 * k + 2].sum(axis=1)
     for i, wheel in enumerate(vehicle.wheels):
         adhesion = direction * trace["adhesion"][:, i]
         wheel_slip = slip(
-            trace["wheel_speed"][:, i], trace["hub_speed"][:, i], trace.radius[i], standstill_speed=STANDSTILL_SPEED
+            trace["wheel_speed"][:, i],
+            trace["hub_speed"][:, i],
+            trace.radius[i],
+            standstill_speed=STANDSTILL_SPEED,
         )
         columns[f"true_adhesion_{wheel}"] = adhesion
         columns[f"true_slip_{wheel}"] = wheel_slip
