@@ -9,8 +9,22 @@ import pandas as pd
 import pytest
 
 from terragrip.report.runs import Run
+from terragrip.vehicle import Vehicle
 
 WHEELS = ("fl", "fr", "rl", "rr")
+YAW_RATE = 0.1
+VEHICLE = {
+    "name": "made up",
+    "mass": 139.0,
+    "wheelbase": 0.6,
+    "track": 0.5,
+    "center_of_gravity_height": 0.3,
+    "axles": {
+        "front": {"mass": 54.0, "wheels": ["fl", "fr"]},
+        "rear": {"mass": 85.0, "wheels": ["rl", "rr"]},
+    },
+    "wheel": {"radius": 0.2, "inertia": 0.15},
+}
 
 
 def drive(name: str = "multi2", method: str = "bank", seconds: float = 120.0, seed: int = 0) -> Run:
@@ -44,14 +58,17 @@ def drive(name: str = "multi2", method: str = "bank", seconds: float = 120.0, se
         {
             "time": time,
             "ground_speed": 0.6 + 0.02 * rng.normal(size=len(time)),
-            "wheel_speed_rr": 0.6 / 0.2 / (1 - truth["true_slip_rr"]),
+            "angular_velocity_z": YAW_RATE,
+            # a left turn: the right wheel's hub, 0.25 m off the middle, runs ahead
+            "wheel_speed_rr": (0.6 + 0.25 * YAW_RATE) / 0.2 / (1 - truth["true_slip_rr"]),
             "wheel_force_x_rr": force,
             "wheel_force_z_rr": load,
             "soil": soil,
         }
     )
     recording.loc[::2, "ground_speed"] = np.nan
-    return Run(name, estimates, method, truth, recording)
+    recording.loc[1::2, "wheel_speed_rr"] = np.nan
+    return Run(name, estimates, method, truth, recording, Vehicle.from_dict(VEHICLE))
 
 
 @pytest.fixture(name="drive")

@@ -35,7 +35,7 @@ def page_fixture(drive: Drive) -> Page:
             sections.tracking(second),
             sections.slip_and_resistance(second),
             sections.methods(comparisons, scores, "bank"),
-            sections.soils(second, [first, second], 0.2),
+            sections.soils(second, [first, second]),
             sections.honesty(second, [*run_coverage(first), *run_coverage(second)]),
         ),
         (Headline("0.9", "R²", "paper 0.8"),),
@@ -111,7 +111,7 @@ def test_an_absent_input_leaves_a_sentence_not_an_error(drive: Drive, missing: s
         sections.tracking(run),
         sections.slip_and_resistance(run),
         sections.methods(compare(run), scores, "bank"),
-        sections.soils(run, [run], 0.2),
+        sections.soils(run, [run]),
         sections.honesty(run, run_coverage(run)),
     )
     html = render(Page("t", "l", made))

@@ -40,6 +40,19 @@ def test_a_lifted_wheel_has_no_measured_ratio(drive: Drive) -> None:
     assert run.sensor_wheel == "rr"
 
 
+def test_measured_slip_is_the_hubs_and_bridges_channels_of_other_instants(drive: Drive) -> None:
+    run = drive()
+    measured = run.measured_slip()
+    truth = run.true("slip_rr")
+    assert measured is not None
+    assert truth is not None
+    rows = np.isfinite(measured)
+    assert rows.sum() == len(measured) // 2
+    # 2 cm/s of noise on 0.625 m/s is .03 of slip a row; the mean must not be off by the turn's .035
+    assert np.mean((measured - truth)[rows]) == pytest.approx(0.0, abs=0.004)
+    assert Run(run.name, run.estimates, run.method, None, run.recording).measured_slip() is None
+
+
 def test_scores_know_what_was_put_in(drive: Drive) -> None:
     run = drive(seconds=600.0)
     score = truth_score(run)

@@ -1,4 +1,7 @@
-"""Mean and SD of slip and adhesion by section and by soil: the crosses of the paper's last two figures."""
+"""Mean and SD of slip and traction by section and by soil: the crosses of the paper's last two figures.
+
+Traction is adhesion (mu, as the paper has it) or the net traction ratio (kappa, what an axle sensor reads).
+"""
 
 from __future__ import annotations
 
@@ -18,7 +21,7 @@ LEAST_ROWS = 100
 
 @dataclass(frozen=True)
 class Cross:
-    """Mean and SD of slip and adhesion over the rows of one soil, as one voice tells it.
+    """Mean and SD of slip and traction over the rows of one soil, as one voice tells it.
 
     `voice` is ``measured``, ``estimated`` or ``true``.
     """
@@ -27,15 +30,18 @@ class Cross:
     voice: str
     slip: float
     slip_std: float
-    adhesion: float
-    adhesion_std: float
+    traction: float
+    traction_std: float
     count: int
 
 
-def section_crosses(run: Run, radius: float) -> list[Cross]:
-    """A cross per section of `run` on one soil, of every voice there is. `radius` [m]: the shown wheel's."""
+def section_crosses(run: Run, quantity: str) -> list[Cross]:
+    """A cross per section of `run` on one soil, of every voice there is.
+
+    `quantity` is ``adhesion`` or ``net_traction``, here and below.
+    """
     crosses = []
-    voices = _voices(run, radius)
+    voices = _voices(run, quantity)
     for soil, first, last in label_stretches(run.soil):
         rows = np.zeros(len(run.time), dtype=np.bool_)
         rows[first : last + 1] = True
@@ -44,12 +50,12 @@ def section_crosses(run: Run, radius: float) -> list[Cross]:
     return [cross for cross in crosses if cross.count >= LEAST_ROWS]
 
 
-def soil_crosses(runs: Sequence[Run], radius: float) -> list[Cross]:
+def soil_crosses(runs: Sequence[Run], quantity: str) -> list[Cross]:
     """A cross per soil over all `runs` together, of every voice there is."""
     pool: dict[tuple[str, str], list[tuple[FloatArray, FloatArray]]] = {}
     for run in runs:
         counted = run.moving & ~run.stuck
-        for voice, slip, mu in _voices(run, radius):
+        for voice, slip, mu in _voices(run, quantity):
             for soil in run.soils:
                 rows: BoolArray = counted & (run.soil == soil)
                 pool.setdefault((soil, voice), []).append((slip[rows], mu[rows]))
@@ -60,7 +66,7 @@ def soil_crosses(runs: Sequence[Run], radius: float) -> list[Cross]:
     return [cross for cross in crosses if cross.count >= LEAST_ROWS]
 
 
-def draw_crosses(crosses: Iterable[Cross], voices: Sequence[str]) -> str:
+def draw_crosses(crosses: Iterable[Cross], voices: Sequence[str], what: str) -> str:
     """An SVG of `crosses`: colour tells the soil, line and marker tell who speaks."""
     shown = [cross for cross in crosses if cross.voice in voices]
     soils = tuple(dict.fromkeys(cross.soil for cross in shown))
@@ -78,7 +84,7 @@ def draw_crosses(crosses: Iterable[Cross], voices: Sequence[str]) -> str:
             marker, line, width = looks[cross.voice]
             color = INK if cross.voice == "true" else soil_color(cross.soil, soils)
             bars = plot.errorbar(
-                cross.slip, cross.adhesion, xerr=cross.slip_std, yerr=cross.adhesion_std, fmt=marker,
+                cross.slip, cross.traction, xerr=cross.slip_std, yerr=cross.traction_std, fmt=marker,
                 color=color, linewidth=width, markersize=7 if marker != "o" else 5,
             )  # fmt: skip
             for bar in bars[2]:
@@ -93,11 +99,11 @@ def draw_crosses(crosses: Iterable[Cross], voices: Sequence[str]) -> str:
         ]
         plot.legend(handles=keys, loc="upper left", bbox_to_anchor=(1.01, 1.0))
         plot.set_xlabel("slip s [–]")
-        plot.set_ylabel("adhesion µ [–]")
+        plot.set_ylabel(f"{what} [–]")
         return to_svg(figure)
 
 
-def cross_table(crosses: Iterable[Cross]) -> Table:
+def cross_table(crosses: Iterable[Cross], what: str) -> Table:
     """Means by soil, the voices side by side, and how far the estimate's mean lies from the other two."""
     by_soil: dict[str, dict[str, Cross]] = {}
     for cross in crosses:
@@ -106,28 +112,28 @@ def cross_table(crosses: Iterable[Cross]) -> Table:
     for soil, said in by_soil.items():
         estimated, measured, true = said.get("estimated"), said.get("measured"), said.get("true")
         trio = (measured, estimated, true)
-        spread = (f"{number(c.adhesion)} ± {number(c.adhesion_std)}" if c else "–" for c in trio)
+        spread = (f"{number(c.traction)} ± {number(c.traction_std)}" if c else "–" for c in trio)
         apart = (
-            number(estimated.adhesion - other.adhesion) if estimated and other else "–"
+            number(estimated.traction - other.traction) if estimated and other else "–"
             for other in (measured, true)
         )
         rows.append((soil, *spread, *apart, *(number(c.slip) if c else "–" for c in trio)))
     return Table(
-        "Mean ± SD of adhesion and mean slip by soil. The paper finds |µ − estimate| under .015 on grass, "
-        "wet and fine, and .03 on coarse, against its sensor.",
-        ("soil", "µ sensor", "µ estimated", "µ true", "est. − sensor", "est. − true",
+        f"Mean ± SD of {what} and mean slip by soil. The sensor's column is its F_x/F_z, which follows κ. The paper "
+        "finds its estimate of µ within .015 of its sensor on grass, wet and fine, and within .03 on coarse.",
+        ("soil", "sensor", "estimated", "true", "est. − sensor", "est. − true",
          "s measured", "s estimated", "s true"),
         tuple(rows),
     )  # fmt: skip
 
 
-def _voices(run: Run, radius: float) -> list[tuple[str, FloatArray, FloatArray]]:
-    """(voice, slip, adhesion) of every voice that `run` has both of."""
+def _voices(run: Run, quantity: str) -> list[tuple[str, FloatArray, FloatArray]]:
+    """(voice, slip, traction) of every voice that `run` has both of."""
     wheel = run.shown_wheel
     found = [
-        ("measured", run.measured_slip(wheel, radius), run.measured_ratio()),
-        ("estimated", run.estimated(f"slip_{wheel}"), run.estimated(f"adhesion_{wheel}")),
-        ("true", run.true(f"slip_{wheel}"), run.true(f"adhesion_{wheel}")),
+        ("measured", run.measured_slip(), run.measured_ratio()),
+        ("estimated", run.estimated(f"slip_{wheel}"), run.estimated(f"{quantity}_{wheel}")),
+        ("true", run.true(f"slip_{wheel}"), run.true(f"{quantity}_{wheel}")),
     ]
     return [(voice, slip, mu) for voice, slip, mu in found if slip is not None and mu is not None]
 

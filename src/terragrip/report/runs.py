@@ -14,6 +14,8 @@ from terragrip.errors import InputError
 if TYPE_CHECKING:
     import pandas as pd
 
+    from terragrip.vehicle import Vehicle
+
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
 
@@ -22,12 +24,17 @@ LEAST_SENSOR_LOAD = 0.1
 air has no adhesion, only noise over nothing."""
 
 
+AFTER_STUCK = 2.0
+"""Seconds that a stuck spell's aftermath lasts: the vehicle jerks free and its tool follows. With them the spell
+of the simulated `multi2` is as long as the 245-255 s that the paper leaves out."""
+
+
 @dataclass(frozen=True)
 class Run:
     """One recorded or simulated drive.
 
     `estimates` is an Estimates table (DESIGN §3). `truth`, of a simulation, and `recording`, what was
-    measured, have the same rows; either may be absent.
+    measured, have the same rows; `vehicle` is the one that was estimated with. Each may be absent.
     """
 
     name: str
@@ -35,6 +42,7 @@ class Run:
     method: str
     truth: pd.DataFrame | None = None
     recording: pd.DataFrame | None = None
+    vehicle: Vehicle | None = None
 
     def __post_init__(self) -> None:
         for what, table in (("truth", self.truth), ("recording", self.recording)):
@@ -97,22 +105,45 @@ class Run:
         with np.errstate(divide="ignore", invalid="ignore"):
             return np.where(load > LEAST_SENSOR_LOAD * typical, force / load, np.nan)
 
-    def measured_slip(self, wheel: str, radius: float) -> FloatArray | None:
-        """Slip from the recorded wheel and ground speed (paper eq. 5), (n,), NaN where either is missing."""
-        if self.recording is None:
+    def measured_slip(self) -> FloatArray | None:
+        """Slip of the shown wheel from the recorded speeds (paper eq. 5), (n,), NaN where no ground speed is.
+
+        The hub of a wheel off the middle runs at v - y times the yaw rate. Wheel speed and yaw rate are
+        interpolated to the rows of the ground speed. None without a recording or a vehicle.
+        """
+        if self.recording is None or self.vehicle is None:
             return None
+        from terragrip.estimation.calibration.windows import wheel_side
         from terragrip.physics.slip import slip
 
-        turning = self.recording[f"wheel_speed_{wheel}"].to_numpy(dtype=np.float64)
-        return slip(turning, self.recording["ground_speed"].to_numpy(dtype=np.float64), radius)
+        wheel = self.vehicle.wheels.index(self.shown_wheel)
+        hub = self.recording["ground_speed"].to_numpy(dtype=np.float64)
+        if "angular_velocity_z" in self.recording:
+            hub = hub - wheel_side(self.vehicle)[wheel] * self._everywhere("angular_velocity_z")
+        turning = self._everywhere(f"wheel_speed_{self.shown_wheel}")
+        return slip(turning, hub, float(self.vehicle.wheel_radius[wheel]))
+
+    def _everywhere(self, channel: str) -> FloatArray:
+        """A recorded channel (n,), linear between its samples."""
+        assert self.recording is not None
+        values = self.recording[channel].to_numpy(dtype=np.float64)
+        known = np.isfinite(values)
+        return np.interp(self.time, self.time[known], values[known]) if known.any() else values
 
     @cached_property
     def soil(self) -> NDArray[np.object_]:
-        """The soil's label at each row, "" where there is none (a transition, or a run without labels)."""
+        """The soil's label at each row, "" where there is none: a run without labels, or a transition.
+
+        A transition lasts until vehicle and tool are on the same soil (PHYSICS §7); a simulation's truth
+        knows it.
+        """
         for table in (self.estimates, self.recording, self.truth):
             if table is not None and "soil" in table:
-                labels = table["soil"].to_numpy(dtype=object)
-                return np.array([x if isinstance(x, str) else "" for x in labels], dtype=object)
+                labels = [x if isinstance(x, str) else "" for x in table["soil"].to_numpy(dtype=object)]
+                found = np.array(labels, dtype=object)
+                if self.truth is not None and "transition" in self.truth:
+                    found[self.truth["transition"].to_numpy(dtype=np.bool_)] = ""
+                return found
         return np.full(len(self.time), "", dtype=object)
 
     @cached_property
@@ -126,6 +157,16 @@ class Run:
         if self.truth is not None and "stuck" in self.truth:
             return self.truth["stuck"].to_numpy(dtype=np.bool_)
         return np.zeros(len(self.time), dtype=np.bool_)
+
+    @cached_property
+    def outlier(self) -> BoolArray:
+        """The longest stuck spell and AFTER_STUCK seconds after it: what the paper cuts out of `multi2` by hand."""
+        found = np.zeros(len(self.time), dtype=np.bool_)
+        spells = stretches(self.stuck)
+        if spells:
+            first, last = max(spells, key=lambda spell: self.time[spell[1]] - self.time[spell[0]])
+            found = (self.time >= self.time[first]) & (self.time <= self.time[last] + AFTER_STUCK)
+        return found
 
     @cached_property
     def moving(self) -> BoolArray:

@@ -15,7 +15,7 @@ from terragrip.report.intervals import (
 )
 from terragrip.report.operating_points import cross_table, draw_crosses, section_crosses, soil_crosses
 from terragrip.report.page import Picture, Section, Table, names
-from terragrip.report.runs import Run, stretches
+from terragrip.report.runs import FloatArray, Run, stretches
 from terragrip.report.scores import Comparison, TruthScore, method_tables, truth_table
 from terragrip.report.timeline import Lane, timeline
 
@@ -24,51 +24,47 @@ ZOOM_MARGIN = 20.0
 
 
 def tracking(run: Run, prose: Sequence[str] = ()) -> Section:
-    """Adhesion of one wheel over time, against sensor and truth (the paper shows `multi2`), and a zoom."""
+    """Traction of one wheel over time against sensor and truth (the paper shows `multi2`), and a zoom."""
     wheel = run.shown_wheel
-    lane = Lane(
-        f"adhesion µ, {wheel} [–]",
-        run.estimated(f"adhesion_{wheel}"),
-        run.estimated(f"adhesion_{wheel}_std"),
-        run.measured_ratio(),
-        run.true(f"adhesion_{wheel}"),
-    )
-    lane = _clipped(lane)
+    lanes = [_lane(run, f"adhesion_{wheel}", f"adhesion µ, {wheel} [–]")]
+    measured = run.measured_ratio()
+    if measured is not None:
+        lanes.insert(0, _lane(run, f"net_traction_{wheel}", f"net traction κ, {wheel} [–]", measured))
     sim = "Simulated run" if run.truth is not None else "Run"
-    voices = _voices(lane)
+    what = "net traction ratio κ (top) and adhesion µ (bottom)" if len(lanes) > 1 else "adhesion µ"
+    voices = _voices(lanes[0])
     whole = Picture(
-        f"adhesion-{run.name}",
-        timeline(run, [lane]),
-        f"{sim} {run.name}, method {run.method}: adhesion of wheel {wheel} over time: {voices}. The strip on "
-        "top names the soil, grey is a transition (vehicle and tool on different soils)."
+        f"traction-{run.name}",
+        timeline(run, lanes),
+        f"{sim} {run.name}, method {run.method}: {what} of wheel {wheel} over time: {voices}. The strip on top "
+        "names the soil, grey is a transition (vehicle and tool on different soils)."
         + (" Shaded: the vehicle is stuck." if run.stuck.any() else ""),
-        f"Adhesion of wheel {wheel} over time in {run.name}, estimate against {voices}",
+        f"Traction of wheel {wheel} over time in {run.name}: {voices}",
     )
     start, end, about = _zoom(run)
     near = Picture(
-        f"adhesion-{run.name}-zoom",
-        timeline(run, [lane], (start, end)),
+        f"traction-{run.name}-zoom",
+        timeline(run, lanes, (start, end)),
         f"The same from {start:.0f} to {end:.0f} s, around {about}.",
-        f"Adhesion of wheel {wheel} in {run.name}, zoomed to {start:.0f} to {end:.0f} s",
+        f"Traction of wheel {wheel} in {run.name}, zoomed to {start:.0f} to {end:.0f} s",
     )
-    return Section(f"tracking-{run.name}", f"Adhesion in {run.name}", tuple(prose), (whole, near))
+    return Section(f"tracking-{run.name}", f"Traction in {run.name}", tuple(prose), (whole, near))
 
 
 def slip_and_resistance(run: Run) -> Section:
     """Slip of one wheel and soil resistance over time, with intervals and truth."""
     wheel = run.shown_wheel
     lanes = [
-        Lane(f"slip s, {wheel} [–]", run.estimated(f"slip_{wheel}"), run.estimated(f"slip_{wheel}_std"),
-             None, run.true(f"slip_{wheel}")),
-        Lane("soil resistance ρs [–]", run.estimated("soil_resistance"), run.estimated("soil_resistance_std"),
-             None, run.true("soil_resistance")),
-    ]  # fmt: skip
+        _lane(run, f"slip_{wheel}", f"slip s, {wheel} [–]", moving_only=True),
+        _lane(run, "soil_resistance", "soil resistance ρs [–]", moving_only=True),
+    ]
     sim = "Simulated run" if run.truth is not None else "Run"
+    off = " Where the vehicle is stuck, slip leaves the plot towards 1." if run.stuck.any() else ""
     picture = Picture(
         f"slip-resistance-{run.name}",
-        timeline(run, [_clipped(lane) for lane in lanes]),
+        timeline(run, lanes),
         f"{sim} {run.name}, method {run.method}: slip of wheel {wheel} (top) and soil rolling resistance "
-        f"(bottom): {_voices(lanes[0])}. At standstill slip is undefined and the resistance held.",
+        f"(bottom): {_voices(lanes[0])}. At standstill slip is undefined and the resistance held.{off}",
         f"Slip of wheel {wheel} and soil resistance over time in {run.name}",
     )
     return Section(f"slip-{run.name}", "Slip and soil resistance", (), (picture,))
@@ -89,31 +85,36 @@ def methods(
     return Section("methods", title, tuple(prose), tuple(tables))
 
 
-def soils(run: Run, together: Sequence[Run], radius: float) -> Section:
+def soils(run: Run, together: Sequence[Run]) -> Section:
     """Crosses of mean and SD: sections of `run`, and by soil over the runs `together`."""
     title = "Operating points by soil"
-    crosses = section_crosses(run, radius)
+    quantity = "net_traction" if run.sensor_wheel is not None else "adhesion"
+    crosses = section_crosses(run, quantity)
     if not crosses:
         return Section("soils", title, omitted="Left out: no section of these runs carries a soil label.")
     voice = next((v for v in ("measured", "estimated") if any(c.voice == v for c in crosses)), "estimated")
-    pooled = soil_crosses(together, radius)
+    pooled = soil_crosses(together, quantity)
     said = names([v for v in ("measured", "estimated", "true") if any(c.voice == v for c in pooled)])
     sim = "simulated " if run.truth is not None else ""
+    what = "net traction ratio κ" if quantity == "net_traction" else "adhesion µ"
     sections_picture = Picture(
         f"sections-{run.name}",
-        draw_crosses(crosses, (voice,)),
-        f"Mean ± SD of slip and adhesion ({voice}) of each section of the {sim}run {run.name} that lies on "
-        f"one soil, wheel {run.shown_wheel}; transitions and stuck spells left out.",
-        f"Crosses of slip and adhesion by section of {run.name}",
+        draw_crosses(crosses, (voice,), what),
+        f"Mean ± SD of slip and {what} ({voice}) of each section of the {sim}run {run.name} that lies on one "
+        f"soil, wheel {run.shown_wheel}; transitions and stuck spells left out.",
+        f"Crosses of slip and traction by section of {run.name}",
     )
     pooled_picture = Picture(
         "soils",
-        draw_crosses(pooled, ("measured", "estimated", "true")),
-        f"Mean ± SD of slip and adhesion by soil over the {sim}runs {names([r.name for r in together])}, "
-        f"{said}. Measured slip comes from the raw speeds, so its SD holds their noise.",
-        "Crosses of slip and adhesion by soil, measured, estimated and true",
+        draw_crosses(pooled, ("measured", "estimated", "true"), what),
+        f"Mean ± SD of slip and {what} by soil over the {sim}runs {names([r.name for r in together])}, {said}. "
+        "Measured slip comes from the raw speeds, so its SD holds their noise.",
+        "Crosses of slip and traction by soil, measured, estimated and true",
     )
-    return Section("soils", title, (), (sections_picture, pooled_picture, cross_table(pooled)))
+    tables = [cross_table(pooled, what)]
+    if quantity != "adhesion":
+        tables.append(cross_table(soil_crosses(together, "adhesion"), "adhesion µ"))
+    return Section("soils", title, (), (sections_picture, pooled_picture, *tables))
 
 
 def honesty(shown: Run, covered: Sequence[Coverage]) -> Section:
@@ -151,22 +152,24 @@ def honesty(shown: Run, covered: Sequence[Coverage]) -> Section:
     return Section("honesty", title, (), tuple(content))
 
 
-def _clipped(lane: Lane) -> Lane:
-    """Axis limits that hold the estimate and the middle 99.8 % of the sensor: spikes may leave."""
-    pieces = [lane.estimate]
-    if lane.std is not None:
-        pieces += [lane.estimate - 1.96 * lane.std, lane.estimate + 1.96 * lane.std]
-    if lane.truth is not None:
-        pieces.append(lane.truth)
-    ends = [np.nanpercentile(piece, [0.1, 99.9]) for piece in pieces if np.isfinite(piece).any()]
-    if lane.measured is not None and np.isfinite(lane.measured).any():
-        ends.append(np.nanpercentile(lane.measured, [0.1, 99.9]))
-    if not ends:
-        return lane
-    low, high = min(e[0] for e in ends), max(e[1] for e in ends)
-    margin = 0.05 * (high - low) or 0.1
-    limits = (float(low - margin), float(high + margin))
-    return Lane(lane.label, lane.estimate, lane.std, lane.measured, lane.truth, limits)
+def _lane(
+    run: Run, column: str, label: str, measured: FloatArray | None = None, *, moving_only: bool = False
+) -> Lane:
+    """A lane of one estimated column, its axis wide enough for nearly all that it shows.
+
+    The rarest 0.3 % at either end may leave the plot, and with `moving_only` what happens while stuck.
+    """
+    estimate, std, truth = run.estimated(column), run.estimated(f"{column}_std"), run.true(column)
+    rows = ~run.stuck if moving_only else np.ones(len(estimate), dtype=np.bool_)
+    voices = [estimate - 1.96 * std, estimate + 1.96 * std, truth, measured]
+    known = [v[rows & np.isfinite(v)] for v in voices if v is not None]
+    ends = [np.percentile(v, [0.3, 99.7]) for v in known if len(v)]
+    limits = None
+    if ends:
+        low, high = min(e[0] for e in ends), max(e[1] for e in ends)
+        margin = 0.06 * (high - low) or 0.1
+        limits = (float(low - margin), float(high + margin))
+    return Lane(label, estimate, std, measured, truth, limits)
 
 
 def _voices(lane: Lane) -> str:
@@ -180,7 +183,7 @@ def _voices(lane: Lane) -> str:
 
 def _zoom(run: Run) -> tuple[float, float, str]:
     """The window to look into: around the first stuck spell, else around the middle of the run."""
-    spells = stretches(run.stuck)
+    spells = stretches(run.outlier)
     if spells:
         first, last = spells[0]
         about = "the spell in which the vehicle is stuck and its tool slides up and pushes"

@@ -22,11 +22,12 @@ ON_COLOR = "#101214"
 ORANGE, SKY, GREEN, YELLOW = "#e69f00", "#56b4e9", "#009e73", "#f0e442"
 BLUE, VERMILLION, PURPLE = "#0072b2", "#d55e00", "#cc79a7"
 
-MEASURED, ESTIMATED, TRUE = ORANGE, BLUE, INK
+MEASURED, ESTIMATED, TRUE = VERMILLION, BLUE, INK
 """Colours of the three voices in every figure: the reference sensor, the estimate, the truth."""
 
-SOIL_COLORS = {"hard": PURPLE, "fine": ORANGE, "wet": SKY, "coarse": VERMILLION, "grass": GREEN}
-_SPARE_COLORS = (BLUE, YELLOW, MUTED)
+SOIL_COLORS = {"hard": MUTED, "fine": ORANGE, "wet": SKY, "coarse": PURPLE, "grass": GREEN}
+"""None of them is a voice's."""
+_SPARE_COLORS = (YELLOW, VERMILLION, BLUE)
 
 CSS_VARIABLES = {
     INK: "ink", MUTED: "muted", GRID: "grid", PAPER: "paper", ORANGE: "orange", SKY: "sky", GREEN: "green",

@@ -52,41 +52,50 @@ def timeline(run: Run, lanes: list[Lane], window: tuple[float, float] | None = N
         rows = (run.time >= window[0]) & (run.time <= window[1])
     figure = new_figure(height=0.75 + 2.65 * len(lanes))
     with styled():
+        from matplotlib.patches import Patch
+
         plots = figure.subplots(len(lanes), 1, sharex=True, squeeze=False)[:, 0]
         for plot, lane in zip(plots, lanes, strict=True):
             _draw_lane(plot, run.time[rows], lane, rows)
             _shade(plot, run, rows)
-        soil_strip(plots[0], run.time[rows], run.soil[rows], run.soils)
+        named = soil_strip(plots[0], run.time[rows], run.soil[rows], run.soils)
+        handles, _ = plots[0].get_legend_handles_labels()
+        if (run.stuck & rows).any():
+            handles.append(Patch(color=INK, alpha=0.10, linewidth=0, label="stuck"))
+        if not named:
+            shown = [soil for soil in run.soils if (run.soil[rows] == soil).any()]
+            handles += [Patch(color=soil_color(soil, run.soils), label=soil) for soil in shown]
         plots[0].legend(
-            loc="lower left", bbox_to_anchor=(0.0, 1.10), ncols=5, borderaxespad=0.0, handlelength=1.6
+            handles=handles,
+            loc="lower left",
+            bbox_to_anchor=(0.0, 1.10),
+            ncols=5,
+            borderaxespad=0.0,
+            handlelength=1.6,
         )
         plots[-1].set_xlabel("time [s]")
         plots[-1].set_xlim(float(run.time[rows][0]), float(run.time[rows][-1]))
         return to_svg(figure)
 
 
-def soil_strip(plot: Axes, time: FloatArray, soil: NDArray[np.object_], soils: tuple[str, ...]) -> None:
-    """A strip of soils above `plot`, named where there is room, grey on a transition or without a label."""
+def soil_strip(plot: Axes, time: FloatArray, soil: NDArray[np.object_], soils: tuple[str, ...]) -> bool:
+    """A strip of soils above `plot`, grey on a transition; whether every stretch had room for its name."""
     if not len(time) or not any(soil):
-        return
+        return True
     across = plot.get_xaxis_transform()
     span = float(time[-1] - time[0]) or 1.0
     bar: dict[str, Any] = {"transform": across, "clip_on": False, "linewidth": 0}
     plot.broken_barh([(float(time[0]), span)], (1.015, 0.055), facecolor=MUTED, alpha=0.25, **bar)
-    for label, first, last in label_stretches(soil):
-        start, width = float(time[first]), float(time[last] - time[first])
-        plot.broken_barh([(start, width)], (1.015, 0.055), facecolor=soil_color(label, soils), **bar)
-        if width / span > 0.011 * len(label) + 0.01:
+    found = [(label, float(time[a]), float(time[b])) for label, a, b in label_stretches(soil)]
+    roomy = all((end - start) / span > 0.011 * len(label) + 0.01 for label, start, end in found)
+    for label, start, end in found:
+        plot.broken_barh([(start, end - start)], (1.015, 0.055), facecolor=soil_color(label, soils), **bar)
+        if roomy:
             plot.text(
-                start + width / 2,
-                1.0405,
-                label,
-                transform=across,
-                ha="center",
-                va="center",
-                fontsize=7.5,
-                color=ON_COLOR,
-            )
+                (start + end) / 2, 1.0405, label,
+                transform=across, ha="center", va="center", fontsize=7.5, color=ON_COLOR,
+            )  # fmt: skip
+    return roomy
 
 
 def slots(time: FloatArray, values: FloatArray, columns: int = COLUMNS) -> tuple[FloatArray, FloatArray]:
@@ -152,12 +161,3 @@ def _thin(time: FloatArray, values: FloatArray) -> tuple[FloatArray, FloatArray]
 def _shade(plot: Axes, run: Run, rows: BoolArray) -> None:
     for first, last in stretches(run.stuck & rows):
         plot.axvspan(float(run.time[first]), float(run.time[last]), color=INK, alpha=0.10, linewidth=0)
-        plot.text(
-            float(run.time[first] + run.time[last]) / 2,
-            0.97,
-            "stuck",
-            transform=plot.get_xaxis_transform(),
-            ha="center",
-            va="top",
-            fontsize=8,
-        )
