@@ -102,13 +102,12 @@ class Adaptation:
             return
         H = update.observation.matrix[update.present]
         K, S, innovation = update.gain, update.innovation_covariance, update.innovation[update.present]
-        for j in range(len(self.scale)):
-            dP = self.dP[j]
-            dS = H @ dP @ H.T
-            dK = solve_positive(S, (dP @ H.T - K @ dS).T).T
-            d_innovation = -H @ self.dx[j]
-            self.dx[j] = self.dx[j] + dK @ innovation + K @ d_innovation
-            self.dP[j] = dP - dK @ S @ K.T - K @ dS @ K.T - K @ S @ dK.T
+        dS = H @ self.dP @ H.T
+        dK = _divided(self.dP @ H.T - K @ dS, S)
+        d_innovation = -self.dx @ H.T
+        self.dx = self.dx + dK @ innovation + d_innovation @ K.T
+        twice = dK @ S @ K.T
+        self.dP = self.dP - twice - K @ dS @ K.T - np.swapaxes(twice, -1, -2)
 
     def restart(self, fresh: NDArray[np.bool_]) -> None:
         """Forget the sensitivities of the states that start anew, fresh (n,)."""
@@ -120,6 +119,12 @@ class Adaptation:
 def _whitened(L: Matrix, matrix: Matrix) -> Matrix:
     """L⁻¹ matrix L⁻ᵀ."""
     return solve_lower(L, solve_lower(L, matrix).T).T
+
+
+def _divided(stack: NDArray[Any], S: Matrix) -> NDArray[Any]:
+    """Each matrix of the stack (k, n, p) times S⁻¹ (p, p)."""
+    rows = stack.reshape(-1, len(S))
+    return solve_positive(S, rows.T).T.reshape(stack.shape)
 
 
 class AdaptiveFilter:

@@ -50,7 +50,7 @@ class Tuning:
     ground_speed_min: float = 0.1
     supervisor: Literal["speeds", "drive"] = "speeds"
     scales: Sequence[float] = (0.03, 0.3, 3.0, 30.0)
-    dwell: float = 1.0
+    dwell: float = 5.0
     mix_stride: int = 5
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import cached_property
 from typing import Any
 
@@ -70,20 +71,20 @@ class UnscentedKalmanFilter(GaussianFilter):
         offsets = np.sqrt(self.spread) * cholesky(self.P).T
         return np.concatenate([self.x[np.newaxis], self.x + offsets, self.x - offsets])
 
+    def _through(self, function: Callable[[Vector], Vector], points: Matrix) -> Matrix:
+        """The function of every point, (2n+1, ...)."""
+        return function(points) if self.vectorized else np.stack([function(point) for point in points])
+
     def _propagate(self, u: Any, dt: float) -> tuple[Vector, Matrix, Matrix]:
         points = self.sigma_points()
-        if self.vectorized:
-            moved = self.f(points, u, dt)
-        else:
-            moved = np.stack([self.f(point, u, dt) for point in points])
+        moved = self._through(lambda x: self.f(x, u, dt), points)
         mean = self.mean_weights @ moved
         weighted = self.covariance_weights[:, np.newaxis] * (moved - mean)
         return mean, (moved - mean).T @ weighted, (points - self.x).T @ weighted
 
     def observe(self, h: Measurement | None = None) -> Observation:
-        h = self.h if h is None else h
         points = self.sigma_points()
-        outputs = h(points) if self.vectorized else np.stack([h(point) for point in points])
+        outputs = self._through(self.h if h is None else h, points)
         mean = self.mean_weights @ outputs
         return SigmaPointObservation(self.P, mean, points - self.x, outputs - mean, self.covariance_weights)
 
