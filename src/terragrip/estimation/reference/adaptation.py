@@ -1,6 +1,4 @@
-"""The adaptation matrix A_k: process noise that follows the innovations (PHYSICS §6, a reconstruction
-(R)).
-"""
+"""The adaptation matrix A_k: process noise that follows the innovations (PHYSICS §6 (R))."""
 
 from __future__ import annotations
 
@@ -32,9 +30,8 @@ class Adaptation:
 
     C, an exponential mean of ν νᵀ, is compared with the filter's own S. With S = L Lᵀ and ΔS = L⁻¹(C - S)L⁻ᵀ,
     V = tr(ΔS ΔSᵀ) is driven down: ln a_j moves by -η g_j/h_j, clipped to ±0.2, with g_j = 2 tr(ΔS ∂ΔS_j),
-    h_j = 2‖∂ΔS_j‖² + 1e-3 and ∂ΔS_j = -L⁻¹ ∂S_j L⁻ᵀ (the derivative of L is left out). ∂S_j runs through
-    the whole
-    recursion of the filter: the one-step derivative is exactly zero for the noises of μ and ρ_s.
+    h_j = 2‖∂ΔS_j‖² + 1e-3 and ∂ΔS_j = -L⁻¹ ∂S_j L⁻ᵀ (the derivative of L is left out). ∂S_j runs through the
+    filter's whole recursion: the one-step derivative is exactly zero for the noises of μ and ρ_s.
 
     Parameters
     ----------

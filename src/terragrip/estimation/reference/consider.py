@@ -17,9 +17,7 @@ COMPLEX_STEP = 1e-30
 
 @dataclass(frozen=True)
 class Constant:
-    """A constant with a prior SD. Names and units as in :func:`with_constant_error`, and
-    ``acceleration_bias`` [m/s²].
-    """
+    """A constant with a prior SD: a name of :func:`with_constant_error`, or ``acceleration_bias`` [m/s²]."""
 
     name: str
     std: float

@@ -12,9 +12,7 @@ from terragrip.estimation.reference.filters import Matrix, Vector, runge_kutta
 from terragrip.physics.motion import ground_acceleration, specific_force, wheel_acceleration
 
 STEP_BOUND = 0.25
-"""Largest substep in time constants of the fastest wheel; Runge-Kutta is then exact to some 1e-5 of a
-change.
-"""
+"""Largest substep in time constants of the fastest wheel: Runge-Kutta then errs by 1e-5 of a change."""
 
 
 @dataclass(frozen=True)
@@ -59,9 +57,7 @@ class Input:
 
 @dataclass(frozen=True)
 class TractionModel:
-    """State (ω_1..ω_n, v, μ_1..μ_n, ρ_s), 2n + 2 numbers on the last axis; channels (ω_1..ω_n, v, a_x), n +
-    2.
-    """
+    """State (ω_1..ω_n, v, μ_1..μ_n, ρ_s) and channels (ω_1..ω_n, v, a_x), each on the last axis."""
 
     machine: Machine
 

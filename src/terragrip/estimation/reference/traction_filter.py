@@ -21,7 +21,7 @@ from terragrip.estimation.reference.filters import (
     Update,
     Vector,
 )
-from terragrip.estimation.reference.supervisor import DriveSupervisor, SpeedSupervisor
+from terragrip.estimation.reference.supervisor import RULES, DriveSupervisor, SpeedSupervisor
 from terragrip.estimation.reference.traction import Input, Machine, TractionModel
 from terragrip.estimation.reference.unscented import UnscentedKalmanFilter
 from terragrip.physics.slip import slip
@@ -107,6 +107,9 @@ class TractionFilter:
                     memory=tuning.memory,
                     stride=tuning.stride,
                 )
+        # the γ of calm travel until the supervisor has spoken
+        gamma = {"adaptive": 1.0, "supervised": RULES[0, 0]}.get(tuning.policy, 0.0)
+        self._gamma: Any = self.dtype.type(gamma)
         self._supervisor: SpeedSupervisor | DriveSupervisor
         if tuning.supervisor == "speeds":
             self._supervisor = SpeedSupervisor(tuning.window, tuning.wheel_speed_min, tuning.ground_speed_min)
@@ -152,24 +155,38 @@ class TractionFilter:
         q_input: (2n+2,), variance that this step adds to each state on top of the walk.
         y: (n+2,), NaN is missing. r: (n+2,), their variances. now: the input at the instant of y.
         """
-        before, now = before.in_precision(self.dtype), now.in_precision(self.dtype)
+        self.time = self.time + self.dtype.type(dt)
+        now = now.in_precision(self.dtype)
+        if self.tuning.policy == "supervised":
+            self._gamma = self._supervise(np.asarray(y, self.dtype), now)
+        return self._advance(dt, before, now, q_input, y, r)
+
+    def predict(self, dt: float, before: Input, q_input: ArrayLike) -> None:
+        """A step without any measurement; the supervisor's γ stays as it was."""
+        self.time = self.time + self.dtype.type(dt)
+        channels = self.model.wheels + 2
+        now = before.in_precision(self.dtype)
+        self._advance(dt, before, now, q_input, np.full(channels, np.nan), np.ones(channels))
+
+    def _advance(
+        self, dt: Any, before: Input, now: Input, q_input: ArrayLike, y: ArrayLike, r: ArrayLike
+    ) -> Step:
+        before, dt = before.in_precision(self.dtype), self.dtype.type(dt)
         y, q_input = np.asarray(y, self.dtype), np.asarray(q_input, self.dtype)
         R = np.diag(np.asarray(r, self.dtype))
-        dt = self.dtype.type(dt)
-        self.time = self.time + dt
         unadapted = np.ones(self.model.states, self.dtype)
         if self._bank is not None:
             self._bank.predict(before, dt, extra=q_input)
             seen = [self._observation(lane, now) for lane in self._bank.filters]
-            return Step(self._bank.update(y, R=R, seen=seen), self.dtype.type(0), unadapted, None)
+            return Step(self._bank.update(y, R=R, seen=seen), self._gamma, unadapted, None)
         if self._adaptive is None:
             prediction = self._single.predict(before, dt, Q=np.diag(self.walk * dt + q_input))
             plain = self._single.update(y, R=R, seen=self._observation(self._single, now))
-            return Step(plain, self.dtype.type(0), unadapted, prediction)
-        gamma, scale = self._gamma(y, now), self._adaptive.adaptation.scale
-        prediction = self._adaptive.predict(before, dt, gamma=gamma, extra=q_input)
+            return Step(plain, self._gamma, unadapted, prediction)
+        scale = self._adaptive.adaptation.scale
+        prediction = self._adaptive.predict(before, dt, gamma=self._gamma, extra=q_input)
         update = self._adaptive.update(y, dt, R=R, seen=self._observation(self._single, now))
-        return Step(update, gamma, scale, prediction)
+        return Step(update, self._gamma, scale, prediction)
 
     def _observation(self, filter: GaussianFilter, now: Input) -> Observation:
         """What the filter expects of the channels with the input ``now``."""
@@ -178,10 +195,8 @@ class TractionFilter:
             return LinearObservation(filter.P, expected, self.model.output_matrix(filter.x, now))
         return filter.observe(lambda points: self.model.output(points, now))
 
-    def _gamma(self, y: Vector, now: Input) -> Any:
+    def _supervise(self, y: Vector, now: Input) -> Any:
         """γ_k from the measurements up to and with y."""
-        if self.tuning.policy == "adaptive":
-            return self.dtype.type(1)
         n = self.model.wheels
         self._last_seen = np.where(np.isnan(y[: n + 1]), self._last_seen, y[: n + 1])
         wheel_speed, ground_speed = self._last_seen[:n], self._last_seen[n]
@@ -195,11 +210,6 @@ class TractionFilter:
         )
         known = ~np.isnan(slips)
         return self._supervisor.gamma(self.time, now.torque, np.mean(slips[known]) if known.any() else np.nan)
-
-    def predict(self, dt: float, before: Input, q_input: ArrayLike) -> None:
-        """A step without any measurement."""
-        channels = self.model.wheels + 2
-        self.step(dt, before, before, q_input, np.full(channels, np.nan), np.ones(channels))
 
     def restart(self, walk_time: float, outputs: ArrayLike, variances: ArrayLike) -> None:
         """Start (ω, v) anew at outputs (n+1,) with variances (n+1,), uncorrelated.
