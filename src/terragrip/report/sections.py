@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -14,10 +15,13 @@ from terragrip.report.intervals import (
     nis_table,
 )
 from terragrip.report.operating_points import cross_table, draw_crosses, section_crosses, soil_crosses
-from terragrip.report.page import Picture, Section, Table, names
+from terragrip.report.page import Picture, Section, Table, names, number
 from terragrip.report.runs import FloatArray, Run, stretches
 from terragrip.report.scores import Comparison, TruthScore, method_tables, truth_table
 from terragrip.report.timeline import Lane, timeline
+
+if TYPE_CHECKING:
+    from terragrip.estimation.calibration import Calibration
 
 ZOOM_MARGIN = 20.0
 """Seconds shown before and after what a zoom is about."""
@@ -150,6 +154,29 @@ def honesty(shown: Run, covered: Sequence[Coverage]) -> Section:
     if not content:
         return Section("honesty", title, omitted="Left out: no truth, and a method without innovations.")
     return Section("honesty", title, (), tuple(content))
+
+
+def calibrated(calibration: Calibration) -> Section:
+    """What the vehicle's own logs told of its sensors and wheels."""
+    rows = tuple(
+        (
+            item.name,
+            number(item.value, 4),
+            f"{number(item.interval[0], 4)} to {number(item.interval[1], 4)}",
+            item.unit,
+        )
+        for item in calibration.quantities
+    )
+    title = "Calibration"
+    if not rows:
+        return Section("calibration", title, omitted="Left out: the logs gave nothing to calibrate from.")
+    table = Table(
+        "What `terragrip calibrate` found, with 95 % intervals; every estimate here uses it.",
+        ("quantity", "value", "95 % interval", "unit"),
+        rows,
+    )
+    missing = tuple(f"Not found: {item.name} ({item.why})." for item in calibration.unknown)
+    return Section("calibration", title, missing, (table,))
 
 
 def _lane(

@@ -1,0 +1,189 @@
+"""The simulated campaign: calibrate its machine, then simulate, estimate and score every run, in processes."""
+
+from __future__ import annotations
+
+import signal
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, TypeVar
+
+from terragrip.report.intervals import Coverage, run_coverage
+from terragrip.report.runs import Run
+from terragrip.report.scores import Comparison, TruthScore, compare, truth_score
+
+if TYPE_CHECKING:
+    from terragrip.estimation import Estimates
+    from terragrip.estimation.calibration import Calibration
+    from terragrip.recording import Recording
+    from terragrip.simulation import SimulationResult
+    from terragrip.vehicle import Vehicle
+
+CAMPAIGN = "campaign"
+BENCHMARKS = ("multi1", "multi2")
+"""The runs over several soils that the paper scores; every method estimates them."""
+CALIBRATED_BY = ("-01", "-02", "-06", "-09")
+"""Endings of the runs that the machine is calibrated from, on each soil: two without a tool, two with."""
+
+Progress = Callable[[int, int, str], None]
+"""Called with steps done, steps in all, and what was just done."""
+
+Result = TypeVar("Result")
+
+
+@dataclass(frozen=True)
+class EstimatedRun:
+    """One run of the campaign. `run`, the whole tables, is kept of the benchmarks only; the rest is small.
+
+    `path`: its estimates by the default method. `duration` [s].
+    """
+
+    name: str
+    path: Path
+    rows: int
+    duration: float
+    coverage: tuple[Coverage, ...]
+    comparisons: tuple[Comparison, ...]
+    truth_scores: tuple[TruthScore, ...]
+    run: Run | None
+
+
+@dataclass(frozen=True)
+class EstimatedCampaign:
+    """The runs in the campaign's order, and the calibration that their estimates stand on."""
+
+    runs: tuple[EstimatedRun, ...]
+    calibration: Calibration
+    vehicle: Vehicle
+
+    @property
+    def comparisons(self) -> list[Comparison]:
+        """Of all runs and methods."""
+        return [item for run in self.runs for item in run.comparisons]
+
+    @property
+    def truth_scores(self) -> list[TruthScore]:
+        """Of all runs and methods."""
+        return [item for run in self.runs for item in run.truth_scores]
+
+    @property
+    def coverage(self) -> list[Coverage]:
+        """Of all runs, default method."""
+        return [item for run in self.runs for item in run.coverage]
+
+    @property
+    def benchmarks(self) -> list[Run]:
+        """The benchmark runs with their tables."""
+        return [item.run for item in self.runs if item.run is not None]
+
+
+def estimate_campaign(
+    folder: Path, seed: int, workers: int, progress: Progress | None, names: Sequence[str] | None
+) -> EstimatedCampaign:
+    """Calibrate, simulate, estimate and score; estimates go to `folder`/<run>.parquet.
+
+    `names`: which of the campaign's runs; None takes all; the benchmarks are always among them.
+    """
+    from terragrip.estimation.calibration import calibrate
+    from terragrip.simulation import Scenario, set_runs
+
+    listed = list(set_runs(CAMPAIGN))
+    wanted = listed if names is None else [name for name in listed if name in {*names, *BENCHMARKS}]
+    calibrating = [name for name in listed if name.endswith(CALIBRATED_BY)]
+    total = len(calibrating) + len(wanted)
+
+    logs: dict[str, Recording] = {}
+    for name, log in in_processes(_record, [(name, seed) for name in calibrating], workers):
+        logs[name] = log
+        _tell(progress, len(logs), total, f"{name}, to calibrate")
+    nominal = Scenario.load(BENCHMARKS[-1]).nominal_vehicle()
+    calibration = calibrate([logs[name] for name in calibrating], nominal)
+    vehicle = calibration.apply(nominal)
+
+    order = sorted(wanted, key=lambda name: name not in BENCHMARKS)  # the long ones first
+    done: dict[str, EstimatedRun] = {}
+    for item in in_processes(_estimate, [(name, seed, vehicle, folder) for name in order], workers):
+        done[item.name] = item
+        _tell(progress, len(calibrating) + len(done), total, item.name)
+    return EstimatedCampaign(tuple(done[name] for name in wanted), calibration, vehicle)
+
+
+def in_processes(
+    function: Callable[..., Result], tasks: Sequence[tuple[object, ...]], workers: int
+) -> Iterator[Result]:
+    """Results of function(*task) as they come. An interrupt or a failure cancels what has not begun and passes on.
+
+    With one worker all happens in this process, in order.
+    """
+    if workers <= 1:
+        for task in tasks:
+            yield function(*task)
+        return
+    with ProcessPoolExecutor(workers, initializer=_ignore_interrupts) as pool:
+        futures = [pool.submit(function, *task) for task in tasks]
+        try:
+            for future in as_completed(futures):
+                yield future.result()
+        except BaseException:
+            pool.shutdown(wait=True, cancel_futures=True)
+            raise
+
+
+def _ignore_interrupts() -> None:
+    """Ctrl-C reaches the whole process group: the parent ends the work, a worker finishes its file."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+
+
+def _tell(progress: Progress | None, done: int, total: int, what: str) -> None:
+    if progress is not None:
+        progress(done, total, what)
+
+
+def _simulated(name: str, seed: int) -> SimulationResult:
+    """The run as `simulate_campaign` makes it: one machine for a seed, another ground for each name."""
+    from terragrip.simulation import simulate
+    from terragrip.simulation.campaign import run_seed
+
+    return simulate(name, run_seed(seed, name), machine_seed=seed)
+
+
+def _record(name: str, seed: int) -> tuple[str, Recording]:
+    """What the sensors read in one run."""
+    return name, _simulated(name, seed).recording
+
+
+def _estimate(name: str, seed: int, vehicle: Vehicle, folder: Path) -> EstimatedRun:
+    """One run from scenario to saved estimates and scores."""
+    from terragrip.estimation import DEFAULT, METHODS, estimate
+
+    result = _simulated(name, seed)
+    path = folder / f"{name}.parquet"
+    estimates = estimate(result.recording, vehicle, method=DEFAULT)
+    estimates.write(path)
+    shown = _run(name, estimates, result, vehicle)
+    comparisons: list[Comparison] = []
+    scores: list[TruthScore | None] = []
+    if name in BENCHMARKS:
+        for method in METHODS:
+            others = estimate(result.recording, vehicle, method=method)
+            run = shown if method == DEFAULT else _run(name, others, result, vehicle)
+            comparisons += compare(run)
+            scores.append(truth_score(run))
+    return EstimatedRun(
+        name,
+        path,
+        len(shown.time),
+        float(shown.time[-1] - shown.time[0]),
+        tuple(run_coverage(shown)),
+        tuple(comparisons),
+        tuple(score for score in scores if score is not None),
+        shown if name in BENCHMARKS else None,
+    )
+
+
+def _run(name: str, estimates: Estimates, result: SimulationResult, vehicle: Vehicle) -> Run:
+    """The report's view of one estimated run."""
+    return Run(
+        name, estimates.to_pandas(), estimates.method, result.truth, result.recording.to_pandas(), vehicle
+    )
