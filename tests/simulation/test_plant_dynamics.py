@@ -13,14 +13,28 @@ G = 9.80665
 SLOPE, CURVE_A, RHO, RHO_SLIP = 0.03, 0.85, 0.12, 0.04
 TOOLS = [
     {"mass": 60, "length": 2.0, "friction": 0.2, "dig_in": 50, "draught_speed": 0.5, "slack": 0.05},
-    {"mass": 30, "length": 1.0, "dig_in": 40, "slack": 0.02, "shear_length": 0.02, "stiffness": 3e4, "damping": 500},
+    {
+        "mass": 30,
+        "length": 1.0,
+        "dig_in": 40,
+        "slack": 0.02,
+        "shear_length": 0.02,
+        "stiffness": 3e4,
+        "damping": 500,
+    },
 ]
 
 
 @pytest.fixture
 def uphill(quiet):
     return quiet(
-        soils={"even": {"curve": {"name": "exponential", "a": CURVE_A}, "resistance": RHO, "resistance_slip": RHO_SLIP}},
+        soils={
+            "even": {
+                "curve": {"name": "exponential", "a": CURVE_A},
+                "resistance": RHO,
+                "resistance_slip": RHO_SLIP,
+            }
+        },
         tools=TOOLS,
         route={"segments": [{"soil": "even", "length": 60}], "slope": {"mean": SLOPE}},
         speed=[[0, 0], [1, 0.5], [2, 0.8]],
@@ -81,10 +95,16 @@ def reference(time, y):
     for k, tool in enumerate(TOOLS):
         xt, vt, held = y[24 + 3 * k : 27 + 3 * k]
         weight = tool["mass"] * G
-        limit = (tool.get("friction", 0) * weight * np.cos(SLOPE) + tool["dig_in"]) * (1 + tool.get("draught_speed", 0) * abs(vt))
+        limit = (tool.get("friction", 0) * weight * np.cos(SLOPE) + tool["dig_in"]) * (
+            1 + tool.get("draught_speed", 0) * abs(vt)
+        )
         draught, rate = buildup(limit, held, vt, tool.get("shear_length", 0.01))
         behind = force[1] if k == 0 else 0.0
-        dy[24 + 3 * k : 27 + 3 * k] = vt, (force[k] - behind - draught - weight * np.sin(SLOPE)) / tool["mass"], rate
+        dy[24 + 3 * k : 27 + 3 * k] = (
+            vt,
+            (force[k] - behind - draught - weight * np.sin(SLOPE)) / tool["mass"],
+            rate,
+        )
 
     s = np.clip((r * w - v) / np.maximum(np.maximum(np.abs(r * w), abs(v)), 0.05), -1, 1)
     mu = np.sign(s) * CURVE_A * (1 - 0.52 * np.exp(0.01 * abs(s)) - 0.48 * np.exp(-11.36 * abs(s)))
@@ -125,7 +145,9 @@ def test_equations_agree_with_python(uphill):
         y[24], y[27] = y[21] - 2.1 + 0.06 * rng.standard_normal(), y[21] - 3.1 + 0.08 * rng.standard_normal()
         time = rng.uniform(0, 2.5)
         expected = reference(time, y)
-        np.testing.assert_allclose(c_derivative(plant, time, y), expected, rtol=1e-8, atol=1e-8 * np.abs(expected).max())
+        np.testing.assert_allclose(
+            c_derivative(plant, time, y), expected, rtol=1e-8, atol=1e-8 * np.abs(expected).max()
+        )
 
 
 def test_time_stepping_agrees_with_radau(uphill, drive):
@@ -146,7 +168,9 @@ def test_time_stepping_agrees_with_radau(uphill, drive):
 def test_second_order_under_step_halving(quiet, drive):
     """In smooth motion an error falls to a quarter when the step is halved."""
     scenario = quiet(tools=[], speed=[[0, 0], [4, 0.8]], duration=2.048)
-    ends = [drive(scenario, step=h, stride=round(0.016 / h))["torque"][-1, 2] for h in (4e-3, 2e-3, 1e-3, 5e-4)]
+    ends = [
+        drive(scenario, step=h, stride=round(0.016 / h))["torque"][-1, 2] for h in (4e-3, 2e-3, 1e-3, 5e-4)
+    ]
     first, second, third = np.abs(np.diff(ends))
     assert 3.0 < first / second < 5.5
     assert 3.0 < second / third < 5.5
@@ -185,7 +209,14 @@ def test_energy_is_accounted_for(quiet, drive):
     soil = work(t.rolling_force.sum(axis=1) * v)
     tool = work(t["tool1_draught"] * vt)
     bar = work(t["drawbar"] * (v - vt))
-    climb = G * np.sin(0.02) * (139 * (t["position"][-1] - t["position"][0]) + 60 * (t["tool1_position"][-1] - t["tool1_position"][0]))
+    climb = (
+        G
+        * np.sin(0.02)
+        * (
+            139 * (t["position"][-1] - t["position"][0])
+            + 60 * (t["tool1_position"][-1] - t["tool1_position"][0])
+        )
+    )
     kinetic = 0.5 * 139 * v[-1] ** 2 + 0.5 * 60 * vt[-1] ** 2 + 0.5 * 0.15 * (w[-1] ** 2).sum()
     assert motors > 500
     assert abs(motors - slip - tyres - bearings - soil - tool - bar - climb - kinetic) < 2e-3 * motors

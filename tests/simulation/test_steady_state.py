@@ -23,7 +23,10 @@ def test_load_at_rest_is_the_axles_mass(quiet, drive):
 def test_load_at_rest_on_a_slope(quiet, drive):
     slope = 0.06
     scenario = quiet(
-        speed=[[0, "off"]], duration=6, route={"segments": [{"soil": "even", "length": 60}], "slope": {"mean": slope}}, tools=[]
+        speed=[[0, "off"]],
+        duration=6,
+        route={"segments": [{"soil": "even", "length": 60}], "slope": {"mean": slope}},
+        tools=[],
     )
     trace = drive(scenario)
     front = (MASS * G * np.cos(slope) * REAR_TO_CG - MASS * G * np.sin(slope) * CG_HEIGHT) / WHEELBASE
@@ -38,7 +41,9 @@ def test_load_at_rest_on_a_slope(quiet, drive):
 )
 def test_steady_motion_balances_forces(quiet, drive, a, rho, rho_slip, draught, slope):
     scenario = quiet(
-        soils={"even": {"curve": {"name": "exponential", "a": a}, "resistance": rho, "resistance_slip": rho_slip}},
+        soils={
+            "even": {"curve": {"name": "exponential", "a": a}, "resistance": rho, "resistance_slip": rho_slip}
+        },
         tools=[{"mass": 60, "length": 2.0, "dig_in": draught}],
         route={"segments": [{"soil": "even", "length": 60}], "slope": {"mean": slope}},
         duration=20,

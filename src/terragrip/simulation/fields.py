@@ -50,7 +50,7 @@ def on_grid(field: Field, east: Floats, north: Floats, mask: npt.NDArray[np.bool
     """Field values (n,) where ``mask``, 0 elsewhere; computed at every ``stride``-th point and interpolated."""
     n = len(east)
     nodes = np.unique(np.r_[np.arange(0, n, stride), n - 1])
-    near = np.array([mask[max(0, k - stride) : k + stride + 1].any() for k in nodes])
+    near = np.convolve(mask, np.ones(2 * stride + 1), mode="same")[nodes] > 0.5
     values = np.zeros(len(nodes))
     if near.any():
         values[near] = field.at(east[nodes[near]], north[nodes[near]])

@@ -66,9 +66,7 @@ def build(scenario: Scenario, track_width: float, wheelbase: float, seed: int) -
     height = route.slope.sd * route.slope.length  # a Gaussian covariance has slope SD sd/length
     slope = route.slope.mean + np.arctan(height * hills.slope(path.east, path.north, path.heading))
     altitude = height * hills.at(path.east, path.north) + np.sin(route.slope.mean) * path.x
-    draught = [
-        _draught(scenario, tool, names, path, middle, seed) for tool in scenario.tools
-    ]
+    draught = [_draught(scenario, tool, names, path, middle, seed) for tool in scenario.tools]
     return Terrain(
         names=names,
         path=path,

@@ -41,12 +41,12 @@ def truth_frame(trace: Trace, whole: Trace) -> pd.DataFrame:
     columns["true_ground_speed"] = trace["speed"]
     columns["true_acceleration"] = trace["acceleration"]
     columns["true_distance"] = trace["position"]
-    columns["true_slope"] = np.arcsin(
-        np.clip(np.sin(trace["slope"]) + trace["gradient_force"] / (vehicle.mass * STANDARD_GRAVITY), -1, 1)
-    )
+    weight = vehicle.mass * STANDARD_GRAVITY
+    slope = np.arcsin(np.clip(np.sin(trace["slope"]) + trace["gradient_force"] / weight, -1, 1))
+    columns["true_slope"] = slope
     columns["true_drawbar_force"] = trace["drawbar"]
     columns["true_assist_force"] = trace["assist"]
-    resistance = direction * trace.rolling_force.sum(axis=1) / trace.normal_force
+    resistance = direction * trace.rolling_force.sum(axis=1) / (weight * np.cos(slope))
     columns["true_soil_resistance"] = resistance
     axles = vehicle.axle_names
     for k, axle in enumerate(axles):
