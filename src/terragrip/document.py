@@ -141,7 +141,7 @@ def _input_error(error: ValidationError, document: Document) -> InputError:
     faults = error.errors(include_url=False)
     order = {"unknown_key": 0, "missing": 2}
     fault = min(faults, key=lambda f: order.get(f["type"], 1))
-    place = _place_in(document.data, fault["loc"])
+    place = _place_in(document.data, fault["loc"], missing=fault["type"] == "missing")
     context = fault.get("ctx", {})
     cause = context.get("error")
     problem, mend = fault["msg"].removeprefix("Value error, "), context.get("mend")
@@ -163,7 +163,7 @@ def _input_error(error: ValidationError, document: Document) -> InputError:
     return InputError(problem, file=document.file or None, place=_located(place, document), mend=mend)
 
 
-def _place_in(data: Any, location: Place) -> Place:
+def _place_in(data: Any, location: Place, *, missing: bool) -> Place:
     """``location`` without the tags that pydantic adds for unions: the keys the user wrote, or misses."""
     place: list[str | int] = []
     for index, key in enumerate(location):
@@ -173,7 +173,7 @@ def _place_in(data: Any, location: Place) -> Place:
         if inside:
             data = data[key]
             place.append(key)
-        elif index == len(location) - 1 and isinstance(data, dict):
+        elif missing and index == len(location) - 1:
             place.append(key)
     return tuple(place)
 

@@ -175,8 +175,9 @@ def _from_pint(text: str) -> Unit:
         f"{_short(text.strip())} is not a unit", "write units as in 'N m', 'km/h' or 'kg m^2'"
     )
     plain = text.translate(_SUPERSCRIPTS).strip()
-    towering = plain.count("^") + plain.count("**") > 4 or re.search(r"[\^*]\s*\(?-?\d{2}", plain)
-    if towering or not _HARMLESS.match(plain):  # a power tower would keep pint busy for ever
+    # A number among the symbols is a slip ("139 2 kg"), and its powers would keep pint busy for ever.
+    number = r"(?<![A-Za-z_0-9^*(+-])[0-9.]|[0-9)]\s*(\*\*|\^)|(\*\*|\^)\s*\(?\s*[+-]?\d{2}"
+    if not _HARMLESS.match(plain) or re.search(number, plain):
         raise unknown
     import pint
 
@@ -193,7 +194,7 @@ def _from_pint(text: str) -> Unit:
     ) as error:  # fmt: skip
         raise unknown from error
     wanted = ("[mass]", "[length]", "[time]", "[current]")
-    if set(powers) - set(wanted) or any(p != int(p) for p in powers.values()) or not math.isfinite(factor):
+    if set(powers) - set(wanted) or any(p != int(p) for p in powers.values()) or not 0 < factor < math.inf:
         raise unknown
     kg, m, s, ampere = (int(powers.get(name, 0)) for name in wanted)
     return Unit(factor, (kg, m, s, ampere))

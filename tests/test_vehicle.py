@@ -1,0 +1,226 @@
+"""The vehicle file: what it gives, and what it refuses with file, key, line and mend."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from terragrip.errors import InputError
+from terragrip.vehicle import Vehicle
+
+GOOD = """\
+name: Innok Heros 444
+mass: 139 kg
+wheelbase: 0.638 m
+track: 0.554 m
+center_of_gravity_height: 0.30 m
+hitch_height: 0.25 m
+axles:
+  front: {mass: 54 kg, wheels: [fl, fr]}
+  rear:  {mass: 85 kg, wheels: [rl, rr]}
+wheel: {radius: 0.20 m, inertia: 0.15 kg m^2}
+tire_rolling_resistance: 0.02
+bearing_resistance: 2.0 N s/rad
+sensors: {wheel_speed: 0.03 rad/s, drawbar_force: 4 N}
+uncertainty: {drive_torque_gain: 0.02, drawbar_offset: 3 N, slope: 0.5 deg}
+"""
+
+
+def load(folder: Path, text: str) -> Vehicle:
+    path = folder / "vehicle.yaml"
+    path.write_text(text)
+    return Vehicle.load(path)
+
+
+def test_numbers_are_si(tmp_path: Path) -> None:
+    vehicle = load(tmp_path, GOOD.replace("0.638 m", "638 mm"))
+    assert (vehicle.mass, vehicle.bearing_resistance) == (139.0, 2.0)
+    assert vehicle.wheelbase == pytest.approx(0.638)
+    assert vehicle.uncertainty.slope == pytest.approx(np.deg2rad(0.5))
+    assert vehicle.sensors.ground_speed is None
+
+
+def test_arrays_follow_the_wheels(tmp_path: Path) -> None:
+    text = GOOD.replace(
+        "  rear:  {mass: 85 kg, wheels: [rl, rr]}",
+        "  rear:  {mass: 85 kg, wheels: [rl, rr], driven: false, wheel: {radius: 0.3 m, inertia: 0.5 kg m^2}}",
+    )
+    text += "calibration: {drive_torque_gain: {fr: 1.02}, drive_torque_offset: {fl: -0.5 N m}}\n"
+    vehicle = load(tmp_path, text)
+    assert vehicle.wheels == ("fl", "fr", "rl", "rr")
+    assert vehicle.axle_names == ("front", "rear")
+    np.testing.assert_array_equal(vehicle.wheel_axle, [0, 0, 1, 1])
+    np.testing.assert_array_equal(vehicle.wheel_radius, [0.2, 0.2, 0.3, 0.3])
+    np.testing.assert_array_equal(vehicle.wheel_inertia, [0.15, 0.15, 0.5, 0.5])
+    np.testing.assert_array_equal(vehicle.driven, [True, True, False, False])
+    np.testing.assert_array_equal(vehicle.drive_torque_gain, [1, 1.02, 1, 1])
+    np.testing.assert_array_equal(vehicle.drive_torque_offset, [-0.5, 0, 0, 0])
+    # Moments about the rear axle: the front one carries m_f at the wheelbase.
+    assert vehicle.center_of_gravity_to_rear == pytest.approx(0.638 * 54 / 139)
+    with pytest.raises(ValueError, match="read-only"):
+        vehicle.wheel_radius[0] = 1.0
+
+
+def test_one_axle_needs_no_wheelbase() -> None:
+    vehicle = Vehicle.from_dict(
+        {
+            "mass": 250,
+            "axles": {"all": {"mass": 250, "wheels": ["l", "r"], "wheel": {"radius": 0.3, "inertia": 1}}},
+        }
+    )
+    assert vehicle.center_of_gravity_to_rear == 0.0
+    assert vehicle.wheelbase is None
+
+
+def test_three_axles_are_evenly_spaced() -> None:
+    axles = {f"a{k}": {"mass": mass, "wheels": [f"l{k}", f"r{k}"]} for k, mass in enumerate((100, 50, 50))}
+    vehicle = Vehicle.from_dict(
+        {
+            "mass": 200,
+            "wheelbase": 2,
+            "center_of_gravity_height": 0.5,
+            "axles": axles,
+            "wheel": {"radius": 0.3, "inertia": 1},
+        }
+    )
+    np.testing.assert_allclose(vehicle.axle_to_rear, [2, 1, 0])
+    assert vehicle.center_of_gravity_to_rear == pytest.approx((100 * 2 + 50 * 1) / 200)
+
+
+@pytest.mark.parametrize(
+    "model",
+    [
+        "{name: fixed}",
+        "{name: hadekel, pressure: 80 kPa}",
+        "{name: biderman, C1: 1e-6 m^2/N, C2: 2 1/m, p0: 20 kPa, pressure: 0.8 bar}",
+    ],
+)
+def test_save_and_load_round_trip(tmp_path: Path, model: str) -> None:
+    text = GOOD.replace("0.15 kg m^2}", f"0.15 kg m^2, width: 0.1 m, radius_model: {model}}}")
+    text += "calibration: {drive_torque_gain: {fr: 1.0234567890123}, pitch_offset: -0.3 deg}\n"
+    vehicle = load(tmp_path, text)
+    vehicle.save(tmp_path / "saved.yaml")
+    assert Vehicle.load(tmp_path / "saved.yaml") == vehicle
+    assert Vehicle.from_dict(vehicle.to_dict()) == vehicle
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["saved.yaml", "vehicle.yaml"]
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "place", "problem", "mend"),
+    [
+        ("mass: 139 kg", "mass: -139 kg", "mass (line 2)", "-139 kg is impossible", "exceed 0 kg"),
+        ("mass: 139 kg", "mass: 139 N", "mass (line 2)", "measures a force, where a mass is needed", "kg"),
+        ("mass: 139 kg", "mass: 139 kilo", "mass (line 2)", "is not a unit", "N m"),
+        ("mass: 139 kg", "mass: heavy", "mass (line 2)", "not a number with a unit", "1.5 kg"),
+        ("mass: 139 kg", "mass: .nan", "mass (line 2)", "not a finite number", "1.5 kg"),
+        ("mass: 54 kg", "mass: 45 kg", "axles (line 7)", "the axles carry 130 kg, the vehicle has 139 kg", "add up"),
+        ("track:", "trak:", "trak (line 4)", "unknown key", "did you mean 'track'?"),
+        ("mass: 54 kg", "mas: 54 kg", "axles.front.mas (line 8)", "unknown key", "did you mean 'mass'?"),
+        ("0.20 m", "200", "wheel.radius (line 10)", "200 m is impossible", "write '200 mm'"),
+        ("0.20 m", "0 m", "wheel.radius (line 10)", "0 m is impossible", "at least 0.01 m"),
+        ("0.30 m", "12 m", "center_of_gravity_height (line 5)", "12 m is impossible", "not exceed 5 m"),
+        ("slope: 0.5 deg", "slope: 5", "uncertainty.slope (line 14)", "5 rad is impossible", "write '5 deg'"),
+        ("[fl, fr]", "[rl, fr]", "axles.front.wheels (line 8)", "the wheel rl stands twice", "own name"),
+        ("[fl, fr]", "[yes, no]", "axles.front.wheels (line 8)", "reads a wheel name as yes or no", "quotes"),
+        ("[fl, fr]", "[f l, fr]", "axles.front.wheels (line 8)", "'f l' is not a wheel name", "underscores"),
+        ("[fl, fr]", "[a, b, c, d, e, f, g]", "axles (line 7)", "there are 9 wheels", "1 to 8"),
+        ("[fl, fr]", "[]", "axles.front.wheels (line 8)", "not a list of wheels", "[fl, fr]"),
+        ("wheelbase: 0.638 m\n", "", "wheelbase", "is missing", "two or more axles need it"),
+        ("center_of_gravity_height: 0.30 m\n", "", "center_of_gravity_height", "is missing", "two or more axles"),
+        ("wheel: {radius: 0.20 m, inertia: 0.15 kg m^2}\n", "", "axles.front (line 8)", "no wheel data", "wheel:"),
+        (", inertia: 0.15 kg m^2", "", "wheel.inertia (line 10)", "is missing", "add it"),
+        ("0.15 kg m^2}", "0.15, radius_model: {name: soft}}", "wheel.radius_model", "no known name", "'hadekel'"),
+        ("0.15 kg m^2}", "0.15, radius_model: {name: hadekel, pressure: 1 bar}}", "wheel.width", "missing", "width"),
+        ("0.15 kg m^2}", "0.15, radius_model: {name: fixed, pressure: 1}}", "wheel.radius_model.pressure", "unknown", "name"),
+        ("mass: 139 kg", "mass: 139 kg\nmass: 140 kg", "mass (line 3)", "the key stands twice", "line 2"),
+        ("mass: 139 kg", "mass: [139 kg", "line 3", "not YAML", "key: value"),
+        ("name: Innok Heros 444", "name: 444", "name (line 1)", "is not text", "quotes"),
+        ("sensors: {wheel_speed: 0.03 rad/s", "sensors: {wheel_speed: 0", "sensors.wheel_speed", "impossible", "exceed"),
+        ("sensors:", "sensors: 3\nx:", "x (line 14)", "unknown key", "known keys are"),
+    ],
+)  # fmt: skip
+def test_refusal(tmp_path: Path, old: str, new: str, place: str, problem: str, mend: str) -> None:
+    assert old in GOOD
+    with pytest.raises(InputError) as caught:
+        load(tmp_path, GOOD.replace(old, new, 1))
+    error = caught.value
+    assert error.file == str(tmp_path / "vehicle.yaml")
+    assert place in (error.place or "")
+    assert problem in error.problem
+    assert mend in (error.mend or "")
+    assert "\n" not in str(error)
+
+
+def test_one_percent_of_mass_is_tolerated(tmp_path: Path) -> None:
+    assert load(tmp_path, GOOD.replace("mass: 54 kg", "mass: 55.3 kg")).axle_mass[0] == 55.3
+    with pytest.raises(InputError):
+        load(tmp_path, GOOD.replace("mass: 54 kg", "mass: 55.5 kg"))
+
+
+@pytest.mark.parametrize(
+    ("content", "problem"),
+    [
+        (b"", "is empty"),
+        (b"- 1\n- 2\n", "not a mapping"),
+        (b"\xff\xfe\x00\x81", "is not text"),
+        (b"a: " + b"[" * 5000, "YAML"),
+    ],
+)
+def test_not_a_vehicle_file(tmp_path: Path, content: bytes, problem: str) -> None:
+    path = tmp_path / "vehicle.yaml"
+    path.write_bytes(content)
+    with pytest.raises(InputError) as caught:
+        Vehicle.load(path)
+    assert problem in caught.value.problem
+
+
+def test_no_such_file_names_the_nearest(tmp_path: Path) -> None:
+    load(tmp_path, GOOD)
+    with pytest.raises(InputError, match=r"vehicel\.yaml: no such file; did you mean vehicle\.yaml\?"):
+        Vehicle.load(tmp_path / "vehicel.yaml")
+    with pytest.raises(InputError, match=r"is a folder; name a file in it, such as vehicle\.yaml"):
+        Vehicle.load(tmp_path)
+
+
+def test_saving_into_no_folder_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="cannot be written"):
+        load(tmp_path, GOOD).save(tmp_path / "none" / "vehicle.yaml")
+
+
+_scalar = st.none() | st.booleans() | st.integers() | st.floats() | st.text(max_size=8)
+_value = st.recursive(
+    _scalar,
+    lambda inner: st.lists(inner, max_size=3) | st.dictionaries(st.text(max_size=5), inner, max_size=3),
+)
+_base: dict[str, Any] = {
+    "mass": 139, "wheelbase": 0.6, "center_of_gravity_height": 0.3, "wheel": {"radius": 0.2, "inertia": 0.1},
+    "axles": {"front": {"mass": 54, "wheels": ["fl", "fr"]}, "rear": {"mass": 85, "wheels": ["rl", "rr"]}},
+}  # fmt: skip
+_fields = tuple(Vehicle.model_fields)
+
+
+@settings(max_examples=200)
+@given(st.dictionaries(st.sampled_from(_fields), _value, min_size=1, max_size=3))
+def test_any_mapping_is_a_vehicle_or_refused(changes: dict[str, Any]) -> None:
+    try:
+        Vehicle.from_dict({**_base, **changes})
+    except InputError as refusal:
+        told = str(refusal)
+    else:
+        return
+    assert told
+    assert "\n" not in told
+
+
+@settings(max_examples=100)
+@given(st.binary(max_size=60))
+def test_any_bytes_are_refused(tmp_path_factory: pytest.TempPathFactory, content: bytes) -> None:
+    path = tmp_path_factory.mktemp("bytes") / "vehicle.yaml"
+    path.write_bytes(content)
+    with pytest.raises(InputError):
+        Vehicle.load(path)
