@@ -1,0 +1,90 @@
+"""Units that are likely wrong are told, right ones are not."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from terragrip.recording import Recording, unit_warnings
+from terragrip.vehicle import Vehicle
+
+Columns = dict[str, np.ndarray]
+
+
+def scaled(columns: Columns, prefix: str, factor: float) -> Recording:
+    return Recording.from_frame({n: v * factor if n.startswith(prefix) else v for n, v in columns.items()})
+
+
+@pytest.mark.parametrize(
+    ("prefix", "factor", "told"),
+    [
+        ("ground_speed", 3.6, "ground_speed may be in km/h"),
+        ("wheel_speed", 3.6, "may come from km/h"),
+        ("wheel_speed", 60 / (2 * np.pi), "rpm"),
+        ("wheel_speed", 180 / np.pi, "deg/s"),
+        ("wheel_speed", 1 / (2 * np.pi), "revolutions per second"),
+        ("wheel_speed", 0.2, "rim's speed in m/s"),
+        ("ground_speed", 100.0, "cm/s"),
+        ("ground_speed", 1000.0, "mm/s"),
+        ("wheel_speed", 25.0, "gear ratio"),
+    ],
+)
+def test_a_wrong_unit_is_named(
+    columns: Columns, vehicle: Vehicle, prefix: str, factor: float, told: str
+) -> None:
+    said = unit_warnings(scaled(columns, prefix, factor), vehicle)
+    assert len(said) == 1
+    assert told in said[0]
+    assert "fl, fr, rl, rr" in said[0]
+
+
+def test_a_rim_speed_in_kmh_is_named(columns: Columns, vehicle: Vehicle) -> None:
+    tractor = Vehicle.from_dict({**vehicle.to_dict(), "wheel": {"radius": 0.8, "inertia": 40}})
+    said = unit_warnings(scaled(columns, "wheel_speed", 0.2 * 3.6), tractor)
+    assert "rim's speed in km/h" in said[0]
+
+
+def test_one_wheel_alone_is_named(columns: Columns, vehicle: Vehicle) -> None:
+    said = unit_warnings(scaled(columns, "wheel_speed_rl", 9.549), vehicle)
+    assert len(said) == 1
+    assert "wheel speed of rl times" in said[0]
+
+
+@pytest.mark.parametrize("slip", [-0.2, 0.0, 0.1, 0.3, 0.5])
+def test_slip_is_no_wrong_unit(columns: Columns, vehicle: Vehicle, slip: float) -> None:
+    assert unit_warnings(scaled(columns, "wheel_speed", 0.93 / (1 - slip)), vehicle) == []
+
+
+def test_standstill_and_backward_say_nothing(columns: Columns, vehicle: Vehicle) -> None:
+    assert unit_warnings(scaled(columns, "ground_speed", 0.0), vehicle) == []
+    backward = {n: -v if "speed" in n else v for n, v in columns.items()}
+    assert unit_warnings(Recording.from_frame(backward), vehicle) == []
+
+
+def test_rates_that_never_share_a_row_are_compared(columns: Columns, vehicle: Vehicle) -> None:
+    odd = np.arange(6000) % 2 == 1
+    mixed = {
+        n: np.where(odd, v * 3.6, np.nan)
+        if n == "ground_speed"
+        else np.where(odd, np.nan, v)
+        if "speed" in n
+        else v
+        for n, v in columns.items()
+    }
+    assert "km/h" in unit_warnings(Recording.from_frame(mixed), vehicle)[0]
+
+
+def test_angles_acceleration_and_time(columns: Columns, vehicle: Vehicle) -> None:
+    n = len(columns["time"])
+    frame = {
+        **columns,
+        "pitch": np.full(n, 5.0),
+        "acceleration_z": np.full(n, 1.0),
+        "latitude": np.full(n, 501.0),
+    }
+    frame["time"] = columns["time"] * 1000
+    said = " ".join(unit_warnings(Recording.from_frame(frame), vehicle))
+    for told in ("pitch reaches 5 rad", "may be in g", "latitude exceeds 180", "time may not be in seconds"):
+        assert told in said
+    upside_down = {**columns, "acceleration_z": np.full(n, -9.8)}
+    assert "other way" in unit_warnings(Recording.from_frame(upside_down), vehicle)[0]
