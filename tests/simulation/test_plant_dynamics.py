@@ -129,7 +129,8 @@ def reference(time, y):
     dv, front, rear = np.linalg.solve(lhs, rhs)
     dy[4], dy[21] = dv, v
     dy[13:17] = zdot
-    dy[17:21] = (load - np.array([front, front, rear, rear]) / 2) / (static / G)
+    warp = np.array([1, -1, -1, 1])
+    dy[17:21] = (load - np.array([front, front, rear, rear]) / 2 - 1500 * warp * (warp @ z)) / (static / G)
     return dy
 
 

@@ -92,3 +92,31 @@ def test_coasting_wheels_are_braked_by_tyre_and_bearing_alone(quiet, drive):
     np.testing.assert_allclose(trace["adhesion"][k], expected, rtol=1e-9)
     assert np.all(trace["slip"][k] < 0)
     assert np.all(trace["slip"][k] > -0.02)
+
+
+PEAKED = {"name": "pacejka", "B": 8.0, "C": 1.9, "D": 0.5, "E": 0.6}
+CURVE_EXAMPLES = [
+    {"name": "exponential", "a": 0.4},
+    {"name": "burckhardt", "c1": 0.1946, "c2": 94.129, "c3": 0.0646},  # snow
+    {"name": "burckhardt", "c1": 0.05, "c2": 306.39, "c3": 0.0},  # ice: steep
+    {"name": "schreiber_kutzbach", "a": 0.5, "b": 0.55, "c": 8.0, "d": 0.05},
+    {"name": "brixius", "mobility": 30},
+    {"name": "wismer_luth", "wheel_numeric": 25},
+    PEAKED,
+]
+
+
+@pytest.mark.parametrize("curve", CURVE_EXAMPLES, ids=lambda c: c["name"])
+def test_any_curve_model_is_followed_over_all_slips(quiet, drive, curve):
+    """A machine that digs itself in runs through every slip; adhesion lies on its model, without a model's intercept."""
+    from terragrip.physics.adhesion import CURVES
+
+    soils = {"even": {"curve": curve, "resistance": 0.02}}
+    tool = [{"mass": 60, "length": 2.0, "added": [[0, 0], [3, 1500]]}]
+    trace = drive(quiet(soils=soils, tools=tool, driver={"acts": False}, duration=15))
+    model = CURVES[curve["name"]]
+    parameters = model.complete({k: v for k, v in curve.items() if k != "name"})
+    slip = trace["slip"][:, 3]
+    assert slip.max() > 0.95
+    expected = np.sign(slip) * model.positive(np.abs(slip), parameters)
+    np.testing.assert_allclose(trace["adhesion"][:, 3], expected, atol=2e-6)

@@ -225,12 +225,13 @@ static void derive(const plant_machine *m, const plant_ground *g, const conduct 
     f->load_front = front0 - drop * f->acceleration;
     dy[V] = f->acceleration;
     dy[X] = v;
+    const double torsion = m->chassis_torsion * (y[Z] - y[Z + 1] - y[Z + 2] + y[Z + 3]);
     const double lateral = v * v * f->curvature / m->gravity * m->cg_height / m->track;
     for (int i = 0; i < 4; i++) {
         const double axle_load = i < 2 ? f->load_front : normal - f->load_front;
         const double share = 0.5 + (i & 1 ? lateral : -lateral);
         const double corner = 0.5 * m->mass * (i < 2 ? m->rear_to_cg / L : 1.0 - m->rear_to_cg / L);
-        dy[ZDOT + i] = (f->load[i] - axle_load * share) / corner;
+        dy[ZDOT + i] = (f->load[i] - axle_load * share - (i == 0 || i == 3 ? torsion : -torsion)) / corner;
     }
 }
 

@@ -114,6 +114,7 @@ typedef struct {
     int32_t driven[4];
     double tire_resistance;
     double tire_stiffness, tire_damping;  /* a wheel, N/m and N s/m */
+    double chassis_torsion;               /* N at each wheel per m of warp (fl - fr - rl + rr) */
     double resistance_length;             /* m, travel over which rolling resistance builds up */
     double slip_speed;                    /* m/s: below it slip is taken over this speed */
     double wheel_rest_speed;              /* rad/s: tyre and bearing resistance reach full size here */

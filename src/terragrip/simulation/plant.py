@@ -121,7 +121,7 @@ def _machine(ffi: Any, scenario: Scenario, vehicle: Vehicle, radius: Floats) -> 
         machine.bearing[i] = vehicle.bearing_resistance
         machine.driven[i] = int(vehicle.driven[i])
     for name in (
-        "tire_stiffness", "tire_damping", "resistance_length", "slip_speed", "wheel_rest_speed", "speed_gain",
+        "tire_stiffness", "tire_damping", "chassis_torsion", "resistance_length", "slip_speed", "wheel_rest_speed", "speed_gain",
         "speed_integral", "motor_lag", "antiwindup_time", "torque_limit", "power_limit",
     ):  # fmt: skip
         setattr(machine, name, getattr(scenario.robot, name))

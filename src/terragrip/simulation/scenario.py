@@ -224,12 +224,13 @@ class Robot(Part):
     """What a vehicle file does not hold: tyres, motors, control, and how far the true machine is from its file.
 
     ``power_limit`` [W] holds for all motors together, ``torque_limit`` [N m] for each wheel. ``wheel_radius_sd`` is
-    relative, common to all wheels. ``slip_speed`` [m/s]: slower than this, slip is taken over this speed.
+    relative, common to all wheels. ``chassis_torsion``: force at each wheel per metre of warp. ``slip_speed`` [m/s]: slower than this, slip is taken over this speed.
     """
 
     wheel_mass: Mass = 5.4
     tire_stiffness: Annotated[float, _number("N/m", above=True)] = 8e4
     tire_damping: Annotated[float, _number("N s/m")] = 600.0
+    chassis_torsion: Annotated[float, _number("N/m")] = 1500.0
     resistance_length: PositiveLength = 0.02
     slip_speed: Annotated[float, _number("m/s", 1e-3, 1)] = 0.05
     wheel_rest_speed: Annotated[float, _number("rad/s", 1e-4, 1)] = 0.02
