@@ -9,6 +9,9 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from terragrip.estimation.batch import estimate as estimate
+    from terragrip.estimation.calibration import Calibration as Calibration
+    from terragrip.estimation.calibration import calibrate as calibrate
+    from terragrip.estimation.calibration import identify_torque_scale as identify_torque_scale
     from terragrip.estimation.estimates import Estimates as Estimates
     from terragrip.estimation.estimator import Estimate as Estimate
     from terragrip.estimation.estimator import TractionEstimator as TractionEstimator
@@ -24,6 +27,9 @@ _HOME = {
     "DEFAULT": "methods",
     "METHODS": "methods",
     "Method": "methods",
+    "Calibration": "calibration",
+    "calibrate": "calibration",
+    "identify_torque_scale": "calibration",
 }
 
 __all__ = list(_HOME)

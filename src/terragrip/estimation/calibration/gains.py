@@ -1,0 +1,239 @@
+"""Relative torque gains from logs: which windows count, on which soil, and what the fit's errors hold."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from terragrip.estimation.calibration.result import Evidence, Quantity, Unknown
+from terragrip.estimation.calibration.sharing import SharedGains, Sharing, fit_shared_gains
+from terragrip.estimation.calibration.windows import Windows, track_blocks, wheel_loads, windows
+from terragrip.estimation.calibration.zeros import Spell, evidence
+from terragrip.physics.slip import slip
+from terragrip.recording import Recording
+from terragrip.vehicle import Vehicle
+
+Floats = npt.NDArray[np.float64]
+Ints = npt.NDArray[np.intp]
+
+WINDOW = 0.5
+"""Window length [s]: a third of a metre of track."""
+
+_SLOWEST = 0.15  # m/s
+_SLIP = (-0.1, 0.6)  # beyond, a wheel digs itself in and leaves the curve that it shares
+_MIN_BLOCKS = 8
+_SEGMENT = 20.0  # m of track that count as one soil where there is no label
+_EDGE = 0.3  # m on either side of a soil's border
+_RADIUS = 0.003  # prior of the wheels' relative radii where the vehicle states none
+_LEAST_OFFSET = 1e-3  # N m
+
+
+@dataclass(frozen=True)
+class ChannelErrors:
+    """Standard deviations of constant errors: of dv/dt + g sinθ and of a_y [m/s²], of the drawbar force [N]."""
+
+    push: float
+    lateral: float
+    drawbar: float
+
+
+@dataclass(frozen=True)
+class RelativeGains:
+    """The gains, what stays unknown, and the wheels' radii (w,) relative to their mean, with standard errors (w,)."""
+
+    quantities: list[Quantity]
+    unknown: list[Unknown]
+    radius: Floats
+    radius_std: Floats
+
+
+def relative_gains(
+    logs: Sequence[Recording],
+    vehicle: Vehicle,
+    offset_std: Floats,
+    errors: ChannelErrors,
+    sources: Sequence[str],
+) -> RelativeGains | list[Unknown]:
+    """Torque gains of the driven wheels relative to their (geometric) mean.
+
+    ``logs`` must have their zeros taken off; ``offset_std`` (w,) N m of the torque zeros.
+    """
+    key = "drive_torque_gain"
+    common = Unknown(
+        "drive_torque_gain, all wheels",
+        "a gain common to all wheels only scales the curves that they share; it keeps its prior",
+    )
+    driven = np.flatnonzero(vehicle.driven)
+    if len(driven) < 2:
+        return [Unknown(key, "one driven wheel has none to be compared with")]
+    table = _driving(windows(logs, vehicle, WINDOW), vehicle)
+    blocks = track_blocks(table) if len(table) else np.zeros(0, dtype=np.intp)
+    few = Unknown(
+        key, "too little driving on one soil: the wheels must share a curve over some 30 m of track"
+    )
+    if len(table) == 0 or len(np.unique(blocks)) < _MIN_BLOCKS:
+        return [few, common]
+    rows = _rows(table, vehicle, offset_std, blocks, driven)
+    fit = fit_shared_gains(rows)
+    if fit is None or fit.blocks < _MIN_BLOCKS:
+        return [few, common]
+    disagreement = _disagreement(rows)
+    covariance = disagreement**2 * fit.covariance + _considered_loads(fit, table, vehicle, driven, errors)
+    told = evidence(table, [Spell(int(k), int(k)) for k in range(len(table))], sources)
+    quantities = _quantities(fit, covariance, vehicle, driven, told, disagreement)
+    radius, radius_std = np.ones(len(vehicle.wheels)), np.zeros(len(vehicle.wheels))
+    radius[driven] += fit.radius
+    radius_std[driven] = np.sqrt(np.diag(covariance)[len(driven) :])
+    return RelativeGains(quantities, [common], radius, radius_std)
+
+
+def _quantities(
+    fit: SharedGains,
+    covariance: Floats,
+    vehicle: Vehicle,
+    driven: Ints,
+    told: tuple[Evidence, ...],
+    disagreement: float,
+) -> list[Quantity]:
+    from scipy.special import stdtrit  # scipy.stats would take seconds to load
+
+    factor = float(stdtrit(fit.blocks - 1, 0.975))
+    said = (
+        "relative to the mean of all wheels: torques of wheels at one slip on one soil compared, "
+        f"{fit.windows} windows on {fit.blocks} stretches of track; it assumes that soil under rear wheels is as under front ones"
+    )
+    if disagreement > 1:
+        said += f"; the soils disagree, so the intervals are {disagreement:.1f} times wider"
+    return [
+        Quantity(
+            "drive_torque_gain",
+            float(np.exp(value)),
+            float(np.exp(value) * np.sqrt(variance)),
+            "1",
+            told,
+            said,
+            wheel=vehicle.wheels[index],
+            factor=factor,
+        )
+        for index, value, variance in zip(
+            driven, fit.log_gain, np.diag(covariance)[: len(driven)], strict=True
+        )
+    ]
+
+
+def _disagreement(rows: Sharing) -> float:
+    """How much more the gains of single soils differ than their errors tell (Birge's ratio, at least 1).
+
+    A gain is the same on every soil; a rut that helps the rear wheels, or wrong loads, are not.
+    """
+    estimates, precisions = [], []
+    for soil in np.unique(rows.soil):
+        own = rows.soil == soil
+        if len(np.unique(rows.block[own])) < _MIN_BLOCKS:
+            continue
+        fit = fit_shared_gains(rows.select(own))
+        if fit is not None:
+            w = len(fit.log_gain)
+            estimates.append(fit.log_gain[1:])  # the first follows from the others
+            precisions.append(np.linalg.pinv(fit.covariance[1:w, 1:w]))
+    if len(estimates) < 2:
+        return 1.0
+    mean = np.linalg.pinv(np.sum(precisions, axis=0)) @ np.sum(
+        [p @ x for p, x in zip(precisions, estimates, strict=True)], axis=0
+    )
+    apart = sum(float((x - mean) @ p @ (x - mean)) for p, x in zip(precisions, estimates, strict=True))
+    return max(1.0, float(np.sqrt(apart / ((len(estimates) - 1) * len(mean)))))
+
+
+def _driving(table: Windows, vehicle: Vehicle) -> Windows:
+    """Windows of forward driving in which everything was measured."""
+    rim = table.wheel_speed * vehicle.wheel_radius
+    known = np.all(
+        np.isfinite(table.torque + table.load + rim + table.wheel_acceleration + table.hub_speed), axis=1
+    )
+    moving = (table.ground_speed > _SLOWEST) & np.all(rim > _SLOWEST, axis=1)
+    whole = table.count > 0.5 * np.median(table.count[table.count > 0])
+    slips = slip(table.wheel_speed, table.hub_speed, vehicle.wheel_radius)
+    on_curve = np.all((slips > _SLIP[0]) & (slips < _SLIP[1]), axis=1)
+    return table.select(known & moving & whole & on_curve & ~_near_border(table))
+
+
+def _rows(table: Windows, vehicle: Vehicle, offset_std: Floats, blocks: Ints, driven: Ints) -> Sharing:
+    radius = vehicle.wheel_radius
+    spin = vehicle.wheel_inertia * table.wheel_acceleration
+    rolling = vehicle.tire_rolling_resistance * table.load + vehicle.bearing_resistance * table.wheel_speed
+    return Sharing(
+        torque=table.torque[:, driven],
+        known=(spin + radius * rolling)[:, driven],
+        leverage=(radius * table.load)[:, driven],
+        slip=slip(table.wheel_speed, table.hub_speed, radius)[:, driven],
+        soil=_soil_codes(table),
+        block=blocks,
+        radius_std=vehicle.uncertainty.wheel_radius or _RADIUS,
+        offset_std=np.maximum(offset_std[driven], _LEAST_OFFSET),
+    )
+
+
+def _soil_codes(table: Windows) -> Ints:
+    """One code per soil label; unlabelled track counts as a soil of its own every so many metres."""
+    stretch = np.floor(table.position[:, 0] / _SEGMENT).astype(int)
+    names = [
+        label if label else f"\0{recording} {place}"
+        for label, recording, place in zip(table.soil, table.recording, stretch, strict=True)
+    ]
+    return np.unique(np.array(names, dtype=str), return_inverse=True)[1].astype(np.intp)
+
+
+def _near_border(table: Windows) -> npt.NDArray[np.bool_]:
+    """Windows (n,) in which not all wheels may be on the soil of the label: within a wheelbase of a border."""
+    near = np.zeros(len(table), dtype=bool)
+    for index in np.unique(table.recording):
+        own = np.flatnonzero(table.recording == index)
+        labels, place = table.soil[own], table.position[own]
+        if not np.any(labels != ""):
+            continue
+        changed = np.flatnonzero(labels[1:] != labels[:-1])
+        reach = float(np.ptp(place[0])) + _EDGE if len(place) else _EDGE
+        for k in changed:
+            middle = 0.5 * (place[k, 0] + place[k + 1, 0])
+            near[own] |= np.abs(place[:, 0] - middle) < reach
+    return near
+
+
+def _considered_loads(
+    fit: SharedGains, table: Windows, vehicle: Vehicle, driven: Ints, errors: ChannelErrors
+) -> Floats:
+    """Covariance (2 w, 2 w) that constant errors of the wheel loads add: what shifts load from wheel to wheel."""
+    axle, last = vehicle.wheel_axle, len(vehicle.axles) - 1
+    changes = []
+    if last > 0:
+        share = vehicle.uncertainty.vertical_load or 0.0
+        changes.append(np.where(axle == 0, share, np.where(axle == last, -share, 0.0)))
+    rest = {
+        "drawbar": np.nan_to_num(table.drawbar),
+        "push": np.nan_to_num(table.push),
+        "lateral": np.nan_to_num(table.lateral),
+    }
+    before = _mean_loads(table, vehicle, rest)
+    for name in rest:
+        after = _mean_loads(table, vehicle, {**rest, name: rest[name] + getattr(errors, name)})
+        changes.append(after / before - 1)
+    effects = [fit.load_sensitivity @ change[driven] for change in changes]
+    return np.sum([np.outer(effect, effect) for effect in effects], axis=0)
+
+
+def _mean_loads(table: Windows, vehicle: Vehicle, channels: dict[str, Floats]) -> Floats:
+    flat = np.zeros(len(table))
+    loads = wheel_loads(
+        vehicle,
+        slope=flat,
+        spin_torque=flat,
+        measured=np.full((len(table), len(vehicle.axles)), np.nan),
+        drawbar=channels["drawbar"],
+        push=channels["push"],
+        lateral=channels["lateral"],
+    )
+    return np.asarray(loads.mean(axis=0))

@@ -1,0 +1,221 @@
+"""The calibration of a vehicle from its own logs: zeros, then radii, then relative gains, each on what came before."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from terragrip.errors import InputError
+from terragrip.estimation.calibration import zeros
+from terragrip.estimation.calibration.gains import ChannelErrors, RelativeGains, relative_gains
+from terragrip.estimation.calibration.radii import WINDOW as RADIUS_WINDOW
+from terragrip.estimation.calibration.radii import Rolling, rolling_radii
+from terragrip.estimation.calibration.result import Calibration, Quantity, Unknown
+from terragrip.estimation.calibration.torque_scale import identify_torque_scale
+from terragrip.estimation.calibration.windows import track_blocks, windows
+from terragrip.physics.loads import GRAVITY
+from terragrip.recording import Recording, sensor_noise, without_held
+from terragrip.vehicle import Vehicle
+
+_SLOPE, _PITCH_ZERO = float(np.radians(0.5)), float(np.radians(0.2))  # priors where the vehicle states none
+_SENSOR_BIAS = 0.03  # m/s^2, likewise, of an accelerometer
+
+
+def calibrate(recordings: Recording | Sequence[Recording], vehicle: Vehicle) -> Calibration:
+    """Find what logs can tell of a vehicle's sensors and wheels.
+
+    Zeros of torque, drawbar and accelerometer come from standstill; rolling radii from straight passes at zero pull;
+    relative torque gains of the wheels from the adhesion curve that they share. Each has a 95 % interval and says what
+    it rests on; what the logs cannot give is listed with the reason. A ``calibration`` block that the vehicle already
+    has is used for whatever the logs cannot give.
+
+    Parameters
+    ----------
+    recordings: logs of one vehicle in one state, read by :func:`terragrip.read`. A ``soil`` label sharpens the gains.
+    vehicle: as its file says.
+
+    Raises
+    ------
+    InputError: there is no log, or one does not fit the vehicle.
+    """
+    logs = [recordings] if isinstance(recordings, Recording) else list(recordings)
+    if not logs:
+        raise InputError("there is no recording to calibrate from", mend="give at least one log")
+    for log in logs:
+        log.check_against(vehicle)
+    sources = [log.source or f"recording {k + 1}" for k, log in enumerate(logs)]
+    logs = [without_held(log) for log in logs]
+    noise = _sensor_noise(logs, vehicle)
+    standing = windows(logs, vehicle, zeros.WINDOW)
+    found: list[Quantity] = []
+    unknown: list[Unknown] = []
+    for quantities, missing in (
+        zeros.torque_zeros(standing, vehicle, sources, noise["drive_torque"]),
+        zeros.drawbar_zero(standing, vehicle, sources, noise["drawbar_force"]),
+        zeros.inclination_zeros(standing, vehicle, sources, noise["acceleration"]),
+    ):
+        found += quantities
+        unknown += missing
+    zeroed = Calibration(tuple(found), ()).apply(vehicle)
+    yaw_zero = zeros.yaw_rate_zero(standing, vehicle, standing.yaw_rate)
+    corrected = [_corrected(log, zeroed, yaw_zero) for log in logs]
+
+    offset_error = np.array(
+        [
+            _std_of(found, "drive_torque_offset", w, vehicle.uncertainty.drive_torque_offset)
+            for w in vehicle.wheels
+        ]
+    )
+    errors = _channel_errors(found, vehicle, logs)
+    passes = windows(corrected, zeroed, RADIUS_WINDOW)
+    rolling = rolling_radii(passes, zeroed, track_blocks(passes), sources)
+    rolled = zeroed
+    if isinstance(rolling, Unknown):
+        unknown.append(rolling)
+    else:
+        rolled = Calibration(tuple(_radii(rolling, None, vehicle)), ()).apply(zeroed)
+    gains = relative_gains(corrected, rolled, offset_error, errors, sources)
+    if isinstance(rolling, Rolling):
+        found += _radii(rolling, gains if isinstance(gains, RelativeGains) else None, vehicle)
+    shared = gains.quantities if isinstance(gains, RelativeGains) else []
+    unknown += gains.unknown if isinstance(gains, RelativeGains) else gains
+    vague = _vague(shared, vehicle)
+    if vague is None:
+        found += shared
+    else:
+        unknown.append(vague)
+    try:
+        found.append(identify_torque_scale(_with_gains(corrected, shared), rolled))
+    except InputError as error:
+        unknown.append(Unknown("drive_torque_scale", error.problem))
+    return Calibration(tuple(found), tuple(unknown), _left(found, vehicle))
+
+
+def _corrected(log: Recording, vehicle: Vehicle, yaw_zero: float) -> Recording:
+    """The log with the vehicle's zeros taken off; gains stay."""
+    block = vehicle.calibration
+    offsets = {f"drive_torque_{w}": block.drive_torque_offset.get(w, 0.0) for w in vehicle.wheels}
+    offsets |= {
+        "drawbar_force": block.drawbar_offset,
+        "acceleration_x": block.acceleration_bias_x,
+        "pitch": block.pitch_offset,
+        "angular_velocity_z": yaw_zero,
+    }
+    changed = {
+        name: log[name] - offset for name, offset in offsets.items() if offset and name in log.channels
+    }
+    return log.with_channels(**changed)
+
+
+def _with_gains(logs: Sequence[Recording], gains: Sequence[Quantity]) -> list[Recording]:
+    """The logs with torques divided by the relative gains."""
+    factors = {f"drive_torque_{q.wheel}": q.value for q in gains}
+    return [
+        log.with_channels(**{n: log[n] / k for n, k in factors.items() if n in log.channels}) for log in logs
+    ]
+
+
+def _sensor_noise(logs: Sequence[Recording], vehicle: Vehicle) -> dict[str, float]:
+    """Standard deviation of a sample [SI], by the vehicle file, else from the logs, else 0 (no such channel)."""
+    columns = {
+        "drive_torque": "drive_torque_",
+        "drawbar_force": "drawbar_force",
+        "acceleration": "acceleration_x",
+    }
+    measured: list[dict[str, float]] | None = None
+    noise = {}
+    for sensor, column in columns.items():
+        stated = getattr(vehicle.sensors, sensor)
+        if stated is None:
+            measured = [sensor_noise(log, {}) for log in logs] if measured is None else measured
+            found = [value for log in measured for name, value in log.items() if name.startswith(column)]
+            stated = float(np.median(found)) if found else 0.0
+        noise[sensor] = stated
+    return noise
+
+
+def _std_of(found: Sequence[Quantity], key: str, wheel: str, prior: float | None) -> float:
+    """Standard error of a wheel's quantity if it was found, else the vehicle's prior, else 0."""
+    for quantity in found:
+        if quantity.key == key and quantity.wheel == wheel:
+            return quantity.std
+    return prior or 0.0
+
+
+def _channel_errors(found: Sequence[Quantity], vehicle: Vehicle, logs: Sequence[Recording]) -> ChannelErrors:
+    """Errors that the channels keep: they move load between the wheels, and so the gains."""
+    stated, errors = vehicle.uncertainty, {quantity.name: quantity.std for quantity in found}
+    ground = GRAVITY * (_SLOPE if stated.slope is None else stated.slope) / np.sqrt(len(logs))
+    sensor = _SENSOR_BIAS if stated.acceleration_bias is None else stated.acceleration_bias
+    measured = all("acceleration_x" in log.channels for log in logs)
+    pitched = all("pitch" in log.channels for log in logs)
+    kinematic = GRAVITY * _PITCH_ZERO if pitched else ground
+    push = errors.get("acceleration_bias_x", sensor) if measured else kinematic
+    lateral = sensor if all("acceleration_y" in log.channels for log in logs) else ground
+    return ChannelErrors(
+        push=float(push),
+        lateral=float(lateral),
+        drawbar=float(errors.get("drawbar_offset", stated.drawbar_offset or 0.0)),
+    )
+
+
+def _vague(gains: Sequence[Quantity], vehicle: Vehicle) -> Unknown | None:
+    """Why the gains are of no use: they tell less than what the vehicle file knows already."""
+    prior, errors = vehicle.uncertainty.drive_torque_gain, [quantity.std for quantity in gains]
+    if not errors or prior is None or max(errors) < prior:
+        return None
+    return Unknown(
+        "drive_torque_gain",
+        f"told to {100 * max(errors):.1f} %, and the vehicle file knows them to {100 * prior:.1f} %: drive farther",
+    )
+
+
+def _radii(rolling: Rolling, gains: RelativeGains | None, vehicle: Vehicle) -> list[Quantity]:
+    """The radii of all wheels: what the passes say of them together, and the gains of each."""
+    wheels = len(vehicle.wheels)
+    apart = (np.ones(wheels), np.zeros(wheels)) if gains is None else (gains.radius, gains.radius_std)
+    said = (
+        "ground speed over wheel speed on straight steady passes at zero pull, corrected for the slip of "
+        f"{100 * rolling.slip:.2f} % there"
+    )
+    if gains is not None:
+        said += "; what a wheel differs from the others is told by its torque over slip"
+    return [
+        Quantity(
+            "wheel_radius", float(r * a), float(r * np.hypot(s, b)), "m", rolling.told, said, wheel=wheel
+        )
+        for wheel, r, s, a, b in zip(vehicle.wheels, rolling.radius, rolling.std, *apart, strict=True)
+    ]
+
+
+def _left(found: Sequence[Quantity], vehicle: Vehicle) -> dict[str, Any]:
+    """The vehicle's considered constants after calibration: what remains unknown of each that was calibrated."""
+    prior, left = vehicle.uncertainty, {}
+
+    def spread(key: str) -> float | None:
+        errors = [q.std for q in found if q.key == key]
+        return float(np.sqrt(np.mean(np.square(errors)))) if errors else None
+
+    for key, name in (
+        ("drive_torque_offset", "drive_torque_offset"),
+        ("drawbar_offset", "drawbar_offset"),
+        ("acceleration_bias_x", "acceleration_bias"),
+    ):
+        error = spread(key)
+        if error is not None:
+            left[name] = error
+    radius = [q.std / q.value for q in found if q.key == "wheel_radius"]
+    if radius:
+        left["wheel_radius"] = float(np.sqrt(np.mean(np.square(radius))))
+    gain = spread("drive_torque_gain")
+    if gain is not None and prior.drive_torque_gain is not None:
+        # Independent errors of n wheels: their mean, prior/√n, is common to all and stays; the rest is known now.
+        wheels = sum(q.key == "drive_torque_gain" for q in found)
+        known_common = prior.drive_torque_gain_common or 0.0
+        left["drive_torque_gain_common"] = float(
+            np.hypot(known_common, prior.drive_torque_gain / np.sqrt(wheels))
+        )
+        left["drive_torque_gain"] = gain
+    return left

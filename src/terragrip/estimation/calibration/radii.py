@@ -1,0 +1,206 @@
+"""Rolling radius of each wheel: ground speed over wheel speed, taken to zero adhesion.
+
+On a zero-pull straight pass the wheels still pull the vehicle's own rolling resistance, and slip a little for it:
+v/ω = r (1 - s). The model here is that of PHYSICS §5 in its identifiable form without the falling part, turned round::
+
+    v/ω_i = r_i (1 - s),   s = -(A_j/C_j) ln(1 - μ_i/A_j)
+
+A_j is the soil's adhesion at large slip, read from the windows of most pull; the curve's initial steepness C_j is
+fitted together with the radii from zero-pull windows and windows of small pull on the same soil. Where no window
+pulls, C_j keeps its prior, and the interval says so. v/ω is regressed on μ, not the reverse: the noise of a speed is in
+v/ω, and μ has little. (R), our own construction.
+
+Driven wheels share one correction of the vehicle file's radii here, and their mean μ: which wheel's radius differs shows
+only in which wheel pulls more, and there it is one with the torque gains, so it is told together with them
+(:mod:`~terragrip.estimation.calibration.sharing`). An undriven wheel has a radius of its own.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from terragrip.estimation.calibration.result import Evidence, Unknown
+from terragrip.estimation.calibration.sharing import block_covariance
+from terragrip.estimation.calibration.windows import Windows
+from terragrip.estimation.calibration.zeros import Spell, evidence
+from terragrip.physics.loads import GRAVITY
+from terragrip.physics.motion import algebraic_adhesion
+from terragrip.vehicle import Vehicle
+
+Floats = npt.NDArray[np.float64]
+Bools = npt.NDArray[np.bool_]
+
+WINDOW = 2.0
+"""Window length [s]: long enough that the noise of a speed sensor is small beside slip."""
+
+_ZERO_PULL = 0.03  # drawbar force over weight
+_STEADY = 0.05  # dv/dt over g
+_SLOWEST = 0.2  # m/s
+_STRAIGHT = 0.02  # relative difference of the wheels' speeds from side to side
+_LEAST_DISTANCE = 5.0  # m of zero-pull passes
+_LOW = 0.5  # of A: windows above do not help to tell the radius
+_STEEPNESS = (
+    np.log(5.0),
+    0.8,
+)  # prior of ln C: mean and standard deviation (C is 2 on grass, 8 on hard soil)
+_LEAST_ASYMPTOTE = 0.1
+_TORQUE_ZERO = 0.02  # prior of a torque zero, over r F, where the vehicle states none
+_ROLLING = 0.15  # adhesion and rolling resistance at zero pull: what a gain error acts on
+
+
+@dataclass(frozen=True)
+class Rolling:
+    """Rolling radii from zero-pull passes.
+
+    ``radius`` (w,) m; ``std`` (w,) relative, with all that is considered; ``slip`` the mean slip that was corrected;
+    ``told`` what it rests on.
+    """
+
+    radius: Floats
+    std: Floats
+    slip: float
+    told: tuple[Evidence, ...]
+
+
+def rolling_radii(
+    windows: Windows, vehicle: Vehicle, block: npt.NDArray[np.intp], sources: Sequence[str]
+) -> Rolling | Unknown:
+    """Rolling radius of every wheel from the zero-pull windows, with its slip there corrected.
+
+    ``block`` (n,) labels the stretch of track of every window. Torques must have their zeros taken off.
+    """
+    adhesion = _adhesion(windows, vehicle)
+    passes = _passes(windows, vehicle) & np.all(np.isfinite(adhesion), axis=1)
+    free = passes & (np.abs(windows.drawbar) < _ZERO_PULL * vehicle.mass * GRAVITY)
+    distance = float(np.sum(windows.ground_speed[free]) * windows.length)
+    if distance < _LEAST_DISTANCE:
+        why = (
+            f"{distance:.0f} m of straight steady passes at zero pull, and {_LEAST_DISTANCE:.0f} m are needed"
+        )
+        return Unknown("wheel_radius", why)
+    soils = sorted(set(windows.soil[free]))
+    code = np.array([soils.index(label) if label in soils else -1 for label in windows.soil])
+    driving = adhesion[:, vehicle.driven] if vehicle.driven.any() else adhesion
+    asymptote = np.array([_asymptote(driving[passes & (code == j)]) for j in range(len(soils))])
+    level = np.where(code >= 0, asymptote[code], np.nan)[:, None]
+    used = passes[:, None] & (np.abs(adhesion) < _LOW * level)
+    scale, covariance, steepness = _fit(windows, vehicle, adhesion, code, asymptote, used, block)
+    radius = vehicle.wheel_radius * scale
+    typical = float(np.average(steepness[code[free]]))
+    variance = np.diag(covariance) + _considered(vehicle, typical)
+    slip = float(np.mean(1 - (windows.hub_speed / windows.wheel_speed)[free] / radius))
+    told = evidence(windows, [Spell(int(k), int(k)) for k in np.flatnonzero(free)], sources)
+    return Rolling(radius, np.sqrt(variance), slip, told)
+
+
+def _adhesion(windows: Windows, vehicle: Vehicle) -> Floats:
+    """Adhesion (n, w); of driven wheels their mean, by load."""
+    adhesion = algebraic_adhesion(
+        windows.wheel_speed,
+        windows.wheel_acceleration,
+        windows.torque,
+        windows.load,
+        radius=vehicle.wheel_radius,
+        inertia=vehicle.wheel_inertia,
+        tire_resistance=vehicle.tire_rolling_resistance,
+        bearing_resistance=vehicle.bearing_resistance,
+    )
+    driven = vehicle.driven
+    if driven.any():
+        load = windows.load[:, driven]
+        mean = np.sum(adhesion[:, driven] * load, axis=1) / np.sum(load, axis=1)
+        adhesion[:, driven] = mean[:, None]
+    return adhesion
+
+
+def _passes(windows: Windows, vehicle: Vehicle) -> Bools:
+    """Windows of steady, straight, forward driving."""
+    rim = windows.wheel_speed * vehicle.wheel_radius
+    change = (
+        np.abs(np.gradient(windows.ground_speed, windows.length))
+        if len(windows) > 1
+        else np.zeros(len(windows))
+    )
+    left, right = [
+        np.array([k for k in range(len(vehicle.wheels)) if _side(vehicle, k) == s], int) for s in (1, -1)
+    ]
+    straight = np.ones(len(windows), dtype=bool)
+    if len(left) and len(right):
+        speed = rim.mean(axis=1)
+        straight = np.abs(rim[:, left].mean(axis=1) - rim[:, right].mean(axis=1)) < _STRAIGHT * np.abs(speed)
+    whole = windows.count > 0.5 * np.median(windows.count[windows.count > 0])
+    moving = (windows.ground_speed > _SLOWEST) & np.all(rim > _SLOWEST, axis=1)
+    return whole & moving & straight & (change < _STEADY * GRAVITY)
+
+
+def _side(vehicle: Vehicle, wheel: int) -> int:
+    """1 left, -1 right, 0 in the middle, by the place in its axle's list."""
+    own = np.flatnonzero(vehicle.wheel_axle == vehicle.wheel_axle[wheel])
+    place = int(np.searchsorted(own, wheel))
+    return int(np.sign(len(own) - 1 - 2 * place))
+
+
+def _asymptote(adhesion: Floats) -> float:
+    """Adhesion at large slip, from the windows of most pull; it only bends the correction."""
+    return max(_LEAST_ASYMPTOTE, float(np.quantile(adhesion, 0.95))) if adhesion.size else _LEAST_ASYMPTOTE
+
+
+def _fit(
+    windows: Windows,
+    vehicle: Vehicle,
+    adhesion: Floats,
+    code: npt.NDArray[np.intp],
+    asymptote: Floats,
+    used: Bools,
+    block: npt.NDArray[np.intp],
+) -> tuple[Floats, Floats, Floats]:
+    """Least squares for the radii over the file's and for ln C_j; the covariance is over blocks of track.
+
+    Returns the scale (w,), the covariance (w, w) of its logarithm, and C (soils,).
+    """
+    w, soils = len(vehicle.wheels), len(asymptote)
+    shared = np.flatnonzero(vehicle.driven)[:1].tolist() + np.flatnonzero(~vehicle.driven).tolist()
+    group = np.array([shared.index(k if k in shared else shared[0]) for k in range(w)])
+    count = len(shared)
+    ratio = np.log(np.where(used, windows.hub_speed / (windows.wheel_speed * vehicle.wheel_radius), 1.0))
+    level = np.where(used, asymptote[code][:, None], 1.0)
+    reach = -level * np.log1p(-np.where(used, adhesion, 0.0) / level)  # C s
+    mean, spread = _STEEPNESS
+    center = np.r_[np.zeros(count), np.full(soils, mean)]
+    prior = np.r_[np.zeros(count), np.full(soils, spread**-2.0)]
+    values = center.copy()
+    for _ in range(30):
+        slip = reach / np.exp(values[count:])[code][:, None]
+        jacobian = np.zeros((*ratio.shape, count + soils))
+        jacobian[:, np.arange(w), group] = 1.0
+        for j in range(soils):
+            jacobian[:, :, count + j] = np.where(code[:, None] == j, slip / (1 - slip), 0.0)
+        residual = ratio - values[group] - np.log1p(-np.minimum(slip, 0.9))
+        noise = 1.4826 * float(np.median(np.abs(residual[used])))
+        spreads = np.hypot(max(noise, 1e-6), 0.1 * slip)  # local adhesion shifts slip in proportion
+        scaled = np.where(used, residual / spreads, 0.0)
+        weight = np.where(used, np.minimum(1.0, 2.5 / np.maximum(np.abs(scaled), 1e-12)), 0.0)
+        flat = np.where(used[..., None], jacobian / spreads[..., None], 0.0).reshape(-1, count + soils)
+        normal = flat.T @ (flat * weight.reshape(-1, 1)) + np.diag(prior)
+        step = np.linalg.solve(normal, flat.T @ (weight * scaled).ravel() - prior * (values - center))
+        values = values + np.clip(step, -1.0, 1.0)
+        if np.max(np.abs(step)) < 1e-10:
+            break
+    score = (flat * (weight * scaled).reshape(-1, 1)).reshape(len(block), w, -1).sum(axis=1)
+    covariance = block_covariance(np.linalg.inv(normal), score, block, np.diag(prior))
+    return np.exp(values[group]), covariance[np.ix_(group, group)], np.exp(values[count:])
+
+
+def _considered(vehicle: Vehicle, steepness: float) -> Floats:
+    """Variance (w,) of the relative radius from what passes cannot tell: torque zeros and gains, ρ_t."""
+    lever = np.sum(vehicle.axle_mass) * GRAVITY * float(np.mean(vehicle.wheel_radius))
+    driven = max(1, int(vehicle.driven.sum()))
+    stated = vehicle.uncertainty
+    zero = _TORQUE_ZERO if stated.drive_torque_offset is None else stated.drive_torque_offset * driven / lever
+    gain = (0.0 if stated.drive_torque_gain is None else stated.drive_torque_gain) * _ROLLING
+    of_adhesion = np.where(vehicle.driven, np.hypot(zero, gain) / np.sqrt(driven), 0.0)
+    return np.asarray((of_adhesion**2 + (stated.tire_rolling_resistance or 0.0) ** 2) / steepness**2)

@@ -1,0 +1,148 @@
+"""What a calibration hands back: quantities with their intervals, and what could not be told."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from terragrip.vehicle import Vehicle
+
+NORMAL_95 = 1.959963984540054
+
+
+@dataclass(frozen=True)
+class Evidence:
+    """What a quantity was computed from: a log, the time span [s] used in it, and samples (or windows)."""
+
+    source: str
+    start: float
+    end: float
+    samples: int
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """A calibrated quantity.
+
+    ``key`` names its place in the vehicle file's ``calibration`` block and ``wheel`` the entry there, if the place
+    holds one per wheel. ``std`` is the standard error with all that is considered; the 95 % interval is value
+    ± factor std, where factor is that of few degrees of freedom where they are few. ``sentence`` says how it was
+    found and on what assumption.
+    """
+
+    key: str
+    value: float
+    std: float
+    unit: str
+    evidence: tuple[Evidence, ...]
+    sentence: str
+    wheel: str | None = None
+    factor: float = NORMAL_95
+
+    @property
+    def name(self) -> str:
+        """``drive_torque_gain fl``."""
+        return self.key if self.wheel is None else f"{self.key} {self.wheel}"
+
+    @property
+    def interval(self) -> tuple[float, float]:
+        """The 95 % interval."""
+        return self.value - self.factor * self.std, self.value + self.factor * self.std
+
+    @property
+    def samples(self) -> int:
+        """Samples over all evidence."""
+        return sum(part.samples for part in self.evidence)
+
+
+@dataclass(frozen=True)
+class Unknown:
+    """A quantity that the data cannot give, and why."""
+
+    name: str
+    why: str
+
+
+@dataclass(frozen=True)
+class Calibration:
+    """The result of :func:`terragrip.calibrate`.
+
+    ``quantities`` were found, ``unknown`` could not be. ``uncertainty`` holds what is left of the constants that
+    the vehicle file's ``uncertainty`` block considers.
+    """
+
+    quantities: tuple[Quantity, ...]
+    unknown: tuple[Unknown, ...]
+    uncertainty: Mapping[str, float] = field(default_factory=dict)
+
+    def __getitem__(self, name: str) -> Quantity:
+        """The quantity of a name such as ``"drive_torque_gain fl"``; raises KeyError if it was not found."""
+        for quantity in self.quantities:
+            if quantity.name == name:
+                return quantity
+        raise KeyError(name)
+
+    def __contains__(self, name: str) -> bool:
+        return any(quantity.name == name for quantity in self.quantities)
+
+    def apply(self, vehicle: Vehicle) -> Vehicle:
+        """The vehicle with the quantities in its ``calibration`` block and the rest in ``uncertainty``.
+
+        What the data could not give keeps what the vehicle says. Raises InputError if a value is impossible for a
+        vehicle.
+        """
+        data = vehicle.to_dict()
+        block: dict[str, Any] = dict(data.get("calibration", {}))
+        for quantity in self.quantities:
+            if quantity.key not in _PLACES:
+                continue
+            if quantity.wheel is None:
+                block[quantity.key] = quantity.value
+            else:
+                block[quantity.key] = {**block.get(quantity.key, {}), quantity.wheel: quantity.value}
+        if block:
+            data["calibration"] = block
+        if self.uncertainty:
+            data["uncertainty"] = {**data.get("uncertainty", {}), **self.uncertainty}
+        return Vehicle.from_dict(data)
+
+    def table(self) -> str:
+        """The quantities with their intervals and evidence, and what could not be told, as plain text."""
+        rows = [("quantity", "value", "95 % interval", "unit", "from")]
+        rows += [_row(quantity) for quantity in self.quantities]
+        widths = [max(len(row[k]) for row in rows) for k in range(len(rows[0]))]
+        lines = [
+            "  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)) for row in rows
+        ]
+        said = dict.fromkeys((quantity.key, quantity.sentence) for quantity in self.quantities)
+        lines += ["", *(f"{key}: {sentence}" for key, sentence in said)] if said else []
+        lines += ["", "Not told by the data:"] if self.unknown else []
+        lines += [f"  {unknown.name}: {unknown.why}" for unknown in self.unknown]
+        return "\n".join(line.rstrip() for line in lines)
+
+
+_PLACES = {
+    "drive_torque_gain",
+    "drive_torque_offset",
+    "drawbar_offset",
+    "acceleration_bias_x",
+    "pitch_offset",
+    "wheel_radius",
+}
+
+
+def _row(quantity: Quantity) -> tuple[str, str, str, str, str]:
+    low, high = quantity.interval
+    digits = max(0, 2 - math.floor(math.log10(max(high - low, 1e-12))))
+    logs = len({part.source for part in quantity.evidence})
+    span = sum(part.end - part.start for part in quantity.evidence)
+    place = quantity.evidence[0].source if logs == 1 else f"{logs} logs"
+    return (
+        quantity.name,
+        f"{quantity.value:.{digits}f}",
+        f"{low:.{digits}f} to {high:.{digits}f}",
+        quantity.unit if quantity.unit != "1" else "",
+        f"{quantity.samples} samples in {span:.0f} s of {place}",
+    )

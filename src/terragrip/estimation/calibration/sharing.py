@@ -1,0 +1,267 @@
+"""Wheels that share one adhesion curve: torque gains of the wheels relative to each other.
+
+Wheels at the same slip on the same soil have the same adhesion, so what one wheel's torque says beyond the others is
+its gain. Model of the mean torque of wheel i over window n (PHYSICS §1, averaged)::
+
+    M_in = k_i (B_in + r_i F_in (m_n + d_n (s_in - s_n + (1 - s_in) e_i))) + o_i,   B = J dω/dt + r ρ_t F + r ρ_w ω
+
+m_n is the adhesion that all wheels have at the window's mean slip s_n, unknown anew in every window: so neither the noise of
+ground speed, nor the curve's form, nor what the soil does to all wheels alike enters the gains. The curve is needed only
+for its steepness d_n, which carries the wheels' small differences of slip. Unknown are ln k_i (mean 0: a gain common to all
+wheels cannot be told from m_n) and, with their priors, the relative radii e_i and the offsets o_i. Weighted least squares
+with Huber weights; (R), our own construction.
+
+Adhesion differs from place to place, so the errors of neighbouring windows hang together: the covariance is the sandwich
+over blocks of track.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import numpy.typing as npt
+
+Floats = npt.NDArray[np.float64]
+Ints = npt.NDArray[np.intp]
+Bools = npt.NDArray[np.bool_]
+
+_ROUNDS = 60
+_CLOSE = 1e-8  # change of every ln k
+_HUBER = 2.5  # robust standard deviations
+_LOCAL = 0.1  # relative difference of local adhesion between wheels, for the weights: to start with,
+_LEAST_LOCAL = 0.01  # and at least
+_LEAST_WINDOWS = 30
+_STEEPNESS = np.geomspace(2.0, 60.0, 60)  # of the curves 1 - exp(-k s)
+_PROTOTYPE = 11.36  # the paper's
+
+
+@dataclass(frozen=True)
+class Sharing:
+    """Rows that share curves: a row a window, a column a wheel (n, w), no NaN.
+
+    ``torque`` N m; ``known`` the part B without adhesion, N m; ``leverage`` r F, N m; ``slip``; ``soil`` (n,) and
+    ``block`` (n,) integer labels from 0. ``radius_std`` of each wheel's relative radius, ``offset_std`` (w,) N m: the priors.
+    """
+
+    torque: Floats
+    known: Floats
+    leverage: Floats
+    slip: Floats
+    soil: Ints
+    block: Ints
+    radius_std: float
+    offset_std: Floats
+
+    def select(self, rows: Bools) -> Sharing:
+        """The windows of a mask (n,)."""
+        return replace(
+            self,
+            torque=self.torque[rows],
+            known=self.known[rows],
+            leverage=self.leverage[rows],
+            slip=self.slip[rows],
+            soil=self.soil[rows],
+            block=self.block[rows],
+        )
+
+
+@dataclass(frozen=True)
+class SharedGains:
+    """``log_gain`` (w,) and relative ``radius`` (w,), both with mean 0, and their ``covariance`` (2 w, 2 w).
+
+    ``windows`` and ``blocks`` of track are what they rest on; ``load_sensitivity`` (2 w, w) is ∂(ln k, e)/∂ln F.
+    """
+
+    log_gain: Floats
+    radius: Floats
+    covariance: Floats
+    windows: int
+    blocks: int
+    load_sensitivity: Floats
+
+
+def fit_shared_gains(data: Sharing) -> SharedGains | None:
+    """Estimate the relative gains; None where there are too few windows."""
+    if len(data.torque) < _LEAST_WINDOWS:
+        return None
+    w = data.torque.shape[1]
+    problem = _Problem.of(data)
+    values = problem.solve(np.zeros(3 * w), 1.0)
+    problem = problem.refined(values)
+    values = problem.solve(values, 1.0)
+    naive = problem.covariance(values, 1.0, np.arange(len(data.block)))
+    clustered = problem.covariance(values, 1.0, data.block)
+    # Neighbouring windows repeat each other: weigh the priors against the data's true information.
+    scale = max(1.0, float(np.trace(clustered[:w, :w]) / np.trace(naive[:w, :w])))
+    values = problem.solve(values, scale)
+    # A radius error that all wheels have leaves no trace here: report the differences.
+    apart = np.eye(w) - 1 / w
+    center = np.block([[np.eye(w), np.zeros((w, w))], [np.zeros((w, w)), apart]])
+    covariance = problem.covariance(values, scale, data.block)[: 2 * w, : 2 * w]
+    return SharedGains(
+        log_gain=values[:w],
+        radius=apart @ values[w : 2 * w],
+        covariance=center @ covariance @ center,
+        windows=len(data.torque),
+        blocks=len(np.unique(data.block)),
+        load_sensitivity=center @ problem.load_sensitivity(values, scale),
+    )
+
+
+@dataclass(frozen=True)
+class _Fit:
+    jacobian: Floats  # (n, w, 3 w), of the scaled residual, what m_n takes up taken out
+    residual: Floats  # (n, w), likewise
+    weight: Floats  # (n, w), of Huber
+    inverse: Floats  # (3 w, 3 w)
+    variance: float  # of a scaled residual
+
+
+@dataclass(frozen=True)
+class _Problem:
+    """Unknowns: ln k, e, o, each (w,)."""
+
+    data: Sharing
+    prior: Floats  # (3 w, 3 w) precision
+    torque_noise: float
+    steepness: Floats  # (n,) d_n
+    local: Floats  # (n,) relative difference of local adhesion between wheels
+
+    @classmethod
+    def of(cls, data: Sharing) -> _Problem:
+        n, w = data.torque.shape
+        prior = np.zeros((3 * w, 3 * w))
+        prior[w : 2 * w, w : 2 * w] = np.eye(w) / data.radius_std**2
+        prior[2 * w :, 2 * w :] = np.diag(1 / data.offset_std**2)
+        noise = 0.02 * float(np.median(np.abs(data.torque)))
+        problem = cls(data, prior, max(noise, 1e-9), np.zeros(n), np.full(n, _LOCAL))
+        return problem._with_steepness(np.zeros(3 * w))
+
+    def refined(self, values: Floats) -> _Problem:
+        """The problem with the curves' steepness and each soil's scatter as the residuals show them."""
+        level, residual, _ = self._levels(values)
+        size = np.maximum(np.abs(self.data.leverage * level[:, None]), self.torque_noise)
+        share = np.median(np.abs(residual / size), axis=1)
+        local = self.local.copy()
+        for soil in np.unique(self.data.soil):
+            own = self.data.soil == soil
+            if own.sum() >= _LEAST_WINDOWS:
+                local[own] = max(_LEAST_LOCAL, 1.4826 * float(np.median(share[own])))
+        return replace(self, local=local)._with_steepness(values)
+
+    def _with_steepness(self, values: Floats) -> _Problem:
+        """d_n of curves A (1 - exp(-k s)), an amplitude a soil, one k for all: the best of a grid."""
+        level, _, _ = self._levels(values)
+        slip, soil = self.data.slip.mean(axis=1), self.data.soil
+        size = np.abs(slip)
+        best, found = np.inf, np.zeros(len(slip))
+        for k in _STEEPNESS if np.ptp(size) > 0.02 else [_PROTOTYPE]:
+            form = np.sign(slip) * -np.expm1(-k * size)
+            amplitude = np.bincount(soil, form * level) / np.maximum(np.bincount(soil, form**2), 1e-12)
+            loss = float(np.sum(np.abs(level - amplitude[soil] * form)))
+            if loss < best:
+                best, found = loss, np.maximum(amplitude[soil], 0.0) * k * np.exp(-k * size)
+        return replace(self, steepness=found)
+
+    def _levels(self, values: Floats) -> tuple[Floats, Floats, Floats]:
+        """m_n (n,), the residual torque (n, w) and its spread (n, w) at the unknowns' values."""
+        w = self.data.torque.shape[1]
+        gain, offset = np.exp(values[:w]), values[2 * w :]
+        lever = gain * self.data.leverage
+        rest = self.data.torque - offset - gain * self.data.known - lever * self._slip_part(values)
+        # Adhesion differs in proportion: the spread of a torque goes with the wheel's own share of it.
+        size = np.abs(np.median(rest / lever, axis=1, keepdims=True)) * lever
+        spread = np.hypot(self.local[:, None] * size, self.torque_noise)
+        level = np.sum(rest * lever / spread**2, axis=1) / np.sum(lever**2 / spread**2, axis=1)
+        return level, rest - level[:, None] * lever, spread
+
+    def _slip_part(self, values: Floats) -> Floats:
+        """Adhesion that the wheels' differences of slip make (n, w)."""
+        w = self.data.torque.shape[1]
+        slip, shift = self.data.slip, values[w : 2 * w]
+        apart = slip - slip.mean(axis=1, keepdims=True) + (1 - slip) * shift
+        return np.asarray(self.steepness[:, None] * apart)
+
+    def fit(self, values: Floats, scale: float) -> _Fit:
+        """Linearise at the values; ``scale`` is the design effect that the priors are weighed with."""
+        n, w = self.data.torque.shape
+        level, residual, spread = self._levels(values)
+        gain = np.exp(values[:w])
+        lever = gain * self.data.leverage
+        jacobian = np.zeros((n, w, 3 * w))
+        own = np.arange(w)
+        jacobian[:, own, own] = gain * self.data.known + lever * (level[:, None] + self._slip_part(values))
+        jacobian[:, own, w + own] = lever * self.steepness[:, None] * (1 - self.data.slip)
+        jacobian[:, own, 2 * w + own] = 1.0
+        scaled = residual / spread
+        robust = 1.4826 * float(np.median(np.abs(scaled)))
+        weight = np.minimum(1.0, _HUBER * robust / np.maximum(np.abs(scaled), 1e-300))
+        free = lever / spread  # what a change of m_n does
+        jacobian /= spread[..., None]
+        norm = np.sum(weight * free**2, axis=1)
+        taken = np.einsum("nw,nwp->np", weight * free, jacobian) / norm[:, None]
+        jacobian -= free[..., None] * taken[:, None, :]
+        scaled = scaled - free * (np.sum(weight * free * scaled, axis=1) / norm)[:, None]
+        variance = float(np.sum(weight * scaled**2) / np.sum(weight)) * w / (w - 1)
+        flat = jacobian.reshape(-1, 3 * w)
+        normal = flat.T @ (flat * weight.reshape(-1, 1)) + variance * scale * self.prior
+        # The mean of ln k is 0: a row of certainty.
+        normal[:w, :w] += 1e6 * float(np.max(np.diag(normal)[:w]))
+        return _Fit(jacobian, scaled, weight, _inverse(normal), variance)
+
+    def step(self, values: Floats, scale: float) -> Floats:
+        """One Gauss-Newton step (3 w,)."""
+        w, fit = self.data.torque.shape[1], self.fit(values, scale)
+        gradient = np.einsum("nwp,nw->p", fit.jacobian, fit.weight * fit.residual)
+        gradient -= fit.variance * scale * self.prior @ values
+        move = fit.inverse @ gradient
+        move[:w] -= np.mean(values[:w] + move[:w])
+        return np.asarray(move)
+
+    def solve(self, values: Floats, scale: float) -> Floats:
+        """Gauss-Newton steps until the gains rest."""
+        w = self.data.torque.shape[1]
+        for _ in range(_ROUNDS):
+            move = self.step(values, scale)
+            values = values + move
+            if np.max(np.abs(move[:w])) < _CLOSE:
+                break
+        return values
+
+    def covariance(self, values: Floats, scale: float, block: Ints) -> Floats:
+        """Sandwich covariance of the unknowns over blocks (n,)."""
+        fit = self.fit(values, scale)
+        score = np.einsum("nwp,nw->np", fit.jacobian, fit.weight * fit.residual)
+        return block_covariance(fit.inverse, score, block, (fit.variance * scale) ** 2 * self.prior)
+
+    def load_sensitivity(self, values: Floats, scale: float) -> Floats:
+        """∂(ln k, e)/∂ln F by one Gauss-Newton step from the optimum, (2 w, w)."""
+        w, change = self.data.torque.shape[1], 0.01
+        rest, columns = self.step(values, scale)[: 2 * w], []
+        for j in range(w):
+            # The tire's resistance in B grows with the load too; it is small beside the adhesion's torque.
+            leverage = self.data.leverage * (1 + change * (np.arange(w) == j))
+            moved = replace(self, data=replace(self.data, leverage=leverage))
+            columns.append((moved.step(values, scale)[: 2 * w] - rest) / change)
+        return np.stack(columns, axis=1)
+
+
+def block_covariance(inverse: Floats, score: Floats, block: Ints, prior: Floats) -> Floats:
+    """Sandwich covariance (p, p) of a least-squares fit whose errors hang together within blocks.
+
+    ``inverse`` (p, p) of the normal matrix; ``score`` (n, p) weighted residual times Jacobian; ``block`` (n,) labels;
+    ``prior`` (p, p) what the priors add to the middle.
+    """
+    labels, code = np.unique(block, return_inverse=True)
+    per_block = np.zeros((len(labels), score.shape[1]))
+    np.add.at(per_block, code, score)
+    count = max(2, len(labels))
+    return np.asarray(inverse @ (per_block.T @ per_block * count / (count - 1) + prior) @ inverse)
+
+
+def _inverse(matrix: Floats) -> Floats:
+    """Inverse of a positive semidefinite matrix after scaling its diagonal to 1; what is not told stays 0."""
+    size = np.sqrt(np.maximum(np.diag(matrix), 1e-300))
+    inverse = np.linalg.pinv(matrix / np.outer(size, size), hermitian=True, rcond=1e-13)
+    return np.asarray(inverse / np.outer(size, size))

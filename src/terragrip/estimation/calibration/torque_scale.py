@@ -1,0 +1,201 @@
+"""The scale of the torque columns, common to all wheels, from the forces that mass and drawbar tell.
+
+For a log whose torque columns are only proportional to torque (from a motor current, say), and as a check on any
+other. By PHYSICS §1, summed over the wheels and averaged over a window::
+
+    X = K (Y + R),   X = Σ M_i/r_i,   Y = F_dx + m (dv/dt + g sinθ),
+    R = Σ (J dω_i/dt)/r_i + Σ (ρ_t F_i + ρ_w ω_i) + ρ_s m g
+
+K is raw torque over true torque. ρ_s, constant for a log, soil and direction of travel, is an intercept; a skid-steered
+vehicle's resistance in turns is a term of its own. Resistance that grows with slip would pass for a larger K: its
+prior is in the interval.
+
+Errors in Y would pull K towards 0. Where there are two measures of dv/dt + g sinθ, the accelerometer and ground speed with
+pitch, each is the other's instrument: K = cov(X, (Y1 + Y2)/2)/cov(Y1, Y2), so errors of either, if unlike, do no harm.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from terragrip.errors import InputError
+from terragrip.estimation.calibration.result import Evidence, Quantity
+from terragrip.estimation.calibration.windows import Windows, windows
+from terragrip.physics.loads import GRAVITY
+from terragrip.recording import Recording, without_held
+from terragrip.vehicle import Vehicle
+
+Floats = npt.NDArray[np.float64]
+Bools = npt.NDArray[np.bool_]
+
+_SHORTEST = 1.0  # s
+_HOLDS = 2.0  # a window spans so many updates of the slowest torque channel
+_SLOWEST = 0.1  # m/s
+_LEAST = 20  # windows
+_BLOCKS = 20  # of windows that hang together, to judge the error by
+_SLIP_RESISTANCE = 0.05  # prior of dρ_s/ds: Brixius gives 0.06 to 0.1, hard ground 0
+_DRAWBAR_GAIN = 0.01  # prior where the vehicle states none
+_HUBER = 2.5
+_STRONG = 3.0  # the instruments' covariance over its error
+
+
+@dataclass(frozen=True)
+class _Balance:
+    """Rows of the force balance: X, its known losses at K = 1, both measures of Y, and what is partialled out."""
+
+    thrust: Floats
+    losses: Floats
+    force: Floats
+    other: Floats
+    nuisance: Floats
+    slip: Floats
+
+
+def identify_torque_scale(recordings: Recording | Sequence[Recording], vehicle: Vehicle) -> Quantity:
+    """Scale K of the torque columns (raw over true torque), the same for all wheels, with its interval.
+
+    Held (stale) values count only while fresh, and a window spans at least two updates of the slowest torque channel.
+    K goes with the vehicle's mass. To use it, set ``calibration.drive_torque_gain`` of every wheel to K.
+
+    Raises
+    ------
+    InputError: fewer than 20 windows of driving, or too little pull, acceleration and slope to tell K at all.
+    """
+    logs = [without_held(r) for r in ([recordings] if isinstance(recordings, Recording) else recordings)]
+    table = windows(logs, vehicle, _window_length(logs))
+    used = _usable(table, vehicle)
+    if used.sum() < _LEAST:
+        raise InputError(
+            f"{int(used.sum())} windows of driving are too few to identify the torque scale, {_LEAST} are needed",
+            file=logs[0].source,
+            mend="use a longer log",
+        )
+    table = table.select(used)
+    rows = _balance(table, vehicle)
+    weight = np.ones(len(rows.thrust))
+    for _ in range(30):
+        scale, strength, residual = _slope(rows, weight)
+        robust = 1.4826 * float(np.median(np.abs(residual)))
+        weight = np.minimum(1.0, _HUBER * max(robust, 1e-12) / np.maximum(np.abs(residual), 1e-12))
+    error = _jackknife(rows, weight)
+    if not strength > _STRONG * _no_strength(rows, weight):
+        raise InputError(
+            "pull, acceleration and slope vary too little to tell the torque scale",
+            file=logs[0].source,
+            mend="use a log with starts, stops, slopes or a towed load",
+        )
+    considered = np.hypot(
+        _SLIP_RESISTANCE * vehicle.mass * GRAVITY * _partial_slope(rows.slip, rows, weight),
+        _drawbar_gain(table, vehicle),
+    )
+    std = float(np.hypot(error, scale * considered))
+    said = "torques over radius against drawbar force and mass times acceleration and slope; it goes with the mass"
+    return Quantity("drive_torque_scale", float(scale), std, "1", _evidence(table, logs), said)
+
+
+def _window_length(logs: Sequence[Recording]) -> float:
+    """At least two updates of the slowest torque channel [s]."""
+    longest = 0.0
+    for log in logs:
+        for name, values in log.channels.items():
+            if name.startswith("drive_torque_") and np.isfinite(values).sum() > 1:
+                longest = max(longest, float(np.median(np.diff(log.time[np.isfinite(values)]))))
+    return max(_SHORTEST, _HOLDS * longest)
+
+
+def _usable(table: Windows, vehicle: Vehicle) -> Bools:
+    """Windows in which everything was measured and all wheels and the vehicle go one way."""
+    way = np.sign(table.ground_speed)[:, None]
+    moving = np.abs(table.ground_speed) > _SLOWEST
+    together = np.all(table.wheel_speed * vehicle.wheel_radius * way > _SLOWEST, axis=1)
+    known = np.isfinite(table.push + table.drawbar) & np.all(
+        np.isfinite(table.torque + table.load + table.wheel_acceleration + table.hub_speed), axis=1
+    )
+    whole = table.count > 0.5 * np.median(table.count[table.count > 0])
+    return moving & together & known & whole
+
+
+def _balance(table: Windows, vehicle: Vehicle) -> _Balance:
+    radius, way = vehicle.wheel_radius, np.sign(table.ground_speed)
+    thrust = np.sum(table.torque / radius, axis=1)
+    inertia = np.sum(vehicle.wheel_inertia * table.wheel_acceleration / radius, axis=1)
+    rolling = vehicle.tire_rolling_resistance * table.load * way[:, None]
+    losses = inertia + np.sum(rolling + vehicle.bearing_resistance * table.wheel_speed, axis=1)
+    kinematic = table.kinematic_push
+    measured = np.isfinite(table.acceleration) & np.isfinite(table.pitch) & np.isfinite(kinematic)
+    first = table.drawbar + vehicle.mass * table.push
+    other = np.where(measured, table.drawbar + vehicle.mass * kinematic, first)
+    groups = np.unique(
+        np.array([f"{r}/{s}/{d:.0f}" for r, s, d in zip(table.recording, table.soil, way, strict=True)]),
+        return_inverse=True,
+    )[1]
+    nuisance = (groups[:, None] == np.arange(groups.max() + 1)).astype(float)
+    turn = np.abs(np.ptp(table.hub_speed, axis=1)) / np.abs(table.ground_speed)
+    if np.ptp(turn) > 0:
+        nuisance = np.column_stack([nuisance, turn * way])
+    slip = np.mean(1 - table.hub_speed / (table.wheel_speed * radius), axis=1) * way
+    return _Balance(thrust, losses, first, other, nuisance, slip)
+
+
+def _centered(values: Floats, nuisance: Floats, weight: Floats) -> Floats:
+    """Values (n, k) less their weighted regression on the nuisance terms."""
+    root = np.sqrt(weight)[:, None]
+    fit = np.linalg.lstsq(nuisance * root, values * root, rcond=None)[0]
+    return values - nuisance @ fit
+
+
+def _slope(rows: _Balance, weight: Floats) -> tuple[float, float, Floats]:
+    """K, the covariance of the two measures of Y, and the residual X - K (Y + losses) (n,), nuisance taken out."""
+    table = np.column_stack([rows.thrust, rows.losses, rows.force, rows.other])
+    x, losses, y1, y2 = _centered(table, rows.nuisance, weight).T
+    strength = float(np.mean(weight * y1 * y2))
+    instrument = (y1 + y2) / 2
+    # X = K (Y + losses): the losses are known, so they stand beside Y in the denominator.
+    below = strength + float(np.mean(weight * losses * instrument))
+    scale = float(np.mean(weight * x * instrument)) / below if below else np.nan
+    return scale, strength, x - scale * (instrument + losses)
+
+
+def _no_strength(rows: _Balance, weight: Floats) -> float:
+    """Standard error of the covariance of the two measures of Y if they had nothing in common."""
+    y1, y2 = _centered(np.column_stack([rows.force, rows.other]), rows.nuisance, weight).T
+    return float(np.sqrt(np.mean(weight * y1**2) * np.mean(weight * y2**2) / len(weight)))
+
+
+def _jackknife(rows: _Balance, weight: Floats) -> float:
+    """Standard error of K, leaving out one stretch of windows at a time."""
+    n = len(weight)
+    count = min(_BLOCKS, n // 2)
+    block = np.arange(n) * count // n
+    without = [_slope(rows, np.where(block == b, 0.0, weight))[0] for b in range(count)]
+    return float(np.sqrt((count - 1) * np.var(without)))
+
+
+def _partial_slope(values: Floats, rows: _Balance, weight: Floats) -> float:
+    """Slope of values (n,) over Y, nuisance taken out."""
+    value, y1, y2 = _centered(np.column_stack([values, rows.force, rows.other]), rows.nuisance, weight).T
+    return float(np.sum(weight * value * (y1 + y2) / 2) / np.sum(weight * y1 * y2))
+
+
+def _drawbar_gain(table: Windows, vehicle: Vehicle) -> float:
+    if not np.any(table.drawbar):
+        return 0.0
+    stated = vehicle.uncertainty.drawbar_gain
+    return _DRAWBAR_GAIN if stated is None else stated
+
+
+def _evidence(table: Windows, logs: Sequence[Recording]) -> tuple[Evidence, ...]:
+    return tuple(
+        Evidence(
+            logs[index].source or f"recording {index + 1}",
+            float(table.start[own].min()),
+            float(table.start[own].max() + table.length),
+            int(table.count[own].sum()),
+        )
+        for index in np.unique(table.recording)
+        for own in [table.recording == index]
+    )

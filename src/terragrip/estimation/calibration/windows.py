@@ -1,0 +1,236 @@
+"""Recordings as means over short windows: the rows that calibration works on.
+
+A window's mean has little noise, needs no common sampling and no filter, and the wheel equation (PHYSICS §1) is
+linear in the channels that are averaged, so it holds for the means.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
+
+import numpy as np
+import numpy.typing as npt
+
+from terragrip.physics.loads import GRAVITY, axle_loads, lateral_shares
+from terragrip.recording import Recording
+from terragrip.vehicle import Vehicle
+
+Floats = npt.NDArray[np.float64]
+Ints = npt.NDArray[np.intp]
+
+_BLOCK_COUNT = 40  # stretches of track wanted,
+_SHORTEST_BLOCK, _LONGEST_BLOCK = 4.0, 20.0  # m, and their lengths
+_LEAST_LOAD = 0.02  # share of the static load under which no wheel is taken to go
+
+
+@dataclass(frozen=True)
+class Windows:
+    """Means over windows of equal length, a row each: SI, NaN where nothing was measured.
+
+    ``recording`` (n,) index of the log; ``start`` (n,) s; ``count`` (n,) samples of ground speed; ``torque``,
+    ``wheel_speed``, ``wheel_acceleration``, ``hub_speed``, ``load``, ``position`` (n, wheels), position being
+    the metres of track that the wheel itself has come; ``push`` (n,) dv/dt + g sinθ, m/s², by the accelerometer where there is one,
+    ``kinematic_push`` by ground speed and pitch alone; ``soil`` (n,) label.
+    """
+
+    recording: Ints
+    start: Floats
+    count: Floats
+    ground_speed: Floats
+    drawbar: Floats
+    push: Floats
+    kinematic_push: Floats
+    acceleration: Floats
+    pitch: Floats
+    yaw_rate: Floats
+    lateral: Floats
+    hub_speed: Floats
+    wheel_speed: Floats
+    wheel_acceleration: Floats
+    torque: Floats
+    load: Floats
+    position: Floats
+    soil: npt.NDArray[np.object_]
+    length: float
+
+    def __len__(self) -> int:
+        return len(self.start)
+
+    def select(self, rows: npt.NDArray[np.bool_]) -> Windows:
+        """The windows of a mask (n,)."""
+        values = {f.name: getattr(self, f.name) for f in fields(self)}
+        return Windows(**{name: v if name == "length" else v[rows] for name, v in values.items()})
+
+
+def windows(recordings: Sequence[Recording], vehicle: Vehicle, length: float) -> Windows:
+    """Cut recordings into windows of ``length`` [s].
+
+    Channels are taken as they stand: take held samples and zeros off before. Without ``drawbar_force`` it is 0.
+    """
+    parts = [_windows_of(index, r, vehicle, length) for index, r in enumerate(recordings)]
+    joined = {
+        f.name: np.concatenate([getattr(part, f.name) for part in parts])
+        for f in fields(Windows)
+        if f.name != "length"
+    }
+    return Windows(**joined, length=length)
+
+
+def _windows_of(index: int, recording: Recording, vehicle: Vehicle, length: float) -> Windows:
+    bin_of = ((recording.time - recording.time[0]) / length).astype(np.intp)
+    n, wheels = int(bin_of[-1]) + 1, vehicle.wheels
+
+    def mean(name: str, absent: float = np.nan) -> Floats:
+        values = recording.channels.get(name)
+        return np.full(n, absent) if values is None else _means(values, bin_of, n)
+
+    def per_wheel(quantity: str, absent: float = np.nan) -> Floats:
+        return np.stack([mean(f"{quantity}_{wheel}", absent) for wheel in wheels], axis=1)
+
+    speed, wheel_speed = mean("ground_speed"), per_wheel("wheel_speed")
+    pitch, measured = mean("pitch"), mean("acceleration_x")
+    slope = np.nan_to_num(pitch)
+    kinematic = _rate(speed, length) + GRAVITY * np.sin(slope)
+    push = np.where(np.isfinite(measured), measured, kinematic)
+    drawbar = mean("drawbar_force", 0.0)
+    wheel_acceleration = _rate(wheel_speed, length)
+    travelled = np.cumsum(np.nan_to_num(np.abs(speed))) * length
+    behind = (vehicle.axle_to_rear[0] - vehicle.axle_to_rear)[vehicle.wheel_axle]
+    yaw, lateral = mean("angular_velocity_z"), mean("acceleration_y")
+    torque = per_wheel("drive_torque")
+    torque[:, ~vehicle.driven] = np.nan_to_num(torque[:, ~vehicle.driven])
+    spin = np.nansum(vehicle.wheel_inertia * wheel_acceleration, axis=1)
+    load = wheel_loads(
+        vehicle,
+        drawbar=drawbar,
+        push=push,
+        slope=slope,
+        spin_torque=spin,
+        lateral=np.nan_to_num(lateral),
+        measured=np.stack([mean(f"vertical_load_{axle}") for axle in vehicle.axle_names], axis=1),
+    )
+    return Windows(
+        recording=np.full(n, index, dtype=np.intp),
+        start=recording.time[0] + length * np.arange(n),
+        count=np.bincount(bin_of, np.isfinite(recording["ground_speed"]), n).astype(np.float64),
+        ground_speed=speed,
+        drawbar=drawbar,
+        push=push,
+        kinematic_push=kinematic,
+        acceleration=measured,
+        pitch=pitch,
+        yaw_rate=yaw,
+        lateral=lateral,
+        hub_speed=speed[:, None] - np.nan_to_num(yaw)[:, None] * wheel_side(vehicle),
+        wheel_speed=wheel_speed,
+        wheel_acceleration=wheel_acceleration,
+        torque=torque,
+        load=load,
+        position=travelled[:, None] - behind,
+        soil=_labels(recording, bin_of, n),
+        length=length,
+    )
+
+
+def track_blocks(table: Windows) -> Ints:
+    """Which stretch of track each window is on (n,), counted from 0 over all recordings."""
+    length = 0.0
+    for index in np.unique(table.recording):
+        length += float(np.nanmax(table.position[table.recording == index], initial=0.0))
+    step = float(np.clip(length / _BLOCK_COUNT, _SHORTEST_BLOCK, _LONGEST_BLOCK))
+    blocks = np.zeros(len(table), dtype=np.intp)
+    first = 0
+    for index in np.unique(table.recording):
+        own = table.recording == index
+        place = np.floor(table.position[own, 0] / step).astype(np.intp)
+        blocks[own] = first + place
+        first += int(place.max()) + 1
+    return blocks
+
+
+def wheel_loads(
+    vehicle: Vehicle,
+    *,
+    drawbar: Floats,
+    push: Floats,
+    slope: Floats,
+    spin_torque: Floats,
+    lateral: Floats,
+    measured: Floats,
+) -> Floats:
+    """Vertical load of each wheel (n, wheels), N (PHYSICS §3); a measured axle load (n, axles) wins, the other of two
+    takes the rest.
+
+    push is dv/dt + g sinθ [m/s²], slope θ [rad], lateral a_y [m/s²], all (n,).
+    """
+    axles = axle_loads(
+        vehicle.axle_mass,
+        vehicle.axle_to_rear,
+        center_of_gravity_height=vehicle.center_of_gravity_height,
+        hitch_height=vehicle.hitch_height,
+        hitch_overhang=vehicle.hitch_overhang,
+        drawbar=drawbar,
+        acceleration=push - GRAVITY * np.sin(slope),
+        slope=slope,
+        spin_torque=spin_torque,
+    )
+    total = axles.sum(axis=1)
+    known = np.isfinite(measured)
+    axles = np.where(known, measured, axles)
+    if axles.shape[1] == 2:
+        for here, other in ((0, 1), (1, 0)):
+            rest = known[:, here] & ~known[:, other]
+            axles[rest, other] = total[rest] - axles[rest, here]
+    loads = np.empty((len(drawbar), len(vehicle.wheels)))
+    for axle in range(len(vehicle.axles)):
+        own = vehicle.wheel_axle == axle
+        shares = lateral_shares(
+            int(own.sum()),
+            lateral if vehicle.track else np.zeros_like(lateral),
+            center_of_gravity_height=vehicle.center_of_gravity_height,
+            track=vehicle.track or 1.0,
+        )
+        static = vehicle.axle_mass[axle] * GRAVITY / own.sum()
+        loads[:, own] = np.maximum(shares * axles[:, [axle]], _LEAST_LOAD * static)
+    return loads
+
+
+def wheel_side(vehicle: Vehicle) -> Floats:
+    """Distance of each wheel (n,) [m] from the vehicle's middle, left positive; 0 without a track."""
+    sides = []
+    for axle in range(len(vehicle.axles)):
+        count = int(np.sum(vehicle.wheel_axle == axle))
+        half = (vehicle.track or 0.0) / 2 if count > 1 else 0.0
+        sides.append(np.linspace(half, -half, count))
+    return np.concatenate(sides)
+
+
+def _means(values: Floats, bin_of: Ints, n: int) -> Floats:
+    """Mean of each bin's measured values (n,), NaN where there are none."""
+    known = np.isfinite(values)
+    count = np.bincount(bin_of[known], minlength=n)
+    total = np.bincount(bin_of[known], values[known], n)
+    return np.where(count > 0, total / np.maximum(count, 1), np.nan)
+
+
+def _rate(values: Floats, step: float) -> Floats:
+    """Central difference along the windows, one-sided at the ends, [unit/s]."""
+    return np.gradient(values, step, axis=0) if len(values) > 1 else np.zeros_like(values)
+
+
+def _labels(recording: Recording, bin_of: Ints, n: int) -> npt.NDArray[np.object_]:
+    """The soil of each window: empty where it is unlabelled or changes within."""
+    found = np.full(n, "", dtype=object)
+    labels = recording.labels.get("soil")
+    if labels is None:
+        return found
+    # Few rows change the label: look at the runs between them, not at every row.
+    edge = np.flatnonzero(labels[1:] != labels[:-1]) + 1
+    first = np.searchsorted(bin_of, np.arange(n))
+    here = np.minimum(first, len(labels) - 1)
+    found[:] = labels[here]
+    found[np.bincount(bin_of, minlength=n) == 0] = ""
+    inside = edge[bin_of[edge] == bin_of[edge - 1]]
+    found[bin_of[inside]] = ""
+    return found

@@ -1,0 +1,250 @@
+"""Zeros of the sensors from standstill: torque, drawbar, accelerometer.
+
+All of them assume that what a sensor should read there is known: nothing drives or holds the wheels, the bar is slack,
+the ground is level or its slope is measured. Where the readings contradict that, nothing is claimed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from terragrip.estimation.calibration.result import Evidence, Quantity, Unknown
+from terragrip.estimation.calibration.windows import Windows
+from terragrip.physics.loads import GRAVITY
+from terragrip.vehicle import Vehicle
+
+Floats = npt.NDArray[np.float64]
+
+WINDOW = 0.5
+"""Window length [s] in which standstill is looked for."""
+
+_STANDING = 0.03  # m/s, of vehicle and rims, as window means
+_LEAST_STANDING = 2.0  # s a spell must last
+_DRIVING = 0.1  # m/s
+_LEAST_FREE = 10.0  # s of driving with a bar that nothing moves
+_DEFAULT_PITCH = float(np.radians(0.2))  # prior of a pitch sensor's zero
+_DEFAULT_SLOPE = float(np.radians(0.5))  # prior of the slope where the vehicle states none
+_UNKNOWN_BIAS = (
+    0.3  # m/s^2, prior of an accelerometer's bias where the vehicle states none: mounting included
+)
+_ALIKE = 3.0  # standard errors
+_IDLE_SHARE = 0.05  # of the driving torque: more than that at standstill is work, not a zero
+
+
+@dataclass(frozen=True)
+class Spell:
+    """Rows ``first`` to ``last`` (inclusive) of the windows, in one recording."""
+
+    first: int
+    last: int
+
+    @property
+    def rows(self) -> slice:
+        """The rows as a slice."""
+        return slice(self.first, self.last + 1)
+
+
+def standstills(windows: Windows, vehicle: Vehicle) -> list[Spell]:
+    """Spells in which vehicle and wheels stand, without the first window after they stop."""
+    rim = np.abs(windows.wheel_speed) * vehicle.wheel_radius
+    standing = (np.abs(windows.ground_speed) < _STANDING) & np.all(rim < _STANDING, axis=1)
+    least = int(np.ceil(_LEAST_STANDING / windows.length))
+    found = spells(standing, windows.recording, least)
+    return [Spell(s.first + (not _starts_a_log(s, windows)), s.last) for s in found]
+
+
+def _starts_a_log(spell: Spell, windows: Windows) -> bool:
+    return spell.first == 0 or windows.recording[spell.first] != windows.recording[spell.first - 1]
+
+
+def spells(wanted: npt.NDArray[np.bool_], recording: npt.NDArray[np.intp], least: int) -> list[Spell]:
+    """Runs of at least ``least`` wanted windows (n,) within one recording."""
+    edge = np.flatnonzero(np.diff(wanted.astype(int)) | np.diff(recording)) + 1
+    starts, ends = np.r_[0, edge], np.r_[edge, len(wanted)]
+    return [
+        Spell(int(a), int(b) - 1)
+        for a, b in zip(starts, ends, strict=True)
+        if b > a and wanted[a] and b - a >= least
+    ]
+
+
+def evidence(windows: Windows, found: Sequence[Spell], sources: Sequence[str]) -> tuple[Evidence, ...]:
+    """One entry per recording: from the first spell's start to the last one's end, with the samples used."""
+    entries: dict[int, list[Spell]] = {}
+    for spell in found:
+        entries.setdefault(int(windows.recording[spell.first]), []).append(spell)
+    return tuple(
+        Evidence(
+            sources[index],
+            float(windows.start[own[0].first]),
+            float(windows.start[own[-1].last] + windows.length),
+            int(sum(windows.count[spell.rows].sum() for spell in own)),
+        )
+        for index, own in entries.items()
+    )
+
+
+def spell_mean(values: Floats, found: Sequence[Spell], windows: Windows, noise: float) -> tuple[float, float]:
+    """Mean and standard error of values (n,) over spells; what varies from spell to spell counts in the error.
+
+    ``noise`` is the standard deviation of a sample: a few windows may scatter less by chance.
+    """
+    inside = [values[spell.rows] for spell in found]
+    pooled = np.concatenate(inside)
+    pooled = pooled[np.isfinite(pooled)]
+    if len(pooled) < 2:
+        return float("nan"), float("nan")
+    samples = float(sum(windows.count[spell.rows].sum() for spell in found))
+    within = max(float(np.std(pooled, ddof=1)) / np.sqrt(len(pooled)), noise / np.sqrt(samples))
+    means = np.array([np.nanmean(part) for part in inside if np.isfinite(part).any()])
+    if len(means) < 3:
+        # Too few spells to see their scatter: half the difference of two stands for it.
+        between = float(np.ptp(means)) / 2 if len(means) == 2 else 0.0
+        return float(np.mean(means)), float(np.hypot(within, between))
+    return float(np.mean(means)), max(within, float(np.std(means, ddof=1)) / np.sqrt(len(means)))
+
+
+def resting(values: Floats, found: Sequence[Spell], windows: Windows, noise: float) -> list[Spell]:
+    """The spells that read alike in all of ``values`` (n, k), within noise: the most numerous such group.
+
+    A zero is the same at every stop, what a drive holds or a bar keeps is not. Of groups of one size the one nearest to
+    zero is taken.
+    """
+    if len(found) < 2 or noise <= 0:
+        return list(found)
+    means = np.array([np.nanmean(values[spell.rows], axis=0) for spell in found])
+    errors = noise / np.sqrt([max(1.0, windows.count[spell.rows].sum()) for spell in found])
+    apart = np.max(np.abs(means[:, None] - means[None]), axis=2)
+    alike = apart < _ALIKE * np.hypot(errors[:, None], errors[None])
+    rank = [(int(alike[k].sum()), -float(np.max(np.abs(means[k])))) for k in range(len(found))]
+    group = alike[max(range(len(found)), key=lambda k: rank[k])]
+    near = np.max(np.abs(means - np.median(means[group], axis=0)), axis=1) < _ALIKE * errors
+    return [spell for spell, member in zip(found, near, strict=True) if member]
+
+
+def torque_zeros(
+    windows: Windows, vehicle: Vehicle, sources: Sequence[str], noise: float
+) -> tuple[list[Quantity], list[Unknown]]:
+    """Torque zero of each driven wheel from standstill; ``noise`` is the standard deviation of a torque sample, N m."""
+    key, found = "drive_torque_offset", standstills(windows, vehicle)
+    if not found:
+        return [], [Unknown(key, f"no standstill of {_LEAST_STANDING:.0f} s or longer")]
+    quantities, unknown = [], []
+    driven = np.flatnonzero(vehicle.driven)
+    found = resting(windows.torque[:, driven], found, windows, noise)
+    for index in driven:
+        wheel, torque = vehicle.wheels[index], windows.torque[:, index]
+        value, error = spell_mean(torque, found, windows, noise)
+        driving = np.abs(torque[np.abs(windows.ground_speed) > _DRIVING])
+        work = float(np.nanquantile(driving, 0.95)) if np.isfinite(driving).any() else np.inf
+        allowed = max(3 * (vehicle.uncertainty.drive_torque_offset or 0.0), _IDLE_SHARE * work)
+        if not np.isfinite(value):
+            unknown.append(Unknown(f"{key} {wheel}", "no torque was measured at standstill"))
+        elif abs(value) > allowed:
+            why = f"at standstill the drive reads {value:.2f} N m, so it seems to hold the vehicle"
+            unknown.append(Unknown(f"{key} {wheel}", why))
+        else:
+            said = (
+                "mean of the stops that read alike; it assumes that nothing drives or holds the wheels there"
+            )
+            entry = evidence(windows, found, sources)
+            quantities.append(Quantity(key, value, error, "N m", entry, said, wheel=wheel))
+    return quantities, unknown
+
+
+def drawbar_zero(
+    windows: Windows, vehicle: Vehicle, sources: Sequence[str], noise: float
+) -> tuple[list[Quantity], list[Unknown]]:
+    """Drawbar zero from standstill, or else from driving with a bar that nothing moves.
+
+    ``noise`` is the standard deviation of a drawbar sample, N.
+    """
+    key = "drawbar_offset"
+    if not np.isfinite(windows.drawbar).any() or not np.any(windows.drawbar):
+        return [], [Unknown(key, "there is no drawbar_force")]
+    allowed = max(3 * (vehicle.uncertainty.drawbar_offset or 0.0), 0.01 * vehicle.mass * GRAVITY)
+    found = standstills(windows, vehicle)
+    said = "mean of the stops that read alike; it assumes that the bar is slack there"
+    why = f"no standstill of {_LEAST_STANDING:.0f} s or longer, and none free of a tool"
+    if found:
+        found = resting(windows.drawbar[:, None], found, windows, noise)
+        value, error = spell_mean(windows.drawbar, found, windows, noise)
+        why = f"at standstill it reads {value:.1f} N, so the bar seems to be under tension"
+    if not found or not abs(value) <= allowed:
+        found = _free_passes(windows, noise)
+        said = "mean over driving in which the drawbar force does not move; it assumes that nothing is towed there"
+        if not found:
+            return [], [Unknown(key, why)]
+        value, error = spell_mean(windows.drawbar, found, windows, noise)
+        if not abs(value) <= allowed:
+            return [], [Unknown(key, why)]
+    return [Quantity(key, value, error, "N", evidence(windows, found, sources), said)], []
+
+
+def _free_passes(windows: Windows, noise: float) -> list[Spell]:
+    """Spells of driving in which the windows' drawbar means scatter no more than sensor noise makes them."""
+    moving = (np.abs(windows.ground_speed) > _DRIVING) & np.isfinite(windows.drawbar)
+    least = int(_LEAST_FREE / windows.length)
+    found = []
+    for spell in spells(moving, windows.recording, least):
+        bar, count = windows.drawbar[spell.rows], windows.count[spell.rows]
+        if np.std(bar) < 2 * noise / np.sqrt(np.median(count)):
+            found.append(spell)
+    return found
+
+
+def inclination_zeros(
+    windows: Windows, vehicle: Vehicle, sources: Sequence[str], noise: float
+) -> tuple[list[Quantity], list[Unknown]]:
+    """Zeros of accelerometer and pitch sensor from standstill, as far as they can be told.
+
+    Standing on slope θ the accelerometer reads b + g sinθ, the pitch sensor p + θ: the data tell b - g p, or b + g sinθ
+    where there is no pitch sensor, and no more. The sum is split by the priors' variances (the best linear estimate),
+    and what stays open is in both intervals. ``noise`` is that of an accelerometer sample, m/s².
+    """
+    bias_key, pitch_key = "acceleration_bias_x", "pitch_offset"
+    no_pitch = Unknown(pitch_key, "there is no pitch")
+    pitched = bool(np.isfinite(windows.pitch).any())
+    if not np.isfinite(windows.acceleration).any():
+        why = "slope and zero of a pitch sensor read alike; it takes an accelerometer, or ground known to be level"
+        return [], [
+            Unknown(bias_key, "there is no acceleration_x"),
+            Unknown(pitch_key, why) if pitched else no_pitch,
+        ]
+    found = [s for s in standstills(windows, vehicle) if np.isfinite(windows.acceleration[s.rows]).any()]
+    if not found:
+        why = f"no standstill of {_LEAST_STANDING:.0f} s or longer"
+        return [], [Unknown(bias_key, why), Unknown(pitch_key, why) if pitched else no_pitch]
+    pitched = all(np.isfinite(windows.pitch[s.rows]).any() for s in found)
+    slope = windows.pitch if pitched else np.zeros(len(windows))
+    total, error = spell_mean(windows.acceleration - GRAVITY * np.sin(slope), found, windows, noise)
+    stated, told = vehicle.uncertainty, evidence(windows, found, sources)
+    # The ground differs from spell to spell, a sensor's zero does not.
+    ground = (_DEFAULT_SLOPE if stated.slope is None else stated.slope) / np.sqrt(len(found))
+    other = GRAVITY * (_DEFAULT_PITCH if pitched else ground)
+    own = _UNKNOWN_BIAS if stated.acceleration_bias is None else stated.acceleration_bias
+    if abs(total) > 3 * np.hypot(own, other):
+        own = max(own, _UNKNOWN_BIAS)
+    share = own**2 / (own**2 + other**2)
+    left = own * other / np.hypot(own, other)
+    if not pitched:
+        said = "mean at standstill, split between bias and slope by their priors: they cannot be told apart"
+        bias = Quantity(bias_key, share * total, float(np.hypot(share * error, left)), "m/s^2", told, said)
+        return [bias], [no_pitch]
+    said = "accelerometer less g sin(pitch) at standstill, split between the two zeros by their priors: only the difference is told"
+    rest = 1 - share
+    bias = Quantity(bias_key, share * total, float(np.hypot(share * error, left)), "m/s^2", told, said)
+    tilt = -rest * total / GRAVITY
+    pitch = Quantity(pitch_key, tilt, float(np.hypot(rest * error, left)) / GRAVITY, "rad", told, said)
+    return [bias, pitch], []
+
+
+def yaw_rate_zero(windows: Windows, vehicle: Vehicle, yaw_rate: Floats) -> float:
+    """Mean of the yaw rate (n,) at standstill, 0 without any: a gyroscope's zero shifts the slip from side to side."""
+    found = standstills(windows, vehicle)
+    rest = [yaw_rate[s.rows][np.isfinite(yaw_rate[s.rows])] for s in found]
+    return float(np.mean(np.concatenate(rest))) if sum(map(len, rest)) else 0.0
