@@ -56,4 +56,4 @@ def from_arrow(name: str, column: Any, source: str | None) -> npt.NDArray[Any]:
         raise InputError(
             f"holds {kind}, not numbers", file=source, place=f"column {name}", mend="give one number a row"
         )
-    return column.to_numpy()
+    return column.to_numpy(zero_copy_only=False)

@@ -105,7 +105,7 @@ def texts(name: str, column: npt.NDArray[Any], rows: int, source: str | None) ->
 
 def _label(value: Any) -> str:
     missing = value is None or value != value or type(value).__name__ == "NAType"
-    return "" if missing else str(value)
+    return "" if missing else str(value).strip()
 
 
 def _from_pandas(series: Any) -> Any:

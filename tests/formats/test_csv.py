@@ -1,0 +1,231 @@
+"""Text tables in all their dialects give the same recording; what is none is refused with row and mend."""
+
+from __future__ import annotations
+
+import gzip
+import hashlib
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from terragrip.errors import InputError
+from terragrip.formats import read, read_table
+from terragrip.recording import Recording
+
+
+def as_text(log: pd.DataFrame, separator: str = ",", decimal: str = ".") -> str:
+    return log.to_csv(index=False, sep=separator, decimal=decimal)
+
+
+def same(recording: Recording, log: pd.DataFrame) -> None:
+    for name in log.columns:
+        if name == "soil":
+            assert list(recording["soil"]) == list(log["soil"])
+        else:
+            np.testing.assert_allclose(recording[name], log[name], rtol=1e-12)
+
+
+def put(folder: Path, content: str | bytes, name: str = "log.csv") -> Path:
+    path = folder / name
+    path.write_bytes(content.encode() if isinstance(content, str) else content)
+    return path
+
+
+DIALECTS: dict[str, Callable[[pd.DataFrame], bytes]] = {
+    "comma": lambda log: as_text(log).encode(),
+    "semicolon": lambda log: as_text(log, ";").encode(),
+    "semicolon, decimal comma": lambda log: as_text(log, ";", ",").encode(),
+    "tab, decimal comma": lambda log: as_text(log, "\t", ",").encode(),
+    "bar": lambda log: as_text(log, "|").encode(),
+    "blanks": lambda log: log.to_string(index=False).encode(),
+    "quoted decimal comma": lambda log: as_text(log, ",", ",").encode(),
+    "gzip": lambda log: gzip.compress(as_text(log).encode()),
+    "byte order mark": lambda log: b"\xef\xbb\xbf" + as_text(log).encode(),
+    "UTF-16": lambda log: as_text(log, "\t").encode("utf-16"),
+    "UTF-16 without mark": lambda log: as_text(log).encode("utf-16-le"),
+    "latin-1": lambda log: as_text(log.assign(Höhe=1)).encode("latin-1"),
+    "Windows line ends": lambda log: as_text(log).replace("\n", "\r\n").encode(),
+    "old Mac line ends": lambda log: as_text(log).replace("\n", "\r").encode(),
+    "comments first": lambda log: b"# logger 3\n# run 7, 2021\n\n" + as_text(log).encode(),
+    "Excel hint": lambda log: b"sep=;\n" + as_text(log, ";").encode(),
+    "blank trailing column": lambda log: as_text(log).replace("\n", ",\n").encode(),
+    "trailing separator in rows only": lambda log: as_text(log).replace("\n", ",\n").replace(",\n", "\n", 1).encode(),
+    "blanks after commas": lambda log: as_text(log).replace(",", ", ").encode(),
+    "quoted header": lambda log: as_text(log).replace(as_text(log).split("\n")[0], ",".join(f'"{c}"' for c in log)).encode(),
+    "blank lines": lambda log: as_text(log).replace("\n", "\n\n").encode(),
+    "units row": lambda log: as_text(log).replace("\n", "\ns,m/s,rad/s,rad/s,N m,N m,N,\n", 1).encode(),
+    "units row in brackets": lambda log: as_text(log).replace("\n", "\n[s],[m/s],[rad/s],[rad/s],[Nm],[Nm],[N],-\n", 1).encode(),
+    "no line end at the end": lambda log: as_text(log).rstrip("\n").encode(),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("dialect", DIALECTS)
+def test_every_dialect_reads_alike(tmp_path: Path, log: pd.DataFrame, dialect: str) -> None:
+    content = DIALECTS[dialect](log)
+    recording = read(put(tmp_path, content))
+    same(recording, log)
+    assert recording.sha256 == hashlib.sha256(content).hexdigest()
+    assert recording.source == str(tmp_path / "log.csv")
+
+
+def test_missing_cells_of_any_spelling_are_nan(tmp_path: Path) -> None:
+    spellings = ["", "NaN", "nan", "NA", "n/a", "null", "None", "-", "1.#QNAN"]
+    rows = "\n".join(f"{k},{cell},1" for k, cell in enumerate(spellings))
+    recording = read(put(tmp_path, f"time,ground_speed,wheel_speed_l\n{rows}\n90,2.5,1\n"))
+    assert np.isnan(recording["ground_speed"][:-1]).all()
+    assert recording["ground_speed"][-1] == 2.5
+
+
+@pytest.mark.parametrize(
+    "header",
+    [
+        "time [s],ground_speed [km/h],wheel_speed_l [rpm],drawbar_force [kN]",
+        "time (ms),ground_speed (km/h),wheel_speed_l (rpm),drawbar_force (kN)",
+        "time,ground_speed,wheel_speed_l,drawbar_force\ns,km/h,rpm,kN",
+    ],
+)
+def test_units_that_the_file_states_are_converted(tmp_path: Path, header: str) -> None:
+    stamp = 2000 if "(ms)" in header else 2
+    recording = read(put(tmp_path, f"{header}\n0,3.6,60,1.5\n{stamp},7.2,30,2\n"))
+    np.testing.assert_allclose(recording.time, [0, 2])
+    np.testing.assert_allclose(recording["ground_speed"], [1, 2])
+    np.testing.assert_allclose(recording["wheel_speed_l"], [2 * np.pi, np.pi])
+    np.testing.assert_allclose(recording["drawbar_force"], [1500, 2000])
+
+
+def test_dates_in_the_time_column(tmp_path: Path) -> None:
+    rows = "".join(f"2021-05-04 10:00:0{k}.5,1,2\n" for k in range(3))
+    recording = read(put(tmp_path, "time,ground_speed,wheel_speed_l\n" + rows))
+    np.testing.assert_allclose(recording.time, [0, 1, 2])
+
+
+def test_a_last_row_that_was_cut_off_is_left_out(tmp_path: Path, log: pd.DataFrame) -> None:
+    text = as_text(log)
+    recording = read(put(tmp_path, text[: text.rindex("\n", 0, -1) + 12]))
+    same(recording, log.iloc[:-1])
+    assert any("cut off" in note for note in recording.notes)
+
+
+def test_a_number_in_the_first_row_of_a_text_column_is_no_units_row(tmp_path: Path) -> None:
+    table = read_table(put(tmp_path, "time,state\n0,s\n1,m\n"))
+    assert list(table.columns["state"]) == ["s", "m"]
+
+
+HEAD = "time,ground_speed,wheel_speed_l\n"
+GOOD_ROWS = "0,1,5\n1,1,5\n"
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        ("", "is empty; give a table"),
+        ("\n  \n", "is empty; give a table"),
+        (HEAD, "the table is empty; give a log with at least one row"),
+        ("# only\n# comments\n", "is empty"),
+        ("0,1,5\n1,1,5\n", "the first row holds numbers, not column names; put a header row"),
+        (HEAD + GOOD_ROWS + "2,fast,5\n", "column ground_speed, row 3: 'fast' is not a number; leave the cell empty"),
+        (HEAD + GOOD_ROWS + "zwei,1,5\n", "column time, row 3: 'zwei' is not a number"),
+        (HEAD + GOOD_ROWS + "2,1\n3,1,5\n", "row 3: has 2 cells, the header 3; give every row as many cells"),
+        (HEAD + GOOD_ROWS + "2,1,5,6,7\n", "row 3: has 5 cells, the header 3"),
+        (HEAD + GOOD_ROWS + "2,inf,5\n", "column ground_speed, row 3 (time 2 s): is infinite"),
+        (HEAD + GOOD_ROWS + "1,1,5\n", "column time, row 3 (time 1 s): time repeats"),
+        (HEAD + GOOD_ROWS + ",1,5\n", "column time, row 3: time is not a finite number"),
+        ("time,groundspeed,wheel_speed_l\n" + GOOD_ROWS, "column ground_speed: is missing; the nearest column is 'groundspeed'"),
+        ("t;v;w\n0;1;5\n", "column time: is missing; map the log's columns in a profile"),
+        ("time,ground_speed,wheel_speed_l,ground_speed\n0,1,5,1\n", "column ground_speed: stands twice"),
+        ("time,ground_speed [N],wheel_speed_l\n0,1,5\n", "column ground_speed: 'N' measures a force, where a speed is"),
+        (b"PK\x03\x04 rest", "is a zip or an Excel workbook; save the sheet as CSV"),
+        (b"\x89HDF\r\n\x1a\n", "is an HDF5 or MATLAB 7.3 file"),
+        (b"\x00\x01\x02\x03binary", "is not a table of text; give a CSV or Parquet file"),
+        (b"\x1f\x8b\x08\x00broken", "is a damaged gzip file"),
+        (gzip.compress(HEAD.encode())[:-6], "is a damaged gzip file"),
+        (b"PAR1" + b"x" * 30, "is a damaged Parquet file, or none"),
+    ],
+)  # fmt: skip
+def test_refusal(tmp_path: Path, content: str | bytes, message: str) -> None:
+    path = put(tmp_path, content)
+    with pytest.raises(InputError) as caught:
+        read(path)
+    assert str(caught.value).startswith(f"{path}: {message}")
+    assert caught.value.mend
+    assert "\n" not in str(caught.value)
+
+
+def test_text_in_a_large_table_names_its_row(tmp_path: Path) -> None:
+    rows = [f"{k},1,5" for k in range(60_000)]
+    rows[54_321] = "54321,1,much"
+    with pytest.raises(InputError, match="column wheel_speed_l, row 54322: 'much' is not a number"):
+        read(put(tmp_path, HEAD + "\n".join(rows) + "\n"))
+
+
+def test_no_such_file(tmp_path: Path) -> None:
+    put(tmp_path, HEAD + GOOD_ROWS, "field_run_3.csv")
+    with pytest.raises(InputError, match=r"field_run3\.csv: no such file; did you mean field_run_3\.csv\?"):
+        read(tmp_path / "field_run3.csv")
+    with pytest.raises(InputError, match=r"is a folder; name a file in it, such as field_run_3\.csv"):
+        read(tmp_path)
+    with pytest.raises(InputError, match="no such file; there is no folder"):
+        read(tmp_path / "nowhere" / "log.csv")
+
+
+_cell = st.sampled_from(
+    [
+        "",
+        "1",
+        "2.5",
+        "-3e5",
+        "1,5",
+        "nan",
+        "inf",
+        "x",
+        '"',
+        "'",
+        "é",
+        "#",
+        " ",
+        "2021-01-01",
+        "1;2",
+        "0x10",
+        "\x00",
+        "\r",
+    ]
+)
+_row = st.lists(_cell, max_size=5)
+_text = st.builds(
+    lambda rows, separator, end: end.join(separator.join(row) for row in rows),
+    st.lists(_row, max_size=6),
+    st.sampled_from([",", ";", "\t", " ", "|", ""]),
+    st.sampled_from(["\n", "\r\n", "\r"]),
+)
+_headed = st.builds(
+    lambda rows: "time,ground_speed,wheel_speed_a,soil\n" + "\n".join(",".join(row) for row in rows),
+    st.lists(st.lists(_cell, min_size=3, max_size=5), max_size=6),
+)
+_content = st.binary(max_size=80) | (_text | _headed).flatmap(
+    lambda text: st.sampled_from(["utf-8", "utf-16", "latin-1", "utf-16-le"]).map(
+        lambda e: text.encode(e, "ignore")
+    )
+)
+
+
+@settings(max_examples=500)
+@given(_content, st.booleans())
+def test_any_bytes_are_a_recording_or_refused(
+    tmp_path_factory: pytest.TempPathFactory, content: bytes, packed: bool
+) -> None:
+    path = tmp_path_factory.mktemp("bytes") / "log.csv"
+    path.write_bytes(gzip.compress(content) if packed else content)
+    try:
+        recording = read(path)
+    except InputError as refusal:
+        told = str(refusal)
+    else:
+        assert np.all(np.diff(recording.time) > 0)
+        return
+    assert "\n" not in told
+    assert str(path) in told

@@ -1,0 +1,118 @@
+"""Parquet: whole, in blocks, and damaged."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pyarrow as pa
+import pyarrow.parquet as pq
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from terragrip.errors import InputError
+from terragrip.formats import iter_parquet, read
+
+
+def put(folder: Path, log: pd.DataFrame) -> Path:
+    path = folder / "log.parquet"
+    log.to_parquet(path, index=False, row_group_size=70)
+    return path
+
+
+def test_whole_file(tmp_path: Path, log: pd.DataFrame) -> None:
+    recording = read(put(tmp_path, log.assign(extra=1)))
+    for name in log.columns:
+        np.testing.assert_array_equal(recording[name], log[name].to_numpy())
+    assert recording.sha256 is not None
+    assert recording.notes == ("Columns that are not used: extra.",)
+
+
+def test_types_become_numbers_and_labels(tmp_path: Path, log: pd.DataFrame) -> None:
+    log["soil"] = log["soil"].astype("category")
+    log["ground_speed"] = log["ground_speed"].astype("float32").astype("Float32").where(log.index != 3)
+    log["drawbar_force"] = log["drawbar_force"].astype(int)
+    recording = read(put(tmp_path, log))
+    assert recording["soil"][0] == "grass"
+    assert np.flatnonzero(np.isnan(recording["ground_speed"])).tolist() == [3]
+    assert recording["drawbar_force"].dtype == np.float64
+
+
+@pytest.mark.parametrize("rows", [1, 64, 299, 300, 1000])
+def test_blocks_make_up_the_whole(tmp_path: Path, log: pd.DataFrame, rows: int) -> None:
+    log.loc[:150, "drawbar_force"] = np.nan  # a block may lack a channel
+    path = put(tmp_path, log)
+    whole, blocks = read(path), list(iter_parquet(path, rows))
+    assert max(len(block) for block in blocks) <= rows
+    for name in log.columns:
+        np.testing.assert_array_equal(np.concatenate([block[name] for block in blocks]), whole[name])
+    assert {(block.sha256, block.notes, block.source) for block in blocks} == {
+        (whole.sha256, whole.notes, whole.source)
+    }
+
+
+@pytest.mark.parametrize(
+    ("column", "row", "value", "message"),
+    [
+        ("time", 200, 1.99, r"column time, row 201 \(time 1.99 s\): time repeats"),
+        ("time", 200, 0.5, r"column time, row 201 \(time 0.5 s\): time runs back from 1.99 s"),
+        ("time", 250, np.nan, "column time, row 251: time is not a finite number"),
+        ("wheel_speed_l", 250, np.inf, r"column wheel_speed_l, row 251 \(time 2.5 s\): is infinite"),
+    ],
+)
+@pytest.mark.parametrize("rows", [50, 100, 1000])
+def test_blocks_name_the_row_of_the_whole(
+    tmp_path: Path, log: pd.DataFrame, column: str, row: int, value: float, message: str, rows: int
+) -> None:
+    log.loc[row, column] = value
+    path = put(tmp_path, log)
+    with pytest.raises(InputError, match=message):
+        read(path)
+    with pytest.raises(InputError, match=message):
+        list(iter_parquet(path, rows))
+
+
+def test_blocks_refuse_what_the_whole_refuses(tmp_path: Path, log: pd.DataFrame) -> None:
+    for spoilt, message in (
+        (log.drop(columns="ground_speed"), "column ground_speed: is missing"),
+        (log.assign(ground_speed=np.nan), "column ground_speed: holds no value"),
+        (log.assign(ground_speed="fast"), "'fast' is not a number"),
+        (log.iloc[:0], "the table is empty"),
+    ):
+        path = put(tmp_path, spoilt)
+        for reading in (read, lambda p: list(iter_parquet(p, 100))):
+            with pytest.raises(InputError, match=message):
+                reading(path)
+
+
+def test_a_column_of_lists_is_refused(tmp_path: Path, log: pd.DataFrame) -> None:
+    path = tmp_path / "log.parquet"
+    table = pa.table({**{n: log[n] for n in log if n != "ground_speed"}, "ground_speed": [[1.0, 2.0]] * 300})
+    pq.write_table(table, path)
+    with pytest.raises(InputError, match=r"column ground_speed: holds list<.*>, not numbers"):
+        read(path)
+
+
+@settings(max_examples=150)
+@given(st.data())
+def test_a_damaged_file_is_a_recording_or_refused(
+    tmp_path_factory: pytest.TempPathFactory, data: st.DataObject
+) -> None:
+    folder = tmp_path_factory.mktemp("damage")
+    time = np.arange(50.0)
+    frame = pd.DataFrame({"time": time, "ground_speed": time, "wheel_speed_a": time, "soil": "x"})
+    content = bytearray(put(folder, frame).read_bytes())
+    for _ in range(data.draw(st.integers(1, 4))):
+        content[data.draw(st.integers(4, len(content) - 1))] = data.draw(st.integers(0, 255))
+    path = folder / "log.parquet"
+    path.write_bytes(content[: data.draw(st.integers(4, len(content)))])
+    try:
+        recording = read(path)
+    except InputError as refusal:
+        told = str(refusal)
+    else:
+        assert np.all(np.diff(recording.time) > 0)
+        return
+    assert "\n" not in told
