@@ -149,6 +149,27 @@ def test_geographic_metres():
     assert (east, north) == (pytest.approx(100), pytest.approx(50))
 
 
+@pytest.mark.parametrize(
+    ("soil", "low", "high"), [("hard", 0.7, 2.0), ("fine", 1.4, 4.0), ("coarse", 2.8, 12.0)]
+)
+def test_rough_ground_shifts_load_between_wheels_but_not_on_average(drive, soil, low, high):
+    """Per cent of each wheel's load (docs/simulation.md)."""
+    scenario = Scenario.from_dict(
+        {
+            "sensors": {"use": "exact"},
+            "route": {"segments": [{"soil": soil, "length": 60}]},
+            "speed": [[0, 0], [1, 0.6]],
+            "duration": 60,
+        }
+    )
+    trace = drive(scenario, stride=10)
+    load = trace["load"][trace["time"] > 5]
+    spread = 100 * load.std(axis=0) / load.mean(axis=0)
+    assert np.all(spread > low)
+    assert np.all(spread < high)
+    np.testing.assert_allclose(load.sum(axis=1).mean(), 139 * 9.80665, rtol=2e-3)
+
+
 def test_soil_variation_has_the_asked_mean_and_spread():
     """Over many metres and seeds: mean 1, relative SD as the library says."""
     scenario = two_soils(0.4)

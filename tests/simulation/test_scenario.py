@@ -75,7 +75,7 @@ def test_use_merges_and_extends_inherits(file):
     ("change", "complaint"),
     [
         ("duration: 10 s\nspede: 3", r"drive.yaml: spede \(line \d+\): unknown key; did you mean 'speed'"),
-        ("duration: -3", r"duration \(line 6\): -3 is impossible"),
+        ("duration: -3", r"duration \(line 6\): -3 is impossible; it must be at least 0.1"),
         ("duration: 10 kg", r"duration \(line 6\): .*measures a mass"),
         ("duration: 10\ntools: [plough]", r"the key stands twice"),
         ("duration: 10\nvehicle: tractor", r"vehicle: nothing called 'tractor' in the library's vehicles"),
@@ -146,6 +146,22 @@ def test_a_machine_the_plant_does_not_know_is_refused(quiet):
     }
     with pytest.raises(InputError, match="two axles of two wheels"):
         simulate(quiet(vehicle=robot))
+
+
+def test_a_motion_that_diverges_is_refused(quiet):
+    from terragrip.simulation import simulate
+
+    with pytest.raises(InputError, match=r"step: the motion diverges after .* use a smaller step"):
+        simulate(quiet(robot={"tire_stiffness": 1e6, "tire_damping": 1e6}, step=0.005))
+
+
+def test_nothing_left_to_record_is_refused(quiet):
+    from terragrip.simulation import simulate
+
+    with pytest.raises(InputError, match="no sensor reads anything"):
+        simulate(quiet(faults=[{"kind": "gap", "at": 0, "duration": 100}]))
+    with pytest.raises(InputError, match="seed -1 is negative"):
+        simulate(quiet(), seed=-1)
 
 
 def test_a_sensor_on_a_wheel_that_is_not_there_is_refused(quiet):

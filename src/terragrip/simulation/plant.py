@@ -63,7 +63,7 @@ def make_plant(scenario: Scenario, vehicle: Vehicle, radius: Floats, terrain: Te
 def run(plant: Plant, duration: float, step: float, stride: int) -> Floats:
     """Integrate from rest at position 0; the trace (rows, PLANT_COLUMNS), a row every ``stride`` steps.
 
-    Ends early where the path ends. Raises FloatingPointError if the state left the finite numbers (a defect of ours).
+    Ends early where the path ends. Raises InputError where the motion diverges (springs too stiff for the step).
     """
     from terragrip.simulation._plant import ffi, lib
 
@@ -80,8 +80,14 @@ def run(plant: Plant, duration: float, step: float, stride: int) -> Floats:
         ffi.cast("double *", ffi.from_buffer("double[]", trace)),
         rows,
     )
+    if status == lib.PLANT_NOT_FINITE:
+        raise InputError(
+            f"the motion diverges after {rows[0] * stride * step:.3g} s",
+            place="step",
+            mend="use a smaller step or softer springs",
+        )
     if status != lib.PLANT_OK:
-        raise FloatingPointError(f"the plant stopped with status {status} after {rows[0]} rows")
+        raise RuntimeError(f"the plant refused its arguments (status {status})")
     return trace[: rows[0]]
 
 

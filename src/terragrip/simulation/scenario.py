@@ -223,8 +223,9 @@ class Driver(Part):
 class Robot(Part):
     """What a vehicle file does not hold: tyres, motors, control, and how far the true machine is from its file.
 
-    ``power_limit`` [W] holds for all motors together, ``torque_limit`` [N m] for each wheel. ``wheel_radius_sd`` is
-    relative, common to all wheels. ``chassis_torsion``: force at each wheel per metre of warp. ``slip_speed`` [m/s]: slower than this, slip is taken over this speed.
+    ``power_limit`` [W] holds for all motors together, ``torque_limit`` [N m] for each wheel. ``chassis_torsion``: force at
+    each wheel per metre of warp (one diagonal up). ``slip_speed`` [m/s]: slower than this, slip is taken over this
+    speed. ``wheel_radius_sd`` is relative, common to all wheels.
     """
 
     wheel_mass: Mass = 5.4
@@ -324,7 +325,7 @@ class Scenario(Part):
     soils: dict[str, Soil]
     tools: Annotated[tuple[Tool, ...], Field(max_length=2)] = ()
     speed: tuple[tuple[Time, Annotated[float, _number("m/s", -5, 5)] | Literal["off"]], ...]
-    duration: Annotated[float, _number("s", 0, LONGEST_RUN, above=True)]
+    duration: Annotated[float, _number("s", 0.1, LONGEST_RUN)]
     soft_spots: Annotated[tuple[SoftSpot, ...], Field(max_length=8)] = ()
     driver: Driver = Field(default_factory=Driver)
     sensors: Sensors

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
+from terragrip.errors import InputError
 from terragrip.recording import Recording
 from terragrip.simulation import faults, plant, terrain
 from terragrip.simulation.fields import stream
@@ -46,7 +47,6 @@ class SimulationResult:
         """Write recording.parquet, truth.parquet, vehicle.yaml and true_parameters.json; raises InputError if it cannot."""
         import json
 
-        from terragrip.errors import InputError
         from terragrip.files import replacing
 
         target = Path(folder)
@@ -77,6 +77,8 @@ def simulate(
     if not isinstance(scenario, Scenario):
         scenario = Scenario.load(scenario)
     seed = scenario.seed if seed is None else seed
+    if min(seed, machine_seed or 0) < 0:
+        raise InputError(f"the seed {min(seed, machine_seed or 0)} is negative", mend="give 0 or more")
     machine_seed = seed if machine_seed is None else machine_seed
     vehicle = scenario.nominal_vehicle()
     plant.check_layout(vehicle)
@@ -118,6 +120,10 @@ def _one_table(series: list[Series]) -> tuple[Floats, dict[str, Floats]]:
         for values in one.values.values():
             some |= np.isfinite(values)
         measured.append(some)
+    if not any(some.any() for some in measured):
+        raise InputError(
+            "no sensor reads anything", place="faults", mend="leave some samples outside the gaps"
+        )
     time = np.unique(np.concatenate([one.time[some] for one, some in zip(series, measured, strict=True)]))
     channels: dict[str, Floats] = {}
     for one, some in zip(series, measured, strict=True):
