@@ -1,0 +1,82 @@
+/* Considered constants (Schmidt-Kalman, PHYSICS 6): what a constant that the data cannot tell does to the estimate. Columns pass through
+ * the gains that the filter itself took; of a bank, through the gains' mean. */
+#include "filter.h"
+
+size_t tg_consider_size(void) { return sizeof(tg_consider); }
+
+tg_status tg_consider_init(tg_consider *c, const tg_filter *f, int32_t columns)
+{
+    if (!c || !f || columns < 0 || columns > TG_MAX_CONSIDERED) return TG_BAD_ARGUMENT;
+    memset(c, 0, sizeof *c);
+    c->columns = columns;
+    c->wheels = f->wheels;
+    c->states = f->states;
+    return TG_OK;
+}
+
+/* The column over the last step's map, with what one SD of its constant adds on the way. */
+TG_INLINE void consider_predict(const tg_passage *p, const tg_deviation *d, const tg_real *s, tg_real *prior, const int n)
+{
+    tg_real v = p->keep * s[n + 1] - p->g * s[n];
+    for (int i = 0; i < n; i++) v += p->c[i] * s[i];
+    for (int i = 0; i <= n; i++) prior[i] = s[i];
+    prior[n + 1] = d ? v + p->dt * d->acceleration : v;
+    for (int i = 0; i < n; i++) {
+        const tg_real omega = p->phi[i] * s[n + 2 + i] + p->b[i] * s[i];
+        prior[n + 2 + i] = d ? omega + p->psi[i] * d->wheel_acceleration[i] : omega;
+    }
+}
+
+/* The gain of the c-th channel taken: the filter's, or the mean over the bank's modes. */
+TG_INLINE const tg_real *consider_gain(const tg_filter *f, int c, tg_real *mean, const int n)
+{
+    if (f->tuning.policy != TG_BANK) return f->gain[c];
+    const tg_bank_state *const bank = &f->policy.bank;
+    for (int i = 0; i < TG_TWICE(n); i++) {
+        mean[i] = 0;
+        for (int m = 0; m < TG_MODES; m++) mean[i] += bank->probability[m] * bank->gain[c][i][m];
+    }
+    return mean;
+}
+
+TG_INLINE void consider_columns(tg_consider *c, const tg_filter *f, const tg_deviation *deviations, const int n)
+{
+    const int rows = TG_TWICE(n);
+    for (int k = 0; k < c->columns; k++) {
+        consider_predict(&f->passage, deviations ? deviations + k : NULL, c->s[k], c->prior[k], n);
+        for (int i = 0; i < rows; i++) c->s[k][i] = c->prior[k][i];
+    }
+    for (int m = 0; m < f->taken; m++) {
+        tg_real mean[TG_ROWS];
+        const tg_real *const gain = consider_gain(f, m, mean, n);
+        const int o = f->channel[m];
+        for (int k = 0; k < c->columns; k++) {
+            tg_real *const s = c->s[k];
+            tg_real expected;
+            if (o <= n)
+                expected = s[n + 1 + o];
+            else {
+                expected = deviations ? deviations[k].accelerometer : 0;
+                for (int i = 0; i <= n; i++) expected += f->accelerometer[i] * s[i];
+            }
+            for (int i = 0; i < rows; i++) s[i] -= gain[i] * expected;
+        }
+    }
+}
+
+tg_status tg_consider_step(tg_consider *c, const tg_filter *f, const tg_deviation *deviations)
+{
+    if (!c || !f || c->wheels != f->wheels) return TG_BAD_ARGUMENT;
+#define COLUMNS(n, stride) consider_columns(c, f, deviations, n)
+    TG_BY_WHEELS(f->wheels, COLUMNS)
+#undef COLUMNS
+    return TG_OK;
+}
+
+tg_status tg_consider_columns(const tg_consider *c, tg_real *s)
+{
+    if (!c || !s) return TG_BAD_ARGUMENT;
+    for (int k = 0; k < c->columns; k++)
+        for (int e = 0; e < c->states; e++) s[k * c->states + e] = c->s[k][tgi_row(c->wheels, e)];
+    return TG_OK;
+}
