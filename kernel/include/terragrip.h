@@ -235,6 +235,7 @@ typedef struct {
     tg_uncertainty uncertainty;
     tg_real prior_adhesion, prior_adhesion_std;     /* before the first sample */
     tg_real prior_resistance, prior_resistance_std;
+    tg_real slope_spread;           /* rad: by how much the slope may differ from the measured pitch (from 0 without one) */
     tg_real standstill_speed;       /* m/s */
     tg_real gap;                    /* s without any wheel or ground speed after which the motion starts anew */
     tg_real max_step;               /* s; a longer step is predicted in pieces */
@@ -245,8 +246,10 @@ typedef struct {
 
 typedef struct tg_estimator tg_estimator;
 size_t tg_estimator_size(void);
-/* Tuned thresholds, tuning and priors; the machine is left empty. */
+/* Tuned thresholds, tuning and priors; the machine is left empty, and with it the random walks. */
 tg_settings tg_default_settings(void);
+/* The tuned random walks (tuning.walk) of the machine that the settings hold. */
+tg_status tg_tune_walks(tg_settings *settings);
 tg_status tg_estimator_init(tg_estimator *e, const tg_settings *settings);
 tg_status tg_estimator_update(tg_estimator *e, const tg_sample *sample, tg_estimate *out);
 /* `rows` samples from columns (a null pointer: never measured) to columns (null: not wanted); doubles on either build. `done` tells

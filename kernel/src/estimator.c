@@ -1,6 +1,7 @@
 /* One raw sample in, one row of estimates out. */
 #include "estimator.h"
 
+#define TG_JOLT_MEMORY 5 /* s */
 #define TG_LONGEST_WALK 30 /* s of random walk that a gap adds at most: beyond it the ground is simply unknown */
 
 /* ---- the filter ---- */
@@ -83,9 +84,23 @@ static void measured(const tg_estimator *e, const tg_row *row, tg_real *y, tg_re
         r[i] = tgi_square(s->noise[TG_WHEEL_SPEED + i]);
     }
     y[n] = d * row->value[TG_GROUND_SPEED];
-    r[n] = tgi_square(s->noise[TG_GROUND_SPEED]);
+    r[n] = row->ground_variance;
     y[n + 1] = d * row->value[TG_ACCELERATION_X];
-    r[n + 1] = tgi_square(s->noise[TG_ACCELERATION_X]) + tgi_square(s->noise[TG_DRAWBAR_FORCE] / s->machine.mass);
+    r[n + 1] = 2 * e->jolt;
+}
+
+/* What the accelerometer reads beyond the model, its mean square over about TG_JOLT_MEMORY: on rough ground the body's jolts are
+ * larger than the sensor's noise. */
+static void watch_jolts(tg_estimator *e, const tg_step *step, tg_real r, tg_real dt)
+{
+    const int32_t c = e->settings.machine.wheels + 1;
+    const tg_real least = tgi_square(e->settings.noise[TG_ACCELERATION_X])
+                        + tgi_square(e->settings.noise[TG_DRAWBAR_FORCE] / e->settings.machine.mass);
+    if (isnan(step->innovation[c])) return;
+    tg_real square = tgi_square(step->innovation[c]), bound = 16 * step->innovation_variance[c];
+    if (square > bound) square = bound;
+    e->jolt += dt / (TG_JOLT_MEMORY + dt) * (square - (step->innovation_variance[c] - r) - e->jolt);
+    if (e->jolt < least) e->jolt = least;
 }
 
 static tg_real supervisor_of(const tg_settings *s, const tg_step *step)
@@ -127,10 +142,11 @@ static int32_t advance(tg_estimator *e, tg_row *row, const tg_drive *drive, tg_r
         return 0;
     }
     tg_consider_step(&e->consider, &e->filter, deviation);
+    watch_jolts(e, &step, r[s->machine.wheels + 1], dt);
     e->belief.nis = step.nis;
     e->belief.channels = step.channels;
     e->belief.supervisor = supervisor_of(s, &step);
-    for (int32_t j = 0; j < s->machine.wheels + 2; j++) row->outlier |= step.weight[j] < s->outlier_weight && !isnan(y[j]);
+    for (int32_t j = 0; j < s->machine.wheels + 2; j++) row->outlier |= step.weight[j] < s->outlier_weight && !isnan(y[j]) && !(row->reckoned && j == s->machine.wheels);
     return 1;
 }
 
@@ -191,11 +207,14 @@ tg_status tg_estimator_update(tg_estimator *e, const tg_sample *sample, tg_estim
     int32_t turned = tgi_track_motion(e, &row);
     tg_real q[TG_MAX_STATES];
     tgi_input_noise(e, row.time, dt, q); /* of the inputs held so far: before this row's are taken */
-    tgi_take_inputs(e, &row, &drive);
+    tgi_take_inputs(e, &row, dt, &drive);
     tgi_loads(e, &row, &drive);
     tg_course course = course_of(e, &row, was_standing, turned, &gap);
+    if (!e->started) e->ground_time = row.time;
+    tgi_reckon(e, &drive, course == TG_GO ? dt : 0, &row, q);
     if (!go_on(e, &row, &drive, course, dt, q)) gap = 1;
     balance_forces(e, &drive, row.time);
+    if (course == TG_GO && !row.reckoned && !isnan(row.value[TG_GROUND_SPEED])) tgi_remember_slip(e, &drive, dt);
 
     if (course == TG_GO && !gap) e->distance += (double)((travelled + tgi_fabs(e->belief.x[n + 1])) / 2 * dt);
     if (row.measured) {

@@ -6,9 +6,12 @@
 #include <string.h>
 
 #define TG_SPIKE 4 /* an increment beyond this many of its usual SDs is a spike */
+#define TG_INPUT_LAG ((tg_real)0.1) /* s */
 
 typedef struct { /* an input between its samples */
-    tg_real value;
+    tg_real value;    /* filtered */
+    tg_real variance; /* of the filtered value's noise */
+    tg_real raw;      /* last sample */
     tg_real level;    /* mean square of its increments, spikes clipped */
     tg_real interval; /* s between its last two samples */
     tg_real spike;    /* square of the last increment where that was a spike, else 0 */
@@ -27,6 +30,8 @@ typedef struct { /* one row, calibrated and checked, in the vehicle's own direct
     tg_real value[TG_SLOTS];
     int32_t measured; /* any wheel or ground speed */
     int32_t outlier;
+    int32_t reckoned; /* the ground speed is not measured but reckoned */
+    tg_real ground_variance;
 } tg_row;
 
 typedef struct { /* what drives the model between two rows, in the vehicle's own directions */
@@ -51,6 +56,16 @@ typedef struct { /* low-passed signals of the algebraic method */
     tg_real gain;                       /* of this row's low-pass: dt/(tau + dt) */
 } tg_algebra;
 
+typedef struct { /* ground speed and slope error with their covariance */
+    tg_real speed, error, speed_variance, covariance, error_variance;
+    tg_real acceleration; /* last sample */
+    int32_t running;
+} tgi_slope;
+
+typedef struct { /* low-passed while the ground speed is measured; the whole vehicle */
+    tg_real slip, adhesion;
+} tgi_slip_memory;
+
 struct tg_estimator {
     tg_settings settings;
     int32_t slots;             /* channels this machine can have */
@@ -67,6 +82,10 @@ struct tg_estimator {
     double last_raw_time[TG_SLOTS];
     tg_hold torque[8], drawbar, pitch, axle_load[8];
     tg_lowpass wheel_speed[8], ground_speed, acceleration, lateral, balance;
+    tgi_slip_memory slip_memory;
+    tgi_slope slope;
+    double ground_time;        /* of the last measured ground speed */
+    tg_real jolt;              /* variance of the accelerometer about the model, (m/s^2)^2 */
     tg_drive before;           /* inputs of the last row */
     tg_belief belief;
     tg_algebra algebra;
@@ -87,7 +106,7 @@ int32_t tgi_track_motion(tg_estimator *e, const tg_row *row);
 void tgi_loads(tg_estimator *e, const tg_row *row, tg_drive *drive);
 
 /* inputs.c */
-void tgi_take_inputs(tg_estimator *e, tg_row *row, tg_drive *drive);
+void tgi_take_inputs(tg_estimator *e, tg_row *row, tg_real dt, tg_drive *drive);
 void tgi_input_noise(const tg_estimator *e, double time, tg_real dt, tg_real *q);
 tg_input tgi_along(const tg_estimator *e, const tg_drive *drive);
 
@@ -98,6 +117,13 @@ void tgi_deviations(const tg_settings *s, const tg_input *u, const tg_real *mu, 
 /* settings.c */
 void tgi_believe(tg_estimator *e);
 tg_status tgi_filter_anew(tg_filter *f, tg_consider *c, const tg_settings *s);
+
+/* slope.c */
+tg_real tgi_slope_update(tg_estimator *e, const tg_row *row, tg_real pitch, tg_real dt);
+
+/* reckoning.c */
+void tgi_remember_slip(tg_estimator *e, const tg_drive *drive, tg_real dt);
+void tgi_reckon(tg_estimator *e, const tg_drive *drive, tg_real dt, tg_row *row, tg_real *q);
 
 /* algebraic.c */
 void tgi_algebraic(tg_estimator *e, const tg_row *row, const tg_drive *drive, int32_t anew);

@@ -33,7 +33,7 @@ void tgi_input_noise(const tg_estimator *e, double time, tg_real dt, tg_real *q)
         q[n] += held_noise(e, &e->pitch, time, dt, s->noise[TG_PITCH], tgi_square((tg_real)0.1)) * tgi_square(m->gravity);
 }
 
-void tgi_take_inputs(tg_estimator *e, tg_row *row, tg_drive *drive)
+void tgi_take_inputs(tg_estimator *e, tg_row *row, tg_real dt, tg_drive *drive)
 {
     const tg_settings *s = &e->settings;
     memset(drive, 0, sizeof *drive);
@@ -48,7 +48,7 @@ void tgi_take_inputs(tg_estimator *e, tg_row *row, tg_drive *drive)
     tgi_hold_update(&e->pitch, row->value[TG_PITCH], row->time, s->noise[TG_PITCH]);
     row->outlier |= e->drawbar.spike > 0;
     drive->drawbar = e->drawbar.value;
-    drive->slope = e->pitch.value;
+    drive->slope = tgi_slope_update(e, row, e->pitch.value, dt);
 }
 
 tg_input tgi_along(const tg_estimator *e, const tg_drive *drive)

@@ -30,7 +30,7 @@ tg_status tgi_clean(tg_estimator *e, const tg_sample *sample, tg_row *row)
     for (int32_t k = 0; k < e->slots; k++)
         if (isinf(sample->value[e->slot[k]])) return TG_NOT_FINITE;
     row->time = sample->time;
-    row->outlier = row->measured = 0;
+    row->outlier = row->measured = row->reckoned = 0;
     for (int32_t k = 0; k < TG_SLOTS; k++) row->value[k] = (tg_real)NAN;
     for (int32_t k = 0; k < e->slots; k++) {
         int32_t slot = e->slot[k];
@@ -60,25 +60,43 @@ tg_real tgi_lowpass(tg_lowpass *f, tg_real x, double time, tg_real tau)
     return f->value;
 }
 
+/* The input itself is filtered as a random walk in noise, with a time constant of at most TG_INPUT_LAG: between two wheel speeds a raw
+ * torque's noise would shake omega more than the wheel ever does. */
+static void track(tg_hold *h, tg_real x, tg_real motion, tg_real noise, tg_real interval)
+{
+    tg_real prior = h->variance + (motion > 0 ? motion : 0), gain = prior / (prior + noise * noise);
+    const tg_real least = interval / (TG_INPUT_LAG + interval);
+    if (!(gain > least)) gain = least;
+    h->value += gain * (x - h->value);
+    h->variance = gain * noise * noise;
+}
+
 /* Take a sample of an input (NaN: none). The mean square of its increments is kept over about 1 s; one far beyond it is a spike:
- * still taken, but its square counts as uncertainty until the next sample, and the mean square sees it clipped. */
+ * taken whole, but its square counts as uncertainty until the next sample, and the mean square sees it clipped. */
 void tgi_hold_update(tg_hold *h, tg_real x, double time, tg_real noise)
 {
     if (isnan(x)) return;
     h->spike = 0;
-    if (h->count > 0) {
-        tg_real interval = (tg_real)(time - h->time), change = (x - h->value) * (x - h->value);
+    if (h->count == 0) {
+        h->value = x;
+        h->variance = noise * noise;
+    } else {
+        tg_real interval = (tg_real)(time - h->time), change = tgi_square(x - h->raw);
         tg_real bound = TG_SPIKE * TG_SPIKE * (h->level + 2 * noise * noise);
         if (h->count > TG_SPIKE && change > bound) {
             h->spike = change;
+            h->value = x;
+            h->variance = noise * noise;
             change = bound;
+        } else {
+            track(h, x, h->level - 2 * noise * noise, noise, interval);
         }
         tg_real memory = interval / (1 + interval);
         if (memory * (tg_real)h->count < 1) memory = 1 / (tg_real)h->count; /* a plain mean at first */
         h->level += memory * (change - h->level);
         h->interval = interval;
     }
-    h->value = x;
+    h->raw = x;
     h->time = time;
     if (h->count < 100) h->count++;
 }
@@ -87,7 +105,7 @@ void tgi_hold_update(tg_hold *h, tg_real x, double time, tg_real noise)
  * by a third of the squared increment in the mean square; held longer, it wanders on (R). */
 tg_real tgi_hold_variance(const tg_hold *h, double time, tg_real noise)
 {
-    tg_real motion = h->level - 2 * noise * noise, variance = noise * noise + h->spike;
+    tg_real motion = h->level - 2 * noise * noise, variance = h->variance + h->spike;
     if (motion > 0 && h->interval > 0) {
         tg_real late = 3 * (tg_real)(time - h->time) / h->interval;
         variance += motion / 3 * (late > 3 ? late : 1);

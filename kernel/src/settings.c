@@ -22,6 +22,7 @@ tg_settings tg_default_settings(void)
     tg_settings s;
     memset(&s, 0, sizeof s);
     s.tuning = tg_default_tuning();
+    s.tuning.huber = 4;
     s.axles = 1;
     s.load_share[0] = 1;
     for (int32_t k = 0; k < TG_SLOTS; k++) s.gain[k] = 1;
@@ -29,6 +30,7 @@ tg_settings tg_default_settings(void)
     s.prior_adhesion_std = (tg_real)0.3;
     s.prior_resistance = (tg_real)0.05;
     s.prior_resistance_std = (tg_real)0.05;
+    s.slope_spread = (tg_real)0.02;
     s.standstill_speed = (tg_real)0.03;
     s.gap = 2;
     s.max_step = (tg_real)0.1;
@@ -36,6 +38,22 @@ tg_settings tg_default_settings(void)
     s.load_filter = (tg_real)0.2;
     s.algebraic_filter = (tg_real)0.25;
     return s;
+}
+
+/* Densities, variance per second. A rim and the ground speed wander alike, in m/s. */
+tg_status tg_tune_walks(tg_settings *s)
+{
+    if (!s || s->machine.wheels < 1 || s->machine.wheels > TG_MAX_WHEELS) return TG_BAD_ARGUMENT;
+    const int32_t n = s->machine.wheels;
+    const tg_real rim = (tg_real)0.001, ground = (tg_real)0.001, adhesion = (tg_real)0.005, resistance = (tg_real)0.0005;
+    for (int32_t i = 0; i < n; i++) {
+        if (!is_positive(s->machine.radius[i])) return TG_NOT_POSITIVE;
+        s->tuning.walk[i] = rim / tgi_square(s->machine.radius[i]);
+        s->tuning.walk[n + 1 + i] = adhesion;
+    }
+    s->tuning.walk[n] = ground;
+    s->tuning.walk[2 * n + 1] = resistance;
+    return TG_OK;
 }
 
 static tg_status check_wheels(const tg_settings *s)
@@ -58,7 +76,7 @@ static tg_status check_numbers(const tg_settings *s)
     const tg_uncertainty *u = &s->uncertainty;
     const tg_real spreads[] = {u->drive_torque_gain, u->drive_torque_gain_common, u->drive_torque_offset, u->drawbar_gain, u->drawbar_offset, u->slope,
                                u->tire_rolling_resistance, u->vertical_load, u->wheel_radius, u->acceleration_bias,
-                               s->standstill_speed, s->outlier_weight, s->load_filter, s->center_of_gravity_height,
+                               s->slope_spread, s->standstill_speed, s->outlier_weight, s->load_filter, s->center_of_gravity_height,
                                s->hitch_height};
     const tg_real positive[] = {s->prior_adhesion_std, s->prior_resistance_std, s->gap, s->max_step, s->algebraic_filter,
                                 s->noise[TG_GROUND_SPEED], s->noise[TG_ACCELERATION_X]};
@@ -142,6 +160,10 @@ tg_status tg_estimator_init(tg_estimator *e, const tg_settings *settings)
     memcpy(&e->consider, &consider, sizeof consider);
     e->belief.columns = tgi_deviation_columns(settings);
     e->direction = 1;
+    e->jolt = tgi_square(settings->noise[TG_ACCELERATION_X]) + tgi_square(settings->noise[TG_DRAWBAR_FORCE] / settings->machine.mass);
+    e->slope.error_variance = tgi_square(settings->slope_spread);
+    e->slip_memory.slip = (tg_real)0.08; /* a guess until the first ground speed */
+    e->slip_memory.adhesion = settings->prior_adhesion;
     for (int32_t i = 0; i < settings->machine.wheels; i++)
         e->spin_inertia += settings->machine.inertia[i] / settings->rolling_radius[i];
     for (int32_t k = 0; k < TG_SLOTS; k++) e->last_raw[k] = (tg_real)NAN;

@@ -197,6 +197,7 @@ def settings_of(
     settings.axles = len(vehicle.axle_names)
     settings.towing = "drawbar_force" in channels
     _set_wheels(settings, vehicle, channels)
+    lib.tg_tune_walks(settings)
     _set_loads(settings, vehicle)
     _set_calibration(settings, vehicle)
     _set_uncertainty(settings, vehicle, "pitch" in channels)

@@ -1,0 +1,66 @@
+/* Ground speed while its sensor is silent: wheel speed less the slip last seen, at the adhesion of now (R). Without it nothing tells slip
+ * and soil resistance apart, and the estimate of v runs off with every error of the forces. */
+#include "estimator.h"
+
+#define TG_SILENCE ((tg_real)0.5)    /* s without a ground speed after which it is reckoned */
+#define TG_SLIP_MEMORY ((tg_real)1)  /* s over which slip and adhesion are remembered */
+#define TG_STEEPNESS ((tg_real)11.36) /* k of mu = A (1 - exp(-k s)), the paper's prototype curve (PHYSICS 5) */
+#define TG_UNKNOWN_FORCE ((tg_real)0.1) /* m^2/s^3, of the speed while it is only reckoned */
+#define TG_ERROR_TIME ((tg_real)1)   /* s over which the error of a reckoned speed stays alike */
+
+/* Mean rim speed and mean adhesion over the load, along the travel. */
+static void means(const tg_estimator *e, const tg_drive *drive, tg_real *rim, tg_real *adhesion)
+{
+    const int32_t n = e->settings.machine.wheels;
+    tg_real load = 0, pull = 0, speed = 0;
+    for (int32_t i = 0; i < n; i++) {
+        load += drive->load[i];
+        pull += drive->load[i] * e->belief.x[i];
+        speed += e->settings.rolling_radius[i] * e->belief.x[n + 2 + i];
+    }
+    *rim = speed / (tg_real)n;
+    *adhesion = pull / load;
+}
+
+/* After a row whose ground speed was measured: remember slip and adhesion. */
+void tgi_remember_slip(tg_estimator *e, const tg_drive *drive, tg_real dt)
+{
+    tgi_slip_memory *m = &e->slip_memory;
+    tg_real rim, adhesion, v = e->belief.x[e->settings.machine.wheels + 1];
+    means(e, drive, &rim, &adhesion);
+    if (rim < 3 * e->settings.standstill_speed) return;
+    tg_real slip = 1 - v / rim, gain = dt / (TG_SLIP_MEMORY + dt);
+    if (slip < (tg_real)-0.2) slip = (tg_real)-0.2;
+    m->slip += gain * (slip - m->slip);
+    m->adhesion += gain * (adhesion - m->adhesion);
+}
+
+/* Slip at another adhesion than the remembered one, on the same soil: along the tangent of the prototype curve. */
+static tg_real slip_at(const tgi_slip_memory *m, tg_real adhesion)
+{
+    tg_real level = m->adhesion > (tg_real)0.1 ? m->adhesion : (tg_real)0.1, slip = m->slip > 0 ? m->slip : 0;
+    tg_real slope = slip > 0 ? tgi_expm1(TG_STEEPNESS * slip) / (TG_STEEPNESS * level) : 1 / (TG_STEEPNESS * level);
+    if (slope > 1) slope = 1;
+    tg_real found = m->slip + slope * (adhesion - m->adhesion);
+    return found < (tg_real)-0.2 ? (tg_real)-0.2 : found > (tg_real)0.8 ? (tg_real)0.8 : found;
+}
+
+/* Give the row a reckoned ground speed where the sensor has been silent, with a variance that grows with the silence and tells the filter
+ * that the error is the same for a while: a white one would be averaged away. */
+void tgi_reckon(tg_estimator *e, const tg_drive *drive, tg_real dt, tg_row *row, tg_real *q)
+{
+    row->ground_variance = tgi_square(e->settings.noise[TG_GROUND_SPEED]);
+    if (!isnan(row->value[TG_GROUND_SPEED])) {
+        e->ground_time = row->time;
+        return;
+    }
+    tg_real silence = (tg_real)(row->time - e->ground_time), rim, adhesion;
+    if (silence < TG_SILENCE || !row->measured || !(dt > 0)) return;
+    means(e, drive, &rim, &adhesion);
+    tg_real spread = tgi_square((tg_real)0.02) * (1 + silence);
+    q[e->settings.machine.wheels] += TG_UNKNOWN_FORCE * dt;
+    if (spread > tgi_square((tg_real)0.15)) spread = tgi_square((tg_real)0.15);
+    row->value[TG_GROUND_SPEED] = (tg_real)e->direction * rim * (1 - slip_at(&e->slip_memory, adhesion));
+    row->ground_variance = (tgi_square(rim) * spread + tgi_square((tg_real)0.01)) * (1 + 2 * TG_ERROR_TIME / dt);
+    row->reckoned = 1;
+}

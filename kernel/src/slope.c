@@ -1,0 +1,58 @@
+/* Slope as the motion shows it, where there is an accelerometer: it reads dv/dt + g sin(slope), so what it reads beyond the change of ground
+ * speed is slope. A pitch sensor alone errs by its mounting and by wheels that sink unevenly; without one the whole slope is found. A
+ * Kalman filter of two states, ground speed and slope error, beside the main one (R). The accelerometer's bias goes into the error too,
+ * as it should: the two then agree on dv/dt. */
+#include "estimator.h"
+
+#define TG_SLOPE_WALK ((tg_real)2e-5) /* rad^2/s */
+#define TG_SLOPE_LIMIT ((tg_real)0.5) /* rad */
+#define TG_SPEED_WALK ((tg_real)1e-3) /* m^2/s^3: jolts that the accelerometer's noise does not hold */
+
+static void start(tgi_slope *s, const tg_settings *settings, tg_real speed)
+{
+    s->speed = speed;
+    s->speed_variance = tgi_square(settings->noise[TG_GROUND_SPEED]);
+    s->covariance = 0;
+    s->running = 1;
+}
+
+static void predict(tgi_slope *s, const tg_settings *settings, tg_real pitch, tg_real dt)
+{
+    const tg_real g = settings->machine.gravity, k = g * dt;
+    const tg_real noise = tgi_square(settings->noise[TG_ACCELERATION_X]) * dt + TG_SPEED_WALK;
+    s->speed += dt * (s->acceleration - g * (tgi_sin(pitch) + s->error));
+    s->speed_variance += k * (k * s->error_variance - 2 * s->covariance) + noise * dt;
+    s->covariance -= k * s->error_variance;
+    s->error_variance += TG_SLOPE_WALK * dt;
+}
+
+static void update(tgi_slope *s, const tg_settings *settings, tg_real speed)
+{
+    tg_real noise = tgi_square(settings->noise[TG_GROUND_SPEED]), innovation = speed - s->speed;
+    tg_real variance = s->speed_variance + noise, size = tgi_square(innovation) / variance;
+    if (size > 9) variance += noise * (tgi_sqrt(size) / 3 - 1); /* a spike: weighted as in the main filter */
+    tg_real gain = s->speed_variance / variance, error_gain = s->covariance / variance;
+    s->speed += gain * innovation;
+    s->error += error_gain * innovation;
+    s->error_variance -= error_gain * s->covariance;
+    s->covariance *= 1 - gain;
+    s->speed_variance *= 1 - gain;
+    if (s->error > TG_SLOPE_LIMIT) s->error = TG_SLOPE_LIMIT;
+    if (s->error < -TG_SLOPE_LIMIT) s->error = -TG_SLOPE_LIMIT;
+}
+
+/* Take a row; `pitch` as measured, 0 where it is not. Returns the slope. */
+tg_real tgi_slope_update(tg_estimator *e, const tg_row *row, tg_real pitch, tg_real dt)
+{
+    tgi_slope *s = &e->slope;
+    const tg_settings *settings = &e->settings;
+    tg_real speed = row->value[TG_GROUND_SPEED];
+    if (s->running && (dt > settings->gap || row->time - e->acceleration.time > 1)) s->running = 0;
+    if (s->running && dt > 0) predict(s, settings, pitch, dt);
+    if (!isnan(row->value[TG_ACCELERATION_X])) s->acceleration = row->value[TG_ACCELERATION_X];
+    if (!isnan(speed)) {
+        if (s->running) update(s, settings, speed);
+        else if (e->acceleration.seen) start(s, settings, speed);
+    }
+    return pitch + s->error;
+}
