@@ -87,26 +87,28 @@ def make_problem(
 
     static = rng.uniform(0.3, 2, n) * machine.mass * machine.gravity / n
 
-    def random_input(phase: float) -> Input:
-        effort = 0.3 + 0.3 * np.sin(phase + np.arange(n))
-        return Input(
-            torque=machine.radius * static * effort,
-            load=static * (1 + 0.2 * np.sin(2 * phase + np.arange(n))),
-            drawbar=0.2 * machine.mass * machine.gravity * np.sin(phase),
-            slope=0.1 * np.cos(phase),
-        )
+    def driven(x: NDArray[np.float64], phase: float) -> Input:
+        """Torques and pull that hold speeds near some that wander, so that no speed outgrows its digits."""
+        wheel_speed, ground_speed, adhesion, resistance = model.split(x)
+        load, slope = static * (1 + 0.2 * np.sin(2 * phase + np.arange(n))), 0.1 * np.cos(phase)
+        spin = 2 * (8 * np.sin(phase + np.arange(n)) - wheel_speed)
+        acceleration = 2 * (1.5 * np.cos(phase) - ground_speed) + 9.81 * np.sin(slope)
+        drag = (adhesion + machine.tire_rolling_resistance) * load + machine.bearing_resistance * wheel_speed
+        thrust = adhesion @ load - resistance * machine.mass * 9.81 * np.cos(slope)
+        torque = machine.inertia * spin + machine.radius * drag
+        return Input(torque, load, thrust - machine.mass * acceleration, slope)
 
     instants = []
-    before = random_input(0.0)
+    before = driven(truth, 0.0)
     for k in range(steps):
         dt = (
             0.01
             if steady_rate
             else rng.choice([0.0, 0.002, 0.01, 0.013, 0.05, 0.4], p=[0.02, 0.2, 0.4, 0.2, 0.17, 0.01])
         )
-        now = random_input(0.005 * k)
         q_input = 10 ** rng.uniform(-9, -4, nx) * (rng.random() < 0.7) * (np.arange(nx) <= n)
         truth = model.transition(truth, before, dt) + rng.normal(size=nx) * np.sqrt(walk * dt + q_input)
+        now = driven(truth, 0.005 * k)
         y = model.output(truth, now) + rng.normal(size=n + 2) * np.sqrt(r)
         y += (rng.random(n + 2) < spikes) * np.sqrt(r) * 10 ** rng.uniform(1, 3, n + 2)
         y[rng.random(n + 2) < missing] = np.nan

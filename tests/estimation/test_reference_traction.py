@@ -268,9 +268,10 @@ def test_considered_sensitivity_is_the_change_of_the_estimate(engine, problem):
     def mean(constant: Constant, error: float) -> Array:
         x = case.x0.astype(np.longdouble)
         for k, update in zip(case.instants, updates, strict=True):
-            machine, before = with_error(case.machine, k.before, constant, error)
+            held, level = k.before.in_precision(np.longdouble), k.now.in_precision(np.longdouble)
+            machine, before = with_error(case.machine, held, constant, error)
             x = TractionModel(machine).transition(x, before, k.dt)
-            expected = TractionModel(machine).output(x, with_error(case.machine, k.now, constant, error)[1])
+            expected = TractionModel(machine).output(x, with_error(case.machine, level, constant, error)[1])
             expected[-1] += error if constant.name == "acceleration_bias" else 0
             x = x + update.gain @ (k.y - expected)[update.present]
         return x
