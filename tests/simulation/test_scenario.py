@@ -148,11 +148,20 @@ def test_a_machine_the_plant_does_not_know_is_refused(quiet):
         simulate(quiet(vehicle=robot))
 
 
-def test_a_motion_that_diverges_is_refused(quiet):
+@pytest.mark.parametrize(
+    ("change", "place"),
+    [
+        ({"robot": {"tire_stiffness": 9e5}, "step": 0.005, "log_rate": 200}, "robot.tire_stiffness"),
+        ({"tools": [{"mass": 1, "damping": 900}]}, "tools.0.stiffness"),
+    ],
+)
+def test_what_a_step_cannot_resolve_is_refused(quiet, change, place):
     from terragrip.simulation import simulate
 
-    with pytest.raises(InputError, match=r"step: the motion diverges after .* use a smaller step"):
-        simulate(quiet(robot={"tire_stiffness": 1e6, "tire_damping": 1e6}, step=0.005))
+    with pytest.raises(
+        InputError, match=rf"quiet: {place}: .* too stiff for steps of .*; use a smaller 'step:'"
+    ):
+        simulate(quiet(**change))
 
 
 def test_nothing_left_to_record_is_refused(quiet):

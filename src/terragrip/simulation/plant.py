@@ -36,11 +36,30 @@ def check_layout(vehicle: Vehicle) -> None:
         )
 
 
+def _check_step(scenario: Scenario, vehicle: Vehicle) -> None:
+    """Raise InputError where a spring or damper is too stiff for the explicit part of a step."""
+    robot, corner = scenario.robot, 0.5 * float(vehicle.axle_mass.min())
+    parts = [
+        ("robot.tire_stiffness", robot.tire_stiffness + 4 * robot.chassis_torsion, robot.tire_damping, corner)
+    ]
+    for k, tool in enumerate(scenario.tools):
+        parts.append((f"tools.{k}.stiffness", tool.stiffness, tool.damping, min(tool.mass, vehicle.mass)))
+    for place, stiffness, damping, mass in parts:
+        if scenario.step * max(np.sqrt(stiffness / mass), damping / mass) > 0.5:
+            raise InputError(
+                f"{stiffness:g} N/m with {damping:g} N s/m on {mass:g} kg is too stiff for steps of {scenario.step:g} s",
+                file=scenario.name or None,
+                place=place,
+                mend="use a smaller 'step:', a softer spring or less damping",
+            )
+
+
 def make_plant(scenario: Scenario, vehicle: Vehicle, radius: Floats, terrain: Terrain) -> Plant:
     """The C structures of a scenario; ``radius`` (4,) [m] is the true one. Raises InputError on an unfit vehicle."""
     from terragrip.simulation._plant import ffi
 
     check_layout(vehicle)
+    _check_step(scenario, vehicle)
     kept: list[Any] = []
 
     def pointer(values: Any, kind: str = "double") -> Any:
