@@ -35,7 +35,9 @@ typedef struct {
 } place;
 
 static place locate(const plant_ground *g, double x) {
-    double u = clamp((x - g->start) / g->spacing, 0.0, (double)(g->count - 1) - 1e-9);
+    const double last = (double)(g->count - 1) - 1e-9;
+    double u = (x - g->start) / g->spacing;
+    u = u > 0.0 ? (u < last ? u : last) : 0.0; /* NaN stays inside the arrays too */
     place p;
     p.i = (int32_t)u;
     p.w = u - p.i;
@@ -47,9 +49,8 @@ static double at(const double *field, place p) { return field[p.i] + p.w * (fiel
 /* Adhesion and its slope at |slip| on one soil: cubic Hermite between the tabulated points. */
 static void curve_at(const plant_ground *g, int32_t soil, double slip, double *mu, double *dmu) {
     const double h = 1.0 / g->curve_intervals;
-    double u = slip * g->curve_intervals;
-    int32_t i = (int32_t)u;
-    if (i >= g->curve_intervals) i = g->curve_intervals - 1;
+    const double u = slip * g->curve_intervals;
+    const int32_t i = u > 0.0 ? (u < g->curve_intervals ? (int32_t)u : g->curve_intervals - 1) : 0;
     const double t = u - i, q = 1.0 - t;
     const double *p = g->curve + 2 * ((int64_t)soil * (g->curve_intervals + 1) + i);
     const double p0 = p[0], m0 = p[1] * h, p1 = p[2], m1 = p[3] * h;
