@@ -9,13 +9,14 @@ Likelihoods and NIS are compared relative to 1 + their magnitude.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from terragrip.estimation.reference import BankUpdate, Machine, Step, TractionFilter, Tuning
+from terragrip.estimation.reference import BankUpdate, Machine, Step, TractionFilter, Tuning, smooth
 
 kernel = pytest.importorskip("terragrip._kernel")
 ffi, lib = kernel.ffi, kernel.lib
@@ -35,8 +36,7 @@ class KernelFilter:
 
     def __init__(self, machine: Machine, tuning: Tuning, x0: Array, P0: Array) -> None:
         self.wheels, self.states = len(machine.radius), 2 * len(machine.radius) + 2
-        self._memory = ffi.new("char[]", lib.tg_filter_size())
-        self.pointer = ffi.cast("tg_filter *", self._memory)
+        self.pointer = allocated("tg_filter *", lib.tg_filter_size())
         checked(
             lib.tg_filter_init(
                 self.pointer, kernel_machine(machine), kernel_tuning(tuning), reals(x0), reals(P0.ravel())
@@ -74,6 +74,12 @@ class KernelFilter:
         dx, dP = np.empty(self.states), np.empty((self.states, self.states))
         checked(lib.tg_filter_sensitivity(self.pointer, j, writable(dx), writable(dP)))
         return dx, dP
+
+
+def allocated(kind: str, size: int) -> Any:
+    """Raw memory that lives as long as the pointer to it."""
+    memory = ffi.new("char[]", size)
+    return ffi.gc(ffi.cast(kind, memory), lambda _: memory)
 
 
 def checked(status: int) -> None:
@@ -315,3 +321,113 @@ def test_kernel_sensitivities_agree_with_differences_of_whole_runs(engine, probl
         for got, unit, i in zip(reached.sensitivity(j), (sd, np.outer(sd, sd)), (0, 1), strict=True):
             difference = (ahead[i] - behind[i]) / (2 * size) / unit
             np.testing.assert_allclose(got / unit, difference, rtol=0, atol=3e-5 * np.max(np.abs(difference)))
+
+
+class Deviations:
+    """Constant deviations, a column each, in the kernel's form and carried along by the reference's gains."""
+
+    def __init__(self, case: Any, columns: int) -> None:
+        rng = np.random.default_rng(columns)
+        n = case.wheels
+        self.spin, self.push = rng.normal(size=(columns, n)), rng.normal(size=columns)
+        self.reading = rng.normal(size=columns)
+        self.kernel = ffi.new("tg_deviation[]", columns)
+        for i in range(columns):
+            self.kernel[i].wheel_acceleration[0:n] = self.spin[i].tolist()
+            self.kernel[i].acceleration, self.kernel[i].accelerometer = self.push[i], self.reading[i]
+        self.columns = np.zeros((2 * n + 2, columns), np.longdouble)
+        self.prior = self.columns
+
+    def restart(self, wheels: int) -> None:
+        self.columns = self.columns.copy()
+        self.columns[: wheels + 1] = 0
+
+    def step(self, filter: TractionFilter, step: Step, x: Array, k: Any) -> None:
+        """As paper eq. 2 and 3: an acceleration is a torque over inertia, a push over mass."""
+        machine, u = filter.model.machine, k.before.in_precision(np.longdouble)
+        plain = filter.model.transition(x, u, np.longdouble(k.dt))
+        self.prior = step.prediction.transition @ self.columns
+        for i in range(len(self.push)):
+            torque, drawbar = (
+                u.torque + machine.inertia * self.spin[i],
+                u.drawbar - machine.mass * self.push[i],
+            )
+            pushed = filter.model.transition(
+                x, replace(u, torque=torque, drawbar=drawbar), np.longdouble(k.dt)
+            )
+            self.prior[:, i] += pushed - plain
+        expected = step.update.observation.matrix @ self.prior
+        expected[-1] += self.reading
+        self.columns = self.prior - step.update.gain @ expected[step.update.present]
+
+
+@pytest.mark.parametrize("engine", ["exact", "unscented"])
+@pytest.mark.parametrize("policy", ["fixed", "supervised"])
+def test_considered_columns_and_smoother_agree(engine, policy, problem):
+    """Forwards the filter with its considered columns, backwards the smoother with both."""
+    case = problem(
+        61, wheels=2, steps=150, condition=1e6, missing=0.1, spikes=0.02, accelerometer=True, restarts=True
+    )
+    assert any(k.restart for k in case.instants)
+    tuning = Tuning(case.walk, engine=engine, policy=policy, huber=2.5)
+    truth = TractionFilter(case.machine, tuning, case.x0, case.P0.astype(np.longdouble))
+    tested = KernelFilter(case.machine, tuning, case.x0, case.P0)
+    n, states, columns = 2, 6, 3
+    deviations = Deviations(case, columns)
+    consider = allocated("tg_consider *", lib.tg_consider_size())
+    track = allocated("tg_track *", lib.tg_track_size())
+    checked(lib.tg_consider_init(consider, tested.pointer, columns))
+    checked(lib.tg_track_init(track, tested.pointer))
+    records = np.zeros((len(case.instants), lib.tg_record_length(n, columns)))
+
+    filtered, considered, predictions, prior_columns = [], [], [], []
+    for k, record in zip(case.instants, records, strict=True):
+        before_P, link = truth.moments()[1], np.eye(states, dtype=np.longdouble)
+        if k.restart is not None:
+            truth.restart(*k.restart)
+            tested.restart(*k.restart)
+            deviations.restart(n)
+            link[: n + 1] = 0
+            checked(lib.tg_consider_step(consider, tested.pointer, ffi.NULL))
+            checked(lib.tg_track_step(track, tested.pointer))
+        x = truth.moments()[0]
+        arguments = (k.dt, k.before, k.now, k.q_input, k.y, k.r)
+        step = truth.step(*arguments)
+        tested.step(*arguments)
+        deviations.step(truth, step, x, k)
+        checked(lib.tg_consider_step(consider, tested.pointer, deviations.kernel))
+        checked(lib.tg_track_step(track, tested.pointer))
+        checked(lib.tg_record_take(writable(record), track, tested.pointer, consider))
+        got = np.empty((columns, states))
+        checked(lib.tg_consider_columns(consider, writable(got)))
+        sd = np.sqrt(np.diag(truth.moments()[1]))
+        size = np.maximum(np.max(np.abs(deviations.columns), axis=0), sd[:, np.newaxis])
+        assert np.max(np.abs(got.T - deviations.columns) / size) < TOLERANCE
+        filtered.append(truth.moments())
+        considered.append(deviations.columns)
+        prior_columns.append(deviations.prior)
+        cross = before_P @ link.T @ step.prediction.transition.T
+        predictions.append(replace(step.prediction, before=before_P, cross=cross))
+
+    smoothed = smooth(filtered, predictions[1:])
+    smoothed_columns = [
+        smooth(
+            [(c[:, i], P) for c, (_, P) in zip(considered, filtered, strict=True)],
+            [replace(p, mean=c[:, i]) for p, c in zip(predictions[1:], prior_columns[1:], strict=True)],
+        )
+        for i in range(columns)
+    ]
+    x, P, s = np.empty(states), np.empty((states, states)), np.empty((columns, states))
+    checked(lib.tg_record_moments(n, columns, writable(records[-1]), writable(x), writable(P), writable(s)))
+    worst = 0.0
+    for i in range(len(records) - 1, -1, -1):
+        if i < len(records) - 1:
+            here, following = writable(records[i]), writable(records[i + 1])
+            checked(lib.tg_smooth_step(n, columns, here, following, writable(x), writable(P), writable(s)))
+        worst = max(worst, *moments_error((x, P), smoothed[i]))
+        sd = np.sqrt(np.diag(smoothed[i][1]))
+        for got, chain in zip(s, smoothed_columns, strict=True):
+            worst = max(
+                worst, float(np.max(np.abs(got - chain[i][0]) / np.maximum(np.max(np.abs(chain[i][0])), sd)))
+            )
+    assert worst < TOLERANCE
