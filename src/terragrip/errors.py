@@ -50,8 +50,11 @@ def nearest(name: str, known: Iterable[str]) -> str | None:
     """The known name most like ``name`` (case and underscores aside), or None if none comes near."""
     from difflib import get_close_matches
 
+    wanted = _plain(name)
     plain = {_plain(k): k for k in known}
-    match = get_close_matches(_plain(name), list(plain), n=1, cutoff=0.6)
+    match = get_close_matches(wanted, list(plain), n=1, cutoff=0.7)
+    if not match and len(wanted) >= 3:
+        match = [p for p in plain if wanted in p or (len(p) >= 3 and p in wanted)]
     return plain[match[0]] if match else None
 
 

@@ -32,8 +32,9 @@ def derivative(time: Floats, position: Floats, window: float) -> tuple[Floats, f
 
     A parabola is fitted by least squares to the samples within ``window`` [s] around each instant, five or more
     (Savitzky and Golay 1964, on the actual instants); Tukey's biweight keeps jumps of the position out. NaN
-    where fewer than four samples lie within the window (at gaps). The deviation follows from the residuals while
-    moving, or the position's resolution where that is coarser, for white noise; None if it cannot be told.
+    where fewer than four samples lie within the window, or nearly all to one side (at gaps and ends). The
+    deviation follows from the residuals while moving, or the position's resolution where that is coarser,
+    for white noise; None if it cannot be told.
     """
     n = len(time)
     speed, deviation = np.full(n, np.nan), np.full(n, np.nan)
@@ -82,6 +83,8 @@ def _parabolas(
         weight = inside * np.clip(1.0 - (residual / (6.0 * scale)) ** 2, 0.0, None) ** 2
         enough &= (weight > 0.05).sum(axis=1) >= _FEWEST
     spread = np.sqrt(np.linalg.inv(_normal(basis, weight + 1e-9 * inside))[:, 1, 1])
+    if enough.any():  # a slope at the end of a one-sided window is worth little
+        enough &= spread <= 3.0 * np.median(spread[enough])
     squares = np.einsum("nk,nk->n", weight, (y - np.einsum("nki,ni->nk", basis, fit)) ** 2)
     own = np.sqrt(squares / np.maximum(weight.sum(axis=1) - 3.0, 0.5))
     deviation = np.maximum(own, floor) * spread / reach

@@ -88,7 +88,8 @@ def find_time(numbers: Mapping[str, Floats], dates: tuple[str, ...] = ()) -> tup
     for name, values in numbers.items():
         words = _words(name)
         score = 4 * (name == TIME) + 2 * bool(words & _TIMES) + bool(words & set(_TIME_UNITS))
-        forward = len(values) > 1 and np.mean(np.diff(values[np.isfinite(values)]) > 0) > 0.9
+        known = values[np.isfinite(values)]
+        forward = len(known) > 1 and np.mean(np.diff(known) > 0) > 0.9
         score = score + 2 * bool(forward) if score >= 2 and not words & _NOT_MEASURED else 0
         if score and (best is None or score > best[0]):
             best = score, name
@@ -167,7 +168,7 @@ def _channel_of(name: str) -> tuple[str, int, str] | None:
 
 
 def _words(name: str) -> set[str]:
-    return {word.lower() for word in _WORD.findall(name)}
+    return {word.lower() for word in (*_WORD.findall(name), *re.split(r"[^A-Za-z0-9]+", name)) if word}
 
 
 def _wheel(words: set[str]) -> str:

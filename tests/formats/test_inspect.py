@@ -1,0 +1,157 @@
+"""Inspect: what is in a log, and a profile that works as proposed."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from terragrip.errors import InputError
+from terragrip.formats import Profile, inspect, read
+from terragrip.formats.recognition import propose
+from terragrip.vehicle import Vehicle
+
+
+def ramp(size: float) -> np.ndarray:
+    return np.linspace(-size, size, 50)
+
+
+@pytest.mark.parametrize(
+    ("name", "size", "channel", "unit"),
+    [
+        ("wheel_speed_fl", 3, "wheel_speed_fl", None),
+        ("vel_fl", 3, "wheel_speed_fl", None),
+        ("omega_l", 3, "wheel_speed_l", None),
+        ("meas_left_vel", 3, "wheel_speed_l", None),
+        ("WheelSpeedRR_rpm", 30, "wheel_speed_rr", "rpm"),
+        ("rpm_rear_right", 30, "wheel_speed_rr", "rpm"),
+        ("w_rl", 3, "wheel_speed_rl", None),
+        ("M1", 20, "drive_torque_1", None),
+        ("torque_front_left", 20, "drive_torque_fl", None),
+        ("right_wheel_current", 20, "drive_torque_r", None),
+        ("speed", 1, "ground_speed", None),
+        ("gps_speed_kmh", 9, "ground_speed", "km/h"),
+        ("VehicleSpeed", 3, "ground_speed", None),
+        ("drawbar_kN", 2, "drawbar_force", "kN"),
+        ("imu_acceleration_x", 2, "acceleration_x", None),
+        ("ax", 2, "acceleration_x", None),
+        ("gyro_z", 2, "angular_velocity_z", None),
+        ("pitch", 12, "pitch", "deg"),
+        ("lat_rad", 0.7, "latitude", "rad"),
+    ],
+)
+def test_names_are_recognised(name: str, size: float, channel: str, unit: str | None) -> None:
+    proposals = propose({name: ramp(size)}, (), {})
+    assert list(proposals) == [channel]
+    assert proposals[channel].entry["from"] == name
+    assert proposals[channel].entry.get("unit") == unit
+
+
+@pytest.mark.parametrize(
+    "name", ["cmd_vel_x", "left_wheel_voltage", "odom_wz_std", "engine_speed", "calib_step", "temp_l", "x"]
+)
+def test_other_names_are_left_alone(name: str) -> None:
+    assert set(propose({name: ramp(3)}, (), {})) <= {"angular_velocity_z"} - (
+        {"angular_velocity_z"} if "std" in name else set()
+    )
+
+
+def test_a_ready_log_needs_no_profile(tmp_path: Path, log: pd.DataFrame) -> None:
+    path = tmp_path / "log.csv"
+    log.drop(index=range(100, 180)).to_csv(path, index=False)
+    found = inspect(path)
+    assert found.ready
+    assert found.rows == 220
+    assert found.time is not None
+    assert found.time.spacing_50 == pytest.approx(0.01)
+    assert found.time.gap_count == 1
+    assert found.time.gaps[0] == pytest.approx((0.99, 0.81))
+    speed = next(column for column in found.columns if column.name == "ground_speed")
+    assert speed.noise == pytest.approx(0.02, rel=0.3)
+    assert (speed.minimum, speed.maximum) == (log["ground_speed"].drop(range(100, 180)).min(), speed.maximum)
+    assert any("pitch" in sentence for sentence in found.missing)
+    assert "can be estimated as it is" in found.to_text()
+    json.dumps(found.to_dict(), allow_nan=False)
+
+
+def test_the_proposed_profile_works_as_it_stands(tmp_path: Path) -> None:
+    rng = np.random.default_rng(0)
+    n = 600
+    frame = pd.DataFrame(
+        {
+            "t_ms": np.arange(n) * 50,
+            "vel_left": 30 + rng.standard_normal(n),
+            "vel_right": 30 + rng.standard_normal(n),
+            "left_current": 5 + rng.standard_normal(n),
+            "right_current": 5 + rng.standard_normal(n),
+            "pose_x": np.arange(n) * 0.03 + 0.002 * rng.standard_normal(n),
+            "pose_y": 0.002 * rng.standard_normal(n),
+            "yaw": 3.0 * rng.standard_normal(n),
+            "terrain": "mud",
+        }
+    )
+    log, profile = tmp_path / "log.csv", tmp_path / "profile.yaml"
+    frame.to_csv(log, index=False)
+    found = inspect(log)
+    assert not found.ready
+    assert found.recognised["ground_speed"] == ("pose_x", "pose_y")
+    profile.write_text(found.profile)
+    recording = read(log, profile)
+    assert recording.wheels == ("l", "r")
+    assert recording["soil"][0] == "mud"
+    assert np.nanmedian(recording["ground_speed"]) == pytest.approx(0.6, rel=0.02)
+    assert "scale" in found.profile
+    again = inspect(log, profile)
+    assert again.ready
+    assert {"ground_speed", "drive_torque_l"} <= {column.name for column in again.columns}
+
+
+def test_wheels_and_units_are_held_against_the_vehicle(tmp_path: Path, log: pd.DataFrame) -> None:
+    path = tmp_path / "log.csv"
+    log.assign(ground_speed=log["ground_speed"] * 3.6).to_csv(path, index=False)
+    wheels = {"mass": 50, "wheels": ["l", "r"], "wheel": {"radius": 0.2, "inertia": 1}}
+    vehicle = Vehicle.from_dict({"mass": 50, "axles": {"all": wheels}})
+    assert any("km/h" in warning for warning in inspect(path, vehicle=vehicle).warnings)
+    other = Vehicle.from_dict({"mass": 50, "axles": {"all": {**wheels, "wheels": ["a", "b"]}}})
+    assert any(
+        "no wheel l; its wheels are a, b" in warning for warning in inspect(path, vehicle=other).warnings
+    )
+
+
+def test_nothing_is_required_but_a_table(tmp_path: Path) -> None:
+    path = tmp_path / "log.csv"
+    path.write_text("a,b,c\n1,x,\n2,y,\n")
+    found = inspect(path)
+    assert (found.rows, found.time, found.ready) == (2, None, False)
+    assert [column.kind for column in found.columns] == ["number", "text", "empty"]
+    assert Profile.from_dict({"channels": {}}) is not None
+    profile = tmp_path / "profile.yaml"
+    profile.write_text(found.profile)
+    Profile.load(profile)
+    assert "needed" in found.to_text()
+    path.write_bytes(b"\x00\x01")
+    with pytest.raises(InputError, match="is not a table of text"):
+        inspect(path)
+
+
+def test_measured_warthog(shared: Callable[[str], Path]) -> None:
+    found = inspect(shared("data/drive_warthog/raw20hz/warthog_wheels_grass.csv.gz"))
+    assert found.recognised["wheel_speed_l"] == ("meas_left_vel",)
+    assert found.recognised["drive_torque_r"] == ("right_wheel_current",)
+    assert found.recognised["ground_speed"] == ("icp_pos_x", "icp_pos_y")
+    held = {column.name: column.held_period for column in found.columns}
+    assert held["meas_left_vel"] == pytest.approx(0.25, rel=0.02)
+    assert held["imu_z"] is None
+    assert "quaternion: [icp_quat_x" in found.profile
+
+
+def test_measured_pathfinder_takes_positions_not_odometry(shared: Callable[[str], Path]) -> None:
+    found = inspect(shared("data/pathfinder_rover/test17run_odom_gps_10hz.csv.gz"))
+    assert [c for c in found.recognised if c.startswith("wheel_speed")] == [
+        f"wheel_speed_{w}" for w in ("fl", "fr", "rl", "rr")
+    ]
+    assert found.recognised["ground_speed"] == ("gps_e", "gps_n")

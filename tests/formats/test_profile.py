@@ -1,0 +1,293 @@
+"""A profile turns foreign columns into the recording's own, and refuses what it cannot."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from terragrip.errors import InputError
+from terragrip.formats import Profile, read
+from terragrip.recording import Recording, sensor_noise
+
+PROFILE = """\
+name: test rig
+time: {from: stamp, unit: ms}
+channels:
+  wheel_speed_l: {from: rpm_left, unit: rpm, sign: -1}
+  wheel_speed_r: rpm_right
+  drive_torque_l: {from: amps, scale: 2.079, offset: -0.5, unit: N m, invalid: [0, [900, 1000]]}
+  ground_speed: {from: kmh, unit: km/h}
+  pitch: {from: slope, unit: deg}
+  soil: {constant: grass}
+"""
+
+
+@pytest.fixture
+def foreign() -> pd.DataFrame:
+    """A log with names and units of its own."""
+    n = 200
+    return pd.DataFrame(
+        {
+            "stamp": np.arange(n) * 50,
+            "rpm_left": -30.0 - np.arange(n) % 7,
+            "rpm_right": 3.2 + np.arange(n) % 5 * 0.01,
+            "amps": 5.0 + np.arange(n) % 3,
+            "kmh": 3.6 + np.arange(n) % 4 * 0.1,
+            "slope": -3.0,
+            "mode": ["idle"] * 50 + ["calib"] * 150,
+        }
+    )
+
+
+def apply(foreign: pd.DataFrame, **channels: Any) -> Recording:
+    base: dict[str, Any] = {"wheel_speed_l": "rpm_right", "ground_speed": "kmh"}
+    data = {"time": {"from": "stamp", "unit": "ms"}, "channels": {**base, **channels}}
+    return Profile.from_dict(data).apply(foreign, source="log.csv")
+
+
+def test_units_scale_offset_sign_and_invalid_values(tmp_path: Path, foreign: pd.DataFrame) -> None:
+    foreign.loc[3, "amps"] = 0.0
+    foreign.loc[4, "amps"] = 950.0
+    log, profile = tmp_path / "log.csv", tmp_path / "profile.yaml"
+    foreign.to_csv(log, index=False)
+    profile.write_text(PROFILE)
+    recording = read(log, profile)
+    np.testing.assert_allclose(recording.time, np.arange(200) * 0.05)
+    np.testing.assert_allclose(recording["wheel_speed_l"], -foreign["rpm_left"] * 2 * np.pi / 60)
+    np.testing.assert_array_equal(recording["wheel_speed_r"], foreign["rpm_right"])
+    np.testing.assert_allclose(recording["ground_speed"], foreign["kmh"] / 3.6)
+    np.testing.assert_allclose(recording["pitch"], np.deg2rad(-3))
+    expected = 2.079 * foreign["amps"] - 0.5
+    expected[3:5] = np.nan
+    np.testing.assert_allclose(recording["drive_torque_l"], expected)
+    assert set(recording["soil"]) == {"grass"}
+    assert recording.sha256 is not None
+    assert Profile.load(profile).apply(foreign)["ground_speed"] == pytest.approx(recording["ground_speed"])
+
+
+def test_delay_moves_a_channel_earlier_on_the_union_of_instants(foreign: pd.DataFrame) -> None:
+    recording = apply(foreign, drive_torque_l={"from": "amps", "delay": "20 ms"})
+    torque, speed = recording["drive_torque_l"], recording["ground_speed"]
+    assert len(recording) == 400
+    measured = np.isfinite(torque)
+    np.testing.assert_allclose(recording.time[measured], np.arange(200) * 0.05 - 0.02)
+    np.testing.assert_array_equal(torque[measured], foreign["amps"])
+    np.testing.assert_array_equal(np.isfinite(speed), ~measured)
+    np.testing.assert_allclose(recording.time[~measured], np.arange(200) * 0.05)
+
+
+def test_a_delay_of_whole_rows_makes_no_rows_of_rounding_errors(foreign: pd.DataFrame) -> None:
+    recording = apply(foreign, drive_torque_l={"from": "amps", "delay": 0.15}, soil={"from": "mode"})
+    assert len(recording) == 203
+    assert np.diff(recording.time).min() == pytest.approx(0.05)
+    np.testing.assert_array_equal(recording["drive_torque_l"][:200], foreign["amps"])
+    np.testing.assert_array_equal(recording["ground_speed"][3:], foreign["kmh"])
+    assert list(recording["soil"][:4]) == ["", "", "", "idle"]
+
+
+def test_nanosecond_stamps_keep_their_digits(foreign: pd.DataFrame) -> None:
+    foreign["stamp"] = 1_721_335_045_320_405_150 + np.arange(200) * 1_000_000
+    data = {
+        "time": {"from": "stamp", "unit": "ns", "zero": "first"},
+        "channels": {"wheel_speed_l": "rpm_right", "ground_speed": "kmh"},
+    }
+    np.testing.assert_allclose(Profile.from_dict(data).apply(foreign).time, np.arange(200) * 1e-3, atol=1e-12)
+
+
+def test_rows_are_selected(foreign: pd.DataFrame) -> None:
+    data = {
+        "time": {"from": "stamp", "unit": "ms"},
+        "rows": {"column": "mode", "equals": "calib"},
+        "channels": {"wheel_speed_l": "rpm_right", "ground_speed": "kmh"},
+    }
+    assert len(Profile.from_dict(data).apply(foreign)) == 150
+    data["rows"] = {"column": "mode", "equals": "drive"}
+    with pytest.raises(InputError, match="column mode: no row equals 'drive'; the column holds calib, idle"):
+        Profile.from_dict(data).apply(foreign)
+
+
+def test_a_unit_that_the_log_states_is_used(tmp_path: Path) -> None:
+    log = tmp_path / "log.csv"
+    log.write_text("t,speed [km/h],left [rpm],amps [A]\n0,3.6,60,2\n1,7.2,60,2\n")
+    channels = {
+        "ground_speed": "speed",
+        "wheel_speed_l": "left",
+        "drive_torque_l": {"from": "amps", "scale": 2.0},
+    }
+    recording = read(log, Profile.from_dict({"time": {"from": "t"}, "channels": channels}))
+    np.testing.assert_allclose(recording["ground_speed"], [1, 2])
+    np.testing.assert_allclose(recording["wheel_speed_l"], 2 * np.pi)
+    np.testing.assert_allclose(recording["drive_torque_l"], 4.0)
+    channels["drive_torque_l"] = {"from": "amps"}
+    with pytest.raises(InputError, match="column amps: 'A' measures a current, where a torque is needed"):
+        read(log, Profile.from_dict({"time": {"from": "t"}, "channels": channels}))
+
+
+def drive(rate: float, *, seed: int, noise: float) -> tuple[pd.DataFrame, np.ndarray]:
+    """A tracked drive along a curve, forward then backward, and its true signed speed."""
+    rng = np.random.default_rng(seed)
+    time = np.arange(0, 60, 1 / rate)
+    speed = np.where(time < 40, 0.8 + 0.2 * np.sin(0.6 * time), -0.5)
+    yaw = 0.3 * np.sin(0.2 * time)
+    x, y = (np.cumsum(speed * f(yaw)) / rate for f in (np.cos, np.sin))
+    frame = pd.DataFrame(
+        {
+            "stamp": time * 1000, "rpm_right": 4.0, "kmh": 1.0, "yaw_deg": np.rad2deg(yaw),
+            "x": x + noise * rng.standard_normal(len(time)), "y": y + noise * rng.standard_normal(len(time)),
+            "qx": 0.0, "qy": 0.0, "qz": np.sin(yaw / 2), "qw": np.cos(yaw / 2),
+        }
+    )  # fmt: skip
+    return frame, speed
+
+
+@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize(
+    "forward", [{"yaw": "yaw_deg", "unit": "deg"}, {"quaternion": ["qx", "qy", "qz", "qw"]}]
+)
+def test_signed_speed_from_positions(forward: dict[str, Any], seed: int) -> None:
+    frame, speed = drive(20, seed=seed, noise=0.002)
+    source = {"derivative_of": ["x", "y"], "unit": "m", "window": "0.5 s", "forward": forward}
+    recording = apply(frame, ground_speed=source)
+    found = recording["ground_speed"]
+    # The turn-round takes no time, which no derivative can follow; a one-sided window tells little.
+    away = np.abs(recording.time - 40) > 0.5
+    assert recording.time[away & np.isnan(found)] == pytest.approx([0, 0.05, 59.9, 59.95])
+    away &= np.isfinite(found)
+    error = (found - speed)[away]
+    assert np.std(error) < 0.008
+    assert abs(np.mean(error)) < 0.002
+    assert recording.noise["ground_speed"] == pytest.approx(np.std(error), rel=0.25)
+    assert sensor_noise(recording)["ground_speed"] == recording.noise["ground_speed"]
+    assert any("derivative of x, y over 0.5 s" in note for note in recording.notes)
+
+
+def test_speed_from_one_coordinate_and_without_heading() -> None:
+    frame, speed = drive(20, seed=1, noise=0.0)
+    frame["odometer_cm"] = 100 * np.cumsum(speed) / 20
+    recording = apply(frame, ground_speed={"derivative_of": ["odometer_cm"], "unit": "cm"})
+    inner = (np.abs(recording.time - 40) > 0.5) & (recording.time > 0.5) & (recording.time < 59)
+    np.testing.assert_allclose(recording["ground_speed"][inner], speed[inner], atol=0.01)
+    unsigned = apply(frame, ground_speed={"derivative_of": ["x", "y"], "unit": "m"})
+    np.testing.assert_allclose(unsigned["ground_speed"][inner], np.abs(speed)[inner], atol=0.01)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_jumps_of_the_pose_gaps_and_held_poses(seed: int) -> None:
+    frame, speed = drive(20, seed=seed, noise=0.002)
+    pose = ["x", "y"]
+    row = np.arange(len(frame)) // 2 * 2  # fresh every other row
+    frame[pose] = frame[pose].to_numpy()[row]
+    frame.loc[300:302, "x"] += 5.0  # a lost track
+    frame.loc[500:561, pose] = np.nan  # 3 s without a pose
+    source = {
+        "derivative_of": pose,
+        "unit": "m",
+        "window": "0.6 s",
+        "forward": {"yaw": "yaw_deg", "unit": "deg"},
+    }
+    found = apply(frame, ground_speed=source)["ground_speed"]
+    known = np.isfinite(found)
+    assert known.mean() == pytest.approx(0.5 * (1 - 72 / 1200), abs=0.02)
+    assert not known[500:562].any()
+    time = np.arange(1200) / 20
+    away = known & (np.abs(time - 40) > 0.7)
+    # A pose stands for the instant it appeared at; half a row of lag moves the speed by 0.003.
+    assert np.abs((found - speed)[away]).max() < 0.03
+
+
+def test_pitch_and_roll_from_a_quaternion() -> None:
+    frame, _ = drive(20, seed=0, noise=0.0)
+    half = np.deg2rad(5.0) / 2
+    frame["qy"], frame["qz"], frame["qw"] = np.sin(half), 0.0, np.cos(half)  # about the left axis: nose down
+    pitch = apply(frame, pitch={"pitch_of": ["qx", "qy", "qz", "qw"]})["pitch"]
+    np.testing.assert_allclose(pitch, np.deg2rad(-5.0))
+    roll = apply(frame, roll={"roll_of": ["qy", "qx", "qz", "qw"], "sign": -1})["roll"]
+    np.testing.assert_allclose(roll, np.deg2rad(-5.0))
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "place", "problem", "mend"),
+    [
+        ("from: kmh", "fron: kmh", "channels.ground_speed.fron (line 7)", "unknown key", "did you mean 'from'?"),
+        ("ground_speed:", "groundspeed:", "channels.groundspeed (line 7)", "no such channel", "'ground_speed'"),
+        ("unit: km/h", "unit: kg", "channels.ground_speed (line 7)", "measures a mass, where a speed", "m/s"),
+        ("unit: km/h", "unit: mph/", "channels.ground_speed (line 7)", "is not a unit", "N m"),
+        ("channels:\n", "channels:\n  time: stamp\n", "channels.time (line 4)", "time is no channel", "beside channels"),
+        ("sign: -1", "sign: 2", "channels.wheel_speed_l.sign (line 4)", "", ""),
+        ("scale: 2.079", "scale: .nan", "channels.drive_torque_l.scale (line 6)", "", ""),
+        ("{constant: grass}", "{unit: m}", "channels.soil (line 9)", "needs exactly one source", "derivative_of"),
+        ("{constant: grass}", "{constant: a, from: b}", "channels.soil (line 9)", "needs exactly one source", ""),
+        ("unit: ms", "unit: m", "time.unit (line 2)", "measures a length, where a time is needed", "'s'"),
+        ("[900, 1000]", "[900, 1000, 2]", "channels.drive_torque_l.invalid", "", ""),
+        ("unit: km/h", "window: 1 s", "channels.ground_speed.window (line 7)", "serves derivative_of only", "leave it out"),
+        ("from: kmh", "derivative_of: [a], forward: {yaw: y}", "channels.ground_speed.forward", "needs derivative_of two", ""),
+        ("name: test rig", "delay: 3", "delay (line 1)", "unknown key", ""),
+    ],
+)  # fmt: skip
+def test_a_faulty_profile_is_refused(
+    tmp_path: Path, old: str, new: str, place: str, problem: str, mend: str
+) -> None:
+    path = tmp_path / "profile.yaml"
+    assert old in PROFILE
+    path.write_text(PROFILE.replace(old, new, 1))
+    with pytest.raises(InputError) as caught:
+        Profile.load(path)
+    assert place in (caught.value.place or "")
+    assert problem in caught.value.problem
+    assert mend in (caught.value.mend or "")
+
+
+def _rename(name: str, other: str) -> Callable[[pd.DataFrame], pd.DataFrame]:
+    return lambda frame: frame.rename(columns={name: other})
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (_rename("kmh", "speed_kmh"), "column kmh: is missing, but the profile names it; the nearest column is 'speed_kmh'"),
+        (_rename("kmh", "?"), "column kmh: is missing, but the profile names it; its columns are stamp, rpm_left"),
+        (lambda f: f.assign(kmh="fast"), "column kmh, row 1 (time 0 s): 'fast' is not a number"),
+        (lambda f: f.assign(stamp=f["stamp"].iloc[::-1].to_numpy()), "column time, row 2 (time 9.9 s): time runs back"),
+        (lambda f: f.iloc[:0], "the table is empty"),
+    ],
+)  # fmt: skip
+def test_a_log_that_does_not_fit_is_refused(
+    foreign: pd.DataFrame, change: Callable[[pd.DataFrame], pd.DataFrame], message: str
+) -> None:
+    with pytest.raises(InputError) as caught:
+        apply(change(foreign), drive_torque_l="amps")
+    assert str(caught.value).startswith(f"log.csv: {message}")
+
+
+def test_measured_poses(shared: Callable[[str], Path]) -> None:
+    """Warthog on grass: the speed of the lidar pose against the wheels', where both sides turn alike."""
+    log = shared("data/drive_warthog/raw20hz/warthog_wheels_grass_2024_7_29_14h46s15.csv.gz")
+    pose = [f"icp_quat_{axis}" for axis in "xyzw"]
+    channels = {
+        "wheel_speed_l": {"from": "meas_left_vel", "unit": "rad/s"},
+        "wheel_speed_r": {"from": "meas_right_vel", "unit": "rad/s"},
+        "ground_speed": {
+            "derivative_of": ["icp_pos_x", "icp_pos_y"], "unit": "m", "window": "0.8 s", "forward": {"quaternion": pose},
+        },
+        "pitch": {"pitch_of": pose},
+    }  # fmt: skip
+    recording = read(log, Profile.from_dict({"time": {"from": "time_s"}, "channels": channels}))
+    left, right, speed = (recording[c] for c in ("wheel_speed_l", "wheel_speed_r", "ground_speed"))
+    assert np.isfinite(speed).mean() == pytest.approx(
+        0.4, abs=0.05
+    )  # poses arrive at 8 to 9 Hz in 20 Hz rows
+    straight = (
+        np.isfinite(speed)
+        & (np.abs(left + right) > 4.0)
+        & (np.abs(left - right) < 0.2 * np.abs(left + right))
+    )
+    ratio = speed[straight] / (0.3 * 0.5 * (left + right)[straight])
+    assert straight.sum() > 100
+    assert 0.90 < np.median(ratio) < 1.0  # the data's own notes: slip of 0.05 on grass; and the sign is right
+    assert np.mean(ratio > 0.5) > 0.95
+    assert np.rad2deg(np.abs(np.nanmedian(recording["pitch"]))) < 3
