@@ -25,10 +25,10 @@ static void consider_statically(tg_estimator *e, const tg_drive *drive)
     const tg_machine *m = &s->machine;
     const int32_t n = m->wheels;
     tg_belief *b = &e->belief;
-    tg_deviation deviation[TG_MAX_CONSIDERED];
-    tg_input u = tgi_along(e, drive);
-    b->columns = tgi_deviation_columns(s);
-    tgi_deviations(s, &u, b->x, deviation);
+    const tg_deviation *deviation = e->deviation;
+    tg_input u;
+    tgi_along(e, drive, &u);
+    tgi_deviations(e, &u, b->x);
     memset(e->consider.s, 0, sizeof e->consider.s);
     for (int32_t c = 0; c < b->columns; c++) {
         tg_real acceleration = deviation[c].acceleration;
@@ -37,7 +37,7 @@ static void consider_statically(tg_estimator *e, const tg_drive *drive)
             e->consider.s[c][i] = torque / (m->radius[i] * u.load[i]);
             acceleration += torque / (m->radius[i] * m->mass);
         }
-        e->consider.s[c][n] = acceleration / (m->gravity * tgi_cos(u.slope));
+        e->consider.s[c][n] = acceleration / (m->gravity * drive->cosine);
     }
 }
 

@@ -13,8 +13,9 @@ int32_t tgi_deviation_columns(const tg_settings *s)
 }
 
 /* What the front axles gain and the rear axles lose, as a share of the mean axle load. */
-static void shift_loads(const tg_settings *s, const tg_real *mu, tg_deviation *d)
+static void shift_loads(const tg_estimator *e, const tg_real *mu, tg_deviation *d)
 {
+    const tg_settings *s = &e->settings;
     const tg_machine *m = &s->machine;
     tg_real largest = 0;
     for (int32_t k = 0; k < s->axles; k++)
@@ -22,43 +23,44 @@ static void shift_loads(const tg_settings *s, const tg_real *mu, tg_deviation *d
     if (!(largest > 0)) return;
     tg_real mean = s->uncertainty.vertical_load * m->mass * m->gravity / (tg_real)s->axles, force = 0;
     for (int32_t i = 0; i < m->wheels; i++) {
-        int32_t k = s->wheel_axle[i];
-        tg_real gain = mean * s->load_transfer[k] / largest * s->wheel_share[i];
-        d->wheel_acceleration[i] = -m->radius[i] * (mu[i] + m->tire_rolling_resistance) * gain / m->inertia[i];
+        tg_real gain = mean * s->load_transfer[s->wheel_axle[i]] / largest * s->wheel_share[i];
+        d->wheel_acceleration[i] = -m->radius[i] * (mu[i] + m->tire_rolling_resistance) * gain * e->constants.inverse_inertia[i];
         force += mu[i] * gain;
     }
-    d->acceleration = d->accelerometer = force / m->mass;
+    d->acceleration = d->accelerometer = force * e->constants.inverse_mass;
 }
 
-/* One column a constant, in the order of tgi_deviation_columns; `u` are the inputs along the travel, `mu` the adhesion. */
-void tgi_deviations(const tg_settings *s, const tg_input *u, const tg_real *mu, tg_deviation *d)
+/* Work out e->deviation, one a constant in the order of tgi_deviation_columns; `u` are the inputs along the travel, `mu` the adhesion.
+ * What a constant does not touch stays 0 from the start. */
+void tgi_deviations(tg_estimator *e, const tg_input *u, const tg_real *mu)
 {
-    const tg_machine *m = &s->machine;
+    const tg_settings *s = &e->settings;
     const tg_uncertainty *spread = &s->uncertainty;
-    const int32_t n = m->wheels;
-    memset(d, 0, (size_t)tgi_deviation_columns(s) * sizeof *d);
+    const tg_real *inverse_inertia = e->constants.inverse_inertia;
+    const int32_t n = s->machine.wheels;
+    tg_deviation *d = e->deviation;
     if (spread->drive_torque_gain > 0 || spread->drive_torque_offset > 0)
         for (int32_t i = 0; i < n; i++) {
             if (!s->driven[i]) continue;
             tg_real variance = tgi_square(spread->drive_torque_gain * u->torque[i]) + tgi_square(spread->drive_torque_offset);
-            (d++)->wheel_acceleration[i] = tgi_sqrt(variance) / m->inertia[i];
+            (d++)->wheel_acceleration[i] = tgi_sqrt(variance) * inverse_inertia[i];
         }
     if (spread->drive_torque_gain_common > 0) {
         for (int32_t i = 0; i < n; i++)
-            d->wheel_acceleration[i] = spread->drive_torque_gain_common * u->torque[i] / m->inertia[i];
+            d->wheel_acceleration[i] = spread->drive_torque_gain_common * u->torque[i] * inverse_inertia[i];
         d++;
     }
     if (spread->drawbar_gain > 0 || spread->drawbar_offset > 0) {
         tg_real variance = tgi_square(spread->drawbar_gain * u->drawbar) + tgi_square(spread->drawbar_offset);
-        d->acceleration = d->accelerometer = -tgi_sqrt(variance) / m->mass;
+        d->acceleration = d->accelerometer = -tgi_sqrt(variance) * e->constants.inverse_mass;
         d++;
     }
-    if (spread->slope > 0) (d++)->acceleration = -m->gravity * spread->slope; /* cos(slope) moves by its square only */
+    if (spread->slope > 0) (d++)->acceleration = -s->machine.gravity * spread->slope; /* cos(slope) moves by its square only */
     if (spread->tire_rolling_resistance > 0) {
         for (int32_t i = 0; i < n; i++)
-            d->wheel_acceleration[i] = -m->radius[i] * spread->tire_rolling_resistance * u->load[i] / m->inertia[i];
+            d->wheel_acceleration[i] = -s->machine.radius[i] * spread->tire_rolling_resistance * u->load[i] * inverse_inertia[i];
         d++;
     }
-    if (spread->vertical_load > 0) shift_loads(s, mu, d++);
+    if (spread->vertical_load > 0) shift_loads(e, mu, d++);
     if (spread->acceleration_bias > 0) d->accelerometer = -spread->acceleration_bias;
 }

@@ -74,14 +74,14 @@ static void drift(tg_estimator *e, tg_real dt)
     restart(e, dt, x, P);
 }
 
+/* The row's channels along the travel, and their variances. The accelerometer's jolts come in swings, not as white noise. */
 static void measured(const tg_estimator *e, const tg_row *row, tg_real *y, tg_real *r)
 {
-    const tg_settings *s = &e->settings;
-    const int32_t n = s->machine.wheels;
+    const int32_t n = e->settings.machine.wheels;
     const tg_real d = (tg_real)e->direction;
     for (int32_t i = 0; i < n; i++) {
         y[i] = d * row->value[TG_WHEEL_SPEED + i];
-        r[i] = tgi_square(s->noise[TG_WHEEL_SPEED + i]);
+        r[i] = e->constants.variance[TG_WHEEL_SPEED + i];
     }
     y[n] = d * row->value[TG_GROUND_SPEED];
     r[n] = row->ground_variance;
@@ -94,26 +94,28 @@ static void measured(const tg_estimator *e, const tg_row *row, tg_real *y, tg_re
 static void watch_jolts(tg_estimator *e, const tg_step *step, tg_real r, tg_real dt)
 {
     const int32_t c = e->settings.machine.wheels + 1;
-    const tg_real least = tgi_square(e->settings.noise[TG_ACCELERATION_X])
-                        + tgi_square(e->settings.noise[TG_DRAWBAR_FORCE] / e->settings.machine.mass);
     if (isnan(step->innovation[c])) return;
     tg_real square = tgi_square(step->innovation[c]), bound = 16 * step->innovation_variance[c];
     if (square > bound) square = bound;
     e->jolt += dt / (TG_JOLT_MEMORY + dt) * (square - (step->innovation_variance[c] - r) - e->jolt);
-    if (e->jolt < least) e->jolt = least;
+    if (e->jolt < e->constants.least_jolt) e->jolt = e->constants.least_jolt;
 }
 
-static tg_real supervisor_of(const tg_settings *s, const tg_step *step)
+static tg_real supervisor_of(const tg_estimator *e, const tg_step *step)
 {
-    if (s->tuning.policy != TG_BANK) return step->gamma;
-    tg_real low = tgi_log(s->tuning.scales[0]), high = low, mean = 0;
-    for (int32_t b = 0; b < TG_MODES; b++) {
-        tg_real scale = tgi_log(s->tuning.scales[b]);
-        mean += step->mode[b] * scale;
-        if (scale < low) low = scale;
-        if (scale > high) high = scale;
-    }
-    return high > low ? (mean - low) / (high - low) : 0;
+    tg_real mean = 0;
+    if (e->settings.tuning.policy != TG_BANK) return step->gamma;
+    for (int32_t b = 0; b < TG_MODES; b++) mean += step->mode[b] * e->constants.scale_score[b];
+    return mean;
+}
+
+/* A channel that the filter trusts much less than usual. A reckoned ground speed is no measurement. */
+static int32_t is_outlier(const tg_estimator *e, const tg_row *row, const tg_step *step)
+{
+    const int32_t n = e->settings.machine.wheels;
+    int32_t found = 0;
+    for (int32_t c = 0; c < n + 2; c++) found |= step->weight[c] < e->settings.outlier_weight && !(row->reckoned && c == n);
+    return found;
 }
 
 /* Predict over dt, in pieces where it is long, and update. Returns 0 where the filter had to start anew. */
@@ -121,32 +123,34 @@ static int32_t advance(tg_estimator *e, tg_row *row, const tg_drive *drive, tg_r
 {
     const tg_settings *s = &e->settings;
     tg_real y[TG_MAX_CHANNELS], r[TG_MAX_CHANNELS];
-    tg_input before = tgi_along(e, &e->before), now = tgi_along(e, drive);
-    tg_deviation deviation[TG_MAX_CONSIDERED];
+    tg_input now;
     tg_step step;
     int32_t pieces = 1;
-    if (dt > s->max_step) pieces = dt / s->max_step < 300 ? (int32_t)(dt / s->max_step) + 1 : 300;
-    dt /= (tg_real)pieces;
-    for (int32_t j = 0; j < TG_MAX_STATES; j++) q[j] /= (tg_real)pieces;
+    if (dt > s->max_step) {
+        pieces = dt / s->max_step < 300 ? (int32_t)(dt / s->max_step) + 1 : 300;
+        dt /= (tg_real)pieces;
+        for (int32_t j = 0; j < TG_MAX_STATES; j++) q[j] /= (tg_real)pieces;
+    }
+    tgi_along(e, drive, &now);
     measured(e, row, y, r);
-    tgi_deviations(s, &before, e->belief.x, deviation);
+    tgi_deviations(e, &e->held, e->belief.x);
     tg_status status = TG_OK;
     for (int32_t k = 1; k < pieces && status == TG_OK; k++) {
-        status = tg_filter_predict(&e->filter, dt, &before, q);
-        tg_consider_step(&e->consider, &e->filter, deviation);
+        status = tg_filter_predict(&e->filter, dt, &e->held, q);
+        tg_consider_step(&e->consider, &e->filter, e->deviation);
     }
-    if (status == TG_OK) status = tg_filter_step(&e->filter, dt, &before, &now, q, y, r, &step);
+    if (status == TG_OK) status = tg_filter_step(&e->filter, dt, &e->held, &now, q, y, r, &step);
     if (status != TG_OK) {
         tgi_filter_anew(&e->filter, &e->consider, s);
         restart_from(e, row, 0);
         return 0;
     }
-    tg_consider_step(&e->consider, &e->filter, deviation);
+    tg_consider_step(&e->consider, &e->filter, e->deviation);
     watch_jolts(e, &step, r[s->machine.wheels + 1], dt);
     e->belief.nis = step.nis;
     e->belief.channels = step.channels;
-    e->belief.supervisor = supervisor_of(s, &step);
-    for (int32_t j = 0; j < s->machine.wheels + 2; j++) row->outlier |= step.weight[j] < s->outlier_weight && !isnan(y[j]) && !(row->reckoned && j == s->machine.wheels);
+    e->belief.supervisor = supervisor_of(e, &step);
+    row->outlier |= is_outlier(e, row, &step);
     return 1;
 }
 
@@ -169,9 +173,9 @@ static void balance_forces(tg_estimator *e, const tg_drive *drive, double time)
     const tg_machine *m = &e->settings.machine;
     const int32_t n = m->wheels;
     const tg_real d = (tg_real)e->direction;
-    tg_real force = -d * drive->drawbar - e->belief.x[n] * m->mass * m->gravity * tgi_cos(drive->slope);
+    tg_real force = -d * drive->drawbar - e->belief.x[n] * m->mass * m->gravity * drive->cosine;
     for (int32_t i = 0; i < n; i++) force += e->belief.x[i] * drive->load[i];
-    tgi_lowpass(&e->balance, e->standing ? 0 : d * force / m->mass, time, e->settings.load_filter);
+    tgi_lowpass(&e->balance, e->standing ? 0 : d * force * e->constants.inverse_mass, time, e->settings.load_filter);
 }
 
 static int32_t go_on(tg_estimator *e, tg_row *row, const tg_drive *drive, tg_course course, tg_real dt, tg_real *q)
@@ -223,7 +227,7 @@ tg_status tg_estimator_update(tg_estimator *e, const tg_sample *sample, tg_estim
     }
     e->started = 1;
     e->time = row.time;
-    e->before = drive;
+    tgi_along(e, &drive, &e->held);
     out->time = row.time;
     out->distance = e->distance;
     out->event = gap || course == TG_WAIT ? TG_EVENT_GAP : e->standing ? TG_EVENT_STANDSTILL

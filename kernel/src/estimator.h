@@ -39,7 +39,7 @@ typedef struct { /* what drives the model between two rows, in the vehicle's own
     tg_real axle_load[8]; /* N */
     tg_real torque[8];
     tg_real drawbar;
-    tg_real slope;
+    tg_real slope, cosine, sine;
 } tg_drive;
 
 typedef struct { /* the estimate with its spreads, along the travel; the filter's row order (mu, rho_s, v, omega), see filter.h */
@@ -66,13 +66,25 @@ typedef struct { /* low-passed while the ground speed is measured; the whole veh
     tg_real slip, adhesion;
 } tgi_slip_memory;
 
+typedef struct { /* what follows from the settings alone */
+    tg_real limit[TG_SLOTS];        /* beyond it a value is a defect; negative: this machine has no such channel */
+    tg_real inverse_gain[TG_SLOTS];
+    tg_real variance[TG_SLOTS];     /* noise squared */
+    tg_real inverse_inertia[8];
+    tg_real inverse_mass, inverse_weight;
+    tg_real spin_inertia;           /* sum J/r */
+    tg_real unknown_torque[8];      /* variance of a torque never seen */
+    tg_real unknown_pull;
+    tg_real least_load[8];          /* N; the model divides by the load */
+    tg_real least_jolt;             /* (m/s^2)^2, variance of the accelerometer at rest */
+    tg_real scale_score[TG_MODES];  /* of the bank: log scale, 0 the smallest, 1 the largest */
+    int32_t holds;                  /* some channel is held */
+} tgi_constants;
+
 struct tg_estimator {
     tg_settings settings;
-    int32_t slots;             /* channels this machine can have */
-    int32_t slot[TG_SLOTS];
-    int32_t holds;             /* some channel is held */
-    tg_real spin_inertia;      /* sum J/r */
-    tg_real inverse_weight;    /* 1/(m g) */
+    tgi_constants constants;
+    tg_deviation deviation[TG_MAX_CONSIDERED];
     int32_t started;           /* a sample was seen */
     int32_t seen_motion;       /* a wheel or ground speed was seen: the outputs are numbers */
     int32_t standing;          /* at standstill */
@@ -86,7 +98,7 @@ struct tg_estimator {
     tgi_slope slope;
     double ground_time;        /* of the last measured ground speed */
     tg_real jolt;              /* variance of the accelerometer about the model, (m/s^2)^2 */
-    tg_drive before;           /* inputs of the last row */
+    tg_input held;             /* inputs of the last row, along the travel */
     tg_belief belief;
     tg_algebra algebra;
     tg_filter filter;
@@ -98,21 +110,20 @@ TG_INLINE tg_real tgi_square(tg_real x) { return x * x; }
 /* quality.c */
 tg_status tgi_clean(tg_estimator *e, const tg_sample *sample, tg_row *row);
 tg_real tgi_lowpass(tg_lowpass *f, tg_real x, double time, tg_real tau);
-void tgi_hold_update(tg_hold *h, tg_real x, double time, tg_real noise);
-tg_real tgi_hold_variance(const tg_hold *h, double time, tg_real noise);
 int32_t tgi_track_motion(tg_estimator *e, const tg_row *row);
 
 /* loads.c */
 void tgi_loads(tg_estimator *e, const tg_row *row, tg_drive *drive);
 
 /* inputs.c */
+void tgi_hold_update(tg_hold *h, tg_real x, double time, tg_real noise);
 void tgi_take_inputs(tg_estimator *e, tg_row *row, tg_real dt, tg_drive *drive);
 void tgi_input_noise(const tg_estimator *e, double time, tg_real dt, tg_real *q);
-tg_input tgi_along(const tg_estimator *e, const tg_drive *drive);
+void tgi_along(const tg_estimator *e, const tg_drive *drive, tg_input *u);
 
 /* deviations.c */
 int32_t tgi_deviation_columns(const tg_settings *s);
-void tgi_deviations(const tg_settings *s, const tg_input *u, const tg_real *mu, tg_deviation *d);
+void tgi_deviations(tg_estimator *e, const tg_input *u, const tg_real *mu);
 
 /* settings.c */
 void tgi_believe(tg_estimator *e);

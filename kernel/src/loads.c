@@ -42,9 +42,9 @@ void tgi_loads(tg_estimator *e, const tg_row *row, tg_drive *drive)
     const tg_settings *s = &e->settings;
     const tg_machine *m = &s->machine;
     tg_real a = specific_force(e, row), g = m->gravity;
-    tg_real weight = m->mass * g * tgi_cos(drive->slope);
+    tg_real weight = m->mass * g * drive->cosine;
     tg_real moment = m->mass * s->center_of_gravity_height * a + drive->drawbar * s->hitch_height
-                   + e->spin_inertia * (a - g * tgi_sin(drive->slope));
+                   + e->constants.spin_inertia * (a - g * drive->sine);
     tg_real load[8];
     for (int32_t k = 0; k < s->axles; k++) load[k] = s->load_share[k] * weight - s->load_transfer[k] * moment;
     take_measured(e, row, weight, load);
@@ -53,9 +53,7 @@ void tgi_loads(tg_estimator *e, const tg_row *row, tg_drive *drive)
     if (!e->lateral.seen && !isnan(row->value[TG_ROLL])) lateral = g * tgi_sin(row->value[TG_ROLL]);
     for (int32_t k = 0; k < s->axles; k++) drive->axle_load[k] = load[k];
     for (int32_t i = 0; i < m->wheels; i++) {
-        int32_t k = s->wheel_axle[i];
-        tg_real least = (tg_real)0.02 * s->load_share[k] * s->wheel_share[i] * m->mass * g;
-        tg_real wheel = load[k] * (s->wheel_share[i] - s->lateral_share[i] * lateral);
+        tg_real least = e->constants.least_load[i], wheel = load[s->wheel_axle[i]] * (s->wheel_share[i] - s->lateral_share[i] * lateral);
         drive->load[i] = wheel > least ? wheel : least;
     }
 }

@@ -49,7 +49,7 @@ static tg_real slip_at(const tgi_slip_memory *m, tg_real adhesion)
  * that the error is the same for a while: a white one would be averaged away. */
 void tgi_reckon(tg_estimator *e, const tg_drive *drive, tg_real dt, tg_row *row, tg_real *q)
 {
-    row->ground_variance = tgi_square(e->settings.noise[TG_GROUND_SPEED]);
+    row->ground_variance = e->constants.variance[TG_GROUND_SPEED];
     if (!isnan(row->value[TG_GROUND_SPEED])) {
         e->ground_time = row->time;
         return;

@@ -101,16 +101,52 @@ static tg_status check(const tg_settings *s)
     return status == TG_OK ? check_numbers(s) : status;
 }
 
-static void list_slots(tg_estimator *e)
+/* Beyond these a value is a defect of the log, not a measurement. */
+static tg_real plausible(int32_t slot)
 {
-    const tg_settings *s = &e->settings;
-    for (int32_t slot = 0; slot < TG_SLOTS; slot++) {
-        int32_t torque = slot - TG_DRIVE_TORQUE, axle = slot - TG_VERTICAL_LOAD;
-        if (slot < TG_GROUND_SPEED && slot >= s->machine.wheels) continue;
-        if (torque >= 0 && torque < TG_MAX_WHEELS && (torque >= s->machine.wheels || !s->driven[torque])) continue;
-        if (axle >= s->axles) continue;
-        e->slot[e->slots++] = slot;
+    if (slot < TG_GROUND_SPEED) return (tg_real)1e4; /* rad/s */
+    if (slot < TG_DRIVE_TORQUE) return (tg_real)1e3; /* m/s */
+    if (slot < TG_ACCELERATION_X) return (tg_real)1e7; /* N m, N */
+    if (slot < TG_PITCH) return (tg_real)1e3; /* m/s^2 */
+    if (slot < TG_VERTICAL_LOAD) return (tg_real)1.5; /* rad */
+    return (tg_real)1e8; /* N */
+}
+
+static int has_channel(const tg_settings *s, int32_t slot)
+{
+    const int32_t torque = slot - TG_DRIVE_TORQUE;
+    if (slot < TG_GROUND_SPEED) return slot < s->machine.wheels;
+    if (torque >= 0 && torque < TG_MAX_WHEELS) return torque < s->machine.wheels && s->driven[torque];
+    return slot - TG_VERTICAL_LOAD < s->axles;
+}
+
+static void work_out_constants(const tg_settings *s, tgi_constants *c)
+{
+    const tg_machine *m = &s->machine;
+    const tg_real weight = m->mass * m->gravity;
+    for (int32_t k = 0; k < TG_SLOTS; k++) {
+        c->limit[k] = has_channel(s, k) ? plausible(k) : -1;
+        c->inverse_gain[k] = 1 / s->gain[k];
+        c->variance[k] = tgi_square(s->noise[k]);
+        c->holds |= s->held_period[k] > 0;
     }
+    for (int32_t i = 0; i < m->wheels; i++) {
+        const tg_real load = s->load_share[s->wheel_axle[i]] * s->wheel_share[i] * weight;
+        c->inverse_inertia[i] = 1 / m->inertia[i];
+        c->spin_inertia += m->inertia[i] / s->rolling_radius[i];
+        c->unknown_torque[i] = tgi_square((tg_real)0.5 * m->radius[i] * load);
+        c->least_load[i] = (tg_real)0.02 * load;
+    }
+    c->inverse_mass = 1 / m->mass;
+    c->inverse_weight = 1 / weight;
+    c->unknown_pull = tgi_square((tg_real)0.3 * weight);
+    c->least_jolt = c->variance[TG_ACCELERATION_X] + c->variance[TG_DRAWBAR_FORCE] * tgi_square(c->inverse_mass);
+    tg_real low = s->tuning.scales[0], high = low;
+    for (int32_t b = 1; b < TG_MODES; b++) {
+        if (s->tuning.scales[b] < low) low = s->tuning.scales[b];
+        if (s->tuning.scales[b] > high) high = s->tuning.scales[b];
+    }
+    for (int32_t b = 0; b < TG_MODES && high > low; b++) c->scale_score[b] = tgi_log(s->tuning.scales[b] / low) / tgi_log(high / low);
 }
 
 /* A filter that knows the priors only, and its considered columns. */
@@ -160,16 +196,12 @@ tg_status tg_estimator_init(tg_estimator *e, const tg_settings *settings)
     memcpy(&e->consider, &consider, sizeof consider);
     e->belief.columns = tgi_deviation_columns(settings);
     e->direction = 1;
-    e->jolt = tgi_square(settings->noise[TG_ACCELERATION_X]) + tgi_square(settings->noise[TG_DRAWBAR_FORCE] / settings->machine.mass);
+    work_out_constants(settings, &e->constants);
+    e->jolt = e->constants.least_jolt;
     e->slope.error_variance = tgi_square(settings->slope_spread);
     e->slip_memory.slip = (tg_real)0.08; /* a guess until the first ground speed */
     e->slip_memory.adhesion = settings->prior_adhesion;
-    for (int32_t i = 0; i < settings->machine.wheels; i++)
-        e->spin_inertia += settings->machine.inertia[i] / settings->rolling_radius[i];
     for (int32_t k = 0; k < TG_SLOTS; k++) e->last_raw[k] = (tg_real)NAN;
-    list_slots(e);
-    e->inverse_weight = 1 / (settings->machine.mass * settings->machine.gravity);
-    for (int32_t k = 0; k < TG_SLOTS; k++) e->holds |= settings->held_period[k] > 0;
     tgi_believe(e);
     return TG_OK;
 }

@@ -126,7 +126,7 @@ void tgi_traction(const tg_estimator *e, const tg_drive *drive, tg_estimate *out
     for (int32_t i = 0; i < n; i++) thrust += b->x[i] * drive->load[i];
 #define TRACTION(n, stride)                        \
     gather(b, e->consider.s, n, stride, &c);       \
-    traction(e, &c, thrust * e->inverse_weight, o, n)
+    traction(e, &c, thrust * e->constants.inverse_weight, o, n)
     TG_BY_WHEELS(n, TRACTION)
 #undef TRACTION
     if (e->direction < 0) {
