@@ -99,20 +99,18 @@ TG_INLINE void exact_take_accelerometer(const tgi_plan *plan, tgi_result *out, c
 TG_INLINE void exact_step(const tg_filter *f, const tgi_plan *plan, tgi_result *out, const int n, const int stride)
 {
     tg_real W[2 * TG_MAX_STATES * TG_ROWS], weight[2 * TG_MAX_STATES];
-    tg_lanes product[TG_MOST_LANES];
     const int rows = TG_TWICE(n);
     exact_predict(f, plan, W, weight, out->x, n, stride);
     for (int i = 0; i < stride; i++) out->x_prior[i] = out->x[i];
     out->taken = 0;
     if (plan->count) exact_innovations(f, plan, W, weight, out, n, stride);
-    int columns = rows;
-    factor_sweep(W, weight, columns, rows - 1, stride / TG_LANES, stride, 0, product, product);
-#define TAKE(j)                                                                                                         \
-    if ((j) < rows) {                                                                                                   \
-        columns = factor_take(W, weight, columns, j, 1, plan->passage.q[j], stride, out->u + (j) * stride, out->d + (j), product); \
-        if ((j) > n && plan->count) exact_take_output(plan, out, j, n, stride);                                         \
+    tgi_gram gram = factor_begin(W, weight, rows, stride);
+#define TAKE(j, lanes)                                                                          \
+    {                                                                                           \
+        factor_row(&gram, j, lanes, plan->passage.q[j], out->u + (j) * stride, out->d + (j));   \
+        if ((j) > n && plan->count) exact_take_output(plan, out, j, n, stride);                 \
     }
-    TG_ROWS_DOWN_FROM_17(TAKE)
+    TG_ROWS_DOWN(rows - 1, 0, stride, TAKE)
 #undef TAKE
     if (plan->count && plan->present[n + 1]) exact_take_accelerometer(plan, out, n, stride);
 }

@@ -9,68 +9,90 @@
 
 #define TG_MOST_LANES 7 /* 28 rows: 18 states and 10 channels */
 
-/* Project the row taken before off every column (if `project`; `part` is its column of U), and gather row j's products with all rows. */
-TG_INLINE void factor_sweep(tg_real *W, const tg_real *weight, int columns, int j, int lanes, int stride, int project, const tg_lanes *part,
-                            tg_lanes *product)
+typedef struct { /* a factorisation on its way from the last row to the first */
+    tg_real *W, *weight;            /* columns `stride` apart, and their weights */
+    int columns, stride;
+    int previous;                   /* the row taken last */
+    tg_real noise;                  /* of the row taken last; 0: it brings no column */
+    tg_lanes part[TG_MOST_LANES];   /* that row's column of U */
+} tgi_gram;
+
+/* Take row j, which lies in the last of `lanes` lanes: project the row before off every column and divide row j's products with all rows
+ * above it by its own. Gives column j of U and d_j. */
+TG_INLINE void factor_row(tgi_gram *g, int j, const int lanes, tg_real noise, tg_real *u, tg_real *d)
 {
+    const int stride = g->stride;
     tg_lanes sum[4][TG_MOST_LANES]; /* four chains: additions wait for each other */
     for (int c = 0; c < 4; c++)
         for (int i = 0; i < lanes; i++) sum[c][i] = lanes_all(0);
-#define COLUMN(k, chain)                                                                \
-    {                                                                                   \
-        tg_real *const w = W + (k) * stride;                                            \
-        tg_lanes e[TG_MOST_LANES];                                                      \
-        if (project) {                                                                  \
-            const tg_lanes taken = lanes_all(w[j + 1]);                                 \
-            for (int i = 0; i < lanes; i++) {                                           \
-                e[i] = lanes_mul_sub(part[i], taken, lanes_load(w + TG_LANES * i));     \
-                lanes_store(w + TG_LANES * i, e[i]);                                    \
-            }                                                                           \
-        } else                                                                          \
-            for (int i = 0; i < lanes; i++) e[i] = lanes_load(w + TG_LANES * i);        \
-        const tg_lanes v = lanes_all(weight[k] * lanes_at(e[j / TG_LANES], j % TG_LANES)); \
-        for (int i = 0; i < lanes; i++) sum[chain][i] = lanes_mul_add(v, e[i], sum[chain][i]); \
+    if (g->noise > 0) { /* the last row's own column, just projected on itself */
+        tg_real *const own = g->W + g->columns * stride;
+        for (int i = 0; i < lanes; i++) lanes_store(own + TG_LANES * i, lanes_sub(lanes_all(0), g->part[i]));
+        const tg_lanes v = lanes_mul(lanes_all(g->noise), lanes_spread(g->part[lanes - 1], j % TG_LANES));
+        for (int i = 0; i < lanes; i++) sum[3][i] = lanes_mul(v, g->part[i]);
+    }
+#define COLUMN(k, chain)                                                                            \
+    {                                                                                               \
+        tg_real *const w = g->W + (k) * stride;                                                     \
+        const tg_lanes taken = lanes_all(w[g->previous]);                                           \
+        tg_lanes e[TG_MOST_LANES];                                                                  \
+        for (int i = 0; i < lanes; i++) {                                                           \
+            e[i] = lanes_mul_sub(g->part[i], taken, lanes_load(w + TG_LANES * i));                  \
+            lanes_store(w + TG_LANES * i, e[i]);                                                    \
+        }                                                                                           \
+        const tg_lanes v = lanes_mul(lanes_all(g->weight[k]), lanes_spread(e[lanes - 1], j % TG_LANES)); \
+        for (int i = 0; i < lanes; i++) sum[chain][i] = lanes_mul_add(v, e[i], sum[chain][i]);       \
     }
     int k = 0;
-    for (; k + 4 <= columns; k += 4) {
+    for (; k + 4 <= g->columns; k += 4) {
         COLUMN(k, 0)
         COLUMN(k + 1, 1)
         COLUMN(k + 2, 2)
         COLUMN(k + 3, 3)
     }
-    if (k < columns) COLUMN(k, 0)
-    if (k + 1 < columns) COLUMN(k + 1, 1)
-    if (k + 2 < columns) COLUMN(k + 2, 2)
+    for (; k < g->columns; k++) COLUMN(k, 0)
 #undef COLUMN
-    for (int i = 0; i < lanes; i++) product[i] = lanes_add(lanes_add(sum[0][i], sum[1][i]), lanes_add(sum[2][i], sum[3][i]));
-}
-
-/* Turn row j's products into column j of U and d_j, then project row j off the columns and gather for row j - 1. `noisy`: row j has noise
- * of its own, so one more column joins; returns the number of columns. */
-TG_INLINE int factor_take(tg_real *W, tg_real *weight, int columns, int j, int noisy, tg_real noise, int stride, tg_real *u, tg_real *d,
-                          tg_lanes *product)
-{
-    const int lanes = j / TG_LANES + 1, next = (j + TG_LANES - 1) / TG_LANES;
-    const tg_real whole = lanes_at(product[j / TG_LANES], j % TG_LANES) + (noise + TG_TINY);
-    const tg_lanes inverse = lanes_all(1 / whole);
-    tg_lanes part[TG_MOST_LANES];
+    if (g->noise > 0) g->weight[g->columns++] = g->noise;
+    for (int i = 0; i < lanes; i++) sum[0][i] = lanes_add(lanes_add(sum[0][i], sum[1][i]), lanes_add(sum[2][i], sum[3][i]));
+    const tg_lanes whole = lanes_add(lanes_spread(sum[0][lanes - 1], j % TG_LANES), lanes_all(noise + TG_TINY));
+    const tg_lanes inverse = lanes_div(lanes_all(1), whole);
     for (int i = 0; i < lanes; i++) {
-        part[i] = lanes_mul(product[i], inverse);
-        lanes_store(u + TG_LANES * i, part[i]);
+        g->part[i] = lanes_mul(sum[0][i], inverse);
+        lanes_store(u + TG_LANES * i, g->part[i]);
     }
-    *d = whole;
+    *d = lanes_at(whole, 0);
+    g->noise = noise;
+    g->previous = j;
     u[j] = 1;
     for (int i = j + 1; i < stride; i++) u[i] = 0;
-    if (j == 0) return columns;
-    factor_sweep(W, weight, columns, j - 1, next, stride, 1, part, product);
-    if (!noisy) return columns;
-    tg_real *const own = W + columns * stride;
-    for (int i = 0; i < next; i++) lanes_store(own + TG_LANES * i, lanes_sub(lanes_all(0), part[i]));
-    const tg_lanes v = lanes_all(noise * u[j - 1]);
-    for (int i = 0; i < next; i++) product[i] = lanes_mul_add(v, part[i], product[i]);
-    weight[columns] = noise;
-    return columns + 1;
 }
+
+/* W and its weights, with nothing taken yet. Column entries of row `rows` and below, up to the whole lane, must be numbers. */
+TG_INLINE tgi_gram factor_begin(tg_real *W, tg_real *weight, int columns, int stride)
+{
+    tgi_gram g;
+    g.W = W;
+    g.weight = weight;
+    g.columns = columns;
+    g.stride = stride;
+    g.previous = 0; /* nothing taken yet: project nothing off */
+    g.noise = 0;
+    for (int i = 0; i < stride / TG_LANES; i++) g.part[i] = lanes_all(0);
+    return g;
+}
+
+/* Do `take(j, lanes)` from row `last` down to `first`; where `stride` is not the largest, lane counts are constants (up to 4). */
+#define TG_LANES_DOWN(last, first, count, take) \
+    for (int j = (last) < TG_LANES * (count) ? (last) : TG_LANES * (count) - 1; j >= (first) && j >= TG_LANES * ((count) - 1); j--) take(j, count)
+#define TG_ROWS_DOWN(last, first, stride, take)                                   \
+    if ((stride) >= TG_ROWS) {                                                    \
+        for (int j = last; j >= (first); j--) take(j, j / TG_LANES + 1)           \
+    } else {                                                                      \
+        TG_LANES_DOWN(last, first, 4, take)                                       \
+        TG_LANES_DOWN(last, first, 3, take)                                       \
+        TG_LANES_DOWN(last, first, 2, take)                                       \
+        TG_LANES_DOWN(last, first, 1, take)                                       \
+    }
 
 /* Measurement update by one channel (Bierman 1977, V.3; Thornton's gain). `f`: U'h, zero before column `first`. Columns of U, d and the
  * gain (K over the returned variance of the residual) are those after the channel. */

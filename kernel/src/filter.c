@@ -303,13 +303,13 @@ tg_status tg_filter_sensitivity(const tg_filter *f, int32_t j, tg_real *dx, tg_r
 void tgi_restart(int n, int stride, const tg_real *q, tg_real *u, tg_real *d)
 {
     tg_real W[2 * TG_MAX_STATES * TG_ROWS], weight[2 * TG_MAX_STATES];
-    tg_lanes product[TG_MOST_LANES];
     const int rows = TG_TWICE(n);
-    int columns = rows;
     memcpy(W, u, (size_t)(rows * stride) * sizeof *u);
     memcpy(weight, d, (size_t)rows * sizeof *d);
-    factor_sweep(W, weight, columns, n, n / TG_LANES + 1, stride, 0, product, product);
-    for (int j = n; j >= 0; j--) columns = factor_take(W, weight, columns, j, 1, q[j], stride, u + j * stride, d + j, product);
+    tgi_gram gram = factor_begin(W, weight, rows, stride);
+#define TAKE(j, lanes) factor_row(&gram, j, lanes, q[j], u + (j) * stride, d + (j));
+    TG_ROWS_DOWN(n, 0, TG_ROWS, TAKE) /* not hot: one loop */
+#undef TAKE
     for (int j = n + 1; j < rows; j++) {
         d[j] = q[j];
         for (int i = 0; i < stride; i++) u[j * stride + i] = i == j;

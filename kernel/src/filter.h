@@ -80,13 +80,6 @@ TG_INLINE int tgi_stride(int n) { return n == 1 ? 4 : n == 2 ? 8 : n == 4 ? 12 :
     default: call((n), TG_ROWS); break;        \
     }
 
-/* Rows from the last to the first, unrolled: the row is then a constant too. */
-#define TG_ROWS_DOWN_FROM_17(take) \
-    take(17) take(16) take(15) take(14) take(13) take(12) take(11) take(10) take(9) \
-    take(8) take(7) take(6) take(5) take(4) take(3) take(2) take(1) take(0)
-#define TG_ROWS_DOWN_FROM_27(take) \
-    take(27) take(26) take(25) take(24) take(23) take(22) take(21) take(20) take(19) take(18) TG_ROWS_DOWN_FROM_17(take)
-
 TG_INLINE int tgi_finite(tg_real x) { return x - x == 0; }
 
 /* Innovation weight of PHYSICS 6 (Huber): 1 within `huber` SDs, then falling. */
@@ -95,9 +88,6 @@ TG_INLINE tg_real tgi_weight(tg_real huber, tg_real innovation, tg_real variance
     if (!(huber > 0) || innovation * innovation <= huber * huber * variance) return 1;
     return huber * tgi_sqrt(variance) / tgi_fabs(innovation);
 }
-
-/* model.c */
-void tgi_rates(const tg_machine *m, const tg_input *u, tg_real cosine, tg_real sine, const tg_real *x, tg_real *rate);
 
 /* exact.c, unscented.c: the prior and posterior of a filter with one lane. */
 void tgi_exact_step(const tg_filter *f, const tgi_plan *plan, tgi_result *result);

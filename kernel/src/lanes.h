@@ -25,6 +25,16 @@ TG_INLINE tg_lanes lanes_div(tg_lanes a, tg_lanes b) { return a / b; }
 TG_INLINE tg_lanes lanes_mul_add(tg_lanes a, tg_lanes b, tg_lanes c) { return c + a * b; }
 TG_INLINE tg_lanes lanes_mul_sub(tg_lanes a, tg_lanes b, tg_lanes c) { return c - a * b; }
 TG_INLINE tg_real lanes_at(tg_lanes a, int i) { return a[i]; }
+#if defined(__clang__)
+TG_INLINE tg_lanes lanes_spread(tg_lanes a, int i) { return lanes_all(a[i]); }
+#else
+#ifdef TG_FLOAT
+typedef int32_t tg_places __attribute__((vector_size(TG_LANES * sizeof(int32_t))));
+#else
+typedef int64_t tg_places __attribute__((vector_size(TG_LANES * sizeof(int64_t))));
+#endif
+TG_INLINE tg_lanes lanes_spread(tg_lanes a, int i) { return __builtin_shuffle(a, (tg_places){i, i, i, i}); }
+#endif
 #else
 typedef struct {
     tg_real at[TG_LANES];
@@ -43,6 +53,7 @@ TG_INLINE tg_lanes lanes_div(tg_lanes a, tg_lanes b) { LANES_EACH(a.at[i] / b.at
 TG_INLINE tg_lanes lanes_mul_add(tg_lanes a, tg_lanes b, tg_lanes c) { LANES_EACH(c.at[i] + a.at[i] * b.at[i]); }
 TG_INLINE tg_lanes lanes_mul_sub(tg_lanes a, tg_lanes b, tg_lanes c) { LANES_EACH(c.at[i] - a.at[i] * b.at[i]); }
 TG_INLINE tg_real lanes_at(tg_lanes a, int i) { return a.at[i]; }
+TG_INLINE tg_lanes lanes_spread(tg_lanes a, int i) { return lanes_all(a.at[i]); }
 #undef LANES_EACH
 #endif
 

@@ -6,6 +6,3 @@ void tgi_supervisor_remember(tg_filter *f, const tgi_plan *plan, const tg_input 
 void tgi_bank_init(tg_filter *f){(void)f;}
 void tgi_bank_moments(const tg_filter *f, tg_real *x, tg_real *P){(void)f;(void)x;(void)P;}
 void tgi_bank_restart(tg_filter *f, const tg_real *outputs, tg_passage *passage){(void)f;(void)outputs;(void)passage;}
-void tgi_unscented_step(const tg_filter *f, const tgi_plan *plan, tgi_result *result){(void)f;(void)plan;(void)result;}
-tg_status tg_consider_init(tg_consider *c, const tg_filter *f, int32_t columns){(void)c;(void)f;(void)columns;return TG_BAD_ARGUMENT;}
-tg_status tg_consider_step(tg_consider *c, const tg_filter *f, const tg_deviation *d){(void)c;(void)f;(void)d;return TG_BAD_ARGUMENT;}

@@ -93,6 +93,8 @@ TG_INLINE tg_status plan_channels(const tg_filter *f, const tgi_call *call, tgi_
     if (zero != 0) return TG_NOT_FINITE;
     if (!positive) return TG_NOT_POSITIVE;
     plan->count = count;
+    plan->accelerometer_shift = 0;
+    for (int i = 0; i <= n; i++) plan->accelerometer[i] = 0;
     if (call->y[n + 1] != call->y[n + 1]) return TG_OK;
     plan_slope(f, call->now->slope, &plan->cosine[1], &plan->sine[1]);
     for (int i = 0; i < n; i++) plan->accelerometer[i] = call->now->load[i] * f->inverse_mass;

@@ -10,26 +10,28 @@ static double one_problem(int n, int engine, double huber, double missing, int s
     static tg_filter f;
     static dense d;
     tg_real x[NX], P[NX * NX], y[NY], r[NY], q[NX];
-    wide total[NX];
+    wide total[NX], truth[NX];
     double worst = 0;
     tg_input before = random_input(&m);
     t.engine = engine;
     t.huber = (tg_real)huber;
     for (int e = 0; e < states; e++) {
         t.walk[e] = (tg_real)pow(10, uniform(-5, -1));
-        x[e] = (tg_real)normal();
+        truth[e] = e < n ? 4 : e == n ? 0.8 : e < states - 1 ? 0.3 : 0.1;
     }
-    random_covariance(states, sizeof(tg_real) == 8 ? 6 : 2, P);
+    random_covariance(states, sizeof(tg_real) == 8 ? 4 : 2, P);
+    for (int e = 0; e < states; e++) x[e] = (tg_real)((double)truth[e] + normal() * sqrt((double)P[e * states + e]));
     CHECK(tg_filter_init(&f, &m, &t, x, P) == TG_OK, "init");
     dense_moments(&d, &m, x, P);
     for (int k = 0; k < steps; k++) {
         const tg_input now = random_input(&m);
         const double dt = k % 7 == 3 ? 0 : k % 50 == 20 ? 0.4 : uniform(0.001, 0.05);
         tg_step step;
+        dense_move(&m, &before, (tg_real)dt, truth);
         for (int c = 0; c < n + 2; c++) {
-            const double scale = c == n + 1 ? 3 : 0.3;
             r[c] = (tg_real)pow(10, uniform(-4, -2));
-            y[c] = uniform(0, 1) < missing ? (tg_real)NAN : (tg_real)((c <= n ? (double)d.x[c] : 0) + scale * normal());
+            y[c] = (tg_real)(c <= n ? (double)truth[c] + 2 * sqrt((double)r[c]) * normal() : uniform(-1, 1));
+            if (uniform(0, 1) < missing) y[c] = (tg_real)NAN;
         }
         for (int e = 0; e < states; e++) {
             q[e] = uniform(0, 1) < 0.5 ? 0 : (tg_real)uniform(0, 1e-4);

@@ -1,0 +1,156 @@
+/* Unscented engine, the paper's: 2 nx + 1 sigma points through Runge-Kutta 4 of the model, moments by their weights, sigma points redrawn
+ * before the update. The factors come from the weighted deviations by Gram-Schmidt, and so does the update: factoring the covariance of
+ * [x; y] with the channels' rows taken first gives the gains (the channels' columns) and the posterior factors (the rest). */
+#include "factor.h"
+#include "model.h"
+
+typedef struct {
+    tg_real spread;      /* sigma points stand sqrt(spread) factors from the mean */
+    tg_real mean, other; /* weights in the mean: of the centre and of each other point */
+    tg_real covariance;  /* weight of the centre in the covariance */
+} weights;
+
+TG_INLINE weights unscented_weights(const tg_tuning *t, const int n)
+{
+    weights w;
+    const tg_real states = (tg_real)TG_TWICE(n);
+    w.spread = t->alpha * t->alpha * (states + t->kappa);
+    w.other = 1 / (2 * w.spread);
+    w.mean = 1 - states / w.spread;
+    w.covariance = w.mean + 1 - t->alpha * t->alpha + t->beta;
+    return w;
+}
+
+/* Sigma points in columns `stride` apart from factors whose columns are `from` apart. */
+TG_INLINE void draw(const weights *w, const tg_real *x, const tg_real *u, const tg_real *d, int from, tg_real *points, int stride, const int n)
+{
+    const int rows = TG_TWICE(n), lanes = from / TG_LANES;
+    tg_real reach[TG_ROWS];
+    for (int k = 0; k < rows; k++) reach[k] = tgi_sqrt(w->spread * d[k]);
+    for (int i = 0; i < lanes; i++) lanes_store(points + TG_LANES * i, lanes_load(x + TG_LANES * i));
+    for (int k = 0; k < rows; k++)
+        for (int i = 0; i < lanes; i++) {
+            const tg_lanes away = lanes_mul(lanes_all(reach[k]), lanes_load(u + k * from + TG_LANES * i));
+            const tg_lanes centre = lanes_load(x + TG_LANES * i);
+            lanes_store(points + (1 + 2 * k) * stride + TG_LANES * i, lanes_add(centre, away));
+            lanes_store(points + (2 + 2 * k) * stride + TG_LANES * i, lanes_sub(centre, away));
+        }
+}
+
+/* Replace points by their deviations from their weighted mean. */
+TG_INLINE void centre(const weights *w, tg_real *points, tg_real *mean, int stride, const int n)
+{
+    const int count = 2 * TG_TWICE(n) + 1;
+    for (int i = 0; i < stride; i += TG_LANES) {
+        tg_lanes plus = lanes_all(0), minus = lanes_all(0);
+        for (int k = 1; k < count; k += 2) {
+            plus = lanes_add(plus, lanes_load(points + k * stride + i));
+            minus = lanes_add(minus, lanes_load(points + (k + 1) * stride + i));
+        }
+        const tg_lanes m = lanes_mul_add(lanes_all(w->mean), lanes_load(points + i), lanes_mul(lanes_all(w->other), lanes_add(plus, minus)));
+        lanes_store(mean + i, m);
+        for (int k = 0; k < count; k++) lanes_store(points + k * stride + i, lanes_sub(lanes_load(points + k * stride + i), m));
+    }
+}
+
+TG_INLINE void unscented_predict(const tg_filter *f, const tgi_plan *plan, const weights *w, tgi_result *out, const int n, const int stride)
+{
+    const int rows = TG_TWICE(n), count = 2 * rows + 1;
+    tg_real W[(3 * TG_MAX_STATES + 1) * TG_ROWS], weight[3 * TG_MAX_STATES + 1];
+    draw(w, f->x, f->u, f->d, stride, W, stride, n);
+    for (int k = 0; k < count; k++) {
+        model_move(f, plan, W + k * stride, n);
+        weight[k] = k ? w->other : w->covariance;
+    }
+    centre(w, W, out->x_prior, stride, n);
+    tgi_gram gram = factor_begin(W, weight, count, stride);
+#define TAKE(j, lanes) factor_row(&gram, j, lanes, plan->passage.q[j], out->u + (j) * stride, out->d + (j));
+    TG_ROWS_DOWN(rows - 1, 0, stride, TAKE)
+#undef TAKE
+}
+
+/* Rows of the joint factor: the state, then a_x, v, omega_1..omega_n: the last is taken first, as in the exact engine. */
+TG_INLINE int joint_row(const int n, int o) { return o == n + 1 ? TG_TWICE(n) : TG_TWICE(n) + 1 + o; }
+
+/* Append the channels to the points; a missing one reads 0 everywhere. */
+TG_INLINE void measure(const tgi_plan *plan, tg_real *points, int stride, const int n)
+{
+    for (int k = 0; k < 2 * TG_TWICE(n) + 1; k++) {
+        tg_real y[TG_MAX_CHANNELS], *const point = points + k * stride;
+        model_channels(plan, point, y, n);
+        for (int o = 0; o < n + 2; o++) point[joint_row(n, o)] = plan->present[o] ? y[o] : 0;
+        for (int i = joint_row(n, n) + 1; i < stride; i++) point[i] = 0;
+    }
+}
+
+TG_INLINE void unscented_update(const tg_filter *f, const tgi_plan *plan, const weights *w, tgi_result *out, const int n, const int stride,
+                                const int joint)
+{
+    const int rows = TG_TWICE(n), count = 2 * rows + 1, all = rows + n + 2;
+    tg_real W[(2 * TG_MAX_STATES + 1 + TG_MAX_CHANNELS) * TG_MOST_LANES * TG_LANES], weight[2 * TG_MAX_STATES + 1 + TG_MAX_CHANNELS];
+    tg_real mean[TG_MOST_LANES * TG_LANES], r[TG_MAX_CHANNELS], u[TG_MAX_CHANNELS][TG_MOST_LANES * TG_LANES], d[TG_MAX_CHANNELS];
+    tg_real column[TG_MOST_LANES * TG_LANES];
+    draw(w, out->x_prior, out->u, out->d, stride, W, joint, n);
+    measure(plan, W, joint, n);
+    centre(w, W, mean, joint, n);
+    for (int k = 0; k < count; k++) weight[k] = k ? w->other : w->covariance;
+    for (int o = 0; o < n + 2; o++) {
+        const int j = joint_row(n, o);
+        out->innovation[o] = plan->y[o] - mean[j];
+        out->variance[o] = plan->r[o];
+        for (int k = 0; k < count; k++) out->variance[o] += weight[k] * W[k * joint + j] * W[k * joint + j];
+        out->weight[o] = plan->present[o] ? tgi_weight(f->tuning.huber, out->innovation[o], out->variance[o]) : 1;
+        r[j - rows] = plan->present[o] ? plan->r[o] / out->weight[o] : 1;
+    }
+    tgi_gram gram = factor_begin(W, weight, count, joint);
+#define TAKE_CHANNEL(j, lanes) factor_row(&gram, j, lanes, r[(j) - rows], u[(j) - rows], d + ((j) - rows));
+#define TAKE_STATE(j, lanes)                                                                                        \
+    {                                                                                                               \
+        factor_row(&gram, j, lanes, 0, column, out->d + (j));                                                        \
+        for (int i = 0; i < stride; i += TG_LANES) lanes_store(out->u + (j) * stride + i, lanes_load(column + i));   \
+    }
+    TG_ROWS_DOWN(all - 1, rows, joint, TAKE_CHANNEL)
+    TG_ROWS_DOWN(rows - 1, 0, joint, TAKE_STATE)
+#undef TAKE_CHANNEL
+#undef TAKE_STATE
+    tg_real residual[TG_MAX_CHANNELS];
+    for (int i = 0; i < stride; i++) out->x[i] = out->x_prior[i];
+    for (int o = n; o >= -1; o--) { /* omega_n .. omega_1, v, a_x */
+        const int c = o < 0 ? n + 1 : o, a = joint_row(n, c) - rows;
+        if (!plan->present[c]) {
+            residual[a] = 0;
+            continue;
+        }
+        residual[a] = out->innovation[c];
+        for (int b = n + 1; b > a; b--) residual[a] -= u[b][rows + a] * residual[b];
+        out->channel[out->taken] = c;
+        out->residual[out->taken] = residual[a];
+        out->residual_variance[out->taken] = d[a];
+        for (int i = 0; i < stride; i++) {
+            out->gain[out->taken][i] = i < rows ? u[a][i] : 0;
+            out->x[i] += out->gain[out->taken][i] * residual[a];
+        }
+        out->taken++;
+    }
+}
+
+TG_INLINE void unscented_step(const tg_filter *f, const tgi_plan *plan, tgi_result *out, const int n, const int stride, const int joint)
+{
+    const weights w = unscented_weights(&f->tuning, n);
+    out->taken = 0;
+    unscented_predict(f, plan, &w, out, n, stride);
+    if (plan->count)
+        unscented_update(f, plan, &w, out, n, stride, joint);
+    else
+        for (int i = 0; i < stride; i++) out->x[i] = out->x_prior[i];
+}
+
+void tgi_unscented_step(const tg_filter *f, const tgi_plan *plan, tgi_result *out)
+{
+    switch (f->wheels) {
+    case 1: unscented_step(f, plan, out, 1, 4, 8); break;
+    case 2: unscented_step(f, plan, out, 2, 8, 12); break;
+    case 4: unscented_step(f, plan, out, 4, 12, 16); break;
+    default: unscented_step(f, plan, out, f->wheels, TG_ROWS, TG_MOST_LANES * TG_LANES); break;
+    }
+}
