@@ -71,7 +71,7 @@ def kernel_bindings() -> list[Binding]:
     cpu_check = ROOT / "kernel/python/cpu.c"
     found = [
         Binding("terragrip._kernel_portable", header, (*sources, cpu_check), declarations=CPU_CHECK),
-        Binding("terragrip._kernel_float", header, sources, real="float"),
+        Binding("terragrip._kernel_float", header, sources, real="float", flags=("-O2",)),
     ]
     if platform.machine() in ("x86_64", "AMD64"):
         found.append(Binding("terragrip._kernel_avx2", header, sources, flags=("-mavx2", "-mfma")))
