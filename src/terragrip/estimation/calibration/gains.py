@@ -25,6 +25,8 @@ WINDOW = 0.5
 _SLOWEST = 0.15  # m/s
 _SLIP = (-0.1, 0.6)  # beyond, a wheel digs itself in and leaves the curve that it shares
 _MIN_BLOCKS = 8
+_BLOCKS_A_SOIL = 15  # for a soil's gains to be held against another's
+_SURPRISE = 0.01
 _SEGMENT = 20.0  # m of track that count as one soil where there is no label
 _EDGE = 0.3  # m on either side of a soil's border
 _RADIUS = 0.003  # prior of the wheels' relative radii where the vehicle states none
@@ -81,9 +83,10 @@ def relative_gains(
     if fit is None or fit.blocks < _MIN_BLOCKS:
         return [few, common]
     disagreement = _disagreement(rows)
-    covariance = disagreement**2 * fit.covariance + _considered_loads(fit, table, vehicle, driven, errors)
+    own = disagreement**2 * fit.covariance
+    covariance = own + _considered_loads(fit, table, vehicle, driven, errors)
     told = evidence(table, [Spell(int(k), int(k)) for k in range(len(table))], sources)
-    quantities = _quantities(fit, covariance, vehicle, driven, told, disagreement)
+    quantities = _quantities(fit, covariance, own, vehicle, driven, told, disagreement)
     radius, radius_std = np.ones(len(vehicle.wheels)), np.zeros(len(vehicle.wheels))
     radius[driven] += fit.radius
     radius_std[driven] = np.sqrt(np.diag(covariance)[len(driven) :])
@@ -93,6 +96,7 @@ def relative_gains(
 def _quantities(
     fit: SharedGains,
     covariance: Floats,
+    own: Floats,
     vehicle: Vehicle,
     driven: Ints,
     told: tuple[Evidence, ...],
@@ -102,8 +106,9 @@ def _quantities(
 
     factor = float(stdtrit(fit.blocks - 1, 0.975))
     said = (
-        "relative to the mean of all wheels: torques of wheels at one slip on one soil compared, "
-        f"{fit.windows} windows on {fit.blocks} stretches of track; it assumes that soil under rear wheels is as under front ones"
+        "relative to the mean of all wheels, with the loads that the vehicle file gives: torques of wheels at one "
+        f"slip on one soil compared, {fit.windows} windows on {fit.blocks} stretches of track; it assumes that "
+        "the soil under rear wheels is as under front ones"
     )
     if disagreement > 1:
         said += f"; the soils disagree, so the intervals are {disagreement:.1f} times wider"
@@ -117,9 +122,11 @@ def _quantities(
             said,
             wheel=vehicle.wheels[index],
             factor=factor,
+            # Wrong loads shift the gains so that adhesion comes out right: the estimator counts them by themselves.
+            own_std=float(np.exp(value) * np.sqrt(alone)),
         )
-        for index, value, variance in zip(
-            driven, fit.log_gain, np.diag(covariance)[: len(driven)], strict=True
+        for index, value, variance, alone in zip(
+            driven, fit.log_gain, np.diag(covariance), np.diag(own), strict=False
         )
     ]
 
@@ -129,10 +136,12 @@ def _disagreement(rows: Sharing) -> float:
 
     A gain is the same on every soil; a rut that helps the rear wheels, or wrong loads, are not.
     """
+    from scipy.special import chdtrc
+
     estimates, precisions = [], []
     for soil in np.unique(rows.soil):
         own = rows.soil == soil
-        if len(np.unique(rows.block[own])) < _MIN_BLOCKS:
+        if len(np.unique(rows.block[own])) < _BLOCKS_A_SOIL:
             continue
         fit = fit_shared_gains(rows.select(own))
         if fit is not None:
@@ -145,7 +154,9 @@ def _disagreement(rows: Sharing) -> float:
         [p @ x for p, x in zip(precisions, estimates, strict=True)], axis=0
     )
     apart = sum(float((x - mean) @ p @ (x - mean)) for p, x in zip(precisions, estimates, strict=True))
-    return max(1.0, float(np.sqrt(apart / ((len(estimates) - 1) * len(mean)))))
+    freedom = (len(estimates) - 1) * len(mean)
+    by_chance = float(chdtrc(freedom, apart))
+    return 1.0 if by_chance > _SURPRISE else max(1.0, float(np.sqrt(apart / freedom)))
 
 
 def _driving(table: Windows, vehicle: Vehicle) -> Windows:
@@ -206,18 +217,13 @@ def _near_border(table: Windows) -> npt.NDArray[np.bool_]:
 def _considered_loads(
     fit: SharedGains, table: Windows, vehicle: Vehicle, driven: Ints, errors: ChannelErrors
 ) -> Floats:
-    """Covariance (2 w, 2 w) that constant errors of the wheel loads add: what shifts load from wheel to wheel."""
-    axle, last = vehicle.wheel_axle, len(vehicle.axles) - 1
-    changes = []
-    if last > 0:
-        share = vehicle.uncertainty.vertical_load or 0.0
-        changes.append(np.where(axle == 0, share, np.where(axle == last, -share, 0.0)))
+    """Covariance (2 w, 2 w) that constant errors of the channels add by shifting load from wheel to wheel."""
     rest = {
         "drawbar": np.nan_to_num(table.drawbar),
         "push": np.nan_to_num(table.push),
         "lateral": np.nan_to_num(table.lateral),
     }
-    before = _mean_loads(table, vehicle, rest)
+    before, changes = _mean_loads(table, vehicle, rest), []
     for name in rest:
         after = _mean_loads(table, vehicle, {**rest, name: rest[name] + getattr(errors, name)})
         changes.append(after / before - 1)

@@ -163,7 +163,7 @@ def _channel_errors(found: Sequence[Quantity], vehicle: Vehicle, logs: Sequence[
 
 def _vague(gains: Sequence[Quantity], vehicle: Vehicle) -> Unknown | None:
     """Why the gains are of no use: they tell less than what the vehicle file knows already."""
-    prior, errors = vehicle.uncertainty.drive_torque_gain, [quantity.std for quantity in gains]
+    prior, errors = vehicle.uncertainty.drive_torque_gain, [quantity.own_std or 0.0 for quantity in gains]
     if not errors or prior is None or max(errors) < prior:
         return None
     return Unknown(
@@ -175,7 +175,7 @@ def _vague(gains: Sequence[Quantity], vehicle: Vehicle) -> Unknown | None:
 def _radii(rolling: Rolling, gains: RelativeGains | None, vehicle: Vehicle) -> list[Quantity]:
     """The radii of all wheels: what the passes say of them together, and the gains of each."""
     wheels = len(vehicle.wheels)
-    apart = (np.ones(wheels), np.zeros(wheels)) if gains is None else (gains.radius, gains.radius_std)
+    differences = (np.ones(wheels), np.zeros(wheels)) if gains is None else (gains.radius, gains.radius_std)
     said = (
         "ground speed over wheel speed on straight steady passes at zero pull, corrected for the slip of "
         f"{100 * rolling.slip:.2f} % there"
@@ -184,9 +184,18 @@ def _radii(rolling: Rolling, gains: RelativeGains | None, vehicle: Vehicle) -> l
         said += "; what a wheel differs from the others is told by its torque over slip"
     return [
         Quantity(
-            "wheel_radius", float(r * a), float(r * np.hypot(s, b)), "m", rolling.told, said, wheel=wheel
+            "wheel_radius",
+            float(radius * apart),
+            float(radius * np.hypot(std, own_std)),
+            "m",
+            rolling.told,
+            said,
+            wheel=wheel,
+            factor=rolling.factor,
         )
-        for wheel, r, s, a, b in zip(vehicle.wheels, rolling.radius, rolling.std, *apart, strict=True)
+        for wheel, radius, std, apart, own_std in zip(
+            vehicle.wheels, rolling.radius, rolling.std, *differences, strict=True
+        )
     ]
 
 
@@ -195,7 +204,7 @@ def _left(found: Sequence[Quantity], vehicle: Vehicle) -> dict[str, Any]:
     prior, left = vehicle.uncertainty, {}
 
     def spread(key: str) -> float | None:
-        errors = [q.std for q in found if q.key == key]
+        errors = [q.std if q.own_std is None else q.own_std for q in found if q.key == key]
         return float(np.sqrt(np.mean(np.square(errors)))) if errors else None
 
     for key, name in (

@@ -1,18 +1,19 @@
 """Rolling radius of each wheel: ground speed over wheel speed, taken to zero adhesion.
 
-On a zero-pull straight pass the wheels still pull the vehicle's own rolling resistance, and slip a little for it:
-v/ω = r (1 - s). The model here is that of PHYSICS §5 in its identifiable form without the falling part, turned round::
+On a zero-pull straight pass the wheels still pull the vehicle's own rolling resistance, and slip a little for
+it: v/ω = r (1 - s). The model is that of PHYSICS §5 in its identifiable form without the falling part, turned
+round::
 
     v/ω_i = r_i (1 - s),   s = -(A_j/C_j) ln(1 - μ_i/A_j)
 
-A_j is the soil's adhesion at large slip, read from the windows of most pull; the curve's initial steepness C_j is
-fitted together with the radii from zero-pull windows and windows of small pull on the same soil. Where no window
-pulls, C_j keeps its prior, and the interval says so. v/ω is regressed on μ, not the reverse: the noise of a speed is in
-v/ω, and μ has little. (R), our own construction.
+The curve's initial steepness C_j and its level A_j are fitted together with the radii, from zero-pull windows
+and windows of moderate pull on the same soil. Where no window pulls they keep their priors, and the interval
+says so. v/ω is regressed on μ, not the reverse: the noise of a speed is in v/ω, and μ has little. (R), our own
+construction.
 
-Driven wheels share one correction of the vehicle file's radii here, and their mean μ: which wheel's radius differs shows
-only in which wheel pulls more, and there it is one with the torque gains, so it is told together with them
-(:mod:`~terragrip.estimation.calibration.sharing`). An undriven wheel has a radius of its own.
+Driven wheels share one correction of the vehicle file's radii here, and their mean μ: which wheel's radius
+differs shows only in which wheel pulls more, and there it is one with the torque gains, so it is told together
+with them (:mod:`~terragrip.estimation.calibration.sharing`). An undriven wheel has a radius of its own.
 """
 
 from __future__ import annotations
@@ -42,12 +43,14 @@ _STEADY = 0.05  # dv/dt over g
 _SLOWEST = 0.2  # m/s
 _STRAIGHT = 0.02  # relative difference of the wheels' speeds from side to side
 _LEAST_DISTANCE = 5.0  # m of zero-pull passes
-_LOW = 0.5  # of A: windows above do not help to tell the radius
+_LOW = 0.7  # of the largest pull: windows above say nothing of the radius
 _STEEPNESS = (
-    np.log(5.0),
+    float(np.log(5.0)),
     0.8,
 )  # prior of ln C: mean and standard deviation (C is 2 on grass, 8 on hard soil)
-_LEAST_ASYMPTOTE = 0.1
+_LEVEL = (0.6, 0.6)  # prior of A: mean, and standard deviation of ln A
+_LEAST_PULL = 0.15
+_ROUNDS = 50
 _TORQUE_ZERO = 0.02  # prior of a torque zero, over r F, where the vehicle states none
 _ROLLING = 0.15  # adhesion and rolling resistance at zero pull: what a gain error acts on
 
@@ -56,12 +59,13 @@ _ROLLING = 0.15  # adhesion and rolling resistance at zero pull: what a gain err
 class Rolling:
     """Rolling radii from zero-pull passes.
 
-    ``radius`` (w,) m; ``std`` (w,) relative, with all that is considered; ``slip`` the mean slip that was corrected;
-    ``told`` what it rests on.
+    ``radius`` (w,) m; ``std`` (w,) relative, with all that is considered; ``factor`` of its 95 % interval; ``slip`` the
+    mean slip that was corrected; ``told`` what it rests on.
     """
 
     radius: Floats
     std: Floats
+    factor: float
     slip: float
     told: tuple[Evidence, ...]
 
@@ -73,6 +77,8 @@ def rolling_radii(
 
     ``block`` (n,) labels the stretch of track of every window. Torques must have their zeros taken off.
     """
+    from scipy.special import stdtrit
+
     adhesion = _adhesion(windows, vehicle)
     passes = _passes(windows, vehicle) & np.all(np.isfinite(adhesion), axis=1)
     free = passes & (np.abs(windows.drawbar) < _ZERO_PULL * vehicle.mass * GRAVITY)
@@ -85,16 +91,17 @@ def rolling_radii(
     soils = sorted(set(windows.soil[free]))
     code = np.array([soils.index(label) if label in soils else -1 for label in windows.soil])
     driving = adhesion[:, vehicle.driven] if vehicle.driven.any() else adhesion
-    asymptote = np.array([_asymptote(driving[passes & (code == j)]) for j in range(len(soils))])
-    level = np.where(code >= 0, asymptote[code], np.nan)[:, None]
-    used = passes[:, None] & (np.abs(adhesion) < _LOW * level)
-    scale, covariance, steepness = _fit(windows, vehicle, adhesion, code, asymptote, used, block)
+    most = np.array([_most(driving[passes & (code == j)]) for j in range(len(soils))])
+    used = passes[:, None] & (code >= 0)[:, None] & (np.abs(adhesion) < _LOW * most[code][:, None])
+    scale, covariance, steepness = _fit(windows, vehicle, adhesion, code, most, used, block)
     radius = vehicle.wheel_radius * scale
     typical = float(np.average(steepness[code[free]]))
     variance = np.diag(covariance) + _considered(vehicle, typical)
     slip = float(np.mean(1 - (windows.hub_speed / windows.wheel_speed)[free] / radius))
     told = evidence(windows, [Spell(int(k), int(k)) for k in np.flatnonzero(free)], sources)
-    return Rolling(radius, np.sqrt(variance), slip, told)
+    stretches = len(np.unique(block[np.any(used, axis=1)]))
+    factor = float(stdtrit(max(1, stretches - 3), 0.975))  # radius, C and A are fitted
+    return Rolling(radius, np.sqrt(variance), factor, slip, told)
 
 
 def _adhesion(windows: Windows, vehicle: Vehicle) -> Floats:
@@ -144,9 +151,9 @@ def _side(vehicle: Vehicle, wheel: int) -> int:
     return int(np.sign(len(own) - 1 - 2 * place))
 
 
-def _asymptote(adhesion: Floats) -> float:
-    """Adhesion at large slip, from the windows of most pull; it only bends the correction."""
-    return max(_LEAST_ASYMPTOTE, float(np.quantile(adhesion, 0.95))) if adhesion.size else _LEAST_ASYMPTOTE
+def _most(adhesion: Floats) -> float:
+    """Adhesion of the windows of most pull."""
+    return max(_LEAST_PULL, float(np.quantile(adhesion, 0.95))) if adhesion.size else _LEAST_PULL
 
 
 def _fit(
@@ -154,45 +161,54 @@ def _fit(
     vehicle: Vehicle,
     adhesion: Floats,
     code: npt.NDArray[np.intp],
-    asymptote: Floats,
+    most: Floats,
     used: Bools,
     block: npt.NDArray[np.intp],
 ) -> tuple[Floats, Floats, Floats]:
-    """Least squares for the radii over the file's and for ln C_j; the covariance is over blocks of track.
+    """Least squares for the radii over the file's, ln C_j and ln A_j; the covariance is over blocks of track.
 
     Returns the scale (w,), the covariance (w, w) of its logarithm, and C (soils,).
     """
-    w, soils = len(vehicle.wheels), len(asymptote)
+    w, soils = len(vehicle.wheels), len(most)
     shared = np.flatnonzero(vehicle.driven)[:1].tolist() + np.flatnonzero(~vehicle.driven).tolist()
     group = np.array([shared.index(k if k in shared else shared[0]) for k in range(w)])
     count = len(shared)
     ratio = np.log(np.where(used, windows.hub_speed / (windows.wheel_speed * vehicle.wheel_radius), 1.0))
-    level = np.where(used, asymptote[code][:, None], 1.0)
-    reach = -level * np.log1p(-np.where(used, adhesion, 0.0) / level)  # C s
-    mean, spread = _STEEPNESS
-    center = np.r_[np.zeros(count), np.full(soils, mean)]
-    prior = np.r_[np.zeros(count), np.full(soils, spread**-2.0)]
+    pull = np.where(used, adhesion, 0.0)
+    (steep, steep_spread), (_, level_spread) = _STEEPNESS, _LEVEL
+    level_mean = np.log(np.maximum(_LEVEL[0], 1.2 * most))
+    center = np.r_[np.zeros(count), np.full(soils, steep), level_mean]
+    prior = np.r_[np.zeros(count), np.full(soils, steep_spread**-2.0), np.full(soils, level_spread**-2.0)]
     values = center.copy()
-    for _ in range(30):
-        slip = reach / np.exp(values[count:])[code][:, None]
-        jacobian = np.zeros((*ratio.shape, count + soils))
+    for _ in range(_ROUNDS):
+        steepness = np.exp(values[count : count + soils])[code][:, None]
+        level = np.exp(values[count + soils :])[code][:, None]
+        share = np.clip(pull / level, -0.95, 0.95)
+        slip = -level / steepness * np.log1p(-share)
+        bend = -level / steepness * (np.log1p(-share) + share / (1 - share))  # d slip / d ln A
+        jacobian = np.zeros((*ratio.shape, count + 2 * soils))
         jacobian[:, np.arange(w), group] = 1.0
         for j in range(soils):
-            jacobian[:, :, count + j] = np.where(code[:, None] == j, slip / (1 - slip), 0.0)
+            own = code[:, None] == j
+            jacobian[:, :, count + j] = np.where(own, slip / (1 - slip), 0.0)
+            jacobian[:, :, count + soils + j] = np.where(own, -bend / (1 - slip), 0.0)
         residual = ratio - values[group] - np.log1p(-np.minimum(slip, 0.9))
         noise = 1.4826 * float(np.median(np.abs(residual[used])))
         spreads = np.hypot(max(noise, 1e-6), 0.1 * slip)  # local adhesion shifts slip in proportion
         scaled = np.where(used, residual / spreads, 0.0)
         weight = np.where(used, np.minimum(1.0, 2.5 / np.maximum(np.abs(scaled), 1e-12)), 0.0)
-        flat = np.where(used[..., None], jacobian / spreads[..., None], 0.0).reshape(-1, count + soils)
+        flat = np.where(used[..., None], jacobian / spreads[..., None], 0.0).reshape(-1, len(values))
         normal = flat.T @ (flat * weight.reshape(-1, 1)) + np.diag(prior)
         step = np.linalg.solve(normal, flat.T @ (weight * scaled).ravel() - prior * (values - center))
         values = values + np.clip(step, -1.0, 1.0)
         if np.max(np.abs(step)) < 1e-10:
             break
-    score = (flat * (weight * scaled).reshape(-1, 1)).reshape(len(block), w, -1).sum(axis=1)
-    covariance = block_covariance(np.linalg.inv(normal), score, block, np.diag(prior))
-    return np.exp(values[group]), covariance[np.ix_(group, group)], np.exp(values[count:])
+    rows = flat.reshape(len(block), w, -1)
+    score = np.einsum("nwp,nw->np", rows, weight * scaled)
+    rooted = rows * np.sqrt(weight)[..., None]
+    informed = np.any(used, axis=1)
+    covariance = block_covariance(normal, rooted[informed], score[informed], block[informed], np.diag(prior))
+    return np.exp(values[group]), covariance[np.ix_(group, group)], np.exp(values[count : count + soils])
 
 
 def _considered(vehicle: Vehicle, steepness: float) -> Floats:

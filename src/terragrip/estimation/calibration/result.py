@@ -29,7 +29,8 @@ class Quantity:
     ``key`` names its place in the vehicle file's ``calibration`` block and ``wheel`` the entry there, if the place
     holds one per wheel. ``std`` is the standard error with all that is considered; the 95 % interval is value
     ± factor std, where factor is that of few degrees of freedom where they are few. ``sentence`` says how it was
-    found and on what assumption.
+    found and on what assumption. ``own_std`` is the part of ``std`` that the vehicle's other uncertainties do not hold
+    already (None: all of it).
     """
 
     key: str
@@ -40,6 +41,7 @@ class Quantity:
     sentence: str
     wheel: str | None = None
     factor: float = NORMAL_95
+    own_std: float | None = None
 
     @property
     def name(self) -> str:
@@ -50,6 +52,18 @@ class Quantity:
     def interval(self) -> tuple[float, float]:
         """The 95 % interval."""
         return self.value - self.factor * self.std, self.value + self.factor * self.std
+
+    @property
+    def rounded(self) -> float:
+        """The value to a hundredth of its standard error: what a file should hold."""
+        if not 0 < self.std < math.inf:
+            return self.value
+        return round(self.value, 2 - math.floor(math.log10(self.std)))
+
+    @property
+    def applies(self) -> bool:
+        """Whether it has a place in the vehicle file; what has none is a check."""
+        return self.key in _PLACES
 
     @property
     def samples(self) -> int:
@@ -96,16 +110,18 @@ class Calibration:
         data = vehicle.to_dict()
         block: dict[str, Any] = dict(data.get("calibration", {}))
         for quantity in self.quantities:
-            if quantity.key not in _PLACES:
+            if not quantity.applies:
                 continue
+            value = quantity.rounded
             if quantity.wheel is None:
-                block[quantity.key] = quantity.value
+                block[quantity.key] = value
             else:
-                block[quantity.key] = {**block.get(quantity.key, {}), quantity.wheel: quantity.value}
+                block[quantity.key] = {**block.get(quantity.key, {}), quantity.wheel: value}
         if block:
             data["calibration"] = block
         if self.uncertainty:
-            data["uncertainty"] = {**data.get("uncertainty", {}), **self.uncertainty}
+            left = {name: float(f"{value:.3g}") for name, value in self.uncertainty.items()}
+            data["uncertainty"] = {**data.get("uncertainty", {}), **left}
         return Vehicle.from_dict(data)
 
     def table(self) -> str:

@@ -90,8 +90,8 @@ def fit_shared_gains(data: Sharing) -> SharedGains | None:
     values = problem.solve(np.zeros(3 * w), 1.0)
     problem = problem.refined(values)
     values = problem.solve(values, 1.0)
-    naive = problem.covariance(values, 1.0, np.arange(len(data.block)))
-    clustered = problem.covariance(values, 1.0, data.block)
+    fit = problem.fit(values, 1.0)
+    naive, clustered = _inverse(fit.normal) * fit.variance, problem.covariance(values, 1.0, data.block)
     # Neighbouring windows repeat each other: weigh the priors against the data's true information.
     scale = max(1.0, float(np.trace(clustered[:w, :w]) / np.trace(naive[:w, :w])))
     values = problem.solve(values, scale)
@@ -114,7 +114,7 @@ class _Fit:
     jacobian: Floats  # (n, w, 3 w), of the scaled residual, what m_n takes up taken out
     residual: Floats  # (n, w), likewise
     weight: Floats  # (n, w), of Huber
-    inverse: Floats  # (3 w, 3 w)
+    normal: Floats  # (3 w, 3 w), priors and the zero mean of ln k included
     variance: float  # of a scaled residual
 
 
@@ -208,14 +208,14 @@ class _Problem:
         normal = flat.T @ (flat * weight.reshape(-1, 1)) + variance * scale * self.prior
         # The mean of ln k is 0: a row of certainty.
         normal[:w, :w] += 1e6 * float(np.max(np.diag(normal)[:w]))
-        return _Fit(jacobian, scaled, weight, _inverse(normal), variance)
+        return _Fit(jacobian, scaled, weight, normal, variance)
 
     def step(self, values: Floats, scale: float) -> Floats:
         """One Gauss-Newton step (3 w,)."""
         w, fit = self.data.torque.shape[1], self.fit(values, scale)
         gradient = np.einsum("nwp,nw->p", fit.jacobian, fit.weight * fit.residual)
         gradient -= fit.variance * scale * self.prior @ values
-        move = fit.inverse @ gradient
+        move = _inverse(fit.normal) @ gradient
         move[:w] -= np.mean(values[:w] + move[:w])
         return np.asarray(move)
 
@@ -233,7 +233,8 @@ class _Problem:
         """Sandwich covariance of the unknowns over blocks (n,)."""
         fit = self.fit(values, scale)
         score = np.einsum("nwp,nw->np", fit.jacobian, fit.weight * fit.residual)
-        return block_covariance(fit.inverse, score, block, (fit.variance * scale) ** 2 * self.prior)
+        jacobian = fit.jacobian * np.sqrt(fit.weight)[..., None]
+        return block_covariance(fit.normal, jacobian, score, block, (fit.variance * scale) ** 2 * self.prior)
 
     def load_sensitivity(self, values: Floats, scale: float) -> Floats:
         """∂(ln k, e)/∂ln F by one Gauss-Newton step from the optimum, (2 w, w)."""
@@ -247,17 +248,22 @@ class _Problem:
         return np.stack(columns, axis=1)
 
 
-def block_covariance(inverse: Floats, score: Floats, block: Ints, prior: Floats) -> Floats:
-    """Sandwich covariance (p, p) of a least-squares fit whose errors hang together within blocks.
+def block_covariance(normal: Floats, jacobian: Floats, score: Floats, block: Ints, prior: Floats) -> Floats:
+    """Covariance (p, p) of a least-squares fit whose errors hang together within blocks: leave one block out (CR3).
 
-    ``inverse`` (p, p) of the normal matrix; ``score`` (n, p) weighted residual times Jacobian; ``block`` (n,) labels;
-    ``prior`` (p, p) what the priors add to the middle.
+    ``normal`` (p, p) with all priors; ``jacobian`` (n, w, p), times the root of the weights; ``score`` (n, p) weighted
+    residual times Jacobian; ``block`` (n,) labels; ``prior`` (p, p) what the priors' own errors add. One step from the
+    optimum stands for each refit. Unlike the plain sandwich it does not flatter a fit that few blocks hold.
     """
     labels, code = np.unique(block, return_inverse=True)
-    per_block = np.zeros((len(labels), score.shape[1]))
-    np.add.at(per_block, code, score)
-    count = max(2, len(labels))
-    return np.asarray(inverse @ (per_block.T @ per_block * count / (count - 1) + prior) @ inverse)
+    count, size = len(labels), len(normal)
+    scores = np.zeros((count, size))
+    np.add.at(scores, code, score)
+    information = np.zeros((count, size, size))
+    np.add.at(information, code, np.einsum("nwp,nwq->npq", jacobian, jacobian))
+    shifts = np.array([_inverse(normal - own) @ g for own, g in zip(information, scores, strict=True)])
+    inverse = _inverse(normal)
+    return np.asarray(shifts.T @ shifts * (count - 1) / count + inverse @ prior @ inverse)
 
 
 def _inverse(matrix: Floats) -> Floats:

@@ -1,0 +1,107 @@
+"""Where the command line starts and ends: parse, run, and turn every failure into an exit code and one line."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import sys
+import warnings
+from collections.abc import Sequence
+from typing import Annotated, Any
+
+import typer
+
+from terragrip.cli.calibrate import command as calibrate
+from terragrip.cli.demo import command as demo
+from terragrip.cli.estimate import command as estimate
+from terragrip.cli.failure import INTERRUPTED, report
+from terragrip.cli.inspect import command as inspect
+from terragrip.cli.simulate import command as simulate
+
+app = typer.Typer(
+    name="terragrip",
+    help="What the ground does under the wheels, from signals that a machine already has.",
+    # Plain help: rich's boxes triple the time of `--help` and break the one-line rule for errors.
+    rich_markup_mode=None,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+)
+app.command("demo")(demo)
+app.command("inspect")(inspect)
+app.command("estimate")(estimate)
+app.command("calibrate")(calibrate)
+app.command("simulate")(simulate)
+
+
+def _print_version(wanted: bool) -> None:
+    if wanted:
+        from terragrip import __version__
+
+        print(f"terragrip {__version__}")
+        raise typer.Exit
+
+
+@app.callback(invoke_without_command=True)
+def _terragrip(
+    context: typer.Context,
+    verbose: Annotated[bool, typer.Option("--verbose", help="Log what is done to standard error.")] = False,
+    debug: Annotated[bool, typer.Option("--debug", help="Show the traceback of a failure.")] = False,
+    version: Annotated[
+        bool, typer.Option("--version", callback=_print_version, is_eager=True, help="Show the version.")
+    ] = False,
+) -> None:
+    if verbose:
+        from terragrip.cli.log import log_to_stderr
+
+        log_to_stderr()
+    if context.invoked_subcommand is None:
+        print(context.get_help())
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command line and return its exit code.
+
+    Parameters
+    ----------
+    arguments: what follows the program's name; ``sys.argv[1:]`` by default.
+
+    Returns
+    -------
+    0 done; 2 the input or the call is unusable (one line on standard error); 1 a defect of Terragrip (one
+    line that says where the traceback is); 130 interrupted; 141 the reader of standard output went away.
+    """
+    words = list(sys.argv[1:] if arguments is None else arguments)
+    debug = "--debug" in words
+    if not (debug or "--verbose" in words):
+        # A failure is one line on standard error; a library's warning would be a second one.
+        warnings.simplefilter("ignore")
+    for stream in (sys.stdout, sys.stderr):
+        if hasattr(stream, "reconfigure"):  # a terminal without µ or ± gets a question mark, not a traceback
+            stream.reconfigure(errors="replace")
+    try:
+        code = _run(words)
+        sys.stdout.flush()
+    except BrokenPipeError:
+        # Python flushes standard output once more at exit: give it somewhere to go.
+        with contextlib.suppress(OSError, ValueError):
+            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 141
+    except KeyboardInterrupt as interruption:
+        return report(interruption, words, debug)
+    return code
+
+
+def _run(words: list[str]) -> int:
+    command: Any = typer.main.get_command(app)
+    try:
+        with command.make_context("terragrip", words) as context:
+            command.invoke(context)
+    except typer.Exit as done:
+        return done.exit_code
+    except typer.Abort:
+        return INTERRUPTED
+    except BrokenPipeError:
+        raise
+    except Exception as failure:  # noqa: BLE001 - the last stop: whatever it is becomes a line and a code
+        return report(failure, words, "--debug" in words)
+    return 0
