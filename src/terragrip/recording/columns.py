@@ -86,21 +86,20 @@ def texts(name: str, column: npt.NDArray[Any], rows: int, source: str | None) ->
         raise InputError(problem, file=source, place=f"column {name}", mend="give one label an instant")
     if column.dtype.kind == "f" and np.isnan(column).all():
         return np.full(rows, "", dtype=object)
+    try:
+        changed = np.asarray(column[1:] != column[:-1], dtype=bool)
+    except (TypeError, ValueError):  # cells that cannot be compared
+        changed = np.ones(max(rows - 1, 0), dtype=bool)
+    starts = np.r_[0, np.flatnonzero(changed) + 1] if rows else np.empty(0, dtype=np.intp)
     shared: dict[Any, str] = {}
-    found = np.empty(rows, dtype=object)
-    for row, label in enumerate(column.tolist()):
+    found = np.empty(len(starts), dtype=object)
+    for k, label in enumerate(column[starts].tolist()):
         try:
-            found[row] = shared[label]
-        except KeyError:
-            found[row] = shared[label] = _label(label)
+            found[k] = shared.setdefault(label, _label(label))
         except TypeError:  # an unhashable cell
-            raise InputError(
-                f"holds a {type(label).__name__}",
-                file=source,
-                place=place(name, row),
-                mend="give text labels",
-            ) from None
-    return found
+            problem, where = f"holds a {type(label).__name__}", place(name, int(starts[k]))
+            raise InputError(problem, file=source, place=where, mend="give text labels") from None
+    return np.repeat(found, np.diff(np.r_[starts, rows]))
 
 
 def _label(value: Any) -> str:
