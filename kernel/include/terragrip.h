@@ -256,6 +256,15 @@ tg_status tg_estimator_update(tg_estimator *e, const tg_sample *sample, tg_estim
  * how many rows went through before a status other than TG_OK. */
 tg_status tg_estimator_block(tg_estimator *e, size_t rows, const double *time, const double *const *in, double *const *out,
                              uint8_t *event, size_t *done);
+/* Smoothing a recording in blocks, backwards. For each block, last to first: an estimator restored to the block's start writes a record of
+ * tg_smooth_length reals a row; then the rows are smoothed from the last to the first. `carry`, tg_smooth_carry reals, goes from block to
+ * block; `next` is the first record of the block behind, null for the last block. Columns of the belief are written to `out`, the others
+ * (nis, channels, supervisor, distance, loads) stay as the forward pass left them. Not for the algebraic method. */
+size_t tg_smooth_length(const tg_estimator *e);
+size_t tg_smooth_carry(const tg_estimator *e);
+tg_status tg_estimator_record(tg_estimator *e, size_t rows, const double *time, const double *const *in, tg_real *records);
+tg_status tg_estimator_smooth(const tg_estimator *e, size_t rows, const tg_real *records, const tg_real *next, tg_real *carry,
+                              double *const *out);
 /* Bytes that continue bit for bit, with this kernel's version and precision only. */
 size_t tg_snapshot_size(void);
 tg_status tg_estimator_snapshot(const tg_estimator *e, uint8_t *bytes);
@@ -294,7 +303,7 @@ typedef struct { /* sensitivities to ln a_j, one lane a parameter */
 } tg_adaptation_state;
 
 typedef struct {
-    tg_real value[TG_SNAPSHOTS][TG_MAX_WHEELS + 1]; /* by rule 0: omega, v; by rule 1: torque, mean slip */
+    tg_real value[TG_SNAPSHOTS][TG_MAX_WHEELS + 1]; /* rule 0: omega, v; rule 1: torque, mean slip */
     double time[TG_SNAPSHOTS];
     tg_real last[TG_MAX_WHEELS + 1];     /* last known omega, v */
     int32_t first, count;

@@ -6,15 +6,30 @@
 
 /* ---- the filter ---- */
 
+/* Considered columns, and a smoother's track, go along with whatever the filter just did. */
+static void follow(tg_estimator *e, const tg_deviation *deviation)
+{
+    tg_consider_step(&e->consider, &e->filter, deviation);
+    if (e->track) tg_track_step(e->track, &e->filter);
+}
+
+/* A filter that has lost its way knows the priors again. */
+static void forget(tg_estimator *e)
+{
+    tgi_filter_anew(&e->filter, &e->consider, &e->settings);
+    if (e->track) tg_track_init(e->track, &e->filter);
+    e->scene.anew = 1;
+}
+
 /* Start the outputs anew at `outputs`, the parameters having walked for `walk` seconds. */
 static void restart(tg_estimator *e, tg_real walk, const tg_real *outputs, const tg_real *variances)
 {
     if (walk > TG_LONGEST_WALK) walk = TG_LONGEST_WALK;
     if (tg_filter_restart(&e->filter, walk, outputs, variances) != TG_OK) {
-        tgi_filter_anew(&e->filter, &e->consider, &e->settings);
+        forget(e);
         tg_filter_restart(&e->filter, 0, outputs, variances);
     }
-    tg_consider_step(&e->consider, &e->filter, NULL);
+    follow(e, NULL);
 }
 
 /* Outputs as this row measures them, along the travel. What it does not measure follows from the rest, broadly: a wheel from the
@@ -137,15 +152,15 @@ static int32_t advance(tg_estimator *e, tg_row *row, const tg_drive *drive, tg_r
     tg_status status = TG_OK;
     for (int32_t k = 1; k < pieces && status == TG_OK; k++) {
         status = tg_filter_predict(&e->filter, dt, &e->held, q);
-        tg_consider_step(&e->consider, &e->filter, e->deviation);
+        if (status == TG_OK) follow(e, e->deviation);
     }
     if (status == TG_OK) status = tg_filter_step(&e->filter, dt, &e->held, &now, q, y, r, &step);
     if (status != TG_OK) {
-        tgi_filter_anew(&e->filter, &e->consider, s);
+        forget(e);
         restart_from(e, row, 0);
         return 0;
     }
-    tg_consider_step(&e->consider, &e->filter, e->deviation);
+    follow(e, e->deviation);
     watch_jolts(e, &step, r[s->machine.wheels + 1], dt);
     e->belief.nis = step.nis;
     e->belief.channels = step.channels;
@@ -183,6 +198,7 @@ static int32_t go_on(tg_estimator *e, tg_row *row, const tg_drive *drive, tg_cou
     int32_t sound = 1;
     tg_belief *b = &e->belief;
     b->nis = b->supervisor = 0;
+    e->scene.anew = 0;
     b->channels = 0;
     if (e->settings.method == TG_ALGEBRAIC) {
         if (course == TG_ANEW || course == TG_GO) tgi_algebraic(e, row, drive, course == TG_ANEW);
@@ -194,6 +210,21 @@ static int32_t go_on(tg_estimator *e, tg_row *row, const tg_drive *drive, tg_cou
     else if (course == TG_GO) sound = advance(e, row, drive, dt, q);
     tgi_believe(e);
     return sound;
+}
+
+static void report(tg_estimator *e, const tg_drive *drive, tg_estimate *out)
+{
+    tg_real *o = out->value;
+    memcpy(e->scene.load, drive->load, sizeof drive->load);
+    e->scene.direction = (tg_real)e->direction;
+    e->scene.standing = (tg_real)e->standing;
+    e->scene.seen_motion = (tg_real)e->seen_motion;
+    tgi_traction(&e->settings, &e->belief, e->consider.s, &e->scene, o);
+    o[TG_OUT_NIS] = e->belief.nis;
+    o[TG_OUT_CHANNELS] = (tg_real)e->belief.channels;
+    o[TG_OUT_SUPERVISOR] = e->belief.supervisor;
+    o[TG_OUT_DISTANCE] = (tg_real)out->distance;
+    for (int32_t k = 0; k < e->settings.axles; k++) o[TG_OUT_VERTICAL_LOAD + k] = drive->axle_load[k];
 }
 
 tg_status tg_estimator_update(tg_estimator *e, const tg_sample *sample, tg_estimate *out)
@@ -232,7 +263,7 @@ tg_status tg_estimator_update(tg_estimator *e, const tg_sample *sample, tg_estim
     out->distance = e->distance;
     out->event = gap || course == TG_WAIT ? TG_EVENT_GAP : e->standing ? TG_EVENT_STANDSTILL
                : row.outlier ? TG_EVENT_OUTLIER : TG_EVENT_NONE;
-    tgi_traction(e, &drive, out);
+    report(e, &drive, out);
     return TG_OK;
 }
 

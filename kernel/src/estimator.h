@@ -34,6 +34,12 @@ typedef struct { /* one row, calibrated and checked, in the vehicle's own direct
     tg_real ground_variance;
 } tg_row;
 
+typedef struct { /* what a row's values need beside the belief; all reals, so that it goes into a record */
+    tg_real load[8]; /* wheel, N */
+    tg_real direction, standing, seen_motion;
+    tg_real anew; /* the filter was started anew: nothing links this row to the one before */
+} tgi_scene;
+
 typedef struct { /* what drives the model between two rows, in the vehicle's own directions */
     tg_real load[8];      /* wheel, N */
     tg_real axle_load[8]; /* N */
@@ -101,6 +107,8 @@ struct tg_estimator {
     tg_input held;             /* inputs of the last row, along the travel */
     tg_belief belief;
     tg_algebra algebra;
+    tgi_scene scene;           /* of the last row */
+    tg_track *track;           /* while a smoother's records are written, else null */
     tg_filter filter;
     tg_consider consider;
 };
@@ -140,5 +148,5 @@ void tgi_reckon(tg_estimator *e, const tg_drive *drive, tg_real dt, tg_row *row,
 void tgi_algebraic(tg_estimator *e, const tg_row *row, const tg_drive *drive, int32_t anew);
 
 /* traction.c */
-void tgi_traction(const tg_estimator *e, const tg_drive *drive, tg_estimate *out);
+void tgi_traction(const tg_settings *s, const tg_belief *b, const tg_real (*S)[TG_ROWS], const tgi_scene *scene, tg_real *o);
 #endif

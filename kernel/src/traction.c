@@ -61,10 +61,9 @@ TG_INLINE tgi_slip slip_of(tg_real omega, tg_real v, tg_real radius, tg_real lea
 }
 
 /* All wheels, delta method. `mean` is the mean adhesion over the load: what a common radius error does to rho_s. */
-TG_INLINE void traction(const tg_estimator *e, const tgi_moments *c, tg_real mean, tg_real *o, const int n)
+TG_INLINE void traction(const tg_settings *s, const tg_real *x, const tgi_moments *c, tg_real mean, tg_real *o, const int n)
 {
-    const tg_settings *s = &e->settings;
-    const tg_real *x = e->belief.x, rho = x[n], v = x[n + 1], error = s->uncertainty.wheel_radius;
+    const tg_real rho = x[n], v = x[n + 1], error = s->uncertainty.wheel_radius;
     const tg_real tire = s->machine.tire_rolling_resistance, least = (tg_real)0.02;
     for (int i = 0; i < n; i++) {
         const tg_real mu = x[i], kappa = mu - rho;
@@ -104,39 +103,33 @@ static void blank(tg_real *out, int32_t place, int32_t n)
 }
 
 /* What is not known: slip and efficiency at standstill, and they and the speeds before anything was measured. */
-static void leave_open(const tg_estimator *e, tg_real *o)
+static void leave_open(const tgi_scene *scene, int32_t n, tg_real *o)
 {
-    const int32_t n = e->settings.machine.wheels;
     const int32_t undefined[] = {TG_OUT_SLIP, TG_OUT_SLIP_STD, TG_OUT_EFFICIENCY, TG_OUT_EFFICIENCY_STD};
     for (int32_t k = 0; k < 4; k++) blank(o, undefined[k], n);
-    if (e->seen_motion) return;
+    if (scene->seen_motion) return;
     blank(o, TG_OUT_GROUND_SPEED, 2);
     blank(o, TG_OUT_WHEEL_SPEED, n);
     blank(o, TG_OUT_WHEEL_SPEED_STD, n);
 }
 
-/* All values of a row. Speeds get back the vehicle's own signs; mu, rho_s, slip and kappa stay in the direction of travel. */
-void tgi_traction(const tg_estimator *e, const tg_drive *drive, tg_estimate *out)
+/* All values that follow from the belief. Speeds get back the vehicle's own signs; mu, rho_s, slip and kappa stay in the direction of
+ * travel. */
+void tgi_traction(const tg_settings *s, const tg_belief *b, const tg_real (*S)[TG_ROWS], const tgi_scene *scene, tg_real *o)
 {
-    const tg_settings *s = &e->settings;
-    const tg_belief *b = &e->belief;
     const int32_t n = s->machine.wheels;
-    tg_real *o = out->value, thrust = 0;
+    tg_real thrust = 0;
     tgi_moments c;
-    for (int32_t i = 0; i < n; i++) thrust += b->x[i] * drive->load[i];
-#define TRACTION(n, stride)                        \
-    gather(b, e->consider.s, n, stride, &c);       \
-    traction(e, &c, thrust * e->constants.inverse_weight, o, n)
+    for (int32_t i = 0; i < n; i++) thrust += b->x[i] * scene->load[i];
+    thrust /= s->machine.mass * s->machine.gravity;
+#define TRACTION(n, stride)         \
+    gather(b, S, n, stride, &c);    \
+    traction(s, b->x, &c, thrust, o, n)
     TG_BY_WHEELS(n, TRACTION)
 #undef TRACTION
-    if (e->direction < 0) {
+    if (scene->direction < 0) {
         o[TG_OUT_GROUND_SPEED] = -o[TG_OUT_GROUND_SPEED];
         for (int32_t i = 0; i < n; i++) o[TG_OUT_WHEEL_SPEED + i] = -o[TG_OUT_WHEEL_SPEED + i];
     }
-    o[TG_OUT_NIS] = b->nis;
-    o[TG_OUT_CHANNELS] = (tg_real)b->channels;
-    o[TG_OUT_SUPERVISOR] = b->supervisor;
-    o[TG_OUT_DISTANCE] = (tg_real)out->distance;
-    for (int32_t k = 0; k < s->axles; k++) o[TG_OUT_VERTICAL_LOAD + k] = drive->axle_load[k];
-    if (e->standing || !e->seen_motion) leave_open(e, o);
+    if (scene->standing || !scene->seen_motion) leave_open(scene, n, o);
 }

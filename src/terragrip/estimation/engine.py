@@ -141,6 +141,33 @@ class Engine:
             if progress is not None:
                 progress(last, rows)
 
+    def smooth_carry(self) -> Floats:
+        """Room for what smoothing carries from block to block."""
+        return np.zeros(lib.tg_smooth_carry(self._estimator))
+
+    def record(self, time: Floats, columns: Mapping[str, Floats]) -> Floats:
+        """Take rows and return their records (n, length), for `smooth`."""
+        records = np.empty((len(time), lib.tg_smooth_length(self._estimator)))
+        sources = _pointers({self._slots_in[k]: v for k, v in columns.items()}, lib.TG_SLOTS, 0)
+        status = lib.tg_estimator_record(
+            self._estimator, len(time), _pointer(time, 0), sources, _pointer(records, 0)
+        )
+        if status != lib.TG_OK:
+            raise refusal(status, None)
+        return records
+
+    def smooth(
+        self, records: Floats, following: Floats | None, carry: Floats, out: Mapping[str, Floats]
+    ) -> None:
+        """Overwrite ``out`` by the smoothed values; ``following`` is the record behind the last row."""
+        targets = _pointers({self._slots_out[k]: v for k, v in out.items()}, lib.TG_OUT_SLOTS, 0)
+        behind = ffi.NULL if following is None else _pointer(following, 0)
+        status = lib.tg_estimator_smooth(
+            self._estimator, len(records), _pointer(records, 0), behind, _pointer(carry, 0), targets
+        )
+        if status != lib.TG_OK:
+            raise refusal(status, None)
+
     def snapshot(self) -> bytes:
         """The estimator as bytes that continue bit for bit."""
         size = lib.tg_snapshot_size()
