@@ -134,10 +134,10 @@ def test_coverage_pools_rows_not_runs(drive: Drive) -> None:
     found = [*run_coverage(drive("a", seconds=30.0)), *run_coverage(drive("b", seconds=300.0, seed=3))]
     together = {item.quantity: item for item in pooled(found)}
     mu = together["adhesion µ"]
-    assert mu.rows == 4 * (600 + 6000)
+    assert mu.rows == 4 * (600 + 5900)  # the 5 s stuck are left out
     assert mu.share() == pytest.approx(0.95, abs=0.006)
     assert mu.share(0.5) == pytest.approx(0.5, abs=0.013)
-    assert together["soil resistance ρs"].rows == 6600
+    assert together["soil resistance ρs"].rows == 6500
 
 
 def test_slots_keep_spikes_and_gaps_in_few_points() -> None:

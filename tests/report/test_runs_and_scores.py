@@ -9,7 +9,7 @@ import pytest
 
 from terragrip.errors import InputError
 from terragrip.report.runs import Run, label_stretches, stretches
-from terragrip.report.scores import compare, find, method_tables, truth_score, truth_table
+from terragrip.report.scores import compare, compare_truth, find, method_tables, truth_score, truth_table
 
 Drive = Callable[..., Run]
 
@@ -82,6 +82,17 @@ def test_kappa_follows_the_sensor_and_mu_lies_above_it_by_the_soil_resistance(dr
     assert kappa.whole.count - kappa.without_stuck.count == 100
 
 
+def test_the_truth_itself_bounds_what_can_be_scored_against_a_sensor(drive: Drive) -> None:
+    run = drive()
+    ceiling = {c.quantity: c for c in compare_truth(run)}
+    estimated = {c.quantity: c for c in compare(run) if c.against == "sensor"}
+    best, ours = ceiling["net_traction"].without_stuck, estimated["net_traction"].without_stuck
+    assert best is not None
+    assert ours is not None
+    assert ours.r2 < best.r2 < 1.0
+    assert compare_truth(Run(run.name, run.estimates, run.method, None, run.recording)) == []
+
+
 def test_without_references_there_is_nothing_to_compare(drive: Drive) -> None:
     run = drive()
     bare = Run(run.name, run.estimates, run.method)
@@ -95,10 +106,10 @@ def test_without_references_there_is_nothing_to_compare(drive: Drive) -> None:
 def test_tables_set_off_the_default_and_carry_the_papers_figures(drive: Drive) -> None:
     runs = [drive(method="bank"), drive(method="ukf")]
     tables = method_tables([c for run in runs for c in compare(run)], "bank")
-    assert len(tables) == 4  # mu and kappa, sensor and truth
-    sensor = tables[0]
+    sensor, truth = tables
     assert sensor.strong == {0}
-    assert sensor.rows[-1][1:5] == ("0.445", "–", "0.848", "0.090")
-    assert not any("paper" in row[0] for row in tables[-1].rows)
+    assert sensor.header[5:8] == ("µ: R² whole", "µ: R² without spell", "µ: NRMSE without spell")
+    assert sensor.rows[-1][5:8] == ("0.445", "0.848", "0.090")
+    assert not any("paper" in row[0] for row in truth.rows)
     scores = [score for run in runs if (score := truth_score(run))]
     assert truth_table(scores, "ukf").strong == {1}

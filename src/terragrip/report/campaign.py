@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, TypeVar
 
 from terragrip.report.intervals import Coverage, run_coverage
 from terragrip.report.runs import Run
-from terragrip.report.scores import Comparison, TruthScore, compare, truth_score
+from terragrip.report.scores import Comparison, TruthScore, compare, compare_truth, truth_score
 
 if TYPE_CHECKING:
     from terragrip.estimation import Estimates
@@ -165,6 +165,7 @@ def _estimate(name: str, seed: int, vehicle: Vehicle, folder: Path) -> Estimated
     comparisons: list[Comparison] = []
     scores: list[TruthScore | None] = []
     if name in BENCHMARKS:
+        comparisons += compare_truth(shown)
         for method in METHODS:
             others = estimate(result.recording, vehicle, method=method)
             run = shown if method == DEFAULT else _run(name, others, result, vehicle)

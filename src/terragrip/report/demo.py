@@ -158,8 +158,9 @@ _METHOD_PROSE = (
     "The model is affine in its state, so ekf, ukf and kalman are one filter computed in different ways and agree to "
     "rounding; aukf and aukf-fs adapt the process noise (aukf-fs is the paper's method); bank mixes four noise levels; "
     "algebraic solves the equations of motion on low-passed signals.",
-    "µ stands apart from the sensor by ρs, whatever the method: a low or negative R² of µ against the sensor is the "
-    "sensor's place, not the estimate's error, which the tables against the truth show.",
+    "µ stands apart from the sensor by ρs, whatever the method: a negative R² of µ against the sensor is the sensor's "
+    "place, not the estimate's error, which the table against the truth shows. \"The truth itself\" is the simulation's "
+    "own κ or µ against its sensor: how far the sensor's dynamics and noise let any estimate come.",
 )
 
 

@@ -71,7 +71,7 @@ def draw_crosses(crosses: Iterable[Cross], voices: Sequence[str], what: str) -> 
     shown = [cross for cross in crosses if cross.voice in voices]
     soils = tuple(dict.fromkeys(cross.soil for cross in shown))
     looks: dict[str, Any] = {
-        "measured": ("x", ":", 0.9),
+        "measured": ("x", ":" if len(voices) > 1 else "-", 1.0),
         "estimated": ("o", "-", 1.7),
         "true": ("+", "-", 0.8),
     }

@@ -17,6 +17,9 @@ PAPER_R2_WHOLE, PAPER_R2_WITHOUT_STUCK, PAPER_NRMSE = 0.445, 0.848, 0.09
 """The paper's figures for its field run `multi2`: R² whole, R² and NRMSE without 245-255 s."""
 
 
+QUANTITIES = ("net_traction", "adhesion")
+TRUTH = "the truth itself"
+"""Stands in a method's place where the simulated truth is compared with the sensor."""
 PARTS = ("whole", "without_outlier", "without_stuck")
 """Which rows of a run are compared."""
 
@@ -72,14 +75,23 @@ def compare(run: Run) -> list[Comparison]:
     """Every comparison that `run` allows: mu and kappa of the sensor's wheel, against sensor and truth."""
     wheel, sensor = run.shown_wheel, run.measured_ratio()
     result = []
-    for quantity in ("adhesion", "net_traction"):
-        estimate = run.estimated(f"{quantity}_{wheel}")
-        for against, reference in (("sensor", sensor), ("truth", run.true(f"{quantity}_{wheel}"))):
-            if reference is None:
-                continue
-            every = np.ones(len(estimate), dtype=np.bool_)
-            parts = (_agreement(reference, estimate, rows) for rows in (every, ~run.outlier, ~run.stuck))
-            result.append(Comparison(run.name, run.method, quantity, against, *parts))
+    for quantity in QUANTITIES:
+        name = f"{quantity}_{wheel}"
+        for against, reference in (("sensor", sensor), ("truth", run.true(name))):
+            if reference is not None:
+                parts = _parts(run, reference, run.estimated(name))
+                result.append(Comparison(run.name, run.method, quantity, against, *parts))
+    return result
+
+
+def compare_truth(run: Run) -> list[Comparison]:
+    """The truth itself against the sensor: what no estimate can be expected to exceed. Empty without both."""
+    sensor, result = run.measured_ratio(), []
+    for quantity in QUANTITIES:
+        truth = run.true(f"{quantity}_{run.shown_wheel}")
+        if sensor is not None and truth is not None:
+            parts = _parts(run, sensor, truth)
+            result.append(Comparison(run.name, TRUTH, quantity, "sensor", *parts))
     return result
 
 
@@ -102,12 +114,12 @@ def truth_score(run: Run) -> TruthScore | None:
 
 def method_tables(comparisons: Sequence[Comparison], default: str) -> list[Table]:
     """Methods against the sensor and against the truth, a table each; the default method's rows set off."""
+    titles = {"sensor": "the reference force sensor's F_x/F_z", "truth": "the simulated truth"}
     tables = []
-    for against, what in (("sensor", "the reference force sensor"), ("truth", "the simulated truth")):
-        for quantity, symbol in (("adhesion", "µ"), ("net_traction", "κ")):
-            rows = [c for c in comparisons if c.against == against and c.quantity == quantity]
-            if rows:
-                tables.append(_table(rows, f"Estimated {symbol} against {what}", default))
+    for against, what in titles.items():
+        rows = [c for c in comparisons if c.against == against]
+        if rows:
+            tables.append(_table(rows, f"Estimated κ and µ against {what}", default))
     return tables
 
 
@@ -144,32 +156,45 @@ def find(
 
 
 def _table(rows: list[Comparison], caption: str, default: str) -> Table:
-    cells = []
-    for c in rows:
-        whole, outlier, stuck = c.whole, c.without_outlier, c.without_stuck
-        cells.append(
-            (
-                f"{c.run}, {c.method}",
-                number(whole.r2 if whole else None),
-                number(whole.nrmse if whole else None),
-                number(outlier.r2 if outlier else None),
-                number(outlier.nrmse if outlier else None),
-                number(stuck.r2 if stuck else None),
-                number(stuck.bias if stuck else None, 4),
-            )
-        )
-    strong = {i for i, c in enumerate(rows) if c.method == default}
+    """A row a run and method: kappa's four figures, then mu's."""
+    pairs = list(dict.fromkeys((c.run, c.method) for c in rows))
+    cells: list[tuple[str, ...]] = []
+    for run, method in pairs:
+        row = [f"{run}, {method}"]
+        for quantity in QUANTITIES:
+            c = find(rows, run=run, method=method, quantity=quantity, against=rows[0].against)
+            row += _figures(c)
+        cells.append(tuple(row))
+    strong = {i for i, (_, method) in enumerate(pairs) if method == default}
     if rows[0].against == "sensor":
-        paper = ("the paper's multi2: aukf-fs, in the field, µ", number(PAPER_R2_WHOLE), "–")
-        cells.append((*paper, number(PAPER_R2_WITHOUT_STUCK), number(PAPER_NRMSE), "–", "–"))
+        paper = (number(PAPER_R2_WHOLE), number(PAPER_R2_WITHOUT_STUCK), number(PAPER_NRMSE), "–")
+        cells.append(("multi2 of the paper, in the field, aukf-fs", "–", "–", "–", "–", *paper))
+    columns = ("R² whole", "R² without spell", "NRMSE without spell", "R² never stuck")
     return Table(
-        caption + ": every row; without the longest stuck spell, as the paper does; without any row in which "
-        "the vehicle is stuck.",
-        ("run, method", "R² whole", "NRMSE whole", "R² without spell", "NRMSE without spell",
-         "R² never stuck", "bias never stuck"),
+        caption + ": over every row; without the longest stuck spell, as the paper does; without any row in "
+        "which the vehicle is stuck.",
+        ("run, method", *(f"{symbol}: {column}" for symbol in ("κ", "µ") for column in columns)),
         tuple(cells),
         frozenset(strong),
-    )  # fmt: skip
+    )
+
+
+def _figures(c: Comparison | None) -> list[str]:
+    if c is None:
+        return ["–"] * 4
+    whole, cut, free = c.whole, c.without_outlier, c.without_stuck
+    return [
+        number(whole.r2 if whole else None),
+        number(cut.r2 if cut else None),
+        number(cut.nrmse if cut else None),
+        number(free.r2 if free else None),
+    ]
+
+
+def _parts(run: Run, reference: FloatArray, estimate: FloatArray) -> list[Agreement | None]:
+    """Agreement over the rows of each of PARTS."""
+    every = np.ones(len(estimate), dtype=np.bool_)
+    return [_agreement(reference, estimate, rows) for rows in (every, ~run.outlier, ~run.stuck)]
 
 
 def _agreement(reference: FloatArray, estimate: FloatArray, rows: Any) -> Agreement | None:

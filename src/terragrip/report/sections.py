@@ -59,8 +59,8 @@ def slip_and_resistance(run: Run) -> Section:
     """Slip of one wheel and soil resistance over time, with intervals and truth."""
     wheel = run.shown_wheel
     lanes = [
-        _lane(run, f"slip_{wheel}", f"slip s, {wheel} [–]", moving_only=True),
-        _lane(run, "soil_resistance", "soil resistance ρs [–]", moving_only=True),
+        _lane(run, f"slip_{wheel}", f"slip s, {wheel} [–]", never_stuck=True),
+        _lane(run, "soil_resistance", "soil resistance ρs [–]", never_stuck=True),
     ]
     sim = "Simulated run" if run.truth is not None else "Run"
     off = " Where the vehicle is stuck, slip leaves the plot towards 1." if run.stuck.any() else ""
@@ -132,7 +132,7 @@ def honesty(shown: Run, covered: Sequence[Coverage]) -> Section:
                 "coverage",
                 draw_coverage(covered),
                 f"How often the intervals hold the simulated truth, against what they claim, over {judged} "
-                f"run{'s' if judged > 1 else ''} while moving. Above the dashed line they are careful, under "
+                f"run{'s' if judged > 1 else ''} while the vehicle moves and is not stuck. Above the dashed line they are careful, under "
                 "it too sure.",
                 "Observed against nominal coverage of the intervals",
             ),
@@ -180,14 +180,15 @@ def calibrated(calibration: Calibration) -> Section:
 
 
 def _lane(
-    run: Run, column: str, label: str, measured: FloatArray | None = None, *, moving_only: bool = False
+    run: Run, column: str, label: str, measured: FloatArray | None = None, *, never_stuck: bool = False
 ) -> Lane:
     """A lane of one estimated column, its axis wide enough for nearly all that it shows.
 
-    The rarest 0.3 % at either end may leave the plot, and with `moving_only` what happens while stuck.
+    The rarest 0.3 % at either end may leave the plot, so may what stands still (there the interval may span
+    everything) and, with `never_stuck`, what happens while stuck.
     """
     estimate, std, truth = run.estimated(column), run.estimated(f"{column}_std"), run.true(column)
-    rows = ~run.stuck if moving_only else np.ones(len(estimate), dtype=np.bool_)
+    rows = run.moving & ~run.stuck if never_stuck else run.moving
     voices = [estimate - 1.96 * std, estimate + 1.96 * std, truth, measured]
     known = [v[rows & np.isfinite(v)] for v in voices if v is not None]
     ends = [np.percentile(v, [0.3, 99.7]) for v in known if len(v)]
