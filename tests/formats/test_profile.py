@@ -291,3 +291,34 @@ def test_measured_poses(shared: Callable[[str], Path]) -> None:
     assert 0.90 < np.median(ratio) < 1.0  # the data's own notes: slip of 0.05 on grass; and the sign is right
     assert np.mean(ratio > 0.5) > 0.95
     assert np.rad2deg(np.abs(np.nanmedian(recording["pitch"]))) < 3
+
+
+def test_a_quotient_is_missing_where_the_divisor_is_small_and_while_the_dividend_is_held(
+    foreign: pd.DataFrame,
+) -> None:
+    n = len(foreign)
+    foreign["speed"] = np.where(np.arange(n) < 40, 0.1, -2.0) + 0.001 * (np.arange(n) % 7)
+    foreign["amps"] = np.repeat(np.random.default_rng(4).normal(20.0, 5.0, n // 10), 10)
+    torque = apply(
+        foreign,
+        drive_torque_l={"from": "amps", "over": "speed", "over_minimum": 0.3, "scale": 48, "unit": "N m"},
+    )["drive_torque_l"]
+    updates = np.arange(40, n, 10)
+    assert np.flatnonzero(np.isfinite(torque)).tolist() == updates.tolist()
+    np.testing.assert_allclose(torque[updates], 48 * foreign["amps"][updates] / foreign["speed"][updates])
+
+
+@pytest.mark.parametrize(
+    ("source", "said"),
+    [
+        ({"from": "amps", "over": "speed"}, "over_minimum"),
+        ({"from": "amps", "over_minimum": 0.3}, "serves over only"),
+        ({"constant": 1.0, "over": "speed", "over_minimum": 0.3}, "serves from only"),
+        ({"from": "amps", "over": "kmhh", "over_minimum": 0.3}, "kmh"),
+    ],
+)
+def test_a_quotient_needs_both_columns_and_a_least_divisor(
+    foreign: pd.DataFrame, source: dict[str, Any], said: str
+) -> None:
+    with pytest.raises(InputError, match=said):
+        apply(foreign, drive_torque_l=source)

@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from terragrip.errors import InputError, nearest
-from terragrip.formats.derivation import derivative, fresh_positions, pitch_of, roll_of, yaw_of
+from terragrip.formats.derivation import derivative, fresh_positions, pitch_of, quotient, roll_of, yaw_of
 from terragrip.formats.profile import Profile, Rows, Source, TimeSource, rate_unit
 from terragrip.formats.table import LogTable
 from terragrip.formats.timebase import spread, union
@@ -95,6 +95,8 @@ def _channel(name: str, origin: Source, log: LogTable, time: Floats) -> tuple[Co
         raw = roll_of(_raw(origin.roll_of, log, time))
     else:
         raw = _without_invalid(_raw((str(origin.column),), log, time)[0], origin)
+        if origin.over is not None:
+            raw = quotient(time, raw, _raw((origin.over,), log, time)[0], origin.over_minimum)
     factor = _factor(name, origin, log)
     if deviation is not None:
         deviation *= abs(factor * origin.scale)
@@ -110,7 +112,7 @@ def _factor(name: str, origin: Source, log: LogTable) -> float:
         return 1.0
     if origin.unit is not None:
         return factor_to(rate_unit(origin.unit) if origin.derivative_of else origin.unit, target)
-    stated = log.units.get(origin.column or "") if origin.scale == 1.0 else None
+    stated = log.units.get(origin.column or "") if origin.scale == 1.0 and origin.over is None else None
     if stated is None:
         return 1.0
     try:

@@ -1,4 +1,4 @@
-"""Channels that a log holds only indirectly: a speed from positions, a pitch from a quaternion."""
+"""Channels that a log holds only indirectly: a speed from positions, a torque from power, a pitch from a quaternion."""
 
 from __future__ import annotations
 
@@ -25,6 +25,18 @@ def fresh_positions(time: Floats, positions: list[Floats]) -> npt.NDArray[np.boo
         moved = [fresh_samples(time, p, period) for p, period in held if period is not None]
         fresh &= np.any(moved, axis=0)
     return fresh
+
+
+def quotient(time: Floats, dividend: Floats, divisor: Floats, least: float) -> Floats:
+    """Dividend over divisor (n,), NaN where the divisor's size is under ``least``.
+
+    A held dividend counts at its updates only: over a divisor that goes on changing it would look fresh.
+    """
+    period = held_period(time, dividend)
+    known = np.abs(divisor) >= least
+    if period is not None:
+        known &= fresh_samples(time, dividend, period)
+    return np.divide(dividend, divisor, out=np.full(len(time), np.nan), where=known)
 
 
 def derivative(time: Floats, position: Floats, window: float) -> tuple[Floats, float | None]:

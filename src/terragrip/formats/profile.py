@@ -7,9 +7,12 @@
       drive_torque_left: {from: left_current, scale: 2.079, unit: N m, invalid: [0, [900, 1000]], delay: 50 ms}
       ground_speed: {derivative_of: [x, y], unit: m, window: 0.5 s, forward: {yaw: heading, unit: deg}}
       pitch: {pitch_of: [qx, qy, qz, qw]}
+      drive_torque_right: {from: right_current, over: meas_right_vel, over_minimum: 0.3, scale: 48, unit: N m}
       soil: {constant: grass}
 
 A value is ``sign * (scale * raw + offset)`` in ``unit``; ``invalid`` values and ranges are judged on the raw one.
+With ``over`` the raw value is a quotient of two columns, as a torque is power over speed: missing where the divisor is
+smaller in size than ``over_minimum``, and between the updates of a held dividend.
 """
 
 from __future__ import annotations
@@ -56,6 +59,8 @@ class Source(Part):
     """Where one channel comes from, and what is done to it."""
 
     column: str | None = Field(None, alias="from")
+    over: str | None = None
+    over_minimum: float = Field(0.0, ge=0.0, allow_inf_nan=False)
     derivative_of: Annotated[tuple[str, ...], Field(min_length=1, max_length=3)] | None = None
     pitch_of: Quaternion | None = None
     roll_of: Quaternion | None = None
@@ -83,6 +88,17 @@ class Source(Part):
         for key in ("window", "forward"):
             if key in self.model_fields_set and self.derivative_of is None:
                 raise Fault("serves derivative_of only", "leave it out", (key,))
+        if self.over is not None and self.column is None:
+            raise Fault("serves from only", "leave it out", ("over",))
+        if self.over is not None and self.over_minimum <= 0:
+            mend = "write e.g. 'over_minimum: 0.3', in the divisor's unit"
+            raise Fault(
+                "needs a positive over_minimum, since a quotient over next to nothing is noise",
+                mend,
+                ("over",),
+            )
+        if self.over is None and "over_minimum" in self.model_fields_set:
+            raise Fault("serves over only", "leave it out", ("over_minimum",))
         if self.forward is not None and len(self.derivative_of or ()) != 2:
             raise Fault("needs derivative_of two columns, x and y", "leave it out", ("forward",))
         if self.window <= 0:
@@ -95,6 +111,7 @@ class Source(Part):
         heading = () if self.forward is None else (self.forward.yaw, *(self.forward.quaternion or ()))
         every = (
             self.column,
+            self.over,
             *(self.derivative_of or ()),
             *(self.pitch_of or ()),
             *(self.roll_of or ()),
