@@ -22,7 +22,7 @@ Floats = npt.NDArray[np.float64]
 Progress = Callable[[int, int], None]
 
 _PASSED_ON = ("latitude", "longitude", "altitude")
-_GAP = EVENTS.index("gap")
+GAP = EVENTS.index("gap")
 
 
 def estimate(
@@ -118,8 +118,8 @@ def finished(
 
 def flag_before_gaps(event: npt.NDArray[np.uint8]) -> None:
     """The row before a gap is the last one before the unknown: flag it too, unless it stands still."""
-    before = np.flatnonzero((event[1:] == _GAP) & (event[:-1] != _GAP))
-    event[before] = _GAP
+    before = np.flatnonzero((event[1:] == GAP) & (event[:-1] != GAP))
+    event[before] = GAP
 
 
 def about_run(

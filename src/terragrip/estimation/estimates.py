@@ -107,8 +107,7 @@ class Estimates:
                 for name, values in self.labels.items()
             }
         )
-        events = pd.Categorical.from_codes(self.event_codes.astype(np.int8), list(EVENTS))
-        table["event"] = pd.Series(events).astype(pd.StringDtype(na_value=np.nan))
+        table["event"] = pd.Series(self._events().to_pandas(), dtype=pd.StringDtype(na_value=np.nan))
         return pd.DataFrame(table, copy=False)
 
     def to_arrow(self) -> pa.Table:
@@ -117,9 +116,15 @@ class Estimates:
 
         arrays: dict[str, Any] = {name: pa.array(values) for name, values in self._numbers()}
         arrays |= {name: _text_array(values) for name, values in self.labels.items()}
-        codes = pa.array(self.event_codes.view(np.int8))
-        arrays["event"] = pa.DictionaryArray.from_arrays(codes, list(EVENTS)).cast(pa.string())
+        arrays["event"] = self._events()
         return pa.table(arrays).replace_schema_metadata({METADATA_KEY: self.metadata()})
+
+    def _events(self) -> pa.Array:
+        import pyarrow as pa
+
+        return pa.DictionaryArray.from_arrays(pa.array(self.event_codes.view(np.int8)), list(EVENTS)).cast(
+            pa.string()
+        )
 
     def _numbers(self) -> Iterator[tuple[str, Floats]]:
         yield "time", self.time
@@ -184,9 +189,11 @@ class Estimates:
 
     def summary(self) -> str:
         """What a user wants to know first, in a few lines of text."""
-        from terragrip.estimation.summary import summary
+        from terragrip.estimation.summary import Tally
 
-        return summary(self)
+        tally = Tally()
+        tally.add(self)
+        return tally.text(self.notes)
 
 
 def parquet_options(schema: pa.Schema) -> dict[str, Any]:

@@ -70,7 +70,7 @@ def _speed_ratio(recording: Recording, wheel: str, radius: float) -> float | Non
     known, rows = np.isfinite(speed), np.isfinite(turning)
     if known.sum() < 2 or rows.sum() < 2:
         return None
-    stride = max(1, int(rows.sum()) // 100_000)
+    stride = max(1, int(rows.sum()) // 20_000)
     when = recording.time[rows][::stride]
     rim = radius * np.abs(turning[rows][::stride])
     ground = np.abs(np.interp(when, recording.time[known], speed[known]))
