@@ -17,6 +17,7 @@ from terragrip.cli.estimate import command as estimate
 from terragrip.cli.failure import INTERRUPTED, report
 from terragrip.cli.inspect import command as inspect
 from terragrip.cli.simulate import command as simulate
+from terragrip.cli.soils import command as soils
 
 app = typer.Typer(
     name="terragrip",
@@ -30,6 +31,7 @@ app.command("demo")(demo)
 app.command("inspect")(inspect)
 app.command("estimate")(estimate)
 app.command("calibrate")(calibrate)
+app.command("soils")(soils)
 app.command("simulate")(simulate)
 
 

@@ -20,16 +20,22 @@ from terragrip.soil.transitions import settled
 
 Array = NDArray[np.float64]
 
+STRETCH = 10.0
+"""Metres of one run that count as one draw of the bootstrap where there are too few runs."""
+FEW_RUNS = 5
+
 
 @dataclass(frozen=True)
 class RunPairs:
-    """The usable pairs of one run on one soil: slip, adhesion and slip noise (n,), wheel after wheel; rho_s (rows,)."""
+    """The usable pairs of one run on one soil: slip, adhesion and slip noise (n,), wheel after wheel; the stretch of `STRETCH` metres
+    that each lies in (n,); rho_s and speed (rows,)."""
 
     run: str
     soil: str
     slip: Array
     adhesion: Array
     slip_std: Array
+    stretch: NDArray[np.int64]
     resistance: Array
     speed: Array
 
@@ -73,6 +79,7 @@ def usable_pairs(
     out = []
     for name in sorted(set(soil[good])):
         rows = good & (soil == name)
+        stretch = np.floor(np.asarray(columns["distance"], dtype=float)[rows] / STRETCH).astype(np.int64)
         out.append(
             RunPairs(
                 run,
@@ -80,6 +87,7 @@ def usable_pairs(
                 np.concatenate([np.asarray(columns[f"slip_{w}"], dtype=float)[rows] for w in wheels]),
                 np.concatenate([np.asarray(columns[f"adhesion_{w}"], dtype=float)[rows] for w in wheels]),
                 np.concatenate([np.asarray(columns[f"slip_{w}_std"], dtype=float)[rows] for w in wheels]),
+                np.tile(stretch, len(wheels)),
                 np.asarray(columns["soil_resistance"], dtype=float)[rows],
                 np.asarray(columns["ground_speed"], dtype=float)[rows],
             )
@@ -133,6 +141,17 @@ def learn_soils(
     return Campaign(soils, missed, tuple(words))
 
 
+def _clusters(parts: Sequence[RunPairs]) -> tuple[NDArray[np.int64], bool]:
+    """What is drawn by the bootstrap: runs, or stretches of runs where there are few. (labels (n,), whether they are runs)."""
+    run = np.repeat(np.arange(len(parts)), [part.slip.size for part in parts])
+    if len(parts) >= FEW_RUNS:
+        return run, True
+    stretch = np.concatenate([part.stretch for part in parts])
+    return np.asarray(
+        np.unique(np.stack([run, stretch]), axis=1, return_inverse=True)[1].ravel(), dtype=np.int64
+    ), False
+
+
 def _learn(
     name: str,
     parts: Sequence[RunPairs],
@@ -146,7 +165,7 @@ def _learn(
     slip = np.concatenate([part.slip for part in parts])
     adhesion = np.concatenate([part.adhesion for part in parts])
     noise = np.concatenate([part.slip_std for part in parts])
-    run = np.repeat(np.arange(len(parts)), [part.slip.size for part in parts])
+    cluster, by_run = _clusters(parts)
     curve = AdhesionCurve(
         template.model,
         template.fixed,
@@ -156,8 +175,13 @@ def _learn(
         template.bootstrap,
         template.seed,
     )
-    binned: Bins = bin_pairs(slip, adhesion, run, settings)
+    binned: Bins = bin_pairs(slip, adhesion, cluster, settings)
     curve.fit_bins(binned)
+    if curve.interval_ and not by_run:
+        curve.notes_.append(
+            f"The intervals come from stretches of {STRETCH:g} m of {len(parts)} run{'s' * (len(parts) > 1)}: "
+            "they do not hold how much runs differ."
+        )
     resistance = np.concatenate([part.resistance for part in parts])
     speed = np.concatenate([part.speed for part in parts])
     soil = Soil.from_curve(name, curve, source, (float(np.nanmean(resistance)), float(np.nanstd(resistance))))
