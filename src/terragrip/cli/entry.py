@@ -21,7 +21,7 @@ from terragrip.cli.soils import command as soils
 
 app = typer.Typer(
     name="terragrip",
-    help="What the ground does under the wheels, from signals that a machine already has.",
+    help="Traction under the wheels, estimated from signals that a machine already has.",
     # Plain help: rich's boxes triple the time of `--help` and break the one-line rule for errors.
     rich_markup_mode=None,
     add_completion=False,
