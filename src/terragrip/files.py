@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-import tempfile
+import secrets
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -19,27 +19,24 @@ def replacing(path: str | os.PathLike[str]) -> Iterator[Path]:
     """
     target = Path(path)
     try:
-        handle, name = tempfile.mkstemp(prefix=f".{target.name}.", suffix=target.suffix, dir=target.parent)
-        os.close(handle)
-    except OSError as error:
-        raise InputError(
-            f"cannot be written ({error.strerror})",
-            file=path,
-            mend="choose another folder, or make it writable",
-        ) from error
-    temporary = Path(name)
+        temporary = target.with_name(f".{target.stem}.{secrets.token_hex(4)}{target.suffix}")
+        os.close(os.open(temporary, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o666))
+    except (OSError, ValueError) as error:
+        raise unwritable(path, error, "choose another folder, or make it writable") from error
     try:
         yield temporary
-        umask = os.umask(0)
-        os.umask(umask)
-        temporary.chmod(0o666 & ~umask)
         temporary.replace(target)
     except OSError as error:
-        raise InputError(
-            f"cannot be written ({error.strerror})", file=path, mend="free space or choose another folder"
-        ) from error
+        raise unwritable(path, error, "free space or choose another folder") from error
     finally:
         temporary.unlink(missing_ok=True)
+
+
+def unwritable(path: str | os.PathLike[str], error: Exception, mend: str) -> InputError:
+    """The InputError for a file that cannot be written."""
+    return InputError(
+        f"cannot be written ({getattr(error, 'strerror', None) or error})", file=path, mend=mend
+    )
 
 
 def refuse_missing(path: str | os.PathLike[str], *, suffixes: tuple[str, ...] = ()) -> None:
@@ -81,5 +78,5 @@ def sha256(path: str | os.PathLike[str]) -> str:
 def unreadable(path: str | os.PathLike[str], error: OSError) -> InputError:
     """The InputError for a file that exists but cannot be read."""
     return InputError(
-        f"cannot be read ({error.strerror})", file=path, mend="check its permissions and the disk"
+        f"cannot be read ({error.strerror or error})", file=path, mend="check its permissions and the disk"
     )

@@ -166,6 +166,24 @@ def test_signed_speed_from_positions(forward: dict[str, Any], seed: int) -> None
     assert any("derivative of x, y over 0.5 s" in note for note in recording.notes)
 
 
+@pytest.mark.parametrize("seed", range(3))
+def test_outlying_positions_weigh_nothing(seed: int) -> None:
+    frame, speed = drive(20, seed=seed, noise=0.002)
+    source = {
+        "derivative_of": ["x", "y"],
+        "unit": "m",
+        "window": "0.8 s",
+        "forward": {"yaw": "yaw_deg", "unit": "deg"},
+    }
+    away = np.abs(np.arange(1200) / 20 - 40) > 0.5
+    clean = apply(frame, ground_speed=source)["ground_speed"][away] - speed[away]
+    rows = np.random.default_rng(seed).choice(1200, 30, replace=False)
+    frame.loc[rows, "x"] += 0.03
+    found = apply(frame, ground_speed=source)["ground_speed"][away] - speed[away]
+    assert np.isfinite(found).mean() > 0.9
+    assert np.nanstd(found) < 1.3 * np.nanstd(clean)
+
+
 def test_speed_from_one_coordinate_and_without_heading() -> None:
     frame, speed = drive(20, seed=1, noise=0.0)
     frame["odometer_cm"] = 100 * np.cumsum(speed) / 20

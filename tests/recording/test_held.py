@@ -79,7 +79,7 @@ def test_standing_and_spikes_are_not_held(seed: int) -> None:
         stops[(time > start) & (time < start + 5)] = 0.0
     assert held_period(time, stops) is None
     spikes = np.zeros(len(time))
-    spikes[rng.choice(len(time), 60, replace=False)] = 5.0
+    spikes[rng.choice(len(time), 60, replace=False)] = rng.uniform(1, 5, 60)
     assert held_period(time, spikes) is None
     assert held_period(time, np.zeros(len(time))) is None
     steps = np.repeat([0.0, 1.0, 0.3, 2.0], 3000)  # commands, not updates

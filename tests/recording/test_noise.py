@@ -48,6 +48,10 @@ def test_resolution_is_the_floor() -> None:
     assert (white_noise(time, values) or 0) >= 0.1 / np.sqrt(12) * (1 - 1e-9)
 
 
+def test_a_counter_has_the_noise_of_its_resolution() -> None:
+    assert white_noise(np.arange(100.0), 0.1 * np.arange(100)) == pytest.approx(0.1 / np.sqrt(12))
+
+
 def test_what_cannot_be_told_is_absent() -> None:
     time = np.arange(0, 60, 0.01)
     noisy = smooth(time) + 0.05 * np.random.default_rng(0).standard_normal(6000)

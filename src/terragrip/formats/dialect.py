@@ -131,7 +131,7 @@ def _best(lines: list[str]) -> tuple[str, str]:
         fitting = sum(abs(len(row) - width) <= 1 for row in body) / len(body) if body else 1.0
         for decimal in (".",) if separator == "," else (".", ","):
             cells = [cell for row in body[:20] for cell in row]
-            numbers = sum(_is_number(cell, decimal) or cell.lower() in _EMPTY for cell in cells)
+            numbers = sum(_is_number(cell, decimal) for cell in cells)
             share = round(numbers / len(cells), 2) if cells else 0.0
             score = (round(fitting, 1) * (width > 1), share if width > 1 else 0.0, float(width))
             if score > best:
