@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from terragrip.errors import InputError
 from terragrip.estimation.calibration import zeros
@@ -47,8 +48,43 @@ def calibrate(recordings: Recording | Sequence[Recording], vehicle: Vehicle) -> 
         log.check_against(vehicle)
     sources = [log.source or f"recording {k + 1}" for k, log in enumerate(logs)]
     logs = [without_held(log) for log in logs]
-    noise = _sensor_noise(logs, vehicle)
-    standing = windows(logs, vehicle, zeros.WINDOW)
+    found, unknown, yaw_zero = _zeros(logs, vehicle, sources)
+    zeroed = Calibration(tuple(found), ()).apply(vehicle)
+    corrected = [_corrected(log, zeroed, yaw_zero) for log in logs]
+
+    passes = windows(corrected, zeroed, RADIUS_WINDOW)
+    rolling = rolling_radii(passes, zeroed, track_blocks(passes), sources)
+    rolled = zeroed
+    if isinstance(rolling, Rolling):
+        together = _possible(_radii(rolling, None, vehicle), vehicle, unknown)
+        rolled = Calibration(tuple(together), ()).apply(zeroed)
+    else:
+        unknown.append(rolling)
+
+    gains = relative_gains(
+        corrected, rolled, _offset_errors(found, vehicle), _channel_errors(found, vehicle, logs), sources
+    )
+    shared: list[Quantity] = []
+    if isinstance(gains, RelativeGains):
+        unknown += gains.unknown
+        shared = _useful(_possible(gains.quantities, vehicle, unknown), vehicle, unknown)
+    else:
+        unknown += gains
+    if isinstance(rolling, Rolling) and rolled is not zeroed:
+        found += _radii(rolling, gains if isinstance(gains, RelativeGains) else None, vehicle)
+    found += shared
+    try:
+        found.append(identify_torque_scale(_with_gains(corrected, shared), rolled))
+    except InputError as error:
+        unknown.append(Unknown("drive_torque_scale", error.problem))
+    return Calibration(tuple(found), tuple(unknown), _left(found, vehicle))
+
+
+def _zeros(
+    logs: Sequence[Recording], vehicle: Vehicle, sources: Sequence[str]
+) -> tuple[list[Quantity], list[Unknown], float]:
+    """Everything that standstill tells; the last is the gyroscope's zero, which has no place in the vehicle file."""
+    noise, standing = _sensor_noise(logs, vehicle), windows(logs, vehicle, zeros.WINDOW)
     found: list[Quantity] = []
     unknown: list[Unknown] = []
     for quantities, missing in (
@@ -56,41 +92,23 @@ def calibrate(recordings: Recording | Sequence[Recording], vehicle: Vehicle) -> 
         zeros.drawbar_zero(standing, vehicle, sources, noise["drawbar_force"]),
         zeros.inclination_zeros(standing, vehicle, sources, noise["acceleration"]),
     ):
-        found += quantities
         unknown += missing
-    zeroed = Calibration(tuple(found), ()).apply(vehicle)
-    yaw_zero = zeros.yaw_rate_zero(standing, vehicle, standing.yaw_rate)
-    corrected = [_corrected(log, zeroed, yaw_zero) for log in logs]
+        found += _possible(quantities, vehicle, unknown)
+    return found, unknown, zeros.yaw_rate_zero(standing, vehicle, standing.yaw_rate)
 
-    offset_error = np.array(
-        [
-            _std_of(found, "drive_torque_offset", w, vehicle.uncertainty.drive_torque_offset)
-            for w in vehicle.wheels
-        ]
-    )
-    errors = _channel_errors(found, vehicle, logs)
-    passes = windows(corrected, zeroed, RADIUS_WINDOW)
-    rolling = rolling_radii(passes, zeroed, track_blocks(passes), sources)
-    rolled = zeroed
-    if isinstance(rolling, Unknown):
-        unknown.append(rolling)
-    else:
-        rolled = Calibration(tuple(_radii(rolling, None, vehicle)), ()).apply(zeroed)
-    gains = relative_gains(corrected, rolled, offset_error, errors, sources)
-    if isinstance(rolling, Rolling):
-        found += _radii(rolling, gains if isinstance(gains, RelativeGains) else None, vehicle)
-    shared = gains.quantities if isinstance(gains, RelativeGains) else []
-    unknown += gains.unknown if isinstance(gains, RelativeGains) else gains
-    vague = _vague(shared, vehicle)
-    if vague is None:
-        found += shared
-    else:
-        unknown.append(vague)
-    try:
-        found.append(identify_torque_scale(_with_gains(corrected, shared), rolled))
-    except InputError as error:
-        unknown.append(Unknown("drive_torque_scale", error.problem))
-    return Calibration(tuple(found), tuple(unknown), _left(found, vehicle))
+
+def _possible(quantities: Sequence[Quantity], vehicle: Vehicle, unknown: list[Unknown]) -> list[Quantity]:
+    """The quantities that a vehicle can have; the others go to ``unknown``."""
+    kept = []
+    for quantity in quantities:
+        try:
+            Calibration((quantity,), ()).apply(vehicle)
+        except InputError:
+            why = f"{quantity.value:.4g} {quantity.unit} is impossible: check the log's units and axes"
+            unknown.append(Unknown(quantity.name, why))
+        else:
+            kept.append(quantity)
+    return kept
 
 
 def _corrected(log: Recording, vehicle: Vehicle, yaw_zero: float) -> Recording:
@@ -136,12 +154,11 @@ def _sensor_noise(logs: Sequence[Recording], vehicle: Vehicle) -> dict[str, floa
     return noise
 
 
-def _std_of(found: Sequence[Quantity], key: str, wheel: str, prior: float | None) -> float:
-    """Standard error of a wheel's quantity if it was found, else the vehicle's prior, else 0."""
-    for quantity in found:
-        if quantity.key == key and quantity.wheel == wheel:
-            return quantity.std
-    return prior or 0.0
+def _offset_errors(found: Sequence[Quantity], vehicle: Vehicle) -> npt.NDArray[np.float64]:
+    """Standard error (w,) of each wheel's torque zero if it was found, else the vehicle's prior, else 0."""
+    prior = vehicle.uncertainty.drive_torque_offset or 0.0
+    told = {q.wheel: q.std for q in found if q.key == "drive_torque_offset"}
+    return np.array([told.get(wheel, prior) for wheel in vehicle.wheels])
 
 
 def _channel_errors(found: Sequence[Quantity], vehicle: Vehicle, logs: Sequence[Recording]) -> ChannelErrors:
@@ -161,15 +178,14 @@ def _channel_errors(found: Sequence[Quantity], vehicle: Vehicle, logs: Sequence[
     )
 
 
-def _vague(gains: Sequence[Quantity], vehicle: Vehicle) -> Unknown | None:
-    """Why the gains are of no use: they tell less than what the vehicle file knows already."""
+def _useful(gains: list[Quantity], vehicle: Vehicle, unknown: list[Unknown]) -> list[Quantity]:
+    """The gains, or none if the vehicle file knows them better already."""
     prior, errors = vehicle.uncertainty.drive_torque_gain, [quantity.own_std or 0.0 for quantity in gains]
     if not errors or prior is None or max(errors) < prior:
-        return None
-    return Unknown(
-        "drive_torque_gain",
-        f"told to {100 * max(errors):.1f} %, and the vehicle file knows them to {100 * prior:.1f} %: drive farther",
-    )
+        return gains
+    why = f"told to {100 * max(errors):.1f} %, and the vehicle file knows them to {100 * prior:.1f} %: drive farther"
+    unknown.append(Unknown("drive_torque_gain", why))
+    return []
 
 
 def _radii(rolling: Rolling, gains: RelativeGains | None, vehicle: Vehicle) -> list[Quantity]:

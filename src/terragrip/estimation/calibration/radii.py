@@ -93,11 +93,13 @@ def rolling_radii(
     driving = adhesion[:, vehicle.driven] if vehicle.driven.any() else adhesion
     most = np.array([_most(driving[passes & (code == j)]) for j in range(len(soils))])
     used = passes[:, None] & (code >= 0)[:, None] & (np.abs(adhesion) < _LOW * most[code][:, None])
+    if not used[free].any():
+        return Unknown("wheel_radius", "no zero-pull window has a plausible adhesion")
     scale, covariance, steepness = _fit(windows, vehicle, adhesion, code, most, used, block)
     radius = vehicle.wheel_radius * scale
     typical = float(np.average(steepness[code[free]]))
     variance = np.diag(covariance) + _considered(vehicle, typical)
-    slip = float(np.mean(1 - (windows.hub_speed / windows.wheel_speed)[free] / radius))
+    slip = float(np.mean(1 - windows.hub_speed[free] / (windows.wheel_speed[free] * radius)))
     told = evidence(windows, [Spell(int(k), int(k)) for k in np.flatnonzero(free)], sources)
     stretches = len(np.unique(block[np.any(used, axis=1)]))
     factor = float(stdtrit(max(1, stretches - 3), 0.975))  # radius, C and A are fitted
@@ -173,7 +175,8 @@ def _fit(
     shared = np.flatnonzero(vehicle.driven)[:1].tolist() + np.flatnonzero(~vehicle.driven).tolist()
     group = np.array([shared.index(k if k in shared else shared[0]) for k in range(w)])
     count = len(shared)
-    ratio = np.log(np.where(used, windows.hub_speed / (windows.wheel_speed * vehicle.wheel_radius), 1.0))
+    rim = np.where(used, windows.wheel_speed * vehicle.wheel_radius, 1.0)
+    ratio = np.log(np.where(used, windows.hub_speed, 1.0) / rim)
     pull = np.where(used, adhesion, 0.0)
     (steep, steep_spread), (_, level_spread) = _STEEPNESS, _LEVEL
     level_mean = np.log(np.maximum(_LEVEL[0], 1.2 * most))

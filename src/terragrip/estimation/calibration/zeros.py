@@ -114,8 +114,9 @@ def resting(values: Floats, found: Sequence[Spell], windows: Windows, noise: flo
     A zero is the same at every stop, what a drive holds or a bar keeps is not. Of groups of one size the one nearest to
     zero is taken.
     """
+    found = [spell for spell in found if np.isfinite(values[spell.rows]).any(axis=0).all()]
     if len(found) < 2 or noise <= 0:
-        return list(found)
+        return found
     means = np.array([np.nanmean(values[spell.rows], axis=0) for spell in found])
     errors = noise / np.sqrt([max(1.0, windows.count[spell.rows].sum()) for spell in found])
     apart = np.max(np.abs(means[:, None] - means[None]), axis=2)
@@ -136,15 +137,15 @@ def torque_zeros(
     quantities, unknown = [], []
     driven = np.flatnonzero(vehicle.driven)
     found = resting(windows.torque[:, driven], found, windows, noise)
+    if not found:
+        return [], [Unknown(key, "no torque was measured at standstill")]
     for index in driven:
         wheel, torque = vehicle.wheels[index], windows.torque[:, index]
         value, error = spell_mean(torque, found, windows, noise)
         driving = np.abs(torque[np.abs(windows.ground_speed) > _DRIVING])
         work = float(np.nanquantile(driving, 0.95)) if np.isfinite(driving).any() else np.inf
         allowed = max(3 * (vehicle.uncertainty.drive_torque_offset or 0.0), _IDLE_SHARE * work)
-        if not np.isfinite(value):
-            unknown.append(Unknown(f"{key} {wheel}", "no torque was measured at standstill"))
-        elif abs(value) > allowed:
+        if abs(value) > allowed:
             why = f"at standstill the drive reads {value:.2f} N m, so it seems to hold the vehicle"
             unknown.append(Unknown(f"{key} {wheel}", why))
         else:
@@ -170,8 +171,8 @@ def drawbar_zero(
     found = standstills(windows, vehicle)
     said = "mean of the stops that read alike; it assumes that the bar is slack there"
     why = f"no standstill of {_LEAST_STANDING:.0f} s or longer, and none free of a tool"
+    found = resting(windows.drawbar[:, None], found, windows, noise)
     if found:
-        found = resting(windows.drawbar[:, None], found, windows, noise)
         value, error = spell_mean(windows.drawbar, found, windows, noise)
         why = f"at standstill it reads {value:.1f} N, so the bar seems to be under tension"
     if not found or not abs(value) <= allowed:

@@ -1,0 +1,145 @@
+"""Relative torque gains: what is told, what is not, and whether the intervals hold."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from terragrip.estimation import calibrate
+from terragrip.estimation.calibration.sharing import Sharing, fit_shared_gains
+from terragrip.recording import Recording
+from terragrip.vehicle import Vehicle
+
+GAIN = np.array([1.02, 0.97, 1.03, 0.99])
+RELATIVE = GAIN / np.exp(np.mean(np.log(GAIN)))
+WHEELS = ("fl", "fr", "rl", "rr")
+Make = Callable[..., Recording]
+
+
+def found(logs: Recording | list[Recording], vehicle: Vehicle) -> tuple[np.ndarray, np.ndarray]:
+    result = calibrate(logs, vehicle)
+    quantities = [result[f"drive_torque_gain {wheel}"] for wheel in WHEELS]
+    return np.array([q.value for q in quantities]), np.array([q.std for q in quantities])
+
+
+def rows(seed: int = 0, gain: np.ndarray = GAIN, loads: float = 1.0) -> Sharing:
+    """An exact problem in the arrays of the fit: slips that differ a little, blocks of ten windows."""
+    rng = np.random.default_rng(seed)
+    slip = rng.uniform(0.03, 0.35, 400)[:, None] + 0.005 * rng.standard_normal((400, 4))
+    leverage = 0.2 * np.array([300.0, 300.0, 400.0, 400.0]) * (1 + 0.05 * rng.standard_normal((400, 4)))
+    known = 2.5 + 0.2 * rng.standard_normal((400, 4))
+    local = 1 + 0.02 * rng.standard_normal((400, 4))
+    torque = gain * (known + leverage * 0.5 * -np.expm1(-10 * slip) * local)
+    leverage = leverage * np.array([loads, loads, 1.0, 1.0])
+    code = np.arange(400) // 10
+    return Sharing(torque, known, leverage, slip, np.zeros(400, dtype=int), code, 1e-5, np.full(4, 1e-4))
+
+
+def test_exact_logs_give_the_gains(drive: Make, vehicle: Vehicle) -> None:
+    value, std = found(drive(gain=GAIN, standing=10), vehicle)
+    assert np.abs(value - RELATIVE).max() < 5e-4
+    assert std.max() < 0.02
+
+
+def test_a_common_gain_leaves_no_trace_and_is_said_to(drive: Make, vehicle: Vehicle) -> None:
+    alone, _ = found(drive(gain=GAIN), vehicle)
+    louder, _ = found(drive(gain=1.05 * GAIN), vehicle)
+    # Only the known part of the torque (tire and bearing resistance) does not scale, hence not zero.
+    assert np.abs(louder / alone - 1).max() < 3e-3
+    result = calibrate(drive(gain=GAIN), vehicle)
+    assert any(u.name == "drive_torque_gain, all wheels" for u in result.unknown)
+    assert np.mean(np.log([result[f"drive_torque_gain {w}"].value for w in WHEELS])) == pytest.approx(
+        0, abs=1e-9
+    )
+
+
+def test_intervals_hold_over_noise_and_patchy_ground(drive: Make, vehicle: Vehicle) -> None:
+    inside, z = [], []
+    for seed in range(24):
+        gain = 1 + 0.02 * np.random.default_rng(100 + seed).standard_normal(4)
+        truth = gain / np.exp(np.mean(np.log(gain)))
+        result = calibrate(drive(gain=gain, patches=0.1, noise=1.0, seed=seed, standing=10), vehicle)
+        quantities = [result[f"drive_torque_gain {wheel}"] for wheel in WHEELS]
+        inside += [q.interval[0] < true < q.interval[1] for q, true in zip(quantities, truth, strict=True)]
+        z += [(q.value - true) / q.std for q, true in zip(quantities, truth, strict=True)]
+    assert np.mean(inside) >= 0.9
+    assert 0.7 < np.sqrt(np.mean(np.square(z))) < 1.3
+
+
+def test_patchy_ground_alone_sets_the_error_of_the_fit() -> None:
+    z = []
+    for seed in range(40):
+        fit = fit_shared_gains(rows(seed))
+        assert fit is not None
+        truth = np.log(RELATIVE)
+        z.append((fit.log_gain - truth) / np.sqrt(np.diag(fit.covariance)[:4]))
+    assert 0.8 < np.sqrt(np.mean(np.square(z))) < 1.25
+
+
+def test_no_label_does_as_well(drive: Make, vehicle: Vehicle) -> None:
+    log = drive(gain=GAIN)
+    plain = Recording(log.time, log.channels, {}, log.source)
+    assert np.abs(found(plain, vehicle)[0] - RELATIVE).max() < 2e-3
+
+
+def test_gains_come_as_well_from_soils_in_one_log(drive: Make, vehicle: Vehicle) -> None:
+    logs = [
+        drive(gain=GAIN, seed=1, soil="a", standing=10),
+        drive(gain=GAIN, seed=2, soil="b", slip=(0.1, 0.4)),
+    ]
+    assert np.abs(found(logs, vehicle)[0] - RELATIVE).max() < 5e-4
+
+
+def test_load_sensitivity_is_that_of_a_refit() -> None:
+    fit, other = fit_shared_gains(rows()), fit_shared_gains(rows(loads=1.01))
+    assert fit is not None
+    assert other is not None
+    expected = fit.load_sensitivity[:4] @ np.log([1.01, 1.01, 1.0, 1.0])
+    assert np.allclose(other.log_gain - fit.log_gain, expected, rtol=0.05, atol=1e-5)
+
+
+def test_soils_that_disagree_widen_the_intervals(drive: Make, vehicle: Vehicle) -> None:
+    rut = GAIN * np.array([1.0, 1.0, 1.06, 1.06])  # rear wheels in a rut pull more, on one soil only
+    same = [drive(300, gain=GAIN, seed=k, soil=s, patches=0.05) for k, s in enumerate("ab")]
+    rutted = [same[0], drive(300, gain=rut, seed=1, soil="b", patches=0.05)]
+    open_minded = Vehicle.from_dict({**vehicle.to_dict(), "uncertainty": {"drive_torque_gain": 0.1}})
+    agree, disagree = calibrate(same, open_minded), calibrate(rutted, open_minded)
+    assert "disagree" not in agree["drive_torque_gain fl"].sentence
+    assert "disagree" in disagree["drive_torque_gain fl"].sentence
+    own = [result["drive_torque_gain rl"].own_std for result in (agree, disagree)]
+    assert own[1] > 2 * own[0]
+
+
+def test_too_little_driving_gives_a_reason(drive: Make, vehicle: Vehicle) -> None:
+    result = calibrate(drive(15, gain=GAIN), vehicle)
+    assert "drive_torque_gain fl" not in result
+    assert any("too little driving" in u.why for u in result.unknown)
+
+
+def test_one_driven_wheel_has_nothing_to_be_compared_with(drive: Make) -> None:
+    one = Vehicle.from_dict({"mass": 30.0, "axles": {"only": {"mass": 30.0, "wheels": ["fl"]}},
+                             "wheel": {"radius": 0.2, "inertia": 0.15}})  # fmt: skip
+    log = drive()
+    kept = {n: x for n, x in log.channels.items() if not n.endswith(("_fr", "_rl", "_rr"))}
+    result = calibrate(Recording(log.time, kept), one)
+    assert any("none to be compared" in u.why for u in result.unknown)
+
+
+def test_what_is_left_goes_into_the_vehicle(drive: Make, vehicle: Vehicle) -> None:
+    result = calibrate(drive(gain=GAIN, standing=10, noise=1.0), vehicle)
+    changed = result.apply(vehicle)
+    assert changed.uncertainty.drive_torque_gain_common == pytest.approx(0.02 / 2)
+    assert 0 < changed.uncertainty.drive_torque_gain < 0.01
+    assert np.abs(changed.drive_torque_gain / RELATIVE - 1).max() < 0.01
+    assert changed.calibration.drive_torque_gain["fl"] == pytest.approx(
+        result["drive_torque_gain fl"].value, rel=1e-3
+    )
+
+
+def test_gains_vaguer_than_the_prior_are_left_out(drive: Make, vehicle: Vehicle) -> None:
+    sure = Vehicle.from_dict({**vehicle.to_dict(), "uncertainty": {"drive_torque_gain": 1e-5}})
+    result = calibrate(drive(gain=GAIN, patches=0.1), sure)
+    assert "drive_torque_gain fl" not in result
+    assert any("knows them to" in u.why for u in result.unknown)

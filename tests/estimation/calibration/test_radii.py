@@ -1,0 +1,72 @@
+"""Rolling radii from zero-pull passes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from terragrip.estimation import calibrate
+from terragrip.recording import Recording
+from terragrip.vehicle import Vehicle
+
+WHEELS = ("fl", "fr", "rl", "rr")
+Make = Callable[..., Recording]
+
+
+def free_pass(
+    drive: Make, radius: float, seed: int = 0, noise: float = 0.0, slip: float = 0.013
+) -> Recording:
+    """Nothing towed: the wheels pull the vehicle's own resistance alone (slip 1.3 %, adhesion 0.06)."""
+    # The conftest's rims turn at the nominal radius: a larger wheel drives faster at the same slip.
+    rim = 1 - (1 - slip) * radius / 0.2
+    log = drive(60, radius=radius, slip=(rim, rim), resistance=0.0, seed=seed, noise=noise)
+    return log.with_channels(drawbar_force=4 * noise * np.random.default_rng(seed).standard_normal(len(log)))
+
+
+def test_the_radius_comes_out_with_the_slip_taken_off(drive: Make, vehicle: Vehicle) -> None:
+    logs = [free_pass(drive, 0.206), drive(120, radius=0.206, slip=(0.0, 0.25))]
+    result = calibrate(logs, vehicle)
+    for wheel in WHEELS:
+        quantity = result[f"wheel_radius {wheel}"]
+        assert quantity.value == pytest.approx(0.206, rel=1e-3)
+        low, high = quantity.interval
+        assert low < 0.206 < high
+        assert quantity.std < 0.004 * 0.206
+    # Without the correction it would be 1.3 % off.
+    assert "slip of 1." in result["wheel_radius fl"].sentence
+    assert result.apply(vehicle).wheel_radius == pytest.approx([0.206] * 4, rel=1e-3)
+
+
+def test_intervals_of_the_radius_hold(drive: Make, vehicle: Vehicle) -> None:
+    z = []
+    for seed in range(10):
+        logs = [
+            free_pass(drive, 0.197, seed, noise=1.0),
+            drive(120, radius=0.197, slip=(0.0, 0.25), seed=seed, noise=1.0, patches=0.05),
+        ]
+        quantity = calibrate(logs, vehicle)["wheel_radius rl"]
+        z.append((quantity.value - 0.197) / (quantity.factor * quantity.std))
+    assert np.mean(np.abs(z) < 1) >= 0.9
+
+
+def test_a_pass_alone_keeps_the_curve_open_and_says_so_in_the_interval(drive: Make, vehicle: Vehicle) -> None:
+    alone = calibrate(free_pass(drive, 0.2), vehicle)["wheel_radius fl"]
+    both = calibrate([free_pass(drive, 0.2), drive(120, slip=(0.0, 0.25))], vehicle)["wheel_radius fl"]
+    assert alone.interval[0] < 0.2 < alone.interval[1]
+    assert alone.std > 2 * both.std
+
+
+def test_a_wheel_with_a_radius_of_its_own(drive: Make, vehicle: Vehicle) -> None:
+    odd = [0.2, 0.2, 0.2, 0.201]
+    logs = [free_pass(drive, 0.2), drive(240, radius=odd, slip=(0.0, 0.3), standing=10)]
+    result = calibrate(logs, vehicle)
+    ratio = result["wheel_radius rr"].value / result["wheel_radius rl"].value
+    assert 1.003 < ratio < 1.007
+
+
+def test_without_a_zero_pull_pass_there_is_a_reason(drive: Make, vehicle: Vehicle) -> None:
+    result = calibrate(drive(120, slip=(0.1, 0.3)), vehicle)
+    assert "wheel_radius fl" not in result
+    assert any(u.name == "wheel_radius" and "zero pull" in u.why for u in result.unknown)

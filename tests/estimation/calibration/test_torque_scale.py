@@ -1,0 +1,94 @@
+"""The torque scale: a factor common to all wheels, from mass and drawbar."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from terragrip.errors import InputError
+from terragrip.estimation import identify_torque_scale
+from terragrip.physics.loads import GRAVITY
+from terragrip.recording import Recording
+from terragrip.vehicle import Vehicle
+
+Make = Callable[..., Recording]
+
+
+def test_from_the_drawbar(drive: Make, vehicle: Vehicle) -> None:
+    scale = identify_torque_scale(drive(gain=0.8), vehicle)
+    assert scale.value == pytest.approx(0.8, rel=0.01)
+    assert scale.interval[0] < 0.8 < scale.interval[1]
+    # Resistance that might grow with slip is considered: no drawbar tells a scale to a per cent.
+    assert 0.01 < scale.std < 0.06
+
+
+def hilly(rng: np.random.Generator, scale: float, *, push_noise: float, pitch_noise: float) -> Recording:
+    """A free vehicle over hills: torque in an unknown unit, accelerometer and pitch each with slow errors."""
+    t = np.arange(0.0, 400.0, 0.05)
+
+    def slow(spread: float) -> np.ndarray:
+        nodes = np.arange(0.0, 404.0, 4.0)
+        return np.interp(t, nodes, spread * rng.standard_normal(len(nodes)))
+
+    slope = slow(0.04)
+    v = 1.0 + slow(0.2)
+    a = np.gradient(v, t)
+    force = 140 * (a + GRAVITY * np.sin(slope)) + 0.08 * 140 * GRAVITY + 4 * 2 * v / 0.2
+    omega = v / 0.2 / 0.97
+    spin = 4 * 0.15 * np.gradient(omega, t) / 0.2
+    torque = scale * (force + spin) * 0.2 / 4
+    channels = {
+        "ground_speed": v,
+        "acceleration_x": a + GRAVITY * np.sin(slope) + slow(push_noise),
+        "pitch": slope + slow(pitch_noise),
+    }
+    for wheel in ("fl", "fr", "rl", "rr"):
+        channels[f"wheel_speed_{wheel}"] = omega
+        channels[f"drive_torque_{wheel}"] = torque
+    return Recording(t, channels)
+
+
+def test_two_measures_of_the_push_undo_each_others_errors(vehicle: Vehicle) -> None:
+    z, direct = [], []
+    for seed in range(12):
+        log = hilly(np.random.default_rng(seed), 0.05, push_noise=0.4, pitch_noise=0.04)
+        scale = identify_torque_scale(log, vehicle)
+        z.append((scale.value - 0.05) / scale.std)
+        alone = Recording(log.time, {n: x for n, x in log.channels.items() if n != "pitch"})
+        direct.append(identify_torque_scale(alone, vehicle).value)
+    # The accelerometer alone, as noisy as the signal, would halve the scale.
+    assert np.mean(direct) < 0.035
+    assert abs(np.mean(z)) < 0.8
+    assert np.mean(np.abs(z) < 2) >= 0.9
+
+
+def test_stale_torques_do_not_bend_it(vehicle: Vehicle) -> None:
+    log = hilly(np.random.default_rng(3), 12.0, push_noise=0.0, pitch_noise=0.0)
+    latest = np.arange(len(log)) // 20 * 20  # fresh once a second
+    stale = log.with_channels(
+        **{name: x[latest] for name, x in log.channels.items() if name.startswith("drive_torque")}
+    )
+    scale = identify_torque_scale(stale, vehicle)
+    assert scale.interval[0] < 12.0 < scale.interval[1]
+    assert scale.value == pytest.approx(12.0, rel=0.05)
+
+
+def test_reverse_counts_too(vehicle: Vehicle) -> None:
+    log = hilly(np.random.default_rng(4), 1.0, push_noise=0.0, pitch_noise=0.0)
+    odd = ("ground_speed", "wheel_speed_", "drive_torque_", "acceleration_x", "pitch")
+    back = log.with_channels(**{n: -x for n, x in log.channels.items() if n.startswith(odd)})
+    both = identify_torque_scale([log, back], vehicle)
+    assert both.value == pytest.approx(1.0, abs=0.02)
+    assert both.samples == pytest.approx(2 * identify_torque_scale(log, vehicle).samples, rel=0.02)
+
+
+def test_it_refuses_what_tells_nothing(drive: Make, vehicle: Vehicle) -> None:
+    with pytest.raises(InputError, match="too few"):
+        identify_torque_scale(drive(10), vehicle)
+    rng = np.random.default_rng(0)
+    log = hilly(rng, 1.0, push_noise=0.5, pitch_noise=0.05)
+    shuffled = log.with_channels(pitch=np.roll(log["pitch"], 3000))
+    with pytest.raises(InputError, match="vary too little"):
+        identify_torque_scale(shuffled, vehicle)

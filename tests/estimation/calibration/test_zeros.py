@@ -1,0 +1,129 @@
+"""Zeros from standstill: what counts as one, and what does not."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from terragrip.errors import InputError
+from terragrip.estimation import calibrate
+from terragrip.physics.loads import GRAVITY
+from terragrip.recording import Recording
+from terragrip.vehicle import Vehicle
+
+OFFSET = (0.5, -0.4, 0.2, -0.1)
+WHEELS = ("fl", "fr", "rl", "rr")
+Make = Callable[..., Recording]
+
+
+def test_torque_zero_is_the_mean_at_standstill(drive: Make, vehicle: Vehicle) -> None:
+    result = calibrate(drive(60, offset=OFFSET, standing=10, noise=1.0), vehicle)
+    for wheel, offset in zip(WHEELS, OFFSET, strict=True):
+        quantity = result[f"drive_torque_offset {wheel}"]
+        assert abs(quantity.value - offset) < 4 * quantity.std
+        assert quantity.std == pytest.approx(1 / np.sqrt(500), rel=0.3)  # noise over 10 s at 50 Hz
+        assert quantity.evidence[0].start == 0
+        assert quantity.evidence[0].end == pytest.approx(10)
+        assert quantity.samples == 500
+
+
+def test_zeros_do_not_disturb_the_gains(drive: Make, vehicle: Vehicle) -> None:
+    result = calibrate(drive(offset=OFFSET, standing=10, gain=(1.02, 0.98, 1.0, 1.0)), vehicle)
+    assert result["drive_torque_gain fl"].value == pytest.approx(1.02, abs=2e-3)
+
+
+def test_a_drive_that_holds_the_vehicle_is_no_zero(drive: Make, vehicle: Vehicle) -> None:
+    result = calibrate(drive(60, standing=10, held_torque=6.0), vehicle)
+    assert "drive_torque_offset fl" not in result
+    assert any("seems to hold the vehicle" in u.why for u in result.unknown)
+
+
+def test_stops_that_read_alike_outvote_stops_that_hold(drive: Make, vehicle: Vehicle) -> None:
+    idle = [drive(40, offset=OFFSET, standing=5, noise=1.0, seed=k) for k in range(4)]
+    holding = [
+        drive(40, offset=OFFSET, standing=5, noise=1.0, seed=9 + k, held_torque=0.4 + 0.4 * k)
+        for k in range(3)
+    ]
+    result = calibrate(idle + holding, vehicle)
+    for wheel, offset in zip(WHEELS, OFFSET, strict=True):
+        quantity = result[f"drive_torque_offset {wheel}"]
+        assert abs(quantity.value - offset) < 4 * quantity.std
+        assert quantity.std < 0.06
+        assert len(quantity.evidence) == 4
+
+
+def test_drawbar_zero_and_a_taut_bar(drive: Make, vehicle: Vehicle) -> None:
+    slack = calibrate(drive(60, drawbar_offset=-5.0, standing=10, noise=1.0), vehicle)["drawbar_offset"]
+    assert abs(slack.value + 5.0) < 4 * slack.std
+    assert slack.std < 0.4
+    taut = calibrate(drive(60, standing=10, bar_tension=80.0), vehicle)
+    assert "drawbar_offset" not in taut
+    assert any("under tension" in u.why for u in taut.unknown)
+
+
+def test_drawbar_zero_from_driving_without_a_tool(drive: Make, vehicle: Vehicle) -> None:
+    log = drive(60, noise=1.0)
+    free = 2.5 + 4 * np.random.default_rng(5).standard_normal(len(log))
+    quantity = calibrate(log.with_channels(drawbar_force=free), vehicle)["drawbar_offset"]
+    assert abs(quantity.value - 2.5) < 4 * quantity.std
+    assert "nothing is towed" in quantity.sentence
+
+
+def test_no_standstill_is_said(drive: Make, vehicle: Vehicle) -> None:
+    result = calibrate(drive(60), vehicle)
+    reasons = {u.name: u.why for u in result.unknown}
+    assert "no standstill" in reasons["drive_torque_offset"]
+    assert "no standstill" in reasons["drawbar_offset"]
+    assert "no acceleration_x" in reasons["acceleration_bias_x"]
+
+
+def inclined(drive: Make, bias: float, pitch_zero: float | None, slope: float = 0.01) -> Recording:
+    log = drive(60, standing=10, noise=0.1)
+    a = np.gradient(log["ground_speed"], log.time) * (log.time >= 10)
+    channels = {"acceleration_x": a + GRAVITY * np.sin(slope) + bias}
+    if pitch_zero is not None:
+        channels["pitch"] = np.full(len(log), slope + pitch_zero)
+    return log.with_channels(**channels)
+
+
+def test_with_pitch_the_difference_is_told_and_split_by_the_priors(drive: Make, vehicle: Vehicle) -> None:
+    data = vehicle.to_dict()
+    data["uncertainty"] = {**data["uncertainty"], "acceleration_bias": 0.05}
+    machine = Vehicle.from_dict(data)
+    result = calibrate(inclined(drive, bias=0.06, pitch_zero=-0.004), machine)
+    bias, pitch = result["acceleration_bias_x"], result["pitch_offset"]
+    told = 0.06 + GRAVITY * 0.004  # b - g p: the data know no more
+    assert bias.value - GRAVITY * pitch.value == pytest.approx(told, abs=2e-3)
+    share = 0.05**2 / (0.05**2 + (GRAVITY * np.radians(0.2)) ** 2)
+    assert bias.value == pytest.approx(share * told, abs=2e-3)
+    assert bias.interval[0] < 0.06 < bias.interval[1]
+    assert bias.std < 0.05
+    assert result.apply(machine).uncertainty.acceleration_bias == pytest.approx(bias.std, rel=0.01)
+
+
+def test_without_pitch_the_slope_stays_in_the_interval(drive: Make, vehicle: Vehicle) -> None:
+    result = calibrate(inclined(drive, bias=0.3, pitch_zero=None), vehicle)
+    bias = result["acceleration_bias_x"]
+    assert bias.interval[0] < 0.3 < bias.interval[1]
+    assert bias.std > 0.8 * GRAVITY * np.radians(0.5)
+    assert "cannot be told apart" in bias.sentence
+
+
+def test_a_bias_beyond_its_prior_is_not_shrunk_away(drive: Make, vehicle: Vehicle) -> None:
+    data = vehicle.to_dict()
+    data["uncertainty"] = {**data["uncertainty"], "acceleration_bias": 0.01}
+    bias = calibrate(inclined(drive, bias=0.8, pitch_zero=0.0), Vehicle.from_dict(data))[
+        "acceleration_bias_x"
+    ]
+    assert bias.value == pytest.approx(0.8, abs=0.05)
+
+
+def test_nothing_to_calibrate_from_and_foreign_logs_are_refused(drive: Make, vehicle: Vehicle) -> None:
+    with pytest.raises(InputError, match="no recording"):
+        calibrate([], vehicle)
+    log = drive(20)
+    channels = {name.replace("_fl", "_xx"): values for name, values in log.channels.items()}
+    with pytest.raises(InputError, match="no wheel xx"):
+        calibrate(Recording(log.time, channels), vehicle)
