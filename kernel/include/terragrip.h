@@ -288,9 +288,8 @@ typedef struct { /* one lane a mode of the bank */
     tg_real x[TG_ROWS][TG_MODES], d[TG_ROWS][TG_MODES], u[TG_MAX_STATES][TG_ROWS][TG_MODES];
     tg_real gain[TG_MAX_CHANNELS][TG_ROWS][TG_MODES];
     tg_real probability[TG_MODES];
-    tg_real prior_probability[TG_MODES];
     double mixed;     /* clock of the last mixing */
-    int32_t updates;  /* since then */
+    int32_t updates;  /* since then, that of the mixing left out */
 } tg_bank_state;
 
 typedef struct { /* sensitivities to ln a_j, one lane a parameter */

@@ -94,6 +94,7 @@ tg_status tg_filter_init(tg_filter *f, const tg_machine *machine, const tg_tunin
         tgi_bank_init(f);
     else
         for (int j = 0; j < rows; j++) f->policy.adaptation.scale[j] = 1;
+    tgi_supervisor_init(f);
     return TG_OK;
 }
 
@@ -148,10 +149,10 @@ TG_INLINE void commit(tg_filter *f, const tgi_plan *plan, const tgi_result *resu
 }
 
 /* What bank and single filter remember alike. */
-static void remember(tg_filter *f, const tgi_call *call, const tgi_plan *plan, int taken)
+static void remember(tg_filter *f, const tgi_call *call, const tgi_plan *plan)
 {
     f->passage = plan->passage;
-    f->taken = taken;
+    f->taken = plan->count;
     f->clock += (double)call->dt;
     f->slope[0] = call->before->slope;
     f->cosine[0] = plan->cosine[0];
@@ -204,12 +205,11 @@ static tg_status advance_one(tg_filter *f, const tgi_call *call, tgi_plan *plan,
         const tg_status status = tgi_adapt(f, plan, &result);
         if (status != TG_OK) return status;
     }
-    if (policy == TG_SUPERVISED && call->y) tgi_supervisor_remember(f, plan, call->now);
+    if (policy == TG_SUPERVISED && call->y) tgi_supervisor_remember(f, plan, call->now, gamma);
     if (out) *out = step;
 #define COMMIT(n, stride) commit(f, plan, &result, n, stride)
     TG_BY_WHEELS(n, COMMIT)
 #undef COMMIT
-    remember(f, call, plan, result.taken);
     return TG_OK;
 }
 
@@ -221,7 +221,9 @@ static tg_status advance(tg_filter *f, const tgi_call *call, tg_step *out)
     TG_BY_WHEELS(f->wheels, PLAN)
 #undef PLAN
     if (status != TG_OK) return status;
-    return advance_one(f, call, &plan, out);
+    status = f->tuning.policy == TG_BANK ? tgi_bank_step(f, &plan, out) : advance_one(f, call, &plan, out);
+    if (status == TG_OK) remember(f, call, &plan);
+    return status;
 }
 
 tg_status tg_filter_step(tg_filter *f, tg_real dt, const tg_input *before, const tg_input *now, const tg_real *q_input,

@@ -97,8 +97,9 @@ void tgi_unscented_step(const tg_filter *f, const tgi_plan *plan, tgi_result *re
 tg_status tgi_adapt(tg_filter *f, const tgi_plan *plan, const tgi_result *result);
 
 /* supervisor.c: gamma of this step, and what to remember of it once the step stands. */
+void tgi_supervisor_init(tg_filter *f);
 tg_real tgi_supervise(const tg_filter *f, const tgi_plan *plan, const tg_input *now);
-void tgi_supervisor_remember(tg_filter *f, const tgi_plan *plan, const tg_input *now);
+void tgi_supervisor_remember(tg_filter *f, const tgi_plan *plan, const tg_input *now, tg_real gamma);
 
 /* bank.c: initial lanes from one; the whole step; mixture. */
 void tgi_bank_init(tg_filter *f);

@@ -195,8 +195,9 @@ static inline void invert(int size, wide A[NY][NY], wide *log_determinant)
         for (int j = 0; j < size; j++) A[i][j] = B[i][size + j];
 }
 
-/* Joint update with the present channels; `huber` as in the kernel; `variance`: of each innovation, to weight by (null: own). */
-static inline void dense_update(dense *d, const tg_machine *m, const tg_input *now, const tg_real *y, const tg_real *r, wide huber)
+/* Joint update with the present channels; `huber` as in the kernel; `weights` by channel: used instead, where given. */
+static inline void dense_update(dense *d, const tg_machine *m, const tg_input *now, const tg_real *y, const tg_real *r, wide huber,
+                                const wide *weights)
 {
     const int n = d->n, states = 2 * n + 2;
     wide H[NY][NX], yhat[NY], PH[NX][NY], inverse[NY][NY], R[NY], logs;
@@ -215,7 +216,8 @@ static inline void dense_update(dense *d, const tg_machine *m, const tg_input *n
         wide S = r[c];
         for (int k = 0; k < states; k++) S += H[c][k] * PH[k][a];
         d->weight[a] = huber > 0 && fabsl(d->nu[a]) > huber * sqrtl(S) ? huber * sqrtl(S) / fabsl(d->nu[a]) : 1;
-        R[a] = (wide)r[c] / d->weight[a];
+        R[a] = r[c] / d->weight[a];
+        if (weights) R[a] = r[c] / (d->weight[a] = weights[c]);
         for (int b = 0; b < d->count; b++) {
             d->S[a][b] = a == b ? R[a] : 0;
             for (int k = 0; k < states; k++) d->S[a][b] += H[c][k] * PH[k][b];

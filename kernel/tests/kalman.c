@@ -43,7 +43,7 @@ static double one_problem(int n, int engine, double huber, double missing, int s
         } else {
             const tg_status status = tg_filter_step(&f, (tg_real)dt, &before, &now, q, y, r, &step);
             CHECK(status == TG_OK, "step %d: status %d", k, (int)status);
-            dense_update(&d, &m, &now, y, r, huber);
+            dense_update(&d, &m, &now, y, r, huber, NULL);
             CHECK(step.channels == d.count, "channels");
             worst = fmax(worst, fabs((double)(step.nis - d.nis)) / (1 + (double)d.nis));
             worst = fmax(worst, fabs((double)(step.log_likelihood - d.log_likelihood)) / (10 + fabs((double)d.log_likelihood)));
