@@ -4,8 +4,10 @@ time.
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -13,6 +15,8 @@ import pytest
 from numpy.typing import NDArray
 
 from terragrip.estimation.reference import Input, Machine, TractionModel
+
+sys.path.insert(0, str(Path(__file__).parent))  # for kernel_filter.py
 
 
 @dataclass(frozen=True)

@@ -4,6 +4,10 @@ The reference runs in long double (80 bit on x86), so what is measured is the ke
 units of max(|x_i|, SD_i), since a double cannot hold more digits of a state than its magnitude has, nor does anyone
 need more than a share of its SD; covariances P_ij in units of SD_i SD_j, which is free of the states' scales.
 Likelihoods and NIS are compared relative to 1 + their magnitude.
+
+The adaptation of A_k feeds back on itself: where C and S differ by orders of magnitude (long after a wide P0, say) one
+step of A can amplify rounding a hundredfold, and no double-precision filter keeps nine digits of it for long. There, and
+only there, the kernel must come nearer to the long double run than the same NumPy equations in double do.
 """
 
 from __future__ import annotations
@@ -16,121 +20,14 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from terragrip.estimation.reference import BankUpdate, Machine, Step, TractionFilter, Tuning, smooth
-
-kernel = pytest.importorskip("terragrip._kernel")
-ffi, lib = kernel.ffi, kernel.lib
+from kernel_filter import KernelFilter, Report, allocated, checked, ffi, lib, report, writable
+from terragrip.estimation.reference import Step, TractionFilter, Tuning, smooth
 
 Array = NDArray[Any]
 TOLERANCE = 1e-9
 METHODS = [
     (engine, policy) for engine in ("exact", "unscented") for policy in ("fixed", "adaptive", "supervised")
 ] + [("exact", "bank")]
-
-PLAIN = ("huber", "alpha", "beta", "kappa", "rate", "memory", "stride", "window")
-PLAIN += ("wheel_speed_min", "ground_speed_min", "dwell", "mix_stride")
-
-
-class KernelFilter:
-    """The kernel's filter floor with the reference's arguments."""
-
-    def __init__(self, machine: Machine, tuning: Tuning, x0: Array, P0: Array) -> None:
-        self.wheels, self.states = len(machine.radius), 2 * len(machine.radius) + 2
-        self.pointer = allocated("tg_filter *", lib.tg_filter_size())
-        checked(
-            lib.tg_filter_init(
-                self.pointer, kernel_machine(machine), kernel_tuning(tuning), reals(x0), reals(P0.ravel())
-            )
-        )
-
-    def step(self, dt: float, before: Any, now: Any, q_input: Array, y: Array, r: Array) -> Any:
-        out = ffi.new("tg_step *")
-        checked(
-            lib.tg_filter_step(
-                self.pointer,
-                dt,
-                kernel_input(before),
-                kernel_input(now),
-                reals(q_input),
-                reals(y),
-                reals(r),
-                out,
-            )
-        )
-        return out
-
-    def predict(self, dt: float, before: Any, q_input: Array) -> None:
-        checked(lib.tg_filter_predict(self.pointer, dt, kernel_input(before), reals(q_input)))
-
-    def restart(self, walk_time: float, outputs: Array, variances: Array) -> None:
-        checked(lib.tg_filter_restart(self.pointer, walk_time, reals(outputs), reals(variances)))
-
-    def moments(self) -> tuple[Array, Array]:
-        x, P = np.empty(self.states), np.empty((self.states, self.states))
-        checked(lib.tg_filter_moments(self.pointer, writable(x), writable(P)))
-        return x, P
-
-    def sensitivity(self, j: int) -> tuple[Array, Array]:
-        dx, dP = np.empty(self.states), np.empty((self.states, self.states))
-        checked(lib.tg_filter_sensitivity(self.pointer, j, writable(dx), writable(dP)))
-        return dx, dP
-
-
-def allocated(kind: str, size: int) -> Any:
-    """Raw memory that lives as long as the pointer to it."""
-    memory = ffi.new("char[]", size)
-    return ffi.gc(ffi.cast(kind, memory), lambda _: memory)
-
-
-def checked(status: int) -> None:
-    assert status == lib.TG_OK, status
-
-
-def reals(values: Any) -> Any:
-    return ffi.new("tg_real[]", [float(v) for v in values])
-
-
-def numbers(values: Any, count: int) -> Array:
-    return np.array(ffi.unpack(values, count))
-
-
-def writable(array: Array) -> Any:
-    return ffi.cast("tg_real *", ffi.from_buffer(array))
-
-
-def kernel_machine(machine: Machine) -> Any:
-    out = ffi.new("tg_machine *")
-    out.wheels = len(machine.radius)
-    for name in ("mass", "gravity", "tire_rolling_resistance"):
-        setattr(out, name, float(getattr(machine, name)))
-    for name in ("radius", "inertia", "bearing_resistance"):
-        getattr(out, name)[0 : out.wheels] = getattr(machine, name).tolist()
-    return out
-
-
-def kernel_input(u: Any) -> Any:
-    out = ffi.new("tg_input *")
-    out.torque[0 : len(u.torque)] = u.torque.tolist()
-    out.load[0 : len(u.load)] = u.load.tolist()
-    out.drawbar, out.slope = float(u.drawbar), float(u.slope)
-    return out
-
-
-def kernel_tuning(tuning: Tuning) -> Any:
-    out = ffi.new("tg_tuning *", lib.tg_default_tuning())
-    out.engine = {"exact": lib.TG_EXACT, "unscented": lib.TG_UNSCENTED}[tuning.engine]
-    out.policy = {
-        "fixed": lib.TG_FIXED,
-        "adaptive": lib.TG_ADAPTIVE,
-        "supervised": lib.TG_SUPERVISED,
-        "bank": lib.TG_BANK,
-    }[tuning.policy]
-    out.supervisor = {"speeds": 0, "drive": 1}[tuning.supervisor]
-    out.walk[0 : len(tuning.walk)] = list(tuning.walk)
-    out.scales[0:4] = list(tuning.scales)
-    for name in PLAIN:
-        setattr(out, name, getattr(tuning, name))
-    return out
 
 
 def moments_error(got: tuple[Array, Array], expected: tuple[Array, Array]) -> tuple[float, float]:
@@ -141,56 +38,54 @@ def moments_error(got: tuple[Array, Array], expected: tuple[Array, Array]) -> tu
     return float(mean), float(np.max(np.abs(got[1] - P) / np.outer(sd, sd)))
 
 
-def step_errors(got: Any, expected: Step, wheels: int) -> dict[str, float]:
+def step_errors(got: Report, expected: Report) -> dict[str, float]:
     """Of every quantity that a step reports."""
-    update = expected.update
-    present = update.present
-    channels, states = wheels + 2, 2 * wheels + 2
-    assert got.channels == present.sum()
-    innovation = numbers(got.innovation, channels)
-    np.testing.assert_array_equal(np.isnan(innovation), ~present)
-
-    def largest(values: Any) -> float:
-        return float(np.max(np.abs(values), initial=0.0))
-
-    variance = update.innovation_variance[present]
-    seen = numbers(got.innovation_variance, channels)[present]
-    mode = update.probabilities if isinstance(update, BankUpdate) else np.zeros(4)
-    return {
-        "innovation": largest(
-            (innovation[present] - update.innovation[present])
-            / np.maximum(np.sqrt(variance), np.abs(update.innovation[present]))
-        ),
-        "innovation variance": largest(seen / variance - 1),
-        "weight": largest(numbers(got.weight, channels)[present] / update.weight[present] - 1),
-        "nis": largest((got.nis - update.nis) / (1 + update.nis)),
-        "log-likelihood": largest(
-            (got.log_likelihood - update.log_likelihood) / (1 + abs(update.log_likelihood))
-        ),
-        "gamma": largest(got.gamma - expected.gamma),
-        "adaptation": largest(numbers(got.adaptation, states) / expected.adaptation - 1),
-        "mode": largest(numbers(got.mode, 4) - mode),
+    innovation, variance = np.abs(expected["innovation"]), expected["innovation variance"]
+    units: dict[str, Any] = {
+        "innovation": np.maximum(np.sqrt(variance), innovation),
+        "innovation variance": variance,
+        "weight": expected["weight"],
+        "nis": 1 + expected["nis"],
+        "log-likelihood": 1 + np.abs(expected["log-likelihood"]),
+        "gamma": 1.0,
+        "adaptation": expected["adaptation"],
+        "mode": 1.0,
     }
+    errors = {}
+    for name, unit in units.items():
+        error = np.abs((got[name] - expected[name]) / unit)
+        assert np.array_equal(np.isnan(got[name]), np.isnan(error))
+        errors[name] = float(np.fmax.reduce(error.ravel(), initial=0.0))
+    return errors
 
 
-def compare(case: Any, tuning: Tuning) -> dict[str, float]:
-    """The largest error of each quantity over all steps of a problem."""
+def compare(case: Any, tuning: Tuning, *, double: bool = False) -> dict[str, float]:
+    """The largest error of each quantity over all steps: of the kernel, or of the reference itself in double."""
     truth = TractionFilter(case.machine, tuning, case.x0, case.P0.astype(np.longdouble))
-    tested = KernelFilter(case.machine, tuning, case.x0, case.P0)
+    make = TractionFilter if double else KernelFilter
+    tested = make(case.machine, tuning, case.x0, case.P0)
     worst: dict[str, float] = {}
     for k in case.instants:
         if k.restart is not None:
             truth.restart(*k.restart)
             tested.restart(*k.restart)
         arguments = (k.dt, k.before, k.now, k.q_input, k.y, k.r)
-        errors = step_errors(tested.step(*arguments), truth.step(*arguments), case.wheels)
+        got = tested.step(*arguments)
+        errors = step_errors(report(got) if isinstance(got, Step) else got, report(truth.step(*arguments)))
         errors["mean"], errors["covariance"] = moments_error(tested.moments(), truth.moments())
         worst = {name: max(error, worst.get(name, 0.0)) for name, error in errors.items()}
     return worst
 
 
-def assert_agree(worst: dict[str, float], tolerance: float = TOLERANCE) -> None:
-    beyond = {name: error for name, error in worst.items() if not error < tolerance}
+def assert_agree(case: Any, tuning: Tuning) -> None:
+    """Every quantity of every step to 1e-9; where the recursion itself amplifies rounding, see the module."""
+    worst = compare(case, tuning)
+    beyond = {name: error for name, error in worst.items() if not error < TOLERANCE}
+    if beyond and tuning.policy in ("adaptive", "supervised"):
+        amplified = compare(case, tuning, double=True)
+        beyond = {
+            name: (error, amplified[name]) for name, error in beyond.items() if not error < amplified[name]
+        }
     assert not beyond, beyond
 
 
@@ -205,7 +100,26 @@ def long_problem(problem: Callable[..., Any]) -> Any:
 
 @pytest.mark.parametrize(("engine", "policy"), METHODS)
 def test_agrees_over_5000_steps(engine, policy, long_problem):
-    assert_agree(compare(long_problem, Tuning(long_problem.walk, engine=engine, policy=policy, huber=3.0)))
+    assert_agree(long_problem, Tuning(long_problem.walk, engine=engine, policy=policy, huber=3.0))
+
+
+@pytest.mark.parametrize("policy", ["supervised", "bank"])
+def test_the_long_problem_exercises_what_it_should(policy, long_problem):
+    tested = KernelFilter(
+        long_problem.machine,
+        Tuning(long_problem.walk, policy=policy, huber=3.0),
+        long_problem.x0,
+        long_problem.P0,
+    )
+    reports = [tested.step(k.dt, k.before, k.now, k.q_input, k.y, k.r) for k in long_problem.instants]
+    assert sum(k.restart is not None for k in long_problem.instants) > 20
+    assert sum(np.isnan(r["innovation"]).all() for r in reports) > 20
+    assert np.mean([np.nanmin(r["weight"], initial=1.0) < 1 for r in reports]) > 0.01
+    if policy == "supervised":
+        assert np.ptp([r["gamma"] for r in reports]) > 0.5
+        assert np.max(np.ptp(np.log([r["adaptation"] for r in reports]), axis=0)) > 1
+    else:
+        assert np.max(np.ptp([r["mode"] for r in reports], axis=0)) > 0.5
 
 
 @pytest.mark.parametrize(("engine", "policy"), METHODS)
@@ -226,13 +140,13 @@ def test_agrees_for_any_number_of_wheels(wheels, engine, policy, problem):
     tuning = Tuning(
         case.walk, engine=engine, policy=policy, huber=2.0 * (wheels % 3 > 0), mix_stride=1 + wheels % 3
     )
-    assert_agree(compare(case, tuning))
+    assert_agree(case, tuning)
 
 
 def test_agrees_with_the_drive_supervisor(problem):
     case = problem(77, wheels=4, steps=300, condition=1e6, missing=0.1, steady_rate=True)
     tuning = Tuning(case.walk, policy="supervised", supervisor="drive", window=0.2)
-    assert_agree(compare(case, tuning))
+    assert_agree(case, tuning)
     gammas = list(supervisor_output(case, tuning))
     assert len(np.unique(np.round(gammas, 3))) > 10  # it did have something to see
 
@@ -240,7 +154,7 @@ def test_agrees_with_the_drive_supervisor(problem):
 def supervisor_output(case: Any, tuning: Tuning) -> Iterator[float]:
     tested = KernelFilter(case.machine, tuning, case.x0, case.P0)
     for k in case.instants:
-        yield tested.step(k.dt, k.before, k.now, k.q_input, k.y, k.r).gamma
+        yield tested.step(k.dt, k.before, k.now, k.q_input, k.y, k.r)["gamma"]
 
 
 @pytest.mark.parametrize("policy", ["fixed", "adaptive", "supervised"])

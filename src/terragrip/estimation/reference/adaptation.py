@@ -28,7 +28,7 @@ DAMPING = 1e-3
 class Adaptation:
     """Scales a_j of the n process noises, their sensitivities, and the remembered innovations (R).
 
-    C, an exponential mean of ν νᵀ, is compared with the filter's own S. With S = L Lᵀ and ΔS = L⁻¹(C - S)L⁻ᵀ,
+    C, an exponential mean of ν νᵀ that starts as S, is compared with the filter's own S. With S = L Lᵀ and ΔS = L⁻¹(C - S)L⁻ᵀ,
     V = tr(ΔS ΔSᵀ) is driven down: ln a_j moves by -η g_j/h_j, clipped to ±0.2, with g_j = 2 tr(ΔS ∂ΔS_j),
     h_j = 2‖∂ΔS_j‖² + 1e-3 and ∂ΔS_j = -L⁻¹ ∂S_j L⁻ᵀ (the derivative of L is left out). ∂S_j runs through the
     filter's whole recursion: the one-step derivative is exactly zero for the noises of μ and ρ_s.
@@ -49,8 +49,8 @@ class Adaptation:
         """∂x/∂ln a_j, (n parameters, n)."""
         self.dP: NDArray[Any] = np.zeros((states, states, states), dtype)
         """∂P/∂ln a_j, (n parameters, n, n)."""
-        self.C: Matrix | None = None
-        """Remembered ν νᵀ, (m, m); None before the first update."""
+        self.C: Matrix = np.full((outputs, outputs), np.nan, dtype)
+        """Remembered ν νᵀ, (m, m); NaN for a pair of channels that was never there together."""
         self._complete_updates = 0
 
     def predict(self, F: Matrix, excitation: Vector) -> None:
@@ -75,16 +75,14 @@ class Adaptation:
         self._carry(update)
 
     def _remember(self, S: Matrix, present: NDArray[np.bool_], innovation: Vector, dt: float) -> None:
-        if self.C is None:
-            self.C = S.copy()
         block = np.ix_(present, present)
+        self.C[block] = np.where(np.isnan(self.C[block]), S[block], self.C[block])
         share = -np.expm1(-self.C.dtype.type(dt) / self.memory)
         observed = np.outer(innovation[present], innovation[present])
         self.C[block] += share * (observed - self.C[block])
 
     def stepped_scale(self, S: Matrix, dS: NDArray[Any]) -> Vector:
         """a (n,) after one step with the innovation covariance S (m, m), of sensitivities dS (n, m, m)."""
-        assert self.C is not None
         L = cholesky(S)
         mismatch = _whitened(L, self.C - S)
         gradient_of_mismatch = [-_whitened(L, one) for one in dS]
