@@ -16,6 +16,8 @@ from cffi_build import ROOT, bindings, extension
 class BuildBindings(build_ext):
     """Compile each extension in a folder of its own: the kernel's files are compiled with several flags."""
 
+    build_temp: str
+
     def build_extension(self, ext: Extension) -> None:
         shared = self.build_temp
         self.build_temp = os.path.join(shared, ext.name)
