@@ -93,10 +93,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
     return code
 
 
-def _run(words: list[str]) -> int:
+def _run(words: Sequence[str]) -> int:
+    # Parsing eats the list it is given, and the report needs the words.
     command: Any = typer.main.get_command(app)
     try:
-        with command.make_context("terragrip", words) as context:
+        with command.make_context("terragrip", list(words)) as context:
             command.invoke(context)
     except typer.Exit as done:
         return done.exit_code

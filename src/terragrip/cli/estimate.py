@@ -9,13 +9,14 @@ import typer
 
 from terragrip.cli.options import Logs, ProfileFile, Quiet, VehicleFile
 from terragrip.cli.output import check_file, check_folder, files_in
-from terragrip.cli.progress import progress
+from terragrip.cli.progress import Step, progress
 from terragrip.errors import InputError
 from terragrip.estimation.methods import DEFAULT, METHODS
 
 if TYPE_CHECKING:
-    from terragrip.estimation import Estimates
     from terragrip.vehicle import Vehicle
+
+_LONG = 100_000_000  # bytes of a Parquet file; ten times as much in memory
 
 
 def command(
@@ -38,16 +39,15 @@ def command(
     from terragrip.estimation.methods import method_named
     from terragrip.vehicle import Vehicle
 
-    if smooth and not method_named(method).can_smooth:
+    if not method_named(method).can_smooth and smooth:
         raise InputError(f"the method {method} cannot smooth", place="--smooth", mend="choose another method")
     machine = Vehicle.load(vehicle)
     targets = _targets(logs, output, vehicle, profile)
     for number, (log, target) in enumerate(zip(logs, targets, strict=True), 1):
         title = log.name if len(logs) == 1 else f"{log.name} ({number} of {len(logs)})"
-        estimates = _estimate(log, machine, profile, method, smooth, title, quiet)
-        estimates.write(target)
+        with progress(title, quiet) as step:
+            text = _estimate(log, machine, target, profile, method, smooth, step)
         if not quiet:
-            text = estimates.summary()
             print(text if len(logs) == 1 else f"{log.name}: {text.splitlines()[0]}")
     if not quiet:
         print(f"Written to {output}")
@@ -67,11 +67,36 @@ def _targets(logs: list[Path], output: Path, vehicle: Path, profile: Path | None
 
 
 def _estimate(
-    log: Path, vehicle: Vehicle, profile: Path | None, method: str, smooth: bool, title: str, quiet: bool
-) -> Estimates:
-    from terragrip.estimation import estimate
-    from terragrip.formats import read
+    log: Path, vehicle: Vehicle, target: Path, profile: Path | None, method: str, smooth: bool, step: Step
+) -> str:
+    """Estimate one log into a file and return the summary; a long Parquet file goes through in blocks."""
+    from terragrip.formats import iter_parquet, read
 
+    rows = 0 if profile or smooth else _rows_of_a_long_log(log)
+    if rows:
+        from terragrip.estimation import estimate_blocks
+
+        blocks = iter_parquet(log)
+        return estimate_blocks(blocks, vehicle, target, method, progress=lambda done: step(done, rows))
     recording = read(log, profile)
-    with progress(title, quiet) as step:
-        return estimate(recording, vehicle, method, smooth=smooth, progress=step)
+    from terragrip.estimation import estimate
+
+    estimates = estimate(recording, vehicle, method, smooth=smooth, progress=step)
+    estimates.write(target)
+    return estimates.summary()
+
+
+def _rows_of_a_long_log(log: Path) -> int:
+    """Rows of a Parquet file that is too large to be held in memory at ease, else 0."""
+    if not log.is_file() or log.stat().st_size < _LONG:
+        return 0
+    with log.open("rb") as stream:
+        if stream.read(4) != b"PAR1":
+            return 0
+    from pyarrow import ArrowException
+    from pyarrow.parquet import read_metadata
+
+    try:
+        return int(read_metadata(log).num_rows)
+    except (ArrowException, OSError):  # damaged: let the reader say what is wrong
+        return 0

@@ -1,0 +1,127 @@
+"""Where results may go: found out before the work, and never half-written."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from terragrip.cli.output import check_file, check_folder, files_in
+from terragrip.errors import InputError
+
+LAUNCH = [sys.executable, "-c", "import sys; from terragrip.cli import main; sys.exit(main())"]
+POSIX = pytest.mark.skipif(os.name != "posix", reason="needs a POSIX system")
+
+
+def test_a_good_file_and_a_good_folder_leave_nothing_behind(tmp_path: Path) -> None:
+    assert check_file(tmp_path / "a.parquet", suffixes=(".parquet",)) == tmp_path / "a.parquet"
+    assert check_folder(tmp_path / "new") == tmp_path / "new"
+    assert [path.name for path in tmp_path.iterdir()] == ["new"]
+
+
+def test_what_is_no_place_for_a_file(tmp_path: Path) -> None:
+    log = tmp_path / "log.csv"
+    log.write_text("x")
+    (tmp_path / "link.parquet").symlink_to(log)
+    for path, inputs, reason in (
+        (tmp_path, [], "is a folder"),
+        (tmp_path / "no" / "a.parquet", [], "does not exist"),
+        (log, [log], "is an input too"),
+        (tmp_path / "link.parquet", [log], "is an input too"),
+        (Path(os.devnull), [], "is a device"),
+    ):
+        with pytest.raises(InputError, match=reason) as caught:
+            check_file(path, inputs)
+        assert caught.value.mend
+    with pytest.raises(InputError, match=r"is not named \.parquet.*a\.parquet"):
+        check_file(tmp_path / "a.csv", suffixes=(".parquet",))
+    assert log.read_text() == "x"
+
+
+def test_what_is_no_place_for_a_folder(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("x")
+    with pytest.raises(InputError, match="is a file"):
+        check_folder(tmp_path / "file")
+    with pytest.raises(InputError, match="does not exist"):
+        check_folder(tmp_path / "a" / "b")
+
+
+@POSIX
+def test_a_folder_that_refuses_writing(tmp_path: Path) -> None:
+    tmp_path.chmod(0o500)
+    try:
+        if os.access(tmp_path, os.W_OK):
+            pytest.skip("NOT TESTED: this user may write anywhere")
+        with pytest.raises(InputError, match="cannot be written"):
+            check_file(tmp_path / "a.parquet")
+    finally:
+        tmp_path.chmod(0o700)
+
+
+def test_a_system_that_refuses_writing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def refuse(*_: object, **__: object) -> None:
+        raise OSError(30, "Read-only file system")
+
+    monkeypatch.setattr("tempfile.TemporaryFile", refuse)
+    with pytest.raises(InputError, match="Read-only file system"):
+        check_file(tmp_path / "a.parquet")
+
+
+def test_two_logs_of_one_name_do_not_overwrite_each_other(tmp_path: Path) -> None:
+    logs = [tmp_path / "a" / "run.csv.gz", tmp_path / "b" / "run.csv"]
+    with pytest.raises(InputError, match="same name"):
+        files_in(tmp_path, logs, ".parquet")
+    assert files_in(tmp_path, logs[:1], ".parquet") == [tmp_path / "run.parquet"]
+
+
+@POSIX
+def test_a_full_disk_leaves_nothing(tmp_path: Path) -> None:
+    import resource
+
+    def limit() -> None:  # the nearest to a full disk that a test can have
+        resource.setrlimit(resource.RLIMIT_FSIZE, (65536, 65536))
+
+    done = subprocess.run(
+        [*LAUNCH, "simulate", "constant", "-o", str(tmp_path / "out")],
+        preexec_fn=limit,  # noqa: PLW1509 - no threads here
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 2
+    assert len(done.stderr.strip().splitlines()) == 1
+    assert "File too large" in done.stderr
+    assert list((tmp_path / "out").iterdir()) == []
+
+
+@POSIX
+def test_ctrl_c_leaves_whole_files(tmp_path: Path) -> None:
+    import pandas as pd
+
+    run = subprocess.Popen(
+        [*LAUNCH, "simulate", "campaign", "-o", str(tmp_path / "out")],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+    )
+    patience = time.monotonic() + 60
+    while (
+        not list(tmp_path.glob("out/*/vehicle.yaml")) and run.poll() is None and time.monotonic() < patience
+    ):
+        time.sleep(0.02)
+    os.killpg(run.pid, signal.SIGINT)  # as a terminal does: to the workers too
+    _, said = run.communicate(timeout=60)
+    assert run.returncode == 130
+    assert len(said.strip().splitlines()) == 1
+    written = list(tmp_path.glob("out/*/*"))
+    assert written
+    assert not [path for path in written if path.name.startswith(".")]
+    for path in written:
+        if path.suffix == ".parquet":
+            assert len(pd.read_parquet(path)) > 0
