@@ -28,6 +28,10 @@ MARGIN = 0.25
 """A form is called unfit where another's cross-validated error is lower by this share, beyond the folds' spread."""
 
 
+LEAST_BINS = 4
+"""Fewest used bins that a comparison makes sense of: the one-parameter forms and those with an intercept."""
+
+
 @dataclass(frozen=True)
 class FormScore:
     """Cross-validated root-mean-square error of bin means [-], its standard error over folds, and the parameters it fits."""
@@ -54,23 +58,23 @@ def compare_forms(
 ) -> FormVerdict:
     """Leave whole clusters (runs) out in turn, fit each form on the rest, judge it on the bin means of those left out.
 
-    Bins with fewer clusters than 2: the folds are alternate bins instead (said in the sentence). Raises InputError on an unknown form or
-    with fewer than 6 used bins.
+    Bins with fewer clusters than 2: the folds are alternate bins instead (said in the sentence). A form takes part where the used bins
+    exceed its parameters by two or more: a fold that loses a bin must still leave one beyond what the form can pass through; what is left
+    out is said. Raises InputError on an unknown form, with fewer than LEAST_BINS used bins, or too few for the asked form.
     """
     names = tuple(candidates or FORMS)
     if asked not in FORMS:
         raise InputError(f"no curve form {asked!r}", mend=f"take one of {', '.join(FORMS)}")
     if asked not in names:
         names = (asked, *names)
-    used = bins.used
-    if np.count_nonzero(used) < 6:
-        raise InputError(
-            f"{np.count_nonzero(used)} slip bins are too few to compare forms", mend="drive at more slips"
-        )
+    levels = int(np.count_nonzero(bins.used))
+    compared = [name for name in names if len(_parameters(name)[1]) <= levels - 2]
+    if levels < LEAST_BINS or asked not in compared:
+        raise InputError(f"{levels} slip bins are too few to compare forms", mend="drive at more slips")
     splits = list(_run_folds(bins, folds) or _bin_folds(bins, folds))
     by_run = bins.clusters >= 2
     scores = sorted(
-        (_score(name, splits) for name in names), key=lambda score: (score.error, score.parameters)
+        (_score(name, splits) for name in compared), key=lambda score: (score.error, score.parameters)
     )
     mine = next(score for score in scores if score.form == asked)
     best = scores[0]
@@ -84,6 +88,8 @@ def compare_forms(
             f"The {asked} form cannot follow these data: {way}, its error is {mine.error:.3g} against {best.error:.3g} "
             f"of the {best.form} form; take that one."
         )
+    if len(compared) < len(names):
+        sentence += f" {levels} slip bins cannot tell forms of more than {levels - 2} parameters."
     return FormVerdict(asked, tuple(scores), follows, None if follows else best.form, sentence)
 
 
@@ -122,11 +128,17 @@ def _bin_folds(bins: Bins, folds: int) -> list[Split]:
     return out
 
 
-def _score(form: str, splits: Sequence[Split]) -> FormScore:
+def _parameters(form: str) -> tuple[dict[str, float], list[str]]:
+    """(held, free): the parameters that a form holds at their values, and the names of those it fits."""
     name, intercept = FORMS[form]
     model = CURVES[name]
     held = {p.name: p.start for p in model.parameters if p.name in model.fixed}
-    free = [n for n in model.names if n not in held] + ([INTERCEPT] if intercept else [])
+    return held, [n for n in model.names if n not in held] + ([INTERCEPT] if intercept else [])
+
+
+def _score(form: str, splits: Sequence[Split]) -> FormScore:
+    model = CURVES[FORMS[form][0]]
+    held, free = _parameters(form)
     errors = []
     for slip, mean, weight, test_slip, test_mean, test_weight in splits:
         begin = starts(model, free, np.where(weight > 0, mean, np.nan))

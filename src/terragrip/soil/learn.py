@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from terragrip.errors import InputError
 from terragrip.soil.bins import PAPER_BINS, Bins, BinSettings, bin_pairs
-from terragrip.soil.choice import FormVerdict, compare_forms
+from terragrip.soil.choice import LEAST_BINS, FormVerdict, compare_forms
 from terragrip.soil.fit import AdhesionCurve
 from terragrip.soil.library import Soil, SoilLibrary
 from terragrip.soil.missing import Gap, in_words, what_to_drive
@@ -185,7 +185,7 @@ def _learn(
     resistance = np.concatenate([part.resistance for part in parts])
     speed = np.concatenate([part.speed for part in parts])
     soil = Soil.from_curve(name, curve, source, (float(np.nanmean(resistance)), float(np.nanstd(resistance))))
-    verdict = compare_forms(binned) if np.count_nonzero(binned.used) >= 6 else None
+    verdict = compare_forms(binned) if np.count_nonzero(binned.used) >= LEAST_BINS else None
     corrected = correct_slip_noise(curve, slip, adhesion, noise) if np.isfinite(noise).any() else None
     if corrected is not None:
         shown = {
