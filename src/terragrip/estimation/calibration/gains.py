@@ -85,7 +85,7 @@ def relative_gains(
     disagreement = _disagreement(rows)
     own = disagreement**2 * fit.covariance
     covariance = own + _considered_loads(fit, table, vehicle, driven, errors)
-    told = evidence(table, [Spell(int(k), int(k)) for k in range(len(table))], sources)
+    told = evidence(table, [Spell(int(k), int(k)) for k in range(len(table))], sources, table.torque_count)
     quantities = _quantities(fit, covariance, own, vehicle, driven, told, disagreement)
     radius, radius_std = np.ones(len(vehicle.wheels)), np.zeros(len(vehicle.wheels))
     radius[driven] += fit.radius

@@ -28,7 +28,8 @@ _LEAST_LOAD = 0.02  # share of the static load under which no wheel is taken to 
 class Windows:
     """Means over windows of equal length, a row each: SI, NaN where nothing was measured.
 
-    ``recording`` (n,) index of the log; ``start`` (n,) s; ``count`` (n,) samples of ground speed; ``torque``,
+    ``recording`` (n,) index of the log; ``start`` (n,) s; ``count`` (n,) samples of ground speed, ``torque_count``,
+    ``drawbar_count`` and ``acceleration_count`` (n,) of these channels; ``torque``,
     ``wheel_speed``, ``wheel_acceleration``, ``hub_speed``, ``load``, ``position`` (n, wheels), position being
     the metres of track that the wheel itself has come; ``push`` (n,) dv/dt + g sinθ, m/s², by the accelerometer where there is one,
     ``kinematic_push`` by ground speed and pitch alone; ``soil`` (n,) label.
@@ -37,6 +38,9 @@ class Windows:
     recording: Ints
     start: Floats
     count: Floats
+    torque_count: Floats
+    drawbar_count: Floats
+    acceleration_count: Floats
     ground_speed: Floats
     drawbar: Floats
     push: Floats
@@ -85,6 +89,11 @@ def _windows_of(index: int, recording: Recording, vehicle: Vehicle, length: floa
         values = recording.channels.get(name)
         return np.full(n, absent) if values is None else _means(values, bin_of, n)
 
+    def samples(name: str) -> Floats:
+        values = recording.channels.get(name)
+        known = np.zeros(0, dtype=np.intp) if values is None else bin_of[np.isfinite(values)]
+        return np.bincount(known, minlength=n).astype(np.float64)
+
     def per_wheel(quantity: str, absent: float = np.nan) -> Floats:
         return np.stack([mean(f"{quantity}_{wheel}", absent) for wheel in wheels], axis=1)
 
@@ -113,7 +122,12 @@ def _windows_of(index: int, recording: Recording, vehicle: Vehicle, length: floa
     return Windows(
         recording=np.full(n, index, dtype=np.intp),
         start=recording.time[0] + length * np.arange(n),
-        count=np.bincount(bin_of, np.isfinite(recording["ground_speed"]), n).astype(np.float64),
+        count=samples("ground_speed"),
+        torque_count=np.min(
+            [samples(f"drive_torque_{wheel}") for wheel in _driven(vehicle)] or [np.zeros(n)], axis=0
+        ),
+        drawbar_count=samples("drawbar_force"),
+        acceleration_count=samples("acceleration_x"),
         ground_speed=speed,
         drawbar=drawbar,
         push=push,
@@ -204,6 +218,10 @@ def wheel_side(vehicle: Vehicle) -> Floats:
         half = (vehicle.track or 0.0) / 2 if count > 1 else 0.0
         sides.append(np.linspace(half, -half, count))
     return np.concatenate(sides)
+
+
+def _driven(vehicle: Vehicle) -> list[str]:
+    return [wheel for wheel, driven in zip(vehicle.wheels, vehicle.driven, strict=True) if driven]
 
 
 def _means(values: Floats, bin_of: Ints, n: int) -> Floats:

@@ -72,8 +72,14 @@ def spells(wanted: npt.NDArray[np.bool_], recording: npt.NDArray[np.intp], least
     ]
 
 
-def evidence(windows: Windows, found: Sequence[Spell], sources: Sequence[str]) -> tuple[Evidence, ...]:
-    """One entry per recording: from the first spell's start to the last one's end, with the samples used."""
+def evidence(
+    windows: Windows, found: Sequence[Spell], sources: Sequence[str], count: Floats | None = None
+) -> tuple[Evidence, ...]:
+    """One entry per recording: from the first spell's start to the last one's end, with the samples used.
+
+    ``count`` (n,) samples of the channel that was used; ground speed's by default.
+    """
+    count = windows.count if count is None else count
     entries: dict[int, list[Spell]] = {}
     for spell in found:
         entries.setdefault(int(windows.recording[spell.first]), []).append(spell)
@@ -82,23 +88,23 @@ def evidence(windows: Windows, found: Sequence[Spell], sources: Sequence[str]) -
             sources[index],
             float(windows.start[own[0].first]),
             float(windows.start[own[-1].last] + windows.length),
-            int(sum(windows.count[spell.rows].sum() for spell in own)),
+            int(sum(count[spell.rows].sum() for spell in own)),
         )
         for index, own in entries.items()
     )
 
 
-def spell_mean(values: Floats, found: Sequence[Spell], windows: Windows, noise: float) -> tuple[float, float]:
+def spell_mean(values: Floats, found: Sequence[Spell], count: Floats, noise: float) -> tuple[float, float]:
     """Mean and standard error of values (n,) over spells; what varies from spell to spell counts in the error.
 
-    ``noise`` is the standard deviation of a sample: a few windows may scatter less by chance.
+    ``noise`` is the standard deviation of one of the ``count`` (n,) samples: a few windows may scatter less by chance.
     """
     inside = [values[spell.rows] for spell in found]
     pooled = np.concatenate(inside)
     pooled = pooled[np.isfinite(pooled)]
     if len(pooled) < 2:
         return float("nan"), float("nan")
-    samples = float(sum(windows.count[spell.rows].sum() for spell in found))
+    samples = max(1.0, float(sum(count[spell.rows].sum() for spell in found)))
     within = max(float(np.std(pooled, ddof=1)) / np.sqrt(len(pooled)), noise / np.sqrt(samples))
     means = np.array([np.nanmean(part) for part in inside if np.isfinite(part).any()])
     if len(means) < 3:
@@ -108,7 +114,7 @@ def spell_mean(values: Floats, found: Sequence[Spell], windows: Windows, noise: 
     return float(np.mean(means)), max(within, float(np.std(means, ddof=1)) / np.sqrt(len(means)))
 
 
-def resting(values: Floats, found: Sequence[Spell], windows: Windows, noise: float) -> list[Spell]:
+def resting(values: Floats, found: Sequence[Spell], count: Floats, noise: float) -> list[Spell]:
     """The spells that read alike in all of ``values`` (n, k), within noise: the most numerous such group.
 
     A zero is the same at every stop, what a drive holds or a bar keeps is not. Of groups of one size the one nearest to
@@ -118,7 +124,7 @@ def resting(values: Floats, found: Sequence[Spell], windows: Windows, noise: flo
     if len(found) < 2 or noise <= 0:
         return found
     means = np.array([np.nanmean(values[spell.rows], axis=0) for spell in found])
-    errors = noise / np.sqrt([max(1.0, windows.count[spell.rows].sum()) for spell in found])
+    errors = noise / np.sqrt([max(1.0, count[spell.rows].sum()) for spell in found])
     apart = np.max(np.abs(means[:, None] - means[None]), axis=2)
     alike = apart < _ALIKE * np.hypot(errors[:, None], errors[None])
     rank = [(int(alike[k].sum()), -float(np.max(np.abs(means[k])))) for k in range(len(found))]
@@ -136,12 +142,12 @@ def torque_zeros(
         return [], [Unknown(key, f"no standstill of {_LEAST_STANDING:.0f} s or longer")]
     quantities, unknown = [], []
     driven = np.flatnonzero(vehicle.driven)
-    found = resting(windows.torque[:, driven], found, windows, noise)
+    found = resting(windows.torque[:, driven], found, windows.torque_count, noise)
     if not found:
         return [], [Unknown(key, "no torque was measured at standstill")]
     for index in driven:
         wheel, torque = vehicle.wheels[index], windows.torque[:, index]
-        value, error = spell_mean(torque, found, windows, noise)
+        value, error = spell_mean(torque, found, windows.torque_count, noise)
         driving = np.abs(torque[np.abs(windows.ground_speed) > _DRIVING])
         work = float(np.nanquantile(driving, 0.95)) if np.isfinite(driving).any() else np.inf
         allowed = max(3 * (vehicle.uncertainty.drive_torque_offset or 0.0), _IDLE_SHARE * work)
@@ -152,7 +158,7 @@ def torque_zeros(
             said = (
                 "mean of the stops that read alike; it assumes that nothing drives or holds the wheels there"
             )
-            entry = evidence(windows, found, sources)
+            entry = evidence(windows, found, sources, windows.torque_count)
             quantities.append(Quantity(key, value, error, "N m", entry, said, wheel=wheel))
     return quantities, unknown
 
@@ -171,19 +177,21 @@ def drawbar_zero(
     found = standstills(windows, vehicle)
     said = "mean of the stops that read alike; it assumes that the bar is slack there"
     why = f"no standstill of {_LEAST_STANDING:.0f} s or longer, and none free of a tool"
-    found = resting(windows.drawbar[:, None], found, windows, noise)
+    found = resting(windows.drawbar[:, None], found, windows.drawbar_count, noise)
     if found:
-        value, error = spell_mean(windows.drawbar, found, windows, noise)
+        value, error = spell_mean(windows.drawbar, found, windows.drawbar_count, noise)
         why = f"at standstill it reads {value:.1f} N, so the bar seems to be under tension"
     if not found or not abs(value) <= allowed:
         found = _free_passes(windows, noise)
         said = "mean over driving in which the drawbar force does not move; it assumes that nothing is towed there"
         if not found:
             return [], [Unknown(key, why)]
-        value, error = spell_mean(windows.drawbar, found, windows, noise)
+        value, error = spell_mean(windows.drawbar, found, windows.drawbar_count, noise)
         if not abs(value) <= allowed:
             return [], [Unknown(key, why)]
-    return [Quantity(key, value, error, "N", evidence(windows, found, sources), said)], []
+    return [
+        Quantity(key, value, error, "N", evidence(windows, found, sources, windows.drawbar_count), said)
+    ], []
 
 
 def _free_passes(windows: Windows, noise: float) -> list[Spell]:
@@ -192,7 +200,7 @@ def _free_passes(windows: Windows, noise: float) -> list[Spell]:
     least = int(_LEAST_FREE / windows.length)
     found = []
     for spell in spells(moving, windows.recording, least):
-        bar, count = windows.drawbar[spell.rows], windows.count[spell.rows]
+        bar, count = windows.drawbar[spell.rows], windows.drawbar_count[spell.rows]
         if np.std(bar) < 2 * noise / np.sqrt(np.median(count)):
             found.append(spell)
     return found
@@ -222,8 +230,10 @@ def inclination_zeros(
         return [], [Unknown(bias_key, why), Unknown(pitch_key, why) if pitched else no_pitch]
     pitched = all(np.isfinite(windows.pitch[s.rows]).any() for s in found)
     slope = windows.pitch if pitched else np.zeros(len(windows))
-    total, error = spell_mean(windows.acceleration - GRAVITY * np.sin(slope), found, windows, noise)
-    stated, told = vehicle.uncertainty, evidence(windows, found, sources)
+    total, error = spell_mean(
+        windows.acceleration - GRAVITY * np.sin(slope), found, windows.acceleration_count, noise
+    )
+    stated, told = vehicle.uncertainty, evidence(windows, found, sources, windows.acceleration_count)
     # The ground differs from spell to spell, a sensor's zero does not.
     ground = (_DEFAULT_SLOPE if stated.slope is None else stated.slope) / np.sqrt(len(found))
     other = GRAVITY * (_DEFAULT_PITCH if pitched else ground)
