@@ -7,10 +7,11 @@ tool, one with loads that come and go over five soils (see calibration_drive.py)
 from __future__ import annotations
 
 import argparse
+from typing import Any
 
 import numpy as np
-from calibration_drive import calibrate_machine
 
+from calibration_drive import calibrate_machine
 from terragrip.estimation import Calibration
 from terragrip.simulation import simulate
 
@@ -32,17 +33,19 @@ def main() -> None:
     first, end = parser.parse_args().seeds
     print(f"{'sensors':10} {'quantity':20} {'rms error':>10} {'std error':>10} {'own std':>10} {'held':>8}")
     for sensors, scenario in SCENARIOS.items():
-        machines = [(calibrate_machine(seed, sensors), truth_of(scenario, seed)) for seed in range(first, end)]
+        machines = [
+            (calibrate_machine(seed, sensors), truth_of(scenario, seed)) for seed in range(first, end)
+        ]
         for key in KEYS:
             print(f"{sensors:10} {key:20} {line(machines, key)}")
 
 
-def truth_of(scenario: str, seed: int) -> dict[str, object]:
+def truth_of(scenario: str, seed: int) -> dict[str, Any]:
     """The calibration block that would undo the machine's errors."""
     return simulate(scenario, seed).true_parameters["calibration"]
 
 
-def line(machines: list[tuple[Calibration, dict[str, object]]], key: str) -> str:
+def line(machines: list[tuple[Calibration, dict[str, Any]]], key: str) -> str:
     """RMS error, RMS standard error, RMS of its own part, share of intervals that hold the truth."""
     errors, spreads, own, inside = [], [], [], []
     for result, truth in machines:
