@@ -319,7 +319,7 @@ def test_bank_agrees_with_filterpy():
     imm = filterpy.IMMEstimator(theirs, bank.probabilities.copy(), M)
     for k, y in enumerate(ys):
         if k == 0:  # ours mixes over the time since the last mixing: none yet
-            bank._since_mixing, bank._updates_since_mixing = dt, 1
+            bank._since_mixing = dt
         bank.step(y, dt=dt)
         imm.predict()
         imm.update(y)
@@ -330,7 +330,7 @@ def test_bank_agrees_with_filterpy():
 
 
 def test_bank_agrees_with_enumeration_while_nothing_is_merged():
-    bank, ys = random_bank(9, 3, dwell=2.0, mix_stride=3)
+    bank, ys = random_bank(9, 3, dwell=2.0, mix_stride=4)
     branches = [
         (p, f.x, f.P, s) for p, f, s in zip(bank.probabilities, bank.filters, bank.scales, strict=True)
     ]

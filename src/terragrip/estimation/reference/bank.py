@@ -75,7 +75,7 @@ class Bank:
         self.dwell, self.mix_stride, self.huber = dwell, mix_stride, huber
         self.probabilities: Vector = np.full(len(self.filters), 1 / dtype.type(len(self.filters)))
         self._since_mixing: Any = dtype.type(0)
-        self._updates_since_mixing = 0
+        self._updates = 0
 
     def moments(self) -> tuple[Vector, Matrix]:
         """Mean (n,) and covariance (n, n) of the mixture."""
@@ -97,11 +97,14 @@ class Bank:
             filter.x, filter.P = mixture(joint[:, b] / arriving[b], means, covariances)
         self.probabilities = arriving
         self._since_mixing = self._since_mixing * 0
-        self._updates_since_mixing = 0
 
-    def predict(self, u: Any, dt: float, *, extra: ArrayLike = 0.0) -> None:
-        """Mix if it is time, then every filter over dt with u held; extra (n,) is added to Q's diagonal."""
-        if self._updates_since_mixing >= self.mix_stride:
+    def predict(self, u: Any, dt: float, *, extra: ArrayLike = 0.0, measured: bool = True) -> None:
+        """Mix if it is time, then every filter over dt with u held; extra (n,) is added to Q's diagonal.
+
+        measured: whether an update with some channel follows; without one there is no mixing.
+        """
+        self._updates += measured
+        if measured and self._updates % self.mix_stride == 0:
             self.mix()
         for filter, scale in zip(self.filters, self.scales, strict=True):
             filter.predict(u, dt, Q=np.diag(scale * self.walk * dt + np.asarray(extra)))
@@ -139,14 +142,13 @@ class Bank:
         if present.any():
             floored = np.maximum(weighted / total, SMALLEST_PROBABILITY)
             self.probabilities = floored / np.sum(floored)
-            self._updates_since_mixing += 1
         return BankUpdate(
             lanes, present, innovation, variance, weight, nis, best + np.log(total), self.probabilities.copy()
         )
 
     def step(self, y: ArrayLike, u: Any = None, dt: float = 1.0) -> BankUpdate:
         """Predict over dt with u held, then update with y."""
-        self.predict(u, dt)
+        self.predict(u, dt, measured=not np.all(np.isnan(y)))
         return self.update(y)
 
 

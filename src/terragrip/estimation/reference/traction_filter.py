@@ -176,7 +176,7 @@ class TractionFilter:
         R = np.diag(np.asarray(r, self.dtype))
         unadapted = np.ones(self.model.states, self.dtype)
         if self._bank is not None:
-            self._bank.predict(before, dt, extra=q_input)
+            self._bank.predict(before, dt, extra=q_input, measured=not np.isnan(y).all())
             seen = [self._observation(lane, now) for lane in self._bank.filters]
             return Step(self._bank.update(y, R=R, seen=seen), self._gamma, unadapted, None)
         if self._adaptive is None:
