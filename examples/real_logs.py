@@ -46,8 +46,8 @@ MACHINES = (
 
 @dataclass(frozen=True)
 class Verdict:
-    """Figures of one log, medians over rows of straight driving; ``nis`` is per channel, over the whole log, and ``straight`` counts
-    rows and wheels.
+    """Figures of one log, medians over rows of straight driving; ``nis`` is per channel over the whole log,
+    ``nis_straight`` over all rows whose sides turn alike; ``straight`` counts rows and wheels.
 
     ``on_the_spot`` is the median slip, by the estimator, where the sides turn against each other.
     """
@@ -56,6 +56,7 @@ class Verdict:
     seconds: float
     held: dict[str, float]
     nis: float
+    nis_straight: float
     standing: float
     straight: int
     slip: float
@@ -100,20 +101,25 @@ def judge(machine: Machine, recording: Recording, vehicle: Vehicle, estimates: E
     def of(quantity: str) -> dict[str, Floats]:
         return {w: estimates[quantity.format(w)] for w in vehicle.wheels}
 
-    taken = float(np.nansum(estimates["channels"]))
+    def ratio(rows: Bools) -> float:
+        return float(np.nansum(estimates["nis"][rows]) / np.nansum(estimates["channels"][rows]))
+
+    # Torques of the wheels come at different instants, so what one gets too much another gets too little.
+    together = np.mean([estimates[f"adhesion_{w}"] for w in vehicle.wheels], axis=0)
     with np.errstate(divide="ignore", invalid="ignore"):  # rows at rest are not looked at
         hub_slip = {w: 1 - hub[w] / (vehicle.wheel_radius[0] * of("wheel_speed_{}")[w]) for w in hub}
     return Verdict(
         log=Path(recording.source or "").name.split(".")[0],
         seconds=float(recording.time[-1] - recording.time[0]),
         held={name: 1 / period for name, period in held_periods(recording).items()},
-        nis=float(np.nansum(estimates["nis"])) / taken,
+        nis=ratio(estimates["channels"] > 0),
+        nis_straight=ratio(turning < 0.1),
         standing=float(np.mean(estimates.event_codes == EVENTS.index("standstill"))),
         straight=sum(int((straight & measured[w]).sum()) for w in vehicle.wheels),
         slip=middle(of("slip_{}"), straight),
         hub_slip=middle(hub_slip, straight),
         slip_std=middle(of("slip_{}_std"), straight),
-        adhesion=middle(of("adhesion_{}"), straight),
+        adhesion=middle(dict.fromkeys(vehicle.wheels, together), straight),
         adhesion_std=middle(of("adhesion_{}_std"), straight),
         resistance=middle(of("soil_resistance"), straight),
         resistance_std=middle(of("soil_resistance_std"), straight),
@@ -139,14 +145,14 @@ def verdicts(machine: Machine, data: Path, method: str, smooth: bool = False) ->
 
 def table(found: list[Verdict]) -> str:
     """The figures as a Markdown table."""
-    head = "| log | s | at rest | NIS | straight rows | slip | hub slip | ± | adhesion | resistance | slip on the spot |"
+    head = "| log | s | at rest | NIS | NIS straight | straight rows | slip | hub slip | ± | adhesion | resistance | slip on the spot |"
     rows = [
-        f"| {v.log} | {v.seconds:.0f} | {100 * v.standing:.0f} % | {v.nis:.2f} | {v.straight} | {v.slip:.3f} | "
+        f"| {v.log} | {v.seconds:.0f} | {100 * v.standing:.0f} % | {v.nis:.2f} | {v.nis_straight:.2f} | {v.straight} | {v.slip:.3f} | "
         f"{v.hub_slip:.3f} | {v.slip_std:.3f} | {v.adhesion:.3f} ± {v.adhesion_std:.3f} | "
         f"{v.resistance:.3f} ± {v.resistance_std:.3f} | {v.on_the_spot:.2f} |"
         for v in found
     ]
-    return "\n".join([head, "|" + "---|" * 11, *rows])
+    return "\n".join([head, "|" + "---|" * 12, *rows])
 
 
 def torque_scale(data: Path) -> str:
