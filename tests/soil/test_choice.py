@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from soil_campaign import pairs
 
+from soil_campaign import pairs
 from terragrip.errors import InputError
 from terragrip.soil.bins import bin_pairs
 from terragrip.soil.choice import compare_forms

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from scipy.optimize import least_squares
-from soil_campaign import pairs
 
+from soil_campaign import pairs
 from terragrip.errors import InputError
 from terragrip.physics.adhesion import CURVES, PROTOTYPE
 from terragrip.soil.bins import BinSettings

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from soil_campaign import pairs
 
+from soil_campaign import pairs
 from terragrip.errors import InputError
 from terragrip.soil.digitised import read_points
 from terragrip.soil.fit import AdhesionCurve

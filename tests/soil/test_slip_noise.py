@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from soil_campaign import pairs
 
+from soil_campaign import pairs
 from terragrip.errors import InputError
 from terragrip.soil.fit import AdhesionCurve
 from terragrip.soil.slip_noise import correct_slip_noise
