@@ -105,7 +105,7 @@ def judge(machine: Machine, recording: Recording, vehicle: Vehicle, estimates: E
         return float(np.nansum(estimates["nis"][rows]) / np.nansum(estimates["channels"][rows]))
 
     # Torques of the wheels come at different instants, so what one gets too much another gets too little.
-    together = np.mean([estimates[f"adhesion_{w}"] for w in vehicle.wheels], axis=0)
+    together: Floats = np.mean([estimates[f"adhesion_{w}"] for w in vehicle.wheels], axis=0)
     with np.errstate(divide="ignore", invalid="ignore"):  # rows at rest are not looked at
         hub_slip = {w: 1 - hub[w] / (vehicle.wheel_radius[0] * of("wheel_speed_{}")[w]) for w in hub}
     return Verdict(
@@ -119,7 +119,7 @@ def judge(machine: Machine, recording: Recording, vehicle: Vehicle, estimates: E
         slip=middle(of("slip_{}"), straight),
         hub_slip=middle(hub_slip, straight),
         slip_std=middle(of("slip_{}_std"), straight),
-        adhesion=middle(dict.fromkeys(vehicle.wheels, together), straight),
+        adhesion=middle({w: np.asarray(together) for w in vehicle.wheels}, straight),
         adhesion_std=middle(of("adhesion_{}_std"), straight),
         resistance=middle(of("soil_resistance"), straight),
         resistance_std=middle(of("soil_resistance_std"), straight),
