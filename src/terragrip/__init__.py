@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from terragrip.formats import read as read
     from terragrip.recording import Recording as Recording
     from terragrip.simulation import simulate as simulate
+    from terragrip.soil.fit import AdhesionCurve as AdhesionCurve
     from terragrip.vehicle import Vehicle as Vehicle
 
 _HOME = {
@@ -31,6 +32,7 @@ _HOME = {
     "estimate": "terragrip.estimation",
     "calibrate": "terragrip.estimation",
     "simulate": "terragrip.simulation",
+    "AdhesionCurve": "terragrip.soil.fit",
     "InputError": "terragrip.errors",
 }
 

@@ -1,0 +1,226 @@
+"""``terragrip soils``: a library from estimates, and every input that is none."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from terragrip.cli import main
+from terragrip.estimation import Estimates
+from terragrip.physics.adhesion import CURVES
+from terragrip.vehicle import Vehicle
+
+ROWS = 3000
+VEHICLE: dict[str, Any] = {
+    "name": "robot",
+    "mass": "139 kg",
+    "wheelbase": "0.64 m",
+    "center_of_gravity_height": "0.3 m",
+    "hitch_height": "0.25 m",
+    "axles": {
+        "front": {"mass": "54 kg", "wheels": ["fl", "fr"]},
+        "rear": {"mass": "85 kg", "wheels": ["rl", "rr"]},
+    },
+    "wheel": {"radius": "0.2 m", "inertia": "0.27 kg m^2"},
+    "tire_rolling_resistance": 0.03,
+}
+
+Write = Callable[..., Path]
+Fails = Callable[..., str]
+
+
+def estimates(
+    seed: int, a: float = 0.85, soil: str = "fine", slip: tuple[float, float] = (0.0, 0.55)
+) -> Estimates:
+    """A drive of 30 m whose wheels slip by `slip`, low to high; `soil` "" = no labels."""
+    rng = np.random.default_rng(seed)
+    columns = {
+        "distance": np.linspace(0, 30, ROWS),
+        "soil_resistance": np.full(ROWS, 0.08),
+        "ground_speed": np.full(ROWS, 0.6),
+    }
+    a *= 1 + 0.03 * rng.standard_normal()
+    for wheel in ("fl", "fr", "rl", "rr"):
+        s = rng.uniform(*slip, ROWS)
+        mu = CURVES["exponential"].value(s, {"a": a}) + 0.02 * rng.standard_normal(ROWS)
+        columns |= {f"slip_{wheel}": s, f"slip_{wheel}_std": np.full(ROWS, 0.005), f"adhesion_{wheel}": mu}
+    labels = {"soil": np.full(ROWS, soil, dtype=object)} if soil else {}
+    about = {"method": "kalman", "vehicle": Vehicle.from_dict(VEHICLE).to_dict()}
+    return Estimates(np.arange(ROWS) * 0.01, columns, np.zeros(ROWS, dtype=np.uint8), labels, about)
+
+
+@pytest.fixture
+def write(tmp_path: Path) -> Write:
+    """Return a function that writes a table of estimates and returns its file."""
+
+    def make(name: str, **drive: Any) -> Path:
+        path = tmp_path / f"{name}.parquet"
+        estimates(**{"seed": sum(map(ord, name)), **drive}).write(path)
+        return path
+
+    return make
+
+
+@pytest.fixture
+def fails(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> Fails:
+    """Return a function that runs the command, expects exit 2 and one line, and returns the line."""
+
+    def run(*words: Any) -> str:
+        output = tmp_path / "out.json"
+        assert main(["soils", *map(str, words), "-o", str(output)]) == 2
+        lines = [line for line in capsys.readouterr().err.splitlines() if line.strip()]
+        assert len(lines) == 1, lines
+        assert not output.exists()
+        return lines[0]
+
+    return run
+
+
+def learn(output: Path, *words: Any) -> dict[str, Any]:
+    assert main(["soils", *map(str, words), "-o", str(output)]) == 0
+    found: dict[str, Any] = json.loads(output.read_text(encoding="utf-8"))
+    return found
+
+
+def test_two_soils_of_six_runs(write: Write, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    files = [write(f"fine{i}") for i in range(6)] + [write(f"hard{i}", a=1.42, soil="hard") for i in range(6)]
+    library = learn(tmp_path / "soils.json", *files)
+    assert set(library["soils"]) == {"fine", "hard"}
+    for name, truth in (("fine", 0.85), ("hard", 1.42)):
+        soil = library["soils"][name]
+        assert soil["parameters"]["a"] == pytest.approx(truth, rel=0.05)
+        low, high = soil["interval"]["a"]
+        assert low < soil["parameters"]["a"] < high
+        assert soil["r2"] > 0.97
+    text = capsys.readouterr().out
+    for said in ("fine", "no data between", "Written to"):
+        assert said in text
+
+
+def test_quiet_says_nothing(write: Write, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    learn(tmp_path / "soils.json", write("a"), "--quiet")
+    said = capsys.readouterr()
+    assert said.out + said.err == ""
+
+
+def test_literature_is_added(write: Write, tmp_path: Path) -> None:
+    library = learn(tmp_path / "soils.json", write("a"), "--literature", "--quiet")
+    assert len(library["soils"]) > 8
+
+
+def test_free_shape_weights_and_other_bins(write: Write, tmp_path: Path) -> None:
+    files = [write(f"r{i}") for i in range(5)]
+    library = learn(
+        tmp_path / "soils.json", *files, "--free", "--weights", "--width", 0.02, "--upper", 0.5, "--quiet"
+    )
+    soil = library["soils"]["fine"]
+    assert soil["settings"]["width"] == 0.02
+    assert soil["settings"]["upper"] == 0.5
+    assert not soil["identifiability"]["identifiable"]
+    assert set(soil["interval"]) == {"A", "k", "d"}
+
+
+def test_no_labels(write: Write, fails: Fails, tmp_path: Path) -> None:
+    file = write("bare", soil="")
+    assert "no sample has a soil label" in fails(file)
+    assert set(learn(tmp_path / "named.json", file, "--soil", "field", "--quiet")["soils"]) == {"field"}
+
+
+@pytest.mark.parametrize(
+    ("slip", "word"),
+    [((0.101, 0.109), "1 slip bins"), ((-0.5, -0.06), "0 slip bins"), ((0.0, 0.04), "0 slip bins")],
+)
+def test_a_soil_that_cannot_be_fitted_is_stated_not_drawn(
+    write: Write, tmp_path: Path, capsys: pytest.CaptureFixture[str], slip: tuple[float, float], word: str
+) -> None:
+    library = learn(tmp_path / "soils.json", write("poor", slip=slip))
+    assert library["soils"] == {}
+    assert word in library["not_fitted"]["fine"]
+    assert "fine: not fitted" in capsys.readouterr().out
+
+
+def test_merge_replaces_its_twin_and_keeps_the_others(write: Write, tmp_path: Path) -> None:
+    old = tmp_path / "old.json"
+    learn(old, write("hard", a=1.42, soil="hard"), write("fine", a=0.5), "--quiet")
+    new = learn(tmp_path / "new.json", write("again", a=0.9), "--merge", old, "--quiet")
+    assert set(new["soils"]) == {"hard", "fine"}
+    assert new["soils"]["fine"]["parameters"]["a"] == pytest.approx(0.9, rel=0.1)
+    assert new["soils"]["hard"] == json.loads(old.read_text())["soils"]["hard"]
+
+
+def spoiled(change: Callable[[dict[str, Any]], Any]) -> str:
+    library = {"version": 1, "soils": {"hard": {"model": "exponential", "parameters": {"a": 1.4}}}}
+    change(library)
+    return json.dumps(library)
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        (spoiled(lambda x: x.update(version=99)), "library version 99"),
+        (spoiled(lambda x: x["soils"]["hard"].update(model="cubic")), "curve model 'cubic' is not known"),
+        (spoiled(lambda x: x["soils"]["hard"]["parameters"].update(a="much")), "'much' is not a number"),
+        (spoiled(lambda x: x["soils"]["hard"]["parameters"].update(a=float("nan"))), "nan is not a number"),
+        (spoiled(lambda x: x["soils"]["hard"]["parameters"].update(b=1.0)), "has no parameter b"),
+        (spoiled(lambda x: x["soils"]["hard"].update(bins=[{"slip": "?"}])), "'?' is not a number"),
+        (spoiled(lambda x: x.pop("soils")), "holds no 'soils'"),
+        ('{"soils": {"hard": {}, "hard": {}}}', "two entries are named 'hard'"),
+        ("not json", "not JSON"),
+        ("", "not JSON"),
+        ("[]", "holds no 'soils'"),
+    ],
+)
+def test_a_library_that_is_none(write: Write, fails: Fails, tmp_path: Path, text: str, said: str) -> None:
+    path = tmp_path / "library.json"
+    path.write_text(text, encoding="utf-8")
+    line = fails(write("a"), "--merge", path)
+    assert said in line
+    assert "library.json" in line
+
+
+def test_files_that_are_no_estimates(write: Write, fails: Fails, tmp_path: Path) -> None:
+    import pandas as pd
+
+    table = tmp_path / "table.parquet"
+    pd.DataFrame({"time": [0.0, 1.0], "x": [1.0, 2.0]}).to_parquet(table)
+    text = tmp_path / "text.parquet"
+    text.write_text("time,slip\n0,0.1\n")
+    damaged = tmp_path / "damaged.parquet"
+    damaged.write_bytes(write("whole").read_bytes()[:4000])
+    for path in (table, text, damaged, tmp_path / "absent.parquet", tmp_path):
+        assert path.name in fails(path)
+
+
+def test_a_file_twice(write: Write, fails: Fails) -> None:
+    file = write("a")
+    assert "is given twice" in fails(file, file.parent / "." / file.name)
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("--model", "cubic"), "no curve model 'cubic'"),
+        (("--width", "0"), "no bins"),
+        (("--lower", "0.5", "--upper", "0.4"), "no bins"),
+        (("--minimum", "0"), "no bins"),
+        (("--width", "nan"), "no bins"),
+        (("--merge", "absent.json"), "absent.json"),
+    ],
+)
+def test_calls_that_make_no_sense(write: Write, fails: Fails, words: tuple[str, ...], said: str) -> None:
+    assert said in fails(write("a"), *words)
+
+
+def test_output_that_would_overwrite_an_input(
+    write: Write, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = write("a")
+    before = file.read_bytes()
+    assert main(["soils", str(file), "-o", str(file)]) == 2
+    assert len(capsys.readouterr().err.strip().splitlines()) == 1
+    assert file.read_bytes() == before
