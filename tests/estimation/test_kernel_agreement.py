@@ -5,9 +5,10 @@ units of max(|x_i|, SD_i), since a double cannot hold more digits of a state tha
 need more than a share of its SD; covariances P_ij in units of SD_i SD_j, which is free of the states' scales.
 Likelihoods and NIS are compared relative to 1 + their magnitude.
 
-The adaptation of A_k feeds back on itself: where C and S differ by orders of magnitude (long after a wide P0, say) one
-step of A can amplify rounding a hundredfold, and no double-precision filter keeps nine digits of it for long. There, and
-only there, the kernel must come nearer to the long double run than the same NumPy equations in double do.
+The adaptation of A_k feeds back on itself. Where C and S differ by orders of magnitude (after a wide P0, or when the
+time step jumps) one step of A can amplify rounding a hundredfold, and no double-precision filter keeps nine digits for
+long: the recursion is chaotic there. Where 1e-9 is missed with A_k on, and only there, the kernel must at every step be
+nearer to the long double run than the same NumPy equations in double are, as long as those keep three digits.
 """
 
 from __future__ import annotations
@@ -59,12 +60,9 @@ def step_errors(got: Report, expected: Report) -> dict[str, float]:
     return errors
 
 
-def compare(case: Any, tuning: Tuning, *, double: bool = False) -> dict[str, float]:
-    """The largest error of each quantity over all steps: of the kernel, or of the reference itself in double."""
+def errors_by_step(case: Any, tuning: Tuning, tested: Any) -> Iterator[dict[str, float]]:
+    """Of every quantity at every step of a problem, of the kernel or of the reference in another precision."""
     truth = TractionFilter(case.machine, tuning, case.x0, case.P0.astype(np.longdouble))
-    make = TractionFilter if double else KernelFilter
-    tested = make(case.machine, tuning, case.x0, case.P0)
-    worst: dict[str, float] = {}
     for k in case.instants:
         if k.restart is not None:
             truth.restart(*k.restart)
@@ -73,20 +71,29 @@ def compare(case: Any, tuning: Tuning, *, double: bool = False) -> dict[str, flo
         got = tested.step(*arguments)
         errors = step_errors(report(got) if isinstance(got, Step) else got, report(truth.step(*arguments)))
         errors["mean"], errors["covariance"] = moments_error(tested.moments(), truth.moments())
-        worst = {name: max(error, worst.get(name, 0.0)) for name, error in errors.items()}
-    return worst
+        yield errors
 
 
 def assert_agree(case: Any, tuning: Tuning) -> None:
-    """Every quantity of every step to 1e-9; where the recursion itself amplifies rounding, see the module."""
-    worst = compare(case, tuning)
+    """Every quantity of every step to 1e-9; where adaptation amplifies rounding, see the module."""
+    start = (case.machine, tuning, case.x0, case.P0)
+    worst: dict[str, float] = {}
+    for errors in errors_by_step(case, tuning, KernelFilter(*start)):
+        worst = {name: max(error, worst.get(name, 0.0)) for name, error in errors.items()}
     beyond = {name: error for name, error in worst.items() if not error < TOLERANCE}
-    if beyond and tuning.policy in ("adaptive", "supervised"):
-        amplified = compare(case, tuning, double=True)
-        beyond = {
-            name: (error, amplified[name]) for name, error in beyond.items() if not error < amplified[name]
-        }
-    assert not beyond, beyond
+    if tuning.policy in ("fixed", "bank") or not beyond:
+        assert not beyond, beyond
+        return
+    amplified = TOLERANCE
+    for errors, in_double in zip(
+        errors_by_step(case, tuning, KernelFilter(*start)),
+        errors_by_step(case, tuning, TractionFilter(*start)),
+        strict=True,
+    ):
+        amplified = max(amplified, *in_double.values())
+        if amplified > 1e-3:
+            return  # neither has digits left to compare
+        assert max(errors.values()) < amplified, errors
 
 
 LONG = {"missing": 0.08, "spikes": 0.01, "accelerometer": True, "restarts": True}
