@@ -140,6 +140,16 @@ def test_coverage_pools_rows_not_runs(drive: Drive) -> None:
     assert together["soil resistance ρs"].rows == 6500
 
 
+def test_an_operators_push_is_not_held_against_the_estimate(drive: Drive) -> None:
+    run = drive()
+    assert run.truth is not None
+    rows = int(run.judged.sum())
+    push = np.where(run.time < 30, 100.0, 0.0)
+    pushed = Run(run.name, run.estimates, run.method, run.truth.assign(true_assist_force=push), run.recording)
+    assert int(pushed.judged.sum()) == rows - 600
+    assert run_coverage(pushed)[-1].rows == rows - 600
+
+
 def test_slots_keep_spikes_and_gaps_in_few_points() -> None:
     time = np.arange(0.0, 1000.0, 0.01)
     values = np.zeros(len(time))

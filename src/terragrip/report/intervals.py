@@ -34,7 +34,7 @@ class Coverage:
 
 
 def run_coverage(run: Run) -> list[Coverage]:
-    """Coverage of mu and slip (every wheel) and rho_s of `run` against its truth, while it moves and is not stuck."""
+    """Coverage of mu and slip (every wheel) and rho_s of `run` against its truth, where :attr:`Run.judged`."""
     result = []
     for quantity, beginning in QUANTITIES.items():
         columns = [beginning] if beginning == "soil_resistance" else [beginning + w for w in run.wheels]
@@ -81,7 +81,7 @@ def coverage_table(found: Sequence[Coverage]) -> Table:
         figures = (item.share(), float(np.median(shares)), min(shares))
         rows.append((item.quantity, *(percent(share) for share in figures), low))
     return Table(
-        "Coverage of the 95 % intervals over all simulated runs while the vehicle moves and is not stuck. Gains and offsets are drawn "
+        "Coverage of the 95 % intervals over all simulated runs while the vehicle moves by itself (neither stuck nor pushed by its operator, a force that no sensor tells). Gains and offsets are drawn "
         "once a run and stay, so single runs scatter around the pooled share more than their many rows "
         "suggest.",
         ("quantity", "pooled", "median run", "worst run", "runs under 90 %"),
@@ -151,7 +151,7 @@ def _triples(run: Run, columns: Sequence[str]) -> tuple[FloatArray, FloatArray, 
         if true is None:
             continue
         said, sd = run.estimated(name), run.estimated(f"{name}_std")
-        rows = run.moving & ~run.stuck & np.isfinite(true) & np.isfinite(said) & np.isfinite(sd)
+        rows = run.judged & np.isfinite(true) & np.isfinite(said) & np.isfinite(sd)
         truth.append(true[rows])
         estimate.append(said[rows])
         std.append(sd[rows])

@@ -24,6 +24,8 @@ LEAST_SENSOR_LOAD = 0.1
 air has no adhesion, only noise over nothing."""
 
 
+LEAST_PUSH = 1.0
+"""An operator's push that counts [N]."""
 AFTER_STUCK = 2.0
 """Seconds that a stuck spell's aftermath lasts: the vehicle jerks free and its tool follows. With them the spell
 of the simulated `multi2` is as long as the 245-255 s that the paper leaves out."""
@@ -172,6 +174,17 @@ class Run:
     def moving(self) -> BoolArray:
         """Rows with an estimate of slip: the others stand still or follow a gap."""
         return np.isfinite(self.estimated(f"slip_{self.shown_wheel}"))
+
+    @cached_property
+    def pushed(self) -> BoolArray:
+        """Where, by a simulation's truth, the operator pushes: a force from outside that no sensor of the log tells."""
+        assist = self.true("assist_force")
+        return np.zeros(len(self.time), dtype=np.bool_) if assist is None else np.abs(assist) > LEAST_PUSH
+
+    @cached_property
+    def judged(self) -> BoolArray:
+        """Rows in which estimates are held against the truth: it moves by itself, neither stuck nor pushed."""
+        return self.moving & ~self.stuck & ~self.pushed
 
     @property
     def _measured(self) -> pd.DataFrame:

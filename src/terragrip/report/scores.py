@@ -54,7 +54,7 @@ class Comparison:
 
 @dataclass(frozen=True)
 class TruthScore:
-    """Errors and 95 % coverage against the truth, while moving and not stuck. mu, slip: the shown wheel."""
+    """Errors and 95 % coverage against the truth where :attr:`Run.judged`. mu, slip: the shown wheel."""
 
     run: str
     method: str
@@ -99,7 +99,7 @@ def truth_score(run: Run) -> TruthScore | None:
     """Errors and coverage of `run` against its truth, None without one."""
     if run.truth is None:
         return None
-    wheel, rows = run.shown_wheel, run.moving & ~run.stuck
+    wheel, rows = run.shown_wheel, run.judged
     columns = (f"adhesion_{wheel}", f"slip_{wheel}", "soil_resistance")
     errors, covered = [], []
     for name in columns:
@@ -127,8 +127,8 @@ def truth_table(scores: Iterable[TruthScore], default: str) -> Table:
     """Mean absolute errors and 95 % coverage of every method and run."""
     listed = list(scores)
     return Table(
-        "Errors against the simulated truth and share of rows whose 95 % interval holds it, while moving, "
-        "stuck spells left out.",
+        "Errors against the simulated truth and share of rows whose 95 % interval holds it, while the "
+        "vehicle moves by itself, neither stuck nor pushed.",
         ("run, method", "R² of µ", "MAE µ", "MAE slip", "MAE ρs", "95 % µ", "95 % slip", "95 % ρs"),
         tuple(
             (

@@ -132,7 +132,7 @@ def honesty(shown: Run, covered: Sequence[Coverage]) -> Section:
                 "coverage",
                 draw_coverage(covered),
                 f"How often the intervals hold the simulated truth, against what they claim, over {judged} "
-                f"run{'s' if judged > 1 else ''} while the vehicle moves and is not stuck. Above the dashed line they are careful, under "
+                f"run{'s' if judged > 1 else ''} while the vehicle moves by itself. Above the dashed line they are careful, under "
                 "it too sure.",
                 "Observed against nominal coverage of the intervals",
             ),
