@@ -159,9 +159,10 @@ _METHOD_PROSE = (
     "rounding; aukf and aukf-fs adapt the process noise (aukf-fs is the paper's method); bank mixes four noise levels; "
     "algebraic solves the equations of motion on low-passed signals.",
     "µ stands apart from the sensor by ρs, whatever the method: a negative R² of µ against the sensor is the sensor's "
-    "place, not the estimate's error, which the table against the truth shows. NRMSE divides by the range of the "
-    "reference, which a sensor's few highest spikes set: compare it between methods, not with the paper. \"The truth itself\" is the simulation's "
-    "own κ or µ against its sensor: how far the sensor's dynamics and noise let any estimate come.",
+    "place, not the estimate's error, which the table against the truth shows. \"The truth itself\" is the simulation's "
+    "own κ or µ against its sensor: how far the sensor's dynamics and noise let any estimate come. NRMSE divides by "
+    "the range of the reference, which a sensor's few highest spikes set: compare it between methods, not with the "
+    "paper.",
 )
 
 

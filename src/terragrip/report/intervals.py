@@ -81,9 +81,8 @@ def coverage_table(found: Sequence[Coverage]) -> Table:
         figures = (item.share(), float(np.median(shares)), min(shares))
         rows.append((item.quantity, *(percent(share) for share in figures), low))
     return Table(
-        "Coverage of the 95 % intervals over all simulated runs while the vehicle moves by itself (neither stuck nor pushed by its operator, a force that no sensor tells). Gains and offsets are drawn "
-        "once a run and stay, so single runs scatter around the pooled share more than their many rows "
-        "suggest.",
+        "Coverage of the 95 % intervals over all simulated runs while the vehicle moves by itself, neither stuck "
+        "nor pushed by its operator (a force that no sensor tells).",
         ("quantity", "pooled", "median run", "worst run", "runs under 90 %"),
         tuple(rows),
     )
