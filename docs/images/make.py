@@ -15,7 +15,7 @@ LARGEST = 300_000  # bytes
 
 
 def main() -> None:
-    folder = Path(sys.argv[1] if len(sys.argv) > 1 else "demo-output") / "figures"
+    folder = Path(sys.argv[1] if len(sys.argv) > 1 else "terragrip-demo") / "figures"
     for source, target in PICTURES.items():
         svg = (folder / source).read_bytes()
         if len(svg) > LARGEST:
