@@ -88,7 +88,7 @@ def test_a_full_disk_leaves_nothing(tmp_path: Path) -> None:
 
     done = subprocess.run(
         [*LAUNCH, "simulate", "constant", "-o", str(tmp_path / "out")],
-        preexec_fn=limit,  # noqa: PLW1509 - no threads here
+        preexec_fn=limit,
         capture_output=True,
         text=True,
         check=False,

@@ -142,4 +142,4 @@ def test_gains_vaguer_than_the_prior_are_left_out(drive: Make, vehicle: Vehicle)
     sure = Vehicle.from_dict({**vehicle.to_dict(), "uncertainty": {"drive_torque_gain": 1e-5}})
     result = calibrate(drive(gain=GAIN, patches=0.1), sure)
     assert "drive_torque_gain fl" not in result
-    assert any("knows them to" in u.why for u in result.unknown)
+    assert any("knows it to" in u.why for u in result.unknown)

@@ -66,6 +66,16 @@ def test_a_wheel_with_a_radius_of_its_own(drive: Make, vehicle: Vehicle) -> None
     assert 1.003 < ratio < 1.007
 
 
+def test_a_radius_vaguer_than_the_vehicle_file_is_left_out(drive: Make, vehicle: Vehicle) -> None:
+    logs = [free_pass(drive, 0.2), drive(120, slip=(0.0, 0.25))]
+    data = vehicle.to_dict()
+    data["uncertainty"] = {**data["uncertainty"], "wheel_radius": 1e-5}
+    result = calibrate(logs, Vehicle.from_dict(data))
+    assert "wheel_radius fl" not in result
+    assert result.apply(vehicle).wheel_radius == pytest.approx([0.2] * 4, rel=0)
+    assert any(u.name == "wheel_radius" and "knows it to" in u.why for u in result.unknown)
+
+
 def test_without_a_zero_pull_pass_there_is_a_reason(drive: Make, vehicle: Vehicle) -> None:
     result = calibrate(drive(120, slip=(0.1, 0.3)), vehicle)
     assert "wheel_radius fl" not in result

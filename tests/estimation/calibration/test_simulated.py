@@ -57,7 +57,14 @@ def errors(machines: list[tuple[Calibration, dict[str, Any]]], key: str) -> tupl
 
 @pytest.mark.parametrize(
     "key",
-    ["drive_torque_gain", "drive_torque_offset", "drawbar_offset", "acceleration_bias_x", "pitch_offset", "wheel_radius"],
+    [
+        "drive_torque_gain",
+        "drive_torque_offset",
+        "drawbar_offset",
+        "acceleration_bias_x",
+        "pitch_offset",
+        "wheel_radius",
+    ],
 )
 def test_intervals_hold_the_truth(machines: list[tuple[Calibration, dict[str, Any]]], key: str) -> None:
     z, inside = errors(machines, key)
@@ -68,7 +75,9 @@ def test_intervals_hold_the_truth(machines: list[tuple[Calibration, dict[str, An
     assert np.sqrt(np.mean(np.square(z))) < 1.6
 
 
-def test_relative_gains_are_told_well_under_their_prior(machines: list[tuple[Calibration, dict[str, Any]]]) -> None:
+def test_relative_gains_are_told_well_under_their_prior(
+    machines: list[tuple[Calibration, dict[str, Any]]],
+) -> None:
     miss, own = [], []
     for result, truth in machines:
         log = np.log([truth["drive_torque_gain"][wheel] for wheel in WHEELS])
@@ -79,7 +88,9 @@ def test_relative_gains_are_told_well_under_their_prior(machines: list[tuple[Cal
     assert np.mean(own) < 0.007
 
 
-def test_radii_are_told_to_a_few_tenths_of_a_per_cent(machines: list[tuple[Calibration, dict[str, Any]]]) -> None:
+def test_radii_are_told_to_a_few_tenths_of_a_per_cent(
+    machines: list[tuple[Calibration, dict[str, Any]]],
+) -> None:
     miss = [
         result[f"wheel_radius {wheel}"].value / truth["wheel_radius"][wheel] - 1
         for result, truth in machines
@@ -88,7 +99,9 @@ def test_radii_are_told_to_a_few_tenths_of_a_per_cent(machines: list[tuple[Calib
     assert np.sqrt(np.mean(np.square(miss))) < 0.003  # machines differ by 0.01
 
 
-def test_what_is_left_is_smaller_and_the_common_gain_is_kept(machines: list[tuple[Calibration, dict[str, Any]]]) -> None:
+def test_what_is_left_is_smaller_and_the_common_gain_is_kept(
+    machines: list[tuple[Calibration, dict[str, Any]]],
+) -> None:
     for result, _ in machines:
         assert result.uncertainty["drive_torque_gain_common"] == pytest.approx(0.01)
         assert result.uncertainty["drive_torque_gain"] < 0.012

@@ -21,6 +21,7 @@ from terragrip.recording import Recording, sensor_noise, without_held
 from terragrip.vehicle import Vehicle
 
 _SLOPE, _PITCH_ZERO = float(np.radians(0.5)), float(np.radians(0.2))  # priors where the vehicle states none
+_UNSTATED_RADIUS = 0.02  # relative, likewise
 _SENSOR_BIAS = 0.03  # m/s^2, likewise, of an accelerometer
 
 
@@ -71,7 +72,8 @@ def calibrate(recordings: Recording | Sequence[Recording], vehicle: Vehicle) -> 
     else:
         unknown += gains
     if isinstance(rolling, Rolling) and rolled is not zeroed:
-        found += _radii(rolling, gains if isinstance(gains, RelativeGains) else None, vehicle)
+        apart = gains if isinstance(gains, RelativeGains) else None
+        found += _useful(_radii(rolling, apart, vehicle), vehicle, unknown)
     found += shared
     try:
         found.append(identify_torque_scale(_with_gains(corrected, shared), rolled))
@@ -93,7 +95,9 @@ def _zeros(
         zeros.inclination_zeros(standing, vehicle, sources, noise["acceleration"]),
     ):
         unknown += missing
-        found += _possible(quantities, vehicle, unknown)
+        possible = _possible(quantities, vehicle, unknown)
+        for key in dict.fromkeys(quantity.key for quantity in possible):
+            found += _useful([quantity for quantity in possible if quantity.key == key], vehicle, unknown)
     return found, unknown, zeros.yaw_rate_zero(standing, vehicle, standing.yaw_rate)
 
 
@@ -178,13 +182,29 @@ def _channel_errors(found: Sequence[Quantity], vehicle: Vehicle, logs: Sequence[
     )
 
 
-def _useful(gains: list[Quantity], vehicle: Vehicle, unknown: list[Unknown]) -> list[Quantity]:
-    """The gains, or none if the vehicle file knows them better already."""
-    prior, errors = vehicle.uncertainty.drive_torque_gain, [quantity.own_std or 0.0 for quantity in gains]
-    if not errors or prior is None or max(errors) < prior:
-        return gains
-    why = f"told to {100 * max(errors):.1f} %, and the vehicle file knows them to {100 * prior:.1f} %: drive farther"
-    unknown.append(Unknown("drive_torque_gain", why))
+def _useful(quantities: list[Quantity], vehicle: Vehicle, unknown: list[Unknown]) -> list[Quantity]:
+    """The quantities of one kind, or none if the vehicle file knows them better already."""
+    if not quantities:
+        return []
+    key, stated = quantities[0].key, vehicle.uncertainty
+    relative = key in ("drive_torque_gain", "wheel_radius")
+    prior = {
+        "drive_torque_gain": stated.drive_torque_gain,
+        "drive_torque_offset": stated.drive_torque_offset,
+        "drawbar_offset": stated.drawbar_offset,
+        "wheel_radius": _UNSTATED_RADIUS if stated.wheel_radius is None else stated.wheel_radius,
+    }.get(key)
+    errors = [
+        (q.std if q.own_std is None else q.own_std) / (abs(q.value) if relative else 1.0) for q in quantities
+    ]
+    if prior is None or max(errors) < prior:
+        return quantities
+    worst, known = (
+        f"{100 * x:.2g} %" if relative else f"{x:.2g} {quantities[0].unit}" for x in (max(errors), prior)
+    )
+    unknown.append(
+        Unknown(key, f"told to {worst} only, and the vehicle file knows it to {known}: record more")
+    )
     return []
 
 
