@@ -30,6 +30,13 @@ static void shift_loads(const tg_estimator *e, const tg_real *mu, tg_deviation *
     d->acceleration = d->accelerometer = force * e->constants.inverse_mass;
 }
 
+/* The slope is known better where the motion shows it. */
+static tg_real slope_spread(const tg_estimator *e)
+{
+    const tg_real given = e->settings.uncertainty.slope, found = tgi_sqrt(e->slope.error_variance);
+    return e->slope.running && found < given ? found : given;
+}
+
 /* Work out e->deviation, one a constant in the order of tgi_deviation_columns; `u` are the inputs along the travel, `mu` the adhesion.
  * What a constant does not touch stays 0 from the start. */
 void tgi_deviations(tg_estimator *e, const tg_input *u, const tg_real *mu)
@@ -55,7 +62,7 @@ void tgi_deviations(tg_estimator *e, const tg_input *u, const tg_real *mu)
         d->acceleration = d->accelerometer = -tgi_sqrt(variance) * e->constants.inverse_mass;
         d++;
     }
-    if (spread->slope > 0) (d++)->acceleration = -s->machine.gravity * spread->slope; /* cos(slope) moves by its square only */
+    if (spread->slope > 0) (d++)->acceleration = -s->machine.gravity * slope_spread(e); /* cos(slope) moves by its square only */
     if (spread->tire_rolling_resistance > 0) {
         for (int32_t i = 0; i < n; i++)
             d->wheel_acceleration[i] = -s->machine.radius[i] * spread->tire_rolling_resistance * u->load[i] * inverse_inertia[i];

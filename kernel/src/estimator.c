@@ -2,6 +2,8 @@
 #include "estimator.h"
 
 #define TG_JOLT_MEMORY 5 /* s */
+#define TG_SWING 3      /* samples that a jolt lasts */
+#define TG_UNMODELLED 2
 #define TG_LONGEST_WALK 30 /* s of random walk that a gap adds at most: beyond it the ground is simply unknown */
 
 /* ---- the filter ---- */
@@ -89,7 +91,8 @@ static void drift(tg_estimator *e, tg_real dt)
     restart(e, dt, x, P);
 }
 
-/* The row's channels along the travel, and their variances. The accelerometer's jolts come in swings, not as white noise. */
+/* The row's channels along the travel, and their variances. The accelerometer's jolts come in swings, not as white noise, and so count
+ * TG_SWING times. */
 static void measured(const tg_estimator *e, const tg_row *row, tg_real *y, tg_real *r)
 {
     const int32_t n = e->settings.machine.wheels;
@@ -101,7 +104,7 @@ static void measured(const tg_estimator *e, const tg_row *row, tg_real *y, tg_re
     y[n] = d * row->value[TG_GROUND_SPEED];
     r[n] = row->ground_variance;
     y[n + 1] = d * row->value[TG_ACCELERATION_X];
-    r[n + 1] = 2 * e->jolt;
+    r[n + 1] = e->constants.least_jolt + TG_SWING * (e->jolt - e->constants.least_jolt);
 }
 
 /* What the accelerometer reads beyond the model, its mean square over about TG_JOLT_MEMORY: on rough ground the body's jolts are
@@ -219,6 +222,7 @@ static void report(tg_estimator *e, const tg_drive *drive, tg_estimate *out)
     e->scene.direction = (tg_real)e->direction;
     e->scene.standing = (tg_real)e->standing;
     e->scene.seen_motion = (tg_real)e->seen_motion;
+    e->scene.unmodelled = TG_UNMODELLED * (e->jolt - e->constants.least_jolt) / tgi_square(e->settings.machine.gravity);
     tgi_traction(&e->settings, &e->belief, e->consider.s, &e->scene, o);
     o[TG_OUT_NIS] = e->belief.nis;
     o[TG_OUT_CHANNELS] = (tg_real)e->belief.channels;

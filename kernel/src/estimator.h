@@ -37,6 +37,7 @@ typedef struct { /* one row, calibrated and checked, in the vehicle's own direct
 typedef struct { /* what a row's values need beside the belief; all reals, so that it goes into a record */
     tg_real load[8]; /* wheel, N */
     tg_real direction, standing, seen_motion;
+    tg_real unmodelled; /* variance of rho_s from forces that the model does not know */
     tg_real anew; /* the filter was started anew: nothing links this row to the one before */
 } tgi_scene;
 
@@ -138,6 +139,7 @@ void tgi_believe(tg_estimator *e);
 tg_status tgi_filter_anew(tg_filter *f, tg_consider *c, const tg_settings *s);
 
 /* slope.c */
+void tgi_slope_correct(tgi_slope *s, tg_real speed, tg_real noise);
 tg_real tgi_slope_update(tg_estimator *e, const tg_row *row, tg_real pitch, tg_real dt);
 
 /* reckoning.c */

@@ -56,15 +56,16 @@ static tg_real hold_variance(const tg_hold *h, double time, tg_real noise)
     return variance;
 }
 
-/* Error of one held input as extra variance of its state over a step: constant between two samples, so that what it adds to the
- * state over their interval T is (T error)^2, spread evenly over the steps. `unknown` is its variance before its first sample and
- * once it is older than a gap. */
+/* Error of one held input as extra variance of its state over the step that ends at `time`. The error stays the same from sample to
+ * sample: `age` after one it has moved the state by (age error), so this step adds error^2 (age^2 - (age - dt)^2). Of that only a half
+ * counts: what lasts, the estimated adhesion takes along (tuned, see tg_default_settings). `unknown` is the variance before the first
+ * sample and once the last one is older than a gap. */
 static tg_real held_noise(const tg_estimator *e, const tg_hold *h, double time, tg_real dt, tg_real noise, tg_real unknown)
 {
     if (h->count == 0) return dt * unknown;
-    tg_real age = (tg_real)(time - h->time), interval = h->interval > age ? h->interval : age;
+    tg_real age = (tg_real)(time - h->time);
     tg_real variance = hold_variance(h, time, noise) + (age > e->settings.gap ? unknown : 0);
-    return dt * interval * variance;
+    return dt * (2 * age - dt) / 2 * variance;
 }
 
 /* Input noise of the step that ends at `time`, from the inputs as they were held over it (PHYSICS 1: torque moves omega, drawbar

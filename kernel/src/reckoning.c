@@ -5,8 +5,11 @@
 #define TG_SILENCE ((tg_real)0.5)    /* s without a ground speed after which it is reckoned */
 #define TG_SLIP_MEMORY ((tg_real)1)  /* s over which slip and adhesion are remembered */
 #define TG_STEEPNESS ((tg_real)11.36) /* k of mu = A (1 - exp(-k s)), the paper's prototype curve (PHYSICS 5) */
-#define TG_UNKNOWN_FORCE ((tg_real)0.1) /* m^2/s^3, of the speed while it is only reckoned */
-#define TG_ERROR_TIME ((tg_real)1)   /* s over which the error of a reckoned speed stays alike */
+#define TG_MOST_SLOPE ((tg_real)0.4) /* of slip over adhesion */
+#define TG_SLIP_SPREAD ((tg_real)0.03) /* SD of a remembered slip; its variance grows by a fifth a second */
+#define TG_ALIKE ((tg_real)0.3)      /* s over which the error of a reckoned speed stays alike */
+#define TG_CARRIED_ALIKE ((tg_real)0.1) /* s, of one that the accelerometer carries on */
+#define TG_UNKNOWN_FORCE ((tg_real)0.03) /* m^2/s^3 of noise on the speed while it is only reckoned */
 
 /* Mean rim speed and mean adhesion over the load, along the travel. */
 static void means(const tg_estimator *e, const tg_drive *drive, tg_real *rim, tg_real *adhesion)
@@ -40,13 +43,13 @@ static tg_real slip_at(const tgi_slip_memory *m, tg_real adhesion)
 {
     tg_real level = m->adhesion > (tg_real)0.1 ? m->adhesion : (tg_real)0.1, slip = m->slip > 0 ? m->slip : 0;
     tg_real slope = slip > 0 ? tgi_expm1(TG_STEEPNESS * slip) / (TG_STEEPNESS * level) : 1 / (TG_STEEPNESS * level);
-    if (slope > 1) slope = 1;
+    if (slope > TG_MOST_SLOPE) slope = TG_MOST_SLOPE;
     tg_real found = m->slip + slope * (adhesion - m->adhesion);
     return found < (tg_real)-0.2 ? (tg_real)-0.2 : found > (tg_real)0.8 ? (tg_real)0.8 : found;
 }
 
-/* Give the row a reckoned ground speed where the sensor has been silent, with a variance that grows with the silence and tells the filter
- * that the error is the same for a while: a white one would be averaged away. */
+/* Give the row a reckoned ground speed where the sensor has been silent. Its error stays alike for a while, which the variance makes up
+ * for: a white one would be averaged away. With an accelerometer it only corrects the speed that the accelerometer carries on. */
 void tgi_reckon(tg_estimator *e, const tg_drive *drive, tg_real dt, tg_row *row, tg_real *q)
 {
     row->ground_variance = e->constants.variance[TG_GROUND_SPEED];
@@ -57,10 +60,18 @@ void tgi_reckon(tg_estimator *e, const tg_drive *drive, tg_real dt, tg_row *row,
     tg_real silence = (tg_real)(row->time - e->ground_time), rim, adhesion;
     if (silence < TG_SILENCE || !row->measured || !(dt > 0)) return;
     means(e, drive, &rim, &adhesion);
-    tg_real spread = tgi_square((tg_real)0.02) * (1 + silence);
-    q[e->settings.machine.wheels] += TG_UNKNOWN_FORCE * dt;
+    tg_real spread = tgi_square(TG_SLIP_SPREAD) * (1 + silence / 5), alike = TG_ALIKE;
     if (spread > tgi_square((tg_real)0.15)) spread = tgi_square((tg_real)0.15);
-    row->value[TG_GROUND_SPEED] = (tg_real)e->direction * rim * (1 - slip_at(&e->slip_memory, adhesion));
-    row->ground_variance = (tgi_square(rim) * spread + tgi_square((tg_real)0.01)) * (1 + 2 * TG_ERROR_TIME / dt);
+    tg_real speed = (tg_real)e->direction * rim * (1 - slip_at(&e->slip_memory, adhesion));
+    tg_real variance = tgi_square(rim) * spread + tgi_square((tg_real)0.01);
+    if (e->slope.running) {
+        tgi_slope_correct(&e->slope, speed, variance * (1 + 2 * alike / dt));
+        speed = e->slope.speed;
+        variance = e->slope.speed_variance;
+        alike = TG_CARRIED_ALIKE;
+    }
+    row->value[TG_GROUND_SPEED] = speed;
+    row->ground_variance = variance * (1 + 2 * alike / dt);
     row->reckoned = 1;
+    q[e->settings.machine.wheels] += TG_UNKNOWN_FORCE * dt;
 }

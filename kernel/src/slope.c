@@ -4,7 +4,7 @@
  * as it should: the two then agree on dv/dt. */
 #include "estimator.h"
 
-#define TG_SLOPE_WALK ((tg_real)2e-5) /* rad^2/s */
+#define TG_SLOPE_WALK ((tg_real)5e-6) /* rad^2/s */
 #define TG_SLOPE_LIMIT ((tg_real)0.5) /* rad */
 #define TG_SPEED_WALK ((tg_real)1e-3) /* m^2/s^3: jolts that the accelerometer's noise does not hold */
 
@@ -26,9 +26,10 @@ static void predict(tgi_slope *s, const tg_settings *settings, tg_real pitch, tg
     s->error_variance += TG_SLOPE_WALK * dt;
 }
 
-static void update(tgi_slope *s, const tg_settings *settings, tg_real speed)
+/* Take a ground speed of this variance. */
+void tgi_slope_correct(tgi_slope *s, tg_real speed, tg_real noise)
 {
-    tg_real noise = tgi_square(settings->noise[TG_GROUND_SPEED]), innovation = speed - s->speed;
+    tg_real innovation = speed - s->speed;
     tg_real variance = s->speed_variance + noise, size = tgi_square(innovation) / variance;
     if (size > 9) variance += noise * (tgi_sqrt(size) / 3 - 1); /* a spike: weighted as in the main filter */
     tg_real gain = s->speed_variance / variance, error_gain = s->covariance / variance;
@@ -51,7 +52,7 @@ tg_real tgi_slope_update(tg_estimator *e, const tg_row *row, tg_real pitch, tg_r
     if (s->running && dt > 0) predict(s, settings, pitch, dt);
     if (!isnan(row->value[TG_ACCELERATION_X])) s->acceleration = row->value[TG_ACCELERATION_X];
     if (!isnan(speed)) {
-        if (s->running) update(s, settings, speed);
+        if (s->running) tgi_slope_correct(s, speed, e->constants.variance[TG_GROUND_SPEED]);
         else if (e->acceleration.seen) start(s, settings, speed);
     }
     return pitch + s->error;

@@ -124,6 +124,7 @@ void tgi_traction(const tg_settings *s, const tg_belief *b, const tg_real (*S)[T
     thrust /= s->machine.mass * s->machine.gravity;
 #define TRACTION(n, stride)         \
     gather(b, S, n, stride, &c);    \
+    c.rr += scene->unmodelled;      \
     traction(s, b->x, &c, thrust, o, n)
     TG_BY_WHEELS(n, TRACTION)
 #undef TRACTION
