@@ -83,7 +83,7 @@ def command(
 
 def table(library: Mapping[str, Soil]) -> str:
     """The library as lines of text: soil, model, first free parameter with its interval, R2, NRMSE, bins."""
-    rows = [("soil", "model", "parameters (95 % interval)", "R2", "NRMSE", "bins")]
+    rows: list[tuple[str, ...]] = [("soil", "model", "parameters (95 % interval)", "R2", "NRMSE", "bins")]
     for name, one in library.items():
         free = one.fit.get("free", list(one.parameters))
         words = []
