@@ -9,7 +9,6 @@ The targets are those of the project's plan, for a machine where filterpy needs 
 from __future__ import annotations
 
 import argparse
-import importlib.util
 import json
 import os
 import subprocess
@@ -174,13 +173,11 @@ def _run(*command: str) -> None:
 
 
 def _command() -> list[str]:
-    """The installed command beside this interpreter, else the module."""
+    """The installed command beside this interpreter, else what it calls."""
     beside = Path(sys.executable).with_name("terragrip")
     if os.access(beside, os.X_OK):
         return [str(beside)]
-    if importlib.util.find_spec("terragrip.cli.__main__"):
-        return [sys.executable, "-m", "terragrip.cli"]
-    raise SystemExit("terragrip is not installed beside this Python: pip install -e .")
+    return [sys.executable, "-c", "from terragrip.cli import main; main()"]
 
 
 if __name__ == "__main__":
