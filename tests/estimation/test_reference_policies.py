@@ -195,6 +195,27 @@ def test_A_stays_within_its_bounds():
     assert smallest == 0.05
 
 
+def test_A_remembers_softened_innovations_pair_by_pair():
+    F = H = np.eye(2)
+    adaptive = AdaptiveFilter(
+        KalmanFilter(F, H, np.zeros((2, 2)), np.eye(2), [0, 0], np.diag([3.0, 8.0]), huber=2.0),
+        [0, 0],
+        2,
+        memory=2.0,
+    )
+    adaptive.step([10.0, np.nan], dt=0.0)  # SD 2: w = .4; no time passes, so C is the S with R/w
+    assert adaptive.adaptation.C[0, 0] == pytest.approx(3 + 1 / 0.4)
+    assert np.isnan(adaptive.adaptation.C[0, 1])
+    before, seen = adaptive.adaptation.C[0, 0], adaptive.filter.observe()
+    update = adaptive.step([20.0, 1.0], dt=0.5)
+    share = 1 - np.exp(-0.5 / 2.0)
+    weighted = update.weight[0] * update.innovation[0] ** 2
+    assert update.weight[0] < 0.5
+    assert adaptive.adaptation.C[0, 0] == pytest.approx(before + share * (weighted - before))
+    start = seen.covariance[1, 1] + 1
+    assert adaptive.adaptation.C[1, 1] == pytest.approx(start + share * (1 - start))
+
+
 def test_gamma_blends_between_the_given_and_the_adapted_noise():
     def prior_variance(gamma: float) -> float:
         adaptive = AdaptiveFilter(KalmanFilter([[1.0]], [[1.0]], [[0.0]], [[1.0]], [0.0], [[1.0]]), [2.0], 1)
@@ -240,19 +261,18 @@ def test_table_by_hand():
     assert supervise(0.03, 0.15) == pytest.approx(0.75 * 0.6 + 0.25 * 0.75)
 
 
-def test_speed_supervisor_sees_a_ramp_of_known_size():
+def test_speed_supervisor_sees_a_step_of_known_size():
     supervisor = SpeedSupervisor(0.5, wheel_speed_min=0.5, ground_speed_min=0.1)
     gammas = []
-    for k in range(101):  # 1 s at 100 Hz: wheel 2 at 10 rad/s, from .4 s on 10 % more
+    for k in range(101):  # 1 s at 100 Hz: wheel 2 at 10 rad/s, from .4 s on 15 % more
         t = k / 100
-        gammas.append(supervisor.gamma(t, np.array([5.0, 10.0 if t < 0.395 else 11.0]), 1.0))
+        gammas.append(supervisor.gamma(t, np.array([5.0, 10.0 if t < 0.395 else 11.5]), 1.0))
     assert gammas[39] == pytest.approx(0.1)
-    mean = (39 * 10 + 11) / 40  # kept at 0 .. .39 s; the reference is not in the mean: 1..39 and now
-    assert gammas[40] == pytest.approx(supervise(1 / ((39 * 10 + 11) / 40), 0.0))
-    assert 0.06 < 1 / mean < 0.10
-    # at .6 s the reference is .1 s (10), the mean over .11 .. .6: 29 of 10 and 21 of 11
-    assert gammas[60] == pytest.approx(supervise(1 / ((29 * 10 + 21 * 11) / 50), 0.0))
-    assert gammas[89] == pytest.approx(0.4)
+    # the reference is 0 s and not in the mean: .01 .. .39 of 10, now of 11.5
+    assert gammas[40] == pytest.approx(supervise(1.5 / ((39 * 10 + 11.5) / 40), 0.0), rel=1e-9)
+    # at .6 s the reference is .1 s, the mean over .11 .. .6: 29 of 10 and 21 of 11.5
+    assert gammas[60] == pytest.approx(supervise(1.5 / ((29 * 10 + 21 * 11.5) / 50), 0.0), rel=1e-9)
+    assert gammas[89] == pytest.approx(supervise(1.5 / 11.5, 0.0), rel=1e-9)
     assert gammas[90] == pytest.approx(0.1)  # the reference, .4 s, is after the change
 
 
