@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import signal
 import zlib
 from collections.abc import Callable, Generator, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
@@ -54,7 +55,7 @@ def _each(jobs: list[tuple[Scenario, int, int]], workers: int) -> Generator[Simu
     if workers <= 1:
         yield from map(_one, jobs)
         return
-    pool = ProcessPoolExecutor(workers)
+    pool = ProcessPoolExecutor(workers, initializer=_ignore_interrupts)
     try:
         # A few runs ahead of the reader, no more: results are large.
         ahead = [pool.submit(_one, job) for job in jobs[: 2 * workers]]
@@ -64,6 +65,11 @@ def _each(jobs: list[tuple[Scenario, int, int]], workers: int) -> Generator[Simu
                 ahead.append(pool.submit(_one, jobs[k + 2 * workers]))
     finally:
         pool.shutdown(cancel_futures=True)
+
+
+def _ignore_interrupts() -> None:
+    """Ctrl-C reaches the workers too: one that it stops while it holds a queue would hang the others."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
 
 
 def _one(job: tuple[Scenario, int, int]) -> SimulationResult:
