@@ -140,6 +140,28 @@ tg_status tg_record_take(tg_real *record, tg_track *t, const tg_filter *f, const
 tg_status tg_record_moments(int32_t wheels, int32_t columns, const tg_real *record, tg_real *x, tg_real *P, tg_real *s);
 tg_status tg_smooth_step(int32_t wheels, int32_t columns, const tg_real *here, const tg_real *next, tg_real *x, tg_real *P, tg_real *s);
 
+/* ---- The adhesion curve while driving (paper, Fig. 2): a of mu = a g(s), g the paper's prototype (PHYSICS 5), from single pairs. ---- */
+
+typedef struct {
+    tg_real a;
+    tg_real variance; /* of a, random errors only */
+    tg_real constant; /* by how much one SD of what stays constant in the pairs moves a */
+    tg_real surprise; /* mean square of recent residuals in their variances: 1 on one ground */
+    tg_real adhesion, height; /* mean mu and g(s) of recent pairs */
+    tg_real silence;  /* s since the last pair; negative: none yet */
+} tg_curve;
+typedef struct {
+    tg_real adhesion, slip;
+    tg_real adhesion_variance, slip_variance; /* random errors */
+    tg_real adhesion_constant;                /* SD of the constant error of mu */
+    tg_real radius_error;                     /* relative SD of the rolling radius: shifts mu and slip */
+} tg_pair;
+tg_curve tg_curve_unknown(void); /* also: a new ground */
+/* `pairs` of one instant, weighted by `share` (> 0; load), dt s and `distance` m after the last. A pair with a NaN or a slip above 60 %
+ * teaches nothing, nor do pairs whose mean is below g(5 %); residuals that one ground does not make start a anew. */
+tg_status tg_curve_update(tg_curve *c, tg_real dt, tg_real distance, int32_t pairs, const tg_pair *pair, const tg_real *share);
+tg_real tg_curve_std(const tg_curve *c); /* of a, random and constant errors */
+
 /* ---- Estimator floor: one raw sample in, one row of estimates out. A whole recording is its samples, one after another. ---- */
 
 /* Places of a sample's channels. Wheels and axles in the vehicle's order, front to rear, left to right. */
@@ -153,7 +175,8 @@ enum {
     TG_PITCH = 20,           /* rad, nose up positive */
     TG_ROLL = 21,            /* rad, left side up positive */
     TG_VERTICAL_LOAD = 22,   /* + axle, N */
-    TG_SLOTS = 30
+    TG_YAW_RATE = 30,        /* rad/s, to the left positive */
+    TG_SLOTS = 32
 };
 
 /* Places of an estimate's values. Each `_STD` holds the considered constants. */
@@ -177,7 +200,11 @@ enum {
     TG_OUT_EFFICIENCY = 72,
     TG_OUT_EFFICIENCY_STD = 80,
     TG_OUT_VERTICAL_LOAD = 88, /* + axle */
-    TG_OUT_SLOTS = 96
+    TG_OUT_CURVE = 96,       /* the vehicle's scale a of the adhesion curve while driving; smoothing leaves it as it was */
+    TG_OUT_CURVE_STD = 97,
+    TG_OUT_WHEEL_CURVE = 98, /* + wheel */
+    TG_OUT_WHEEL_CURVE_STD = 106,
+    TG_OUT_SLOTS = 114
 };
 
 typedef enum {
@@ -191,14 +218,14 @@ typedef enum { TG_FILTERED = 0, TG_ALGEBRAIC = 1 } tg_method;
 
 typedef struct {
     double time;            /* s, rising */
-    tg_real value[30];      /* NaN = not measured at that instant */
+    tg_real value[32];      /* NaN = not measured at that instant */
 } tg_sample;
 
 typedef struct {
     double time;
     double distance;
     int32_t event;          /* tg_event */
-    tg_real value[96];
+    tg_real value[114];
 } tg_estimate;
 
 typedef struct { /* spreads (1 SD) of constants that the data cannot tell; 0 = known */
@@ -225,13 +252,14 @@ typedef struct {
     tg_real load_share[8];          /* axle: part of the weight it carries at rest on level ground */
     tg_real load_transfer[8];       /* axle, 1/m: load gained per N m of nose-down moment (two axles: 1/L, -1/L) */
     tg_real wheel_share[8];         /* wheel: part of its axle's load */
+    tg_real wheel_side[8];          /* wheel, m left of the middle: its hub moves at v - side x yaw rate */
     tg_real lateral_share[8];       /* wheel, s^2/m: part of its axle's load it loses per m/s^2 to the left */
     tg_real center_of_gravity_height; /* m */
     tg_real hitch_height;           /* m */
     tg_real rolling_radius[8];      /* wheel, m: travel per radian; machine.radius is the torque arm */
-    tg_real offset[30], gain[30];   /* calibration: value = (raw - offset) / gain */
-    tg_real noise[30];              /* SD of each channel after calibration */
-    tg_real held_period[30];        /* s; > 0: the channel repeats its last value between updates this far apart */
+    tg_real offset[32], gain[32];   /* calibration: value = (raw - offset) / gain */
+    tg_real noise[32];              /* SD of each channel after calibration */
+    tg_real held_period[32];        /* s; > 0: the channel repeats its last value between updates this far apart */
     tg_uncertainty uncertainty;
     tg_real prior_adhesion, prior_adhesion_std;     /* before the first sample */
     tg_real prior_resistance, prior_resistance_std;
@@ -252,6 +280,8 @@ tg_settings tg_default_settings(void);
 tg_status tg_tune_walks(tg_settings *settings);
 tg_status tg_estimator_init(tg_estimator *e, const tg_settings *settings);
 tg_status tg_estimator_update(tg_estimator *e, const tg_sample *sample, tg_estimate *out);
+/* The ground is another one from here on: what was learned of its adhesion curve no longer holds. */
+tg_status tg_estimator_new_ground(tg_estimator *e);
 /* `rows` samples from columns (a null pointer: never measured) to columns (null: not wanted); doubles on either build. `done` tells
  * how many rows went through before a status other than TG_OK. */
 tg_status tg_estimator_block(tg_estimator *e, size_t rows, const double *time, const double *const *in, double *const *out,

@@ -219,11 +219,13 @@ static void report(tg_estimator *e, const tg_drive *drive, tg_estimate *out)
 {
     tg_real *o = out->value;
     memcpy(e->scene.load, drive->load, sizeof drive->load);
+    for (int32_t i = 0; i < e->settings.machine.wheels; i++)
+        e->scene.hub[i] = -(tg_real)e->direction * e->settings.wheel_side[i] * e->yaw_rate;
     e->scene.direction = (tg_real)e->direction;
     e->scene.standing = (tg_real)e->standing;
     e->scene.seen_motion = (tg_real)e->seen_motion;
     e->scene.unmodelled = TG_UNMODELLED * (e->jolt - e->constants.least_jolt) / tgi_square(e->settings.machine.gravity);
-    tgi_traction(&e->settings, &e->belief, e->consider.s, &e->scene, o);
+    tgi_traction(&e->settings, &e->belief, (const tg_real(*)[TG_ROWS])e->consider.s, &e->scene, o);
     o[TG_OUT_NIS] = e->belief.nis;
     o[TG_OUT_CHANNELS] = (tg_real)e->belief.channels;
     o[TG_OUT_SUPERVISOR] = e->belief.supervisor;
@@ -244,6 +246,7 @@ tg_status tg_estimator_update(tg_estimator *e, const tg_sample *sample, tg_estim
     int32_t was_standing = e->standing, gap, n = e->settings.machine.wheels;
     tg_real dt = e->started ? (tg_real)(row.time - e->time) : 0, travelled = tgi_fabs(e->belief.x[n + 1]);
     int32_t turned = tgi_track_motion(e, &row);
+    tgi_track_turn(e, &row);
     tg_real q[TG_MAX_STATES];
     tgi_input_noise(e, row.time, dt, q); /* of the inputs held so far: before this row's are taken */
     tgi_take_inputs(e, &row, dt, &drive);
@@ -268,6 +271,7 @@ tg_status tg_estimator_update(tg_estimator *e, const tg_sample *sample, tg_estim
     out->event = gap || course == TG_WAIT ? TG_EVENT_GAP : e->standing ? TG_EVENT_STANDSTILL
                : row.outlier ? TG_EVENT_OUTLIER : TG_EVENT_NONE;
     report(e, &drive, out);
+    tgi_curves(e, course == TG_GO && out->event == TG_EVENT_NONE, dt, e->standing ? 0 : travelled * dt, drive.load, out->value);
     return TG_OK;
 }
 

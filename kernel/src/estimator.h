@@ -1,6 +1,7 @@
 /* Inside the estimator floor. Signals here are calibrated; "along" means in the direction of travel (PHYSICS 2). */
 #ifndef TG_ESTIMATOR_H
 #define TG_ESTIMATOR_H
+#include "curve.h"
 #include "filter.h"
 #include <math.h>
 #include <string.h>
@@ -36,6 +37,7 @@ typedef struct { /* one row, calibrated and checked, in the vehicle's own direct
 
 typedef struct { /* what a row's values need beside the belief; all reals, so that it goes into a record */
     tg_real load[8]; /* wheel, N */
+    tg_real hub[8];  /* wheel, m/s: what its hub is faster than the vehicle, along the travel */
     tg_real direction, standing, seen_motion;
     tg_real unmodelled; /* variance of rho_s from forces that the model does not know */
     tg_real anew; /* the filter was started anew: nothing links this row to the one before */
@@ -100,6 +102,9 @@ struct tg_estimator {
     tg_real last_raw[TG_SLOTS];
     double last_raw_time[TG_SLOTS];
     tg_hold torque[8], drawbar, pitch, axle_load[8];
+    tg_real yaw_rate;
+    double yaw_time;           /* of its last sample */
+    double slow_time;          /* when the ground speed was last near 0 */
     tg_lowpass wheel_speed[8], ground_speed, acceleration, lateral, balance;
     tgi_slip_memory slip_memory;
     tgi_slope slope;
@@ -109,6 +114,9 @@ struct tg_estimator {
     tg_belief belief;
     tg_algebra algebra;
     tgi_scene scene;           /* of the last row */
+    tg_curve curve, wheel_curve[8];
+    tg_real curve_std, wheel_curve_std[8];
+    tg_real curve_wait, curve_distance; /* s and m since the curves were last brought up to date */
     tg_track *track;           /* while a smoother's records are written, else null */
     tg_filter filter;
     tg_consider consider;
@@ -119,6 +127,7 @@ TG_INLINE tg_real tgi_square(tg_real x) { return x * x; }
 /* quality.c */
 tg_status tgi_clean(tg_estimator *e, const tg_sample *sample, tg_row *row);
 tg_real tgi_lowpass(tg_lowpass *f, tg_real x, double time, tg_real tau);
+void tgi_track_turn(tg_estimator *e, const tg_row *row);
 int32_t tgi_track_motion(tg_estimator *e, const tg_row *row);
 
 /* loads.c */
@@ -148,6 +157,10 @@ void tgi_reckon(tg_estimator *e, const tg_drive *drive, tg_real dt, tg_row *row,
 
 /* algebraic.c */
 void tgi_algebraic(tg_estimator *e, const tg_row *row, const tg_drive *drive, int32_t anew);
+
+/* curves.c */
+void tgi_no_curves(tg_estimator *e);
+void tgi_curves(tg_estimator *e, int32_t learn, tg_real dt, tg_real distance, const tg_real *load, tg_real *o);
 
 /* traction.c */
 void tgi_traction(const tg_settings *s, const tg_belief *b, const tg_real (*S)[TG_ROWS], const tgi_scene *scene, tg_real *o);

@@ -1,6 +1,8 @@
 /* What a raw sample is worth: calibration, impossible and held values; standstill and the direction of travel. */
 #include "estimator.h"
 
+#define TG_LEAP 0.5 /* s */
+
 /* A held channel repeats its last value until it is measured anew. A repetition counts as a measurement only after 1.5 periods, and
  * then only of an input (constant torque is common) or of 0 (standstill): a speed that stays the same to the last bit is a silent
  * sensor. */
@@ -64,6 +66,24 @@ static int32_t recent(const tg_lowpass *f, double time, tg_real age)
     return f->seen && time - f->time <= (double)age;
 }
 
+/* The yaw rate as last measured; after a second without it the vehicle is taken to drive straight. */
+void tgi_track_turn(tg_estimator *e, const tg_row *row)
+{
+    if (!isnan(row->value[TG_YAW_RATE])) {
+        e->yaw_rate = row->value[TG_YAW_RATE];
+        e->yaw_time = row->time;
+    } else if (row->time - e->yaw_time > 1) {
+        e->yaw_rate = 0;
+    }
+}
+
+/* Whether the ground speed speaks against standstill. While no wheel turns, half a second of it must: a single leap is the sensor's. */
+static int32_t moves(tg_estimator *e, tg_real ground, double time)
+{
+    if (tgi_fabs(ground) < 2 * e->settings.standstill_speed) e->slow_time = time;
+    return !e->standing || time - e->slow_time > TG_LEAP;
+}
+
 /* Low-passed speeds tell standstill and the direction of travel, both with hysteresis so that noise does not flicker. A ground speed
  * that is a second old no longer counts. Returns 1 where the direction has turned. */
 int32_t tgi_track_motion(tg_estimator *e, const tg_row *row)
@@ -82,7 +102,7 @@ int32_t tgi_track_motion(tg_estimator *e, const tg_row *row)
     if (seen > 0) rim /= (tg_real)seen;
     if (recent(&e->ground_speed, row->time, age)) {
         seen++;
-        if (tgi_fabs(ground) > fastest) fastest = tgi_fabs(ground);
+        if (moves(e, ground, row->time) && tgi_fabs(ground) > fastest) fastest = tgi_fabs(ground);
     } else {
         ground = rim;
     }

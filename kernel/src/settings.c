@@ -64,7 +64,7 @@ static tg_status check_wheels(const tg_settings *s)
     for (int32_t i = 0; i < s->machine.wheels; i++) {
         if (s->wheel_axle[i] < 0 || s->wheel_axle[i] >= s->axles) return TG_BAD_ARGUMENT;
         if (!is_positive(s->rolling_radius[i]) || !is_positive(s->wheel_share[i])) return TG_NOT_POSITIVE;
-        if (!is_number(s->lateral_share[i])) return TG_NOT_FINITE;
+        if (!is_number(s->lateral_share[i]) || !is_number(s->wheel_side[i])) return TG_NOT_FINITE;
         if (!is_positive(s->noise[TG_WHEEL_SPEED + i])) return TG_NOT_POSITIVE;
     }
     for (int32_t k = 0; k < s->axles; k++) {
@@ -112,7 +112,8 @@ static tg_real plausible(int32_t slot)
     if (slot < TG_ACCELERATION_X) return (tg_real)1e7; /* N m, N */
     if (slot < TG_PITCH) return (tg_real)1e3; /* m/s^2 */
     if (slot < TG_VERTICAL_LOAD) return (tg_real)1.5; /* rad */
-    return (tg_real)1e8; /* N */
+    if (slot < TG_YAW_RATE) return (tg_real)1e8; /* N */
+    return 100; /* rad/s */
 }
 
 static int has_channel(const tg_settings *s, int32_t slot)
@@ -120,7 +121,7 @@ static int has_channel(const tg_settings *s, int32_t slot)
     const int32_t torque = slot - TG_DRIVE_TORQUE;
     if (slot < TG_GROUND_SPEED) return slot < s->machine.wheels;
     if (torque >= 0 && torque < TG_MAX_WHEELS) return torque < s->machine.wheels && s->driven[torque];
-    return slot - TG_VERTICAL_LOAD < s->axles;
+    return slot < TG_YAW_RATE ? slot - TG_VERTICAL_LOAD < s->axles : slot == TG_YAW_RATE;
 }
 
 static void work_out_constants(const tg_settings *s, tgi_constants *c)
@@ -205,6 +206,7 @@ tg_status tg_estimator_init(tg_estimator *e, const tg_settings *settings)
     e->slip_memory.slip = (tg_real)0.08; /* a guess until the first ground speed */
     e->slip_memory.adhesion = settings->prior_adhesion;
     for (int32_t k = 0; k < TG_SLOTS; k++) e->last_raw[k] = (tg_real)NAN;
+    tgi_no_curves(e);
     tgi_believe(e);
     return TG_OK;
 }

@@ -61,7 +61,7 @@ TG_INLINE tgi_slip slip_of(tg_real omega, tg_real v, tg_real radius, tg_real lea
 }
 
 /* All wheels, delta method. `mean` is the mean adhesion over the load: what a common radius error does to rho_s. */
-TG_INLINE void traction(const tg_settings *s, const tg_real *x, const tgi_moments *c, tg_real mean, tg_real *o, const int n)
+TG_INLINE void traction(const tg_settings *s, const tg_real *x, const tgi_moments *c, const tg_real *hub, tg_real mean, tg_real *o, const int n)
 {
     const tg_real rho = x[n], v = x[n + 1], error = s->uncertainty.wheel_radius;
     const tg_real tire = s->machine.tire_rolling_resistance, least = (tg_real)0.02;
@@ -75,7 +75,7 @@ TG_INLINE void traction(const tg_settings *s, const tg_real *x, const tgi_moment
         o[TG_OUT_NET_TRACTION_STD + i] = root(c->mm[i] - 2 * c->mr[i] + c->rr + tgi_square((mu - mean) * error));
     }
     for (int i = 0; i < n; i++) {
-        const tgi_slip g = slip_of(x[n + 2 + i], v, s->rolling_radius[i], s->standstill_speed);
+        const tgi_slip g = slip_of(x[n + 2 + i], v + hub[i], s->rolling_radius[i], s->standstill_speed);
         const tg_real slip_variance = g.wheel * (g.wheel * c->ww[i] + 2 * g.ground * c->wv[i]) + g.ground * g.ground * c->vv;
         o[TG_OUT_SLIP + i] = g.slip;
         o[TG_OUT_SLIP_STD + i] = bounded_root(slip_variance + tgi_square(g.radius * error));
@@ -125,7 +125,7 @@ void tgi_traction(const tg_settings *s, const tg_belief *b, const tg_real (*S)[T
 #define TRACTION(n, stride)         \
     gather(b, S, n, stride, &c);    \
     c.rr += scene->unmodelled;      \
-    traction(s, b->x, &c, thrust, o, n)
+    traction(s, b->x, &c, scene->hub, thrust, o, n)
     TG_BY_WHEELS(n, TRACTION)
 #undef TRACTION
     if (scene->direction < 0) {

@@ -44,6 +44,7 @@ def sample_slots(vehicle: Vehicle) -> dict[str, int]:
         "acceleration_y": lib.TG_ACCELERATION_Y,
         "pitch": lib.TG_PITCH,
         "roll": lib.TG_ROLL,
+        "angular_velocity_z": lib.TG_YAW_RATE,
         **{f"vertical_load_{a}": lib.TG_VERTICAL_LOAD + k for k, a in enumerate(vehicle.axle_names)},
     }
 
@@ -69,6 +70,9 @@ def estimate_slots(vehicle: Vehicle) -> dict[str, int]:
             take(f"{quantity}_{wheel}", slot, std, i)
     for k, axle in enumerate(vehicle.axle_names):
         slots[f"vertical_load_{axle}"] = lib.TG_OUT_VERTICAL_LOAD + k
+    take("curve_a", lib.TG_OUT_CURVE, lib.TG_OUT_CURVE_STD)
+    for i, wheel in enumerate(vehicle.wheels):
+        take(f"curve_a_{wheel}", lib.TG_OUT_WHEEL_CURVE, lib.TG_OUT_WHEEL_CURVE_STD, i)
     slots["nis"] = lib.TG_OUT_NIS
     slots["channels"] = lib.TG_OUT_CHANNELS
     slots["supervisor"] = lib.TG_OUT_SUPERVISOR
@@ -167,6 +171,10 @@ class Engine:
         )
         if status != lib.TG_OK:
             raise refusal(status, None)
+
+    def new_ground(self) -> None:
+        """Forget the adhesion curves: the ground is another one."""
+        lib.tg_estimator_new_ground(self._estimator)
 
     def snapshot(self) -> bytes:
         """The estimator as bytes that continue bit for bit."""
@@ -311,9 +319,12 @@ def _set_loads(settings: Any, vehicle: Vehicle) -> None:
                 center_of_gravity_height=vehicle.center_of_gravity_height,
                 track=vehicle.track,
             )
-        for level, leaning in zip(shares[0], shares[1], strict=True):
+        half = (vehicle.track or 0.0) / 2 if count > 1 else 0.0
+        sides = np.linspace(half, -half, count)
+        for level, leaning, side in zip(shares[0], shares[1], sides, strict=True):
             settings.wheel_share[place] = level
             settings.lateral_share[place] = level - leaning
+            settings.wheel_side[place] = side
             place += 1
 
 

@@ -192,6 +192,13 @@ class TractionEstimator:
 
         return run(self, recording)
 
+    def new_ground(self) -> None:
+        """Forget the adhesion curves (``curve_a``, ``curve_a_<wheel>``): from here on the ground is another one.
+
+        A ground that differs enough is noticed without it, within about a second.
+        """
+        self._engine.new_ground()
+
     def snapshot(self) -> bytes:
         """Everything needed to go on later, bit for bit: vehicle, settings and state."""
         about = {

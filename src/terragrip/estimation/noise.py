@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from terragrip.recording import Recording
     from terragrip.vehicle import Vehicle
 
-_SENSOR_OF = {"acceleration_x": "acceleration", "acceleration_y": "acceleration", "roll": "pitch"}
+_SENSOR_OF = {"acceleration_x": "acceleration", "acceleration_y": "acceleration", "roll": "pitch", "angular_velocity_z": "yaw_rate"}
 
 
 def channel_noise(
@@ -88,5 +88,6 @@ def _guesses(vehicle: Vehicle) -> dict[str, float]:
         "drawbar_force": 0.01 * weight,
         "acceleration": 0.3,
         "pitch": 0.01,
+        "yaw_rate": 0.01,
         "vertical_load": 0.02 * weight,
     }

@@ -1,0 +1,173 @@
+/* The adhesion curve while driving (paper, Fig. 2): from single pairs of slip and adhesion the scale a of mu = a g(s), g the paper's
+ * prototype, as a scalar Kalman filter. One pair tells the whole curve, as far as the soil keeps to its form. (R): noise, forgetting and
+ * the way a new ground shows are ours. */
+#include "curve.h"
+
+/* The prototype (paper eq. 8, PHYSICS 5): g(s) = 1 - p e^(alpha_1 s) - (1 - p) e^(alpha_2 s). */
+#define TG_SHARE ((tg_real)0.52)
+#define TG_SLOW ((tg_real)0.01)
+#define TG_RISE ((tg_real)-11.36)
+
+/* The slips that the curve is fitted to (paper: 5 % to 60 %). Below, g is near 0 and a pair says nothing of a. The lower bound is put to
+ * the mean of g: on single slips it would pick those whose error is upward. */
+#define TG_LEAST_HEIGHT ((tg_real)0.2075) /* g(0.05) */
+#define TG_LARGEST_SLIP ((tg_real)0.6)
+
+#define TG_PRIOR ((tg_real)0.85)          /* middle of the paper's five soils */
+#define TG_PRIOR_VARIANCE ((tg_real)0.25) /* 0.5 squared: 0 to 1.85 hold them all */
+#define TG_SCATTER ((tg_real)0.08)        /* SD of adhesion about a soil's curve, as a share of it */
+#define TG_LEAST_SCATTER ((tg_real)0.01)
+#define TG_MEMORY ((tg_real)0.5)          /* s, over which pairs are averaged and their errors are alike */
+#define TG_WANDER ((tg_real)0.004)        /* variance a gains a metre: 0.06 after one, 0.2 after ten */
+#define TG_SURPRISE_MEMORY ((tg_real)1)   /* s */
+#define TG_SURPRISE ((tg_real)4)          /* mean square residual, in variances, that only another ground makes */
+#define TG_LARGEST_SURPRISE ((tg_real)25)
+
+tg_curve tg_curve_unknown(void)
+{
+    const tg_curve c = {TG_PRIOR, TG_PRIOR_VARIANCE, 0, 0, 0, 0, -1};
+    return c;
+}
+
+tg_real tg_curve_std(const tg_curve *c)
+{
+    return c ? tgi_sqrt(c->variance + c->constant * c->constant) : (tg_real)NAN;
+}
+
+/* e^(alpha_1 s) by its series, to 1e-12: alpha_1 s is at most 0.006. */
+static tg_real slow(tg_real s)
+{
+    const tg_real x = TG_SLOW * s;
+    return 1 + x * (1 + x * ((tg_real)0.5 + x * ((tg_real)(1.0 / 6) + x * (tg_real)(1.0 / 24))));
+}
+
+/* Seen from the prototype, odd in slip. `told` is 0 where the pair tells nothing. */
+tgi_sight tgi_look(const tg_pair *p)
+{
+    tgi_sight found;
+    const tg_real s = tgi_fabs(p->slip), sum = p->adhesion + p->adhesion_variance + p->slip_variance + p->adhesion_constant;
+    memset(&found, 0, sizeof found);
+    if (!(s <= TG_LARGEST_SLIP) || isnan(sum) || isinf(sum)) return found;
+    const tg_real first = TG_SHARE * slow(s), second = (1 - TG_SHARE) * tgi_exp(TG_RISE * s), g = 1 - first - second;
+    found.told = 1;
+    found.adhesion = p->adhesion;
+    found.height = p->slip < 0 ? -g : g;
+    found.slope = -TG_SLOW * first - TG_RISE * second;
+    found.variance = p->adhesion_variance;
+    found.slip_variance = p->slip_variance;
+    found.constant = p->adhesion_constant * p->adhesion_constant;
+    found.radius = p->radius_error;
+    found.travel = 1 - s;
+    return found;
+}
+
+/* The residual mu - a g(s): its variance, and by how much one SD of all constants moves it. A radius error e too much lowers mu by mu e
+ * and raises slip by (1 - s) e: both lower the residual. */
+typedef struct {
+    tg_real adhesion, height, variance, constant;
+} tgi_measurement;
+
+static tgi_measurement measure(const tgi_sight *k, tg_real a)
+{
+    const tg_real slope = a * k->slope, radius = (tgi_fabs(k->adhesion) + tgi_fabs(slope) * k->travel) * k->radius;
+    const tg_real scatter = TG_SCATTER * a * k->height;
+    const tg_real variance = k->variance + slope * slope * k->slip_variance + scatter * scatter + TG_LEAST_SCATTER * TG_LEAST_SCATTER;
+    const tgi_measurement m = {k->adhesion, k->height, variance, tgi_sqrt(k->constant + radius * radius)};
+    return m;
+}
+
+/* The mean of the wheels by `share`; their errors are taken as alike, which no count of wheels makes smaller. */
+static int32_t mean_of(const tgi_sight *sight, const tg_real *share, int32_t pairs, tg_real a, tgi_measurement *mean)
+{
+    tg_real sum = 0, sd = 0;
+    memset(mean, 0, sizeof *mean);
+    for (int32_t i = 0; i < pairs; i++) {
+        if (!sight[i].told || !(share[i] > 0)) continue;
+        const tgi_measurement m = measure(&sight[i], a);
+        sum += share[i];
+        mean->adhesion += share[i] * m.adhesion;
+        mean->height += share[i] * m.height;
+        sd += share[i] * tgi_sqrt(m.variance);
+        mean->constant += share[i] * m.constant;
+    }
+    if (!(sum > 0)) return 0;
+    const tg_real inverse = 1 / sum;
+    mean->adhesion *= inverse;
+    mean->height *= inverse;
+    mean->constant *= inverse;
+    mean->variance = sd * inverse * sd * inverse;
+    return 1;
+}
+
+static void wander(tg_curve *c, tg_real distance)
+{
+    c->variance += TG_WANDER * distance;
+    if (c->variance > TG_PRIOR_VARIANCE) c->variance = TG_PRIOR_VARIANCE; /* beyond it a is simply unknown */
+}
+
+/* The mean square of residuals in their variances; 1 on one ground. */
+static int32_t is_new_ground(tg_curve *c, tg_real square, tg_real dt)
+{
+    if (square > TG_LARGEST_SURPRISE) square = TG_LARGEST_SURPRISE;
+    c->surprise += dt / (TG_SURPRISE_MEMORY + dt) * (square - c->surprise);
+    return c->surprise > TG_SURPRISE;
+}
+
+/* Means over about TG_MEMORY: the product of a pair's errors in slip and in g(s) would pull a down. */
+static void average(tg_curve *c, const tgi_measurement *m, tg_real dt)
+{
+    const tg_real elapsed = c->silence + dt, gain = c->silence < 0 ? 1 : elapsed / (TG_MEMORY + elapsed);
+    c->adhesion += gain * (m->adhesion - c->adhesion);
+    c->height += gain * (m->height - c->height);
+    c->silence = 0;
+}
+
+static void start_anew(tg_curve *c, const tgi_measurement *m)
+{
+    c->variance = TG_PRIOR_VARIANCE;
+    c->constant = 0;
+    c->surprise = 0;
+    c->adhesion = m->adhesion;
+    c->height = m->height;
+}
+
+/* A row counts as the share dt/TG_MEMORY of an independent pair. The constants' column goes through the same gain (Schmidt-Kalman): no
+ * number of pairs makes it smaller. */
+static void take(tg_curve *c, const tgi_measurement *m, tg_real dt)
+{
+    average(c, m, dt);
+    if (!(tgi_fabs(c->height) >= TG_LEAST_HEIGHT)) return;
+    tg_real residual = c->adhesion - c->a * c->height;
+    const tg_real expected = c->height * c->height * c->variance + m->variance + m->constant * m->constant;
+    if (is_new_ground(c, residual * residual / expected, dt)) {
+        start_anew(c, m);
+        residual = c->adhesion - c->a * c->height;
+    }
+    const tg_real r = dt < TG_MEMORY ? m->variance * TG_MEMORY / dt : m->variance, h = c->height;
+    const tg_real gain = c->variance * h / (h * h * c->variance + r), keep = 1 - gain * h;
+    c->a += gain * residual;
+    c->variance *= keep;
+    c->constant = keep * c->constant + tgi_fabs(gain) * m->constant;
+}
+
+void tgi_curve_take(tg_curve *c, tg_real dt, tg_real distance, int32_t pairs, const tgi_sight *sight, const tg_real *share)
+{
+    tgi_measurement m;
+    wander(c, distance);
+    if (dt > 0 && mean_of(sight, share, pairs, c->a, &m)) take(c, &m, dt);
+    else if (c->silence >= 0) c->silence += dt;
+}
+
+tg_status tg_curve_update(tg_curve *c, tg_real dt, tg_real distance, int32_t pairs, const tg_pair *pair, const tg_real *share)
+{
+    tgi_sight sight[TG_MAX_WHEELS];
+    if (!c || pairs < 0 || pairs > TG_MAX_WHEELS || (pairs > 0 && (!pair || !share))) return TG_BAD_ARGUMENT;
+    if (isnan(dt) || isinf(dt) || isnan(distance) || isinf(distance)) return TG_NOT_FINITE;
+    if (dt < 0) return TG_TIME_REVERSED;
+    for (int32_t i = 0; i < pairs; i++) {
+        if (pair[i].adhesion_variance < 0 || pair[i].slip_variance < 0 || pair[i].radius_error < 0) return TG_NOT_POSITIVE;
+        sight[i] = tgi_look(&pair[i]);
+    }
+    tgi_curve_take(c, dt, distance < 0 ? -distance : distance, pairs, sight, share);
+    return TG_OK;
+}

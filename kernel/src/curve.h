@@ -1,0 +1,17 @@
+/* Inside the online curve: a pair seen from the prototype curve, worked out once for a wheel and for the vehicle. */
+#ifndef TG_CURVE_H
+#define TG_CURVE_H
+#include "filter.h"
+#include <math.h>
+#include <string.h>
+
+typedef struct {
+    tg_real adhesion, height, slope; /* mu, g(s), |dg/ds| */
+    tg_real variance, slip_variance, constant;
+    tg_real radius, travel;          /* relative radius error; 1 - |s| */
+    int32_t told;
+} tgi_sight;
+
+tgi_sight tgi_look(const tg_pair *p);
+void tgi_curve_take(tg_curve *c, tg_real dt, tg_real distance, int32_t pairs, const tgi_sight *sight, const tg_real *share);
+#endif

@@ -1,0 +1,68 @@
+/* The adhesion curve of each wheel and of the vehicle, from a row's estimates. */
+#include "estimator.h"
+
+/* s. Neighbouring estimates are alike over far longer, so that those in between would teach nothing new. */
+#define TG_CURVE_STEP ((tg_real)0.05)
+
+void tgi_no_curves(tg_estimator *e)
+{
+    const tg_curve unknown = tg_curve_unknown();
+    e->curve = unknown;
+    e->curve_std = tg_curve_std(&unknown);
+    for (int32_t i = 0; i < TG_MAX_WHEELS; i++) {
+        e->wheel_curve[i] = unknown;
+        e->wheel_curve_std[i] = e->curve_std;
+    }
+}
+
+tg_status tg_estimator_new_ground(tg_estimator *e)
+{
+    if (!e) return TG_BAD_ARGUMENT;
+    tgi_no_curves(e);
+    return TG_OK;
+}
+
+/* A wheel's pair. What an estimate's spread holds beyond the filter's variance is constant: it does not average out. */
+static tg_pair pair_of(const tg_estimator *e, int32_t i, const tg_real *o)
+{
+    const int32_t stride = tgi_stride(e->settings.machine.wheels);
+    const tg_real radius = e->settings.uncertainty.wheel_radius, travel = 1 - tgi_fabs(o[TG_OUT_SLIP + i]);
+    const tg_real random = e->belief.P[i * stride + i];
+    const tg_real constant = tgi_square(o[TG_OUT_ADHESION_STD + i]) - random - tgi_square(o[TG_OUT_ADHESION + i] * radius);
+    const tg_real slip = tgi_square(o[TG_OUT_SLIP_STD + i]) - tgi_square(travel * radius);
+    const tg_pair pair = {o[TG_OUT_ADHESION + i], o[TG_OUT_SLIP + i], random, slip > 0 ? slip : 0,
+                          tgi_sqrt(constant > 0 ? constant : 0), radius};
+    return pair;
+}
+
+static void learn_curves(tg_estimator *e, int32_t learn, const tg_real *load, const tg_real *o)
+{
+    const int32_t n = e->settings.machine.wheels;
+    tgi_sight sight[TG_MAX_WHEELS];
+    for (int32_t i = 0; i < n; i++) {
+        if (learn) {
+            const tg_pair pair = pair_of(e, i, o);
+            sight[i] = tgi_look(&pair);
+        }
+        tgi_curve_take(&e->wheel_curve[i], e->curve_wait, e->curve_distance, learn ? 1 : 0, &sight[i], &load[i]);
+        e->wheel_curve_std[i] = tg_curve_std(&e->wheel_curve[i]);
+    }
+    tgi_curve_take(&e->curve, e->curve_wait, e->curve_distance, learn ? n : 0, sight, load);
+    e->curve_std = tg_curve_std(&e->curve);
+    e->curve_wait = e->curve_distance = 0;
+}
+
+/* `learn`: the row's pairs are estimates of a moving vehicle, not flagged. Without it the curve only ages by `distance`. */
+void tgi_curves(tg_estimator *e, int32_t learn, tg_real dt, tg_real distance, const tg_real *load, tg_real *o)
+{
+    const int32_t n = e->settings.machine.wheels;
+    e->curve_wait += dt;
+    e->curve_distance += distance;
+    if (e->curve_wait >= TG_CURVE_STEP) learn_curves(e, learn, load, o);
+    o[TG_OUT_CURVE] = e->curve.a;
+    o[TG_OUT_CURVE_STD] = e->curve_std;
+    for (int32_t i = 0; i < n; i++) {
+        o[TG_OUT_WHEEL_CURVE + i] = e->wheel_curve[i].a;
+        o[TG_OUT_WHEEL_CURVE_STD + i] = e->wheel_curve_std[i];
+    }
+}
