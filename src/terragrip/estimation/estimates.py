@@ -40,7 +40,8 @@ class Estimates:
     constants that data cannot tell. ``channels`` is how many channels an update took, the expectation of
     ``nis``. ``supervisor`` is γ of the supervised policy, 1 under `aukf`, 0 under a fixed policy; under `bank`
     it is where the expected scale of the noise stands between the smallest (0) and the largest (1), on a
-    logarithmic scale. NaN stands only where ``event`` says why: slip and efficiency at ``standstill``, and
+    logarithmic scale. ``curve_a`` (vehicle, and of each wheel) is the scale of the adhesion curve known so far
+    (docs/kernel.md). NaN stands only where ``event`` says why: slip and efficiency at ``standstill``, and
     speeds in a ``gap`` before anything was measured.
     """
 

@@ -1,0 +1,121 @@
+"""The adhesion curve while driving (paper, Fig. 2): its scale a from single pairs of slip and adhesion, recursively.
+
+The kernel does the same for each wheel and the vehicle of every estimated row (columns `curve_a`, `curve_a_<wheel>`); this is for pairs
+from elsewhere, such as a force sensor's.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from terragrip._kernel import ffi, lib
+from terragrip.physics.adhesion import CURVES, PROTOTYPE
+
+_MOST = 8
+_REFUSED = {
+    lib.TG_BAD_ARGUMENT: f"more than {_MOST} pairs of one instant",
+    lib.TG_NOT_FINITE: "a step of time or distance that is no number",
+    lib.TG_NOT_POSITIVE: "a negative spread",
+    lib.TG_TIME_REVERSED: "a step back in time",
+}
+
+
+class OnlineCurve:
+    """The current a of mu = a g(s), g the paper's prototype (eq. 8), with its standard deviation.
+
+    A scalar Kalman filter (R) on the means of mu and g(s) over about 0.5 s: a wanders with the distance driven
+    (0.06 SD a metre); a pair's variance is var(mu) + (a g')^2 var(s) and
+    the soil's own scatter (8 %); since the errors of neighbouring pairs are alike, a row counts as dt/0.5 s of an independent pair.
+    Constant errors (torque gain, rolling radius) enter as considered: they do not average out. Residuals four times as large, in the mean
+    square, as one ground makes them, start a anew; `new_ground` does so by hand.
+
+    Slips over 60 %, and means under g(5 %) (g near 0), teach nothing: `a_std` stays as wide as it is, 0.5 before the first pair.
+    """
+
+    def __init__(self) -> None:
+        self._curve = ffi.new("tg_curve *", lib.tg_curve_unknown())
+
+    def update(
+        self,
+        dt: float,
+        slip: ArrayLike,
+        adhesion: ArrayLike,
+        *,
+        slip_std: ArrayLike = 0.0,
+        adhesion_std: ArrayLike = 0.0,
+        adhesion_constant_std: ArrayLike = 0.0,
+        radius_std: float = 0.0,
+        distance: float = 0.0,
+        share: ArrayLike = 1.0,
+    ) -> OnlineCurve:
+        """Take the pairs of one instant, `dt` s and `distance` m after the last; returns itself.
+
+        slip, adhesion: a number, or up to eight of one instant, weighted by `share` (their loads). The `_std` are 1 SD: of random errors,
+        of adhesion's constant error, of the rolling radius (relative). NaN: no pair. Raises ValueError on a negative spread or step back.
+        """
+        columns = np.broadcast_arrays(
+            *(
+                np.atleast_1d(np.asarray(x, dtype=float))
+                for x in (slip, adhesion, slip_std, adhesion_std, adhesion_constant_std, share)
+            )
+        )
+        if len(columns[0]) > _MOST:
+            raise ValueError(_REFUSED[lib.TG_BAD_ARGUMENT])
+        if min(np.nanmin(np.append(column, 0.0)) for column in columns[2:5]) < 0:
+            raise ValueError(_REFUSED[lib.TG_NOT_POSITIVE])
+        pairs = [
+            {
+                "adhesion": mu,
+                "slip": s,
+                "adhesion_variance": mu_std**2,
+                "slip_variance": s_std**2,
+                "adhesion_constant": constant,
+                "radius_error": radius_std,
+            }
+            for s, mu, s_std, mu_std, constant, _ in zip(*columns, strict=True)
+        ]
+        status = lib.tg_curve_update(
+            self._curve,
+            dt,
+            distance,
+            len(pairs),
+            ffi.new("tg_pair[]", pairs),
+            ffi.new("double[]", columns[5].tolist()),
+        )
+        if status != lib.TG_OK:
+            raise ValueError(_REFUSED[status])
+        return self
+
+    def new_ground(self) -> None:
+        """Forget: the ground is another one."""
+        self._curve[0] = lib.tg_curve_unknown()
+
+    @property
+    def a(self) -> float:
+        """Scale of the curve."""
+        return float(self._curve.a)
+
+    @property
+    def a_std(self) -> float:
+        """One standard deviation of `a`, random and constant errors."""
+        return float(lib.tg_curve_std(self._curve))
+
+    @property
+    def rise(self) -> tuple[float, float]:
+        """A = a(1 - p), the height of the curve's rise (PHYSICS 5), and its standard deviation."""
+        return self.a * (1 - PROTOTYPE["p"]), self.a_std * (1 - PROTOTYPE["p"])
+
+    def predict(self, slip: ArrayLike) -> NDArray[np.float64]:
+        """mu at slips of any shape, by the current curve."""
+        return CURVES["exponential"].value(slip, {"a": self.a})
+
+    def __repr__(self) -> str:
+        return f"OnlineCurve(a={self.a:.3g} +- {self.a_std:.2g})"
+
+
+def rise_of(a: Any) -> Any:
+    """A = a(1 - p) from a column `curve_a`, or its spread from `curve_a_std`; any shape."""
+    return np.asarray(a, dtype=float) * (1 - PROTOTYPE["p"])
