@@ -9,7 +9,7 @@
 #include <time.h>
 
 #define SAMPLES 512
-#define ROUNDS 9
+#define ROUNDS 60
 
 static tg_filter filter;
 static tg_consider consider;
@@ -86,7 +86,7 @@ static void time_method(const char *name, int n, int engine, int policy, int acc
     for (int round = 0; round < ROUNDS; round++) {
         tg_status status = tg_filter_init(&filter, &m, &tuning, x0, P0);
         if (columns && status == TG_OK) status = tg_consider_init(&consider, &filter, columns);
-        const int steps = policy == TG_FIXED && engine == TG_EXACT ? 40000 : 10000;
+        const int steps = n > 4 ? 1000 : 4000;
         const double start = seconds();
         for (int k = 0; k < steps && status == TG_OK; k++) {
             const int now = k % SAMPLES, before = (k + SAMPLES - 1) % SAMPLES;

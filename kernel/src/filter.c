@@ -99,10 +99,10 @@ tg_status tg_filter_init(tg_filter *f, const tg_machine *machine, const tg_tunin
 }
 
 /* Q of this step (PHYSICS 6): [I + gamma (A - I)] Q0 on top of the inputs' noise. */
-static void scale_noise(const tg_filter *f, tg_real gamma, tgi_plan *plan)
+TG_INLINE void scale_noise(const tg_filter *f, tg_real gamma, tgi_plan *plan, const int n)
 {
     const tg_real *const a = f->policy.adaptation.scale, dt = plan->passage.dt;
-    for (int j = 0; j < f->states; j++) plan->passage.q[j] += (1 + gamma * (a[j] - 1)) * f->walk[j] * dt;
+    for (int j = 0; j < TG_TWICE(n); j++) plan->passage.q[j] += (1 + gamma * (a[j] - 1)) * f->walk[j] * dt;
 }
 
 /* ln N of the residuals, which are independent of each other. */
@@ -123,14 +123,16 @@ static void judge(tgi_result *result)
 
 TG_INLINE int result_is_finite(const tgi_result *result, const int n, const int stride)
 {
-    tg_lanes zero[2] = {lanes_all(0), lanes_all(result->nis * 0 + result->log_likelihood * 0)};
-    for (int i = 0; i < TG_TWICE(n) * stride; i += TG_LANES)
-        zero[0] = lanes_mul_add(lanes_load(result->u + i), lanes_all(0), zero[0]);
+    const tg_lanes none = lanes_all(0);
+    tg_lanes zero[4] = {none, none, none, lanes_all(result->nis * 0 + result->log_likelihood * 0)};
+    for (int k = 0; k < TG_TWICE(n); k++)
+        for (int i = 0; i < stride; i += TG_LANES)
+            zero[k % 4] = lanes_mul_add(lanes_load(result->u + k * stride + i), none, zero[k % 4]);
     for (int i = 0; i < stride; i += TG_LANES) {
-        zero[1] = lanes_mul_add(lanes_load(result->x + i), lanes_all(0), zero[1]);
-        if (i < TG_TWICE(n)) zero[0] = lanes_mul_add(lanes_load(result->d + i), lanes_all(0), zero[0]);
+        zero[0] = lanes_mul_add(lanes_load(result->x + i), none, zero[0]);
+        zero[1] = lanes_mul_add(lanes_load(result->d + i), none, zero[1]);
     }
-    return lanes_sum(lanes_add(zero[0], zero[1])) == 0;
+    return lanes_sum(lanes_add(lanes_add(zero[0], zero[1]), lanes_add(zero[2], zero[3]))) == 0;
 }
 
 TG_INLINE void commit(tg_filter *f, const tgi_plan *plan, const tgi_result *result, const int n, const int stride)
@@ -145,84 +147,84 @@ TG_INLINE void commit(tg_filter *f, const tgi_plan *plan, const tgi_result *resu
         f->channel[c] = result->channel[c];
         for (int i = 0; i < stride; i += TG_LANES) lanes_store(f->gain[c] + i, lanes_load(result->gain[c] + i));
     }
-    for (int i = 0; i <= n; i++) f->accelerometer[i] = plan->accelerometer[i];
+    for (int i = 0; plan->count && i <= n; i++) f->accelerometer[i] = plan->accelerometer[i];
 }
 
 /* What bank and single filter remember alike. */
-static void remember(tg_filter *f, const tgi_call *call, const tgi_plan *plan)
+TG_INLINE void remember(tg_filter *f, const tgi_call *call, const tgi_plan *plan, const int n)
 {
-    f->passage = plan->passage;
+    plan_copy_passage(&f->passage, &plan->passage, n);
     f->taken = plan->count;
     f->clock += (double)call->dt;
     f->slope[0] = call->before->slope;
     f->cosine[0] = plan->cosine[0];
     f->sine[0] = plan->sine[0];
-    if (!call->y || !plan->present[f->wheels + 1]) return;
+    if (!plan->count || !plan->present[n + 1]) return;
     f->slope[1] = call->now->slope;
     f->cosine[1] = plan->cosine[1];
     f->sine[1] = plan->sine[1];
 }
 
-static void report(const tg_filter *f, const tgi_plan *plan, const tgi_result *result, tg_real gamma, tg_step *out)
+TG_INLINE void report(const tgi_plan *plan, const tgi_result *result, const tg_real *scale, tg_step *out, const int n)
 {
-    memset(out, 0, sizeof *out);
     out->channels = result->taken;
     out->nis = result->nis;
     out->log_likelihood = result->log_likelihood;
-    out->gamma = gamma;
-    for (int o = 0; o < f->channels; o++) {
-        const int c = tgi_channel(f->wheels, o), present = plan->count && plan->present[o];
+    out->gamma = plan->gamma;
+    for (int o = 0; o < n + 2; o++) {
+        const int c = tgi_channel(n, o), present = plan->count && plan->present[o];
         out->innovation[c] = present ? result->innovation[o] : (tg_real)NAN;
         out->innovation_variance[c] = present ? result->variance[o] : 0;
         out->weight[c] = present ? result->weight[o] : 1;
     }
-    for (int e = 0; e < f->states; e++) out->adaptation[e] = f->policy.adaptation.scale[tgi_row(f->wheels, e)];
+    for (int c = n + 2; c < TG_MAX_CHANNELS; c++) out->innovation[c] = out->innovation_variance[c] = out->weight[c] = 0;
+    for (int e = 0; e < TG_MAX_STATES; e++) out->adaptation[e] = e < TG_TWICE(n) ? scale[tgi_row(n, e)] : 0;
+    for (int b = 0; b < TG_MODES; b++) out->mode[b] = 0;
 }
 
-static tg_status advance_one(tg_filter *f, const tgi_call *call, tgi_plan *plan, tg_step *out)
+TG_INLINE tg_status advance_one(tg_filter *f, const tgi_call *call, tgi_plan *plan, tg_step *out, const int n, const int stride)
 {
-    const int32_t policy = f->tuning.policy, n = f->wheels;
-    const tg_real gamma = policy == TG_FIXED      ? 0
-                          : policy == TG_ADAPTIVE ? 1
-                          : call->y               ? tgi_supervise(f, plan, call->now)
-                                                  : f->supervisor.gamma;
+    const int32_t policy = f->tuning.policy;
+    tg_real scale[TG_ROWS];
     tgi_result result;
-    scale_noise(f, gamma, plan);
-    plan->gamma = gamma;
+    plan->gamma = policy == TG_FIXED      ? 0
+                  : policy == TG_ADAPTIVE ? 1
+                  : call->y               ? tgi_supervise(f, plan, call->now)
+                                          : f->supervisor.gamma;
+    scale_noise(f, plan->gamma, plan, n);
+    for (int i = 0; i < stride; i += TG_LANES) lanes_store(scale + i, lanes_load(f->policy.adaptation.scale + i));
     if (f->tuning.engine == TG_EXACT)
         tgi_exact_step(f, plan, &result);
     else
         tgi_unscented_step(f, plan, &result);
     judge(&result);
-#define FINITE(n, stride) finite = result_is_finite(&result, n, stride)
-    int finite = 0;
-    TG_BY_WHEELS(n, FINITE)
-#undef FINITE
-    if (!finite) return TG_DIVERGED;
-    tg_step step;
-    if (out) report(f, plan, &result, gamma, &step);
+    if (!result_is_finite(&result, n, stride)) return TG_DIVERGED;
     if (policy != TG_FIXED) {
         const tg_status status = tgi_adapt(f, plan, &result);
         if (status != TG_OK) return status;
     }
-    if (policy == TG_SUPERVISED && call->y) tgi_supervisor_remember(f, plan, call->now, gamma);
-    if (out) *out = step;
-#define COMMIT(n, stride) commit(f, plan, &result, n, stride)
-    TG_BY_WHEELS(n, COMMIT)
-#undef COMMIT
+    if (policy == TG_SUPERVISED && call->y) tgi_supervisor_remember(f, plan, call->now);
+    if (out) report(plan, &result, scale, out, n);
+    commit(f, plan, &result, n, stride);
     return TG_OK;
 }
 
-static tg_status advance(tg_filter *f, const tgi_call *call, tg_step *out)
+TG_INLINE tg_status advance(tg_filter *f, const tgi_call *call, tg_step *out, const int n, const int stride)
 {
     tgi_plan plan;
-    tg_status status = TG_OK;
-#define PLAN(n, stride) status = plan_step(f, call, &plan, n)
-    TG_BY_WHEELS(f->wheels, PLAN)
-#undef PLAN
+    tg_status status = plan_step(f, call, &plan, n);
     if (status != TG_OK) return status;
-    status = f->tuning.policy == TG_BANK ? tgi_bank_step(f, &plan, out) : advance_one(f, call, &plan, out);
-    if (status == TG_OK) remember(f, call, &plan);
+    status = f->tuning.policy == TG_BANK ? tgi_bank_step(f, &plan, out) : advance_one(f, call, &plan, out, n, stride);
+    if (status == TG_OK) remember(f, call, &plan, n);
+    return status;
+}
+
+static tg_status advance_any(tg_filter *f, const tgi_call *call, tg_step *out)
+{
+    tg_status status = TG_OK;
+#define ADVANCE(n, stride) status = advance(f, call, out, n, stride)
+    TG_BY_WHEELS(f->wheels, ADVANCE)
+#undef ADVANCE
     return status;
 }
 
@@ -231,14 +233,14 @@ tg_status tg_filter_step(tg_filter *f, tg_real dt, const tg_input *before, const
 {
     if (!f || !before || !now || !y || !r) return TG_BAD_ARGUMENT;
     const tgi_call call = {dt, before, now, q_input, y, r};
-    return advance(f, &call, out);
+    return advance_any(f, &call, out);
 }
 
 tg_status tg_filter_predict(tg_filter *f, tg_real dt, const tg_input *before, const tg_real *q_input)
 {
     if (!f || !before) return TG_BAD_ARGUMENT;
     const tgi_call call = {dt, before, before, q_input, NULL, NULL};
-    return advance(f, &call, NULL);
+    return advance_any(f, &call, NULL);
 }
 
 /* Row order to state order. */
@@ -309,7 +311,7 @@ void tgi_restart(int n, int stride, const tg_real *q, tg_real *u, tg_real *d)
     memcpy(W, u, (size_t)(rows * stride) * sizeof *u);
     memcpy(weight, d, (size_t)rows * sizeof *d);
     tgi_gram gram = factor_begin(W, weight, rows, stride);
-#define TAKE(j, lanes) factor_row(&gram, j, lanes, q[j], u + (j) * stride, d + (j));
+#define TAKE(j, lanes) factor_row(&gram, j, lanes, j == n, 1, q[j], u + (j) * stride, d + (j));
     TG_ROWS_DOWN(n, 0, TG_ROWS, TAKE) /* not hot: one loop */
 #undef TAKE
     for (int j = n + 1; j < rows; j++) {

@@ -53,7 +53,7 @@ typedef struct { /* one step, worked out before any state is touched; rows in ro
 } tgi_plan;
 
 typedef struct { /* what a step comes to, before it is known to be sound */
-    tg_real x[TG_ROWS], d[TG_ROWS], u[TG_MAX_STATES * TG_ROWS];
+    tg_real x[TG_ROWS], d[TG_ROWS], u[TG_MAX_STATES * TG_ROWS]; /* 0 beyond the last row */
     tg_real x_prior[TG_ROWS];
     int32_t taken;
     int32_t channel[TG_MAX_CHANNELS];
@@ -99,7 +99,7 @@ tg_status tgi_adapt(tg_filter *f, const tgi_plan *plan, const tgi_result *result
 /* supervisor.c: gamma of this step, and what to remember of it once the step stands. */
 void tgi_supervisor_init(tg_filter *f);
 tg_real tgi_supervise(const tg_filter *f, const tgi_plan *plan, const tg_input *now);
-void tgi_supervisor_remember(tg_filter *f, const tgi_plan *plan, const tg_input *now, tg_real gamma);
+void tgi_supervisor_remember(tg_filter *f, const tgi_plan *plan, const tg_input *now);
 
 /* bank.c: initial lanes from one; the whole step; mixture. */
 void tgi_bank_init(tg_filter *f);

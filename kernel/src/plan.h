@@ -39,6 +39,12 @@ TG_INLINE tg_status plan_passage(const tg_filter *f, const tg_input *u, tg_real 
     tg_passage *const p = &plan->passage;
     const tg_real stretch = f->stiffness * dt / TG_SUBSTEP;
     if (!(stretch <= TG_SUBSTEPS_MAX)) return TG_BAD_ARGUMENT;
+    for (int i = 0; i < TG_MAX_WHEELS; i += TG_LANES) { /* places beyond the last wheel stay 0 */
+        lanes_store(p->phi + i, lanes_all(0));
+        lanes_store(p->psi + i, lanes_all(0));
+        lanes_store(p->b + i, lanes_all(0));
+        lanes_store(p->c + i, lanes_all(0));
+    }
     plan->substeps = stretch > 1 ? (int32_t)tgi_ceil(stretch) : 1;
     const tg_real h = plan->substeps == 1 ? dt : dt / (tg_real)plan->substeps;
     for (int i = 0; i < n; i++) {
@@ -103,6 +109,21 @@ TG_INLINE tg_status plan_channels(const tg_filter *f, const tgi_call *call, tgi_
     return TG_OK;
 }
 
+/* Field by field: a whole structure is copied by a slow instruction. */
+TG_INLINE void plan_copy_passage(tg_passage *to, const tg_passage *from, const int n)
+{
+    for (int i = 0; i < n; i += TG_LANES) {
+        lanes_store(to->phi + i, lanes_load(from->phi + i));
+        lanes_store(to->psi + i, lanes_load(from->psi + i));
+        lanes_store(to->b + i, lanes_load(from->b + i));
+        lanes_store(to->c + i, lanes_load(from->c + i));
+    }
+    for (int j = 0; j < TG_TWICE(n); j += TG_LANES) lanes_store(to->q + j, lanes_load(from->q + j));
+    to->keep = from->keep;
+    to->g = from->g;
+    to->dt = from->dt;
+}
+
 TG_INLINE tg_status plan_step(const tg_filter *f, const tgi_call *call, tgi_plan *plan, const int n)
 {
     if (!(call->dt >= 0)) return TG_TIME_REVERSED;
@@ -117,7 +138,7 @@ TG_INLINE tg_status plan_step(const tg_filter *f, const tgi_call *call, tgi_plan
         if (status != TG_OK) return status;
     }
     tg_real *const q = plan->passage.q;
-    for (int j = 0; j < TG_TWICE(n); j++) q[j] = 0;
+    for (int j = 0; j < TG_ROWS; j += TG_LANES) lanes_store(q + j, lanes_all(0));
     if (call->q_input) {
         tg_real zero = 0;
         int positive = 1;

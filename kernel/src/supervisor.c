@@ -107,13 +107,13 @@ tg_real tgi_supervise(const tg_filter *f, const tgi_plan *plan, const tg_input *
     return gamma;
 }
 
-void tgi_supervisor_remember(tg_filter *f, const tgi_plan *plan, const tg_input *now, tg_real gamma)
+void tgi_supervisor_remember(tg_filter *f, const tgi_plan *plan, const tg_input *now)
 {
     tg_supervisor_state *const s = &f->supervisor;
     const double t = f->clock + (double)plan->passage.dt, apart = (double)f->tuning.window / APART;
     tg_real known[TG_MAX_WHEELS + 1];
     known_values(f, plan, known);
-    s->gamma = gamma;
+    s->gamma = plan->gamma;
     for (int i = 0; i <= f->wheels; i++) s->last[i] = known[i];
     if (s->count && t - s->time[(s->first + s->count - 1) % TG_SNAPSHOTS] < apart - CLOCK_TOLERANCE) return;
     int gone = s->count ? reference(f, t) : 0; /* older than any reference to come */

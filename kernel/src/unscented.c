@@ -64,8 +64,11 @@ TG_INLINE void unscented_predict(const tg_filter *f, const tgi_plan *plan, const
     }
     centre(w, W, out->x_prior, stride, n);
     tgi_gram gram = factor_begin(W, weight, count, stride);
-#define TAKE(j, lanes) factor_row(&gram, j, lanes, plan->passage.q[j], out->u + (j) * stride, out->d + (j));
-    TG_ROWS_DOWN(rows - 1, 0, stride, TAKE)
+#define TAKE(j, lanes, first) factor_row(&gram, j, lanes, first, 1, plan->passage.q[j], out->u + (j) * stride, out->d + (j));
+#define NEXT(j, lanes) TAKE(j, lanes, 0)
+    TAKE(rows - 1, (rows - 1) / TG_LANES + 1, 1)
+    TG_ROWS_DOWN(rows - 2, 0, stride, NEXT)
+#undef NEXT
 #undef TAKE
 }
 
@@ -103,15 +106,18 @@ TG_INLINE void unscented_update(const tg_filter *f, const tgi_plan *plan, const 
         r[j - rows] = plan->present[o] ? plan->r[o] / out->weight[o] : 1;
     }
     tgi_gram gram = factor_begin(W, weight, count, joint);
-#define TAKE_CHANNEL(j, lanes) factor_row(&gram, j, lanes, r[(j) - rows], u[(j) - rows], d + ((j) - rows));
+#define TAKE_CHANNEL(j, lanes, first) factor_row(&gram, j, lanes, first, 1, r[(j) - rows], u[(j) - rows], d + ((j) - rows));
+#define NEXT_CHANNEL(j, lanes) TAKE_CHANNEL(j, lanes, 0)
 #define TAKE_STATE(j, lanes)                                                                                        \
     {                                                                                                               \
-        factor_row(&gram, j, lanes, 0, column, out->d + (j));                                                        \
+        factor_row(&gram, j, lanes, 0, 0, 0, column, out->d + (j));                                                        \
         for (int i = 0; i < stride; i += TG_LANES) lanes_store(out->u + (j) * stride + i, lanes_load(column + i));   \
     }
-    TG_ROWS_DOWN(all - 1, rows, joint, TAKE_CHANNEL)
+    TAKE_CHANNEL(all - 1, (all - 1) / TG_LANES + 1, 1)
+    TG_ROWS_DOWN(all - 2, rows, joint, NEXT_CHANNEL)
     TG_ROWS_DOWN(rows - 1, 0, joint, TAKE_STATE)
 #undef TAKE_CHANNEL
+#undef NEXT_CHANNEL
 #undef TAKE_STATE
     tg_real residual[TG_MAX_CHANNELS];
     for (int i = 0; i < stride; i++) out->x[i] = out->x_prior[i];
@@ -138,6 +144,7 @@ TG_INLINE void unscented_step(const tg_filter *f, const tgi_plan *plan, tgi_resu
 {
     const weights w = unscented_weights(&f->tuning, n);
     out->taken = 0;
+    for (int j = TG_TWICE(n); j < stride; j++) out->d[j] = 0;
     unscented_predict(f, plan, &w, out, n, stride);
     if (plan->count)
         unscented_update(f, plan, &w, out, n, stride, joint);
