@@ -56,6 +56,9 @@ def test_a_pass_alone_keeps_the_curve_open_and_says_so_in_the_interval(drive: Ma
     both = calibrate([free_pass(drive, 0.2), drive(120, slip=(0.0, 0.25))], vehicle)["wheel_radius fl"]
     assert alone.interval[0] < 0.2 < alone.interval[1]
     assert alone.std > 2 * both.std
+    # A vehicle file knows no degrees of freedom: it gets the width of the interval.
+    low, high = alone.interval
+    assert alone.spread == pytest.approx((high - low) / 2 / 1.96, rel=1e-3)
 
 
 def test_a_wheel_with_a_radius_of_its_own(drive: Make, vehicle: Vehicle) -> None:

@@ -194,9 +194,7 @@ def _useful(quantities: list[Quantity], vehicle: Vehicle, unknown: list[Unknown]
         "drawbar_offset": stated.drawbar_offset,
         "wheel_radius": _UNSTATED_RADIUS if stated.wheel_radius is None else stated.wheel_radius,
     }.get(key)
-    errors = [
-        (q.std if q.own_std is None else q.own_std) / (abs(q.value) if relative else 1.0) for q in quantities
-    ]
+    errors = [q.spread / (abs(q.value) if relative else 1.0) for q in quantities]
     if prior is None or max(errors) < prior:
         return quantities
     worst, known = (
@@ -240,7 +238,7 @@ def _left(found: Sequence[Quantity], vehicle: Vehicle) -> dict[str, Any]:
     prior, left = vehicle.uncertainty, {}
 
     def spread(key: str) -> float | None:
-        errors = [q.std if q.own_std is None else q.own_std for q in found if q.key == key]
+        errors = [q.spread for q in found if q.key == key]
         return float(np.sqrt(np.mean(np.square(errors)))) if errors else None
 
     for key, name in (
@@ -251,7 +249,7 @@ def _left(found: Sequence[Quantity], vehicle: Vehicle) -> dict[str, Any]:
         error = spread(key)
         if error is not None:
             left[name] = error
-    radius = [q.std / q.value for q in found if q.key == "wheel_radius"]
+    radius = [q.spread / q.value for q in found if q.key == "wheel_radius"]
     if radius:
         left["wheel_radius"] = float(np.sqrt(np.mean(np.square(radius))))
     gain = spread("drive_torque_gain")

@@ -54,6 +54,12 @@ class Quantity:
         return self.value - self.factor * self.std, self.value + self.factor * self.std
 
     @property
+    def spread(self) -> float:
+        """The standard deviation that the rest of the vehicle file should count with: ``own_std`` (or ``std``), widened
+        where few degrees of freedom widen the interval."""
+        return (self.std if self.own_std is None else self.own_std) * self.factor / NORMAL_95
+
+    @property
     def rounded(self) -> float:
         """The value to a hundredth of its standard error: what a file should hold."""
         if not 0 < self.std < math.inf:
