@@ -195,7 +195,7 @@ class TractionEstimator:
     def new_ground(self) -> None:
         """Forget the adhesion curves (``curve_a``, ``curve_a_<wheel>``): from here on the ground is another one.
 
-        A ground that differs enough is noticed without it, within about a second.
+        Without it a new ground takes a few seconds to show, in which the intervals are too narrow (docs/kernel.md).
         """
         self._engine.new_ground()
 
