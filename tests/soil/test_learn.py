@@ -82,3 +82,13 @@ def test_a_soil_that_cannot_be_fitted_is_named_not_invented():
     assert "coarse" in campaign.not_fitted
     assert "coarse" not in campaign.soils
     assert any(w.startswith("coarse: not fitted") for w in campaign.words)
+
+
+def test_a_curve_that_explains_nothing_is_not_a_soil():
+    columns = table(1)
+    rng = np.random.default_rng(3)
+    for w in WHEELS:
+        columns[f"adhesion_{w}"] = 0.4 - 0.3 * columns[f"slip_{w}"] + 0.05 * rng.standard_normal(6000)
+    campaign = learn_soils(usable_pairs(columns, WHEELS, 2.6, "run"))
+    assert set(campaign.not_fitted) == {"fine", "coarse"}
+    assert "explains nothing" in campaign.not_fitted["fine"]

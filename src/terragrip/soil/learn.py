@@ -23,6 +23,8 @@ Array = NDArray[np.float64]
 STRETCH = 10.0
 """Metres of one run that count as one draw of the bootstrap where there are too few runs."""
 FEW_RUNS = 5
+POOR = 0.5
+"""R2 below which a fit carries a warning."""
 
 
 @dataclass(frozen=True)
@@ -177,6 +179,14 @@ def _learn(
     )
     binned: Bins = bin_pairs(slip, adhesion, cluster, settings)
     curve.fit_bins(binned)
+    if curve.r2_ <= 0:
+        raise InputError(
+            f"the {curve.model} curve explains nothing of its {np.count_nonzero(binned.used)} bins (R2 {curve.r2_:.2f}): "
+            "slip may have been too small to tell from its noise",
+            mend="drive at more slip",
+        )
+    if curve.r2_ < POOR:
+        curve.notes_.append(f"The curve explains little of the bins (R2 {curve.r2_:.2f}): take it as a hint.")
     if curve.interval_ and not by_run:
         curve.notes_.append(
             f"The intervals come from stretches of {STRETCH:g} m of {len(parts)} run{'s' * (len(parts) > 1)}: "
