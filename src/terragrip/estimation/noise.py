@@ -14,7 +14,12 @@ if TYPE_CHECKING:
     from terragrip.recording import Recording
     from terragrip.vehicle import Vehicle
 
-_SENSOR_OF = {"acceleration_x": "acceleration", "acceleration_y": "acceleration", "roll": "pitch", "angular_velocity_z": "yaw_rate"}
+_SENSOR_OF = {
+    "acceleration_x": "acceleration",
+    "acceleration_y": "acceleration",
+    "roll": "pitch",
+    "angular_velocity_z": "yaw_rate",
+}
 
 
 def channel_noise(
