@@ -191,7 +191,7 @@ static void balance_forces(tg_estimator *e, const tg_drive *drive, double time)
     const tg_machine *m = &e->settings.machine;
     const int32_t n = m->wheels;
     const tg_real d = (tg_real)e->direction;
-    tg_real force = -d * drive->drawbar - e->belief.x[n] * m->mass * m->gravity * drive->cosine;
+    tg_real force = -d * drive->calm_drawbar - e->belief.x[n] * m->mass * m->gravity * drive->cosine;
     for (int32_t i = 0; i < n; i++) force += e->belief.x[i] * drive->load[i];
     tgi_lowpass(&e->balance, e->standing ? 0 : d * force * e->constants.inverse_mass, time, e->settings.load_filter);
 }

@@ -13,6 +13,7 @@ typedef struct { /* an input between its samples */
     tg_real value;    /* filtered */
     tg_real variance; /* of the filtered value's noise */
     tg_real raw;      /* last sample */
+    tg_real calm;     /* value at the last sample that was no spike */
     tg_real level;    /* mean square of its increments, spikes clipped */
     tg_real interval; /* s between its last two samples */
     tg_real spike;    /* square of the last increment where that was a spike, else 0 */
@@ -48,6 +49,7 @@ typedef struct { /* what drives the model between two rows, in the vehicle's own
     tg_real axle_load[8]; /* N */
     tg_real torque[8];
     tg_real drawbar;
+    tg_real calm_drawbar; /* for the loads, which know no uncertainty: the value before a spike */
     tg_real slope, cosine, sine;
 } tg_drive;
 

@@ -39,6 +39,7 @@ void tgi_hold_update(tg_hold *h, tg_real x, double time, tg_real noise)
         h->level += memory * (change - h->level);
         h->interval = interval;
     }
+    if (h->spike == 0) h->calm = h->value;
     h->raw = x;
     h->time = time;
     if (h->count < 100) h->count++;
@@ -101,6 +102,7 @@ void tgi_take_inputs(tg_estimator *e, tg_row *row, tg_real dt, tg_drive *drive)
     tgi_hold_update(&e->pitch, row->value[TG_PITCH], row->time, s->noise[TG_PITCH]);
     row->outlier |= e->drawbar.spike > 0;
     drive->drawbar = e->drawbar.value;
+    drive->calm_drawbar = e->drawbar.calm;
     drive->slope = tgi_slope_update(e, row, e->pitch.value, dt);
     drive->cosine = tgi_cos(drive->slope);
     drive->sine = tgi_sin(drive->slope);

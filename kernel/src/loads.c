@@ -43,7 +43,7 @@ void tgi_loads(tg_estimator *e, const tg_row *row, tg_drive *drive)
     const tg_machine *m = &s->machine;
     tg_real a = specific_force(e, row), g = m->gravity;
     tg_real weight = m->mass * g * drive->cosine;
-    tg_real moment = m->mass * s->center_of_gravity_height * a + drive->drawbar * s->hitch_height
+    tg_real moment = m->mass * s->center_of_gravity_height * a + drive->calm_drawbar * s->hitch_height
                    + e->constants.spin_inertia * (a - g * drive->sine);
     tg_real load[8];
     for (int32_t k = 0; k < s->axles; k++) load[k] = s->load_share[k] * weight - s->load_transfer[k] * moment;

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any
 
@@ -69,12 +70,16 @@ def estimate(
     return run(estimator, log, progress)
 
 
-def run(estimator: TractionEstimator, recording: Recording, progress: Progress | None = None) -> Estimates:
-    """All rows of the recording through the estimator as it stands."""
+def run(
+    estimator: TractionEstimator, recording: Recording, progress: Progress | None = None, *, flag: bool = True
+) -> Estimates:
+    """All rows of the recording through the estimator as it stands; ``flag`` also flags rows before gaps."""
     time, columns = prepared(estimator, recording)
     out = table_of(estimator.columns, len(time))
     event = np.empty(len(time), dtype=np.uint8)
     estimator.engine.run(time, columns, out, event, progress)
+    if flag:
+        flag_before_gaps(event)
     return finished(estimator, recording, out, event, smooth=False)
 
 
@@ -105,8 +110,7 @@ def finished(
     *,
     smooth: bool,
 ) -> Estimates:
-    """Estimates from the kernel's columns: with what is passed on, the row before each gap flagged, and notes."""
-    flag_before_gaps(event)
+    """Estimates from the kernel's columns, with what is passed on and notes."""
     for name in (*_PASSED_ON, *recording.references):
         if name in recording.channels:
             out[name] = recording.channels[name]
@@ -117,7 +121,7 @@ def finished(
 
 
 def flag_before_gaps(event: npt.NDArray[np.uint8]) -> None:
-    """The row before a gap is the last one before the unknown: flag it too, unless it stands still."""
+    """Flag the row before each gap too: it is the last one before the unknown."""
     before = np.flatnonzero((event[1:] == GAP) & (event[:-1] != GAP))
     event[before] = GAP
 
@@ -128,7 +132,7 @@ def about_run(
     """What the table was made from, ready for JSON."""
     from terragrip import __version__
 
-    return {
+    about = {
         "version": __version__,
         "method": estimator.method,
         "smooth": smooth,
@@ -141,6 +145,8 @@ def about_run(
             "standstill_speed": estimator.thresholds.standstill_speed,
         },
     }
+    plain: dict[str, Any] = json.loads(json.dumps(about))
+    return plain
 
 
 def notes_of(estimator: TractionEstimator, recording: Recording) -> list[str]:

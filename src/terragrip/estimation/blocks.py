@@ -8,7 +8,7 @@ from concurrent.futures import Future, ThreadPoolExecutor
 from typing import TYPE_CHECKING
 
 from terragrip.errors import InputError
-from terragrip.estimation.batch import GAP, run
+from terragrip.estimation.batch import GAP, flag_before_gaps, run
 from terragrip.estimation.estimator import TractionEstimator
 from terragrip.estimation.methods import DEFAULT
 from terragrip.estimation.summary import Tally
@@ -72,7 +72,7 @@ def _estimated(
             estimator = TractionEstimator.for_recording(
                 block, vehicle, method, sensors=sensors, held=held, gap=gap, standstill_speed=standstill_speed
             )
-        yield run(estimator, block)
+        yield run(estimator, block, flag=False)
 
 
 def _flagged(parts: Iterator[Estimates]) -> Iterator[Estimates]:
@@ -83,6 +83,7 @@ def _flagged(parts: Iterator[Estimates]) -> Iterator[Estimates]:
             if part.event_codes[0] == GAP:
                 last.event_codes[-1] = GAP
             yield last
+        flag_before_gaps(part.event_codes)
         last = part
     if last is not None:
         yield last

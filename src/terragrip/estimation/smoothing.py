@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
-from terragrip.estimation.batch import finished, prepared, table_of
+from terragrip.estimation.batch import finished, flag_before_gaps, prepared, table_of
 from terragrip.estimation.estimates import Estimates
 
 if TYPE_CHECKING:
@@ -58,6 +58,7 @@ def run_smoothed(
         following = records[0].copy()
         _tell(progress, 2 * rows - first, 2 * rows)
     engine.restore(end)
+    flag_before_gaps(event)
     return finished(estimator, recording, out, event, smooth=True)
 
 

@@ -1,0 +1,155 @@
+"""The table of estimates: columns, file, summary; and the same file from blocks."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from drives import WHEELS, drive, robot
+from terragrip.errors import InputError
+from terragrip.estimation import Estimates, TractionEstimator, estimate, estimate_blocks
+from terragrip.recording import Recording
+
+
+def labelled(seconds: float = 8.0) -> Recording:
+    """A recording with position, soil, references and a gap of 3 s."""
+    base = drive(seconds, imu=True).recording
+    time = np.where(base.time < 5, base.time, base.time + 3)
+    soil = np.where(base.time < 4, "fine", "").astype(object)
+    return Recording(
+        time,
+        {**base.channels, "latitude": 51 + 0 * time, "longitude": 13 + 0 * time, "true_adhesion_rr": 0.3 + 0 * time,
+         "wheel_force_x_rr": 70 + 0 * time},
+        {"soil": soil},
+        source="log.csv",
+        sha256="ab" * 32,
+        notes=("A note of the reader.",),
+    )  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def estimates():
+    return estimate(labelled(), robot())
+
+
+def test_the_columns_of_the_contract(estimates):
+    table = estimates.to_pandas()
+    quantities = ("wheel_speed", "adhesion", "slip", "net_traction", "efficiency")
+    wanted = {
+        "time",
+        "ground_speed",
+        "ground_speed_std",
+        "soil_resistance",
+        "soil_resistance_std",
+        "distance",
+        "nis",
+    }
+    wanted |= {
+        "supervisor",
+        "event",
+        "soil",
+        "vertical_load_front",
+        "vertical_load_rear",
+        "latitude",
+        "longitude",
+    }
+    wanted |= {f"{q}_{w}{end}" for q in quantities for w in WHEELS for end in ("", "_std")}
+    wanted |= {"true_adhesion_rr", "wheel_force_x_rr"}
+    assert wanted <= set(table)
+    assert np.array_equal(table["time"], labelled().time)
+    assert set(table["event"]) == {"", "gap"}
+    assert set(table["soil"]) == {"fine", ""}
+
+
+def test_a_file_gives_back_the_table(estimates, tmp_path):
+    path = tmp_path / "e.parquet"
+    estimates.write(path)
+    back = Estimates.read(path)
+    pd.testing.assert_frame_equal(back.to_pandas(), estimates.to_pandas())
+    pd.testing.assert_frame_equal(pd.read_parquet(path), estimates.to_pandas())
+    assert back.about == estimates.about
+    assert back.notes == estimates.notes
+    assert back.vehicle.to_dict() == robot().to_dict()
+    assert back.about["recording"] == {"source": "log.csv", "sha256": "ab" * 32}
+    assert back.method == "bank"
+    assert [p.name for p in tmp_path.iterdir()] == ["e.parquet"]
+
+
+def test_a_folder_that_is_not_there_is_refused(estimates, tmp_path):
+    with pytest.raises(InputError, match="cannot be written"):
+        estimates.write(tmp_path / "no" / "e.parquet")
+
+
+def test_what_is_no_table_of_estimates_is_refused(tmp_path):
+    path = tmp_path / "x.parquet"
+    path.write_bytes(b"PAR1 not really")
+    with pytest.raises(InputError, match="Parquet"):
+        Estimates.read(path)
+    pd.DataFrame({"time": [0.0]}).to_parquet(path)
+    with pytest.raises(InputError, match="no table of estimates"):
+        Estimates.read(path)
+    with pytest.raises(InputError, match="no such file"):
+        Estimates.read(tmp_path / "none.parquet")
+
+
+def test_the_summary_says_what_was_met(estimates):
+    text = estimates.summary()
+    assert "800 rows, 11.0 s" in text
+    assert "gap 1 (2 rows)" in text  # the row before the gap and the one after
+    assert "expected 1" in text
+    assert "Note: A note of the reader." in text
+    assert "adhesion rr" in text
+
+
+def test_held_channels_are_in_the_summary():
+    recording = drive(20.0).recording
+    held = np.repeat(recording["ground_speed"][::5], 5)[: len(recording)]
+    found = estimate(recording.with_channels(ground_speed=held), robot())
+    assert found.about["settings"]["held"]["ground_speed"] == pytest.approx(0.05, rel=0.05)
+    assert "ground_speed (20 Hz)" in found.summary()
+
+
+def test_distance_is_the_way_travelled(estimates):
+    driven = drive(20.0)
+    found = estimate(driven.recording, robot())
+    way = np.trapezoid(driven.truth["ground_speed"], found.time)
+    assert found["distance"][-1] == pytest.approx(way, rel=0.01)
+    assert (np.diff(found["distance"]) >= 0).all()
+
+
+@pytest.mark.parametrize("cuts", [(0, 800), (0, 1, 250, 500, 800), (0, 499, 501, 800)])
+def test_a_file_from_blocks_is_the_whole_file(estimates, tmp_path, cuts):
+    """The gap lies between rows 499 and 500, so one cut falls on it."""
+    recording, path, seen = labelled(), tmp_path / "e.parquet", []
+    known = TractionEstimator.for_recording(recording, robot())
+    blocks = (recording.select(slice(a, b)) for a, b in pairwise(cuts))
+    text = estimate_blocks(blocks, robot(), path, sensors=known.noise, held=known.held, progress=seen.append)
+    pd.testing.assert_frame_equal(Estimates.read(path).to_pandas(), estimates.to_pandas())
+    assert text == estimates.summary()
+    assert seen[-1] == 800
+
+
+def test_a_failing_block_leaves_no_file(tmp_path):
+    recording = labelled()
+    backwards = [recording.select(slice(400, 800)), recording.select(slice(0, 400))]
+    with pytest.raises(InputError, match="does not run forward"):
+        estimate_blocks(backwards, robot(), tmp_path / "e.parquet")
+    with pytest.raises(InputError, match="no row"):
+        estimate_blocks([], robot(), tmp_path / "e.parquet")
+    assert not list(tmp_path.iterdir())
+
+
+def test_progress_reaches_the_end():
+    seen = []
+    estimate(drive(3.0).recording, robot(), progress=lambda done, rows: seen.append((done, rows)))
+    assert seen[-1] == (300, 300)
+
+
+def test_wheels_that_do_not_fit_are_refused():
+    recording = drive(3.0).recording
+    channels = {name.replace("_fl", "_xx"): values for name, values in recording.channels.items()}
+    with pytest.raises(InputError, match="xx"):
+        estimate(Recording(recording.time, channels), robot())

@@ -1,0 +1,91 @@
+"""The kernel's vertical loads against physics.loads, and a measured load that wins."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from drives import drive, robot
+from terragrip.estimation import estimate
+from terragrip.physics.loads import GRAVITY, axle_loads, lateral_shares
+from terragrip.recording import Recording
+
+
+def steady(seconds: float = 12.0, **channels: float) -> Recording:
+    """Constant signals, no noise."""
+    time = np.arange(0, seconds, 0.01)
+    values = {"ground_speed": 0.6, "drawbar_force": 0.0, **channels}
+    for wheel in ("fl", "fr", "rl", "rr"):
+        values |= {f"wheel_speed_{wheel}": 3.2, f"drive_torque_{wheel}": 15.0}
+    return Recording(time, {name: np.full(len(time), value) for name, value in values.items()})
+
+
+@pytest.mark.parametrize("imu", [True, False])
+def test_loads_follow_pull_acceleration_and_slope(imu):
+    moved = drive(
+        30.0,
+        noise=0.0,
+        imu=imu,
+        speed=lambda t: 0.8 + 0.3 * np.sin(t / 4),
+        slope=lambda t: 0.1 * np.sin(t / 9) * imu,
+    )
+    found = estimate(moved.recording, robot())
+    late = found.time > 10
+    swing = np.ptp(moved.truth["vertical_load_front"][late])
+    assert swing > 40
+    for axle in ("front", "rear"):
+        off = np.abs(found[f"vertical_load_{axle}"] - moved.truth[f"vertical_load_{axle}"])[late]
+        assert off.max() < 0.15 * swing
+
+
+def test_the_formula_at_rest_on_a_slope_and_under_a_pull():
+    """A steady state: the specific force is g sin(slope), nothing spins up."""
+    slope, pull = 0.1, 200.0
+    recording = steady(drawbar_force=pull, pitch=slope, acceleration_x=GRAVITY * np.sin(slope))
+    found = estimate(recording, robot(), held={})
+    wanted = axle_loads(
+        (54.0, 85.0),
+        (0.638, 0.0),
+        center_of_gravity_height=0.30,
+        hitch_height=0.25,
+        drawbar=pull,
+        slope=slope,
+    )
+    assert found["vertical_load_front"][-1] == pytest.approx(wanted[0], rel=1e-3)
+    assert found["vertical_load_rear"][-1] == pytest.approx(wanted[1], rel=1e-3)
+
+
+def test_a_measured_load_wins_and_the_other_axle_takes_the_rest():
+    found = estimate(steady(vertical_load_front=400.0), robot(), held={})
+    assert found["vertical_load_front"][-1] == 400.0
+    assert found["vertical_load_rear"][-1] == pytest.approx(139 * GRAVITY - 400.0, rel=1e-9)
+
+
+def test_both_measured_loads_are_taken():
+    found = estimate(steady(vertical_load_front=400.0, vertical_load_rear=1000.0), robot(), held={})
+    assert found["vertical_load_rear"][-1] == 1000.0
+
+
+def test_lateral_acceleration_moves_load_to_the_outer_wheels():
+    """Through the adhesion: the same torque over another load."""
+    sideways = 2.0
+    found = estimate(steady(acceleration_y=sideways), robot(), held={})
+    straight = estimate(steady(), robot(), held={})
+    left, right = lateral_shares(2, sideways, center_of_gravity_height=0.30, track=0.554)
+    gross = [found[f"adhesion_{w}"][-1] + 0.02 for w in ("rl", "rr")]
+    plain = straight["adhesion_rl"][-1] + 0.02
+    assert gross[0] == pytest.approx(plain * 0.5 / left, rel=0.02)
+    assert gross[1] == pytest.approx(plain * 0.5 / right, rel=0.02)
+
+
+def test_roll_stands_in_for_a_missing_accelerometer():
+    by_roll = estimate(steady(roll=0.2), robot(), held={})
+    by_force = estimate(steady(acceleration_y=GRAVITY * np.sin(0.2)), robot(), held={})
+    assert by_roll["adhesion_rl"][-1] == pytest.approx(by_force["adhesion_rl"][-1], rel=1e-6)
+
+
+def test_a_wheel_never_floats():
+    """A pull that would lift the front: the adhesion stays a number."""
+    found = estimate(steady(drawbar_force=2000.0), robot(), held={})
+    assert found["vertical_load_front"][-1] < 100
+    assert np.isfinite(found["adhesion_fl"]).all()

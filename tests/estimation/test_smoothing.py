@@ -1,0 +1,83 @@
+"""The backward pass: better than the filter, never surer than it should be, whatever the blocks."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from drives import drive, robot
+from terragrip.errors import InputError
+from terragrip.estimation import TractionEstimator, estimate
+from terragrip.estimation.smoothing import run_smoothed
+from terragrip.recording import Recording
+
+SMOOTHABLE = ("kalman", "ukf", "aukf", "aukf-fs", "bank")
+QUANTITIES = ("adhesion_rr", "slip_fl", "soil_resistance", "ground_speed")
+
+
+def with_a_gap(recording: Recording) -> Recording:
+    return Recording(np.where(recording.time < 10, recording.time, recording.time + 4), recording.channels)
+
+
+@pytest.mark.parametrize("method", SMOOTHABLE)
+def test_smoothing_is_better_than_filtering(method):
+    noisy = drive(30.0, slip=lambda t: 0.1 + 0.06 * np.sin(t))
+    filtered = estimate(noisy.recording, robot(), method)
+    smoothed = estimate(noisy.recording, robot(), method, smooth=True)
+    inner = (filtered.time > 2) & (filtered.time < 28)
+    for name in QUANTITIES:
+        rms = [np.sqrt(np.mean((e[name] - noisy.truth[name])[inner] ** 2)) for e in (filtered, smoothed)]
+        assert rms[1] < rms[0], (name, rms)
+        assert (smoothed[f"{name}_std"] > 0).all()
+    assert np.median(smoothed["adhesion_rr_std"] / filtered["adhesion_rr_std"]) < 1
+    assert smoothed.about["smooth"]
+
+
+def test_intervals_of_the_smoother_hold_the_truth():
+    noisy = drive(40.0, seed=5)
+    smoothed = estimate(noisy.recording, robot(), "kalman", smooth=True)
+    for name in ("adhesion_rr", "slip_rr", "soil_resistance"):
+        inside = np.abs(smoothed[name] - noisy.truth[name]) < 1.96 * smoothed[f"{name}_std"]
+        assert inside.mean() > 0.9, name
+
+
+@pytest.mark.parametrize("method", ["kalman", "bank"])
+def test_the_block_length_does_not_matter(method):
+    recording = with_a_gap(drive(20.0, imu=True).recording)
+    results = [
+        run_smoothed(TractionEstimator.for_recording(recording, robot(), method), recording, block=block)
+        for block in (97, 1000, 100_000)
+    ]
+    for name in results[0].columns:
+        for other in results[1:]:
+            assert np.array_equal(results[0][name], other[name], equal_nan=True), name
+
+
+def test_the_last_row_is_the_filters():
+    recording = drive(5.0).recording
+    filtered, smoothed = (estimate(recording, robot(), "kalman", smooth=s) for s in (False, True))
+    for name in QUANTITIES:
+        assert smoothed[name][-1] == pytest.approx(filtered[name][-1], rel=1e-9)
+    assert np.array_equal(smoothed["nis"], filtered["nis"])
+    assert np.array_equal(smoothed.event_codes, filtered.event_codes)
+
+
+def test_the_estimator_stands_at_the_end():
+    recording = drive(5.0).recording
+    one, other = (TractionEstimator.for_recording(recording, robot()) for _ in range(2))
+    run_smoothed(one, recording, block=100)
+    other.update_block(recording)
+    assert one.snapshot() == other.snapshot()
+
+
+def test_nothing_is_smoothed_over_a_gap_in_the_motion():
+    """What follows a gap tells nothing of the speeds before it, but of the ground it does."""
+    recording = with_a_gap(drive(20.0).recording)
+    smoothed = estimate(recording, robot(), "kalman", smooth=True)
+    assert np.isfinite(smoothed["slip_rr"]).all()
+    assert set(smoothed["event"]) == {"", "gap"}
+
+
+def test_algebraic_cannot_smooth():
+    with pytest.raises(InputError, match="cannot smooth"):
+        estimate(drive(3.0).recording, robot(), "algebraic", smooth=True)
