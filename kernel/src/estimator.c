@@ -2,8 +2,8 @@
 #include "estimator.h"
 
 #define TG_JOLT_MEMORY 5 /* s */
-#define TG_SWING 3      /* samples that a jolt lasts */
-#define TG_UNMODELLED 2
+#define TG_SWING 2 /* samples that a jolt lasts */
+#define TG_UNMODELLED ((tg_real)2.5) /* share of the jolts that rho_s may hold, with the swings of several rows */
 #define TG_LONGEST_WALK 30 /* s of random walk that a gap adds at most: beyond it the ground is simply unknown */
 
 /* ---- the filter ---- */

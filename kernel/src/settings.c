@@ -48,7 +48,7 @@ tg_status tg_tune_walks(tg_settings *s)
 {
     if (!s || s->machine.wheels < 1 || s->machine.wheels > TG_MAX_WHEELS) return TG_BAD_ARGUMENT;
     const int32_t n = s->machine.wheels;
-    const tg_real rim = (tg_real)1e-3, ground = (tg_real)4e-4, adhesion = (tg_real)2.5e-3, resistance = (tg_real)3e-4;
+    const tg_real rim = (tg_real)1e-3, ground = (tg_real)1e-4, adhesion = (tg_real)2.5e-3, resistance = (tg_real)3e-4;
     for (int32_t i = 0; i < n; i++) {
         if (!is_positive(s->machine.radius[i])) return TG_NOT_POSITIVE;
         s->tuning.walk[i] = rim / tgi_square(s->machine.radius[i]);
