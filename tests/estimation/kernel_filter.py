@@ -5,13 +5,11 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-import pytest
 from numpy.typing import NDArray
 
+from terragrip._kernel import ffi, lib
 from terragrip.estimation.reference import BankUpdate, Machine, Step, Tuning
 
-kernel = pytest.importorskip("terragrip._kernel")
-ffi, lib = kernel.ffi, kernel.lib
 
 Array = NDArray[Any]
 Report = dict[str, Array]
