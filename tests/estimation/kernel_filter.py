@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 from terragrip._kernel import ffi, lib
 from terragrip.estimation.reference import BankUpdate, Machine, Step, Tuning
 
-
 Array = NDArray[Any]
 Report = dict[str, Array]
 """What one step did, a name a quantity; NaN where a channel was missing."""
