@@ -47,11 +47,14 @@ TG_INLINE void exact_take(const tg_filter *f, const tgi_plan *plan, tgi_result *
     variance += sum;
     const tg_real weight = tgi_weight(f->tuning.huber, innovation, variance);
     const tg_real r = weight < 1 ? plan->r[o] / weight : plan->r[o];
-    out->residual_variance[taken] = factor_measure(out->u, out->d, along, spread, first, TG_TWICE(n), stride, r, gain);
+    const tg_real inverse = factor_measure(out->u, out->d, along, spread, first, TG_TWICE(n), stride, r, gain);
     for (int i = 0; i < stride; i += TG_LANES)
         lanes_store(out->x + i, lanes_mul_add(lanes_all(residual), lanes_load(gain + i), lanes_load(out->x + i)));
     out->channel[taken] = o;
     out->residual[taken] = residual;
+    out->residual_variance[taken] = r + sum;
+    out->nis += residual * residual * inverse;
+    out->volume *= r + sum;
     out->innovation[o] = innovation;
     out->variance[o] = variance;
     out->weight[o] = weight;
@@ -92,6 +95,8 @@ TG_INLINE void exact_step(const tg_filter *f, const tgi_plan *plan, tgi_result *
     for (int i = 0; i < stride; i += TG_LANES) lanes_store(out->x_prior + i, lanes_load(out->x + i));
     for (int j = rows; j < stride; j++) out->d[j] = 0;
     out->taken = 0;
+    out->nis = 0;
+    out->volume = 1;
     tgi_gram gram = factor_begin(W, weight, rows, stride);
 #define TAKE(j, lanes, first)                                                                             \
     {                                                                                                     \
@@ -100,7 +105,8 @@ TG_INLINE void exact_step(const tg_filter *f, const tgi_plan *plan, tgi_result *
     }
 #define NEXT(j, lanes) TAKE(j, lanes, 0)
     TAKE(rows - 1, (rows - 1) / TG_LANES + 1, 1)
-    TG_ROWS_DOWN(rows - 2, 0, stride, NEXT)
+    TG_ROWS_DOWN(rows - 2, 1, stride, NEXT)
+    factor_last(&gram, plan->passage.q[0], out->u, out->d);
 #undef NEXT
 #undef TAKE
     if (plan->count && plan->present[n + 1]) exact_take_accelerometer(f, plan, out, n, stride);

@@ -80,6 +80,30 @@ TG_INLINE void factor_row(tgi_gram *g, int j, const int lanes, const int first, 
     g->previous = j;
 }
 
+/* Take row 0 after others: there is nothing above it. */
+TG_INLINE void factor_last(const tgi_gram *g, tg_real noise, tg_real *u, tg_real *d)
+{
+    const tg_real part = lanes_at(g->part[0], 0);
+    tg_real sum[4] = {noise + TG_TINY, g->joins ? g->noise * part * part : 0, 0, 0};
+#define COLUMN(k, chain)                                                      \
+    {                                                                         \
+        const tg_real *const w = g->W + (k) * g->stride;                      \
+        const tg_real left = w[0] - part * w[g->previous];                    \
+        sum[chain] += g->weight[k] * left * left;                             \
+    }
+    int k = 0;
+    for (; k + 4 <= g->columns; k += 4) {
+        COLUMN(k, 0)
+        COLUMN(k + 1, 1)
+        COLUMN(k + 2, 2)
+        COLUMN(k + 3, 3)
+    }
+    for (; k < g->columns; k++) COLUMN(k, 3)
+#undef COLUMN
+    *d = (sum[0] + sum[1]) + (sum[2] + sum[3]);
+    for (int i = 0; i < g->stride; i += TG_LANES) lanes_store(u + i, i ? lanes_all(0) : lanes_load(TG_ABOVE[0] + TG_LANES));
+}
+
 /* W and its weights, with nothing taken yet. Entries of a column beyond its last row, up to the whole lane, must be numbers. */
 TG_INLINE tgi_gram factor_begin(tg_real *W, tg_real *weight, int columns, int stride)
 {
@@ -105,7 +129,7 @@ TG_INLINE tgi_gram factor_begin(tg_real *W, tg_real *weight, int columns, int st
     }
 
 /* Measurement update by one channel (Bierman 1977, V.3; Thornton's gain). `f`: U'h, zero before column `first`; `spread`: sums of d f^2 up
- * to each column. Columns of U, d and the gain (K over the residual's variance) are those after the channel; returns that variance. */
+ * to each column. Columns of U, d and the gain (K over the residual's variance) are those after the channel; returns one over that variance. */
 TG_INLINE tg_real factor_measure(tg_real *u, tg_real *d, const tg_real *f, const tg_real *spread, int first, int rows, int stride, tg_real r,
                                  tg_real *gain)
 {
@@ -127,6 +151,6 @@ TG_INLINE tg_real factor_measure(tg_real *u, tg_real *d, const tg_real *f, const
         }
     }
     for (int i = 0; i < lanes; i++) lanes_store(gain + TG_LANES * i, lanes_mul(K[i], lanes_all(inverse)));
-    return variance;
+    return inverse;
 }
 #endif

@@ -106,39 +106,33 @@ TG_INLINE void scale_noise(const tg_filter *f, tg_real gamma, tgi_plan *plan, co
 }
 
 /* ln N of the residuals, which are independent of each other. */
-static void judge(tgi_result *result)
+static tg_real log_likelihood(const tgi_result *result)
 {
-    tg_real nis = 0, volume = 1, logs = 0;
-    for (int c = 0; c < result->taken; c++) {
-        nis += result->residual[c] * result->residual[c] / result->residual_variance[c];
-        volume *= result->residual_variance[c];
-    }
-    if (volume > TG_TINY && volume < 1 / TG_TINY)
-        logs = tgi_log(volume);
+    tg_real logs = 0;
+    if (result->volume > TG_TINY && result->volume < 1 / TG_TINY)
+        logs = tgi_log(result->volume);
     else
         for (int c = 0; c < result->taken; c++) logs += tgi_log(result->residual_variance[c]);
-    result->nis = nis;
-    result->log_likelihood = -(nis + logs + (tg_real)result->taken * TG_LN_2PI) / 2;
+    return -(result->nis + logs + (tg_real)result->taken * TG_LN_2PI) / 2;
 }
 
 TG_INLINE int result_is_finite(const tgi_result *result, const int n, const int stride)
 {
     const tg_lanes none = lanes_all(0);
-    tg_lanes zero[4] = {none, none, none, lanes_all(result->nis * 0 + result->log_likelihood * 0)};
-    for (int k = 0; k < TG_TWICE(n); k++)
-        for (int i = 0; i < stride; i += TG_LANES)
-            zero[k % 4] = lanes_mul_add(lanes_load(result->u + k * stride + i), none, zero[k % 4]);
+    tg_lanes zero[4] = {none, none, none, lanes_all(result->log_likelihood * 0)};
     for (int i = 0; i < stride; i += TG_LANES) {
         zero[0] = lanes_mul_add(lanes_load(result->x + i), none, zero[0]);
         zero[1] = lanes_mul_add(lanes_load(result->d + i), none, zero[1]);
+        for (int k = i; k < TG_TWICE(n); k++) /* columns that reach this lane */
+            zero[k % 4] = lanes_mul_add(lanes_load(result->u + k * stride + i), none, zero[k % 4]);
     }
     return lanes_sum(lanes_add(lanes_add(zero[0], zero[1]), lanes_add(zero[2], zero[3]))) == 0;
 }
 
 TG_INLINE void commit(tg_filter *f, const tgi_plan *plan, const tgi_result *result, const int n, const int stride)
 {
-    for (int i = 0; i < TG_TWICE(n) * stride; i += TG_LANES) lanes_store(f->u + i, lanes_load(result->u + i));
     for (int i = 0; i < stride; i += TG_LANES) {
+        for (int k = i; k < TG_TWICE(n); k++) lanes_store(f->u + k * stride + i, lanes_load(result->u + k * stride + i));
         lanes_store(f->x + i, lanes_load(result->x + i));
         lanes_store(f->d + i, lanes_load(result->d + i));
         lanes_store(f->x_prior + i, lanes_load(result->x_prior + i));
@@ -178,7 +172,10 @@ TG_INLINE void report(const tgi_plan *plan, const tgi_result *result, const tg_r
         out->weight[c] = present ? result->weight[o] : 1;
     }
     for (int c = n + 2; c < TG_MAX_CHANNELS; c++) out->innovation[c] = out->innovation_variance[c] = out->weight[c] = 0;
-    for (int e = 0; e < TG_MAX_STATES; e++) out->adaptation[e] = e < TG_TWICE(n) ? scale[tgi_row(n, e)] : 0;
+    for (int i = 0; i < n; i++) out->adaptation[i] = scale[n + 2 + i];
+    out->adaptation[n] = scale[n + 1];
+    for (int i = 0; i <= n; i++) out->adaptation[n + 1 + i] = scale[i];
+    for (int e = TG_TWICE(n); e < TG_MAX_STATES; e++) out->adaptation[e] = 0;
     for (int b = 0; b < TG_MODES; b++) out->mode[b] = 0;
 }
 
@@ -187,6 +184,7 @@ TG_INLINE tg_status advance_one(tg_filter *f, const tgi_call *call, tgi_plan *pl
     const int32_t policy = f->tuning.policy;
     tg_real scale[TG_ROWS];
     tgi_result result;
+    for (int i = f->states; i < f->stride; i++) result.d[i] = 0; /* the engines write the states only, the check reads whole lanes */
     plan->gamma = policy == TG_FIXED      ? 0
                   : policy == TG_ADAPTIVE ? 1
                   : call->y               ? tgi_supervise(f, plan, call->now)
@@ -197,7 +195,7 @@ TG_INLINE tg_status advance_one(tg_filter *f, const tgi_call *call, tgi_plan *pl
         tgi_exact_step(f, plan, &result);
     else
         tgi_unscented_step(f, plan, &result);
-    judge(&result);
+    result.log_likelihood = log_likelihood(&result);
     if (!result_is_finite(&result, n, stride)) return TG_DIVERGED;
     if (policy != TG_FIXED) {
         const tg_status status = tgi_adapt(f, plan, &result);
@@ -311,9 +309,8 @@ void tgi_restart(int n, int stride, const tg_real *q, tg_real *u, tg_real *d)
     memcpy(W, u, (size_t)(rows * stride) * sizeof *u);
     memcpy(weight, d, (size_t)rows * sizeof *d);
     tgi_gram gram = factor_begin(W, weight, rows, stride);
-#define TAKE(j, lanes) factor_row(&gram, j, lanes, j == n, 1, q[j], u + (j) * stride, d + (j));
-    TG_ROWS_DOWN(n, 0, TG_ROWS, TAKE) /* not hot: one loop */
-#undef TAKE
+    for (int j = n; j > 0; j--) factor_row(&gram, j, j / TG_LANES + 1, j == n, 1, q[j], u + j * stride, d + j);
+    factor_last(&gram, q[0], u, d);
     for (int j = n + 1; j < rows; j++) {
         d[j] = q[j];
         for (int i = 0; i < stride; i++) u[j * stride + i] = i == j;

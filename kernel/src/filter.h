@@ -6,32 +6,6 @@
 #ifndef TG_FILTER_H
 #define TG_FILTER_H
 #include "lanes.h"
-#include <float.h>
-#include <math.h>
-
-#ifdef TG_FLOAT
-#define tgi_sqrt sqrtf
-#define tgi_fabs fabsf
-#define tgi_log logf
-#define tgi_exp expf
-#define tgi_expm1 expm1f
-#define tgi_cos cosf
-#define tgi_sin sinf
-#define tgi_ceil ceilf
-#define TG_TINY 1e-36f /* keeps a factor's d above zero; far below the rounding of any variance */
-#define TG_LARGEST FLT_MAX
-#else
-#define tgi_sqrt sqrt
-#define tgi_fabs fabs
-#define tgi_log log
-#define tgi_exp exp
-#define tgi_expm1 expm1
-#define tgi_cos cos
-#define tgi_sin sin
-#define tgi_ceil ceil
-#define TG_TINY 1e-290
-#define TG_LARGEST DBL_MAX
-#endif
 
 #define TG_SUBSTEP ((tg_real)0.25)  /* largest r rho_w/J h of one Runge-Kutta step */
 #define TG_SUBSTEPS_MAX 1000000     /* a longer dt is refused */
@@ -61,7 +35,8 @@ typedef struct { /* what a step comes to, before it is known to be sound */
     tg_real residual[TG_MAX_CHANNELS];       /* innovation after the channels before it, and its variance */
     tg_real residual_variance[TG_MAX_CHANNELS];
     tg_real innovation[TG_MAX_CHANNELS], variance[TG_MAX_CHANNELS], weight[TG_MAX_CHANNELS]; /* prior */
-    tg_real nis, log_likelihood;
+    tg_real nis, volume; /* sum of residual^2/variance and product of the variances, over the channels taken */
+    tg_real log_likelihood;
 } tgi_result;
 
 /* Row of the state's place e (omega, v, mu, rho_s). */

@@ -1,9 +1,35 @@
-/* Four numbers that are computed on at once. Where the compiler has vectors this wide they are one register; elsewhere plain C99, with
+/* The kernel's arithmetic: functions of tg_real, and four numbers that are computed on at once. Where the compiler has vectors this wide they are one register; elsewhere plain C99, with
  * the same order of operations and so the same bits. */
 #ifndef TG_LANES_H
 #define TG_LANES_H
 #include "terragrip.h"
+#include <float.h>
+#include <math.h>
 #include <string.h>
+
+#ifdef TG_FLOAT
+#define tgi_sqrt sqrtf
+#define tgi_fabs fabsf
+#define tgi_log logf
+#define tgi_exp expf
+#define tgi_expm1 expm1f
+#define tgi_cos cosf
+#define tgi_sin sinf
+#define tgi_ceil ceilf
+#define TG_TINY 1e-36f /* keeps a factor's d above zero; far below the rounding of any variance */
+#define TG_LARGEST FLT_MAX
+#else
+#define tgi_sqrt sqrt
+#define tgi_fabs fabs
+#define tgi_log log
+#define tgi_exp exp
+#define tgi_expm1 expm1
+#define tgi_cos cos
+#define tgi_sin sin
+#define tgi_ceil ceil
+#define TG_TINY 1e-290
+#define TG_LARGEST DBL_MAX
+#endif
 
 #if defined(__GNUC__)
 #define TG_INLINE static inline __attribute__((always_inline, unused))

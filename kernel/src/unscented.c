@@ -67,7 +67,8 @@ TG_INLINE void unscented_predict(const tg_filter *f, const tgi_plan *plan, const
 #define TAKE(j, lanes, first) factor_row(&gram, j, lanes, first, 1, plan->passage.q[j], out->u + (j) * stride, out->d + (j));
 #define NEXT(j, lanes) TAKE(j, lanes, 0)
     TAKE(rows - 1, (rows - 1) / TG_LANES + 1, 1)
-    TG_ROWS_DOWN(rows - 2, 0, stride, NEXT)
+    TG_ROWS_DOWN(rows - 2, 1, stride, NEXT)
+    factor_last(&gram, plan->passage.q[0], out->u, out->d);
 #undef NEXT
 #undef TAKE
 }
@@ -115,7 +116,9 @@ TG_INLINE void unscented_update(const tg_filter *f, const tgi_plan *plan, const 
     }
     TAKE_CHANNEL(all - 1, (all - 1) / TG_LANES + 1, 1)
     TG_ROWS_DOWN(all - 2, rows, joint, NEXT_CHANNEL)
-    TG_ROWS_DOWN(rows - 1, 0, joint, TAKE_STATE)
+    TG_ROWS_DOWN(rows - 1, 1, joint, TAKE_STATE)
+    factor_last(&gram, 0, column, out->d);
+    for (int i = 0; i < stride; i += TG_LANES) lanes_store(out->u + i, lanes_load(column + i));
 #undef TAKE_CHANNEL
 #undef NEXT_CHANNEL
 #undef TAKE_STATE
@@ -132,6 +135,8 @@ TG_INLINE void unscented_update(const tg_filter *f, const tgi_plan *plan, const 
         out->channel[out->taken] = c;
         out->residual[out->taken] = residual[a];
         out->residual_variance[out->taken] = d[a];
+        out->nis += residual[a] * residual[a] / d[a];
+        out->volume *= d[a];
         for (int i = 0; i < stride; i++) {
             out->gain[out->taken][i] = i < rows ? u[a][i] : 0;
             out->x[i] += out->gain[out->taken][i] * residual[a];
@@ -144,6 +149,8 @@ TG_INLINE void unscented_step(const tg_filter *f, const tgi_plan *plan, tgi_resu
 {
     const weights w = unscented_weights(&f->tuning, n);
     out->taken = 0;
+    out->nis = 0;
+    out->volume = 1;
     for (int j = TG_TWICE(n); j < stride; j++) out->d[j] = 0;
     unscented_predict(f, plan, &w, out, n, stride);
     if (plan->count)
