@@ -184,7 +184,7 @@ class AdhesionCurve:
         rng = np.random.default_rng(self.seed)
         draws = rng.multinomial(clusters, np.full(clusters, 1 / clusters), size=self.bootstrap).astype(float)
         n = draws @ count
-        used = bins.used & (n > 0)
+        used = bins.used & (n >= bins.settings.minimum)
         safe = np.where(used, n, 1.0)
         weights = self._bin_weights(bins) * used
         enough = np.count_nonzero(used, axis=1) >= max(len(free), 2)

@@ -13,6 +13,7 @@ from terragrip.errors import InputError
 from terragrip.soil.bins import PAPER_BINS, Bins, BinSettings, bin_pairs
 from terragrip.soil.choice import LEAST_BINS, FormVerdict, compare_forms
 from terragrip.soil.fit import AdhesionCurve
+from terragrip.soil.ground_mean import GroundMean, mean_over_ground
 from terragrip.soil.library import Soil, SoilLibrary
 from terragrip.soil.missing import Gap, in_words, what_to_drive
 from terragrip.soil.slip_noise import SlipNoise, correct_slip_noise
@@ -30,7 +31,7 @@ POOR = 0.5
 @dataclass(frozen=True)
 class RunPairs:
     """The usable pairs of one run on one soil: slip, adhesion and slip noise (n,), wheel after wheel; the stretch of `STRETCH` metres
-    that each lies in (n,); rho_s and speed (rows,)."""
+    that each lies in and the metres that it stands for (n,); rho_s and speed (rows,)."""
 
     run: str
     soil: str
@@ -38,6 +39,7 @@ class RunPairs:
     adhesion: Array
     slip_std: Array
     stretch: NDArray[np.int64]
+    metres: Array
     resistance: Array
     speed: Array
 
@@ -50,6 +52,7 @@ class LearnedSoil:
     curve: AdhesionCurve
     verdict: FormVerdict | None
     slip_noise: SlipNoise | None
+    ground_mean: GroundMean | None
     gaps: tuple[Gap, ...]
     pairs: tuple[RunPairs, ...] = field(repr=False)
 
@@ -78,10 +81,12 @@ def usable_pairs(
     """
     soil = np.asarray(columns["soil"], dtype=object)
     good = settled(columns["distance"], soil, length) & (np.asarray(columns["event"], dtype=object) == "")
+    distance = np.asarray(columns["distance"], dtype=float)
+    steps = np.diff(distance, prepend=distance[:1])
     out = []
     for name in sorted(set(soil[good])):
         rows = good & (soil == name)
-        stretch = np.floor(np.asarray(columns["distance"], dtype=float)[rows] / STRETCH).astype(np.int64)
+        stretch = np.floor(distance[rows] / STRETCH).astype(np.int64)
         out.append(
             RunPairs(
                 run,
@@ -90,6 +95,7 @@ def usable_pairs(
                 np.concatenate([np.asarray(columns[f"adhesion_{w}"], dtype=float)[rows] for w in wheels]),
                 np.concatenate([np.asarray(columns[f"slip_{w}_std"], dtype=float)[rows] for w in wheels]),
                 np.tile(stretch, len(wheels)),
+                np.tile(steps[rows], len(wheels)),
                 np.asarray(columns["soil_resistance"], dtype=float)[rows],
                 np.asarray(columns["ground_speed"], dtype=float)[rows],
             )
@@ -137,6 +143,11 @@ def learn_soils(
         words += (
             [f"{name}: {learned.slip_noise.sentence}"]
             if learned.slip_noise and learned.slip_noise.matters
+            else []
+        )
+        words += (
+            [f"{name}: {learned.ground_mean.sentence}"]
+            if learned.ground_mean and learned.ground_mean.matters
             else []
         )
         words += in_words(name, learned.gaps) if learned.gaps else []
@@ -204,6 +215,14 @@ def _learn(
             "slip_std": corrected.slip_std,
         }
         soil = replace(soil, fit={**soil.fit, "slip_noise": shown})
+    metres = np.concatenate([part.metres for part in parts])
+    ground = mean_over_ground(
+        curve, slip, adhesion, metres, cluster, noise, template.bootstrap, template.seed
+    )
+    if ground is not None:
+        interval = None if ground.interval is None else list(ground.interval)
+        of_ground = {"a": ground.mean, "interval": interval, "metres": ground.metres}
+        soil = replace(soil, fit={**soil.fit, "ground_mean": of_ground})
     usual = float(np.nanmedian(speed))
     gaps = what_to_drive(soil, binned, mass, sample_period, wheels, usual) if mass else []
-    return LearnedSoil(soil, curve, verdict, corrected, tuple(gaps), tuple(parts))
+    return LearnedSoil(soil, curve, verdict, corrected, ground, tuple(gaps), tuple(parts))
