@@ -16,6 +16,7 @@ from terragrip.cli.demo import command as demo
 from terragrip.cli.estimate import command as estimate
 from terragrip.cli.failure import INTERRUPTED, report
 from terragrip.cli.inspect import command as inspect
+from terragrip.cli.live import command as live
 from terragrip.cli.simulate import command as simulate
 from terragrip.cli.soils import command as soils
 
@@ -33,6 +34,7 @@ app.command("estimate")(estimate)
 app.command("calibrate")(calibrate)
 app.command("soils")(soils)
 app.command("simulate")(simulate)
+app.command("live")(live)
 
 
 def _print_version(wanted: bool) -> None:

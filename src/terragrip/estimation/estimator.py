@@ -53,6 +53,16 @@ class Estimate:
     def __iter__(self) -> Iterator[str]:
         return iter(("time", *self._places, "event"))
 
+    @property
+    def places(self) -> dict[str, int]:
+        """Where in `values` each column stands."""
+        return self._places
+
+    @property
+    def values(self) -> list[float]:
+        """All numbers of the kernel's estimate, by `places`; the list is this estimate's own."""
+        return self._values
+
     def to_dict(self) -> dict[str, float | str]:
         """All columns by name."""
         return {name: self[name] for name in self}
@@ -102,7 +112,7 @@ class TractionEstimator:
         self.vehicle = vehicle
         self.method = method_named(method).name
         self.held = dict(held or {})
-        self.channels = _channels(vehicle, channels)
+        self.channels = default_channels(vehicle) if channels is None else tuple(channels)
         self.thresholds = Thresholds(gap=gap, standstill_speed=standstill_speed)
         self._start(sensors)
 
@@ -245,9 +255,8 @@ class TractionEstimator:
         return refusal(status, f"time {sample.get('time')}")
 
 
-def _channels(vehicle: Vehicle, given: Collection[str] | None) -> tuple[str, ...]:
-    if given is not None:
-        return tuple(given)
+def default_channels(vehicle: Vehicle) -> tuple[str, ...]:
+    """The columns that samples of this vehicle carry at least: speeds, and torques of driven wheels."""
     torques = [f"drive_torque_{w}" for w, on in zip(vehicle.wheels, vehicle.driven, strict=True) if on]
     return (*(f"wheel_speed_{w}" for w in vehicle.wheels), "ground_speed", *torques)
 

@@ -24,6 +24,7 @@ from pydantic import BeforeValidator, Field, field_validator, model_validator
 
 from terragrip.document import Fault, Part, read_yaml, validate
 from terragrip.errors import nearest
+from terragrip.formats.payload import Payload
 from terragrip.recording import Recording
 from terragrip.recording.schema import (
     AXLE_CHANNELS,
@@ -148,6 +149,7 @@ class Profile(Part):
     description: str = ""
     time: TimeSource = Field(default_factory=lambda: TimeSource.model_validate({}))
     rows: Rows | None = None
+    payload: Payload | None = None  # of a live source's messages
     channels: dict[str, Source]
 
     @classmethod

@@ -1,0 +1,81 @@
+"""``terragrip live``: estimates while the machine drives."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from terragrip.cli.options import Quiet, VehicleFile
+from terragrip.errors import InputError
+from terragrip.estimation.methods import DEFAULT, METHODS
+
+if TYPE_CHECKING:
+    from terragrip.live.service import Service
+
+
+def command(
+    source: Annotated[
+        list[str], typer.Option("--source", metavar="URI", help="udp: mqtt: can: ros2: zenoh: serial: replay: (docs/live.md).")
+    ],
+    vehicle: VehicleFile,
+    sink: Annotated[
+        list[str] | None, typer.Option("--sink", metavar="URI", help="udp: mqtt: can: ros2: zenoh: foxglove: studio:.")
+    ] = None,
+    profile: Annotated[
+        str | None, typer.Option("--profile", metavar="FILE", help="What the sources' fields mean (YAML).")
+    ] = None,
+    record: Annotated[
+        Path | None, typer.Option("--record", metavar="DIR", help="Keep all that comes in and out; goes on where it broke off.")
+    ] = None,
+    method: Annotated[str, typer.Option(metavar="NAME", help=f"One of {', '.join(METHODS)}.")] = DEFAULT,
+    window: Annotated[
+        float, typer.Option(metavar="MS", min=0.0, max=10_000.0, help="How long a row waits for late samples, ms.")
+    ] = 20.0,
+    duration: Annotated[
+        float | None, typer.Option(metavar="S", min=0.0, help="Stop after so many seconds.")
+    ] = None,
+    quiet: Quiet = False,
+) -> None:
+    """Estimate while the machine drives.
+
+    Samples from any number of sources, estimates to any number of sinks; Ctrl-C ends it with the record whole.
+    """
+    import asyncio
+
+    from terragrip.formats import Profile
+    from terragrip.live.service import Service
+    from terragrip.vehicle import Vehicle
+
+    if quiet and not sink and record is None:
+        raise InputError("estimates would go nowhere", place="--quiet", mend="add --sink or --record")
+    service = Service(
+        Vehicle.load(vehicle),
+        source,
+        sink or [],
+        profile=None if profile is None else Profile.load(profile),
+        record=record,
+        method=method,
+        window=window / 1000.0,
+    )
+    asyncio.run(_run(service, duration, quiet))
+    if not quiet:
+        print(service.statistics.summary())
+        if record is not None:
+            print(f"Recorded in {record}")
+
+
+async def _run(service: Service, duration: float | None, quiet: bool) -> None:
+    import asyncio
+    import signal
+
+    from terragrip.live.status import shown
+
+    loop = asyncio.get_running_loop()
+    for number in (signal.SIGINT, signal.SIGTERM):
+        loop.add_signal_handler(number, service.stop)
+    if duration is not None:
+        loop.call_later(duration, service.stop)
+    with shown(service, quiet):
+        await service.run()

@@ -1,0 +1,9 @@
+"""Live estimation: sources of samples, the same estimator as for logs, a record that survives a kill, and sinks."""
+
+from __future__ import annotations
+
+from terragrip.live.core import Core, Row
+from terragrip.live.event import Event
+from terragrip.live.record import Recorder, read_record
+
+__all__ = ["Core", "Event", "Recorder", "Row", "read_record"]

@@ -1,0 +1,196 @@
+"""The heart of the live service: what came in and when, to rows, estimates and events. No clock, no I/O.
+
+Everything it does follows from the sequence of `take`, `tick`, `note` and `flush` with their arguments; so the record
+(terragrip.live.record) needs to hold only those to bring it back bit for bit after a kill.
+"""
+
+from __future__ import annotations
+
+import base64
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from terragrip.errors import InputError
+from terragrip.estimation.estimator import Estimate, TractionEstimator, default_channels
+from terragrip.estimation.methods import DEFAULT
+from terragrip.live.clock import SourceClock
+from terragrip.live.counts import Counts
+from terragrip.live.event import Event
+from terragrip.live.reorder import Pending, Reorder
+
+if TYPE_CHECKING:
+    from terragrip.vehicle import Vehicle
+
+WINDOW = 0.02  # s
+
+Values = dict[str, float]
+
+
+@dataclass(frozen=True, slots=True)
+class Settings:
+    """What makes two runs the same: kept with the record, compared on resuming.
+
+    ``window`` [s]: how long a row waits for what is due. ``channels``: columns the samples carry; empty: those seen by the
+    first row. ``sources``: their URIs.
+    """
+
+    sources: tuple[str, ...]
+    method: str = DEFAULT
+    window: float = WINDOW
+    channels: tuple[str, ...] = ()
+
+    def to_dict(self) -> dict[str, Any]:
+        """As JSON holds it."""
+        return {
+            "sources": list(self.sources),
+            "method": self.method,
+            "window": self.window,
+            "channels": list(self.channels),
+        }
+
+    @classmethod
+    def from_dict(cls, data: Mapping[str, Any]) -> Settings:
+        """The inverse of `to_dict`."""
+        return cls(tuple(data["sources"]), data["method"], data["window"], tuple(data["channels"]))
+
+
+@dataclass(frozen=True, slots=True)
+class Row:
+    """A row that went into the estimator, and its estimate; ``arrival`` [s] of its first sample."""
+
+    arrival: float
+    values: Values
+    estimate: Estimate
+    predicted: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Refusal:
+    """A sample, or part of one, that found no way into the estimator."""
+
+    arrival: float
+    time: float
+    source: int
+    why: str
+    values: Values
+
+
+Output = Row | Event | Refusal
+
+
+class Core:
+    """Samples in, rows with estimates, events and refusals out."""
+
+    def __init__(self, vehicle: Vehicle, settings: Settings) -> None:
+        self.vehicle = vehicle
+        self.settings = settings
+        self.counts = Counts()
+        self.reorder = Reorder(settings.window, self.counts)
+        align = len(settings.sources) > 1
+        self.clocks = [SourceClock(align) for _ in settings.sources]
+        self.estimator: TractionEstimator | None = None
+        self.rows = 0
+        if settings.channels:
+            self._begin(settings.channels)
+
+    def _begin(self, channels: Collection[str]) -> TractionEstimator:
+        self.estimator = TractionEstimator(self.vehicle, self.settings.method, channels=channels)
+        return self.estimator
+
+    @property
+    def time(self) -> float:
+        """Instant [s] of the last row; -inf before the first."""
+        return self.reorder.released
+
+    def take(self, arrival: float, source: int, stamp: float, values: Values) -> list[Output]:
+        """A sample of ``source`` (its place in the settings), stamped by its own clock [s]; SI values by column."""
+        self.counts.add("received", values)
+        clock = self.clocks[source]
+        before = clock.lead
+        going, refused, jump = clock.take(arrival, stamp, values)
+        out: list[Output] = []
+        for lost in refused:
+            self.counts.add("clock", lost)
+            out.append(Refusal(arrival, stamp, source, "clock", lost))
+        if jump:
+            out.append(
+                Event(
+                    self.time, "clock_jump", self.settings.sources[source],
+                    f"the clock jumped by {jump:+.6g} s (stamps led arrivals by {before:.3g} s); time goes on without the jump",
+                )
+            )  # fmt: skip
+        for when, time, one in going:
+            lost = self.reorder.add(when, source, time, one)
+            if lost:
+                out.append(Refusal(when, time, source, "late or doubled", lost))
+        return self._release(self.reorder.ready(arrival), out)
+
+    def tick(self, now: float) -> list[Output]:
+        """Nothing came up to ``now``: rows that have waited for a window go on."""
+        return self._release(self.reorder.ready(now), [])
+
+    def due(self, now: float) -> bool:
+        """Whether `tick` would do anything."""
+        pending = self.reorder.pending
+        return bool(pending) and now - pending[0].arrival >= self.reorder.window
+
+    def flush(self) -> list[Output]:
+        """The sources have ended: all rows go on."""
+        return self._release(self.reorder.flush(), [])
+
+    def note(self, note: Mapping[str, Any]) -> list[Output]:
+        """What the service saw beside samples: counts (``fate``, ``channels``, ``number``) and an ``event``."""
+        if "fate" in note:
+            self.counts.add(note["fate"], note["channels"], note.get("number", 1))
+        return [Event.from_dict({**note["event"], "time": self.time})] if "event" in note else []
+
+    def _release(self, rows: list[Pending], out: list[Output]) -> list[Output]:
+        for row in rows:
+            estimator = self.estimator or self._begin(self._seen(row))
+            try:
+                estimate = estimator.update({**row.values, "time": row.time})
+            except InputError as error:
+                source = next(iter(row.origin.values()))
+                out.append(Refusal(row.arrival, row.time, source, str(error), row.values))
+                out.append(Event(row.time, "refused", self.settings.sources[source], str(error)))
+                continue
+            self.rows += 1
+            out.append(Row(row.arrival, row.values, estimate))
+        for kind, source, channel in self.reorder.changes:
+            text = f"{channel} no longer comes" if kind == "channel_lost" else f"{channel} comes again"
+            out.append(Event(self.time, kind, self.settings.sources[source], text))
+        self.reorder.changes.clear()
+        return out
+
+    def _seen(self, first: Pending) -> Collection[str]:
+        pending = [name for row in self.reorder.pending for name in row.values]
+        return tuple(dict.fromkeys([*default_channels(self.vehicle), *first.values, *pending]))
+
+    def state(self) -> dict[str, Any]:
+        """Everything, as JSON holds it, to the last bit."""
+        snapshot = self.estimator.snapshot() if self.estimator else b""
+        return {
+            "settings": self.settings.to_dict(),
+            "vehicle": self.vehicle.to_dict(),
+            "estimator": base64.b64encode(snapshot).decode(),
+            "clocks": [clock.state() for clock in self.clocks],
+            "reorder": self.reorder.state(),
+            "counts": self.counts.state(),
+            "rows": self.rows,
+        }
+
+    @classmethod
+    def from_state(cls, state: Mapping[str, Any]) -> Core:
+        """The inverse of `state`; raises InputError where the estimator's snapshot is damaged."""
+        from terragrip.vehicle import Vehicle
+
+        found = cls(Vehicle.from_dict(state["vehicle"]), Settings.from_dict(state["settings"]))
+        snapshot = base64.b64decode(state["estimator"])
+        found.estimator = TractionEstimator.restore(snapshot) if snapshot else None
+        found.clocks = [SourceClock.from_state(one) for one in state["clocks"]]
+        found.counts = Counts.from_state(state["counts"])
+        found.reorder.counts = found.counts
+        found.reorder.restore(state["reorder"])
+        found.rows = state["rows"]
+        return found

@@ -1,0 +1,111 @@
+"""What a source is given: where its messages go, and whom it tells that it is connected or lost."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+from terragrip.live.decode import Decoder
+from terragrip.live.inbox import Inbox, Values
+from terragrip.live.payload import Unpack, Unreadable
+
+Note = Callable[[dict[str, Any]], None]
+
+_EVERY = 5.0  # s between two events of the same kind about the same thing
+_SETTLED = 50  # messages after which another set of fields is a change, not one more kind of message
+_LAYOUTS = 64
+
+
+class Lost(Exception):
+    """A source or sink lost its other side; the text says why. It is connected anew after a while."""
+
+
+class Feed:
+    """The way of source number ``index`` into the inbox."""
+
+    def __init__(
+        self, index: int, name: str, decoder: Decoder, unpack: Unpack, inbox: Inbox, note: Note, *, after: float
+    ) -> None:
+        self.index, self.name = index, name
+        self.decoder, self.inbox = decoder, inbox
+        self.after = after  # newest stamp that the record holds: a replay goes on behind it
+        self.messages = self.unreadable = 0
+        self.is_lost = False
+        self._unpack, self._note = unpack, note
+        self._said: dict[str, float] = {}
+        self._layouts: dict[frozenset[str], None] = {}
+        self._since_layout = 0
+
+    def message(self, data: bytes, arrival: float | None = None) -> None:
+        """A message as bytes, by the profile's payload."""
+        try:
+            found = self._unpack(data)
+        except Unreadable as error:
+            self.spoiled(str(error))
+            return
+        for fields in found:
+            self.fields(fields, arrival)
+
+    def fields(self, fields: Mapping[str, Any], arrival: float | None = None) -> None:
+        """A message as named fields."""
+        self.messages += 1
+        samples = self.decoder.samples(fields)
+        for stamp, values in samples:
+            self.inbox.put(self.index, stamp, values, arrival)
+        if self.decoder.unreadable:
+            self._say_unreadable()
+        self._watch_layout(fields.keys(), bool(samples))
+
+    def sample(self, stamp: float | None, values: Values, arrival: float | None = None) -> None:
+        """A sample that needs no decoding."""
+        self.messages += 1
+        self.inbox.put(self.index, stamp, values, arrival)
+
+    def spoiled(self, why: str) -> None:
+        """A message that nobody can read."""
+        self.unreadable += 1
+        self._note({"fate": "unreadable", "channels": [f"({self.name})"]})
+        self._event("unreadable", f"a message was {why}", key="message")
+
+    def _say_unreadable(self) -> None:
+        wrong, self.decoder.unreadable = self.decoder.unreadable, {}
+        self._note({"fate": "unreadable", "channels": list(wrong)})
+        for channel, what in wrong.items():
+            self._event("unreadable", f"{channel} was {what}, not a number", key=channel)
+
+    def _watch_layout(self, names: Any, useful: bool) -> None:
+        layout = frozenset(names)
+        if layout in self._layouts:
+            self._since_layout += 1
+            return
+        if self._layouts and self._since_layout >= _SETTLED:
+            before = next(reversed(self._layouts))
+            gone, new = sorted(before - layout)[:5], sorted(layout - before)[:5]
+            parts = [f"without {', '.join(gone)}"] if gone else []
+            parts += [f"with {', '.join(new)}"] if new else []
+            self._event("schema", f"messages changed: {' and '.join(parts)}", key="schema")
+        elif not useful and not self._layouts:
+            self._event("schema", f"no field is known among {', '.join(sorted(layout)[:8])}", key="schema")
+        if len(self._layouts) < _LAYOUTS:
+            self._layouts[layout] = None
+        self._since_layout = 0
+
+    def connected(self) -> None:
+        """The source has its other side (again)."""
+        if self.is_lost:
+            self.is_lost = False
+            self._event("source_back", "connected again")
+
+    def lost(self, why: str) -> None:
+        """The source lost its other side."""
+        self._event("source_lost", why, key=None if not self.is_lost else "lost")
+        self.is_lost = True
+
+    def _event(self, kind: str, text: str, key: str | None = None) -> None:
+        """An event; those with the same ``key`` at most every few seconds."""
+        now = self.inbox.clock()
+        if key is not None:
+            if now - self._said.get(key, float("-inf")) < _EVERY:
+                return
+            self._said[key] = now
+        self._note({"event": {"time": None, "kind": kind, "source": self.name, "text": text}})

@@ -1,0 +1,68 @@
+"""What goes to sinks: an estimate, an event, a status; written as JSON once, however many sinks there are."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from fnmatch import fnmatchcase
+from typing import Any
+
+from terragrip.live.core import Row
+from terragrip.live.event import Event
+
+ESTIMATE, EVENT, STATUS, SOIL, GROUND = "estimate", "event", "status", "soil", "ground"
+
+
+class Message:
+    """``kind`` is `ESTIMATE`, `EVENT`, `STATUS`, `SOIL` or `GROUND`; ``row`` is there for an estimate, ``data`` for the others."""
+
+    __slots__ = ("_json", "data", "kind", "row", "time")
+
+    def __init__(self, kind: str, time: float, row: Row | None = None, data: dict[str, Any] | None = None) -> None:
+        self.kind, self.time, self.row, self.data = kind, time, row, data
+        self._json: dict[Columns | None, bytes] = {}
+
+    @classmethod
+    def of_event(cls, event: Event) -> Message:
+        """An event's message."""
+        return cls(EVENT, event.time, data=event.to_dict())
+
+    def json(self, columns: Columns | None = None) -> bytes:
+        """The message as a JSON object; of an estimate, ``columns`` or all of them. Missing numbers are null."""
+        found = self._json.get(columns)
+        if found is None:
+            found = json.dumps(self.data).encode() if self.row is None else _estimate(self.row, columns)
+            self._json[columns] = found
+        return found
+
+
+class Columns:
+    """Which columns of an estimate a sink wants, by patterns as a shell has them: ``slip_*,adhesion_*``."""
+
+    def __init__(self, text: str) -> None:
+        self._patterns = [part.strip() for part in text.split(",") if part.strip()]
+        self._places: dict[str, int] = {}
+        self._of: object = None
+
+    def places(self, row: Row) -> dict[str, int]:
+        """Name and place of each wanted column."""
+        every = row.estimate.places
+        if self._of is not every:
+            self._of = every
+            self._places = {n: k for n, k in every.items() if any(fnmatchcase(n, p) for p in self._patterns)}
+        return self._places
+
+
+def _estimate(row: Row, columns: Columns | None) -> bytes:
+    estimate, values = row.estimate, row.estimate.values
+    places = estimate.places if columns is None else columns.places(row)
+    numbers = ",".join(
+        f'"{name}":{value!r}' if (value := values[place]) == value else f'"{name}":null'
+        for name, place in places.items()
+    )
+    head = f'{{"time":{estimate.time!r},"arrival":{row.arrival!r},"event":"{estimate.event}"'
+    head += f',"predicted":{"true" if row.predicted else "false"}'
+    return f"{head}{',' if numbers else ''}{numbers}}}".encode()
+
+
+Publish = Callable[[Message], None]

@@ -1,0 +1,68 @@
+"""Bytes of a message into named fields."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from typing import Any
+
+from terragrip.formats.payload import Payload
+
+Fields = dict[str, Any]
+
+
+class Unreadable(Exception):
+    """A message that is not what it should be; the text says what it is, shortly."""
+
+
+Unpack = Callable[[bytes], list[Fields]]
+
+
+def unpacker(payload: Payload | None) -> Unpack:
+    """A function from a message's bytes to its fields, one mapping a sample; it raises Unreadable."""
+    if payload is None or payload.format == "json":
+        return from_json
+    packer, names = payload.packer, payload.fields
+
+    def unpack(data: bytes) -> list[Fields]:
+        if len(data) % packer.size or not data:
+            raise Unreadable(f"{len(data)} bytes, not a multiple of {packer.size}")
+        return [dict(zip(names, values, strict=True)) for values in packer.iter_unpack(data)]
+
+    return unpack
+
+
+def from_json(data: bytes) -> list[Fields]:
+    """JSON objects: one, several in a list, or one a line. Nested ones are flattened: ``wheel.fl``."""
+    try:
+        found = json.loads(data)
+    except UnicodeDecodeError:
+        raise Unreadable(f"no JSON: {len(data)} bytes that are no text") from None
+    except (ValueError, RecursionError):
+        lines = data.splitlines()
+        if len(lines) > 1:
+            return [fields for line in lines if line.strip() for fields in from_json(line)]
+        raise Unreadable(f"no JSON: {_short(data)}") from None
+    objects = found if isinstance(found, list) else [found]
+    if not all(isinstance(one, dict) for one in objects):
+        raise Unreadable(f"JSON, but no object: {_short(data)}")
+    return [_flat(one) if any(isinstance(v, dict | list) for v in one.values()) else one for one in objects]
+
+
+def _flat(nested: Fields, prefix: str = "", depth: int = 0) -> Fields:
+    flat: Fields = {}
+    for name, value in nested.items():
+        if isinstance(value, dict) and depth < 8:
+            flat |= _flat(value, f"{prefix}{name}.", depth + 1)
+        elif isinstance(value, list) and depth < 8:
+            flat |= _flat({str(k): item for k, item in enumerate(value[:64])}, f"{prefix}{name}.", depth + 1)
+        else:
+            flat[prefix + name] = value
+    return flat
+
+
+def _short(data: bytes) -> str:
+    text = data[:40].decode("utf-8", "replace")
+    return repr(text + ("…" if len(data) > 40 else ""))
+
+

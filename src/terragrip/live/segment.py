@@ -1,0 +1,139 @@
+"""A closed segment of the record: Parquet files that appear whole, synced, or not at all."""
+
+from __future__ import annotations
+
+import json
+import os
+from array import array
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from terragrip.estimation.engine import EVENTS
+from terragrip.live.core import Output, Refusal, Row
+from terragrip.live.event import Event
+
+if TYPE_CHECKING:
+    import pyarrow as pa
+
+    from terragrip.estimation.estimates import Estimates
+    from terragrip.estimation.estimator import TractionEstimator
+
+RECORDING, ESTIMATES, REFUSED, EVENT_LINES = "recording", "estimates", "refused", "events"
+
+
+@dataclass(slots=True)
+class Segment:
+    """What came out of the core since the last segment was closed. Rows lie flat, 8 bytes a number."""
+
+    number: int
+    time: array[float] = field(default_factory=lambda: array("d"))
+    arrival: array[float] = field(default_factory=lambda: array("d"))
+    estimates: array[float] = field(default_factory=lambda: array("d"))
+    codes: array[int] = field(default_factory=lambda: array("B"))
+    channels: dict[str, array[float]] = field(default_factory=dict)
+    refusals: list[Refusal] = field(default_factory=list)
+    events: list[Event] = field(default_factory=list)
+
+    def __len__(self) -> int:
+        return len(self.time)
+
+    def add(self, output: Output) -> None:
+        """Take one output of the core."""
+        if isinstance(output, Row):
+            self._add_row(output)
+        elif isinstance(output, Event):
+            self.events.append(output)
+        else:
+            self.refusals.append(output)
+
+    def _add_row(self, row: Row) -> None:
+        rows = len(self.time)
+        self.time.append(row.estimate.time)
+        self.arrival.append(row.arrival)
+        self.estimates.extend(row.estimate.values)
+        self.codes.append(EVENTS.index(row.estimate.event))
+        for name, column in self.channels.items():
+            column.append(row.values.get(name, float("nan")))
+        if not row.values.keys() <= self.channels.keys():
+            for name, value in row.values.items():
+                if name not in self.channels:
+                    self.channels[name] = array("d", [float("nan")]) * rows
+                    self.channels[name].append(value)
+
+    def write(self, folder: Path, estimator: TractionEstimator | None) -> None:
+        """Write the segment's files; raises OSError."""
+        if len(self) and estimator is not None:
+            import pyarrow.parquet as pq
+
+            from terragrip.estimation.estimates import parquet_options
+
+            for name, table in (
+                (RECORDING, self.to_recording()),
+                (ESTIMATES, self.to_estimates(estimator).to_arrow()),
+            ):
+                with durable(folder / f"{name}-{self.number:06d}.parquet") as path:
+                    pq.write_table(table, path, **parquet_options(table.schema))
+        if self.refusals:
+            lines = [json.dumps({n: getattr(r, n) for n in Refusal.__slots__}) for r in self.refusals]
+            self._write_lines(folder, REFUSED, lines)
+        if self.events:
+            self._write_lines(folder, EVENT_LINES, [json.dumps(event.to_dict()) for event in self.events])
+
+    def _write_lines(self, folder: Path, name: str, lines: list[str]) -> None:
+        with durable(folder / f"{name}-{self.number:06d}.jsonl") as path:
+            path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+
+    def to_recording(self) -> pa.Table:
+        """The rows as they were measured, with the arrival of each [s since 1970]."""
+        import numpy as np
+        import pyarrow as pa
+
+        columns = {"time": self.time, "arrival": self.arrival, **self.channels}
+        return pa.table({name: pa.array(np.frombuffer(c)) for name, c in columns.items()})
+
+    def to_estimates(self, estimator: TractionEstimator) -> Estimates:
+        """The rows' estimates as a table."""
+        import numpy as np
+
+        from terragrip.estimation.batch import about_run
+        from terragrip.estimation.estimates import Estimates
+
+        table = np.frombuffer(self.estimates).reshape(len(self), -1)
+        columns = {
+            name: np.ascontiguousarray(table[:, place])
+            for name, place in estimator.engine.index_out.items()
+        }
+        for name in ("latitude", "longitude", "altitude"):
+            if name in self.channels:
+                columns[name] = np.frombuffer(self.channels[name])
+        about = about_run(estimator, None, None, smooth=False)
+        codes = np.frombuffer(self.codes, dtype=np.uint8)
+        return Estimates(np.frombuffer(self.time), columns, codes, {}, about)
+
+
+@contextmanager
+def durable(path: Path) -> Iterator[Path]:
+    """A temporary path, synced and renamed to ``path`` at the end; raises OSError."""
+    temporary = path.with_name(f".{path.name}.part")
+    try:
+        yield temporary
+        file = os.open(temporary, os.O_RDONLY)
+        try:
+            os.fsync(file)
+        finally:
+            os.close(file)
+        temporary.replace(path)
+    finally:
+        temporary.unlink(missing_ok=True)
+
+
+def sync_folder(folder: Path) -> None:
+    """Have renames in a folder survive a power cut; raises OSError."""
+    file = os.open(folder, os.O_RDONLY)
+    try:
+        os.fsync(file)
+    finally:
+        os.close(file)

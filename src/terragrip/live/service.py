@@ -1,0 +1,286 @@
+"""The live service: sources to core or record to sinks, in one thread, with what is lost said and counted."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+from collections.abc import Awaitable, Callable, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from terragrip.errors import InputError
+from terragrip.estimation.methods import DEFAULT, method_named
+from terragrip.live.core import WINDOW, Core, Output, Row, Settings
+from terragrip.live.decode import Decoder
+from terragrip.live.event import Event
+from terragrip.live.feed import Feed, Lost
+from terragrip.live.inbox import CAPACITY, Inbox
+from terragrip.live.message import ESTIMATE, STATUS, Message
+from terragrip.live.outbox import Outbox
+from terragrip.live.payload import unpacker
+from terragrip.live.prediction import Prediction
+from terragrip.live.record import Recorder
+from terragrip.live.sinks import Sink, open_sink
+from terragrip.live.sources import Source, open_source
+from terragrip.live.statistics import Statistics
+
+if TYPE_CHECKING:
+    from terragrip.formats import Profile
+    from terragrip.vehicle import Vehicle
+
+_AT_ONCE = 64  # samples between two turns of sources and sinks
+_HOUSEKEEPING = 0.1  # s
+_SYNC = 0.5  # s
+_BEHIND = 1.0  # s
+_BACKOFF = (0.5, 30.0)  # s, doubled from the first to the last
+_SETTLED = 10.0  # s connected, after which the back-off begins anew
+_LINGER = 2.0  # s for sinks to take the last messages
+
+logger = logging.getLogger("terragrip.live")
+
+
+class Service:
+    """Runs until its sources end or `stop` is called.
+
+    Parameters
+    ----------
+    vehicle: the machine. method: the estimator's.
+    sources, sinks: URIs (docs/live.md). profile: what the sources' fields mean; None: the recording's own names.
+    record: folder of the record, which is resumed where it holds one; None: none is kept.
+    window: s that a row waits for what is due (`terragrip.live.reorder`).
+    capacity: samples that may wait for the estimator before they are dropped.
+
+    Raises InputError on a URI, profile, vehicle or folder that cannot be used.
+    """
+
+    def __init__(
+        self,
+        vehicle: Vehicle,
+        sources: Sequence[str],
+        sinks: Sequence[str] = (),
+        *,
+        profile: Profile | None = None,
+        record: Path | None = None,
+        method: str = DEFAULT,
+        window: float = WINDOW,
+        capacity: int = CAPACITY,
+    ) -> None:
+        method_named(method)
+        if not sources:
+            raise InputError("there is no source", place="--source", mend="name one, e.g. udp://127.0.0.1:9870")
+        decoders = [Decoder(profile) for _ in sources]
+        opened = [open_source(text, decoder) for text, decoder in zip(sources, decoders, strict=True)]
+        self.sinks = [open_sink(text, vehicle) for text in sinks]
+        self.outboxes = [Outbox(uri) for uri, _ in self.sinks]
+        self.sources: list[Source] = [source for _, source in opened]
+        channels = dict.fromkeys(
+            name
+            for decoder, source in zip(decoders, self.sources, strict=True)
+            for name in (*decoder.channels, *getattr(source, "channels", ()))
+        )
+        settings = Settings(tuple(sources), method, window, tuple(channels))
+        self.recorder = None if record is None else Recorder(record, vehicle, settings)
+        self.core = Core(vehicle, settings) if self.recorder is None else self.recorder.core
+        self._engine: Core | Recorder = self.core if self.recorder is None else self.recorder
+        self.inbox = Inbox(capacity)
+        payload = None if profile is None else profile.payload
+        self.feeds = [
+            Feed(
+                k, text, decoders[k], unpacker(payload), self.inbox, self.note,
+                after=self.core.clocks[k].newest,
+            )
+            for k, text in enumerate(sources)
+        ]  # fmt: skip
+        self.statistics = Statistics(self)
+        self.prediction = Prediction(self.core)
+        self.listeners: list[Callable[[Message], None]] = [outbox.put for outbox in self.outboxes]
+        self._real_time = all(source.real_time for source in self.sources)
+        self._stopped = False
+        self._record_failure: str | None = None
+
+    def stop(self) -> None:
+        """Let `run` come to its end."""
+        self._stopped = True
+        self.inbox.wake()
+
+    def note(self, note: dict[str, Any]) -> None:
+        """What a source or sink has to say: counts, an event."""
+        self._dispatch(self._safely(self._engine.note, note))
+
+    async def run(self) -> None:
+        """Estimate until the sources have ended or `stop` was called; then close the record whole.
+
+        Raises InputError where a source or sink cannot be used at all, or the record could not be written.
+        """
+        watched = [
+            asyncio.create_task(self._supervise_source(source, feed))
+            for source, feed in zip(self.sources, self.feeds, strict=True)
+        ]
+        takers = [
+            asyncio.create_task(self._supervise_sink(sink, outbox))
+            for (_, sink), outbox in zip(self.sinks, self.outboxes, strict=True)
+        ]
+        try:
+            await self._loop(watched, takers)
+            self._dispatch(self._safely(self._engine.flush))
+            self.announce()
+            for outbox in self.outboxes:
+                await outbox.emptied(_LINGER)
+        finally:
+            for task in (*watched, *takers):
+                task.cancel()
+            await asyncio.gather(*watched, *takers, return_exceptions=True)
+            self._close_record()
+        for task in (*watched, *takers):
+            if not task.cancelled() and (failure := task.exception()) is not None:
+                raise failure
+        if self._record_failure:
+            raise InputError(self._record_failure, place="--record", mend="free space or choose another folder")
+
+    async def _loop(self, watched: list[asyncio.Task[None]], takers: list[asyncio.Task[None]]) -> None:
+        loop = asyncio.get_running_loop()
+        housekeeping = loop.time()
+        while not self._stopped:
+            taken = await self.inbox.wait(self._patience())
+            if taken:
+                self._drain()
+                await asyncio.sleep(0)
+            else:
+                now = self.inbox.clock()
+                if self._real_time and self._engine.due(now):
+                    self._dispatch(self._safely(self._engine.tick, now))
+            self._write()
+            if loop.time() - housekeeping >= _HOUSEKEEPING:
+                housekeeping = loop.time()
+                self._keep_house()
+            if all(task.done() for task in watched) and not self.inbox.samples:
+                return
+            if any(task.done() and not task.cancelled() and task.exception() for task in (*watched, *takers)):
+                return
+
+    def _patience(self) -> float:
+        """s to wait for a sample: until a row that waits is due."""
+        pending = self.core.reorder.pending
+        if not pending or not self._real_time:
+            return _HOUSEKEEPING
+        left = pending[0].arrival + self.core.settings.window - self.inbox.clock()
+        return min(max(left, 1e-4), _HOUSEKEEPING)
+
+    def _drain(self) -> None:
+        samples = self.inbox.samples
+        for _ in range(min(len(samples), _AT_ONCE)):
+            sample = samples.popleft()
+            outputs = self._safely(self._engine.take, *sample)
+            self.statistics.sample(sample[1], sample[0])
+            if outputs:
+                self._dispatch(outputs)
+        self.inbox.taken()
+
+    def _safely(self, act: Callable[..., list[Output]], *arguments: Any) -> list[Output]:
+        """Do it; where the record cannot be written, say so and go on without."""
+        try:
+            return act(*arguments)
+        except OSError as error:
+            self._without_record(error)
+            return []
+
+    def _write(self) -> None:
+        if self.recorder is not None:
+            try:
+                self.recorder.write()
+            except OSError as error:
+                self._without_record(error)
+
+    def _without_record(self, error: OSError) -> None:
+        assert self.recorder is not None
+        self._record_failure = f"the record stopped at {self.core.time:.6g} s ({error.strerror or error})"
+        self.recorder.abandon()
+        self.recorder, self._engine = None, self.core
+        self._dispatch([Event(self.core.time, "record_failed", "record", self._record_failure)])
+
+    def _close_record(self) -> None:
+        if self.recorder is None:
+            return
+        try:
+            self.recorder.close()
+        except OSError as error:
+            self._record_failure = f"the record's last segment could not be closed ({error.strerror or error})"
+
+    def _dispatch(self, outputs: list[Output]) -> None:
+        for output in outputs:
+            if isinstance(output, Row):
+                self.statistics.row(output, self.inbox.clock())
+                if self.listeners:
+                    message = Message(ESTIMATE, output.estimate.time, output)
+                    for listen in self.listeners:
+                        listen(message)
+            elif isinstance(output, Event):
+                self.statistics.event(output)
+                logger.info("%s: %s: %s", output.source, output.kind, output.text)
+                message = Message.of_event(output)
+                for listen in self.listeners:
+                    listen(message)
+
+    def _keep_house(self) -> None:
+        now = self.inbox.clock()
+        dropped, self.inbox.dropped = self.inbox.dropped, type(self.inbox.dropped)()
+        for channel, mine in dropped.by_channel.items():
+            self.note({"fate": "dropped", "channels": [channel], "number": mine["dropped"]})
+        if self._real_time:
+            for feed in self.feeds:
+                self.statistics.watch_silence(feed, now)
+            lag = now - self.inbox.samples[0][0] if self.inbox.samples else 0.0
+            if lag > _BEHIND or dropped.by_channel:
+                self.statistics.say_behind(lag, dropped.total("dropped"), now)
+            predicted = self.prediction.at(now, self.statistics.last_arrival, self.statistics.period)
+            if predicted is not None:
+                self._dispatch([predicted])
+        if self.statistics.second(now):
+            self.announce()
+        if self.recorder is not None and self.statistics.due_sync(now, _SYNC):
+            try:
+                self.recorder.sync()
+            except OSError as error:
+                self._without_record(error)
+
+    def announce(self) -> None:
+        """Send the status to whom it concerns."""
+        message = Message(STATUS, self.core.time, data=self.statistics.to_dict())
+        for listen in self.listeners:
+            listen(message)
+
+    async def _supervise_source(self, source: Source, feed: Feed) -> None:
+        await self._again_and_again(lambda: source.run(feed), feed.lost)
+
+    async def _supervise_sink(self, sink: Sink, outbox: Outbox) -> None:
+        name = outbox.uri.text
+        state = {"lost": False}
+
+        def lost(why: str) -> None:
+            if not state["lost"]:
+                self.note({"event": {"time": None, "kind": "sink_lost", "source": name, "text": why}})
+            state["lost"] = True
+
+        def back() -> None:
+            if state["lost"]:
+                self.note({"event": {"time": None, "kind": "sink_back", "source": name, "text": "connected again"}})
+            state["lost"] = False
+
+        outbox.connected = back
+        await self._again_and_again(lambda: sink.run(outbox), lost)
+
+    async def _again_and_again(self, run: Callable[[], Awaitable[None]], lost: Callable[[str], None]) -> None:
+        """Run until it ends of itself; after a loss again, waiting longer each time."""
+        loop = asyncio.get_running_loop()
+        pause = _BACKOFF[0]
+        while True:
+            began = loop.time()
+            try:
+                await run()
+                return
+            except Lost as loss:
+                lost(str(loss))
+            if loop.time() - began > _SETTLED:
+                pause = _BACKOFF[0]
+            await asyncio.sleep(pause)
+            pause = min(2 * pause, _BACKOFF[1])

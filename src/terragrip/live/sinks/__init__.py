@@ -1,0 +1,32 @@
+"""Where estimates and events go. Each sink has a module, which loads when its URI is opened."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from typing import TYPE_CHECKING, Protocol
+
+from terragrip.live.outbox import Outbox
+from terragrip.live.sources import opened
+from terragrip.live.uri import Uri
+
+if TYPE_CHECKING:
+    from terragrip.vehicle import Vehicle
+
+_HOMES: dict[str, str] = {"udp": "udp"}
+_ALL = ("rate", "columns")
+OPTIONS: dict[str, Collection[str]] = {
+    "udp": (*_ALL, "format"),
+}
+
+
+class Sink(Protocol):
+    """A taker of messages."""
+
+    async def run(self, outbox: Outbox) -> None:
+        """Take messages for ever; raises Lost where the other side went away."""
+
+
+def open_sink(text: str, vehicle: Vehicle) -> tuple[Uri, Sink]:
+    """The sink of a URI; raises InputError if it names none, or the package it needs is missing."""
+    uri = Uri.parse(text, OPTIONS, "sink")
+    return uri, opened(f"{__name__}.{_HOMES[uri.scheme]}", uri).open_sink(uri, vehicle)

@@ -1,0 +1,48 @@
+"""Where samples come from. Each source has a module, which loads when its URI is opened."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from importlib import import_module
+from typing import Protocol
+
+from terragrip.errors import InputError
+from terragrip.live.decode import Decoder
+from terragrip.live.feed import Feed
+from terragrip.live.uri import Uri
+
+_HOMES: dict[str, str] = {"udp": "udp", "replay": "replay"}
+OPTIONS: dict[str, Collection[str]] = {
+    "udp": ("allow",),
+    "replay": ("speed",),
+}
+
+
+class Source(Protocol):
+    """A source of messages.
+
+    ``real_time``: samples come when they come, and silence means something; a replay waits for whoever takes them.
+    """
+
+    real_time: bool
+
+    async def run(self, feed: Feed) -> None:
+        """Feed messages until there are no more; raises Lost where the other side went away, InputError for good."""
+
+
+def open_source(text: str, decoder: Decoder) -> tuple[Uri, Source]:
+    """The source of a URI; raises InputError if it names none, or the package it needs is missing."""
+    uri = Uri.parse(text, OPTIONS, "source")
+    return uri, opened(f"{__name__}.{_HOMES[uri.scheme]}", uri).open_source(uri, decoder)
+
+
+def opened(module: str, uri: Uri):  # type: ignore[no-untyped-def]  # a module
+    """The module of a source or sink; raises InputError naming the extra where a package is missing."""
+    try:
+        return import_module(module)
+    except ModuleNotFoundError as error:
+        if (error.name or "").split(".")[0] == "terragrip":
+            raise
+        raise InputError(
+            f"needs the Python package {error.name}", place=uri.text, mend="pip install 'terragrip[live]'"
+        ) from error

@@ -1,0 +1,130 @@
+"""What the service shows of itself: rates, delays, drops, the last estimate and event."""
+
+from __future__ import annotations
+
+from collections import deque
+from typing import TYPE_CHECKING, Any
+
+from terragrip.live.core import Row
+from terragrip.live.event import Event
+from terragrip.live.feed import Feed
+
+if TYPE_CHECKING:
+    from terragrip.live.service import Service
+
+_SILENT = 1.0  # s, or ten periods
+_EVERY = 5.0  # s between two events that estimates are behind
+
+
+class Statistics:
+    """Numbers of the last whole second, and of the run."""
+
+    def __init__(self, service: Service) -> None:
+        self._service = service
+        now = service.inbox.clock()
+        self.last_arrival = now
+        self.period = 0.0  # s between rows, lately
+        self.row_rate = self.sample_rate = self.delay = 0.0
+        self.last: Row | None = None
+        self.events: deque[Event] = deque(maxlen=50)
+        self.event_counts: dict[str, int] = {}
+        self._arrivals = [now] * len(service.feeds)
+        self._messages = [0] * len(service.feeds)
+        self._silent = [False] * len(service.feeds)
+        self._began, self._rows, self._samples, self._delays = now, 0, 0, 0.0
+        self._synced = self._behind = now - _EVERY
+
+    def sample(self, source: int, arrival: float) -> None:
+        """A sample went into the core."""
+        self._samples += 1
+        self._arrivals[source] = arrival
+        if arrival > self.last_arrival:
+            self.last_arrival = arrival
+
+    def row(self, row: Row, now: float) -> None:
+        """A row came out of it."""
+        if row.predicted:
+            self.last = row
+            return
+        if self.last is not None and not self.last.predicted:
+            self.period += 0.1 * (row.estimate.time - self.last.estimate.time - self.period)
+        self.last = row
+        self._rows += 1
+        self._delays += now - row.arrival
+
+    def event(self, event: Event) -> None:
+        """An event was told."""
+        self.events.append(event)
+        self.event_counts[event.kind] = self.event_counts.get(event.kind, 0) + 1
+
+    def watch_silence(self, feed: Feed, now: float) -> None:
+        """Say where a source that is connected sends nothing, and where it sends again."""
+        heard = feed.messages + feed.unreadable
+        if heard != self._messages[feed.index]:
+            self._messages[feed.index] = heard
+            if self._silent[feed.index]:
+                self._silent[feed.index] = False
+                feed.connected()
+            self._arrivals[feed.index] = now
+        elif not feed.is_lost and not self._silent[feed.index]:
+            silence = now - self._arrivals[feed.index]
+            if silence > max(_SILENT, 10.0 * self.period):
+                self._silent[feed.index] = True
+                feed.lost(f"nothing came for {silence:.1f} s")
+
+    def say_behind(self, lag: float, dropped: int, now: float) -> None:
+        """Say that estimates are behind the sensors."""
+        if now - self._behind >= _EVERY:
+            self._behind = now
+            text = f"estimates are {lag:.2g} s behind; {dropped} values dropped just now"
+            self._service.note({"event": {"time": None, "kind": "behind", "source": "service", "text": text}})
+
+    def second(self, now: float) -> bool:
+        """Whether a second is over; then its rates are worked out."""
+        span = now - self._began
+        if span < 1.0:
+            return False
+        self.row_rate, self.sample_rate = self._rows / span, self._samples / span
+        self.delay = self._delays / self._rows if self._rows else 0.0
+        self._began, self._rows, self._samples, self._delays = now, 0, 0, 0.0
+        return True
+
+    def due_sync(self, now: float, step: float) -> bool:
+        """Whether ``step`` s have passed since the record was synced."""
+        if now - self._synced < step:
+            return False
+        self._synced = now
+        return True
+
+    def to_dict(self) -> dict[str, Any]:
+        """The status, as sinks get it."""
+        service = self._service
+        return {
+            "time": service.core.time if service.core.rows else None,
+            "rows": service.core.rows,
+            "row_rate": round(self.row_rate, 2),
+            "sample_rate": round(self.sample_rate, 2),
+            "delay": self.delay,
+            "waiting": len(service.inbox.samples),
+            "counts": service.core.counts.state(),
+            "events": dict(self.event_counts),
+            "sinks": {
+                box.uri.text: {"sent": box.sent, "dropped": box.dropped} for box in service.outboxes
+            },
+        }
+
+    def summary(self) -> str:
+        """The run in a few lines of text."""
+        service = self._service
+        core = service.core
+        lines = [f"{core.rows} rows estimated" + (f", up to {core.time:.6g} s" if core.rows else "")]
+        for fate in ("missing", "late", "doubled", "dropped", "unreadable", "clock"):
+            by = {name: mine[fate] for name, mine in core.counts.by_channel.items() if mine[fate]}
+            if by:
+                lines.append(f"{fate}: " + ", ".join(f"{name} {number}" for name, number in by.items()))
+        late, received = core.counts.total("late"), core.counts.total("received")
+        if late > 0.01 * received:
+            lines.append(f"{late} of {received} values came too late: a longer --window takes them in")
+        if self.event_counts:
+            lines.append("events: " + ", ".join(f"{kind} {number}" for kind, number in self.event_counts.items()))
+        return "\n".join(lines)

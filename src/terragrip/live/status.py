@@ -1,0 +1,119 @@
+"""The running status on a terminal."""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, Any
+
+from terragrip.live.core import Row
+from terragrip.live.message import Message
+
+if TYPE_CHECKING:
+    from terragrip.live.service import Service
+
+_STEP = 0.25  # s
+_TROUBLE = ("late", "doubled", "missing", "dropped", "unreadable", "clock")
+
+
+@contextmanager
+def shown(service: Service, quiet: bool) -> Iterator[None]:
+    """Show the status on standard error while the block runs: on a terminal a live table, elsewhere one line an event."""
+    if quiet:
+        yield
+        return
+    if not sys.stderr.isatty():
+        service.listeners.append(_print_event)
+        yield
+        return
+    from rich.console import Console
+    from rich.live import Live
+
+    state = {"next": 0.0}
+    with Live(console=Console(stderr=True), auto_refresh=False, transient=True) as live:
+
+        def refresh(message: Message) -> None:
+            now = time.monotonic()
+            if now >= state["next"]:
+                state["next"] = now + _STEP
+                live.update(table(service), refresh=True)
+
+        service.listeners.append(refresh)
+        yield
+
+
+def _print_event(message: Message) -> None:
+    if message.kind == "event" and message.data is not None:
+        event = message.data
+        print(f"{event['kind']}: {event['source']}: {event['text']}", file=sys.stderr)
+
+
+def table(service: Service) -> Any:
+    """Rates, drops, slip, adhesion, the ground and the last events, as rich shows them."""
+    from rich.console import Group
+    from rich.table import Table
+    from rich.text import Text
+
+    parts: list[Any] = [Text(line) for line in head(service)]
+    row = service.statistics.last
+    if row is not None:
+        parts.append(_wheels(row, Table))
+    trouble = counts_table(service, Table)
+    if trouble is not None:
+        parts.append(trouble)
+    parts += [Text(f"{e.time:9.1f} s  {e.kind}: {e.source}: {e.text}") for e in list(service.statistics.events)[-4:]]
+    return Group(*parts)
+
+
+def head(service: Service) -> list[str]:
+    """The lines above the tables."""
+    s, core = service.statistics, service.core
+    lines = [
+        f"time {core.time:.1f} s   {s.row_rate:.0f} rows/s   {s.sample_rate:.0f} samples/s   "
+        f"delay {1e3 * s.delay:.1f} ms   {len(service.inbox.samples)} waiting   {core.rows} rows"
+        if core.rows else "waiting for the first sample"
+    ]  # fmt: skip
+    if s.last is not None:
+        e = s.last.estimate
+        state = "predicted, nothing comes in" if s.last.predicted else e.event or "driving"
+        lines.append(
+            f"{state}   v {e.ground_speed:.2f} ± {e.ground_speed_std:.2f} m/s   "
+            f"soil resistance {e.soil_resistance:.3f} ± {e.soil_resistance_std:.3f}"
+        )
+    return lines
+
+
+def _wheels(row: Row, table: Any) -> Any:
+    shown = table("wheel", "slip %", "adhesion", "net traction", "efficiency %")
+    estimate = row.estimate
+    for name in estimate.places:
+        if name.startswith("adhesion_") and not name.endswith("_std"):
+            wheel = name.removeprefix("adhesion_")
+            shown.add_row(
+                wheel,
+                _with_std(estimate, f"slip_{wheel}", 100.0, 1),
+                _with_std(estimate, f"adhesion_{wheel}", 1.0, 2),
+                _with_std(estimate, f"net_traction_{wheel}", 1.0, 2),
+                _with_std(estimate, f"efficiency_{wheel}", 100.0, 0),
+            )
+    return shown
+
+
+def _with_std(estimate: Any, name: str, scale: float, digits: int) -> str:
+    value, std = scale * estimate[name], scale * estimate[f"{name}_std"]
+    return "—" if value != value else f"{value:.{digits}f} ± {std:.{digits}f}"
+
+
+def counts_table(service: Service, table: Any) -> Any:
+    """What went wrong, by channel; None where nothing did."""
+    wrong = {
+        name: mine for name, mine in service.core.counts.by_channel.items() if any(mine[f] for f in _TROUBLE)
+    }
+    if not wrong:
+        return None
+    shown = table("channel", "received", *_TROUBLE)
+    for name, mine in wrong.items():
+        shown.add_row(name, str(mine["received"]), *(str(mine[fate]) for fate in _TROUBLE))
+    return shown

@@ -1,0 +1,76 @@
+"""Sources and sinks by URI: ``udp://127.0.0.1:9870?format=doubles``, ``can:can0?interface=socketcan``, ``replay:LOG?speed=10``."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from dataclasses import dataclass, field
+from urllib.parse import parse_qsl, unquote, urlsplit
+
+from terragrip.errors import InputError, nearest
+
+
+@dataclass(frozen=True, slots=True)
+class Uri:
+    """A URI taken apart. ``text`` is what the user wrote; ``path`` what follows ``scheme:`` or the host."""
+
+    text: str
+    scheme: str
+    host: str = ""
+    port: int | None = None
+    path: str = ""
+    options: dict[str, str] = field(default_factory=dict)
+
+    @classmethod
+    def parse(cls, text: str, schemes: dict[str, Collection[str]], role: str) -> Uri:
+        """Take a URI apart; ``schemes`` are those known, each with its options.
+
+        Raises InputError on an unknown scheme or option, and on a password, which everyone could read.
+        """
+        head, colon, _ = text.partition(":")
+        scheme = head.lower()
+        if not colon or scheme not in schemes:
+            near = nearest(scheme, schemes)
+            mend = f"did you mean {near}:?" if near else f"give one of {', '.join(f'{s}:' for s in schemes)}"
+            raise InputError(f"{text!r} names no {role} that Terragrip knows", place=f"--{role}", mend=mend)
+        try:
+            parts = urlsplit(text)
+            port = parts.port
+        except ValueError as error:
+            raise InputError(f"{text!r} is no URI ({error})", place=f"--{role}", mend="write host:port") from error
+        if parts.username or parts.password:
+            raise InputError(
+                f"credentials do not belong on the command line ({scheme}://…@{parts.hostname})", place=f"--{role}",
+                mend="set TERRAGRIP_USERNAME and TERRAGRIP_PASSWORD, or TERRAGRIP_CREDENTIALS=FILE of mode 0600",
+            )  # fmt: skip
+        # The fragment sign is a wild card of MQTT, not the beginning of a fragment.
+        rest = text[len(head) + 1 :]
+        path = rest.split("?", 1)[0]
+        if path.startswith("//"):
+            path = path[2:].partition("/")[2]
+        options = dict(parse_qsl(rest.partition("?")[2], keep_blank_values=True))
+        for name in options:
+            if name not in schemes[scheme]:
+                near = nearest(name, schemes[scheme])
+                known = ", ".join(sorted(schemes[scheme])) or "none"
+                mend = f"did you mean {near}?" if near else f"its options are: {known}"
+                raise InputError(f"{scheme}: has no option {name!r}", place=f"--{role} {text}", mend=mend)
+        return cls(text, scheme, parts.hostname or "", port, unquote(path), options)
+
+    def number(self, option: str, default: float) -> float:
+        """An option as a positive number; raises InputError if it is none."""
+        text = self.options.get(option)
+        if text is None:
+            return default
+        try:
+            value = float(text)
+        except ValueError:
+            value = 0.0
+        if not 0.0 < value < float("inf"):
+            raise InputError(
+                f"{option} is {text!r}", place=self.text, mend="give a positive number"
+            )
+        return value
+
+    def is_loopback(self) -> bool:
+        """Whether the host can be reached from this machine only."""
+        return self.host in ("localhost", "::1") or self.host.startswith("127.")

@@ -1,0 +1,12 @@
+"""Makes machine.py, which tests import from, and its fixtures known."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).parent))
+
+from machine import port, short, vehicle
+
+__all__ = ["port", "short", "vehicle"]

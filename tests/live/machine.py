@@ -1,0 +1,46 @@
+"""A robot, a drive that obeys the equations, and the way to run a live service in a test."""
+
+from __future__ import annotations
+
+import asyncio
+import socket
+import sys
+from pathlib import Path
+
+import pytest
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "estimation"))  # for drives.py
+
+from drives import Drive, drive, robot
+
+
+@pytest.fixture(scope="session")
+def vehicle():
+    return robot()
+
+
+@pytest.fixture(scope="session")
+def short() -> Drive:
+    return drive(6.0, imu=True)
+
+
+@pytest.fixture
+def port() -> int:
+    """A UDP and TCP port that nobody uses."""
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return int(probe.getsockname()[1])
+
+
+def rows_of(recording):
+    """The rows as mappings, without what was not measured."""
+    names = list(recording.channels)
+    for time, *values in zip(recording.time, *(recording.channels[n] for n in names), strict=True):
+        yield float(time), {n: float(v) for n, v in zip(names, values, strict=True) if v == v}
+
+
+async def until(condition, seconds: float = 10.0) -> None:
+    """Wait for something to become true; fails where it does not."""
+    async with asyncio.timeout(seconds):
+        while not condition():
+            await asyncio.sleep(0.005)

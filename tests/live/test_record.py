@@ -1,0 +1,185 @@
+"""Nothing is lost: killed again and again, a run goes on as if it had never stopped, to the last bit."""
+
+from __future__ import annotations
+
+import json
+import os
+import random
+import signal
+import time
+
+import numpy as np
+import pytest
+
+from machine import rows_of
+from drives import drive
+from terragrip import read
+from terragrip.errors import InputError
+from terragrip.estimation import Estimates, TractionEstimator
+from terragrip.live import Recorder, read_record
+from terragrip.live.core import Settings
+from terragrip.live.wal import Reading
+
+KILLS = 100
+
+
+def settings_for(recording) -> Settings:
+    return Settings(("replay:test",), channels=tuple(recording.channels))
+
+
+def play(recorder: Recorder, rows, pause: float = 0.0) -> None:
+    """Feed the rows behind the newest that the record holds, ten at a time."""
+    after = recorder.core.clocks[0].newest
+    for k, (stamp, values) in enumerate(row for row in rows if row[0] > after):
+        recorder.take(stamp, 0, stamp, values)
+        if k % 10 == 9:
+            recorder.write()
+            recorder.sync()
+            time.sleep(pause)
+    recorder.flush()
+    recorder.close()
+
+
+def assert_as_never_interrupted(folder, recording, vehicle) -> None:
+    kept, estimates = read_record(folder)
+    assert np.array_equal(kept.time, recording.time)
+    for name, values in recording.channels.items():
+        assert np.array_equal(kept.channels[name], values, equal_nan=True), name
+    through = TractionEstimator(vehicle, channels=tuple(recording.channels)).update_block(recording)
+    for name, values in through.columns.items():
+        assert np.array_equal(estimates.columns[name], values, equal_nan=True), name
+
+
+def killed_child(act, seconds: float) -> bool:
+    """Fork a child that does ``act`` and kill it after ``seconds``; whether it had come to its end before."""
+    child = os.fork()
+    if child == 0:
+        code = 1
+        try:
+            act()
+            code = 0
+        finally:
+            os._exit(code)
+    time.sleep(seconds)
+    os.kill(child, signal.SIGKILL)
+    _, status = os.waitpid(child, 0)
+    return os.WIFEXITED(status) and os.WEXITSTATUS(status) == 0
+
+
+def test_killed_a_hundred_times_it_ends_as_if_never_interrupted(tmp_path, vehicle):
+    import pyarrow.parquet  # noqa: F401  # here, so that a child need not
+
+    recording = drive(25.0, imu=True).recording
+    rows, settings = list(rows_of(recording)), settings_for(recording)
+    random.seed(5)
+    kills = 0
+    while kills < KILLS:
+        # Segments of 150 rows: kills hit every step of closing one.
+        def act():
+            play(Recorder(tmp_path / "r", vehicle, settings, rows=150), rows, pause=0.004)
+
+        if killed_child(act, random.uniform(0.0, 0.15)):
+            break
+        kills += 1
+    play(Recorder(tmp_path / "r", vehicle, settings, rows=150), rows)
+    assert kills == KILLS
+    assert_as_never_interrupted(tmp_path / "r", recording, vehicle)
+
+
+def test_at_most_the_frames_behind_the_last_write_are_lost(tmp_path, vehicle, short):
+    rows, settings = list(rows_of(short.recording)), settings_for(short.recording)
+
+    def act():
+        recorder = Recorder(tmp_path, vehicle, settings)
+        for stamp, values in rows[:437]:
+            recorder.take(stamp, 0, stamp, values)
+            recorder.write()
+        for stamp, values in rows[437:450]:
+            recorder.take(stamp, 0, stamp, values)
+        os.kill(os.getpid(), signal.SIGKILL)
+
+    killed_child(act, 1.0)
+    kept, _ = read_record(tmp_path)
+    assert np.array_equal(kept.time, short.recording.time[:437])
+
+
+@pytest.mark.parametrize("cut", [1, 7, 30, 100])
+def test_a_torn_end_is_cut_off_and_said(tmp_path, vehicle, short, cut):
+    rows, settings = list(rows_of(short.recording)), settings_for(short.recording)
+    recorder = Recorder(tmp_path, vehicle, settings)
+    for stamp, values in rows[:100]:
+        recorder.take(stamp, 0, stamp, values)
+    recorder.write()
+    recorder.abandon()
+    wal = tmp_path / "wal-000001.log"
+    wal.write_bytes(wal.read_bytes()[:-cut])
+    again = Recorder(tmp_path, vehicle, settings)
+    assert again.core.rows in (98, 99)
+    assert "torn" in again.segment.events[-1].text
+    play(again, rows)
+    assert_as_never_interrupted(tmp_path, short.recording, vehicle)
+
+
+def test_a_flipped_byte_ends_the_reading_there(tmp_path, vehicle, short):
+    recorder = Recorder(tmp_path, vehicle, settings_for(short.recording))
+    for stamp, values in list(rows_of(short.recording))[:50]:
+        recorder.take(stamp, 0, stamp, values)
+    recorder.close()
+    recorder = Recorder(tmp_path, vehicle, settings_for(short.recording))
+    for stamp, values in list(rows_of(short.recording))[50:100]:
+        recorder.take(stamp, 0, stamp, values)
+    recorder.write()
+    path = tmp_path / "wal-000002.log"
+    whole = len(list(Reading(path)))
+    data = bytearray(path.read_bytes())
+    data[len(data) // 2] ^= 1
+    path.write_bytes(data)
+    reading = Reading(path)
+    assert 0 < len(list(reading)) < whole
+    assert reading.good < reading.size
+    recorder.abandon()
+
+
+def test_segments_are_files_that_every_command_reads(tmp_path, vehicle, short):
+    play(Recorder(tmp_path, vehicle, settings_for(short.recording), rows=250), rows_of(short.recording))
+    names = sorted(path.name for path in tmp_path.glob("*.parquet"))
+    assert names == [f"{kind}-00000{k}.parquet" for kind in ("estimates", "recording") for k in (1, 2, 3)]
+    assert len(read(tmp_path / "recording-000002.parquet")) == 250
+    part = Estimates.read(tmp_path / "estimates-000002.parquet")
+    assert part.vehicle.to_dict() == vehicle.to_dict()
+    assert not list(tmp_path.glob(".*.part"))
+
+
+def test_what_was_refused_is_kept_too(tmp_path, vehicle, short):
+    recorder = Recorder(tmp_path, vehicle, settings_for(short.recording))
+    rows = list(rows_of(short.recording))
+    for stamp, values in [*rows[:100], rows[20]]:
+        recorder.take(stamp, 0, stamp, values)
+    recorder.close()
+    (line,) = (tmp_path / "refused-000001.jsonl").read_text().splitlines()
+    assert json.loads(line)["time"] == rows[20][0]
+    assert json.loads(line)["values"] == rows[20][1]
+
+
+def test_another_vehicle_or_a_second_writer_is_refused(tmp_path, vehicle, short):
+    settings = settings_for(short.recording)
+    recorder = Recorder(tmp_path, vehicle, settings)
+    with pytest.raises(InputError, match="in use"):
+        Recorder(tmp_path, vehicle, settings)
+    recorder.close()
+    from drives import robot
+
+    with pytest.raises(InputError, match="another vehicle"):
+        Recorder(tmp_path, robot(mass=150.0, axles={"front": {"mass": 60.0, "wheels": ["fl", "fr"]}, "rear": {"mass": 90.0, "wheels": ["rl", "rr"]}}), settings)  # fmt: skip
+    with pytest.raises(InputError, match="made with window"):
+        Recorder(tmp_path, vehicle, Settings(settings.sources, window=1.0, channels=settings.channels))
+    (tmp_path / "snapshot-000000.json").unlink(missing_ok=True)
+    for path in tmp_path.glob("snapshot-*"):
+        path.write_text(path.read_text().replace('"rows"', '"rowz"'))
+        with pytest.raises(InputError, match="is damaged"):
+            Recorder(tmp_path, vehicle, settings)
+
+
+def test_no_record_is_said(tmp_path):
+    with pytest.raises(InputError, match="holds no record"):
+        read_record(tmp_path)

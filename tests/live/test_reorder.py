@@ -1,0 +1,166 @@
+"""Samples find their row; what is late, doubled or missing is counted; nothing waits without a reason."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from terragrip.live.clock import SourceClock
+from terragrip.live.counts import Counts
+from terragrip.live.reorder import Reorder
+
+STEP = 0.01
+
+
+def settled(window: float = 0.05, channels=("a",), rows: int = 30) -> tuple[Reorder, Counts, list]:
+    """A buffer that has met its streams, at time `rows` * STEP."""
+    counts = Counts()
+    buffer, out = Reorder(window, counts), []
+    for k in range(rows):
+        for name in channels:
+            buffer.add(k * STEP, 0, k * STEP, {name: float(k)})
+        out += buffer.ready(k * STEP)
+    out += buffer.ready(rows * STEP + window)
+    return buffer, counts, out
+
+
+def test_in_good_order_nothing_waits():
+    buffer, counts, out = settled()
+    assert len(out) == 30
+    for k in range(30, 60):
+        now = k * STEP + 1.0
+        buffer.add(now, 0, k * STEP, {"a": 1.0})
+        assert [row.time for row in buffer.ready(now)] == [k * STEP]
+    assert counts.total("missing") == counts.total("late") == 0
+
+
+def test_a_sample_out_of_order_finds_its_place():
+    buffer, counts, _ = settled()
+    buffer.add(1.0, 0, 31 * STEP, {"a": 31.0})
+    assert buffer.ready(1.0) == []
+    buffer.add(1.01, 0, 30 * STEP, {"a": 30.0})
+    assert [row.values["a"] for row in buffer.ready(1.01)] == [30.0, 31.0]
+    assert counts.total("missing") == counts.total("late") == 0
+
+
+def test_a_hole_is_waited_for_once_and_counted():
+    buffer, counts, _ = settled(window=0.05)
+    buffer.add(1.0, 0, 32 * STEP, {"a": 0.0})
+    assert buffer.ready(1.049) == []
+    assert len(buffer.ready(1.051)) == 1
+    assert counts.by_channel["a"]["missing"] == 2
+    buffer.add(1.06, 0, 31 * STEP, {"a": 0.0})
+    assert counts.by_channel["a"]["late"] == 1
+    buffer.add(1.06, 0, 32 * STEP, {"a": 0.0})
+    assert counts.by_channel["a"]["doubled"] == 1
+    buffer.add(1.07, 0, 33 * STEP, {"a": 0.0})
+    assert len(buffer.ready(1.07)) == 1
+
+
+def test_parts_of_one_instant_become_one_row():
+    buffer, _, _ = settled(channels=("a", "b", "c"))
+    for name in ("c", "a"):
+        buffer.add(1.0, 0, 30 * STEP, {name: 1.0})
+        assert buffer.ready(1.0) == []
+    buffer.add(1.001, 0, 30 * STEP, {"b": 1.0})
+    (row,) = buffer.ready(1.001)
+    assert row.values.keys() == {"a", "b", "c"}
+
+
+def test_a_channel_that_stays_away_is_lost_and_no_longer_waited_for():
+    buffer, _, _ = settled(channels=("a", "b"))
+    for k in range(30, 45):
+        now = 1.0 + k * STEP
+        buffer.add(now, 0, k * STEP, {"a": 1.0})
+        buffer.ready(now)
+    assert buffer.ready(2.0) is not None
+    assert ("channel_lost", 0, "b") in buffer.changes
+    buffer.add(3.0, 0, 50 * STEP, {"a": 1.0, "b": 1.0})
+    buffer.ready(3.1)
+    assert ("channel_back", 0, "b") in buffer.changes
+
+
+def test_slow_and_fast_channels_live_side_by_side():
+    counts = Counts()
+    buffer, times = Reorder(0.05, counts), []
+    for k in range(400):
+        now = k * STEP
+        buffer.add(now, 0, now, {"fast": 1.0, **({"slow": 1.0} if k % 10 == 0 else {})})
+        times += [(row.time, now) for row in buffer.ready(now)]
+    late = [now - time for time, now in times if time > 1.0]
+    assert max(late) == 0.0
+    assert counts.total("missing") == 0
+
+
+@given(st.permutations(range(40)), st.integers(0, 2**32 - 1))
+def test_whatever_the_order_rows_come_out_sorted_and_all_is_accounted_for(order, seed):
+    buffer, counts, out = settled(window=0.03)
+    before = len(out)
+    for n, k in enumerate(order):
+        now = 1.0 + n * STEP
+        if buffer.add(now, 0, (30 + k) * STEP, {"a": float(k)}) == {}:
+            pass
+        out += buffer.ready(now)
+    out += buffer.flush()
+    times = [row.time for row in out]
+    assert times == sorted(set(times))
+    assert len(out) - before + counts.total("late") == 40
+
+
+@given(st.lists(st.floats(0, 1, width=16), min_size=30, max_size=60, unique=True), st.integers(5, 25))
+def test_going_on_from_its_state_changes_nothing(stamps, split):
+    def run(restart: bool) -> list:
+        counts = Counts()
+        buffer, out = Reorder(0.05, counts), []
+        for n, stamp in enumerate(stamps):
+            if restart and n == split:
+                state = json.loads(json.dumps(buffer.state()))
+                buffer = Reorder(0.05, counts)
+                buffer.restore(state)
+            buffer.add(n * STEP, n % 2, stamp, {"a": stamp})
+            out += buffer.ready(n * STEP)
+        return [(row.time, row.values) for row in [*out, *buffer.flush()]] + [counts.state()]
+
+    assert run(True) == run(False)
+
+
+class TestClock:
+    def run(self, stamps_and_arrivals, align=False):
+        clock = SourceClock(align)
+        times, jumps, refused = [], [], 0
+        for arrival, stamp in stamps_and_arrivals:
+            going, lost, jump = clock.take(arrival, stamp, {})
+            times += [time for _, time, _ in going]
+            refused += len(lost)
+            jumps += [jump] if jump else []
+        return times, jumps, refused
+
+    @pytest.mark.parametrize("day", [86400.0, -86400.0])
+    def test_a_jump_of_a_day_is_seen_and_time_goes_on(self, day):
+        before = [(1000 + k * 0.1, 5 + k * 0.1) for k in range(50)]
+        after = [(1005 + k * 0.1, 10 + day + k * 0.1) for k in range(50)]
+        times, (jump,), refused = self.run([*before, *after])
+        assert jump == pytest.approx(day)
+        assert refused == 0
+        assert times == pytest.approx([5 + k * 0.1 for k in range(100)])
+
+    def test_one_wild_stamp_is_refused(self):
+        good = [(k * 0.1, k * 0.1) for k in range(60)]
+        times, jumps, refused = self.run([*good[:20], (2.0, 1e6), *good[20:]])
+        assert (jumps, refused, len(times)) == ([], 1, 60)
+
+    def test_a_backlog_keeps_its_stamps(self):
+        live = [(k * 0.1, k * 0.1) for k in range(50)]
+        backlog = [(40.0 + 0.0005 * k, 5.0 + 0.1 * k) for k in range(350)]  # 35 s of samples in 0.2 s
+        times, jumps, _ = self.run([*live, *backlog])
+        assert jumps == []
+        assert times[-1] == pytest.approx(39.9)
+
+    def test_several_clocks_are_set_against_the_machines_own(self):
+        times, _, _ = self.run([(1000.0 + k, 3.0 + k) for k in range(3)], align=True)
+        assert times == [1000.0, 1001.0, 1002.0]
+        times, _, _ = self.run([(1000.0 + k, 999.97 + k) for k in range(3)], align=True)
+        assert times == [999.97, 1000.97, 1001.97]
