@@ -11,8 +11,8 @@ import time
 import numpy as np
 import pytest
 
+from drives import drive, robot
 from machine import rows_of
-from drives import drive
 from terragrip import read
 from terragrip.errors import InputError
 from terragrip.estimation import Estimates, TractionEstimator
@@ -50,8 +50,8 @@ def assert_as_never_interrupted(folder, recording, vehicle) -> None:
         assert np.array_equal(estimates.columns[name], values, equal_nan=True), name
 
 
-def killed_child(act, seconds: float) -> bool:
-    """Fork a child that does ``act`` and kill it after ``seconds``; whether it had come to its end before."""
+def killed_child(act, seconds: float | None = None) -> bool:
+    """Fork a child that does ``act`` and kill it after ``seconds``, if given; whether it had come to its end before."""
     child = os.fork()
     if child == 0:
         code = 1
@@ -60,8 +60,9 @@ def killed_child(act, seconds: float) -> bool:
             code = 0
         finally:
             os._exit(code)
-    time.sleep(seconds)
-    os.kill(child, signal.SIGKILL)
+    if seconds is not None:
+        time.sleep(seconds)
+        os.kill(child, signal.SIGKILL)
     _, status = os.waitpid(child, 0)
     return os.WIFEXITED(status) and os.WEXITSTATUS(status) == 0
 
@@ -98,7 +99,7 @@ def test_at_most_the_frames_behind_the_last_write_are_lost(tmp_path, vehicle, sh
             recorder.take(stamp, 0, stamp, values)
         os.kill(os.getpid(), signal.SIGKILL)
 
-    killed_child(act, 1.0)
+    killed_child(act)
     kept, _ = read_record(tmp_path)
     assert np.array_equal(kept.time, short.recording.time[:437])
 
@@ -167,10 +168,15 @@ def test_another_vehicle_or_a_second_writer_is_refused(tmp_path, vehicle, short)
     with pytest.raises(InputError, match="in use"):
         Recorder(tmp_path, vehicle, settings)
     recorder.close()
-    from drives import robot
-
+    other = robot(
+        mass=150.0,
+        axles={
+            "front": {"mass": 60.0, "wheels": ["fl", "fr"]},
+            "rear": {"mass": 90.0, "wheels": ["rl", "rr"]},
+        },
+    )
     with pytest.raises(InputError, match="another vehicle"):
-        Recorder(tmp_path, robot(mass=150.0, axles={"front": {"mass": 60.0, "wheels": ["fl", "fr"]}, "rear": {"mass": 90.0, "wheels": ["rl", "rr"]}}), settings)  # fmt: skip
+        Recorder(tmp_path, other, settings)
     with pytest.raises(InputError, match="made with window"):
         Recorder(tmp_path, vehicle, Settings(settings.sources, window=1.0, channels=settings.channels))
     (tmp_path / "snapshot-000000.json").unlink(missing_ok=True)

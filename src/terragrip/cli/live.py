@@ -17,21 +17,29 @@ if TYPE_CHECKING:
 
 def command(
     source: Annotated[
-        list[str], typer.Option("--source", metavar="URI", help="udp: mqtt: can: ros2: zenoh: serial: replay: (docs/live.md).")
+        list[str],
+        typer.Option(
+            "--source", metavar="URI", help="udp: mqtt: can: ros2: zenoh: serial: replay: (docs/live.md)."
+        ),
     ],
     vehicle: VehicleFile,
     sink: Annotated[
-        list[str] | None, typer.Option("--sink", metavar="URI", help="udp: mqtt: can: ros2: zenoh: foxglove: studio:.")
+        list[str] | None,
+        typer.Option("--sink", metavar="URI", help="udp: mqtt: can: ros2: zenoh: foxglove: studio:."),
     ] = None,
     profile: Annotated[
         str | None, typer.Option("--profile", metavar="FILE", help="What the sources' fields mean (YAML).")
     ] = None,
     record: Annotated[
-        Path | None, typer.Option("--record", metavar="DIR", help="Keep all that comes in and out; goes on where it broke off.")
+        Path | None,
+        typer.Option(
+            "--record", metavar="DIR", help="Keep all that comes in and out; goes on where it broke off."
+        ),
     ] = None,
     method: Annotated[str, typer.Option(metavar="NAME", help=f"One of {', '.join(METHODS)}.")] = DEFAULT,
     window: Annotated[
-        float, typer.Option(metavar="MS", min=0.0, max=10_000.0, help="How long a row waits for late samples, ms.")
+        float,
+        typer.Option(metavar="MS", min=0.0, max=10_000.0, help="How long a row waits for late samples, ms."),
     ] = 20.0,
     duration: Annotated[
         float | None, typer.Option(metavar="S", min=0.0, help="Stop after so many seconds.")

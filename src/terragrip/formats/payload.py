@@ -29,13 +29,17 @@ class Payload(Part):
                 raise Fault("a JSON object names its own fields", "leave out fields and layout")
             return self
         if not self.fields:
-            raise Fault("packed numbers need names", "write 'fields: [time, ...]' in their order", ("fields",))
+            raise Fault(
+                "packed numbers need names", "write 'fields: [time, ...]' in their order", ("fields",)
+            )
         if (self.format == "struct") != bool(self.layout):
             raise Fault("layout goes with format struct", "write e.g. 'layout: d4f'", ("layout",))
         packer = self.packer
         count = len(packer.unpack(bytes(packer.size)))
         if count != len(self.fields):
-            raise Fault(f"the layout holds {count} numbers, not {len(self.fields)}", "correct one", ("layout",))
+            raise Fault(
+                f"the layout holds {count} numbers, not {len(self.fields)}", "correct one", ("layout",)
+            )
         return self
 
     @property

@@ -50,7 +50,8 @@ class SourceClock:
         self.waiting.append((arrival, stamp, values))
         if arrival - self.waiting[0][0] < AGREEMENT:
             return [], refused, 0.0
-        return self._jump(), refused, lead - self.lead
+        jump = lead - self.lead
+        return self._jump(), refused, jump
 
     def _accept(self, arrival: float, stamp: float, values: Values) -> Stamped:
         assert self.offset is not None

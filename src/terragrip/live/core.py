@@ -107,7 +107,6 @@ class Core:
         """A sample of ``source`` (its place in the settings), stamped by its own clock [s]; SI values by column."""
         self.counts.add("received", values)
         clock = self.clocks[source]
-        before = clock.lead
         going, refused, jump = clock.take(arrival, stamp, values)
         out: list[Output] = []
         for lost in refused:
@@ -117,7 +116,7 @@ class Core:
             out.append(
                 Event(
                     self.time, "clock_jump", self.settings.sources[source],
-                    f"the clock jumped by {jump:+.6g} s (stamps led arrivals by {before:.3g} s); time goes on without the jump",
+                    f"the clock jumped by {jump:+.5g} s; time goes on without the jump",
                 )
             )  # fmt: skip
         for when, time, one in going:

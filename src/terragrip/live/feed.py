@@ -24,7 +24,15 @@ class Feed:
     """The way of source number ``index`` into the inbox."""
 
     def __init__(
-        self, index: int, name: str, decoder: Decoder, unpack: Unpack, inbox: Inbox, note: Note, *, after: float
+        self,
+        index: int,
+        name: str,
+        decoder: Decoder,
+        unpack: Unpack,
+        inbox: Inbox,
+        note: Note,
+        *,
+        after: float,
     ) -> None:
         self.index, self.name = index, name
         self.decoder, self.inbox = decoder, inbox

@@ -18,7 +18,9 @@ class Message:
 
     __slots__ = ("_json", "data", "kind", "row", "time")
 
-    def __init__(self, kind: str, time: float, row: Row | None = None, data: dict[str, Any] | None = None) -> None:
+    def __init__(
+        self, kind: str, time: float, row: Row | None = None, data: dict[str, Any] | None = None
+    ) -> None:
         self.kind, self.time, self.row, self.data = kind, time, row, data
         self._json: dict[Columns | None, bytes] = {}
 

@@ -32,7 +32,9 @@ class Outbox:
                 return
             # On a grid, so that 10 Hz out of 100 Hz is every tenth; anew after a pause.
             late = message.time - self._next > self.step
-            self._next = message.time + self.step * (1 - 1e-6) if late or self._next < 0 else self._next + self.step
+            self._next = (
+                message.time + self.step * (1 - 1e-6) if late or self._next < 0 else self._next + self.step
+            )
         if len(self._queue) >= self.capacity:
             self._queue.popleft()
             self.dropped += 1

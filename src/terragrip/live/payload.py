@@ -64,5 +64,3 @@ def _flat(nested: Fields, prefix: str = "", depth: int = 0) -> Fields:
 def _short(data: bytes) -> str:
     text = data[:40].decode("utf-8", "replace")
     return repr(text + ("…" if len(data) > 40 else ""))
-
-

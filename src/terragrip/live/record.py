@@ -46,7 +46,13 @@ class Recorder:
     """
 
     def __init__(
-        self, folder: Path, vehicle: Vehicle, settings: Settings, *, rows: int = ROWS, seconds: float = SECONDS
+        self,
+        folder: Path,
+        vehicle: Vehicle,
+        settings: Settings,
+        *,
+        rows: int = ROWS,
+        seconds: float = SECONDS,
     ) -> None:
         self.folder = folder
         self._rows, self._seconds = rows, seconds
@@ -57,7 +63,11 @@ class Recorder:
         try:
             self._resume(vehicle, settings)
         except OSError as error:
+            self.abandon()
             raise unwritable(folder, error, "free space or choose another folder") from error
+        except InputError:
+            self.abandon()
+            raise
 
     def _resume(self, vehicle: Vehicle, settings: Settings) -> None:
         for part in self.folder.glob(".*.part"):
@@ -196,7 +206,9 @@ def read_record(folder: str | os.PathLike[str]) -> tuple[Recording, Estimates]:
     place = Path(folder)
     number = _last_snapshot(place) if place.is_dir() else None
     if number is None:
-        raise InputError("holds no record", file=folder, mend="name a folder that terragrip live --record made")
+        raise InputError(
+            "holds no record", file=folder, mend="name a folder that terragrip live --record made"
+        )
     core = _load_snapshot(place, number)
     tables: dict[str, list[Any]] = {RECORDING: [], ESTIMATES: []}
     for kind, found in tables.items():
@@ -210,7 +222,9 @@ def read_record(folder: str | os.PathLike[str]) -> tuple[Recording, Estimates]:
         raise InputError("the record holds no row yet", file=folder, mend="record some samples first")
     rows = pa.concat_tables(tables[RECORDING], promote_options="default")
     metadata = tables[ESTIMATES][-1].schema.metadata
-    estimates = pa.concat_tables(tables[ESTIMATES], promote_options="default").replace_schema_metadata(metadata)
+    estimates = pa.concat_tables(tables[ESTIMATES], promote_options="default").replace_schema_metadata(
+        metadata
+    )
     return Recording.from_frame(rows, str(folder)), Estimates.from_arrow(estimates, str(folder))
 
 

@@ -48,7 +48,7 @@ class Stream:
             del self.steps[0]
         self.count += 1
         # Often at first, then now and then: a period hardly changes.
-        if _FEWEST <= self.count and (self.count < 2 * _STEPS or self.count % 8 == 0):
+        if self.count >= _FEWEST and (self.count < 2 * _STEPS or self.count % 8 == 0):
             self._learn()
         self.last = self.due_from = time
         return missing

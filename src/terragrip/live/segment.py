@@ -103,8 +103,7 @@ class Segment:
 
         table = np.frombuffer(self.estimates).reshape(len(self), -1)
         columns = {
-            name: np.ascontiguousarray(table[:, place])
-            for name, place in estimator.engine.index_out.items()
+            name: np.ascontiguousarray(table[:, place]) for name, place in estimator.engine.index_out.items()
         }
         for name in ("latitude", "longitude", "altitude"):
             if name in self.channels:

@@ -67,7 +67,9 @@ class Service:
     ) -> None:
         method_named(method)
         if not sources:
-            raise InputError("there is no source", place="--source", mend="name one, e.g. udp://127.0.0.1:9870")
+            raise InputError(
+                "there is no source", place="--source", mend="name one, e.g. udp://127.0.0.1:9870"
+            )
         decoders = [Decoder(profile) for _ in sources]
         opened = [open_source(text, decoder) for text, decoder in zip(sources, decoders, strict=True)]
         self.sinks = [open_sink(text, vehicle) for text in sinks]
@@ -135,7 +137,9 @@ class Service:
             if not task.cancelled() and (failure := task.exception()) is not None:
                 raise failure
         if self._record_failure:
-            raise InputError(self._record_failure, place="--record", mend="free space or choose another folder")
+            raise InputError(
+                self._record_failure, place="--record", mend="free space or choose another folder"
+            )
 
     async def _loop(self, watched: list[asyncio.Task[None]], takers: list[asyncio.Task[None]]) -> None:
         loop = asyncio.get_running_loop()
@@ -204,7 +208,9 @@ class Service:
         try:
             self.recorder.close()
         except OSError as error:
-            self._record_failure = f"the record's last segment could not be closed ({error.strerror or error})"
+            self._record_failure = (
+                f"the record's last segment could not be closed ({error.strerror or error})"
+            )
 
     def _dispatch(self, outputs: list[Output]) -> None:
         for output in outputs:
@@ -263,7 +269,9 @@ class Service:
 
         def back() -> None:
             if state["lost"]:
-                self.note({"event": {"time": None, "kind": "sink_back", "source": name, "text": "connected again"}})
+                self.note(
+                    {"event": {"time": None, "kind": "sink_back", "source": name, "text": "connected again"}}
+                )
             state["lost"] = False
 
         outbox.connected = back

@@ -108,9 +108,7 @@ class Statistics:
             "waiting": len(service.inbox.samples),
             "counts": service.core.counts.state(),
             "events": dict(self.event_counts),
-            "sinks": {
-                box.uri.text: {"sent": box.sent, "dropped": box.dropped} for box in service.outboxes
-            },
+            "sinks": {box.uri.text: {"sent": box.sent, "dropped": box.dropped} for box in service.outboxes},
         }
 
     def summary(self) -> str:
@@ -126,5 +124,7 @@ class Statistics:
         if late > 0.01 * received:
             lines.append(f"{late} of {received} values came too late: a longer --window takes them in")
         if self.event_counts:
-            lines.append("events: " + ", ".join(f"{kind} {number}" for kind, number in self.event_counts.items()))
+            lines.append(
+                "events: " + ", ".join(f"{kind} {number}" for kind, number in self.event_counts.items())
+            )
         return "\n".join(lines)

@@ -63,7 +63,9 @@ def table(service: Service) -> Any:
     trouble = counts_table(service, Table)
     if trouble is not None:
         parts.append(trouble)
-    parts += [Text(f"{e.time:9.1f} s  {e.kind}: {e.source}: {e.text}") for e in list(service.statistics.events)[-4:]]
+    parts += [
+        Text(f"{e.time:9.1f} s  {e.kind}: {e.source}: {e.text}") for e in list(service.statistics.events)[-4:]
+    ]
     return Group(*parts)
 
 

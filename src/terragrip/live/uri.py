@@ -28,20 +28,24 @@ class Uri:
         """
         head, colon, _ = text.partition(":")
         scheme = head.lower()
-        if not colon or scheme not in schemes:
-            near = nearest(scheme, schemes)
-            mend = f"did you mean {near}:?" if near else f"give one of {', '.join(f'{s}:' for s in schemes)}"
-            raise InputError(f"{text!r} names no {role} that Terragrip knows", place=f"--{role}", mend=mend)
         try:
             parts = urlsplit(text)
             port = parts.port
         except ValueError as error:
-            raise InputError(f"{text!r} is no URI ({error})", place=f"--{role}", mend="write host:port") from error
+            raise InputError(
+                f"{head}:… is no URI ({error})", place=f"--{role}", mend="write host:port"
+            ) from error
         if parts.username or parts.password:
             raise InputError(
                 f"credentials do not belong on the command line ({scheme}://…@{parts.hostname})", place=f"--{role}",
                 mend="set TERRAGRIP_USERNAME and TERRAGRIP_PASSWORD, or TERRAGRIP_CREDENTIALS=FILE of mode 0600",
             )  # fmt: skip
+        if not colon or scheme not in schemes:
+            near = nearest(scheme, schemes)
+            mend = f"did you mean {near}:?" if near else f"give one of {', '.join(f'{s}:' for s in schemes)}"
+            raise InputError(
+                f"{head[:20]!r} names no {role} that Terragrip knows", place=f"--{role}", mend=mend
+            )
         # The fragment sign is a wild card of MQTT, not the beginning of a fragment.
         rest = text[len(head) + 1 :]
         path = rest.split("?", 1)[0]
@@ -66,9 +70,7 @@ class Uri:
         except ValueError:
             value = 0.0
         if not 0.0 < value < float("inf"):
-            raise InputError(
-                f"{option} is {text!r}", place=self.text, mend="give a positive number"
-            )
+            raise InputError(f"{option} is {text!r}", place=self.text, mend="give a positive number")
         return value
 
     def is_loopback(self) -> bool:

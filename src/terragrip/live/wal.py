@@ -50,9 +50,7 @@ class WriteAhead:
         """A sample as the core takes it."""
         names = tuple(values)
         packer, numbers = self._packers.get(names) or self._packer(names)
-        self._frame(
-            packer.pack(b"S", arrival, source, stamp, len(numbers), *numbers, *values.values())
-        )
+        self._frame(packer.pack(b"S", arrival, source, stamp, len(numbers), *numbers, *values.values()))
 
     def _packer(self, names: tuple[str, ...]) -> tuple[struct.Struct, tuple[int, ...]]:
         for name in names:

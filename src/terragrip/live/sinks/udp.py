@@ -26,7 +26,9 @@ class UdpSink:
         if not self.port or not uri.host:
             raise InputError("names no host and port", place=uri.text, mend="write udp://127.0.0.1:9871")
         if uri.options.get("format", "json") not in ("json", "doubles"):
-            raise InputError(f"has no format {uri.options['format']!r}", place=uri.text, mend="json or doubles")
+            raise InputError(
+                f"has no format {uri.options['format']!r}", place=uri.text, mend="json or doubles"
+            )
 
     async def run(self, outbox: Outbox) -> None:
         """Send messages; raises Lost where the system does not let us."""

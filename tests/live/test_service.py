@@ -1,0 +1,266 @@
+"""The whole service: what a user sends comes back as estimates, and faults are named, counted and survived."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import socket
+import struct
+from contextlib import asynccontextmanager
+
+import numpy as np
+import pytest
+
+from drives import robot
+from machine import rows_of, until
+from terragrip.errors import InputError
+from terragrip.estimation import TractionEstimator
+from terragrip.formats import Profile
+from terragrip.live import read_record
+from terragrip.live.service import Service
+
+pytestmark = pytest.mark.asyncio
+
+
+@asynccontextmanager
+async def running(service: Service):
+    """The service at work; what it published is in `service.seen`."""
+    service.seen = []
+    service.listeners.append(service.seen.append)
+    task = asyncio.create_task(service.run())
+    await asyncio.sleep(0.05)
+    try:
+        yield service
+    finally:
+        service.stop()
+        await asyncio.wait_for(task, 20)
+
+
+class Sender:
+    """Sends datagrams to a service."""
+
+    def __init__(self, port: int) -> None:
+        self._link = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        self._link.connect(("127.0.0.1", port))
+
+    def send(self, *messages) -> None:
+        for message in messages:
+            data = message if isinstance(message, bytes) else json.dumps(message).encode()
+            self._link.send(data)
+
+    def close(self) -> None:
+        self._link.close()
+
+
+@pytest.fixture
+def sender(port):
+    found = Sender(port)
+    yield found
+    found.close()
+
+
+def events(service: Service, kind: str) -> list[str]:
+    return [event.text for event in service.statistics.events if event.kind == kind]
+
+
+def messages(recording, count: int):
+    return [{"time": time, **values} for time, values in list(rows_of(recording))[:count]]
+
+
+async def test_a_replay_gives_what_the_estimator_gives(tmp_path, vehicle, short):
+    log = tmp_path / "drive.parquet"
+    short.recording.to_pandas().to_parquet(log)
+    service = Service(vehicle, [f"replay:{log}?speed=max"], record=tmp_path / "record")
+    await service.run()
+    _, estimates = read_record(tmp_path / "record")
+    through = TractionEstimator(vehicle, channels=tuple(short.recording.channels)).update_block(
+        short.recording
+    )
+    assert np.array_equal(estimates.time, through.time)
+    for name, values in through.columns.items():
+        assert np.array_equal(estimates.columns[name], values, equal_nan=True), name
+
+
+async def test_datagrams_in_estimates_out(vehicle, short, port, sender):
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as receiver:
+        receiver.bind(("127.0.0.1", 0))
+        receiver.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4 << 20)
+        receiver.setblocking(False)
+        sink = f"udp://127.0.0.1:{receiver.getsockname()[1]}?columns=slip_*,soil_resistance"
+        service = Service(vehicle, [f"udp://127.0.0.1:{port}"], [sink])
+        loop, got = asyncio.get_running_loop(), []
+        loop.add_reader(receiver, lambda: got.append(json.loads(receiver.recv(65536))))
+        async with running(service):
+            sender.send(*messages(short.recording, 300))
+            await until(lambda: len([m for m in got if "slip_fl" in m]) == 300)
+        loop.remove_reader(receiver)
+    found = [m for m in got if "slip_fl" in m]
+    assert [m["time"] for m in found] == short.recording.time[:300].tolist()
+    assert found[-1].keys() == {
+        "time",
+        "arrival",
+        "event",
+        "predicted",
+        "soil_resistance",
+        "soil_resistance_std",
+    } | {f"slip_{w}{std}" for w in vehicle.wheels for std in ("", "_std")}
+    assert found[-1]["slip_fl"] == pytest.approx(short.truth["slip_fl"][299], abs=0.05)
+
+
+async def test_simulinks_doubles_in_and_out(vehicle, short, port, sender):
+    names = list(short.recording.channels)
+    profile = Profile.from_dict(
+        {
+            "payload": {"format": "doubles", "fields": ["t", *names], "byte_order": "big"},
+            "time": {"from": "t"},
+            "channels": {name: name for name in names},
+        }
+    )
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as receiver:
+        receiver.bind(("127.0.0.1", 0))
+        sink = f"udp://127.0.0.1:{receiver.getsockname()[1]}?format=doubles&columns=ground_speed*"
+        service = Service(vehicle, [f"udp://127.0.0.1:{port}"], [sink], profile=profile)
+        async with running(service):
+            for time, values in list(rows_of(short.recording))[:50]:
+                sender.send(struct.pack(f">{1 + len(names)}d", time, *(values[n] for n in names)))
+            sender.send(b"seven b")
+            await until(lambda: service.core.rows == 50)
+            await until(lambda: events(service, "unreadable"))
+        time, speed, std = struct.unpack("<3d", receiver.recv(100))
+    assert time == short.recording.time[0]
+    assert speed == pytest.approx(short.truth["ground_speed"][0], abs=5 * std)
+    assert "7 bytes" in events(service, "unreadable")[0]
+
+
+async def test_a_payload_that_is_no_json_or_no_number_is_named_counted_survived(vehicle, short, port, sender):
+    service = Service(vehicle, [f"udp://127.0.0.1:{port}"])
+    good = messages(short.recording, 100)
+    async with running(service):
+        sender.send(*good[:50], b"\xff\xfe", b"{", b"[1, 2]", b"12", {**good[50], "ground_speed": "fast"})
+        sender.send({**good[51], "ground_speed": 1e999}, *good[52:])
+        await until(lambda: service.core.rows == 100)
+    counts = service.core.counts.by_channel
+    assert counts["ground_speed"]["unreadable"] == 2
+    assert counts["ground_speed"]["received"] == 98
+    assert service.feeds[0].unreadable == 4
+    assert any("no JSON" in text for text in events(service, "unreadable"))
+    assert any("'fast'" in text for text in events(service, "unreadable"))
+
+
+async def test_late_doubled_and_missing_are_counted_by_channel(vehicle, short, port, sender):
+    service = Service(vehicle, [f"udp://127.0.0.1:{port}"], window=0.05)
+    good = messages(short.recording, 200)
+    swapped = [*good[:60], good[61], good[60], *good[62:100], good[99], *good[105:150]]
+    async with running(service):
+        sender.send(*swapped)
+        await until(lambda: service.core.rows == 145)
+        sender.send(good[102], *good[150:])
+        await until(lambda: service.core.rows == 195)
+    mine = service.core.counts.by_channel["ground_speed"]
+    assert (mine["late"], mine["doubled"], mine["missing"], mine["received"]) == (1, 1, 5, 197)
+    times = [m.time for m in service.seen if m.kind == "estimate" and not m.row.predicted]
+    assert times == sorted(times)
+
+
+async def test_a_silent_source_is_said_and_estimates_go_on_with_growing_intervals(
+    vehicle, short, port, sender
+):
+    service = Service(vehicle, [f"udp://127.0.0.1:{port}"])
+    good = messages(short.recording, 200)
+    async with running(service):
+        sender.send(*good[:100])
+        await until(lambda: events(service, "source_lost"))
+        predicted = [m.row for m in service.seen if m.kind == "estimate" and m.row.predicted]
+        sender.send(*good[100:])
+        await until(lambda: service.core.rows == 200)
+        await until(lambda: events(service, "source_back"))
+    assert len(predicted) >= 3
+    spreads = [row.estimate.ground_speed_std for row in predicted]
+    assert spreads == sorted(spreads)
+    assert spreads[0] < spreads[-1]
+    # What was only delayed finds the filter as if nothing had happened.
+    through = TractionEstimator(vehicle, channels=service.core.estimator.channels)
+    for row in rows_of(short.recording):
+        if row[0] <= good[-1]["time"]:
+            last = through.update({"time": row[0], **row[1]})
+    kept = [m.row.estimate for m in service.seen if m.kind == "estimate" and not m.row.predicted]
+    assert kept[-1].to_dict() == last.to_dict()
+
+
+async def test_a_clock_that_jumps_by_a_day_is_named_and_time_goes_on(vehicle, port, sender):
+    service = Service(vehicle, [f"udp://127.0.0.1:{port}"])
+    speeds = dict.fromkeys([f"wheel_speed_{w}" for w in vehicle.wheels], 3.0) | {"ground_speed": 0.55}
+    async with running(service):
+        for k in range(160):
+            sender.send({"time": k * 0.01 + (86400.0 if k >= 40 else 0.0), **speeds})
+            await asyncio.sleep(0.01)
+        await until(lambda: events(service, "clock_jump"))
+        await until(lambda: service.core.rows == 160)
+    assert "+86400" in events(service, "clock_jump")[0]
+    assert 1.0 < service.core.time < 20.0
+
+
+async def test_another_set_of_fields_is_named_and_survived(vehicle, short, port, sender):
+    service = Service(vehicle, [f"udp://127.0.0.1:{port}"])
+    good = messages(short.recording, 300)
+    async with running(service):
+        sender.send(*good[:150])
+        await until(lambda: service.core.rows == 150)
+        for message in good[150:]:
+            del message["drive_torque_fl"]
+            message["torque_front_left"] = 3.0
+            sender.send(message)
+            await asyncio.sleep(0.001)
+        await until(lambda: service.core.rows == 300)
+    assert events(service, "schema") == [
+        "messages changed: without drive_torque_fl and with torque_front_left"
+    ]
+    assert events(service, "channel_lost") == ["drive_torque_fl no longer comes"]
+
+
+async def test_where_estimates_cannot_keep_up_drops_are_counted(vehicle, short):
+    service = Service(vehicle, ["udp://127.0.0.1:1"], capacity=10)
+    service.sources.clear()
+    for k in range(25):
+        service.inbox.put(0, k * 0.01, {"ground_speed": 1.0})
+    service._keep_house()
+    assert service.core.counts.by_channel["ground_speed"]["dropped"] == 15
+    assert "15 values dropped" in events(service, "behind")[0]
+
+
+async def test_a_full_disk_stops_the_record_not_the_estimates(
+    tmp_path, vehicle, short, port, sender, monkeypatch
+):
+    service = Service(vehicle, [f"udp://127.0.0.1:{port}"], record=tmp_path)
+    monkeypatch.setattr("terragrip.live.wal.os.write", _disk_full)
+    task = asyncio.create_task(service.run())
+    await asyncio.sleep(0.05)
+    sender.send(*messages(short.recording, 100))
+    await until(lambda: service.core.rows == 100)
+    service.stop()
+    with pytest.raises(InputError, match=r"the record stopped at .*No space left"):
+        await task
+    assert events(service, "record_failed")
+
+
+def _disk_full(file: int, data: bytes) -> int:
+    raise OSError(28, "No space left on device")
+
+
+@pytest.mark.parametrize(
+    ("source", "problem"),
+    [
+        ("upd://127.0.0.1:9", "names no source"),
+        ("udp://127.0.0.1:9?speed=3", "has no option 'speed'"),
+        ("udp://0.0.0.0:9", "name the senders"),
+        ("udp://127.0.0.1", "names no port"),
+        ("mqtt://user:secret@127.0.0.1/x", "credentials do not belong"),
+        ("replay:nowhere.csv", "no such file"),
+        ("replay:", "names no log"),
+    ],
+)
+async def test_a_source_that_cannot_be_used_is_refused_in_one_line(source, problem):
+    with pytest.raises(InputError) as refused:
+        Service(robot(), [source])
+    assert problem in str(refused.value)
+    assert "secret" not in str(refused.value)
