@@ -86,7 +86,7 @@ async def test_datagrams_in_estimates_out(vehicle, short, port, sender):
         receiver.bind(("127.0.0.1", 0))
         receiver.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4 << 20)
         receiver.setblocking(False)
-        sink = f"udp://127.0.0.1:{receiver.getsockname()[1]}?columns=slip_*,soil_resistance"
+        sink = f"udp://127.0.0.1:{receiver.getsockname()[1]}?columns=slip_*,soil_resistance*"
         service = Service(vehicle, [f"udp://127.0.0.1:{port}"], [sink])
         loop, got = asyncio.get_running_loop(), []
         loop.add_reader(receiver, lambda: got.append(json.loads(receiver.recv(65536))))
