@@ -22,15 +22,15 @@ KERNEL_TESTS := $(patsubst kernel/tests/%.c,%,$(wildcard kernel/tests/*.c))
 BUILD_INPUTS := pyproject.toml setup.py cffi_build.py $(KERNEL_SOURCES) $(KERNEL_HEADERS) \
 	$(wildcard kernel/python/*.c src/terragrip/*/*.c src/terragrip/*/*.h)
 
-.PHONY: help demo test lint kernel-test pytest bench lock clean
+.PHONY: help demo test lint kernel-test web-test pytest studio bench lock clean
 
 help: ## show this list
 	@sed -n 's/^\([a-z-]*\):[^#]*## /  make \1\t/p' $(MAKEFILE_LIST)
 
-demo: $(VENV)/package ## set up, simulate the campaign, estimate every run, and say where the report is
+demo: $(VENV)/package studio ## set up, simulate the campaign, estimate every run, and say where the report is
 	@$(BIN)/terragrip demo
 
-test: lint kernel-test pytest ## set up, then lint, type checks, import rules, C tests and Python tests
+test: lint kernel-test web-test pytest ## set up, then lint, type checks, import rules, C tests and Python tests
 
 lint: $(VENV)/package $(VENV)/dev ## ruff, mypy and import-linter
 	$(BIN)/ruff check
@@ -38,8 +38,14 @@ lint: $(VENV)/package $(VENV)/dev ## ruff, mypy and import-linter
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 
-pytest: $(VENV)/package $(VENV)/dev ## the Python tests alone
+pytest: $(VENV)/package $(VENV)/dev studio ## the Python tests alone
 	$(BIN)/python -m pytest -n $(WORKERS)
+
+studio: $(VENV)/made ## build the studio's pages, where Node.js 20 or newer is
+	@$(BIN)/python build_pages.py
+
+web-test: studio ## the pages' own tests, where Node.js is
+	@if [ -d web/node_modules ]; then cd web && npm run --silent test; else echo "SKIPPED: the tests of the pages need Node.js 20 or newer" >&2; fi
 
 bench: $(VENV)/package $(VENV)/dev ## every benchmark: ratios against a peer in the same run
 	@for script in benchmarks/bench_*.py; do echo "== $$script"; $(BIN)/python "$$script" || exit 1; done
@@ -52,7 +58,7 @@ LOCK_FLAGS := --quiet --upgrade --universal --python-version 3.11 --no-annotate 
 	--no-emit-find-links --fork-strategy fewest --custom-compile-command "make lock"
 
 clean: ## remove everything that was built or installed
-	rm -rf $(VENV) build dist src/*.egg-info .mypy_cache .pytest_cache .ruff_cache .import_linter_cache .hypothesis
+	rm -rf $(VENV) build dist web/node_modules src/terragrip/studio/static src/*.egg-info .mypy_cache .pytest_cache .ruff_cache .import_linter_cache .hypothesis
 	find src tests -name __pycache__ -prune -exec rm -rf {} +
 	rm -f src/terragrip/*.so src/terragrip/*/*.so src/terragrip/_kernel_*.py src/terragrip/simulation/_plant.py
 

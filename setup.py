@@ -1,4 +1,4 @@
-"""Build the C extensions; everything else about the package stands in pyproject.toml."""
+"""Build the C extensions and the studio's pages; everything else about the package stands in pyproject.toml."""
 
 from __future__ import annotations
 
@@ -8,8 +8,10 @@ from pathlib import Path
 
 from setuptools import Extension, setup
 from setuptools.command.build_ext import build_ext
+from setuptools.command.build_py import build_py
 
 sys.path.insert(0, str(Path(__file__).resolve().parent))
+import build_pages
 from cffi_build import ROOT, bindings, extension
 
 
@@ -27,8 +29,17 @@ class BuildBindings(build_ext):
             self.build_temp = shared
 
 
+class BuildPackage(build_py):
+    """The pages first, where Node is: a wheel then holds them."""
+
+    def run(self) -> None:
+        if not self.editable_mode:  # in a clone the Makefile builds them
+            build_pages.main()
+        super().run()
+
+
 setup(
-    cmdclass={"build_ext": BuildBindings},
+    cmdclass={"build_ext": BuildBindings, "build_py": BuildPackage},
     ext_modules=[extension(binding, ROOT / "build" / "glue") for binding in bindings()],
     options={"bdist_wheel": {"py_limited_api": "cp311"}},
 )

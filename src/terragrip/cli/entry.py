@@ -19,6 +19,7 @@ from terragrip.cli.inspect import command as inspect
 from terragrip.cli.live import command as live
 from terragrip.cli.simulate import command as simulate
 from terragrip.cli.soils import command as soils
+from terragrip.cli.studio import command as studio
 
 app = typer.Typer(
     name="terragrip",
@@ -35,6 +36,7 @@ app.command("calibrate")(calibrate)
 app.command("soils")(soils)
 app.command("simulate")(simulate)
 app.command("live")(live)
+app.command("studio")(studio)
 
 
 def _print_version(wanted: bool) -> None:

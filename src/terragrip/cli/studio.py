@@ -1,0 +1,52 @@
+"""``terragrip studio``: the pages where an engineer looks, served on this machine."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from terragrip.errors import InputError
+
+
+def command(
+    folder: Annotated[
+        Path,
+        typer.Argument(metavar="FOLDER", help="Logs, estimates, libraries; the only place read or written."),
+    ] = Path(),
+    address: Annotated[
+        str, typer.Option("--address", metavar="IP", help="Serve other machines too; a token is then needed.")
+    ] = "127.0.0.1",
+    port: Annotated[int, typer.Option(min=0, max=65535, help="TCP port; 0 takes a free one.")] = 8750,
+    live: Annotated[
+        str | None, typer.Option("--live", metavar="URL", help="WebSocket of a running 'terragrip live'.")
+    ] = None,
+    upload_limit: Annotated[
+        int, typer.Option("--upload-limit", metavar="MB", min=1, help="Largest file taken by drop.")
+    ] = 2000,
+) -> None:
+    """Open the studio on a folder.
+
+    The token for other machines is made anew at each start, or taken from the environment variable
+    TERRAGRIP_TOKEN. Ctrl-C ends it.
+    """
+    import ipaddress
+
+    try:
+        home = ipaddress.ip_address("127.0.0.1" if address == "localhost" else address).is_loopback
+    except ValueError:
+        raise InputError(
+            f"{address!r} is no IP address", place="--address", mend="give e.g. 0.0.0.0"
+        ) from None
+    if live is not None and not live.startswith(("ws://", "wss://")):
+        raise InputError(f"{live!r} is no WebSocket address", place="--live", mend="give ws://HOST:PORT")
+    try:
+        from terragrip.studio.serve import serve
+    except ModuleNotFoundError as error:
+        if (error.name or "").split(".")[0] == "terragrip":
+            raise
+        raise InputError(
+            f"the studio needs the Python package {error.name!r}", mend="pip install 'terragrip[studio]'"
+        ) from error
+    serve(folder, address, port, loopback=home, live=live, upload_limit=upload_limit * 1_000_000)

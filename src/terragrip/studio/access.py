@@ -1,0 +1,132 @@
+"""Who may talk to the studio: host, origin and token checks, and the headers that keep a page to itself.
+
+A page of another site can send requests to loopback (DNS rebinding, cross-site forms, WebSockets, which no
+same-origin rule holds back). So every request is checked here, before any route sees it.
+"""
+
+from __future__ import annotations
+
+import hmac
+import ipaddress
+from collections.abc import Iterable
+from http.cookies import CookieError, SimpleCookie
+from typing import Any
+from urllib.parse import parse_qs, quote, urlsplit
+
+COOKIE = "terragrip_token"
+LOOPBACK = frozenset({"127.0.0.1", "localhost", "::1"})
+POLICY = (
+    "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' blob: data:; connect-src 'self'; "
+    "font-src 'self'; worker-src 'self'; manifest-src 'self'; frame-ancestors 'none'; base-uri 'none'; form-action 'self'"
+)
+_HEADERS = (
+    (b"content-security-policy", POLICY.encode()),
+    (b"x-content-type-options", b"nosniff"),
+    (b"x-frame-options", b"DENY"),
+    (b"referrer-policy", b"no-referrer"),
+    (b"cross-origin-opener-policy", b"same-origin"),
+    (b"cross-origin-resource-policy", b"same-origin"),
+)
+
+
+class Access:
+    """ASGI middleware that lets through what comes from the studio's own page, or from a program that knows the token.
+
+    Parameters
+    ----------
+    app: the ASGI application behind.
+    hosts: names that the Host header may carry besides the loopback names.
+    token: what every request must bring (cookie, or ``Authorization: Bearer``); None on loopback.
+    """
+
+    def __init__(self, app: Any, hosts: Iterable[str] = (), token: str | None = None) -> None:
+        self._app, self._token = app, token
+        self._hosts = LOOPBACK | {host.lower() for host in hosts}
+
+    async def __call__(self, scope: Any, receive: Any, send: Any) -> None:
+        if scope["type"] not in ("http", "websocket"):
+            await self._app(scope, receive, send)
+            return
+        headers = {name.decode("latin-1"): value.decode("latin-1") for name, value in scope["headers"]}
+        problem = self._problem(scope, headers)
+        if problem is None and self._token is not None:
+            handed = parse_qs(scope.get("query_string", b"").decode("latin-1")).get("token", [""])[0]
+            if scope["type"] == "http" and scope["path"] == "/" and handed:
+                await self._log_in(send, handed)
+                return
+            if not self._knows_token(headers):
+                problem = (401, "a token is needed: open the address that 'terragrip studio' printed")
+        if problem is not None:
+            await _refuse(scope, send, *problem)
+            return
+
+        async def guarded(message: Any) -> None:
+            if message["type"] == "http.response.start":
+                message = {**message, "headers": [*message.get("headers", []), *_HEADERS]}
+            await send(message)
+
+        await self._app(scope, receive, guarded)
+
+    def _problem(self, scope: Any, headers: dict[str, str]) -> tuple[int, str] | None:
+        host = headers.get("host", "")
+        if not self._host_is_ours(host):
+            return 403, "this host name is not the studio's"
+        origin = headers.get("origin")
+        if origin is not None and urlsplit(origin).netloc.lower() != host.lower():
+            return 403, "requests from other sites are refused"
+        site = headers.get("sec-fetch-site", "none")
+        navigation = headers.get("sec-fetch-mode") == "navigate" and scope.get("method") == "GET"
+        if site not in ("same-origin", "none") and not (navigation and not scope["path"].startswith("/api")):
+            return 403, "requests from other sites are refused"
+        return None
+
+    def _host_is_ours(self, header: str) -> bool:
+        name = (urlsplit(f"//{header}").hostname or "").lower()
+        if name in self._hosts:
+            return True
+        # With a token a rebound name gains nothing; addresses are let in so that a tablet can name the machine.
+        return self._token is not None and _is_address(name)
+
+    def _knows_token(self, headers: dict[str, str]) -> bool:
+        assert self._token is not None
+        kind, _, given = headers.get("authorization", "").partition(" ")
+        if kind.lower() == "bearer" and _same(given.strip(), self._token):
+            return True
+        try:
+            cookie = SimpleCookie(headers.get("cookie", "")).get(COOKIE)
+        except CookieError:
+            return False
+        return cookie is not None and _same(cookie.value, self._token)
+
+    async def _log_in(self, send: Any, given: str) -> None:
+        assert self._token is not None
+        if not _same(given, self._token):
+            await _answer(send, 401, "this token is not the studio's")
+            return
+        cookie = f"{COOKIE}={quote(self._token)}; HttpOnly; SameSite=Strict; Path=/"
+        await _answer(send, 303, "", ((b"location", b"/"), (b"set-cookie", cookie.encode())))
+
+
+def _same(given: str, token: str) -> bool:
+    return hmac.compare_digest(given.encode(), token.encode())
+
+
+def _is_address(name: str) -> bool:
+    try:
+        ipaddress.ip_address(name)
+    except ValueError:
+        return False
+    return True
+
+
+async def _refuse(scope: Any, send: Any, status: int, text: str) -> None:
+    if scope["type"] == "websocket":
+        await send({"type": "websocket.close", "code": 1008, "reason": text})
+    else:
+        await _answer(send, status, text)
+
+
+async def _answer(send: Any, status: int, text: str, more: tuple[tuple[bytes, bytes], ...] = ()) -> None:
+    headers = [(b"content-type", b"text/plain; charset=utf-8"), *more, *_HEADERS]
+    await send({"type": "http.response.start", "status": status, "headers": headers})
+    await send({"type": "http.response.body", "body": text.encode()})

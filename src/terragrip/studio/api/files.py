@@ -1,0 +1,189 @@
+"""What the folder holds; taking new files; looking into a log."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import math
+import secrets
+from collections.abc import AsyncIterator
+from dataclasses import asdict
+from pathlib import Path
+from typing import Annotated, Any
+
+from fastapi import APIRouter, Query, Request, Response, WebSocket, WebSocketDisconnect
+from fastapi.responses import FileResponse
+
+from terragrip.errors import InputError
+from terragrip.studio.folder import PICTURES, Folder, kind_of
+from terragrip.studio.state import Here
+
+router = APIRouter(tags=["folder"])
+
+Named = Annotated[str, Query(description="Path relative to the folder, with slashes.")]
+
+_SHOWN = {".png": "image/png", ".jpg": "image/jpeg", ".jpeg": "image/jpeg", ".webp": "image/webp"}
+
+
+@router.get("/folder")
+async def list_folder(studio: Here) -> dict[str, Any]:
+    """Every file that the studio knows what to do with."""
+    items = await asyncio.to_thread(studio.folder.items)
+    return {"name": studio.folder.root.name, "items": [asdict(item) for item in items]}
+
+
+@router.websocket("/notices")
+async def notices(socket: WebSocket, studio: Here) -> None:
+    """Changes of the folder and progress of jobs, as they happen."""
+    await socket.accept()
+    queue = studio.notices.join()
+
+    async def hear_the_end() -> None:
+        with contextlib.suppress(WebSocketDisconnect):
+            while True:
+                await socket.receive_text()
+
+    end = asyncio.create_task(hear_the_end())
+    try:
+        while not end.done():
+            wait = asyncio.create_task(queue.get())
+            done, _ = await asyncio.wait({wait, end}, return_when=asyncio.FIRST_COMPLETED)
+            if wait in done:
+                await socket.send_json(wait.result())
+            else:
+                wait.cancel()
+    except WebSocketDisconnect:
+        pass
+    finally:
+        end.cancel()
+        studio.notices.leave(queue)
+
+
+@router.get("/file")
+def get_file(studio: Here, path: Named) -> Response:
+    """One file of the folder, to keep. Pictures are shown, everything else is handed over as a download."""
+    target = studio.folder.file(path)
+    shown = _SHOWN.get(target.suffix.lower())
+    if shown is None:
+        return FileResponse(target, media_type="application/octet-stream", filename=target.name)
+    return FileResponse(target, media_type=shown)
+
+
+@router.put("/file", status_code=201)
+async def take_file(request: Request, studio: Here, path: Named, replace: bool = False) -> dict[str, Any]:
+    """Take a file into the folder, whole or not at all; its content must be what its name says."""
+    target = _free(studio.folder, path, replace)
+    temporary = target.with_name(f".{secrets.token_hex(8)}{_suffixes(target)}")
+    try:
+        await _receive(request.stream(), temporary, studio.upload_limit, path)
+        await asyncio.to_thread(_check, temporary, path)
+        temporary.replace(target)
+    finally:
+        temporary.unlink(missing_ok=True)
+    return {"path": studio.folder.name(target), "kind": await asyncio.to_thread(kind_of, target)}
+
+
+@router.delete("/file", status_code=204)
+def remove_file(studio: Here, path: Named) -> None:
+    """Remove a file of the folder."""
+    studio.folder.file(path).unlink()
+
+
+@router.get("/inspect")
+def inspect_log(studio: Here, path: Named, profile: str = "", vehicle: str = "") -> dict[str, Any]:
+    """What a log holds, which channels were found, what is missing, and a profile to begin with."""
+    from terragrip.formats import inspect
+
+    found = inspect(
+        studio.folder.file(path),
+        studio.folder.file(profile) if profile else None,
+        studio.folder.file(vehicle) if vehicle else None,
+    )
+    text = found.to_text().replace(f"{studio.folder.root}/", "")
+    plain: dict[str, Any] = {**finite(found.to_dict()), "file": path, "text": text}
+    return plain
+
+
+def finite(value: Any) -> Any:
+    """Plain data with null for what JSON cannot hold (NaN, infinities)."""
+    if isinstance(value, float):
+        return value if math.isfinite(value) else None
+    if isinstance(value, dict):
+        return {key: finite(one) for key, one in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [finite(one) for one in value]
+    return value
+
+
+def _free(folder: Folder, path: str, replace: bool) -> Path:
+    target = folder.resolve(path)
+    if target.exists() and not (replace and target.is_file()):
+        raise InputError("exists already", file=path, mend="choose another name, or replace it")
+    if not target.parent.is_dir():
+        raise InputError("cannot be written there", file=path, mend="name a folder that exists")
+    return target
+
+
+def _suffixes(target: Path) -> str:
+    """The last suffix, and the one before it of a compressed file."""
+    return "".join(target.suffixes[-2:]) if target.suffix == ".gz" else target.suffix
+
+
+async def _receive(stream: AsyncIterator[bytes], target: Path, limit: int, path: str) -> None:
+    size = 0
+    with target.open("xb") as file:
+        async for chunk in stream:
+            size += len(chunk)
+            if size > limit:
+                raise InputError(
+                    f"is larger than {limit / 1e6:.0f} MB", file=path, mend="copy it into the folder yourself"
+                )
+            await asyncio.to_thread(file.write, chunk)
+    if size == 0:
+        raise InputError("is empty", file=path, mend="drop a file with content")
+
+
+def _check(temporary: Path, path: str) -> None:
+    """Raise InputError unless the content is what the name says."""
+    try:
+        kind = kind_of(temporary)
+        if kind == "recording":
+            from terragrip.formats import inspect
+
+            inspect(temporary)
+        elif kind == "vehicle":
+            from terragrip.vehicle import Vehicle
+
+            Vehicle.load(temporary)
+        elif kind == "library":
+            from terragrip.soil.library import SoilLibrary
+
+            SoilLibrary.load(temporary)
+        elif kind == "picture":
+            check_picture(temporary.read_bytes()[:64], temporary.suffix.lower(), path)
+        elif kind is None or kind == "report":
+            raise InputError(
+                "is nothing that the studio takes", mend="drop a log, a vehicle, a profile or a picture"
+            )
+    except InputError as error:
+        raise InputError(error.problem, file=path, place=error.place, mend=error.mend) from None
+
+
+_MAGIC = {
+    ".png": (b"\x89PNG\r\n\x1a\n",),
+    ".jpg": (b"\xff\xd8\xff",),
+    ".jpeg": (b"\xff\xd8\xff",),
+    ".webp": (b"RIFF",),
+}
+
+
+def check_picture(head: bytes, suffix: str, path: str) -> None:
+    """Raise InputError unless the first bytes are those of a PNG, JPEG or WebP file, as the suffix says.
+
+    SVG is refused: it is a document that can carry scripts.
+    """
+    if suffix not in _MAGIC:
+        known = ", ".join(sorted(PICTURES & set(_MAGIC)))
+        raise InputError("is no picture that the studio takes", file=path, mend=f"give one of {known}")
+    if not head.startswith(_MAGIC[suffix]):
+        raise InputError(f"is no {suffix[1:].upper()} picture, whatever its name says", file=path)

@@ -1,0 +1,94 @@
+"""The application: routes, errors as one line, the built front end."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+from collections.abc import AsyncIterator, Iterable
+from importlib import import_module
+from pathlib import Path
+
+from fastapi import FastAPI, Request
+from fastapi.exceptions import RequestValidationError
+from fastapi.responses import JSONResponse, Response
+from fastapi.staticfiles import StaticFiles
+
+from terragrip import __version__
+from terragrip.errors import InputError
+from terragrip.studio.access import Access
+from terragrip.studio.state import UPLOAD_LIMIT, Studio
+
+STATIC = Path(__file__).with_name("static")
+ROUTES = ("files", "jobs", "fit", "pictures")
+NOT_BUILT = (
+    "The studio's pages are not built. They need Node.js 20 or newer: install it, then run `make studio` in a clone "
+    "(or install a released wheel, which holds them). The interface at /openapi.json works without them."
+)
+
+
+def create_app(
+    folder: str | os.PathLike[str],
+    *,
+    token: str | None = None,
+    hosts: Iterable[str] = (),
+    upload_limit: int = UPLOAD_LIMIT,
+    live: str | None = None,
+) -> FastAPI:
+    """The studio on one folder, as an ASGI application.
+
+    Parameters
+    ----------
+    folder: the only folder that requests can read or write.
+    token: what every request must bring; needed on any address but loopback.
+    hosts: names that the Host header may carry besides loopback's.
+    upload_limit: bytes of one upload.
+    live: WebSocket address of a running live service.
+
+    Raises InputError if there is no such folder.
+    """
+    studio = Studio(folder, upload_limit, live)
+
+    @contextlib.asynccontextmanager
+    async def life(_: FastAPI) -> AsyncIterator[None]:
+        yield
+        await studio.jobs.close()
+
+    # Swagger's own page loads from the internet; the description alone is at /openapi.json.
+    app = FastAPI(title="Terragrip studio", version=__version__, docs_url=None, redoc_url=None, lifespan=life)
+    app.state.studio = studio
+    for name in ROUTES:
+        app.include_router(import_module(f"terragrip.studio.api.{name}").router, prefix="/api")
+    app.add_exception_handler(InputError, _unusable)
+    app.add_exception_handler(RequestValidationError, _malformed)
+    if (STATIC / "index.html").is_file():
+        app.mount("/", _Pages(directory=STATIC, html=True), name="pages")
+    else:
+        app.add_api_route("/", _not_built, include_in_schema=False)
+    app.add_middleware(Access, hosts=tuple(hosts), token=token)
+    return app
+
+
+class _Pages(StaticFiles):
+    """The built pages: names with a hash never change, the rest is asked for again."""
+
+    def file_response(self, full_path, stat_result, scope, status_code=200):  # type: ignore[no-untyped-def]
+        response = super().file_response(full_path, stat_result, scope, status_code)
+        fixed = "/assets/" in os.fspath(full_path)
+        response.headers["cache-control"] = "public, max-age=31536000, immutable" if fixed else "no-cache"
+        return response
+
+
+async def _unusable(request: Request, error: Exception) -> Response:
+    root = f"{request.app.state.studio.folder.root}/"
+    return JSONResponse({"detail": str(error).replace(root, "")}, status_code=422)
+
+
+async def _malformed(request: Request, error: Exception) -> Response:
+    assert isinstance(error, RequestValidationError)
+    first = error.errors()[0]
+    place = ".".join(str(part) for part in first.get("loc", ())[1:])
+    return JSONResponse({"detail": f"{place}: {first.get('msg', 'is not usable')}"}, status_code=422)
+
+
+async def _not_built() -> Response:
+    return Response(NOT_BUILT, media_type="text/plain", status_code=503)

@@ -1,0 +1,53 @@
+"""What every open page hears: changes of the folder, progress of jobs, new calibrations."""
+
+from __future__ import annotations
+
+import asyncio
+from typing import Any
+
+from terragrip.studio.folder import Folder, Item
+
+PERIOD = 1.0
+"""Seconds between looks at the folder while a page is open."""
+BACKLOG = 256
+"""Notices that a page may lag behind before the oldest is dropped."""
+
+
+class Notices:
+    """Fan-out of small JSON messages to any number of pages. Used from one event loop."""
+
+    def __init__(self, folder: Folder) -> None:
+        self._folder = folder
+        self._pages: set[asyncio.Queue[dict[str, Any]]] = set()
+        self._watch: asyncio.Task[None] | None = None
+
+    def join(self) -> asyncio.Queue[dict[str, Any]]:
+        """A queue that receives every notice from now on."""
+        queue: asyncio.Queue[dict[str, Any]] = asyncio.Queue(BACKLOG)
+        self._pages.add(queue)
+        if self._watch is None:
+            self._watch = asyncio.create_task(self._look())
+        return queue
+
+    def leave(self, queue: asyncio.Queue[dict[str, Any]]) -> None:
+        """Send no more to `queue`; with the last page gone nobody looks at the folder."""
+        self._pages.discard(queue)
+        if not self._pages and self._watch is not None:
+            self._watch.cancel()
+            self._watch = None
+
+    def tell(self, kind: str, **content: Any) -> None:
+        """Send {"kind": kind, ...} to every page."""
+        for queue in self._pages:
+            if queue.full():
+                queue.get_nowait()
+            queue.put_nowait({"kind": kind, **content})
+
+    async def _look(self) -> None:
+        seen: list[Item] | None = None
+        while True:
+            items = await asyncio.to_thread(self._folder.items)
+            if seen is not None and items != seen:
+                self.tell("folder")
+            seen = items
+            await asyncio.sleep(PERIOD)

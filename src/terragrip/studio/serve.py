@@ -1,0 +1,80 @@
+"""Serve the studio until Ctrl-C."""
+
+from __future__ import annotations
+
+import os
+import secrets
+import socket
+from pathlib import Path
+
+import uvicorn
+
+from terragrip.errors import InputError
+from terragrip.studio.app import STATIC, create_app
+
+TOKEN = "TERRAGRIP_TOKEN"
+SHORTEST = 16
+"""Characters that a token of the user's own must have."""
+
+
+def serve(
+    folder: Path, address: str, port: int, *, loopback: bool, live: str | None, upload_limit: int
+) -> None:
+    """Bind, say where the pages are, serve. InputError where the folder or the port is not to be had, or the token is too short."""
+    token = None if loopback else _token()
+    app = create_app(folder, token=token, hosts=(address,), upload_limit=upload_limit, live=live)
+    listener = _bind(address, port)
+    place = f"http://{_shown(address)}:{listener.getsockname()[1]}/"
+    if not (STATIC / "index.html").is_file():
+        print(
+            "The pages are not built (Node.js 20 or newer, then `make studio`); only the interface is served."
+        )
+    print(
+        f"Terragrip studio: {place}{f'?token={token}' if token and TOKEN not in os.environ else ''}",
+        flush=True,
+    )
+    if not loopback:
+        print(
+            "Anyone who knows the token can read and write this folder; the way there is not encrypted.",
+            flush=True,
+        )
+    # No access log: it would hold the token of the first request.
+    config = uvicorn.Config(
+        app, log_level="warning", access_log=False, ws_max_size=1 << 20, timeout_graceful_shutdown=2
+    )
+    server = uvicorn.Server(config)
+    try:
+        server.run(sockets=[listener])
+    except KeyboardInterrupt:
+        pass
+    finally:
+        listener.close()
+
+
+def _token() -> str:
+    given = os.environ.get(TOKEN)
+    if given is None:
+        return secrets.token_urlsafe(24)
+    if len(given) < SHORTEST or not given.isascii() or not given.isprintable():
+        raise InputError(
+            f"is shorter than {SHORTEST} printable characters", place=TOKEN, mend="choose a longer one"
+        )
+    return given
+
+
+def _bind(address: str, port: int) -> socket.socket:
+    family = socket.AF_INET6 if ":" in address else socket.AF_INET
+    listener = socket.socket(family, socket.SOCK_STREAM)
+    listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+    try:
+        listener.bind((address, port))
+    except OSError as error:
+        listener.close()
+        raise InputError(
+            f"{address}:{port} cannot be had ({error.strerror})", place="--port", mend="choose another, or 0"
+        ) from error
+    return listener
+
+
+def _shown(address: str) -> str:
+    return f"[{address}]" if ":" in address else address

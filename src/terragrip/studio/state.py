@@ -1,0 +1,64 @@
+"""What the routes share: the folder, the jobs, the notices, the tables in memory."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+from fastapi import Depends
+from fastapi.requests import HTTPConnection
+
+from terragrip.studio.folder import Folder
+from terragrip.studio.jobs import Jobs
+from terragrip.studio.notices import Notices
+from terragrip.studio.tables import Tables
+
+if TYPE_CHECKING:
+    from terragrip.estimation import Estimates
+    from terragrip.recording import Recording
+
+UPLOAD_LIMIT = 2_000_000_000
+"""Bytes of one upload."""
+
+
+def _estimates(path: Path) -> Estimates:
+    from terragrip.estimation import Estimates
+
+    return Estimates.read(path)
+
+
+def _recording(path: Path, profile: str = "") -> Recording:
+    from terragrip.formats import read
+
+    return read(path, profile or None)
+
+
+class Studio:
+    """One studio on one folder.
+
+    Parameters
+    ----------
+    root: the folder. InputError if it is none.
+    upload_limit: bytes that one upload may have.
+    live: address of a live service's WebSocket (ws://127.0.0.1:...), or None.
+    """
+
+    def __init__(
+        self, root: str | os.PathLike[str], upload_limit: int = UPLOAD_LIMIT, live: str | None = None
+    ) -> None:
+        self.folder = Folder(root)
+        self.notices = Notices(self.folder)
+        self.jobs = Jobs(self.notices, self.folder.root)
+        self.estimates: Tables[Estimates] = Tables(_estimates)
+        self.recordings: Tables[Recording] = Tables(_recording)
+        self.upload_limit, self.live = upload_limit, live
+
+
+def _studio(connection: HTTPConnection) -> Studio:
+    studio: Studio = connection.app.state.studio
+    return studio
+
+
+Here = Annotated[Studio, Depends(_studio)]
+"""The studio of the application that serves the request."""

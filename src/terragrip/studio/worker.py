@@ -1,0 +1,92 @@
+"""The process that does one long job, so that it can be cancelled: a request on standard input, a line of JSON for each step on standard
+output, the last one with the outcome. Run as ``python -m terragrip.studio.worker``.
+"""
+
+from __future__ import annotations
+
+import json
+import signal
+import sys
+import time
+from pathlib import Path
+from types import FrameType
+from typing import Any
+
+from terragrip.errors import InputError
+
+PERIOD = 0.1
+"""Seconds between two reports of progress."""
+
+
+class _Reporter:
+    def __init__(self) -> None:
+        self._last = 0.0
+
+    def __call__(self, done: int, total: int, text: str = "") -> None:
+        now = time.monotonic()
+        if now - self._last >= PERIOD or done == total:
+            self._last = now
+            say(state="running", done=int(done), total=int(total))
+
+
+def say(**content: Any) -> None:
+    """One line to the studio."""
+    print(json.dumps(content), flush=True)
+
+
+def run(request: dict[str, Any]) -> str:
+    """Do the job that `request` describes ("kind" and absolute paths); returns a text for the user. Raises InputError."""
+    kind = request["kind"]
+    if kind == "estimate":
+        return _estimate(request)
+    if kind == "soils":
+        return _soils(request)
+    raise InputError(f"there is no job {kind!r}")
+
+
+def _estimate(request: dict[str, Any]) -> str:
+    from terragrip.estimation import estimate
+    from terragrip.formats import read
+    from terragrip.vehicle import Vehicle
+
+    vehicle = Vehicle.load(request["vehicle"])
+    recording = read(request["recording"], request.get("profile"))
+    found = estimate(
+        recording,
+        vehicle,
+        request["method"],
+        smooth=bool(request.get("smooth")),
+        progress=_Reporter(),
+    )
+    found.write(request["output"])
+    return found.summary()
+
+
+def _soils(request: dict[str, Any]) -> str:
+    from terragrip.soil.estimates import soils_of
+
+    campaign = soils_of([Path(path) for path in request["estimates"]], progress=_Reporter())
+    campaign.library({"from": [Path(path).name for path in request["estimates"]]}).write(request["output"])
+    return "\n".join(campaign.words)
+
+
+def _stop(number: int, frame: FrameType | None) -> None:
+    raise KeyboardInterrupt
+
+
+def main() -> int:
+    """Read the request, do it, say how it ended."""
+    signal.signal(signal.SIGTERM, _stop)
+    request = json.load(sys.stdin)
+    try:
+        say(state="done", text=run(request))
+    except InputError as error:
+        say(state="failed", text=str(error))
+        return 2
+    except KeyboardInterrupt:
+        return 130
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

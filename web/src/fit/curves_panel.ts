@@ -1,0 +1,209 @@
+/** The panel on the right: the active curve's model, a slider and a number field for each parameter, its fit. */
+
+import { digits, fill, h } from "../ui/dom";
+import { sameCurve } from "./scene";
+import type { Curve, Parameter, State } from "./state";
+
+const SYMBOLS: Record<string, string> = { alpha_1: "α₁", alpha_2: "α₂", c1: "c₁", c2: "c₂", c3: "c₃", mobility: "Bn", wheel_numeric: "Cn" };
+const STEPS = 1000;
+const WIDE: Record<string, [number, number]> = {
+  // A slider is of no use over a range that a fit may roam; the number field takes the whole of it.
+  a: [0, 3],
+  alpha_1: [-0.5, 1],
+  alpha_2: [-60, -0.5],
+  A: [0, 2],
+  k: [0.5, 60],
+  d: [-0.5, 1.5],
+  b: [0, 2],
+  c: [0.5, 60],
+  c1: [0, 2],
+  c2: [0.5, 120],
+  c3: [-0.5, 1.5],
+  D: [0, 2],
+  B: [0.1, 40],
+  E: [-5, 1],
+  intercept: [-0.3, 0.3],
+  mobility: [1, 100],
+  wheel_numeric: [1, 150],
+};
+
+export class CurvesPanel {
+  readonly element = h("section", { class: "panel", "aria-label": "Curve" });
+  private rows = new Map<string, { slider: HTMLInputElement; field: HTMLInputElement; parameter: Parameter }>();
+
+  constructor(
+    private state: State,
+    private actions: { fit: () => void; save: () => void },
+  ) {
+    state.on((change) => {
+      if (change === "all") this.draw();
+    });
+  }
+
+  draw(): void {
+    this.rows.clear();
+    const curve = this.state.active;
+    if (!curve) {
+      fill(this.element, h("h2", {}, "Curve"), h("p", { class: "hint" }, "No curve yet."), this.adder());
+      return;
+    }
+    const model = this.state.model(curve.model);
+    const parameters = [...(model?.parameters ?? [])];
+    if ("intercept" in curve.parameters) {
+      parameters.push({ name: "intercept", unit: "1", lower: -1, upper: 1, start: 0, meaning: "−ρ, where the sensor sees net traction" });
+    }
+    fill(
+      this.element,
+      h("h2", {}, "Curve"),
+      h("div", { class: "field" }, h("label", { for: "curve-name" }, "Name"), this.nameField(curve)),
+      h("div", { class: "field" }, h("label", { for: "curve-model" }, "Model"), this.modelChoice(curve)),
+      h("p", { class: "source" }, model?.source ?? ""),
+      parameters.map((p) => this.row(curve, p)),
+      this.interceptChoice(curve),
+      h(
+        "div",
+        { class: "row" },
+        h("button", { type: "button", class: "primary", id: "fit-button", click: this.actions.fit }, "Fit to points"),
+        h("button", { type: "button", click: this.actions.save }, "Save to library"),
+      ),
+      this.result(curve),
+      this.adder(),
+    );
+  }
+
+  private adder(): HTMLElement {
+    return h(
+      "button",
+      {
+        type: "button",
+        click: () => {
+          this.state.addCurve("exponential");
+          this.state.commit();
+          this.state.changed("all");
+        },
+      },
+      "Add a curve",
+    );
+  }
+
+  private nameField(curve: Curve): HTMLElement {
+    const field = h("input", { id: "curve-name", type: "text", value: curve.name, maxlength: 100 });
+    field.addEventListener("change", () => {
+      curve.name = field.value.trim() || curve.name;
+      this.state.commit();
+      this.state.changed("all");
+    });
+    return field;
+  }
+
+  private modelChoice(curve: Curve): HTMLElement {
+    const choice = h(
+      "select",
+      { id: "curve-model" },
+      this.state.models.map((m) => h("option", { value: m.name, selected: m.name === curve.model }, m.name.replace("_", "–"))),
+    );
+    choice.addEventListener("change", () => {
+      const model = this.state.model(choice.value);
+      if (!model) return;
+      const intercept = curve.parameters["intercept"];
+      curve.model = model.name;
+      curve.parameters = Object.fromEntries(model.parameters.map((p) => [p.name, p.start]));
+      if (intercept !== undefined) curve.parameters["intercept"] = intercept;
+      curve.fit = null;
+      this.state.commit();
+      this.state.changed("all");
+      document.getElementById("curve-model")?.focus();
+    });
+    return choice;
+  }
+
+  private row(curve: Curve, parameter: Parameter): HTMLElement {
+    const { name } = parameter;
+    const [low, high] = WIDE[name] ?? [parameter.lower, parameter.upper];
+    const now = curve.parameters[name] ?? parameter.start;
+    const slider = h("input", {
+      type: "range",
+      min: Math.min(low, now),
+      max: Math.max(high, now),
+      step: (high - low) / STEPS,
+      id: `slider-${name}`,
+      "aria-label": `${name}: ${parameter.meaning}`,
+    });
+    const field = h("input", { type: "number", step: "any", id: `field-${name}`, "aria-label": `${name}, exact` });
+    slider.value = String(now);
+    field.value = digits(now, 5);
+    slider.addEventListener("input", () => {
+      curve.parameters[name] = Number(slider.value);
+      field.value = digits(Number(slider.value), 5);
+      this.state.changed("curve");
+    });
+    slider.addEventListener("change", () => this.settle());
+    field.addEventListener("change", () => {
+      const typed = field.valueAsNumber;
+      if (!Number.isFinite(typed) || typed < parameter.lower || typed > parameter.upper) {
+        field.setCustomValidity(`between ${parameter.lower} and ${parameter.upper}`);
+        field.reportValidity();
+        return;
+      }
+      field.setCustomValidity("");
+      curve.parameters[name] = typed;
+      slider.min = String(Math.min(low, typed));
+      slider.max = String(Math.max(high, typed));
+      slider.value = String(typed);
+      this.state.changed("curve");
+      this.settle();
+    });
+    this.rows.set(name, { slider, field, parameter });
+    return h(
+      "div",
+      { class: "slider", title: parameter.meaning },
+      h("label", { for: `field-${name}` }, SYMBOLS[name] ?? name),
+      slider,
+      field,
+    );
+  }
+
+  private settle(): void {
+    this.state.commit();
+    const result = this.element.querySelector(".result");
+    const curve = this.state.active;
+    if (result && curve) result.replaceWith(this.result(curve));
+  }
+
+  private interceptChoice(curve: Curve): HTMLElement {
+    const box = h("input", { type: "checkbox", checked: "intercept" in curve.parameters });
+    box.addEventListener("change", () => {
+      if (box.checked) curve.parameters["intercept"] = 0;
+      else delete curve.parameters["intercept"];
+      this.state.commit();
+      this.state.changed("all");
+    });
+    return h("label", { class: "check" }, box, "net traction (with an intercept −ρ)");
+  }
+
+  private result(curve: Curve): HTMLElement {
+    const fit = curve.fit;
+    if (!fit) return h("div", { class: "result" });
+    const badge = fit.identifiability;
+    const rows = fit.free.map((name) => {
+      const interval = fit.interval[name];
+      const range = interval ? `${digits(interval[0])} … ${digits(interval[1])}` : "–";
+      return h("tr", {}, h("th", { scope: "row" }, SYMBOLS[name] ?? name), h("td", {}, digits(fit.parameters[name], 4)), h("td", {}, range));
+    });
+    const effective = Object.keys(fit.interval)
+      .filter((name) => !fit.free.includes(name))
+      .map((name) => {
+        const [low, high] = fit.interval[name] as [number, number];
+        return h("tr", {}, h("th", { scope: "row" }, name), h("td", {}, digits(badge.effective?.[name], 4)), h("td", {}, `${digits(low)} … ${digits(high)}`));
+      });
+    return h(
+      "div",
+      { class: `result${sameCurve(curve) ? "" : " stale"}`, "aria-live": "polite" },
+      h("p", {}, sameCurve(curve) ? "" : "The sliders have left this fit."),
+      h("table", {}, h("thead", {}, h("tr", {}, h("th", {}, ""), h("th", {}, "fit"), h("th", {}, "95 % interval"))), h("tbody", {}, rows, effective)),
+      h("p", {}, `R² ${digits(fit.r2)}   NRMSE ${digits(fit.nrmse)}   ${fit.bins.length} bins`),
+      h("p", { class: `badge ${badge.identifiable ? "good" : "poor"}` }, badge.identifiable ? "identifiable" : "not identifiable", ` (condition ${digits(badge.condition, 2)})`),
+      fit.notes.map((text) => h("p", { class: "hint" }, text)),
+    );
+  }
+}

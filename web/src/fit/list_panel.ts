@@ -1,0 +1,167 @@
+/** The panel on the left: curves, soils of the folder, literature, pictures. */
+
+import { get, type Item } from "../ui/api";
+import { fill, h } from "../ui/dom";
+import { tried } from "../ui/notes";
+import type { Curve, Soil, State } from "./state";
+
+interface Literature {
+  name: string;
+  model: string;
+  parameters: Record<string, number>;
+  source: string;
+}
+
+interface Served extends Partial<Soil> {
+  name: string;
+  model?: string;
+  parameters?: Record<string, number>;
+  source?: string;
+}
+
+export class ListPanel {
+  readonly element = h("section", { class: "panel", "aria-label": "Curves and data" });
+  private files: Item[] = [];
+  private literature: Literature[] = [];
+
+  constructor(
+    private state: State,
+    private shown: () => void,
+    private pictures: HTMLElement,
+  ) {
+    state.on((change) => {
+      if (change === "all" || change === "data") this.draw();
+    });
+  }
+
+  async load(items: Item[]): Promise<void> {
+    this.files = items.filter((item) => item.kind === "estimates" || item.kind === "library" || item.path.endsWith(".csv"));
+    if (!this.literature.length) this.literature = (await tried(() => get<Literature[]>("literature"))) ?? [];
+    this.draw();
+  }
+
+  draw(): void {
+    fill(
+      this.element,
+      h("h2", {}, "Curves"),
+      h("ul", { class: "list", id: "curve-list" }, this.state.kept.curves.map((curve) => this.curve(curve))),
+      this.literatureChoice(),
+      h("h2", {}, "Soils"),
+      this.state.soils.length
+        ? h("ul", { class: "list", id: "soil-list" }, this.state.soils.map((soil) => this.soil(soil)))
+        : h("p", { class: "hint" }, "Choose a file of estimates, a soil library or digitised points."),
+      this.fileChoice(),
+      this.pictures,
+    );
+  }
+
+  private curve(curve: Curve): HTMLElement {
+    const { kept } = this.state;
+    const box = h("input", { type: "checkbox", checked: curve.shown, "aria-label": `show ${curve.name}` });
+    box.addEventListener("change", () => {
+      curve.shown = box.checked;
+      this.state.commit();
+      this.state.changed("curve");
+    });
+    const choose = (): void => {
+      kept.active = curve.id;
+      this.state.commit();
+      this.state.changed("all");
+    };
+    const remove = (): void => {
+      kept.curves = kept.curves.filter((other) => other.id !== curve.id);
+      if (kept.active === curve.id) kept.active = kept.curves.at(-1)?.id ?? 0;
+      this.state.commit();
+      this.state.changed("all");
+    };
+    return h(
+      "li",
+      { class: curve.id === kept.active ? "chosen" : null },
+      box,
+      h("span", { class: `swatch ${curve.color}`, "aria-hidden": "true" }),
+      h("button", { type: "button", class: "name", "aria-pressed": String(curve.id === kept.active), title: curve.source, click: choose }, curve.name),
+      h("button", { type: "button", class: "quiet", "aria-label": `remove ${curve.name}`, click: remove }, "×"),
+    );
+  }
+
+  private soil(soil: Soil): HTMLElement {
+    const box = h("input", { type: "checkbox", checked: soil.shown, "aria-label": `show ${soil.name}` });
+    box.addEventListener("change", () => {
+      soil.shown = box.checked;
+      this.state.changed("data");
+    });
+    const chosen = this.state.target === soil.key;
+    const choose = (): void => {
+      this.state.target = soil.key;
+      soil.shown = true;
+      this.state.changed("data");
+    };
+    const remove = (): void => {
+      this.state.soils = this.state.soils.filter((other) => other !== soil);
+      this.state.changed("data");
+    };
+    return h(
+      "li",
+      { class: chosen ? "chosen" : null },
+      box,
+      h("span", { class: `swatch round ${soil.color}`, "aria-hidden": "true" }),
+      h("button", { type: "button", class: "name", "aria-pressed": String(chosen), title: soil.note || `${soil.path}: ${soil.count} samples`, click: choose }, soil.name),
+      h("button", { type: "button", class: "quiet", "aria-label": `remove ${soil.name}`, click: remove }, "×"),
+    );
+  }
+
+  private literatureChoice(): HTMLElement {
+    const choice = h(
+      "select",
+      { "aria-label": "Add a curve of the literature" },
+      h("option", { value: "" }, "Literature …"),
+      this.literature.map((soil, i) => h("option", { value: i }, `${soil.name} (${soil.source.split(",")[0]})`)),
+    );
+    choice.addEventListener("change", () => {
+      const soil = this.literature[Number(choice.value)];
+      if (!soil || choice.value === "") return;
+      this.state.addCurve(soil.model, soil.parameters, soil.name, soil.source);
+      this.state.commit();
+      this.state.changed("all");
+    });
+    return choice;
+  }
+
+  private fileChoice(): HTMLElement {
+    const choice = h(
+      "select",
+      { id: "soil-file", "aria-label": "Show soils of a file" },
+      h("option", { value: "" }, this.files.length ? "Soils of a file …" : "No estimates or libraries in the folder"),
+      this.files.map((item) => h("option", { value: item.path }, item.path)),
+    );
+    choice.addEventListener("change", () => void this.open(choice.value));
+    return choice;
+  }
+
+  async open(path: string): Promise<void> {
+    if (!path) return;
+    const served = await tried(() => get<Served[]>("soils", { path }));
+    for (const one of served ?? []) {
+      const key = `${path}#${one.name}`;
+      this.state.soils = this.state.soils.filter((soil) => soil.key !== key);
+      if (one.model && one.parameters) this.state.addCurve(one.model, one.parameters, one.name, one.source || path);
+      if (!one.bins?.length && !one.points?.slip.length) continue;
+      this.state.soils.push({
+        key,
+        path,
+        name: one.name,
+        soil: one.soil ?? one.name,
+        color: one.model ? (this.state.active?.color ?? this.state.nextColor()) : this.state.nextColor(),
+        shown: true,
+        points: one.points ?? { slip: [], adhesion: [] },
+        bins: one.bins ?? [],
+        count: one.count ?? one.points?.slip.length ?? 0,
+        note: one.note ?? "",
+      });
+      if (!this.state.target) this.state.target = key;
+    }
+    this.state.commit();
+    this.state.changed("all");
+    this.shown();
+  }
+}

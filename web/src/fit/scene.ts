@@ -1,0 +1,86 @@
+/** What is drawn where: axes, points, bins, curves, on any ink. */
+
+import { color } from "../ui/theme";
+import { digits } from "../ui/dom";
+import type { Ink } from "./ink";
+import { value } from "./models";
+import type { Curve, Soil } from "./state";
+import { ticks, type View } from "./view";
+
+export function drawAxes(ink: Ink, view: View): void {
+  const { width, height, left, right, top, bottom } = view;
+  const [ink_, muted, grid] = [color("ink"), color("muted"), color("grid")];
+  for (const x of ticks(view.x, (width - left - right) / 90)) {
+    const px = view.px(x);
+    ink.line([px, top, px, height - bottom], { color: grid });
+    ink.text(digits(x * 100), px, height - bottom + 14, muted, "middle");
+  }
+  for (const y of ticks(view.y, (height - top - bottom) / 60)) {
+    const py = view.py(y);
+    ink.line([left, py, width - right, py], { color: grid });
+    ink.text(digits(y), left - 8, py, muted, "end");
+  }
+  ink.line([left, top, left, height - bottom, width - right, height - bottom], { color: muted });
+  for (const zero of [view.y.low < 0 && view.y.high > 0]) if (zero) ink.line([left, view.py(0), width - right, view.py(0)], { color: muted });
+  ink.text("slip s [%]", (left + width - right) / 2, height - 10, ink_, "middle");
+  ink.text("adhesion µ (gross traction ratio less ρt) [–]", 14, (top + height - bottom) / 2, ink_, "middle", true);
+}
+
+export function drawSoil(ink: Ink, view: View, soil: Soil): void {
+  const shade = color(soil.color);
+  const { slip, adhesion } = soil.points;
+  const points = new Float64Array(2 * slip.length);
+  for (let i = 0; i < slip.length; i++) {
+    points[2 * i] = view.px(slip[i] as number);
+    points[2 * i + 1] = view.py(adhesion[i] as number);
+  }
+  const many = slip.length > 300;
+  ink.dots(points, many ? 1 : 3.5, shade, many ? 0.3 : 0.9);
+  for (const bin of soil.bins) {
+    const px = view.px(bin.slip);
+    if (bin.std > 0) {
+      ink.line([px, view.py(bin.mean - bin.std), px, view.py(bin.mean + bin.std)], { color: shade, width: 1.2 });
+    }
+  }
+  ink.dots(soil.bins.flatMap((bin) => [view.px(bin.slip), view.py(bin.mean)]), 4, shade, 1);
+}
+
+export function drawCurve(ink: Ink, view: View, curve: Curve, active: boolean): void {
+  const shade = color(curve.color);
+  const band = curve.fit?.band;
+  if (band && sameCurve(curve)) {
+    const outline: number[] = [];
+    band.slip.forEach((s, i) => outline.push(view.px(s), view.py(band.high[i] as number)));
+    for (let i = band.slip.length - 1; i >= 0; i--) outline.push(view.px(band.slip[i] as number), view.py(band.low[i] as number));
+    ink.area(outline, shade, 0.18);
+  }
+  const count = Math.max(Math.round((view.width - view.left - view.right) / 2), 2);
+  const points = new Float64Array(2 * count + 2);
+  for (let i = 0; i <= count; i++) {
+    const s = view.x.low + (i / count) * (view.x.high - view.x.low);
+    points[2 * i] = view.px(s);
+    points[2 * i + 1] = Math.abs(s) > 1 ? NaN : view.py(value(curve.model, curve.parameters, s));
+  }
+  ink.line(points, { color: shade, width: active ? 2.6 : 1.6 });
+}
+
+/** Whether the curve still is what its fit found: a moved slider parts them. */
+export function sameCurve(curve: Curve): boolean {
+  const fit = curve.fit;
+  return !!fit && fit.model === curve.model && Object.entries(fit.parameters).every(([name, v]) => Math.abs((curve.parameters[name] ?? 0) - v) < 1e-9);
+}
+
+export function drawLegend(ink: Ink, view: View, curves: Curve[], soils: Soil[]): void {
+  let y = view.top + 12;
+  const x = view.width - view.right - 10;
+  for (const curve of curves) {
+    ink.text(curve.name, x - 28, y, color("ink"), "end");
+    ink.line([x - 22, y, x, y], { color: color(curve.color), width: 2.4 });
+    y += 18;
+  }
+  for (const soil of soils) {
+    ink.text(soil.name, x - 28, y, color("ink"), "end");
+    ink.dots([x - 11, y], 4, color(soil.color), 1);
+    y += 18;
+  }
+}

@@ -1,0 +1,167 @@
+/** What the fit page shows, and its undo. Data of soils and pictures are held apart: undo never loses them. */
+
+import { CURVE_COLORS } from "../ui/theme";
+import type { Parameters } from "./models";
+import type { Calibration } from "./picture";
+
+export interface Parameter {
+  name: string;
+  unit: string;
+  lower: number;
+  upper: number;
+  start: number;
+  meaning: string;
+}
+
+export interface Model {
+  name: string;
+  source: string;
+  fixed: string[];
+  parameters: Parameter[];
+}
+
+export interface FitResult {
+  model: string;
+  parameters: Parameters;
+  free: string[];
+  interval: Record<string, [number, number]>;
+  r2: number;
+  nrmse: number;
+  bins: Bin[];
+  clusters: number;
+  identifiability: { condition: number; identifiable: boolean; effective: Parameters; twin: Parameters | null; sentence: string };
+  notes: string[];
+  band?: { slip: number[]; low: number[]; high: number[] };
+  peak: [number, number];
+}
+
+export interface Bin {
+  slip: number;
+  mean: number;
+  std: number;
+  count: number;
+}
+
+export interface Curve {
+  id: number;
+  name: string;
+  model: string;
+  parameters: Parameters;
+  color: string;
+  shown: boolean;
+  fit: FitResult | null;
+  source: string;
+}
+
+export interface Soil {
+  key: string;
+  path: string;
+  name: string;
+  soil: string;
+  color: string;
+  shown: boolean;
+  points: { slip: number[]; adhesion: number[] };
+  bins: Bin[];
+  count: number;
+  note: string;
+}
+
+interface Kept {
+  curves: Curve[];
+  active: number;
+  pictures: Record<string, Calibration>;
+}
+
+const DEEP = 200;
+
+export class State {
+  models: Model[] = [];
+  soils: Soil[] = [];
+  images = new Map<string, HTMLImageElement>();
+  /** The soil, or "picture:path#line", that a fit takes. */
+  target = "";
+  kept: Kept = { curves: [], active: 0, pictures: {} };
+  private past: string[] = [];
+  private future: string[] = [];
+  private settled = JSON.stringify(this.kept);
+  private listeners = new Set<(what: Change) => void>();
+  private colors = 0;
+
+  on(listener: (what: Change) => void): void {
+    this.listeners.add(listener);
+  }
+
+  /** Say that something changed; "curve" is the quick one, while a slider moves. */
+  changed(what: Change): void {
+    for (const listener of this.listeners) listener(what);
+  }
+
+  /** A step that undo goes back over. Call when a change is complete. */
+  commit(): void {
+    const now = JSON.stringify(this.kept);
+    if (now === this.settled) return;
+    this.past.push(this.settled);
+    if (this.past.length > DEEP) this.past.shift();
+    this.future = [];
+    this.settled = now;
+  }
+
+  undo(): boolean {
+    return this.step(this.past, this.future);
+  }
+
+  redo(): boolean {
+    return this.step(this.future, this.past);
+  }
+
+  private step(from: string[], to: string[]): boolean {
+    const before = from.pop();
+    if (before === undefined) return false;
+    to.push(this.settled);
+    this.settled = before;
+    this.kept = JSON.parse(before) as Kept;
+    this.changed("all");
+    return true;
+  }
+
+  get canUndo(): boolean {
+    return this.past.length > 0;
+  }
+
+  get canRedo(): boolean {
+    return this.future.length > 0;
+  }
+
+  get active(): Curve | undefined {
+    return this.kept.curves.find((curve) => curve.id === this.kept.active);
+  }
+
+  model(name: string): Model | undefined {
+    return this.models.find((model) => model.name === name);
+  }
+
+  nextColor(): string {
+    return CURVE_COLORS[this.colors++ % CURVE_COLORS.length] ?? "blue";
+  }
+
+  addCurve(model: string, parameters?: Parameters, name?: string, source = "drawn in the studio"): Curve {
+    const chosen = this.model(model);
+    const start = Object.fromEntries((chosen?.parameters ?? []).map((p) => [p.name, p.start]));
+    const id = Math.max(0, ...this.kept.curves.map((c) => c.id)) + 1;
+    const curve: Curve = {
+      id,
+      name: name ?? `curve ${id}`,
+      model,
+      parameters: { ...start, ...parameters },
+      color: this.nextColor(),
+      shown: true,
+      fit: null,
+      source,
+    };
+    this.kept.curves.push(curve);
+    this.kept.active = id;
+    return curve;
+  }
+}
+
+export type Change = "curve" | "data" | "view" | "pictures" | "all";

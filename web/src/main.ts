@@ -1,0 +1,59 @@
+import { Notices } from "./ui/api";
+import { fill, h } from "./ui/dom";
+import { startTheme, switchTheme } from "./ui/theme";
+import type { Page } from "./ui/page";
+
+const PAGES: Record<string, { title: string; load: () => Promise<{ page: Page }> }> = {
+  start: { title: "Folder", load: () => import("./start/page") },
+  fit: { title: "Fit", load: () => import("./fit/page") },
+};
+
+const notices = new Notices();
+const main = document.getElementById("main") as HTMLElement;
+const bar = document.getElementById("bar") as HTMLElement;
+let leave: (() => void) | void;
+let opened = 0;
+
+function route(): { name: string; query: URLSearchParams } {
+  const [path = "", query = ""] = location.hash.replace(/^#\/?/, "").split("?");
+  return { name: path in PAGES ? path : "start", query: new URLSearchParams(query) };
+}
+
+async function open(): Promise<void> {
+  const { name, query } = route();
+  const turn = ++opened;
+  const chosen = PAGES[name];
+  if (!chosen) return;
+  drawBar(name);
+  document.title = `${chosen.title} · Terragrip studio`;
+  const { page } = await chosen.load();
+  if (turn !== opened) return;
+  leave?.();
+  main.className = `page-${name}`;
+  fill(main);
+  leave = page(main, { notices, query });
+}
+
+function drawBar(current: string): void {
+  const links = Object.entries(PAGES).map(([name, { title }]) =>
+    h("a", { href: `#/${name}`, "aria-current": name === current ? "page" : null }, title),
+  );
+  const state = h("span", { id: "connection", role: "status" });
+  fill(
+    bar,
+    h("a", { href: "#/start", class: "brand" }, "Terragrip"),
+    h("nav", { "aria-label": "Pages" }, links),
+    state,
+    h("button", { type: "button", class: "quiet", click: switchTheme, "aria-label": "Switch between light and dark" }, "◐"),
+  );
+}
+
+notices.on((notice) => {
+  if (notice.kind !== "connection") return;
+  const state = document.getElementById("connection");
+  if (state) state.textContent = notice.up ? "" : "The studio does not answer; trying again …";
+});
+
+startTheme();
+addEventListener("hashchange", () => void open());
+void open();

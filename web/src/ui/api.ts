@@ -1,0 +1,122 @@
+/** The server's interface. Every failure becomes an Error whose message is the server's one line. */
+
+export interface Item {
+  path: string;
+  kind: string;
+  size: number;
+  modified: number;
+}
+
+export interface Job {
+  id: string;
+  kind: string;
+  title: string;
+  output: string;
+  state: "queued" | "running" | "done" | "failed" | "cancelled";
+  done: number;
+  total: number;
+  text: string;
+}
+
+export type Query = Record<string, string | number | boolean | undefined>;
+
+export function address(path: string, query: Query = {}): string {
+  const words = new URLSearchParams();
+  for (const [key, value] of Object.entries(query)) if (value !== undefined) words.set(key, String(value));
+  const text = words.toString();
+  return `./api/${path}${text ? `?${text}` : ""}`;
+}
+
+export async function request(path: string, query: Query = {}, options: RequestInit = {}): Promise<Response> {
+  let answer: Response;
+  try {
+    answer = await fetch(address(path, query), options);
+  } catch {
+    throw new Error("The studio does not answer; is it still running?");
+  }
+  if (!answer.ok) throw new Error(await reason(answer));
+  return answer;
+}
+
+async function reason(answer: Response): Promise<string> {
+  const text = await answer.text();
+  try {
+    return String(JSON.parse(text).detail);
+  } catch {
+    return text || `${answer.status} ${answer.statusText}`;
+  }
+}
+
+export async function get<T>(path: string, query: Query = {}): Promise<T> {
+  return (await (await request(path, query)).json()) as T;
+}
+
+export async function send<T>(method: string, path: string, body: unknown, query: Query = {}): Promise<T> {
+  const options = { method, headers: { "content-type": "application/json" }, body: JSON.stringify(body) };
+  const answer = await request(path, query, options);
+  return (answer.status === 204 ? undefined : await answer.json()) as T;
+}
+
+/** Upload with progress; `fetch` cannot tell how much has gone. */
+export function upload(path: string, content: Blob, replace: boolean, progress: (share: number) => void): Promise<{ path: string; kind: string }> {
+  return new Promise((resolve, reject) => {
+    const call = new XMLHttpRequest();
+    call.open("PUT", address("file", { path, replace }));
+    call.upload.onprogress = (event) => event.lengthComputable && progress(event.loaded / event.total);
+    call.onerror = () => reject(new Error("The studio does not answer; is it still running?"));
+    call.onload = () => {
+      let said: { detail?: string } = {};
+      try {
+        said = JSON.parse(call.responseText);
+      } catch {
+        said = { detail: call.responseText };
+      }
+      if (call.status < 300) resolve(said as { path: string; kind: string });
+      else reject(new Error(said.detail || call.statusText));
+    };
+    call.send(content);
+  });
+}
+
+export function socketAddress(path: string): string {
+  const base = new URL(`./api/${path}`, location.href);
+  base.protocol = base.protocol === "https:" ? "wss:" : "ws:";
+  base.hash = "";
+  return base.href;
+}
+
+export type Notice = { kind: "folder" } | { kind: "job"; job: Job } | { kind: "picture"; path: string } | { kind: "connection"; up: boolean };
+
+/** Hear the server's notices; joins again with growing pauses when the connection drops. */
+export class Notices {
+  private listeners = new Set<(notice: Notice) => void>();
+  private pause = 500;
+
+  constructor() {
+    this.open();
+  }
+
+  on(listener: (notice: Notice) => void): () => void {
+    this.listeners.add(listener);
+    return () => this.listeners.delete(listener);
+  }
+
+  private tell(notice: Notice): void {
+    for (const listener of this.listeners) listener(notice);
+  }
+
+  private open(): void {
+    const socket = new WebSocket(socketAddress("notices"));
+    socket.onopen = () => {
+      this.pause = 500;
+      this.tell({ kind: "connection", up: true });
+      this.tell({ kind: "folder" });
+    };
+    socket.onmessage = (event) => this.tell(JSON.parse(event.data as string) as Notice);
+    socket.onclose = () => {
+      this.tell({ kind: "connection", up: false });
+      setTimeout(() => this.open(), this.pause);
+      this.pause = Math.min(this.pause * 2, 8000);
+    };
+  }
+}
