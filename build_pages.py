@@ -39,7 +39,12 @@ def stale() -> bool:
     page = STATIC / "index.html"
     if not page.is_file():
         return True
-    sources = [WEB / "package-lock.json", WEB / "index.html", WEB / "vite.config.ts", *(WEB / "src").rglob("*")]
+    sources = [
+        WEB / "package-lock.json",
+        WEB / "index.html",
+        WEB / "vite.config.ts",
+        *(WEB / "src").rglob("*"),
+    ]
     return any(path.stat().st_mtime > page.stat().st_mtime for path in sources if path.is_file())
 
 
