@@ -15,6 +15,7 @@ from terragrip.cli.calibrate import command as calibrate
 from terragrip.cli.demo import command as demo
 from terragrip.cli.estimate import command as estimate
 from terragrip.cli.failure import INTERRUPTED, report
+from terragrip.cli.ground import command as ground
 from terragrip.cli.inspect import command as inspect
 from terragrip.cli.live import command as live
 from terragrip.cli.simulate import command as simulate
@@ -34,6 +35,7 @@ app.command("inspect")(inspect)
 app.command("estimate")(estimate)
 app.command("calibrate")(calibrate)
 app.command("soils")(soils)
+app.command("ground")(ground)
 app.command("simulate")(simulate)
 app.command("live")(live)
 app.command("studio")(studio)

@@ -1,0 +1,132 @@
+"""``terragrip ground``: where the ground changes, what it is, and what happened on it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from terragrip.cli.options import Quiet
+from terragrip.cli.output import check_file, check_folder, files_in
+from terragrip.cli.progress import progress
+from terragrip.errors import InputError
+
+if TYPE_CHECKING:
+    from terragrip.ground.result import Ground
+
+
+def command(
+    estimates: Annotated[
+        list[Path], typer.Argument(metavar="ESTIMATES", help="Files written by 'terragrip estimate'.")
+    ],
+    output: Annotated[Path, typer.Option("--output", "-o", metavar="FILE", help="The result, ground.json.")],
+    library: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="The known soils, soils.json; without it no soil is named."),
+    ] = None,
+    table: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="PATH",
+            help="Write the estimates with the columns soil_estimate and soil_probability here (Parquet; with several, a folder).",
+        ),
+    ] = None,
+    online: Annotated[
+        bool,
+        typer.Option("--online", help="As it would have been told while driving, without looking ahead."),
+    ] = False,
+    length: Annotated[
+        float, typer.Option(metavar="M", help="Mean way on one ground before the data speak.")
+    ] = 30.0,
+    quiet: Quiet = False,
+) -> None:
+    """Find changes of the ground, name the soils, list events.
+
+    Changes with time, spread and probability; sections in which vehicle and tool are on one soil, with slip and adhesion; which soil of the
+    library it is, with probabilities, or 'unknown' where none fits; events. All drives go into one file, each entry with its run.
+    """
+    from terragrip.estimation import Estimates
+    from terragrip.ground.analysis import Settings, analyse
+    from terragrip.ground.result import write
+    from terragrip.soil.library import SoilLibrary
+
+    if not 0 < length < float("inf"):
+        raise InputError(f"{length:g} is no length", place="--length", mend="give metres, e.g. 30")
+    runs = _names(estimates)
+    inputs = [*estimates, *([library] if library else [])]
+    target = check_file(output, inputs, suffixes=(".json",))
+    tables = _tables(table, estimates, [*inputs, output])
+    known = SoilLibrary.load(library) if library else None
+    settings, grounds = Settings(online=online, length=length), []
+    with progress("ground", quiet) as step:
+        for number, (path, run) in enumerate(zip(estimates, runs, strict=True), 1):
+            try:
+                ground, enriched = analyse(Estimates.read(path), known, run, settings)
+            except InputError as error:
+                raise (
+                    error
+                    if error.file not in (None, run)
+                    else InputError(error.problem, file=path, place=error.place, mend=error.mend)
+                ) from None
+            grounds.append(ground)
+            if tables:
+                enriched.write(tables[number - 1])
+            step(number, len(estimates), run)
+    write(grounds, target, {"library": None if library is None else library.name})
+    if not quiet:
+        print(summary(grounds))
+        print(f"Written to {output}" + (f" and {table}" if table else ""))
+
+
+def _names(files: list[Path]) -> list[str]:
+    """A name for each drive: its file's; refuses a file given twice and two files of one name."""
+    taken: dict[str, Path] = {}
+    for path in files:
+        other = taken.get(path.stem)
+        if other is not None:
+            if other.resolve() == path.resolve():
+                raise InputError("is given twice", file=path, mend="name each run once")
+            raise InputError(
+                f"has the same name as {other}", file=path, mend="rename one: runs are told apart by name"
+            )
+        taken[path.stem] = path
+    return list(taken)
+
+
+def _tables(table: Path | None, estimates: list[Path], inputs: list[Path]) -> list[Path]:
+    if table is None:
+        return []
+    if len(estimates) == 1:
+        return [check_file(table, inputs, suffixes=(".parquet",), option="--table")]
+    for path in estimates:
+        if not path.exists():
+            raise InputError("no such file", file=path, mend="check the path")
+    check_folder(table)
+    return [check_file(path, inputs, option="--table") for path in files_in(table, estimates, ".parquet")]
+
+
+def summary(grounds: list[Ground]) -> str:
+    """Lines of text: each drive, its sections, its notes; many drives a line each."""
+    lines = []
+    for ground in grounds:
+        counted = [f"{len(ground.changes)} change{'s' * (len(ground.changes) != 1)}"]
+        counted.append(f"{len(ground.sections)} section{'s' * (len(ground.sections) != 1)}")
+        counted.append(f"{len(ground.events)} event{'s' * (len(ground.events) != 1)}")
+        seen = f"; {', '.join(ground.soils)}" if ground.soils else ""
+        lines.append(f"{ground.run}: {', '.join(counted)}{seen}")
+        if len(grounds) == 1:
+            lines += _sections(ground)
+        lines += [f"  {note}" for note in ground.notes]
+    return "\n".join(lines)
+
+
+def _sections(ground: Ground) -> list[str]:
+    rows: list[tuple[str, ...]] = [("  from s", "to s", "soil", "probability", "slip", "adhesion")]
+    for one in ground.sections:
+        slip = "" if one.slip_mean is None else f"{one.slip_mean:.3f} ± {one.slip_std:.3f}"
+        adhesion = "" if one.adhesion_mean is None else f"{one.adhesion_mean:.3f} ± {one.adhesion_std:.3f}"
+        chance = f"{one.probabilities[one.soil]:.2f}"
+        rows.append((f"  {one.start:.1f}", f"{one.end:.1f}", one.soil, chance, slip, adhesion))
+    widths = [max(len(row[i]) for row in rows) for i in range(6)]
+    return ["  ".join(cell.ljust(w) for cell, w in zip(row, widths, strict=True)).rstrip() for row in rows]

@@ -1,0 +1,1 @@
+"""The ground along a drive: where it changes, what it is, and what happened on it."""

@@ -1,0 +1,170 @@
+"""From a table of estimates to the ground of the drive: changes, soils, sections, events."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from terragrip.estimation import Estimates
+from terragrip.ground.changes import LENGTH, Change, changes_of
+from terragrip.ground.emissions import UNKNOWN, Emissions
+from terragrip.ground.online_changes import OnlineSettings, online_changes
+from terragrip.ground.recognition import Chain, ForwardFilter, by_soil
+from terragrip.ground.result import Ground, Timeline
+from terragrip.ground.sections import Stretch, sections_of
+from terragrip.ground.signals import GROUND
+from terragrip.soil.blocks import Blocks, estimates_blocks
+from terragrip.soil.estimates import whole_length
+from terragrip.soil.library import SoilLibrary
+from terragrip.soil.signature import maker
+from terragrip.soil.transitions import settled
+
+Array = NDArray[np.float64]
+
+SURE = 0.5
+"""Probability from which a change cuts a section."""
+
+
+@dataclass(frozen=True)
+class Settings:
+    """How a drive is looked at. `online`: as it would have been told while driving (no look ahead); `length` [m]: mean way on one
+    ground before the data speak, of changes; `chain`: the prior of the soils; `signals`: what changes are looked for in."""
+
+    online: bool = False
+    length: float = LENGTH
+    signals: tuple[str, ...] = GROUND
+    chain: Chain = field(default_factory=Chain)
+
+
+def analyse(
+    estimates: Estimates, library: SoilLibrary | None = None, run: str = "", settings: Settings | None = None
+) -> tuple[Ground, Estimates]:
+    """The ground of one drive, and the estimates with the columns `soil_estimate` and `soil_probability`.
+
+    Without a library every soil is "unknown": changes, sections and events only. Raises InputError on a table without the columns
+    needed, an empty one, or a damaged library.
+    """
+    chosen = settings or Settings()
+    blocks = estimates_blocks(estimates, file=run or None)
+    changes = _changes(blocks, chosen)
+    emissions = Emissions(dict(library.soils) if library else {}, maker(estimates))
+    forward = ForwardFilter.begin(emissions, chosen.chain).update(blocks)
+    probabilities = by_soil(forward.filtered if chosen.online else forward.smoothed())
+    timeline = Timeline(
+        blocks.start, emissions.names, probabilities, blocks.known, block_labels(estimates, blocks)
+    )
+    stretches = _stretches(estimates, changes, timeline)
+    sections = sections_of(estimates, stretches, whole_length(estimates.vehicle))
+    soils = tuple(dict.fromkeys(timeline.soil[timeline.known])) if library else ()
+    ground = Ground(
+        run,
+        float(estimates.time[0]),
+        float(estimates.time[-1]),
+        soils,
+        changes,
+        sections,
+        _events(estimates),
+        timeline,
+        _notes(blocks, emissions, timeline, len(stretches) - len(sections), library is not None),
+        {"recording": estimates.about.get("recording", {}), "online": chosen.online},
+    )
+    return ground, with_columns(estimates, blocks, timeline, chosen.online)
+
+
+def with_columns(estimates: Estimates, blocks: Blocks, timeline: Timeline, online: bool) -> Estimates:
+    """The estimates with `soil_estimate` (the most probable soil) and `soil_probability` (its probability) in every row.
+
+    `online`: a row holds what was known before it, the block that ended last; else what its own block's is.
+    """
+    soil, best = timeline.soil, timeline.probabilities.max(axis=1)
+    if online:
+        soil, best = (
+            np.concatenate(([UNKNOWN], soil[:-1])).astype(object),
+            np.concatenate(([np.nan], best[:-1])),
+        )
+    return replace(
+        estimates,
+        columns={**estimates.columns, "soil_probability": np.repeat(best, blocks.rows)},
+        labels={**estimates.labels, "soil_estimate": np.repeat(soil, blocks.rows)},
+    )
+
+
+def block_labels(estimates: Estimates, blocks: Blocks) -> NDArray[np.object_]:
+    """The recording's label in the middle of each block (blocks,), "" where vehicle and tool are on different soils or there is none."""
+    if "soil" not in estimates.names:
+        return np.full(len(blocks), "", dtype=object)
+    one = settled(estimates["distance"], estimates["soil"], whole_length(estimates.vehicle))
+    labels = np.where(one, estimates["soil"], "")
+    middle = np.cumsum(blocks.rows) - blocks.rows // 2 - 1
+    return np.asarray(labels[middle], dtype=object)
+
+
+def _changes(blocks: Blocks, settings: Settings) -> tuple[Change, ...]:
+    if not settings.online:
+        return changes_of(blocks, settings.signals, settings.length)
+    told = online_changes(blocks, OnlineSettings(length=settings.length, names=settings.signals))
+    return tuple(Change(one.time, one.std, one.probability, {}, one.told) for one in told)
+
+
+def _stretches(estimates: Estimates, changes: Sequence[Change], timeline: Timeline) -> list[Stretch]:
+    """The drive cut at its changes, each piece with the mean of its blocks' probabilities."""
+    cuts = [float(change.time) for change in changes if change.probability >= SURE]
+    rows = np.searchsorted(estimates.time, cuts)
+    borders = sorted({0, *(int(k) for k in rows if 0 < k < len(estimates)), len(estimates)})
+    found = []
+    for first, last in pairwise(borders):
+        inside = (timeline.time >= estimates.time[first]) & (timeline.time <= estimates.time[last - 1])
+        told = inside & timeline.known if (inside & timeline.known).any() else inside
+        if not told.any():
+            told = np.arange(len(timeline.time)) == max(
+                int(np.searchsorted(timeline.time, estimates.time[first])) - 1, 0
+            )
+        mean = timeline.probabilities[told].mean(axis=0)
+        probabilities = {name: round(float(p), 4) for name, p in zip(timeline.names, mean, strict=True)}
+        found.append(Stretch(first, last, probabilities))
+    return found
+
+
+def _events(estimates: Estimates) -> tuple[dict[str, Any], ...]:
+    """Spells of the `event` column."""
+    codes = estimates.event_codes
+    begin = np.flatnonzero(np.concatenate(([True], codes[1:] != codes[:-1])))
+    end = np.append(begin[1:], codes.size) - 1
+    names = estimates["event"]
+    return tuple(
+        {"kind": str(names[a]), "start": float(estimates.time[a]), "end": float(estimates.time[b]), "why": ""}
+        for a, b in zip(begin, end, strict=True)
+        if names[a]
+    )
+
+
+def _notes(
+    blocks: Blocks, emissions: Emissions, timeline: Timeline, short: int, library: bool
+) -> tuple[str, ...]:
+    said = list(emissions.notes)
+    known = timeline.known
+    if not known.any():
+        said.append(
+            "No stretch of the drive tells of the ground: it stands, spins, or is flagged throughout."
+        )
+    elif library and (timeline.soil[known] == UNKNOWN).all():
+        said.append("No soil of the library fits any of the drive: all of it is unknown.")
+    elif library:
+        share = float((timeline.soil[known] == UNKNOWN).mean())
+        if share >= 0.01:
+            said.append(f"No soil of the library fits {100 * share:.0f} % of the drive: there it is unknown.")
+    if short:
+        said.append(
+            f"{short} stretch{'es' * (short > 1)} between changes {'are' if short > 1 else 'is'} too short for vehicle and tool "
+            "to be on together, and no section."
+        )
+    if len(known) and known.mean() < 0.5:
+        said.append(
+            f"Only {100 * known.mean():.0f} % of the drive tells of the ground; elsewhere the soil is carried on."
+        )
+    return tuple(said)

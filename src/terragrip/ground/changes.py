@@ -1,0 +1,178 @@
+"""Change points of a whole drive: the most probable segmentation, by ruptures' PELT with a conjugate cost (Killick 2012; Fearnhead 2006).
+
+The penalty comes from the data: what a block counts for is measured on the drive's own serial correlation, and the price of a change is the
+chance of one in the distance that a block covers.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from terragrip.errors import InputError
+from terragrip.ground.conjugate import Model
+from terragrip.ground.signals import GROUND, LAWS, SIGNALS, signals_of
+from terragrip.soil.blocks import PERIOD, Blocks
+
+Array = NDArray[np.float64]
+
+LENGTH = 30.0
+"""Mean way on one ground [m], before anything is known of a drive."""
+LEAST = 4
+"""Fewest blocks of a stretch: 2 s."""
+LEAST_FOR_WEIGHTS = 120
+"""Blocks (a minute) that tell how alike neighbours are; a shorter drive takes the usual figure."""
+_JUMP = 2
+"""PELT tries every second block; where a change lies between its neighbours is then weighed block by block."""
+_AT_ONCE = 512
+"""Stretches that end at one block and are weighed together."""
+_SHIFT = 20.0
+"""Moved from every stretch's cost into the penalty: the sum stays, and PELT's pruning, made for costs that no split raises, stays right."""
+
+
+@dataclass(frozen=True)
+class Change:
+    """The ground changes at `time` [s], known to `std` [s], with `probability`.
+
+    `shift`: by how many SDs (of a block on one ground) each signal moved. `told` [s]: when it was known while driving, None afterwards.
+    """
+
+    time: float
+    std: float
+    probability: float
+    shift: Mapping[str, float] = field(default_factory=dict)
+    told: float | None = None
+
+    def to_dict(self) -> dict[str, Any]:
+        """As ground.json holds it."""
+        out: dict[str, Any] = {"time": self.time, "std": self.std, "probability": self.probability}
+        if self.told is not None:
+            out["told"] = self.told
+        return {**out, "shift": dict(self.shift)} if self.shift else out
+
+
+def changes_of(
+    blocks: Blocks, names: Sequence[str] = GROUND, length: float = LENGTH, penalty: float | None = None
+) -> tuple[Change, ...]:
+    """The changes of a whole drive.
+
+    `names`: which of `SIGNALS` to look at. `length` [m]: mean way on one ground before the data speak. `penalty`: price of a change as
+    twice a log likelihood; None takes it from `length` and the drive's own speed. Raises InputError where ruptures is not installed.
+    """
+    signals, model, told = _prepared(blocks, names)
+    if len(signals) < 2 * LEAST:
+        return ()
+    driven = float(np.diff(blocks.travelled[told]).clip(0).sum())
+    chance = float(np.clip(driven / len(signals) / length, 1e-6, 0.5))
+    price = -2 * np.log(chance) if penalty is None else penalty
+    cost = _Cost(signals, model)
+    borders = _pelt(cost, price)
+    where, ends = blocks[told], [0, *borders, len(signals)]
+    return tuple(
+        _change(cost, where, signals, names, (before, border, after), np.exp(-price / 2))
+        for before, border, after in zip(ends, ends[1:], ends[2:], strict=False)
+    )
+
+
+def _prepared(blocks: Blocks, names: Sequence[str]) -> tuple[Array, Model, NDArray[np.bool_]]:
+    """Complete rows of those signals that the drive has, their model, and which blocks they are."""
+    for name in names:
+        if name not in SIGNALS:
+            raise InputError(f"there is no signal {name!r}", mend=f"take of {', '.join(SIGNALS)}")
+    every = signals_of(blocks, tuple(names))
+    there = np.isfinite(every).sum(axis=0) >= 0.5 * blocks.known.sum()
+    every = np.where(there, every, np.array([LAWS[name].mean for name in names]))
+    told = np.isfinite(every).all(axis=1) & blocks.known
+    signals = every[told]
+    usual = Model.of(names)
+    measured = weights(signals) if len(signals) >= LEAST_FOR_WEIGHTS else usual.weight
+    return signals, Model.of(names, np.where(there, measured, 1e-9)), told
+
+
+def weights(signals: Array) -> Array:
+    """What a block counts for, (signals,): (1 - r)/(1 + r), r the correlation of neighbours, as of a first-order process.
+
+    r from medians of squared differences one and six blocks apart, so that changes of the ground do not pass for correlation.
+    """
+    near = np.median((signals[1:] - signals[:-1]) ** 2, axis=0)
+    far = np.median((signals[6:] - signals[:-6]) ** 2, axis=0)
+    r = np.clip(1 - near / np.maximum(far, 1e-300), 0.0, 0.9)
+    return np.asarray((1 - r) / (1 + r))
+
+
+class _Cost:
+    """Minus twice the log evidence of stretches of the signals; ruptures asks for one at a time, all of one end in turn."""
+
+    model = ""
+    min_size = LEAST
+
+    def __init__(self, signals: Array, model: Model) -> None:
+        self._sum = np.vstack([np.zeros(signals.shape[1]), np.cumsum(signals, axis=0)])
+        self._square = np.vstack([np.zeros(signals.shape[1]), np.cumsum(signals**2, axis=0)])
+        self._model = model
+        self.signal = signals
+        self._end, self._costs = -1, np.zeros(0)
+
+    def fit(self, signal: Any) -> _Cost:
+        """Nothing to learn: ruptures calls it."""
+        return self
+
+    def error(self, start: int, end: int) -> float:
+        """Cost of the stretch [start, end), less `_SHIFT`."""
+        if end != self._end:
+            first = np.arange(max(end - _AT_ONCE, 0), end)
+            self._end, self._costs = end, self.of(first, np.full(first.size, end))
+        back = end - start
+        if back > self._costs.size:
+            return float(self.of(np.array([start]), np.array([end]))[0]) - _SHIFT
+        return float(self._costs[-back]) - _SHIFT
+
+    def of(self, start: NDArray[np.int64], end: NDArray[np.int64]) -> Array:
+        """Costs of the stretches [start, end), (stretches,)."""
+        total, square = self._sum[end] - self._sum[start], self._square[end] - self._square[start]
+        return -2 * self._model.evidence((end - start).astype(float), total, square)
+
+
+def _pelt(cost: _Cost, price: float) -> list[int]:
+    try:
+        from ruptures.detection.pelt import Pelt
+    except ImportError:
+        raise InputError(
+            "finding changes of a whole drive needs ruptures",
+            mend="install it with pip install 'terragrip[ground]'",
+        ) from None
+    search = Pelt(min_size=LEAST, jump=_JUMP)
+    search.cost = cost
+    search.fit(cost.signal)
+    return [int(k) for k in search.predict(pen=price + _SHIFT)[:-1]]
+
+
+def _change(
+    cost: _Cost,
+    blocks: Blocks,
+    signals: Array,
+    names: Sequence[str],
+    place: tuple[int, int, int],
+    chance: float,
+) -> Change:
+    """The change at `border` between its neighbours: where it may lie, and how probable it is that there is one at all."""
+    before, border, after = place
+    at = np.arange(before + 1, after)
+    both = cost.of(np.full(at.size, before), at) + cost.of(at, np.full(at.size, after))
+    none = cost.of(np.array([before]), np.array([after]))[0]
+    logs = -0.5 * (both - none) + np.log(chance)
+    top = logs.max()
+    weight = np.exp(logs - top)
+    odds = np.log(weight.sum()) + top
+    weight /= weight.sum()
+    low, high = blocks.end[at - 1], blocks.start[at]
+    middle = 0.5 * (low + high)
+    time = float((weight * middle).sum())
+    variance = (weight * ((middle - time) ** 2 + np.maximum(high - low, PERIOD) ** 2 / 12)).sum()
+    moved = signals[border:after].mean(axis=0) - signals[before:border].mean(axis=0)
+    shift = {name: round(float(x) / LAWS[name].within, 2) for name, x in zip(names, moved, strict=True)}
+    return Change(time, float(np.sqrt(variance)), float(1 / (1 + np.exp(-odds))), shift)

@@ -1,0 +1,58 @@
+"""The conjugate model of a signal on one ground: normal, its mean and variance unknown, normal-inverse-gamma before (Murphy 2007).
+
+Neighbouring blocks repeat each other: a block counts for `weight` of an independent one, in the update and in the likelihood alike.
+Change points while driving and afterwards stand on this one model.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import gammaln
+
+from terragrip.ground.signals import LAWS
+from terragrip.soil.blocks import PERIOD
+
+Array = NDArray[np.float64]
+
+SHAPE = 4.0
+"""Shape of the prior on the variance: as sure of it as eight independent blocks would make one."""
+
+
+@dataclass(frozen=True)
+class Model:
+    """Prior of each signal, (signals,) each: mean, count, shape, scale of the normal-inverse-gamma law; what a block counts for."""
+
+    mean: Array
+    count: Array
+    shape: Array
+    scale: Array
+    weight: Array
+
+    @classmethod
+    def of(cls, names: Sequence[str], weight: Array | None = None) -> Model:
+        """The model of signals by name; `weight` (signals,) where it was measured on the drive itself."""
+        laws = [LAWS[name] for name in names]
+        within = np.array([law.within for law in laws])
+        return cls(
+            mean=np.array([law.mean for law in laws]),
+            count=(within / np.array([law.sd for law in laws])) ** 2,
+            shape=np.full(len(laws), SHAPE),
+            scale=SHAPE * within**2,
+            weight=np.array([min(PERIOD / law.repeat, 1.0) for law in laws]) if weight is None else weight,
+        )
+
+    def evidence(self, count: Array, total: Array, square: Array) -> Array:
+        """Log evidence of stretches, summed over signals: from the number of their blocks (stretches,), sums and sums of squares of the
+        signals (stretches, signals)."""
+        n = count[:, None] * self.weight
+        kappa, alpha = self.count + n, self.shape + n / 2
+        first, second = total * self.weight, square * self.weight
+        middle = (self.count * self.mean + first) / kappa
+        beta = self.scale + 0.5 * np.maximum(second + self.count * self.mean**2 - kappa * middle**2, 0.0)
+        logs = gammaln(alpha) - gammaln(self.shape) + self.shape * np.log(self.scale) - alpha * np.log(beta)
+        logs += 0.5 * (np.log(self.count) - np.log(kappa)) - 0.5 * n * np.log(2 * np.pi)
+        return np.asarray(logs.sum(axis=1))

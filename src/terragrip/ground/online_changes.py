@@ -1,0 +1,129 @@
+"""Change points while driving: Bayesian online change-point detection (Adams and MacKay 2007) with a conjugate model.
+
+The model of one ground is `conjugate.Model`, so that the predictive law is Student's. The hazard is of the distance driven: standing still
+changes nothing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import gammaln
+
+from terragrip.ground.conjugate import Model
+from terragrip.ground.signals import GROUND, signals_of
+from terragrip.soil.blocks import PERIOD, Blocks
+
+Array = NDArray[np.float64]
+
+_MOST = 240
+"""Run lengths kept: two minutes; a longer run is as well known as it will ever be."""
+_LEAST = 1e-7
+
+
+@dataclass(frozen=True)
+class OnlineSettings:
+    """`length` [m]: mean way on one ground; `threshold`: probability at which a change is told; `recent` [s]: how far back to look."""
+
+    length: float = 30.0
+    threshold: float = 0.5
+    recent: float = 6.0
+    names: tuple[str, ...] = GROUND
+
+
+@dataclass(frozen=True)
+class Told:
+    """A change as it is told while driving: when it was told, when it was, its SD and probability. Times in s."""
+
+    told: float
+    time: float
+    std: float
+    probability: float
+
+
+class OnlineChanges:
+    """Takes blocks in order and tells of changes; `probability` is that of a change within the last `recent` seconds."""
+
+    def __init__(self, settings: OnlineSettings | None = None) -> None:
+        self.settings = settings or OnlineSettings()
+        model = Model.of(self.settings.names)
+        self._weight = model.weight
+        self._prior = (model.mean, model.count, model.shape, model.scale)
+        self._mean, self._count, self._shape, self._scale = (x[None, :].copy() for x in self._prior)
+        self._probability = np.ones(1)
+        self._begin = np.full(1, np.nan)
+        self._travelled: float | None = None
+        self._quiet_until = -np.inf
+        self.probability = 0.0
+
+    def update(self, blocks: Blocks) -> list[Told]:
+        """Take blocks, one or many; returns the changes that they tell of."""
+        found = []
+        signals = signals_of(blocks, self.settings.names)
+        for k in range(len(blocks)):
+            change = self._take(
+                signals[k], float(blocks.start[k]), float(blocks.end[k]), float(blocks.travelled[k])
+            )
+            if change is not None:
+                found.append(change)
+        return found
+
+    def _take(self, x: Array, start: float, end: float, travelled: float) -> Told | None:
+        driven = 0.0 if self._travelled is None else max(travelled - self._travelled, 0.0)
+        self._travelled = travelled
+        hazard = -np.expm1(-driven / self.settings.length)
+        grown = self._probability * (1 - hazard)
+        self._probability = np.append(grown, hazard)
+        self._begin = np.append(self._begin, start)
+        for name, prior in zip(("_mean", "_count", "_shape", "_scale"), self._prior, strict=True):
+            setattr(self, name, np.vstack([getattr(self, name), prior]))
+        seen = np.isfinite(x)
+        if seen.any():
+            self._learn(np.where(seen, x, 0.0), np.where(seen, self._weight, 0.0))
+        self._prune()
+        return self._tell(end)
+
+    def _learn(self, x: Array, weight: Array) -> None:
+        """Weigh the runs by what they predicted, then take the block into each."""
+        off, degrees = x - self._mean, 2 * self._shape
+        square = self._scale * (self._count + 1) / (self._shape * self._count)
+        logs = gammaln((degrees + 1) / 2) - gammaln(degrees / 2) - 0.5 * np.log(degrees * np.pi * square)
+        logs -= (degrees + 1) / 2 * np.log1p(off**2 / (degrees * square))
+        total = (logs * weight).sum(axis=1)
+        weighed = self._probability * np.exp(total - total.max())
+        self._probability = weighed / weighed.sum()
+        self._scale = self._scale + weight * self._count * off**2 / (2 * (self._count + weight))
+        self._mean = self._mean + weight * off / (self._count + weight)
+        self._count = self._count + weight
+        self._shape = self._shape + weight / 2
+
+    def _prune(self) -> None:
+        keep = self._probability > _LEAST
+        keep[-1] = True
+        if len(keep) > _MOST:
+            keep[: len(keep) - _MOST] = False
+        if not keep.any() or keep.all():
+            return
+        for name in ("_mean", "_count", "_shape", "_scale", "_probability", "_begin"):
+            setattr(self, name, getattr(self, name)[keep])
+        self._probability = self._probability / self._probability.sum()
+
+    def _tell(self, now: float) -> Told | None:
+        recent = self._begin > max(now - self.settings.recent, self._quiet_until)
+        self.probability = float(self._probability[recent].sum())
+        if self.probability < self.settings.threshold:
+            return None
+        weight, at = self._probability[recent] / self.probability, self._begin[recent]
+        time = float((weight * at).sum())
+        self._quiet_until = now
+        return Told(
+            now, time, float(np.sqrt((weight * (at - time) ** 2).sum() + PERIOD**2 / 12)), self.probability
+        )
+
+
+def online_changes(blocks: Blocks, settings: OnlineSettings | None = None) -> Sequence[Told]:
+    """All changes of a drive as they would have been told while driving."""
+    return OnlineChanges(settings).update(blocks)

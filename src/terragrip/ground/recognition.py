@@ -1,0 +1,100 @@
+"""Which soil a drive is on: a forward filter over known soils and an unknown one, and its smoothing backwards.
+
+A sticky Markov chain: the soil changes with the distance driven, not with time, so that standing still changes nothing.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from terragrip.ground.emissions import CELLS, Emissions
+from terragrip.soil.blocks import Blocks
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Chain:
+    """The prior: mean length of one soil [m], and the share that a soil nobody knows has among the new ones."""
+
+    length: float = 10.0
+    unknown: float = 0.1
+
+    def start(self, soils: int) -> Array:
+        """Probabilities before anything is seen, (soils + CELLS,): the soils alike, the unknown's cells alike."""
+        unknown = self.unknown if soils else 1.0
+        return np.concatenate(
+            (np.full(soils, (1 - unknown) / max(soils, 1)), np.full(CELLS, unknown / CELLS))
+        )
+
+
+@dataclass
+class ForwardFilter:
+    """Probabilities of the soils, and of the cells of the unknown one, up to now; one block at a time."""
+
+    emissions: Emissions
+    chain: Chain
+    probabilities: Array
+    travelled: float | None = None
+
+    @classmethod
+    def begin(cls, emissions: Emissions, chain: Chain | None = None) -> ForwardFilter:
+        """Before the first block."""
+        prior = chain or Chain()
+        return cls(emissions, prior, prior.start(len(emissions.soils)))
+
+    def update(self, blocks: Blocks) -> Forward:
+        """Take blocks in order, one or many: the results are the same."""
+        logs = self.emissions.log_likelihood(blocks)
+        weight = np.exp(logs - logs.max(axis=1, keepdims=True)) if len(logs) else logs
+        start, filtered, anew = (
+            self.chain.start(len(self.emissions.soils)),
+            np.empty_like(logs),
+            np.zeros(len(logs)),
+        )
+        for k, travelled in enumerate(blocks.travelled):
+            driven = 0.0 if self.travelled is None else travelled - self.travelled
+            anew[k] = -np.expm1(-max(driven, 0.0) / self.chain.length)
+            moved = ((1 - anew[k]) * self.probabilities + anew[k] * start) * weight[k]
+            self.probabilities = moved / moved.sum()
+            self.travelled = float(travelled)
+            filtered[k] = self.probabilities
+        return Forward(filtered, weight, anew, start)
+
+
+@dataclass(frozen=True)
+class Forward:
+    """A forward pass: filtered probabilities and relative likelihoods (blocks, soils + CELLS), the chance of a soil drawn anew before each
+    block (blocks,), and the law that it is drawn from (soils + CELLS,)."""
+
+    filtered: Array
+    weight: Array
+    anew: Array
+    start: Array
+
+    def smoothed(self) -> Array:
+        """Probabilities given the whole drive, (blocks, soils + CELLS): the backward pass of Rabiner 1989, scaled."""
+        out, after = self.filtered.copy(), np.ones(self.filtered.shape[1])
+        for k in range(len(out) - 2, -1, -1):
+            seen = self.weight[k + 1] * after
+            after = (1 - self.anew[k + 1]) * seen + self.anew[k + 1] * (self.start * seen).sum()
+            after /= after.max()
+            both = out[k] * after
+            out[k] = both / both.sum()
+        return out
+
+
+def by_soil(probabilities: Array) -> Array:
+    """The cells of the unknown soil put together: (blocks, soils + 1)."""
+    soils = probabilities.shape[1] - CELLS
+    return np.column_stack([probabilities[:, :soils], probabilities[:, soils:].sum(axis=1)])
+
+
+def names_of(probabilities: Array, names: tuple[str, ...]) -> NDArray[np.object_]:
+    """The most probable soil of each row, (rows,)."""
+    if not len(probabilities):
+        return np.zeros(0, dtype=object)
+    return np.array(names, dtype=object)[probabilities.argmax(axis=1)]

@@ -1,0 +1,176 @@
+"""What is known of the ground of one drive, and ground.json (DESIGN 3)."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from terragrip.errors import InputError
+from terragrip.files import refuse_missing, replacing
+from terragrip.ground.changes import Change
+from terragrip.ground.sections import Section
+
+Array = NDArray[np.float64]
+
+VERSION = 1
+
+
+@dataclass(frozen=True)
+class Timeline:
+    """Probabilities of the soils over a drive, a block of half a second a row.
+
+    `time` [s] (blocks,): each block's start; `names`: the soils, "unknown" last; `probabilities` (blocks, names); `known` (blocks,):
+    whether the block tells of the ground (elsewhere the probabilities are carried on); `label` (blocks,): the recording's own name of
+    the soil, "" where it has none or where vehicle and tool are on different soils.
+    """
+
+    time: Array
+    names: tuple[str, ...]
+    probabilities: Array
+    known: NDArray[np.bool_]
+    label: NDArray[np.object_]
+
+    @property
+    def soil(self) -> NDArray[np.object_]:
+        """The most probable soil of each block (blocks,)."""
+        if not len(self.time):
+            return np.zeros(0, dtype=object)
+        return np.array(self.names, dtype=object)[self.probabilities.argmax(axis=1)]
+
+    def to_dict(self) -> dict[str, Any]:
+        """As ground.json holds it: probabilities by soil, to four digits."""
+        return {
+            "time": [round(float(t), 3) for t in self.time],
+            "probabilities": {
+                name: [round(float(p), 4) for p in self.probabilities[:, k]]
+                for k, name in enumerate(self.names)
+            },
+            "known": [bool(x) for x in self.known],
+            "label": [str(x) for x in self.label],
+        }
+
+    @classmethod
+    def from_dict(cls, data: Mapping[str, Any]) -> Timeline:
+        """Of ground.json; raises KeyError, TypeError or ValueError where it is none."""
+        names = tuple(data["probabilities"])
+        time = np.array(data["time"], dtype=float)
+        table = np.array([data["probabilities"][name] for name in names], dtype=float).reshape(
+            len(names), time.size
+        )
+        known, label = np.array(data["known"], dtype=bool), np.array(data["label"], dtype=object)
+        if not len(known) == len(label) == time.size:
+            raise ValueError("columns differ in length")
+        return cls(time, names, table.T, known, label)
+
+
+@dataclass(frozen=True)
+class Ground:
+    """The ground along one drive. `run`: its name; `events`: what happened, with reasons; `notes`: plain sentences for the user."""
+
+    run: str
+    start: float
+    end: float
+    soils: tuple[str, ...]
+    changes: tuple[Change, ...]
+    sections: tuple[Section, ...]
+    events: tuple[Mapping[str, Any], ...]
+    timeline: Timeline
+    notes: tuple[str, ...] = ()
+    about: Mapping[str, Any] = field(default_factory=dict)
+
+
+def to_dict(grounds: Sequence[Ground], about: Mapping[str, Any] | None = None) -> dict[str, Any]:
+    """One object for all drives: `changes`, `sections`, `events` of all, each with its `run`; `runs`: what is of a drive as a whole."""
+    return {
+        "version": VERSION,
+        **(about or {}),
+        "changes": [{"run": g.run, **one.to_dict()} for g in grounds for one in g.changes],
+        "sections": [{"run": g.run, **one.to_dict()} for g in grounds for one in g.sections],
+        "events": [{"run": g.run, **one} for g in grounds for one in g.events],
+        "runs": [
+            {
+                "run": g.run,
+                "start": g.start,
+                "end": g.end,
+                "soils": list(g.soils),
+                "notes": list(g.notes),
+                **g.about,
+                "timeline": g.timeline.to_dict(),
+            }
+            for g in grounds
+        ],
+    }
+
+
+def write(
+    grounds: Sequence[Ground], path: str | os.PathLike[str], about: Mapping[str, Any] | None = None
+) -> None:
+    """Write ground.json, whole or not at all; raises InputError if it cannot be written. No number that JSON does not know is written."""
+    text = json.dumps(to_dict(grounds, about), allow_nan=False, ensure_ascii=False)
+    with replacing(path) as temporary:
+        temporary.write_text(text + "\n", encoding="utf-8")
+
+
+def read(path: str | os.PathLike[str]) -> tuple[Ground, ...]:
+    """Read ground.json, a `Ground` a drive. Raises InputError: no such file, not JSON, of a newer version, or not what `write` writes."""
+    file = os.fspath(path)
+    refuse_missing(file, suffixes=(".json",))
+    try:
+        with open(file, encoding="utf-8") as stream:
+            data = json.load(stream)
+    except (UnicodeDecodeError, json.JSONDecodeError, RecursionError) as error:
+        raise InputError(
+            f"not JSON ({error})", file=file, mend="give a file written by 'terragrip ground'"
+        ) from None
+    except OSError as error:
+        raise InputError(f"cannot be read ({error.strerror})", file=file) from None
+    if not isinstance(data, dict) or "sections" not in data:
+        raise InputError("holds no 'sections'", file=file, mend="give a file written by 'terragrip ground'")
+    version = data.get("version", VERSION)
+    if not isinstance(version, int) or version > VERSION:
+        raise InputError(
+            f"is of version {version}, this terragrip reads up to {VERSION}",
+            file=file,
+            mend="update terragrip",
+        )
+    try:
+        return tuple(_ground(one, data) for one in data["runs"])
+    except (KeyError, TypeError, ValueError, AttributeError) as error:
+        raise InputError(
+            f"is damaged ({error})", file=file, mend="write it anew with 'terragrip ground'"
+        ) from None
+
+
+def _ground(one: Mapping[str, Any], data: Mapping[str, Any]) -> Ground:
+    run = str(one["run"])
+
+    def mine(key: str) -> list[dict[str, Any]]:
+        return [{k: v for k, v in row.items() if k != "run"} for row in data[key] if row["run"] == run]
+
+    known = {"run", "start", "end", "soils", "notes", "timeline"}
+    return Ground(
+        run,
+        _finite(one["start"]),
+        _finite(one["end"]),
+        tuple(one["soils"]),
+        tuple(Change(**row) for row in mine("changes")),
+        tuple(Section(**row) for row in mine("sections")),
+        tuple(mine("events")),
+        Timeline.from_dict(one["timeline"]),
+        tuple(one["notes"]),
+        {k: v for k, v in one.items() if k not in known},
+    )
+
+
+def _finite(value: Any) -> float:
+    number = float(value)
+    if not math.isfinite(number):
+        raise ValueError(f"{value} is no time")
+    return number

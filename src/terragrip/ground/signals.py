@@ -1,0 +1,72 @@
+"""What a change of the ground shows in: signals of blocks that the driver's own doing (speed, pull, tool) leaves alone.
+
+Slip and adhesion move together with the pull on one and the same ground. So the signal is where they stand to each other: the scale a of
+mu = a g(s). With it rho_s, and how much rho_s and mu vary within a block. Slip and adhesion themselves are offered for those who want them.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from terragrip.physics.adhesion import CURVES
+from terragrip.soil.blocks import Blocks
+
+Array = NDArray[np.float64]
+
+SIGNALS = ("soil_resistance", "curve_scale", "soil_resistance_sd", "adhesion_sd", "slip", "adhesion")
+"""Names of the signals. The first four tell of the ground alone."""
+GROUND = SIGNALS[:4]
+
+_SCALE, _SCALE_SD, _ADHESION_SD = 0.85, 0.5, 0.03
+"""Before mu is seen a is 0.85 +- 0.5, as the kernel's curve has it; a block's mu scatters by 0.03 about its curve."""
+
+
+@dataclass(frozen=True)
+class Law:
+    """What is known of a signal before a drive: mean and SD over all grounds, SD on one, for how long [s] blocks repeat each other.
+
+    The figures are those of the simulated campaign's soils, development seeds 1000 and 1010.
+    """
+
+    mean: float
+    sd: float
+    within: float
+    repeat: float
+
+
+LAWS: dict[str, Law] = {
+    "soil_resistance": Law(0.12, 0.07, 0.018, 2.0),
+    "curve_scale": Law(0.85, 0.40, 0.08, 2.0),
+    "soil_resistance_sd": Law(-5.7, 0.8, 0.68, 1.0),
+    "adhesion_sd": Law(-5.1, 0.8, 0.55, 1.0),
+    "slip": Law(0.12, 0.12, 0.03, 4.0),
+    "adhesion": Law(0.25, 0.15, 0.03, 4.0),
+}
+
+
+def signals_of(blocks: Blocks, names: tuple[str, ...] = GROUND) -> Array:
+    """Signals (blocks, names); NaN where a block tells nothing. Raises ValueError on a name that is none of `SIGNALS`."""
+    slip, adhesion = blocks.mean_slip, blocks.mean_adhesion
+    every = {
+        "soil_resistance": blocks.resistance,
+        "curve_scale": curve_scale(slip, adhesion),
+        "soil_resistance_sd": blocks.roughness[:, 0],
+        "adhesion_sd": blocks.roughness[:, 1],
+        "slip": slip,
+        "adhesion": adhesion,
+    }
+    for name in names:
+        if name not in every:
+            raise ValueError(f"there is no signal {name!r}; there are {', '.join(SIGNALS)}")
+    out = np.column_stack([every[name] for name in names])
+    return np.asarray(np.where(blocks.known[:, None], out, np.nan))
+
+
+def curve_scale(slip: Array, adhesion: Array) -> Array:
+    """a of mu = a g(s), g the paper's prototype (eq. 8), drawn towards 0.85 where slip is too small to tell it; any shape."""
+    shape = CURVES["exponential"].value(slip, {"a": 1.0})
+    ridge = (_ADHESION_SD / _SCALE_SD) ** 2
+    return np.asarray((adhesion * shape + ridge * _SCALE) / (shape**2 + ridge))

@@ -1,0 +1,213 @@
+"""Blocks of half a second of a drive: the level of rho_s, mu and slip, and how much they vary within the block.
+
+Both are what a soil is told by: its level and its roughness. Blocks count from a fixed instant, so that a drive gives the same blocks
+sample by sample as at once.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, fields
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from terragrip.errors import InputError
+
+if TYPE_CHECKING:
+    from terragrip.estimation import Estimates
+    from terragrip.vehicle import Vehicle
+
+Array = NDArray[np.float64]
+
+PERIOD = 0.5
+"""Seconds of a block: several times the filter's own memory of noise, and short beside a border's crossing."""
+SETTLING = 2
+"""Blocks after a standstill, a stuck spell or a gap in which the estimates still swing in."""
+LEAST_ROWS = 4
+"""Fewest usable rows that tell how much a block varies."""
+LARGEST_SLIP = 0.6
+"""Slip beyond which the ground cannot be read: the vehicle digs (and the paper's bins end)."""
+FLOOR = 1e-4
+"""Added to standard deviations before their logarithm, so that held values stay finite."""
+_USABLE = ("", "immobilization", "outlier")
+
+
+@dataclass(frozen=True)
+class Blocks:
+    """Blocks of one drive, arrays of shape (blocks,) or, by driven wheel, (blocks, wheels). NaN: nothing usable in the block.
+
+    `number` counts periods since `origin`; a gap leaves numbers out. `start`, `end` [s]: its first row, and the first row after it;
+    `rows`: how many rows, `usable`: of these without an event, moving and with slips up to 60 %; `streak`: how many blocks on end, up to
+    and with this one, are usable by half. `travelled` [m]: distance at its last row.
+    `resistance` rho_s, `adhesion`, `slip`: means of usable rows, the `_variance` of each: mean square of the estimates' own SD.
+    `roughness` (blocks, 2): ln of the SD within the block of rho_s, and of mu (the wheels' mean). `share`: the wheels' shares of the load.
+    """
+
+    number: NDArray[np.int64]
+    start: Array
+    end: Array
+    rows: NDArray[np.int64]
+    usable: NDArray[np.int64]
+    streak: NDArray[np.int64]
+    travelled: Array
+    resistance: Array
+    resistance_variance: Array
+    adhesion: Array
+    adhesion_variance: Array
+    roughness: Array
+    slip: Array
+    slip_variance: Array
+    share: Array
+
+    def __len__(self) -> int:
+        return len(self.number)
+
+    @property
+    def known(self) -> NDArray[np.bool_]:
+        """Which blocks tell of the ground, (blocks,): the estimates have settled since the vehicle stood or spun."""
+        return (self.streak > SETTLING) & np.isfinite(self.resistance) & np.isfinite(self.mean_adhesion)
+
+    @property
+    def mean_adhesion(self) -> Array:
+        """mu, the wheels' mean by load (blocks,)."""
+        return np.asarray((self.adhesion * self.share).sum(axis=1))
+
+    @property
+    def mean_slip(self) -> Array:
+        """Slip, the wheels' mean by load (blocks,)."""
+        return np.asarray((self.slip * self.share).sum(axis=1))
+
+    def __getitem__(self, rows: Any) -> Blocks:
+        """The blocks of a slice, mask or index array."""
+        return Blocks(**{one.name: getattr(self, one.name)[rows] for one in fields(self)})
+
+
+def wheel_loads(columns: Mapping[str, Any], axle_of: Mapping[str, str]) -> dict[str, Array]:
+    """The columns that weigh the wheels: the load of each wheel's axle; ones where the table holds none."""
+    rows = len(np.asarray(columns["time"]))
+    return {
+        wheel: np.asarray(columns.get(f"vertical_load_{axle}", np.ones(rows)), dtype=float)
+        for wheel, axle in axle_of.items()
+    }
+
+
+def needed_columns(wheels: Sequence[str]) -> tuple[str, ...]:
+    """What blocks are made of."""
+    each = [f"{name}_{w}" for w in wheels for name in ("adhesion", "slip")]
+    return ("time", "distance", "event", "soil_resistance", *each)
+
+
+def blocks_of(
+    columns: Mapping[str, Any],
+    axle_of: Mapping[str, str],
+    origin: float | None = None,
+    before: tuple[int, int] | None = None,
+    file: str | None = None,
+) -> Blocks:
+    """Cut a table of estimates into blocks.
+
+    columns: those of `needed_columns`, (rows,) each; where there are any, their `_std` (else they count as exact) and
+    `vertical_load_<axle>`. `axle_of`: the driven wheels and their axles. `origin` [s]: where the count starts (default: the first row).
+    `before`: number and streak of the block before, of a drive that goes on. Raises InputError where a column is missing or no row is.
+    """
+    wheels = tuple(axle_of)
+    for name in needed_columns(wheels):
+        if name not in columns:
+            raise InputError(
+                "is missing",
+                file=file,
+                place=f"column {name}",
+                mend="write the estimates anew with terragrip estimate",
+            )
+    time = np.asarray(columns["time"], dtype=float)
+    if not time.size:
+        raise InputError("holds no row", file=file, mend="estimate a log that is not empty")
+    first = float(time[0]) if origin is None else origin
+    count = np.floor((time - first) / PERIOD + 1e-9).astype(np.int64)
+    begin = np.flatnonzero(np.concatenate(([True], count[1:] != count[:-1])))
+    size = np.diff(np.append(begin, time.size))
+
+    slip = _matrix(columns, "slip_{}", wheels)
+    good = np.isin(np.asarray(columns["event"], dtype=object), _USABLE)
+    good &= np.isfinite(slip).all(axis=1) & (np.abs(slip) <= LARGEST_SLIP).all(axis=1)
+    adhesion = _matrix(columns, "adhesion_{}", wheels)
+    resistance = np.asarray(columns["soil_resistance"], dtype=float)[:, None]
+    good &= np.isfinite(adhesion).all(axis=1) & np.isfinite(resistance[:, 0])
+    usable = np.add.reduceat(good.astype(np.int64), begin)
+
+    def variance(*names: str) -> Array:
+        return mean(
+            np.column_stack([np.asarray(columns.get(n, np.zeros(time.size)), dtype=float) for n in names])
+            ** 2
+        )
+
+    def mean(values: Array) -> Array:
+        total = np.add.reduceat(np.where(good[:, None], values, 0.0), begin, axis=0)
+        return np.asarray(np.where(usable[:, None] > 0, total / np.maximum(usable, 1)[:, None], np.nan))
+
+    def spread(values: Array, level: Array) -> Array:
+        off = np.where(good[:, None], values - np.repeat(level, size, axis=0), 0.0)
+        square = np.add.reduceat(off**2, begin, axis=0) / np.maximum(usable - 1, 1)[:, None]
+        return np.asarray(np.where(usable[:, None] >= LEAST_ROWS, np.sqrt(square), np.nan))
+
+    loads = wheel_loads(columns, axle_of)
+    load = mean(np.column_stack([loads[w] for w in wheels]))
+    load = np.where(np.isfinite(load) & (load > 0), load, 1.0)
+    level, mu = mean(resistance), mean(adhesion)
+    within = spread(resistance, level)[:, 0], spread(adhesion, mu).mean(axis=1)
+    return Blocks(
+        number=count[begin],
+        start=time[begin],
+        end=np.append(time[begin[1:]], time[-1]),
+        rows=size,
+        usable=usable,
+        streak=_streak(count[begin], 2 * usable >= size, before),
+        travelled=np.asarray(columns["distance"], dtype=float)[begin + size - 1],
+        resistance=level[:, 0],
+        resistance_variance=variance("soil_resistance_std")[:, 0],
+        adhesion=mu,
+        adhesion_variance=variance(*(f"adhesion_{w}_std" for w in wheels)),
+        roughness=np.log(np.column_stack(within) + FLOOR),
+        slip=mean(slip),
+        slip_variance=variance(*(f"slip_{w}_std" for w in wheels)),
+        share=load / load.sum(axis=1, keepdims=True),
+    )
+
+
+def driven_wheels(vehicle: Vehicle) -> dict[str, str]:
+    """The driven wheels and the axle of each; all wheels where none is driven."""
+    names = [vehicle.axle_names[k] for k in vehicle.wheel_axle]
+    found = {w: a for w, a, on in zip(vehicle.wheels, names, vehicle.driven, strict=True) if on}
+    return found or dict(zip(vehicle.wheels, names, strict=True))
+
+
+def estimates_blocks(
+    estimates: Estimates, rows: NDArray[np.bool_] | None = None, file: str | None = None
+) -> Blocks:
+    """The blocks of a table of estimates; of some `rows` (rows,) only: the others count as unusable.
+
+    Raises InputError as `blocks_of`, and where the table holds no vehicle.
+    """
+    columns = {name: estimates[name] for name in estimates.names}
+    if rows is not None:
+        columns["event"] = np.where(rows, columns["event"], "gap")
+    return blocks_of(columns, driven_wheels(estimates.vehicle), file=file)
+
+
+def _streak(
+    number: NDArray[np.int64], good: NDArray[np.bool_], before: tuple[int, int] | None
+) -> NDArray[np.int64]:
+    """Good blocks on end up to and with each block, (blocks,); a number left out ends a streak."""
+    last, run = before or (int(number[0]) - 1, 0)
+    follows = number == np.concatenate(([last], number[:-1])) + 1
+    out = np.empty(len(number), dtype=np.int64)
+    for k in range(len(number)):
+        run = (run + 1 if follows[k] else 1) if good[k] else 0
+        out[k] = run
+    return out
+
+
+def _matrix(columns: Mapping[str, Any], name: str, wheels: Sequence[str]) -> Array:
+    return np.column_stack([np.asarray(columns[name.format(w)], dtype=float) for w in wheels])

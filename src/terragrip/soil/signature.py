@@ -1,0 +1,183 @@
+"""What a known soil looks like from the vehicle, beyond its mean curve: how level and roughness of its blocks are distributed.
+
+Learned from blocks of labelled estimates and kept in the library (`soils.<name>.signature`), for recognition.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from terragrip.errors import InputError
+from terragrip.physics.adhesion import CURVES
+from terragrip.soil.blocks import Blocks
+from terragrip.soil.library import Soil
+
+if TYPE_CHECKING:
+    from terragrip.estimation import Estimates
+
+Array = NDArray[np.float64]
+
+LEAST_BLOCKS = 20
+"""Fewest blocks (10 s) that a signature is learned from."""
+OFFSET = 0.05
+"""mu at which the error about the curve is as much additive as proportional."""
+LEAST_SD = (0.005, 0.03)
+"""Below this the ground of one soil does not vary from field to field: of rho_s, and of mu relative to its curve."""
+
+
+@dataclass(frozen=True)
+class Signature:
+    """A soil's blocks: level (rho_s, relative error of mu about the curve) and roughness (see `Blocks`), normally distributed.
+
+    `level_sd`, `level_correlation`: of the ground alone; the estimates' own variance comes on top of it, block by block.
+    `made_by`: method of the estimates, since methods smooth differently. `blocks`, `runs`: what it was learned from.
+    """
+
+    level: Array
+    level_sd: Array
+    level_correlation: float
+    roughness: Array
+    roughness_covariance: Array
+    made_by: str
+    blocks: int
+    runs: int
+
+    def to_dict(self) -> dict[str, Any]:
+        """As soils.json holds it."""
+        return {k: v.tolist() if isinstance(v, np.ndarray) else v for k, v in vars(self).items()}
+
+    @classmethod
+    def from_dict(cls, data: Any, place: str) -> Signature:
+        """Of a library's entry; raises InputError where it is not what `to_dict` gives."""
+        shapes = {"level": (2,), "level_sd": (2,), "roughness": (2,), "roughness_covariance": (2, 2)}
+        try:
+            arrays = {k: np.array(data[k], dtype=float).reshape(shape) for k, shape in shapes.items()}
+            correlation = float(data["level_correlation"])
+            counts = {k: int(data[k]) for k in ("blocks", "runs")}
+            np.linalg.cholesky(arrays["roughness_covariance"])
+            sound = all(np.isfinite(x).all() for x in arrays.values()) and bool(
+                (arrays["level_sd"] > 0).all()
+            )
+            sound &= abs(correlation) < 1
+        except (KeyError, TypeError, ValueError, np.linalg.LinAlgError):
+            sound = False
+        if not sound:
+            raise InputError(
+                "is no signature of a soil", place=place, mend="learn the library anew with terragrip soils"
+            )
+        return cls(
+            arrays["level"],
+            arrays["level_sd"],
+            correlation,
+            arrays["roughness"],
+            arrays["roughness_covariance"],
+            str(data.get("made_by", "")),
+            counts["blocks"],
+            counts["runs"],
+        )
+
+
+def signature_in(soil: Soil) -> Signature | None:
+    """The signature that a library's soil holds, None where it holds none; raises InputError where it is damaged."""
+    data = soil.fit.get("signature")
+    return None if data is None else Signature.from_dict(data, f"soils.{soil.name}.signature")
+
+
+def curve_error(soil: Soil, blocks: Blocks) -> tuple[Array, Array, Array]:
+    """Relative error of mu about the soil's curve, the variance of it that the estimates know of, and its scale, (blocks,) each.
+
+    error = mean over wheels, by load, of mu - f(s), over scale = |f(s)| + `OFFSET`. Errors of the wheels are taken as alike; that of slip
+    enters by the curve's slope.
+    """
+    plain = {k: v for k, v in soil.parameters.items() if k != "intercept"}
+    curve = soil.value(blocks.slip)
+    slope = CURVES[soil.model].slope(blocks.slip, plain)
+    scale = np.abs((curve * blocks.share).sum(axis=1)) + OFFSET
+    error = ((blocks.adhesion - curve) * blocks.share).sum(axis=1) / scale
+    known = np.sqrt(blocks.adhesion_variance + slope**2 * blocks.slip_variance)
+    return error, ((known * blocks.share).sum(axis=1) / scale) ** 2, scale
+
+
+def learn_signature(soil: Soil, runs: Sequence[Blocks], made_by: str = "") -> Signature | None:
+    """The signature of one soil from the blocks of runs that lie on it; None where there are fewer than `LEAST_BLOCKS`.
+
+    Differences between runs count: they widen the law.
+    """
+    levels, noises, roughness = [], [], []
+    for run in runs:
+        known = run.known
+        error, noise, _ = curve_error(soil, run)
+        levels.append(np.where(known[:, None], np.column_stack([run.resistance, error]), np.nan))
+        noises.append(np.column_stack([run.resistance_variance, noise]))
+        rough = np.isfinite(run.roughness).all(axis=1) & known
+        roughness.append(np.where(rough[:, None], run.roughness, np.nan))
+    if not levels:
+        return None
+    level, noise, rough = np.concatenate(levels), np.concatenate(noises), np.concatenate(roughness)
+    told = np.isfinite(level).all(axis=1) & np.isfinite(noise).all(axis=1)
+    level, noise, rough = level[told], noise[told], rough[np.isfinite(rough).all(axis=1)]
+    if min(len(level), len(rough)) < LEAST_BLOCKS:
+        return None
+    middle, sd = _ground(level, noise)
+    scaled = (level - middle) / np.sqrt(sd**2 + noise)
+    covariance = np.cov(rough, rowvar=False) + 0.01 * np.eye(rough.shape[1])
+    return Signature(
+        middle,
+        sd,
+        _correlation(scaled),
+        rough.mean(axis=0),
+        covariance,
+        made_by,
+        len(level),
+        len(runs),
+    )
+
+
+def _correlation(pairs: Array) -> float:
+    """Correlation of two columns, within 0.9 either way; 0 where one is constant."""
+    if (pairs.std(axis=0) == 0).any():
+        return 0.0
+    return float(
+        np.clip(np.mean(np.prod((pairs - pairs.mean(axis=0)) / pairs.std(axis=0), axis=1)), -0.9, 0.9)
+    )
+
+
+def _ground(values: Array, noise: Array) -> tuple[Array, Array]:
+    """Mean and SD of the ground under values (blocks, 2) whose own variances are known.
+
+    The SD with which the squares, over their whole variance, have the mean 1 (Paule and Mandel 1982), by bisection; at least `LEAST_SD`.
+    """
+    middle, sd = np.zeros(2), np.zeros(2)
+    for k in range(2):
+        x, v = values[:, k], noise[:, k]
+        low, high = 0.0, float(np.var(x)) + 1e-12
+        for _ in range(40):
+            ground = 0.5 * (low + high)
+            weight = 1 / (ground + v)
+            middle[k] = (weight * x).sum() / weight.sum()
+            low, high = (ground, high) if (weight * (x - middle[k]) ** 2).mean() > 1 else (low, ground)
+        sd[k] = max(np.sqrt(0.5 * (low + high)), LEAST_SD[k])
+    return middle, sd
+
+
+def maker(estimates: Estimates) -> str:
+    """The method of a table of estimates in words: what its roughness depends on."""
+    return estimates.method + (", smoothed" if estimates.about.get("smooth") else "")
+
+
+def with_signatures(
+    soils: Mapping[str, Soil], blocks: Mapping[str, Sequence[Blocks]], made_by: str = ""
+) -> dict[str, Soil]:
+    """Each soil with the signature learned from its blocks, where there are enough of them."""
+    out = {}
+    for name, soil in soils.items():
+        signature = learn_signature(soil, blocks.get(name, ()), made_by)
+        out[name] = (
+            soil if signature is None else replace(soil, fit={**soil.fit, "signature": signature.to_dict()})
+        )
+    return out
