@@ -1,0 +1,86 @@
+"""Uploads are whole, sized, checked by content; a log is looked into."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from fastapi.testclient import TestClient
+
+NOTICES = "ws://127.0.0.1:8750/api/notices"
+
+PNG = b"\x89PNG\r\n\x1a\n" + b"\0" * 40
+
+
+def put(client: TestClient, path: str, content: bytes, **query: object) -> tuple[int, str]:
+    answer = client.put("/api/file", params={"path": path, **query}, content=content)
+    return answer.status_code, answer.json().get("detail", "")
+
+
+def test_a_good_log_is_taken_and_told(client: TestClient, folder: Path) -> None:
+    text = b"time,wheel_speed_fl,ground_speed\n" + b"".join(b"%d,5.0,1.0\n" % i for i in range(50))
+    assert put(client, "new.csv", text)[0] == 201
+    assert (folder / "new.csv").read_bytes() == text
+    found = client.get("/api/inspect", params={"path": "new.csv"}).json()
+    assert found["rows"] == 50
+    assert str(folder) not in found["text"]
+
+
+@pytest.mark.parametrize(
+    ("path", "content", "why"),
+    [
+        ("broken.parquet", b"PAR1 and then nothing of the sort", ""),
+        ("empty.csv", b"", "is empty"),
+        ("virus.exe", b"MZ", "nothing that the studio takes"),
+        ("page.html", b"<script>alert(1)</script>", "nothing that the studio takes"),
+        ("picture.png", b"<svg onload='alert(1)'>", "is no PNG picture"),
+        ("picture.svg", b"<svg xmlns='http://www.w3.org/2000/svg'/>", "no picture that the studio takes"),
+        ("bad.yaml", b"axles: {front: {mass: -1 kg}}", ""),
+        ("soils.json", b"{}", "exists already"),
+        ("lib.json", b'{"soils": {"x": {"model": "none"}}}', "not known"),
+        ("no/such/folder.csv", b"a,b\n1,2\n", "cannot be written there"),
+    ],
+)  # fmt: skip
+def test_what_is_not_what_its_name_says_is_refused_and_leaves_nothing(
+    client: TestClient, folder: Path, path: str, content: bytes, why: str
+) -> None:
+    before = {p: p.read_bytes() for p in folder.iterdir()}
+    status, detail = put(client, path, content)
+    assert status == 422
+    assert why in detail
+    assert "\n" not in detail
+    assert str(folder) not in detail
+    assert {p: p.read_bytes() for p in folder.iterdir()} == before
+
+
+def test_an_upload_over_the_limit_is_refused(client: TestClient, folder: Path) -> None:
+    before = sorted(folder.iterdir())
+    status, detail = put(client, "large.csv", b"x" * 2_000_001)
+    assert status == 422
+    assert "larger than 2 MB" in detail
+    assert sorted(folder.iterdir()) == before
+
+
+def test_a_picture_is_shown_and_everything_else_is_a_download(client: TestClient) -> None:
+    assert put(client, "scan.png", PNG)[0] == 201
+    assert client.get("/api/file", params={"path": "scan.png"}).headers["content-type"] == "image/png"
+    answer = client.get("/api/file", params={"path": "vehicle.yaml"})
+    assert answer.headers["content-disposition"].startswith("attachment")
+
+
+def test_replacing_must_be_asked_for(client: TestClient, folder: Path) -> None:
+    assert put(client, "scan.png", PNG)[0] == 201
+    assert put(client, "scan.png", PNG + b"1")[0] == 422
+    assert put(client, "scan.png", PNG + b"1", replace=True)[0] == 201
+    assert (folder / "scan.png").read_bytes().endswith(b"1")
+
+
+def test_pages_hear_of_a_new_file(client: TestClient, folder: Path) -> None:
+    with client.websocket_connect(NOTICES) as one, client.websocket_connect(NOTICES) as two:
+        # The first look at the folder has to be over before the change.
+        import time
+
+        time.sleep(0.5)
+        (folder / "another.yaml").write_text("axles: {}")
+        assert one.receive_json() == {"kind": "folder"}
+        assert two.receive_json() == {"kind": "folder"}

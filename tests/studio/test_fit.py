@@ -1,0 +1,110 @@
+"""The fit page's server: models, points, fits, saving."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from fastapi.testclient import TestClient
+
+from terragrip.physics.adhesion import CURVES
+from terragrip.soil.estimates import soils_of
+from terragrip.soil.library import SoilLibrary
+
+
+def fit(client: TestClient, **wanted: Any) -> Any:
+    return client.post("/api/fit", json={"model": "exponential", "bootstrap": 200, **wanted})
+
+
+def test_points_on_a_curve_give_the_curve_back(client: TestClient) -> None:
+    slip = np.linspace(0.02, 0.9, 25)
+    for name, given in (("burckhardt", {"c1": 0.9, "c2": 18.0, "c3": 0.3}), ("exponential", {"a": 0.71})):
+        mu = CURVES[name].value(slip, given)
+        found = fit(client, model=name, slip=slip.tolist(), adhesion=mu.tolist()).json()
+        for parameter, value in given.items():
+            assert math.isclose(found["parameters"][parameter], value, rel_tol=1e-4)
+        assert found["r2"] > 0.999999
+        assert len(found["bins"]) == len(slip)
+
+
+def test_a_soil_of_estimates_is_fitted_as_terragrip_soils_does(client: TestClient, folder: Path) -> None:
+    shown = {
+        soil["name"]: soil for soil in client.get("/api/soils", params={"path": "estimates.parquet"}).json()
+    }
+    reference = soils_of([folder / "estimates.parquet"]).soils["grass"].curve
+    bins = {"upper": 0.40}
+    found = fit(client, path="estimates.parquet", soil="grass", bins=bins).json()
+    assert shown["grass"]["bins"]
+    assert math.isclose(found["parameters"]["a"], reference.parameters_["a"], rel_tol=1e-6)
+    assert found["bins"] == reference.bins_.to_list()
+
+
+def test_enough_points_carry_intervals_and_a_band(client: TestClient) -> None:
+    slip = np.linspace(0.02, 0.6, 40)
+    mu = CURVES["exponential"].value(slip, {"a": 0.8}) + 0.01 * np.random.default_rng(1).standard_normal(40)
+    found = fit(client, slip=slip.tolist(), adhesion=mu.tolist()).json()
+    low, high = found["interval"]["a"]
+    assert low < 0.8 < high
+    assert found["band"]["low"][30] < found["band"]["high"][30]
+
+
+def test_too_few_points_get_a_sentence_and_no_curve(client: TestClient) -> None:
+    for points in ({}, {"slip": [0.1], "adhesion": [0.2]}, {"slip": [0.1, 0.1], "adhesion": [0.2, 0.3]}):
+        answer = fit(client, **points)
+        assert answer.status_code == 422
+        assert "\n" not in answer.json()["detail"]
+    assert fit(client, slip=[0.1, 0.2], adhesion=[0.1]).status_code == 422
+    assert fit(client, model="magic", slip=[0.1, 0.2], adhesion=[0.1, 0.2]).status_code == 422
+    assert client.post("/api/fit", content=b'{"model": "exponential", "slip": [NaN]}').status_code == 422
+
+
+def test_all_four_parameters_carry_the_badge(client: TestClient) -> None:
+    slip = np.linspace(0.05, 0.6, 30)
+    mu = CURVES["exponential"].value(slip, {"a": 0.85}) + 0.01 * np.sin(40 * slip)
+    found = fit(client, fixed="free", slip=slip.tolist(), adhesion=mu.tolist()).json()
+    assert found["identifiability"]["identifiable"] is False
+    assert set(found["interval"]) == {"A", "k", "d"}
+
+
+def test_a_saved_curve_is_read_back_and_another_of_its_name_refused(client: TestClient, folder: Path) -> None:
+    soil = {
+        "library": "mine.json",
+        "name": "sand",
+        "model": "burckhardt",
+        "parameters": {"c1": 0.5, "c2": 9.0, "c3": 0.1},
+    }
+    assert client.post("/api/soils/save", json=soil).status_code == 201
+    assert SoilLibrary.load(folder / "mine.json")["sand"].parameters["c2"] == 9.0
+    again = client.post("/api/soils/save", json=soil)
+    assert again.status_code == 422
+    assert "sand" in again.json()["detail"]
+    changed = {**soil, "replace": True, "parameters": {**soil["parameters"], "c2": 11.0}}  # type: ignore[dict-item]
+    assert client.post("/api/soils/save", json=changed).status_code == 201
+    assert SoilLibrary.load(folder / "mine.json")["sand"].parameters["c2"] == 11.0
+    for bad in (
+        {"library": "mine.csv"},
+        {"model": "none"},
+        {"parameters": {"zz": 1}},
+        {"library": "../x.json"},
+    ):
+        assert client.post("/api/soils/save", json={**soil, "name": "other", **bad}).status_code == 422
+
+
+@pytest.mark.parametrize("path", ["soils.json", "estimates.parquet"])
+def test_soils_of_each_kind_of_file_are_served(client: TestClient, path: str) -> None:
+    soils = client.get("/api/soils", params={"path": path}).json()
+    assert [soil["name"] for soil in soils if soil.get("bins")] == ["grass"]
+
+
+def test_digitised_points_are_served(client: TestClient, folder: Path) -> None:
+    (folder / "points.csv").write_text("slip,mu\n5,0.2\n10,0.3\n20,0.35\n")
+    (soil,) = client.get("/api/soils", params={"path": "points.csv"}).json()
+    assert soil["points"] == {"slip": [0.05, 0.1, 0.2], "adhesion": [0.2, 0.3, 0.35]}
+
+
+def test_literature_and_models_are_served(client: TestClient) -> None:
+    assert {model["name"] for model in client.get("/api/models").json()} == set(CURVES)
+    assert "dry asphalt" in {soil["name"] for soil in client.get("/api/literature").json()}

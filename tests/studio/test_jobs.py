@@ -1,0 +1,109 @@
+"""Long work: done, failed with one line, cancelled without a trace."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+from fastapi.testclient import TestClient
+
+NOTICES = "ws://127.0.0.1:8750/api/notices"
+
+
+def wait(
+    client: TestClient, identity: str, until: tuple[str, ...] = ("done", "failed", "cancelled")
+) -> dict[str, Any]:
+    for _ in range(600):
+        job: dict[str, Any] = client.get(f"/api/jobs/{identity}").json()
+        if job["state"] in until:
+            return job
+        time.sleep(0.05)
+    raise AssertionError(f"the job did not end: {job}")
+
+
+def ask(client: TestClient, **changes: Any) -> Any:
+    wanted = {"recording": "recording.parquet", "vehicle": "vehicle.yaml", "output": "new.parquet", **changes}
+    return client.post("/api/jobs/estimate", json=wanted)
+
+
+def test_an_estimate_equals_the_one_of_the_command_line(client: TestClient, folder: Path) -> None:
+    job = wait(client, ask(client).json()["id"])
+    assert job["state"] == "done"
+    pd.testing.assert_frame_equal(
+        pd.read_parquet(folder / "new.parquet"), pd.read_parquet(folder / "estimates.parquet")
+    )
+
+
+def test_progress_is_told(client: TestClient) -> None:
+    with client.websocket_connect(NOTICES) as notices:
+        ask(client)
+        states = []
+        while not states or states[-1] not in ("done", "failed"):
+            notice = notices.receive_json()
+            if notice["kind"] == "job":
+                states.append(notice["job"]["state"])
+    assert states[0] == "queued"
+    assert "running" in states
+    assert states[-1] == "done"
+
+
+def test_a_log_that_does_not_fit_fails_with_one_line(client: TestClient, folder: Path) -> None:
+    pd.DataFrame({"time": np.arange(20.0), "wheel_speed_xx": 1.0, "ground_speed": 1.0}).to_csv(
+        folder / "odd.csv", index=False
+    )
+    job = wait(client, ask(client, recording="odd.csv").json()["id"])
+    assert job["state"] == "failed"
+    assert job["text"].startswith("odd.csv")
+    assert "\n" not in job["text"]
+    assert not (folder / "new.parquet").exists()
+
+
+def test_a_cancelled_job_leaves_nothing(client: TestClient, folder: Path) -> None:
+    table = pd.read_parquet(folder / "recording.parquet")
+    span = float(table["time"].iloc[-1] - table["time"].iloc[0]) + 0.01
+    long = pd.concat([table.assign(time=table["time"] + i * span) for i in range(150)])
+    long.to_parquet(folder / "long.parquet")
+    before = sorted(folder.iterdir())
+    first = ask(client, recording="long.parquet").json()["id"]
+    second = ask(client, output="second.parquet").json()["id"]
+    wait(client, first, ("running",))
+    assert client.delete(f"/api/jobs/{second}").json()["state"] == "cancelled"
+    assert client.delete(f"/api/jobs/{first}").json()["state"] == "cancelled"
+    time.sleep(0.3)
+    assert sorted(folder.iterdir()) == before
+    assert wait(client, ask(client).json()["id"])["state"] == "done"
+
+
+@pytest.mark.parametrize(
+    ("changes", "why"),
+    [
+        ({"recording": "nothing.csv"}, "no such file"),
+        ({"method": "magic"}, "no method"),
+        ({"method": "algebraic", "smooth": True}, "cannot smooth"),
+        ({"output": "estimates.parquet"}, "exists already"),
+        ({"output": "recording.parquet", "replace": True}, "is an input of this job"),
+        ({"output": "new.csv"}, "has another ending"),
+        ({"output": "../new.parquet"}, "no path in the studio's folder"),
+    ],
+)
+def test_unusable_requests_are_refused_before_work_begins(
+    client: TestClient, changes: dict[str, Any], why: str
+) -> None:
+    answer = ask(client, **changes)
+    assert answer.status_code == 422
+    assert why in answer.json()["detail"]
+    assert client.get("/api/jobs").json() == []
+
+
+def test_soils_are_learnt(client: TestClient, folder: Path) -> None:
+    from terragrip.soil.library import SoilLibrary
+
+    answer = client.post(
+        "/api/jobs/soils", json={"estimates": ["estimates.parquet"], "output": "learnt.json"}
+    )
+    assert wait(client, answer.json()["id"])["state"] == "done"
+    assert dict(SoilLibrary.load(folder / "learnt.json")) == dict(SoilLibrary.load(folder / "soils.json"))
