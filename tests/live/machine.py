@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import socket
 import sys
+from contextlib import asynccontextmanager
 from pathlib import Path
 
 import pytest
@@ -12,6 +13,7 @@ import pytest
 sys.path.insert(0, str(Path(__file__).parents[1] / "estimation"))  # for drives.py
 
 from drives import Drive, drive, robot
+from terragrip.live.service import Service
 
 
 @pytest.fixture(scope="session")
@@ -44,3 +46,25 @@ async def until(condition, seconds: float = 10.0) -> None:
     async with asyncio.timeout(seconds):
         while not condition():
             await asyncio.sleep(0.005)
+
+
+@asynccontextmanager
+async def running(service: Service):
+    """The service at work; what it published is in `service.seen`."""
+    service.seen = []
+    service.listeners.append(service.seen.append)
+    task = asyncio.create_task(service.run())
+    await asyncio.sleep(0.05)
+    try:
+        yield service
+    finally:
+        service.stop()
+        await asyncio.wait_for(task, 20)
+
+
+def events(service: Service, kind: str) -> list[str]:
+    return [event.text for event in service.statistics.events if event.kind == kind]
+
+
+def messages(recording, count: int):
+    return [{"time": time, **values} for time, values in list(rows_of(recording))[:count]]

@@ -6,13 +6,12 @@ import asyncio
 import json
 import socket
 import struct
-from contextlib import asynccontextmanager
 
 import numpy as np
 import pytest
 
 from drives import robot
-from machine import rows_of, until
+from machine import events, messages, rows_of, running, until
 from terragrip.errors import InputError
 from terragrip.estimation import TractionEstimator
 from terragrip.formats import Profile
@@ -20,20 +19,6 @@ from terragrip.live import read_record
 from terragrip.live.service import Service
 
 pytestmark = pytest.mark.asyncio
-
-
-@asynccontextmanager
-async def running(service: Service):
-    """The service at work; what it published is in `service.seen`."""
-    service.seen = []
-    service.listeners.append(service.seen.append)
-    task = asyncio.create_task(service.run())
-    await asyncio.sleep(0.05)
-    try:
-        yield service
-    finally:
-        service.stop()
-        await asyncio.wait_for(task, 20)
 
 
 class Sender:
@@ -57,14 +42,6 @@ def sender(port):
     found = Sender(port)
     yield found
     found.close()
-
-
-def events(service: Service, kind: str) -> list[str]:
-    return [event.text for event in service.statistics.events if event.kind == kind]
-
-
-def messages(recording, count: int):
-    return [{"time": time, **values} for time, values in list(rows_of(recording))[:count]]
 
 
 async def test_a_replay_gives_what_the_estimator_gives(tmp_path, vehicle, short):

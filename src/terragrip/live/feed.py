@@ -44,15 +44,24 @@ class Feed:
         self._layouts: dict[frozenset[str], None] = {}
         self._since_layout = 0
 
-    def message(self, data: bytes, arrival: float | None = None) -> None:
-        """A message as bytes, by the profile's payload."""
+    def message(self, data: bytes, arrival: float | None = None, *, topic: str | None = None) -> None:
+        """A message as bytes, by the profile's payload; of a ``topic`` where the source has such."""
         try:
             found = self._unpack(data)
         except Unreadable as error:
-            self.spoiled(str(error))
-            return
+            number = None if topic is None else _number(data)
+            if number is None:
+                self.spoiled(str(error) if topic is None else f"{error} on {topic}")
+                return
+            found = [{str(topic): number}]
         for fields in found:
-            self.fields(fields, arrival)
+            self.fields(fields if topic is None else self._of_topic(topic, fields), arrival)
+
+    def _of_topic(self, topic: str, fields: Mapping[str, Any]) -> Mapping[str, Any]:
+        """Fields by their own names, and by ``topic/name`` where the profile asks for that."""
+        long = {f"{topic}/{name}": value for name, value in fields.items()}
+        wanted = {name: value for name, value in long.items() if name in self.decoder.wanted}
+        return {**fields, **wanted} if wanted else fields
 
     def fields(self, fields: Mapping[str, Any], arrival: float | None = None) -> None:
         """A message as named fields."""
@@ -117,3 +126,10 @@ class Feed:
                 return
             self._said[key] = now
         self._note({"event": {"time": None, "kind": kind, "source": self.name, "text": text}})
+
+
+def _number(data: bytes) -> float | None:
+    try:
+        return float(data) if len(data) <= 40 else None
+    except ValueError:
+        return None

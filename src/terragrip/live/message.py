@@ -46,12 +46,16 @@ class Columns:
         self._places: dict[str, int] = {}
         self._of: object = None
 
+    def wants(self, name: str) -> bool:
+        """Whether a column is wanted."""
+        return any(fnmatchcase(name, pattern) for pattern in self._patterns)
+
     def places(self, row: Row) -> dict[str, int]:
         """Name and place of each wanted column."""
         every = row.estimate.places
         if self._of is not every:
             self._of = every
-            self._places = {n: k for n, k in every.items() if any(fnmatchcase(n, p) for p in self._patterns)}
+            self._places = {name: place for name, place in every.items() if self.wants(name)}
         return self._places
 
 

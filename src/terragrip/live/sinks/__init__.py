@@ -12,10 +12,17 @@ from terragrip.live.uri import Uri
 if TYPE_CHECKING:
     from terragrip.vehicle import Vehicle
 
-_HOMES: dict[str, str] = {"udp": "udp"}
+_HOMES: dict[str, str] = {
+    "udp": "udp", "mqtt": "mqtt", "mqtts": "mqtt", "zenoh": "zenoh", "foxglove": "foxglove", "studio": "studio",
+}  # fmt: skip
 _ALL = ("rate", "columns")
 OPTIONS: dict[str, Collection[str]] = {
     "udp": (*_ALL, "format"),
+    "mqtt": (*_ALL, "qos", "client"),
+    "mqtts": (*_ALL, "qos", "client", "ca"),
+    "zenoh": (*_ALL, "connect", "listen", "scout"),
+    "foxglove": (*_ALL, "mcap"),
+    "studio": _ALL,
 }
 
 

@@ -11,10 +11,16 @@ from terragrip.live.decode import Decoder
 from terragrip.live.feed import Feed
 from terragrip.live.uri import Uri
 
-_HOMES: dict[str, str] = {"udp": "udp", "replay": "replay"}
+_HOMES: dict[str, str] = {
+    "udp": "udp", "replay": "replay", "mqtt": "mqtt", "mqtts": "mqtt", "serial": "serial", "zenoh": "zenoh",
+}  # fmt: skip
 OPTIONS: dict[str, Collection[str]] = {
     "udp": ("allow",),
     "replay": ("speed",),
+    "mqtt": ("qos", "client"),
+    "mqtts": ("qos", "client", "ca"),
+    "serial": ("baud",),
+    "zenoh": ("connect", "listen", "scout"),
 }
 
 

@@ -1,0 +1,85 @@
+"""Messages to any number of WebSocket clients, each with a queue of its own; the studio mounts this.
+
+First comes a JSON text: ``{"kind": "hello", "version", "vehicle", "columns", "events"}``. Then JSON texts
+``{"kind": "estimate", …}``, ``event``, ``status``, ``soil``, ``ground``. A client that asks for binary gets estimates as
+little-endian doubles instead: time [s], 1 if predicted, the event's place in ``events``, then ``columns`` in order.
+"""
+
+from __future__ import annotations
+
+import json
+import struct
+from collections.abc import AsyncGenerator
+from typing import TYPE_CHECKING
+
+from terragrip import __version__
+from terragrip.errors import InputError
+from terragrip.estimation.engine import EVENTS, estimate_slots
+from terragrip.live.message import ESTIMATE, Message
+from terragrip.live.outbox import Outbox
+from terragrip.live.uri import Uri
+
+if TYPE_CHECKING:
+    from terragrip.vehicle import Vehicle
+
+OPTIONS = ("rate", "columns", "format", "token")
+
+
+class Broadcast:
+    """``put`` takes a message for all; ``subscribe`` gives one client's frames."""
+
+    def __init__(self, vehicle: Vehicle) -> None:
+        self._vehicle = vehicle
+        self._clients: list[Outbox] = []
+        self._dropped = 0
+
+    def __len__(self) -> int:
+        return len(self._clients)
+
+    @property
+    def dropped(self) -> int:
+        """Messages that slow clients missed."""
+        return self._dropped + sum(client.dropped for client in self._clients)
+
+    def put(self, message: Message) -> None:
+        """Queue a message for each client."""
+        for client in self._clients:
+            client.put(message)
+
+    async def subscribe(self, request: str = "/") -> AsyncGenerator[str | bytes]:
+        """The frames for a client that asked for ``/?format=binary&rate=20&columns=slip_*``; raises InputError on any other."""
+        uri = Uri.parse(f"studio://127.0.0.1{request}", {"studio": OPTIONS}, "sink")
+        binary = uri.options.get("format", "json") == "binary"
+        if uri.options.get("format", "json") not in ("json", "binary"):
+            raise InputError(f"has no format {uri.options['format']!r}", place=request, mend="json or binary")
+        client = Outbox(uri)
+        every = list(estimate_slots(self._vehicle))
+        columns = every if client.columns is None else [n for n in every if client.columns.wants(n)]
+        hello = {
+            "kind": "hello", "version": __version__, "vehicle": self._vehicle.name, "columns": columns,
+            "wheels": list(self._vehicle.wheels), "events": list(EVENTS),
+        }  # fmt: skip
+        packer = struct.Struct(f"<{3 + len(columns)}d")
+        self._clients.append(client)
+        try:
+            yield json.dumps(hello)
+            while True:
+                message = await client.get()
+                row = message.row
+                if binary and row is not None:
+                    values, places = row.estimate.values, row.estimate.places
+                    event = EVENTS.index(row.estimate.event)
+                    numbers = (values[places[name]] for name in columns)
+                    yield packer.pack(row.estimate.time, row.predicted, event, *numbers)
+                else:
+                    yield _named(
+                        message.kind, message.json(client.columns if message.kind == ESTIMATE else None)
+                    )
+        finally:
+            self._clients.remove(client)
+            self._dropped += client.dropped
+
+
+def _named(kind: str, data: bytes) -> str:
+    """A JSON object with its kind in front."""
+    return f'{{"kind":"{kind}",{data[1:].decode()}'

@@ -1,0 +1,63 @@
+"""JSON schemas of the messages, for Foxglove and MCAP: traction estimate, ground change, soil, event, status."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Any
+
+from terragrip.live.event import KINDS
+from terragrip.live.message import ESTIMATE, EVENT, GROUND, SOIL, STATUS
+
+_NUMBER = {"type": ["number", "null"]}
+_TEXT = {"type": "string"}
+_COUNT = {"type": "integer"}
+_TIME = {"type": ["number", "null"], "description": "s, on the samples' time base"}
+
+NAMES = {
+    ESTIMATE: "terragrip.TractionEstimate",
+    GROUND: "terragrip.GroundChange",
+    SOIL: "terragrip.Soil",
+    EVENT: "terragrip.Event",
+    STATUS: "terragrip.Status",
+}
+
+
+def schema_of(kind: str, columns: Iterable[str] = ()) -> dict[str, Any]:
+    """The schema of a kind of message; of an estimate, with the vehicle's ``columns``."""
+    return {"title": NAMES[kind], "type": "object", "properties": _PROPERTIES[kind] | _columns(kind, columns)}
+
+
+def _columns(kind: str, columns: Iterable[str]) -> dict[str, Any]:
+    return dict.fromkeys(columns, _NUMBER) if kind == ESTIMATE else {}
+
+
+_PROPERTIES: dict[str, dict[str, Any]] = {
+    ESTIMATE: {
+        "time": _TIME,
+        "arrival": {"type": "number", "description": "s since 1970, of the row's first sample"},
+        "event": _TEXT,
+        "predicted": {"type": "boolean", "description": "nothing was measured: the filter went on alone"},
+    },
+    GROUND: {"time": _TIME, "std": _NUMBER, "probability": _NUMBER},
+    SOIL: {
+        "time": _TIME,
+        "soil": _TEXT,
+        "probability": _NUMBER,
+        "probabilities": {"type": "object", "additionalProperties": {"type": "number"}},
+    },
+    EVENT: {"time": _TIME, "kind": {"type": "string", "enum": list(KINDS)}, "source": _TEXT, "text": _TEXT},
+    STATUS: {
+        "time": _TIME,
+        "rows": _COUNT,
+        "row_rate": _NUMBER,
+        "sample_rate": _NUMBER,
+        "delay": {"type": "number", "description": "s, mean, from a row's first sample to its estimate"},
+        "waiting": _COUNT,
+        "counts": {
+            "type": "object",
+            "description": "by channel: received, late, doubled, missing, dropped, …",
+        },
+        "events": {"type": "object", "additionalProperties": _COUNT},
+        "sinks": {"type": "object"},
+    },
+}

@@ -1,0 +1,45 @@
+"""Estimates, events and the status to topics of an MQTT broker, as JSON."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from terragrip.live.feed import Lost
+from terragrip.live.mqtt import check, client, quality
+from terragrip.live.outbox import Outbox
+from terragrip.live.uri import Uri
+
+if TYPE_CHECKING:
+    from terragrip.vehicle import Vehicle
+
+
+class MqttSink:
+    """``mqtt://HOST/terragrip``: to ``terragrip/estimate``, ``terragrip/event``, ``/status``, ``/soil`` and ``/ground``."""
+
+    def __init__(self, uri: Uri) -> None:
+        self.uri = uri
+        self.qos = quality(uri)
+        check(uri)
+
+    async def run(self, outbox: Outbox) -> None:
+        """Publish messages; raises Lost where the broker refuses or goes away."""
+        import aiomqtt
+
+        topic = self.uri.path.rstrip("/")
+        try:
+            async with client(self.uri) as broker:
+                outbox.connected()
+                while True:
+                    message = await outbox.get()
+                    await broker.publish(
+                        f"{topic}/{message.kind}", message.json(outbox.columns), qos=self.qos
+                    )
+        except aiomqtt.MqttError as error:
+            raise Lost(f"the broker: {error}") from error
+        except OSError as error:
+            raise Lost(f"the broker: {error.strerror or error}") from error
+
+
+def open_sink(uri: Uri, vehicle: Vehicle) -> MqttSink:
+    """See `terragrip.live.sinks.open_sink`."""
+    return MqttSink(uri)

@@ -1,0 +1,87 @@
+"""A WebSocket server of our own, which the studio's pages and any script read (terragrip.live.broadcast)."""
+
+from __future__ import annotations
+
+import asyncio
+import http
+from typing import TYPE_CHECKING, Any
+from urllib.parse import parse_qs, urlsplit
+
+from terragrip.errors import InputError
+from terragrip.live.broadcast import Broadcast
+from terragrip.live.credentials import Credentials
+from terragrip.live.feed import Lost
+from terragrip.live.outbox import Outbox
+from terragrip.live.uri import Uri
+
+if TYPE_CHECKING:
+    from terragrip.vehicle import Vehicle
+
+
+class StudioSink:
+    """``studio://127.0.0.1:8766``. Beyond this machine clients must know the token."""
+
+    def __init__(self, uri: Uri, vehicle: Vehicle) -> None:
+        import websockets.asyncio.server  # noqa: F401  # so that a missing package is said at once
+
+        self.uri = uri
+        self.broadcast = Broadcast(vehicle)
+        self._credentials = Credentials.find()
+        if not uri.is_loopback() and not self._credentials.token:
+            raise InputError(
+                "anyone could listen here", place=uri.text, mend="serve on 127.0.0.1, or set TERRAGRIP_TOKEN"
+            )
+
+    async def run(self, outbox: Outbox) -> None:
+        """Serve messages; raises Lost where the port is taken."""
+        from websockets.asyncio.server import serve
+
+        try:
+            server = await serve(
+                self._serve, self.uri.host, self.uri.port or 8766, process_request=self._admit
+            )
+        except OSError as error:
+            raise Lost(f"the server: {error.strerror or error}") from error
+        async with server:
+            outbox.connected()
+            while True:
+                self.broadcast.put(await outbox.get())
+
+    def _admit(self, connection: Any, request: Any) -> Any:
+        """Refuse who does not know the token, where one is set, and pages of other sites."""
+        origin = request.headers.get("Origin")
+        if origin and not Uri("", "", host=urlsplit(origin).hostname or "").is_loopback():
+            return connection.respond(http.HTTPStatus.FORBIDDEN, "Pages of other sites may not listen.\n")
+        if self._credentials.token is None:
+            return None
+        given = request.headers.get("Authorization", "").removeprefix("Bearer ")
+        given = given or parse_qs(urlsplit(request.path).query).get("token", [""])[0]
+        if self._credentials.grants(given):
+            return None
+        return connection.respond(http.HTTPStatus.UNAUTHORIZED, "The token is wrong or missing.\n")
+
+    async def _serve(self, connection: Any) -> None:
+        from websockets.exceptions import ConnectionClosed
+
+        listening = asyncio.create_task(connection.wait_closed())
+        frames = self.broadcast.subscribe(connection.request.path)
+        try:
+            while not listening.done():
+                waiting = asyncio.ensure_future(anext(frames))
+                await asyncio.wait((waiting, listening), return_when=asyncio.FIRST_COMPLETED)
+                if not waiting.done():
+                    waiting.cancel()
+                    return
+                await connection.send(waiting.result())
+        except InputError as error:
+            await connection.close(1008, str(error)[:120])
+        except ConnectionClosed:
+            return
+        finally:
+            listening.cancel()
+            await frames.aclose()
+
+
+def open_sink(uri: Uri, vehicle: Vehicle) -> StudioSink:
+    """See `terragrip.live.sinks.open_sink`."""
+    return StudioSink(uri, vehicle)

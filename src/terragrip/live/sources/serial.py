@@ -1,0 +1,76 @@
+"""A GNSS receiver on a serial line, NMEA 0183: ground speed, position, altitude."""
+
+from __future__ import annotations
+
+import asyncio
+import threading
+from pathlib import Path
+
+from terragrip.errors import InputError
+from terragrip.live.decode import Decoder
+from terragrip.live.feed import Feed, Lost
+from terragrip.live.nmea import fields_of
+from terragrip.live.payload import Unreadable
+from terragrip.live.uri import Uri
+
+_LONGEST = 512  # bytes of a line
+
+
+class SerialSource:
+    """``serial:/dev/ttyUSB0?baud=4800``."""
+
+    real_time = True
+
+    def __init__(self, uri: Uri) -> None:
+        import serial  # noqa: F401  # so that a missing package is said at once
+
+        self.uri = uri
+        self._has_rmc = False
+        self.baud = round(uri.number("baud", 4800))
+        if not uri.path:
+            raise InputError("names no device", place=uri.text, mend="write serial:/dev/ttyUSB0")
+
+    async def run(self, feed: Feed) -> None:
+        """Feed sentences; raises Lost where the device is not there or goes away."""
+        import serial
+
+        loop, done = asyncio.get_running_loop(), threading.Event()
+        try:
+            line = serial.Serial(str(Path(self.uri.path)), self.baud, timeout=0.2)
+        except (serial.SerialException, ValueError) as error:
+            raise Lost(f"the device: {error}") from error
+        feed.connected()
+
+        def read() -> None:
+            rest = b""
+            while not done.is_set():
+                rest += line.read(max(1, line.in_waiting))
+                *whole, rest = rest.split(b"\n")
+                rest = rest[-_LONGEST:]
+                for sentence in whole:
+                    loop.call_soon_threadsafe(self._take, feed, sentence)
+
+        try:
+            await asyncio.to_thread(read)
+        except (serial.SerialException, OSError) as error:
+            raise Lost(f"the device: {error}") from error
+        finally:
+            done.set()
+            line.close()
+
+    def _take(self, feed: Feed, sentence: bytes) -> None:
+        try:
+            fields = fields_of(sentence)
+        except Unreadable as error:
+            feed.spoiled(str(error))
+            return
+        if "latitude" not in fields and "ground_speed" in fields and self._has_rmc:
+            return  # VTG repeats the speed of RMC
+        self._has_rmc |= "latitude" in fields and "ground_speed" in fields
+        if fields:
+            feed.fields(fields)
+
+
+def open_source(uri: Uri, decoder: Decoder) -> SerialSource:
+    """See `terragrip.live.sources.open_source`."""
+    return SerialSource(uri)

@@ -1,0 +1,43 @@
+"""Key expressions of Zenoh: payloads as those of MQTT."""
+
+from __future__ import annotations
+
+import asyncio
+from typing import Any
+
+from terragrip.live.decode import Decoder
+from terragrip.live.feed import Feed
+from terragrip.live.uri import Uri
+from terragrip.live.zenoh import config, key_of, open_session
+
+
+class ZenohSource:
+    """``zenoh:machine/**?connect=tcp/127.0.0.1:7447``."""
+
+    real_time = True
+
+    def __init__(self, uri: Uri) -> None:
+        self.uri = uri
+        self.key = key_of(uri, "machine/**")
+        config(uri)
+
+    async def run(self, feed: Feed) -> None:
+        """Feed samples; raises Lost where the other side is not there. Zenoh itself connects again later."""
+        loop = asyncio.get_running_loop()
+        session = await asyncio.to_thread(open_session, self.uri)
+
+        def heard(sample: Any) -> None:  # in a thread of Zenoh's
+            data, key = bytes(sample.payload), str(sample.key_expr)
+            loop.call_soon_threadsafe(lambda: feed.message(data, topic=key))
+
+        try:
+            session.declare_subscriber(self.key, heard)
+            feed.connected()
+            await asyncio.Event().wait()
+        finally:
+            await asyncio.to_thread(session.close)
+
+
+def open_source(uri: Uri, decoder: Decoder) -> ZenohSource:
+    """See `terragrip.live.sources.open_source`."""
+    return ZenohSource(uri)

@@ -1,0 +1,59 @@
+"""The session of a Zenoh source or sink."""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+from terragrip.errors import InputError
+from terragrip.live.feed import Lost
+from terragrip.live.uri import Uri
+
+
+def open_session(uri: Uri) -> Any:
+    """A peer that connects to ``connect`` and listens on ``listen`` (``tcp/127.0.0.1:7447``); it looks for others with ``scout=1``.
+
+    By itself it neither listens nor looks beyond this machine. Raises Lost where the other side is not there.
+    """
+    import zenoh
+
+    try:
+        return zenoh.open(config(uri))
+    except zenoh.ZError as error:
+        raise Lost(f"Zenoh: {' '.join(str(error).split())[:160]}") from error
+
+
+def config(uri: Uri) -> Any:
+    """The session's configuration; raises InputError on an endpoint that is none."""
+    import zenoh
+
+    found = zenoh.Config()
+    ends = {name: [e for e in uri.options.get(name, "").split(",") if e] for name in ("connect", "listen")}
+    scout = uri.options.get("scout", "0")
+    if scout not in ("0", "1"):
+        raise InputError(f"scout is {scout!r}", place=uri.text, mend="give 0 or 1")
+    try:
+        found.insert_json5("mode", '"peer"')
+        found.insert_json5("scouting/multicast/enabled", "true" if scout == "1" else "false")
+        found.insert_json5("connect/endpoints", json.dumps(ends["connect"]))
+        found.insert_json5("listen/endpoints", json.dumps(ends["listen"]))
+        if ends["connect"]:
+            found.insert_json5("connect/timeout_ms", "2000")
+            found.insert_json5("connect/exit_on_failure", "true")
+    except zenoh.ZError as error:
+        raise InputError(
+            "names no endpoint", place=uri.text, mend="write connect=tcp/127.0.0.1:7447"
+        ) from error
+    return found
+
+
+def key_of(uri: Uri, where: str) -> str:
+    """The key expression of a URI; raises InputError if it is none."""
+    import zenoh
+
+    try:
+        return str(zenoh.KeyExpr(uri.path.strip("/")))
+    except zenoh.ZError as error:
+        raise InputError(
+            f"{uri.path!r} is no key expression", place=uri.text, mend=f"write zenoh:{where}"
+        ) from error

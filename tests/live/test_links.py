@@ -1,0 +1,180 @@
+"""Zenoh, Foxglove, MCAP, the studio's WebSocket and a serial line, each with a real other side."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import itertools
+import json
+import os
+import struct
+
+import pytest
+from mcap.exceptions import EndOfFile
+from mcap.reader import NonSeekingReader, make_reader
+from websockets.asyncio.client import connect
+
+from machine import events, messages, running, until
+from terragrip.errors import InputError
+from terragrip.live.schemas import NAMES
+from terragrip.live.service import Service
+
+pytestmark = pytest.mark.asyncio
+
+
+async def test_a_pair_of_zenoh_sessions(vehicle, short, port):
+    import zenoh
+
+    config = zenoh.Config()
+    config.insert_json5("scouting/multicast/enabled", "false")
+    config.insert_json5("listen/endpoints", json.dumps([f"tcp/127.0.0.1:{port}"]))
+    got = []
+    with zenoh.open(config) as other:
+        other.declare_subscriber("terragrip/estimate", lambda s: got.append(json.loads(bytes(s.payload))))
+        at = f"connect=tcp/127.0.0.1:{port}"
+        service = Service(vehicle, [f"zenoh:machine/*?{at}"], [f"zenoh:terragrip?{at}&columns=slip_fl"])
+        async with running(service):
+            await asyncio.sleep(0.6)
+            for message in messages(short.recording, 200):
+                other.put("machine/all", json.dumps(message))
+            await until(lambda: service.core.rows == 200)
+            await until(lambda: sum(not m["predicted"] for m in got) == 200)
+    measured = [m for m in got if not m["predicted"]]
+    assert measured[-1]["time"] == short.recording.time[199]
+    assert measured[-1]["slip_fl"] == pytest.approx(short.truth["slip_fl"][199], abs=0.05)
+
+
+async def test_zenoh_whose_other_side_is_absent_is_named(vehicle, port):
+    service = Service(vehicle, [f"zenoh:machine/*?connect=tcp/127.0.0.1:{port}"])
+    async with running(service):
+        await until(lambda: events(service, "source_lost"))
+    with pytest.raises(InputError, match="no key expression"):
+        Service(vehicle, ["zenoh:a//b"])
+
+
+async def test_foxglove_subscribes_and_an_mcap_holds_the_same(tmp_path, vehicle, short, port):
+    log = tmp_path / "drive.parquet"
+    short.recording.to_pandas().to_parquet(log)
+    sink = f"foxglove://127.0.0.1:{port}?mcap={tmp_path / 'mcap'}"
+    service = Service(vehicle, [f"replay:{log}?speed=6"], [sink])
+    async with running(service):
+        async with connect(f"ws://127.0.0.1:{port}", subprotocols=["foxglove.sdk.v1"]) as client:
+            channels = {}
+            while len(channels) < len(NAMES):
+                found = json.loads(await client.recv())
+                channels |= {c["topic"]: c for c in found.get("channels", [])}
+            estimate = channels["/terragrip/estimate"]
+            await client.send(
+                json.dumps({"op": "subscribe", "subscriptions": [{"id": 7, "channelId": estimate["id"]}]})
+            )
+            data = b""
+            while not isinstance(data, bytes) or data[:1] != b"\x01":
+                data = await client.recv()
+        await until(lambda: service.core.rows == len(short.recording))
+    opcode, subscription, _ = struct.unpack_from("<BIQ", data)
+    assert (opcode, subscription) == (1, 7)
+    assert json.loads(data[13:])["slip_fl"] is not None
+    schema = json.loads(estimate["schema"])
+    assert (schema["title"], "adhesion_rr_std" in schema["properties"]) == (
+        "terragrip.TractionEstimate",
+        True,
+    )
+
+    (path,) = (tmp_path / "mcap").iterdir()
+    with path.open("rb") as stream:
+        recorded = [
+            (s.name, json.loads(m.data))
+            for s, c, m in make_reader(stream).iter_messages(topics="/terragrip/estimate")
+        ]
+    assert [data["time"] for _, data in recorded] == short.recording.time.tolist()
+    assert {name for name, _ in recorded} == {"terragrip.TractionEstimate"}
+    # Cut off in the middle, as by a kill, it still reads up to there.
+    cut = tmp_path / "cut.mcap"
+    cut.write_bytes(path.read_bytes()[: path.stat().st_size // 2])
+    assert 0 < readable_messages(cut) < readable_messages(path)
+
+
+def readable_messages(path) -> int:
+    found = 0
+    with path.open("rb") as stream, contextlib.suppress(EndOfFile):
+        for found, _ in enumerate(NonSeekingReader(stream).iter_messages(log_time_order=False), 1):  # noqa: B007
+            pass
+    return found
+
+
+async def test_foxglove_stays_on_this_machine(vehicle):
+    with pytest.raises(InputError, match="SSH tunnel"):
+        Service(vehicle, ["udp://127.0.0.1:9870"], ["foxglove://0.0.0.0:8765"])
+
+
+async def test_the_studios_websocket_in_json_and_in_doubles(tmp_path, vehicle, short, port):
+    log = tmp_path / "drive.parquet"
+    short.recording.to_pandas().to_parquet(log)
+    service = Service(vehicle, [f"replay:{log}?speed=6"], [f"studio://127.0.0.1:{port}"])
+    async with running(service):
+        async with connect(f"ws://127.0.0.1:{port}/?columns=slip_fl") as text:
+            hello, first = json.loads(await text.recv()), json.loads(await text.recv())
+        async with connect(f"ws://127.0.0.1:{port}/?format=binary&columns=slip_fl*&rate=20") as packed:
+            columns = json.loads(await packed.recv())["columns"]
+            found = [await packed.recv() for _ in range(10)]
+        async with connect(f"ws://127.0.0.1:{port}/?colums=slip_fl") as wrong:
+            await wrong.wait_closed()
+            assert "did you mean columns" in wrong.close_reason
+        service.stop()
+    assert (hello["kind"], hello["columns"], hello["wheels"]) == ("hello", ["slip_fl"], list(vehicle.wheels))
+    assert first.keys() == {"kind", "time", "arrival", "event", "predicted", "slip_fl"}
+    numbers = [struct.unpack("<5d", one) for one in found if isinstance(one, bytes)]
+    assert columns == ["slip_fl", "slip_fl_std"]
+    steps = [b[0] - a[0] for a, b in itertools.pairwise(numbers)]
+    assert steps == pytest.approx([0.05] * len(steps))
+
+
+async def test_the_studios_websocket_beyond_this_machine_wants_the_token(vehicle, port, monkeypatch):
+    with pytest.raises(InputError, match="TERRAGRIP_TOKEN"):
+        Service(vehicle, ["udp://127.0.0.1:9870"], [f"studio://0.0.0.0:{port}"])
+    monkeypatch.setenv("TERRAGRIP_TOKEN", "a-long-one")
+    service = Service(vehicle, ["udp://127.0.0.1:0"], [f"studio://0.0.0.0:{port}"])
+    from websockets.exceptions import InvalidStatus
+
+    async with running(service):
+        for wrong in ("", "?token=a-short-one"):
+            with pytest.raises(InvalidStatus, match="401"):
+                await connect(f"ws://127.0.0.1:{port}/{wrong}").__aenter__()
+        with pytest.raises(InvalidStatus, match="403"):
+            await connect(
+                f"ws://127.0.0.1:{port}/?token=a-long-one", origin="https://elsewhere.example"
+            ).__aenter__()
+        async with connect(f"ws://127.0.0.1:{port}/?token=a-long-one") as client:
+            assert json.loads(await client.recv())["kind"] == "hello"
+
+
+def sentence(body: str) -> bytes:
+    check = 0
+    for character in body:
+        check ^= ord(character)
+    return f"${body}*{check:02X}\r\n".encode()
+
+
+async def test_a_receiver_on_a_serial_line(vehicle, port):
+    machine, device = os.openpty()
+    name = os.ttyname(device)
+    service = Service(vehicle, [f"serial:{name}?baud=9600", f"udp://127.0.0.1:{port}"])
+    async with running(service):
+        await asyncio.sleep(0.1)
+        for k in range(5):
+            os.write(
+                machine, sentence(f"GPRMC,1235{k:02d},A,4807.038,N,01131.000,E,002.0,084.4,230394,003.1,W")
+            )
+            os.write(machine, sentence("GPVTG,084.4,T,,M,002.0,N,003.7,K"))
+            os.write(machine, b"$GPRMC,garbled*00\r\n")
+            await asyncio.sleep(0.03)
+        await until(lambda: service.core.rows >= 5)
+        counts = service.core.counts.by_channel
+        assert (counts["ground_speed"]["received"], counts["latitude"]["received"]) == (5, 5)
+        assert service.feeds[0].unreadable == 5
+        os.close(device)
+        os.close(machine)
+        await until(lambda: any("the device" in text for text in events(service, "source_lost")))
+    rows = [message.row for message in service.seen if message.kind == "estimate"]
+    assert rows[0].values["ground_speed"] == pytest.approx(2.0 * 1852 / 3600)
+    assert rows[0].values["latitude"] == pytest.approx(48 + 7.038 / 60)
