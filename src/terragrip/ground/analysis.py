@@ -12,12 +12,13 @@ from numpy.typing import NDArray
 
 from terragrip.estimation import Estimates
 from terragrip.ground.changes import LENGTH, Change, changes_of
-from terragrip.ground.emissions import UNKNOWN, Emissions
+from terragrip.ground.emissions import Emissions
 from terragrip.ground.online_changes import OnlineSettings, online_changes
 from terragrip.ground.recognition import Chain, ForwardFilter, by_soil
 from terragrip.ground.result import Ground, Timeline
 from terragrip.ground.sections import Stretch, sections_of
 from terragrip.ground.signals import GROUND
+from terragrip.ground.unknown import UNKNOWN
 from terragrip.soil.blocks import Blocks, estimates_blocks
 from terragrip.soil.estimates import whole_length
 from terragrip.soil.library import SoilLibrary

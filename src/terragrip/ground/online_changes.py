@@ -6,8 +6,9 @@ changes nothing.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +23,7 @@ Array = NDArray[np.float64]
 _MOST = 240
 """Run lengths kept: two minutes; a longer run is as well known as it will ever be."""
 _LEAST = 1e-7
+_RUNS = ("_mean", "_count", "_shape", "_scale")
 
 
 @dataclass(frozen=True)
@@ -71,6 +73,27 @@ class OnlineChanges:
                 found.append(change)
         return found
 
+    def to_dict(self) -> dict[str, Any]:
+        """The state as plain values, exact."""
+        quiet = None if self._quiet_until == -np.inf else self._quiet_until
+        runs = {name: getattr(self, name).tolist() for name in (*_RUNS, "_probability")}
+        begin = [None if np.isnan(x) else float(x) for x in self._begin]
+        return {
+            **runs,
+            "_begin": begin,
+            "travelled": self._travelled,
+            "quiet": quiet,
+            "probability": self.probability,
+        }
+
+    def restore(self, state: Mapping[str, Any]) -> None:
+        """Take the state of `to_dict`; raises KeyError, TypeError or ValueError where it is none."""
+        for name in (*_RUNS, "_probability"):
+            setattr(self, name, np.array(state[name], dtype=float))
+        self._begin = np.array([np.nan if x is None else x for x in state["_begin"]], dtype=float)
+        self._travelled, self.probability = state["travelled"], float(state["probability"])
+        self._quiet_until = -np.inf if state["quiet"] is None else float(state["quiet"])
+
     def _take(self, x: Array, start: float, end: float, travelled: float) -> Told | None:
         driven = 0.0 if self._travelled is None else max(travelled - self._travelled, 0.0)
         self._travelled = travelled
@@ -78,7 +101,7 @@ class OnlineChanges:
         grown = self._probability * (1 - hazard)
         self._probability = np.append(grown, hazard)
         self._begin = np.append(self._begin, start)
-        for name, prior in zip(("_mean", "_count", "_shape", "_scale"), self._prior, strict=True):
+        for name, prior in zip(_RUNS, self._prior, strict=True):
             setattr(self, name, np.vstack([getattr(self, name), prior]))
         seen = np.isfinite(x)
         if seen.any():
@@ -107,7 +130,7 @@ class OnlineChanges:
             keep[: len(keep) - _MOST] = False
         if not keep.any() or keep.all():
             return
-        for name in ("_mean", "_count", "_shape", "_scale", "_probability", "_begin"):
+        for name in (*_RUNS, "_probability", "_begin"):
             setattr(self, name, getattr(self, name)[keep])
         self._probability = self._probability / self._probability.sum()
 

@@ -10,7 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from terragrip.ground.emissions import CELLS, Emissions
+from terragrip.ground.emissions import Emissions
+from terragrip.ground.unknown import CELLS
 from terragrip.soil.blocks import Blocks
 
 Array = NDArray[np.float64]

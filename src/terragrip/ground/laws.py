@@ -1,0 +1,62 @@
+"""Small laws that emissions are made of: normal densities, a broad law for strays, and tempering."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from terragrip.physics.adhesion import CURVES
+from terragrip.soil.blocks import PERIOD, Blocks
+from terragrip.soil.signature import OFFSET
+
+Array = NDArray[np.float64]
+
+LEVEL_TIME, ROUGHNESS_TIME = 3.5, 1.3
+"""Seconds for which neighbouring blocks repeat each other. All soils alike: else the sharper of two laws would win by its name."""
+BROAD_RESISTANCE, BROAD_SCALE = (0.12, 0.08), (0.85, 0.5)
+"""Mean and SD over all grounds of rho_s (0.02 to 0.3 on fields and roads; ASABE D497) and of the scale of mu's curve."""
+ADHESION_ROUGHNESS = 0.6
+"""ln SD within a block of mu, less that of rho_s: what the simulated campaign's soils have in the mean."""
+_BROAD_ROUGHNESS = (-5.6, 0.8)
+_STRAY = 0.01
+"""Share of blocks that a soil leaves to the broad law: a stone, a rut, a step of the tool."""
+
+
+def tempered(logs: Array, seconds: float) -> Array:
+    """Log likelihoods of blocks that repeat each other for `seconds`: each counts for PERIOD / seconds."""
+    return logs * min(PERIOD / seconds, 1.0)
+
+
+def mixed(mine: Array, broad: Array) -> Array:
+    """Log density of a law with strays."""
+    return np.asarray(np.logaddexp(np.log(1 - _STRAY) + mine, np.log(_STRAY) + broad))
+
+
+def normal(error: Array, variance: Array) -> Array:
+    """Log density of a normal law, elementwise."""
+    return np.asarray(-0.5 * (error**2 / variance + np.log(2 * np.pi * variance)))
+
+
+def bivariate(off: Array, covariance: Array) -> Array:
+    """Log density of a normal law of pairs, (blocks, 2) to (blocks,)."""
+    (a, b), (_, c) = covariance
+    determinant = a * c - b * b
+    x, y = off[..., 0], off[..., 1]
+    square = (c * x * x - 2 * b * x * y + a * y * y) / determinant
+    return np.asarray(-0.5 * square - np.log(2 * np.pi) - 0.5 * np.log(determinant))
+
+
+def broad_level(blocks: Blocks) -> Array:
+    """Log density of rho_s and mu, independent and broad, mu about the paper's prototype curve (blocks,)."""
+    shape = CURVES["exponential"].value(blocks.mean_slip, {"a": 1.0})
+    spread = BROAD_SCALE[1] * np.abs(shape) + OFFSET
+    mean, sd = BROAD_RESISTANCE
+    resistance = normal(blocks.resistance - mean, sd**2 + blocks.resistance_variance)
+    return resistance + normal(blocks.mean_adhesion - BROAD_SCALE[0] * shape, spread**2)
+
+
+def broad_roughness(roughness: Array) -> Array:
+    """Log density of the roughness of any ground (blocks,)."""
+    mean, sd = _BROAD_ROUGHNESS
+    off = roughness - np.array([mean, mean + ADHESION_ROUGHNESS])
+    return normal(off[:, 0], np.full(len(off), sd**2)) + normal(off[:, 1], np.full(len(off), sd**2))

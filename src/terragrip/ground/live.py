@@ -1,0 +1,150 @@
+"""The ground while driving: estimates in, one by one; every half second the soils' probabilities, and changes as they are told.
+
+The same blocks, the same model and the same code as for a whole drive looked at without looking ahead: identical results.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any, Self
+
+import numpy as np
+
+from terragrip.errors import InputError
+from terragrip.ground.changes import Change
+from terragrip.ground.emissions import Emissions
+from terragrip.ground.online_changes import OnlineChanges, OnlineSettings
+from terragrip.ground.recognition import ForwardFilter, by_soil
+from terragrip.soil.blocks import PERIOD, Blocks, blocks_of, driven_wheels, needed_columns
+from terragrip.soil.library import SoilLibrary
+
+if TYPE_CHECKING:
+    from terragrip.estimation import Estimate, TractionEstimator
+
+_VERSION = 1
+
+
+@dataclass(frozen=True)
+class GroundState:
+    """What is known at the end of a block. `time` [s]: of the row that ended it; `soil`: the most probable; `probabilities` of all soils.
+
+    `known`: whether the block told of the ground (else the probabilities are carried on). `change`: a change told now, or None.
+    """
+
+    time: float
+    soil: str
+    probabilities: Mapping[str, float]
+    known: bool
+    change: Change | None
+
+
+class LiveGround:
+    """Follows the ground along the estimates of one drive.
+
+    estimator: the estimator that the estimates come from; told of a new ground (`new_ground()`) at every change, so that its adhesion curve
+    starts anew. library: the known soils; without one every soil is unknown, and changes are told only.
+    """
+
+    def __init__(
+        self,
+        estimator: TractionEstimator,
+        library: SoilLibrary | None = None,
+        changes: OnlineSettings | None = None,
+    ) -> None:
+        self.estimator = estimator
+        self._axle_of = driven_wheels(estimator.vehicle)
+        optional = [f"{n}_std" for n in needed_columns(tuple(self._axle_of))[3:]]
+        loads = [f"vertical_load_{axle}" for axle in dict.fromkeys(self._axle_of.values())]
+        every = (*needed_columns(tuple(self._axle_of)), *optional, *loads)
+        there = {"time", "event", *estimator.columns}
+        self._columns = tuple(name for name in every if name in there)
+        self._emissions = Emissions(dict(library.soils) if library else {}, estimator.method)
+        self._filter = ForwardFilter.begin(self._emissions)
+        self._changes = OnlineChanges(changes)
+        self._origin: float | None = None
+        self._number = 0
+        self._before: tuple[int, int] | None = None
+        self._rows: list[list[Any]] = []
+
+    def update(self, estimate: Estimate) -> GroundState | None:
+        """Take the next estimate; returns the state where it ends a block, else None."""
+        if self._origin is None:
+            self._origin = estimate.time
+        number = int(np.floor((estimate.time - self._origin) / PERIOD + 1e-9))
+        state = None
+        if number != self._number and self._rows:
+            state = self._close(estimate.time)
+        self._number = number
+        self._rows.append([estimate[name] for name in self._columns])
+        return state
+
+    def finish(self) -> GroundState | None:
+        """The state after the last, unfinished block; None where there is none. Nothing may follow."""
+        return self._close(float(self._rows[-1][0])) if self._rows else None
+
+    def _close(self, end: float) -> GroundState:
+        block = self._block(end)
+        self._before = (int(block.number[0]), int(block.streak[0]))
+        self._rows.clear()
+        probabilities = by_soil(self._filter.update(block).filtered)[0]
+        told = self._changes.update(block)
+        change = Change(told[0].time, told[0].std, told[0].probability, {}, told[0].told) if told else None
+        if change is not None:
+            self.estimator.new_ground()
+        names = self._emissions.names
+        by_name = {name: float(p) for name, p in zip(names, probabilities, strict=True)}
+        return GroundState(end, names[int(probabilities.argmax())], by_name, bool(block.known[0]), change)
+
+    def _block(self, end: float) -> Blocks:
+        columns = dict(zip(self._columns, map(np.array, zip(*self._rows, strict=True)), strict=True))
+        block = blocks_of(columns, self._axle_of, self._origin, self._before)
+        return replace(block, end=np.array([end]))
+
+    def snapshot(self) -> bytes:
+        """Everything needed to go on later, bit for bit: the state, not the library, as JSON."""
+        state = {
+            "version": _VERSION,
+            "soils": list(self._emissions.soils),
+            "columns": list(self._columns),
+            "origin": self._origin,
+            "number": self._number,
+            "before": self._before,
+            "rows": self._rows,
+            "probabilities": self._filter.probabilities.tolist(),
+            "travelled": self._filter.travelled,
+            "changes": self._changes.to_dict(),
+        }
+        return json.dumps(state).encode()
+
+    @classmethod
+    def restore(
+        cls,
+        data: bytes,
+        estimator: TractionEstimator,
+        library: SoilLibrary | None = None,
+        changes: OnlineSettings | None = None,
+    ) -> Self:
+        """Go on from a snapshot with the same estimator and library; raises InputError where it is damaged or of others."""
+        found = cls(estimator, library, changes)
+        try:
+            state = json.loads(data)
+            same = (
+                state["version"] == _VERSION
+                and state["soils"] == list(found._emissions.soils)
+                and state["columns"] == list(found._columns)
+            )
+            if same:
+                found._origin, found._number, found._rows = state["origin"], state["number"], state["rows"]
+                found._before = None if state["before"] is None else (state["before"][0], state["before"][1])
+                found._filter.probabilities = np.array(state["probabilities"], dtype=float)
+                found._filter.travelled = state["travelled"]
+                found._changes.restore(state["changes"])
+        except (ValueError, KeyError, TypeError, IndexError) as error:
+            raise InputError(f"the snapshot of the ground is damaged ({error})", mend="start anew") from None
+        if not same:
+            raise InputError(
+                "the snapshot of the ground is of another version, vehicle or library", mend="start anew"
+            )
+        return found

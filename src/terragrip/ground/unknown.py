@@ -1,0 +1,79 @@
+"""The soil that nobody knows: any soil on a grid of what soils can be.
+
+One broad law would not do: over a stretch, a known soil that fits badly has the better density in every block than a law that is broad
+in every block. A cell of the grid is as sharp as a known soil is, so that the cell which fits wins over known soils that do not. That
+there are many cells, each as probable as the rest, is what a known soil that fits has ahead (Occam).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from terragrip.ground.laws import (
+    ADHESION_ROUGHNESS,
+    LEVEL_TIME,
+    ROUGHNESS_TIME,
+    bivariate,
+    broad_level,
+    broad_roughness,
+    mixed,
+    normal,
+    tempered,
+)
+from terragrip.physics.adhesion import CURVES
+from terragrip.soil.blocks import Blocks
+from terragrip.soil.signature import OFFSET
+
+Array = NDArray[np.float64]
+
+UNKNOWN = "unknown"
+
+RESISTANCES = np.array([0.03, 0.06, 0.09, 0.12, 0.16, 0.21, 0.27])
+"""rho_s of fields and roads (ASABE D497)."""
+SCALES = np.array([0.15, 0.22, 0.33, 0.47, 0.66, 0.9, 1.2, 1.6])
+"""Scale a of the paper's prototype curve: ice to dry concrete."""
+ROUGHNESSES = np.array([-6.4, -5.7, -5.0, -4.3])
+"""ln of rho_s's SD within a block."""
+CELLS = RESISTANCES.size * SCALES.size * ROUGHNESSES.size
+"""How many soils the unknown one may be."""
+
+# Within such a soil, as the simulated campaign's soils have it in the mean.
+_SCALE_SPREAD = 0.12
+_RESISTANCE_SPREAD = 5.0  # SD of a block's rho_s over the SD within blocks: rough soils vary at every length
+_LEAST_RESISTANCE_SD = 0.01
+_ROUGHNESS_COVARIANCE = np.array([[0.50, 0.24], [0.24, 0.32]])
+
+
+def cells(blocks: Blocks, roughness: Array | None) -> Array:
+    """Tempered log likelihoods (blocks, CELLS) of known blocks; `roughness` (blocks, 2), None where it is not told."""
+    rows = len(blocks)
+    broad = broad_level(blocks)[:, None, None, None]
+    adhesion = _adhesion(blocks)[:, None, :, None]
+    spread = (_RESISTANCE_SPREAD * np.exp(ROUGHNESSES)) ** 2 + _LEAST_RESISTANCE_SD**2
+    off = blocks.resistance[:, None, None] - RESISTANCES
+    resistance = normal(off, spread[:, None] + blocks.resistance_variance[:, None, None])[:, :, None, :]
+    out = tempered(mixed(adhesion + resistance, broad), LEVEL_TIME)
+    if roughness is not None:
+        middle = np.column_stack([ROUGHNESSES, ROUGHNESSES + ADHESION_ROUGHNESS])
+        texture = bivariate(roughness[:, None, :] - middle, _ROUGHNESS_COVARIANCE)
+        out = (
+            out
+            + tempered(mixed(texture, broad_roughness(roughness)[:, None]), ROUGHNESS_TIME)[:, :, None, None]
+        )
+    return np.asarray(out.reshape(rows, CELLS))
+
+
+def _adhesion(blocks: Blocks) -> Array:
+    """Log density of mu about the curve of each scale, (blocks, scales); as `signature.curve_error` has it."""
+    curve = CURVES["exponential"]
+    shape = (curve.value(blocks.slip, {"a": 1.0}) * blocks.share).sum(axis=1)[:, None]
+    slope = curve.slope(blocks.slip, {"a": 1.0})[:, None, :]
+    scale = SCALES * np.abs(shape) + OFFSET
+    error = (blocks.mean_adhesion[:, None] - SCALES * shape) / scale
+    known = np.sqrt(
+        blocks.adhesion_variance[:, None, :]
+        + (SCALES[:, None] * slope) ** 2 * blocks.slip_variance[:, None, :]
+    )
+    own = ((known * blocks.share[:, None, :]).sum(axis=2) / scale) ** 2
+    return normal(error, _SCALE_SPREAD**2 + own) - np.log(scale)
