@@ -36,7 +36,15 @@ def test_every_file_is_there_and_nothing_else(
     assert result.page == folder / "index.html"
     assert {path.name for path in result.estimates} == {"fine-03.parquet", "multi1.parquet", "multi2.parquet"}
     names = {path.name for path in folder.iterdir()}
-    assert names == {"index.html", "figures", "estimates", "scores.json", "vehicle.yaml"}
+    assert names == {
+        "index.html",
+        "report.pdf",
+        "figures",
+        "estimates",
+        "scores.json",
+        "soils.json",
+        "vehicle.yaml",
+    }
     assert not [path for path in folder.rglob("*") if path.name.startswith(".")]
     for path in result.estimates:
         table = Estimates.read(path)
@@ -78,7 +86,7 @@ def test_the_page_says_simulated_and_loads_nothing(
     assert "0.848" in html
     assert not re.search(r"""(?:src|href)\s*=\s*["'](?!#)""", html)
     captions = re.findall(r"<figcaption>(.*?)</figcaption>", html, re.DOTALL)
-    assert len(captions) == 7
+    assert len(captions) == 13
     assert sum("imulated" in caption for caption in captions) >= 6
 
 

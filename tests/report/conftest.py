@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
@@ -10,6 +12,8 @@ import pytest
 
 from terragrip.report.runs import Run
 from terragrip.vehicle import Vehicle
+
+sys.path.insert(0, str(Path(__file__).parent))
 
 WHEELS = ("fl", "fr", "rl", "rr")
 YAW_RATE = 0.1

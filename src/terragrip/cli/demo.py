@@ -32,3 +32,9 @@ def command(
     if not quiet:
         print(f"{len(result.estimates)} runs simulated, estimated and scored in {result.seconds:.0f} s")
         print(f"The page: {result.page}")
+        if result.pdf is None:
+            from terragrip.report.pdf import EXTRA
+
+            print(f"No PDF: plutoprint is not installed; {EXTRA}")
+        else:
+            print(f"The PDF: {result.pdf}")

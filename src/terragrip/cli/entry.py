@@ -18,6 +18,7 @@ from terragrip.cli.failure import INTERRUPTED, report
 from terragrip.cli.ground import command as ground
 from terragrip.cli.inspect import command as inspect
 from terragrip.cli.live import command as live
+from terragrip.cli.report import command as report_command
 from terragrip.cli.simulate import command as simulate
 from terragrip.cli.soils import command as soils
 from terragrip.cli.studio import command as studio
@@ -36,6 +37,7 @@ app.command("estimate")(estimate)
 app.command("calibrate")(calibrate)
 app.command("soils")(soils)
 app.command("ground")(ground)
+app.command("report")(report_command)
 app.command("simulate")(simulate)
 app.command("live")(live)
 app.command("studio")(studio)

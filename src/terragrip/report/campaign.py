@@ -6,6 +6,7 @@ import signal
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeVar
 
@@ -18,6 +19,8 @@ if TYPE_CHECKING:
     from terragrip.estimation.calibration import Calibration
     from terragrip.recording import Recording
     from terragrip.simulation import SimulationResult
+    from terragrip.soil.estimates import GatheredRuns
+    from terragrip.soil.learn import Campaign, RunPairs
     from terragrip.vehicle import Vehicle
 
 CAMPAIGN = "campaign"
@@ -36,7 +39,8 @@ Result = TypeVar("Result")
 class EstimatedRun:
     """One run of the campaign. `run`, the whole tables, is kept of the benchmarks only; the rest is small.
 
-    `path`: its estimates by the default method. `duration` [s].
+    `path`: its estimates by the default method. `duration` [s]. `gathered`: what the soils'
+    curves are learned from; `true_pairs`: true slip and adhesion of the same rows.
     """
 
     name: str
@@ -46,6 +50,8 @@ class EstimatedRun:
     coverage: tuple[Coverage, ...]
     comparisons: tuple[Comparison, ...]
     truth_scores: tuple[TruthScore, ...]
+    gathered: GatheredRuns
+    true_pairs: tuple[RunPairs, ...]
     run: Run | None
 
 
@@ -71,6 +77,17 @@ class EstimatedCampaign:
     def coverage(self) -> list[Coverage]:
         """Of all runs, default method."""
         return [item for run in self.runs for item in run.coverage]
+
+    @cached_property
+    def soils(self) -> Campaign:
+        """The soils' curves from the estimates of all runs."""
+        from terragrip.soil.estimates import GatheredRuns
+        from terragrip.soil.learn import Campaign
+
+        every = GatheredRuns()
+        for run in self.runs:
+            every.join(run.gathered)
+        return every.learn() if every.pairs else Campaign({}, {}, ())
 
     @property
     def benchmarks(self) -> list[Run]:
@@ -156,11 +173,15 @@ def _record(name: str, seed: int) -> tuple[str, Recording]:
 def _estimate(name: str, seed: int, vehicle: Vehicle, folder: Path) -> EstimatedRun:
     """One run from scenario to saved estimates and scores."""
     from terragrip.estimation import DEFAULT, METHODS, estimate
+    from terragrip.report.campaign_soils import true_pairs
+    from terragrip.soil.estimates import GatheredRuns
 
     result = _simulated(name, seed)
     path = folder / f"{name}.parquet"
     estimates = estimate(result.recording, vehicle, method=DEFAULT)
     estimates.write(path)
+    gathered = GatheredRuns()
+    gathered.add(estimates, name)
     shown = _run(name, estimates, result, vehicle)
     comparisons: list[Comparison] = []
     scores: list[TruthScore | None] = []
@@ -179,6 +200,8 @@ def _estimate(name: str, seed: int, vehicle: Vehicle, folder: Path) -> Estimated
         tuple(run_coverage(shown)),
         tuple(comparisons),
         tuple(score for score in scores if score is not None),
+        gathered,
+        tuple(true_pairs(estimates, result, name)),
         shown if name in BENCHMARKS else None,
     )
 

@@ -11,10 +11,20 @@ from typing import Any
 
 from terragrip import __version__
 from terragrip.errors import InputError
-from terragrip.report import sections
+from terragrip.report import residuals, sections, soil_sections
 from terragrip.report.campaign import BENCHMARKS, EstimatedCampaign, Progress, estimate_campaign
+from terragrip.report.campaign_soils import fits_of_truth, soils_of_scenario
 from terragrip.report.intervals import pooled
-from terragrip.report.page import Headline, Page, number, percent, write_page, write_whole
+from terragrip.report.page import (
+    Headline,
+    Page,
+    number,
+    percent,
+    require_drawing,
+    write_page,
+    write_whole,
+)
+from terragrip.report.pdf import pdf_possible, write_pdf
 from terragrip.report.runs import Run
 from terragrip.report.scores import (
     PAPER_NRMSE,
@@ -30,9 +40,11 @@ SEED = 0
 
 @dataclass(frozen=True)
 class DemoResult:
-    """Where the demo's files lie, what it scored, and how long it took [s]."""
+    """Where the demo's files lie, what it scored, and how long it took [s]. `pdf` is None where nothing can print it."""
 
     page: Path
+    pdf: Path | None
+    soils: Path
     scores: Path
     estimates: tuple[Path, ...]
     comparisons: tuple[Comparison, ...]
@@ -50,8 +62,9 @@ def run_demo(
 
     Parameters
     ----------
-    output: folder, made if it is not there. It gets index.html, figures/*.svg, scores.json, vehicle.yaml
-        (calibrated) and estimates/<run>.parquet; a file is written whole or not at all.
+    output: folder, made if it is not there. It gets index.html, report.pdf (where plutoprint is installed),
+        figures/*.svg, scores.json, soils.json, vehicle.yaml (calibrated) and estimates/<run>.parquet; a file is written whole
+        or not at all.
     seed: of the whole campaign. workers: processes.
     progress: called after each run with steps done, steps in all, and what was just done.
     runs: names of the campaign's runs to take; all by default. The benchmarks multi1 and multi2 are always
@@ -61,7 +74,7 @@ def run_demo(
     KeyboardInterrupt passes through once the workers have stopped.
     """
     begin = time.monotonic()
-    _require_drawing()
+    require_drawing()
     folder = output / "estimates"
     try:
         folder.mkdir(parents=True, exist_ok=True)
@@ -73,9 +86,15 @@ def run_demo(
     seconds = time.monotonic() - begin
     scores = output / "scores.json"
     write_whole(scores, json.dumps(_scores(campaign, seed), indent=2) + "\n")
-    page = write_page(_page(campaign, seed, seconds), output)
+    soils = output / "soils.json"
+    campaign.soils.library({"simulated": True, "seed": seed}).write(soils)
+    page = _page(campaign, seed, seconds)
+    written = write_page(page, output)
+    printed = write_pdf(page, output / "report.pdf") if pdf_possible() else None
     paths = tuple(item.path for item in campaign.runs)
-    return DemoResult(page, scores, paths, tuple(campaign.comparisons), time.monotonic() - begin)
+    return DemoResult(
+        written, printed, soils, scores, paths, tuple(campaign.comparisons), time.monotonic() - begin
+    )
 
 
 def _page(campaign: EstimatedCampaign, seed: int, seconds: float) -> Page:
@@ -84,6 +103,13 @@ def _page(campaign: EstimatedCampaign, seed: int, seconds: float) -> Page:
 
     runs, main = campaign.runs, campaign.benchmarks[-1]
     minutes = sum(item.duration for item in runs) / 60
+    true_pairs = [part for run in runs for part in run.true_pairs]
+    truth = soils_of_scenario(main.name, true_pairs)
+    curves = soil_sections.told_by_all(
+        campaign.soils, truth=truth, true_pairs=fits_of_truth(campaign.soils, true_pairs)
+    )
+    tire = campaign.vehicle.tire_rolling_resistance
+    scales = {name: soil.parameters["a"] for name, soil in truth.items()}
     return Page(
         "The field campaign, simulated and estimated",
         f"{len(runs)} simulated runs of the robot of Kobelski, Osinenko and Streif (2021), {minutes:.0f} minutes "
@@ -92,8 +118,14 @@ def _page(campaign: EstimatedCampaign, seed: int, seconds: float) -> Page:
         (
             sections.tracking(main, _sensor_prose(main)),
             sections.slip_and_resistance(main),
-            sections.methods(campaign.comparisons, campaign.truth_scores, DEFAULT, _METHOD_PROSE),
+            sections.online_curve(main, scales, "that the soils were made with"),
+            soil_sections.both_maxima(curves, tire),
+            soil_sections.fits(curves, campaign.soils.not_fitted),
+            soil_sections.trust(curves),
+            soil_sections.what_is_missing(curves),
             sections.soils(main, campaign.benchmarks),
+            residuals.section(main),
+            sections.methods(campaign.comparisons, campaign.truth_scores, DEFAULT, _METHOD_PROSE),
             sections.honesty(main, campaign.coverage),
             sections.calibrated(campaign.calibration),
         ),
@@ -181,12 +213,3 @@ def _scores(campaign: EstimatedCampaign, seed: int) -> dict[str, Any]:
         "truth": [score.to_dict() for score in campaign.truth_scores],
         "coverage_95": {item.quantity: item.share() for item in pooled(campaign.coverage)},
     }
-
-
-def _require_drawing() -> None:
-    """Tell before the long work, not after it, that drawing is not possible."""
-    from importlib.util import find_spec
-
-    missing = [name for name in ("matplotlib", "jinja2") if find_spec(name) is None]
-    if missing:
-        raise InputError(f"{missing[0]} is not installed", mend="pip install 'terragrip[report]'")

@@ -108,31 +108,46 @@ def cross_table(crosses: Iterable[Cross], what: str) -> Table:
     by_soil: dict[str, dict[str, Cross]] = {}
     for cross in crosses:
         by_soil.setdefault(cross.soil, {})[cross.voice] = cross
+    voices = [v for v in ("measured", "estimated", "true") if any(v in said for said in by_soil.values())]
+    others = [v for v in voices if v != "estimated"]
+    named = {"measured": "sensor", "estimated": "estimated", "true": "true"}
     rows = []
     for soil, said in by_soil.items():
-        estimated, measured, true = said.get("estimated"), said.get("measured"), said.get("true")
-        trio = (measured, estimated, true)
-        spread = (f"{number(c.traction)} ± {number(c.traction_std)}" if c else "–" for c in trio)
-        apart = (
-            number(estimated.traction - other.traction) if estimated and other else "–"
-            for other in (measured, true)
-        )
-        rows.append((soil, *spread, *apart, *(number(c.slip) if c else "–" for c in trio)))
+        row = [soil, *(_spread(said.get(v)) for v in voices)]
+        row += [_apart(said.get("estimated"), said.get(v)) for v in others]
+        row += [number(said[v].slip) if v in said else "–" for v in voices]
+        rows.append(tuple(row))
     return Table(
-        f"Mean ± SD of {what} and mean slip by soil. The sensor's column is its F_x/F_z, which follows κ. The paper "
-        "finds its estimate of µ within .015 of its sensor on grass, wet and fine, and within .03 on coarse.",
-        ("soil", "sensor", "estimated", "true", "est. − sensor", "est. − true",
-         "s measured", "s estimated", "s true"),
+        f"Mean ± SD of {what} and mean slip by soil."
+        + (" The sensor's column is its F_x/F_z, which follows κ." if "measured" in voices else "")
+        + " The paper finds its estimate of µ within .015 of its sensor on grass, wet and fine, and within .03 on coarse.",
+        (
+            "soil",
+            *(named[v] for v in voices),
+            *(f"est. − {named[v]}" for v in others),
+            *(f"s {v}" for v in voices),
+        ),
         tuple(rows),
-    )  # fmt: skip
+    )
+
+
+def _spread(cross: Cross | None) -> str:
+    return f"{number(cross.traction)} ± {number(cross.traction_std)}" if cross else "–"
+
+
+def _apart(estimated: Cross | None, other: Cross | None) -> str:
+    return number(estimated.traction - other.traction) if estimated and other else "–"
 
 
 def _voices(run: Run, quantity: str) -> list[tuple[str, FloatArray, FloatArray]]:
-    """(voice, slip, traction) of every voice that `run` has both of."""
+    """(voice, slip, traction) of every voice there is. Estimates alone hold no measured slip: the sensor's traction then stands at the
+    estimated one."""
     wheel = run.shown_wheel
+    slip = run.estimated(f"slip_{wheel}")
+    measured = run.measured_slip()
     found = [
-        ("measured", run.measured_slip(), run.measured_ratio()),
-        ("estimated", run.estimated(f"slip_{wheel}"), run.estimated(f"{quantity}_{wheel}")),
+        ("measured", slip if measured is None else measured, run.measured_ratio()),
+        ("estimated", slip, run.estimated(f"{quantity}_{wheel}")),
         ("true", run.true(f"slip_{wheel}"), run.true(f"{quantity}_{wheel}")),
     ]
     return [(voice, slip, mu) for voice, slip, mu in found if slip is not None and mu is not None]

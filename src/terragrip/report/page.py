@@ -63,8 +63,11 @@ class Page:
     facts: tuple[tuple[str, str], ...] = field(default=())
 
 
-def render(page: Page) -> str:
-    """The page as one HTML document, styles and figures inside. Raises InputError without Jinja2."""
+def render(page: Page, print_css: str = "") -> str:
+    """The page as one HTML document, styles and figures inside; `print_css` goes behind the page's own styles.
+
+    Raises InputError without Jinja2.
+    """
     try:
         import jinja2
     except ImportError:
@@ -78,7 +81,9 @@ def render(page: Page) -> str:
     )
     css = environment.loader.get_source(environment, "page.css")[0] if environment.loader else ""
     return environment.get_template("page.html").render(
-        page=page, css=css, inline=lambda picture: in_page(picture.svg, picture.alt, picture.name)
+        page=page,
+        css=css + print_css,
+        inline=lambda picture: in_page(picture.svg, picture.alt, picture.name),
     )
 
 
@@ -122,3 +127,12 @@ def percent(share: float | None, digits: int = 1) -> str:
 def names(words: Sequence[str]) -> str:
     """Words in a row: "a, b and c"."""
     return words[0] if len(words) == 1 else ", ".join(words[:-1]) + " and " + words[-1] if words else ""
+
+
+def require_drawing() -> None:
+    """Tell before the long work, not after it, that drawing is not possible. Raises InputError."""
+    from importlib.util import find_spec
+
+    missing = [name for name in ("matplotlib", "jinja2") if find_spec(name) is None]
+    if missing:
+        raise InputError(f"{missing[0]} is not installed", mend="pip install 'terragrip[report]'")

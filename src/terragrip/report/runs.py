@@ -136,8 +136,8 @@ class Run:
     def soil(self) -> NDArray[np.object_]:
         """The soil's label at each row, "" where there is none: a run without labels, or a transition.
 
-        A transition lasts until vehicle and tool are on the same soil (PHYSICS §7); a simulation's truth
-        knows it.
+        A transition lasts until vehicle and tool are on the same soil (PHYSICS §7): by a simulation's truth, else by the distance
+        driven and the vehicle's length.
         """
         for table in (self.estimates, self.recording, self.truth):
             if table is not None and "soil" in table:
@@ -145,6 +145,11 @@ class Run:
                 found = np.array(labels, dtype=object)
                 if self.truth is not None and "transition" in self.truth:
                     found[self.truth["transition"].to_numpy(dtype=np.bool_)] = ""
+                elif self.vehicle is not None and "distance" in self.estimates:
+                    from terragrip.soil.estimates import whole_length
+                    from terragrip.soil.transitions import settled
+
+                    found[~settled(self.estimated("distance"), found, whole_length(self.vehicle))] = ""
                 return found
         return np.full(len(self.time), "", dtype=object)
 
@@ -155,9 +160,11 @@ class Run:
 
     @cached_property
     def stuck(self) -> BoolArray:
-        """Where the vehicle is stuck: by the simulation's truth, else nowhere."""
+        """Where the vehicle is stuck: by the simulation's truth, else by the events of the estimates."""
         if self.truth is not None and "stuck" in self.truth:
             return self.truth["stuck"].to_numpy(dtype=np.bool_)
+        if "event" in self.estimates:
+            return np.asarray(self.estimates["event"].isin(["stuck", "push"]).to_numpy(), dtype=np.bool_)
         return np.zeros(len(self.time), dtype=np.bool_)
 
     @cached_property

@@ -168,7 +168,7 @@ def _table(rows: list[Comparison], caption: str, default: str) -> Table:
     strong = {i for i, (_, method) in enumerate(pairs) if method == default}
     if rows[0].against == "sensor":
         paper = (number(PAPER_R2_WHOLE), number(PAPER_R2_WITHOUT_STUCK), number(PAPER_NRMSE), "–")
-        cells.append(("multi2 of the paper, in the field, aukf-fs", "–", "–", "–", "–", *paper))
+        cells.append(("multi2, paper (field), aukf-fs", "–", "–", "–", "–", *paper))
     columns = ("R² whole", "R² without spell", "NRMSE without spell", "R² never stuck")
     return Table(
         caption + ": over every row; without the longest stuck spell, as the paper does; without any row in "

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -23,6 +23,8 @@ from terragrip.report.timeline import Lane, timeline
 if TYPE_CHECKING:
     from terragrip.estimation.calibration import Calibration
 
+WIDE = 0.3
+"""SD of the online curve's scale beyond which it does not set the plot's height."""
 ZOOM_MARGIN = 20.0
 """Seconds shown before and after what a zoom is about."""
 
@@ -74,6 +76,37 @@ def slip_and_resistance(run: Run) -> Section:
     return Section(f"slip-{run.name}", "Slip and soil resistance", (), (picture,))
 
 
+def online_curve(run: Run, scales: Mapping[str, float], told: str = "of the fits below") -> Section:
+    """The scale a of the adhesion curve as it is known while driving (paper, Fig. 2), beside each soil's own.
+
+    `scales`: a by soil, drawn as steps; `told`: whose they are, for the caption.
+    """
+    title = "The curve, known while driving"
+    if "curve_a" not in run.estimates:
+        return Section("online", title, omitted="Left out: these estimates carry no online curve.")
+    steps = np.array([scales.get(label, np.nan) for label in run.soil], dtype=np.float64)
+    estimate, std = run.estimated("curve_a"), run.estimated("curve_a_std")
+    known = run.moving & ~run.stuck & (std < WIDE)
+    top = np.nanmax(np.concatenate((estimate[known], steps, [0.5])))
+    lane = Lane(
+        "scale a of the curve [–]",
+        estimate,
+        std,
+        truth=steps,
+        limits=(0.0, 1.25 * float(top)),
+        reference=f"a {told}",
+    )
+    picture = Picture(
+        f"online-{run.name}",
+        timeline(run, [lane]),
+        f"{'Simulated run' if run.truth is not None else 'Run'} {run.name}: the scale a of µ(s) = a g(s), learned from single pairs "
+        f"of slip and adhesion as they come, with its 95 % interval, beside the a {told}. With a the whole curve is known at each instant; "
+        "the interval widens where slip is too small to teach, and begins anew where the ground changes.",
+        f"Scale of the adhesion curve over time in {run.name}",
+    )
+    return Section("online", title, (), (picture,))
+
+
 def methods(
     comparisons: Sequence[Comparison], scores: Sequence[TruthScore], default: str, prose: Sequence[str] = ()
 ) -> Section:
@@ -112,7 +145,11 @@ def soils(run: Run, together: Sequence[Run]) -> Section:
         "soils",
         draw_crosses(pooled, ("measured", "estimated", "true"), what),
         f"Mean ± SD of slip and {what} by soil over the {sim}runs {names([r.name for r in together])}, {said}. "
-        "Measured slip comes from the raw speeds, so its SD holds their noise.",
+        + (
+            "Measured slip comes from the raw speeds, so its SD holds their noise."
+            if run.recording is not None
+            else "The sensor's traction stands at the estimated slip."
+        ),
         "Crosses of slip and traction by soil, measured, estimated and true",
     )
     tables = [cross_table(pooled, what)]

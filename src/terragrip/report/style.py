@@ -35,6 +35,8 @@ CSS_VARIABLES = {
 }  # fmt: skip
 """Which CSS variable takes the place of which colour in a page."""
 
+WIDEST = 750.0
+"""Points of a figure that would fill a sheet's width: one of 9.6 inches leaves room for a second below it."""
 PAGE_SCALE = 1.52
 """Pixels of a page that a point of a figure may grow to: 9.6 inches fill the text's width."""
 
@@ -117,12 +119,17 @@ def in_page(svg: str, label: str, prefix: str) -> str:
     body = svg[svg.index("<svg") :]
     body = re.sub(r"<metadata>.*?</metadata>", "", body, count=1, flags=re.DOTALL)
     width = re.search(r'\bwidth="([\d.]+)pt"', body)
-    limit = f' style="max-width: {float(width[1]) * PAGE_SCALE:.0f}px"' if width else ""
+    points = float(width[1]) if width else 0.0
+    limit = (
+        f' style="max-width: {points * PAGE_SCALE:.0f}px; --print: {points / WIDEST:.0%}"' if width else ""
+    )
     body = re.sub(r'\b(width|height)="[\d.]+pt" ?', "", body, count=2)
     body = body.replace("<svg", f'<svg role="img" aria-label="{escape(label, quote=True)}"{limit}', 1)
     body = re.sub(r'\bid="', f'id="{prefix}-', body)
     body = re.sub(r'(xlink:href|href)="#', rf'\1="#{prefix}-', body)
     body = body.replace("url(#", f"url(#{prefix}-")
+    # Opacity of a group makes a printer paint it as a picture; of fill and stroke it stays drawing.
+    body = re.sub(r"(?<![-\w])opacity: ([\d.]+)", r"fill-opacity: \1; stroke-opacity: \1", body)
     for color, name in CSS_VARIABLES.items():
         body = re.sub(color, f"var(--{name})", body, flags=re.IGNORECASE)
     return body

@@ -32,7 +32,7 @@ COLUMNS = 900
 
 @dataclass(frozen=True)
 class Lane:
-    """One quantity of a run, ready to draw: (n,) each, None where there is none."""
+    """One quantity of a run, ready to draw: (n,) each, None where there is none. `reference`: what `truth` is called."""
 
     label: str
     estimate: FloatArray
@@ -40,6 +40,7 @@ class Lane:
     measured: FloatArray | None = None
     truth: FloatArray | None = None
     limits: tuple[float, float] | None = None
+    reference: str = "truth"
 
 
 def timeline(run: Run, lanes: list[Lane], window: tuple[float, float] | None = None) -> str:
@@ -146,7 +147,7 @@ def _draw_lane(plot: Axes, time: FloatArray, lane: Lane, rows: BoolArray) -> Non
         )
     plot.plot(*slots(time, lane.estimate[rows]), color=ESTIMATED, label="estimate")
     if lane.truth is not None:
-        plot.plot(*slots(time, lane.truth[rows]), color=TRUE, linewidth=0.8, label="truth")
+        plot.plot(*slots(time, lane.truth[rows]), color=TRUE, linewidth=0.8, label=lane.reference)
     plot.set_ylabel(lane.label)
     if lane.limits is not None:
         plot.set_ylim(*lane.limits)

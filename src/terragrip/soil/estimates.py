@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -36,45 +36,83 @@ def soils_of(
     `soil`: the name of all rows, for logs without labels. Other arguments as `learn_soils`. Raises InputError on a file that is no table
     of estimates, on one file given twice, and where no row is labelled.
     """
-    paths = [Path(file) for file in files]
-    twins = [
-        path for i, path in enumerate(paths) if path.resolve() in {other.resolve() for other in paths[:i]}
-    ]
-    if twins:
-        raise InputError("is given twice", file=twins[0], mend="name each run once")
-    parts: list[RunPairs] = []
-    blocks: dict[str, list[Blocks]] = {}
-    makers: set[str] = set()
-    periods, masses, wheels = [], [], 1
+    paths = distinct(files)
+    gathered = GatheredRuns()
     for number, path in enumerate(paths, 1):
-        estimates = Estimates.read(path)
-        parts += pairs_of(estimates, path.stem, soil)
-        for name, found in labelled_blocks(estimates, soil, os.fspath(path)):
-            blocks.setdefault(name, []).append(found)
-        makers.add(maker(estimates))
-        periods.append(float(np.median(np.diff(estimates.time))) if len(estimates) > 1 else np.nan)
-        masses.append(estimates.vehicle.mass)
-        wheels = max(wheels, len(estimates.wheels))
+        gathered.add(Estimates.read(path), path.stem, soil, os.fspath(path))
         if progress:
             progress(number, len(paths) + 1)
-    names = ", ".join(path.name for path in paths[:3]) + (
-        f" and {len(paths) - 3} more" if len(paths) > 3 else ""
-    )
-    campaign = learn_soils(
-        parts,
-        curve,
-        bins,
-        float(np.median(masses)),
-        float(np.nanmedian(periods)),
-        wheels,
-        source=f"{len(paths)} runs: {names}",
-    )
-    plain = {name: learned.soil for name, learned in campaign.soils.items()}
-    signed = with_signatures(plain, blocks, makers.pop() if len(makers) == 1 else "several methods")
-    learned = {name: replace(one, soil=signed[name]) for name, one in campaign.soils.items()}
+    campaign = gathered.learn(curve, bins)
     if progress:
         progress(len(paths) + 1, len(paths) + 1)
-    return replace(campaign, soils=learned)
+    return campaign
+
+
+def distinct(files: Sequence[str | os.PathLike[str]]) -> list[Path]:
+    """The files as paths. Raises InputError on one that is given twice."""
+    paths = [Path(file) for file in files]
+    seen: set[Path] = set()
+    for path in paths:
+        if path.resolve() in seen:
+            raise InputError("is given twice", file=path, mend="name each run once")
+        seen.add(path.resolve())
+    return paths
+
+
+@dataclass
+class GatheredRuns:
+    """What soils are learned from, run after run: usable pairs, blocks for signatures, and what the advice needs of the machine."""
+
+    runs: list[str] = field(default_factory=list)
+    pairs: list[RunPairs] = field(default_factory=list)
+    blocks: dict[str, list[Blocks]] = field(default_factory=dict)
+    makers: set[str] = field(default_factory=set)
+    periods: list[float] = field(default_factory=list)
+    masses: list[float] = field(default_factory=list)
+    wheels: int = 1
+
+    def add(self, estimates: Estimates, run: str, soil: str | None = None, file: str | None = None) -> None:
+        """Take one run; `soil` names all its rows, `file` is named where it is unusable."""
+        self.runs.append(run)
+        self.pairs += pairs_of(estimates, run, soil)
+        for name, found in labelled_blocks(estimates, soil, file or run):
+            self.blocks.setdefault(name, []).append(found)
+        self.makers.add(maker(estimates))
+        self.periods.append(float(np.median(np.diff(estimates.time))) if len(estimates) > 1 else np.nan)
+        self.masses.append(estimates.vehicle.mass)
+        self.wheels = max(self.wheels, len(estimates.wheels))
+
+    def join(self, other: GatheredRuns) -> None:
+        """Take all runs of `other` too."""
+        self.runs += other.runs
+        self.pairs += other.pairs
+        for name, found in other.blocks.items():
+            self.blocks.setdefault(name, []).extend(found)
+        self.makers |= other.makers
+        self.periods += other.periods
+        self.masses += other.masses
+        self.wheels = max(self.wheels, other.wheels)
+
+    def learn(
+        self, curve: AdhesionCurve | None = None, bins: Mapping[str, BinSettings] | None = None
+    ) -> Campaign:
+        """Fit every soil of what was gathered. Raises as `learn_soils`."""
+        names = ", ".join(self.runs[:3])
+        names += f" and {len(self.runs) - 3} more" if len(self.runs) > 3 else ""
+        campaign = learn_soils(
+            self.pairs,
+            curve,
+            bins,
+            float(np.median(self.masses)) if self.masses else None,
+            float(np.nanmedian(self.periods)) if self.periods else 0.01,
+            self.wheels,
+            source=f"{len(self.runs)} runs: {names}",
+        )
+        plain = {name: learned.soil for name, learned in campaign.soils.items()}
+        method = next(iter(self.makers)) if len(self.makers) == 1 else "several methods"
+        signed = with_signatures(plain, self.blocks, method)
+        learned = {name: replace(one, soil=signed[name]) for name, one in campaign.soils.items()}
+        return replace(campaign, soils=learned)
 
 
 def labelled_blocks(estimates: Estimates, soil: str | None, file: str) -> Iterator[tuple[str, Blocks]]:

@@ -1,0 +1,210 @@
+"""Adhesion-slip curves drawn: bins with their fit, and mu(s) and eta(s) with both maxima (the paper's curve figures)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from terragrip.physics.efficiency import tractive_efficiency
+from terragrip.report.style import (
+    BLUE,
+    GREEN,
+    INK,
+    MUTED,
+    ORANGE,
+    PURPLE,
+    new_figure,
+    soil_color,
+    styled,
+    to_svg,
+)
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+    from terragrip.soil.fit import AdhesionCurve
+    from terragrip.soil.learn import LearnedSoil
+    from terragrip.soil.library import Soil
+
+Array = NDArray[np.float64]
+
+SLIPS = np.linspace(0.0, 0.65, 131)
+"""Slips that curves are drawn at: the bins' range and a little more."""
+
+
+@dataclass(frozen=True)
+class SoilCurves:
+    """One soil's curve as everyone tells it.
+
+    `learned`: from these estimates. `paper`: the paper's soil of that name. `library`: of the library that was given. `truth`: what a
+    simulation made the soil with; `true_pairs`: the fit of `learned` on the simulation's true slip and adhesion. None where there is none.
+    """
+
+    name: str
+    learned: LearnedSoil
+    paper: Soil | None = None
+    library: Soil | None = None
+    truth: Soil | None = None
+    true_pairs: AdhesionCurve | None = None
+
+
+@dataclass(frozen=True)
+class Maxima:
+    """(slip, value) of the largest adhesion and of the largest tractive efficiency of one curve (paper eq. 7)."""
+
+    adhesion: tuple[float, float]
+    efficiency: tuple[float, float]
+
+
+def maxima(soil: Soil, tire_resistance: float) -> Maxima:
+    """Both maxima of `soil` on slips of 0 to 1, its mean resistance at every slip."""
+    from terragrip.physics.adhesion import CURVES, efficiency_peak
+
+    model = CURVES[soil.model]
+    parameters = {k: v for k, v in soil.parameters.items() if k != "intercept"}
+    return Maxima(
+        model.peak(parameters), efficiency_peak(model, parameters, _resistance(soil), tire_resistance)
+    )
+
+
+def draw_fits(curves: Sequence[SoilCurves], columns: int = 2) -> str:
+    """An SVG: a plot a soil, bin means with SD bars, the fit and whatever else tells the curve."""
+    columns = min(columns, len(curves))
+    rows = -(-len(curves) // columns)
+    wide = columns > 1
+    figure = new_figure(9.6 if wide else 8.4, (3.0 if wide else 4.4) * rows + 0.5)
+    with styled():
+        plots = figure.subplots(rows, columns, squeeze=False, sharex=True, sharey=wide)
+        named: dict[str, Any] = {}
+        for plot, curve in zip(plots.flat, curves, strict=False):
+            named |= _draw_fit(plot, curve)
+            if wide:
+                plot.set_title(curve.name)
+        for plot in plots.flat[len(curves) :]:
+            plot.remove()
+        for plot in plots[:, 0]:
+            plot.set_ylabel("adhesion µ [–]")
+        for i, plot in enumerate(plots.flat[: len(curves)]):
+            if i + columns >= len(curves):
+                plot.set_xlabel("slip s [–]")
+                plot.tick_params(labelbottom=True)
+        figure.legend(list(named.values()), list(named), loc="outside upper left", ncols=3 if wide else 4)
+        return to_svg(figure)
+
+
+def draw_both_maxima(curve: SoilCurves, tire_resistance: float) -> str:
+    """An SVG of one soil: mu(s) and eta(s) over slip, their maxima marked, the truth's beside them."""
+    figure = new_figure(8.4, 4.2)
+    with styled():
+        plot = figure.subplots()
+        voices: list[tuple[str, Soil, dict[str, Any]]] = [("", curve.learned.soil, {"linewidth": 1.8})]
+        if curve.truth is not None:
+            voices.append((" of the truth", curve.truth, {"linewidth": 0.9, "linestyle": "--"}))
+        slip = np.linspace(0.0, 1.0, 401)
+        for ending, soil, look in voices:
+            eta = _efficiency(soil, slip, tire_resistance)
+            for label, values, color in (
+                ("adhesion µ", soil.value(slip), BLUE),
+                ("efficiency η", eta, GREEN),
+            ):
+                plot.plot(slip, values, color=INK if ending else color, label=f"{label}{ending}", **look)
+        peaks = maxima(curve.learned.soil, tire_resistance)
+        for (at, height), what, color, marker in (
+            (peaks.adhesion, "µ", BLUE, "o"),
+            (peaks.efficiency, "η", GREEN, "s"),
+        ):
+            if np.isfinite(at):
+                plot.plot([at], [height], marker, color=color, markersize=7)
+                said = f"largest {what}: {height:.2f} at {at:.0%} slip"
+                plot.annotate(said, (at, height), (9, 9), textcoords="offset points", color=INK, fontsize=9)
+        plot.set_xlim(0, 1)
+        plot.set_ylim(0, 1.15 * max(peaks.adhesion[1], peaks.efficiency[1]))
+        plot.set_xlabel("slip s [–]")
+        plot.set_ylabel("adhesion µ, efficiency η [–]")
+        figure.legend(loc="outside upper left", ncols=4)
+        return to_svg(figure)
+
+
+def draw_all_maxima(curves: Sequence[SoilCurves], tire_resistance: float) -> str:
+    """An SVG of all soils: mu(s) left, eta(s) right, the maxima marked."""
+    names = tuple(curve.name for curve in curves)
+    figure = new_figure(9.6, 3.7)
+    with styled():
+        left, right = figure.subplots(1, 2)
+        slip = np.linspace(0.0, 1.0, 401)
+        for curve in curves:
+            soil, color = curve.learned.soil, soil_color(curve.name, names)
+            peaks = maxima(soil, tire_resistance)
+            left.plot(slip, soil.value(slip), color=color, label=curve.name, linewidth=1.7)
+            right.plot(slip, _efficiency(soil, slip, tire_resistance), color=color, linewidth=1.7)
+            left.plot([peaks.adhesion[0]], [peaks.adhesion[1]], "o", color=color, markersize=5)
+            right.plot([peaks.efficiency[0]], [peaks.efficiency[1]], "s", color=color, markersize=5)
+        for plot, label in ((left, "adhesion µ [–]"), (right, "tractive efficiency η [–]")):
+            plot.set_xlabel("slip s [–]")
+            plot.set_ylabel(label)
+            plot.set_xlim(0, 1)
+            plot.set_ylim(bottom=0)
+        figure.legend(loc="outside upper left", ncols=max(len(curves), 1))
+        return to_svg(figure)
+
+
+def _draw_fit(plot: Axes, told: SoilCurves) -> dict[str, Any]:
+    """Draw one soil; the legend's entries by label."""
+    bins = told.learned.curve.bins_
+    used = bins.used
+    named: dict[str, Any] = {
+        "bins of the estimates, mean ± SD": plot.errorbar(
+            bins.slip[used],
+            bins.mean[used],
+            yerr=bins.std[used],
+            fmt="x",
+            color=MUTED,
+            ecolor=MUTED,
+            elinewidth=0.7,
+            markersize=4,
+        )
+    }
+    if told.learned.curve.samples_ is not None:
+        low, high = told.learned.curve.band(SLIPS)
+        named["95 % of the fit"] = plot.fill_between(SLIPS, low, high, color=BLUE, alpha=0.22, linewidth=0)
+    lines: list[tuple[str, Array | None, dict[str, Any]]] = [
+        ("fit to the bins", told.learned.curve.predict(SLIPS), {"color": BLUE, "linewidth": 1.8}),
+        ("mean of the ground", _of_ground(told), {"color": BLUE, "linewidth": 1.2, "linestyle": "--"}),
+        ("paper", _value(told.paper), {"color": ORANGE, "linewidth": 1.4, "linestyle": "-."}),
+        (
+            "library",
+            _value(told.library),
+            {"color": PURPLE, "linewidth": 1.4, "linestyle": (0, (5, 1, 1, 1))},
+        ),
+        ("simulated truth", _value(told.truth), {"color": INK, "linewidth": 0.9}),
+    ]
+    for label, values, look in lines:
+        if values is not None:
+            (named[label],) = plot.plot(SLIPS, values, **look)
+    plot.set_xlim(0, SLIPS[-1])
+    plot.set_ylim(bottom=0)
+    return named
+
+
+def _of_ground(told: SoilCurves) -> Array | None:
+    found = told.learned.ground_mean
+    if found is None:
+        return None
+    return told.learned.curve.predict(SLIPS) * (found.mean / found.plain)
+
+
+def _value(soil: Soil | None) -> Array | None:
+    return None if soil is None else soil.value(SLIPS)
+
+
+def _efficiency(soil: Soil, slip: Array, tire_resistance: float) -> Array:
+    eta = tractive_efficiency(soil.value(slip), _resistance(soil), tire_resistance, slip)
+    return np.asarray(eta, dtype=float)
+
+
+def _resistance(soil: Soil) -> float:
+    return soil.resistance[0] if soil.resistance else 0.0

@@ -1,0 +1,158 @@
+"""The report of any set of estimates: what they hold is shown, what they lack is said."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from terragrip import __version__
+from terragrip.errors import InputError
+from terragrip.estimation import Estimates
+from terragrip.report import residuals, sections, soil_sections
+from terragrip.report.page import Page, Section, Table, names, number
+from terragrip.report.runs import Run, label_stretches
+from terragrip.report.scores import Comparison, compare
+from terragrip.soil.estimates import GatheredRuns, distinct
+from terragrip.soil.learn import Campaign
+from terragrip.soil.library import SoilLibrary
+
+SHOWN = 2
+"""Runs drawn over time; the paper draws one and compares two."""
+
+
+@dataclass(frozen=True)
+class _Summary:
+    """A line of the table of runs."""
+
+    name: str
+    duration: float
+    distance: float
+    soils: tuple[str, ...]
+    method: str
+    events: str
+
+
+def report_of(
+    files: Sequence[str | os.PathLike[str]],
+    library: SoilLibrary | None = None,
+    title: str = "Traction report",
+    progress: Callable[[int, int], None] | None = None,
+) -> Page:
+    """The report of estimates files (Parquet, written by `terragrip estimate`).
+
+    library: soils to draw beside those learned here. progress: called with steps done and steps in all.
+    Raises InputError on a file that is no table of estimates or is given twice; whatever else is absent leaves its section out.
+    """
+    paths = distinct(files)
+    total = len(paths) + 2
+
+    def step(done: int) -> None:
+        if progress is not None:
+            progress(done, total)
+
+    summaries, shown, gathered = _read(paths, step)
+    campaign = gathered.learn() if gathered.pairs else Campaign({}, {}, ())
+    step(total - 1)
+    if not shown:
+        raise InputError(
+            "no row of these estimates moves",
+            file=paths[0],
+            mend="give estimates of a drive, not of a standstill",
+        )
+    main, together = shown[0], sorted(shown, key=lambda run: run.name)
+    curves = soil_sections.told_by_all(campaign, library)
+    tire = main.vehicle.tire_rolling_resistance if main.vehicle is not None else 0.0
+    comparisons: list[Comparison] = [c for run in together for c in compare(run)]
+    page = Page(
+        title,
+        f"{len(paths)} run{'s' * (len(paths) != 1)}, {sum(one.duration for one in summaries) / 60:.0f} minutes, "
+        f"{sum(one.distance for one in summaries):.0f} m, estimated by {names(sorted({one.method for one in summaries}))}. "
+        f"Drawn over time: {names([run.name for run in together])}.",
+        (
+            *(sections.tracking(run) for run in together),
+            sections.slip_and_resistance(main),
+            sections.online_curve(
+                main, {one.name: one.learned.soil.parameters.get("a", np.nan) for one in curves}
+            ),
+            soil_sections.both_maxima(curves, tire),
+            soil_sections.fits(curves, campaign.not_fitted),
+            soil_sections.trust(curves),
+            soil_sections.what_is_missing(curves),
+            sections.soils(main, together),
+            residuals.section(main),
+            sections.methods(comparisons, [], main.method),
+            sections.honesty(main, []),
+            _runs(summaries),
+        ),
+        facts=(
+            ("Made by", f"Terragrip {__version__}, terragrip report"),
+            ("Vehicle", main.vehicle.name if main.vehicle is not None else "–"),
+            (
+                "Estimates",
+                names([path.name for path in paths[:3]])
+                + (f" and {len(paths) - 3} more" if len(paths) > 3 else ""),
+            ),
+        ),
+    )
+    step(total)
+    return page
+
+
+def _read(
+    paths: Sequence[Path], step: Callable[[int], None]
+) -> tuple[list[_Summary], list[Run], GatheredRuns]:
+    """A summary of each run, the SHOWN most telling runs (most stretches of soil, then a sensor, then the longest), all pairs."""
+    summaries: list[_Summary] = []
+    kept: list[tuple[tuple[int, bool, float], Run]] = []
+    gathered = GatheredRuns()
+    for number_, path in enumerate(paths, 1):
+        estimates = Estimates.read(path)
+        if len(estimates) < 2:
+            raise InputError("holds fewer than two rows", file=path, mend="leave it out")
+        gathered.add(estimates, path.stem, file=str(path))
+        run = Run(path.stem, estimates.to_pandas(), estimates.method, vehicle=estimates.vehicle)
+        summaries.append(_summary(run))
+        if run.wheels and run.moving.any():
+            worth = (len(label_stretches(run.soil)), run.sensor_wheel is not None, summaries[-1].duration)
+            kept = sorted([*kept, (worth, run)], key=lambda one: one[0], reverse=True)[:SHOWN]
+        step(number_)
+    if kept and len(kept) == SHOWN and kept[1][0][0] < 2 <= kept[0][0][0]:
+        kept = kept[:1]  # a run on one soil says nothing beside one over several
+    return summaries, [run for _, run in kept], gathered
+
+
+def _summary(run: Run) -> _Summary:
+    distance = run.estimated("distance")[-1] if "distance" in run.estimates else np.nan
+    events = run.estimates["event"].value_counts() if "event" in run.estimates else {}
+    told = ", ".join(f"{kind} {count / len(run.time):.0%}" for kind, count in events.items() if kind)
+    return _Summary(
+        run.name,
+        float(run.time[-1] - run.time[0]),
+        float(np.nan_to_num(distance)),
+        run.soils,
+        run.method,
+        told or "–",
+    )
+
+
+def _runs(summaries: Sequence[_Summary]) -> Section:
+    table = Table(
+        "The runs of this report. Events: the share of rows that carry each.",
+        ("run", "duration [s]", "distance [m]", "soils", "method", "events"),
+        tuple(
+            (
+                one.name,
+                number(one.duration, 0),
+                number(one.distance, 0),
+                names(one.soils) or "unlabelled",
+                one.method,
+                one.events,
+            )
+            for one in summaries
+        ),
+    )
+    return Section("runs", "Runs", (), (table,))

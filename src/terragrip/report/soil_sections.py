@@ -1,0 +1,326 @@
+"""Sections of the report on soil curves: both maxima, fits, how far to trust them, what to drive next."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from terragrip.report.curves import SoilCurves, draw_all_maxima, draw_both_maxima, draw_fits, maxima
+from terragrip.report.page import Picture, Section, Table, names, number, percent
+from terragrip.soil.fit import FREE, AdhesionCurve
+from terragrip.soil.learn import Campaign
+from terragrip.soil.library import Soil, SoilLibrary
+from terragrip.soil.literature import paper_soils
+from terragrip.soil.missing import in_words
+
+FIRST = "hard"
+"""The soil that the paper shows alone; else the one with the most bins stands there."""
+NO_SOILS = "Left out: no sample of these estimates carries a soil label, so there is no curve to fit."
+
+
+def told_by_all(
+    campaign: Campaign,
+    library: SoilLibrary | None = None,
+    truth: Mapping[str, Soil] | None = None,
+    true_pairs: Mapping[str, AdhesionCurve] | None = None,
+) -> list[SoilCurves]:
+    """The campaign's soils, the one to show first in front, each with what paper, library and simulation tell of it."""
+    paper = paper_soils()
+    found = [
+        SoilCurves(
+            name,
+            learned,
+            paper.get(name),
+            library.get(name) if library is not None else None,
+            truth.get(name) if truth is not None else None,
+            true_pairs.get(name) if true_pairs is not None else None,
+        )
+        for name, learned in campaign.soils.items()
+    ]
+    return sorted(found, key=lambda one: (one.name != FIRST, -len(one.learned.soil.bins)))
+
+
+def both_maxima(curves: Sequence[SoilCurves], tire_resistance: float) -> Section:
+    """mu(s) and eta(s) with both maxima: the paper's argument for knowing the curve."""
+    title = "Adhesion and efficiency over slip"
+    if not curves:
+        return Section("maxima", title, omitted=NO_SOILS)
+    first = curves[0]
+    truth = ", dashed: the simulated truth" if first.truth is not None else ""
+    pictures: list[Picture | Table] = [
+        Picture(
+            f"maxima-{_stem(first.name)}",
+            draw_both_maxima(first, tire_resistance),
+            f"Adhesion µ(s) and tractive efficiency η(s) on {first.name} by the fitted curve{truth}. Most pull and best efficiency "
+            "lie at different slips: the curve says what each costs.",
+            f"Adhesion and efficiency over slip on {first.name}, both maxima marked",
+        )
+    ]
+    if len(curves) > 1:
+        pictures.append(
+            Picture(
+                "maxima",
+                draw_all_maxima(curves, tire_resistance),
+                "µ(s) (left) and η(s) (right) of every soil by its fitted curve; dots and squares mark the maxima.",
+                "Adhesion and efficiency over slip of every soil",
+            )
+        )
+    pictures.append(_maxima_table(curves, tire_resistance))
+    prose = (
+        "η = κ/(κ + ρ) (1 − s), with κ = µ − ρs and ρ = ρs + ρt (paper, eq. 7); ρs is the soil's mean over its samples, "
+        f"ρt = {number(tire_resistance)} the tyre's.",
+    )
+    return Section("maxima", title, prose, tuple(pictures))
+
+
+def fits(curves: Sequence[SoilCurves], not_fitted: Mapping[str, str]) -> Section:
+    """Bins and fits of every soil, and the paper's table with ours and the truth beside it."""
+    title = "Adhesion curves of the soils"
+    missed = tuple(f"{name}: not fitted, {why}." for name, why in not_fitted.items())
+    if not curves:
+        return Section(
+            "curves",
+            title,
+            omitted=NO_SOILS if not missed else "Left out: no soil could be fitted.",
+            prose=missed,
+        )
+    first, rest = curves[0], curves[1:]
+    said = _voices(curves)
+    settings = first.learned.curve.bins_.settings
+    how = (
+        f"Bins of {percent(settings.width, 0)} slip from {percent(settings.lower, 0)} to {percent(settings.upper, 0)}, each with at least "
+        f"{settings.minimum} samples; samples on a transition or under an event are left out."
+    )
+    content: list[Picture | Table] = [
+        Picture(
+            f"fit-{_stem(first.name)}",
+            draw_fits([first], 1),
+            f"Adhesion over slip on {first.name}: {said}. {how}",
+            f"Bins and fitted curve on {first.name}",
+        )
+    ]
+    if rest:
+        content.append(
+            Picture(
+                "fits",
+                draw_fits(rest),
+                f"The same on {names([one.name for one in rest])}: {said}."
+                + (
+                    " On grass slips above 40 % are too few and left out, as in the paper."
+                    if any(c.name == "grass" for c in rest)
+                    else ""
+                ),
+                "Bins and fitted curves of the other soils",
+            )
+        )
+    content += [_quality_table(curves), _scale_table(curves)]
+    return Section("curves", title, missed, tuple(content))
+
+
+def trust(curves: Sequence[SoilCurves]) -> Section:
+    """What the data fix and what not, whether the form follows them, what slip noise and varying ground do."""
+    title = "How far the curves can be trusted"
+    if not curves:
+        return Section("trust", title, omitted=NO_SOILS)
+    rows = tuple(_trust_row(one) for one in curves)
+    table = Table(
+        "Each fit's badge: do the data fix what was fitted (condition number; beyond 10 000 they do not), does its form follow them "
+        "(whole runs left out), what the spread of the slip estimate does to it, and a counted by metres of ground instead of by bins.",
+        (
+            "soil",
+            "data fix the fit",
+            "form follows",
+            "slip SD",
+            "parameter, corrected for slip noise",
+            "by metres of ground (95 %)",
+        ),
+        rows,
+    )
+    words = [f"{one.name}: {note}" for one in curves for note in one.learned.curve.notes_]
+    words += [
+        f"{one.name}: {one.learned.verdict.sentence}"
+        for one in curves
+        if one.learned.verdict is not None and not one.learned.verdict.follows
+    ]
+    return Section("trust", title, (_free_shape(curves[0]), *words), (table,))
+
+
+def what_is_missing(curves: Sequence[SoilCurves]) -> Section:
+    """Which slips lack data, and which pull and speed fill them."""
+    title = "What to drive next"
+    if not curves:
+        return Section("missing", title, omitted=NO_SOILS)
+    rows = tuple(
+        (
+            one.name,
+            f"{percent(gap.slip[0], 0)} to {percent(gap.slip[1], 0)}",
+            f"{number(max(gap.pull[0], 0), 0)} to {number(max(gap.pull[1], 0), 0)} N",
+            f"{number(gap.speed, 1)} m/s",
+            f"{number(max(gap.seconds, 1), 0)} s",
+            "yes" if gap.reachable else "no: the curve falls there",
+        )
+        for one in curves
+        for gap in one.learned.gaps
+    )
+    if not rows:
+        return Section("missing", title, ("Every slip bin of every soil holds enough samples.",))
+    words = tuple(
+        sentence for one in curves if one.learned.gaps for sentence in in_words(one.name, one.learned.gaps)
+    )
+    table = Table(
+        "Slips without enough samples, and the drawbar pull at which the soil's own curve puts the vehicle there on level ground.",
+        ("soil", "slips without data", "drawbar pull", "wheel speed", "at least", "a steady pull holds it"),
+        rows,
+    )
+    return Section("missing", title, words, (table,))
+
+
+def _quality_table(curves: Sequence[SoilCurves]) -> Table:
+    """NRMSE and R² of the fits: the paper's, ours, and the same fit on true pairs."""
+    true = any(one.true_pairs is not None for one in curves)
+    rows = []
+    for one in curves:
+        row = [one.name]
+        for key in ("nrmse", "r2"):
+            row += [number(getattr(one.paper, key, None)), number(getattr(one.learned.soil, key))]
+            row += [number(getattr(one.true_pairs, f"{key}_", None))] * true
+        rows.append(
+            (*row, str(len(one.learned.soil.bins)), str(len({part.run for part in one.learned.pairs})))
+        )
+    head = [
+        f"{what}: {who}" for what in ("NRMSE", "R²") for who in ("paper", "ours", *(["true pairs"] * true))
+    ]
+    ending = ' "True pairs": the same fit on the simulation\'s own slip and adhesion.' if true else ""
+    return Table(
+        "Quality of the fits on bin means, as in the paper's Table 1 (its figures come from the field)."
+        + ending,
+        ("soil", *head, "bins", "runs"),
+        tuple(rows),
+    )
+
+
+def _scale_table(curves: Sequence[SoilCurves]) -> Table:
+    """The scale a: paper, ours with interval, by metres of ground, of true pairs, of the truth, of the library."""
+    true, given = any(one.truth is not None for one in curves), any(one.library is not None for one in curves)
+    rows = []
+    for one in curves:
+        ground = one.learned.ground_mean
+        row = [
+            one.name,
+            _scale(one.paper),
+            _scale(one.learned.soil),
+            _interval(one.learned.soil.interval.get("a")),
+        ]
+        row += [number(ground.mean if ground else None), _interval(ground.interval if ground else None)]
+        if true:
+            row += [
+                number(one.true_pairs.parameters_.get("a") if one.true_pairs else None),
+                _scale(one.truth),
+            ]
+        rows.append((*row, *([_scale(one.library)] * given)))
+    head = ("soil", "paper", "ours, by bins", "95 %", "ours, by metres", "95 %")
+    ending = (
+        " The truth is what the soil was made with, the mean over its ground; the true pairs' fit shows what sorting by slip does to it."
+        if true
+        else ""
+    )
+    return Table(
+        "The scale a of the prototype curve (µ at full slip is 0.476 a). By bins: the paper's fit, each bin counts alike. By metres: "
+        "the mean curve of the ground driven over; bins of high slip gather the weak spots." + ending,
+        (*head, *(("true pairs, by bins", "truth") if true else ()), *(("library",) if given else ())),
+        tuple(rows),
+    )
+
+
+def _maxima_table(curves: Sequence[SoilCurves], tire_resistance: float) -> Table:
+    true = any(one.truth is not None for one in curves)
+    rows = []
+    for one in curves:
+        row = [one.name]
+        for soil in (one.learned.soil, *([one.truth] if true else [])):
+            if soil is None:
+                row += ["–"] * 2
+                continue
+            peaks = maxima(soil, tire_resistance)
+            row += [
+                f"{number(height, 2)} at {percent(at, 0)}" if at == at else "–"
+                for at, height in (peaks.adhesion, peaks.efficiency)
+            ]
+        resistance = one.learned.soil.resistance
+        rows.append((*row, number(resistance[0] if resistance else None)))
+    return Table(
+        "The largest adhesion and the largest tractive efficiency of each soil, and the slips where they lie.",
+        (
+            "soil",
+            "largest µ",
+            "largest η",
+            *(("true largest µ", "true largest η") if true else ()),
+            "mean ρs",
+        ),
+        tuple(rows),
+    )
+
+
+def _trust_row(one: SoilCurves) -> tuple[str, ...]:
+    badge, noise, verdict, ground = (
+        one.learned.curve.identifiability_,
+        one.learned.slip_noise,
+        one.learned.verdict,
+        one.learned.ground_mean,
+    )
+    corrected = "–"
+    if noise is not None:
+        corrected = ", ".join(
+            f"{name} {number(noise.plain[name])} → {number(noise.corrected[name])}" for name in noise.plain
+        ) + (" (matters)" if noise.matters else "")
+    return (
+        one.name,
+        f"{'yes' if badge.identifiable else 'no'} ({badge.condition:.3g})",
+        "–" if verdict is None else "yes" if verdict.follows else f"no: take {verdict.proposal}",
+        number(noise.slip_std if noise else None),
+        corrected,
+        "–" if ground is None else f"{number(ground.mean)} ({_interval(ground.interval)})",
+    )
+
+
+def _free_shape(one: SoilCurves) -> str:
+    """What a fit of all four parameters could tell of this soil: the badge's own sentence."""
+    from terragrip.errors import InputError
+
+    try:
+        free = AdhesionCurve("exponential", FREE, bootstrap=0).fit_bins(one.learned.curve.bins_)
+    except InputError:
+        return (
+            "The fits hold the prototype's shape and fit its scale: there are too few bins to ask for more."
+        )
+    badge = free.identifiability_
+    effective = badge.effective or {}
+    fixed = ", ".join(f"{name} = {number(value)}" for name, value in effective.items())
+    return (
+        f"The fits hold the prototype's shape and fit its scale. Were all four parameters free on {one.name}: {badge.sentence} "
+        f"What stays fixed: {fixed} in µ ≈ A (1 − e^(−k s)) − d s."
+    )
+
+
+def _voices(curves: Sequence[SoilCurves]) -> str:
+    said = ["mean and SD of each bin", "the paper's fit to them with its 95 % interval"]
+    said += ["the mean curve of the ground"] * any(one.learned.ground_mean is not None for one in curves)
+    for field, what in (
+        ("paper", "the paper's curve"),
+        ("library", "the library's curve"),
+        ("truth", "the simulated truth"),
+    ):
+        said += [what] * any(getattr(one, field) is not None for one in curves)
+    return names(said)
+
+
+def _scale(soil: Soil | None) -> str:
+    return number(soil.parameters.get("a") if soil is not None else None)
+
+
+def _interval(pair: tuple[float, float] | None) -> str:
+    return "–" if pair is None else f"{number(pair[0])} to {number(pair[1])}"
+
+
+def _stem(name: str) -> str:
+    """A soil's name as a part of a file name and an id."""
+    return "".join(c if c.isascii() and c.isalnum() else "-" for c in name)

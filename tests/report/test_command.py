@@ -1,0 +1,130 @@
+"""``terragrip report``: one page that loads nothing, one PDF with its own fonts, and a sentence for what is absent."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pytest
+
+import made_up
+from terragrip.cli import main
+from terragrip.soil.library import Soil, SoilLibrary
+
+
+@pytest.fixture(scope="module", name="files")
+def files_fixture(tmp_path_factory: pytest.TempPathFactory) -> list[str]:
+    """Six runs on single soils and one across three, with a force sensor."""
+    folder = tmp_path_factory.mktemp("estimates")
+    for i in range(3):
+        made_up.estimates(1000 + i, ("hard",)).write(folder / f"hard-{i}.parquet")
+        made_up.estimates(1010 + i, ("fine",)).write(folder / f"fine-{i}.parquet")
+    made_up.estimates(1020, ("hard", "fine", "grass", "hard"), sensor=True, rows=2400).write(
+        folder / "multi.parquet"
+    )
+    return [str(path) for path in sorted(folder.glob("*.parquet"))]
+
+
+@pytest.fixture(scope="module", name="report")
+def report_fixture(files: list[str], tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The report of all, beside a library."""
+    folder = tmp_path_factory.mktemp("report")
+    SoilLibrary({"fine": Soil("fine", "exponential", {"a": 0.777})}).write(folder / "soils.json")
+    words = ["report", *files, "--library", str(folder / "soils.json"), "-o", str(folder / "report.html")]
+    assert main([*words, "--title", "Field <3>", "--quiet"]) == 0
+    return folder
+
+
+def test_the_page_holds_every_section_and_loads_nothing(report: Path) -> None:
+    html = (report / "report.html").read_text(encoding="utf-8")
+    assert "Field &lt;3&gt;" in html
+    assert not re.search(r"""(?:src|href)\s*=\s*["'](?!#)|@import|url\((?!#)|<script|<link""", html)
+    assert "simulated data" not in html
+    assert 'class="omitted"' not in html
+    for anchor in (
+        "tracking-multi",
+        "maxima",
+        "curves",
+        "trust",
+        "missing",
+        "soils",
+        "residuals",
+        "methods",
+        "honesty",
+        "runs",
+    ):
+        assert f'id="{anchor}"' in html, anchor
+    assert "0.777" in html  # the library's
+    assert "0.046" in html  # the paper's NRMSE on hard
+    assert "6 runs" not in html
+    assert "7 runs" in html
+
+
+def test_the_pdf_is_drawn_with_text_and_brings_its_fonts(report: Path) -> None:
+    pdf = (report / "report.pdf").read_bytes()
+    assert pdf.startswith(b"%PDF-")
+    assert pdf.rstrip().endswith(b"%%EOF")
+    assert b"DejaVuSans" in pdf
+    assert b"/Subtype /Image" not in pdf  # figures are drawn, not painted
+    assert 20_000 < len(pdf) < 1_000_000
+
+
+def test_no_pdf_and_another_place_for_it(
+    files: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["report", files[0], "-o", str(tmp_path / "a.html"), "--no-pdf"]) == 0
+    assert {path.name for path in tmp_path.iterdir()} == {"a.html"}
+    assert main(["report", files[0], "-o", str(tmp_path / "b.html"), "--pdf", str(tmp_path / "c.pdf")]) == 0
+    assert {path.name for path in tmp_path.iterdir()} == {"a.html", "b.html", "c.pdf"}
+    assert str(tmp_path / "c.pdf") in capsys.readouterr().out
+
+
+def test_without_plutoprint_the_page_is_written_and_one_line_says_what_to_install(
+    files: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("terragrip.report.pdf.pdf_possible", lambda: False)
+    assert main(["report", files[0], "-o", str(tmp_path / "a.html"), "--quiet"]) == 0
+    said = capsys.readouterr()
+    assert "pip install 'terragrip[report]'" in said.out
+    assert len(said.out.splitlines()) == 1
+    assert {path.name for path in tmp_path.iterdir()} == {"a.html"}
+
+
+def test_one_run_without_labels_or_sensor_leaves_sections_out_with_a_sentence(tmp_path: Path) -> None:
+    made_up.estimates(1, ("",)).write(tmp_path / "bare.parquet")
+    assert (
+        main(["report", str(tmp_path / "bare.parquet"), "-o", str(tmp_path / "a.html"), "--no-pdf", "-q"])
+        == 0
+    )
+    html = (tmp_path / "a.html").read_text(encoding="utf-8")
+    omitted = re.findall(r'<p class="omitted">(.*?)</p>', html)
+    assert len(omitted) >= 6
+    assert all(text.startswith("Left out: ") for text in omitted)
+    assert 'id="fig-traction-bare"' in html
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["{0}", "{0}", "-o", "a.html"], "is given twice"),
+        (["{0}", "-o", "a.txt"], "is not named .html"),
+        (["nowhere.parquet", "-o", "a.html"], "nowhere.parquet"),
+        (["{0}", "-o", "a.html", "--library", "nowhere.json"], "nowhere.json"),
+        (["{0}", "-o", "a.html", "--pdf", "a.html"], "is not named .pdf"),
+        (["{0}", "-o", "nofolder/a.html"], "does not exist"),
+    ],
+)
+def test_what_cannot_be_used_is_one_line_and_leaves_nothing(
+    files: list[str],
+    words: list[str],
+    said: str,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert main(["report", *(word.format(files[0]) for word in words)]) == 2
+    lines = capsys.readouterr().err.splitlines()
+    assert len(lines) == 1
+    assert said in lines[0]
+    assert list(tmp_path.iterdir()) == []

@@ -1,0 +1,115 @@
+"""Curves in the report: the paper's numbers, ours and the truth side by side, and what is said where there is none."""
+
+from __future__ import annotations
+
+import re
+
+import numpy as np
+import pytest
+
+import made_up
+from terragrip.physics.adhesion import CURVES
+from terragrip.report import soil_sections
+from terragrip.report.curves import SoilCurves, maxima
+from terragrip.report.page import Picture, Section, Table
+from terragrip.soil.estimates import GatheredRuns
+from terragrip.soil.fit import AdhesionCurve
+from terragrip.soil.library import Soil, SoilLibrary
+
+
+@pytest.fixture(scope="module", name="curves")
+def curves_fixture() -> list[SoilCurves]:
+    """hard and fine, six runs each, with a truth, the same fit on "true" pairs, and a library that knows fine."""
+    gathered = GatheredRuns()
+    for i, soil in enumerate(["hard", "fine"] * 6):
+        gathered.add(made_up.estimates(1000 + i, (soil,)), f"{soil}-{i}")
+    campaign = gathered.learn()
+    truth = {n: Soil(n, "exponential", {"a": made_up.A[n]}, resistance=(0.1, 0.0)) for n in ("hard", "fine")}
+    slip = np.linspace(0.05, 0.6, 5000)
+    true = {
+        n: AdhesionCurve(bootstrap=0).fit(slip, CURVES["exponential"].value(slip, {"a": a}))
+        for n, a in made_up.A.items()
+    }
+    library = SoilLibrary({"fine": Soil("fine", "exponential", {"a": 0.777})})
+    return soil_sections.told_by_all(campaign, library, truth, true)
+
+
+def tables(section: Section) -> list[Table]:
+    return [item for item in section.content if isinstance(item, Table)]
+
+
+def test_the_table_holds_the_papers_numbers_ours_and_the_truth(curves: list[SoilCurves]) -> None:
+    quality, scale = tables(soil_sections.fits(curves, {}))
+    cells = {row[0]: dict(zip(scale.header, row, strict=True)) for row in scale.rows}
+    assert cells["hard"]["paper"] == "1.420"
+    assert cells["fine"]["truth"] == "0.850"
+    assert cells["fine"]["library"] == "0.777"
+    assert cells["hard"]["library"] == "–"
+    for name, a in (("hard", 1.42), ("fine", 0.85)):
+        assert float(cells[name]["ours, by bins"]) == pytest.approx(a, rel=0.03)
+        assert float(cells[name]["ours, by metres"]) == pytest.approx(a, rel=0.03)
+        assert float(cells[name]["true pairs, by bins"]) == pytest.approx(a, abs=1e-3)
+    row = dict(zip(quality.header, quality.rows[0], strict=True))
+    assert (row["soil"], row["NRMSE: paper"], row["R²: paper"], row["runs"]) == (
+        "hard",
+        "0.046",
+        "0.975",
+        "6",
+    )
+    assert float(row["R²: ours"]) > 0.97
+
+
+def test_hard_stands_first_and_alone_as_in_the_paper(curves: list[SoilCurves]) -> None:
+    pictures = [item for item in soil_sections.fits(curves, {}).content if isinstance(item, Picture)]
+    assert [picture.name for picture in pictures] == ["fit-hard", "fits"]
+    for picture in pictures:
+        assert "simulated truth" in picture.svg
+        assert "simulated truth" in picture.caption
+        assert "95 %" in picture.caption
+    # a mark and a bar for each used bin of hard
+    bins = len(curves[0].learned.soil.bins)
+    assert 40 < bins <= 55
+    assert pictures[0].svg.count("<use") >= bins
+
+
+def test_maxima_are_those_of_the_formula(curves: list[SoilCurves]) -> None:
+    """eta = kappa/(kappa + rho)(1 - s) on a fine grid, written out here once more."""
+    soil = Soil("x", "exponential", {"a": 0.85}, resistance=(0.1, 0.0))
+    found = maxima(soil, 0.02)
+    s = np.linspace(1e-4, 1, 200_001)
+    mu = 0.85 * (1 - 0.52 * np.exp(0.01 * s) - 0.48 * np.exp(-11.36 * s))
+    eta = np.where(mu > 0.1, (mu - 0.1) / (mu + 0.02) * (1 - s), 0)
+    assert found.adhesion == pytest.approx((s[mu.argmax()], mu.max()), abs=2e-4)
+    assert found.efficiency == pytest.approx((s[eta.argmax()], eta.max()), abs=2e-4)
+    (table,) = tables(soil_sections.both_maxima(curves, 0.02))
+    fine = dict(zip(table.header, next(row for row in table.rows if row[0] == "fine"), strict=True))
+    assert fine["true largest η"] == f"{eta.max():.2f} at {100 * s[eta.argmax()]:.0f} %"
+
+
+def test_the_badge_says_that_four_parameters_are_too_many(curves: list[SoilCurves]) -> None:
+    section = soil_sections.trust(curves)
+    assert "draws the same curve" in section.prose[0]
+    assert re.search(r"A = 0\.\d+, k = \d+\.\d+, d = ", section.prose[0])
+    (table,) = tables(section)
+    assert all(row[1].startswith("yes") for row in table.rows)
+
+
+def test_what_lacks_is_said_and_where_nothing_lacks_too(curves: list[SoilCurves]) -> None:
+    section = soil_sections.what_is_missing(curves)
+    (table,) = tables(section)
+    assert all(row[1].endswith("to 60 %") for row in table.rows)
+    assert any("no data between" in sentence for sentence in section.prose)
+
+
+def test_without_soils_each_section_says_why() -> None:
+    for section in (
+        soil_sections.both_maxima([], 0.02),
+        soil_sections.fits([], {}),
+        soil_sections.trust([]),
+        soil_sections.what_is_missing([]),
+    ):
+        assert section.omitted is not None
+        assert "soil label" in section.omitted
+        assert not section.content
+    missed = soil_sections.fits([], {"clay": "1 slip bins"})
+    assert missed.prose == ("clay: not fitted, 1 slip bins.",)
