@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from terragrip.vehicle import Vehicle
 
 _HOMES: dict[str, str] = {
-    "udp": "udp", "mqtt": "mqtt", "mqtts": "mqtt", "zenoh": "zenoh", "foxglove": "foxglove", "studio": "studio",
+    "udp": "udp", "mqtt": "mqtt", "mqtts": "mqtt", "zenoh": "zenoh", "foxglove": "foxglove", "studio": "studio", "can": "can",
 }  # fmt: skip
 _ALL = ("rate", "columns")
 OPTIONS: dict[str, Collection[str]] = {
@@ -23,6 +23,7 @@ OPTIONS: dict[str, Collection[str]] = {
     "zenoh": (*_ALL, "connect", "listen", "scout"),
     "foxglove": (*_ALL, "mcap"),
     "studio": _ALL,
+    "can": (*_ALL, "interface", "bitrate"),
 }
 
 

@@ -1,0 +1,64 @@
+"""The CAN bus of a source or sink, by python-can."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+
+from terragrip.errors import InputError
+from terragrip.live.feed import Lost
+from terragrip.live.uri import Uri
+
+INTERFACES = ("socketcan", "vector", "virtual", "pcan", "kvaser", "slcan", "ixxat", "udp_multicast")
+EXTENDED = 1 << 31  # set in an identifier of 29 bits, as in a DBC
+
+
+def check(uri: Uri) -> str:
+    """The interface's name; raises InputError on a missing channel or an unknown interface."""
+    _python_can()
+    interface = uri.options.get("interface", "socketcan")
+    if not uri.path:
+        raise InputError("names no channel", place=uri.text, mend="write can:can0")
+    if interface not in INTERFACES:
+        raise InputError(
+            f"there is no interface {interface!r}", place=uri.text, mend=f"one of {', '.join(INTERFACES)}"
+        )
+    return interface
+
+
+def open_bus(uri: Uri) -> Any:
+    """The bus of ``can:can0?interface=socketcan&bitrate=250000``; raises Lost where it is not there."""
+    can = _python_can()
+    options: dict[str, Any] = {"interface": check(uri), "channel": uri.path}
+    if "bitrate" in uri.options:
+        options["bitrate"] = round(uri.number("bitrate", 250_000))
+    try:
+        return can.Bus(**options)
+    except (can.CanError, OSError, ValueError, ImportError, NotImplementedError) as error:
+        raise Lost(f"the bus: {' '.join(str(error).split())[:160]}") from error
+
+
+def errors() -> tuple[type[Exception], ...]:
+    """What a bus that is lost raises."""
+    return (_python_can().CanError, OSError)
+
+
+def _python_can() -> Any:
+    with _without("asammdf"):
+        import can
+    return can
+
+
+@contextmanager
+def _without(package: str) -> Iterator[None]:
+    """python-can imports asammdf where it is installed, for a log format: 85 MB and 0.6 s that a live bus does not need."""
+    if "can" in sys.modules or package in sys.modules:
+        yield
+        return
+    sys.modules[package] = None  # type: ignore[assignment]  # makes its import fail
+    try:
+        yield
+    finally:
+        del sys.modules[package]

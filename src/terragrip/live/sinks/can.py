@@ -1,0 +1,105 @@
+"""Estimates as CAN frames, by the DBC that comes with the package (terragrip.dbc)."""
+
+from __future__ import annotations
+
+import asyncio
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from terragrip.errors import InputError
+from terragrip.estimation.engine import EVENTS
+from terragrip.live.can import check, errors, open_bus
+from terragrip.live.core import Row
+from terragrip.live.feed import Lost
+from terragrip.live.outbox import Outbox
+from terragrip.live.uri import Uri
+
+if TYPE_CHECKING:
+    from terragrip.vehicle import Vehicle
+
+DBC = Path(__file__).parents[1] / "terragrip.dbc"
+RATE = "10"  # Hz: 18 frames a row on four wheels and more than this is much for a machine's bus
+_MOST = 8  # wheels
+
+_VEHICLE = {
+    "GroundSpeed": "ground_speed",
+    "GroundSpeedStd": "ground_speed_std",
+    "SoilResistance": "soil_resistance",
+    "SoilResistanceStd": "soil_resistance_std",
+}
+_WHEEL = {
+    "TG_Wheel": {"Slip": "slip", "Adhesion": "adhesion"},
+    "TG_Traction": {"NetTraction": "net_traction", "Efficiency": "efficiency"},
+}
+
+
+class CanSink:
+    """``can:can0?interface=socketcan&rate=10``; wheels in the order of the vehicle file."""
+
+    def __init__(self, uri: Uri, vehicle: Vehicle) -> None:
+        import cantools
+
+        self.uri = uri
+        check(uri)
+        if len(vehicle.wheels) > _MOST:
+            raise InputError(f"the DBC has {_MOST} wheels", place=uri.text, mend="use another sink")
+        uri.options.setdefault("rate", RATE)
+        self._database: Any = cantools.database.load_file(DBC)
+        self._wheels = vehicle.wheels
+        self._counter = 0
+
+    async def run(self, outbox: Outbox) -> None:
+        """Send frames; raises Lost where the bus goes away or takes nothing any more."""
+        import can
+
+        bus = await asyncio.to_thread(open_bus, self.uri)
+        try:
+            outbox.connected()
+            while True:
+                row = (await outbox.get()).row
+                for identifier, data in self.frames(row) if row is not None else ():
+                    bus.send(can.Message(arbitration_id=identifier, is_extended_id=True, data=data))
+        except errors() as error:
+            raise Lost(f"the bus: {error}") from error
+        finally:
+            bus.shutdown()
+
+    def frames(self, row: Row) -> list[tuple[int, bytes]]:
+        """Identifier and payload of each frame of a row."""
+        estimate = row.estimate
+        values: dict[str, float] = {ours: estimate[column] for ours, column in _VEHICLE.items()}
+        values |= {
+            "Event": EVENTS.index(estimate.event),
+            "Predicted": row.predicted,
+            "MessageCounter": self._counter,
+        }
+        self._counter = (self._counter + 1) % 251
+        found = [self._frame("TG_Vehicle", values)]
+        for message, quantities in _WHEEL.items():
+            for number, wheel in enumerate(self._wheels, 1):
+                values = {}
+                for ours, quantity in quantities.items():
+                    values[f"{ours}{number}"] = estimate[f"{quantity}_{wheel}"]
+                    values[f"{ours}Std{number}"] = estimate[f"{quantity}_{wheel}_std"]
+                found.append(self._frame(f"{message}{number}", values))
+        return found
+
+    def _frame(self, name: str, values: dict[str, float]) -> tuple[int, bytes]:
+        message = self._database.get_message_by_name(name)
+        raw = {signal.name: _raw(signal, values[signal.name]) for signal in message.signals}
+        return message.frame_id, message.encode(raw, scaling=False, strict=False)
+
+
+def _raw(signal: Any, value: float) -> int:
+    """A signal's raw value, held within its range; all ones ("not available", J1939-71) where it is missing."""
+    if math.isnan(value):
+        return (1 << signal.length) - 1
+    raw = round((value - signal.offset) / signal.scale)
+    most = round((signal.maximum - signal.offset) / signal.scale)
+    return min(max(raw, 0), most)
+
+
+def open_sink(uri: Uri, vehicle: Vehicle) -> CanSink:
+    """See `terragrip.live.sinks.open_sink`."""
+    return CanSink(uri, vehicle)
