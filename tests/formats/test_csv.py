@@ -142,7 +142,7 @@ GOOD_ROWS = "0,1,5\n1,1,5\n"
         ("time,ground_speed,wheel_speed_l,ground_speed\n0,1,5,1\n", "column ground_speed: stands twice"),
         ("time,ground_speed [N],wheel_speed_l\n0,1,5\n", "column ground_speed: 'N' measures a force, where a speed is"),
         (b"PK\x03\x04 rest", "is a zip or an Excel workbook; save the sheet as CSV"),
-        (b"\x89HDF\r\n\x1a\n", "is an HDF5 or MATLAB 7.3 file"),
+        (b"\x89HDF\r\n\x1a\n", "is a damaged MATLAB file, or none"),
         (b"\x00\x01\x02\x03binary", "is not a table of text; give a CSV or Parquet file"),
         (b"\x1f\x8b\x08\x00broken", "is a damaged gzip file"),
         (gzip.compress(HEAD.encode())[:-6], "is a damaged gzip file"),

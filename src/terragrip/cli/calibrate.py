@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from terragrip.cli.options import Logs, ProfileFile, Quiet, VehicleFile
+from terragrip.cli.options import DbcFiles, Logs, ProfileFile, Quiet, VehicleFile
 from terragrip.cli.output import check_file
 from terragrip.cli.progress import progress
 from terragrip.errors import InputError
@@ -20,6 +20,7 @@ def command(
         Path, typer.Option("--output", "-o", metavar="FILE", help="The calibrated vehicle file (YAML).")
     ],
     profile: ProfileFile = None,
+    dbc: DbcFiles = None,
     quiet: Quiet = False,
 ) -> None:
     """Calibrate a vehicle from its logs.
@@ -32,11 +33,13 @@ def command(
     from terragrip.vehicle import Vehicle
 
     machine = Vehicle.load(vehicle)
-    check_file(output, [*logs, vehicle, *([profile] if profile else [])], suffixes=(".yaml", ".yml"))
+    check_file(
+        output, [*logs, vehicle, *([profile] if profile else []), *(dbc or [])], suffixes=(".yaml", ".yml")
+    )
     recordings = []
     with progress("reading", quiet) as step:
         for number, log in enumerate(logs, 1):
-            recordings.append(read(log, profile))
+            recordings.append(read(log, profile, dbc=tuple(dbc or ())))
             step(number, len(logs), log.name)
     found = calibrate(recordings, machine)
     if not any(quantity.applies for quantity in found.quantities):

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from terragrip.cli.options import Logs, ProfileFile, Quiet, VehicleFile
+from terragrip.cli.options import DbcFiles, Logs, OtherSources, ProfileFile, Quiet, VehicleFile
 from terragrip.cli.output import check_file, check_folder, files_in
 from terragrip.cli.progress import Step, progress
 from terragrip.errors import InputError
@@ -27,6 +28,8 @@ def command(
         typer.Option("--output", "-o", metavar="PATH", help="Parquet file; with several logs, a folder."),
     ],
     profile: ProfileFile = None,
+    dbc: DbcFiles = None,
+    others: OtherSources = None,
     method: Annotated[str, typer.Option(metavar="NAME", help=f"One of {', '.join(METHODS)}.")] = DEFAULT,
     smooth: Annotated[bool, typer.Option("--smooth", help="Run the whole log backwards too.")] = False,
     quiet: Quiet = False,
@@ -34,28 +37,44 @@ def command(
     """Estimate traction from logs.
 
     Adhesion, slip, soil resistance, net traction and efficiency of every wheel at every row, each with its
-    standard deviation, as Parquet.
+    standard deviation, as Parquet. Where no torque was logged: slip, from speeds alone.
     """
     from terragrip.estimation.methods import method_named
     from terragrip.vehicle import Vehicle
 
     if not method_named(method).can_smooth and smooth:
         raise InputError(f"the method {method} cannot smooth", place="--smooth", mend="choose another method")
+    if others and len(logs) > 1:
+        raise InputError(
+            "there are several logs", place="--with", mend="join the sources of one log at a time"
+        )
     machine = Vehicle.load(vehicle)
-    targets = _targets(logs, output, vehicle, profile)
+    targets = _targets(
+        logs, output, [vehicle, *([profile] if profile else []), *(dbc or []), *(others or [])]
+    )
+    sources = Sources(profile, tuple(dbc or ()), tuple(others or ()))
     for number, (log, target) in enumerate(zip(logs, targets, strict=True), 1):
         title = log.name if len(logs) == 1 else f"{log.name} ({number} of {len(logs)})"
         with progress(title, quiet) as step:
-            text = _estimate(log, machine, target, profile, method, smooth, step)
+            text = _estimate(log, machine, target, sources, method, smooth, step)
         if not quiet:
             print(text if len(logs) == 1 else f"{log.name}: {text.splitlines()[0]}")
     if not quiet:
         print(f"Written to {output}")
 
 
-def _targets(logs: list[Path], output: Path, vehicle: Path, profile: Path | None) -> list[Path]:
-    """The file of each log's estimates, tried before the long work."""
-    inputs = [*logs, vehicle, *([profile] if profile else [])]
+@dataclass(frozen=True)
+class Sources:
+    """What a log is read with: profile, DBC files, other logs of the same drive."""
+
+    profile: Path | None
+    dbc: tuple[Path, ...]
+    others: tuple[Path, ...]
+
+
+def _targets(logs: list[Path], output: Path, beside: list[Path]) -> list[Path]:
+    """The file of each log's estimates, tried before the long work; ``beside`` are the other inputs."""
+    inputs = [*logs, *beside]
     if len(logs) == 1:
         return [check_file(output, inputs, suffixes=(".parquet",))]
     for log in logs:
@@ -67,18 +86,20 @@ def _targets(logs: list[Path], output: Path, vehicle: Path, profile: Path | None
 
 
 def _estimate(
-    log: Path, vehicle: Vehicle, target: Path, profile: Path | None, method: str, smooth: bool, step: Step
+    log: Path, vehicle: Vehicle, target: Path, sources: Sources, method: str, smooth: bool, step: Step
 ) -> str:
     """Estimate one log into a file and return the summary; a long Parquet file goes through in blocks."""
     from terragrip.formats import iter_parquet, read
 
-    rows = 0 if profile or smooth else _rows_of_a_long_log(log)
+    plain = not (sources.profile or sources.dbc or sources.others or smooth)
+    rows = _rows_of_a_long_log(log) if plain else 0
     if rows:
         from terragrip.estimation import estimate_blocks
 
         blocks = iter_parquet(log)
         return estimate_blocks(blocks, vehicle, target, method, progress=lambda done: step(done, rows))
-    recording = read(log, profile)
+    path = [log, *sources.others] if sources.others else log
+    recording = read(path, sources.profile, dbc=sources.dbc)
     from terragrip.estimation import estimate
 
     estimates = estimate(recording, vehicle, method, smooth=smooth, progress=step)

@@ -7,14 +7,15 @@ from typing import Annotated
 
 import typer
 
-from terragrip.cli.options import ProfileFile
+from terragrip.cli.options import DbcFiles, ProfileFile
 from terragrip.cli.output import check_file
 from terragrip.errors import InputError
 
 
 def command(
-    log: Annotated[Path, typer.Argument(metavar="LOG", help="A log: CSV (plain or gzipped) or Parquet.")],
+    log: Annotated[Path, typer.Argument(metavar="LOG", help="A log of any known format (docs/formats.md).")],
     profile: ProfileFile = None,
+    dbc: DbcFiles = None,
     vehicle: Annotated[
         Path | None, typer.Option("--vehicle", metavar="FILE", help="Hold the log against this vehicle.")
     ] = None,
@@ -36,7 +37,7 @@ def command(
                 "exists already", file=write_profile, place="--write-profile", mend="name a new file"
             )
         check_file(write_profile, option="--write-profile")
-    found = inspect(log, profile, vehicle)
+    found = inspect(log, profile, vehicle, dbc=dbc or ())
     print(found.to_text())
     if write_profile is not None:
         with replacing(write_profile) as temporary:

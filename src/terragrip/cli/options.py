@@ -7,10 +7,25 @@ from typing import Annotated
 
 import typer
 
-Logs = Annotated[list[Path], typer.Argument(metavar="LOG", help="Logs: CSV (plain or gzipped) or Parquet.")]
+Logs = Annotated[
+    list[Path], typer.Argument(metavar="LOG", help="Logs of any known format (docs/formats.md).")
+]
 VehicleFile = Annotated[Path, typer.Option("--vehicle", metavar="FILE", help="The vehicle file (YAML).")]
 ProfileFile = Annotated[
     Path | None,
-    typer.Option("--profile", metavar="FILE", help="How the log's columns become Terragrip's (YAML)."),
+    typer.Option(
+        "--profile",
+        metavar="FILE",
+        help="How the log's columns become Terragrip's: a YAML file, or tractor-isobus, ros2-4wd or simulink.",
+    ),
+]
+DbcFiles = Annotated[
+    list[Path] | None, typer.Option("--dbc", metavar="FILE", help="A DBC of a CAN log; may be repeated.")
+]
+OtherSources = Annotated[
+    list[Path] | None,
+    typer.Option(
+        "--with", metavar="LOG", help="Another log of the same drive, to be joined; may be repeated."
+    ),
 ]
 Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="No progress, no summary.")]

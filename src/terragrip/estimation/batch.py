@@ -38,7 +38,7 @@ def estimate(
     standstill_speed: float | None = None,
     progress: Progress | None = None,
 ) -> Estimates:
-    """Estimate a whole recording.
+    """Estimate a whole recording; of one without any drive torque, slip alone (`terragrip.estimation.slip_only`).
 
     Parameters
     ----------
@@ -55,6 +55,19 @@ def estimate(
     InputError: the recording or the vehicle is unusable, there is no such method, or `algebraic` is to smooth.
     """
     log = recording if isinstance(recording, Recording) else Recording.from_frame(recording)
+    from terragrip.estimation.slip_only import estimate_slip, is_slip_only
+
+    if is_slip_only(log, vehicle):
+        return estimate_slip(
+            log,
+            vehicle,
+            smooth=smooth,
+            sensors=sensors,
+            held=held,
+            gap=gap,
+            standstill_speed=standstill_speed,
+            progress=progress,
+        )
     log.check_against(vehicle)
     if smooth and not method_named(method).can_smooth:
         raise InputError(

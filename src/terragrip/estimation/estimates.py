@@ -78,9 +78,9 @@ class Estimates:
     def wheels(self) -> tuple[str, ...]:
         """Names of the wheels, in the vehicle's order."""
         return tuple(
-            name.removeprefix("adhesion_")
+            name.removeprefix("slip_")
             for name in self.columns
-            if name.startswith("adhesion_") and not name.endswith("_std")
+            if name.startswith("slip_") and not name.endswith("_std")
         )
 
     @property
@@ -167,9 +167,7 @@ class Estimates:
     @classmethod
     def from_arrow(cls, table: pa.Table, source: str | None = None) -> Self:
         """Take an Arrow table of estimates; raises InputError if columns are missing or of another type."""
-        missing = [
-            n for n in ("time", "event", "soil_resistance", "ground_speed") if n not in table.column_names
-        ]
+        missing = [n for n in ("time", "event", "ground_speed") if n not in table.column_names]
         if missing:
             raise InputError(
                 "this is no table of estimates", file=source, place=f"column {missing[0]}", mend="is missing"

@@ -89,6 +89,7 @@ def _guesses(vehicle: Vehicle) -> dict[str, float]:
     return {
         "wheel_speed": 0.02 / radius,
         "ground_speed": 0.05,
+        "wheel_based_speed": 0.02,
         "drive_torque": 0.01 * weight * radius,
         "drawbar_force": 0.01 * weight,
         "acceleration": 0.3,

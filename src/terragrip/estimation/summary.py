@@ -52,7 +52,7 @@ class Tally:
             self.channels += float(np.nansum(block["channels"]))
         moving = np.flatnonzero(block.event_codes == 0)
         chosen = moving[:: max(1, len(moving) // _SAMPLE)]
-        for name in (n for _, n, _ in _quantities(self.wheels)):
+        for name in (n for _, n, _ in _quantities(self.wheels) if n in block):
             for column in (name, f"{name}_std"):
                 self.sample.setdefault(column, []).append(block[column][chosen])
 
@@ -73,7 +73,7 @@ class Tally:
         smooth = ", smoothed" if self.about.get("smooth") else ""
         method = self.about.get("method", "unknown")
         return (
-            f"{self.rows} rows, {self.duration:.1f} s, {self.distance:.1f} m, {len(self.wheels)} wheels, "
+            f"{self.rows} rows, {self.duration:.1f} s, {self.distance:.1f} m, {len(self.wheels)} wheel{'s' * (len(self.wheels) != 1)}, "
             f"method {method}{smooth}"
         )
 
@@ -107,6 +107,8 @@ class Tally:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", RuntimeWarning)  # a column may be all NaN
             for title, name, unit in _quantities(self.wheels):
+                if name not in columns:
+                    continue
                 value, spread = np.nanmedian(columns[name]), np.nanmedian(columns[f"{name}_std"])
                 lines.append(f"  {title:<18} {value:8.3f} ± {spread:.3f}{unit}")
         return lines

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from terragrip.errors import InputError, nearest
+from terragrip.errors import InputError
+from terragrip.formats.binding import bound
 from terragrip.formats.derivation import derivative, fresh_positions, pitch_of, quotient, roll_of, yaw_of
 from terragrip.formats.profile import Profile, Rows, Source, TimeSource, rate_unit
+from terragrip.formats.signals import SINCE_1970
 from terragrip.formats.table import LogTable
 from terragrip.formats.timebase import spread, union
 from terragrip.recording import Recording
@@ -21,13 +24,34 @@ Floats = npt.NDArray[np.float64]
 Column = npt.NDArray[Any]
 
 
+@dataclass(frozen=True, eq=False)
+class Part:
+    """Channels of one log on its own time base; ``start``: when time 0 was [s since 1970], if that is known."""
+
+    time: Floats
+    columns: dict[str, Column]
+    source: str | None
+    sha256: str | None
+    notes: tuple[str, ...]
+    noise: dict[str, float]
+    start: float | None
+
+
 def convert(profile: Profile, log: Any, source: str | None = None) -> Recording:
     """The recording that ``profile`` makes of ``log`` (see `Profile.apply`)."""
     if not isinstance(log, LogTable):
         columns = columns_of(log, source)
         log = LogTable(tuple(columns), columns, source=source)
-    _require(profile, log)
-    time, notes = _time(profile.time, log)
+    part = converted(profile, log)
+    frame = {TIME: part.time, **part.columns}
+    return Recording.from_frame(frame, part.source, sha256=part.sha256, notes=part.notes, noise=part.noise)
+
+
+def converted(profile: Profile, log: LogTable, *, partial: bool = False) -> Part:
+    """The channels that ``profile`` makes of a log; where it is ``partial``, those that it can make of this one."""
+    profile, notes = bound(profile, log, partial=partial)
+    time, start, said = _time(profile.time, log)
+    notes += said
     channels: dict[str, Column] = {}
     noise: dict[str, float] = {}
     for name, origin in profile.channels.items():
@@ -47,32 +71,35 @@ def convert(profile: Profile, log: Any, source: str | None = None) -> Recording:
         instants, rows = union(time, delays)
         channels = {n: spread(v, rows[delays[n]], len(instants)) for n, v in channels.items()}
         time = instants
-    frame = {TIME: time, **channels}
-    return Recording.from_frame(frame, log.source, sha256=log.sha256, notes=(*log.notes, *notes), noise=noise)
+    return Part(time, channels, log.source, log.sha256, (*log.notes, *notes), noise, start)
 
 
-def _require(profile: Profile, log: LogTable) -> None:
-    """Raise InputError at the first column that the profile names and the log lacks."""
-    for column in sorted(profile.sources - set(log.columns)):
-        close = nearest(column, log.names)
-        mend = f"the nearest column is {close!r}" if close else f"its columns are {', '.join(log.names[:12])}"
-        problem = "is missing, but the profile names it"
-        raise InputError(problem, file=log.source, place=f"column {column}", mend=mend)
-
-
-def _time(origin: TimeSource, log: LogTable) -> tuple[Floats, list[str]]:
-    """The time base [s] and the notes on it."""
+def _time(origin: TimeSource, log: LogTable) -> tuple[Floats, float | None, list[str]]:
+    """The time base [s], when its zero was [s since 1970] if that is known, and the notes on it."""
     stamps = log.columns[origin.column]
     notes: list[str] = []
+    start = log.start
     if stamps.dtype.kind in "Mm":
         time, notes = seconds(stamps, log.source)
+        if stamps.dtype.kind == "M" and len(stamps):
+            start = float((stamps[0] - np.datetime64(0, "s")) / np.timedelta64(1, "s"))
     else:
         if origin.zero == "first" and stamps.dtype.kind in "iu" and len(stamps):
             stamps = stamps.astype(np.int64) - np.int64(stamps[0])  # nanoseconds since 1970 need all 64 bits
         time = numbers(origin.column, stamps, None, log.source) * factor_to(origin.unit, "s")
+        if start is None:
+            start = _since_1970(log.columns[origin.column], origin)
     if origin.zero == "first" and len(time):
         time = time - time[0]
-    return time, notes
+    return time, start, notes
+
+
+def _since_1970(stamps: Column, origin: TimeSource) -> float | None:
+    """When time 0 was [s since 1970], where the stamps are so large that they count from then."""
+    first = float(stamps[0]) * factor_to(origin.unit, "s") if len(stamps) else np.nan
+    if not SINCE_1970 < first < np.inf:
+        return None
+    return first if origin.zero == "first" else 0.0
 
 
 def _channel(name: str, origin: Source, log: LogTable, time: Floats) -> tuple[Column, float | None]:
@@ -83,7 +110,7 @@ def _channel(name: str, origin: Source, log: LogTable, time: Floats) -> tuple[Co
         if origin.column is None:
             mend = "write 'from: <column>' or 'constant: <label>'"
             raise InputError("is a label", file=log.source, place=f"column {name}", mend=mend)
-        return texts(name, log.columns[origin.column], len(time), log.source), None
+        return texts(name, log.columns[str(origin.column)], len(time), log.source), None
     deviation = None
     if origin.constant is not None:
         raw = np.full(len(time), quantity(origin.constant, unit_of(name) or "1"))
@@ -96,7 +123,10 @@ def _channel(name: str, origin: Source, log: LogTable, time: Floats) -> tuple[Co
     else:
         raw = _without_invalid(_raw((str(origin.column),), log, time)[0], origin)
         if origin.over is not None:
-            raw = quotient(time, raw, _raw((origin.over,), log, time)[0], origin.over_minimum)
+            divisor = _raw((origin.over,), log, time)[0]
+            raw = quotient(
+                time, raw, _between(time, divisor) if log.clocked else divisor, origin.over_minimum
+            )
     factor = _factor(name, origin, log)
     if deviation is not None:
         deviation *= abs(factor * origin.scale)
@@ -112,7 +142,7 @@ def _factor(name: str, origin: Source, log: LogTable) -> float:
         return 1.0
     if origin.unit is not None:
         return factor_to(rate_unit(origin.unit) if origin.derivative_of else origin.unit, target)
-    stated = log.units.get(origin.column or "") if origin.scale == 1.0 and origin.over is None else None
+    stated = log.units.get(str(origin.column)) if origin.scale == 1.0 and origin.over is None else None
     if stated is None:
         return 1.0
     try:
@@ -122,6 +152,14 @@ def _factor(name: str, origin: Source, log: LogTable) -> float:
         raise InputError(
             error.problem, file=log.source, place=f"column {origin.column}", mend=mend
         ) from error
+
+
+def _between(time: Floats, values: Floats) -> Floats:
+    """Values (n,) of a signal of its own clock at the instants of others, on straight lines between its samples."""
+    known = np.isfinite(values)
+    if not known.any():
+        return values
+    return np.interp(time, time[known], values[known], left=np.nan, right=np.nan)
 
 
 def _raw(columns: tuple[str, ...], log: LogTable, time: Floats) -> list[Floats]:
@@ -169,6 +207,9 @@ def _heading(origin: Source, log: LogTable, time: Floats) -> Floats:
 def _kept(rows: Rows, log: LogTable) -> npt.NDArray[np.bool_]:
     """Which rows (n,) the profile keeps; raises InputError if none."""
     column = log.columns[rows.column]
+    if log.clocked and column.dtype.kind == "f":  # a state lasts until the next is sent
+        last = np.maximum.accumulate(np.where(np.isfinite(column), np.arange(len(column)), 0))
+        column = column[last]
     if column.dtype.kind in "fiub" and isinstance(rows.equals, int | float):
         keep = column == rows.equals
     else:

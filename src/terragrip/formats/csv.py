@@ -179,3 +179,8 @@ def _numbers_of_texts(name: str, column: pa.ChunkedArray, source: str) -> npt.ND
             mend = "leave the cell empty or give a number"
             raise InputError(f"{shown} is not a number", file=source, place=place, mend=mend) from None
     return found
+
+
+def read_csv_log(path: str, wanted: Wanted | None, databases: object) -> LogTable:
+    """`read_csv` with the arguments of every kind of log."""
+    return read_csv(path, wanted)

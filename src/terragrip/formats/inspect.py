@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -93,6 +94,8 @@ def inspect(
     path: str | os.PathLike[str],
     profile: Profile | str | os.PathLike[str] | None = None,
     vehicle: Vehicle | str | os.PathLike[str] | None = None,
+    *,
+    dbc: Sequence[str | os.PathLike[str]] = (),
 ) -> Inspection:
     """Tell what is in a log, which of our channels it holds or lacks, and propose a profile.
 
@@ -100,10 +103,11 @@ def inspect(
     it. Nothing is required of the log but that it is a table; raises InputError if it is none.
     """
     machine = vehicle if isinstance(vehicle, Vehicle) or vehicle is None else Vehicle.load(vehicle)
-    table = read_table(path)
+    databases = tuple(dbc)
+    table = read_table(path, databases=databases)
     warnings, recording = list(table.notes), None
     try:
-        recording = read(path, profile)
+        recording = read(path, profile, dbc=databases)
         warnings += [note for note in recording.notes if note not in warnings]
     except InputError as error:
         if profile is not None:

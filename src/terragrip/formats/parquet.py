@@ -111,3 +111,8 @@ def _refuse_twice(names: tuple[str, ...], chosen: list[str], source: str) -> Non
     twice = next((name for name in chosen if names.count(name) > 1), None)
     if twice is not None:
         raise InputError("stands twice", file=source, place=f"column {twice}", mend="keep one of them")
+
+
+def read_parquet_log(path: str, wanted: Wanted | None, databases: object) -> LogTable:
+    """`read_parquet` with the arguments of every kind of log."""
+    return read_parquet(path, wanted)

@@ -13,11 +13,19 @@
 A value is ``sign * (scale * raw + offset)`` in ``unit``; ``invalid`` values and ranges are judged on the raw one.
 With ``over`` the raw value is a quotient of two columns, as a torque is power over speed: missing where the divisor is
 smaller in size than ``over_minimum``, and between the updates of a held dividend.
+
+``from`` may list names, of which the first that the log has, with a value, counts; ``*`` in a name stands for any text.
+A channel with ``optional: true`` is left out, with a note, where the log lacks it. ``dbc:`` names the DBC files of a CAN
+log, from the profile's folder. Profiles that come with Terragrip go by name: `SHIPPED`.
 """
 
 from __future__ import annotations
 
+import fnmatch
 import os
+from collections.abc import Iterable
+from functools import cached_property
+from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
 from pydantic import BeforeValidator, Field, field_validator, model_validator
@@ -40,6 +48,9 @@ from terragrip.units import UnitError, factor_to, quantity
 Seconds = Annotated[float, BeforeValidator(lambda value: quantity(value, "s"))]
 Quaternion = tuple[str, str, str, str]
 
+SHIPPED = ("tractor-isobus", "ros2-4wd", "simulink")
+"""Profiles that come with Terragrip: give the name in place of a file."""
+
 
 class Forward(Part):
     """What tells forward from backward: a yaw column and its unit, or the columns of a quaternion x, y, z, w."""
@@ -59,7 +70,8 @@ class Forward(Part):
 class Source(Part):
     """Where one channel comes from, and what is done to it."""
 
-    column: str | None = Field(None, alias="from")
+    column: str | Annotated[tuple[str, ...], Field(min_length=1)] | None = Field(None, alias="from")
+    optional: bool = False
     over: str | None = None
     over_minimum: float = Field(0.0, ge=0.0, allow_inf_nan=False)
     derivative_of: Annotated[tuple[str, ...], Field(min_length=1, max_length=3)] | None = None
@@ -107,11 +119,16 @@ class Source(Part):
         return self
 
     @property
+    def candidates(self) -> tuple[str, ...]:
+        """The names, or patterns of names, of which the first counts."""
+        return (self.column,) if isinstance(self.column, str) else self.column or ()
+
+    @property
     def columns(self) -> tuple[str, ...]:
-        """The log's columns that it reads."""
+        """The log's columns that it may read; `candidates` may be patterns."""
         heading = () if self.forward is None else (self.forward.yaw, *(self.forward.quaternion or ()))
         every = (
-            self.column,
+            *self.candidates,
             self.over,
             *(self.derivative_of or ()),
             *(self.pitch_of or ()),
@@ -150,17 +167,31 @@ class Profile(Part):
     time: TimeSource = Field(default_factory=lambda: TimeSource.model_validate({}))
     rows: Rows | None = None
     payload: Payload | None = None  # of a live source's messages
+    dbc: tuple[str, ...] = ()
     channels: dict[str, Source]
 
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> Self:
-        """Read a profile file; raises InputError with the file, the key, its line and the mend."""
-        return validate(cls, read_yaml(path))
+        """Read a profile file, or take one of `SHIPPED` by name.
+
+        Raises InputError with the file, the key, its line and the mend.
+        """
+        own = Path(__file__).with_name("profiles") / f"{path}.yaml"
+        if os.fspath(path) in SHIPPED and not Path(path).is_file():
+            return validate(cls, read_yaml(own))
+        found = validate(cls, read_yaml(path))
+        here = Path(path).parent
+        return found.model_copy(update={"dbc": tuple(os.fspath(here / name) for name in found.dbc)})
 
     @classmethod
     def from_dict(cls, data: dict[str, Any], file: str | None = None) -> Self:
         """Build from a mapping as a profile file holds; raises InputError, which names ``file`` if given."""
         return validate(cls, data, file=file)
+
+    @field_validator("dbc", mode="before")
+    @classmethod
+    def _one_or_several(cls, value: Any) -> Any:
+        return (value,) if isinstance(value, str) else value
 
     @field_validator("channels", mode="before")
     @classmethod
@@ -168,7 +199,7 @@ class Profile(Part):
         """``ground_speed: speed`` is short for ``ground_speed: {from: speed}``."""
         if not isinstance(value, dict):
             return value
-        return {k: {"from": v} if isinstance(v, str) else v for k, v in value.items()}
+        return {k: {"from": v} if isinstance(v, str | list) else v for k, v in value.items()}
 
     @model_validator(mode="after")
     def _known_channels(self) -> Self:
@@ -192,9 +223,17 @@ class Profile(Part):
             _check_unit(name, source)
         return self
 
-    @property
+    def wants(self, name: str) -> bool:
+        """Whether the profile may read a column of that name."""
+        return name in self.sources or any(fnmatch.fnmatchcase(name, p) for p in self._patterns)
+
+    @cached_property
+    def _patterns(self) -> tuple[str, ...]:
+        return tuple(as_pattern(name) for name in self.sources if "*" in name)
+
+    @cached_property
     def sources(self) -> frozenset[str]:
-        """All columns of the log that the profile reads."""
+        """All columns of the log that the profile may read, as it names them."""
         named = {column for source in self.channels.values() for column in source.columns}
         return frozenset({self.time.column, *named, *([self.rows.column] if self.rows else [])})
 
@@ -207,6 +246,19 @@ class Profile(Part):
         from terragrip.formats.conversion import convert
 
         return convert(self, log, source)
+
+
+def as_pattern(name: str) -> str:
+    """A name with ``*`` as a pattern of `fnmatch`, in which nothing else is special."""
+    return "".join(f"[{c}]" if c in "[?" else c for c in name)
+
+
+def matching(name: str, names: Iterable[str]) -> list[str]:
+    """The names that a profile's name stands for: itself, or all that its ``*`` allows."""
+    if "*" not in name:
+        return [name] if name in names else []
+    pattern = as_pattern(name)
+    return [found for found in names if fnmatch.fnmatchcase(found, pattern)]
 
 
 def unit_factor(unit: str, target: str) -> float:

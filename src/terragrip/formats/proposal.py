@@ -45,8 +45,8 @@ def missing_channels(proposals: Mapping[str, Proposal], has_time: bool) -> list[
 
 
 def is_ready(recording: Recording) -> bool:
-    """Whether the recording has what estimates need of it: speeds, and a torque for some wheel."""
-    return any(f"drive_torque_{wheel}" in recording for wheel in recording.wheels)
+    """Whether the recording has what estimates need of it: with speeds alone there is slip."""
+    return "ground_speed" in recording and (bool(recording.wheels) or "wheel_based_speed" in recording)
 
 
 def profile_text(

@@ -3,34 +3,129 @@
 from __future__ import annotations
 
 import os
-from pathlib import Path
+from collections.abc import Sequence
 
 import numpy as np
 
 from terragrip.errors import InputError
-from terragrip.files import refuse_missing, unreadable
-from terragrip.formats.csv import SUFFIXES, read_csv
-from terragrip.formats.parquet import MAGIC, read_parquet
-from terragrip.formats.profile import Profile
+from terragrip.formats.conversion import Part
+from terragrip.formats.kind import Databases, kind_of
+from terragrip.formats.profile import SHIPPED, Profile
+from terragrip.formats.signals import SignalLog
 from terragrip.formats.table import LogTable, Wanted
 from terragrip.recording import Recording, checks
+from terragrip.recording.columns import seconds
 from terragrip.recording.schema import LABELS, TIME, is_channel, unit_of
 from terragrip.units import UnitError, factor_to
 
+PathLike = str | os.PathLike[str]
 
-def read(path: str | os.PathLike[str], profile: Profile | str | os.PathLike[str] | None = None) -> Recording:
-    """Read a log (CSV and its cousins, plain or gzipped, or Parquet) as a Recording.
+
+def read(
+    path: PathLike | Sequence[PathLike],
+    profile: Profile | PathLike | Sequence[Profile | PathLike] | None = None,
+    *,
+    dbc: PathLike | Sequence[PathLike] = (),
+) -> Recording:
+    """Read a log of any known format (docs/formats.md) as a Recording; its content tells which format it has.
 
     Without a profile the columns must have the recording's own names; a unit that the file itself states
-    (``ground_speed [km/h]``, or a row of units) is converted. With a `Profile`, or the path of one, the columns
-    become what it says. Raises InputError with file, column, row and mend for whatever makes the log unusable.
+    (``ground_speed [km/h]``, or a row of units) is converted. With a `Profile`, the path of one, or the name of one
+    that comes with Terragrip, the columns become what it says. ``dbc``: the DBC files of a CAN log, beside the
+    profile's own.
+
+    Several paths are sources of one drive: each gives the channels that it has, the first source where several have
+    one; a list of profiles has one for each. Clocks are aligned by their stamps where both count from 1970, then by
+    the correlation of the speeds, and the notes say by how much.
+
+    Raises InputError with file, column, row and mend for whatever makes the log unusable.
     """
+    databases: Databases = (dbc,) if isinstance(dbc, str | os.PathLike) else tuple(dbc)
+    if not isinstance(path, str | os.PathLike):
+        from terragrip.formats.sources import merged
+
+        paths = list(path)
+        return merged([_part(p, own, databases) for p, own in zip(paths, _each(profile, paths), strict=True)])
+    if isinstance(profile, list | tuple):
+        raise InputError("there are several profiles for one log", file=path, mend="give one profile")
+    chosen = _loaded(profile)  # type: ignore[arg-type]  # a sequence was refused above
+    if chosen is not None:
+        return chosen.apply(read_table(path, chosen.wants, (*databases, *chosen.dbc)))
+    table = read_table(path, _own, databases)
+    _require(table)
+    notes = [*table.notes, *checks.remarks(table.names)]
+    return Recording.from_frame(_in_si(table), table.source, sha256=table.sha256, notes=notes)
+
+
+def read_table(path: PathLike, wanted: Wanted | None = None, databases: Databases = ()) -> LogTable:
+    """Read the ``wanted`` columns of a log by their own names (None: all); raises InputError if it is no log."""
+    kind = kind_of(path)
+    if databases and not kind.takes_databases:
+        mend = "leave out --dbc, or 'dbc:' in the profile"
+        raise InputError(f"is a {kind.title}, which needs no DBC", file=path, mend=mend)
+    log = kind.reader()(os.fspath(path), wanted, databases)
+    return log.table() if isinstance(log, SignalLog) else log
+
+
+def _own(name: str) -> bool:
+    return name == TIME or name in LABELS or is_channel(name)
+
+
+def _loaded(profile: Profile | PathLike | None) -> Profile | None:
+    return profile if profile is None or isinstance(profile, Profile) else Profile.load(profile)
+
+
+def _each(
+    profile: Profile | PathLike | Sequence[Profile | PathLike] | None, paths: list[PathLike]
+) -> list[Profile | None]:
+    """The profile of each source."""
+    if not paths:
+        raise InputError("there is no log", mend="give at least one")
+    if profile is None or isinstance(profile, Profile | str | os.PathLike):
+        return [_loaded(profile)] * len(paths)
+    found = [_loaded(own) for own in profile]
+    if len(found) != len(paths):
+        raise InputError(
+            f"there are {len(found)} profiles for {len(paths)} logs",
+            mend="give one profile, or one for each log",
+        )
+    return found
+
+
+def _part(path: PathLike, profile: Profile | None, databases: Databases) -> Part:
+    """The channels of one of several sources."""
+    from terragrip.formats.conversion import converted
+
     if profile is not None:
-        chosen = profile if isinstance(profile, Profile) else Profile.load(profile)
-        sources = chosen.sources
-        return chosen.apply(read_table(path, wanted=lambda name: name in sources))
-    table = read_table(path, wanted=lambda name: name == TIME or name in LABELS or is_channel(name))
-    checks.require_columns(table.names, table.source)
+        can = kind_of(path).takes_databases
+        return converted(
+            profile, read_table(path, profile.wants, (*databases, *profile.dbc) if can else ()), partial=True
+        )
+    table = read_table(path, _own, databases if kind_of(path).takes_databases else ())
+    if TIME not in table.columns:
+        raise InputError(
+            "is missing",
+            file=table.source,
+            place=f"column {TIME}",
+            mend="name it in a profile for this source",
+        )
+    columns = _in_si(table)
+    time, _ = seconds(columns.pop(TIME), table.source)
+    return Part(time, columns, table.source, table.sha256, table.notes, {}, table.start)
+
+
+def _require(table: LogTable) -> None:
+    try:
+        checks.require_columns(table.names, table.source)
+    except InputError as error:
+        if not table.clocked:
+            raise
+        mend = f"map its signals in a profile ('terragrip inspect' proposes one; {', '.join(SHIPPED)} come with it)"
+        raise InputError(error.problem, file=error.file, place=error.place, mend=mend) from error
+
+
+def _in_si(table: LogTable) -> dict[str, np.ndarray]:
+    """The columns, in the schema's units where the file states its own."""
     columns = dict(table.columns)
     for name, unit in table.units.items():
         target = unit_of(name)
@@ -44,16 +139,4 @@ def read(path: str | os.PathLike[str], profile: Profile | str | os.PathLike[str]
             ) from error
         if factor != 1.0:
             columns[name] = columns[name] * np.float64(factor)
-    notes = [*table.notes, *checks.remarks(table.names)]
-    return Recording.from_frame(columns, table.source, sha256=table.sha256, notes=notes)
-
-
-def read_table(path: str | os.PathLike[str], wanted: Wanted | None = None) -> LogTable:
-    """Read the ``wanted`` columns of a log by their own names (None: all); raises InputError if it is no table."""
-    refuse_missing(path, suffixes=(*SUFFIXES, ".parquet"))
-    try:
-        with Path(path).open("rb") as stream:
-            magic = stream.read(4)
-    except OSError as error:
-        raise unreadable(path, error) from error
-    return read_parquet(path, wanted) if magic == MAGIC else read_csv(path, wanted)
+    return columns

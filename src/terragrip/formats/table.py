@@ -19,7 +19,8 @@ class LogTable:
     """Columns of a log file: ``names`` are all there are, ``columns`` those that were read.
 
     Numbers are float64 or integers (n,), missing = NaN; texts are objects, missing = None; dates are datetime64.
-    ``units`` holds what the file itself says of a column's unit.
+    ``units`` holds what the file itself says of a column's unit. ``start`` is when time 0 was [s since 1970], where
+    the log says. ``clocked``: columns had clocks of their own, so that a missing cell may be a sample between two.
     """
 
     names: tuple[str, ...]
@@ -28,6 +29,8 @@ class LogTable:
     source: str | None = None
     sha256: str | None = None
     notes: tuple[str, ...] = ()
+    start: float | None = None
+    clocked: bool = False
 
 
 def from_arrow(name: str, column: Any, source: str | None) -> npt.NDArray[Any]:

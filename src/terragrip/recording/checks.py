@@ -12,7 +12,7 @@ from terragrip.recording.schema import LABELS, TIME, is_channel
 
 Floats = npt.NDArray[np.float64]
 
-_ESSENTIAL = ("wheel_speed_", "drive_torque_", "ground_speed", "drawbar_force")
+_ESSENTIAL = ("wheel_speed_", "wheel_based_speed", "drive_torque_", "ground_speed", "drawbar_force")
 
 
 def place(column: str, row: int, time: Floats | None = None, *, first_row: int = 0) -> str:
@@ -27,7 +27,9 @@ def require_columns(columns: Collection[str], source: str | None) -> None:
     """Raise InputError unless time, ground_speed and a wheel speed are among the columns."""
     if not columns:
         raise InputError("there are no columns", file=source, mend="give a table with a header")
-    wheels = any(c.startswith("wheel_speed_") and len(c) > len("wheel_speed_") for c in columns)
+    wheels = "wheel_based_speed" in columns or any(
+        c.startswith("wheel_speed_") and len(c) > len("wheel_speed_") for c in columns
+    )
     missing = [n for n in (TIME, "ground_speed") if n not in columns] + ["wheel_speed_<wheel>"] * (not wheels)
     if not missing:
         return

@@ -9,6 +9,7 @@ WHEEL_CHANNELS = {"wheel_speed": "rad/s", "drive_torque": "N m", "wheel_force_x"
 AXLE_CHANNELS = {"vertical_load": "N"}
 CHANNELS = {
     "ground_speed": "m/s",
+    "wheel_based_speed": "m/s",  # what the drive train says of all driven wheels as one, by the machine's own radius
     "drawbar_force": "N",
     "acceleration_x": "m/s^2",
     "acceleration_y": "m/s^2",

@@ -14,8 +14,10 @@ from terragrip.estimation.calibration.gains import ChannelErrors, RelativeGains,
 from terragrip.estimation.calibration.radii import WINDOW as RADIUS_WINDOW
 from terragrip.estimation.calibration.radii import Rolling, rolling_radii
 from terragrip.estimation.calibration.result import Calibration, Quantity, Unknown
+from terragrip.estimation.calibration.speeds import calibrate_radii
 from terragrip.estimation.calibration.torque_scale import identify_torque_scale
 from terragrip.estimation.calibration.windows import track_blocks, windows
+from terragrip.estimation.slip_only import is_slip_only
 from terragrip.physics.loads import GRAVITY
 from terragrip.recording import Recording, sensor_noise, without_held
 from terragrip.vehicle import Vehicle
@@ -30,7 +32,8 @@ def calibrate(recordings: Recording | Sequence[Recording], vehicle: Vehicle) -> 
 
     Zeros of torque, drawbar and accelerometer come from standstill; rolling radii from straight passes at zero pull;
     relative torque gains of the wheels from the adhesion curve that they share. Each has a 95 % interval and says what
-    it rests on; what the logs cannot give is listed with the reason. A ``calibration`` block that the vehicle already
+    it rests on; what the logs cannot give is listed with the reason. Logs without any torque give radii alone, and must be
+    of driving without load. A ``calibration`` block that the vehicle already
     has is used for whatever the logs cannot give.
 
     Parameters
@@ -45,9 +48,11 @@ def calibrate(recordings: Recording | Sequence[Recording], vehicle: Vehicle) -> 
     logs = [recordings] if isinstance(recordings, Recording) else list(recordings)
     if not logs:
         raise InputError("there is no recording to calibrate from", mend="give at least one log")
+    sources = [log.source or f"recording {k + 1}" for k, log in enumerate(logs)]
+    if all(is_slip_only(log, vehicle) for log in logs):
+        return calibrate_radii(logs, vehicle, sources)
     for log in logs:
         log.check_against(vehicle)
-    sources = [log.source or f"recording {k + 1}" for k, log in enumerate(logs)]
     logs = [without_held(log) for log in logs]
     found, unknown, yaw_zero = _zeros(logs, vehicle, sources)
     zeroed = Calibration(tuple(found), ()).apply(vehicle)

@@ -1,0 +1,310 @@
+"""Slip where no torque is measured: a stock tractor's bus, a robot that logs its wheel speeds and position.
+
+Slip, ground speed, wheel speed and distance come from speeds alone; adhesion, soil resistance, traction and efficiency
+cannot be had, so their columns are absent.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from terragrip.errors import InputError
+from terragrip.estimation import zero_slip
+from terragrip.estimation.engine import EVENTS, wheel_radii
+from terragrip.estimation.estimates import Estimates
+from terragrip.estimation.noise import channel_noise, logged_noise
+from terragrip.estimation.slip_filter import Walks, choose_walks, run
+from terragrip.recording import Recording, held_periods, unit_warnings, without_held
+from terragrip.vehicle import Vehicle
+
+Floats = npt.NDArray[np.float64]
+
+METHOD = "slip-only"
+DRIVE = "drive"
+"""Name of the wheel that stands for all driven ones, where only the drive train's speed was logged."""
+
+_STANDSTILL = 0.05  # m/s
+_GAP = 2.0  # s
+_RADIUS = 0.02  # relative SD of a radius that nothing calibrated
+_PASSED_ON = ("drawbar_force", "latitude", "longitude", "altitude")
+_OUTLIER, _STILL, _AWAY = (EVENTS.index(name) for name in ("outlier", "standstill", "gap"))
+
+
+@dataclass(frozen=True)
+class RimSpeed:
+    """A wheel's rim speed (n,) [m/s] by the radius that counts, its SD, the radius [m] and its relative SD."""
+
+    wheel: str
+    values: Floats
+    noise: float
+    radius: float
+    spread: float
+
+
+def is_slip_only(recording: Recording, vehicle: Vehicle) -> bool:
+    """Whether the recording has speeds, and no torque of any wheel though the vehicle drives some."""
+    torque = any(name.startswith("drive_torque_") for name in recording.channels)
+    return bool(vehicle.driven.any()) and not torque
+
+
+def estimate_slip(
+    recording: Recording,
+    vehicle: Vehicle,
+    *,
+    smooth: bool = False,
+    sensors: Mapping[str, float] | None = None,
+    held: Mapping[str, float] | None = None,
+    gap: float | None = None,
+    standstill_speed: float | None = None,
+    progress: Callable[[int, int], None] | None = None,
+) -> Estimates:
+    """Estimate slip from speeds alone; arguments as for `terragrip.estimate`.
+
+    Slip of a wheel is against the radius of the vehicle file. The drive train's speed (``wheel_based_speed``) is by a
+    radius that the machine supposes: it is held against the log's own zero-slip ratio, unless the vehicle's calibration
+    names the radii. ``about["zero_slip"]`` holds each wheel's zero-slip radius in this log with its SD.
+
+    Raises InputError where a wheel of the log is not the vehicle's.
+    """
+    periods = dict(held_periods(recording) if held is None else held)
+    log = without_held(recording, periods)
+    logged = logged_noise(recording, vehicle, periods)
+    mine = dict(sensors or {})
+    used = tuple(
+        n for n in log.channels if n == "ground_speed" or n.startswith(("wheel_speed_", "wheel_based"))
+    )
+    noise, guessed = channel_noise(vehicle, used, {**{k: v for k, v in logged.items() if k in used}, **mine})
+    zero = {name: _zero(recording, vehicle, name) for name in used if name != "ground_speed"}
+    rims, notes = _rim_speeds(log, vehicle, noise, zero)
+    step = _STANDSTILL if standstill_speed is None else standstill_speed
+    speeds = np.stack([log.channels["ground_speed"], *(rim.values for rim in rims)], axis=1)
+    sds = np.array([noise["ground_speed"], *(rim.noise for rim in rims)])
+    anew = _anew(log.time, speeds, _GAP if gap is None else gap)
+    walks = choose_walks(log.time, speeds, sds, anew)
+    found = run(log.time, speeds, sds, anew, walks, smooth=smooth)
+    columns = _columns(found.state, found.covariance, rims, log.time, step)
+    columns |= {"nis": found.nis, "channels": found.channels}
+    event = _events(found.state, rims, found.outlier, anew, step)
+    for name in (*_PASSED_ON, *recording.references):
+        if name in recording.channels:
+            columns[name] = recording.channels[name]
+    if progress is not None:
+        progress(len(log), len(log))
+    if guessed:
+        shown = ", ".join(f"{name} ({noise[name]:.3g})" for name in guessed)
+        notes.append(f"The noise of {shown} is a guess from the vehicle's size: give it under 'sensors'.")
+    heard = [note for note in recording.notes if not note.startswith("There is no drawbar_force")]
+    said = (*heard, *unit_warnings(recording, vehicle), _WHAT_IS_MISSING, *notes)
+    about = _about(recording, vehicle, noise, periods, walks, zero, smooth=smooth)
+    return Estimates(log.time, columns, event, dict(recording.labels), about, tuple(dict.fromkeys(said)))
+
+
+_WHAT_IS_MISSING = (
+    "There is no drive torque: slip, speeds and distance are estimated, and maps of slip can be drawn; adhesion, soil "
+    "resistance, net traction and efficiency cannot be had."
+)
+
+
+def _zero(recording: Recording, vehicle: Vehicle, name: str) -> zero_slip.Ratio | None:
+    """The zero-slip ratio of a channel in this log."""
+    radius = _radius_of(vehicle, name)
+    return zero_slip.lightest(*zero_slip.ratios(recording, name, radius))
+
+
+def _radius_of(vehicle: Vehicle, name: str) -> float:
+    """What takes a channel to m/s by the vehicle file."""
+    if name == "wheel_based_speed":
+        return 1.0
+    wheel = name.removeprefix("wheel_speed_")
+    if wheel not in vehicle.wheels:
+        mend = f"its wheels are {', '.join(vehicle.wheels)}"
+        raise InputError(f"the vehicle has no wheel {wheel}", place=f"column {name}", mend=mend)
+    return float(wheel_radii(vehicle)[1][vehicle.wheels.index(wheel)])
+
+
+def _rim_speeds(
+    log: Recording, vehicle: Vehicle, noise: Mapping[str, float], zero: Mapping[str, zero_slip.Ratio | None]
+) -> tuple[list[RimSpeed], list[str]]:
+    """The rim speeds that slip is told from, and sentences on their radii."""
+    notes: list[str] = []
+    rims: list[RimSpeed] = []
+    stated = vehicle.uncertainty.wheel_radius
+    for wheel in log.wheels:
+        name = f"wheel_speed_{wheel}"
+        radius = _radius_of(vehicle, name)
+        values = radius * log.channels[name] + _hub(log, vehicle, wheel)
+        rims.append(
+            RimSpeed(wheel, values, radius * noise[name], radius, _RADIUS if stated is None else stated)
+        )
+        notes += _told(f"wheel {wheel}", zero[name], radius, "the vehicle file says")
+    if rims:
+        if "wheel_based_speed" in log.channels:
+            notes.append("wheel_based_speed is not used: the wheels have speeds of their own.")
+        return rims, notes
+    supposed = float(np.mean(np.asarray(vehicle.wheel_radius)[vehicle.driven]))
+    scale, spread, said = _scale_of_drive(vehicle, zero["wheel_based_speed"], supposed, stated)
+    values = scale * log.channels["wheel_based_speed"]
+    sd = scale * noise["wheel_based_speed"]
+    return [RimSpeed(DRIVE, values, sd, scale * supposed, spread)], said
+
+
+def _scale_of_drive(
+    vehicle: Vehicle, zero: zero_slip.Ratio | None, supposed: float, stated: float | None
+) -> tuple[float, float, list[str]]:
+    """Factor of the drive train's speed, its relative SD, and the sentence on it."""
+    calibrated = vehicle.calibration.wheel_radius
+    driven = [w for w, d in zip(vehicle.wheels, vehicle.driven, strict=True) if d]
+    if all(wheel in calibrated for wheel in driven):
+        of_file = [vehicle.wheel_data[vehicle.wheels.index(wheel)].radius for wheel in driven]
+        scale = float(np.mean([calibrated[w] / r for w, r in zip(driven, of_file, strict=True)]))
+        spread = _RADIUS if stated is None else stated
+        return scale, spread, _told("the drive", zero, supposed / scale, "before calibration")
+    if zero is None:
+        return (
+            1.0,
+            _RADIUS,
+            [
+                "The log is too short to tell the zero-slip radius: slip is against the speed as the machine gives it, "
+                f"to about {100 * _RADIUS:.0f} %."
+            ],
+        )
+    return (
+        zero.value,
+        zero.std,
+        [
+            *_told("the drive", zero, supposed, "the vehicle file says"),
+            "Slip counts from there: the lightest tenth of steady stretches is called zero. Calibrate on a pass without load "
+            "to make it absolute.",
+        ],
+    )
+
+
+def _told(what: str, zero: zero_slip.Ratio | None, radius: float, beside: str) -> list[str]:
+    if zero is None:
+        return []
+    return [
+        f"Zero-slip radius of {what} in this log: {zero.value * radius:.4f} ± {zero.std * radius:.4f} m, from the lightest "
+        f"tenth of {zero.windows} steady windows ({beside} {radius:.4f} m)."
+    ]
+
+
+def _hub(log: Recording, vehicle: Vehicle, wheel: str) -> Floats | float:
+    """What a turn takes off the speed of a wheel's hub [m/s] (n,): yaw rate times the wheel's distance to the left."""
+    if not vehicle.track or "angular_velocity_z" not in log.channels:
+        return 0.0
+    own = np.flatnonzero(vehicle.wheel_axle == vehicle.wheel_axle[vehicle.wheels.index(wheel)])
+    place = int(np.searchsorted(own, vehicle.wheels.index(wheel)))
+    side = float(np.linspace(vehicle.track / 2, -vehicle.track / 2, len(own))[place]) if len(own) > 1 else 0.0
+    yaw = log.channels["angular_velocity_z"]
+    known = np.isfinite(yaw)
+    return side * np.interp(log.time, log.time[known], yaw[known]) if known.any() else 0.0
+
+
+def _anew(time: Floats, speeds: Floats, gap: float) -> npt.NDArray[np.bool_]:
+    """Rows (n,) before which no speed was measured for longer than ``gap`` [s], and the first."""
+    measured = np.isfinite(speeds).any(axis=1)
+    last = np.maximum.accumulate(np.where(measured, time, -np.inf))
+    silence = time - np.r_[-np.inf, last[:-1]]
+    return np.asarray(silence > gap)
+
+
+def _columns(
+    state: Floats, covariance: Floats, rims: list[RimSpeed], time: Floats, standstill: float
+) -> dict[str, Floats]:
+    """The table's columns (n,) from the filter's state and covariance."""
+    v = state[:, 0]
+    steps = np.diff(time, prepend=time[0])
+    found = {
+        "distance": np.cumsum(steps * (np.abs(v) + np.abs(np.r_[v[:1], v[:-1]])) / 2),
+        "ground_speed": v,
+        "ground_speed_std": np.sqrt(np.maximum(covariance[:, 0, 0], 0.0)),
+    }
+    slips: dict[str, Floats] = {}
+    for i, rim in enumerate(rims):
+        d, k = state[:, i + 2], i + 2
+        u = v + d
+        spread = covariance[:, 0, 0] + 2 * covariance[:, 0, k] + covariance[:, k, k]
+        found[f"wheel_speed_{rim.wheel}"] = u / rim.radius
+        found[f"wheel_speed_{rim.wheel}_std"] = np.sqrt(np.maximum(spread, 0.0)) / rim.radius
+        slips[f"slip_{rim.wheel}"], slips[f"slip_{rim.wheel}_std"] = _slip(
+            v, d, covariance[:, [0, 0, k], [0, k, k]], rim.spread, standstill
+        )
+    return found | slips
+
+
+def _slip(v: Floats, d: Floats, spread: Floats, radius: float, standstill: float) -> tuple[Floats, Floats]:
+    """Slip (paper eq. 5) and its SD (n,) by the first derivatives; ``spread`` (n, 3): variances of v, v with d, d."""
+    u = v + d
+    driving = np.abs(u) >= np.abs(v)
+    faster = np.where(driving, u, v)
+    moving = np.abs(faster) > standstill
+    safe = np.where(moving, faster, 1.0)
+    value = np.where(moving, d / safe, np.nan)
+    # Driving: d/(v + d); braking: d/v. Derivatives by v and d.
+    by_v = -d / safe**2
+    by_d = np.where(driving, v, safe) / safe**2
+    variance = by_v**2 * spread[:, 0] + 2 * by_v * by_d * spread[:, 1] + by_d**2 * spread[:, 2]
+    variance += (radius * np.where(driving, v, u) / safe) ** 2
+    return np.clip(value, -1.0, 1.0), np.where(moving, np.sqrt(np.maximum(variance, 0.0)), np.nan)
+
+
+def _events(
+    state: Floats,
+    rims: list[RimSpeed],
+    outlier: npt.NDArray[np.bool_],
+    anew: npt.NDArray[np.bool_],
+    standstill: float,
+) -> npt.NDArray[np.uint8]:
+    event = np.where(outlier, _OUTLIER, 0).astype(np.uint8)
+    fastest = np.abs(state[:, 0])
+    for i in range(len(rims)):
+        fastest = np.maximum(fastest, np.abs(state[:, 0] + state[:, i + 2]))
+    event[fastest <= standstill] = _STILL
+    after = anew.copy()
+    after[0] = False
+    event[after | np.r_[after[1:], False]] = _AWAY
+    return event
+
+
+def _about(
+    recording: Recording,
+    vehicle: Vehicle,
+    noise: Mapping[str, float],
+    held: Mapping[str, float],
+    walks: Walks,
+    zero: Mapping[str, zero_slip.Ratio | None],
+    *,
+    smooth: bool,
+) -> dict[str, Any]:
+    """What the table was made from, ready for JSON."""
+    from terragrip import __version__
+
+    about = {
+        "version": __version__,
+        "method": METHOD,
+        "smooth": smooth,
+        "vehicle": vehicle.to_dict(),
+        "recording": {"source": recording.source, "sha256": recording.sha256},
+        "settings": {
+            "noise": dict(noise),
+            "held": dict(held),
+            "walks": {"jerk": walks.jerk, "change": walks.change},
+        },
+        "zero_slip": {
+            name.removeprefix("wheel_speed_").replace("wheel_based_speed", DRIVE): {
+                "ratio": ratio.value,
+                "std": ratio.std,
+                "windows": ratio.windows,
+            }
+            for name, ratio in zero.items()
+            if ratio is not None
+        },
+    }
+    plain: dict[str, Any] = json.loads(json.dumps(about))
+    return plain

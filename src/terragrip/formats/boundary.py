@@ -1,0 +1,65 @@
+"""Where other people's readers are called: what they need, and what they raise on a damaged file."""
+
+from __future__ import annotations
+
+import os
+import struct
+import warnings
+import zlib
+from collections.abc import Iterator
+from contextlib import contextmanager
+from importlib import import_module
+from typing import Any
+
+from terragrip.errors import InputError
+
+DAMAGE: tuple[type[Exception], ...] = (
+    # What byte-wise parsers run into when bytes are not what they should be.
+    ValueError,  # with UnicodeDecodeError
+    LookupError,
+    TypeError,
+    AttributeError,
+    ArithmeticError,
+    AssertionError,
+    EOFError,
+    OSError,
+    MemoryError,
+    RecursionError,
+    NotImplementedError,
+    struct.error,
+    zlib.error,
+)
+
+
+def needed(module: str, what: str) -> Any:
+    """Import a package of the extra ``formats``; raises InputError that names the extra if it is not installed."""
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # of other people's modules, at import
+            return import_module(module)
+    except ModuleNotFoundError as error:
+        missing = (error.name or module).partition(".")[0]
+        raise InputError(
+            f"to read {what} the Python package {missing!r} is needed",
+            mend="pip install 'terragrip[formats]'",
+        ) from error
+
+
+@contextmanager
+def reading(source: str | os.PathLike[str], kind: str, *errors: type[Exception]) -> Iterator[None]:
+    """Turn what a library raises on a damaged file into an InputError that says so.
+
+    ``errors`` are the library's own exceptions, beside those of broken bytes. Its warnings are silenced: they
+    would be lines that nobody can act on.
+    """
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            yield
+    except InputError:
+        raise
+    except (*DAMAGE, *errors) as error:
+        said = " ".join(str(error).split())[:100] or type(error).__name__
+        raise InputError(
+            f"is a damaged {kind}, or none ({said})", file=source, mend="copy or record it again"
+        ) from error

@@ -1,0 +1,128 @@
+"""Signals in the payloads of many frames at once."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+Floats = npt.NDArray[np.float64]
+Bytes = npt.NDArray[np.uint8]
+
+
+@dataclass(frozen=True)
+class Field:
+    """Where a signal stands in a payload: ``start`` and byte order as a DBC has them, bits counted from 0.
+
+    Value = scale * raw + offset in ``unit``. ``codes``: the raw range ends in the codes of J1939 for "error" and "not
+    available", which are missing values. ``selector`` and ``chosen``: present only where that field holds one of those.
+    ``reverse``: the field that holds 0 where the value runs backward.
+    """
+
+    name: str
+    start: int
+    length: int
+    little_endian: bool = True
+    signed: bool = False
+    floating: bool = False
+    scale: float = 1.0
+    offset: float = 0.0
+    unit: str | None = None
+    codes: bool = False
+    selector: str | None = None
+    chosen: tuple[int, ...] = ()
+    reverse: str | None = None
+
+    @property
+    def last_byte(self) -> int:
+        """Index of the last byte it reaches into."""
+        if self.little_endian:
+            return (self.start + self.length - 1) // 8
+        return (8 * (self.start // 8) + 7 - self.start % 8 + self.length - 1) // 8
+
+
+def raw_of(field: Field, data: Bytes) -> npt.NDArray[np.uint64]:
+    """Raw values (n,) of a field in payloads (n, bytes); the payloads must reach to the field's last byte."""
+    found = np.zeros(len(data), dtype=np.uint64)
+    if field.little_endian:
+        first, last = field.start // 8, field.last_byte
+        shifts = [8 * (byte - first) - field.start % 8 for byte in range(first, last + 1)]
+    else:
+        position = 8 * (field.start // 8) + 7 - field.start % 8  # counted from the first byte's highest bit
+        first, last = position // 8, field.last_byte
+        trailing = 8 * last + 8 - position - field.length
+        shifts = [8 * (last - byte) - trailing for byte in range(first, last + 1)]
+    for byte, shift in zip(range(first, last + 1), shifts, strict=True):
+        part = data[:, byte].astype(np.uint64)
+        found |= part << np.uint64(shift) if shift >= 0 else part >> np.uint64(-shift)
+    if field.length < 64:
+        found &= np.uint64((1 << field.length) - 1)
+    return found
+
+
+def missing_codes(field: Field, raw: npt.NDArray[np.uint64]) -> npt.NDArray[np.bool_]:
+    """Which raw values (n,) say "error", "not available" or are reserved (SAE J1939-71, ISO 11783-7).
+
+    Whole bytes: the highest byte is 0xFB or more. Fewer bits: the two highest codes, "error" and "not available"; a
+    single bit has none. Signed fields are NMEA 2000's: the two highest codes.
+    """
+    if field.length < 2 or field.floating:
+        return np.zeros(len(raw), dtype=bool)
+    if field.signed:
+        top = (1 << (field.length - 1)) - 1
+        return (raw == np.uint64(top)) | (raw == np.uint64(top - 1))
+    if field.length % 8 == 0:
+        return raw >= np.uint64(0xFB << (field.length - 8))
+    return raw >= np.uint64((1 << field.length) - 2)
+
+
+def physical(field: Field, raw: npt.NDArray[np.uint64]) -> Floats:
+    """Physical values (n,) of raw ones."""
+    if field.floating:
+        kind = {16: np.float16, 32: np.float32, 64: np.float64}[field.length]
+        word = {16: np.uint16, 32: np.uint32, 64: np.uint64}[field.length]
+        with np.errstate(invalid="ignore"):  # a signalling NaN is a NaN
+            numbers = raw.astype(word).view(kind).astype(np.float64)
+    elif field.signed:
+        up = np.uint64(64 - field.length)
+        numbers = ((raw << up).view(np.int64) >> np.int64(64 - field.length)).astype(np.float64)
+    else:
+        numbers = raw.astype(np.float64)
+    if (field.scale, field.offset) == (1.0, 0.0):
+        return numbers
+    return field.scale * numbers + field.offset
+
+
+def decode(
+    fields: tuple[Field, ...], wanted: set[str], data: Bytes, lengths: npt.NDArray[np.uint16]
+) -> dict[str, Floats]:
+    """The wanted fields (n,) of payloads (n, bytes) of which each holds ``lengths`` (n,) bytes; NaN where absent."""
+    by_name = {field.name: field for field in fields}
+    raws: dict[str, npt.NDArray[np.uint64]] = {}
+
+    def raw(field: Field) -> npt.NDArray[np.uint64]:
+        if field.name not in raws:
+            short = field.last_byte + 1 - data.shape[1]
+            wide = np.pad(data, ((0, 0), (0, short))) if short > 0 else data
+            raws[field.name] = raw_of(field, wide)
+        return raws[field.name]
+
+    def present(field: Field) -> npt.NDArray[np.bool_]:
+        there = lengths > field.last_byte
+        if field.selector is not None:
+            parent = by_name[field.selector]
+            there = there & present(parent) & np.isin(raw(parent), np.array(field.chosen, dtype=np.uint64))
+        return there
+
+    found = {}
+    for field in (f for f in fields if f.name in wanted):
+        known = present(field)
+        if field.codes:
+            known = known & ~missing_codes(field, raw(field))
+        values = np.where(known, physical(field, raw(field)), np.nan)
+        if field.reverse is not None:
+            backward = by_name[field.reverse]
+            values = np.where(present(backward) & (raw(backward) == 0), -values, values)
+        found[field.name] = values
+    return found

@@ -1,0 +1,162 @@
+"""Which frame holds which signals: the built-in table of J1939 and ISO 11783, and DBC files."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+from terragrip.document import read_yaml
+from terragrip.errors import InputError
+from terragrip.files import refuse_missing
+from terragrip.formats.boundary import DAMAGE, needed
+from terragrip.formats.can.bits import Field
+
+EXTENDED = 1 << 31
+"""Set in an identifier of 29 bits, as in a DBC."""
+
+
+@dataclass(frozen=True)
+class Message:
+    """A frame's signals. ``key`` is its identifier (`EXTENDED` where it has 29 bits), or its PGN if ``by_group``."""
+
+    name: str
+    key: int
+    fields: tuple[Field, ...]
+    length: int
+    by_group: bool
+
+
+def group_of(identifier: int) -> int:
+    """The parameter group number of a 29-bit identifier; a destination address is no part of it (J1939-21)."""
+    group = (identifier >> 8) & 0x3FFFF
+    return group if (group >> 8) & 0xFF >= 240 else group & 0x3FF00
+
+
+def source_of(identifier: int) -> int:
+    """The address of the sender of a 29-bit identifier (J1939-21)."""
+    return identifier & 0xFF
+
+
+class Catalog:
+    """Messages by identifier and by parameter group; the first of equals counts.
+
+    ``names`` gives each signal its name: its own, or ``Message.Signal`` where several messages have one of that name.
+    """
+
+    def __init__(self, messages: Iterable[Message]) -> None:
+        self.by_identifier: dict[int, Message] = {}
+        self.by_group: dict[int, Message] = {}
+        for message in messages:
+            (self.by_group if message.by_group else self.by_identifier).setdefault(message.key, message)
+        seen: dict[str, int] = {}
+        for message in self.messages:
+            for field in message.fields:
+                seen[field.name] = seen.get(field.name, 0) + 1
+        self._twice = {name for name, count in seen.items() if count > 1}
+
+    @property
+    def messages(self) -> tuple[Message, ...]:
+        """All messages."""
+        return (*self.by_identifier.values(), *self.by_group.values())
+
+    def message_of(self, identifier: int) -> Message | None:
+        """The message of a frame's identifier (`EXTENDED` set where it has 29 bits); None if it is unknown."""
+        found = self.by_identifier.get(identifier)
+        if found is None and identifier & EXTENDED:
+            found = self.by_group.get(group_of(identifier))
+        return found
+
+    def name(self, message: Message, field: Field) -> str:
+        """The name of a signal in a log."""
+        return f"{message.name}.{field.name}" if field.name in self._twice else field.name
+
+
+def catalog(databases: Sequence[str | os.PathLike[str]] = ()) -> Catalog:
+    """The built-in table, after the messages of DBC files; raises InputError if one of these cannot be read."""
+    own = [message for path in databases for message in _read_dbc(path)]
+    taken = {message.key if message.by_group else group_of(message.key) for message in own}
+    return Catalog([*own, *(message for message in built_in() if message.key not in taken)])
+
+
+@cache
+def built_in() -> tuple[Message, ...]:
+    """The parameter groups of ``j1939.yaml``."""
+    table = read_yaml(Path(__file__).with_name("j1939.yaml")).data
+    return tuple(_group(int(number), entry) for number, entry in table.items())
+
+
+def _group(number: int, entry: dict[str, Any]) -> Message:
+    fields = []
+    for name, place in entry["fields"].items():
+        byte, _, bit = str(place["at"]).partition(".")
+        fields.append(
+            Field(
+                name=name,
+                start=8 * (int(byte) - 1) + int(bit or 1) - 1,
+                length=place["bits"],
+                signed=place.get("signed", False),
+                scale=place.get("scale", 1.0),
+                offset=place.get("offset", 0.0),
+                unit=place.get("unit"),
+                codes=True,
+                reverse=place.get("reverse"),
+            )
+        )
+    length = max(8, max(field.last_byte for field in fields) + 1)
+    return Message(entry["name"], number, tuple(fields), length, by_group=True)
+
+
+def _read_dbc(path: str | os.PathLike[str]) -> list[Message]:
+    """The messages of a DBC (or what else cantools reads: KCD, SYM, ARXML)."""
+    file = os.fspath(path)
+    refuse_missing(file, suffixes=(".dbc", ".kcd", ".sym", ".arxml"))
+    cantools = needed("cantools", "a DBC")
+    errors = (*DAMAGE, cantools.Error, needed("textparser", "a DBC").Error)
+    try:
+        database = cantools.database.load_file(file, strict=False, cache_dir=None)
+        found = [message_of(database, message) for message in database.messages]
+    except errors as error:
+        said = " ".join(str(error).split())[:120]
+        raise InputError(f"is no DBC that can be read ({said})", file=file, mend="export it again") from error
+    if not found:
+        raise InputError("describes no message", file=file, mend="give the DBC of the machine's bus")
+    return found
+
+
+def message_of(database: Any, message: Any) -> Message:
+    """A message of a cantools database."""
+    by_group = message.is_extended_frame and _is_j1939(database, message)
+    extended = EXTENDED if message.is_extended_frame else 0
+    key = group_of(message.frame_id) if by_group else message.frame_id | extended
+    fields = tuple(_field(signal, codes=by_group) for signal in message.signals)
+    return Message(message.name, key, fields, message.length, by_group)
+
+
+def _is_j1939(database: Any, message: Any) -> bool:
+    """By the message's frame format, the database's protocol, or DBC's usual source address for "any", 0xFE."""
+    if message.protocol == "j1939" or message.frame_id & 0xFF == 0xFE:
+        return True
+    attributes = getattr(database.dbc, "attributes", None) or {}
+    protocol = attributes.get("ProtocolType") or attributes.get("BusType")
+    return protocol is not None and str(protocol.value).upper() == "J1939"
+
+
+def _field(signal: Any, *, codes: bool) -> Field:
+    return Field(
+        name=signal.name,
+        start=signal.start,
+        length=signal.length,
+        little_endian=signal.byte_order == "little_endian",
+        signed=signal.is_signed,
+        floating=signal.is_float,
+        scale=float(signal.scale),
+        offset=float(signal.offset),
+        unit=signal.unit or None,
+        codes=codes and not signal.is_float,
+        selector=signal.multiplexer_signal,
+        chosen=tuple(signal.multiplexer_ids or ()),
+    )

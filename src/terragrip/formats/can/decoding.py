@@ -1,0 +1,94 @@
+"""From the frames of a log to its signals."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from terragrip.formats.can.bits import decode
+from terragrip.formats.can.catalog import EXTENDED, Message, group_of
+from terragrip.formats.can.frames import NO_SENDER, Frames, Payloads, of_sender
+from terragrip.formats.signals import Signal
+
+
+def names_of(frames: Frames) -> tuple[str, ...]:
+    """All signals of the messages that occur; those of one of several senders also by ``Name@F0``."""
+    found: dict[str, None] = {}
+    for (_, sender), message in frames.seen.items():
+        for f in message.fields:
+            name = frames.catalog.name(message, f)
+            found[name] = None
+            if frames.senders(message) > 1:
+                found[of_sender(name, sender)] = None
+    return tuple(found)
+
+
+def signals_of(frames: Frames) -> tuple[dict[str, Signal], list[str]]:
+    """The wanted signals by name, and sentences on them.
+
+    Where several senders give a message, a plain name is the signal of the sender with most valid samples, of the
+    lowest address among equals.
+    """
+    found: dict[str, Signal] = {}
+    best: dict[str, tuple[int, int]] = {}  # plain name: valid samples, and the sender's address made negative
+    several: set[str] = set()
+    for (name, sender), kept in frames.kept.items():
+        message = frames.seen[name, sender]
+        shared = frames.senders(message) > 1
+        for plain, signal in _decoded(frames, message, sender, kept).items():
+            if shared and (frames.wanted is None or frames.wanted(of_sender(plain, sender))):
+                found[of_sender(plain, sender)] = signal
+            rank = int(np.isfinite(signal.values).sum()), -sender
+            if (frames.wanted is None or frames.wanted(plain)) and rank > best.get(plain, (-1, 0)):
+                best[plain], found[plain] = rank, signal
+                several |= {plain} if shared else set()
+    return found, [*_on_senders(best, several), *_on_missing(found), *_on_frames(frames)]
+
+
+def _decoded(frames: Frames, message: Message, sender: int, kept: Payloads) -> dict[str, Signal]:
+    names = {f.name: frames.catalog.name(message, f) for f in message.fields}
+    wanted = {
+        field
+        for field, name in names.items()
+        if frames.wanted is None
+        or frames.wanted(name)
+        or (sender != NO_SENDER and frames.wanted(of_sender(name, sender)))
+    }
+    time = np.frombuffer(kept.time, np.float64)
+    data = np.frombuffer(kept.data, np.uint8).reshape(len(time), kept.width)
+    lengths: npt.NDArray[np.uint16] = np.frombuffer(kept.lengths, np.uint16)
+    values = decode(message.fields, wanted, data, lengths)
+    units = {f.name: f.unit for f in message.fields}
+    return {names[field]: Signal(time, column, units[field]) for field, column in values.items()}
+
+
+def _on_senders(best: dict[str, tuple[int, int]], several: set[str]) -> list[str]:
+    return [
+        f"{name} has several senders; it is that of address {-best[name][1]:02X} hex, which has most valid samples."
+        for name in sorted(several)
+    ]
+
+
+def _on_missing(found: dict[str, Signal]) -> list[str]:
+    """Signals that were sent, but as "not available" or "error" only."""
+    silent = [
+        n for n, s in found.items() if "@" not in n and len(s.values) and not np.isfinite(s.values).any()
+    ]
+    if not silent:
+        return []
+    more = f" and {len(silent) - 8} more" if len(silent) > 8 else ""
+    return [f'Sent as "not available" or "error" throughout: {", ".join(silent[:8])}{more}.']
+
+
+def _on_frames(frames: Frames) -> list[str]:
+    said = []
+    if frames.unknown:
+        count, total = len(frames.unknown), sum(frames.unknown.values())
+        groups = {group_of(i) for i in frames.unknown if i & EXTENDED}
+        what = (
+            f", among them the parameter groups {', '.join(map(str, sorted(groups)[:6]))}" if groups else ""
+        )
+        said.append(f"{total} of {frames.count} frames ({count} identifiers) are in no DBC or table{what}.")
+    if frames.transport.broken:
+        said.append(f"{frames.transport.broken} messages of several frames lack a part and were left out.")
+    return said

@@ -1,0 +1,174 @@
+"""CAN logs: BLF, ASC, TRC, candump and tables of frames."""
+
+from __future__ import annotations
+
+import io
+import os
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+from terragrip.errors import InputError
+from terragrip.files import sha256, unreadable
+from terragrip.formats.boundary import DAMAGE, needed
+from terragrip.formats.can.catalog import EXTENDED, catalog
+from terragrip.formats.can.decoding import names_of, signals_of
+from terragrip.formats.can.frames import Frames
+from terragrip.formats.can.text_logs import Count, Frame, candump, layout_of, table
+from terragrip.formats.signals import SignalLog
+from terragrip.formats.table import Wanted
+
+Databases = Sequence[str | os.PathLike[str]]
+
+_MOST_BAD = 0.5  # share of lines without a frame from which a file is none of its kind
+_BUSY = 20.0  # frames a second: a bus that speaks less is one whose stamps are taken for seconds by mistake
+
+
+def read_blf(path: str, wanted: Wanted | None, databases: Databases) -> SignalLog:
+    """Vector BLF, by python-can."""
+    return _by_python_can(path, "BLFReader", "BLF log", wanted, databases)
+
+
+def read_asc(path: str, wanted: Wanted | None, databases: Databases) -> SignalLog:
+    """Vector ASC, by python-can; time counts from the start of the measurement."""
+    return _by_python_can(path, "ASCReader", "ASC log", wanted, databases)
+
+
+def read_trc(path: str, wanted: Wanted | None, databases: Databases) -> SignalLog:
+    """PEAK TRC, by python-can."""
+    return _by_python_can(path, "TRCReader", "TRC log", wanted, databases)
+
+
+def read_candump(path: str, wanted: Wanted | None, databases: Databases) -> SignalLog:
+    """candump's log files and printed lines."""
+    return _from_lines(path, "candump log", wanted, databases, lambda lines, count: candump(lines, count))
+
+
+def read_frame_table(path: str, wanted: Wanted | None, databases: Databases) -> SignalLog:
+    """Tables with time, identifier (or pgn and source) and data columns."""
+
+    def frames(lines: Iterator[str], count: Count) -> Iterator[Frame]:
+        layout = layout_of(next(lines, ""))
+        if layout is None:
+            raise InputError("is no table of CAN frames", file=path, mend="give time, id and data columns")
+        return table(lines, layout, count)
+
+    return _from_lines(path, "table of CAN frames", wanted, databases, frames)
+
+
+def finished(
+    frames: Frames,
+    path: str,
+    notes: Sequence[str],
+    databases: Databases,
+    scale: float = 1.0,
+    *,
+    refuse_unknown: bool = True,
+) -> SignalLog:
+    """The signals of all frames taken; raises InputError where none is known, and says which there are.
+
+    ``scale`` takes the stamps to seconds; ``refuse_unknown`` False lets a log pass that has other signals.
+    """
+    if not frames.count:
+        raise InputError("holds no CAN frame", file=path, mend="check that the bus was recorded")
+    if not frames.seen and refuse_unknown:
+        shown = ", ".join(_shown(i) for i in sorted(frames.unknown)[:6])
+        what = "the DBC" if databases else "the built-in table of J1939"
+        raise InputError(
+            f"none of its {len(frames.unknown)} identifiers is in {what} ({shown})",
+            file=path,
+            mend="give the bus's DBC: --dbc FILE, or 'dbc:' in the profile",
+        )
+    signals, said = signals_of(frames)
+    if scale != 1.0:
+        scaled = {id(s.time): s.time * scale for s in signals.values()}
+        signals = {n: type(s)(scaled[id(s.time)], s.values, s.unit) for n, s in signals.items()}
+    return SignalLog(names_of(frames), signals, path, sha256(path), (*notes, *said))
+
+
+def _shown(identifier: int) -> str:
+    return f"{identifier & ~EXTENDED:08X}" if identifier & EXTENDED else f"{identifier:03X}"
+
+
+def _by_python_can(
+    path: str, reader: str, kind: str, wanted: Wanted | None, databases: Databases
+) -> SignalLog:
+    can = needed("can", f"a {kind}")
+    frames, notes = Frames(catalog(databases), wanted), []
+    binary = reader == "BLFReader"
+    try:
+        # Opened here, since a reader that refuses the file leaves it open.
+        with open(path, "rb") if binary else open(path, encoding="utf-8", errors="replace") as stream:
+            _take_messages(frames, getattr(can, reader)(stream))
+    except (*DAMAGE, can.CanError) as error:
+        said = " ".join(str(error).split())[:80] or type(error).__name__
+        if not frames.count:
+            raise InputError(
+                f"is a damaged {kind}, or none ({said})", file=path, mend="copy or record it again"
+            ) from error
+        notes.append(
+            f"The log is damaged after frame {frames.count} ({said}); the frames before it were read."
+        )
+    return finished(frames, path, notes, databases)
+
+
+def _take_messages(frames: Frames, messages: Iterable[Any]) -> None:
+    for message in messages:
+        if message.is_error_frame or message.is_remote_frame:
+            continue
+        identifier = message.arbitration_id
+        frames.take(
+            message.timestamp,
+            identifier | EXTENDED if message.is_extended_id else identifier,
+            bytes(message.data),
+        )
+
+
+def _from_lines(
+    path: str,
+    kind: str,
+    wanted: Wanted | None,
+    databases: Databases,
+    parse: Callable[[Iterator[str], Count], Iterator[Frame]],
+) -> SignalLog:
+    frames, count = Frames(catalog(databases), wanted), Count()
+    last = 0.0
+    try:
+        with Path(path).open("rb") as stream:
+            lines = io.TextIOWrapper(stream, encoding="utf-8", errors="replace", newline="\n")
+            for time, identifier, payload in parse(_bounded(lines), count):
+                frames.take(time, identifier, payload)
+                last = time
+    except OSError as error:
+        raise unreadable(path, error) from error
+    if count.bad > _MOST_BAD * (count.bad + frames.count):
+        raise InputError(
+            f"is a damaged {kind}, or none: {count.bad} lines hold no frame",
+            file=path,
+            place=f"line {count.first} ({count.shown!r})",
+            mend="copy or record it again",
+        )
+    notes = []
+    if count.bad:
+        notes.append(f"{count.bad} lines hold no frame, the first is line {count.first}; they were left out.")
+    scale = 1.0
+    span = last - (frames.first or 0.0)
+    if (
+        span > 0
+        and frames.count > 100
+        and frames.count / span < _BUSY
+        and last < 1e8
+        and kind.startswith("table")
+    ):
+        scale = 1e-3
+        notes.append(
+            "The frames' stamps were taken for milliseconds: as seconds the bus would be next to silent."
+        )
+    return finished(frames, path, notes, databases, scale)
+
+
+def _bounded(lines: Iterable[str], most: int = 4096) -> Iterator[str]:
+    """Lines of no more than ``most`` characters, since a damaged file may have no line ends at all."""
+    reader = lines.readline  # type: ignore[attr-defined]
+    while line := reader(most):
+        yield line

@@ -1,0 +1,160 @@
+"""CAN frames in text: candump's two forms, and tables with an identifier and a data column."""
+
+from __future__ import annotations
+
+import base64
+import binascii
+import re
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass
+
+from terragrip.formats.can.catalog import EXTENDED
+
+Frame = tuple[float, int, bytes]
+
+# (1600000000.000000) can0 18FE4800#0000030405060708 R
+_COMPACT = re.compile(
+    r"\s*\((\d+\.\d+)\)\s+\S+\s+([0-9A-Fa-f]{3}|[0-9A-Fa-f]{8})#(?:#[0-9A-Fa-f])?([0-9A-Fa-f]*)(?:\s+[RT])?\s*$"
+)
+# (1600000000.000000)  can0  RX - -  18FE4800   [8]  00 00 03
+_SPACED = re.compile(
+    r"\s*\((\d+\.\d+)\)\s+\S+\s+(?:[RT]X\s+\S+\s+\S+\s+)?([0-9A-Fa-f]{3}|[0-9A-Fa-f]{8})\s+\[\s*\d+\]\s*((?:[0-9A-Fa-f]{2}\s?)*)"
+)
+_NO_DATA = re.compile(r"#R\d?\b|remote request|ERRORFRAME|\b2[0-9A-Fa-f]{7}[# ]")
+_EIGHT = 8  # hexadecimal digits of a 29-bit identifier
+
+_TIMES = {
+    "timestamp": 1.0,
+    "time": 1.0,
+    "timestampepoch": 1.0,
+    "time_s": 1.0,
+    "t": 1.0,
+    "time_ms": 1e-3,
+    "timems": 1e-3,
+}
+_IDENTIFIERS = ("arbitration_id", "id", "can_id", "canid", "identifier")
+_DATA = ("data", "databytes", "payload", "data_hex")
+
+
+@dataclass
+class Count:
+    """How many lines of a text log held no frame and were no known remark, and the first of them."""
+
+    bad: int = 0
+    first: int = 0
+    shown: str = ""
+
+    def add(self, number: int, line: str) -> None:
+        """Count a line."""
+        if not self.bad:
+            self.first, self.shown = number, line.strip()[:40]
+        self.bad += 1
+
+
+def candump(lines: Iterable[str], count: Count) -> Iterator[Frame]:
+    """Frames of candump's log file or of its printed lines; a line that is neither is counted."""
+    for number, line in enumerate(lines, 1):
+        match = _COMPACT.match(line) or _SPACED.match(line)
+        data = "" if match is None else "".join(match[3].split())
+        if match is None or len(data) % 2:
+            if line.strip() and not _NO_DATA.search(line):
+                count.add(number, line)
+            continue
+        extended = EXTENDED if len(match[2]) == _EIGHT else 0
+        yield float(match[1]), int(match[2], 16) | extended, bytes.fromhex(data)
+
+
+@dataclass(frozen=True)
+class Layout:
+    """The columns of a table of frames; ``group`` and ``source`` where it gives these in place of an identifier."""
+
+    separator: str
+    width: int
+    time: int
+    scale: float
+    data: int
+    identifier: int | None = None
+    extended: int | None = None
+    skip: tuple[int, ...] = ()
+    group: int | None = None
+    source: int | None = None
+
+
+def layout_of(header: str) -> Layout | None:
+    """The layout that a header line tells, or None if it is no table of CAN frames."""
+    separator = max(";\t,", key=header.count)
+    names = [cell.strip().strip('"').lower() for cell in header.strip().lstrip("\ufeff").split(separator)]
+    time = next((k for k, name in enumerate(names) if name in _TIMES), None)
+    data = next((k for k, name in enumerate(names) if name in _DATA), None)
+    if time is None or data is None:
+        return None
+    own = next((names.index(name) for name in _IDENTIFIERS if name in names), None)
+    group = names.index("pgn") if "pgn" in names else None
+    if own is None and group is None:
+        return None
+    source = next((names.index(name) for name in ("source", "src", "sa") if name in names), None)
+    extended = next((names.index(name) for name in ("extended", "ide") if name in names), None)
+    return Layout(
+        separator,
+        len(names),
+        time,
+        _TIMES[names[time]],
+        data,
+        own,
+        extended,
+        tuple(names.index(name) for name in ("remote", "error") if name in names),
+        None if own is not None else group,
+        source,
+    )
+
+
+def table(lines: Iterable[str], layout: Layout, count: Count) -> Iterator[Frame]:
+    """Frames of a table of which the header was taken; a line that holds none is counted."""
+    read = _identifier(layout)
+    for number, line in enumerate(lines, 2):
+        cells = line.rstrip("\r\n").split(layout.separator)
+        if len(cells) != layout.width:
+            if line.strip():
+                count.add(number, line)
+            continue
+        try:
+            if any(cells[k].strip() not in ("", "0", "False", "false") for k in layout.skip):
+                continue
+            yield (
+                layout.scale * float(cells[layout.time].replace(",", ".")),
+                read(cells),
+                _payload(cells[layout.data]),
+            )
+        except (ValueError, binascii.Error):
+            count.add(number, line)
+
+
+def _identifier(layout: Layout) -> Callable[[list[str]], int]:
+    if layout.identifier is None:
+        group, source = layout.group, layout.source
+        assert group is not None
+        return lambda cells: (
+            EXTENDED | (int(cells[group]) << 8) | (int(cells[source]) & 0xFF if source else 0xFE)
+        )
+    place, extended = layout.identifier, layout.extended
+
+    def read(cells: list[str]) -> int:
+        text = cells[place].strip().strip('"').lower().removeprefix("0x").rstrip("hx")
+        number = int(text, 16)
+        if number >= 1 << 29:
+            raise ValueError("no identifier")
+        wide = number > 0x7FF or (
+            len(text) == _EIGHT if extended is None else cells[extended].strip() in ("1", "True", "true")
+        )
+        return number | EXTENDED if wide else number
+
+    return read
+
+
+def _payload(text: str) -> bytes:
+    """Hexadecimal with or without blanks and 0x, or python-can's base64."""
+    plain = text.strip().strip('"')
+    try:
+        return bytes.fromhex(plain.replace("0x", "").replace(" ", ""))
+    except ValueError:
+        return base64.b64decode(plain, validate=True)

@@ -1,0 +1,122 @@
+"""How far one clock is ahead of another, told by two records of the same machine's speed."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+Floats = npt.NDArray[np.float64]
+
+_STEP = 0.05  # s between the points on which speeds are compared
+_LEAST_OVERLAP = 20.0  # s
+_LEAST_SHARE = 0.3  # of the shorter record
+_LEAST_CORRELATION = 0.8
+_APART = 2.0  # s from the best offset, where another one must be worse
+_WORSE = 0.02  # in correlation
+_LONGEST = 20_000_000  # points; a record over ten days
+
+
+@dataclass(frozen=True)
+class Offset:
+    """``seconds`` that the second clock is ahead, its standard deviation, and the correlation of the speeds there."""
+
+    seconds: float
+    std: float
+    correlation: float
+
+
+def offset_between(
+    reference: tuple[Floats, Floats], other: tuple[Floats, Floats], *, reach: float | None = None
+) -> Offset | None:
+    """How far the clock of ``other`` is ahead of that of ``reference``; each is (time [s], speed), of any scale.
+
+    The correlation of both speeds over their common part is largest at the true offset (Padfield 2012, for records
+    that overlap in part). ``reach``: the largest offset looked for [s]; None: any. None comes back where the common part
+    is short, the speeds are unlike, or do not tell one offset from another.
+    """
+    first, second = _regular(*reference), _regular(*other)
+    if first is None or second is None or len(first[1]) + len(second[1]) > _LONGEST:
+        return None
+    correlation, lags = _correlation(first[1], second[1])
+    shift = second[0] - first[0] - _STEP * lags  # what must be taken off the second clock
+    if reach is not None:
+        correlation = np.where(np.abs(shift) <= reach, correlation, -np.inf)
+    best = int(np.argmax(correlation))
+    if not correlation[best] >= _LEAST_CORRELATION:
+        return None
+    elsewhere = np.abs(shift - shift[best]) > _APART
+    if elsewhere.any() and correlation[elsewhere].max() > correlation[best] - _WORSE:
+        return None
+    seconds = float(shift[best] - _STEP * _peak(correlation, best))
+    return Offset(seconds, _deviation(first, second, seconds), float(min(correlation[best], 1.0)))
+
+
+def _regular(time: Floats, speed: Floats) -> tuple[float, Floats] | None:
+    """Start and speed on regular points, NaN in gaps over a second."""
+    known = np.isfinite(time) & np.isfinite(speed)
+    time, speed = time[known], speed[known]
+    if len(time) < 3 or time[-1] - time[0] < _LEAST_OVERLAP or (time[-1] - time[0]) / _STEP > _LONGEST:
+        return None
+    points = np.arange(time[0], time[-1], _STEP)
+    values = np.interp(points, time, speed)
+    after = np.clip(np.searchsorted(time, points), 1, len(time) - 1)
+    longest = max(1.0, 3.0 * float(np.median(np.diff(time))))
+    values[time[after] - time[after - 1] > longest] = np.nan
+    return float(time[0]), values
+
+
+def _correlation(a: Floats, b: Floats) -> tuple[Floats, npt.NDArray[np.intp]]:
+    """Correlation of a (n,) with b (m,) over their common part, at each lag of b by whole points."""
+    from scipy.fft import irfft, next_fast_len, rfft
+
+    size = next_fast_len(len(a) + len(b) - 1, real=True)
+    masks = [np.isfinite(x).astype(np.float64) for x in (a, b)]
+    values = [np.where(m > 0, x - np.nanmean(x), 0.0) for x, m in zip((a, b), masks, strict=True)]
+    fa, fb = rfft(values[0], size), np.conj(rfft(values[1], size))
+    ma, mb = rfft(masks[0], size), np.conj(rfft(masks[1], size))
+    sa, sb = rfft(values[0] ** 2, size), np.conj(rfft(values[1] ** 2, size))
+
+    def at_lags(product: npt.NDArray[np.complex128]) -> Floats:
+        return np.asarray(irfft(product, size))
+
+    count = np.maximum(np.round(at_lags(ma * mb)), 0.0)
+    common = np.maximum(count, 1.0)
+    sum_a, sum_b = at_lags(fa * mb), at_lags(ma * fb)
+    cross = at_lags(fa * fb) - sum_a * sum_b / common
+    spread_a = at_lags(sa * mb) - sum_a**2 / common
+    spread_b = at_lags(ma * sb) - sum_b**2 / common
+    floor = 1e-9 * common * max(float(values[0].var()), float(values[1].var()), 1e-12)
+    enough = count >= max(_LEAST_OVERLAP / _STEP, _LEAST_SHARE * min(masks[0].sum(), masks[1].sum()))
+    with np.errstate(invalid="ignore", divide="ignore"):
+        found = cross / np.sqrt(np.maximum(spread_a, floor) * np.maximum(spread_b, floor))
+    lags = np.arange(size)
+    lags = np.where(lags < len(a), lags, lags - size)
+    order = np.argsort(lags)
+    return np.where(enough, found, -np.inf)[order], lags[order]
+
+
+def _peak(values: Floats, best: int) -> float:
+    """Where a parabola through three points peaks, in points from the middle one."""
+    if not 0 < best < len(values) - 1 or not np.isfinite(values[best - 1 : best + 2]).all():
+        return 0.0
+    low, middle, high = values[best - 1 : best + 2]
+    bend = low - 2 * middle + high
+    return float(0.5 * (low - high) / bend) if bend < 0 else 0.0
+
+
+def _deviation(first: tuple[float, Floats], second: tuple[float, Floats], seconds: float) -> float:
+    """Standard deviation of an offset: that of the speeds' difference over the size of the acceleration."""
+    time = first[0] + _STEP * np.arange(len(first[1]))
+    stamps = second[0] - seconds + _STEP * np.arange(len(second[1]))
+    speed = np.interp(time, stamps, second[1], left=np.nan, right=np.nan)
+    both = np.isfinite(first[1]) & np.isfinite(speed)
+    a, b = first[1][both], speed[both]
+    scale, level = np.polyfit(a, b, 1)
+    rest = b - scale * a - level
+    acceleration = np.gradient(scale * a, _STEP)
+    # Neighbouring differences are alike: count those that are not.
+    alike = float(np.clip(np.corrcoef(rest[:-1], rest[1:])[0, 1], 0.0, 0.999)) if rest.std() > 0 else 0.0
+    information = float(np.sum(acceleration**2)) * (1 - alike) / (1 + alike)
+    return float(max(np.sqrt(np.mean(rest**2) / information), _STEP / 100))

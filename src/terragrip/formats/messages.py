@@ -1,0 +1,175 @@
+"""Messages of topics as signals: every number in a message by topic and field, ``/odom.twist.twist.linear.x``.
+
+Arrays of up to 16 numbers give ``field[0]`` and so on; where the message has a list ``name`` of the same length, as a
+JointState has, ``velocity.front_left`` in place of ``velocity[0]``. Covariances are left out.
+"""
+
+from __future__ import annotations
+
+from array import array
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from terragrip.formats.signals import Signal
+from terragrip.formats.table import Wanted
+
+_LONGEST_ARRAY = 16
+_LONGEST_LIST = 8  # messages in a message
+_DEEPEST = 8
+_OTHER_CLOCK = 1.0  # s between stamp and receipt from which the sender's clock is another one
+_QUICKEST = 0.05  # quantile of the delay that counts as no delay
+
+Parts = Callable[[Any], Iterable[tuple[str, Any]]]
+"""Gives a message's fields as (name, value), or nothing for a value that is no message."""
+Path = tuple[str | int, ...]
+
+
+@dataclass
+class _Column:
+    path: Path
+    is_text: bool
+    numbers: array[float] = field(default_factory=lambda: array("d"))
+    texts: list[str | None] = field(default_factory=list)
+
+
+@dataclass
+class Topic:
+    """Collects the wanted fields of one topic's messages.
+
+    ``parts`` gives the fields of a message; ``stamp`` the sender's time [s], if the message has one. ``strange``: values
+    that are not there, or of another kind than in the first message.
+    """
+
+    name: str
+    parts: Parts
+    stamp: Callable[[Any], float | None]
+    wanted: Wanted | None = None
+    names: tuple[str, ...] = ()
+    count: int = 0
+    bad: int = 0
+    strange: int = 0
+    _receipts: array[float] = field(default_factory=lambda: array("d"))
+    _stamps: array[float] = field(default_factory=lambda: array("d"))
+    _columns: dict[str, _Column] = field(default_factory=dict)
+    _labels: tuple[str, ...] | None = None
+
+    @property
+    def is_wanted(self) -> bool:
+        """Whether any field is wanted; True until the first message told which there are."""
+        return bool(self._columns) or not self.count
+
+    def take(self, receipt: float, message: Any) -> None:
+        """Take a message that came at ``receipt`` [s]."""
+        labels = self._names_of_entries(message)
+        if not self.count or labels != self._labels:
+            self._learn(message, labels)
+        self.count += 1
+        if not self._columns:
+            return
+        sent = self.stamp(message)
+        self._receipts.append(receipt)
+        self._stamps.append(sent or np.nan)
+        found: dict[Path, Any] = {}
+        self._walk(message, (), found, {column.path[0] for column in self._columns.values() if column.path})
+        for column in self._columns.values():
+            value = found.get(column.path)
+            if column.is_text:
+                known = isinstance(value, str)
+                column.texts.append(value if known else None)
+            else:
+                known = isinstance(value, bool | int | float | np.number | np.bool_)
+                column.numbers.append(float(value) if known else np.nan)  # type: ignore[arg-type]
+            self.strange += not known
+
+    def signals(self) -> tuple[dict[str, Signal], list[str]]:
+        """The signals collected, and sentences on them."""
+        notes = []
+        if self.strange:
+            notes.append(
+                f"{self.name}: {self.strange} values are absent, or of another kind than in the first message."
+            )
+        if self.bad:
+            notes.append(f"{self.name}: {self.bad} messages cannot be read and were left out.")
+        time, said = self._time()
+        notes += said
+        found = {}
+        for name, column in self._columns.items():
+            values = np.array(column.texts, dtype=object) if column.is_text else np.array(column.numbers)
+            # A column that a later message brought has no value before.
+            missing = len(time) - len(values)
+            if missing:
+                values = np.r_[np.full(missing, None if column.is_text else np.nan), values]
+            found[name] = Signal(time, values)
+        return found, notes
+
+    def _time(self) -> tuple[np.ndarray, list[str]]:
+        """When the values were measured: the sender's stamps where there are, on the receiver's clock."""
+        receipts, stamps = np.array(self._receipts), np.array(self._stamps)
+        if not len(stamps) or not np.isfinite(stamps).all():
+            return receipts, []
+        delay = receipts - stamps
+        typical = float(np.median(delay))
+        if abs(typical) <= _OTHER_CLOCK:
+            return stamps, []
+        offset = float(np.quantile(delay, _QUICKEST))
+        told = (
+            f"{self.name} is stamped {offset:.3f} s off the recorder's clock; the stamps were moved onto it."
+        )
+        return stamps + offset, [told]
+
+    def _names_of_entries(self, message: Any) -> tuple[str, ...] | None:
+        """The list ``name`` of a message, as of a JointState's joints; None if it has none."""
+        found = next((value for key, value in self.parts(message) if key == "name"), None)
+        if isinstance(found, list | tuple) and all(isinstance(entry, str) for entry in found):
+            return tuple(found)
+        return None
+
+    def _learn(self, message: Any, labels: tuple[str, ...] | None) -> None:
+        """Make columns of the fields of a message, beside those that there are."""
+        self._labels = labels
+        found: dict[Path, Any] = {}
+        self._walk(message, (), found, None)
+        names = dict.fromkeys(self.names)
+        for path, value in found.items():
+            name = f"{self.name}.{_shown(path)}" if path else self.name
+            names[name] = None
+            if name in self._columns or (self.wanted is not None and not self.wanted(name)):
+                continue
+            self._columns[name] = _Column(path, isinstance(value, str))
+        self.names = tuple(names)
+
+    def _walk(self, value: Any, path: Path, found: dict[Path, Any], only: set[str | int] | None) -> None:
+        """Collect the numbers and texts under a value by path; ``only``: in these first fields."""
+        if isinstance(value, bool | int | float | str | np.number | np.bool_):
+            found[path] = value
+            return
+        if isinstance(value, np.ndarray | list | tuple):
+            self._walk_list(value, path, found)
+            return
+        if len(path) >= _DEEPEST:
+            return
+        for key, part in self.parts(value):
+            if not path and only is not None and key not in only:
+                continue
+            if key not in ("frame_id", "child_frame_id") and "covariance" not in key:
+                self._walk(part, (*path, key), found, only)
+
+    def _walk_list(self, values: Any, path: Path, found: dict[Path, Any]) -> None:
+        if not len(values) or isinstance(values[0], str):
+            return
+        plain = isinstance(values[0], bool | int | float | np.number | np.bool_)
+        if len(values) > (_LONGEST_ARRAY if plain else _LONGEST_LIST):
+            return
+        named = self._labels if self._labels and len(self._labels) == len(values) and len(path) == 1 else None
+        for k, value in enumerate(values):
+            self._walk(value, (*path, k if named is None else named[k]), found, None)
+
+
+def _shown(path: Path) -> str:
+    text = ""
+    for step in path:
+        text += f"[{step}]" if isinstance(step, int) else f".{step}" if text else step
+    return text

@@ -1,0 +1,233 @@
+"""ROS bags: ROS 1, and ROS 2 in SQLite or MCAP, by rosbags; messages of any type whose definition the bag holds."""
+
+from __future__ import annotations
+
+import sqlite3
+from collections.abc import Iterable, Iterator
+from contextlib import closing
+from pathlib import Path
+from typing import Any
+
+from terragrip.errors import InputError
+from terragrip.files import sha256
+from terragrip.formats.boundary import DAMAGE, needed, reading
+from terragrip.formats.kind import Databases
+from terragrip.formats.messages import Topic
+from terragrip.formats.signals import Signal, SignalLog
+from terragrip.formats.table import Wanted
+
+
+def read_ros1(path: str, wanted: Wanted | None, databases: Databases) -> SignalLog:
+    """Read a ROS 1 bag by topic and field; raises InputError if it is damaged or has no index."""
+    rosbag1 = needed("rosbags.rosbag1", "a ROS 1 bag")
+    types = Types("ROS1_NOETIC")
+    topics: dict[int, Topic] = {}
+    names: dict[int, str] = {}
+    with reading(path, "ROS 1 bag", rosbag1.ReaderError, *types.errors), rosbag1.Reader(path) as bag:
+        for connection in bag.connections:
+            definition = getattr(connection.msgdef, "data", connection.msgdef)
+            names[connection.id] = types.learn(connection.msgtype, str(definition), "msg")
+            topics[connection.id] = ros_topic(connection.topic, wanted)
+        for connection in bag.connections:
+            topic, name = topics[connection.id], names[connection.id]
+            for _, receipt, raw in bag.messages(connections=[connection]):
+                if not topic.is_wanted:
+                    break
+                _take(
+                    topic,
+                    types,
+                    receipt,
+                    lambda name=name, raw=raw: types.store(name).deserialize_ros1(raw, name),
+                )
+    return log_of(topics.values(), path, types.notes())
+
+
+def read_ros2(path: str, wanted: Wanted | None, databases: Databases) -> SignalLog:
+    """Read a ROS 2 bag, a folder or one of its files, by topic and field.
+
+    Message types that the bag does not describe must be those that come with ROS 2.
+    """
+    types = Types("LATEST")
+    topics: dict[str, Topic] = {}
+    files = _files_of(path)
+    if files[0].suffix == ".mcap":
+        from terragrip.formats.mcap import collect
+
+        notes: list[str] = []
+        for file in files:
+            notes += collect(file, wanted, topics, types)
+        return log_of(topics.values(), path, [*types.notes(), *notes], files)
+    for file in files:
+        with reading(file, "ROS 2 bag", sqlite3.Error, *types.errors), closing(_opened(file)) as base:
+            _collect(base, wanted, topics, types)
+    return log_of(topics.values(), path, types.notes(), files)
+
+
+class Types:
+    """Message types of one log, from the definitions that it holds, else from those that come with ROS.
+
+    ``unknown`` types, and those whose definition cannot be read, are named in `notes`.
+    """
+
+    def __init__(self, base: str) -> None:
+        self._typesys = needed("rosbags.typesys", "a ROS message")
+        self._serde = needed("rosbags.serde", "a ROS message")
+        self._base = base
+        self._own: dict[str, Any] = {}
+        self._common: Any = None
+        self.unknown: dict[str, None] = {}
+        self.errors: tuple[type[Exception], ...] = (self._typesys.TypesysError, self._serde.SerdeError)
+
+    def learn(self, name: str, definition: str, language: str) -> str:
+        """Take a type's definition (``msg`` or ``idl``); returns the name that it goes by."""
+        name = name if name.count("/") != 1 else name.replace("/", "/msg/")
+        if name in self._own or not definition.strip():
+            return name
+        try:
+            read = self._typesys.get_types_from_idl if language == "idl" else self._typesys.get_types_from_msg
+            found = read(definition) if language == "idl" else read(definition, name)
+            store = self._typesys.get_typestore(self._typesys.Stores.EMPTY)
+            given = {k: v for k, v in found.items() if k not in store.fielddefs}
+            base = self._known()
+            lacking = {k: v for k, v in base.fielddefs.items() if k not in given and k not in store.fielddefs}
+            store.register({**lacking, **given} if _refers_out(given) else given)
+            self._own[name] = store
+        except (*DAMAGE, *self.errors):
+            self.unknown[name] = None
+        return name
+
+    def store(self, name: str) -> Any:
+        """The rosbags store that reads a type; raises KeyError if there is none."""
+        if name in self._own:
+            return self._own[name]
+        if name not in self._known().fielddefs:
+            self.unknown[name] = None
+            raise KeyError(name)
+        return self._known()
+
+    def notes(self) -> list[str]:
+        """A sentence on the types that are unknown."""
+        if not self.unknown:
+            return []
+        return [
+            f"The log does not describe these message types, which were left out: {', '.join(self.unknown)}."
+        ]
+
+    def _known(self) -> Any:
+        if self._common is None:
+            self._common = self._typesys.get_typestore(self._typesys.Stores[self._base])
+        return self._common
+
+
+def _refers_out(definitions: dict[str, Any]) -> bool:
+    """Whether types name others that are not among them (rosbags writes a name as ``(Nodetype.NAME, name)``)."""
+    known = {*definitions, "builtin_interfaces/msg/Time", "builtin_interfaces/msg/Duration"}
+
+    def named(node: Any) -> Iterator[str]:
+        kind, content = node
+        if int(kind) == 2:
+            yield content
+        elif int(kind) in (3, 4):
+            yield from named(content[0])
+
+    return any(
+        name not in known for _, fields in definitions.values() for _, node in fields for name in named(node)
+    )
+
+
+def ros_topic(name: str, wanted: Wanted | None) -> Topic:
+    """A `Topic` of ROS messages as rosbags gives them."""
+    return Topic(name, _parts, _stamp, wanted)
+
+
+def _parts(message: Any) -> Iterable[tuple[str, Any]]:
+    fields = getattr(message, "__dataclass_fields__", None)
+    if fields is None:
+        return ()
+    names = set(fields) - {"__msgtype__"}
+    if names == {"sec", "nanosec"} or names == {"sec", "nsec"}:
+        return ()  # a time or duration
+    return [(key, getattr(message, key)) for key in fields if key != "__msgtype__"]
+
+
+def _stamp(message: Any) -> float | None:
+    stamp = getattr(getattr(message, "header", None), "stamp", None)
+    return None if stamp is None else float(stamp.sec + 1e-9 * getattr(stamp, "nanosec", 0))
+
+
+def _take(topic: Topic, types: Types, receipt: int, read: Any) -> None:
+    """Read a message and hand it to its topic; one that cannot be read is counted."""
+    try:
+        message = read()
+    except (*DAMAGE, *types.errors):
+        topic.bad += 1
+        return
+    topic.take(receipt * 1e-9, message)
+
+
+def _files_of(path: str) -> list[Path]:
+    """The files of a bag that is a folder or one file, in the order of their names."""
+    if Path(path).is_file():
+        return [Path(path)]
+    for suffix in (".db3", ".mcap"):
+        found = sorted(p for p in Path(path).iterdir() if p.suffix == suffix)
+        if found:
+            return found
+    packed = [p.name for p in Path(path).iterdir() if p.suffix in (".zstd", ".zst")]
+    mend = (
+        f"unpack {packed[0]} first (zstd -d)" if packed else "name the bag's folder, with .db3 or .mcap files"
+    )
+    raise InputError("holds no bag file", file=path, mend=mend)
+
+
+def _opened(file: Path) -> sqlite3.Connection:
+    return sqlite3.connect(f"{file.absolute().as_uri()}?mode=ro&immutable=1", uri=True)
+
+
+def _collect(base: sqlite3.Connection, wanted: Wanted | None, topics: dict[str, Topic], types: Types) -> None:
+    """Read the topics of one SQLite file."""
+    tables = {row[0] for row in base.execute("SELECT name FROM sqlite_master WHERE type = 'table'")}
+    if not {"topics", "messages"} <= tables:
+        raise ValueError("it has no tables topics and messages")
+    if "message_definitions" in tables:
+        for name, language, text in base.execute(
+            "SELECT topic_type, encoding, encoded_message_definition FROM message_definitions"
+        ):
+            types.learn(str(name), str(text), str(language).removeprefix("ros2"))
+    for number, name, kind, form in list(
+        base.execute("SELECT id, name, type, serialization_format FROM topics")
+    ):
+        if form != "cdr":
+            types.unknown[f"{kind} ({form})"] = None
+            continue
+        topic = topics.setdefault(str(name), ros_topic(str(name), wanted))
+        rows = base.execute("SELECT timestamp, data FROM messages WHERE topic_id = ?", (number,))
+        for receipt, raw in rows:
+            if not topic.is_wanted:
+                break
+            _take(
+                topic,
+                types,
+                receipt,
+                lambda raw=raw, kind=str(kind): types.store(kind).deserialize_cdr(raw, kind),
+            )
+
+
+def log_of(topics: Iterable[Topic], path: str, notes: list[str], files: Iterable[Path] = ()) -> SignalLog:
+    """The signals of all topics; raises InputError if no message could be read."""
+    found: dict[str, Signal] = {}
+    names: dict[str, None] = {}
+    topics, said = list(topics), list(notes)
+    for topic in topics:
+        signals, own = topic.signals()
+        found |= signals
+        said += own
+        names |= dict.fromkeys(topic.names)
+    if not any(topic.count for topic in topics):
+        bad = sum(topic.bad for topic in topics)
+        problem = f"holds no message that can be read ({bad} cannot)" if bad else "holds no message"
+        raise InputError(
+            f"{problem}{'; ' + said[0] if said else ''}", file=path, mend="check how it was recorded"
+        )
+    digest = "+".join(sha256(file) for file in files) or sha256(path)
+    return SignalLog(tuple(names), found, path, digest, tuple(said))

@@ -1,0 +1,121 @@
+"""A log of signals that each have a clock of their own, before they mean anything."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from terragrip.errors import InputError
+from terragrip.formats.table import LogTable
+from terragrip.recording.schema import TIME
+
+Floats = npt.NDArray[np.float64]
+
+_SAME = 1e-3  # share of the shortest typical spacing within which two stamps are one instant
+SINCE_1970 = 1e8
+"""Larger stamps [s] count from 1970, smaller ones from some start of their own."""
+
+
+@dataclass(frozen=True, eq=False)
+class Signal:
+    """One signal: ``time`` (n,) [s], ``values`` (n,) float64 (missing = NaN) or texts, and its unit if it is known.
+
+    Signals of one message share one ``time`` array.
+    """
+
+    time: Floats
+    values: npt.NDArray[Any]
+    unit: str | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class SignalLog:
+    """Signals of a log by name: ``names`` are all there are, ``signals`` those that were read.
+
+    ``texts`` says what a signal is of its own accord (a message's comment); ``notes`` are sentences for the user.
+    """
+
+    names: tuple[str, ...]
+    signals: dict[str, Signal]
+    source: str | None = None
+    sha256: str | None = None
+    notes: tuple[str, ...] = field(default_factory=tuple)
+
+    def table(self) -> LogTable:
+        """One table on the union of the instants, NaN where a signal was not measured; texts last until the next.
+
+        Time counts from the first instant; the table's ``start`` says when that was, where stamps count from 1970.
+        Stamps that are no finite number are left out and counted; of two samples at one instant the later one counts.
+        Raises InputError if no signal that was asked for has a sample.
+        """
+        clocks = {id(s.time): s.time for s in self.signals.values()}
+        notes = list(self.notes)
+        lost = sum(int(np.sum(~np.isfinite(t))) for t in clocks.values())
+        if lost:
+            notes.append(f"{lost} stamps are not finite, and their samples were left out.")
+        orders = {key: _order(t) for key, t in clocks.items()}
+        base, rows = _union([clocks[key][order] for key, order in orders.items()])
+        if not len(base):
+            if self.signals:
+                raise InputError(
+                    "holds no sample of any known signal", file=self.source, mend="check that it was recorded"
+                )
+            return LogTable((TIME, *self.names), {}, {}, self.source, self.sha256, tuple(notes), clocked=True)
+        place = dict(zip(orders, rows, strict=True))
+        columns: dict[str, npt.NDArray[Any]] = {TIME: base - base[0]}
+        for name, signal in self.signals.items():
+            order, row = orders[id(signal.time)], place[id(signal.time)]
+            columns[name] = _spread(signal.values[order], row, len(base))
+        doubled = sum(len(row) - len(np.unique(row)) for row in rows)
+        if doubled:
+            notes.append(f"{doubled} samples repeat the instant of the one before them and take its place.")
+        units = {name: s.unit for name, s in self.signals.items() if s.unit}
+        start = float(base[0]) if base[0] > SINCE_1970 else None
+        return LogTable(
+            (TIME, *self.names), columns, units, self.source, self.sha256, tuple(notes), start, clocked=True
+        )
+
+
+def _order(time: Floats) -> npt.NDArray[np.intp]:
+    """Places (m,) of the finite stamps in the order of time."""
+    known = np.flatnonzero(np.isfinite(time))
+    if len(known) == len(time) and bool((np.diff(time) >= 0).all()):
+        return known
+    return known[np.argsort(time[known], kind="stable")]
+
+
+def _union(clocks: list[Floats]) -> tuple[Floats, list[npt.NDArray[np.intp]]]:
+    """The instants (m,) of sorted clocks, and the row (n,) of each of their samples."""
+    if not clocks:
+        return np.empty(0), []
+    stamps = np.concatenate(clocks)
+    if not len(stamps):
+        return stamps, [np.empty(0, dtype=np.intp) for _ in clocks]
+    order = np.argsort(stamps, kind="stable")
+    apart = np.diff(stamps[order]) > _tolerance(clocks)
+    group = np.r_[0, np.cumsum(apart)]
+    row = np.empty(len(stamps), dtype=np.intp)
+    row[order] = group
+    ends = np.cumsum([len(clock) for clock in clocks])[:-1]
+    return stamps[order][np.r_[True, apart]], np.split(row, ends)
+
+
+def _tolerance(clocks: list[Floats]) -> float:
+    spacings = [float(np.median(np.diff(clock))) for clock in clocks if len(clock) > 2]
+    return _SAME * min((s for s in spacings if s > 0), default=0.0)
+
+
+def _spread(values: npt.NDArray[Any], rows: npt.NDArray[np.intp], length: int) -> npt.NDArray[Any]:
+    if values.dtype.kind in "fiub":
+        found = np.full(length, np.nan)
+        found[rows] = values
+        return found
+    texts = np.full(length, None, dtype=object)
+    texts[rows] = values
+    last = np.maximum.accumulate(np.where(texts != None, np.arange(length), -1))  # noqa: E711  (elementwise)
+    held = texts[np.maximum(last, 0)]
+    held[last < 0] = None
+    return held

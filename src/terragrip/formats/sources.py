@@ -1,0 +1,100 @@
+"""Several sources of one drive on one time base."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from terragrip.errors import InputError
+from terragrip.formats.clocks import offset_between
+from terragrip.formats.conversion import Part
+from terragrip.formats.signals import Signal, SignalLog
+from terragrip.recording import Recording
+from terragrip.recording.schema import LABELS, TIME, unit_of
+
+Floats = npt.NDArray[np.float64]
+
+_REACH = 60.0  # s that clocks which both count from 1970 may differ by: leap seconds are 18 s, time zones are told apart
+
+
+def merged(parts: Sequence[Part]) -> Recording:
+    """One recording of several sources: each channel from the first that has it, on the first one's clock.
+
+    Raises InputError where a source has no usable channel or time, and for whatever `Recording.from_frame` refuses.
+    """
+    reference = parts[0]
+    signals: dict[str, Signal] = {}
+    notes: list[str] = list(reference.notes)
+    noise: dict[str, float] = {}
+    for number, part in enumerate(parts):
+        if not part.columns:
+            raise InputError(
+                "holds no channel", file=part.source, mend="leave it out, or name its columns in a profile"
+            )
+        shift = 0.0
+        if number:
+            notes += part.notes
+            shift, said = _shift(reference, part)
+            notes.append(said)
+        for name, values in part.columns.items():
+            if name in signals:
+                continue
+            known = _known(values)
+            signals[name] = Signal(part.time[known] - shift, values[known], unit_of(name))
+            noise |= {name: part.noise[name]} if name in part.noise else {}
+    table = SignalLog(tuple(signals), signals, ", ".join(str(p.source) for p in parts)).table()
+    # The union starts at its first instant: give it back the first source's clock.
+    origin = min(float(s.time[0]) for s in signals.values() if len(s.time))
+    frame: dict[str, Any] = {**table.columns, TIME: table.columns[TIME] + origin}
+    digests = "+".join(part.sha256 or "" for part in parts)
+    return Recording.from_frame(
+        frame, table.source, sha256=digests, notes=tuple(dict.fromkeys((*notes, *table.notes))), noise=noise
+    )
+
+
+def _known(values: npt.NDArray[Any]) -> npt.NDArray[np.bool_]:
+    if values.dtype.kind in "fiub":
+        return np.isfinite(values)
+    return np.asarray(values != "", dtype=bool)
+
+
+def _shift(reference: Part, part: Part) -> tuple[float, str]:
+    """What to take off a source's time, and the sentence that says so."""
+    stated, reach = 0.0, None
+    if reference.start is not None and part.start is not None:
+        stated, reach = reference.start - part.start, _REACH
+    name = Path(str(part.source)).name
+    mine, theirs = _speed(reference), _speed(part)
+    found = None
+    if mine is not None and theirs is not None:
+        found = offset_between(mine, (theirs[0] - stated, theirs[1]), reach=reach)
+    if found is None:
+        how = "counts from 1970 as the first does" if reach is not None else "starts with the first one"
+        return stated, f"The clock of {name} is taken as it is (it {how}): the speeds do not tell an offset."
+    side = "ahead of" if found.seconds >= 0 else "behind"
+    beyond = "its stamps" if reach is not None else "its start"
+    return stated + found.seconds, (
+        f"The clock of {name} is {abs(found.seconds):.3f} ± {found.std:.3f} s {side} the first one beyond {beyond}, by the "
+        f"correlation of the speeds ({found.correlation:.3f}), and was set right."
+    )
+
+
+def _speed(part: Part) -> tuple[Floats, Floats] | None:
+    """Time and a speed of any scale: over ground, of the drive train, or of the wheels on average."""
+    for name in ("ground_speed", "wheel_based_speed"):
+        if name in part.columns and np.isfinite(part.columns[name]).sum() > 2:
+            return part.time, np.abs(part.columns[name])
+    wheels = [v for n, v in part.columns.items() if n.startswith("wheel_speed_") and n not in LABELS]
+    if not wheels:
+        return None
+    known = [np.isfinite(v) for v in wheels]
+    filled = [
+        np.interp(part.time, part.time[k], np.abs(v[k]))
+        for v, k in zip(wheels, known, strict=True)
+        if k.any()
+    ]
+    return (part.time, np.mean(filled, axis=0)) if filled else None

@@ -1,0 +1,241 @@
+"""CAN logs: every container gives the same signals; bits against cantools; codes, senders, long messages, damage."""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Callable
+from pathlib import Path
+
+import cantools
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from can_frames import START, WHEEL_BASED, drive, payload, write_log
+from terragrip.errors import InputError
+from terragrip.formats.can.bits import Field, missing_codes
+from terragrip.formats.can.catalog import EXTENDED, Catalog, catalog, group_of, message_of
+from terragrip.formats.can.decoding import signals_of
+from terragrip.formats.can.frames import Frames
+from terragrip.formats.reading import read, read_table
+
+DBC = """VERSION ""
+NS_ :
+BS_:
+BU_: ECU
+BO_ 291 Wheels: 8 ECU
+ SG_ front m0 : 7|16@0+ (0.01,0) [0|0] "m/s" ECU
+ SG_ rear m1 : 0|16@1- (0.5,-3) [0|0] "rad/s" ECU
+ SG_ page M : 60|4@1+ (1,0) [0|0] "" ECU
+ SG_ odd : 21|13@0- (0.25,1) [0|0] "" ECU
+ SG_ wide : 33|26@1+ (1,0) [0|0] "" ECU
+BO_ 2147483940 Floats: 8 ECU
+ SG_ ratio : 0|32@1- (1,0) [0|0] "" ECU
+ SG_ big : 39|32@0- (1,0) [0|0] "" ECU
+SIG_VALTYPE_ 2147483940 ratio : 1;
+SIG_VALTYPE_ 2147483940 big : 1;
+"""
+
+
+@pytest.fixture(scope="module")
+def dbc(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("dbc") / "bus.dbc"
+    path.write_text(DBC)
+    return path
+
+
+@pytest.mark.parametrize("suffix", ["blf", "asc", "trc", "log", "csv"])
+def test_every_container_gives_the_same_signals(tmp_path: Path, suffix: str) -> None:
+    machine = drive(1000, 30.0)
+    table = read_table(write_log(tmp_path / f"log.{suffix}", machine.frames))
+    sent = [struct.unpack("<H", d[:2])[0] / 1000 for _, i, d in machine.frames if i == WHEEL_BASED]
+    wheel = table.columns["WheelBasedMachineSpeed"]
+    assert np.allclose(wheel[np.isfinite(wheel)], sent, atol=1e-9)
+    assert np.isfinite(table.columns["GroundBasedMachineSpeed"]).sum() == 150
+    stamps = np.array([t for t, _, _ in machine.frames]) - START
+    assert np.allclose(table.columns["time"], stamps, atol=2e-3)
+    assert table.units["WheelBasedMachineSpeed"] == "m/s"
+    assert table.start is None if suffix == "asc" else table.start == pytest.approx(START, abs=1e-3)
+
+
+def test_candump_as_printed_and_other_tables(tmp_path: Path) -> None:
+    texts = {
+        "printed.txt": "(1700000000.500000)  can0  RX - -  0CFE48F0   [8]  E8 03 00 00 00 00 FF FD\n" * 3
+        + "(1700000001.000000)  can0  0CFE4980   [8]  D0 07 00 00 00 00 FF FD\n",
+        "semicolon.csv": "Timestamp;Type;ID;Data\n1700000000.5;1;CFE48F0;E8030000000000FD\n1700000001.0;1;CFE4980;D0070000000000FD\n",
+        "groups.csv": ",time,pgn,priority,source,destination,data\n0,500,65096,3,240,255,E8 03 00 00 00 00 FF FD \n"
+        + "1,1000,65097,3,128,255,D0 07 00 00 00 00 FF FD \n" * 2,
+    }
+    for name, text in texts.items():
+        (tmp_path / name).write_text(text)
+        columns = read_table(tmp_path / name).columns
+        assert np.nanmax(columns["WheelBasedMachineSpeed"]) == 1.0, name
+        assert np.nanmax(columns["GroundBasedMachineSpeed"]) == 2.0, name
+
+
+def decoded(
+    frames: list[tuple[float, int, bytes]], databases: tuple[Path, ...] = ()
+) -> dict[str, np.ndarray]:
+    taken = Frames(catalog(databases))
+    for time, identifier, data in frames:
+        taken.take(time, identifier, data)
+    return {name: signal.values for name, signal in signals_of(taken)[0].items()}
+
+
+@settings(max_examples=60)
+@given(data=st.binary(min_size=8, max_size=8))
+def test_bits_agree_with_cantools(data: bytes) -> None:
+    database = cantools.database.load_string(DBC, "dbc")
+    taken = Frames(Catalog(message_of(database, message) for message in database.messages))
+    taken.take(0.0, 291, data)
+    taken.take(0.0, 292 | EXTENDED, data)
+    found = {name: signal.values[0] for name, signal in signals_of(taken)[0].items()}
+    expected: dict[str, float] = {}
+    name_of = {291: "Wheels", 292: "Floats"}
+    for identifier in (291, 292):
+        try:
+            expected |= database.get_message_by_name(name_of[identifier]).decode(data, decode_choices=False)
+        except cantools.database.errors.DecodeError:  # no such page: the other signals are there all the same
+            page = data[7] >> 4
+            assert page > 1
+            assert found["page"] == page
+    for name, value in expected.items():
+        assert found[name] == pytest.approx(value, rel=1e-12, nan_ok=True), name
+    for name in {"front", "rear"} - set(expected):
+        assert np.isnan(found[name])
+
+
+def test_a_short_frame_lacks_what_it_does_not_reach(dbc: Path) -> None:
+    found = decoded([(0.0, 291, bytes(3)), (1.0, 291, bytes(8))], (dbc,))
+    assert np.isnan(found["page"][0])
+    assert found["page"][1] == 0
+    assert np.isnan(found["wide"][0])
+    assert found["odd"][1] == 1.0
+
+
+@pytest.mark.parametrize(
+    ("bits", "valid", "missing"),
+    [
+        (2, (0, 1), (2, 3)),
+        (8, (0, 0xFA), (0xFB, 0xFE, 0xFF)),
+        (16, (0, 0xFAFF), (0xFB00, 0xFE00, 0xFEFF, 0xFF00, 0xFFFF)),
+        (32, (0, 0xFAFFFFFF), (0xFB000000, 0xFE000000, 0xFFFFFFFF)),
+    ],
+)
+def test_codes_for_error_and_not_available(
+    bits: int, valid: tuple[int, ...], missing: tuple[int, ...]
+) -> None:
+    raw = np.array([*valid, *missing], dtype=np.uint64)
+    found = missing_codes(Field("x", 0, bits, codes=True), raw)
+    assert list(found) == [False] * len(valid) + [True] * len(missing)
+
+
+def test_not_available_is_missing_and_reverse_is_negative() -> None:
+    frames = [
+        (0.0, WHEEL_BASED | EXTENDED, payload(1.5)),
+        (0.1, WHEEL_BASED | EXTENDED, payload(1.5, direction=0)),
+        (0.2, WHEEL_BASED | EXTENDED, payload(65.535)),
+        (0.3, WHEEL_BASED | EXTENDED, payload(65.024)),
+    ]
+    speed = decoded(frames)["WheelBasedMachineSpeed"]
+    assert list(speed[:2]) == [1.5, -1.5]
+    assert np.isnan(speed[2:]).all()
+
+
+def test_any_source_address_and_priority() -> None:
+    assert group_of(0x18EA1234) == 0xEA00  # a destination is no part of the group
+    for identifier in (0x0CFE48F0, 0x18FE4803, 0x1CFE48FE):
+        assert decoded([(0.0, identifier | EXTENDED, payload(2.0))])["WheelBasedMachineSpeed"] == 2.0
+
+
+def test_of_several_senders_the_one_with_values_counts() -> None:
+    silent, heard = 0x0CFE4903 | EXTENDED, 0x0CFE4980 | EXTENDED
+    frames = [(0.1 * k, silent, payload(65.535)) for k in range(5)]
+    frames += [(0.1 * k, heard, payload(2.0)) for k in range(4)]
+    found = decoded(frames)
+    assert list(found["GroundBasedMachineSpeed"]) == [2.0] * 4
+    assert np.isnan(found["GroundBasedMachineSpeed@03"]).all()
+    taken = Frames(catalog())
+    for frame in frames:
+        taken.take(*frame)
+    assert any("address 80" in note for note in signals_of(taken)[1])
+
+
+def test_messages_of_several_frames() -> None:
+    latitude, longitude, altitude = 51.25, 13.5, 120.5
+    body = bytes(7) + struct.pack(
+        "<qqq", round(latitude * 1e16), round(longitude * 1e16), round(altitude * 1e6)
+    )
+    body = body.ljust(43, b"\xff")
+    fast = [bytes([0x40, 43]) + body[:6]]
+    fast += [bytes([0x40 | k + 1]) + body[6 + 7 * k : 13 + 7 * k].ljust(7, b"\xff") for k in range(6)]
+    position = 0x0DF80501 | EXTENDED
+    frames = [(0.1 * k, position, data) for k, data in enumerate(fast)]
+    frames += [(1.0, position, fast[0]), (1.1, position, fast[2])]  # a part is lost
+    frames += [(2.0 + 0.1 * k, position, data) for k, data in enumerate(fast)]
+    found = decoded(frames)
+    assert list(found["GnssPositionLatitude"]) == [latitude] * 2
+    assert list(found["GnssPositionAltitude"]) == [altitude] * 2
+    # The same group by J1939's broadcast announce message.
+    announce = bytes([32, 43, 0, 7, 255, 0x05, 0xF8, 0x01])
+    frames = [(0.0, 0x1CECFF05 | EXTENDED, announce)]
+    frames += [
+        (0.1 * k + 0.1, 0x1CEBFF05 | EXTENDED, bytes([k + 1]) + body[7 * k : 7 * k + 7].ljust(7, b"\xff"))
+        for k in range(7)
+    ]
+    assert list(decoded(frames)["GnssPositionLongitude"]) == [longitude]
+
+
+def test_only_what_a_profile_asks_for_is_kept(tmp_path: Path) -> None:
+    path = write_log(tmp_path / "log.blf", drive(1000, 10.0).frames)
+    table = read_table(path, lambda name: name == "GroundBasedMachineSpeed")
+    assert set(table.columns) == {"time", "GroundBasedMachineSpeed"}
+    assert "WheelBasedMachineSpeed" in table.names
+
+
+def test_refusals(tmp_path: Path, dbc: Path) -> None:
+    frames = [(START + k, 0x7F0, bytes(8)) for k in range(5)]
+    log = write_log(tmp_path / "other.blf", frames, extended=False)
+    with pytest.raises(
+        InputError, match=r"identifiers is in the built-in table of J1939 \(7F0\); give the bus's DBC"
+    ):
+        read_table(log)
+    with pytest.raises(InputError, match="is in the DBC"):
+        read_table(log, databases=(dbc,))
+    tractor = write_log(tmp_path / "log.blf", drive(1000, 10.0).frames)
+    with pytest.raises(InputError, match="is missing"):
+        read(tractor)
+    with pytest.raises(InputError, match="no such file"):
+        read(tractor, "tractor-isobus", dbc=tmp_path / "absent.dbc")
+    (tmp_path / "broken.dbc").write_text("BO_ x\n")
+    with pytest.raises(InputError, match="is no DBC that can be read"):
+        read(tractor, "tractor-isobus", dbc=tmp_path / "broken.dbc")
+    (tmp_path / "table.csv").write_text("time,a\n0,1\n")
+    with pytest.raises(InputError, match="is a text table, which needs no DBC"):
+        read(tmp_path / "table.csv", dbc=dbc)
+
+
+def test_a_log_cut_off_is_read_as_far_as_it_goes(tmp_path: Path) -> None:
+    path = write_log(tmp_path / "log.blf", drive(1000, 200.0).frames)
+    whole = len(read_table(path).columns["time"])
+    path.write_bytes(path.read_bytes()[: -path.stat().st_size // 3])
+    cut = read_table(path)
+    assert 0 < len(cut.columns["time"]) < whole
+    lines = write_log(tmp_path / "log.log", drive(1000, 10.0).frames).read_text().splitlines(keepends=True)
+    (tmp_path / "log.log").write_text("".join(["@@@\n", *lines]))
+    assert any(
+        "1 lines hold no frame, the first is line 1" in n for n in read_table(tmp_path / "log.log").notes
+    )
+
+
+def test_measured_john_deere(shared: Callable[[str], Path]) -> None:
+    folder = shared("data/ingest_samples/tractorhacking_j1939_5055E")
+    for log in sorted(folder.glob("*.csv")):
+        table = read_table(log)
+        assert np.isnan(table.columns["GroundBasedMachineSpeed"]).all(), "65.535 m/s is no speed"
+        assert np.nanmax(np.abs(table.columns["WheelBasedVehicleSpeed"])) == 0
+        assert any("milliseconds" in note for note in table.notes)
+    assert np.nanmax(read_table(folder / "highRPM1.csv").columns["EngineSpeed"]) == 1259.5
+    with pytest.raises(InputError, match="column ground_speed: holds no value"):
+        read(folder / "idle10sec.csv", "tractor-isobus")
