@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import shutil
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
+sys.path.insert(0, str(Path(__file__).parent))  # for browser_parts.py
 pytest.importorskip("fastapi", reason="the studio needs terragrip[studio]")
 
 from fastapi.testclient import TestClient

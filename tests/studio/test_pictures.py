@@ -33,8 +33,8 @@ def test_a_calibration_is_kept_beside_the_picture(client: TestClient, folder: Pa
         "lines": [{"name": "dry", "points": [[0.1, 0.4]]}],
     }
     with client.websocket_connect(NOTICES) as other:
-        assert client.put("/api/picture", params={"path": picture}, json=whole).status_code == 200
-        assert other.receive_json() == {"kind": "picture", "path": picture}
+        assert client.put("/api/picture", params={"path": picture, "by": "me"}, json=whole).status_code == 200
+        assert other.receive_json() == {"kind": "picture", "path": picture, "by": "me"}
     assert json.loads((folder / "scan.png.picture.json").read_text())["opacity"] == 0.3
     back = client.get("/api/picture", params={"path": picture}).json()
     assert {name: back[name] for name in whole} == whole

@@ -212,7 +212,7 @@ class Editor {
         this.drawSide();
       };
       const field = (label: string, value: number | undefined, put: (mark: Mark, v: number) => void): HTMLElement => {
-        const input = h("input", { type: "number", step: "any", "aria-label": `${TITLE[axis]}, point ${i + 1}, ${label}`, value: value === undefined ? "" : Number(value.toFixed(4)) });
+        const input = h("input", { type: "number", step: "any", "aria-label": `${TITLE[axis]}, point ${i + 1}, ${label}`, value: value === undefined ? "" : Number(value.toFixed(label === "value" ? 5 : 1)) });
         input.addEventListener("change", () => Number.isFinite(input.valueAsNumber) && set((m) => put(m, input.valueAsNumber)));
         return h("td", {}, input);
       };

@@ -1,12 +1,13 @@
 /** The fit page: curves by slider over points, bins and pictures. */
 
-import { get, send, type Item } from "../ui/api";
+import { ME, get, send, type Item } from "../ui/api";
 import { h, save } from "../ui/dom";
 import { note, tried } from "../ui/notes";
 import type { Page } from "../ui/page";
 import { CurvesPanel } from "./curves_panel";
 import { ListPanel } from "./list_panel";
 import { value } from "./models";
+import { mapOf } from "./picture";
 import { PicturesPanel } from "./pictures_panel";
 import { Plot } from "./plot";
 import { sameCurve } from "./scene";
@@ -15,7 +16,7 @@ import { State, type FitResult, type Model } from "./state";
 export const page: Page = (main, { notices, query }) => {
   const state = new State();
   const plot = new Plot(state);
-  const pictures = new PicturesPanel(state);
+  const pictures = new PicturesPanel(state, () => plot.fit());
   const list = new ListPanel(state, () => plot.fit(), pictures.element);
   const curves = new CurvesPanel(state, { fit: () => void fit(state), save: () => void keep(state) });
   const undo = h("button", { type: "button", click: () => step("undo"), title: "Ctrl+Z" }, "Undo");
@@ -82,7 +83,7 @@ export const page: Page = (main, { notices, query }) => {
 
   const forget = notices.on((notice) => {
     if (notice.kind === "folder") void reload();
-    if (notice.kind === "picture") void pictures.renewed(notice.path);
+    if (notice.kind === "picture" && notice.by !== ME) void pictures.renewed(notice.path);
   });
   addEventListener("keydown", key);
   addEventListener("paste", paste);
@@ -90,7 +91,7 @@ export const page: Page = (main, { notices, query }) => {
   main.addEventListener("dragover", hover);
   void start();
   // For the browser tests: how often the plot was drawn, and what is on it.
-  Object.assign(window, { terragripFit: { plot, state } });
+  Object.assign(window, { terragripFit: { plot, state, value, mapOf } });
   return () => {
     forget();
     plot.close();

@@ -1,6 +1,6 @@
 /** Background pictures: load by file, drop or paste, calibrate, fade, digitise a line. */
 
-import { address, get, send, upload, type Item } from "../ui/api";
+import { ME, address, get, send, upload, type Item } from "../ui/api";
 import { fill, h } from "../ui/dom";
 import { note, tried } from "../ui/notes";
 import { calibrate } from "./calibrate";
@@ -15,7 +15,10 @@ export class PicturesPanel {
   private digitising: { path: string; line: number } | null = null;
   private files: string[] = [];
 
-  constructor(private state: State) {
+  constructor(
+    private state: State,
+    private shown: () => void,
+  ) {
     state.on((change) => {
       if (change === "all" || change === "pictures" || change === "data") this.draw();
     });
@@ -74,6 +77,7 @@ export class PicturesPanel {
     const before = this.state.kept.pictures[path];
     if (!image || !before) return;
     await this.keep(path, await calibrate(path, image, before));
+    this.shown();
   }
 
   /** Another page changed a calibration: take it over unless it is ours already. */
@@ -90,12 +94,12 @@ export class PicturesPanel {
     this.state.kept.pictures[path] = calibration;
     this.state.commit();
     this.state.changed(redraw);
-    await tried(() => send("PUT", "picture", calibration, { path }));
+    await tried(() => send("PUT", "picture", calibration, { path, by: ME }));
   }
 
   /** Send what undo or redo brought back to the server too. */
   keepAll(): void {
-    for (const [path, calibration] of Object.entries(this.state.kept.pictures)) void tried(() => send("PUT", "picture", calibration, { path }));
+    for (const [path, calibration] of Object.entries(this.state.kept.pictures)) void tried(() => send("PUT", "picture", calibration, { path, by: ME }));
   }
 
   /** A click on the plot: a point of the line being digitised; with shift the nearest is removed. */

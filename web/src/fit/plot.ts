@@ -49,14 +49,16 @@ export class Plot {
     requestAnimationFrame(() => this.draw());
   }
 
-  /** Show all points, or the usual window where there are none. */
+  /** Show all points and marked axes, or the usual window where there are none. */
   fit(): void {
     const soils = this.state.soils.filter((soil) => soil.shown);
-    const xs = soils.flatMap((s) => [...s.points.slip, ...s.bins.map((b) => b.slip)]);
-    const ys = soils.flatMap((s) => [...s.points.adhesion, ...s.bins.map((b) => b.mean + b.std)]);
+    const pictures = Object.values(this.state.kept.pictures).filter((picture) => picture.shown);
+    const marks = (axis: "slip" | "adhesion"): number[] => pictures.flatMap((p) => p[axis]?.marks.map((mark) => mark.value) ?? []);
+    const xs = [...soils.flatMap((s) => [...s.points.slip, ...s.bins.map((b) => b.slip)]), ...marks("slip")];
+    const ys = [...soils.flatMap((s) => [...s.points.adhesion, ...s.bins.map((b) => b.mean + b.std)]), ...marks("adhesion")];
     const most = (values: number[], share: number): number => [...values].sort((a, b) => a - b)[Math.floor(values.length * share)] ?? 0;
     this.view.x = { low: Math.min(0, most(xs, 0.002)), high: Math.max(0.7, Math.min(most(xs, 0.998) * 1.05, 1)) };
-    this.view.y = { low: Math.min(0, most(ys, 0.002)), high: Math.max(0.4, most(ys, 0.998) * 1.12) || 0.8 };
+    this.view.y = { low: Math.min(0, most(ys, 0.002)), high: ys.length ? Math.max(0.1, most(ys, 0.998) * 1.12) : 0.8 };
     this.redraw("view");
   }
 

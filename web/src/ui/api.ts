@@ -85,7 +85,10 @@ export function socketAddress(path: string): string {
   return base.href;
 }
 
-export type Notice = { kind: "folder" } | { kind: "job"; job: Job } | { kind: "picture"; path: string } | { kind: "connection"; up: boolean };
+/** This page among all that are open. */
+export const ME = crypto.getRandomValues(new Uint32Array(2)).join("-");
+
+export type Notice = { kind: "folder" } | { kind: "job"; job: Job } | { kind: "picture"; path: string; by: string } | { kind: "connection"; up: boolean };
 
 /** Hear the server's notices; joins again with growing pauses when the connection drops. */
 export class Notices {

@@ -6,7 +6,7 @@ import json
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from fastapi import APIRouter
+from fastapi import APIRouter, Query
 from pydantic import BaseModel, Field, FiniteFloat, ValidationError
 
 from terragrip.errors import InputError
@@ -75,14 +75,16 @@ def get_calibration(studio: Here, path: Named) -> Calibration:
 
 
 @router.put("/picture")
-async def put_calibration(studio: Here, path: Named, calibration: Calibration) -> dict[str, Any]:
-    """Keep a picture's calibration beside it; every open page hears of it."""
+async def put_calibration(
+    studio: Here, path: Named, calibration: Calibration, by: Annotated[str, Query(max_length=40)] = ""
+) -> dict[str, Any]:
+    """Keep a picture's calibration beside it; every open page hears of it, with the name `by` that the sender gave itself."""
     _check(calibration.slip, "slip", path)
     _check(calibration.adhesion, "adhesion", path)
     file = _beside(studio.folder.file(path))
     with replacing(file) as temporary:
         temporary.write_text(calibration.model_dump_json(indent=1) + "\n", encoding="utf-8")
-    studio.notices.tell("picture", path=path)
+    studio.notices.tell("picture", path=path, by=by)
     return {"path": studio.folder.name(file)}
 
 

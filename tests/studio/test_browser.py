@@ -1,0 +1,303 @@
+"""The pages in a real browser (Debian's chromium): each page's main path, its speed, its faults, the keyboard alone, axe-core."""
+
+from __future__ import annotations
+
+import json
+import socket
+import threading
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import uvicorn
+
+from browser_parts import AXE, chromium, problems
+from terragrip.physics.adhesion import CURVES
+from terragrip.studio.app import create_app
+
+playwright = pytest.importorskip(
+    "playwright.sync_api", reason="SKIPPED LOUDLY: the browser tests need playwright"
+)
+
+pytestmark = [
+    pytest.mark.skipif(
+        chromium() is None, reason="no chromium: apt-get install chromium, or run `make test` as root"
+    ),
+    pytest.mark.skipif(problems() is not None, reason=problems() or ""),
+    # playwright's loop and sockets are still open when pytest looks for what was left behind
+    pytest.mark.filterwarnings("ignore::ResourceWarning", "ignore::pytest.PytestUnraisableExceptionWarning"),
+]
+
+
+class Served:
+    """A studio on a folder, served by a thread; it can be stopped and started again on its port."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        with socket.socket() as probe:
+            probe.bind(("127.0.0.1", 0))
+            self.port = probe.getsockname()[1]
+        self.start()
+
+    @property
+    def url(self) -> str:
+        return f"http://127.0.0.1:{self.port}"
+
+    def start(self) -> None:
+        app = create_app(self.folder, upload_limit=20_000_000)
+        config = uvicorn.Config(app, port=self.port, log_level="critical", timeout_graceful_shutdown=1)
+        self.server = uvicorn.Server(config)
+        self.thread = threading.Thread(target=self.server.run, daemon=True)
+        self.thread.start()
+        while not self.server.started:
+            time.sleep(0.01)
+
+    def stop(self) -> None:
+        self.server.should_exit = True
+        self.thread.join(10)
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Any]:
+    with playwright.sync_playwright() as started:
+        running = started.chromium.launch(
+            executable_path=chromium(), args=["--no-sandbox", "--disable-gpu", "--disable-quic"]
+        )
+        yield running
+        running.close()
+
+
+@pytest.fixture
+def served(folder: Path) -> Iterator[Served]:
+    studio = Served(folder)
+    yield studio
+    studio.stop()
+
+
+@pytest.fixture
+def page(browser: Any, served: Served) -> Iterator[Any]:
+    """A tab of 1280 x 720 whose console stays free of errors and whose requests stay on this machine."""
+    context = browser.new_context(viewport={"width": 1280, "height": 720}, bypass_csp=False)
+    tab = context.new_page()
+    faults: list[str] = []
+    tab.on("console", lambda m: faults.append(m.text) if m.type == "error" else None)
+    tab.on("pageerror", lambda error: faults.append(str(error)))
+    tab.on(
+        "request",
+        lambda r: (
+            faults.append(r.url) if served.url not in r.url and r.url[:5] not in ("data:", "blob:") else None
+        ),
+    )
+    tab.set_default_timeout(15_000)
+    yield tab
+    context.close()
+    assert [f for f in faults if "422" not in f and "WebSocket" not in f and "ERR_CONNECTION" not in f] == []
+
+
+def open_fit(page: Any, served: Served, path: str = "") -> None:
+    page.goto(f"{served.url}/#/fit{f'?path={path}' if path else ''}")
+    page.wait_for_selector("#slider-a")
+
+
+def test_a_slider_redraws_fifty_times_a_second(page: Any, served: Served) -> None:
+    open_fit(page, served, "estimates.parquet")
+    page.wait_for_selector("#soil-list li")
+    rate = page.evaluate(
+        """async () => {
+          const { plot } = window.terragripFit;
+          const slider = document.getElementById("slider-a");
+          const before = plot.redraws, begin = performance.now();
+          let i = 0;
+          await new Promise((done) => {
+            const move = () => {
+              slider.value = String(0.3 + 0.7 * ((i++ % 50) / 50));
+              slider.dispatchEvent(new Event("input"));
+              if (performance.now() - begin < 2000) requestAnimationFrame(move); else done();
+            };
+            move();
+          });
+          return (1000 * (plot.redraws - before)) / (performance.now() - begin);
+        }"""
+    )
+    # The figure itself (50 a second) is benchmarks/bench_studio.py's; here only that each frame draws.
+    assert rate > 10
+
+
+def test_the_browsers_curves_are_the_servers(page: Any, served: Served) -> None:
+    open_fit(page, served)
+    slips = np.linspace(-0.9, 0.9, 37)
+    for name, model in CURVES.items():
+        page.select_option("#curve-model", name)
+        drawn = page.evaluate(
+            "slips => slips.map(s => window.terragripFit.value(window.terragripFit.state.active.model, window.terragripFit.state.active.parameters, s))",
+            slips.tolist(),
+        )
+        np.testing.assert_allclose(drawn, model.value(slips, {}), rtol=1e-12, atol=1e-14)
+
+
+def test_fit_shows_the_servers_numbers_and_undo_takes_them_back(page: Any, served: Served) -> None:
+    open_fit(page, served, "estimates.parquet")
+    page.wait_for_selector("#soil-list li")
+    page.click("#fit-button")
+    page.wait_for_selector(".badge")
+    fitted = float(page.input_value("#field-a"))
+    assert fitted != pytest.approx(1.0)
+    page.keyboard.press("Control+z")
+    assert float(page.input_value("#field-a")) == pytest.approx(1.0)
+    page.keyboard.press("Control+Shift+z")
+    assert float(page.input_value("#field-a")) == pytest.approx(fitted)
+
+
+def test_the_fit_page_by_keyboard_alone(page: Any, served: Served) -> None:
+    open_fit(page, served, "estimates.parquet")
+    page.wait_for_selector("#soil-list li")
+    seen: set[str] = set()
+    for _ in range(60):
+        page.keyboard.press("Tab")
+        now = page.evaluate(
+            "() => document.activeElement.id || document.activeElement.textContent.slice(0, 30)"
+        )
+        seen.add(now)
+        if now == "fit-button":
+            break
+    assert {"slider-a", "field-a", "curve-model"} <= seen
+    page.keyboard.press("Enter")
+    page.wait_for_selector(".badge")
+    page.focus("#slider-a")
+    before = page.input_value("#field-a")
+    page.keyboard.press("ArrowRight")
+    assert page.input_value("#field-a") != before
+
+
+def diagram(folder: Path) -> None:
+    """A picture of a printed diagram, turned by 10 degrees, whose pixels are known: see `pixel`."""
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(8, 6), dpi=100)
+    axes = figure.add_axes((0, 0, 1, 1))
+    axes.set_xlim(0, 800)
+    axes.set_ylim(600, 0)
+    axes.axis("off")
+    for value in np.linspace(0, 1, 11):
+        axes.plot(*zip(pixel(value, 0), pixel(value, 1), strict=True), color="0.7")
+        axes.plot(*zip(pixel(0, value), pixel(1, value), strict=True), color="0.7")
+    figure.savefig(folder / "scan.png")
+
+
+def pixel(slip: float, adhesion: float) -> tuple[float, float]:
+    """Where a point lies in the picture of `diagram`."""
+    c, s = np.cos(np.radians(10)), np.sin(np.radians(10))
+    x, y = 560 * slip, -400 * adhesion
+    return float(80 + c * x - s * y), float(440 + s * x + c * y)
+
+
+def test_a_turned_picture_is_calibrated_to_half_a_per_cent_of_the_axis(
+    page: Any, served: Served, folder: Path
+) -> None:
+    diagram(folder)
+    open_fit(page, served)
+    page.select_option("select[aria-label='Open a picture of the folder']", "scan.png")
+    sheet = page.wait_for_selector("dialog .sheet")
+    box = sheet.bounding_box()
+    scale = box["width"] / 800
+    for point in ((0.1, 0.0), (0.9, 0.0), (0.0, 0.1), (0.0, 0.9)):
+        x, y = pixel(*point)
+        page.mouse.click(box["x"] + x * scale, box["y"] + y * scale)
+    for name, value in (
+        ("Slip axis, point 1", 10),
+        ("Slip axis, point 2", 90),
+        ("Adhesion axis, point 1", 0.1),
+        ("Adhesion axis, point 2", 0.9),
+    ):
+        field = page.locator(f"input[aria-label='{name}, value']")
+        field.fill(str(value))
+        field.press("Tab")
+    page.click("text=Use these axes")
+    page.click("text=Digitise a line")
+    page.wait_for_timeout(200)
+    wanted = [(0.15, 0.2), (0.35, 0.5), (0.55, 0.6)]
+    places = page.evaluate(
+        """points => {
+          const { plot, state, mapOf } = window.terragripFit;
+          const box = plot.element.getBoundingClientRect();
+          const map = mapOf(state.kept.pictures["scan.png"]);
+          return points.map((p) => { const v = map.toValue(p); return [box.x + plot.view.px(v[0]), box.y + plot.view.py(v[1])]; });
+        }""",
+        [list(pixel(*point)) for point in wanted],
+    )
+    for x, y in places:
+        page.mouse.click(x, y)
+    page.wait_for_function(
+        "() => window.terragripFit.state.kept.pictures['scan.png'].lines[0].points.length === 3"
+    )
+    page.wait_for_timeout(300)
+    kept = json.loads((folder / "scan.png.picture.json").read_text())
+    np.testing.assert_allclose(kept["lines"][0]["points"], wanted, atol=0.005)
+
+
+def test_a_broken_file_is_refused_with_one_line_and_a_good_one_estimated(
+    page: Any, served: Served, folder: Path
+) -> None:
+    page.goto(served.url)
+    page.wait_for_selector("text=recording.parquet")
+    page.set_input_files(
+        "#new-file", files=[{"name": "broken.parquet", "mimeType": "", "buffer": b"PAR1 broken"}]
+    )
+    page.wait_for_selector(".note.error")
+    assert "broken.parquet" in page.inner_text(".note.error")
+    assert not (folder / "broken.parquet").exists()
+    page.click("button:text-is('recording.parquet')")
+    page.wait_for_selector("text=ready to estimate")
+    page.fill("#wizard-output", "by-hand.parquet")
+    page.click("button:text-is('Estimate')")
+    page.wait_for_selector(".state.done")
+    assert (folder / "by-hand.parquet").exists()
+
+
+def test_a_dropped_connection_is_said_and_recovers(page: Any, served: Served, folder: Path) -> None:
+    page.goto(served.url)
+    page.wait_for_selector("text=recording.parquet")
+    served.stop()
+    page.wait_for_selector("text=does not answer; trying again")
+    served.start()
+    page.wait_for_function("() => document.getElementById('connection').textContent === ''")
+    (folder / "late.csv").write_text("time,ground_speed\n0,1\n1,1\n2,1\n")
+    page.wait_for_selector("text=late.csv")
+
+
+def test_two_browsers_see_each_others_changes(page: Any, browser: Any, served: Served) -> None:
+    other = browser.new_page()
+    for tab in (page, other):
+        tab.goto(served.url)
+        tab.wait_for_selector("text=recording.parquet")
+    page.wait_for_timeout(1200)
+    page.set_input_files(
+        "#new-file",
+        files=[{"name": "mine.csv", "mimeType": "", "buffer": b"time,ground_speed\n0,1\n1,1\n2,1\n"}],
+    )
+    other.wait_for_selector("text=mine.csv")
+    other.close()
+
+
+@pytest.mark.parametrize("theme", ["light", "dark"])
+@pytest.mark.parametrize("where", ["#/start", "#/fit?path=estimates.parquet"])
+def test_axe_finds_nothing_serious(browser: Any, served: Served, where: str, theme: str) -> None:
+    context = browser.new_context(
+        viewport={"width": 1280, "height": 720}, color_scheme=theme, bypass_csp=True
+    )
+    tab = context.new_page()
+    tab.goto(f"{served.url}/{where}")
+    tab.wait_for_selector("main h1, main h2")
+    tab.wait_for_timeout(500)
+    tab.add_script_tag(path=AXE)
+    found = tab.evaluate("() => axe.run(document, { resultTypes: ['violations'] })")
+    serious = [
+        (v["id"], v["nodes"][0]["html"][:120])
+        for v in found["violations"]
+        if v["impact"] in ("serious", "critical")
+    ]
+    context.close()
+    assert serious == []
