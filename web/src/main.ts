@@ -5,6 +5,7 @@ import type { Page } from "./ui/page";
 
 const PAGES: Record<string, { title: string; load: () => Promise<{ page: Page }> }> = {
   start: { title: "Folder", load: () => import("./start/page") },
+  drive: { title: "Drive", load: () => import("./drive/page") },
   fit: { title: "Fit", load: () => import("./fit/page") },
 };
 

@@ -98,7 +98,8 @@ export const page: Page = (main, { notices }) => {
   function main_action(item: Item): HTMLElement {
     if (item.kind === "recording") return h("button", { type: "button", class: "link", click: () => open(item.path) }, item.path);
     if (item.kind === "estimates" || item.kind === "library") {
-      return h("a", { href: `#/fit?path=${encodeURIComponent(item.path)}` }, item.path);
+      const to = item.kind === "estimates" ? "drive" : "fit";
+      return h("a", { href: `#/${to}?path=${encodeURIComponent(item.path)}` }, item.path);
     }
     return h("a", { href: address("file", { path: item.path }), download: item.path.split("/").at(-1) ?? "" }, item.path);
   }

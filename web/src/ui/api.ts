@@ -27,11 +27,13 @@ export function address(path: string, query: Query = {}): string {
   return `./api/${path}${text ? `?${text}` : ""}`;
 }
 
-export async function request(path: string, query: Query = {}, options: RequestInit = {}): Promise<Response> {
+export async function request(path: string, query: Query = {}, options: RequestInit = {}, more = ""): Promise<Response> {
   let answer: Response;
   try {
-    answer = await fetch(address(path, query), options);
-  } catch {
+    const plain = address(path, query);
+    answer = await fetch(more ? `${plain}${plain.includes("?") ? "&" : "?"}${more}` : plain, options);
+  } catch (error) {
+    if (error instanceof DOMException && error.name === "AbortError") throw error;
     throw new Error("The studio does not answer; is it still running?");
   }
   if (!answer.ok) throw new Error(await reason(answer));

@@ -1,0 +1,197 @@
+"""A drive for the screen: which columns there are, what happened when, and why an estimate moved."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+
+from terragrip.errors import InputError
+from terragrip.files import sha256
+from terragrip.studio.tables import buckets, extremes
+
+if TYPE_CHECKING:
+    from terragrip.estimation import Estimates
+    from terragrip.recording import Recording
+    from terragrip.studio.state import Studio
+
+Floats = npt.NDArray[np.float64]
+
+LEVEL = 1.959964
+"""Standard deviations of a 95 % interval."""
+MEASURED = "measured:"
+SPAN = 0.5
+"""Seconds before and after a sample that `why` compares."""
+MOST_SPANS = 2000
+
+
+def spans(labels: npt.NDArray[Any], time: Floats) -> list[dict[str, Any]]:
+    """Stretches of one label, empty ones left out: name, start and end [s]."""
+    if not len(labels):
+        return []
+    edges = np.flatnonzero(labels[1:] != labels[:-1]) + 1
+    starts, ends = np.r_[0, edges], np.r_[edges, len(labels)] - 1
+    found = [
+        {"name": str(labels[a]), "start": float(time[a]), "end": float(time[b])}
+        for a, b in zip(starts, ends, strict=True)
+        if labels[a]
+    ]
+    return found[:MOST_SPANS]
+
+
+def window(
+    table: Estimates, recording: Recording | None, names: list[str], start: float, end: float, width: int
+) -> tuple[bool, Floats, list[Floats]]:
+    """Columns between two times, cut to `width` buckets: (whether cut, time, columns), all of one length.
+
+    A name is a column, its 95 % limit (``slip_rl:low``, ``slip_rl:high``), or a channel of the recording (``measured:ground_speed``).
+    Where it is cut, a bucket is two points: its smallest and its largest value, so that no spike is lost. Raises InputError on a name
+    that is not there.
+    """
+    starts = buckets(table.time, start, end, width)
+    first, last = int(starts[0]), int(starts[-1])
+    cut = len(starts) - 1 < last - first
+    found = []
+    for name in names:
+        values, side = _values(table, recording, name)
+        if not cut:
+            found.append(np.asarray(values[first:last], dtype=np.float64))
+            continue
+        low, high = extremes(values, starts)
+        pair = {"low": (low, low), "high": (high, high)}.get(side, (low, high))
+        found.append(np.stack(pair, axis=1).ravel())
+    if not cut:
+        return False, table.time[first:last], found
+    begin = table.time[starts[:-1]]
+    following = np.r_[begin[1:], table.time[last - 1]]
+    return True, np.stack((begin, (begin + following) / 2), axis=1).ravel(), found
+
+
+def _values(table: Estimates, recording: Recording | None, name: str) -> tuple[Floats, str]:
+    if name.startswith(MEASURED):
+        channel = name.removeprefix(MEASURED)
+        if recording is None or channel not in recording.channels:
+            raise InputError("is not in the recording", place=f"column {name}")
+        return recording.channels[channel], ""
+    column, _, side = name.partition(":")
+    if column not in table.columns or side not in ("", "low", "high"):
+        raise InputError("is not in the estimates", place=f"column {name}")
+    values = table.columns[column]
+    if not side:
+        return values, ""
+    if f"{column}_std" not in table.columns:
+        raise InputError("has no interval", place=f"column {name}")
+    spread = LEVEL * table.columns[f"{column}_std"]
+    return (values - spread if side == "low" else values + spread), side
+
+
+def recording_of(studio: Studio, table: Estimates) -> tuple[Path, Recording] | None:
+    """The recording that the estimates were made from, where the folder holds it unchanged (same SHA-256, same rows)."""
+    about = table.about.get("recording", {})
+    wanted, name = about.get("sha256"), Path(str(about.get("source") or "")).name
+    if not wanted or not name:
+        return None
+    for item in studio.folder.items():
+        if item.kind != "recording" or Path(item.path).name != name:
+            continue
+        path = studio.folder.file(item.path)
+        if studio.fingerprints.get(path) != wanted:
+            continue
+        try:
+            recording = studio.recordings.get(path)
+        except InputError:  # it needs a profile
+            return None
+        return (path, recording) if len(recording) == len(table) else None
+    return None
+
+
+def fingerprint(path: Path) -> str:
+    """SHA-256 of a file."""
+    return sha256(path)
+
+
+def sample(table: Estimates, recording: Recording | None, time: float) -> dict[str, Any]:
+    """Everything known of the sample nearest to `time`, and for each wheel what moved its adhesion."""
+    row = int(np.clip(np.searchsorted(table.time, time), 0, len(table) - 1))
+    if row and abs(table.time[row - 1] - time) < abs(table.time[row] - time):
+        row -= 1
+    values = {name: float(column[row]) for name, column in table.columns.items()}
+    labels = {name: str(column[row]) for name, column in table.labels.items()}
+    measured = {} if recording is None else {n: float(c[row]) for n, c in recording.channels.items()}
+    return {
+        "row": row,
+        "time": float(table.time[row]),
+        "values": values,
+        "labels": labels,
+        "measured": measured,
+        "event": str(table["event"][row]),
+        "why": why(table, recording, row),
+    }
+
+
+def why(table: Estimates, recording: Recording | None, row: int) -> list[str]:
+    """Why adhesion moved around a sample: a sentence a wheel, the wheel that moved most first.
+
+    Compares the half second before with the half second after by the torque balance of a wheel (PHYSICS 1):
+    mu = (M - J domega/dt - r rho_w omega)/(r F_z) - rho_t, one term changed at a time.
+    """
+    before, after = _half_seconds(table.time, row)
+    if before.stop - before.start < 2 or after.stop - after.start < 2:
+        return ["Too close to the end of the drive to compare before with after."]
+    sentences = []
+    for wheel in table.wheels:
+        moved = _mean(table[f"adhesion_{wheel}"], after) - _mean(table[f"adhesion_{wheel}"], before)
+        if np.isfinite(moved):
+            sentences.append((abs(moved), _sentence(table, recording, wheel, before, after, moved)))
+    sentences.sort(key=lambda pair: -pair[0])
+    return [text for _, text in sentences]
+
+
+def _half_seconds(time: Floats, row: int) -> tuple[slice, slice]:
+    first = int(np.searchsorted(time, time[row] - SPAN))
+    last = int(np.searchsorted(time, time[row] + SPAN, "right"))
+    return slice(first, row), slice(row, last)
+
+
+def _mean(values: npt.NDArray[Any], rows: slice) -> float:
+    part = values[rows]
+    known = part[np.isfinite(part)]
+    return float(known.mean()) if known.size else float("nan")
+
+
+def _rate(values: Floats, time: Floats, rows: slice) -> float:
+    t = time[rows] - time[rows].mean()
+    return float(np.sum(t * values[rows]) / max(float(np.sum(t * t)), 1e-12))
+
+
+def _sentence(
+    table: Estimates, recording: Recording | None, wheel: str, before: slice, after: slice, moved: float
+) -> str:
+    vehicle = table.vehicle
+    number = vehicle.wheels.index(wheel)
+    axle = vehicle.axle_names[int(vehicle.wheel_axle[number])]
+    radius, inertia = float(vehicle.wheel_radius[number]), float(vehicle.wheel_inertia[number])
+    share = 1.0 / max(sum(int(a == vehicle.wheel_axle[number]) for a in vehicle.wheel_axle), 1)
+    load = [share * _mean(table[f"vertical_load_{axle}"], rows) for rows in (before, after)]
+    speed = table[f"wheel_speed_{wheel}"]
+    rate = [_rate(speed, table.time, rows) for rows in (before, after)]
+    arm = radius * load[1]
+    parts = []
+    channel = f"drive_torque_{wheel}"
+    if recording is not None and channel in recording.channels:
+        torque = [_mean(recording.channels[channel], rows) for rows in (before, after)]
+        parts.append((f"torque {torque[1] - torque[0]:+.1f} N m", (torque[1] - torque[0]) / arm))
+        parts.append((f"load {load[1] - load[0]:+.0f} N", torque[0] / radius * (1 / load[1] - 1 / load[0])))
+    else:
+        parts.append((f"load {load[1] - load[0]:+.0f} N", float("nan")))
+    parts.append(
+        (f"wheel acceleration {rate[1] - rate[0]:+.1f} rad/s²", -inertia * (rate[1] - rate[0]) / arm)
+    )
+    told = ", ".join(
+        f"{text} ({effect:+.3f})" if np.isfinite(effect) else text
+        for text, effect in sorted(parts, key=lambda part: -abs(part[1]) if np.isfinite(part[1]) else 0.0)
+    )
+    slip = _mean(table[f"slip_{wheel}"], after) - _mean(table[f"slip_{wheel}"], before)
+    return f"{wheel}: adhesion {moved:+.3f} within {2 * SPAN:g} s; {told}; slip {100 * slip:+.1f} points."

@@ -1,0 +1,246 @@
+/** A run over time: measured against estimated, with intervals, soils, events and what the filter thinks of itself. */
+
+import { get, type Item } from "../ui/api";
+import { digits, fill, h } from "../ui/dom";
+import { tried } from "../ui/notes";
+import type { Page } from "../ui/page";
+import { Charts } from "./charts";
+import { Plane } from "./plane";
+import { EVENT_COLORS, panelsOf, soilColor, type Run } from "./run";
+
+const FIRST = ["adhesion", "slip", "resistance", "speed"];
+const KEY = "terragrip-drive-panels";
+
+interface Sample {
+  row: number;
+  time: number;
+  values: Record<string, number | null>;
+  measured: Record<string, number | null>;
+  labels: Record<string, string>;
+  event: string;
+  why: string[];
+}
+
+export const page: Page = (main, { notices, query }) => {
+  const charts = new Charts();
+  const plane = new Plane();
+  const choice = h("select", { id: "run", "aria-label": "Run" });
+  const wheels = h("div", { class: "chips", role: "group", "aria-label": "Wheels" });
+  const panels = h("details", { class: "chooser" }, h("summary", {}, "Panels"));
+  const legend = h("div", { class: "chips legend-row" });
+  const readout = h("output", { class: "line", "aria-live": "off" });
+  const details = h("section", { class: "sample", "aria-label": "Sample", "aria-live": "polite" });
+  const planeWheel = h("select", { "aria-label": "Wheel of the plane" });
+  let run: Run | null = null;
+  let path = "";
+  let chosen: string[] = [];
+  let shown: string[] = JSON.parse(localStorage.getItem(KEY) ?? "null") ?? FIRST;
+  let picked = 0;
+  let asking = false;
+
+  const tools = h(
+    "div",
+    { class: "tools" },
+    choice,
+    wheels,
+    panels,
+    h("span", { class: "spring" }),
+    h("button", { type: "button", id: "zoom-in", click: () => zoom(0.5), "aria-label": "Zoom in" }, "+"),
+    h("button", { type: "button", click: () => zoom(2), "aria-label": "Zoom out" }, "−"),
+    h("button", { type: "button", click: () => run && charts.zoom([run.start, run.end]) }, "Whole run"),
+  );
+  main.append(
+    h("section", { class: "middle", "aria-label": "Charts" }, tools, legend, charts.element, readout),
+    h(
+      "aside",
+      { class: "panel", "aria-label": "Plane and sample" },
+      h("div", { class: "row" }, h("h2", {}, "µ–s plane"), planeWheel),
+      plane.element,
+      h(
+        "div",
+        { class: "row" },
+        h("h2", {}, "Sample"),
+        h("span", { class: "spring" }),
+        h("button", { type: "button", click: () => stepSample(-1), "aria-label": "Previous sample" }, "◀"),
+        h("button", { type: "button", click: () => stepSample(1), "aria-label": "Next sample" }, "▶"),
+      ),
+      details,
+    ),
+  );
+  fill(details, h("p", { class: "hint" }, "Click a chart to see everything known of that moment, and why µ moved. ◀ ▶ step through samples."));
+
+  function zoom(factor: number): void {
+    const [low, high] = charts.range;
+    const middle = picked > low && picked < high ? picked : (low + high) / 2;
+    charts.zoom([middle + (low - middle) * factor, middle + (high - middle) * factor]);
+  }
+
+  function draw(): void {
+    if (!run) return;
+    const all = panelsOf(run, chosen);
+    fill(
+      panels,
+      h("summary", {}, "Panels"),
+      h(
+        "div",
+        { class: "menu" },
+        all.map((panel) => {
+          const box = h("input", { type: "checkbox", checked: shown.includes(panel.key) });
+          box.addEventListener("change", () => {
+            shown = box.checked ? [...shown, panel.key] : shown.filter((key) => key !== panel.key);
+            localStorage.setItem(KEY, JSON.stringify(shown));
+            charts.show(path, run as Run, all.filter((p) => shown.includes(p.key)));
+          });
+          return h("label", { class: "check" }, box, panel.title);
+        }),
+      ),
+    );
+    charts.show(path, run, all.filter((panel) => shown.includes(panel.key)));
+  }
+
+  function drawWheels(): void {
+    fill(
+      wheels,
+      (run?.wheels ?? []).map((wheel) => {
+        const button = h("button", { type: "button", class: "chip", "aria-pressed": String(chosen.includes(wheel)) }, wheel);
+        button.addEventListener("click", () => {
+          chosen = chosen.includes(wheel) ? chosen.filter((w) => w !== wheel) : (run?.wheels ?? []).filter((w) => w === wheel || chosen.includes(w));
+          drawWheels();
+          draw();
+        });
+        return button;
+      }),
+    );
+  }
+
+  function drawLegend(): void {
+    if (!run) return;
+    const soils = [...new Set((run.soils.length ? run.soils.map((s) => s.name) : (run.ground?.sections ?? []).map((s) => s.soil)))];
+    const kinds = [...new Set(run.events.map((event) => event.kind))];
+    fill(
+      legend,
+      soils.map((name) => h("span", {}, h("i", { class: `patch ${soilColor(name)}` }), name)),
+      kinds.map((kind) => h("span", {}, h("i", { class: `strip ${EVENT_COLORS[kind] ?? "ink"}` }), kind)),
+      run.recording ? null : h("span", { class: "hint" }, "The recording is not in this folder: measured channels are left out."),
+      h("span", { class: "hint" }, "drag to zoom, shift+wheel to zoom, double click for the whole run"),
+    );
+  }
+
+  async function open(wanted: string): Promise<void> {
+    const found = await tried(() => get<Run>("drive", { path: wanted }));
+    if (!found) return;
+    path = wanted;
+    run = found;
+    chosen = found.wheels.slice(-2);
+    choice.value = wanted;
+    history.replaceState(null, "", `#/drive?path=${encodeURIComponent(wanted)}`);
+    fill(planeWheel, found.wheels.map((wheel) => h("option", { value: wheel, selected: wheel === found.wheels.at(-1) }, wheel)));
+    drawWheels();
+    drawLegend();
+    draw();
+    void drawPlane();
+  }
+
+  async function drawPlane(): Promise<void> {
+    if (!run || !planeWheel.value) return;
+    const [start, end] = charts.range;
+    const points = await tried(() => get<{ slip: number[]; adhesion: number[] }>("drive/plane", { path, wheel: planeWheel.value, start, end }));
+    if (points) plane.show(points);
+  }
+
+  async function pick(time: number): Promise<void> {
+    if (asking) return;
+    asking = true;
+    const found = await tried(() => get<Sample>("drive/sample", { path, time }));
+    asking = false;
+    if (!found) return;
+    picked = found.time;
+    showSample(found);
+  }
+
+  function stepSample(by: number): void {
+    if (!run) return;
+    const period = (run.end - run.start) / Math.max(run.rows - 1, 1);
+    void pick((picked || charts.range[0]) + by * period);
+  }
+
+  function showSample(sample: Sample): void {
+    const wheel = planeWheel.value;
+    const of = (name: string): number => sample.values[name] ?? NaN;
+    plane.at({
+      slip: of(`slip_${wheel}`),
+      adhesion: of(`adhesion_${wheel}`),
+      slip_std: of(`slip_${wheel}_std`),
+      adhesion_std: of(`adhesion_${wheel}_std`),
+      a: of("curve_a"),
+      a_std: of("curve_a_std"),
+    });
+    const names = Object.keys(sample.values).filter((name) => !name.endsWith("_std"));
+    const event = run?.events.find((e) => e.start <= sample.time && e.end >= sample.time);
+    fill(
+      details,
+      h("p", {}, h("strong", {}, `t = ${sample.time.toFixed(3)} s`), ` (row ${sample.row})`, sample.labels["soil"] ? `, ${sample.labels["soil"]}` : ""),
+      sample.event ? h("p", { class: "bad" }, `${sample.event}${event?.why ? `: ${event.why}` : ""}`) : null,
+      h("h3", {}, "Why µ moved"),
+      sample.why.map((text) => h("p", { class: "why" }, text)),
+      h("h3", {}, "Estimated"),
+      h(
+        "table",
+        {},
+        h(
+          "tbody",
+          {},
+          names.map((name) => {
+            const spread = sample.values[`${name}_std`];
+            return h("tr", {}, h("th", { scope: "row" }, name), h("td", {}, digits(sample.values[name], 4)), h("td", {}, spread === undefined || spread === null ? "" : `± ${digits(1.96 * spread, 2)}`));
+          }),
+        ),
+      ),
+      Object.keys(sample.measured).length ? h("h3", {}, "Measured") : null,
+      h("table", {}, h("tbody", {}, Object.entries(sample.measured).map(([name, v]) => h("tr", {}, h("th", { scope: "row" }, name), h("td", {}, digits(v, 5)), h("td", {}))))),
+    );
+  }
+
+  function hover(time: number | null): void {
+    if (time === null || !run) {
+      readout.value = "";
+      return;
+    }
+    const soil = run.soils.find((s) => s.start <= time && s.end >= time)?.name;
+    const section = run.ground?.sections.find((s) => s.start <= time && s.end >= time);
+    const event = run.events.find((e) => e.start <= time && e.end >= time);
+    const told = section ? `recognised: ${section.soil} (${digits(100 * (section.probabilities[section.soil] ?? 0), 2)} %)` : "";
+    readout.value = [`t ${time.toFixed(2)} s`, soil, told, event && `${event.kind}${event.why ? `: ${event.why}` : ""}`].filter(Boolean).join("   ");
+  }
+
+  charts.onCursor = hover;
+  charts.onPick = (time) => void pick(time);
+  let soon = 0;
+  charts.onRange = () => {
+    clearTimeout(soon);
+    soon = window.setTimeout(() => void drawPlane(), 150);
+  };
+  choice.addEventListener("change", () => void open(choice.value));
+  planeWheel.addEventListener("change", () => {
+    void drawPlane();
+    if (picked) void pick(picked);
+  });
+
+  async function reload(): Promise<void> {
+    const folder = await tried(() => get<{ items: Item[] }>("folder"));
+    const runs = (folder?.items ?? []).filter((item) => item.kind === "estimates").map((item) => item.path);
+    fill(choice, runs.length ? runs.map((name) => h("option", { value: name, selected: name === path }, name)) : h("option", { value: "" }, "No estimates in the folder"));
+    const wanted = query.get("path");
+    if (!path && runs.length) await open(wanted && runs.includes(wanted) ? wanted : (runs[0] as string));
+    if (!runs.length) fill(charts.element, h("p", { class: "hint empty" }, "Nothing to show yet: open a recording on the folder page and estimate it."));
+  }
+
+  const forget = notices.on((notice) => notice.kind === "folder" && void reload());
+  void reload();
+  Object.assign(window, { terragripDrive: { charts } });
+  return () => {
+    forget();
+    charts.close();
+    plane.close();
+  };
+};

@@ -1,0 +1,130 @@
+/** The mu-s plane of one wheel: the shown time's pairs, the pair under the cursor, the online curve known by then. */
+
+import { CanvasInk } from "../fit/ink";
+import { value } from "../fit/models";
+import { View, ticks } from "../fit/view";
+import { digits, h } from "../ui/dom";
+import { color, onTheme } from "../ui/theme";
+
+export interface Now {
+  slip: number;
+  adhesion: number;
+  slip_std: number;
+  adhesion_std: number;
+  a: number;
+  a_std: number;
+}
+
+const USELESS = 1.0;
+/** SD of a beyond which the online curve says nothing and is not drawn. */
+
+export class Plane {
+  readonly element = h("div", { class: "plane", role: "img", "aria-label": "Adhesion over slip of one wheel, with the online curve" });
+  private canvas = h("canvas", { "aria-hidden": "true" });
+  private view = new View({ low: -0.05, high: 0.7 }, { low: -0.1, high: 0.8 }, 300, 260);
+  private points = { slip: [] as number[], adhesion: [] as number[] };
+  private now: Now | null = null;
+  private asked = false;
+  private forget: () => void;
+  private watcher: ResizeObserver;
+
+  constructor() {
+    this.element.append(this.canvas);
+    this.view.left = 46;
+    this.view.bottom = 36;
+    this.forget = onTheme(() => this.draw());
+    this.watcher = new ResizeObserver(() => this.resize());
+    this.watcher.observe(this.element);
+  }
+
+  close(): void {
+    this.forget();
+    this.watcher.disconnect();
+  }
+
+  show(points: { slip: number[]; adhesion: number[] }): void {
+    this.points = points;
+    const most = (values: number[], share: number): number => {
+      const known = values.filter((v) => v !== null && Number.isFinite(v)).sort((a, b) => a - b);
+      return known[Math.floor((known.length - 1) * share)] ?? 0;
+    };
+    this.view.x = { low: Math.min(-0.02, most(points.slip, 0.01)), high: Math.max(0.3, most(points.slip, 0.99) * 1.1) };
+    this.view.y = { low: Math.min(-0.02, most(points.adhesion, 0.01)), high: Math.max(0.3, most(points.adhesion, 0.99) * 1.2) };
+    this.later();
+  }
+
+  at(now: Now | null): void {
+    this.now = now;
+    this.later();
+  }
+
+  private resize(): void {
+    this.view.width = this.element.clientWidth;
+    this.view.height = this.element.clientHeight;
+    this.canvas.width = this.view.width * devicePixelRatio;
+    this.canvas.height = this.view.height * devicePixelRatio;
+    this.draw();
+  }
+
+  private later(): void {
+    if (this.asked) return;
+    this.asked = true;
+    requestAnimationFrame(() => {
+      this.asked = false;
+      this.draw();
+    });
+  }
+
+  private draw(): void {
+    const pen = this.canvas.getContext("2d");
+    if (!pen || this.view.width < 50) return;
+    const { view } = this;
+    pen.setTransform(devicePixelRatio, 0, 0, devicePixelRatio, 0, 0);
+    pen.clearRect(0, 0, view.width, view.height);
+    const ink = new CanvasInk(pen);
+    for (const x of ticks(view.x, 5)) {
+      ink.line([view.px(x), view.top, view.px(x), view.height - view.bottom], { color: color("grid") });
+      ink.text(digits(100 * x), view.px(x), view.height - view.bottom + 12, color("muted"), "middle");
+    }
+    for (const y of ticks(view.y, 5)) {
+      ink.line([view.left, view.py(y), view.width - view.right, view.py(y)], { color: color("grid") });
+      ink.text(digits(y), view.left - 6, view.py(y), color("muted"), "end");
+    }
+    ink.text("slip [%]", (view.left + view.width - view.right) / 2, view.height - 8, color("ink"), "middle");
+    ink.text("adhesion µ [–]", 10, view.height / 2, color("ink"), "middle", true);
+    pen.save();
+    pen.beginPath();
+    pen.rect(view.left, view.top, view.width - view.left - view.right, view.height - view.top - view.bottom);
+    pen.clip();
+    const points: number[] = [];
+    this.points.slip.forEach((s, i) => points.push(view.px(s), view.py(this.points.adhesion[i] as number)));
+    ink.dots(points, 1.1, color("muted"), 0.45);
+    if (this.now) this.drawNow(ink, this.now);
+    pen.restore();
+  }
+
+  private drawNow(ink: CanvasInk, now: Now): void {
+    const { view } = this;
+    const curve = (a: number): number[] => {
+      const out: number[] = [];
+      for (let i = 0; i <= 80; i++) {
+        const s = view.x.low + (i / 80) * (view.x.high - view.x.low);
+        out.push(view.px(s), view.py(value("exponential", { a, p: 0.52, alpha_1: 0.01, alpha_2: -11.36 }, s)));
+      }
+      return out;
+    };
+    if (now.a_std < USELESS) {
+      const high = curve(now.a + 1.96 * now.a_std);
+      const low = curve(now.a - 1.96 * now.a_std);
+      const back: number[] = [];
+      for (let i = low.length - 2; i >= 0; i -= 2) back.push(low[i] as number, low[i + 1] as number);
+      ink.area([...high, ...back], color("green"), 0.2);
+      ink.line(curve(now.a), { color: color("green"), width: 2 });
+    }
+    const [x, y] = [view.px(now.slip), view.py(now.adhesion)];
+    const [dx, dy] = [view.px(now.slip + 1.96 * now.slip_std) - x, view.py(now.adhesion + 1.96 * now.adhesion_std) - y];
+    ink.line([x - dx, y, x + dx, y], { color: color("vermillion"), width: 1.6 });
+    ink.line([x, y - dy, x, y + dy], { color: color("vermillion"), width: 1.6 });
+    ink.dots([x, y], 4.5, color("vermillion"), 1);
+  }
+}

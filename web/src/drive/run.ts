@@ -1,0 +1,132 @@
+/** A run as the server describes it, and the panels that can be drawn of it. */
+
+export interface Span {
+  name: string;
+  start: number;
+  end: number;
+}
+
+export interface Event {
+  kind: string;
+  start: number;
+  end: number;
+  why: string;
+}
+
+export interface Section {
+  start: number;
+  end: number;
+  soil: string;
+  probabilities: Record<string, number>;
+}
+
+export interface Run {
+  rows: number;
+  start: number;
+  end: number;
+  columns: string[];
+  measured: string[];
+  recording: string | null;
+  wheels: string[];
+  method: string;
+  vehicle: string;
+  radius: Record<string, number>;
+  notes: string[];
+  events: Event[];
+  soils: Span[];
+  ground: { path: string; sections: Section[]; changes: { time: number; std: number; probability: number }[] } | null;
+}
+
+export interface Trace {
+  /** The column asked of the server. */
+  column: string;
+  label: string;
+  color: string;
+  /** Also ask for the 95 % interval. */
+  band: boolean;
+  dash?: number[];
+  /** From SI to what is shown. */
+  scale: number;
+}
+
+export interface Panel {
+  key: string;
+  title: string;
+  unit: string;
+  traces: Trace[];
+  /** Lines across the panel, such as the expected NIS. */
+  levels?: { value: number; label: string }[];
+  low?: number;
+  high?: number;
+}
+
+const WHEEL_COLORS = ["blue", "vermillion", "green", "purple", "orange", "sky", "muted", "ink"];
+const DASH = [4, 4];
+
+/** All panels that the run has columns for; `wheels` are the chosen ones. */
+export function panelsOf(run: Run, wheels: string[]): Panel[] {
+  const has = (name: string): boolean => run.columns.includes(name);
+  const meant = (name: string): boolean => run.measured.includes(name);
+  const color = (wheel: string): string => WHEEL_COLORS[run.wheels.indexOf(wheel) % WHEEL_COLORS.length] ?? "blue";
+  const each = (name: string, scale = 1): Trace[] =>
+    wheels
+      .filter((wheel) => has(`${name}_${wheel}`))
+      .map((wheel) => ({ column: `${name}_${wheel}`, label: wheel, color: color(wheel), band: has(`${name}_${wheel}_std`), scale }));
+  const measured = (name: string, label: string, shade: string, scale = 1): Trace[] =>
+    meant(name) ? [{ column: `measured:${name}`, label, color: shade, band: false, dash: DASH, scale }] : [];
+  const one = (column: string, label: string, shade = "blue", scale = 1): Trace[] =>
+    has(column) ? [{ column, label, color: shade, band: has(`${column}_std`), scale }] : [];
+  const speeds = wheels.flatMap((wheel): Trace[] => {
+    const scale = run.radius[wheel] ?? 1;
+    const own = has(`wheel_speed_${wheel}`)
+      ? [{ column: `wheel_speed_${wheel}`, label: `r ω ${wheel}`, color: color(wheel), band: false, scale }]
+      : [];
+    return own;
+  });
+  const panels: Panel[] = [
+    { key: "adhesion", title: "Adhesion µ", unit: "–", traces: each("adhesion") },
+    { key: "slip", title: "Slip s", unit: "%", traces: each("slip", 100), low: -20, high: 100 },
+    { key: "resistance", title: "Soil resistance ρs", unit: "–", traces: one("soil_resistance", "ρs", "purple") },
+    { key: "efficiency", title: "Tractive efficiency η", unit: "%", traces: each("efficiency", 100), low: 0, high: 100 },
+    { key: "traction", title: "Net traction κ", unit: "–", traces: each("net_traction") },
+    {
+      key: "speed",
+      title: "Speeds",
+      unit: "m/s",
+      traces: [...one("ground_speed", "v", "ink"), ...measured("ground_speed", "v measured", "muted"), ...speeds],
+    },
+    { key: "torque", title: "Drive torque, measured", unit: "N m", traces: wheels.flatMap((w) => measured(`drive_torque_${w}`, w, color(w)).map(solid)) },
+    { key: "drawbar", title: "Drawbar force, measured", unit: "N", traces: measured("drawbar_force", "pull", "green").map(solid) },
+    { key: "curve", title: "Online curve: a", unit: "–", traces: one("curve_a", "a", "green"), low: 0, high: 2.5 },
+    { key: "nis", title: "Filter's honesty: NIS", unit: "–", traces: one("nis", "NIS", "vermillion"), levels: [{ value: run.wheels.length + 1, label: "expected" }], low: 0, high: 6 * (run.wheels.length + 1) },
+    { key: "supervisor", title: "Supervisor γ", unit: "–", traces: one("supervisor", "γ", "orange"), low: 0, high: 1.02 },
+    { key: "load", title: "Vertical load", unit: "N", traces: run.columns.filter((c) => c.startsWith("vertical_load_")).map((column, i) => ({ column, label: column.slice(14), color: WHEEL_COLORS[i] ?? "blue", band: false, scale: 1 })) },
+  ];
+  return panels.filter((panel) => panel.traces.length > 0);
+}
+
+function solid(trace: Trace): Trace {
+  const { dash: _, ...rest } = trace;
+  return rest;
+}
+
+/** Colours of soils and events: soils are tints, events are strong. */
+const SOIL_COLORS: Record<string, string> = { hard: "muted", fine: "orange", wet: "sky", coarse: "purple", grass: "green" };
+const SPARE = ["blue", "vermillion", "orange", "sky", "purple", "green"];
+
+export function soilColor(name: string): string {
+  const known = SOIL_COLORS[name];
+  if (known) return known;
+  let sum = 0;
+  for (const c of name) sum = (sum * 31 + c.charCodeAt(0)) % 9973;
+  return SPARE[sum % SPARE.length] ?? "blue";
+}
+
+export const EVENT_COLORS: Record<string, string> = {
+  immobilization: "vermillion",
+  stuck: "bad",
+  push: "purple",
+  standstill: "muted",
+  gap: "ink",
+  outlier: "orange",
+};
