@@ -43,6 +43,7 @@ def test_every_file_is_there_and_nothing_else(
         "estimates",
         "scores.json",
         "soils.json",
+        "ground.json",
         "vehicle.yaml",
     }
     assert not [path for path in folder.rglob("*") if path.name.startswith(".")]
@@ -86,7 +87,7 @@ def test_the_page_says_simulated_and_loads_nothing(
     assert "0.848" in html
     assert not re.search(r"""(?:src|href)\s*=\s*["'](?!#)""", html)
     captions = re.findall(r"<figcaption>(.*?)</figcaption>", html, re.DOTALL)
-    assert len(captions) == 13
+    assert len(captions) == 16
     assert sum("imulated" in caption for caption in captions) >= 6
 
 

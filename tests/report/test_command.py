@@ -27,10 +27,12 @@ def files_fixture(tmp_path_factory: pytest.TempPathFactory) -> list[str]:
 
 @pytest.fixture(scope="module", name="report")
 def report_fixture(files: list[str], tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The report of all, beside a library."""
+    """The report of all, beside a library and the ground of the last."""
     folder = tmp_path_factory.mktemp("report")
     SoilLibrary({"fine": Soil("fine", "exponential", {"a": 0.777})}).write(folder / "soils.json")
-    words = ["report", *files, "--library", str(folder / "soils.json"), "-o", str(folder / "report.html")]
+    ground, library = str(folder / "ground.json"), str(folder / "soils.json")
+    assert main(["ground", files[-1], "-o", ground, "--quiet"]) == 0
+    words = ["report", *files, "--library", library, "--ground", ground, "-o", str(folder / "report.html")]
     assert main([*words, "--title", "Field <3>", "--quiet"]) == 0
     return folder
 
@@ -48,6 +50,9 @@ def test_the_page_holds_every_section_and_loads_nothing(report: Path) -> None:
         "trust",
         "missing",
         "soils",
+        "ground",
+        "sections",
+        "events",
         "residuals",
         "methods",
         "honesty",

@@ -25,6 +25,12 @@ def command(
     library: Annotated[
         Path | None, typer.Option(metavar="FILE", help="A soils.json to draw beside what is learned here.")
     ] = None,
+    ground: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE", help="A ground.json of these drives: soils over time, sections, events."
+        ),
+    ] = None,
     pdf: Annotated[
         Path | None, typer.Option("--pdf", metavar="FILE", help="Another place for the PDF.")
     ] = None,
@@ -37,20 +43,22 @@ def command(
     Traction over time, adhesion curves of soils with fits and what to trust, operating points, residuals and intervals; what the
     estimates lack is left out and said. One HTML file that loads nothing, and one PDF.
     """
+    from terragrip.ground.result import read as read_ground
     from terragrip.report.from_estimates import report_of
     from terragrip.report.page import render, require_drawing, write_whole
     from terragrip.report.pdf import EXTRA, pdf_possible, write_pdf
     from terragrip.soil.library import SoilLibrary
 
-    inputs = [*estimates, *([library] if library else [])]
+    inputs = [*estimates, *(path for path in (library, ground) if path)]
     target = check_file(output, inputs, suffixes=(".html", ".htm"))
     printed = None
     if not no_pdf:
         printed = check_file(pdf or target.with_suffix(".pdf"), inputs, suffixes=(".pdf",), option="--pdf")
     require_drawing()
     beside = SoilLibrary.load(library) if library else None
+    grounds = read_ground(ground) if ground else ()
     with progress("report", quiet) as step:
-        page = report_of(estimates, beside, title, step)
+        page = report_of(estimates, beside, grounds, title, step)
     write_whole(target, render(page))
     if not quiet:
         print(f"The page: {target}")

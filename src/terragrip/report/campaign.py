@@ -17,10 +17,12 @@ from terragrip.report.scores import Comparison, TruthScore, compare, compare_tru
 if TYPE_CHECKING:
     from terragrip.estimation import Estimates
     from terragrip.estimation.calibration import Calibration
+    from terragrip.ground.result import Ground
     from terragrip.recording import Recording
     from terragrip.simulation import SimulationResult
     from terragrip.soil.estimates import GatheredRuns
     from terragrip.soil.learn import Campaign, RunPairs
+    from terragrip.soil.library import SoilLibrary
     from terragrip.vehicle import Vehicle
 
 CAMPAIGN = "campaign"
@@ -81,18 +83,41 @@ class EstimatedCampaign:
     @cached_property
     def soils(self) -> Campaign:
         """The soils' curves from the estimates of all runs."""
-        from terragrip.soil.estimates import GatheredRuns
-        from terragrip.soil.learn import Campaign
+        return _learn(self.runs)
 
-        every = GatheredRuns()
-        for run in self.runs:
-            every.join(run.gathered)
-        return every.learn() if every.pairs else Campaign({}, {}, ())
+    @cached_property
+    def known_soils(self) -> SoilLibrary:
+        """The soils by the runs that stay on one: what the benchmarks, left out here, are recognised by."""
+        return _learn([run for run in self.runs if run.run is None]).library()
+
+    @cached_property
+    def grounds(self) -> tuple[Ground, ...]:
+        """The ground of the benchmarks by their estimates and the soils of the other runs."""
+        from terragrip.estimation import Estimates
+        from terragrip.ground.analysis import analyse
+
+        library = self.known_soils if self.known_soils else None
+        return tuple(
+            analyse(Estimates.read(one.path), library, one.name)[0]
+            for one in self.runs
+            if one.run is not None
+        )
 
     @property
     def benchmarks(self) -> list[Run]:
         """The benchmark runs with their tables."""
         return [item.run for item in self.runs if item.run is not None]
+
+
+def _learn(runs: Sequence[EstimatedRun]) -> Campaign:
+    """The soils of these runs; an empty campaign where none carries a label."""
+    from terragrip.soil.estimates import GatheredRuns
+    from terragrip.soil.learn import Campaign
+
+    every = GatheredRuns()
+    for run in runs:
+        every.join(run.gathered)
+    return every.learn() if every.pairs else Campaign({}, {}, ())
 
 
 def estimate_campaign(

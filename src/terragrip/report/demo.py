@@ -11,7 +11,8 @@ from typing import Any
 
 from terragrip import __version__
 from terragrip.errors import InputError
-from terragrip.report import residuals, sections, soil_sections
+from terragrip.ground.result import write as write_ground
+from terragrip.report import ground_sections, residuals, sections, soil_sections
 from terragrip.report.campaign import BENCHMARKS, EstimatedCampaign, Progress, estimate_campaign
 from terragrip.report.campaign_soils import fits_of_truth, soils_of_scenario
 from terragrip.report.intervals import pooled
@@ -63,7 +64,7 @@ def run_demo(
     Parameters
     ----------
     output: folder, made if it is not there. It gets index.html, report.pdf (where plutoprint is installed),
-        figures/*.svg, scores.json, soils.json, vehicle.yaml (calibrated) and estimates/<run>.parquet; a file is written whole
+        figures/*.svg, scores.json, soils.json, ground.json, vehicle.yaml (calibrated) and estimates/<run>.parquet; a file is written whole
         or not at all.
     seed: of the whole campaign. workers: processes.
     progress: called after each run with steps done, steps in all, and what was just done.
@@ -88,6 +89,7 @@ def run_demo(
     write_whole(scores, json.dumps(_scores(campaign, seed), indent=2) + "\n")
     soils = output / "soils.json"
     campaign.soils.library({"simulated": True, "seed": seed}).write(soils)
+    write_ground(campaign.grounds, output / "ground.json", {"simulated": True})
     page = _page(campaign, seed, seconds)
     written = write_page(page, output)
     printed = write_pdf(page, output / "report.pdf") if pdf_possible() else None
@@ -124,6 +126,9 @@ def _page(campaign: EstimatedCampaign, seed: int, seconds: float) -> Page:
             soil_sections.trust(curves),
             soil_sections.what_is_missing(curves),
             sections.soils(main, campaign.benchmarks),
+            ground_sections.recognised(campaign.grounds, simulated=True),
+            ground_sections.section_points(campaign.grounds, simulated=True),
+            ground_sections.events(campaign.grounds),
             residuals.section(main),
             sections.methods(campaign.comparisons, campaign.truth_scores, DEFAULT, _METHOD_PROSE),
             sections.honesty(main, campaign.coverage),

@@ -6,19 +6,23 @@ import os
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from terragrip import __version__
 from terragrip.errors import InputError
 from terragrip.estimation import Estimates
-from terragrip.report import residuals, sections, soil_sections
+from terragrip.report import ground_sections, residuals, sections, soil_sections
 from terragrip.report.page import Page, Section, Table, names, number
 from terragrip.report.runs import Run, label_stretches
 from terragrip.report.scores import Comparison, compare
 from terragrip.soil.estimates import GatheredRuns, distinct
 from terragrip.soil.learn import Campaign
 from terragrip.soil.library import SoilLibrary
+
+if TYPE_CHECKING:
+    from terragrip.ground.result import Ground
 
 SHOWN = 2
 """Runs drawn over time; the paper draws one and compares two."""
@@ -39,12 +43,14 @@ class _Summary:
 def report_of(
     files: Sequence[str | os.PathLike[str]],
     library: SoilLibrary | None = None,
+    grounds: Sequence[Ground] = (),
     title: str = "Traction report",
     progress: Callable[[int, int], None] | None = None,
 ) -> Page:
     """The report of estimates files (Parquet, written by `terragrip estimate`).
 
-    library: soils to draw beside those learned here. progress: called with steps done and steps in all.
+    library: soils to draw beside those learned here. grounds: of ground.json (`terragrip ground`).
+    progress: called with steps done and steps in all.
     Raises InputError on a file that is no table of estimates or is given twice; whatever else is absent leaves its section out.
     """
     paths = distinct(files)
@@ -83,6 +89,9 @@ def report_of(
             soil_sections.trust(curves),
             soil_sections.what_is_missing(curves),
             sections.soils(main, together),
+            ground_sections.recognised(grounds),
+            ground_sections.section_points(grounds),
+            ground_sections.events(grounds),
             residuals.section(main),
             sections.methods(comparisons, [], main.method),
             sections.honesty(main, []),

@@ -1,0 +1,247 @@
+"""Sections of the report on the ground: soils with probabilities over the drive, confusion, section crosses, events with reasons."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from terragrip.report.operating_points import Cross, draw_crosses
+from terragrip.report.page import Picture, Section, Table, names, number, percent
+from terragrip.report.runs import label_stretches
+from terragrip.report.style import INK, MUTED, new_figure, soil_color, styled, to_svg
+from terragrip.report.timeline import soil_strip
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+    from terragrip.ground.result import Ground, Timeline
+
+ALIKE = ("fine", "wet")
+"""Soils that the paper could not tell apart: their shares are also given as one."""
+SHOWN = 2
+"""Drives drawn over time: those with most changes."""
+LEAST_EVENT = 0.5
+"""Seconds under which an event is counted but not listed."""
+LISTED = 40
+
+
+def recognised(grounds: Sequence[Ground], simulated: bool = False) -> Section:
+    """Probabilities of the soils over the drives, changes, and the confusion matrix where the recording names its soils."""
+    title = "What the ground was"
+    told = [ground for ground in grounds if len(ground.timeline.time) > 1]
+    if not told:
+        return Section("ground", title, omitted="Left out: no ground.json was given, or it holds no drive.")
+    shown = sorted(told, key=lambda ground: -len(ground.changes))[:SHOWN]
+    sim = "Simulated run" if simulated else "Run"
+    content: list[Picture | Table] = []
+    for ground in sorted(shown, key=lambda one: one.run):
+        way = (
+            "as it was told while driving"
+            if ground.about.get("online")
+            else "told afterwards, from the whole drive"
+        )
+        labelled = any(ground.timeline.label)
+        strip = " The strip on top is the recording's own label, grey a transition." if labelled else ""
+        picture = Picture(
+            f"ground-{_stem(ground.run)}",
+            draw_probabilities(ground),
+            f"{sim} {ground.run}: probability of each soil over time, {way}. Vertical lines: changes of the ground found in the estimates, "
+            f"as dark as they are probable.{strip} Where two soils look alike, they share the probability.",
+            f"Probabilities of soils over time in {ground.run}",
+        )
+        content.append(picture)
+    matrix = confusion([ground.timeline for ground in told])
+    prose = [note if len(told) == 1 else f"{ground.run}: {note}" for ground in shown for note in ground.notes]
+    if matrix is not None:
+        prose.insert(0, matrix[1])
+        content.append(matrix[0])
+    else:
+        prose.append("There is no confusion matrix: the recordings do not name their soils.")
+    return Section("ground", title, tuple(prose), tuple(content))
+
+
+def section_points(grounds: Sequence[Ground], simulated: bool = False) -> Section:
+    """Mean and SD of slip and adhesion of each section found, coloured by the soil it was taken for (the paper's last two figures)."""
+    title = "Operating points of the sections found"
+    crosses = [
+        Cross(
+            one.soil,
+            "estimated",
+            one.slip_mean,
+            one.slip_std or 0.0,
+            one.adhesion_mean,
+            one.adhesion_std or 0.0,
+            one.samples,
+        )
+        for ground in grounds
+        for one in ground.sections
+        if one.slip_mean is not None and one.adhesion_mean is not None
+    ]
+    if not crosses:
+        return Section(
+            "sections",
+            title,
+            omitted="Left out: no ground.json was given, or none of its sections has a sample.",
+        )
+    picture = Picture(
+        "ground-sections",
+        draw_crosses(crosses, ("estimated",), "adhesion µ"),
+        f"Mean ± SD of slip and adhesion (the driven wheels' mean by load) of each of the {len(crosses)} sections between changes"
+        f"{' of the simulated runs' if simulated else ''}, in the colour of the soil it was taken for. Nothing here looks at labels.",
+        "Crosses of slip and adhesion of the sections that were found",
+    )
+    rows = tuple(
+        (
+            f"{ground.run}, {number(one.start, 0)} to {number(one.end, 0)} s",
+            one.soil,
+            percent(one.probabilities.get(one.soil), 0),
+            one.label or "–",
+            f"{number(one.slip_mean)} ± {number(one.slip_std)}",
+            f"{number(one.adhesion_mean)} ± {number(one.adhesion_std)}",
+            _sensor(one.measured),
+        )
+        for ground in grounds
+        for one in ground.sections
+    )[:LISTED]
+    table = Table(
+        "Sections: vehicle and tool between two changes. The sensor's column is its F_x/F_z, which follows κ."
+        + (f" The first {LISTED}." if sum(len(ground.sections) for ground in grounds) > LISTED else ""),
+        ("run, time", "taken for", "probability", "label", "slip", "adhesion", "sensor"),
+        rows,
+    )
+    return Section("sections", title, (), (picture, table))
+
+
+def events(grounds: Sequence[Ground]) -> Section:
+    """What happened, with start, end and the reason in the user's words."""
+    title = "Events"
+    if not grounds:
+        return Section("events", title, omitted="Left out: no ground.json was given.")
+    every = [(ground.run, one) for ground in grounds for one in ground.events]
+    listed = [(run, one) for run, one in every if one["end"] - one["start"] >= LEAST_EVENT]
+    if not listed:
+        return Section("events", title, ("No event of half a second or more.",))
+    kinds = {
+        kind: sum(one["kind"] == kind for _, one in every)
+        for kind in sorted({one["kind"] for _, one in every})
+    }
+    prose = (
+        f"{', '.join(f'{count} {kind}' for kind, count in kinds.items())}; those of half a second or more:"
+    )
+    rows = tuple(
+        (
+            f"{run}, {number(one['start'], 1)} s",
+            one["kind"],
+            number(one["end"] - one["start"], 1),
+            str(one.get("why") or "–"),
+        )
+        for run, one in listed[:LISTED]
+    )
+    caption = (
+        f"Events; the first {LISTED} of {len(listed)}."
+        if len(listed) > LISTED
+        else "Events and why each was raised."
+    )
+    return Section(
+        "events", title, (prose,), (Table(caption, ("run, start", "event", "lasts [s]", "why"), rows),)
+    )
+
+
+def confusion(timelines: Iterable[Timeline]) -> tuple[Table, str] | None:
+    """Shares of the labelled, telling time of each soil (rows) that was taken for each soil (columns), and how much is right in words.
+
+    None without labels.
+    """
+    truth, taken = [], []
+    for timeline in timelines:
+        rows = timeline.known & (timeline.label != "")
+        truth.append(timeline.label[rows])
+        taken.append(timeline.soil[rows])
+    true, said = (
+        np.concatenate([np.zeros(0, dtype=object), *truth]),
+        np.concatenate([np.zeros(0, dtype=object), *taken]),
+    )
+    if not len(true):
+        return None
+    columns = sorted(set(said), key=lambda name: (name == "unknown", name))
+    rows_ = []
+    for name in sorted(set(true)):
+        mine = said[true == name]
+        rows_.append(
+            (name, *(percent(float(np.mean(mine == other)), 0) for other in columns), str(len(mine)))
+        )
+    sentence = f"By the recordings' own labels the soil is right in {percent(float(np.mean(true == said)))} of the time"
+    if set(ALIKE) <= set(true):
+        alike = np.isin(true, ALIKE) & np.isin(said, ALIKE)
+        joined = percent(float(np.mean((true == said) | alike)))
+        sentence += f", in {joined} with {names(ALIKE)} taken as one, which the paper could not tell apart"
+    table = Table(
+        "The soil by its label (rows) and what it was taken for (columns), in shares of the row.",
+        ("label", *columns, "blocks of 0.5 s"),
+        tuple(rows_),
+    )
+    return table, f"{sentence}."
+
+
+def draw_probabilities(ground: Ground) -> str:
+    """An SVG: stacked probabilities over time, changes as lines, the label's strip above."""
+    timeline = ground.timeline
+    soils = (
+        *(name for name in timeline.names if name != "unknown"),
+        *(["unknown"] * ("unknown" in timeline.names)),
+    )
+    figure = new_figure(9.6, 3.1)
+    with styled():
+        from matplotlib.patches import Patch
+
+        plot = figure.subplots()
+        lower = np.zeros(len(timeline.time))
+        for name in soils:
+            share = timeline.probabilities[:, timeline.names.index(name)]
+            color, alpha = (INK, 0.85) if name == "unknown" else (soil_color(name, soils), 0.9)
+            plot.fill_between(
+                timeline.time, lower, lower + share, step="post", color=color, alpha=alpha, linewidth=0
+            )
+            lower = lower + share
+        _mark_changes(plot, ground)
+        soil_strip(
+            plot, timeline.time, timeline.label, tuple(s for s, _, _ in label_stretches(timeline.label))
+        )
+        plot.set_ylim(0, 1)
+        plot.set_xlim(float(timeline.time[0]), float(timeline.time[-1]))
+        plot.set_xlabel("time [s]")
+        plot.set_ylabel("probability")
+        plot.grid(visible=False)
+        handles = [
+            Patch(color=INK if name == "unknown" else soil_color(name, soils), label=name) for name in soils
+        ]
+        plot.legend(
+            handles=handles,
+            loc="lower left",
+            bbox_to_anchor=(0.0, 1.10),
+            ncols=8,
+            borderaxespad=0.0,
+            handlelength=1.6,
+        )
+        return to_svg(figure)
+
+
+def _mark_changes(plot: Axes, ground: Ground) -> None:
+    for change in ground.changes:
+        plot.axvline(change.time, color=INK, linewidth=1.0, alpha=max(min(change.probability, 1.0), 0.1))
+        plot.plot([change.time], [1.0], "v", color=MUTED, markersize=4, clip_on=False)
+
+
+def _sensor(measured: object) -> str:
+    """The force sensor's mean and SD of a section, "–" without one."""
+    for found in measured.values() if isinstance(measured, dict) else ():
+        mean, std = found.get("force_ratio_mean"), found.get("force_ratio_std")
+        if mean is not None:
+            return f"{number(mean)} ± {number(std)}"
+    return "–"
+
+
+def _stem(name: str) -> str:
+    return "".join(c if c.isascii() and c.isalnum() else "-" for c in name)

@@ -1,0 +1,89 @@
+"""The ground in the report: shares that can be counted by hand, and a sentence where nothing is known."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from terragrip.ground.changes import Change
+from terragrip.ground.result import Ground, Timeline
+from terragrip.ground.sections import Section as Stay
+from terragrip.report import ground_sections
+from terragrip.report.page import Picture, Section, Table
+
+NAMES = ("fine", "wet", "unknown")
+
+
+def ground(labels: list[str], taken: list[str], events: tuple[dict[str, object], ...] = ()) -> Ground:
+    """A drive of blocks of half a second; the soil taken for has probability .8."""
+    time = 0.5 * np.arange(len(labels))
+    probabilities = np.full((len(labels), 3), 0.1)
+    probabilities[np.arange(len(labels)), [NAMES.index(name) for name in taken]] = 0.8
+    timeline = Timeline(
+        time, NAMES, probabilities, np.ones(len(labels), dtype=bool), np.array(labels, dtype=object)
+    )
+    stay = Stay(
+        0.0, 2.0, 0.0, "fine", {"fine": 0.8, "wet": 0.1}, 200, 0.12, 0.02, 0.33, 0.04, 0.1, 0.01, label="wet"
+    )
+    change = Change(2.0, 0.2, 0.9, {})
+    return Ground(
+        "run 1", 0.0, float(time[-1]), NAMES[:2], (change,), (stay,), events, timeline, ("A note.",)
+    )
+
+
+def only(section: Section, kind: type) -> list:
+    return [item for item in section.content if isinstance(item, kind)]
+
+
+def test_confusion_counts_labelled_blocks_only() -> None:
+    labels = ["fine"] * 8 + ["wet"] * 4 + [""] * 20
+    taken = ["fine"] * 6 + ["wet"] + ["unknown"] + ["fine"] * 3 + ["wet"] + ["wet"] * 20
+    section = ground_sections.recognised([ground(labels, taken)])
+    (table,) = only(section, Table)
+    assert table.header == ("label", "fine", "wet", "unknown", "blocks of 0.5 s")
+    assert table.rows == (("fine", "75 %", "12 %", "12 %", "8"), ("wet", "75 %", "25 %", "0 %", "4"))
+    # 7 of 12 right; 11 of 12 with fine and wet as one
+    assert "right in 58.3 %" in section.prose[0]
+    assert "in 91.7 % with fine and wet taken as one" in section.prose[0]
+    assert "A note." in section.prose
+
+
+def test_the_figure_marks_changes_and_names_soils() -> None:
+    section = ground_sections.recognised([ground(["fine"] * 9, ["fine"] * 9)], simulated=True)
+    (picture,) = only(section, Picture)
+    assert "Simulated run run 1" in picture.caption
+    for name in NAMES:
+        assert name in picture.svg
+
+
+def test_without_labels_there_is_no_confusion_but_a_sentence() -> None:
+    section = ground_sections.recognised([ground([""] * 9, ["fine"] * 9)])
+    assert not only(section, Table)
+    assert any("no confusion matrix" in text for text in section.prose)
+
+
+def test_sections_carry_their_means_and_what_they_were_taken_for() -> None:
+    section = ground_sections.section_points([ground(["fine"] * 9, ["fine"] * 9)])
+    (table,) = only(section, Table)
+    assert table.rows == (("run 1, 0 to 2 s", "fine", "80 %", "wet", "0.120 ± 0.020", "0.330 ± 0.040", "–"),)
+    assert len(only(section, Picture)) == 1
+
+
+def test_events_are_listed_with_their_reasons_and_short_ones_counted() -> None:
+    happened = (
+        {"kind": "stuck", "start": 1.0, "end": 3.5, "why": "wheels turn at 0.9 m/s, the vehicle stands"},
+        {"kind": "outlier", "start": 4.0, "end": 4.1, "why": ""},
+    )
+    section = ground_sections.events([ground(["fine"] * 9, ["fine"] * 9, happened)])
+    (table,) = only(section, Table)
+    assert table.rows == (("run 1, 1.0 s", "stuck", "2.5", "wheels turn at 0.9 m/s, the vehicle stands"),)
+    assert section.prose[0].startswith("1 outlier, 1 stuck")
+
+
+@pytest.mark.parametrize(
+    "section", [ground_sections.recognised, ground_sections.section_points, ground_sections.events]
+)
+def test_without_a_ground_each_section_says_so(section) -> None:
+    found = section([])
+    assert found.omitted
+    assert "ground.json" in found.omitted
