@@ -197,10 +197,10 @@ async def test_another_set_of_fields_is_named_and_survived(vehicle, short, port,
 
 async def test_where_estimates_cannot_keep_up_drops_are_counted(vehicle, short):
     service = Service(vehicle, ["udp://127.0.0.1:1"], capacity=10)
-    service.sources.clear()
-    for k in range(25):
-        service.inbox.put(0, k * 0.01, {"ground_speed": 1.0})
-    service._keep_house()
+    async with running(service):
+        for k in range(25):
+            service.inbox.put(0, k * 0.01, {"ground_speed": 1.0})
+        await until(lambda: events(service, "behind"))
     assert service.core.counts.by_channel["ground_speed"]["dropped"] == 15
     assert "15 values dropped" in events(service, "behind")[0]
 
@@ -213,7 +213,7 @@ async def test_a_full_disk_stops_the_record_not_the_estimates(
     task = asyncio.create_task(service.run())
     await asyncio.sleep(0.05)
     sender.send(*messages(short.recording, 100))
-    await until(lambda: service.core.rows == 100)
+    await until(lambda: service.core.rows == 100 and events(service, "record_failed"))
     service.stop()
     with pytest.raises(InputError, match=r"the record stopped at .*No space left"):
         await task

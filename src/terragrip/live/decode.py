@@ -16,7 +16,7 @@ Values = dict[str, float]
 Sample = tuple[float | None, Values]
 """Stamp [s] on the source's clock, None where the message bears none; and values."""
 
-_PER_MESSAGE = 4096
+_HUGE = 1e300
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,6 +35,7 @@ class Decoder:
     def __init__(self, profile: Profile | None) -> None:
         self.profile = profile
         self.unreadable: dict[str, str] = {}
+        self._known: dict[str, bool] = {}
         self.wanted = frozenset() if profile is None else profile.sources
         self._time, self._zero = TIME, False
         self._first: int | float | None = None
@@ -71,12 +72,15 @@ class Decoder:
 
     def _plain(self, fields: Mapping[str, Any]) -> list[Sample]:
         values: Values = {}
+        known = self._known
         for name, raw in fields.items():
-            if raw is None or not is_channel(name) or name.startswith(REFERENCE):
-                continue
-            value = self._number(name, raw)
-            if value is not None:
-                values[name] = value
+            ours = known.get(name)
+            if ours is None:
+                ours = known[name] = is_channel(name) and not name.startswith(REFERENCE)
+            if ours:
+                value = raw if type(raw) is float and -_HUGE < raw < _HUGE else self._number(name, raw)
+                if value is not None:
+                    values[name] = value
         return [(self._stamp(fields), values)] if values else []
 
     def _stamp(self, fields: Mapping[str, Any]) -> float | None:

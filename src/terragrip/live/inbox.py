@@ -15,7 +15,7 @@ Arrived = tuple[float, int, float, Values]
 
 
 class Inbox:
-    """``clock`` gives s since 1970; it never steps within one run."""
+    """``clock`` gives s since 1970; it never steps within one run. ``filled`` is called when a sample comes into an empty box."""
 
     def __init__(self, capacity: int = CAPACITY, clock: Callable[[], float] | None = None) -> None:
         self.capacity = capacity
@@ -23,39 +23,25 @@ class Inbox:
         self.clock = clock or (lambda: began + (time.monotonic() - at))
         self.samples: deque[Arrived] = deque()
         self.dropped = Counts()
-        self._filled = asyncio.Event()
+        self.filled: Callable[[], None] = lambda: None
         self._room = asyncio.Event()
 
     def put(self, source: int, stamp: float | None, values: Values, arrival: float | None = None) -> None:
         """Add a sample, stamped by its arrival where it bears no stamp; drop it, counted, where there is no room."""
-        if len(self.samples) >= self.capacity:
+        waiting = len(self.samples)
+        if waiting >= self.capacity:
             self.dropped.add("dropped", values)
             return
         now = self.clock() if arrival is None else arrival
         self.samples.append((now, source, now if stamp is None else stamp, values))
-        self._filled.set()
+        if not waiting:
+            self.filled()
 
     async def room(self) -> None:
         """Wait until at least half of the place is free: for sources that can wait."""
         while len(self.samples) > self.capacity // 2:
             self._room.clear()
             await self._room.wait()
-
-    async def wait(self, timeout: float) -> bool:
-        """Wait for a sample, at most ``timeout`` s; whether there is one."""
-        if self.samples:
-            return True
-        self._filled.clear()
-        try:
-            async with asyncio.timeout(timeout):
-                await self._filled.wait()
-        except TimeoutError:
-            return False
-        return bool(self.samples)
-
-    def wake(self) -> None:
-        """Let `wait` return."""
-        self._filled.set()
 
     def taken(self) -> None:
         """Tell waiting sources that there is room."""

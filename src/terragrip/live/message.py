@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Callable
 from fnmatch import fnmatchcase
+from operator import itemgetter
 from typing import Any
 
 from terragrip.live.core import Row
@@ -33,22 +34,24 @@ class Message:
         """The message as a JSON object; of an estimate, ``columns`` or all of them. Missing numbers are null."""
         found = self._json.get(columns)
         if found is None:
-            found = json.dumps(self.data).encode() if self.row is None else _estimate(self.row, columns)
+            found = json.dumps(self.data).encode() if self.row is None else (columns or _EVERY).json(self.row)
             self._json[columns] = found
         return found
 
 
 class Columns:
-    """Which columns of an estimate a sink wants, by patterns as a shell has them: ``slip_*,adhesion_*``."""
+    """Which columns of an estimate a sink wants, by patterns as a shell has them: ``slip_*,adhesion_*``; empty: all."""
 
-    def __init__(self, text: str) -> None:
+    def __init__(self, text: str = "") -> None:
         self._patterns = [part.strip() for part in text.split(",") if part.strip()]
-        self._places: dict[str, int] = {}
         self._of: object = None
+        self._places: dict[str, int] = {}
+        self._template = ""
+        self._pick: Callable[[list[float]], tuple[float, ...]] = tuple
 
     def wants(self, name: str) -> bool:
         """Whether a column is wanted."""
-        return any(fnmatchcase(name, pattern) for pattern in self._patterns)
+        return not self._patterns or any(fnmatchcase(name, pattern) for pattern in self._patterns)
 
     def places(self, row: Row) -> dict[str, int]:
         """Name and place of each wanted column."""
@@ -56,19 +59,30 @@ class Columns:
         if self._of is not every:
             self._of = every
             self._places = {name: place for name, place in every.items() if self.wants(name)}
+            self._template = "".join(f',"{name}":%.9g' for name in self._places)
+            places = list(self._places.values())
+            one = slice(places[0], places[0] + 1) if len(places) == 1 else None
+            self._pick = (
+                (lambda values: tuple(values[one]))
+                if one
+                else itemgetter(*places)
+                if places
+                else lambda values: ()
+            )
         return self._places
 
+    def json(self, row: Row) -> bytes:
+        """The row as a JSON object, numbers to nine digits; a missing one is null."""
+        self.places(row)
+        estimate = row.estimate
+        numbers = self._template % self._pick(estimate.values)
+        if ":nan" in numbers:
+            numbers = numbers.replace(":nan", ":null")
+        predicted = "true" if row.predicted else "false"
+        return (
+            f'{{"time":{estimate.time!r},"arrival":{row.arrival!r},"event":"{estimate.event}","predicted":{predicted}'
+            f"{numbers}}}"
+        ).encode()
 
-def _estimate(row: Row, columns: Columns | None) -> bytes:
-    estimate, values = row.estimate, row.estimate.values
-    places = estimate.places if columns is None else columns.places(row)
-    numbers = ",".join(
-        f'"{name}":{value!r}' if (value := values[place]) == value else f'"{name}":null'
-        for name, place in places.items()
-    )
-    head = f'{{"time":{estimate.time!r},"arrival":{row.arrival!r},"event":"{estimate.event}"'
-    head += f',"predicted":{"true" if row.predicted else "false"}'
-    return f"{head}{',' if numbers else ''}{numbers}}}".encode()
 
-
-Publish = Callable[[Message], None]
+_EVERY = Columns()

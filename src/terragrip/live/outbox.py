@@ -20,6 +20,7 @@ class Outbox:
         self.step = 0.0 if "rate" not in uri.options else 1.0 / uri.number("rate", 1.0)
         self.columns = Columns(uri.options["columns"]) if "columns" in uri.options else None
         self.dropped = self.sent = 0
+        self.direct: Callable[[Message], None] | None = None  # a sink that never waits takes messages at once
         self.connected: Callable[[], None] = lambda: None  # a sink calls it once it has its other side
         self._queue: deque[Message] = deque()
         self._filled = asyncio.Event()
@@ -35,11 +36,36 @@ class Outbox:
             self._next = (
                 message.time + self.step * (1 - 1e-6) if late or self._next < 0 else self._next + self.step
             )
+        if self.direct is not None:
+            self.sent += 1
+            self.direct(message)
+            return
         if len(self._queue) >= self.capacity:
             self._queue.popleft()
             self.dropped += 1
         self._queue.append(message)
         self._filled.set()
+
+    async def deliver(self, take: Callable[[Message], None]) -> None:
+        """Give every message to ``take`` as it comes, until cancelled or ``take`` raises; what has waited comes first."""
+        loop = asyncio.get_running_loop()
+        failed: asyncio.Future[None] = loop.create_future()
+
+        def safely(message: Message) -> None:
+            try:
+                take(message)
+            except Exception as error:  # noqa: BLE001 - handed to who awaits this
+                self.direct = None
+                if not failed.done():
+                    failed.set_exception(error)
+
+        while self._queue and not failed.done():
+            safely(self._queue.popleft())
+        self.direct = safely
+        try:
+            await failed
+        finally:
+            self.direct = None
 
     async def get(self) -> Message:
         """The next message."""

@@ -46,7 +46,9 @@ def from_json(data: bytes) -> list[Fields]:
     objects = found if isinstance(found, list) else [found]
     if not all(isinstance(one, dict) for one in objects):
         raise Unreadable(f"JSON, but no object: {_short(data)}")
-    return [_flat(one) if any(isinstance(v, dict | list) for v in one.values()) else one for one in objects]
+    if data.count(b"{") == len(objects) and data.count(b"[") == (found is objects):
+        return objects  # nothing is nested; braces within texts only cost a second look
+    return [_flat(one) for one in objects]
 
 
 def _flat(nested: Fields, prefix: str = "", depth: int = 0) -> Fields:

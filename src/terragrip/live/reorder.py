@@ -125,19 +125,24 @@ class Reorder:
         while self.pending:
             row = self.pending[0]
             expired = now - row.arrival >= self.window
-            if not expired and any(
-                stream.awaited(row.time, row.origin.get(key[1]) == key[0])
-                for key, stream in self.streams.items()
-            ):
-                break
-            if not expired and not self._acquainted(row):
+            if not expired and not self._complete(row):
                 break
             out.append(self._release(row, expired))
         return out
 
-    def _acquainted(self, row: Pending) -> bool:
-        """Whether every stream of the row was met before; a new one may bring brothers of the same instant."""
-        return all((source, name) in self.streams for name, source in row.origin.items())
+    def _complete(self, row: Pending) -> bool:
+        """Whether nothing is due that the row lacks, and each of its streams was met before (a new one may bring brothers)."""
+        time, origin, streams = row.time, row.origin, self.streams
+        met = 0
+        for (source, name), stream in streams.items():
+            present = origin.get(name) == source
+            if present:
+                met += 1
+                if time <= stream.due_from + 1.5 * stream.period and stream.period:
+                    continue  # regular, and in its turn: the common case
+            if stream.awaited(time, present):
+                return False
+        return met == len(origin)
 
     def _release(self, row: Pending, expired: bool) -> Pending:
         del self.pending[0]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import gc
 import logging
 from collections.abc import Awaitable, Callable, Sequence
 from pathlib import Path
@@ -98,12 +99,15 @@ class Service:
         self.listeners: list[Callable[[Message], None]] = [outbox.put for outbox in self.outboxes]
         self._real_time = all(source.real_time for source in self.sources)
         self._stopped = False
+        self._done: Any = None  # a future, once `run` runs
+        self._waking: asyncio.TimerHandle | None = None
         self._record_failure: str | None = None
 
     def stop(self) -> None:
         """Let `run` come to its end."""
         self._stopped = True
-        self.inbox.wake()
+        if self._done is not None and not self._done.done():
+            self._done.set_result(None)
 
     def note(self, note: dict[str, Any]) -> None:
         """What a source or sink has to say: counts, an event."""
@@ -122,13 +126,26 @@ class Service:
             asyncio.create_task(self._supervise_sink(sink, outbox))
             for (_, sink), outbox in zip(self.sinks, self.outboxes, strict=True)
         ]
+        gc.freeze()  # what is there now stays: the collector need not look at it again
+        self._loop = asyncio.get_running_loop()
+        self._done = self._loop.create_future()
+        for task in watched:
+            task.add_done_callback(lambda _: self._source_done(watched))
+        for task in takers:
+            task.add_done_callback(self._sink_done)
+        self.inbox.filled = lambda: self._later(self._work)
+        self._later(self._work)
+        self._loop.call_later(_HOUSEKEEPING, self._guarded, self._keep_house)
         try:
-            await self._loop(watched, takers)
+            if not self._stopped:
+                await self._done
             self._dispatch(self._safely(self._engine.flush))
             self.announce()
             for outbox in self.outboxes:
                 await outbox.emptied(_LINGER)
         finally:
+            self._stopped = True
+            gc.unfreeze()
             for task in (*watched, *takers):
                 task.cancel()
             await asyncio.gather(*watched, *takers, return_exceptions=True)
@@ -141,34 +158,53 @@ class Service:
                 self._record_failure, place="--record", mend="free space or choose another folder"
             )
 
-    async def _loop(self, watched: list[asyncio.Task[None]], takers: list[asyncio.Task[None]]) -> None:
-        loop = asyncio.get_running_loop()
-        housekeeping = loop.time()
-        while not self._stopped:
-            taken = await self.inbox.wait(self._patience())
-            if taken:
-                self._drain()
-                await asyncio.sleep(0)
-            else:
-                now = self.inbox.clock()
-                if self._real_time and self._engine.due(now):
-                    self._dispatch(self._safely(self._engine.tick, now))
-            self._write()
-            if loop.time() - housekeeping >= _HOUSEKEEPING:
-                housekeeping = loop.time()
-                self._keep_house()
-            if all(task.done() for task in watched) and not self.inbox.samples:
-                return
-            if any(task.done() and not task.cancelled() and task.exception() for task in (*watched, *takers)):
-                return
+    def _source_done(self, watched: list[asyncio.Task[None]]) -> None:
+        if any(not task.cancelled() and task.exception() for task in watched if task.done()):
+            self.stop()
+        self._end_with(watched)
 
-    def _patience(self) -> float:
-        """s to wait for a sample: until a row that waits is due."""
+    def _end_with(self, watched: list[asyncio.Task[None]]) -> None:
+        """Stop once all sources have ended and all that they brought is estimated."""
+        if all(task.done() for task in watched):
+            if self.inbox.samples and not self._stopped:
+                self._loop.call_soon(self._end_with, watched)
+            else:
+                self.stop()
+
+    def _sink_done(self, task: asyncio.Task[None]) -> None:
+        if not task.cancelled() and task.exception():
+            self.stop()
+
+    def _later(self, act: Callable[[], None]) -> None:
+        self._loop.call_soon(self._guarded, act)
+
+    def _guarded(self, act: Callable[[], None]) -> None:
+        """Do it in a turn of the loop; what goes wrong ends the run."""
+        if self._stopped:
+            return
+        try:
+            act()
+        except Exception as failure:  # noqa: BLE001 - raised by `run`
+            if not self._done.done():
+                self._done.set_exception(failure)
+
+    def _work(self) -> None:
+        """Estimate what is there; come again for more, or for a row that waits."""
+        self._drain()
+        if self.inbox.samples:
+            self._later(self._work)
+            return
         pending = self.core.reorder.pending
-        if not pending or not self._real_time:
-            return _HOUSEKEEPING
-        left = pending[0].arrival + self.core.settings.window - self.inbox.clock()
-        return min(max(left, 1e-4), _HOUSEKEEPING)
+        if pending and self._real_time and self._waking is None:
+            left = pending[0].arrival + self.core.settings.window - self.inbox.clock()
+            self._waking = self._loop.call_later(max(left, 0.0) + 1e-4, self._guarded, self._tick)
+
+    def _tick(self) -> None:
+        self._waking = None
+        now = self.inbox.clock()
+        if not self.inbox.samples and self._engine.due(now):
+            self._dispatch(self._safely(self._engine.tick, now))
+        self._work()
 
     def _drain(self) -> None:
         samples = self.inbox.samples
@@ -228,6 +264,8 @@ class Service:
                     listen(message)
 
     def _keep_house(self) -> None:
+        self._loop.call_later(_HOUSEKEEPING, self._guarded, self._keep_house)
+        self._write()
         now = self.inbox.clock()
         dropped, self.inbox.dropped = self.inbox.dropped, type(self.inbox.dropped)()
         for channel, mine in dropped.by_channel.items():

@@ -66,15 +66,16 @@ class FoxgloveSink:
             raise Lost(f"the server: {error}") from error
         try:
             outbox.connected()
-            while True:
-                message = await outbox.get()
-                self._rotate()
-                self._channels[message.kind].log(message.json(outbox.columns), log_time=_nanoseconds(message))
+            await outbox.deliver(lambda message: self._log(message, outbox))
         finally:
             server.stop()
             if self._writer is not None:
                 self._writer.close()
                 self._writer = None
+
+    def _log(self, message: Message, outbox: Outbox) -> None:
+        self._rotate()
+        self._channels[message.kind].log(message.json(outbox.columns), log_time=_nanoseconds(message))
 
     def _rotate(self) -> None:
         """Open, flush or change the MCAP file as time goes."""

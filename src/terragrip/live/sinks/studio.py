@@ -44,8 +44,7 @@ class StudioSink:
             raise Lost(f"the server: {error.strerror or error}") from error
         async with server:
             outbox.connected()
-            while True:
-                self.broadcast.put(await outbox.get())
+            await outbox.deliver(self.broadcast.put)
 
     def _admit(self, connection: Any, request: Any) -> Any:
         """Refuse who does not know the token, where one is set, and pages of other sites."""

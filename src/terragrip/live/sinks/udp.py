@@ -40,11 +40,14 @@ class UdpSink:
         except OSError as error:
             raise Lost(f"cannot send to {self.uri.host} ({error.strerror or error})") from error
         outbox.connected()
+
+        def send(message: Message) -> None:
+            data = self._encoded(message, outbox)
+            if data:
+                transport.sendto(data)
+
         try:
-            while True:
-                data = self._encoded(await outbox.get(), outbox)
-                if data:
-                    transport.sendto(data)
+            await outbox.deliver(send)
         finally:
             transport.close()
 
