@@ -350,6 +350,9 @@ struct tg_filter {
     tg_real slope[2], cosine[2], sine[2]; /* of the last two slopes */
     tg_real walk[TG_ROWS];
     tg_real x[TG_ROWS], d[TG_ROWS], u[TG_MAX_STATES * TG_ROWS]; /* without a bank */
+    tg_real P[TG_MAX_STATES * TG_ROWS];  /* instead of d and u, where `formed`: rows `stride` apart, columns to the diagonal hold */
+    int32_t formed;
+    int32_t factor_steps;                /* still to be taken with factors */
     tg_real x_prior[TG_ROWS];            /* of the last step, before its update */
     tg_passage passage;                  /* of the last step */
     int32_t taken;                       /* channels of the last step, in the order taken */

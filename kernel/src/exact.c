@@ -20,10 +20,10 @@ TG_INLINE void exact_move(const tg_passage *p, const tg_real *from, tg_real *to,
 }
 
 /* F U in W, weights d, prior mean. */
-TG_INLINE void exact_predict(const tg_filter *f, const tgi_plan *plan, tg_real *W, tg_real *weight, tg_real *x, const int n, const int stride)
+TG_INLINE void exact_predict(const tg_filter *f, const tgi_factors *from, const tgi_plan *plan, tg_real *W, tg_real *weight, tg_real *x, const int n, const int stride)
 {
-    for (int k = 0; k < TG_TWICE(n); k++) exact_move(&plan->passage, f->u + k * stride, W + k * stride, n, stride);
-    for (int k = 0; k < TG_TWICE(n); k++) weight[k] = f->d[k];
+    for (int k = 0; k < TG_TWICE(n); k++) exact_move(&plan->passage, from->u + k * stride, W + k * stride, n, stride);
+    for (int k = 0; k < TG_TWICE(n); k++) weight[k] = from->d[k];
     exact_move(&plan->passage, f->x, x, n, stride);
     for (int j = n + 1; j < TG_TWICE(n); j++) x[j] += plan->shift[j];
 }
@@ -87,11 +87,11 @@ TG_INLINE void exact_take_accelerometer(const tg_filter *f, const tgi_plan *plan
     exact_take(f, plan, out, n + 1, along, coupling, 0, residual, n, stride);
 }
 
-TG_INLINE void exact_step(const tg_filter *f, const tgi_plan *plan, tgi_result *out, const int n, const int stride)
+TG_INLINE void exact_step(const tg_filter *f, const tgi_factors *from, const tgi_plan *plan, tgi_result *out, const int n, const int stride)
 {
     tg_real W[2 * TG_MAX_STATES * TG_ROWS], weight[2 * TG_MAX_STATES];
     const int rows = TG_TWICE(n);
-    exact_predict(f, plan, W, weight, out->x, n, stride);
+    exact_predict(f, from, plan, W, weight, out->x, n, stride);
     for (int i = 0; i < stride; i += TG_LANES) lanes_store(out->x_prior + i, lanes_load(out->x + i));
     for (int j = rows; j < stride; j++) out->d[j] = 0;
     out->taken = 0;
@@ -112,9 +112,9 @@ TG_INLINE void exact_step(const tg_filter *f, const tgi_plan *plan, tgi_result *
     if (plan->count && plan->present[n + 1]) exact_take_accelerometer(f, plan, out, n, stride);
 }
 
-void tgi_exact_step(const tg_filter *f, const tgi_plan *plan, tgi_result *out)
+void tgi_exact_step(const tg_filter *f, const tgi_factors *from, const tgi_plan *plan, tgi_result *out)
 {
-#define STEP(n, stride) exact_step(f, plan, out, n, stride)
+#define STEP(n, stride) exact_step(f, from, plan, out, n, stride)
     TG_BY_WHEELS(f->wheels, STEP)
 #undef STEP
 }

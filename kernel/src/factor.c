@@ -44,3 +44,25 @@ void tgi_covariance(int rows, int stride, const tg_real *u, const tg_real *d, tg
     default: covariance(rows, stride, u, d, P); break;
     }
 }
+
+tg_status tgi_factors_of(const tg_filter *f, tg_real *u, tg_real *d)
+{
+    const int rows = f->states, stride = f->stride;
+    if (!f->formed) {
+        memcpy(u, f->u, (size_t)(rows * stride) * sizeof *u);
+        memcpy(d, f->d, (size_t)rows * sizeof *d);
+        return TG_OK;
+    }
+    tg_real P[TG_MAX_STATES * TG_MAX_STATES];
+    for (int i = 0; i < rows; i++)
+        for (int j = 0; j <= i; j++) P[i * rows + j] = P[j * rows + i] = f->P[i * stride + j];
+    return tgi_factorise(rows, stride, P, u, d);
+}
+
+void tgi_covariance_of(const tg_filter *f, tg_real *P)
+{
+    if (f->formed)
+        memcpy(P, f->P, (size_t)(f->states * f->stride) * sizeof *P);
+    else
+        tgi_covariance(f->states, f->stride, f->u, f->d, P);
+}

@@ -1,4 +1,5 @@
 /* The filter: set-up, one step, restart, moments. Engines and policies are in files of their own. */
+#include "direct.h"
 #include "factor.h"
 #include "plan.h"
 
@@ -129,7 +130,14 @@ TG_INLINE int result_is_finite(const tgi_result *result, const int n, const int 
     return lanes_sum(lanes_add(lanes_add(zero[0], zero[1]), lanes_add(zero[2], zero[3]))) == 0;
 }
 
-TG_INLINE void commit(tg_filter *f, const tgi_plan *plan, const tgi_result *result, const int n, const int stride)
+/* What a step leaves besides the belief. */
+TG_INLINE void commit_channels(tg_filter *f, const tgi_plan *plan, const tgi_result *result, const int n)
+{
+    for (int c = 0; c < result->taken; c++) f->channel[c] = result->channel[c];
+    for (int i = 0; plan->count && i <= n; i++) f->accelerometer[i] = plan->accelerometer[i];
+}
+
+TG_INLINE void commit(tg_filter *f, const tgi_result *result, const int n, const int stride)
 {
     for (int i = 0; i < stride; i += TG_LANES) {
         for (int k = i; k < TG_TWICE(n); k++) lanes_store(f->u + k * stride + i, lanes_load(result->u + k * stride + i));
@@ -137,11 +145,10 @@ TG_INLINE void commit(tg_filter *f, const tgi_plan *plan, const tgi_result *resu
         lanes_store(f->d + i, lanes_load(result->d + i));
         lanes_store(f->x_prior + i, lanes_load(result->x_prior + i));
     }
-    for (int c = 0; c < result->taken; c++) {
-        f->channel[c] = result->channel[c];
+    for (int c = 0; c < result->taken; c++)
         for (int i = 0; i < stride; i += TG_LANES) lanes_store(f->gain[c] + i, lanes_load(result->gain[c] + i));
-    }
-    for (int i = 0; plan->count && i <= n; i++) f->accelerometer[i] = plan->accelerometer[i];
+    f->formed = 0;
+    f->factor_steps = f->factor_steps > 0 ? f->factor_steps - 1 : TGI_FACTOR_STEPS;
 }
 
 /* What bank and single filter remember alike. */
@@ -179,31 +186,59 @@ TG_INLINE void report(const tgi_plan *plan, const tgi_result *result, const tg_r
     for (int b = 0; b < TG_MODES; b++) out->mode[b] = 0;
 }
 
+static tg_status step_with_factors(const tg_filter *f, const tgi_plan *plan, tgi_result *result)
+{
+    tg_real u[TG_MAX_STATES * TG_ROWS], d[TG_ROWS];
+    tgi_factors from = {f->u, f->d};
+    for (int i = f->states; i < f->stride; i++) result->d[i] = 0; /* the engines write the states only, the check reads whole lanes */
+    if (f->tuning.engine == TG_UNSCENTED) {
+        tgi_unscented_step(f, plan, result);
+        return TG_OK;
+    }
+    if (f->formed) {
+        if (tgi_factors_of(f, u, d) != TG_OK) return TG_DIVERGED;
+        from.u = u;
+        from.d = d;
+    }
+    tgi_exact_step(f, &from, plan, result);
+    return TG_OK;
+}
+
 TG_INLINE tg_status advance_one(tg_filter *f, const tgi_call *call, tgi_plan *plan, tg_step *out, const int n, const int stride)
 {
     const int32_t policy = f->tuning.policy;
     tg_real scale[TG_ROWS];
     tgi_result result;
-    for (int i = f->states; i < f->stride; i++) result.d[i] = 0; /* the engines write the states only, the check reads whole lanes */
     plan->gamma = policy == TG_FIXED      ? 0
                   : policy == TG_ADAPTIVE ? 1
                   : call->y               ? tgi_supervise(f, plan, call->now)
                                           : f->supervisor.gamma;
     scale_noise(f, plan->gamma, plan, n);
     for (int i = 0; i < stride; i += TG_LANES) lanes_store(scale + i, lanes_load(f->policy.adaptation.scale + i));
-    if (f->tuning.engine == TG_EXACT)
-        tgi_exact_step(f, plan, &result);
-    else
-        tgi_unscented_step(f, plan, &result);
+    int formed = 0;
+#if TGI_DIRECT
+    tgi_direct direct;
+    direct.result = &result;
+    formed = f->tuning.engine == TG_EXACT && n <= TG_LANES && f->factor_steps == 0 && tgi_direct_step(f, plan, &direct);
+    if (formed && policy != TG_FIXED) tgi_direct_gains(&direct, result.gain, n);
+#endif
+    if (!formed) {
+        const tg_status status = step_with_factors(f, plan, &result);
+        if (status != TG_OK) return status;
+    }
     result.log_likelihood = log_likelihood(&result);
-    if (!result_is_finite(&result, n, stride)) return TG_DIVERGED;
+    if (!formed && !result_is_finite(&result, n, stride)) return TG_DIVERGED;
     if (policy != TG_FIXED) {
         const tg_status status = tgi_adapt(f, plan, &result);
         if (status != TG_OK) return status;
     }
     if (policy == TG_SUPERVISED && call->y) tgi_supervisor_remember(f, plan, call->now);
     if (out) report(plan, &result, scale, out, n);
-    commit(f, plan, &result, n, stride);
+#if TGI_DIRECT
+    if (formed) tgi_direct_commit(f, &direct);
+#endif
+    if (!formed) commit(f, &result, n, stride);
+    commit_channels(f, plan, &result, n);
     return TG_OK;
 }
 
@@ -265,7 +300,7 @@ tg_status tg_filter_moments(const tg_filter *f, tg_real *x, tg_real *P)
         to_state_order(f->wheels, f->stride, rows_x, rows_P, x, P);
         return TG_OK;
     }
-    if (P) tgi_covariance(f->states, f->stride, f->u, f->d, rows_P);
+    if (P) tgi_covariance_of(f, rows_P);
     to_state_order(f->wheels, f->stride, f->x, rows_P, x, P);
     return TG_OK;
 }
@@ -275,11 +310,13 @@ tg_status tg_filter_factors(const tg_filter *f, int32_t mode, tg_real *U, tg_rea
     if (!f || !U || !D) return TG_BAD_ARGUMENT;
     const int bank = f->tuning.policy == TG_BANK;
     if (mode < 0 || mode >= (bank ? TG_MODES : 1)) return TG_BAD_ARGUMENT;
+    tg_real u[TG_MAX_STATES * TG_ROWS], d[TG_ROWS];
+    if (!bank && tgi_factors_of(f, u, d) != TG_OK) return TG_DIVERGED;
     for (int k = 0; k < f->states; k++) {
-        D[k] = bank ? f->policy.bank.d[k][mode] : f->d[k];
+        D[k] = bank ? f->policy.bank.d[k][mode] : d[k];
         for (int e = 0; e < f->states; e++) {
             const int i = tgi_row(f->wheels, e);
-            U[e * f->states + k] = i > k ? 0 : bank ? f->policy.bank.u[k][i][mode] : f->u[k * f->stride + i];
+            U[e * f->states + k] = i > k ? 0 : bank ? f->policy.bank.u[k][i][mode] : u[k * f->stride + i];
         }
     }
     return TG_OK;
@@ -345,7 +382,12 @@ tg_status tg_filter_restart(tg_filter *f, tg_real walk_time, const tg_real *outp
     if (f->tuning.policy == TG_BANK)
         tgi_bank_restart(f, outputs, &passage);
     else {
-        tgi_restart(n, f->stride, passage.q, f->u, f->d);
+        tg_real u[TG_MAX_STATES * TG_ROWS], d[TG_ROWS];
+        if (tgi_factors_of(f, u, d) != TG_OK) return TG_DIVERGED;
+        tgi_restart(n, f->stride, passage.q, u, d);
+        memcpy(f->u, u, (size_t)(f->states * f->stride) * sizeof *u);
+        memcpy(f->d, d, (size_t)f->states * sizeof *d);
+        f->formed = 0;
         for (int o = 0; o <= n; o++) f->x[n + 1 + o] = outputs[tgi_channel(n, o)];
         memcpy(f->x_prior, f->x, sizeof f->x);
         if (f->tuning.policy != TG_FIXED) restart_sensitivities(f);

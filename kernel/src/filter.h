@@ -64,8 +64,12 @@ TG_INLINE tg_real tgi_weight(tg_real huber, tg_real innovation, tg_real variance
     return huber * tgi_sqrt(variance) / tgi_fabs(innovation);
 }
 
+typedef struct { /* of P = U diag(d) U', columns `stride` apart */
+    const tg_real *u, *d;
+} tgi_factors;
+
 /* exact.c, unscented.c: the prior and posterior of a filter with one lane. */
-void tgi_exact_step(const tg_filter *f, const tgi_plan *plan, tgi_result *result);
+void tgi_exact_step(const tg_filter *f, const tgi_factors *from, const tgi_plan *plan, tgi_result *result);
 void tgi_unscented_step(const tg_filter *f, const tgi_plan *plan, tgi_result *result);
 
 /* adaptation.c: sensitivities and noise scales over this step; TG_DIVERGED and nothing changed where they leave the finite numbers. */
@@ -88,4 +92,6 @@ void tgi_restart(int n, int stride, const tg_real *q, tg_real *u, tg_real *d);
 /* factor.c */
 tg_status tgi_factorise(int rows, int stride, const tg_real *P, tg_real *u, tg_real *d);
 void tgi_covariance(int rows, int stride, const tg_real *u, const tg_real *d, tg_real *P);
+tg_status tgi_factors_of(const tg_filter *f, tg_real *u, tg_real *d); /* without a bank, whichever the filter holds */
+void tgi_covariance_of(const tg_filter *f, tg_real *P);
 #endif

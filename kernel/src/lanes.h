@@ -43,6 +43,7 @@
     (defined(__AVX__) || (defined(TG_FLOAT) && (defined(__SSE2__) || defined(__ARM_NEON))))
 typedef tg_real tg_lanes __attribute__((vector_size(TG_LANES * sizeof(tg_real))));
 
+#define TG_LANES_OF(a, b, c, d) {a, b, c, d}
 TG_INLINE tg_lanes lanes_all(tg_real x) { return (tg_lanes){x, x, x, x}; }
 TG_INLINE tg_lanes lanes_add(tg_lanes a, tg_lanes b) { return a + b; }
 TG_INLINE tg_lanes lanes_sub(tg_lanes a, tg_lanes b) { return a - b; }
@@ -66,6 +67,7 @@ typedef struct {
     tg_real at[TG_LANES];
 } tg_lanes;
 
+#define TG_LANES_OF(a, b, c, d) {{a, b, c, d}}
 #define LANES_EACH(expression)                                    \
     do {                                                          \
         for (int i = 0; i < TG_LANES; i++) a.at[i] = expression; \
@@ -83,6 +85,11 @@ TG_INLINE tg_lanes lanes_spread(tg_lanes a, int i) { return lanes_all(a.at[i]); 
 #undef LANES_EACH
 #endif
 
+TG_INLINE tg_lanes lanes_of(tg_real a, tg_real b, tg_real c, tg_real d)
+{
+    const tg_lanes all = TG_LANES_OF(a, b, c, d);
+    return all;
+}
 TG_INLINE tg_lanes lanes_load(const tg_real *p)
 {
     tg_lanes a;

@@ -71,6 +71,7 @@ TG_INLINE tg_status plan_passage(const tg_filter *f, const tg_input *u, tg_real 
     p->dt = dt;
     p->keep = 1;
     p->g = g * plan->cosine[0];
+    for (int j = 0; j < TG_ROWS; j += TG_LANES) lanes_store(plan->shift + j, lanes_all(0));
     plan->shift[n + 1] = -per_mass * u->drawbar - g * plan->sine[0];
     for (int i = 0; i < n; i++) {
         const tg_real pull = f->arm[i] * u->load[i];

@@ -179,7 +179,7 @@ void tgi_believe(tg_estimator *e)
         return;
     }
     memcpy(e->belief.x, f->x, sizeof e->belief.x);
-    tgi_covariance(f->states, f->stride, f->u, f->d, e->belief.P);
+    tgi_covariance_of(f, e->belief.P);
 }
 
 /* The machine and the tuning are checked by the filter. */

@@ -1,0 +1,309 @@
+/* The exact step on the covariance itself: a third of the work of factors, and it subtracts. Sound where a bound on what is left says so
+ * (docs/decisions/0023-covariance-under-a-bound.md); elsewhere the caller takes factors. Up to four wheels, double precision. */
+#include "direct.h"
+
+#if TGI_DIRECT
+
+typedef struct { /* the map, in lanes */
+    tg_lanes phi, b, c;
+    tg_real g;
+} map;
+
+/* What belongs to the wheels; 0 beyond the last. */
+TG_INLINE tg_lanes load_wheels(const tg_real *p, const int n)
+{
+    return n == TG_LANES ? lanes_load(p) : lanes_of(p[0], n > 1 ? p[1] : 0, n > 2 ? p[2] : 0, 0);
+}
+
+TG_INLINE void load_rows(const tg_real *P, tgi_block *k, const int n, const int stride)
+{
+    const tg_real *const rho = P + n * stride, *const v = rho + stride;
+    for (int i = 0; i < n; i++) {
+        const tg_real *const omega = v + (1 + i) * stride;
+        k->mu[i] = load_wheels(P + i * stride, n);
+        k->omega_mu[i] = load_wheels(omega, n);
+        k->omega_rest[i] = lanes_of(omega[n], omega[n + 1], 0, 0);
+        k->omega[i] = load_wheels(omega + n + 2, n);
+    }
+    k->rho_mu = load_wheels(rho, n);
+    k->rho_rest = lanes_of(rho[n], rho[n + 1], 0, 0);
+    k->rho_omega = load_wheels(rho + n + 2, n);
+    k->v_mu = load_wheels(v, n);
+    k->v_rest = lanes_of(v[n], v[n + 1], 0, 0);
+    k->v_omega = load_wheels(v + n + 2, n);
+}
+
+/* Row i of the transposed 4 x 4 block. */
+TG_INLINE void transpose(const tg_lanes *a, tg_lanes *to, const int n)
+{
+    for (int i = 0; i < n; i++)
+        to[i] = lanes_of(lanes_at(a[0], i), n > 1 ? lanes_at(a[n > 1 ? 1 : 0], i) : 0, n > 2 ? lanes_at(a[n > 2 ? 2 : 0], i) : 0,
+                         n > 3 ? lanes_at(a[n > 3 ? 3 : 0], i) : 0);
+}
+
+TG_INLINE tg_lanes unit(int i) { return lanes_of(i == 0, i == 1, i == 2, i == 3); }
+
+/* F P F' + Q. Products that appear twice in the covariance are rounded alike: it stays symmetric to the bit. */
+TG_INLINE void block_predict(const map *m, const tg_real *q, const tgi_block *P, tgi_block *to, const int n)
+{
+    const tg_lanes g = lanes_all(m->g);
+    tg_lanes Y[TG_LANES], pull = P->v_mu, wheels = P->v_omega; /* Y: mu by omega */
+    transpose(P->omega_mu, Y, n);
+    for (int i = 0; i < n; i++) {
+        const tg_lanes c = lanes_all(lanes_at(m->c, i));
+        pull = lanes_mul_add(c, P->mu[i], pull);
+        wheels = lanes_mul_add(c, Y[i], wheels);
+    }
+    const tg_lanes v_mu = lanes_mul_sub(g, P->rho_mu, pull), v_old_omega = lanes_mul_sub(g, P->rho_omega, wheels);
+    const tg_lanes v_omega = lanes_mul_add(m->b, v_mu, lanes_mul(m->phi, v_old_omega));
+    const tg_lanes rho_omega = lanes_mul_add(m->b, P->rho_mu, lanes_mul(m->phi, P->rho_omega));
+    const tg_real rho = lanes_at(P->rho_rest, 0), v_rho = lanes_at(P->v_rest, 0);
+    const tg_real cross = (v_rho - m->g * rho) + lanes_sum(lanes_mul(m->c, P->rho_mu));
+    const tg_real v = (lanes_at(P->v_rest, 1) - m->g * (v_rho + cross)) + lanes_sum(lanes_mul(m->c, lanes_add(P->v_mu, v_mu)));
+    for (int j = 0; j < n; j++) {
+        const tg_lanes phi = lanes_all(lanes_at(m->phi, j)), b = lanes_all(lanes_at(m->b, j));
+        const tg_lanes mixed = lanes_mul_add(lanes_mul(phi, m->b), P->omega_mu[j], lanes_mul(lanes_mul(b, m->phi), Y[j]));
+        const tg_lanes own = lanes_mul_add(lanes_mul(b, m->b), P->mu[j], lanes_mul(lanes_mul(phi, m->phi), P->omega[j]));
+        to->omega[j] = lanes_mul_add(lanes_all(q[n + 2 + j]), unit(j), lanes_add(own, mixed));
+        to->omega_mu[j] = lanes_mul_add(b, P->mu[j], lanes_mul(phi, P->omega_mu[j]));
+        to->omega_rest[j] = lanes_of(lanes_at(rho_omega, j), lanes_at(v_omega, j), 0, 0);
+        to->mu[j] = lanes_mul_add(lanes_all(q[j]), unit(j), P->mu[j]);
+    }
+    to->rho_mu = P->rho_mu;
+    to->rho_rest = lanes_of(rho + q[n], cross, 0, 0);
+    to->rho_omega = rho_omega;
+    to->v_mu = v_mu;
+    to->v_rest = lanes_of(cross, v + q[n + 1], 0, 0);
+    to->v_omega = v_omega;
+}
+
+/* The first half of the bound: every state's noise is a share of its variance. False for what is no number, too. */
+TG_INLINE int noise_holds(const tg_real *q, const tgi_block *P, const int n)
+{
+    int holds = (q[n] >= TGI_NOISE_SHARE * lanes_at(P->rho_rest, 0)) & (q[n + 1] >= TGI_NOISE_SHARE * lanes_at(P->v_rest, 1));
+    for (int i = 0; i < n; i++)
+        holds &= (q[i] >= TGI_NOISE_SHARE * lanes_at(P->mu[i], i)) & (q[n + 2 + i] >= TGI_NOISE_SHARE * lanes_at(P->omega[i], i));
+    return holds;
+}
+
+/* P less h h' inverse; K = h inverse. */
+TG_INLINE void block_take(tgi_block *P, const tgi_gain *h, tg_real one_over, tgi_gain *K, const int n)
+{
+    const tg_lanes inverse = lanes_all(one_over), h_rho = lanes_all(lanes_at(h->rest, 0)), h_v = lanes_all(lanes_at(h->rest, 1));
+    K->mu = lanes_mul(h->mu, inverse);
+    K->rest = lanes_mul(h->rest, inverse);
+    K->omega = lanes_mul(h->omega, inverse);
+    for (int i = 0; i < n; i++) {
+        const tg_lanes mu = lanes_all(lanes_at(h->mu, i)), omega = lanes_all(lanes_at(h->omega, i)), k = lanes_all(lanes_at(K->omega, i));
+        P->mu[i] = lanes_mul_sub(lanes_mul(mu, h->mu), inverse, P->mu[i]);
+        P->omega[i] = lanes_mul_sub(lanes_mul(omega, h->omega), inverse, P->omega[i]);
+        P->omega_mu[i] = lanes_mul_sub(omega, K->mu, P->omega_mu[i]);
+        P->omega_rest[i] = lanes_mul_sub(k, h->rest, P->omega_rest[i]);
+    }
+    P->rho_mu = lanes_mul_sub(h_rho, K->mu, P->rho_mu);
+    P->rho_rest = lanes_mul_sub(lanes_mul(h_rho, h->rest), inverse, P->rho_rest);
+    P->rho_omega = lanes_mul_sub(h_rho, K->omega, P->rho_omega);
+    P->v_mu = lanes_mul_sub(h_v, K->mu, P->v_mu);
+    P->v_rest = lanes_mul_sub(lanes_mul(h_v, h->rest), inverse, P->v_rest);
+    P->v_omega = lanes_mul_sub(h_v, K->omega, P->v_omega);
+}
+
+typedef struct { /* the step on its way */
+    tgi_direct *out;
+    tg_real noise; /* product of the channels' weighted R: the second half of the bound */
+} taking;
+
+/* One channel with h = P H' and the residual after the channels before it; its prior innovation and variance give the weight. */
+TG_INLINE void take(const tg_filter *f, const tgi_plan *plan, taking *t, int o, const tgi_gain *h, tg_real product, tg_real residual,
+                    tg_real innovation, tg_real variance, const int n)
+{
+    tgi_direct *const out = t->out;
+    const tg_real weight = tgi_weight(f->tuning.huber, innovation, variance), r = weight < 1 ? plan->r[o] / weight : plan->r[o];
+    const tg_real S = product + r, inverse = 1 / S;
+    tgi_gain *const K = &out->gain[out->taken];
+    block_take(&out->P, h, inverse, K, n);
+    const tg_lanes nu = lanes_all(residual);
+    out->x.mu = lanes_mul_add(nu, K->mu, out->x.mu);
+    out->x.rest = lanes_mul_add(nu, K->rest, out->x.rest);
+    out->x.omega = lanes_mul_add(nu, K->omega, out->x.omega);
+    tgi_result *const result = out->result;
+    result->channel[out->taken] = o;
+    result->residual[out->taken] = residual;
+    result->residual_variance[out->taken] = S;
+    result->innovation[o] = innovation;
+    result->variance[o] = variance;
+    result->weight[o] = weight;
+    result->nis += residual * residual * inverse;
+    result->volume *= S;
+    t->noise *= r;
+    out->taken++;
+}
+
+TG_INLINE tg_real dot(tg_lanes a, tg_lanes b) { return lanes_sum(lanes_mul(a, b)); }
+
+TG_INLINE void take_accelerometer(const tg_filter *f, const tgi_plan *plan, taking *t, tg_lanes a, tg_real a_rho, tg_real innovation,
+                                  tg_real variance, const int n)
+{
+    const tgi_block *const P = &t->out->P;
+    const tg_lanes weight = lanes_all(a_rho);
+    tgi_gain h;
+    tg_lanes Y[TG_LANES], mu = lanes_mul(weight, P->rho_mu), omega = lanes_mul(weight, P->rho_omega);
+    transpose(P->omega_mu, Y, n);
+    for (int i = 0; i < n; i++) {
+        const tg_lanes own = lanes_all(lanes_at(a, i));
+        mu = lanes_mul_add(own, P->mu[i], mu);
+        omega = lanes_mul_add(own, Y[i], omega);
+    }
+    h.mu = mu;
+    h.omega = omega;
+    h.rest = lanes_mul_add(weight, P->rho_rest, lanes_of(dot(a, P->rho_mu), dot(a, P->v_mu), 0, 0));
+    const tg_real product = dot(a, h.mu) + a_rho * lanes_at(h.rest, 0);
+    const tg_real expected = dot(a, t->out->x.mu) + a_rho * lanes_at(t->out->x.rest, 0);
+    take(f, plan, t, n + 1, &h, product, plan->y[n + 1] - plan->accelerometer_shift - expected, innovation, variance, n);
+}
+
+/* Channels in the order of the other engine: omega_n..omega_1, v, a_x. */
+TG_INLINE void take_channels(const tg_filter *f, const tgi_plan *plan, taking *t, const int n)
+{
+    tgi_direct *const out = t->out;
+    tgi_block *const P = &out->P;
+    const tgi_gain prior = out->x;
+    const tg_lanes a = load_wheels(plan->accelerometer, n);
+    const tg_real a_rho = plan->accelerometer[n];
+    tg_real innovation[TG_LANES + 2] = {0}, variance[TG_LANES + 2] = {0};
+    for (int i = 0; i < n; i++) {
+        innovation[1 + i] = plan->y[1 + i] - lanes_at(prior.omega, i);
+        variance[1 + i] = lanes_at(P->omega[i], i) + plan->r[1 + i];
+    }
+    innovation[0] = plan->y[0] - lanes_at(prior.rest, 1);
+    variance[0] = lanes_at(P->v_rest, 1) + plan->r[0];
+    if (plan->present[n + 1]) {
+        tg_lanes mu = lanes_mul(lanes_all(a_rho), P->rho_mu);
+        for (int i = 0; i < n; i++) mu = lanes_mul_add(lanes_all(lanes_at(a, i)), P->mu[i], mu);
+        variance[n + 1] = dot(a, mu) + a_rho * (dot(a, P->rho_mu) + a_rho * lanes_at(P->rho_rest, 0)) + plan->r[n + 1];
+        innovation[n + 1] = plan->y[n + 1] - plan->accelerometer_shift - (dot(a, prior.mu) + a_rho * lanes_at(prior.rest, 0));
+    }
+    for (int j = n - 1; j >= 0; j--)
+        if (plan->present[1 + j]) {
+            const tgi_gain h = {P->omega_mu[j], P->omega_rest[j], P->omega[j]};
+            take(f, plan, t, 1 + j, &h, lanes_at(h.omega, j), plan->y[1 + j] - lanes_at(out->x.omega, j), innovation[1 + j], variance[1 + j], n);
+        }
+    if (plan->present[0]) {
+        const tgi_gain h = {P->v_mu, P->v_rest, P->v_omega};
+        take(f, plan, t, 0, &h, lanes_at(h.rest, 1), plan->y[0] - lanes_at(out->x.rest, 1), innovation[0], variance[0], n);
+    }
+    if (plan->present[n + 1]) take_accelerometer(f, plan, t, a, a_rho, innovation[n + 1], variance[n + 1], n);
+}
+
+TG_INLINE int is_finite(const tgi_direct *out, const int n)
+{
+    const tgi_block *const P = &out->P;
+    const tg_lanes none = lanes_all(0);
+    tg_lanes a = lanes_mul(out->x.mu, none), b = lanes_mul(out->x.rest, none);
+#define ADD(to, x) to = lanes_mul_add(x, none, to)
+    ADD(a, out->x.omega);
+    ADD(b, P->rho_mu);
+    ADD(a, P->rho_rest);
+    ADD(b, P->rho_omega);
+    ADD(a, P->v_mu);
+    ADD(b, P->v_rest);
+    ADD(a, P->v_omega);
+    for (int i = 0; i < n; i++) {
+        ADD(a, P->mu[i]);
+        ADD(b, P->omega[i]);
+        ADD(a, P->omega_mu[i]);
+    }
+#undef ADD
+    return lanes_sum(lanes_add(a, b)) == 0;
+}
+
+TG_INLINE int direct_step(const tg_filter *f, const tg_real *P, const tgi_plan *plan, tgi_direct *out, const int n, const int stride)
+{
+    const tg_passage *const p = &plan->passage;
+    const map m = {lanes_load(p->phi), lanes_load(p->b), lanes_load(p->c), p->g};
+    tgi_block before;
+    load_rows(P, &before, n, stride);
+    block_predict(&m, p->q, &before, &out->P, n);
+    if (!noise_holds(p->q, &out->P, n)) return 0;
+    const tg_real *const x = f->x, *const shift = plan->shift;
+    const tg_lanes mu = load_wheels(x, n), omega = load_wheels(x + n + 2, n);
+    out->x.mu = mu;
+    out->x.rest = lanes_of(x[n], (x[n + 1] - m.g * x[n]) + dot(m.c, mu) + shift[n + 1], 0, 0);
+    out->x.omega = lanes_add(lanes_mul_add(m.b, mu, lanes_mul(m.phi, omega)), load_wheels(shift + n + 2, n));
+    out->x_prior = out->x;
+    out->taken = 0;
+    out->result->nis = 0;
+    out->result->volume = 1;
+    taking t = {out, 1};
+    if (plan->count) take_channels(f, plan, &t, n);
+    out->result->taken = out->taken;
+    return t.noise >= TGI_NOISE_SHARE * out->result->volume && is_finite(out, n);
+}
+
+int tgi_direct_step(const tg_filter *f, const tgi_plan *plan, tgi_direct *out)
+{
+    tg_real formed[TG_MAX_STATES * TG_ROWS];
+    const tg_real *P = f->P;
+    int holds = 0;
+    if (!f->formed) {
+        tgi_covariance(f->states, f->stride, f->u, f->d, formed);
+        P = formed;
+    }
+    switch (f->wheels) {
+    case 1: holds = direct_step(f, P, plan, out, 1, 4); break;
+    case 2: holds = direct_step(f, P, plan, out, 2, 8); break;
+    case 3: holds = direct_step(f, P, plan, out, 3, TG_ROWS); break;
+    case 4: holds = direct_step(f, P, plan, out, 4, 12); break;
+    default: break;
+    }
+    return holds;
+}
+
+/* A row of three parts, in row order. */
+TG_INLINE void store_row(tg_real *to, tg_lanes mu, tg_lanes rest, tg_lanes omega, const int n)
+{
+    if (n == TG_LANES) {
+        lanes_store(to, mu);
+        lanes_store(to + n + 2, omega);
+    } else
+        for (int i = 0; i < n; i++) {
+            to[i] = lanes_at(mu, i);
+            to[n + 2 + i] = lanes_at(omega, i);
+        }
+    to[n] = lanes_at(rest, 0);
+    to[n + 1] = lanes_at(rest, 1);
+}
+
+TG_INLINE void store_gains(const tgi_direct *out, tg_real (*gain)[TG_ROWS], const int n)
+{
+    for (int c = 0; c < out->taken; c++) store_row(gain[c], out->gain[c].mu, out->gain[c].rest, out->gain[c].omega, n);
+}
+
+void tgi_direct_gains(const tgi_direct *out, tg_real (*gain)[TG_ROWS], int n) { store_gains(out, gain, n); }
+
+TG_INLINE void commit(tg_filter *f, const tgi_direct *out, const int n, const int stride)
+{
+    const tgi_block *const P = &out->P;
+    tg_real *const rho = f->P + n * stride, *const v = rho + stride;
+    for (int i = 0; i < n; i++) {
+        store_row(f->P + i * stride, P->mu[i], lanes_all(0), lanes_all(0), n);
+        store_row(v + (1 + i) * stride, P->omega_mu[i], P->omega_rest[i], P->omega[i], n);
+    }
+    store_row(rho, P->rho_mu, P->rho_rest, P->rho_omega, n);
+    store_row(v, P->v_mu, P->v_rest, P->v_omega, n);
+    store_row(f->x, out->x.mu, out->x.rest, out->x.omega, n);
+    store_row(f->x_prior, out->x_prior.mu, out->x_prior.rest, out->x_prior.omega, n);
+    store_gains(out, f->gain, n);
+    f->formed = 1;
+}
+
+void tgi_direct_commit(tg_filter *f, const tgi_direct *out)
+{
+    switch (f->wheels) {
+    case 1: commit(f, out, 1, 4); break;
+    case 2: commit(f, out, 2, 8); break;
+    case 3: commit(f, out, 3, TG_ROWS); break;
+    default: commit(f, out, 4, 12); break;
+    }
+}
+#endif
