@@ -99,4 +99,4 @@ def test_a_radar_that_falls_silent_is_replaced_by_gnss(tmp_path: Path) -> None:
         )
     recording = tg.read(write_log(tmp_path / "log.blf", frames), "tractor-isobus")
     assert np.nanmedian(recording["ground_speed"]) == pytest.approx(1.9)
-    assert "ground_speed is SpeedOverGround." in recording.notes
+    assert "ground_speed is from SpeedOverGround." in recording.notes

@@ -20,6 +20,7 @@ from terragrip.estimation.engine import EVENTS, wheel_radii
 from terragrip.estimation.estimates import Estimates
 from terragrip.estimation.noise import channel_noise, logged_noise
 from terragrip.estimation.slip_filter import Walks, choose_walks, run
+from terragrip.physics.slip import slip
 from terragrip.recording import Recording, held_periods, unit_warnings, without_held
 from terragrip.vehicle import Vehicle
 
@@ -88,6 +89,7 @@ def estimate_slip(
     anew = _anew(log.time, speeds, _GAP if gap is None else gap)
     walks = choose_walks(log.time, speeds, sds, anew)
     found = run(log.time, speeds, sds, anew, walks, smooth=smooth)
+    notes += _against_travel(found.state, rims)
     columns = _columns(found.state, found.covariance, rims, log.time, step)
     columns |= {"nis": found.nis, "channels": found.channels}
     event = _events(found.state, rims, found.outlier, anew, step)
@@ -227,31 +229,46 @@ def _columns(
     }
     slips: dict[str, Floats] = {}
     for i, rim in enumerate(rims):
-        d, k = state[:, i + 2], i + 2
-        u = v + d
-        spread = covariance[:, 0, 0] + 2 * covariance[:, 0, k] + covariance[:, k, k]
+        k = i + 2
+        u = v + state[:, k]
+        with_v = covariance[:, 0, 0] + covariance[:, 0, k]
+        spread = with_v + covariance[:, 0, k] + covariance[:, k, k]
         found[f"wheel_speed_{rim.wheel}"] = u / rim.radius
         found[f"wheel_speed_{rim.wheel}_std"] = np.sqrt(np.maximum(spread, 0.0)) / rim.radius
         slips[f"slip_{rim.wheel}"], slips[f"slip_{rim.wheel}_std"] = _slip(
-            v, d, covariance[:, [0, 0, k], [0, k, k]], rim.spread, standstill
+            v, u, np.stack([covariance[:, 0, 0], with_v, spread], axis=1), rim.spread, standstill
         )
     return found | slips
 
 
-def _slip(v: Floats, d: Floats, spread: Floats, radius: float, standstill: float) -> tuple[Floats, Floats]:
-    """Slip (paper eq. 5) and its SD (n,) by the first derivatives; ``spread`` (n, 3): variances of v, v with d, d."""
-    u = v + d
-    driving = np.abs(u) >= np.abs(v)
-    faster = np.where(driving, u, v)
-    moving = np.abs(faster) > standstill
-    safe = np.where(moving, faster, 1.0)
-    value = np.where(moving, d / safe, np.nan)
-    # Driving: d/(v + d); braking: d/v. Derivatives by v and d.
-    by_v = -d / safe**2
-    by_d = np.where(driving, v, safe) / safe**2
-    variance = by_v**2 * spread[:, 0] + 2 * by_v * by_d * spread[:, 1] + by_d**2 * spread[:, 2]
-    variance += (radius * np.where(driving, v, u) / safe) ** 2
-    return np.clip(value, -1.0, 1.0), np.where(moving, np.sqrt(np.maximum(variance, 0.0)), np.nan)
+def _slip(v: Floats, u: Floats, spread: Floats, radius: float, standstill: float) -> tuple[Floats, Floats]:
+    """Slip (paper eq. 5) and its SD (n,) by first derivatives; ``spread`` (n, 3): variances of v, of v with u, of u."""
+    value = slip(u, v, 1.0, standstill_speed=standstill)
+    travel, rim = np.abs(v), np.abs(u)
+    driving = rim >= travel
+    safe = np.where(np.isfinite(value), np.maximum(travel, rim), 1.0)
+    # Driving: 1 - |v|/|u|; braking: -1 + |u|/|v|.
+    by_v = -np.sign(v) * np.where(driving, safe, rim) / safe**2
+    by_u = np.sign(u) * np.where(driving, travel, safe) / safe**2
+    variance = by_v**2 * spread[:, 0] + 2 * by_v * by_u * spread[:, 1] + by_u**2 * spread[:, 2]
+    variance += (radius * np.where(driving, travel, rim) / safe) ** 2
+    return value, np.where(np.isfinite(value), np.sqrt(np.maximum(variance, 0.0)), np.nan)
+
+
+def _against_travel(state: Floats, rims: list[RimSpeed]) -> list[str]:
+    """A sentence on wheels that turn backward while the machine goes forward, most of the time."""
+    v = state[:, 0]
+    odd = []
+    for i, rim in enumerate(rims):
+        u = v + state[:, i + 2]
+        moving = (np.abs(v) > _STANDSTILL) & (np.abs(u) > _STANDSTILL)
+        if moving.any() and np.mean((u * v)[moving] < 0) > 0.5:
+            odd.append(rim.wheel)
+    if not odd:
+        return []
+    return [
+        f"The wheel speed of {', '.join(odd)} is against the travel: write 'sign: -1' for it in the profile."
+    ]
 
 
 def _events(

@@ -20,19 +20,17 @@ def bound(profile: Profile, log: LogTable, *, partial: bool = False) -> tuple[Pr
     absent: list[str] = []
     channels: dict[str, Source] = {}
     for name, origin in profile.channels.items():
-        if origin.candidates:
-            chosen = _chosen(origin, log)
-            if chosen is not None:
-                if len(origin.candidates) > 1 or "*" in origin.candidates[0]:
-                    notes.append(f"{name} is {chosen}.")
-                origin = origin.model_copy(update={"column": chosen})
-        lacking = next((column for column in origin.columns if not matching(column, log.columns)), None)
-        if lacking is None:
-            channels[name] = origin
+        found = next((own for source in origin.chain if (own := _bound(source, log)) is not None), None)
+        if found is not None:
+            channels[name] = found
+            if len(origin.chain) > 1 or any("*" in c for c in origin.columns) or len(origin.candidates) > 1:
+                notes.append(f"{name} is from {', '.join(found.columns)}.")
         elif origin.optional or partial:
             absent.append(name)
         else:
-            raise _missing(lacking, log, others=len(origin.candidates) > 1)
+            every = [column for source in origin.chain for column in source.columns]
+            lacking = next((c for c in every if not matching(c, log.columns)), every[0])
+            raise _missing(lacking, log, others=len(origin.chain) > 1 or len(origin.candidates) > 1)
     if absent and not partial:
         notes.append(f"Nothing in the log gives {', '.join(absent)}; the profile can do without.")
     time, rows = profile.time, profile.rows
@@ -47,10 +45,28 @@ def bound(profile: Profile, log: LogTable, *, partial: bool = False) -> tuple[Pr
     return profile.model_copy(update={"channels": channels, "time": time, "rows": rows}), notes
 
 
-def _chosen(origin: Source, log: LogTable) -> str | None:
-    """The first column that a candidate stands for and that holds a value; else the first that there is."""
-    found = [column for name in origin.candidates for column in matching(name, log.columns)]
-    return next((column for column in found if _holds(log, column)), found[0] if found else None)
+def _bound(origin: Source, log: LogTable) -> Source | None:
+    """A source with existing columns for its names; None if the log lacks one, or has several alternatives without a value."""
+    update: dict[str, object] = {}
+    if origin.candidates:
+        found = [column for name in origin.candidates for column in matching(name, log.columns)]
+        if not found:
+            return None
+        held = next((column for column in found if _holds(log, column)), None)
+        if held is None and origin.otherwise is not None:
+            return None
+        update["column"] = held or found[0]
+    for key in ("derivative_of", "norm_of", "pitch_of", "roll_of"):
+        names = getattr(origin, key)
+        if names is not None:
+            columns = [next(iter(matching(name, log.columns)), None) for name in names]
+            if None in columns or (
+                origin.otherwise is not None and not all(_holds(log, str(c)) for c in columns)
+            ):
+                return None
+            update[key] = tuple(columns)
+    bound_one = origin.model_copy(update=update)
+    return bound_one if all(column in log.columns for column in bound_one.columns) else None
 
 
 def _holds(log: LogTable, column: str) -> bool:

@@ -15,6 +15,9 @@ _LEAST_SHARE = 0.3  # of the shorter record
 _LEAST_CORRELATION = 0.8
 _APART = 2.0  # s from the best offset, where another one must be worse
 _WORSE = 0.02  # in correlation
+_WIDTH = 20  # points that rates are smoothed over: a second
+_ROUNDS = 5
+_LEAST_STD = 0.005  # s
 _LONGEST = 20_000_000  # points; a record over ten days
 
 
@@ -49,8 +52,8 @@ def offset_between(
     elsewhere = np.abs(shift - shift[best]) > _APART
     if elsewhere.any() and correlation[elsewhere].max() > correlation[best] - _WORSE:
         return None
-    seconds = float(shift[best] - _STEP * _peak(correlation, best))
-    return Offset(seconds, _deviation(first, second, seconds), float(min(correlation[best], 1.0)))
+    seconds, deviation = _refined(first, second, float(shift[best]))
+    return Offset(seconds, deviation, float(min(correlation[best], 1.0)))
 
 
 def _regular(time: Floats, speed: Floats) -> tuple[float, Floats] | None:
@@ -97,26 +100,55 @@ def _correlation(a: Floats, b: Floats) -> tuple[Floats, npt.NDArray[np.intp]]:
     return np.where(enough, found, -np.inf)[order], lags[order]
 
 
-def _peak(values: Floats, best: int) -> float:
-    """Where a parabola through three points peaks, in points from the middle one."""
-    if not 0 < best < len(values) - 1 or not np.isfinite(values[best - 1 : best + 2]).all():
-        return 0.0
-    low, middle, high = values[best - 1 : best + 2]
-    bend = low - 2 * middle + high
-    return float(0.5 * (low - high) / bend) if bend < 0 else 0.0
+def _refined(
+    first: tuple[float, Floats], second: tuple[float, Floats], seconds: float
+) -> tuple[float, float]:
+    """A better offset, from the changes of the speeds, and its standard deviation.
 
-
-def _deviation(first: tuple[float, Floats], second: tuple[float, Floats], seconds: float) -> float:
-    """Standard deviation of an offset: that of the speeds' difference over the size of the acceleration."""
+    The rate of the second speed is regressed on rate and jerk of the first, whose coefficients are k and -k times what
+    the offset lacks; rates, since a change of slip shifts a speed for long and a rate for a moment, and biweights keep
+    those moments out.
+    """
     time = first[0] + _STEP * np.arange(len(first[1]))
-    stamps = second[0] - seconds + _STEP * np.arange(len(second[1]))
-    speed = np.interp(time, stamps, second[1], left=np.nan, right=np.nan)
-    both = np.isfinite(first[1]) & np.isfinite(speed)
-    a, b = first[1][both], speed[both]
-    scale, level = np.polyfit(a, b, 1)
-    rest = b - scale * a - level
-    acceleration = np.gradient(scale * a, _STEP)
-    # Neighbouring differences are alike: count those that are not.
-    alike = float(np.clip(np.corrcoef(rest[:-1], rest[1:])[0, 1], 0.0, 0.999)) if rest.std() > 0 else 0.0
-    information = float(np.sum(acceleration**2)) * (1 - alike) / (1 + alike)
-    return float(max(np.sqrt(np.mean(rest**2) / information), _STEP / 100))
+    mine = _smooth(first[1])
+    rate, jerk = np.gradient(mine, _STEP), np.gradient(_smooth(np.gradient(mine, _STEP)), _STEP)
+    deviation = _LEAST_STD
+    for _ in range(_ROUNDS):
+        stamps = second[0] - seconds + _STEP * np.arange(len(second[1]))
+        known = np.isfinite(second[1])
+        theirs = np.interp(time, stamps[known], second[1][known], left=np.nan, right=np.nan)
+        away = np.isnan(np.interp(time, stamps, second[1], left=np.nan, right=np.nan))
+        other = np.gradient(_smooth(np.where(away, np.nan, theirs)), _STEP)
+        both = np.isfinite(rate) & np.isfinite(jerk) & np.isfinite(other)
+        if both.sum() < 2 * _WIDTH:
+            break
+        design, target = np.stack([rate[both], jerk[both]], axis=1), other[both]
+        weight = np.ones(len(target))
+        for _ in range(_ROUNDS):
+            normal = design.T @ (weight[:, None] * design) + 1e-12 * np.eye(2)
+            found = np.linalg.solve(normal, design.T @ (weight * target))
+            rest = target - design @ found
+            scale = max(1.4826 * float(np.median(np.abs(rest))), 1e-9)
+            weight = np.clip(1.0 - (rest / (4.7 * scale)) ** 2, 0.0, None) ** 2
+        if found[0] <= 0:
+            break
+        step = float(np.clip(-found[1] / found[0], -_APART, _APART))
+        seconds += step
+        # Points within the smoothing are alike: so many count as one.
+        spread = scale**2 * 2 * _WIDTH * np.linalg.inv(normal)[1, 1]
+        deviation = max(float(np.sqrt(spread) / found[0]), _LEAST_STD)
+        if abs(step) < 0.1 * deviation:
+            break
+    return seconds, deviation
+
+
+def _smooth(values: Floats) -> Floats:
+    """Means over a second around each point (n,); NaN where one of them is."""
+    half = _WIDTH // 2
+    sums = np.r_[0.0, np.cumsum(np.nan_to_num(values))]
+    missing = np.r_[0, np.cumsum(np.isnan(values))]
+    found = np.full(len(values), np.nan)
+    inner = np.arange(half, len(values) - half)
+    whole = missing[inner + half + 1] == missing[inner - half]
+    found[inner] = np.where(whole, (sums[inner + half + 1] - sums[inner - half]) / (2 * half + 1), np.nan)
+    return found

@@ -10,7 +10,15 @@ import numpy.typing as npt
 
 from terragrip.errors import InputError
 from terragrip.formats.binding import bound
-from terragrip.formats.derivation import derivative, fresh_positions, pitch_of, quotient, roll_of, yaw_of
+from terragrip.formats.derivation import (
+    derivative,
+    fresh_positions,
+    metres_of,
+    pitch_of,
+    quotient,
+    roll_of,
+    yaw_of,
+)
 from terragrip.formats.profile import Profile, Rows, Source, TimeSource, rate_unit
 from terragrip.formats.signals import SINCE_1970
 from terragrip.formats.table import LogTable
@@ -116,6 +124,8 @@ def _channel(name: str, origin: Source, log: LogTable, time: Floats) -> tuple[Co
         raw = np.full(len(time), quantity(origin.constant, unit_of(name) or "1"))
     elif origin.derivative_of is not None:
         raw, deviation = _rate(origin, log, time)
+    elif origin.norm_of is not None:
+        raw = np.sqrt(sum(part**2 for part in _raw(origin.norm_of, log, time)))
     elif origin.pitch_of is not None:
         raw = pitch_of(_raw(origin.pitch_of, log, time))
     elif origin.roll_of is not None:
@@ -139,6 +149,8 @@ def _factor(name: str, origin: Source, log: LogTable) -> float:
     """Factor to the schema's unit: from the profile's unit, else from the one that the log itself states."""
     target = unit_of(name)
     if target is None:
+        return 1.0
+    if origin.is_geographic:
         return 1.0
     if origin.unit is not None:
         return factor_to(rate_unit(origin.unit) if origin.derivative_of else origin.unit, target)
@@ -180,6 +192,8 @@ def _without_invalid(values: Floats, origin: Source) -> Floats:
 def _rate(origin: Source, log: LogTable, time: Floats) -> tuple[Floats, float | None]:
     """Speed (n,) along the positions' path, at the instants of fresh positions, and its standard deviation."""
     positions = _raw(origin.derivative_of or (), log, time)
+    if origin.is_geographic:
+        positions = list(metres_of(*positions))
     fresh = fresh_positions(time, positions) & np.isfinite(time)
     rates, deviations = zip(
         *(derivative(time[fresh], p[fresh], origin.window) for p in positions), strict=True

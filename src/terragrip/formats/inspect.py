@@ -4,17 +4,18 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from terragrip.errors import InputError
-from terragrip.formats.profile import Profile
+from terragrip.formats.profile import SHIPPED, Profile
 from terragrip.formats.proposal import is_ready, missing_channels, profile_text
-from terragrip.formats.reading import read, read_table
+from terragrip.formats.reading import read, read_log
 from terragrip.formats.recognition import find_time, propose
+from terragrip.formats.signals import SINCE_1970, SignalLog
 from terragrip.formats.table import LogTable
 from terragrip.recording import Recording, unit_warnings
 from terragrip.recording.held import fresh_samples, held_period, measured_part
@@ -77,6 +78,7 @@ class Inspection:
     missing: tuple[str, ...]
     warnings: tuple[str, ...]
     ready: bool  # the log can be estimated as it is, or with the profile that was given
+    fitting: tuple[str, ...]  # profiles that come with Terragrip and fit
     profile: str  # a proposed profile, YAML
 
     def to_dict(self) -> dict[str, Any]:
@@ -104,44 +106,126 @@ def inspect(
     """
     machine = vehicle if isinstance(vehicle, Vehicle) or vehicle is None else Vehicle.load(vehicle)
     databases = tuple(dbc)
-    table = read_table(path, databases=databases)
-    warnings, recording = list(table.notes), None
+    log = read_log(path, databases=databases)
+    warnings, recording = list(log.notes), None
+    fitting: tuple[str, ...] = ()
     try:
         recording = read(path, profile, dbc=databases)
         warnings += [note for note in recording.notes if note not in warnings]
     except InputError as error:
         if profile is not None:
             raise
-        warnings.append(_cause(error))
+        fitting = _fitting(log)
+        warnings += [] if fitting else [_cause(error)]
     if recording is not None and machine is not None:
         warnings += unit_warnings(recording, machine)
         try:
-            recording.check_against(machine)
+            if not _without_torque(recording):
+                recording.check_against(machine)
         except InputError as error:
             warnings.append(_cause(error))
     if recording is not None and profile is not None:
-        table = _as_table(recording, table)
-    numbers = {n: c.astype(np.float64) for n, c in table.columns.items() if c.dtype.kind in "fiub"}
-    dates = tuple(n for n, c in table.columns.items() if c.dtype.kind == "M")
-    texts = tuple(n for n, c in table.columns.items() if c.dtype.kind == "O")
-    stamp = find_time(numbers, dates)
-    base = None if stamp is None else _seconds(table.columns[stamp[0]], stamp[1])
-    proposals = propose(
-        {n: v for n, v in numbers.items() if stamp is None or n != stamp[0]}, texts, table.units
-    )
-    rows = len(next(iter(table.columns.values()), ()))
+        log = _as_table(recording, log)
+    seen = _Seen.of(log)
+    proposals = propose(seen.numbers(), seen.texts(), seen.units)
+    stamp, base = seen.stamp, seen.base
     return Inspection(
-        file=str(table.source),
-        sha256=str(table.sha256),
-        rows=rows,
+        file=str(log.source),
+        sha256=str(log.sha256),
+        rows=len(next(iter(seen.columns.values()), ())) if base is None else len(base),
         time=None if stamp is None or base is None else _time_summary(stamp[0], stamp[1], base),
-        columns=tuple(_column_summary(n, c, table.units.get(n), base) for n, c in table.columns.items()),
+        columns=tuple(
+            _column_summary(n, c, seen.units.get(n), seen.clocks.get(n, base))
+            for n, c in seen.columns.items()
+        ),
         recognised={channel: proposal.columns for channel, proposal in proposals.items()},
         missing=tuple(missing_channels(proposals, stamp is not None)),
         warnings=tuple(warnings),
         ready=recording is not None and is_ready(recording),
-        profile=profile_text(os.path.basename(str(table.source)), stamp, proposals, table, base),
+        fitting=fitting,
+        profile=profile_text(
+            os.path.basename(str(log.source)), stamp, proposals, since_1970=seen.since_1970, dbc=databases
+        ),
     )
+
+
+@dataclass(frozen=True)
+class _Seen:
+    """What is told of a log: columns and units by name, the time's column and unit, its instants [s].
+
+    ``clocks``: the instants of signals that have their own.
+    """
+
+    columns: dict[str, npt.NDArray[Any]]
+    units: dict[str, str]
+    stamp: tuple[str, str] | None
+    base: Floats | None
+    clocks: dict[str, Floats]
+    since_1970: bool
+
+    @classmethod
+    def of(cls, log: LogTable | SignalLog) -> _Seen:
+        if isinstance(log, SignalLog):
+            base = log.instants()
+            first = float(base[0]) if len(base) else 0.0
+            return cls(
+                {name: signal.values for name, signal in log.signals.items()},
+                {name: signal.unit for name, signal in log.signals.items() if signal.unit},
+                (TIME, "s"),
+                base - first,
+                {name: signal.time - first for name, signal in log.signals.items()},
+                since_1970=False,
+            )
+        numbers = {n: c.astype(np.float64) for n, c in log.columns.items() if c.dtype.kind in "fiub"}
+        dates = tuple(n for n, c in log.columns.items() if c.dtype.kind == "M")
+        stamp = find_time(numbers, dates)
+        instants = None if stamp is None else _seconds(log.columns[stamp[0]], stamp[1])
+        large = (
+            stamp is not None
+            and len(numbers.get(stamp[0], ())) > 0
+            and _is_large(log.columns[stamp[0]], stamp[1])
+        )
+        dated = stamp is not None and stamp[0] in dates
+        return cls(log.columns, log.units, stamp, instants, {}, since_1970=large or dated)
+
+    def numbers(self) -> dict[str, Floats]:
+        """The numeric columns but time."""
+        own = None if self.stamp is None or self.clocks else self.stamp[0]
+        return {
+            n: c.astype(np.float64, copy=False)
+            for n, c in self.columns.items()
+            if c.dtype.kind in "fiub" and n != own
+        }
+
+    def texts(self) -> tuple[str, ...]:
+        """The names of the text columns."""
+        return tuple(n for n, c in self.columns.items() if c.dtype.kind == "O")
+
+
+def _fitting(log: LogTable | SignalLog) -> tuple[str, ...]:
+    """The profiles that come with Terragrip and make a recording of the log."""
+    found = []
+    for name in SHIPPED:
+        profile = Profile.load(name)
+        if isinstance(log, SignalLog):
+            own = {n: s for n, s in log.signals.items() if profile.wants(n)}
+            table = replace(log, signals=own).table() if own else None
+        else:
+            table = log
+        try:
+            if table is not None and is_ready(profile.apply(table)):
+                found.append(name)
+        except InputError:
+            continue
+    return tuple(found)
+
+
+def _without_torque(recording: Recording) -> bool:
+    return not any(name.startswith("drive_torque_") for name in recording.channels)
+
+
+def _is_large(column: npt.NDArray[Any], unit: str) -> bool:
+    return bool(abs(float(column[0])) * factor_to(unit, "s") > SINCE_1970)
 
 
 def _cause(error: InputError) -> str:
@@ -150,7 +234,7 @@ def _cause(error: InputError) -> str:
     return f"{place}{error.problem}" + (f"; {error.mend}" if error.mend else "")
 
 
-def _as_table(recording: Recording, table: LogTable) -> LogTable:
+def _as_table(recording: Recording, table: LogTable | SignalLog) -> LogTable:
     columns = {TIME: recording.time, **recording.channels, **recording.labels}
     units = {name: unit for name in columns if (unit := unit_of(name)) is not None}
     return LogTable(tuple(columns), columns, units, table.source, table.sha256)

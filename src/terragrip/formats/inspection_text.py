@@ -23,6 +23,9 @@ def text_of(inspection: Inspection) -> str:
         parts.append("Missing\n" + "\n".join(f"  {sentence}" for sentence in inspection.missing))
     if inspection.warnings:
         parts.append("Remarks\n" + "\n".join(f"  {sentence}" for sentence in inspection.warnings))
+    if inspection.fitting:
+        named = " or ".join(f"--profile {name}" for name in inspection.fitting)
+        parts.append(f"A profile that comes with Terragrip fits: {named}")
     if inspection.ready:
         parts.append("The log can be estimated as it is read here.")
     else:

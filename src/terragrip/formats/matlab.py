@@ -203,7 +203,8 @@ def _walk_struct(struct: Mapping[str, Any], name: str, found: _Found, depth: int
         elif key.lower() == "values" and isinstance(part, Mapping):
             _walk(part, name, found, depth + 1)  # a Dataset's element: its name is the signal's
         elif key.lower() in ("elements", "signals") and not isinstance(part, str):
-            _walk(part, name, found, depth + 1)
+            own = _own_name(part)  # one element alone is no list
+            _walk(part, _joined(name, own) if own else name, found, depth + 1)
         elif not isinstance(part, str):
             _walk(part, _joined(name, key), found, depth + 1)
 

@@ -28,7 +28,7 @@ _DAY = 86400.0
 _KNOT, _KMH = 1852 / 3600, 1 / 3.6
 
 UNITS = {
-    "speed": "m/s",
+    "ground_speed": "m/s",
     "course": "deg",
     "latitude": "deg",
     "longitude": "deg",
@@ -73,7 +73,7 @@ class _Track:
 
 
 def read_nmea(path: str, wanted: Wanted | None, databases: Databases) -> SignalLog:
-    """Read an NMEA 0183 log: speed, course, latitude, longitude, altitude, hdop, quality and satellites.
+    """Read an NMEA 0183 log: ground_speed, course, latitude, longitude, altitude, hdop, quality and satellites.
 
     Sentences with a wrong checksum are left out and counted; without a fix values are missing. Raises InputError if no
     sentence is readable.
@@ -124,7 +124,7 @@ def _rmc(sentence: Any, track: _Track) -> None:
         track.no_fix += 1
         return
     speed = _number(sentence.spd_over_grnd)
-    track.add("speed", None if speed is None else speed * _KNOT)
+    track.add("ground_speed", None if speed is None else speed * _KNOT)
     track.add("course", _number(sentence.true_course))
     track.add("latitude", sentence.latitude)
     track.add("longitude", sentence.longitude)
@@ -135,11 +135,11 @@ def _vtg(sentence: Any, track: _Track) -> None:
     if getattr(sentence, "faa_mode", "A") == "N":
         track.no_fix += 1
         return
-    known = track.columns.get("speed")
+    known = track.columns.get("ground_speed")
     if known is not None and known[0][-1] == track.now:
         return
     speed = _number(sentence.spd_over_grnd_kmph)
-    track.add("speed", None if speed is None else speed * _KMH)
+    track.add("ground_speed", None if speed is None else speed * _KMH)
     track.add("course", _number(sentence.true_track))
 
 

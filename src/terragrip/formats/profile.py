@@ -15,6 +15,8 @@ With ``over`` the raw value is a quotient of two columns, as a torque is power o
 smaller in size than ``over_minimum``, and between the updates of a held dividend.
 
 ``from`` may list names, of which the first that the log has, with a value, counts; ``*`` in a name stands for any text.
+``norm_of`` is the size of a vector of two or three columns; ``derivative_of`` takes a latitude and a longitude too, with
+``unit: deg``. ``else`` holds what to do where the log lacks a source: ``{from: gps_speed, else: {derivative_of: [x, y]}}``.
 A channel with ``optional: true`` is left out, with a note, where the log lacks it. ``dbc:`` names the DBC files of a CAN
 log, from the profile's folder. Profiles that come with Terragrip go by name: `SHIPPED`.
 """
@@ -75,6 +77,7 @@ class Source(Part):
     over: str | None = None
     over_minimum: float = Field(0.0, ge=0.0, allow_inf_nan=False)
     derivative_of: Annotated[tuple[str, ...], Field(min_length=1, max_length=3)] | None = None
+    norm_of: Annotated[tuple[str, ...], Field(min_length=2, max_length=3)] | None = None
     pitch_of: Quaternion | None = None
     roll_of: Quaternion | None = None
     constant: str | float | None = None
@@ -86,18 +89,18 @@ class Source(Part):
     invalid: tuple[float | tuple[float, float], ...] = ()
     window: Seconds = 0.5
     forward: Forward | None = None
+    otherwise: Source | None = Field(None, alias="else")
 
     @model_validator(mode="after")
     def _one_source(self) -> Self:
         given = [
             k
-            for k in ("column", "derivative_of", "pitch_of", "roll_of", "constant")
+            for k in ("column", "derivative_of", "norm_of", "pitch_of", "roll_of", "constant")
             if getattr(self, k) is not None
         ]
         if len(given) != 1:
-            raise Fault(
-                "needs exactly one source", "write one of from, derivative_of, pitch_of, roll_of, constant"
-            )
+            mend = "write one of from, derivative_of, norm_of, pitch_of, roll_of, constant"
+            raise Fault("needs exactly one source", mend)
         for key in ("window", "forward"):
             if key in self.model_fields_set and self.derivative_of is None:
                 raise Fault("serves derivative_of only", "leave it out", (key,))
@@ -119,18 +122,30 @@ class Source(Part):
         return self
 
     @property
+    def is_geographic(self) -> bool:
+        """Whether it is the derivative of a latitude and a longitude."""
+        angles = ("deg", "degree", "degrees", "°")
+        return self.derivative_of is not None and len(self.derivative_of) == 2 and self.unit in angles
+
+    @property
+    def chain(self) -> tuple[Source, ...]:
+        """Itself, and what may take its place, in turn."""
+        return (self,) if self.otherwise is None else (self, *self.otherwise.chain)
+
+    @property
     def candidates(self) -> tuple[str, ...]:
         """The names, or patterns of names, of which the first counts."""
         return (self.column,) if isinstance(self.column, str) else self.column or ()
 
     @property
     def columns(self) -> tuple[str, ...]:
-        """The log's columns that it may read; `candidates` may be patterns."""
+        """The log's columns that it may read, or patterns of them; those of `otherwise` are its own."""
         heading = () if self.forward is None else (self.forward.yaw, *(self.forward.quaternion or ()))
         every = (
             *self.candidates,
             self.over,
             *(self.derivative_of or ()),
+            *(self.norm_of or ()),
             *(self.pitch_of or ()),
             *(self.roll_of or ()),
             *heading,
@@ -220,7 +235,8 @@ class Profile(Part):
                     else "the names are in DESIGN section 3, e.g. wheel_speed_fl"
                 )
                 raise Fault("no such channel", mend, ("channels", name))
-            _check_unit(name, source)
+            for one in source.chain:
+                _check_unit(name, one)
         return self
 
     def wants(self, name: str) -> bool:
@@ -234,7 +250,9 @@ class Profile(Part):
     @cached_property
     def sources(self) -> frozenset[str]:
         """All columns of the log that the profile may read, as it names them."""
-        named = {column for source in self.channels.values() for column in source.columns}
+        named = {
+            column for one in self.channels.values() for source in one.chain for column in source.columns
+        }
         return frozenset({self.time.column, *named, *([self.rows.column] if self.rows else [])})
 
     def apply(self, log: Any, source: str | None = None) -> Recording:
@@ -273,7 +291,7 @@ def _check_unit(name: str, origin: Source) -> None:
     """Raise Fault unless the unit, or the constant with its unit, fits the channel."""
     target = unit_of(name)
     try:
-        if origin.unit is not None and target is not None:
+        if origin.unit is not None and target is not None and not origin.is_geographic:
             factor_to(rate_unit(origin.unit) if origin.derivative_of else origin.unit, target)
         if origin.constant is not None and name not in LABELS:
             quantity(origin.constant, target or "1")

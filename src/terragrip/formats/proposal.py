@@ -3,14 +3,11 @@
 from __future__ import annotations
 
 import json
+import os
 import re
-from collections.abc import Mapping
-
-import numpy as np
-import numpy.typing as npt
+from collections.abc import Mapping, Sequence
 
 from terragrip.formats.recognition import Proposal
-from terragrip.formats.table import LogTable
 from terragrip.recording import Recording
 from terragrip.recording.schema import wheel_names_in
 
@@ -22,17 +19,22 @@ def missing_channels(proposals: Mapping[str, Proposal], has_time: bool) -> list[
     """What no column was found for, and what follows, as sentences."""
     said = [] if has_time else ["No time column was found: it is needed, in seconds that run forward."]
     wheels = [w for w in wheel_names_in(proposals) if f"wheel_speed_{w}" in proposals]
-    if not wheels:
+    if not wheels and "wheel_based_speed" not in proposals:
         said.append("No wheel speed was found: nothing can be estimated without.")
     if "ground_speed" not in proposals:
         said.append(
             "No ground speed was found: there is no slip and no resistance without; positions will do."
         )
-    said += [
-        f"No drive torque was found for wheel {wheel}: its axle must be undriven."
-        for wheel in wheels
-        if f"drive_torque_{wheel}" not in proposals
-    ]
+    without = [wheel for wheel in wheels if f"drive_torque_{wheel}" not in proposals]
+    if len(without) == len(wheels) and (wheels or "wheel_based_speed" in proposals):
+        said.append(
+            "No drive torque was found: slip, its zero-slip radius, distance and maps of slip can be had; adhesion, soil "
+            "resistance, net traction and efficiency cannot, and no soil can be learned."
+        )
+    else:
+        said += [
+            f"No drive torque was found for wheel {wheel}: its axle must be undriven." for wheel in without
+        ]
     if "drawbar_force" not in proposals:
         said.append("No drawbar force was found: the vehicle is taken to tow nothing.")
     if "acceleration_x" not in proposals:
@@ -53,8 +55,9 @@ def profile_text(
     file: str,
     stamp: tuple[str, str] | None,
     proposals: Mapping[str, Proposal],
-    table: LogTable,
-    time: npt.NDArray[np.float64] | None,
+    *,
+    since_1970: bool,
+    dbc: Sequence[str | os.PathLike[str]] = (),
 ) -> str:
     """A profile as YAML: loads as it stands, with a question mark at every line that was guessed."""
     lines = [f"# Proposed by 'terragrip inspect' for {file}. Check every line; '?' marks a doubt."]
@@ -62,12 +65,10 @@ def profile_text(
         lines.append("# time: {from: ???, unit: s}   # needed: no column looked like time")
     else:
         column, unit = stamp
-        dated = table.columns[column].dtype.kind == "M"
-        entry: dict[str, object] = (
-            {"from": column} if dated or unit == "s" else {"from": column, "unit": unit}
-        )
-        since_1970 = time is not None and len(time) > 0 and (dated or _is_large(table.columns[column], unit))
+        entry: dict[str, object] = {"from": column} if unit == "s" else {"from": column, "unit": unit}
         lines.append(f"time: {_flow(entry | ({'zero': 'first'} if since_1970 else {}))}")
+    if dbc:
+        lines.append(f"dbc: {json.dumps([os.path.abspath(file) for file in dbc], ensure_ascii=False)}")
     lines.append("channels:" if proposals else "channels: {}")
     for channel in sorted(proposals, key=_order):
         proposal = proposals[channel]
@@ -85,11 +86,6 @@ def profile_text(
 def _order(channel: str) -> tuple[int, str]:
     first = ("wheel_speed_", "drive_torque_", "ground_speed", "drawbar_force")
     return next((k for k, prefix in enumerate(first) if channel.startswith(prefix)), len(first)), channel
-
-
-def _is_large(column: npt.NDArray[np.generic], unit: str) -> bool:
-    scale = {"ns": 1e-9, "us": 1e-6, "ms": 1e-3}.get(unit, 1.0)
-    return bool(abs(float(column[0])) * scale > 1e8)
 
 
 def _flow(entry: Mapping[str, object]) -> str:

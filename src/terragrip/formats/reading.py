@@ -59,12 +59,17 @@ def read(
 
 def read_table(path: PathLike, wanted: Wanted | None = None, databases: Databases = ()) -> LogTable:
     """Read the ``wanted`` columns of a log by their own names (None: all); raises InputError if it is no log."""
+    log = read_log(path, wanted, databases)
+    return log.table() if isinstance(log, SignalLog) else log
+
+
+def read_log(path: PathLike, wanted: Wanted | None = None, databases: Databases = ()) -> LogTable | SignalLog:
+    """Read a log as `read_table` does; signals with clocks of their own are left on them."""
     kind = kind_of(path)
     if databases and not kind.takes_databases:
         mend = "leave out --dbc, or 'dbc:' in the profile"
         raise InputError(f"is a {kind.title}, which needs no DBC", file=path, mend=mend)
-    log = kind.reader()(os.fspath(path), wanted, databases)
-    return log.table() if isinstance(log, SignalLog) else log
+    return kind.reader()(os.fspath(path), wanted, databases)
 
 
 def _own(name: str) -> bool:

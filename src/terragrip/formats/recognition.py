@@ -64,6 +64,10 @@ _UNITS = {
     "rpm": "rpm", "kmh": "km/h", "kph": "km/h", "mph": "mph", "mps": "m/s", "degs": "deg/s", "dps": "deg/s",
     "deg": "deg", "rad": "rad", "nm": "N m", "kn": "kN", "rps": "rev/s", "radps": "rad/s",
 }  # fmt: skip
+_ON_THE_BUS = {  # signals of J1939 and ISO 11783 by the names that can/j1939.yaml and most DBC files give them
+    "WheelBasedMachineSpeed": "wheel_based_speed", "WheelBasedVehicleSpeed": "wheel_based_speed",
+    "GroundBasedMachineSpeed": "ground_speed", "RearHitchDraft": "drawbar_force",
+}  # fmt: skip
 _TIME_UNITS = {"ns": "ns", "us": "us", "ms": "ms", "s": "s", "sec": "s", "secs": "s", "seconds": "s"}
 _TIMES = {"time", "t", "timestamp", "stamp", "unix", "epoch", "zeit"}
 
@@ -139,6 +143,8 @@ def _channel_of(name: str) -> tuple[str, int, str] | None:
     """Channel, score and doubt of a number column; the schema's own names win."""
     if is_channel(name):
         return name, 100, ""
+    if name in _ON_THE_BUS:
+        return _ON_THE_BUS[name], 8, ""
     words = _words(name)
     if words & _NOT_MEASURED:
         return None

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -51,6 +51,8 @@ class SignalLog:
         Stamps that are no finite number are left out and counted; of two samples at one instant the later one counts.
         Raises InputError if no signal that was asked for has a sample.
         """
+        if TIME in self.names or TIME in self.signals:
+            return self._renamed().table()
         clocks = {id(s.time): s.time for s in self.signals.values()}
         notes = list(self.notes)
         lost = sum(int(np.sum(~np.isfinite(t))) for t in clocks.values())
@@ -77,6 +79,20 @@ class SignalLog:
         return LogTable(
             (TIME, *self.names), columns, units, self.source, self.sha256, tuple(notes), start, clocked=True
         )
+
+    def instants(self) -> Floats:
+        """The union of the signals' instants [s] (n,), as they are stamped."""
+        clocks = {id(s.time): s.time for s in self.signals.values()}
+        return _union([clock[_order(clock)] for clock in clocks.values()])[0]
+
+    def _renamed(self) -> SignalLog:
+        """The same log, in which a signal ``time`` is ``signal.time``: the table's own time takes that name."""
+        names = tuple(_other_time(name) for name in self.names)
+        return replace(self, names=names, signals={_other_time(name): s for name, s in self.signals.items()})
+
+
+def _other_time(name: str) -> str:
+    return f"signal.{TIME}" if name == TIME else name
 
 
 def _order(time: Floats) -> npt.NDArray[np.intp]:

@@ -116,6 +116,8 @@ class Decoder:
         if source.constant is not None:
             constant = quantity(source.constant, unit_of(name) or "1")
             return lambda fields: constant
+        if source.norm_of is not None:
+            return self._norm(name, source.norm_of, gain, offset)
         if source.column is None:
             what = "derivative_of" if source.derivative_of else "pitch_of" if source.pitch_of else "roll_of"
             if what == "derivative_of":
@@ -129,12 +131,12 @@ class Decoder:
     def _scaled(
         self, name: str, source: Source, gain: float, offset: float
     ) -> Callable[[Mapping[str, Any]], float | None]:
-        column, over, least = str(source.column), source.over, source.over_minimum
+        columns, over, least = source.candidates, source.over, source.over_minimum
         bad = [item if isinstance(item, tuple) else (item, item) for item in source.invalid]
         plain = not bad and over is None
 
         def read(fields: Mapping[str, Any]) -> float | None:
-            raw = fields.get(column)
+            raw = next((fields[column] for column in columns if fields.get(column) is not None), None)
             if raw is None:
                 return None
             value = self._number(name, raw)
@@ -148,6 +150,16 @@ class Decoder:
                     return None
                 value /= divisor
             return gain * value + offset
+
+        return read
+
+    def _norm(
+        self, name: str, columns: tuple[str, ...], gain: float, offset: float
+    ) -> Callable[[Mapping[str, Any]], float | None]:
+        def read(fields: Mapping[str, Any]) -> float | None:
+            parts = [self._number(name, fields.get(column)) for column in columns]
+            known = [part for part in parts if part is not None]
+            return gain * math.hypot(*known) + offset if len(known) == len(columns) else None
 
         return read
 

@@ -44,10 +44,12 @@ def source_of(identifier: int) -> int:
 class Catalog:
     """Messages by identifier and by parameter group; the first of equals counts.
 
-    ``names`` gives each signal its name: its own, or ``Message.Signal`` where several messages have one of that name.
+    `name` gives each signal its name: its own, or ``Message.Signal`` where several messages have one of that name.
+    ``given``: the messages that came from DBC files.
     """
 
-    def __init__(self, messages: Iterable[Message]) -> None:
+    def __init__(self, messages: Iterable[Message], given: Iterable[Message] = ()) -> None:
+        self.given = frozenset(message.name for message in given)
         self.by_identifier: dict[int, Message] = {}
         self.by_group: dict[int, Message] = {}
         for message in messages:
@@ -79,7 +81,7 @@ def catalog(databases: Sequence[str | os.PathLike[str]] = ()) -> Catalog:
     """The built-in table, after the messages of DBC files; raises InputError if one of these cannot be read."""
     own = [message for path in databases for message in _read_dbc(path)]
     taken = {message.key if message.by_group else group_of(message.key) for message in own}
-    return Catalog([*own, *(message for message in built_in() if message.key not in taken)])
+    return Catalog([*own, *(message for message in built_in() if message.key not in taken)], own)
 
 
 @cache

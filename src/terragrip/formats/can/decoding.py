@@ -82,6 +82,9 @@ def _on_missing(found: dict[str, Signal]) -> list[str]:
 
 def _on_frames(frames: Frames) -> list[str]:
     said = []
+    given = frames.catalog.given
+    if given and not any(name in given for name, _ in frames.seen):
+        said.append(f"None of the DBC's messages occurs in the log ({', '.join(sorted(given)[:6])}).")
     if frames.unknown:
         count, total = len(frames.unknown), sum(frames.unknown.values())
         groups = {group_of(i) for i in frames.unknown if i & EXTENDED}

@@ -1,0 +1,546 @@
+"""MDF, ROS bags, MCAP, MATLAB and NMEA: small files written with the libraries give back what was put in."""
+
+from __future__ import annotations
+
+import json
+import struct
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import asammdf
+import h5py
+import numpy as np
+import pynmea2
+import pytest
+import scipy.io
+from google.protobuf.descriptor_pb2 import FieldDescriptorProto, FileDescriptorProto, FileDescriptorSet
+from google.protobuf.descriptor_pool import DescriptorPool
+from google.protobuf.message_factory import GetMessageClass
+from mcap.writer import Writer
+from rosbags.rosbag1 import Writer as Writer1
+from rosbags.rosbag2 import StoragePlugin
+from rosbags.rosbag2 import Writer as Writer2
+from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+
+import terragrip as tg
+from can_frames import START, drive
+from terragrip.errors import InputError
+from terragrip.formats import inspect, read
+from terragrip.formats.reading import read_table
+
+COUNT = 200
+TIME = np.arange(COUNT) / 20
+SPEED = 1 + 0.2 * np.sin(TIME)
+JOINTS = ("front_left_wheel", "front_right_wheel", "rear_left_wheel", "rear_right_wheel")
+SNS = 1_000_000_000
+
+# --- MDF -----------------------------------------------------------------------------------------------------------
+
+
+def write_mdf(path: Path, version: str = "4.10") -> Path:
+    slow = np.arange(40) / 4
+    with asammdf.MDF(version=version) as file:
+        file.append([asammdf.Signal(SPEED, TIME, name="v_ground", unit="m/s")])
+        file.append(
+            [
+                asammdf.Signal(20 + slow, slow, name="rpm_left", unit="rpm"),
+                asammdf.Signal(np.arange(40, dtype=np.int16), slow, name="gear"),
+            ]
+        )
+        file.save(path, overwrite=True)
+    return path
+
+
+@pytest.mark.parametrize("version", ["3.30", "4.10"])
+def test_mdf_signals_keep_their_clocks_and_units(tmp_path: Path, version: str) -> None:
+    table = read_table(write_mdf(tmp_path / ("log.mdf" if version < "4" else "log.mf4"), version))
+    assert len(table.columns["time"]) == COUNT  # the slow clock's instants are among the fast one's
+    speed = table.columns["v_ground"]
+    assert np.allclose(speed, SPEED)
+    turning = table.columns["rpm_left"]
+    assert np.isfinite(turning).sum() == 40
+    assert np.allclose(turning[::5], 20 + np.arange(40) / 4)
+    assert table.units["rpm_left"] == "rpm"
+
+
+def test_mdf_bus_logging_by_the_built_in_table(tmp_path: Path) -> None:
+    machine = drive(1000, 20.0)
+    kind = np.dtype(
+        [
+            ("CAN_DataFrame.BusChannel", "u1"),
+            ("CAN_DataFrame.ID", "<u4"),
+            ("CAN_DataFrame.IDE", "u1"),
+            ("CAN_DataFrame.DLC", "u1"),
+            ("CAN_DataFrame.DataLength", "u1"),
+            ("CAN_DataFrame.DataBytes", "(8,)u1"),
+        ]
+    )
+    records = np.zeros(len(machine.frames), kind)
+    for row, (_, identifier, data) in zip(records, machine.frames, strict=True):
+        row["CAN_DataFrame.ID"], row["CAN_DataFrame.IDE"] = identifier, 1
+        row["CAN_DataFrame.DLC"] = row["CAN_DataFrame.DataLength"] = 8
+        row["CAN_DataFrame.DataBytes"] = np.frombuffer(data, np.uint8)
+    stamps = np.array([t for t, _, _ in machine.frames]) - START
+    source = asammdf.Source("CAN", "CAN", "", asammdf.Source.SOURCE_BUS, asammdf.Source.BUS_TYPE_CAN)
+    with asammdf.MDF() as file:
+        file.append(
+            asammdf.Signal(records, stamps, name="CAN_DataFrame", source=source),
+            acq_source=source,
+            comment="bus",
+        )
+        file.save(tmp_path / "bus.mf4", overwrite=True)
+    recording = read(tmp_path / "bus.mf4", "tractor-isobus")
+    rim = recording["wheel_based_speed"]
+    assert np.isfinite(rim).sum() == 200
+    assert np.isfinite(recording["ground_speed"]).sum() == 100
+
+
+def test_measured_mdf_with_its_dbc(shared: Callable[[str], Path]) -> None:
+    folder = shared("data/ingest_samples/css_j1939_mf4")
+    dbc = folder / "CSS-Electronics-SAE-J1939-DEMO.dbc"
+    for name, engine, wheel in (("00000001-60B621D9", 577, 184), ("asammdf_basics_00000001", 3993, 3993)):
+        columns = read_table(folder / f"{name}.MF4", databases=(dbc,)).columns
+        assert np.isfinite(columns["EngineSpeed"]).sum() == engine
+        assert np.isfinite(columns["WheelBasedVehicleSpeed"]).sum() == wheel
+
+
+def test_measured_gnss_in_fast_packets(shared: Callable[[str], Path]) -> None:
+    folder = shared("data/ingest_samples/css_j1939_mf4")
+    log = folder / "nmea_94C49784_00000002.MF4"
+    by_dbc = read_table(log, databases=(folder / "tp_nmea.dbc",)).columns
+    built_in = read_table(log).columns
+    assert np.isfinite(by_dbc["latitude"]).sum() == 60  # of 420 frames, seven a position
+    rapid = np.nanmedian(built_in["GnssLatitude"])
+    assert np.nanmedian(by_dbc["latitude"]) == pytest.approx(rapid, abs=1e-5)
+    assert np.array_equal(
+        by_dbc["altitude"][np.isfinite(by_dbc["altitude"])],
+        built_in["GnssPositionAltitude"][np.isfinite(built_in["GnssPositionAltitude"])],
+    )
+    assert "signal.time" in by_dbc
+
+
+# --- ROS -----------------------------------------------------------------------------------------------------------
+
+CUSTOM = """std_msgs/Header header
+float64 pull
+bool locked
+string soil
+float32[3] temperature
+uint8[400] raw
+"""
+
+
+def ros_messages(store: Any) -> list[tuple[str, str, list[Any]]]:
+    """Topic, type and messages of a robot of four wheels that goes at SPEED with 5 % slip."""
+    kinds, first = store.types, store is not None and "seq" in str(store.fielddefs["std_msgs/msg/Header"])
+
+    def header(t: float) -> Any:
+        whole = int(START + t)
+        stamp = kinds["builtin_interfaces/msg/Time"](
+            sec=whole, nanosec=round((START + t - whole) * SNS) % SNS
+        )
+        extra = {"seq": 0} if first else {}
+        return kinds["std_msgs/msg/Header"](stamp=stamp, frame_id="base", **extra)
+
+    def vector(x: float, y: float = 0.0, z: float = 0.0) -> Any:
+        return kinds["geometry_msgs/msg/Vector3"](x=x, y=y, z=z)
+
+    joints, fixes, velocities, imus, pulls = [], [], [], [], []
+    north = np.cumsum(SPEED) / 20
+    for k, t in enumerate(TIME.tolist()):
+        omega = SPEED[k] / 0.95 / 0.2
+        names = list(JOINTS) if k < COUNT // 2 else list(reversed(JOINTS))
+        turning = np.array([omega + 0.01 * JOINTS.index(n) for n in names])
+        joints.append(
+            kinds["sensor_msgs/msg/JointState"](
+                header=header(t), name=names, position=np.zeros(4), velocity=turning, effort=10 * turning
+            )
+        )
+        if k % 4 == 0:
+            velocities.append(
+                kinds["geometry_msgs/msg/TwistStamped"](
+                    header=header(t),
+                    twist=kinds["geometry_msgs/msg/Twist"](
+                        linear=vector(0.6 * SPEED[k], 0.8 * SPEED[k]), angular=vector(0.0)
+                    ),
+                )
+            )
+            status = kinds["sensor_msgs/msg/NavSatStatus"](status=0, service=1)
+            fixes.append(
+                kinds["sensor_msgs/msg/NavSatFix"](
+                    header=header(t), status=status, latitude=51 + north[k] / 111_250.0, longitude=13.0, altitude=110.0,
+                    position_covariance=np.zeros(9), position_covariance_type=0,
+                )
+            )  # fmt: skip
+        quaternion = kinds["geometry_msgs/msg/Quaternion"](x=0.0, y=0.0, z=0.0, w=1.0)
+        imus.append(
+            kinds["sensor_msgs/msg/Imu"](
+                header=header(t), orientation=quaternion, orientation_covariance=np.zeros(9),
+                angular_velocity=vector(0, 0, 0.1), angular_velocity_covariance=np.zeros(9),
+                linear_acceleration=vector(0.5, 0, 9.81), linear_acceleration_covariance=np.zeros(9),
+            )
+        )  # fmt: skip
+        pulls.append(
+            kinds["farm_msgs/msg/Pull"](
+                header=header(t), pull=100.0 + k, locked=k > 5, soil="clay" if k > 100 else "sand",
+                temperature=np.array([1, 2, 3], dtype=np.float32), raw=np.zeros(400, np.uint8),
+            )
+        )  # fmt: skip
+    return [
+        ("/joint_states", "sensor_msgs/msg/JointState", joints),
+        ("/gps/vel", "geometry_msgs/msg/TwistStamped", velocities),
+        ("/gps/fix", "sensor_msgs/msg/NavSatFix", fixes),
+        ("/imu", "sensor_msgs/msg/Imu", imus),
+        ("/pull", "farm_msgs/msg/Pull", pulls),
+    ]
+
+
+def write_ros1(path: Path) -> Path:
+    store = get_typestore(Stores.ROS1_NOETIC)
+    store.register(get_types_from_msg(CUSTOM, "farm_msgs/msg/Pull"))
+    with Writer1(path) as bag:
+        for topic, kind, messages in ros_messages(store):
+            connection = bag.add_connection(topic, kind, typestore=store)
+            for message in messages:
+                stamp = message.header.stamp
+                bag.write(
+                    connection,
+                    stamp.sec * SNS + stamp.nanosec + 3_000_000,
+                    store.serialize_ros1(message, kind),
+                )
+    return path
+
+
+def write_ros2(path: Path, plugin: StoragePlugin, topics: tuple[str, ...] = ()) -> Path:
+    store = get_typestore(Stores.ROS2_HUMBLE)
+    store.register(get_types_from_msg(CUSTOM, "farm_msgs/msg/Pull"))
+    with Writer2(path, version=9, storage_plugin=plugin) as bag:
+        for topic, kind, messages in ros_messages(store):
+            if topics and topic not in topics:
+                continue
+            connection = bag.add_connection(topic, kind, typestore=store)
+            for message in messages:
+                stamp = message.header.stamp
+                bag.write(
+                    connection,
+                    stamp.sec * SNS + stamp.nanosec + 3_000_000,
+                    store.serialize_cdr(message, kind),
+                )
+    return path
+
+
+WRITERS: dict[str, Callable[[Path], Path]] = {
+    "ros1": lambda folder: write_ros1(folder / "run.bag"),
+    "sqlite": lambda folder: write_ros2(folder / "run", StoragePlugin.SQLITE3),
+    "mcap": lambda folder: write_ros2(folder / "run", StoragePlugin.MCAP),
+    "one mcap file": lambda folder: next(write_ros2(folder / "run", StoragePlugin.MCAP).glob("*.mcap")),
+    "one sqlite file": lambda folder: next(write_ros2(folder / "run", StoragePlugin.SQLITE3).glob("*.db3")),
+}
+
+
+@pytest.mark.parametrize("kind", list(WRITERS))
+def test_ros_bags_by_topic_and_field(tmp_path: Path, kind: str) -> None:
+    table = read_table(WRITERS[kind](tmp_path))
+    columns = table.columns
+    turning = columns["/joint_states.velocity.rear_left_wheel"]
+    assert np.allclose(
+        turning[np.isfinite(turning)], SPEED / 0.95 / 0.2 + 0.02
+    )  # though the joints' order changes
+    assert np.allclose(columns["/pull.pull"], 100 + np.arange(COUNT))
+    assert list(columns["/pull.soil"][[0, 150]]) == ["sand", "clay"]
+    assert columns["/pull.temperature[2]"][0] == 3
+    assert not [name for name in table.names if "covariance" in name or "raw" in name]
+    # Stamps are the sender's, not the recorder's 3 ms later.
+    assert table.start == pytest.approx(START, abs=1e-3)
+    assert np.allclose(columns["time"], TIME, atol=1e-6)
+
+
+@pytest.mark.parametrize("kind", ["ros1", "mcap"])
+def test_the_shipped_profile_takes_gnss_not_the_wheels(tmp_path: Path, kind: str) -> None:
+    bag = WRITERS[kind](tmp_path)
+    recording = tg.read(bag, "ros2-4wd")
+    assert recording.wheels == ("fl", "fr", "rl", "rr")
+    assert np.nanmax(np.abs(recording["ground_speed"][::4] - SPEED[::4])) < 1e-9  # √(0.6² + 0.8²) = 1
+    assert np.nanmedian(recording["drive_torque_fl"] / recording["wheel_speed_fl"]) == pytest.approx(10)
+    assert recording["acceleration_z"][0] == 9.81
+    assert inspect(bag).fitting == ("ros2-4wd",)
+
+
+def test_speed_from_a_position_in_degrees(tmp_path: Path) -> None:
+    bag = write_ros2(tmp_path / "run", StoragePlugin.MCAP, ("/joint_states", "/gps/fix"))
+    recording = tg.read(bag, "ros2-4wd")
+    speed = recording["ground_speed"]
+    inner = np.isfinite(speed) & (recording.time > 1) & (recording.time < 9)
+    assert np.sqrt(np.mean((speed[inner] - SPEED[inner]) ** 2)) < 0.02
+
+
+def test_types_that_a_bag_does_not_describe_are_named(tmp_path: Path) -> None:
+    import sqlite3
+
+    file = next(write_ros2(tmp_path / "run", StoragePlugin.SQLITE3).glob("*.db3"))
+    with sqlite3.connect(file) as base:
+        base.execute("DROP TABLE message_definitions")
+    base.close()
+    table = read_table(file)
+    assert "/imu.linear_acceleration.x" in table.columns
+    assert any("farm_msgs/msg/Pull" in note for note in table.notes)
+
+
+def test_measured_bags_with_a_type_of_their_own(shared: Callable[[str], Path]) -> None:
+    folder = shared("data/ingest_samples/cmu_rosbag1")
+    for name, count in (("force-displacement_1", 3004), ("force-displacement_1_zero", 925)):
+        table = read_table(folder / f"{name}.bag", lambda n: n.endswith("wrench.wrench.force.z"))
+        force = table.columns["/rokubimini_cosmo/forcetorque_readings.wrench.wrench.force.z"]
+        assert np.isfinite(force).sum() == count
+        assert 1 / np.median(np.diff(table.columns["time"])) == pytest.approx(100, rel=0.02)
+        assert "/rokubimini_cosmo/forcetorque_readings.temperature" in table.names
+
+
+# --- MCAP ----------------------------------------------------------------------------------------------------------
+
+
+def protobuf_schema() -> tuple[bytes, Any]:
+    """A serialised descriptor set of a message with a speed and a nested wheel, and the class."""
+    file = FileDescriptorProto(name="machine.proto", package="farm", syntax="proto3")
+    wheel = file.message_type.add(name="Wheel")
+    wheel.field.add(name="omega", number=1, type=FieldDescriptorProto.TYPE_DOUBLE, label=1)
+    machine = file.message_type.add(name="Machine")
+    machine.field.add(name="speed", number=1, type=FieldDescriptorProto.TYPE_DOUBLE, label=1)
+    machine.field.add(
+        name="left", number=2, type=FieldDescriptorProto.TYPE_MESSAGE, label=1, type_name=".farm.Wheel"
+    )
+    machine.field.add(name="loads", number=3, type=FieldDescriptorProto.TYPE_DOUBLE, label=3)
+    pool = DescriptorPool()
+    pool.Add(file)
+    return FileDescriptorSet(file=[file]).SerializeToString(), GetMessageClass(
+        pool.FindMessageTypeByName("farm.Machine")
+    )
+
+
+def write_mcap(path: Path, messages: int = COUNT) -> Path:
+    described, machine = protobuf_schema()
+    with path.open("wb") as stream:
+        writer = Writer(stream, chunk_size=2000)
+        writer.start()
+        plain = writer.register_schema("speed", "jsonschema", b"{}")
+        as_json = writer.register_channel("/speed", "json", plain)
+        schema = writer.register_schema("farm.Machine", "protobuf", described)
+        as_protobuf = writer.register_channel("/machine", "protobuf", schema)
+        odd = writer.register_channel("/odd", "flatbuffer", 0)
+        for k, t in enumerate(TIME[:messages].tolist()):
+            stamp = int((START + t) * SNS)
+            text = json.dumps({"v": SPEED[k], "wheels": [{"omega": 5.0 + k}, {"omega": 6.0}], "ok": True})
+            writer.add_message(as_json, stamp, text.encode(), stamp)
+            message = machine(speed=SPEED[k], loads=[1.0, 2.0 + k])
+            message.left.omega = 7.0 + k
+            writer.add_message(as_protobuf, stamp, message.SerializeToString(), stamp)
+            writer.add_message(odd, stamp, b"\0\1", stamp)
+        writer.finish()
+    return path
+
+
+def test_mcap_with_json_and_protobuf(tmp_path: Path) -> None:
+    table = read_table(write_mcap(tmp_path / "log.mcap"))
+    assert np.allclose(table.columns["/speed.v"], SPEED)
+    assert table.columns["/speed.wheels[0].omega"][3] == 8
+    assert np.allclose(table.columns["/machine.speed"], SPEED)
+    assert table.columns["/machine.left.omega"][3] == 10
+    assert table.columns["/machine.loads[1]"][3] == 5
+    assert any("/odd (flatbuffer)" in note for note in table.notes)
+    assert np.allclose(table.columns["time"], TIME, atol=1e-6)
+
+
+def test_mcap_cut_off_and_with_a_damaged_chunk(tmp_path: Path) -> None:
+    whole = write_mcap(tmp_path / "log.mcap").read_bytes()
+    (tmp_path / "cut.mcap").write_bytes(whole[: len(whole) // 2])
+    cut = read_table(tmp_path / "cut.mcap")
+    assert 0 < len(cut.columns["time"]) < COUNT
+    assert any("ends early" in note for note in cut.notes)
+    hurt = bytearray(whole)
+    hurt[whole.find(b"\x28\xb5\x2f\xfd", len(whole) // 3) + 40] ^= 0xFF  # in the Zstandard frame of a chunk
+    (tmp_path / "hurt.mcap").write_bytes(hurt)
+    damaged = read_table(tmp_path / "hurt.mcap")
+    assert COUNT * 0.8 < len(damaged.columns["time"]) < COUNT
+    assert any("1 chunks are damaged" in note for note in damaged.notes)
+
+
+def test_a_schema_that_changes_in_mid_stream_is_counted(tmp_path: Path) -> None:
+    path = tmp_path / "log.mcap"
+    with path.open("wb") as stream:
+        writer = Writer(stream)
+        writer.start()
+        channel = writer.register_channel(
+            "/speed", "json", writer.register_schema("speed", "jsonschema", b"{}")
+        )
+        for k in range(100):
+            body = {"v": 1.0} if k < 60 else {"v": "fast"} if k < 80 else {"velocity": 1.0}
+            raw = b"no json" if k == 99 else json.dumps(body).encode()
+            writer.add_message(channel, k * SNS, raw, k * SNS)
+        writer.finish()
+    table = read_table(path)
+    assert np.isfinite(table.columns["/speed.v"]).sum() == 60
+    assert any("39 values are absent, or of another kind" in note for note in table.notes)
+    assert any("1 messages cannot be read" in note for note in table.notes)
+
+
+# --- MATLAB --------------------------------------------------------------------------------------------------------
+
+
+def matlab_content() -> dict[str, Any]:
+    return {
+        "tout": TIME[:, None],
+        "v": SPEED[:, None],
+        "omega": np.c_[SPEED, 2 * SPEED, 3 * SPEED],
+        "vehicle_name": "tractor",
+        "log": {
+            "time": TIME[:50],
+            "ground_speed": SPEED[:50],
+            "nested": {"t": TIME[:20], "pull": SPEED[:20]},
+        },
+        "series": {"Time": TIME[:30], "Data": 5 * SPEED[:30]},
+        "single": 4.0,
+    }
+
+
+EXPECTED = {
+    "v": SPEED,
+    "omega[1]": 2 * SPEED,
+    "log.ground_speed": SPEED[:50],
+    "log.nested.pull": SPEED[:20],
+    "series": 5 * SPEED[:30],
+}
+
+
+def write_hdf5(path: Path, content: dict[str, Any]) -> Path:
+    """As MATLAB 7.3 writes: columns as rows, classes as attributes, a block of 512 bytes before."""
+
+    def put(group: Any, name: str, value: Any) -> None:
+        if isinstance(value, dict):
+            inner = group.create_group(name)
+            inner.attrs["MATLAB_class"] = np.bytes_("struct")
+            for key, part in value.items():
+                put(inner, key, part)
+        elif isinstance(value, str):
+            item = group.create_dataset(name, data=np.array([[ord(c)] for c in value], dtype=np.uint16))
+            item.attrs["MATLAB_class"] = np.bytes_("char")
+        else:
+            array = np.atleast_2d(np.asarray(value, dtype=float))
+            array = array if array.shape[0] != 1 or array.size == 1 else array.T
+            group.create_dataset(name, data=array.T).attrs["MATLAB_class"] = np.bytes_("double")
+
+    with h5py.File(path, "w", userblock_size=512) as file:
+        for name, value in content.items():
+            put(file, name, value)
+    with path.open("r+b") as stream:
+        stream.write(
+            b"MATLAB 7.3 MAT-file, Platform: GLNXA64".ljust(124) + struct.pack("<HH", 0x0200, 0x4D49)
+        )
+    return path
+
+
+@pytest.mark.parametrize("version", ["5", "7.3"])
+def test_matlab_arrays_structs_and_exported_series(tmp_path: Path, version: str) -> None:
+    path = tmp_path / "log.mat"
+    if version == "5":
+        scipy.io.savemat(path, matlab_content())
+    else:
+        write_hdf5(path, matlab_content())
+    columns = read_table(path).columns
+    for name, values in EXPECTED.items():
+        known = columns[name][np.isfinite(columns[name])]
+        assert np.allclose(known, values), name
+    assert np.allclose(columns["time"], TIME)
+    assert "single" not in columns
+
+
+def test_matlab_structure_with_time_and_a_dataset_as_exported(tmp_path: Path) -> None:
+    signals = [
+        {"values": SPEED, "dimensions": 1.0, "label": "ground_speed", "blockName": "car/v"},
+        *({"values": SPEED / 0.2 + k, "dimensions": 1.0, "label": f"omega_{w}", "blockName": ""}
+          for k, w in enumerate(("fl", "fr", "rl", "rr"))),
+    ]  # fmt: skip
+    elements = [{"Name": "drawbar", "Values": {"Time": TIME[::2], "Data": 100 * SPEED[::2]}}]
+    scipy.io.savemat(
+        tmp_path / "run.mat", {"yout": {"time": TIME, "signals": signals}, "logsout": {"elements": elements}}
+    )
+    recording = read(tmp_path / "run.mat", "simulink")
+    assert np.allclose(recording["ground_speed"], SPEED)
+    assert np.allclose(recording["wheel_speed_rl"], SPEED / 0.2 + 2)
+    assert np.allclose(recording["drawbar_force"][::2], 100 * SPEED[::2])
+
+
+def test_matlab_objects_are_named_with_the_way_out(tmp_path: Path) -> None:
+    path = write_hdf5(tmp_path / "log.mat", {"t": TIME, "v": SPEED})
+    with h5py.File(path, "r+") as file:
+        item = file.create_dataset("tt", data=np.zeros((1, 6), np.uint32))
+        item.attrs["MATLAB_class"] = np.bytes_("timetable")
+        item.attrs["MATLAB_object_decode"] = np.int32(3)
+    table = read_table(path)
+    assert "v" in table.columns
+    assert any("left out: tt; export them there" in note for note in table.notes)
+
+
+# --- NMEA ----------------------------------------------------------------------------------------------------------
+
+
+def write_nmea(path: Path) -> Path:
+    lines = []
+    for k in range(100):
+        clock = f"2359{30 + k // 10:02d}.{k % 10}0" if k < 300 else ""
+        knots = SPEED[k] / (1852 / 3600)
+        rmc = ("A", "5103.0000", "N", "01344.0000", "E", f"{knots:.6f}", "90.0", "211126", "", "")
+        if k == 50:
+            rmc = ("V", *rmc[1:])
+        lines.append(str(pynmea2.RMC("GP", "RMC", (clock, *rmc))))
+        gga = (
+            clock,
+            "5103.0000",
+            "N",
+            "01344.0000",
+            "E",
+            "4",
+            "12",
+            "0.8",
+            "110.5",
+            "M",
+            "44.0",
+            "M",
+            "",
+            "",
+        )
+        lines.append(str(pynmea2.GGA("GN", "GGA", gga)))
+    lines[20] = lines[20].replace("01344", "01345")  # the checksum is wrong now
+    path.write_text("\r\n".join(lines) + "\r\n")
+    return path
+
+
+def test_nmea_sentences(tmp_path: Path) -> None:
+    table = read_table(write_nmea(tmp_path / "gnss.log"))
+    speed = table.columns["ground_speed"]
+    assert np.isfinite(speed).sum() == 98  # one without a fix, one damaged
+    known = np.isfinite(speed)
+    assert np.allclose(speed[known], SPEED[:100][np.isin(np.arange(100), [10, 50], invert=True)], atol=1e-5)
+    assert np.allclose(table.columns["time"], np.arange(100) / 10)
+    assert table.columns["latitude"][0] == pytest.approx(51.05)
+    assert table.columns["altitude"][0] == 110.5
+    assert {
+        "1 sentences are damaged and were left out.",
+        "1 sentences have no fix: their values are missing.",
+    } <= set(table.notes)
+    assert table.start == pytest.approx(1795305570.0)  # 2026-11-21 23:59:30 UTC
+
+
+def test_nmea_runs_past_midnight(tmp_path: Path) -> None:
+    clocks = ("235959.50", "000000.00", "000000.50")
+    gga = ("5103.0000", "N", "01344.0000", "E", "4", "12", "0.8", "110.5", "M", "44.0", "M", "", "")
+    path = tmp_path / "gnss.nmea"
+    path.write_text("\n".join(str(pynmea2.GGA("GN", "GGA", (clock, *gga))) for clock in clocks) + "\n")
+    assert np.allclose(read_table(path).columns["time"], [0, 0.5, 1.0])
+
+
+def test_a_log_without_any_sentence_of_ours(tmp_path: Path) -> None:
+    path = tmp_path / "gnss.nmea"
+    path.write_text("$GPGSV,1,1,00*79\n" * 5)
+    with pytest.raises(InputError, match="no usable RMC, VTG or GGA"):
+        read_table(path)
