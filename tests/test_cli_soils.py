@@ -224,3 +224,44 @@ def test_output_that_would_overwrite_an_input(
     assert main(["soils", str(file), "-o", str(file)]) == 2
     assert len(capsys.readouterr().err.strip().splitlines()) == 1
     assert file.read_bytes() == before
+
+
+def test_digitised_points_become_soils_beside_learned_ones(
+    write: Write, fails: Fails, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    s = np.linspace(2, 58, 29)
+    mu = [CURVES["exponential"].value(s / 100, {"a": a}) for a in (0.6, 1.1)]
+    rows = "\n".join(f"{x:.2f};{y:.4f};{x:.2f};{z:.4f}" for x, y, z in zip(s, *mu, strict=True))
+    points = tmp_path / "points.csv"
+    points.write_text(f"clay;;stubble;\nX;Y;X;Y\n{rows}\n")
+    found = learn(tmp_path / "soils.json", write("a"), points)["soils"]
+    assert set(found) == {"fine", "clay", "stubble"}
+    assert found["clay"]["parameters"]["a"] == pytest.approx(0.6, rel=1e-3)
+    assert found["stubble"]["parameters"]["a"] == pytest.approx(1.1, rel=1e-3)
+    assert found["clay"]["interval"] == {}
+    assert "points.csv" in found["clay"]["source"]
+    assert "data fix it" in capsys.readouterr().out
+    points.write_text("slip;mu\n0.1;x\n0.2;0.3\n")
+    assert "is not a number" in fails(write("b"), points)
+
+
+def test_libraries_are_joined_twins_refused_and_others_compared(
+    write: Write, fails: Fails, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    fine, hard = tmp_path / "fine.json", tmp_path / "hard.json"
+    learn(fine, *(write(f"f{i}") for i in range(5)), "--quiet")
+    learn(hard, *(write(f"h{i}", a=1.42, soil="hard") for i in range(5)), "--quiet")
+    both = tmp_path / "both.json"
+    assert set(learn(both, fine, hard, "--quiet")["soils"]) == {"fine", "hard"}
+    said = fails(fine, both)
+    assert "'fine'" in said
+    assert "both.json" in said
+    capsys.readouterr()
+    learn(tmp_path / "again.json", *(write(f"g{i}", a=0.95) for i in range(5)), "--compare", both)
+    line = next(text for text in capsys.readouterr().out.splitlines() if text.startswith("  fine: "))
+    assert float(line.split()[1]) == pytest.approx(
+        0.1 * 0.43, abs=0.02
+    )  # a is 0.1 larger, g is 0.43 in the mean
+    assert "intervals of a" in line
+    learn(tmp_path / "x.json", fine, "--compare", hard)
+    assert "No soil of these" in capsys.readouterr().out

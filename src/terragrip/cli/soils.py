@@ -13,12 +13,16 @@ from terragrip.cli.output import check_file
 from terragrip.cli.progress import progress
 
 if TYPE_CHECKING:
-    from terragrip.soil.library import Soil
+    from terragrip.soil.library import Soil, SoilLibrary
 
 
 def command(
-    estimates: Annotated[
-        list[Path], typer.Argument(metavar="ESTIMATES", help="Files written by 'terragrip estimate'.")
+    inputs: Annotated[
+        list[Path],
+        typer.Argument(
+            metavar="ESTIMATES",
+            help="Files written by 'terragrip estimate'; also libraries (.json) to join and digitised points (.csv).",
+        ),
     ],
     output: Annotated[
         Path, typer.Option("--output", "-o", metavar="FILE", help="The soil library, soils.json.")
@@ -43,6 +47,10 @@ def command(
     literature: Annotated[
         bool, typer.Option("--literature", help="Add the soils of the literature.")
     ] = False,
+    compare: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="Say how far these soils lie from those of this library."),
+    ] = None,
     quiet: Quiet = False,
 ) -> None:
     """Learn adhesion-slip curves of soils.
@@ -52,23 +60,36 @@ def command(
     """
     from terragrip.errors import InputError
     from terragrip.soil.bins import PAPER_BINS, BinSettings
+    from terragrip.soil.digitised import soils_of_points
     from terragrip.soil.estimates import soils_of
     from terragrip.soil.fit import FREE, AdhesionCurve
     from terragrip.soil.library import SoilLibrary
     from terragrip.soil.literature import literature_soils
 
-    inputs = [*estimates, *([merge] if merge else [])]
-    target = check_file(output, inputs, suffixes=(".json",))
+    target = check_file(output, [*inputs, *(path for path in (merge, compare) if path)], suffixes=(".json",))
     base = SoilLibrary.load(merge) if merge else None
+    other = SoilLibrary.load(compare) if compare else None
     try:
         bins = BinSettings(width, lower, upper, minimum)
     except ValueError as error:
         raise InputError(str(error), place="--width, --lower, --upper", mend="choose other bins") from None
     curve = AdhesionCurve(model, FREE if free else None, weights="count" if weights else None, bins=bins)
     special = PAPER_BINS if bins == BinSettings() else {}
-    with progress("soils", quiet) as step:
-        campaign = soils_of(estimates, curve, special, soil, step)
-    library = campaign.library({"files": [str(path) for path in estimates]})
+    estimates = [path for path in inputs if path.suffix.lower() not in (".json", ".csv")]
+    library = SoilLibrary({})
+    words: list[str] = []
+    if estimates:
+        with progress("soils", quiet) as step:
+            campaign = soils_of(estimates, curve, special, soil, step)
+        library = campaign.library({"files": [str(path) for path in estimates]})
+        words += campaign.words
+    for path in inputs:
+        if path.suffix.lower() == ".json":
+            library = _joined(library, SoilLibrary.load(path), path)
+        elif path.suffix.lower() == ".csv":
+            points = soils_of_points(path, curve)
+            words += [f"{name}: not fitted, {why}." for name, why in points.not_fitted.items()]
+            library = _joined(library, points, path)
     if base is not None:
         library = base.merge(library, "replace")
     if literature:
@@ -76,14 +97,56 @@ def command(
     library.write(target)
     if not quiet:
         print(table(library))
-        for sentence in campaign.words:
+        for sentence in words:
             print(sentence)
+        if other is not None:
+            print(comparison(library, other, compare))
         print(f"Written to {output}")
 
 
+def _joined(library: SoilLibrary, other: SoilLibrary, path: Path) -> SoilLibrary:
+    """Both libraries; a soil of one name in both is refused, with the file that brings the second."""
+    from terragrip.errors import InputError
+
+    twins = sorted(set(library.soils) & set(other.soils))
+    if twins:
+        raise InputError(
+            f"the soil {twins[0]!r} is in another of these inputs too",
+            file=path,
+            mend="rename one, or give one library with --merge, whose twins are replaced",
+        )
+    return library.merge(other)
+
+
+def comparison(library: SoilLibrary, other: SoilLibrary, path: Path | None) -> str:
+    """Lines of text: each soil in both, the differences of adhesion over 5-60 % slip, and whether the intervals meet."""
+    rows = library.compare(other)
+    if not rows:
+        return f"No soil of these is in {path} too."
+    lines = [f"Compared with {path}, adhesion over 5 % to 60 % slip:"]
+    for row in rows:
+        meet = row["intervals_meet"]
+        said = "; ".join(f"intervals of {k} {'meet' if v else 'do not meet'}" for k, v in meet.items())
+        lines.append(
+            f"  {row['soil']}: {-row['mean']:+.3f} in the mean, {row['largest']:.3f} at most"
+            + (f"; {said}" if said else "")
+        )
+    return "\n".join(lines)
+
+
 def table(library: Mapping[str, Soil]) -> str:
-    """The library as lines of text: soil, model, first free parameter with its interval, R2, NRMSE, bins."""
-    rows: list[tuple[str, ...]] = [("soil", "model", "parameters (95 % interval)", "R2", "NRMSE", "bins")]
+    """The library as lines of text: soil, model, free parameters with intervals, a by metres of ground, R2, NRMSE, bins, the badge."""
+    head = (
+        "soil",
+        "model",
+        "parameters (95 % interval)",
+        "a by metres",
+        "R2",
+        "NRMSE",
+        "bins",
+        "data fix it",
+    )
+    rows: list[tuple[str, ...]] = [head]
     for name, one in library.items():
         free = one.fit.get("free", list(one.parameters))
         words = []
@@ -94,8 +157,11 @@ def table(library: Mapping[str, Soil]) -> str:
                 + (f" ({interval[0]:.3g} to {interval[1]:.3g})" if interval else "")
             )
         score = ["" if value is None else f"{value:.3f}" for value in (one.r2, one.nrmse)]
-        rows.append((name, one.model, ", ".join(words), *score, str(len(one.bins) or "")))
-    widths = [max(len(row[i]) for row in rows) for i in range(6)]
+        metres, badge = one.fit.get("ground_mean"), one.fit.get("identifiability")
+        by_metres = f"{metres['a']:.3g}" if metres else ""
+        fixed = "" if not badge else "yes" if badge["identifiable"] else f"no ({badge['condition']:.1g})"
+        rows.append((name, one.model, ", ".join(words), by_metres, *score, str(len(one.bins) or ""), fixed))
+    widths = [max(len(row[i]) for row in rows) for i in range(len(head))]
     return "\n".join(
         "  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip() for row in rows
     )

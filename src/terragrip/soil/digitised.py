@@ -12,6 +12,9 @@ from numpy.typing import NDArray
 
 from terragrip.errors import InputError
 from terragrip.files import refuse_missing, unreadable
+from terragrip.soil.bins import BinSettings
+from terragrip.soil.fit import AdhesionCurve
+from terragrip.soil.library import Soil, SoilLibrary
 
 Array = NDArray[np.float64]
 
@@ -114,3 +117,36 @@ def _curve(slip: Array, value: Array, name: str, file: str) -> DigitisedCurve:
         )
     order = np.argsort(slip, kind="stable")
     return DigitisedCurve(name, slip[order], value[order], notes)
+
+
+def soils_of_points(path: str | os.PathLike[str], curve: AdhesionCurve | None = None) -> SoilLibrary:
+    """A soil for each digitised curve of a file (see `read_points`), each point a bin of its own; what cannot be fitted is in `not_fitted`.
+
+    curve: an unfitted AdhesionCurve whose model and range of slips to use (default: the paper's, 5-60 %). Points of one curve are no
+    repetitions, so there are no intervals. Raises InputError as `read_points`, and on two curves of one name.
+    """
+    template = curve or AdhesionCurve()
+    soils: dict[str, Soil] = {}
+    missed: dict[str, str] = {}
+    for one in read_points(path):
+        if one.name in soils or one.name in missed:
+            raise InputError(
+                f"two curves are named {one.name!r}", file=os.fspath(path), mend="rename one in its header"
+            )
+        inside = one.slip[(one.slip >= template.bins.lower) & (one.slip < template.bins.upper)]
+        steps = np.diff(np.unique(inside))
+        width = max(float(steps.min()) / 2, 1e-5) if steps.size else template.bins.width
+        fitted = AdhesionCurve(
+            template.model,
+            template.fixed,
+            template.intercept,
+            bins=BinSettings(width, template.bins.lower, template.bins.upper, 1),
+            bootstrap=0,
+        )
+        try:
+            soils[one.name] = Soil.from_curve(
+                one.name, fitted.fit(one.slip, one.value), f"digitised, {os.path.basename(os.fspath(path))}"
+            )
+        except InputError as error:
+            missed[one.name] = str(error)
+    return SoilLibrary(soils, {"digitised": [os.fspath(path)]}, missed)

@@ -157,7 +157,10 @@ class SoilLibrary(Mapping[str, Soil]):
             )
         both = {**self.soils, **other.soils} if clash == "replace" else {**other.soils, **self.soils}
         order = [*self.soils, *(name for name in other.soils if name not in self.soils)]
-        return SoilLibrary({name: both[name] for name in order}, {**other.provenance, **self.provenance})
+        missed = {k: v for k, v in {**other.not_fitted, **self.not_fitted}.items() if k not in both}
+        return SoilLibrary(
+            {name: both[name] for name in order}, {**other.provenance, **self.provenance}, missed
+        )
 
     def compare(self, other: SoilLibrary) -> list[dict[str, Any]]:
         """For each soil in both: the largest and the mean difference of mu over slips 5-60 %, and whether intervals of one model meet."""
