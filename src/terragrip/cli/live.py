@@ -13,6 +13,7 @@ from terragrip.estimation.methods import DEFAULT, METHODS
 
 if TYPE_CHECKING:
     from terragrip.live.service import Service
+    from terragrip.soil.library import SoilLibrary
 
 
 def command(
@@ -41,6 +42,11 @@ def command(
         float,
         typer.Option(metavar="MS", min=0.0, max=10_000.0, help="How long a row waits for late samples, ms."),
     ] = 20.0,
+    ground: Annotated[bool, typer.Option("--ground", help="Tell where the ground changes.")] = False,
+    library: Annotated[
+        Path | None,
+        typer.Option("--library", metavar="FILE", help="Known soils (terragrip soils): tell which it is."),
+    ] = None,
     duration: Annotated[
         float | None, typer.Option(metavar="S", min=0.0, help="Stop after so many seconds.")
     ] = None,
@@ -66,12 +72,22 @@ def command(
         record=record,
         method=method,
         window=window / 1000.0,
+        ground=ground,
+        library=_library(library),
     )
     asyncio.run(_run(service, duration, quiet))
     if not quiet:
         print(service.statistics.summary())
         if record is not None:
             print(f"Recorded in {record}")
+
+
+def _library(path: Path | None) -> SoilLibrary | None:
+    if path is None:
+        return None
+    from terragrip.soil.library import SoilLibrary
+
+    return SoilLibrary.load(path)
 
 
 async def _run(service: Service, duration: float | None, quiet: bool) -> None:

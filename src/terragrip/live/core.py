@@ -20,6 +20,8 @@ from terragrip.live.event import Event
 from terragrip.live.reorder import Pending, Reorder
 
 if TYPE_CHECKING:
+    from terragrip.ground.live import GroundState, LiveGround
+    from terragrip.soil.library import SoilLibrary
     from terragrip.vehicle import Vehicle
 
 WINDOW = 0.02  # s
@@ -32,13 +34,14 @@ class Settings:
     """What makes two runs the same: kept with the record, compared on resuming.
 
     ``window`` [s]: how long a row waits for what is due. ``channels``: columns the samples carry; empty: those seen by the
-    first row. ``sources``: their URIs.
+    first row. ``sources``: their URIs. ``ground``: whether ground changes and soils are followed.
     """
 
     sources: tuple[str, ...]
     method: str = DEFAULT
     window: float = WINDOW
     channels: tuple[str, ...] = ()
+    ground: bool = False
 
     def to_dict(self) -> dict[str, Any]:
         """As JSON holds it."""
@@ -47,12 +50,15 @@ class Settings:
             "method": self.method,
             "window": self.window,
             "channels": list(self.channels),
+            "ground": self.ground,
         }
 
     @classmethod
     def from_dict(cls, data: Mapping[str, Any]) -> Settings:
         """The inverse of `to_dict`."""
-        return cls(tuple(data["sources"]), data["method"], data["window"], tuple(data["channels"]))
+        return cls(
+            tuple(data["sources"]), data["method"], data["window"], tuple(data["channels"]), data["ground"]
+        )
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,14 +82,36 @@ class Refusal:
     values: Values
 
 
-Output = Row | Event | Refusal
+@dataclass(frozen=True, slots=True)
+class Ground:
+    """The ground at the end of half a second: the most probable soil, the probability of each, and a change told now."""
+
+    time: float
+    soil: str
+    probabilities: Mapping[str, float]
+    change: Mapping[str, float] | None  # time, std, probability
+
+    def to_dict(self) -> dict[str, Any]:
+        """As JSON holds it."""
+        return {
+            "time": self.time,
+            "soil": self.soil,
+            "probability": self.probabilities[self.soil],
+            "probabilities": dict(self.probabilities),
+            "change": None if self.change is None else dict(self.change),
+        }
+
+
+Output = Row | Event | Refusal | Ground
 
 
 class Core:
     """Samples in, rows with estimates, events and refusals out."""
 
-    def __init__(self, vehicle: Vehicle, settings: Settings) -> None:
+    def __init__(self, vehicle: Vehicle, settings: Settings, library: SoilLibrary | None = None) -> None:
         self.vehicle = vehicle
+        self.library = library
+        self.ground: LiveGround | None = None
         self.settings = settings
         self.counts = Counts()
         self.reorder = Reorder(settings.window, self.counts)
@@ -96,6 +124,10 @@ class Core:
 
     def _begin(self, channels: Collection[str]) -> TractionEstimator:
         self.estimator = TractionEstimator(self.vehicle, self.settings.method, channels=channels)
+        if self.settings.ground:
+            from terragrip.ground.live import LiveGround
+
+            self.ground = LiveGround(self.estimator, self.library)
         return self.estimator
 
     @property
@@ -156,6 +188,10 @@ class Core:
                 continue
             self.rows += 1
             out.append(Row(row.arrival, row.values, estimate))
+            if self.ground is not None:
+                state = self.ground.update(estimate)
+                if state is not None:
+                    out += _told(state)
         for kind, source, channel in self.reorder.changes:
             text = f"{channel} no longer comes" if kind == "channel_lost" else f"{channel} comes again"
             out.append(Event(self.time, kind, self.settings.sources[source], text))
@@ -177,14 +213,15 @@ class Core:
             "reorder": self.reorder.state(),
             "counts": self.counts.state(),
             "rows": self.rows,
+            "ground": base64.b64encode(self.ground.snapshot()).decode() if self.ground else "",
         }
 
     @classmethod
-    def from_state(cls, state: Mapping[str, Any]) -> Core:
-        """The inverse of `state`; raises InputError where the estimator's snapshot is damaged."""
+    def from_state(cls, state: Mapping[str, Any], library: SoilLibrary | None = None) -> Core:
+        """The inverse of `state`, with the same library; raises InputError where a snapshot in it is damaged."""
         from terragrip.vehicle import Vehicle
 
-        found = cls(Vehicle.from_dict(state["vehicle"]), Settings.from_dict(state["settings"]))
+        found = cls(Vehicle.from_dict(state["vehicle"]), Settings.from_dict(state["settings"]), library)
         snapshot = base64.b64decode(state["estimator"])
         found.estimator = TractionEstimator.restore(snapshot) if snapshot else None
         found.clocks = [SourceClock.from_state(one) for one in state["clocks"]]
@@ -192,4 +229,23 @@ class Core:
         found.reorder.counts = found.counts
         found.reorder.restore(state["reorder"])
         found.rows = state["rows"]
+        if state["ground"] and found.estimator is not None:
+            from terragrip.ground.live import LiveGround
+
+            found.ground = LiveGround.restore(base64.b64decode(state["ground"]), found.estimator, library)
         return found
+
+
+def _told(state: GroundState) -> list[Output]:
+    """A block's state as outputs of ours; with an event where a change is told."""
+    change = state.change
+    as_numbers = (
+        None
+        if change is None
+        else {"time": change.time, "std": change.std, "probability": change.probability}
+    )
+    out: list[Output] = [Ground(state.time, state.soil, state.probabilities, as_numbers)]
+    if change is not None:
+        text = f"the ground changed at {change.time:.1f} ± {change.std:.1f} s, probability {change.probability:.2f}"
+        out.append(Event(state.time, "ground_change", "ground", text))
+    return out

@@ -27,9 +27,11 @@ from terragrip.live.wal import Reading, WriteAhead
 if TYPE_CHECKING:
     from terragrip.estimation.estimates import Estimates
     from terragrip.recording import Recording
+    from terragrip.soil.library import SoilLibrary
     from terragrip.vehicle import Vehicle
 
 ROWS = 20_000  # a segment is closed after so many rows
+_SOILS = "soils.json"
 SECONDS = 60.0  # or so long after its first arrival
 
 
@@ -39,7 +41,7 @@ class Recorder:
     Parameters
     ----------
     folder: made if absent. If it holds a record, the run goes on from its end.
-    vehicle, settings: as `Core` takes them; must be the record's.
+    vehicle, settings, library: as `Core` takes them; must be the record's.
     rows, seconds: when a segment is closed.
 
     Raises InputError if the folder cannot be used, is in use, or holds the record of another vehicle or other settings.
@@ -51,6 +53,7 @@ class Recorder:
         vehicle: Vehicle,
         settings: Settings,
         *,
+        library: SoilLibrary | None = None,
         rows: int = ROWS,
         seconds: float = SECONDS,
     ) -> None:
@@ -61,7 +64,7 @@ class Recorder:
         self._closing: list[Future[None]] = []
         self._syncing: Future[None] | None = None
         try:
-            self._resume(vehicle, settings)
+            self._resume(vehicle, settings, library)
         except OSError as error:
             self.abandon()
             raise unwritable(folder, error, "free space or choose another folder") from error
@@ -69,18 +72,20 @@ class Recorder:
             self.abandon()
             raise
 
-    def _resume(self, vehicle: Vehicle, settings: Settings) -> None:
+    def _resume(self, vehicle: Vehicle, settings: Settings, library: SoilLibrary | None) -> None:
         for part in self.folder.glob(".*.part"):
             part.unlink()
         number = _last_snapshot(self.folder)
         if number is None:
-            self.core = Core(vehicle, settings)
+            if library is not None:
+                library.write(self.folder / _SOILS)
+            self.core = Core(vehicle, settings, library)
             _write_snapshot(self.folder, 0, self.core.state())
             number = 0
         else:
             self.core = _load_snapshot(self.folder, number)
             _clear(self.folder, number)
-            _refuse_other(self.folder, self.core, vehicle, settings)
+            _refuse_other(self.folder, self.core, vehicle, settings, library)
         self.segment, self._wal, torn = Segment(number + 1), None, 0
         for segment, reading, more in _replay(self.folder, number, self.core):
             if more:
@@ -267,7 +272,9 @@ def _locked(folder: Path) -> int:
     return file
 
 
-def _refuse_other(folder: Path, core: Core, vehicle: Vehicle, settings: Settings) -> None:
+def _refuse_other(
+    folder: Path, core: Core, vehicle: Vehicle, settings: Settings, library: SoilLibrary | None
+) -> None:
     before, now = core.settings.to_dict(), settings.to_dict()
     for name in before:
         if before[name] != now[name]:
@@ -275,9 +282,15 @@ def _refuse_other(folder: Path, core: Core, vehicle: Vehicle, settings: Settings
                 f"the record was made with {name} {before[name]}, not {now[name]}",
                 file=folder, place="--record", mend="give the same, or choose another folder",
             )  # fmt: skip
-    if core.vehicle.to_dict() != vehicle.to_dict():
+    soils = [None if one is None else one.to_dict() for one in (core.library, library)]
+    for what, same in (
+        ("vehicle file", core.vehicle.to_dict() == vehicle.to_dict()),
+        ("soil library", soils[0] == soils[1]),
+    ):
+        if same:
+            continue
         raise InputError(
-            "the record was made with another vehicle file", file=folder, place="--record",
+            f"the record was made with another {what}", file=folder, place="--record",
             mend="give the same, or choose another folder",
         )  # fmt: skip
 
@@ -317,5 +330,11 @@ def _load_snapshot(folder: Path, number: int) -> Core:
     with contextlib.suppress(OSError, ValueError):
         check, text, *_ = path.read_text(encoding="utf-8").split("\n")
         if int(check, 16) == zlib.crc32(text.encode()):
-            return Core.from_state(json.loads(text))
+            soils = folder / _SOILS
+            library = None
+            if soils.exists():
+                from terragrip.soil.library import SoilLibrary
+
+                library = SoilLibrary.load(soils)
+            return Core.from_state(json.loads(text), library)
     raise InputError("is damaged", file=path, mend="begin a new record in another folder")

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from terragrip.estimation.engine import EVENTS
-from terragrip.live.core import Output, Refusal, Row
+from terragrip.live.core import Ground, Output, Refusal, Row
 from terragrip.live.event import Event
 
 if TYPE_CHECKING:
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from terragrip.estimation.estimates import Estimates
     from terragrip.estimation.estimator import TractionEstimator
 
-RECORDING, ESTIMATES, REFUSED, EVENT_LINES = "recording", "estimates", "refused", "events"
+RECORDING, ESTIMATES, REFUSED, EVENT_LINES, GROUND = "recording", "estimates", "refused", "events", "ground"
 
 
 @dataclass(slots=True)
@@ -36,6 +36,7 @@ class Segment:
     channels: dict[str, array[float]] = field(default_factory=dict)
     refusals: list[Refusal] = field(default_factory=list)
     events: list[Event] = field(default_factory=list)
+    ground: list[Ground] = field(default_factory=list)
 
     def __len__(self) -> int:
         return len(self.time)
@@ -46,6 +47,8 @@ class Segment:
             self._add_row(output)
         elif isinstance(output, Event):
             self.events.append(output)
+        elif isinstance(output, Ground):
+            self.ground.append(output)
         else:
             self.refusals.append(output)
 
@@ -79,6 +82,8 @@ class Segment:
         if self.refusals:
             lines = [json.dumps({n: getattr(r, n) for n in Refusal.__slots__}) for r in self.refusals]
             self._write_lines(folder, REFUSED, lines)
+        if self.ground:
+            self._write_lines(folder, GROUND, [json.dumps(ground.to_dict()) for ground in self.ground])
         if self.events:
             self._write_lines(folder, EVENT_LINES, [json.dumps(event.to_dict()) for event in self.events])
 

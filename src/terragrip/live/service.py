@@ -11,12 +11,12 @@ from typing import TYPE_CHECKING, Any
 
 from terragrip.errors import InputError
 from terragrip.estimation.methods import DEFAULT, method_named
-from terragrip.live.core import WINDOW, Core, Output, Row, Settings
+from terragrip.live.core import WINDOW, Core, Ground, Output, Row, Settings
 from terragrip.live.decode import Decoder
 from terragrip.live.event import Event
 from terragrip.live.feed import Feed, Lost
 from terragrip.live.inbox import CAPACITY, Inbox
-from terragrip.live.message import ESTIMATE, STATUS, Message
+from terragrip.live.message import ESTIMATE, GROUND, SOIL, STATUS, Message
 from terragrip.live.outbox import Outbox
 from terragrip.live.payload import unpacker
 from terragrip.live.prediction import Prediction
@@ -27,6 +27,7 @@ from terragrip.live.statistics import Statistics
 
 if TYPE_CHECKING:
     from terragrip.formats import Profile
+    from terragrip.soil.library import SoilLibrary
     from terragrip.vehicle import Vehicle
 
 _AT_ONCE = 64  # samples between two turns of sources and sinks
@@ -49,6 +50,7 @@ class Service:
     sources, sinks: URIs (docs/live.md). profile: what the sources' fields mean; None: the recording's own names.
     record: folder of the record, which is resumed where it holds one; None: none is kept.
     window: s that a row waits for what is due (`terragrip.live.reorder`).
+    ground: tell ground changes while driving; library: and which of these soils it is.
     capacity: samples that may wait for the estimator before they are dropped.
 
     Raises InputError on a URI, profile, vehicle or folder that cannot be used.
@@ -64,6 +66,8 @@ class Service:
         record: Path | None = None,
         method: str = DEFAULT,
         window: float = WINDOW,
+        ground: bool = False,
+        library: SoilLibrary | None = None,
         capacity: int = CAPACITY,
     ) -> None:
         method_named(method)
@@ -81,9 +85,9 @@ class Service:
             for decoder, source in zip(decoders, self.sources, strict=True)
             for name in (*decoder.channels, *getattr(source, "channels", ()))
         )
-        settings = Settings(tuple(sources), method, window, tuple(channels))
-        self.recorder = None if record is None else Recorder(record, vehicle, settings)
-        self.core = Core(vehicle, settings) if self.recorder is None else self.recorder.core
+        settings = Settings(tuple(sources), method, window, tuple(channels), ground or library is not None)
+        self.recorder = None if record is None else Recorder(record, vehicle, settings, library=library)
+        self.core = Core(vehicle, settings, library) if self.recorder is None else self.recorder.core
         self._engine: Core | Recorder = self.core if self.recorder is None else self.recorder
         self.inbox = Inbox(capacity)
         payload = None if profile is None else profile.payload
@@ -252,16 +256,18 @@ class Service:
         for output in outputs:
             if isinstance(output, Row):
                 self.statistics.row(output, self.inbox.clock())
-                if self.listeners:
-                    message = Message(ESTIMATE, output.estimate.time, output)
-                    for listen in self.listeners:
-                        listen(message)
+                self._publish(Message(ESTIMATE, output.estimate.time, output))
+            elif isinstance(output, Ground):
+                self.statistics.ground = output
+                data = output.to_dict()
+                change = data.pop("change")
+                self._publish(Message(SOIL, output.time, data=data))
+                if change is not None:
+                    self._publish(Message(GROUND, change["time"], data=change))
             elif isinstance(output, Event):
                 self.statistics.event(output)
                 logger.info("%s: %s: %s", output.source, output.kind, output.text)
-                message = Message.of_event(output)
-                for listen in self.listeners:
-                    listen(message)
+                self._publish(Message.of_event(output))
 
     def _keep_house(self) -> None:
         self._loop.call_later(_HOUSEKEEPING, self._guarded, self._keep_house)
@@ -289,7 +295,9 @@ class Service:
 
     def announce(self) -> None:
         """Send the status to whom it concerns."""
-        message = Message(STATUS, self.core.time, data=self.statistics.to_dict())
+        self._publish(Message(STATUS, self.core.time, data=self.statistics.to_dict()))
+
+    def _publish(self, message: Message) -> None:
         for listen in self.listeners:
             listen(message)
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import deque
 from typing import TYPE_CHECKING, Any
 
-from terragrip.live.core import Row
+from terragrip.live.core import Ground, Row
 from terragrip.live.event import Event
 from terragrip.live.feed import Feed
 
@@ -26,6 +26,7 @@ class Statistics:
         self.period = 0.0  # s between rows, lately
         self.row_rate = self.sample_rate = self.delay = 0.0
         self.last: Row | None = None
+        self.ground: Ground | None = None
         self.events: deque[Event] = deque(maxlen=50)
         self.event_counts: dict[str, int] = {}
         self._arrivals = [now] * len(service.feeds)

@@ -84,6 +84,9 @@ def head(service: Service) -> list[str]:
             f"{state}   v {e.ground_speed:.2f} ± {e.ground_speed_std:.2f} m/s   "
             f"soil resistance {e.soil_resistance:.3f} ± {e.soil_resistance_std:.3f}"
         )
+    if s.ground is not None:
+        likely = sorted(s.ground.probabilities.items(), key=lambda one: -one[1])[:3]
+        lines.append("ground: " + ", ".join(f"{name} {probability:.0%}" for name, probability in likely))
     return lines
 
 

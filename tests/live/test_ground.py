@@ -1,0 +1,87 @@
+"""The ground while driving: changes and soils come through, and a restart changes none of them."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+
+from drives import drive
+from machine import events, rows_of
+from terragrip.estimation import TractionEstimator
+from terragrip.ground.live import LiveGround
+from terragrip.live import Recorder, read_record
+from terragrip.live.core import Ground, Settings
+from terragrip.live.service import Service
+from terragrip.soil.library import Soil, SoilLibrary
+
+
+@pytest.fixture(scope="module")
+def recording():
+    """Soft ground from 20 s on."""
+    return drive(40.0, resistance=lambda t: np.where(t > 20, 0.20, 0.05)).recording
+
+
+@pytest.fixture(scope="module")
+def library():
+    curve = {"A": 0.5, "k": 10.0, "d": 0.0}  # that of `drive`
+    soils = {
+        name: Soil(name, "effective", curve, resistance=(resistance, 0.01), spread=0.02)
+        for name, resistance in (("hard", 0.05), ("soft", 0.20))
+    }
+    return SoilLibrary(soils)
+
+
+@pytest.fixture(scope="module")
+def by_hand(recording, library, vehicle):
+    """What the estimator and the ground say, sample by sample."""
+    estimator = TractionEstimator(vehicle, channels=tuple(recording.channels))
+    ground = LiveGround(estimator, library)
+    estimates, states = [], []
+    for time, values in rows_of(recording):
+        estimates.append(estimator.update({"time": time, **values}))
+        states.append(ground.update(estimates[-1]))
+    return estimates, [state for state in states if state is not None]
+
+
+def test_a_restart_goes_on_with_the_same_ground(tmp_path, recording, library, vehicle, by_hand):
+    settings = Settings(("replay:test",), channels=tuple(recording.channels), ground=True)
+    got, rows = [], list(rows_of(recording))
+    for first, last in ((0, 1234), (1234, 2222), (2222, len(rows))):
+        recorder = Recorder(tmp_path, vehicle, settings, library=library, rows=700)
+        for time, values in rows[first:last]:
+            got += [out for out in recorder.take(time, 0, time, values) if isinstance(out, Ground)]
+        recorder.write()
+        recorder.abandon() if last < len(rows) else recorder.close()
+    estimates, states = by_hand
+    assert [(g.time, g.soil, g.probabilities) for g in got] == [
+        (s.time, s.soil, s.probabilities) for s in states
+    ]
+    assert [bool(g.change) for g in got] == [s.change is not None for s in states]
+    _, kept = read_record(tmp_path)
+    assert kept.columns["curve_a"].tolist() == [estimate.curve_a for estimate in estimates]
+    lines = [
+        json.loads(line)
+        for p in sorted(tmp_path.glob("ground-*.jsonl"))
+        for line in p.read_text().splitlines()
+    ]
+    assert [line["soil"] for line in lines] == [state.soil for state in states]
+
+
+@pytest.mark.asyncio
+async def test_soils_and_changes_are_published(tmp_path, recording, library, vehicle, by_hand):
+    log = tmp_path / "drive.parquet"
+    recording.to_pandas().to_parquet(log)
+    service = Service(vehicle, [f"replay:{log}?speed=max"], library=library)
+    seen = []
+    service.listeners.append(seen.append)
+    await service.run()
+    changes = [message.data for message in seen if message.kind == "ground"]
+    assert [change["time"] for change in changes] == pytest.approx([20.0], abs=1.0)
+    assert len(events(service, "ground_change")) == 1
+    soils = [message.data for message in seen if message.kind == "soil"]
+    assert [(soil["time"], soil["soil"], soil["probabilities"]) for soil in soils] == [
+        (state.time, state.soil, state.probabilities) for state in by_hand[1]
+    ]
+    assert soils[-1]["probability"] == max(soils[-1]["probabilities"].values())
