@@ -6,6 +6,8 @@ import type { Page } from "./ui/page";
 const PAGES: Record<string, { title: string; load: () => Promise<{ page: Page }> }> = {
   start: { title: "Folder", load: () => import("./start/page") },
   drive: { title: "Drive", load: () => import("./drive/page") },
+  live: { title: "Live", load: () => import("./live/page") },
+  map: { title: "Map", load: () => import("./map/page") },
   fit: { title: "Fit", load: () => import("./fit/page") },
 };
 

@@ -7,10 +7,11 @@ import os
 from collections.abc import AsyncIterator, Iterable
 from importlib import import_module
 from pathlib import Path
+from typing import Any
 
 from fastapi import FastAPI, Request
 from fastapi.exceptions import RequestValidationError
-from fastapi.responses import JSONResponse, Response
+from fastapi.responses import FileResponse, JSONResponse, Response
 from fastapi.staticfiles import StaticFiles
 
 from terragrip import __version__
@@ -19,7 +20,7 @@ from terragrip.studio.access import Access
 from terragrip.studio.state import UPLOAD_LIMIT, Studio
 
 STATIC = Path(__file__).with_name("static")
-ROUTES = ("files", "jobs", "fit", "pictures", "drive")
+ROUTES = ("files", "jobs", "fit", "pictures", "drive", "live", "basemap")
 NOT_BUILT = (
     "The studio's pages are not built. They need Node.js 20 or newer: install it, then run `make studio` in a clone "
     "(or install a released wheel, which holds them). The interface at /openapi.json works without them."
@@ -69,11 +70,22 @@ def create_app(
 
 
 class _Pages(StaticFiles):
-    """The built pages: names with a hash never change, the rest is asked for again."""
+    """The built pages, compressed at build time: names with a hash never change, the rest is asked for again."""
 
-    def file_response(self, full_path, stat_result, scope, status_code=200):  # type: ignore[no-untyped-def]
-        response = super().file_response(full_path, stat_result, scope, status_code)
-        fixed = "/assets/" in os.fspath(full_path)
+    async def get_response(self, path: str, scope: Any) -> Response:
+        response = await super().get_response(path, scope)
+        whole = getattr(response, "path", None)
+        if response.status_code != 200 or whole is None:
+            return response
+        accepted = dict(scope["headers"]).get(b"accept-encoding", b"").decode("latin-1")
+        for coding, ending in (("br", ".br"), ("gzip", ".gz")):
+            packed = f"{whole}{ending}"
+            if coding in accepted and os.path.isfile(packed):
+                response = FileResponse(packed, media_type=response.media_type)
+                response.headers["content-encoding"] = coding
+                break
+        response.headers["vary"] = "accept-encoding"
+        fixed = "/assets/" in os.fspath(whole)
         response.headers["cache-control"] = "public, max-age=31536000, immutable" if fixed else "no-cache"
         return response
 

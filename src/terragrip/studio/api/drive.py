@@ -50,7 +50,7 @@ def about(studio: Here, path: Named) -> dict[str, Any]:
             "vehicle": table.vehicle.name,
             "radius": dict(zip(table.vehicle.wheels, table.vehicle.wheel_radius.tolist(), strict=True)),
             "notes": list(table.notes),
-            "events": _events(table),
+            "events": drive.events(table),
             "soils": drive.spans(table["soil"], table.time) if "soil" in table else [],
             "ground": _ground(studio, path),
         }
@@ -117,13 +117,6 @@ def track(studio: Here, path: Named, column: Columns = []) -> Response:  # noqa:
 def _known(table: Estimates, wheel: str) -> None:
     if wheel not in table.wheels:
         raise InputError(f"there is no wheel {wheel!r}", mend=f"take one of {', '.join(table.wheels)}")
-
-
-def _events(table: Estimates) -> list[dict[str, Any]]:
-    return [
-        {"kind": span["name"], "start": span["start"], "end": span["end"], "why": ""}
-        for span in drive.spans(table["event"], table.time)
-    ]
 
 
 def _ground(studio: Studio, path: str) -> dict[str, Any] | None:

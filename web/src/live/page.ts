@@ -1,0 +1,180 @@
+/** The live page: big numbers for the cab, six traces, warnings. Fed by the live service, or by a run played again. */
+
+import { soilColor } from "../drive/run";
+import { get, type Item } from "../ui/api";
+import { digits, fill, h } from "../ui/dom";
+import { tried } from "../ui/notes";
+import type { Page } from "../ui/page";
+import { Feed, type Said } from "./feed";
+import { Traces, type Trace } from "./traces";
+
+/** mu_max of the prototype curve over its scale a (PHYSICS 5). */
+const PEAK = 0.476;
+const WHEEL_COLORS = ["blue", "vermillion", "green", "purple", "orange", "sky", "muted", "ink"];
+const WARNING: Record<string, string> = {
+  immobilization: "About to dig in",
+  stuck: "Stuck",
+  push: "The tool pushes",
+};
+const LINGER = 2;
+
+export const page: Page = (main, { notices, query }) => {
+  const source = h("select", { id: "live-source", "aria-label": "Source" });
+  const speed = h("select", { "aria-label": "Speed of the replay" }, [1, 2, 5, 10, 20].map((x) => h("option", { value: x }, `${x}×`)));
+  const pause = h("button", { type: "button", id: "pause", "aria-pressed": "false" }, "Pause");
+  const state = h("span", { id: "live-state", class: "state", role: "status" }, "…");
+  const health = h("span", { class: "hint", id: "health" });
+  const warning = h("div", { class: "warning", role: "alert", hidden: true });
+  const slip = tile("Slip", "%");
+  const grip = tile("Grip in use", "%");
+  const soil = tile("Soil", "");
+  const speedTile = tile("Speed", "m/s");
+  const said = h("ul", { class: "said", "aria-label": "Events" });
+  let warnedAt = -Infinity;
+  let updates = 0;
+  let rate = 0;
+
+  const feed = new Feed(() => {
+    const replay = source.value;
+    return new URLSearchParams(replay ? { replay, speed: speed.value } : {}).toString();
+  });
+  const traces = new Traces(feed.ring, () => feed.hello?.events ?? []);
+  main.append(
+    h("div", { class: "tools" }, source, speed, pause, state, h("span", { class: "spring" }), health),
+    warning,
+    h("div", { class: "tiles" }, slip.element, grip.element, soil.element, speedTile.element),
+    traces.element,
+    said,
+  );
+
+  feed.onState = (now, why) => {
+    state.className = `state ${now === "connected" ? "done" : now === "connecting" || now === "ended" ? "" : "failed"}`;
+    state.textContent = { connecting: "connecting …", connected: "connected", lost: `connection lost: ${why}`, ended: "the run has ended" }[now];
+    if (now === "connected" && feed.hello) {
+      traces.show(tracesOf(feed.hello.wheels, feed.hello.columns));
+      warnedAt = -Infinity;
+      fill(said);
+    }
+  };
+  feed.onRows = () => {
+    updates++;
+    if (traces.held === null) {
+      traces.redraw();
+      numbers();
+    }
+  };
+  feed.onSaid = tell;
+
+  function tell(message: Said): void {
+    if (message.source !== undefined && message.text !== undefined) {
+      said.prepend(h("li", {}, h("strong", {}, message.kind), message.time === null ? "" : ` ${message.time.toFixed(1)} s`, message.text ? `: ${message.text}` : ""));
+      while (said.children.length > 6) said.lastElementChild?.remove();
+      if (message.kind in WARNING) warn(message.kind, message.text);
+    } else if (message.kind === "soil") {
+      const sure = message.probability === null || message.probability === undefined ? (message.labelled ? "labelled" : "") : `${digits(100 * message.probability, 2)} % sure`;
+      soil.set(message.soil || "–", sure);
+      soil.element.dataset["soil"] = soilColor(message.soil ?? "");
+    } else if (message.kind === "status") {
+      const lost = Object.values(message.counts ?? {}).reduce((sum, one) => sum + (one["dropped"] ?? 0), 0);
+      health.dataset["drops"] = `${lost} dropped, ${digits(1000 * (message.delay ?? 0), 2)} ms behind`;
+    }
+  }
+
+  function warn(kind: string, text: string): void {
+    warnedAt = feed.ring.now;
+    warning.hidden = false;
+    fill(warning, h("strong", {}, WARNING[kind] ?? kind), text ? ` ${text}` : "");
+  }
+
+  function numbers(): void {
+    const { ring, hello } = feed;
+    if (!hello) return;
+    const code = ring.event[(ring.taken - 1) % ring.event.length] ?? 0;
+    const event = hello.events[code] ?? "";
+    if (event in WARNING && warning.hidden) warn(event, "");
+    if (event in WARNING) warnedAt = ring.now;
+    else if (!warning.hidden && !(ring.now - warnedAt < LINGER)) warning.hidden = true;
+    const wheels = hello.wheels;
+    const slips = wheels.map((wheel) => ring.last(`slip_${wheel}`)).filter(Number.isFinite);
+    const most = Math.max(...slips);
+    const wheel = wheels.find((name) => ring.last(`slip_${name}`) === most) ?? "";
+    const spread = 196 * ring.last(`slip_${wheel}_std`);
+    slip.set(slips.length ? (100 * most).toFixed(0) : "–", slips.length ? `${wheel}, ± ${spread.toFixed(0)}` : "standing");
+    const offered = PEAK * ring.last("curve_a");
+    const used = Math.max(...wheels.map((name) => ring.last(`adhesion_${name}`)));
+    const known = ring.last("curve_a_std") < 0.35 * ring.last("curve_a");
+    grip.set(known ? Math.min((100 * used) / offered, 100).toFixed(0) : "–", known ? `µ ${digits(used, 2)} of ${digits(offered, 2)}` : `µ ${digits(used, 2)}; what the soil offers is not known yet`);
+    speedTile.set(ring.last("ground_speed").toFixed(2), `± ${(1.96 * ring.last("ground_speed_std")).toFixed(2)}`);
+  }
+
+  pause.addEventListener("click", () => {
+    traces.held = traces.held === null ? feed.ring.now : null;
+    pause.setAttribute("aria-pressed", String(traces.held !== null));
+    pause.textContent = traces.held === null ? "Pause" : "Follow";
+    traces.redraw();
+  });
+  source.addEventListener("change", () => {
+    speed.hidden = source.value === "";
+    feed.again();
+  });
+  speed.addEventListener("change", () => feed.again());
+
+  async function reload(first: boolean): Promise<void> {
+    const [folder, live] = await Promise.all([tried(() => get<{ items: Item[] }>("folder")), tried(() => get<{ service: boolean }>("live/sources"))]);
+    const runs = (folder?.items ?? []).filter((item) => item.kind === "estimates").map((item) => item.path);
+    const before = first ? (query.get("replay") ?? (live?.service ? "" : (runs[0] ?? ""))) : source.value;
+    fill(
+      source,
+      live?.service || !runs.length ? h("option", { value: "" }, live?.service ? "live service" : "no live service, no runs") : null,
+      runs.map((path) => h("option", { value: path }, `replay ${path}`)),
+    );
+    source.value = before;
+    speed.hidden = source.value === "";
+    if (first) feed.again();
+  }
+
+  const clock = window.setInterval(() => {
+    rate = updates;
+    updates = 0;
+    const drops = health.dataset["drops"] ?? "";
+    health.textContent = feed.state === "connected" ? [`${rate} updates/s`, drops].filter(Boolean).join(", ") : "";
+  }, 1000);
+  const forget = notices.on((notice) => notice.kind === "folder" && void reload(false));
+  void reload(true);
+  Object.assign(window, { terragripLive: { feed, traces } });
+  return () => {
+    clearInterval(clock);
+    forget();
+    feed.close();
+    traces.close();
+  };
+};
+
+function tile(title: string, unit: string): { element: HTMLElement; set: (value: string, more: string) => void } {
+  const number = h("span", { class: "big" }, "–");
+  const more = h("span", { class: "more" }, "");
+  const element = h("div", { class: "tile" }, h("h2", {}, title), h("div", {}, number, h("span", { class: "unit" }, unit)), more);
+  return {
+    element,
+    set(value, text) {
+      if (number.textContent !== value) number.textContent = value;
+      if (more.textContent !== text) more.textContent = text;
+    },
+  };
+}
+
+function tracesOf(wheels: string[], columns: string[]): Trace[] {
+  const each = (name: string): Trace["lines"] =>
+    wheels
+      .map((wheel, i) => ({ column: `${name}_${wheel}`, color: WHEEL_COLORS[i % WHEEL_COLORS.length] ?? "blue", label: wheel }))
+      .filter((line) => columns.includes(line.column));
+  const one = (column: string, color: string): Trace["lines"] => (columns.includes(column) ? [{ column, color, label: column }] : []);
+  return [
+    { title: "Slip", unit: "%", scale: 100, lines: each("slip"), low: -20, high: 100 },
+    { title: "Adhesion µ", unit: "–", scale: 1, lines: each("adhesion"), low: -0.5, high: 1.5 },
+    { title: "Ground speed", unit: "m/s", scale: 1, lines: one("ground_speed", "blue"), low: 0, high: 20 },
+    { title: "Soil resistance ρs", unit: "–", scale: 1, lines: one("soil_resistance", "purple"), low: -0.3, high: 1 },
+    { title: "Efficiency η", unit: "%", scale: 100, lines: each("efficiency"), low: 0, high: 100 },
+    { title: "Online curve a", unit: "–", scale: 1, lines: one("curve_a", "green"), low: 0, high: 3 },
+  ];
+}

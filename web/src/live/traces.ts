@@ -1,0 +1,210 @@
+/** Six traces of the last half minute, drawn straight from the ring on one canvas each frame that brought rows. */
+
+import { EVENT_COLORS } from "../drive/run";
+import { ticks } from "../fit/view";
+import { digits, h } from "../ui/dom";
+import { color, onTheme } from "../ui/theme";
+import type { Ring } from "./feed";
+
+export interface Trace {
+  title: string;
+  unit: string;
+  scale: number;
+  /** Columns drawn together, each with its colour. */
+  lines: { column: string; color: string; label: string }[];
+  low: number;
+  high: number;
+}
+
+const [LEFT, RIGHT, GAP, FOOT] = [50, 10, 24, 24];
+
+export class Traces {
+  readonly element = h("div", { class: "traces", role: "img", "aria-label": "The last seconds of slip, adhesion, speeds and resistance" });
+  /** Seconds shown. */
+  span = 30;
+  /** The time at the right edge while paused; null follows. */
+  held: number | null = null;
+  redraws = 0;
+  private canvas = h("canvas", { "aria-hidden": "true" });
+  private traces: Trace[] = [];
+  private asked = false;
+  private ranges = new Map<string, [number, number]>();
+  private palette = new Map<string, string>();
+  private forget: () => void;
+  private watcher: ResizeObserver;
+
+  constructor(
+    private ring: Ring,
+    private events: () => string[],
+  ) {
+    this.element.append(this.canvas);
+    this.forget = onTheme(() => {
+      this.palette.clear();
+      this.redraw();
+    });
+    this.watcher = new ResizeObserver(() => {
+      this.canvas.width = this.element.clientWidth * devicePixelRatio;
+      this.canvas.height = this.element.clientHeight * devicePixelRatio;
+      this.redraw();
+    });
+    this.watcher.observe(this.element);
+  }
+
+  close(): void {
+    this.forget();
+    this.watcher.disconnect();
+  }
+
+  show(traces: Trace[]): void {
+    this.traces = traces;
+    this.ranges.clear();
+    this.redraw();
+  }
+
+  redraw(): void {
+    if (this.asked) return;
+    this.asked = true;
+    requestAnimationFrame(() => {
+      this.asked = false;
+      this.draw();
+    });
+  }
+
+  private ink(name: string): string {
+    let found = this.palette.get(name);
+    if (!found) {
+      found = color(name);
+      this.palette.set(name, found);
+    }
+    return found;
+  }
+
+  private draw(): void {
+    const pen = this.canvas.getContext("2d");
+    const [width, height] = [this.element.clientWidth, this.element.clientHeight];
+    if (!pen || width < 100 || !this.traces.length) return;
+    this.redraws++;
+    pen.setTransform(devicePixelRatio, 0, 0, devicePixelRatio, 0, 0);
+    pen.clearRect(0, 0, width, height);
+    const end = this.held ?? this.ring.now;
+    if (Number.isNaN(end)) return;
+    const first = this.firstSince(end - this.span);
+    const rows = 3;
+    const wide = (width - GAP) / 2;
+    const tall = (height - FOOT) / rows;
+    this.traces.forEach((trace, i) => {
+      const x0 = (i % 2) * (wide + GAP);
+      const y0 = Math.floor(i / 2) * tall;
+      this.drawOne(pen, trace, x0, y0, wide, tall, first, end, Math.floor(i / 2) === rows - 1);
+    });
+  }
+
+  private firstSince(time: number): number {
+    let [low, high] = [0, this.ring.count];
+    while (low < high) {
+      const middle = (low + high) >> 1;
+      if ((this.ring.time[this.ring.place(middle)] as number) < time) low = middle + 1;
+      else high = middle;
+    }
+    return Math.max(low - 1, 0);
+  }
+
+  private drawOne(pen: CanvasRenderingContext2D, trace: Trace, x0: number, y0: number, width: number, height: number, first: number, end: number, last: boolean): void {
+    const { ring } = this;
+    const [left, right, top, bottom] = [x0 + LEFT, x0 + width - RIGHT, y0 + 24, y0 + height - 6];
+    const [low, high] = this.range(trace, first);
+    const px = (time: number): number => right - ((end - time) / this.span) * (right - left);
+    const py = (v: number): number => bottom - ((v - low) / (high - low)) * (bottom - top);
+    pen.font = "600 13px system-ui, sans-serif";
+    pen.fillStyle = this.ink("ink");
+    pen.textBaseline = "alphabetic";
+    pen.textAlign = "left";
+    pen.fillText(`${trace.title} [${trace.unit}]`, left, y0 + 16);
+    pen.font = "12px system-ui, sans-serif";
+    let x = left + pen.measureText(`${trace.title} [${trace.unit}]`).width + 34;
+    for (const line of trace.lines.length > 1 ? trace.lines : []) {
+      pen.fillStyle = this.ink(line.color);
+      pen.fillRect(x, y0 + 10, 12, 3);
+      pen.fillText(line.label, x + 16, y0 + 16);
+      x += 26 + pen.measureText(line.label).width;
+    }
+    pen.lineWidth = 1;
+    pen.textAlign = "right";
+    pen.textBaseline = "middle";
+    for (const v of ticks({ low, high }, 4)) {
+      pen.strokeStyle = this.ink("grid");
+      pen.beginPath();
+      pen.moveTo(left, py(v));
+      pen.lineTo(right, py(v));
+      pen.stroke();
+      pen.fillStyle = this.ink("muted");
+      pen.fillText(digits(v), left - 6, py(v));
+    }
+    if (last) {
+      pen.textAlign = "center";
+      for (let back = 0; back <= this.span; back += 10) pen.fillText(back ? `−${back} s` : "now", px(end - back) - (back ? 0 : 10), bottom + 14);
+    }
+    const names = this.events();
+    const count = ring.count;
+    pen.save();
+    pen.beginPath();
+    pen.rect(left, top - 2, right - left, bottom - top + 4);
+    pen.clip();
+    for (let i = first; i < count; i++) {
+      const at = ring.place(i);
+      const code = ring.event[at] as number;
+      if (!code || (ring.time[at] as number) > end) continue;
+      pen.fillStyle = this.ink(EVENT_COLORS[names[code] ?? ""] ?? "ink");
+      pen.fillRect(px(ring.time[at] as number) - 1, bottom - 3, 2, 5);
+    }
+    for (const line of trace.lines) {
+      const values = ring.columns[ring.names.indexOf(line.column)];
+      if (!values) continue;
+      pen.strokeStyle = this.ink(line.color);
+      pen.lineWidth = 1.6;
+      pen.beginPath();
+      let on = false;
+      for (let i = first; i < count; i++) {
+        const at = ring.place(i);
+        const time = ring.time[at] as number;
+        if (time > end) break;
+        const v = (values[at] as number) * trace.scale;
+        if (Number.isNaN(v)) {
+          on = false;
+          continue;
+        }
+        if (on) pen.lineTo(px(time), py(v));
+        else pen.moveTo(px(time), py(v));
+        on = true;
+      }
+      pen.stroke();
+    }
+    pen.restore();
+  }
+
+  /** A range that grows at once and shrinks slowly, so that the lines do not dance. */
+  private range(trace: Trace, first: number): [number, number] {
+    let [low, high] = [Infinity, -Infinity];
+    for (const line of trace.lines) {
+      const values = this.ring.columns[this.ring.names.indexOf(line.column)];
+      if (!values) continue;
+      for (let i = first; i < this.ring.count; i++) {
+        const v = (values[this.ring.place(i)] as number) * trace.scale;
+        if (v < low) low = v;
+        if (v > high) high = v;
+      }
+    }
+    low = Math.max(Math.min(low, trace.low === 0 ? 0 : low), trace.low);
+    high = Math.min(high, trace.high);
+    if (!(high > low)) [low, high] = [trace.low, Math.min(trace.high, trace.low + 1)];
+    const room = 0.08 * (high - low);
+    const before = this.ranges.get(trace.title);
+    const now: [number, number] = [low - (trace.low === 0 ? 0 : room), high + room];
+    if (before) {
+      now[0] = now[0] < before[0] ? now[0] : before[0] + 0.03 * (now[0] - before[0]);
+      now[1] = now[1] > before[1] ? now[1] : before[1] + 0.03 * (now[1] - before[1]);
+    }
+    this.ranges.set(trace.title, now);
+    return now;
+  }
+}

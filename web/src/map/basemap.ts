@@ -1,0 +1,47 @@
+/** Where a picture lies on the map: from its file, or typed by the user. */
+
+import { h } from "../ui/dom";
+
+export type Corners = [[number, number], [number, number], [number, number], [number, number]];
+
+export interface Placed {
+  corners: Corners | null;
+}
+
+interface Bounds {
+  getWest(): number;
+  getEast(): number;
+  getSouth(): number;
+  getNorth(): number;
+}
+
+/** Ask for the edges of a picture without coordinates; null where the user gives up. */
+export function corners(name: string, bounds: Bounds): Promise<Corners | null> {
+  return new Promise((resolve) => {
+    const field = (label: string, value: number): HTMLInputElement => h("input", { type: "number", step: "any", id: `edge-${label}`, value: value.toFixed(6), required: true });
+    const fields = { north: field("north", bounds.getNorth()), south: field("south", bounds.getSouth()), west: field("west", bounds.getWest()), east: field("east", bounds.getEast()) };
+    const dialog = h("dialog", { class: "wizard", "aria-labelledby": "edges" });
+    const form = h(
+      "form",
+      { method: "dialog" },
+      h("h2", { id: "edges" }, `Edges of ${name}`),
+      h("p", { class: "hint" }, "This picture does not say where it lies. Give its edges in degrees (WGS 84)."),
+      Object.entries(fields).map(([label, input]) => h("div", { class: "field" }, h("label", { for: input.id }, label), input)),
+      h("div", { class: "row end" }, h("button", { type: "button", click: () => end(null) }, "Cancel"), h("button", { type: "submit", class: "primary" }, "Lay it down")),
+    );
+    const end = (found: Corners | null): void => {
+      dialog.close();
+      dialog.remove();
+      resolve(found);
+    };
+    form.addEventListener("submit", (event) => {
+      event.preventDefault();
+      const [n, s, w, e] = [fields.north, fields.south, fields.west, fields.east].map((input) => input.valueAsNumber) as [number, number, number, number];
+      end([[w, n], [e, n], [e, s], [w, s]]);
+    });
+    dialog.addEventListener("cancel", () => end(null));
+    dialog.append(form);
+    document.body.append(dialog);
+    dialog.showModal();
+  });
+}

@@ -1,0 +1,265 @@
+/** The map: the track coloured by any quantity, soils and events, a picture as basemap, brushed together with a chart. */
+
+import "maplibre-gl/dist/maplibre-gl.css";
+import * as maplibre from "maplibre-gl";
+import workerUrl from "maplibre-gl/dist/maplibre-gl-worker.mjs?worker&url";
+import { EVENT_COLORS, panelsOf, soilColor, type Run } from "../drive/run";
+import { Charts } from "../drive/charts";
+import { address, get, type Item } from "../ui/api";
+import { columns, type Columns } from "../ui/columns";
+import { digits, fill, h } from "../ui/dom";
+import { note, tried } from "../ui/notes";
+import type { Page } from "../ui/page";
+import { color, onTheme } from "../ui/theme";
+import { shade, SCALE } from "./shade";
+import { corners, type Placed } from "./basemap";
+
+maplibre.setWorkerUrl(workerUrl);
+
+const QUANTITIES: [string, string, string, number][] = [
+  ["slip", "Slip", "%", 100],
+  ["adhesion", "Adhesion µ", "–", 1],
+  ["soil_resistance", "Soil resistance ρs", "–", 1],
+  ["net_traction", "Net traction κ", "–", 1],
+  ["efficiency", "Efficiency η", "%", 100],
+  ["ground_speed", "Ground speed", "m/s", 1],
+  ["curve_a", "Curve a", "–", 1],
+  ["nis", "NIS", "–", 1],
+  ["altitude", "Altitude", "m", 1],
+];
+
+export const page: Page = (main, { notices, query }) => {
+  const choice = h("select", { id: "map-run", "aria-label": "Run" });
+  const quantity = h("select", { id: "map-quantity", "aria-label": "Coloured by" });
+  const base = h("select", { "aria-label": "Basemap" });
+  const legend = h("div", { class: "legend-row chips" });
+  const box = h("div", { class: "map", id: "map" });
+  const charts = new Charts();
+  const readout = h("output", { class: "line" });
+  main.append(
+    h("div", { class: "tools" }, choice, quantity, base, h("span", { class: "spring" }), h("button", { type: "button", click: () => frame() }, "Whole track")),
+    legend,
+    box,
+    charts.element,
+    readout,
+  );
+  const map = new maplibre.Map({
+    container: box,
+    style: { version: 8, sources: {}, layers: [{ id: "paper", type: "background", paint: { "background-color": color("panel") } }] },
+    attributionControl: false,
+    dragRotate: false,
+  });
+  map.addControl(new maplibre.ScaleControl({ unit: "metric" }));
+  map.addControl(new maplibre.NavigationControl({ showCompass: false }));
+  const ready = new Promise<void>((resolve) => map.on("load", () => resolve()));
+  let run: Run | null = null;
+  let path = "";
+  let track: Columns | null = null;
+
+  const forgetTheme = onTheme(() => {
+    if (map.isStyleLoaded()) map.setPaintProperty("paper", "background-color", color("panel"));
+    void draw();
+  });
+
+  function names(): { value: string; title: string; unit: string; scale: number }[] {
+    if (!run) return [];
+    const out: { value: string; title: string; unit: string; scale: number }[] = [];
+    for (const [name, title, unit, scale] of QUANTITIES) {
+      if (run.columns.includes(name)) out.push({ value: name, title, unit, scale });
+      for (const wheel of run.wheels) if (run.columns.includes(`${name}_${wheel}`)) out.push({ value: `${name}_${wheel}`, title: `${title} ${wheel}`, unit, scale });
+    }
+    out.push({ value: "soil", title: "Soil", unit: "", scale: 1 }, { value: "event", title: "Events", unit: "", scale: 1 });
+    return out;
+  }
+
+  async function open(wanted: string): Promise<void> {
+    const found = await tried(() => get<Run>("drive", { path: wanted }));
+    if (!found) return;
+    path = wanted;
+    run = found;
+    history.replaceState(null, "", `#/map?path=${encodeURIComponent(wanted)}`);
+    const before = quantity.value;
+    fill(quantity, names().map((n) => h("option", { value: n.value }, n.title)));
+    quantity.value = names().some((n) => n.value === before) ? before : `slip_${found.wheels.at(-1)}`;
+    charts.show(path, found, panelsOf(found, found.wheels.slice(-1)).filter((p) => p.key === "slip"));
+    await draw();
+    frame();
+  }
+
+  async function draw(): Promise<void> {
+    if (!run) return;
+    const asked = names().find((n) => n.value === quantity.value);
+    const named = quantity.value === "soil" || quantity.value === "event";
+    track = (await tried(() => columns("drive/track", { path }, named ? [] : [quantity.value]))) ?? null;
+    await ready;
+    if (!track || !track.count) {
+      if (track) note("This run has no positions: the map needs latitude and longitude.", "error");
+      replace("track", [], "line");
+      return;
+    }
+    const [time, lon, lat, values] = track.data as [Float64Array, Float64Array, Float64Array, Float64Array | undefined];
+    const [low, high] = values ? spread(values) : [0, 1];
+    const paint = (i: number): string => {
+      const t = time[i] as number;
+      if (quantity.value === "soil") return color(soilColor(soilAt(t)));
+      if (quantity.value === "event") return color(EVENT_COLORS[eventAt(t)?.kind ?? ""] ?? "line");
+      const v = values?.[i] ?? NaN;
+      return Number.isNaN(v) ? color("line") : shade((v - low) / (high - low));
+    };
+    // Stretches of one shade are one line: a map of 20 000 features would stutter.
+    const features: GeoJSON.Feature[] = [];
+    let from = 0;
+    for (let i = 1; i <= time.length; i++) {
+      const broken = i === time.length || paint(i) !== paint(from) || (time[i] as number) - (time[i - 1] as number) > 5;
+      if (!broken) continue;
+      const until = Math.min(i, time.length - 1);
+      const line: number[][] = [];
+      for (let k = from; k <= until; k++) line.push([lon[k] as number, lat[k] as number]);
+      if (line.length > 1) features.push({ type: "Feature", properties: { shade: paint(from) }, geometry: { type: "LineString", coordinates: line } });
+      from = i;
+    }
+    replace("track", features, "line");
+    drawLegend(asked, low, high);
+  }
+
+  function soilAt(t: number): string {
+    return run?.soils.find((s) => s.start <= t && s.end >= t)?.name ?? run?.ground?.sections.find((s) => s.start <= t && s.end >= t)?.soil ?? "";
+  }
+
+  function eventAt(t: number) {
+    return run?.events.find((e) => e.start <= t && e.end >= t);
+  }
+
+  function drawLegend(asked: { title: string; unit: string; scale: number } | undefined, low: number, high: number): void {
+    if (!run) return;
+    if (quantity.value === "soil" || quantity.value === "event") {
+      const kinds = quantity.value === "soil" ? [...new Set([...run.soils.map((s) => s.name), ...(run.ground?.sections ?? []).map((s) => s.soil)])] : [...new Set(run.events.map((e) => e.kind))];
+      fill(legend, kinds.length ? kinds.map((k) => h("span", {}, h("i", { class: `strip ${quantity.value === "soil" ? soilColor(k) : (EVENT_COLORS[k] ?? "ink")}` }), k)) : h("span", { class: "hint" }, "none in this run"));
+      return;
+    }
+    const scale = asked?.scale ?? 1;
+    const bar = h("canvas", { width: 180, height: 10, class: "bar", "aria-hidden": "true" });
+    const pen = bar.getContext("2d");
+    for (let i = 0; pen && i < 180; i++) {
+      pen.fillStyle = SCALE(i / 179);
+      pen.fillRect(i, 0, 1, 10);
+    }
+    fill(legend, h("span", {}, asked?.title ?? ""), h("span", {}, digits(low * scale), bar, `${digits(high * scale)} ${asked?.unit ?? ""}`), h("span", { class: "hint" }, "5 % to 95 % of the run"));
+  }
+
+  function replace(id: string, features: GeoJSON.Feature[], type: "line" | "circle"): void {
+    const data: GeoJSON.FeatureCollection = { type: "FeatureCollection", features };
+    const source = map.getSource(id) as maplibre.GeoJSONSource | undefined;
+    if (source) {
+      source.setData(data);
+      return;
+    }
+    map.addSource(id, { type: "geojson", data });
+    if (type === "line") map.addLayer({ id, source: id, type: "line", layout: { "line-cap": "round", "line-join": "round" }, paint: { "line-color": ["get", "shade"], "line-width": 5 } });
+    else map.addLayer({ id, source: id, type: "circle", paint: { "circle-radius": 7, "circle-color": color("paper"), "circle-stroke-width": 3, "circle-stroke-color": color("ink") } });
+  }
+
+  function frame(): void {
+    if (!track?.count) return;
+    const [, lon, lat] = track.data as [Float64Array, Float64Array, Float64Array];
+    const bounds = new maplibre.LngLatBounds();
+    for (let i = 0; i < lon.length; i++) bounds.extend([lon[i] as number, lat[i] as number]);
+    map.fitBounds(bounds, { padding: 40, duration: 0, maxZoom: 24 });
+  }
+
+  function mark(time: number | null): void {
+    if (!track || time === null || !map.isStyleLoaded()) return;
+    const i = nearest(track.data[0] as Float64Array, time);
+    const [lon, lat] = [(track.data[1] as Float64Array)[i] as number, (track.data[2] as Float64Array)[i] as number];
+    replace("here", [{ type: "Feature", properties: {}, geometry: { type: "Point", coordinates: [lon, lat] } }], "circle");
+    tell(i);
+  }
+
+  function tell(i: number): void {
+    if (!track) return;
+    const asked = names().find((n) => n.value === quantity.value);
+    const t = (track.data[0] as Float64Array)[i] as number;
+    const v = track.data[3]?.[i];
+    const event = eventAt(t);
+    readout.value = [`t ${t.toFixed(2)} s`, v === undefined ? "" : `${asked?.title} ${digits(v * (asked?.scale ?? 1))} ${asked?.unit}`, soilAt(t), event ? `${event.kind}${event.why ? `: ${event.why}` : ""}` : ""].filter(Boolean).join("   ");
+  }
+
+  charts.onCursor = mark;
+  charts.onRange = ([start, end]) => {
+    if (!track?.count || !run) return;
+    if (start <= run.start && end >= run.end) return frame();
+    const time = track.data[0] as Float64Array;
+    const [a, b] = [nearest(time, start), nearest(time, end)];
+    const bounds = new maplibre.LngLatBounds();
+    for (let i = a; i <= b; i++) bounds.extend([(track.data[1] as Float64Array)[i] as number, (track.data[2] as Float64Array)[i] as number]);
+    map.fitBounds(bounds, { padding: 60, duration: 200, maxZoom: 24 });
+  };
+  map.on("mousemove", (event) => {
+    if (!track?.count) return;
+    const [, lon, lat] = track.data as [Float64Array, Float64Array, Float64Array];
+    let best = -1;
+    let least = 0.02 * (map.getBounds().getEast() - map.getBounds().getWest());
+    for (let i = 0; i < lon.length; i++) {
+      const away = Math.hypot((lon[i] as number) - event.lngLat.lng, (lat[i] as number) - event.lngLat.lat);
+      if (away < least) [least, best] = [away, i];
+    }
+    if (best >= 0) mark((track.data[0] as Float64Array)[best] as number);
+  });
+
+  choice.addEventListener("change", () => void open(choice.value));
+  quantity.addEventListener("change", () => void draw());
+  base.addEventListener("change", () => void lay(base.value));
+
+  async function lay(picture: string): Promise<void> {
+    await ready;
+    if (map.getLayer("base")) map.removeLayer("base");
+    if (map.getSource("base")) map.removeSource("base");
+    if (!picture) return;
+    const placed = await tried(() => get<Placed>("basemap", { path: picture }));
+    if (!placed) return;
+    const at = placed.corners ?? (await corners(picture, map.getBounds()));
+    if (!at) return;
+    map.addSource("base", { type: "image", url: new URL(address("basemap/picture", { path: picture }), location.href).href, coordinates: at });
+    map.addLayer({ id: "base", type: "raster", source: "base" }, map.getLayer("track") ? "track" : undefined);
+  }
+
+  async function reload(): Promise<void> {
+    const folder = await tried(() => get<{ items: Item[] }>("folder"));
+    const items = folder?.items ?? [];
+    const runs = items.filter((item) => item.kind === "estimates").map((item) => item.path);
+    const pictures = items.filter((item) => item.kind === "basemap" || (item.kind === "picture" && !item.path.endsWith(".svg"))).map((item) => item.path);
+    fill(choice, runs.length ? runs.map((name) => h("option", { value: name, selected: name === path }, name)) : h("option", { value: "" }, "No estimates in the folder"));
+    const before = base.value;
+    fill(base, h("option", { value: "" }, "No basemap"), pictures.map((name) => h("option", { value: name, selected: name === before }, name)));
+    const wanted = query.get("path");
+    if (!path && runs.length) await open(wanted && runs.includes(wanted) ? wanted : (runs[0] as string));
+  }
+
+  const forget = notices.on((notice) => notice.kind === "folder" && void reload());
+  void reload();
+  Object.assign(window, { terragripMap: { map, charts } });
+  return () => {
+    forget();
+    forgetTheme();
+    charts.close();
+    map.remove();
+  };
+};
+
+/** 5 % and 95 % of the values: one spike must not wash out the rest. */
+function spread(values: Float64Array): [number, number] {
+  const known = Array.from(values).filter((v) => !Number.isNaN(v)).sort((a, b) => a - b);
+  const low = known[Math.floor(0.05 * known.length)] ?? 0;
+  const high = known[Math.floor(0.95 * known.length)] ?? 1;
+  return high > low ? [low, high] : [low - 0.5, low + 0.5];
+}
+
+function nearest(time: Float64Array, wanted: number): number {
+  let [low, high] = [0, time.length - 1];
+  while (low < high) {
+    const middle = (low + high) >> 1;
+    if ((time[middle] as number) < wanted) low = middle + 1;
+    else high = middle;
+  }
+  return low;
+}
