@@ -31,8 +31,8 @@ class OnlineSettings:
     """`length` [m]: mean way on one ground; `threshold`: probability at which a change is told; `recent` [s]: how far back to look."""
 
     length: float = 30.0
-    threshold: float = 0.5
-    recent: float = 6.0
+    threshold: float = 0.8
+    recent: float = 10.0
     names: tuple[str, ...] = GROUND
 
 

@@ -21,7 +21,7 @@ Array = NDArray[np.float64]
 class Chain:
     """The prior: mean length of one soil [m], and the share that a soil nobody knows has among the new ones."""
 
-    length: float = 10.0
+    length: float = 8.0
     unknown: float = 0.1
 
     def start(self, soils: int) -> Array:

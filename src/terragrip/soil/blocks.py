@@ -23,7 +23,7 @@ Array = NDArray[np.float64]
 
 PERIOD = 0.5
 """Seconds of a block: several times the filter's own memory of noise, and short beside a border's crossing."""
-SETTLING = 2
+SETTLING = 4
 """Blocks after a standstill, a stuck spell or a gap in which the estimates still swing in."""
 LEAST_ROWS = 4
 """Fewest usable rows that tell how much a block varies."""
