@@ -33,8 +33,8 @@ class Confusion:
 
 @dataclass(frozen=True)
 class ReliabilityBin:
-    """Blocks whose stated probability of the most probable soil lies in [lower, upper): their mean probability, the share that was right, and
-    how many there are."""
+    """Blocks whose stated probability of the most probable soil lies in [lower, upper): the mean of it, the share that was right, and how
+    many there are."""
 
     lower: float
     upper: float
@@ -71,8 +71,10 @@ def confusion(timelines: Iterable[Timeline]) -> Confusion:
 def reliability(
     timelines: Iterable[Timeline], edges: Sequence[float] = (0, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 0.97, 1.0)
 ) -> tuple[ReliabilityBin, ...]:
-    """The most probable soil's probability against how often it was right, over labelled blocks that tell of the ground; empty bins are left
-    out."""
+    """The most probable soil's probability against how often it was right, over labelled blocks that tell of the ground.
+
+    Empty bins are left out.
+    """
     stated, right = [], []
     for one in timelines:
         rows = one.known & (one.label != "")

@@ -1,0 +1,424 @@
+"""How well the ground is told: changes and soils on simulated drives that nothing was tuned on.
+
+    python benchmarks/bench_ground.py [--seeds 3000 ...] [--write]
+
+A machine a seed, calibrated from its own campaign as `make demo` does it. Three libraries: of *another* machine (the 66 single-soil runs
+of seed 2000), of its *own* single-soil runs (other ground than the scored drives), and the other machine's without one soil at a time.
+Scored: `multi1` and `multi2` (the campaign's routes over several soils), `accuracy-clean` and `accuracy-faults` (another route, other
+sensors, faults), and the single-soil runs of the first two seeds, where every change told is a false alarm.
+
+A border counts where two soils that differ meet (fine and wet are one); it is found by a change within its transition (some part of
+vehicle or tool on a border, or on another soil than the rest) +- 2 s, one change a border. A second change in one transition, or one
+anywhere else, is false. Delay: from the soil under the centre of gravity changing to the change being told. Soils count by rows, all of
+them: standstill, transitions and stuck spells too. --write puts the tables and the reliability diagram into docs.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Iterable, Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass, field
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from calibration_drive import calibrate_machine
+from terragrip.estimation import Estimates, calibrate, estimate
+from terragrip.ground.analysis import Settings, analyse
+from terragrip.ground.baseline import adwin_changes
+from terragrip.ground.changes import Change
+from terragrip.ground.result import Timeline
+from terragrip.ground.scores import ReliabilityBin, calibration_error, confusion, merged, reliability
+from terragrip.ground.unknown import UNKNOWN
+from terragrip.simulation import Scenario, SimulationResult, set_runs, simulate
+from terragrip.simulation.campaign import run_seed
+from terragrip.soil.blocks import estimates_blocks
+from terragrip.soil.estimates import labelled_blocks, pairs_of
+from terragrip.soil.learn import learn_soils
+from terragrip.soil.library import SoilLibrary
+from terragrip.soil.signature import maker, with_signatures
+from terragrip.vehicle import Vehicle
+
+SEEDS = tuple(range(3000, 3008))
+LIBRARY_SEED = 2000
+MULTI = ("multi1", "multi2")
+OTHER = {"accuracy-clean": "clean", "accuracy-faults": "multirate"}
+ONE = {"fine": "fine or wet", "wet": "fine or wet"}
+MARGIN = 2.0
+WAYS = ("offline", "online", "adwin")
+ALONE = 2
+"""How many seeds also drive the single-soil runs."""
+DOCUMENT = Path(__file__).resolve().parents[1] / "docs/ground.md"
+PICTURE = DOCUMENT.parent / "images/ground-reliability.svg"
+BEGIN, END = "<!-- made by benchmarks/bench_ground.py --write -->", "<!-- end -->"
+
+
+@dataclass
+class Told:
+    """Changes of one way on some drives: borders, how many were found, changes told, false ones, hours driven, delays [s]."""
+
+    borders: int = 0
+    found: int = 0
+    told: int = 0
+    hours: float = 0.0
+    delays: list[float] = field(default_factory=list)
+
+    def add(self, other: Told) -> None:
+        self.borders += other.borders
+        self.found += other.found
+        self.told += other.told
+        self.hours += other.hours
+        self.delays += other.delays
+
+    @property
+    def recall(self) -> float:
+        return self.found / self.borders if self.borders else float("nan")
+
+    @property
+    def precision(self) -> float:
+        return self.found / self.told if self.told else float("nan")
+
+    @property
+    def false_an_hour(self) -> float:
+        return (self.told - self.found) / self.hours
+
+
+@dataclass
+class Drive:
+    """Scores of one drive: changes by way; shares of rows, and of settled rows, with the right soil; seconds until a soil was named."""
+
+    group: str
+    changes: dict[str, Told]
+    right: dict[str, float] = field(default_factory=dict)
+    settled: dict[str, float] = field(default_factory=dict)
+    naming: dict[str, list[float]] = field(default_factory=dict)
+    timelines: dict[str, Timeline] = field(default_factory=dict)
+    unknown: dict[str, tuple[int, int, int, int]] = field(default_factory=dict)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
+    parser.add_argument("--seeds", type=int, nargs="+", default=list(SEEDS))
+    parser.add_argument("--write", action="store_true", help="put the tables into docs/ground.md")
+    parser.add_argument("--workers", type=int, default=2)
+    arguments = parser.parse_args()
+    if LIBRARY_SEED in arguments.seeds:
+        parser.error(f"the library is of seed {LIBRARY_SEED}: it cannot be scored")
+    drives: list[Drive] = []
+    jobs = [(seed, k < ALONE) for k, seed in enumerate(arguments.seeds)]
+    with ProcessPoolExecutor(arguments.workers) as pool:
+        for (seed, _), found in zip(jobs, pool.map(score_seed, jobs), strict=True):
+            drives += found
+            right = [d.right["another, offline"] for d in found if d.right]
+            print(f"seed {seed}: soil right in {100 * np.mean(right):.1f} % of rows", flush=True)
+    text = tables(drives, arguments.seeds)
+    print("\n" + text)
+    if arguments.write:
+        write(text)
+        draw(drives)
+        print(f"written to {DOCUMENT} and {PICTURE}")
+
+
+@cache
+def library_of(seed: int) -> tuple[Vehicle, SoilLibrary]:
+    """The calibrated machine of a seed, and the library of its single-soil runs (never `multi1`, `multi2`)."""
+    names = [name for name in set_runs("campaign") if name not in MULTI]
+    logs = {name: run(name, seed) for name in names}
+    by = [logs[name].recording for name in names if name.endswith(("-01", "-02", "-06", "-09"))]
+    vehicle = calibrate(by, Scenario.load(MULTI[0]).nominal_vehicle()).apply(logs[names[0]].vehicle)
+    parts, blocks, made_by = [], {}, ""
+    for name in names:
+        found = estimate(logs[name].recording, vehicle)
+        parts += pairs_of(found, name)
+        made_by = maker(found)
+        for soil, one in labelled_blocks(found, None, name):
+            blocks.setdefault(soil, []).append(one)
+    library = learn_soils(parts).library()
+    return vehicle, SoilLibrary(with_signatures(library.soils, blocks, made_by))
+
+
+def run(name: str, seed: int) -> SimulationResult:
+    """A run of the campaign of a seed: one machine, another ground for each name."""
+    return simulate(name, run_seed(seed, name), machine_seed=seed)
+
+
+def score_seed(job: tuple[int, bool]) -> list[Drive]:
+    """All drives of one seed."""
+    seed, alone = job
+    another = library_of(LIBRARY_SEED)[1]
+    vehicle, own = library_of(seed)
+    drives = [score(run(name, seed), vehicle, "multi", another, own) for name in MULTI]
+    for name, sensors in OTHER.items():
+        result = simulate(name, seed)
+        calibrated = calibrate_machine(seed, sensors).apply(result.vehicle)
+        drives.append(score(result, calibrated, name, another, None))
+    if alone:
+        singles = [name for name in set_runs("campaign") if name not in MULTI]
+        drives += [Drive("single", told(run(name, seed), vehicle)) for name in singles]
+    return drives
+
+
+def score(
+    result: SimulationResult, vehicle: Vehicle, group: str, another: SoilLibrary, own: SoilLibrary | None
+) -> Drive:
+    """One drive over several soils."""
+    found = estimate(result.recording, vehicle)
+    drive = Drive(group, changes(found, result))
+    truth = np.array([ONE.get(x, x) for x in result.truth["soil"]], dtype=object)
+    mixed = result.truth["transition"].to_numpy(dtype=bool)
+    for label, library in (("another", another), ("own", own)):
+        if library is None:
+            continue
+        for way in ("offline", "online"):
+            ground, table = analyse(found, library, group, Settings(online=way == "online"))
+            named = np.array([ONE.get(x, x) for x in table["soil_estimate"]], dtype=object)
+            key = f"{label}, {way}"
+            drive.right[key] = float((named == truth).mean())
+            drive.settled[key] = float((named == truth)[~mixed].mean())
+            drive.timelines[key] = ground.timeline
+            if way == "online":
+                drive.naming[label] = list(naming(found.time, truth, named, result))
+    for soils in (("grass",), ("coarse",), ("fine", "wet"), ("hard",)):
+        rest = SoilLibrary({k: v for k, v in another.items() if k not in soils})
+        timeline = analyse(found, rest, group)[0].timeline
+        told_unknown = timeline.soil == UNKNOWN
+        missing, there = (
+            np.isin(timeline.label, soils),
+            (timeline.label != "") & ~np.isin(timeline.label, soils),
+        )
+        counts = [missing.sum(), (missing & told_unknown).sum(), there.sum(), (there & told_unknown).sum()]
+        drive.unknown[" and ".join(soils)] = (int(counts[0]), int(counts[1]), int(counts[2]), int(counts[3]))
+    return drive
+
+
+def naming(
+    time: np.ndarray, truth: np.ndarray, named: np.ndarray, result: SimulationResult
+) -> Iterator[float]:
+    """Seconds from a soil's coming under the centre of gravity to its being named while driving, 15 where it is not by then.
+
+    Borders with the vehicle standing, stuck or pushed from 10 s before to 5 s after are left out.
+    """
+    still = (result.truth["stuck"] | result.truth["push"] | result.truth["standstill"]).to_numpy(dtype=bool)
+    for k in np.flatnonzero(truth[1:] != truth[:-1]) + 1:
+        around = (time > time[k] - 10) & (time < time[k] + 5)
+        if not still[around].any():
+            rows = np.flatnonzero((time >= time[k]) & (time < time[k] + 15) & (named == truth[k]))
+            yield float(time[rows[0]] - time[k]) if rows.size else 15.0
+
+
+def told(result: SimulationResult, vehicle: Vehicle) -> dict[str, Told]:
+    """Changes on one drive, by way."""
+    return changes(estimate(result.recording, vehicle), result)
+
+
+def changes(found: Estimates, result: SimulationResult) -> dict[str, Told]:
+    blocks = estimates_blocks(found)
+    offline = analyse(found)[0].changes
+    online = analyse(found, settings=Settings(online=True))[0].changes
+    ways: dict[str, Sequence[Change]] = {"offline": offline, "online": online, "adwin": adwin_changes(blocks)}
+    spans = list(borders(result))
+    return {way: match(some, spans, float(found.time[-1] - found.time[0])) for way, some in ways.items()}
+
+
+def borders(result: SimulationResult) -> Iterator[tuple[float, float, float, bool]]:
+    """Transitions: start, end, when the soil changes under the centre of gravity, whether the soils differ."""
+    time = result.truth["time"].to_numpy()
+    soil = result.truth["soil"].to_numpy(dtype=object)
+    mixed = np.concatenate(([0], result.truth["transition"].to_numpy(dtype=np.int8), [0]))
+    for first, after in zip(
+        np.flatnonzero(np.diff(mixed) == 1), np.flatnonzero(np.diff(mixed) == -1), strict=True
+    ):
+        inside = slice(max(first - 1, 0), after + 1)
+        turn = np.flatnonzero(soil[inside][1:] != soil[inside][:-1])
+        if turn.size:
+            sides = {ONE.get(x, x) for x in (soil[inside][0], soil[inside][-1])}
+            yield time[first], time[after - 1], time[inside][turn[0] + 1], len(sides) > 1
+
+
+def match(some: Sequence[Change], spans: Sequence[tuple[float, float, float, bool]], seconds: float) -> Told:
+    """One change a border; a border between fine and wet may be told or not."""
+    out, taken = Told(borders=sum(differ for *_, differ in spans), hours=seconds / 3600), set()
+    for change in some:
+        near = [k for k, (a, b, _, _) in enumerate(spans) if a - MARGIN <= change.time <= b + MARGIN]
+        free = [k for k in near if k not in taken]
+        if free and not spans[free[0]][3]:
+            taken.add(free[0])
+            continue
+        out.told += 1
+        if free:
+            taken.add(free[0])
+            out.found += 1
+            if change.told is not None:
+                out.delays.append(change.told - spans[free[0]][2])
+    return out
+
+
+def tables(drives: Sequence[Drive], seeds: Sequence[int]) -> str:
+    """Markdown: changes, soils, unknown, confusion, reliability, targets."""
+    parts = [f"Seeds {seeds[0]} to {seeds[-1]}; the other machine's library is of seed {LIBRARY_SEED}.\n"]
+    parts += ["### Changes\n", _changes_table(drives), "### Soils\n", _soils_table(drives)]
+    parts += ["### A soil that the library does not hold\n", _unknown_table(drives)]
+    parts += [
+        "### Which for which\n",
+        _confusion_table(drives),
+        "### Probabilities\n",
+        _reliability_table(drives),
+    ]
+    return "\n".join([*parts, "### Targets\n", _targets(drives)])
+
+
+def _groups(drives: Iterable[Drive]) -> dict[str, list[Drive]]:
+    out: dict[str, list[Drive]] = {}
+    for drive in drives:
+        out.setdefault(drive.group, []).append(drive)
+    return out
+
+
+def _pooled(drives: Iterable[Drive], way: str) -> Told:
+    out = Told()
+    for drive in drives:
+        out.add(drive.changes[way])
+    return out
+
+
+def _changes_table(drives: Sequence[Drive]) -> str:
+    lines = [
+        "| drives | way | borders | recall | precision | false an hour | delay, median s | 90 % s |",
+        "|---|---|---:|---:|---:|---:|---:|---:|",
+    ]
+    for group, some in _groups(drives).items():
+        for way in WAYS:
+            one = _pooled(some, way)
+            scores = f"{one.recall:.3f} | {one.precision:.3f}" if one.borders else " | "
+            delay = (
+                "|"
+                if not one.delays
+                else f"{np.median(one.delays):.1f} | {np.percentile(one.delays, 90):.1f}"
+            )
+            lines.append(
+                f"| {group} ({one.hours:.2f} h) | {way} | {one.borders or ''} | {scores} | {one.false_an_hour:.1f} | {delay} |"
+            )
+    return "\n".join(lines) + "\n"
+
+
+def _soils_table(drives: Sequence[Drive]) -> str:
+    lines = [
+        "| drives | library, way | right, all rows % | right, settled % | named after, median s |",
+        "|---|---|---:|---:|---:|",
+    ]
+    for group, some in _groups(drives).items():
+        for key in dict.fromkeys(k for d in some for k in d.right):
+            label, way = key.split(", ")
+            waits = [w for d in some for w in d.naming.get(label, [])] if way == "online" else []
+            after = f"{np.median(waits):.1f}" if waits else ""
+            right = [100 * np.mean([getattr(d, n)[key] for d in some]) for n in ("right", "settled")]
+            lines.append(f"| {group} | {key} | {right[0]:.1f} | {right[1]:.1f} | {after} |")
+    return "Fine and wet taken as one.\n\n" + "\n".join(lines) + "\n"
+
+
+def _unknown_table(drives: Sequence[Drive]) -> str:
+    lines = ["| left out | of it unknown % | of the others unknown % |", "|---|---:|---:|"]
+    some = [d for d in drives if d.unknown]
+    for key in some[0].unknown:
+        a, b, c, d = np.sum([x.unknown[key] for x in some], axis=0)
+        lines.append(f"| {key} | {100 * b / max(a, 1):.1f} | {100 * d / max(c, 1):.1f} |")
+    return "Settled blocks of all drives, offline, the other machine's library.\n\n" + "\n".join(lines) + "\n"
+
+
+def _timelines(drives: Sequence[Drive], key: str) -> list[Timeline]:
+    return [d.timelines[key] for d in drives if key in d.timelines]
+
+
+def _confusion_table(drives: Sequence[Drive]) -> str:
+    found = confusion(_timelines(drives, "another, offline"))
+    lines = ["| label | " + " | ".join(found.soils) + " |", "|---|" + "---:|" * len(found.soils)]
+    for name, row in zip(found.labels, found.counts, strict=True):
+        lines.append(f"| {name} | " + " | ".join(f"{100 * x / row.sum():.1f}" for x in row) + " |")
+    return (
+        "Per cent of settled blocks of a label, offline, the other machine's library.\n\n"
+        + "\n".join(lines)
+        + "\n"
+    )
+
+
+def _bins(drives: Sequence[Drive], key: str, together: bool) -> tuple[ReliabilityBin, ...]:
+    some = _timelines(drives, key)
+    return reliability([merged(t, ONE) for t in some] if together else some)
+
+
+KEYS = ("another, offline", "another, online", "own, offline", "own, online")
+
+
+def _reliability_table(drives: Sequence[Drive]) -> str:
+    lines = [
+        "| library, way | soils | stated | right | blocks | calibration error |",
+        "|---|---|---|---|---|---:|",
+    ]
+    for key in KEYS:
+        for together in (False, True):
+            bins = _bins(drives, key, together)
+            stated, right = (", ".join(f"{getattr(b, n):.2f}" for b in bins) for n in ("stated", "right"))
+            counts = ", ".join(str(b.count) for b in bins)
+            soils = "fine and wet as one" if together else "all"
+            lines.append(
+                f"| {key} | {soils} | {stated} | {right} | {counts} | {calibration_error(bins):.3f} |"
+            )
+    return "\n".join(lines) + "\n"
+
+
+def _targets(drives: Sequence[Drive]) -> str:
+    several = [d for d in drives if d.group != "single"]
+    offline, online = _pooled(several, "offline"), _pooled(several, "online")
+    right = 100 * np.mean([d.right["another, offline"] for d in several])
+    rows = [
+        ("borders found, offline", offline.recall, 0.9, True),
+        ("precision of changes, offline", offline.precision, 0.85, True),
+        ("rows with the right soil, offline, another machine's library, %", right, 88.0, True),
+        ("median delay of a change told while driving, s", float(np.median(online.delays)), 3.0, False),
+    ]
+    lines = ["| figure, all drives over several soils | reached | target | |", "|---|---:|---:|---|"]
+    for name, value, target, least in rows:
+        met = value >= target if least else value <= target
+        lines.append(
+            f"| {name} | {value:.3g} | {'≥' if least else '≤'} {target:g} | {'reached' if met else 'missed'} |"
+        )
+    return "\n".join(lines) + "\n"
+
+
+def draw(drives: Sequence[Drive]) -> None:
+    """The reliability diagram."""
+    from terragrip.report.style import new_figure, on_paper, styled, to_svg
+
+    def panel(axes: Any, together: bool) -> None:
+        axes.plot([0.3, 1], [0.3, 1], "--", color="0.6", linewidth=1)
+        for key, marker in zip(KEYS, "osD^", strict=True):
+            bins = _bins(drives, key, together)
+            axes.plot(
+                [b.stated for b in bins], [b.right for b in bins], marker=marker, markersize=4, label=key
+            )
+        axes.set(xlabel="stated probability of the soil [–]", xlim=(0.3, 1.02), ylim=(0, 1.02))
+        axes.set_title("fine and wet taken as one" if together else "all soils")
+
+    figure = new_figure(8.0, 3.6)
+    with styled():
+        axes = figure.subplots(1, 2, sharey=True)
+        panel(axes[0], False)
+        panel(axes[1], True)
+        axes[0].set_ylabel("share that was right [–]")
+        axes[0].legend(fontsize=8, loc="upper left")
+    PICTURE.write_text(on_paper(to_svg(figure)), encoding="utf-8")
+
+
+def write(text: str) -> None:
+    """Replace what stands between the marks in docs/ground.md."""
+    old = DOCUMENT.read_text(encoding="utf-8")
+    before, rest = old.split(BEGIN, 1)
+    after = rest.split(END, 1)[1]
+    DOCUMENT.write_text(f"{before}{BEGIN}\n\n{text}\n{END}{after}", encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()
