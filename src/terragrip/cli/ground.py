@@ -50,6 +50,7 @@ def command(
     from terragrip.ground.analysis import Settings, analyse
     from terragrip.ground.result import write
     from terragrip.soil.library import SoilLibrary
+    from terragrip.soil.signature import signature_in
 
     if not 0 < length < float("inf"):
         raise InputError(f"{length:g} is no length", place="--length", mend="give metres, e.g. 30")
@@ -58,6 +59,8 @@ def command(
     target = check_file(output, inputs, suffixes=(".json",))
     tables = _tables(table, estimates, [*inputs, output])
     known = SoilLibrary.load(library) if library else None
+    for soil in known.values() if known else ():
+        signature_in(soil, library)
     settings, grounds = Settings(online=online, length=length), []
     with progress("ground", quiet) as step:
         for number, (path, run) in enumerate(zip(estimates, runs, strict=True), 1):

@@ -55,7 +55,7 @@ def analyse(
     changes = _changes(blocks, chosen)
     emissions = Emissions(dict(library.soils) if library else {}, maker(estimates))
     forward = ForwardFilter.begin(emissions, chosen.chain).update(blocks)
-    probabilities = by_soil(forward.filtered if chosen.online else forward.smoothed())
+    probabilities = by_soil(forward.filtered if chosen.online else forward.smoothed(), emissions.states)
     timeline = Timeline(
         blocks.start, emissions.names, probabilities, blocks.known, block_labels(estimates, blocks)
     )

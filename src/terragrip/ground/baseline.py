@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from terragrip.errors import InputError
@@ -20,14 +22,15 @@ def adwin_changes(blocks: Blocks, names: tuple[str, ...] = GROUND, delta: float 
     A change's time is when it is told; ADWIN gives no spread and no probability: std is NaN, probability 1. InputError without river.
     """
     try:
-        from river.drift import ADWIN
+        from river import drift
     except ImportError:
         raise InputError(
             "the baseline ADWIN needs river", mend="install it with pip install 'terragrip[ground]'"
         ) from None
+    make: Any = drift.ADWIN  # river carries no types
     signals, told = signals_of(blocks, names), []
     unit = np.array([(LAWS[n].mean, _SPAN * LAWS[n].sd) for n in names])
-    detectors = [ADWIN(delta=delta, clock=1) for _ in names]
+    detectors = [make(delta=delta, clock=1) for _ in names]
     for k, row in enumerate((signals - unit[:, 0]) / unit[:, 1] + 0.5):
         if not np.isfinite(row).all():
             continue
@@ -37,5 +40,5 @@ def adwin_changes(blocks: Blocks, names: tuple[str, ...] = GROUND, delta: float 
         if found:
             now = float(blocks.end[k])
             told.append(Change(now, float("nan"), 1.0, {}, now))
-            detectors = [ADWIN(delta=delta, clock=1) for _ in names]
+            detectors = [make(delta=delta, clock=1) for _ in names]
     return tuple(told)

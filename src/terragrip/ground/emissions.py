@@ -24,7 +24,7 @@ from terragrip.ground.laws import (
     normal,
     tempered,
 )
-from terragrip.ground.unknown import CELLS, UNKNOWN, cells
+from terragrip.ground.unknown import CELLS, ROUGHNESSES, UNKNOWN, cells, textures
 from terragrip.soil.blocks import Blocks
 from terragrip.soil.library import Soil
 from terragrip.soil.signature import Signature, curve_error, signature_in
@@ -74,12 +74,22 @@ class Emissions:
             )
         return tuple(said)
 
+    @cached_property
+    def states(self) -> NDArray[np.int64]:
+        """Which soil each state belongs to, an index of `names` (states,).
+
+        A known soil is one state; one whose roughness is not known has a state for each that the unknown soil may have, lest the
+        unknown soil win by being sharp where this one must be broad. The unknown soil's cells come last.
+        """
+        per = [1 if self._texture(one) else ROUGHNESSES.size for one in self.signatures.values()]
+        return np.repeat(np.arange(len(per) + 1), [*per, CELLS])
+
     def log_likelihood(self, blocks: Blocks) -> Array:
-        """(blocks, soils + CELLS), tempered: a block counts for PERIOD over the time in which blocks repeat each other.
+        """(blocks, states), tempered: a block counts for PERIOD over the time in which blocks repeat each other.
 
         0 where a block tells nothing of the ground.
         """
-        out = np.zeros((len(blocks), len(self.soils) + CELLS))
+        out = np.zeros((len(blocks), self.states.size))
         rough = np.isfinite(blocks.roughness).all(axis=1)
         for rows, told in ((blocks.known & rough, True), (blocks.known & ~rough, False)):
             if rows.any():
@@ -93,16 +103,20 @@ class Emissions:
         for name, soil in self.soils.items():
             signature = self.signatures[name]
             mine = tempered(mixed(_level(soil, signature, blocks), level), LEVEL_TIME)
+            texture = self._texture(signature)
+            if texture is None:
+                several = np.repeat(mine[:, None], ROUGHNESSES.size, axis=1)
+                columns.append(several if roughness is None else several + textures(roughness))
+                continue
             if roughness is not None:
-                mine = mine + tempered(self._texture(signature, roughness), ROUGHNESS_TIME)
-            columns.append(mine)
-        return np.column_stack([*columns, cells(blocks, roughness)])
+                own = bivariate(roughness - texture.roughness, texture.roughness_covariance)
+                mine = mine + tempered(mixed(own, broad_roughness(roughness)), ROUGHNESS_TIME)
+            columns.append(mine[:, None])
+        return np.concatenate([*columns, cells(blocks, roughness)], axis=1)
 
-    def _texture(self, signature: Signature | None, roughness: Array) -> Array:
-        broad = broad_roughness(roughness)
-        if signature is None or not self._comparable(signature):
-            return broad
-        return mixed(bivariate(roughness - signature.roughness, signature.roughness_covariance), broad)
+    def _texture(self, signature: Signature | None) -> Signature | None:
+        """The signature where its roughness can be compared with these estimates'."""
+        return signature if signature is not None and self._comparable(signature) else None
 
     def _comparable(self, signature: Signature) -> bool:
         return not (self.made_by and signature.made_by) or self.made_by == signature.made_by

@@ -88,7 +88,7 @@ class LiveGround:
         block = self._block(end)
         self._before = (int(block.number[0]), int(block.streak[0]))
         self._rows.clear()
-        probabilities = by_soil(self._filter.update(block).filtered)[0]
+        probabilities = by_soil(self._filter.update(block).filtered, self._emissions.states)[0]
         told = self._changes.update(block)
         change = Change(told[0].time, told[0].std, told[0].probability, {}, told[0].told) if told else None
         if change is not None:

@@ -11,7 +11,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from terragrip.ground.emissions import Emissions
-from terragrip.ground.unknown import CELLS
 from terragrip.soil.blocks import Blocks
 
 Array = NDArray[np.float64]
@@ -24,17 +23,17 @@ class Chain:
     length: float = 8.0
     unknown: float = 0.1
 
-    def start(self, soils: int) -> Array:
-        """Probabilities before anything is seen, (soils + CELLS,): the soils alike, the unknown's cells alike."""
+    def start(self, states: NDArray[np.int64]) -> Array:
+        """Probabilities before anything is seen (states,): known soils alike, states of one soil alike. `states`: of `Emissions`."""
+        soils = int(states[-1])
         unknown = self.unknown if soils else 1.0
-        return np.concatenate(
-            (np.full(soils, (1 - unknown) / max(soils, 1)), np.full(CELLS, unknown / CELLS))
-        )
+        each = np.append(np.full(soils, (1 - unknown) / max(soils, 1)), unknown)
+        return np.asarray((each / np.bincount(states))[states])
 
 
 @dataclass
 class ForwardFilter:
-    """Probabilities of the soils, and of the cells of the unknown one, up to now; one block at a time."""
+    """Probabilities of the states of `emissions` up to now; one block at a time."""
 
     emissions: Emissions
     chain: Chain
@@ -45,14 +44,14 @@ class ForwardFilter:
     def begin(cls, emissions: Emissions, chain: Chain | None = None) -> ForwardFilter:
         """Before the first block."""
         prior = chain or Chain()
-        return cls(emissions, prior, prior.start(len(emissions.soils)))
+        return cls(emissions, prior, prior.start(emissions.states))
 
     def update(self, blocks: Blocks) -> Forward:
         """Take blocks in order, one or many: the results are the same."""
         logs = self.emissions.log_likelihood(blocks)
         weight = np.exp(logs - logs.max(axis=1, keepdims=True)) if len(logs) else logs
         start, filtered, anew = (
-            self.chain.start(len(self.emissions.soils)),
+            self.chain.start(self.emissions.states),
             np.empty_like(logs),
             np.zeros(len(logs)),
         )
@@ -63,21 +62,22 @@ class ForwardFilter:
             self.probabilities = moved / moved.sum()
             self.travelled = float(travelled)
             filtered[k] = self.probabilities
-        return Forward(filtered, weight, anew, start)
+        return Forward(filtered, weight, anew, start, self.emissions.states)
 
 
 @dataclass(frozen=True)
 class Forward:
-    """A forward pass: filtered probabilities and relative likelihoods (blocks, soils + CELLS), the chance of a soil drawn anew before each
-    block (blocks,), and the law that it is drawn from (soils + CELLS,)."""
+    """A forward pass: filtered probabilities and relative likelihoods (blocks, states), the chance of a soil drawn anew before each block
+    (blocks,), the law that it is drawn from and the soil of each state (states,)."""
 
     filtered: Array
     weight: Array
     anew: Array
     start: Array
+    states: NDArray[np.int64]
 
     def smoothed(self) -> Array:
-        """Probabilities given the whole drive, (blocks, soils + CELLS): the backward pass of Rabiner 1989, scaled."""
+        """Probabilities given the whole drive, (blocks, states): the backward pass of Rabiner 1989, scaled."""
         out, after = self.filtered.copy(), np.ones(self.filtered.shape[1])
         for k in range(len(out) - 2, -1, -1):
             seen = self.weight[k + 1] * after
@@ -88,14 +88,6 @@ class Forward:
         return out
 
 
-def by_soil(probabilities: Array) -> Array:
-    """The cells of the unknown soil put together: (blocks, soils + 1)."""
-    soils = probabilities.shape[1] - CELLS
-    return np.column_stack([probabilities[:, :soils], probabilities[:, soils:].sum(axis=1)])
-
-
-def names_of(probabilities: Array, names: tuple[str, ...]) -> NDArray[np.object_]:
-    """The most probable soil of each row, (rows,)."""
-    if not len(probabilities):
-        return np.zeros(0, dtype=object)
-    return np.array(names, dtype=object)[probabilities.argmax(axis=1)]
+def by_soil(probabilities: Array, states: NDArray[np.int64]) -> Array:
+    """The states of each soil put together: (blocks, soils + 1), the unknown soil last."""
+    return np.asarray(np.add.reduceat(probabilities, np.flatnonzero(np.diff(states, prepend=-1)), axis=1))

@@ -55,13 +55,15 @@ def cells(blocks: Blocks, roughness: Array | None) -> Array:
     resistance = normal(off, spread[:, None] + blocks.resistance_variance[:, None, None])[:, :, None, :]
     out = tempered(mixed(adhesion + resistance, broad), LEVEL_TIME)
     if roughness is not None:
-        middle = np.column_stack([ROUGHNESSES, ROUGHNESSES + ADHESION_ROUGHNESS])
-        texture = bivariate(roughness[:, None, :] - middle, _ROUGHNESS_COVARIANCE)
-        out = (
-            out
-            + tempered(mixed(texture, broad_roughness(roughness)[:, None]), ROUGHNESS_TIME)[:, :, None, None]
-        )
+        out = out + textures(roughness)[:, :, None, None]
     return np.asarray(out.reshape(rows, CELLS))
+
+
+def textures(roughness: Array) -> Array:
+    """Tempered log likelihoods (blocks, ROUGHNESSES) of the roughness alone."""
+    middle = np.column_stack([ROUGHNESSES, ROUGHNESSES + ADHESION_ROUGHNESS])
+    mine = bivariate(roughness[:, None, :] - middle, _ROUGHNESS_COVARIANCE)
+    return tempered(mixed(mine, broad_roughness(roughness)[:, None]), ROUGHNESS_TIME)
 
 
 def _adhesion(blocks: Blocks) -> Array:

@@ -5,6 +5,7 @@ Learned from blocks of labelled estimates and kept in the library (`soils.<name>
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
@@ -52,7 +53,7 @@ class Signature:
         return {k: v.tolist() if isinstance(v, np.ndarray) else v for k, v in vars(self).items()}
 
     @classmethod
-    def from_dict(cls, data: Any, place: str) -> Signature:
+    def from_dict(cls, data: Any, place: str, file: str | os.PathLike[str] | None = None) -> Signature:
         """Of a library's entry; raises InputError where it is not what `to_dict` gives."""
         shapes = {"level": (2,), "level_sd": (2,), "roughness": (2,), "roughness_covariance": (2, 2)}
         try:
@@ -68,7 +69,10 @@ class Signature:
             sound = False
         if not sound:
             raise InputError(
-                "is no signature of a soil", place=place, mend="learn the library anew with terragrip soils"
+                "is no signature of a soil",
+                file=file,
+                place=place,
+                mend="learn the library anew with terragrip soils",
             )
         return cls(
             arrays["level"],
@@ -82,10 +86,10 @@ class Signature:
         )
 
 
-def signature_in(soil: Soil) -> Signature | None:
-    """The signature that a library's soil holds, None where it holds none; raises InputError where it is damaged."""
+def signature_in(soil: Soil, file: str | os.PathLike[str] | None = None) -> Signature | None:
+    """The signature that a library's soil holds, None where there is none; InputError where it is damaged, in the library `file`."""
     data = soil.fit.get("signature")
-    return None if data is None else Signature.from_dict(data, f"soils.{soil.name}.signature")
+    return None if data is None else Signature.from_dict(data, f"soils.{soil.name}.signature", file)
 
 
 def curve_error(soil: Soil, blocks: Blocks) -> tuple[Array, Array, Array]:

@@ -1,0 +1,193 @@
+"""Changes: the conjugate model against Student's law, segmentation against all segmentations, the detector against the plain recursion."""
+
+from __future__ import annotations
+
+import sys
+from dataclasses import replace
+from itertools import combinations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.special import logsumexp
+from scipy.stats import t as student
+
+from ground_drives import COARSE, FINE, GRASS, drive
+from terragrip.errors import InputError
+from terragrip.ground.baseline import adwin_changes
+from terragrip.ground.changes import LEAST, _Cost, _pelt, changes_of, weights
+from terragrip.ground.conjugate import Model
+from terragrip.ground.online_changes import OnlineChanges, OnlineSettings, online_changes
+from terragrip.ground.signals import GROUND, curve_scale, signals_of
+from terragrip.physics.adhesion import CURVES
+from terragrip.soil.blocks import estimates_blocks
+
+
+def predictive(model: Model, x: np.ndarray) -> np.ndarray:
+    """Log Student predictive of each row of x (n, signals) after those before it, all weights 1 (Murphy 2007, eq. 110)."""
+    mean, count, shape, scale = (np.array(v) for v in (model.mean, model.count, model.shape, model.scale))
+    out = []
+    for row in x:
+        law = student(2 * shape, mean, np.sqrt(scale * (count + 1) / (shape * count)))
+        out.append(law.logpdf(row).sum())
+        scale = scale + count * (row - mean) ** 2 / (2 * (count + 1))
+        mean, count, shape = (count * mean + row) / (count + 1), count + 1, shape + 0.5
+    return np.array(out)
+
+
+@given(st.integers(0, 10_000), st.integers(1, 30))
+@settings(max_examples=30)
+def test_evidence_is_the_product_of_student_predictives(seed, n):
+    model = replace(Model.of(GROUND), weight=np.ones(4))
+    x = model.mean + np.random.default_rng(seed).standard_normal((n, 4)) * 0.1
+    found = model.evidence(np.array([float(n)]), x.sum(axis=0)[None], (x**2).sum(axis=0)[None])
+    assert found[0] == pytest.approx(predictive(model, x).sum(), rel=1e-9, abs=1e-8)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_the_segmentation_is_the_best_of_all(seed):
+    rng = np.random.default_rng(seed)
+    steps = np.repeat(rng.normal(0.12, 0.06, 4), 6)
+    x = np.column_stack([steps, 0.85 + 0 * steps, -5.7 + 0 * steps, -5.1 + 0 * steps]) + rng.standard_normal(
+        (24, 4)
+    ) * [0.01, 0.08, 0.5, 0.5]
+    cost, price = _Cost(x, replace(Model.of(GROUND), weight=np.ones(4))), 6.0
+
+    def total(cuts):
+        ends = np.array([0, *cuts, 24])
+        return cost.of(ends[:-1], ends[1:]).sum() + price * len(cuts)
+
+    every = [
+        c for k in range(6) for c in combinations(range(0, 24, 2), k) if (np.diff([0, *c, 24]) >= LEAST).all()
+    ]
+    assert tuple(_pelt(cost, price)) == min(every, key=total)
+
+
+def test_a_change_is_found_where_it_is():
+    found = changes_of(estimates_blocks(drive(1, [("grass", GRASS, 40), ("coarse", COARSE, 40)])))
+    assert len(found) == 1
+    assert found[0].time == pytest.approx(40, abs=1)
+    assert found[0].std < 1
+    assert found[0].probability > 0.99
+    assert found[0].shift["soil_resistance"] > 2
+    assert found[0].shift["adhesion_sd"] > 1
+
+
+def test_pull_alone_is_no_change():
+    """More pull on one soil moves slip and adhesion along its curve: told where these are the signals, and not else."""
+    for seed in range(6):
+        blocks = estimates_blocks(drive(seed, [("fine", FINE, 60), ("fine", replace(FINE, slip=0.3), 60)]))
+        assert changes_of(blocks) == ()
+        assert online_changes(blocks) == []
+        assert changes_of(blocks, ("slip", "adhesion"))
+
+
+def test_correlation_lowers_what_a_block_counts_for():
+    """First-order noise: weights near (1 - r)/(1 + r), white noise near 1; steps of the level do not pass for correlation."""
+    rng = np.random.default_rng(0)
+    white = rng.standard_normal((4000, 1))
+    red = np.zeros((4000, 1))
+    for k in range(1, 4000):
+        red[k] = 0.7 * red[k - 1] + np.sqrt(1 - 0.49) * white[k]
+    assert weights(white)[0] == pytest.approx(1, abs=0.1)
+    assert weights(red)[0] == pytest.approx(0.3 / 1.7, rel=0.35)
+    assert weights(white + 8 * (np.arange(4000) // 400 % 2)[:, None])[0] == pytest.approx(1, abs=0.1)
+
+
+def test_standing_still_changes_nothing():
+    """The chance of a change goes with the way: the same signals at a standstill are told later, or never."""
+    estimates = drive(2, [("fine", FINE, 60), ("grass", GRASS, 4)])
+    still = replace(
+        estimates, columns={**estimates.columns, "distance": np.minimum(estimates.columns["distance"], 33.0)}
+    )
+    settings = OnlineSettings(threshold=0.3, recent=6)
+    assert len(online_changes(estimates_blocks(estimates), settings)) == 1
+    assert online_changes(estimates_blocks(still), settings) == []
+
+
+def plain_probabilities(x: np.ndarray, hazard: float, model: Model) -> np.ndarray:
+    """Adams and MacKay's recursion in the plain: log P(the present ground began at block k | all), after the last block."""
+    joint = np.array([0.0])
+    for n in range(len(x)):
+        grown = joint + np.log1p(-hazard) if n else joint
+        fresh = logsumexp(joint) + np.log(hazard) if n else -np.inf
+        joint = np.append(grown, fresh)
+        for k in range(len(joint)):
+            joint[k] += predictive(model, x[max(k - 1, 0) : n + 1] if k else x[: n + 1])[-1]
+    return joint - logsumexp(joint)
+
+
+def test_the_detector_is_the_plain_recursion(monkeypatch):
+    blocks = estimates_blocks(drive(3, [("fine", FINE, 8), ("grass", GRASS, 8)]))
+    blocks = blocks[blocks.known]
+    x, model = signals_of(blocks), replace(Model.of(GROUND), weight=np.ones(4))
+    monkeypatch.setattr("terragrip.ground.online_changes._LEAST", 0.0)
+    detector = OnlineChanges(OnlineSettings(length=30))
+    detector._weight = model.weight
+    detector.update(blocks)
+    hazard = -np.expm1(-0.3 / 30)  # 0.3 m a block
+    expected = plain_probabilities(x, hazard, model)
+    assert expected[1] == -np.inf  # the first block ends no ground
+    np.testing.assert_allclose(detector._probability, np.exp(np.delete(expected, 1)), rtol=1e-6, atol=1e-12)
+
+
+def test_a_change_is_told_soon_and_once():
+    told = online_changes(estimates_blocks(drive(4, [("grass", GRASS, 40), ("fine", FINE, 40)])))
+    assert len(told) == 1
+    assert 40 < told[0].told < 43.5
+    assert told[0].time == pytest.approx(40, abs=1)
+    assert 0.8 <= told[0].probability <= 1
+
+
+def test_block_by_block_and_with_a_break_it_tells_the_same():
+    blocks = estimates_blocks(drive(5, [("grass", GRASS, 30), ("coarse", COARSE, 30)]))
+    whole = online_changes(blocks)
+    first = OnlineChanges()
+    found = [told for k in range(50) for told in first.update(blocks[k : k + 1])]
+    second = OnlineChanges()
+    second.restore(first.to_dict())
+    found += second.update(blocks[50:])
+    assert found == whole
+    assert len(whole) == 1
+
+
+def test_slow_roughness_lets_levels_speak():
+    """At 4 Hz a half second has two rows: no roughness, but a change of level is still found."""
+    estimates = drive(6, [("grass", GRASS, 40), ("fine", FINE, 40)])
+    thin = replace(
+        estimates,
+        time=estimates.time[::5],
+        columns={k: v[::5] for k, v in estimates.columns.items()},
+        event_codes=estimates.event_codes[::5],
+        labels={k: v[::5] for k, v in estimates.labels.items()},
+    )
+    found = changes_of(estimates_blocks(thin))
+    assert [round(c.time) for c in found] == [40]
+
+
+def test_short_and_empty_drives_have_none():
+    blocks = estimates_blocks(drive(7, [("fine", FINE, 3)]))
+    assert changes_of(blocks) == ()
+    assert online_changes(blocks) == []
+
+
+def test_the_curve_scale_is_the_one_that_made_the_pair():
+    slip = np.array([0.1, 0.2, 0.4])
+    mu = CURVES["exponential"].value(slip, {"a": 0.4})
+    np.testing.assert_allclose(curve_scale(slip, mu), 0.4, rtol=0.06)
+    assert curve_scale(np.array([0.0]), np.array([0.0]))[0] == pytest.approx(0.85)
+
+
+def test_adwin_tells_of_a_large_step_too():
+    told = adwin_changes(estimates_blocks(drive(8, [("grass", GRASS, 60), ("coarse", COARSE, 60)])))
+    assert any(60 < one.told < 70 for one in told)
+
+
+def test_without_ruptures_or_with_an_unknown_signal_one_line(monkeypatch):
+    blocks = estimates_blocks(drive(9, [("fine", FINE, 20)]))
+    with pytest.raises(InputError, match="no signal 'colour'"):
+        changes_of(blocks, ("colour",))
+    monkeypatch.setitem(sys.modules, "ruptures.detection.pelt", None)
+    with pytest.raises(InputError, match=r"terragrip\[ground\]"):
+        changes_of(blocks)

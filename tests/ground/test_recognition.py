@@ -1,0 +1,155 @@
+"""Recognition: the filter against dense matrices, an unknown soil, twins that share, and what a library lacks."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from ground_drives import COARSE, FINE, GRASS, Ground, drive
+from terragrip.errors import InputError
+from terragrip.ground.analysis import Settings, analyse
+from terragrip.ground.emissions import Emissions
+from terragrip.ground.recognition import Chain, ForwardFilter, by_soil
+from terragrip.ground.unknown import CELLS
+from terragrip.soil.blocks import estimates_blocks
+from terragrip.soil.library import Soil, SoilLibrary
+from terragrip.soil.literature import literature_soils
+
+MIXED = [("grass", GRASS, 30), ("fine", FINE, 30), ("coarse", COARSE, 30), ("grass", GRASS, 20)]
+
+
+def without(library: SoilLibrary, *names: str) -> SoilLibrary:
+    return SoilLibrary({k: v for k, v in library.items() if k not in names})
+
+
+def share(timeline, label: str, soil: str) -> float:
+    """How much of the blocks labelled `label` is named `soil`."""
+    rows = timeline.label == label
+    return float((timeline.soil[rows] == soil).mean())
+
+
+def test_filter_and_smoother_are_those_of_dense_matrices(library):
+    emissions, chain = Emissions(dict(library)), Chain(length=5.0, unknown=0.2)
+    blocks = estimates_blocks(drive(1, [("grass", GRASS, 8), ("fine", FINE, 8)]))
+    forward = ForwardFilter.begin(emissions, chain).update(blocks)
+    likelihood, start = np.exp(emissions.log_likelihood(blocks)), chain.start(emissions.states)
+    n = len(start)
+    driven = np.diff(blocks.travelled, prepend=blocks.travelled[0])
+    steps = [(s := np.exp(-d / 5.0)) * np.eye(n) + (1 - s) * np.tile(start, (n, 1)) for d in driven]
+    alpha, filtered = start, []
+    for step, seen in zip(steps, likelihood, strict=True):
+        alpha = (alpha @ step) * seen
+        alpha /= alpha.sum()
+        filtered.append(alpha)
+    beta, both = np.ones(n), [filtered[-1]]
+    for k in range(len(blocks) - 2, -1, -1):
+        beta = steps[k + 1] @ (likelihood[k + 1] * beta)
+        beta /= beta.sum()
+        both.append(filtered[k] * beta / (filtered[k] * beta).sum())
+    np.testing.assert_allclose(forward.filtered, filtered, rtol=1e-8, atol=1e-14)
+    np.testing.assert_allclose(forward.smoothed(), both[::-1], rtol=1e-8, atol=1e-14)
+    assert forward.filtered.shape == (len(blocks), len(library) + CELLS)
+    together = by_soil(forward.filtered, emissions.states)
+    np.testing.assert_allclose(together[:, :3], forward.filtered[:, :3])
+    np.testing.assert_allclose(together[:, 3], forward.filtered[:, 3:].sum(axis=1))
+
+
+@pytest.mark.parametrize("online", [False, True])
+def test_known_soils_are_named(library, online):
+    ground, table = analyse(drive(2, MIXED), library, "m", Settings(online=online))
+    for soil in library:
+        assert share(ground.timeline, soil, soil) > (0.85 if online else 0.97)
+    assert [s.soil for s in ground.sections] == ["grass", "fine", "coarse", "grass"]
+    assert set(table["soil_estimate"]) <= {*library, "unknown"}
+    assert np.nanmin(table["soil_probability"]) > 0.2
+    assert ground.notes == ()
+
+
+@pytest.mark.parametrize("missing", ["grass", "coarse"])
+def test_a_soil_that_the_library_does_not_hold_is_unknown(library, missing):
+    timeline = analyse(drive(3, MIXED), without(library, missing))[0].timeline
+    assert share(timeline, missing, "unknown") > 0.9
+    for soil in library:
+        if soil != missing:
+            assert share(timeline, soil, soil) > 0.95
+
+
+def test_a_library_without_the_soils_driven_says_so(library):
+    ground, table = analyse(drive(4, [("ice", Ground(0.16, 0.03), 40)]), library)
+    assert set(table["soil_estimate"][400:]) == {"unknown"}
+    assert ground.notes == ("No soil of the library fits any of the drive: all of it is unknown.",)
+
+
+def test_twins_share_the_probability(library):
+    """Two soils that cannot be told apart: half each, whichever was driven."""
+    twins = SoilLibrary({**library, "twin": replace(library["fine"], name="twin")})
+    timeline = analyse(drive(5, [("fine", FINE, 60)]), twins)[0].timeline
+    last = dict(zip(timeline.names, timeline.probabilities[-1], strict=True))
+    assert last["fine"] == pytest.approx(last["twin"])
+    assert last["fine"] + last["twin"] > 0.99
+
+
+def test_standing_still_carries_the_soil_on(library):
+    estimates = drive(6, [("fine", FINE, 60)])
+    estimates.columns["distance"][600:] = estimates.columns["distance"][600]
+    for name in estimates.columns:
+        if name.startswith("slip"):
+            estimates.columns[name][600:] = np.nan
+    timeline = analyse(estimates, library, settings=Settings(online=True))[0].timeline
+    assert not timeline.known[62:].any()
+    np.testing.assert_allclose(timeline.probabilities[62:], np.tile(timeline.probabilities[62], (58, 1)))
+
+
+def test_wide_intervals_make_soils_hard_to_tell(library):
+    """The estimates' own SDs enter: ten times as wide, the same drive names its soil less surely."""
+    sharp = drive(7, [("fine", FINE, 30)])
+    wide = replace(sharp, columns={k: 20 * v if k.endswith("_std") else v for k, v in sharp.columns.items()})
+    one, other = (analyse(e, library)[0].timeline for e in (sharp, wide))
+    fine = one.names.index("fine")
+    assert other.probabilities[20:, fine].mean() < one.probabilities[20:, fine].mean() - 0.02
+
+
+def test_soils_without_a_signature_are_told_by_curve_and_resistance():
+    """Of a library that is older, or from the literature: named with less certainty, and said."""
+    soils = {
+        name: Soil(name, "exponential", {"a": g.a}, resistance=(g.resistance, 0.02))
+        for name, g in {"grass": GRASS, "fine": FINE}.items()
+    }
+    ground = analyse(drive(8, [("grass", GRASS, 40), ("fine", FINE, 40)]), SoilLibrary(soils))[0]
+    assert share(ground.timeline, "grass", "grass") > 0.8
+    assert share(ground.timeline, "fine", "fine") > 0.8
+    assert "no signature of grass, fine" in ground.notes[0]
+    assert analyse(drive(8, [("fine", FINE, 30)]), literature_soils())[0].timeline.probabilities.sum(
+        axis=1
+    ) == pytest.approx(1)
+
+
+def test_roughness_of_another_method_is_not_compared(library):
+    smoothed = drive(9, [("fine", FINE, 40)], smooth=True)
+    ground = analyse(smoothed, library)[0]
+    assert "these are by bank, smoothed: their roughness is not compared" in ground.notes[0]
+    assert share(ground.timeline, "fine", "fine") > 0.5
+
+
+def test_an_empty_library_and_none_name_nothing():
+    for library in (None, SoilLibrary({})):
+        ground = analyse(drive(10, [("grass", GRASS, 30), ("fine", FINE, 30)]), library)[0]
+        assert set(ground.timeline.soil) == {"unknown"}
+        assert len(ground.changes) == 1
+
+
+def test_a_damaged_signature_is_named(library):
+    bad = replace(library["fine"], fit={"signature": {"level": 1}})
+    with pytest.raises(InputError, match=r"soils\.fine\.signature"):
+        analyse(drive(11, [("fine", FINE, 10)]), SoilLibrary({"fine": bad}))
+
+
+def test_nothing_to_read_is_said(library):
+    estimates = drive(12, [("fine", FINE, 20)])
+    estimates.event_codes[:] = 2
+    ground = analyse(estimates, library)[0]
+    assert "No stretch of the drive tells of the ground" in ground.notes[0]
+    assert ground.sections[0].slip_mean is None
+    assert [e["kind"] for e in ground.events] == ["standstill"]

@@ -1,0 +1,65 @@
+"""Signatures: the ground's own spread apart from the estimates', kept in the library."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from ground_drives import COARSE, FINE, GRASS, Ground, drive
+from terragrip.errors import InputError
+from terragrip.soil.blocks import estimates_blocks
+from terragrip.soil.library import Soil, SoilLibrary
+from terragrip.soil.signature import Signature, learn_signature, signature_in
+
+
+def test_it_finds_what_the_drives_were_drawn_from(library):
+    for name, ground in {"grass": GRASS, "fine": FINE, "coarse": COARSE}.items():
+        found = signature_in(library[name])
+        assert found.level[0] == pytest.approx(ground.resistance, abs=3 * ground.varies / np.sqrt(100))
+        assert found.runs == 2
+        assert found.made_by == "bank"
+    smooth, rough = signature_in(library["fine"]), signature_in(library["coarse"])
+    assert np.exp(rough.roughness - smooth.roughness) == pytest.approx(
+        5.0, rel=0.2
+    )  # as drawn: 0.015 against 0.003
+    assert rough.level_sd[0] == pytest.approx(0.03, rel=0.2)
+
+
+def test_the_estimates_own_noise_is_not_the_grounds():
+    soil = Soil("x", "exponential", {"a": 0.85})
+    blocks = estimates_blocks(drive(1, [("x", Ground(0.85, 0.12, 0.02), 400)]))
+    rng = np.random.default_rng(0)
+    noisy = replace(
+        blocks,
+        resistance=blocks.resistance + 0.03 * rng.standard_normal(len(blocks)),
+        resistance_variance=blocks.resistance_variance * 0 + 0.03**2,
+    )
+    clean = replace(blocks, resistance_variance=blocks.resistance_variance * 0)
+    for one in (clean, noisy):
+        assert learn_signature(soil, [one]).level_sd[0] == pytest.approx(0.02, rel=0.15)
+
+
+def test_too_few_blocks_are_no_signature():
+    blocks = estimates_blocks(drive(2, [("fine", FINE, 8)]))
+    assert learn_signature(Soil("fine", "exponential", {"a": 0.85}), [blocks]) is None
+    assert learn_signature(Soil("fine", "exponential", {"a": 0.85}), []) is None
+
+
+def test_it_survives_the_library_file(library, tmp_path):
+    library.write(tmp_path / "soils.json")
+    again = SoilLibrary.load(tmp_path / "soils.json")
+    for name in library:
+        assert signature_in(again[name]).to_dict() == signature_in(library[name]).to_dict()
+
+
+@pytest.mark.parametrize(
+    ("key", "value"),
+    [("level", [0.1]), ("level_sd", [0.0, 0.1]), ("roughness_covariance", [[1, 2], [2, 1]]), ("level_correlation", 1.0),
+     ("level", [float("nan"), 0.0]), ("blocks", "many")],
+)  # fmt: skip
+def test_a_damaged_one_is_refused(library, key, value):
+    data = {**signature_in(library["fine"]).to_dict(), key: value}
+    with pytest.raises(InputError, match=r"soils\.fine\.signature: is no signature"):
+        Signature.from_dict(data, "soils.fine.signature")

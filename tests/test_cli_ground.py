@@ -1,0 +1,122 @@
+"""``terragrip ground``: one file of results from one or many drives, and every input that is none."""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+sys.path.insert(0, str(Path(__file__).parent / "ground"))
+from ground_drives import FINE, GRASS, drive
+from terragrip.cli import main
+from terragrip.estimation import Estimates
+
+
+@pytest.fixture
+def files(tmp_path: Path) -> list[Path]:
+    """Two runs over grass and fine soil, and a library learned from two others."""
+    for seed, name in enumerate(("grass", "fine")):
+        drive(50 + seed, [(name, {"grass": GRASS, "fine": FINE}[name], 60)]).write(
+            tmp_path / f"{name}.parquet"
+        )
+    assert (
+        main(
+            [
+                "soils",
+                str(tmp_path / "grass.parquet"),
+                str(tmp_path / "fine.parquet"),
+                "-q",
+                "-o",
+                str(tmp_path / "soils.json"),
+            ]
+        )
+        == 0
+    )
+    paths = []
+    for seed in (1, 2):
+        paths.append(tmp_path / f"run{seed}.parquet")
+        drive(seed, [("grass", GRASS, 30), ("fine", FINE, 30)]).write(paths[-1])
+    return paths
+
+
+def fails(capsys: pytest.CaptureFixture[str], output: Path, *words: Any) -> str:
+    """The one line of a call that exits 2 and writes nothing."""
+    capsys.readouterr()
+    assert main(["ground", *map(str, words), "-o", str(output)]) == 2
+    lines = [line for line in capsys.readouterr().err.splitlines() if line.strip()]
+    assert len(lines) == 1, lines
+    assert not output.exists()
+    return lines[0]
+
+
+def test_one_drive_with_a_library(files, tmp_path, capsys):
+    out, table = tmp_path / "ground.json", tmp_path / "with.parquet"
+    words = [
+        "ground",
+        str(files[0]),
+        "--library",
+        str(tmp_path / "soils.json"),
+        "-o",
+        str(out),
+        "--table",
+        str(table),
+    ]
+    assert main(words) == 0
+    said = capsys.readouterr().out
+    assert "run1: 1 change, 2 sections, 0 events; grass, fine" in said
+    data = json.loads(out.read_text())
+    assert [s["soil"] for s in data["sections"]] == ["grass", "fine"]
+    assert data["library"] == "soils.json"
+    again = Estimates.read(table)
+    assert set(again["soil_estimate"]) <= {"grass", "fine", "unknown"}
+    assert again["soil_probability"].max() <= 1
+    assert main(words) == 0  # a table with these columns, and results, may be written anew
+    assert json.loads(out.read_text()) == data
+
+
+def test_many_drives_without_a_library(files, tmp_path, capsys):
+    out, folder = tmp_path / "ground.json", tmp_path / "tables"
+    assert main(["ground", *map(str, files), "-o", str(out), "--table", str(folder), "--online"]) == 0
+    data = json.loads(out.read_text())
+    assert {s["soil"] for s in data["sections"]} == {"unknown"}
+    assert [c["run"] for c in data["changes"]] == ["run1", "run2"]
+    assert all(c["told"] > c["time"] for c in data["changes"])
+    assert sorted(p.name for p in folder.iterdir()) == ["run1.parquet", "run2.parquet"]
+    capsys.readouterr()
+    assert main(["ground", str(folder / "run1.parquet"), "-q", "-o", str(out)]) == 0
+    assert capsys.readouterr().out == ""
+
+
+def test_unusable_inputs_are_one_line(files, tmp_path, capsys):
+    out, soils = tmp_path / "g.json", tmp_path / "soils.json"
+    assert "no such file" in fails(capsys, out, tmp_path / "none.parquet")
+    assert "is given twice" in fails(capsys, out, files[0], files[0])
+    (tmp_path / "x").mkdir()
+    twin = tmp_path / "x" / "run1.parquet"
+    twin.write_bytes(files[0].read_bytes())
+    assert "has the same name" in fails(capsys, out, files[0], twin)
+    assert "--length" in fails(capsys, out, files[0], "--length", "0")
+    assert "is not named .json" in fails(capsys, tmp_path / "g.txt", files[0])
+    newer = tmp_path / "newer.json"
+    newer.write_text(json.dumps({**json.loads(soils.read_text()), "version": 99}))
+    assert "newer.json: library version 99" in fails(capsys, out, files[0], "--library", newer)
+    broken = json.loads(soils.read_text())
+    broken["soils"]["fine"]["signature"]["level"] = "high"
+    newer.write_text(json.dumps(broken))
+    line = fails(capsys, out, files[0], "--library", newer)
+    assert "soils.fine.signature: is no signature" in line
+    assert "newer.json" in line
+    estimates = Estimates.read(files[0])
+    del estimates.columns["adhesion_fl"]
+    estimates.write(tmp_path / "cut.parquet")
+    assert "cut.parquet: column adhesion_fl: is missing" in fails(capsys, out, tmp_path / "cut.parquet")
+    drive(1, [("fine", FINE, 0)]).write(tmp_path / "empty.parquet")
+    assert "empty.parquet: holds no row" in fails(capsys, out, tmp_path / "empty.parquet")
+
+
+def test_without_the_extra_it_says_what_to_install(files, tmp_path, capsys, monkeypatch):
+    monkeypatch.setitem(sys.modules, "ruptures.detection.pelt", None)
+    assert "terragrip[ground]" in fails(capsys, tmp_path / "g.json", files[0])
