@@ -1,12 +1,21 @@
-"""Estimates on python-can's virtual bus, read by cantools with the DBC that comes with the package."""
+"""A robot's frames in and estimates out on python-can's virtual bus; cantools is the oracle on both sides."""
 
 from __future__ import annotations
 
-import pytest
+import asyncio
+import struct
 
-from machine import running, until
+import cantools
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from machine import events, rows_of, running, until
 from terragrip.errors import InputError
 from terragrip.estimation.engine import EVENTS
+from terragrip.formats import Profile
+from terragrip.live.frames import FrameDecoder
 from terragrip.live.service import Service
 from terragrip.live.sinks.can import DBC
 
@@ -20,8 +29,6 @@ def heard(bus) -> list:
 
 @pytest.mark.asyncio
 async def test_estimates_as_frames_that_the_dbc_describes(tmp_path, vehicle, short):
-    import cantools
-
     log = tmp_path / "drive.parquet"
     short.recording.to_pandas().to_parquet(log)
     service = Service(vehicle, [f"replay:{log}?speed=20"], [f"can:{tmp_path.name}?interface=virtual"])
@@ -74,8 +81,6 @@ def test_what_is_missing_is_not_available(vehicle):
 
 
 def test_the_dbc_knows_every_event():
-    import cantools
-
     choices = (
         cantools.database.load_file(DBC).get_message_by_name("TG_Vehicle").get_signal_by_name("Event").choices
     )
@@ -92,3 +97,119 @@ async def test_a_bus_that_is_not_there_is_named(vehicle):
     service = Service(vehicle, ["udp://127.0.0.1:0"], ["can:can99"])
     async with running(service):
         await until(lambda: any(event.kind == "sink_lost" for event in service.statistics.events))
+
+
+ROBOT = """VERSION ""
+NS_ :
+BS_:
+BU_: Robot
+BO_ 257 Hubs: 8 Robot
+ SG_ hub_fl : 0|16@1- (0.001,0) [0|0] "rad/s" Vector__XXX
+ SG_ hub_fr : 16|16@1- (0.001,0) [0|0] "rad/s" Vector__XXX
+ SG_ hub_rl : 32|16@1- (0.001,0) [0|0] "rad/s" Vector__XXX
+ SG_ hub_rr : 48|16@1- (0.001,0) [0|0] "rad/s" Vector__XXX
+BO_ 258 Motors: 8 Robot
+ SG_ motor_fl : 7|16@0- (0.01,0) [0|0] "N m" Vector__XXX
+ SG_ motor_fr : 23|16@0- (0.01,0) [0|0] "N m" Vector__XXX
+ SG_ motor_rl : 39|16@0- (0.01,0) [0|0] "N m" Vector__XXX
+ SG_ motor_rr : 55|16@0- (0.01,0) [0|0] "N m" Vector__XXX
+BO_ 259 Radar: 4 Robot
+ SG_ radar : 0|32@1- (1,0) [0|0] "km/h" Vector__XXX
+BO_ 260 Mixed: 8 Robot
+ SG_ page M : 0|4@1+ (1,0) [0|0] "" Vector__XXX
+ SG_ odd m1 : 5|11@1- (0.5,-3) [0|0] "" Vector__XXX
+ SG_ across m2 : 11|13@0+ (2,0) [0|0] "" Vector__XXX
+ SG_ always : 40|7@1+ (1,0) [0|0] "" Vector__XXX
+SIG_VALTYPE_ 259 radar : 1;
+"""
+
+
+@pytest.fixture(scope="module")
+def dbc(tmp_path_factory):
+    path = tmp_path_factory.mktemp("dbc") / "robot.dbc"
+    path.write_text(ROBOT)
+    return path
+
+
+@pytest.fixture(scope="module")
+def robot_profile(dbc):
+    wheels = ("fl", "fr", "rl", "rr")
+    return Profile.from_dict(
+        {
+            "dbc": [str(dbc)],
+            "channels": {f"wheel_speed_{w}": f"hub_{w}" for w in wheels}
+            | {f"drive_torque_{w}": f"motor_{w}" for w in wheels}
+            | {"ground_speed": "radar"},
+        }
+    )
+
+
+@given(identifier=st.sampled_from([257, 258, 259, 260]), data=st.binary(min_size=8, max_size=8))
+def test_frames_are_decoded_as_cantools_does(dbc, identifier, data):
+    message = cantools.database.load_file(dbc).get_message_by_frame_id(identifier)
+    data = data[: message.length]
+    try:
+        expected = message.decode(data)
+    except cantools.database.DecodeError:  # a page that there is not
+        return
+    found = FrameDecoder([str(dbc)], lambda name: False).fields(identifier, False, data)
+    assert found == pytest.approx(expected, nan_ok=True)
+
+
+def test_j1939s_not_available_is_missing_and_a_sender_has_a_name():
+    decoder = FrameDecoder([], lambda name: name.endswith("@F0"))
+    data = struct.pack("<HIBB", 0xFFFF, 0xFFFFFFFF, 0xFF, 0xFF)
+    assert decoder.fields(0x0CFE49F0, True, data) == {}
+    found = decoder.fields(0x0CFE49F0, True, struct.pack("<HIBB", 1500, 0, 0xFF, 0xFF))
+    assert found["GroundBasedMachineSpeed"] == pytest.approx(1.5)
+    assert found["GroundBasedMachineSpeed@F0"] == pytest.approx(1.5)
+    assert decoder.fields(0x123, False, data) == {}
+    assert decoder.unknown == {0x123: 1}
+
+
+@pytest.mark.asyncio
+async def test_a_robots_frames_give_its_slip(tmp_path, vehicle, short, dbc, robot_profile):
+    import can
+
+    database = cantools.database.load_file(dbc)
+    service = Service(vehicle, [f"can:{tmp_path.name}?interface=virtual"], profile=robot_profile)
+    with can.Bus(interface="virtual", channel=tmp_path.name) as bus:
+        async with running(service):
+            await asyncio.sleep(0.1)
+            for _, values in list(rows_of(short.recording))[:200]:
+                for name, prefix, channel in (
+                    ("Hubs", "hub", "wheel_speed"),
+                    ("Motors", "motor", "drive_torque"),
+                ):
+                    signals = {f"{prefix}_{w}": values[f"{channel}_{w}"] for w in vehicle.wheels}
+                    send(bus, database.get_message_by_name(name), signals)
+                send(bus, database.get_message_by_name("Radar"), {"radar": 3.6 * values["ground_speed"]})
+                await asyncio.sleep(0.01)
+            await until(lambda: service.core.counts.by_channel["ground_speed"]["received"] == 200)
+            await asyncio.sleep(0.1)
+    rows = [
+        message.row for message in service.seen if message.kind == "estimate" and not message.row.predicted
+    ]
+    speeds = np.array([row.values["ground_speed"] for row in rows if "ground_speed" in row.values])
+    assert speeds == pytest.approx(short.recording.channels["ground_speed"][:200], abs=1e-6)
+    last = rows[-1].estimate
+    # Stamped as they were sent, which here was not at their own pace: slip does not mind.
+    assert last.slip_fl == pytest.approx(short.truth["slip_fl"][199], abs=0.05)
+    assert not events(service, "schema")
+
+
+def send(bus, message, signals) -> None:
+    import can
+
+    bus.send(can.Message(arbitration_id=message.frame_id, data=message.encode(signals), is_extended_id=False))
+
+
+def test_a_profile_without_wheel_speeds_is_refused(vehicle):
+    with pytest.raises(InputError, match="the profile gives no wheel_speed_fl"):
+        Service(vehicle, ["can:x?interface=virtual"], profile=Profile.load("tractor-isobus"))
+
+
+def test_a_dbc_that_is_none_is_refused(tmp_path, vehicle):
+    (tmp_path / "no.dbc").write_text("nothing")
+    with pytest.raises(InputError, match=r"no\.dbc"):
+        Service(vehicle, [f"can:x?interface=virtual&dbc={tmp_path / 'no.dbc'}"])

@@ -14,8 +14,9 @@ from mcap.exceptions import EndOfFile
 from mcap.reader import NonSeekingReader, make_reader
 from websockets.asyncio.client import connect
 
-from machine import events, messages, running, until
+from machine import events, messages, rows_of, running, until
 from terragrip.errors import InputError
+from terragrip.formats import Profile
 from terragrip.live.schemas import NAMES
 from terragrip.live.service import Service
 
@@ -42,6 +43,79 @@ async def test_a_pair_of_zenoh_sessions(vehicle, short, port):
     measured = [m for m in got if not m["predicted"]]
     assert measured[-1]["time"] == short.recording.time[199]
     assert measured[-1]["slip_fl"] == pytest.approx(short.truth["slip_fl"][199], abs=0.05)
+
+
+async def test_ros_2_by_zenoh(vehicle, short, port):
+    """JointState and TwistStamped under the keys of rmw_zenoh; estimates come back as std_msgs/String in CDR."""
+    import zenoh
+    from rosbags.typesys import Stores, get_typestore
+
+    store = get_typestore(Stores.LATEST)
+    config = zenoh.Config()
+    config.insert_json5("scouting/multicast/enabled", "false")
+    config.insert_json5("listen/endpoints", json.dumps([f"tcp/127.0.0.1:{port}"]))
+    joints = [f"{w}_hub" for w in vehicle.wheels]
+    profile = Profile.from_dict(
+        {
+            "channels": {f"wheel_speed_{w}": f"/joints.velocity.{w}_hub" for w in vehicle.wheels}
+            | {f"drive_torque_{w}": f"/joints.effort.{w}_hub" for w in vehicle.wheels}
+            | {"ground_speed": {"norm_of": ["/gnss/vel.twist.linear.x", "/gnss/vel.twist.linear.y"]}}
+        }
+    )
+    got = []
+    with zenoh.open(config) as other:
+        other.declare_subscriber("7/terragrip/estimate/*/*", lambda s: got.append(bytes(s.payload)))
+        at = f"connect=tcp/127.0.0.1:{port}&domain=7"
+        service = Service(
+            vehicle, [f"ros2:/joints,/gnss/vel?{at}"], [f"ros2:/terragrip?{at}"], profile=profile
+        )
+        async with running(service):
+            await asyncio.sleep(0.6)
+            for time, values in list(rows_of(short.recording))[:100]:
+                for topic, name, message in ros_messages(store, 5.0 + time, values, vehicle.wheels, joints):
+                    key = f"7/{topic}/{name.replace('/msg/', '::msg::dds_::')}_/RIHS01_0"
+                    other.put(key, bytes(store.serialize_cdr(message, name)))
+            other.put("7/joints/sensor_msgs::msg::dds_::JointState_/RIHS01_0", b"garbage")
+            await until(
+                lambda: service.core.rows == 100 and len(got) >= 100 and service.feeds[0].unreadable == 1
+            )
+    text = store.deserialize_cdr(got[99], "std_msgs/msg/String").data
+    assert json.loads(text)["time"] == pytest.approx(5.0 + short.recording.time[99])
+    measured = [m.row for m in service.seen if m.kind == "estimate" and not m.row.predicted]
+    sent = short.recording.channels["drive_torque_rr"][:100]
+    assert [row.values["drive_torque_rr"] for row in measured] == sent.tolist()
+    assert measured[5].values["ground_speed"] == pytest.approx(
+        abs(short.recording.channels["ground_speed"][5])
+    )
+
+
+def ros_messages(store, time, values, wheels, joints):
+    """A JointState and a TwistStamped of one instant."""
+    import numpy as np
+
+    types = store.types
+    stamp = types["builtin_interfaces/msg/Time"](sec=int(time), nanosec=round(1e9 * (time % 1)))
+    header = types["std_msgs/msg/Header"](stamp=stamp, frame_id="base")
+    speeds, torques = (
+        np.array([values[f"{n}_{w}"] for w in wheels]) for n in ("wheel_speed", "drive_torque")
+    )
+    vector = types["geometry_msgs/msg/Vector3"]
+    yield (
+        "joints",
+        "sensor_msgs/msg/JointState",
+        types["sensor_msgs/msg/JointState"](
+            header=header, name=joints, position=np.zeros(4), velocity=speeds, effort=torques
+        ),
+    )
+    speed = values["ground_speed"]
+    twist = types["geometry_msgs/msg/Twist"](
+        linear=vector(0.6 * speed, 0.8 * speed, 0.0), angular=vector(0.0, 0.0, 0.0)
+    )
+    yield (
+        "gnss/vel",
+        "geometry_msgs/msg/TwistStamped",
+        types["geometry_msgs/msg/TwistStamped"](header=header, twist=twist),
+    )
 
 
 async def test_zenoh_whose_other_side_is_absent_is_named(vehicle, port):

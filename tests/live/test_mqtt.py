@@ -122,22 +122,25 @@ async def test_by_password_in_and_out(tmp_path, vehicle, short, port, monkeypatc
 
 async def test_by_tls_and_a_number_a_topic(tmp_path, vehicle, short, port):
     with broker(tmp_path, port, tls=True):
+        hubs = {
+            f"wheel_speed_{wheel}": {"from": f"m/hubs/{wheel}", "unit": "rad/s"} for wheel in vehicle.wheels
+        }
         profile = Profile.from_dict(
-            {"channels": {"ground_speed": {"from": "m/speed", "unit": "km/h"}, "wheel_speed_fl": {"from": "m/hubs/fl", "unit": "rad/s"}}}
-        )  # fmt: skip
+            {"channels": {"ground_speed": {"from": "m/speed", "unit": "km/h"}, **hubs}}
+        )
         service = Service(vehicle, [f"mqtts://127.0.0.1:{port}/m/#?ca={tmp_path}/cert.pem"], profile=profile)
         trusted = ssl.create_default_context(cafile=tmp_path / "cert.pem")
         async with running(service), aiomqtt.Client("127.0.0.1", port, tls_context=trusted) as client:
             await asyncio.sleep(0.3)
             for _ in range(20):
                 await client.publish("m/speed", "3.6")
-                await client.publish("m/hubs", json.dumps({"fl": 5.0, "fr": 5.1}))
-            await until(lambda: service.core.counts.total("received") == 40)
+                await client.publish("m/hubs", json.dumps(dict.fromkeys(vehicle.wheels, 5.0)))
+            await until(lambda: service.core.counts.total("received") == 100)
             await until(lambda: service.core.rows > 0)
         rows = [message.row for message in service.seen if message.kind == "estimate"]
     assert {name: value for row in rows for name, value in row.values.items()} == {
         "ground_speed": pytest.approx(1.0),
-        "wheel_speed_fl": 5.0,
+        **dict.fromkeys(hubs, 5.0),
     }
 
 

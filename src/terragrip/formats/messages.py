@@ -84,6 +84,14 @@ class Topic:
                 column.numbers.append(float(value) if known else np.nan)  # type: ignore[arg-type]
             self.strange += not known
 
+    def fields(self, message: Any) -> dict[str, Any]:
+        """The wanted fields of one message by name, for who takes messages as they come; nothing is collected."""
+        self._labels = self._names_of_entries(message)
+        found: dict[Path, Any] = {}
+        self._walk(message, (), found, None)
+        names = {f"{self.name}.{_shown(path)}" if path else self.name: value for path, value in found.items()}
+        return {name: value for name, value in names.items() if self.wanted is None or self.wanted(name)}
+
     def signals(self) -> tuple[dict[str, Signal], list[str]]:
         """The signals collected, and sentences on them."""
         notes = []

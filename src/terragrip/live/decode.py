@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from terragrip.errors import InputError
-from terragrip.formats.profile import Profile, Source
+from terragrip.formats.profile import Profile, Source, matching
 from terragrip.recording.schema import LABELS, REFERENCE, TIME, is_channel, unit_of
 from terragrip.units import factor_to, quantity
 
@@ -19,41 +19,56 @@ Sample = tuple[float | None, Values]
 _HUGE = 1e300
 
 
+_LAYOUTS = 256  # sets of fields whose plan is kept
+
+Read = Callable[[Mapping[str, Any]], float | None]
+
+
 @dataclass(frozen=True, slots=True)
-class _Channel:
-    name: str
-    read: Callable[[Mapping[str, Any]], float | None]
+class _Step:
+    """How a message of one set of fields gives a channel; of several ways the one of lowest ``rank`` counts."""
+
+    channel: str
     delay: float
+    rank: tuple[int, int]
+    read: Read
 
 
 class Decoder:
     """Turns fields into samples; ``unreadable`` collects channels whose value was no number since it was last cleared.
 
-    Without a profile fields must bear the recording's own names, in SI, with ``time`` in s.
+    Without a profile fields must bear the recording's own names, in SI, with ``time`` in s. ``units``: what the source
+    itself states of its fields. Raises InputError where the profile needs what only a whole log can give.
     """
 
     def __init__(self, profile: Profile | None) -> None:
         self.profile = profile
+        self.units: dict[str, str] = {}
         self.unreadable: dict[str, str] = {}
         self._known: dict[str, bool] = {}
-        self.wanted = frozenset() if profile is None else profile.sources
         self._time, self._zero = TIME, False
         self._first: int | float | None = None
         self._factor = 1.0
-        self._channels: list[_Channel] = []
+        self._plans: dict[tuple[str, ...], list[_Step]] = {}
+        self._best: dict[str, tuple[int, int]] = {}
+        self._divisors: dict[str, Any] = {}
+        self._sources: dict[str, Source] = {}
         if profile is not None:
             self._time, self._zero = profile.time.column, profile.time.zero == "first"
             self._factor = factor_to(profile.time.unit, "s")
-            self._channels = [
-                _Channel(name, self._reader(name, source), source.delay)
-                for name, source in profile.channels.items()
-                if name not in LABELS
-            ]
+            self._sources = {name: one for name, one in profile.channels.items() if name not in LABELS}
+            for name, source in self._sources.items():
+                _refuse_looking_ahead(name, source)
+                self._divisors |= {one.over: None for one in source.chain if one.over is not None}
 
     @property
     def channels(self) -> tuple[str, ...]:
         """The columns a profile promises; none without one."""
-        return tuple(channel.name for channel in self._channels)
+        return tuple(name for name, source in self._sources.items() if not source.optional)
+
+    def wants(self, name: str) -> bool:
+        """Whether the profile names a field."""
+        return self.profile is not None and self.profile.wants(name)
 
     def samples(self, fields: Mapping[str, Any]) -> list[Sample]:
         """The samples of one message: one, or several where channels have delays of their own; none without a value."""
@@ -62,13 +77,56 @@ class Decoder:
         rows = self.profile.rows
         if rows is not None and fields.get(rows.column) != rows.equals:
             return []
-        stamp = self._stamp(fields)
+        layout = tuple(fields)
+        plan = self._plans.get(layout)
+        if plan is None:
+            plan = self._plan(layout)
+        if self._divisors:
+            self._divisors |= {name: fields[name] for name in self._divisors if name in fields}
         by_delay: dict[float, Values] = {}
-        for channel in self._channels:
-            value = channel.read(fields)
+        for step in plan:
+            if step.rank > self._best.get(step.channel, step.rank):
+                continue  # a better source of this channel has spoken
+            value = step.read(fields)
             if value is not None:
-                by_delay.setdefault(channel.delay, {})[channel.name] = value
+                self._best[step.channel] = step.rank
+                by_delay.setdefault(step.delay, {})[step.channel] = value
+        if not by_delay:
+            return []
+        stamp = self._stamp(fields)
         return [(None if stamp is None else stamp - delay, values) for delay, values in by_delay.items()]
+
+    def _plan(self, layout: tuple[str, ...]) -> list[_Step]:
+        """What messages of these fields give: of each channel's ways the first whose fields are all there."""
+        plan = []
+        for name, source in self._sources.items():
+            found = next(
+                (step for k, one in enumerate(source.chain) if (step := self._step(name, k, one, layout))),
+                None,
+            )
+            if found is not None:
+                plan.append(found)
+        if len(self._plans) < _LAYOUTS:
+            self._plans[layout] = plan
+        return plan
+
+    def _step(self, name: str, place: int, source: Source, layout: tuple[str, ...]) -> _Step | None:
+        if source.constant is not None:
+            constant = quantity(source.constant, unit_of(name) or "1")
+            return _Step(name, source.delay, (place, 0), lambda fields: constant)
+        several = source.norm_of or source.pitch_of or source.roll_of
+        if several is not None:
+            columns = [next(iter(matching(column, layout)), None) for column in several]
+            if None in columns:
+                return None
+            return _Step(
+                name, source.delay, (place, 0), self._vector(name, source, [str(c) for c in columns])
+            )
+        for rank, candidate in enumerate(source.candidates):
+            column = next(iter(matching(candidate, layout)), None)
+            if column is not None:
+                return _Step(name, source.delay, (place, rank), self._scaled(name, source, column))
+        return None
 
     def _plain(self, fields: Mapping[str, Any]) -> list[Sample]:
         values: Values = {}
@@ -110,33 +168,22 @@ class Decoder:
             return None
         return None if value != value else value
 
-    def _reader(self, name: str, source: Source) -> Callable[[Mapping[str, Any]], float | None]:
-        factor = factor_to(source.unit, unit_of(name) or "1") if source.unit else 1.0
-        gain, offset = source.sign * factor * source.scale, source.sign * factor * source.offset
-        if source.constant is not None:
-            constant = quantity(source.constant, unit_of(name) or "1")
-            return lambda fields: constant
-        if source.norm_of is not None:
-            return self._norm(name, source.norm_of, gain, offset)
-        if source.column is None:
-            what = "derivative_of" if source.derivative_of else "pitch_of" if source.pitch_of else "roll_of"
-            if what == "derivative_of":
-                raise InputError(
-                    "derivative_of looks ahead, which live samples cannot", place=f"channels.{name}",
-                    mend="give a source of the speed itself",
-                )  # fmt: skip
-            return self._angle(name, source, gain, offset)
-        return self._scaled(name, source, gain, offset)
+    def _gain(self, name: str, source: Source, column: str | None) -> tuple[float, float]:
+        """Factor and offset from a field's number to SI: by the profile's unit, else by the one that the source states."""
+        unit = source.unit
+        if unit is None and source.scale == 1.0 and source.over is None and column is not None:
+            unit = self.units.get(column)
+        factor = factor_to(unit, unit_of(name) or "1") if unit else 1.0
+        return source.sign * factor * source.scale, source.sign * factor * source.offset
 
-    def _scaled(
-        self, name: str, source: Source, gain: float, offset: float
-    ) -> Callable[[Mapping[str, Any]], float | None]:
-        columns, over, least = source.candidates, source.over, source.over_minimum
+    def _scaled(self, name: str, source: Source, column: str) -> Read:
+        gain, offset = self._gain(name, source, column)
+        over, least = source.over, source.over_minimum
         bad = [item if isinstance(item, tuple) else (item, item) for item in source.invalid]
         plain = not bad and over is None
 
         def read(fields: Mapping[str, Any]) -> float | None:
-            raw = next((fields[column] for column in columns if fields.get(column) is not None), None)
+            raw = fields.get(column)
             if raw is None:
                 return None
             value = self._number(name, raw)
@@ -145,7 +192,7 @@ class Decoder:
             if any(low <= value <= high for low, high in bad):
                 return None
             if over is not None:
-                divisor = self._number(name, fields.get(over))
+                divisor = self._number(name, fields.get(over, self._divisors[over]))
                 if divisor is None or abs(divisor) < least:
                     return None
                 value /= divisor
@@ -153,30 +200,33 @@ class Decoder:
 
         return read
 
-    def _norm(
-        self, name: str, columns: tuple[str, ...], gain: float, offset: float
-    ) -> Callable[[Mapping[str, Any]], float | None]:
-        def read(fields: Mapping[str, Any]) -> float | None:
-            parts = [self._number(name, fields.get(column)) for column in columns]
-            known = [part for part in parts if part is not None]
-            return gain * math.hypot(*known) + offset if len(known) == len(columns) else None
-
-        return read
-
-    def _angle(
-        self, name: str, source: Source, gain: float, offset: float
-    ) -> Callable[[Mapping[str, Any]], float | None]:
+    def _vector(self, name: str, source: Source, columns: list[str]) -> Read:
+        """The size of a vector, or the pitch or roll of a quaternion."""
         import numpy as np
 
         from terragrip.formats.derivation import pitch_of, roll_of
 
-        columns, angle = (source.pitch_of, pitch_of) if source.pitch_of else (source.roll_of, roll_of)
+        gain, offset = self._gain(name, source, columns[0])
 
         def read(fields: Mapping[str, Any]) -> float | None:
-            parts = [self._number(name, fields.get(column)) for column in columns or ()]
-            if any(part is None for part in parts):
+            parts = [self._number(name, fields.get(column)) for column in columns]
+            numbers = [part for part in parts if part is not None]
+            if len(numbers) < len(parts):
                 return None
-            value = float(angle([np.array([part]) for part in parts])[0])
+            if source.norm_of is not None:
+                value = math.hypot(*numbers)
+            else:
+                angle = pitch_of if source.pitch_of is not None else roll_of
+                value = float(angle([np.array([number]) for number in numbers])[0])
             return None if value != value else gain * value + offset
 
         return read
+
+
+def _refuse_looking_ahead(name: str, source: Source) -> None:
+    if all(one.derivative_of is not None for one in source.chain) and not source.optional:
+        raise InputError(
+            "derivative_of looks ahead, which live samples cannot",
+            place=f"channels.{name}",
+            mend="give a source of the speed itself",
+        )

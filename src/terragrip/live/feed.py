@@ -39,6 +39,7 @@ class Feed:
         self.after = after  # newest stamp that the record holds: a replay goes on behind it
         self.messages = self.unreadable = 0
         self.is_lost = False
+        self.one_layout = True  # messages are of few kinds, so that another one is worth an event
         self._unpack, self._note = unpack, note
         self._said: dict[str, float] = {}
         self._layouts: dict[frozenset[str], None] = {}
@@ -60,7 +61,7 @@ class Feed:
     def _of_topic(self, topic: str, fields: Mapping[str, Any]) -> Mapping[str, Any]:
         """Fields by their own names, and by ``topic/name`` where the profile asks for that."""
         long = {f"{topic}/{name}": value for name, value in fields.items()}
-        wanted = {name: value for name, value in long.items() if name in self.decoder.wanted}
+        wanted = {name: value for name, value in long.items() if self.decoder.wants(name)}
         return {**fields, **wanted} if wanted else fields
 
     def fields(self, fields: Mapping[str, Any], arrival: float | None = None) -> None:
@@ -71,7 +72,8 @@ class Feed:
             self.inbox.put(self.index, stamp, values, arrival)
         if self.decoder.unreadable:
             self._say_unreadable()
-        self._watch_layout(fields.keys(), bool(samples))
+        if self.one_layout:
+            self._watch_layout(fields.keys(), bool(samples))
 
     def sample(self, stamp: float | None, values: Values, arrival: float | None = None) -> None:
         """A sample that needs no decoding."""

@@ -80,6 +80,8 @@ class Service:
         self.sinks = [open_sink(text, vehicle) for text in sinks]
         self.outboxes = [Outbox(uri) for uri, _ in self.sinks]
         self.sources: list[Source] = [source for _, source in opened]
+        if profile is not None:
+            _check_channels(profile, vehicle)
         channels = dict.fromkeys(
             name
             for decoder, source in zip(decoders, self.sources, strict=True)
@@ -132,6 +134,7 @@ class Service:
         ]
         gc.freeze()  # what is there now stays: the collector need not look at it again
         self._loop = asyncio.get_running_loop()
+        self._loop.set_exception_handler(_unheard)
         self._done = self._loop.create_future()
         for task in watched:
             task.add_done_callback(lambda _: self._source_done(watched))
@@ -338,3 +341,23 @@ class Service:
                 pause = _BACKOFF[0]
             await asyncio.sleep(pause)
             pause = min(2 * pause, _BACKOFF[1])
+
+
+def _check_channels(profile: Profile, vehicle: Vehicle) -> None:
+    """Raise InputError where the profile lacks what the filter cannot do without."""
+    needed = ["ground_speed", *(f"wheel_speed_{wheel}" for wheel in vehicle.wheels)]
+    lacking = [name for name in needed if name not in profile.channels]
+    if lacking:
+        raise InputError(
+            f"the profile gives no {lacking[0]}",
+            place="--profile",
+            mend="live estimates need the ground speed and each wheel's speed; record the log, and terragrip estimate gives slip",
+        )
+
+
+def _unheard(loop: asyncio.AbstractEventLoop, context: dict[str, Any]) -> None:
+    """A future that failed with nobody listening: aiomqtt leaves some when a broker goes, of which the service knows."""
+    if type(context.get("exception")).__module__.startswith("aiomqtt"):
+        logger.info("%s: %s", context["message"], context["exception"])
+    else:
+        loop.default_exception_handler(context)

@@ -14,6 +14,7 @@ if TYPE_CHECKING:
 
 _HOMES: dict[str, str] = {
     "udp": "udp", "mqtt": "mqtt", "mqtts": "mqtt", "zenoh": "zenoh", "foxglove": "foxglove", "studio": "studio", "can": "can",
+    "ros2": "ros2",
 }  # fmt: skip
 _ALL = ("rate", "columns")
 OPTIONS: dict[str, Collection[str]] = {
@@ -24,6 +25,7 @@ OPTIONS: dict[str, Collection[str]] = {
     "foxglove": (*_ALL, "mcap"),
     "studio": _ALL,
     "can": (*_ALL, "interface", "bitrate"),
+    "ros2": (*_ALL, "domain", "connect", "listen", "scout"),
 }
 
 

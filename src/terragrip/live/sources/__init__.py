@@ -13,6 +13,7 @@ from terragrip.live.uri import Uri
 
 _HOMES: dict[str, str] = {
     "udp": "udp", "replay": "replay", "mqtt": "mqtt", "mqtts": "mqtt", "serial": "serial", "zenoh": "zenoh",
+    "can": "can", "ros2": "ros2",
 }  # fmt: skip
 OPTIONS: dict[str, Collection[str]] = {
     "udp": ("allow",),
@@ -20,6 +21,8 @@ OPTIONS: dict[str, Collection[str]] = {
     "mqtt": ("qos", "client"),
     "mqtts": ("qos", "client", "ca"),
     "serial": ("baud",),
+    "can": ("interface", "bitrate", "dbc"),
+    "ros2": ("domain", "connect", "listen", "scout"),
     "zenoh": ("connect", "listen", "scout"),
 }
 

@@ -39,6 +39,7 @@ class SerialSource:
             line = serial.Serial(str(Path(self.uri.path)), self.baud, timeout=0.2)
         except (serial.SerialException, ValueError) as error:
             raise Lost(f"the device: {error}") from error
+        feed.one_layout = False
         feed.connected()
 
         def read() -> None:

@@ -1,0 +1,107 @@
+"""One CAN frame into named fields, by the same table and DBC files as logs (terragrip.formats.can)."""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Callable, Sequence
+
+from terragrip.formats.can.bits import Field
+from terragrip.formats.can.catalog import EXTENDED, Message, catalog, source_of
+from terragrip.formats.can.frames import of_sender
+from terragrip.live.payload import Fields
+
+_FLOATS = {16: "<e", 32: "<f", 64: "<d"}
+
+
+class FrameDecoder:
+    """Fields of a frame as a log of it would name them; ``units`` by name; ``unknown`` counts frames that no table holds.
+
+    ``wants`` tells whether a signal of one of several senders (``Name@F0``) is asked for. Raises InputError on a DBC that
+    cannot be read.
+    """
+
+    def __init__(self, databases: Sequence[str], wants: Callable[[str], bool]) -> None:
+        self._catalog = catalog(databases)
+        self._wants = wants
+        self._plans: dict[int, list[tuple[Field, tuple[str, ...]]] | None] = {}
+        self.unknown: dict[int, int] = {}
+        self.units = {
+            self._catalog.name(message, field): field.unit
+            for message in self._catalog.messages
+            for field in message.fields
+            if field.unit
+        }
+
+    def fields(self, identifier: int, extended: bool, data: bytes) -> Fields:
+        """The fields of a data frame; empty where no table holds it. "Not available" and "error" are left out."""
+        key = identifier | EXTENDED if extended else identifier
+        if key not in self._plans:
+            self._plans[key] = self._plan(key)
+        plan = self._plans[key]
+        if plan is None:
+            self.unknown[key] = self.unknown.get(key, 0) + 1
+            return {}
+        raws = {field.name: _raw(field, data) for field, _ in plan}
+        found: Fields = {}
+        by_name = {field.name: field for field, _ in plan}
+        for field, names in plan:
+            raw = raws[field.name]
+            if raw is None or not _chosen(field, raws) or (field.codes and _is_code(field, raw)):
+                continue
+            value = _physical(field, raw)
+            if field.reverse is not None and field.reverse in by_name and raws[field.reverse] == 0:
+                value = -value
+            for name in names:
+                found[name] = value
+        return found
+
+    def _plan(self, key: int) -> list[tuple[Field, tuple[str, ...]]] | None:
+        """The message's fields and the names of each."""
+        message = self._catalog.message_of(key)
+        return (
+            None
+            if message is None
+            else [(field, self._names(message, field, key)) for field in message.fields]
+        )
+
+    def _names(self, message: Message, field: Field, key: int) -> tuple[str, ...]:
+        name = self._catalog.name(message, field)
+        sender = of_sender(name, source_of(key)) if message.by_group else name
+        return (name, sender) if sender != name and self._wants(sender) else (name,)
+
+
+def _raw(field: Field, data: bytes) -> int | None:
+    """The raw value, unsigned; None where the payload does not reach to it."""
+    if len(data) <= field.last_byte:
+        return None
+    if field.little_endian:
+        raw = int.from_bytes(data, "little") >> field.start
+    else:
+        position = 8 * (field.start // 8) + 7 - field.start % 8  # from the first byte's highest bit
+        raw = int.from_bytes(data, "big") >> (8 * len(data) - position - field.length)
+    return raw & ((1 << field.length) - 1)
+
+
+def _chosen(field: Field, raws: dict[str, int | None]) -> bool:
+    return field.selector is None or raws.get(field.selector) in field.chosen
+
+
+def _is_code(field: Field, raw: int) -> bool:
+    """Whether a raw value says "error" or "not available" (see `terragrip.formats.can.bits.missing_codes`)."""
+    if field.length < 2 or field.floating:
+        return False
+    if field.signed:
+        return raw in ((1 << (field.length - 1)) - 1, (1 << (field.length - 1)) - 2)
+    if field.length % 8 == 0:
+        return raw >= 0xFB << (field.length - 8)
+    return raw >= (1 << field.length) - 2
+
+
+def _physical(field: Field, raw: int) -> float:
+    if field.floating:
+        number = struct.unpack(_FLOATS[field.length], raw.to_bytes(field.length // 8, "little"))[0]
+    elif field.signed and raw >> (field.length - 1):
+        number = raw - (1 << field.length)
+    else:
+        number = raw
+    return float(field.scale * number + field.offset)

@@ -1,0 +1,77 @@
+"""Frames of a CAN bus, by DBC files and the built-in table of J1939 and ISO 11783."""
+
+from __future__ import annotations
+
+import asyncio
+import threading
+from typing import Any
+
+from terragrip.live.can import check, errors, open_bus
+from terragrip.live.decode import Decoder
+from terragrip.live.feed import Feed, Lost
+from terragrip.live.frames import FrameDecoder
+from terragrip.live.uri import Uri
+
+_PATIENCE = 0.2  # s
+_AT_ONCE = 64  # frames
+
+
+class CanSource:
+    """``can:can0?interface=socketcan&dbc=machine.dbc``; several DBC files by commas. The profile's own are read too.
+
+    A sample is stamped by the interface, which is on the machine's clock.
+    """
+
+    real_time = True
+
+    def __init__(self, uri: Uri, decoder: Decoder) -> None:
+        self.uri = uri
+        check(uri)
+        own = decoder.profile.dbc if decoder.profile is not None else ()
+        databases = [name for name in uri.options.get("dbc", "").split(",") if name]
+        self.frames = FrameDecoder([*databases, *own], decoder.wants)
+        decoder.units = self.frames.units
+
+    async def run(self, feed: Feed) -> None:
+        """Feed frames; raises Lost where the bus is not there or goes away."""
+        loop, done = asyncio.get_running_loop(), threading.Event()
+        bus = await asyncio.to_thread(open_bus, self.uri)
+        feed.one_layout = False
+        feed.connected()
+
+        def read() -> None:
+            while not done.is_set():
+                frame = bus.recv(_PATIENCE)
+                batch: list[Any] = []
+                while frame is not None and len(batch) < _AT_ONCE:
+                    batch.append(frame)
+                    frame = bus.recv(0.0)
+                if frame is not None:
+                    batch.append(frame)
+                if batch:
+                    loop.call_soon_threadsafe(self._take, feed, batch)
+
+        reader = asyncio.ensure_future(asyncio.to_thread(read))
+        try:
+            await asyncio.shield(reader)
+        except errors() as error:
+            raise Lost(f"the bus: {error}") from error
+        finally:
+            done.set()
+            await asyncio.wait([reader])
+            bus.shutdown()
+
+    def _take(self, feed: Feed, batch: list[Any]) -> None:
+        for frame in batch:
+            if frame.is_error_frame or frame.is_remote_frame:
+                continue
+            fields = self.frames.fields(frame.arbitration_id, frame.is_extended_id, bytes(frame.data))
+            if fields:
+                feed.fields({**fields, "time": frame.timestamp} if frame.timestamp > 0 else fields)
+            else:
+                feed.messages += 1
+
+
+def open_source(uri: Uri, decoder: Decoder) -> CanSource:
+    """See `terragrip.live.sources.open_source`."""
+    return CanSource(uri, decoder)

@@ -1,0 +1,126 @@
+"""Topics of ROS 2: by rclpy where a ROS 2 installation is sourced, else by Zenoh as rmw_zenoh or a bridge puts them there."""
+
+from __future__ import annotations
+
+import asyncio
+import threading
+from collections.abc import Callable
+from typing import Any
+
+from terragrip.errors import InputError
+from terragrip.live.decode import Decoder
+from terragrip.live.feed import Feed, Lost
+from terragrip.live.payload import Unreadable
+from terragrip.live.ros2 import Reader, domain_of, has_rclpy, ros_name
+from terragrip.live.uri import Uri
+
+_LOOK = 1.0  # s between looks for topics that nobody publishes yet
+
+Take = Callable[[str, str, bytes], None]
+
+
+class Ros2Source:
+    """``ros2:/joint_states,/odom``; for a Zenoh bridge, whose keys hold no type, ``/odom:nav_msgs/msg/Odometry``."""
+
+    real_time = True
+
+    def __init__(self, uri: Uri, decoder: Decoder) -> None:
+        self.uri, self._decoder = uri, decoder
+        self.domain = domain_of(uri)
+        parts = [part.partition(":") for part in uri.path.split(",") if part]
+        self.topics = {name: kind for name, _, kind in parts}
+        if not parts or not all(name.startswith("/") for name in self.topics):
+            raise InputError("names no topic", place=uri.text, mend="write ros2:/joint_states,/odom")
+        self.by_rclpy = has_rclpy()
+        if not self.by_rclpy:
+            from terragrip.live.zenoh import config
+
+            config(uri)
+
+    async def run(self, feed: Feed) -> None:
+        """Feed messages; raises Lost where the other side is not there."""
+        loop, reader = asyncio.get_running_loop(), Reader(self._decoder)
+        feed.one_layout = False
+
+        def take(topic: str, kind: str, data: bytes) -> None:
+            try:
+                fields = reader.fields(topic, kind, data)
+            except Unreadable as error:
+                feed.spoiled(f"{error} on {topic}")
+                return
+            if fields:
+                feed.fields(fields)
+
+        def heard(topic: str, kind: str, data: bytes) -> None:  # in another thread
+            loop.call_soon_threadsafe(take, topic, kind, data)
+
+        await (self._by_rclpy if self.by_rclpy else self._by_zenoh)(feed, heard)
+
+    async def _by_zenoh(self, feed: Feed, heard: Take) -> None:
+        from terragrip.live.zenoh import open_session
+
+        session = await asyncio.to_thread(open_session, self.uri)
+        try:
+            for topic, kind in self.topics.items():
+                session.declare_subscriber(f"{self.domain}{topic}/*/*", self._typed(topic, heard))
+                if kind:
+                    session.declare_subscriber(topic.strip("/"), self._bridged(topic, kind, heard))
+            feed.connected()
+            await asyncio.Event().wait()
+        finally:
+            await asyncio.to_thread(session.close)
+
+    def _typed(self, topic: str, heard: Take) -> Callable[[Any], None]:
+        def listen(sample: Any) -> None:
+            kind = ros_name(str(sample.key_expr).split("/")[-2])
+            if kind is not None:
+                heard(topic, kind, bytes(sample.payload))
+
+        return listen
+
+    def _bridged(self, topic: str, kind: str, heard: Take) -> Callable[[Any], None]:
+        return lambda sample: heard(topic, kind, bytes(sample.payload))
+
+    async def _by_rclpy(self, feed: Feed, heard: Take) -> None:
+        """Raw subscriptions, so that messages are read the same way on both paths."""
+        done = threading.Event()
+
+        def spin() -> None:
+            import rclpy
+            from rclpy.context import Context
+            from rclpy.executors import SingleThreadedExecutor
+            from rclpy.qos import qos_profile_sensor_data
+            from rosidl_runtime_py.utilities import get_message
+
+            context = Context()
+            rclpy.init(context=context, domain_id=self.domain)
+            node = rclpy.create_node("terragrip_live", context=context)
+            executor = SingleThreadedExecutor(context=context)
+            executor.add_node(node)
+            missing = dict(self.topics)
+            try:
+                while not done.is_set():
+                    types = dict(node.get_topic_names_and_types())
+                    for topic in [name for name in missing if name in types]:
+                        kind = missing.pop(topic) or types[topic][0]
+                        node.create_subscription(
+                            get_message(kind), topic, lambda data, t=topic, k=kind: heard(t, k, bytes(data)),
+                            qos_profile_sensor_data, raw=True,
+                        )  # fmt: skip
+                    executor.spin_once(timeout_sec=_LOOK if missing else 0.2)
+            finally:
+                node.destroy_node()
+                rclpy.shutdown(context=context)
+
+        feed.connected()
+        try:
+            await asyncio.to_thread(spin)
+        except RuntimeError as error:
+            raise Lost(f"ROS 2: {error}") from error
+        finally:
+            done.set()
+
+
+def open_source(uri: Uri, decoder: Decoder) -> Ros2Source:
+    """See `terragrip.live.sources.open_source`."""
+    return Ros2Source(uri, decoder)
