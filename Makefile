@@ -22,7 +22,7 @@ KERNEL_TESTS := $(patsubst kernel/tests/%.c,%,$(wildcard kernel/tests/*.c))
 BUILD_INPUTS := pyproject.toml setup.py cffi_build.py $(KERNEL_SOURCES) $(KERNEL_HEADERS) \
 	$(wildcard kernel/python/*.c src/terragrip/*/*.c src/terragrip/*/*.h)
 
-.PHONY: help demo test lint kernel-test web-test pytest studio bench lock clean
+.PHONY: help demo test lint kernel-test web-test pytest studio system bench lock clean
 
 help: ## show this list
 	@sed -n 's/^\([a-z-]*\):[^#]*## /  make \1\t/p' $(MAKEFILE_LIST)
@@ -30,13 +30,24 @@ help: ## show this list
 demo: $(VENV)/package studio ## set up, simulate the campaign, estimate every run, and say where the report is
 	@$(BIN)/terragrip demo
 
-test: lint kernel-test web-test pytest ## set up, then lint, type checks, import rules, C tests and Python tests
+test: system lint kernel-test web-test pytest ## set up, then lint, type checks, import rules, C tests and Python tests
 
 lint: $(VENV)/package $(VENV)/dev ## ruff, mypy and import-linter
 	$(BIN)/ruff check
 	$(BIN)/ruff format --check
 	$(BIN)/mypy
 	$(BIN)/lint-imports
+
+# Real parts of some tests: a browser for the studio, a broker for the live service. Installed only by root on Debian; without them
+# those tests say loudly that they were skipped.
+SYSTEM := chromium mosquitto openssl
+system: ## as root on Debian: install the programs that the tests of studio and live service drive
+	@missing=""; for name in $(SYSTEM); do PATH="$$PATH:/usr/sbin" command -v $$name >/dev/null 2>&1 || missing="$$missing $$name"; done; \
+	if [ -n "$$missing" ] && [ "$$(id -u)" = 0 ] && command -v apt-get >/dev/null 2>&1; then \
+	  echo "Installing$$missing for the tests"; \
+	  { apt-get update -qq && DEBIAN_FRONTEND=noninteractive apt-get install -qq -y --no-install-recommends $$missing; } >/dev/null 2>&1 \
+	    || echo "make: could not install$$missing; their tests will be skipped" >&2; \
+	elif [ -n "$$missing" ]; then echo "make: without$$missing some tests are skipped" >&2; fi
 
 pytest: $(VENV)/package $(VENV)/dev studio ## the Python tests alone
 	$(BIN)/python -m pytest -n $(WORKERS)

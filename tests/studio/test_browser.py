@@ -132,7 +132,10 @@ def test_the_browsers_curves_are_the_servers(page: Any, served: Served) -> None:
     for name, model in CURVES.items():
         page.select_option("#curve-model", name)
         drawn = page.evaluate(
-            "slips => slips.map(s => window.terragripFit.value(window.terragripFit.state.active.model, window.terragripFit.state.active.parameters, s))",
+            """slips => {
+              const { value, state } = window.terragripFit;
+              return slips.map((s) => value(state.active.model, state.active.parameters, s));
+            }""",
             slips.tolist(),
         )
         np.testing.assert_allclose(drawn, model.value(slips, {}), rtol=1e-12, atol=1e-14)
@@ -282,15 +285,64 @@ def test_two_browsers_see_each_others_changes(page: Any, browser: Any, served: S
     other.close()
 
 
+def test_drive_zooms_brushes_and_explains_a_sample(page: Any, served: Served) -> None:
+    page.goto(f"{served.url}/#/drive?path=estimates.parquet")
+    page.wait_for_selector(".charts[data-rows]")
+    chart = page.locator(".u-over").first
+    box = chart.bounding_box()
+    before = page.evaluate("() => window.terragripDrive.charts.range")
+    page.mouse.move(box["x"] + 200, box["y"] + 40)
+    page.mouse.down()
+    page.mouse.move(box["x"] + 320, box["y"] + 40, steps=4)
+    page.mouse.up()
+    after = page.evaluate("() => window.terragripDrive.charts.range")
+    assert after[1] - after[0] < 0.5 * (before[1] - before[0])
+    chart.click(position={"x": 100, "y": 30})
+    page.wait_for_selector(".why")
+    assert "adhesion" in page.inner_text(".why >> nth=0")
+    time_of = page.inner_text(".sample strong")
+    page.click("button[aria-label='Next sample']")
+    page.wait_for_function("t => document.querySelector('.sample strong').textContent !== t", arg=time_of)
+    page.click("text=Panels")
+    page.check("text=Filter's honesty: NIS")
+    page.wait_for_selector('[aria-label="Filter\'s honesty: NIS over time"]')
+
+
+def test_a_live_replay_follows_pauses_and_recovers(page: Any, served: Served) -> None:
+    page.goto(f"{served.url}/#/live?replay=estimates.parquet")
+    page.wait_for_selector("#live-state:text-is('connected')")
+    page.wait_for_function("() => window.terragripLive.feed.ring.taken > 150")
+    page.wait_for_function("() => window.terragripLive.traces.redraws > 20")
+    page.click("#pause")
+    held = page.evaluate("() => window.terragripLive.traces.held")
+    page.wait_for_timeout(300)
+    assert page.evaluate("() => window.terragripLive.feed.ring.now") > held
+    page.click("#pause")
+    served.stop()
+    page.wait_for_selector("#live-state:has-text('connection lost')")
+    served.start()
+    page.wait_for_selector("#live-state:text-is('connected')")
+
+
+def test_the_map_draws_the_track_and_changes_its_colours(page: Any, served: Served) -> None:
+    page.goto(f"{served.url}/#/map?path=estimates.parquet")
+    page.wait_for_function("() => window.terragripMap?.map.getSource('track')")
+    shades = "() => new Set(window.terragripMap.map.getSource('track').serialize().data.features.map((f) => f.properties.shade)).size"
+    assert page.evaluate(shades) > 5
+    page.select_option("#map-quantity", "soil")
+    page.wait_for_function(f"() => ({shades})() === 1")
+    assert "grass" in page.inner_text(".legend-row")
+
+
 @pytest.mark.parametrize("theme", ["light", "dark"])
-@pytest.mark.parametrize("where", ["#/start", "#/fit?path=estimates.parquet"])
+@pytest.mark.parametrize("where", ["#/start", "#/fit?path=estimates.parquet", "#/drive", "#/live", "#/map"])
 def test_axe_finds_nothing_serious(browser: Any, served: Served, where: str, theme: str) -> None:
     context = browser.new_context(
         viewport={"width": 1280, "height": 720}, color_scheme=theme, bypass_csp=True
     )
     tab = context.new_page()
     tab.goto(f"{served.url}/{where}")
-    tab.wait_for_selector("main h1, main h2")
+    tab.wait_for_selector("main select, main h1")
     tab.wait_for_timeout(500)
     tab.add_script_tag(path=AXE)
     found = tab.evaluate("() => axe.run(document, { resultTypes: ['violations'] })")

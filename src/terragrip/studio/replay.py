@@ -136,16 +136,31 @@ async def relayed(address: str, token: str | None) -> AsyncIterator[str | bytes]
 
 
 async def _together(socket: Any) -> AsyncIterator[str | bytes]:
-    """Messages as they come, rows within `PERIOD` of each other in one."""
-    rows: list[bytes] = []
+    """Messages in their order, rows that come within `PERIOD` of each other in one. Raises ConnectionClosed at the end."""
+    from websockets.exceptions import ConnectionClosed
+
     loop = asyncio.get_running_loop()
-    due = loop.time()
-    async for message in socket:
+    while True:
+        message = await socket.recv()
         if isinstance(message, str):
             yield message
             continue
-        rows.append(message)
-        if loop.time() >= due:
-            yield b"".join(rows)
-            rows.clear()
-            due = loop.time() + PERIOD
+        rows, due, text, gone = [message], loop.time() + PERIOD, None, None
+        while text is None and gone is None:
+            try:
+                async with asyncio.timeout_at(due):
+                    message = await socket.recv()
+            except TimeoutError:
+                break
+            except ConnectionClosed as closed:
+                gone = closed
+                break
+            if isinstance(message, str):
+                text = message
+            else:
+                rows.append(message)
+        yield b"".join(rows)
+        if text is not None:
+            yield text
+        if gone is not None:
+            raise gone

@@ -1,0 +1,180 @@
+"""The drive page's server: columns cut without losing a spike, samples explained, the track."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from fastapi.testclient import TestClient
+from hypothesis import given
+from hypothesis import strategies as st
+
+from terragrip.estimation import Estimates
+from terragrip.studio.tables import buckets, extremes
+
+RUN = "estimates.parquet"
+
+
+def unpack(content: bytes) -> dict[str, Any]:
+    size = int.from_bytes(content[:4], "little")
+    head = json.loads(content[4 : 4 + size])
+    values = np.frombuffer(content[4 + size :]).reshape(len(head["columns"]), head["count"])
+    return {**dict(zip(head["columns"], values, strict=True)), "cut": head["cut"]}
+
+
+def window(client: TestClient, **query: Any) -> dict[str, Any]:
+    answer = client.get("/api/drive/window", params={"path": RUN, **query})
+    assert answer.status_code == 200, answer.text
+    return unpack(answer.content)
+
+
+@given(
+    values=st.lists(st.floats(-1e6, 1e6) | st.just(np.nan), min_size=1, max_size=300),
+    width=st.integers(1, 40),
+    part=st.tuples(st.floats(0, 1), st.floats(0, 1)),
+)
+def test_buckets_keep_the_extremes_of_what_is_shown(
+    values: list[float], width: int, part: tuple[float, float]
+) -> None:
+    column, time = np.array(values), np.arange(len(values)) * 0.1
+    start, end = (x * time[-1] for x in sorted(part))
+    starts = buckets(time, start, end, width)
+    assert np.all(np.diff(starts) > 0)
+    inside = (time >= start) & (time <= end)
+    assert starts[0] <= np.flatnonzero(inside)[0] if inside.any() else True
+    assert starts[-1] > np.flatnonzero(inside)[-1] if inside.any() else True
+    assert len(starts) - 1 <= 2 * width + 1
+    low, high = extremes(column, starts)
+    shown = column[starts[0] : starts[-1]]
+    np.testing.assert_array_equal(np.fmin.reduce(low), np.fmin.reduce(shown))
+    np.testing.assert_array_equal(np.fmax.reduce(high), np.fmax.reduce(shown))
+
+
+def test_a_whole_run_is_cut_and_a_short_window_is_not(client: TestClient, folder: Path) -> None:
+    table = Estimates.read(folder / RUN)
+    ends = {"start": table.time[0], "end": table.time[-1]}
+    whole = window(client, column=["slip_rr", "slip_rr:low", "slip_rr:high"], width=100, **ends)
+    assert whole["cut"]
+    assert len(whole["time"]) <= 200
+    slip = table["slip_rr"]
+    assert np.nanmin(whole["slip_rr"]) == np.nanmin(slip)
+    assert np.nanmax(whole["slip_rr"]) == np.nanmax(slip)
+    spread = 1.959964 * table["slip_rr_std"]
+    assert np.nanmin(whole["slip_rr:low"]) == np.nanmin(slip - spread)
+    assert np.nanmax(whole["slip_rr:high"]) == np.nanmax(slip + spread)
+    few = window(client, column=["slip_rr"], width=1000, start=table.time[500], end=table.time[520])
+    assert not few["cut"]
+    np.testing.assert_array_equal(few["slip_rr"], slip[499:522])
+    np.testing.assert_array_equal(few["time"], table.time[499:522])
+
+
+def test_measured_channels_come_from_the_unchanged_recording(client: TestClient, folder: Path) -> None:
+    about = client.get("/api/drive", params={"path": RUN}).json()
+    assert about["recording"] == "recording.parquet"
+    assert "drive_torque_rr" in about["measured"]
+    shown = window(client, column=["measured:drive_torque_rr"], start=5.0, end=5.2)
+    import terragrip as tg
+
+    recording = tg.read(folder / "recording.parquet")
+    rows = np.searchsorted(recording.time, shown["time"])
+    np.testing.assert_array_equal(shown["measured:drive_torque_rr"], recording["drive_torque_rr"][rows])
+
+
+def test_another_recording_of_that_name_is_not_taken_for_it(client: TestClient, folder: Path) -> None:
+    shutil.copy(folder / "truth.parquet", folder / "recording.parquet")
+    about = client.get("/api/drive", params={"path": RUN}).json()
+    assert (about["recording"], about["measured"]) == (None, [])
+    answer = client.get(
+        "/api/drive/window", params={"path": RUN, "column": "measured:ground_speed", "start": 0, "end": 1}
+    )
+    assert answer.status_code == 422
+
+
+@pytest.mark.parametrize(
+    "query",
+    [
+        {"column": "nothing"},
+        {"column": "nis:low"},
+        {"column": "slip_rr:middle"},
+        {"column": "slip_rr", "end": -1},
+        {"column": "slip_rr", "start": "nan"},
+        {"column": "slip_rr", "path": "vehicle.yaml"},
+        {"column": "slip_rr", "width": 0},
+    ],
+)
+def test_unusable_windows_get_one_line(client: TestClient, query: dict[str, Any]) -> None:
+    answer = client.get("/api/drive/window", params={"path": RUN, "start": 0, "end": 9, **query})
+    assert answer.status_code == 422
+    assert "\n" not in answer.json()["detail"]
+
+
+def test_a_torque_step_is_named_as_what_moved_adhesion(client: TestClient, folder: Path) -> None:
+    """A made-up table: torque of one wheel steps by 10 N m, its adhesion by what the torque balance says, nothing else moves."""
+    import terragrip as tg
+
+    vehicle = tg.Vehicle.load(folder / "vehicle.yaml")
+    time = np.arange(0, 20, 0.01)
+    step = np.where(time >= 10, 10.0, 0.0)
+    recording = {"time": time, "ground_speed": np.full_like(time, 0.5)}
+    load = {"front": 250.0, "rear": 417.0}
+    columns = {"ground_speed": np.full_like(time, 0.5), "soil_resistance": np.full_like(time, 0.1)}
+    for number, wheel in enumerate(vehicle.wheels):
+        radius, axle = vehicle.wheel_radius[number], vehicle.axle_names[vehicle.wheel_axle[number]]
+        torque = 20.0 + (step if wheel == "rr" else 0.0 * step)
+        recording |= {f"wheel_speed_{wheel}": np.full_like(time, 3.0), f"drive_torque_{wheel}": torque}
+        columns |= {
+            f"wheel_speed_{wheel}": np.full_like(time, 3.0),
+            f"slip_{wheel}": np.full_like(time, 0.1),
+            f"adhesion_{wheel}": torque / (radius * load[axle]),
+        }
+        load_column = np.full_like(time, 2 * load[axle])
+        columns[f"vertical_load_{axle}"] = load_column
+    path = folder / "step.csv"
+    tg.Recording.from_frame(recording).to_pandas().to_csv(path, index=False)
+    back = tg.read(path)
+    about = {
+        "method": "bank",
+        "vehicle": vehicle.to_dict(),
+        "recording": {"source": "step.csv", "sha256": back.sha256},
+    }
+    Estimates(time, columns, np.zeros(len(time), np.uint8), {}, about).write(folder / "step.parquet")
+    found = client.get("/api/drive/sample", params={"path": "step.parquet", "time": 10.0}).json()
+    first = found["why"][0]
+    moved = 10.0 / (vehicle.wheel_radius[vehicle.wheels.index("rr")] * load["rear"])
+    assert first.startswith("rr: adhesion")
+    assert f"{moved:+.3f} within 1 s; torque +10.0 N m ({moved:+.3f})" in first
+    assert found["measured"]["drive_torque_rr"] == 30.0
+    assert all(f"adhesion {0:+.3f}" in text for text in found["why"][1:])
+
+
+def test_the_track_holds_every_position(client: TestClient, folder: Path) -> None:
+    answer = client.get("/api/drive/track", params={"path": RUN, "column": "slip_rr"})
+    track = unpack(answer.content)
+    table = Estimates.read(folder / RUN)
+    known = np.isfinite(table["latitude"])
+    np.testing.assert_array_equal(track["latitude"], table["latitude"][known])
+    np.testing.assert_array_equal(track["slip_rr"], table["slip_rr"][known])
+
+
+def test_the_plane_is_thinned_and_holds_pairs(client: TestClient) -> None:
+    pairs = client.get("/api/drive/plane", params={"path": RUN, "wheel": "rr", "start": 0, "end": 1e9}).json()
+    assert 100 < len(pairs["slip"]) == len(pairs["adhesion"]) <= 6000
+    assert (
+        client.get("/api/drive/plane", params={"path": RUN, "wheel": "zz", "start": 0, "end": 1}).status_code
+        == 422
+    )
+
+
+def test_ground_of_the_run_is_shown_where_it_lies_beside_it(client: TestClient, folder: Path) -> None:
+    assert client.get("/api/drive", params={"path": RUN}).json()["ground"] is None
+    ground = {
+        "changes": [],
+        "sections": [{"start": 0, "end": 9, "soil": "grass", "probabilities": {"grass": 1.0}}],
+        "events": [],
+    }
+    (folder / "estimates-ground.json").write_text(json.dumps(ground))
+    assert client.get("/api/drive", params={"path": RUN}).json()["ground"]["sections"] == ground["sections"]
