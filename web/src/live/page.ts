@@ -130,7 +130,10 @@ export const page: Page = (main, { notices, query }) => {
     );
     source.value = before;
     speed.hidden = source.value === "";
-    if (first) feed.again();
+    if (first) {
+      speed.value = query.get("speed") ?? "1";
+      feed.again();
+    }
   }
 
   const clock = window.setInterval(() => {

@@ -1,0 +1,74 @@
+"""A studio process on a folder with a simulated run, and a browser in front of it: shared by the benchmark and the screenshots."""
+
+from __future__ import annotations
+
+import contextlib
+import re
+import shutil
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+ARGUMENTS = [
+    "--no-sandbox",
+    "--disable-gpu",
+    "--disable-quic",
+    "--disable-background-networking",
+    "--disable-component-update",
+]
+
+
+def fill(folder: Path, scenario: str = "multi2", seed: int = 0) -> None:
+    """Recording, vehicle, estimates, soil library and ground of one simulated run of the campaign."""
+    import terragrip as tg
+    from terragrip.simulation import Scenario
+    from terragrip.soil.estimates import soils_of
+
+    made = tg.simulate(Scenario.load(scenario), seed)
+    made.save(folder)
+    (folder / "truth.parquet").unlink()
+    (folder / "true_parameters.json").unlink()
+    (folder / "recording.parquet").rename(folder / f"{scenario}.parquet")
+    tg.estimate(tg.read(folder / f"{scenario}.parquet"), tg.Vehicle.load(folder / "vehicle.yaml")).write(
+        folder / f"{scenario}-estimates.parquet"
+    )
+    soils_of([folder / f"{scenario}-estimates.parquet"]).library().write(folder / "soils.json")
+
+
+@contextlib.contextmanager
+def studio(folder: Path) -> Iterator[tuple[str, int]]:
+    """Serve the folder; gives the address and the process's number."""
+    process = subprocess.Popen(
+        [sys.executable, "-m", "terragrip", "studio", str(folder), "--port", "0"],
+        stdout=subprocess.PIPE,
+        text=True,
+    )
+    try:
+        assert process.stdout is not None
+        line = ""
+        while "http://" not in line:
+            line = process.stdout.readline()
+            if not line:
+                raise SystemExit("the studio did not start")
+        found = re.search(r"http://\S+", line)
+        assert found is not None
+        yield found.group(0), process.pid
+    finally:
+        process.terminate()
+        process.wait(10)
+
+
+@contextlib.contextmanager
+def browser() -> Iterator[Any]:
+    """Debian's chromium by playwright."""
+    from playwright.sync_api import sync_playwright
+
+    path = shutil.which("chromium") or shutil.which("chromium-browser")
+    if path is None:
+        raise SystemExit("this needs chromium: apt-get install chromium")
+    with sync_playwright() as started:
+        running = started.chromium.launch(executable_path=path, args=ARGUMENTS)
+        yield running
+        running.close()

@@ -1,0 +1,67 @@
+"""Make docs/images/studio-*.png: every page of the studio, light and dark, on a simulated run. Needs chromium and the built pages."""
+
+from __future__ import annotations
+
+import sys
+import tempfile
+from pathlib import Path
+from typing import Any
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "benchmarks"))
+from studio_session import browser, fill, studio
+
+IMAGES = Path(__file__).parent / "images"
+
+
+def drive(page: Any) -> None:
+    page.wait_for_selector(".charts[data-rows]")
+    page.locator(".u-over").first.click(position={"x": 560, "y": 40})
+    page.wait_for_selector(".why")
+
+
+def live(page: Any) -> None:
+    page.wait_for_function("() => window.terragripLive?.feed.ring.taken > 4500", timeout=60_000)
+
+
+def fit(page: Any) -> None:
+    page.wait_for_selector("#soil-list li")
+    page.click("#fit-button")
+    page.wait_for_selector(".badge")
+
+
+def map_page(page: Any) -> None:
+    page.wait_for_function("() => window.terragripMap?.map.getSource('track')")
+
+
+def start(page: Any) -> None:
+    page.wait_for_selector("h1")
+
+
+PAGES = {
+    "start": ("", start),
+    "drive": ("#/drive?path={run}", drive),
+    "live": ("#/live?replay={run}&speed=5", live),
+    "map": ("#/map?path={run}", map_page),
+    "fit": ("#/fit?path={run}", fit),
+}
+
+
+def main() -> None:
+    with tempfile.TemporaryDirectory() as made, browser() as chromium:
+        folder = Path(made) / "field-days"
+        folder.mkdir()
+        fill(folder)
+        run = next(folder.glob("*-estimates.parquet")).name
+        with studio(folder) as (url, _):
+            for theme in ("light", "dark"):
+                for name, (place, work) in PAGES.items():
+                    page = chromium.new_page(viewport={"width": 1280, "height": 720}, color_scheme=theme)
+                    page.goto(url + place.format(run=run))
+                    work(page)
+                    page.wait_for_timeout(1500)
+                    page.screenshot(path=IMAGES / f"studio-{name}-{theme}.png")
+                    page.close()
+
+
+if __name__ == "__main__":
+    main()
