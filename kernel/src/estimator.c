@@ -275,24 +275,31 @@ tg_status tg_estimator_update(tg_estimator *e, const tg_sample *sample, tg_estim
     return TG_OK;
 }
 
+static void fill(tg_sample *sample, const double *time, const double *const *in, const int32_t *given, int32_t count, size_t row)
+{
+    sample->time = time[row];
+    for (int32_t k = 0; k < count; k++) sample->value[given[k]] = (tg_real)in[given[k]][row];
+}
+
 tg_status tg_estimator_block(tg_estimator *e, size_t rows, const double *time, const double *const *in, double *const *out,
                              uint8_t *event, size_t *done)
 {
     if (!e || !time || !in || !out || !event || !done) return TG_BAD_ARGUMENT;
-    tg_sample sample;
+    tg_sample sample[2]; /* the next one is filled while this one is worked on: lanes cannot be read right after their parts are written */
     tg_estimate estimate;
     int32_t given[TG_SLOTS], wanted[TG_OUT_SLOTS], n_given = 0, n_wanted = 0;
     for (int32_t k = 0; k < TG_SLOTS; k++) {
-        sample.value[k] = (tg_real)NAN;
+        sample[0].value[k] = sample[1].value[k] = (tg_real)NAN;
         if (in[k]) given[n_given++] = k;
     }
     for (int32_t k = 0; k < TG_OUT_SLOTS; k++)
         if (out[k]) wanted[n_wanted++] = k;
-    for (*done = 0; *done < rows; ++*done) {
+    *done = 0;
+    if (rows > 0) fill(&sample[0], time, in, given, n_given, 0);
+    for (; *done < rows; ++*done) {
         size_t row = *done;
-        sample.time = time[row];
-        for (int32_t k = 0; k < n_given; k++) sample.value[given[k]] = (tg_real)in[given[k]][row];
-        tg_status status = tg_estimator_update(e, &sample, &estimate);
+        if (row + 1 < rows) fill(&sample[(row + 1) % 2], time, in, given, n_given, row + 1);
+        tg_status status = tg_estimator_update(e, &sample[row % 2], &estimate);
         if (status != TG_OK) return status;
         for (int32_t k = 0; k < n_wanted; k++) out[wanted[k]][row] = (double)estimate.value[wanted[k]];
         if (out[TG_OUT_DISTANCE]) out[TG_OUT_DISTANCE][row] = estimate.distance; /* unrounded on the float build */
