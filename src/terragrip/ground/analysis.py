@@ -61,7 +61,7 @@ def analyse(
     )
     stretches = _stretches(estimates, changes, timeline)
     sections = sections_of(estimates, stretches, whole_length(estimates.vehicle))
-    soils = tuple(dict.fromkeys(timeline.soil[timeline.known])) if library else ()
+    soils = _soils(timeline) if library else ()
     ground = Ground(
         run,
         float(estimates.time[0]),
@@ -103,6 +103,12 @@ def block_labels(estimates: Estimates, blocks: Blocks) -> NDArray[np.object_]:
     labels = np.where(one, estimates["soil"], "")
     middle = np.cumsum(blocks.rows) - blocks.rows // 2 - 1
     return np.asarray(labels[middle], dtype=object)
+
+
+def _soils(timeline: Timeline) -> tuple[str, ...]:
+    """The most probable soils of at least a fiftieth of what tells of the ground, in the order of their appearance."""
+    named = timeline.soil[timeline.known]
+    return tuple(name for name in dict.fromkeys(named) if (named == name).mean() >= 0.02)
 
 
 def _changes(blocks: Blocks, settings: Settings) -> tuple[Change, ...]:

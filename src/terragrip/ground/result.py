@@ -72,7 +72,8 @@ class Timeline:
 
 @dataclass(frozen=True)
 class Ground:
-    """The ground along one drive. `run`: its name; `events`: what happened, with reasons; `notes`: plain sentences for the user."""
+    """The ground along one drive. `run`: its name; `soils`: those named for more than moments, none without a library; `events`: what
+    happened, with reasons; `notes`: plain sentences for the user; `about`: the recording, and whether looked at `online`."""
 
     run: str
     start: float
