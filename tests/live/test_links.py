@@ -67,7 +67,7 @@ async def test_ros_2_by_zenoh(vehicle, short, port):
         other.declare_subscriber("7/terragrip/estimate/*/*", lambda s: got.append(bytes(s.payload)))
         at = f"connect=tcp/127.0.0.1:{port}&domain=7"
         service = Service(
-            vehicle, [f"ros2:/joints,/gnss/vel?{at}"], [f"ros2:/terragrip?{at}"], profile=profile
+            vehicle, [f"ros2:/joints,/gnss/vel?{at}"], [f"ros2:/terragrip?{at}"], profile=profile, window=0.5
         )
         async with running(service):
             await asyncio.sleep(0.6)

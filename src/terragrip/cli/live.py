@@ -42,6 +42,14 @@ def command(
         float,
         typer.Option(metavar="MS", min=0.0, max=10_000.0, help="How long a row waits for late samples, ms."),
     ] = 20.0,
+    held: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--held",
+            metavar="CHANNEL=S",
+            help="A channel repeated between updates S seconds apart: ground_speed=0.2.",
+        ),
+    ] = None,
     ground: Annotated[bool, typer.Option("--ground", help="Tell where the ground changes.")] = False,
     library: Annotated[
         Path | None,
@@ -72,6 +80,7 @@ def command(
         record=record,
         method=method,
         window=window / 1000.0,
+        held=_held(held or []),
         ground=ground,
         library=_library(library),
     )
@@ -80,6 +89,25 @@ def command(
         print(service.statistics.summary())
         if record is not None:
             print(f"Recorded in {record}")
+
+
+def _held(pairs: list[str]) -> dict[str, float]:
+    """Update periods by channel."""
+    from terragrip.recording.schema import is_channel
+
+    found = {}
+    for pair in pairs:
+        name, _, text = pair.partition("=")
+        try:
+            period = float(text)
+        except ValueError:
+            period = 0.0
+        if not is_channel(name) or not 0.0 < period < 1e4:
+            raise InputError(
+                f"{pair!r} is no channel and period", place="--held", mend="write ground_speed=0.2"
+            )
+        found[name] = period
+    return found
 
 
 def _library(path: Path | None) -> SoilLibrary | None:

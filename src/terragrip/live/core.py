@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import base64
 from collections.abc import Collection, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from terragrip.errors import InputError
@@ -34,13 +34,15 @@ class Settings:
     """What makes two runs the same: kept with the record, compared on resuming.
 
     ``window`` [s]: how long a row waits for what is due. ``channels``: columns the samples carry; empty: those seen by the
-    first row. ``sources``: their URIs. ``ground``: whether ground changes and soils are followed.
+    first row. ``sources``: their URIs without options. ``held`` [s]: update periods of channels that are repeated between
+    updates. ``ground``: whether ground changes and soils are followed.
     """
 
     sources: tuple[str, ...]
     method: str = DEFAULT
     window: float = WINDOW
     channels: tuple[str, ...] = ()
+    held: Mapping[str, float] = field(default_factory=dict)
     ground: bool = False
 
     def to_dict(self) -> dict[str, Any]:
@@ -50,15 +52,14 @@ class Settings:
             "method": self.method,
             "window": self.window,
             "channels": list(self.channels),
+            "held": dict(self.held),
             "ground": self.ground,
         }
 
     @classmethod
     def from_dict(cls, data: Mapping[str, Any]) -> Settings:
         """The inverse of `to_dict`."""
-        return cls(
-            tuple(data["sources"]), data["method"], data["window"], tuple(data["channels"]), data["ground"]
-        )
+        return cls(**{**data, "sources": tuple(data["sources"]), "channels": tuple(data["channels"])})
 
 
 @dataclass(frozen=True, slots=True)
@@ -123,7 +124,9 @@ class Core:
             self._begin(settings.channels)
 
     def _begin(self, channels: Collection[str]) -> TractionEstimator:
-        self.estimator = TractionEstimator(self.vehicle, self.settings.method, channels=channels)
+        self.estimator = TractionEstimator(
+            self.vehicle, self.settings.method, channels=channels, held=self.settings.held
+        )
         if self.settings.ground:
             from terragrip.ground.live import LiveGround
 

@@ -109,11 +109,11 @@ class Feed:
             self._layouts[layout] = None
         self._since_layout = 0
 
-    def connected(self) -> None:
+    def connected(self, how: str = "connected again") -> None:
         """The source has its other side (again)."""
         if self.is_lost:
             self.is_lost = False
-            self._event("source_back", "connected again")
+            self._event("source_back", how)
 
     def lost(self, why: str) -> None:
         """The source lost its other side."""

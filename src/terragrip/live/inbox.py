@@ -10,6 +10,7 @@ from collections.abc import Callable
 from terragrip.live.counts import Counts
 
 CAPACITY = 8192  # samples
+_BREATH = 0.002  # s
 Values = dict[str, float]
 Arrived = tuple[float, int, float, Values]
 
@@ -24,6 +25,7 @@ class Inbox:
         self.samples: deque[Arrived] = deque()
         self.dropped = Counts()
         self.filled: Callable[[], None] = lambda: None
+        self.busy: Callable[[], bool] = lambda: False  # whether sinks have enough to do
         self._room = asyncio.Event()
 
     def put(self, source: int, stamp: float | None, values: Values, arrival: float | None = None) -> None:
@@ -38,7 +40,9 @@ class Inbox:
             self.filled()
 
     async def room(self) -> None:
-        """Wait until at least half of the place is free: for sources that can wait."""
+        """Wait until at least half of the place is free, and sinks keep up: for sources that can wait."""
+        while self.busy():
+            await asyncio.sleep(_BREATH)
         while len(self.samples) > self.capacity // 2:
             self._room.clear()
             await self._room.wait()

@@ -63,6 +63,8 @@ class Recorder:
         self._thread = ThreadPoolExecutor(1, thread_name_prefix="record")
         self._closing: list[Future[None]] = []
         self._syncing: Future[None] | None = None
+        self.opening: list[Output] = []  # what opening brought: that a run goes on
+        self._opened: float | None = None  # arrival of the segment's first output
         try:
             self._resume(vehicle, settings, library)
         except OSError as error:
@@ -102,7 +104,9 @@ class Recorder:
             text = f"resumed after {self.core.rows} rows, the last at {self.core.time:.6g} s"
             if torn:
                 text += f"; the last {torn} bytes were torn and are left out"
-            self.note({"event": {"time": None, "kind": "resumed", "source": "record", "text": text}})
+            self.opening = self.note(
+                {"event": {"time": None, "kind": "resumed", "source": "record", "text": text}}
+            )
 
     def _open_wal(self) -> WriteAhead:
         wal = WriteAhead(_wal(self.folder, self.segment.number))
@@ -142,10 +146,11 @@ class Recorder:
         segment = self.segment
         for output in outputs:
             segment.add(output)
-        if len(segment) and now is not None and (
-            len(segment) >= self._rows or now - segment.arrival[0] >= self._seconds
-        ):  # fmt: skip
-            self._rotate()
+        if now is not None and outputs:
+            if self._opened is None:
+                self._opened = now
+            if segment.size >= self._rows or now - self._opened >= self._seconds:
+                self._rotate()
         return outputs
 
     def _rotate(self) -> None:
@@ -153,7 +158,7 @@ class Recorder:
         wal.write()
         state = self.core.state()
         encoded = json.dumps(state)  # now: the state's lists go on changing
-        self.segment = Segment(old.number + 1)
+        self.segment, self._opened = Segment(old.number + 1), None
         self._wal = self._open_wal()
         self._wal.write()
         self._closing.append(self._thread.submit(self._close_segment, old, encoded, wal))
@@ -182,7 +187,7 @@ class Recorder:
     def close(self) -> None:
         """Close the open segment and let go of the folder; raises OSError."""
         try:
-            if len(self.segment) or self.segment.events or self.segment.refusals:
+            if self.segment.size:
                 self._rotate()
             self._thread.shutdown()  # the last sync is behind it
             for closing in self._closing:
@@ -337,4 +342,8 @@ def _load_snapshot(folder: Path, number: int) -> Core:
 
                 library = SoilLibrary.load(soils)
             return Core.from_state(json.loads(text), library)
-    raise InputError("is damaged", file=path, mend="begin a new record in another folder")
+    raise InputError(
+        "is damaged, or of another version of Terragrip",
+        file=path,
+        mend="begin a new record in another folder",
+    )

@@ -41,6 +41,11 @@ class Segment:
     def __len__(self) -> int:
         return len(self.time)
 
+    @property
+    def size(self) -> int:
+        """Outputs in it: rows, events, refusals and states of the ground."""
+        return len(self.time) + len(self.events) + len(self.refusals) + len(self.ground)
+
     def add(self, output: Output) -> None:
         """Take one output of the core."""
         if isinstance(output, Row):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 import gc
 import logging
-from collections.abc import Awaitable, Callable, Sequence
+from collections.abc import Awaitable, Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -50,6 +50,7 @@ class Service:
     sources, sinks: URIs (docs/live.md). profile: what the sources' fields mean; None: the recording's own names.
     record: folder of the record, which is resumed where it holds one; None: none is kept.
     window: s that a row waits for what is due (`terragrip.live.reorder`).
+    held: update periods [s] of channels that a source repeats between updates.
     ground: tell ground changes while driving; library: and which of these soils it is.
     capacity: samples that may wait for the estimator before they are dropped.
 
@@ -66,6 +67,7 @@ class Service:
         record: Path | None = None,
         method: str = DEFAULT,
         window: float = WINDOW,
+        held: Mapping[str, float] | None = None,
         ground: bool = False,
         library: SoilLibrary | None = None,
         capacity: int = CAPACITY,
@@ -87,18 +89,22 @@ class Service:
             for decoder, source in zip(decoders, self.sources, strict=True)
             for name in (*decoder.channels, *getattr(source, "channels", ()))
         )
-        settings = Settings(tuple(sources), method, window, tuple(channels), ground or library is not None)
+        names = tuple(uri.name for uri, _ in opened)
+        settings = Settings(
+            names, method, window, tuple(channels), dict(held or {}), ground or library is not None
+        )
         self.recorder = None if record is None else Recorder(record, vehicle, settings, library=library)
         self.core = Core(vehicle, settings, library) if self.recorder is None else self.recorder.core
         self._engine: Core | Recorder = self.core if self.recorder is None else self.recorder
         self.inbox = Inbox(capacity)
+        self.inbox.busy = lambda: any(outbox.is_busy for outbox in self.outboxes)
         payload = None if profile is None else profile.payload
         self.feeds = [
             Feed(
                 k, text, decoders[k], unpacker(payload), self.inbox, self.note,
                 after=self.core.clocks[k].newest,
             )
-            for k, text in enumerate(sources)
+            for k, text in enumerate(names)
         ]  # fmt: skip
         self.statistics = Statistics(self)
         self.prediction = Prediction(self.core)
@@ -141,6 +147,8 @@ class Service:
         for task in takers:
             task.add_done_callback(self._sink_done)
         self.inbox.filled = lambda: self._later(self._work)
+        if self.recorder is not None:
+            self._dispatch(self.recorder.opening)
         self._later(self._work)
         self._loop.call_later(_HOUSEKEEPING, self._guarded, self._keep_house)
         try:
@@ -308,15 +316,17 @@ class Service:
         await self._again_and_again(lambda: source.run(feed), feed.lost)
 
     async def _supervise_sink(self, sink: Sink, outbox: Outbox) -> None:
-        name = outbox.uri.text
+        name = outbox.uri.name
         state = {"lost": False}
 
         def lost(why: str) -> None:
+            outbox.is_connected = False
             if not state["lost"]:
                 self.note({"event": {"time": None, "kind": "sink_lost", "source": name, "text": why}})
             state["lost"] = True
 
         def back() -> None:
+            outbox.is_connected = True
             if state["lost"]:
                 self.note(
                     {"event": {"time": None, "kind": "sink_back", "source": name, "text": "connected again"}}

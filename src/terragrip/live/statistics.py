@@ -65,7 +65,7 @@ class Statistics:
             self._messages[feed.index] = heard
             if self._silent[feed.index]:
                 self._silent[feed.index] = False
-                feed.connected()
+                feed.connected("it sends again")
             self._arrivals[feed.index] = now
         elif not feed.is_lost and not self._silent[feed.index]:
             silence = now - self._arrivals[feed.index]
@@ -109,7 +109,7 @@ class Statistics:
             "waiting": len(service.inbox.samples),
             "counts": service.core.counts.state(),
             "events": dict(self.event_counts),
-            "sinks": {box.uri.text: {"sent": box.sent, "dropped": box.dropped} for box in service.outboxes},
+            "sinks": {box.uri.name: {"sent": box.sent, "dropped": box.dropped} for box in service.outboxes},
         }
 
     def summary(self) -> str:

@@ -60,6 +60,11 @@ class Uri:
                 raise InputError(f"{scheme}: has no option {name!r}", place=f"--{role} {text}", mend=mend)
         return cls(text, scheme, parts.hostname or "", port, unquote(path), options)
 
+    @property
+    def name(self) -> str:
+        """The URI without its options: what it is called in events and the record."""
+        return self.text.split("?", 1)[0]
+
     def number(self, option: str, default: float) -> float:
         """An option as a positive number; raises InputError if it is none."""
         text = self.options.get(option)

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Collection
+from importlib import import_module
 from typing import TYPE_CHECKING, Protocol
 
 from terragrip.live.outbox import Outbox
-from terragrip.live.sources import opened
+from terragrip.live.sources import packages_of
 from terragrip.live.uri import Uri
 
 if TYPE_CHECKING:
@@ -39,4 +40,6 @@ class Sink(Protocol):
 def open_sink(text: str, vehicle: Vehicle) -> tuple[Uri, Sink]:
     """The sink of a URI; raises InputError if it names none, or the package it needs is missing."""
     uri = Uri.parse(text, OPTIONS, "sink")
-    return uri, opened(f"{__name__}.{_HOMES[uri.scheme]}", uri).open_sink(uri, vehicle)
+    with packages_of(uri):
+        sink: Sink = import_module(f"{__name__}.{_HOMES[uri.scheme]}").open_sink(uri, vehicle)
+    return uri, sink

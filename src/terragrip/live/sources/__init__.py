@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Iterator
+from contextlib import contextmanager
 from importlib import import_module
 from typing import Protocol
 
@@ -42,13 +43,16 @@ class Source(Protocol):
 def open_source(text: str, decoder: Decoder) -> tuple[Uri, Source]:
     """The source of a URI; raises InputError if it names none, or the package it needs is missing."""
     uri = Uri.parse(text, OPTIONS, "source")
-    return uri, opened(f"{__name__}.{_HOMES[uri.scheme]}", uri).open_source(uri, decoder)
+    with packages_of(uri):
+        source: Source = import_module(f"{__name__}.{_HOMES[uri.scheme]}").open_source(uri, decoder)
+    return uri, source
 
 
-def opened(module: str, uri: Uri):  # type: ignore[no-untyped-def]  # a module
-    """The module of a source or sink; raises InputError naming the extra where a package is missing."""
+@contextmanager
+def packages_of(uri: Uri) -> Iterator[None]:
+    """Raise InputError naming the extra where a package that a source or sink needs is missing."""
     try:
-        return import_module(module)
+        yield
     except ModuleNotFoundError as error:
         if (error.name or "").split(".")[0] == "terragrip":
             raise
