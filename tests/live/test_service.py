@@ -241,3 +241,34 @@ async def test_a_source_that_cannot_be_used_is_refused_in_one_line(source, probl
         Service(robot(), [source])
     assert problem in str(refused.value)
     assert "secret" not in str(refused.value)
+
+
+async def test_sources_with_clocks_of_their_own_share_one_time_base(vehicle, short, port, sender):
+    """Wheels stamped since the robot's start, the receiver since 1970 by another clock 30 s off: rows in true order."""
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+        probe.bind(("127.0.0.1", 0))
+        other_port = probe.getsockname()[1]
+    other = Sender(other_port)
+    service = Service(vehicle, [f"udp://127.0.0.1:{port}", f"udp://127.0.0.1:{other_port}"], window=0.1)
+    began = asyncio.get_running_loop().time()
+    async with running(service):
+        for message in messages(short.recording, 100):
+            now = asyncio.get_running_loop().time() - began
+            speed = message.pop("ground_speed")
+            sender.send({**message, "time": 4.0 + now})
+            other.send({"ground_speed": speed, "time": 1.7e9 + 30.0 + now})
+            await asyncio.sleep(0.01)
+        await until(lambda: service.core.counts.total("received") == 100 * len(short.recording.channels))
+        await asyncio.sleep(0.2)
+    other.close()
+    rows = [
+        message.row for message in service.seen if message.kind == "estimate" and not message.row.predicted
+    ]
+    times = np.array([row.estimate.time for row in rows])
+    speeds = np.array([row.estimate.time for row in rows if "ground_speed" in row.values])
+    wheels = np.array([row.estimate.time for row in rows if "wheel_speed_fl" in row.values])
+    assert (np.diff(times) > 0).all()
+    assert len(speeds) + service.core.counts.by_channel["ground_speed"]["late"] == 100
+    # Sent together, they stand within a few ms of each other, and on the machine's clock.
+    assert np.median(np.abs(speeds[:, None] - wheels).min(axis=1)) < 0.02
+    assert abs(times[-1] - rows[-1].arrival) < 5.0

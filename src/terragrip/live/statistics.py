@@ -120,12 +120,26 @@ class Statistics:
         for fate in ("missing", "late", "doubled", "dropped", "unreadable", "clock"):
             by = {name: mine[fate] for name, mine in core.counts.by_channel.items() if mine[fate]}
             if by:
-                lines.append(f"{fate}: " + ", ".join(f"{name} {number}" for name, number in by.items()))
+                lines.append(f"{fate}: " + _by_number(by))
         late, received = core.counts.total("late"), core.counts.total("received")
         if late > 0.01 * received:
             lines.append(f"{late} of {received} values came too late: a longer --window takes them in")
+        lossy = {box.uri.name: box.dropped for box in service.outboxes if box.dropped}
+        if lossy:
+            lines.append("messages that sinks were too slow for: " + _by_number(lossy))
         if self.event_counts:
             lines.append(
                 "events: " + ", ".join(f"{kind} {number}" for kind, number in self.event_counts.items())
             )
         return "\n".join(lines)
+
+
+def _by_number(numbers: dict[str, int]) -> str:
+    """``2 each of a, b; 1 of c``."""
+    alike: dict[int, list[str]] = {}
+    for name, number in numbers.items():
+        alike.setdefault(number, []).append(name)
+    return "; ".join(
+        f"{number} {'each of' if len(names) > 1 else 'of'} {', '.join(names)}"
+        for number, names in alike.items()
+    )

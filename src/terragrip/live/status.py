@@ -84,6 +84,9 @@ def head(service: Service) -> list[str]:
             f"{state}   v {e.ground_speed:.2f} ± {e.ground_speed_std:.2f} m/s   "
             f"soil resistance {e.soil_resistance:.3f} ± {e.soil_resistance_std:.3f}"
         )
+    lossy = [f"{box.uri.name} {box.dropped}" for box in service.outboxes if box.dropped]
+    if lossy:
+        lines.append("sinks too slow, messages dropped: " + ", ".join(lossy))
     if s.ground is not None:
         likely = sorted(s.ground.probabilities.items(), key=lambda one: -one[1])[:3]
         lines.append("ground: " + ", ".join(f"{name} {probability:.0%}" for name, probability in likely))
@@ -112,13 +115,15 @@ def _with_std(estimate: Any, name: str, scale: float, digits: int) -> str:
 
 
 def counts_table(service: Service, table: Any) -> Any:
-    """What went wrong, by channel; None where nothing did."""
-    wrong = {
-        name: mine for name, mine in service.core.counts.by_channel.items() if any(mine[f] for f in _TROUBLE)
-    }
-    if not wrong:
+    """What went wrong, by channel; None where nothing did. Channels that fared alike share a line."""
+    alike: dict[tuple[int, ...], list[str]] = {}
+    for name, mine in service.core.counts.by_channel.items():
+        if any(mine[fate] for fate in _TROUBLE):
+            alike.setdefault(tuple(mine[fate] for fate in ("received", *_TROUBLE)), []).append(name)
+    if not alike:
         return None
     shown = table("channel", "received", *_TROUBLE)
-    for name, mine in wrong.items():
-        shown.add_row(name, str(mine["received"]), *(str(mine[fate]) for fate in _TROUBLE))
+    for counts, names in alike.items():
+        more = f" and {len(names) - 1} more" if len(names) > 1 else ""
+        shown.add_row(names[0] + more, *map(str, counts))
     return shown
