@@ -5,12 +5,15 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from terragrip.errors import InputError
 from terragrip.formats.profile import Profile, Source, matching
 from terragrip.recording.schema import LABELS, REFERENCE, TIME, is_channel, unit_of
 from terragrip.units import factor_to, quantity
+
+if TYPE_CHECKING:
+    from terragrip.vehicle import Vehicle
 
 Values = dict[str, float]
 Sample = tuple[float | None, Values]
@@ -229,4 +232,16 @@ def _refuse_looking_ahead(name: str, source: Source) -> None:
             "derivative_of looks ahead, which live samples cannot",
             place=f"channels.{name}",
             mend="give a source of the speed itself",
+        )
+
+
+def check_channels(profile: Profile, vehicle: Vehicle) -> None:
+    """Raise InputError where the profile lacks what the filter cannot do without."""
+    needed = ["ground_speed", *(f"wheel_speed_{wheel}" for wheel in vehicle.wheels)]
+    lacking = [name for name in needed if name not in profile.channels]
+    if lacking:
+        raise InputError(
+            f"the profile gives no {lacking[0]}",
+            place="--profile",
+            mend="live estimates need the ground speed and each wheel's speed; record the log, and terragrip estimate gives slip",
         )

@@ -5,25 +5,26 @@ from __future__ import annotations
 import asyncio
 import gc
 import logging
-from collections.abc import Awaitable, Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from terragrip.errors import InputError
 from terragrip.estimation.methods import DEFAULT, method_named
 from terragrip.live.core import WINDOW, Core, Ground, Output, Row, Settings
-from terragrip.live.decode import Decoder
+from terragrip.live.decode import Decoder, check_channels
 from terragrip.live.event import Event
-from terragrip.live.feed import Feed, Lost
+from terragrip.live.feed import Feed
 from terragrip.live.inbox import CAPACITY, Inbox
 from terragrip.live.message import ESTIMATE, GROUND, SOIL, STATUS, Message
 from terragrip.live.outbox import Outbox
 from terragrip.live.payload import unpacker
 from terragrip.live.prediction import Prediction
 from terragrip.live.record import Recorder
-from terragrip.live.sinks import Sink, open_sink
+from terragrip.live.sinks import open_sink
 from terragrip.live.sources import Source, open_source
 from terragrip.live.statistics import Statistics
+from terragrip.live.supervision import supervise_sink, supervise_source, unheard
 
 if TYPE_CHECKING:
     from terragrip.formats import Profile
@@ -34,8 +35,6 @@ _AT_ONCE = 64  # samples between two turns of sources and sinks
 _HOUSEKEEPING = 0.1  # s
 _SYNC = 0.5  # s
 _BEHIND = 1.0  # s
-_BACKOFF = (0.5, 30.0)  # s, doubled from the first to the last
-_SETTLED = 10.0  # s connected, after which the back-off begins anew
 _LINGER = 2.0  # s for sinks to take the last messages
 
 logger = logging.getLogger("terragrip.live")
@@ -83,7 +82,7 @@ class Service:
         self.outboxes = [Outbox(uri) for uri, _ in self.sinks]
         self.sources: list[Source] = [source for _, source in opened]
         if profile is not None:
-            _check_channels(profile, vehicle)
+            check_channels(profile, vehicle)
         channels = dict.fromkeys(
             name
             for decoder, source in zip(decoders, self.sources, strict=True)
@@ -131,16 +130,16 @@ class Service:
         Raises InputError where a source or sink cannot be used at all, or the record could not be written.
         """
         watched = [
-            asyncio.create_task(self._supervise_source(source, feed))
+            asyncio.create_task(supervise_source(source, feed))
             for source, feed in zip(self.sources, self.feeds, strict=True)
         ]
         takers = [
-            asyncio.create_task(self._supervise_sink(sink, outbox))
+            asyncio.create_task(supervise_sink(sink, outbox, self.note))
             for (_, sink), outbox in zip(self.sinks, self.outboxes, strict=True)
         ]
         gc.freeze()  # what is there now stays: the collector need not look at it again
         self._loop = asyncio.get_running_loop()
-        self._loop.set_exception_handler(_unheard)
+        self._loop.set_exception_handler(unheard)
         self._done = self._loop.create_future()
         for task in watched:
             task.add_done_callback(lambda _: self._source_done(watched))
@@ -311,63 +310,3 @@ class Service:
     def _publish(self, message: Message) -> None:
         for listen in self.listeners:
             listen(message)
-
-    async def _supervise_source(self, source: Source, feed: Feed) -> None:
-        await self._again_and_again(lambda: source.run(feed), feed.lost)
-
-    async def _supervise_sink(self, sink: Sink, outbox: Outbox) -> None:
-        name = outbox.uri.name
-        state = {"lost": False}
-
-        def lost(why: str) -> None:
-            outbox.is_connected = False
-            if not state["lost"]:
-                self.note({"event": {"time": None, "kind": "sink_lost", "source": name, "text": why}})
-            state["lost"] = True
-
-        def back() -> None:
-            outbox.is_connected = True
-            if state["lost"]:
-                self.note(
-                    {"event": {"time": None, "kind": "sink_back", "source": name, "text": "connected again"}}
-                )
-            state["lost"] = False
-
-        outbox.connected = back
-        await self._again_and_again(lambda: sink.run(outbox), lost)
-
-    async def _again_and_again(self, run: Callable[[], Awaitable[None]], lost: Callable[[str], None]) -> None:
-        """Run until it ends of itself; after a loss again, waiting longer each time."""
-        loop = asyncio.get_running_loop()
-        pause = _BACKOFF[0]
-        while True:
-            began = loop.time()
-            try:
-                await run()
-                return
-            except Lost as loss:
-                lost(str(loss))
-            if loop.time() - began > _SETTLED:
-                pause = _BACKOFF[0]
-            await asyncio.sleep(pause)
-            pause = min(2 * pause, _BACKOFF[1])
-
-
-def _check_channels(profile: Profile, vehicle: Vehicle) -> None:
-    """Raise InputError where the profile lacks what the filter cannot do without."""
-    needed = ["ground_speed", *(f"wheel_speed_{wheel}" for wheel in vehicle.wheels)]
-    lacking = [name for name in needed if name not in profile.channels]
-    if lacking:
-        raise InputError(
-            f"the profile gives no {lacking[0]}",
-            place="--profile",
-            mend="live estimates need the ground speed and each wheel's speed; record the log, and terragrip estimate gives slip",
-        )
-
-
-def _unheard(loop: asyncio.AbstractEventLoop, context: dict[str, Any]) -> None:
-    """A future that failed with nobody listening: aiomqtt leaves some when a broker goes, of which the service knows."""
-    if type(context.get("exception")).__module__.startswith("aiomqtt"):
-        logger.info("%s: %s", context["message"], context["exception"])
-    else:
-        loop.default_exception_handler(context)
