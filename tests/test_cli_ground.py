@@ -90,6 +90,29 @@ def test_many_drives_without_a_library(files, tmp_path, capsys):
     assert capsys.readouterr().out == ""
 
 
+def test_signals_may_be_chosen(files, tmp_path):
+    out = tmp_path / "ground.json"
+    assert (
+        main(
+            [
+                "ground",
+                str(files[0]),
+                "-q",
+                "-o",
+                str(out),
+                "--signal",
+                "soil_resistance",
+                "--signal",
+                "slip_sd",
+            ]
+        )
+        == 0
+    )
+    (change,) = json.loads(out.read_text())["changes"]
+    assert set(change["shift"]) == {"soil_resistance", "slip_sd"}
+    assert change["shift"]["soil_resistance"] > 2
+
+
 def test_unusable_inputs_are_one_line(files, tmp_path, capsys):
     out, soils = tmp_path / "g.json", tmp_path / "soils.json"
     assert "no such file" in fails(capsys, out, tmp_path / "none.parquet")
@@ -100,6 +123,7 @@ def test_unusable_inputs_are_one_line(files, tmp_path, capsys):
     assert "has the same name" in fails(capsys, out, files[0], twin)
     assert "--length" in fails(capsys, out, files[0], "--length", "0")
     assert "is not named .json" in fails(capsys, tmp_path / "g.txt", files[0])
+    assert "did you mean adhesion_std?" in fails(capsys, out, files[0], "--signal", "adhesion_stt")
     newer = tmp_path / "newer.json"
     newer.write_text(json.dumps({**json.loads(soils.read_text()), "version": 99}))
     assert "newer.json: library version 99" in fails(capsys, out, files[0], "--library", newer)

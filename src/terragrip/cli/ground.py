@@ -10,7 +10,7 @@ import typer
 from terragrip.cli.options import Quiet
 from terragrip.cli.output import check_file, check_folder, files_in
 from terragrip.cli.progress import progress
-from terragrip.errors import InputError
+from terragrip.errors import InputError, nearest
 
 if TYPE_CHECKING:
     from terragrip.ground.result import Ground
@@ -39,6 +39,13 @@ def command(
     length: Annotated[
         float, typer.Option(metavar="M", help="Mean way on one ground before the data speak.")
     ] = 30.0,
+    signal: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="NAME",
+            help="Look for changes in this signal (may be repeated; a wrong name lists them). Default: those of the ground alone.",
+        ),
+    ] = None,
     quiet: Quiet = False,
 ) -> None:
     """Find changes of the ground, name the soils, list events.
@@ -61,7 +68,7 @@ def command(
     known = SoilLibrary.load(library) if library else None
     for soil in known.values() if known else ():
         signature_in(soil, library)
-    settings, grounds = Settings(online=online, length=length), []
+    settings, grounds = Settings(online, length, _signals(signal)), []
     with progress("ground", quiet) as step:
         for number, (path, run) in enumerate(zip(estimates, runs, strict=True), 1):
             try:
@@ -80,6 +87,17 @@ def command(
     if not quiet:
         print(summary(grounds))
         print(f"Written to {output}" + (f" and {table}" if table else ""))
+
+
+def _signals(given: list[str] | None) -> tuple[str, ...]:
+    from terragrip.ground.signals import GROUND, SIGNALS
+
+    for name in given or ():
+        if name not in SIGNALS:
+            near = nearest(name, SIGNALS)
+            mend = f"did you mean {near}?" if near else f"take of {', '.join(SIGNALS)}"
+            raise InputError(f"there is no signal {name!r}", place="--signal", mend=mend)
+    return tuple(dict.fromkeys(given)) if given else GROUND
 
 
 def _names(files: list[Path]) -> list[str]:

@@ -57,7 +57,7 @@ class LiveGround:
         self._axle_of = driven_wheels(estimator.vehicle)
         optional = [f"{n}_std" for n in needed_columns(tuple(self._axle_of))[3:]]
         loads = [f"vertical_load_{axle}" for axle in dict.fromkeys(self._axle_of.values())]
-        every = (*needed_columns(tuple(self._axle_of)), *optional, *loads)
+        every = (*needed_columns(tuple(self._axle_of)), *optional, *loads, "curve_a")
         there = {"time", "event", *estimator.columns}
         self._columns = tuple(name for name in every if name in there)
         self._emissions = Emissions(dict(library.soils) if library else {}, estimator.method)

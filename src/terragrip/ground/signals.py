@@ -12,13 +12,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from terragrip.physics.adhesion import CURVES
-from terragrip.soil.blocks import Blocks
+from terragrip.soil.blocks import FLOOR, Blocks
 
 Array = NDArray[np.float64]
 
-SIGNALS = ("soil_resistance", "curve_scale", "soil_resistance_sd", "adhesion_sd", "slip", "adhesion")
-"""Names of the signals. The first four tell of the ground alone."""
-GROUND = SIGNALS[:4]
+GROUND = ("soil_resistance", "curve_scale", "soil_resistance_sd", "adhesion_sd")
+"""The signals that tell of the ground alone. `_sd`: ln of the SD within a block."""
+SIGNALS = (
+    *GROUND, "slip", "adhesion", "curve_a", "slip_sd", "soil_resistance_std", "adhesion_std", "slip_std",
+)  # fmt: skip
+"""All signals on offer. `curve_a`: the kernel's curve while driving, which lags by seconds; `_std`: ln of the estimates' own SD."""
 
 _SCALE, _SCALE_SD, _ADHESION_SD = 0.85, 0.5, 0.03
 """Before mu is seen a is 0.85 +- 0.5, as the kernel's curve has it; a block's mu scatters by 0.03 about its curve."""
@@ -44,6 +47,11 @@ LAWS: dict[str, Law] = {
     "adhesion_sd": Law(-5.1, 0.8, 0.55, 1.0),
     "slip": Law(0.12, 0.12, 0.03, 4.0),
     "adhesion": Law(0.25, 0.15, 0.03, 4.0),
+    "curve_a": Law(0.77, 0.4, 0.1, 10.0),
+    "slip_sd": Law(-4.2, 0.5, 0.35, 1.5),
+    "soil_resistance_std": Law(-5.2, 0.5, 0.2, 4.0),
+    "adhesion_std": Law(-4.8, 0.5, 0.2, 3.0),
+    "slip_std": Law(-3.6, 0.5, 0.2, 5.0),
 }
 
 
@@ -57,12 +65,21 @@ def signals_of(blocks: Blocks, names: tuple[str, ...] = GROUND) -> Array:
         "adhesion_sd": blocks.roughness[:, 1],
         "slip": slip,
         "adhesion": adhesion,
+        "curve_a": blocks.curve_a,
+        "slip_sd": blocks.slip_sd,
+        "soil_resistance_std": _log_sd(blocks.resistance_variance),
+        "adhesion_std": _log_sd(blocks.adhesion_variance.mean(axis=1)),
+        "slip_std": _log_sd(blocks.slip_variance.mean(axis=1)),
     }
     for name in names:
         if name not in every:
             raise ValueError(f"there is no signal {name!r}; there are {', '.join(SIGNALS)}")
     out = np.column_stack([every[name] for name in names])
     return np.asarray(np.where(blocks.known[:, None], out, np.nan))
+
+
+def _log_sd(variance: Array) -> Array:
+    return np.asarray(0.5 * np.log(variance + FLOOR**2))
 
 
 def curve_scale(slip: Array, adhesion: Array) -> Array:

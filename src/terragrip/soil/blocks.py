@@ -42,7 +42,8 @@ class Blocks:
     `rows`: how many rows, `usable`: of these without an event, moving and with slips up to 60 %; `streak`: how many blocks on end, up to
     and with this one, are usable by half. `travelled` [m]: distance at its last row.
     `resistance` rho_s, `adhesion`, `slip`: means of usable rows, the `_variance` of each: mean square of the estimates' own SD.
-    `roughness` (blocks, 2): ln of the SD within the block of rho_s, and of mu (the wheels' mean). `share`: the wheels' shares of the load.
+    `roughness` (blocks, 2): ln of the SD within the block of rho_s, and of mu (the wheels' mean); `slip_sd`: so of slip. `curve_a`: its
+    mean (NaN where the table has none). `share`: the wheels' shares of the load.
     """
 
     number: NDArray[np.int64]
@@ -57,7 +58,9 @@ class Blocks:
     adhesion: Array
     adhesion_variance: Array
     roughness: Array
+    curve_a: Array
     slip: Array
+    slip_sd: Array
     slip_variance: Array
     share: Array
 
@@ -155,7 +158,7 @@ def blocks_of(
     loads = wheel_loads(columns, axle_of)
     load = mean(np.column_stack([loads[w] for w in wheels]))
     load = np.where(np.isfinite(load) & (load > 0), load, 1.0)
-    level, mu = mean(resistance), mean(adhesion)
+    level, mu, level_of_slip = mean(resistance), mean(adhesion), mean(slip)
     within = spread(resistance, level)[:, 0], spread(adhesion, mu).mean(axis=1)
     return Blocks(
         number=count[begin],
@@ -170,7 +173,11 @@ def blocks_of(
         adhesion=mu,
         adhesion_variance=variance(*(f"adhesion_{w}_std" for w in wheels)),
         roughness=np.log(np.column_stack(within) + FLOOR),
-        slip=mean(slip),
+        curve_a=mean(np.asarray(columns.get("curve_a", np.full(time.size, np.nan)), dtype=float)[:, None])[
+            :, 0
+        ],
+        slip=level_of_slip,
+        slip_sd=np.log(spread(slip, level_of_slip).mean(axis=1) + FLOOR),
         slip_variance=variance(*(f"slip_{w}_std" for w in wheels)),
         share=load / load.sum(axis=1, keepdims=True),
     )
