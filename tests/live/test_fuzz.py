@@ -1,0 +1,107 @@
+"""Whatever comes in: never a traceback, and what cannot be read is counted."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+
+from hypothesis import given
+from hypothesis import strategies as st
+
+from terragrip.formats import Profile
+from terragrip.live.counts import Counts
+from terragrip.live.decode import Decoder
+from terragrip.live.feed import Feed
+from terragrip.live.frames import FrameDecoder
+from terragrip.live.inbox import Inbox
+from terragrip.live.nmea import fields_of
+from terragrip.live.payload import Unreadable, unpacker
+from terragrip.live.wal import MAGIC, Reading, WriteAhead
+
+anything = st.recursive(
+    st.none() | st.booleans() | st.integers() | st.floats() | st.text(max_size=8),
+    lambda inner: st.lists(inner, max_size=4) | st.dictionaries(st.text(max_size=8), inner, max_size=4),
+    max_leaves=12,
+)
+NAMES = ("time", "ground_speed", "wheel_speed_fl", "pitch", "unknown")
+PROFILE = Profile.from_dict(
+    {
+        "time": {"from": "t", "unit": "ms", "zero": "first"},
+        "channels": {
+            "ground_speed": {
+                "from": ["fast", "*slow*"],
+                "unit": "km/h",
+                "invalid": [[900, 1000]],
+                "delay": "50 ms",
+            },
+            "wheel_speed_fl": {"norm_of": ["time", "unknown"]},
+            "pitch": {"pitch_of": ["time", "pitch", "unknown", "ground_speed"]},
+            "drive_torque_fl": {"from": "pitch", "over": "ground_speed", "over_minimum": 0.1, "unit": "W s"},
+        },
+    }
+)
+
+
+def feed(profile: Profile | None) -> Feed:
+    """A feed whose notes go into counts, as the service's do."""
+    counts = Counts()
+
+    def note(note):
+        json.dumps(note)
+        if "fate" in note:
+            counts.add(note["fate"], note["channels"], note.get("number", 1))
+
+    payload = None if profile is None else profile.payload
+    return Feed(0, "test", Decoder(profile), unpacker(payload), Inbox(), note, after=0.0)
+
+
+@given(st.binary(max_size=60) | anything.map(lambda value: json.dumps(value).encode()), st.booleans())
+def test_any_message(data, with_profile):
+    found = feed(PROFILE if with_profile else None)
+    found.message(data)
+    found.message(data, topic="a/b")
+    assert all(isinstance(value, float) for sample in found.inbox.samples for value in sample[3].values())
+
+
+@given(st.lists(st.dictionaries(st.sampled_from((*NAMES, "t", "fast", "a slow one")), anything), max_size=5))
+def test_any_fields(messages):
+    for profile in (None, PROFILE):
+        found = feed(profile)
+        for fields in messages:
+            found.fields(fields)
+        for _, _, stamp, values in found.inbox.samples:
+            assert all(abs(number) < float("inf") for number in (stamp, *values.values()))
+
+
+@given(st.integers(0, (1 << 29) - 1), st.booleans(), st.binary(max_size=64))
+def test_any_frame(identifier, extended, data):
+    fields = FrameDecoder([], lambda name: True).fields(identifier, extended, data)
+    assert all(isinstance(value, float) for value in fields.values())
+
+
+@given(st.binary(max_size=100) | st.text(alphabet="$GPRMCVTA,.0123456789*NWE-", max_size=80).map(str.encode))
+def test_any_sentence(line):
+    with contextlib.suppress(Unreadable):
+        assert all(abs(value) < float("inf") for value in fields_of(line).values())
+
+
+@given(data=st.data())
+def test_any_damage_to_a_write_ahead_file(tmp_path_factory, data):
+    path = tmp_path_factory.mktemp("wal") / "wal.log"
+    wal = WriteAhead(path)
+    for k in range(20):
+        wal.sample(float(k), 0, float(k), {"ground_speed": 1.0, f"wheel_speed_{k % 3}": 2.0})
+        wal.tick(float(k))
+        wal.note({"k": k})
+    wal.close()
+    whole = list(Reading(path))
+    assert len(whole) == 60
+    content = bytearray(path.read_bytes())
+    for place in data.draw(st.lists(st.integers(0, len(content) - 1), max_size=3)):
+        content[place] ^= data.draw(st.integers(1, 255))
+    cut = data.draw(st.integers(0, len(content)))
+    path.write_bytes(content[:cut])
+    reading = Reading(path)
+    found = list(reading)
+    assert found == whole[: len(found)]
+    assert reading.good <= max(cut, len(MAGIC))
