@@ -16,7 +16,6 @@ from terragrip.estimation import Estimates
 from terragrip.soil.blocks import driven_wheels, wheel_loads
 
 Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 
 @dataclass(frozen=True)
@@ -108,9 +107,9 @@ class _Values:
         self.labels = columns.get("soil")
 
     def section(self, stretch: Stretch, begin: int) -> Section:
-        rows = np.zeros(self.time.size, dtype=bool)
-        rows[begin : stretch.last] = True
-        counts = rows & self.counts
+        """The section of a stretch that counts from row `begin` on."""
+        rows = slice(begin, stretch.last)
+        counts = begin + np.flatnonzero(self.counts[rows])
         wheels = {
             w: dict(
                 zip(
@@ -132,7 +131,7 @@ class _Values:
             float(self.time[stretch.first]),
             stretch.soil,
             stretch.probabilities,
-            int(counts.sum()),
+            counts.size,
             *_moments(self.mean_slip, counts),
             *_moments(self.mean_adhesion, counts),
             *_moments(self.resistance, counts),
@@ -142,7 +141,7 @@ class _Values:
         )
 
 
-def _moments(values: Array, rows: Mask) -> tuple[float | None, float | None]:
+def _moments(values: Array, rows: NDArray[np.intp]) -> tuple[float | None, float | None]:
     chosen = values[rows]
     chosen = chosen[np.isfinite(chosen)]
     return (float(chosen.mean()), float(chosen.std())) if chosen.size else (None, None)
