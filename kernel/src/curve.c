@@ -41,6 +41,24 @@ static tg_real slow(tg_real s)
     return 1 + x * (1 + x * ((tg_real)0.5 + x * ((tg_real)(1.0 / 6) + x * (tg_real)(1.0 / 24))));
 }
 
+/* g(s), odd in slip, on -1 to 1. */
+static tg_real height_at(tg_real slip)
+{
+    const tg_real s = tgi_fabs(slip), g = 1 - TG_SHARE * slow(s) - (1 - TG_SHARE) * tgi_exp(TG_RISE * s);
+    return slip < 0 ? -g : g;
+}
+
+/* How g answers to an error of slip: its slope, or where that is more, the mean slope down to two SDs less slip. High up g is flat and
+ * its slope says that slip hardly matters; but a slip of 0.3 +- 0.13 may be none at all, as at a start. */
+static tg_real answer(tg_real slip, tg_real height, tg_real slope, tg_real variance)
+{
+    tg_real reach = 2 * tgi_sqrt(variance);
+    if (!(reach > (tg_real)0.01)) return slope; /* g is straight enough, and division by nothing is none */
+    if (reach > 1) reach = 1;
+    const tg_real mean = (height - height_at(slip - reach)) / reach;
+    return mean > slope ? mean : slope;
+}
+
 /* Seen from the prototype, odd in slip. `told` is 0 where the pair tells nothing. */
 tgi_sight tgi_look(const tg_pair *p)
 {
@@ -52,7 +70,7 @@ tgi_sight tgi_look(const tg_pair *p)
     found.told = 1;
     found.adhesion = p->adhesion;
     found.height = p->slip < 0 ? -g : g;
-    found.slope = -TG_SLOW * first - TG_RISE * second;
+    found.slope = answer(s, g, -TG_SLOW * first - TG_RISE * second, p->slip_variance);
     found.variance = p->adhesion_variance;
     found.slip_variance = p->slip_variance;
     found.constant = p->adhesion_constant * p->adhesion_constant;
@@ -61,15 +79,15 @@ tgi_sight tgi_look(const tg_pair *p)
     return found;
 }
 
-/* The residual mu - a g(s): its variance, and by how much one SD of all constants moves it. A radius error e too much lowers mu by mu e
+/* The residual mu - a g(s): its variance (a itself is uncertain: `size` is the root of E[a^2]), and by how much one SD of all constants moves it. A radius error e too much lowers mu by mu e
  * and raises slip by (1 - s) e: both lower the residual. */
 typedef struct {
     tg_real adhesion, height, variance, constant;
 } tgi_measurement;
 
-static tgi_measurement measure(const tgi_sight *k, tg_real a)
+static tgi_measurement measure(const tgi_sight *k, tg_real a, tg_real size)
 {
-    const tg_real slope = a * k->slope, radius = (tgi_fabs(k->adhesion) + tgi_fabs(slope) * k->travel) * k->radius;
+    const tg_real slope = size * k->slope, radius = (tgi_fabs(k->adhesion) + tgi_fabs(slope) * k->travel) * k->radius;
     const tg_real scatter = TG_SCATTER * a * k->height;
     const tg_real variance = k->variance + slope * slope * k->slip_variance + scatter * scatter + TG_LEAST_SCATTER * TG_LEAST_SCATTER;
     const tgi_measurement m = {k->adhesion, k->height, variance, tgi_sqrt(k->constant + radius * radius)};
@@ -77,13 +95,14 @@ static tgi_measurement measure(const tgi_sight *k, tg_real a)
 }
 
 /* The mean of the wheels by `share`; their errors are taken as alike, which no count of wheels makes smaller. */
-static int32_t mean_of(const tgi_sight *sight, const tg_real *share, int32_t pairs, tg_real a, tgi_measurement *mean)
+static int32_t mean_of(const tgi_sight *sight, const tg_real *share, int32_t pairs, const tg_curve *c, tgi_measurement *mean)
 {
+    const tg_real size = tgi_sqrt(c->a * c->a + c->variance);
     tg_real sum = 0, sd = 0;
     memset(mean, 0, sizeof *mean);
     for (int32_t i = 0; i < pairs; i++) {
         if (!sight[i].told || !(share[i] > 0)) continue;
-        const tgi_measurement m = measure(&sight[i], a);
+        const tgi_measurement m = measure(&sight[i], c->a, size);
         sum += share[i];
         mean->adhesion += share[i] * m.adhesion;
         mean->height += share[i] * m.height;
@@ -154,7 +173,7 @@ void tgi_curve_take(tg_curve *c, tg_real dt, tg_real distance, int32_t pairs, co
 {
     tgi_measurement m;
     wander(c, distance);
-    if (dt > 0 && mean_of(sight, share, pairs, c->a, &m)) take(c, &m, dt);
+    if (dt > 0 && mean_of(sight, share, pairs, c, &m)) take(c, &m, dt);
     else if (c->silence >= 0) c->silence += dt;
 }
 

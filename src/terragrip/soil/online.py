@@ -27,7 +27,7 @@ class OnlineCurve:
     """The current a of mu = a g(s), g the paper's prototype (eq. 8), with its standard deviation.
 
     A scalar Kalman filter (R) on the means of mu and g(s) over about 0.5 s: a wanders with the distance driven
-    (0.06 SD a metre); a pair's variance is var(mu) + (a g')^2 var(s) and
+    (0.06 SD a metre); a pair's variance is var(mu) + E[a^2] g'^2 var(s), with g' no less than the mean slope over two SDs of slip, and
     the soil's own scatter (8 %); since the errors of neighbouring pairs are alike, a row counts as dt/0.5 s of an independent pair.
     Constant errors (torque gain, rolling radius) enter as considered: they do not average out. Residuals four times as large, in the mean
     square, as one ground makes them, start a anew; `new_ground` does so by hand.
