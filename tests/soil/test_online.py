@@ -109,7 +109,7 @@ def test_the_interval_holds_the_truth():
 
 
 def test_a_slip_that_may_be_none_teaches_little():
-    """A start: adhesion of 0.08 at a slip of 0.2 known to 0.1 is a weak soil, or a firm one at 2 % slip. Slopes at 0.2 alone would decide."""
+    """A start: adhesion of 0.08 at a slip of 0.2 known to 0.1 is a weak soil, or a firm one at 2 % slip."""
     spread = {}
     for slip_std in (0.0, 0.1):
         curve = OnlineCurve()
