@@ -1,0 +1,137 @@
+"""What a recording offers for telling grounds apart: each sensor family's channels, free of missing and held samples."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from terragrip.errors import InputError
+from terragrip.recording import Recording, fresh_samples
+from terragrip.recording.checks import check_time, refuse_infinite
+from terragrip.recording.columns import columns_of, numbers, seconds
+from terragrip.recording.held import held_period
+from terragrip.recording.schema import TIME
+
+Floats = npt.NDArray[np.float64]
+
+# A motor current stands in for the torque: what is learnt does not depend on the gain between them.
+PREFIXES = {
+    "wheel speed": ("wheel_speed_",),
+    "torque": ("drive_torque_", "motor_current_"),
+    "ground speed": ("ground_speed",),
+    "angular velocity": ("angular_velocity_x", "angular_velocity_y", "angular_velocity_z"),
+    "acceleration": ("acceleration_x", "acceleration_y", "acceleration_z"),
+}
+FAMILIES = tuple(PREFIXES)
+
+_HELD = 1.5  # sample periods
+
+
+@dataclass(frozen=True)
+class Channel:
+    """One measured channel: its instants (n,) [s] and values (n,), all finite."""
+
+    time: Floats
+    values: Floats
+
+    @property
+    def period(self) -> float:
+        """Median time [s] between samples; NaN for fewer than two."""
+        return float(np.median(np.diff(self.time))) if len(self.time) > 1 else np.nan
+
+
+@dataclass(frozen=True)
+class Signals:
+    """The usable channels of one recording by family and name, and the span [s] of its rows."""
+
+    start: float
+    end: float
+    families: dict[str, dict[str, Channel]]
+
+
+def family_of(column: str) -> str | None:
+    """The sensor family that a recording column belongs to, None for one that is not used."""
+    for family, prefixes in PREFIXES.items():
+        for prefix in prefixes:
+            open_ended = prefix.endswith("_")
+            if column == prefix or (open_ended and column.startswith(prefix) and len(column) > len(prefix)):
+                return family
+    return None
+
+
+def tables_of(recordings: Any) -> list[tuple[Floats, dict[str, Floats], str]]:
+    """Time, used channels and name of each recording (a Recording, a DataFrame or a mapping of columns).
+
+    Ground speed and wheel speeds may be missing: what is there is used. Raises InputError naming the recording
+    on anything that is no list of tables, and on time or values that are unusable.
+    """
+    if isinstance(recordings, Recording | Mapping | str) or hasattr(recordings, "columns"):
+        raise InputError(
+            "recordings is one table, not a list", place="recordings", mend="give a list: [recording]"
+        )
+    try:
+        listed = list(recordings)
+    except TypeError:
+        problem = f"{type(recordings).__name__} is not a list of recordings"
+        raise InputError(problem, place="recordings", mend="give a list of Recording or DataFrames") from None
+    return [_table(recording, k) for k, recording in enumerate(listed)]
+
+
+def held_channels(tables: Sequence[tuple[Floats, dict[str, Floats], str]]) -> dict[str, float]:
+    """Update period [s] of each channel whose logger repeats values, judged on all recordings together."""
+    found = {}
+    for name in sorted({name for _, channels, _ in tables for name in channels}):
+        times, values, offset = [], [], 0.0
+        for time, channels, _ in tables:
+            if name in channels and len(time):
+                times.append(time - time[0] + offset)
+                values.append(channels[name])
+                offset = float(times[-1][-1]) + 1.0
+        if not times:
+            continue
+        time, value = np.concatenate(times), np.concatenate(values)
+        rows = float(np.median(np.diff(time[np.isfinite(value)]))) if np.isfinite(value).sum() > 1 else np.inf
+        period = held_period(time, value)
+        if (
+            period is not None and period > _HELD * rows
+        ):  # short of that it is a quantised signal at its own rate
+            found[name] = period
+    return found
+
+
+def signals_of(table: tuple[Floats, dict[str, Floats], str], held: Mapping[str, float]) -> Signals:
+    """The usable channels of a table from `tables_of`; repeats of a held channel count as not measured."""
+    time, channels, _ = table
+    families: dict[str, dict[str, Channel]] = {}
+    for name, values in channels.items():
+        keep = fresh_samples(time, values, held[name]) if name in held else np.isfinite(values)
+        if np.count_nonzero(keep) > 1:
+            family = family_of(name) or ""
+            families.setdefault(family, {})[name] = Channel(time[keep], values[keep])
+    # Each row stands for one period, so a window's worth of rows fills a window. Every row counts, whatever was
+    # measured in it: a recording has the same windows with and without a sensor.
+    period = float(np.median(np.diff(time))) if len(time) > 1 else 0.0
+    return Signals(float(time[0]), float(time[-1]) + period, families)
+
+
+def _table(recording: Any, index: int) -> tuple[Floats, dict[str, Floats], str]:
+    name = f"recordings[{index}]"
+    if isinstance(recording, Recording):
+        used = {n: v for n, v in recording.channels.items() if family_of(n)}
+        return recording.time, used, recording.source or name
+    columns = columns_of(recording, name)
+    if TIME not in columns:
+        raise InputError("is missing", file=name, place=f"column {TIME}", mend="add the instants in seconds")
+    time, _ = seconds(columns[TIME], name)
+    check_time(time, name)
+    channels = {}
+    for column, cells in columns.items():
+        if family_of(column):
+            values = numbers(column, cells, time, name)
+            refuse_infinite(column, values, time, name)
+            channels[column] = values
+    return time, channels, name

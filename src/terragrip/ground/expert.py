@@ -1,0 +1,129 @@
+"""One expert: the classifier for one set of sensors, its calibrated probabilities, and what it calls strange."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from terragrip.ground.kernel_machine import KernelMachine
+from terragrip.ground.standardization import Standardization
+
+Floats = npt.NDArray[np.float64]
+Codes = npt.NDArray[np.intp]
+
+LEVELS: Floats = np.r_[0.0, np.geomspace(1e-4, 1.0, 400)]
+
+
+@dataclass(frozen=True)
+class Expert:
+    """A machine on the features of one set of sensor families.
+
+    ``slope`` and ``offsets`` (classes,) turn scores into probabilities; ``usual`` is mean and SD of the score of the
+    winner and of the log distance (2, 2), ``strange`` (levels,) the strangeness that a share of known windows exceeds.
+    """
+
+    families: frozenset[str]
+    features: tuple[str, ...]
+    standardization: Standardization
+    machine: KernelMachine
+    slope: float
+    offsets: Floats
+    usual: Floats
+    strange: Floats
+
+    def judge(self, features: Floats) -> tuple[Floats, Floats]:
+        """Probabilities (n, classes) and strangeness (n,) of windows with these features (n, features)."""
+        scores, distance = self.machine.decide(self.standardization.apply(features))
+        return probabilities(scores, self.slope, self.offsets), strangeness(scores, distance, self.usual)
+
+    def novelty(self, strange: Floats) -> Floats:
+        """Share (n,) of windows on known grounds, from runs not trained on, that are at least as strange."""
+        return np.interp(strange, self.strange[::-1], LEVELS[::-1])
+
+
+def train(
+    families: frozenset[str],
+    names: Sequence[str],
+    features: Floats,
+    codes: Codes,
+    groups: Codes,
+    folds: Codes,
+    threads: int,
+) -> Expert:
+    """Fit an expert; ``folds`` (n,) says which part of a cross-validation a window is held out in.
+
+    What is said of probabilities and strangeness is learnt from windows of recordings that were held out.
+    """
+
+    def fitted(rows: npt.NDArray[np.bool_]) -> tuple[Standardization, KernelMachine]:
+        scaling = Standardization.fit(features[rows], codes[rows], groups[rows])
+        return scaling, KernelMachine.fit(scaling.apply(features[rows]), codes[rows])
+
+    everything = np.ones(len(codes), dtype=bool)
+    parts = [everything, *(folds != fold for fold in range(int(folds.max()) + 1))]
+    with ThreadPoolExecutor(threads) as pool:  # the solver works outside the interpreter's lock
+        machines = list(pool.map(fitted, parts))
+    classes = machines[0][1].classes
+    scores, distance = np.empty((len(codes), classes)), np.empty(len(codes))
+    for fold, (scaling, machine) in enumerate(machines[1:]):
+        out = folds == fold
+        scores[out], distance[out] = machine.decide(scaling.apply(features[out]))
+    weight = 1.0 / np.bincount(codes)[codes]
+    weight /= weight.sum()
+    slope, offsets = calibrate(scores, codes, weight)
+    best = scores.max(axis=1)
+    usual = np.array([_mean_and_spread(best, weight), _mean_and_spread(distance, weight)])
+    odd = strangeness(scores, distance, usual)
+    order = np.argsort(-odd)
+    share = np.cumsum(weight[order])
+    levels = np.interp(LEVELS, np.r_[0.0, share], np.r_[odd[order[0]] + 1e-6, odd[order]])
+    strange = np.minimum.accumulate(levels) - 1e-12 * np.arange(len(levels), dtype=float)
+    return Expert(families, tuple(names), *machines[0], slope, offsets, usual, strange)
+
+
+def probabilities(scores: Floats, slope: float, offsets: Floats) -> Floats:
+    """Softmax (n, classes) of scaled and shifted scores (n, classes)."""
+    logits = slope * scores + offsets
+    odds = np.exp(logits - logits.max(axis=1, keepdims=True))
+    return odds / odds.sum(axis=1, keepdims=True)
+
+
+def strangeness(scores: Floats, distance: Floats, usual: Floats) -> Floats:
+    """How far (n,) windows are from any known ground: no class wins clearly, and nothing known lies near.
+
+    Each is measured in its own standard deviations over known windows; their sum tells more than either.
+    """
+    (best, spread), (far, width) = usual
+    return (best - scores.max(axis=1)) / spread + (distance - far) / width
+
+
+def calibrate(scores: Floats, codes: Codes, weight: Floats) -> tuple[float, Floats]:
+    """Slope and offsets (classes,) under which softmax probabilities are most likely (Platt's scaling, many classes)."""
+    from scipy.optimize import minimize
+
+    rows = np.arange(len(codes))
+    hit = np.zeros_like(scores)
+    hit[rows, codes] = 1.0
+
+    def loss(parameters: Floats) -> tuple[float, Floats]:
+        slope, offsets = np.exp(parameters[0]), parameters[1:]
+        found = probabilities(scores, slope, offsets)
+        # A weak pull to no offset keeps a class that never errs finite.
+        value = -(weight * np.log(found[rows, codes] + 1e-12)).sum() + 1e-3 * (parameters**2).sum()
+        off = (found - hit) * weight[:, None]
+        gradient = np.r_[slope * (off * scores).sum(), off.sum(axis=0)] + 2e-3 * parameters
+        return value, gradient
+
+    start = np.r_[1.0, np.zeros(scores.shape[1])]
+    best = minimize(loss, start, jac=True, method="L-BFGS-B", bounds=[(-3, 5), *[(-8, 8)] * scores.shape[1]])
+    return float(np.exp(best.x[0])), best.x[1:]
+
+
+def _mean_and_spread(values: Floats, weight: Floats) -> tuple[float, float]:
+    mean = float((weight * values).sum())
+    spread = float(np.sqrt((weight * (values - mean) ** 2).sum()))
+    return mean, spread if spread > 1e-9 else 1.0

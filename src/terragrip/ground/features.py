@@ -1,0 +1,236 @@
+"""Features of windows: what each says about the ground, and which sensors it needs.
+
+A feature's name begins with its sensors. Wheels come in as mean and spread over the wheels, so that neither their
+number nor their order matters. Sizes come in as logarithms relative to the vehicle's usual ones, so that a gain on
+a channel, such as amperes for newton metres, is only a shift.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cache
+
+import numpy as np
+import numpy.typing as npt
+
+from terragrip.ground.channels import FAMILIES, Channel, Signals
+from terragrip.ground.vibration import (
+    band_edges,
+    band_energies,
+    likeness,
+    moments,
+    spectral_shape,
+    unsteadiness,
+)
+from terragrip.ground.wheel_features import FLOOR, Table, effort_of, log_size, motion, over_wheels
+from terragrip.ground.windows import samples_in
+
+Floats = npt.NDArray[np.float64]
+
+SPEED, TORQUE, GROUND, TURN, ACCELERATION = FAMILIES
+_SAME_RATE = 1.2
+
+
+@dataclass(frozen=True)
+class Layout:
+    """What a vehicle's recordings look like: window [s], sample period [s] and usual size of each family."""
+
+    window: float
+    period: dict[str, float]
+    size: dict[str, float]
+
+
+def features_of(signals: Signals, starts: Floats, layout: Layout) -> Table:
+    """Features (windows,) by name, of the windows that begin at ``starts``; NaN where not measured.
+
+    A family of sensors that the recording or the layout lacks gives none.
+    """
+    found: Table = {}
+    usable = {f: c for f, c in signals.families.items() if f in layout.period}
+    with np.errstate(invalid="ignore", divide="ignore"):
+        speeds = _wheels(usable.get(SPEED, {}), starts, layout, SPEED)
+        if speeds is not None:
+            found |= _named(SPEED, motion(speeds[0], layout.size[SPEED]))
+        torques = _wheels(usable.get(TORQUE, {}), starts, layout, TORQUE)
+        if torques is not None:
+            found |= _named(TORQUE, effort_of(torques[0], layout.size[TORQUE]))
+            if speeds is not None:
+                beside = _drive_beside_motion(usable, starts, layout, torques)
+                found |= _named(f"{SPEED}+{TORQUE}", beside)
+        if GROUND in usable:
+            found |= _ground(usable, starts, layout, speeds)
+        for family in (TURN, ACCELERATION):
+            if family in usable:
+                found |= _body(family, usable[family], starts, layout)
+                if speeds is not None:
+                    pace = found[f"{SPEED}: pace"]
+                    found[f"{SPEED}+{family}: per speed"] = found[f"{family}: all spread"] - pace
+        if speeds is not None and TURN in usable:
+            found |= _named(f"{SPEED}+{TURN}", _yaw(usable, starts, layout, speeds))
+    return found
+
+
+@cache
+def families_needed(feature: str) -> frozenset[str]:
+    """The sensor families that a feature rests on, read from its name."""
+    return frozenset(feature.partition(": ")[0].split("+"))
+
+
+def _named(sensors: str, features: Table) -> Table:
+    return {f"{sensors}: {name}": values for name, values in features.items()}
+
+
+def _period(family: str, channels: dict[str, Channel], layout: Layout) -> float:
+    """The trained period where the recording's is about that, else the recording's own."""
+    own = min(channel.period for channel in channels.values())
+    trained = layout.period[family]
+    return trained if 1 / _SAME_RATE < own / trained < _SAME_RATE else own
+
+
+def _stack(
+    channels: dict[str, Channel], starts: Floats, layout: Layout, period: float, lead: Channel
+) -> Floats:
+    """Samples (windows, channels, samples) on one grid."""
+    return np.stack(
+        [samples_in(c, starts, layout.window, period, anchor=lead) for c in channels.values()], axis=1
+    )
+
+
+def _lead(channels: dict[str, Channel]) -> Channel:
+    """The channel that sets the grid: the densest, the first of equals."""
+    return max(channels.values(), key=lambda channel: len(channel.time))
+
+
+def _wheels(
+    channels: dict[str, Channel], starts: Floats, layout: Layout, family: str
+) -> tuple[Floats, float] | None:
+    """Samples (windows, wheels, samples) and their period, or None if no channel holds at least two a window."""
+    if not channels:
+        return None
+    period = _period(family, channels, layout)
+    if period > layout.window / 2:
+        return None
+    return _stack(channels, starts, layout, period, _lead(channels)), period
+
+
+def _drive_beside_motion(
+    usable: dict[str, dict[str, Channel]], starts: Floats, layout: Layout, torques: tuple[Floats, float]
+) -> Table:
+    """Torque and speed together: power, signed effort, and whether they rise and fall as one."""
+    torque, period = torques
+    speed = _stack(usable[SPEED], starts, layout, period, _lead(usable[TORQUE]))
+    effort, pace = over_wheels(np.abs(torque))[0], over_wheels(np.abs(speed))[0]
+    net = over_wheels(speed)[0]
+    size = layout.size[TORQUE] * layout.size[SPEED]
+    found = {
+        "power": log_size((effort * pace).mean(axis=-1), size),
+        "rise together": likeness(effort, pace),
+        "rise with acceleration": likeness(effort[:, 1:], np.diff(pace, axis=-1)),
+    }
+    # Wheels are paired by name where both are measured; mean net effort needs no pairing.
+    forward = over_wheels(torque)[0] * np.sign(net)
+    found["net effort"] = forward.mean(axis=-1) / layout.size[TORQUE]
+    pairs = {name.rpartition("_")[2]: k for k, name in enumerate(usable[SPEED])}
+    own = [
+        (k, pairs[n.rpartition("_")[2]])
+        for k, n in enumerate(usable[TORQUE])
+        if n.rpartition("_")[2] in pairs
+    ]
+    if len(own) > 1:
+        level = np.abs(torque[:, [t for t, _ in own]]).mean(axis=-1)
+        rate = np.abs(speed[:, [s for _, s in own]]).mean(axis=-1)
+        rows = np.arange(len(level))
+        floor = FLOOR * layout.size[TORQUE]
+        fast, slow = np.nan_to_num(rate).argmax(axis=1), np.nan_to_num(rate, nan=np.inf).argmin(axis=1)
+        found["fast against slow wheel"] = np.log((level[rows, fast] + floor) / (level[rows, slow] + floor))
+    return found
+
+
+def _ground(
+    usable: dict[str, dict[str, Channel]],
+    starts: Floats,
+    layout: Layout,
+    speeds: tuple[Floats, float] | None,
+) -> Table:
+    """Ground speed: its own evenness, and how much faster the wheels turn than the vehicle moves (slip)."""
+    channels = usable[GROUND]
+    period = _period(GROUND, channels, layout)
+    size = layout.size[GROUND]
+    moving = samples_in(channels["ground_speed"], starts, layout.window, period)
+    level = np.abs(moving).mean(axis=-1)
+    found = _named(
+        GROUND,
+        {
+            "level": log_size(level, size),
+            "evenness": np.log(moving.std(axis=-1) / (level + FLOOR * size) + FLOOR),
+        },
+    )
+    if speeds is not None:
+        pace = over_wheels(np.abs(speeds[0]))[0].mean(axis=-1)
+        slip = log_size(pace, layout.size[SPEED]) - log_size(level, size)
+        found[f"{SPEED}+{GROUND}: slip"] = slip
+    return found
+
+
+def _body(family: str, channels: dict[str, Channel], starts: Floats, layout: Layout) -> Table:
+    """Vibration of the body, gravity and slow tilt removed: each axis, and all of them."""
+    period = _period(family, channels, layout)
+    edges = band_edges(layout.window, layout.period[family])
+    size = layout.size[family]
+    values = _stack(channels, starts, layout, period, _lead(channels))
+    axes = [name.rpartition("_")[2] for name in channels]
+    found: Table = {}
+    each = moments(values)
+    spread = np.log(each.pop("spread") / size + 1e-3)
+    total = 0.5 * np.log(np.nansum(np.exp(2 * spread), axis=1)) + 0.0 * spread.sum(axis=1)
+    found["all spread"] = total
+    found["unsteadiness"] = unsteadiness(values)
+    energies = band_energies(values, period, edges) / size**2 if len(edges) else None
+    if energies is not None:
+        whole = energies.sum(axis=1)
+        found |= {f"all {name}": shape for name, shape in spectral_shape(whole, edges).items()}
+        spectrum = np.log(energies + 1e-7)
+        resolved = np.isfinite(spectrum)
+        mean = np.where(resolved, spectrum, 0.0).sum(axis=-1, keepdims=True)
+        shape = spectrum - mean / resolved.sum(axis=-1, keepdims=True)
+        octaves = _octaves(whole)
+        found |= {f"all octave {k}": np.log(band + 1e-7) for k, band in enumerate(octaves)}
+    for k, axis in enumerate(axes):
+        found[f"{axis} spread"] = spread[:, k]
+        found[f"{axis} share"] = spread[:, k] - total
+        found |= {f"{axis} {name}": of_axes[:, k] for name, of_axes in each.items()}
+        if energies is not None:
+            found |= {f"{axis} band {b}": shape[:, k, b] for b in range(shape.shape[-1])}
+        for j in range(k):
+            found[f"{axes[j]}{axis} alike"] = np.abs(likeness(values[:, j], values[:, k]))
+    return _named(family, found)
+
+
+def _octaves(energies: Floats) -> list[Floats]:
+    """Band energies (windows, bands) summed by octave, from the highest down."""
+    found, high = [], energies.shape[-1]
+    while high >= 1:
+        low = high // 2
+        found.append(energies[:, low:high].sum(axis=-1))
+        high = low
+    return found
+
+
+def _yaw(
+    usable: dict[str, dict[str, Channel]], starts: Floats, layout: Layout, speeds: tuple[Floats, float]
+) -> Table:
+    """How much the body turns for what the wheels ask: low on ground that lets a skid-steered vehicle slide."""
+    channels = usable[TURN]
+    if "angular_velocity_z" not in channels:
+        return {}
+    turning = samples_in(
+        channels["angular_velocity_z"], starts, layout.window, _period(TURN, channels, layout)
+    )
+    wheel = speeds[0]
+    parting = (over_wheels(wheel)[1] - over_wheels(wheel)[2]).mean(axis=-1) / (2 * layout.size[SPEED])
+    rate = np.abs(turning.mean(axis=-1)) / layout.size[TURN]
+    return {
+        "yaw rate": np.log(rate + FLOOR),
+        "yaw gain": np.log((rate + 0.1) / (parting + 0.1)),
+        "yaw energy": np.log(np.sqrt((turning**2).mean(axis=-1)) / layout.size[TURN] + FLOOR),
+    }

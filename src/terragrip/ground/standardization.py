@@ -1,0 +1,61 @@
+"""Features on one scale, weighed by how far grounds differ in them beside runs on one ground."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+Floats = npt.NDArray[np.float64]
+
+_LIMIT = 3.5  # standard deviations: what lies further out says no more
+_TRUST = 0.5  # power of the ratio of variances
+
+
+@dataclass(frozen=True)
+class Standardization:
+    """Centre, scale and weight (features,) of each feature."""
+
+    centre: Floats
+    scale: Floats
+    weight: Floats
+
+    @classmethod
+    def fit(
+        cls, features: Floats, codes: npt.NDArray[np.intp], groups: npt.NDArray[np.intp]
+    ) -> Standardization:
+        """Learn from ``features`` (n, features; NaN = not measured), class codes (n,) and recording numbers (n,).
+
+        A feature that differs from run to run on one ground as much as between grounds tells little about a run
+        never seen; its weight is the root of the ratio of the two variances.
+        """
+        measured = np.isfinite(features)
+        count = np.maximum(measured.sum(axis=0), 1)
+        centre = np.where(measured, features, 0.0).sum(axis=0) / count
+        rest = np.where(measured, features - centre, 0.0)
+        scale = np.sqrt((rest**2).sum(axis=0) / count)
+        scale = np.where(scale > 1e-9 * (1.0 + np.abs(centre)), scale, np.inf)  # a constant says nothing
+        points = cls(centre, scale, np.ones(features.shape[1])).apply(features)
+        runs, of_run = np.unique(groups, return_inverse=True)
+        size = np.bincount(of_run).astype(float)[:, None]
+        means = np.stack([points[of_run == r].mean(axis=0) for r in range(len(runs))])
+        within = (np.bincount(of_run) @ _variances(points, means, of_run, size)) / len(points)
+        class_of = np.array([codes[of_run == r][0] for r in range(len(runs))])
+        by_class = [means[class_of == c] for c in np.unique(class_of)]
+        between_runs = np.mean([m.var(axis=0) for m in by_class], axis=0)
+        between_classes = np.var([m.mean(axis=0) for m in by_class], axis=0)
+        weight = (between_classes / (between_runs + 0.3 * within + 1e-3)) ** _TRUST
+        size_of = np.sqrt((weight**2).mean())
+        return cls(centre, scale, weight / size_of if size_of > 0 else np.ones_like(weight))
+
+    def apply(self, features: Floats) -> Floats:
+        """Features (n, features) on one scale; what is not measured lies at the centre."""
+        points = np.clip((features - self.centre) / self.scale, -_LIMIT, _LIMIT)
+        return np.where(np.isfinite(points), points, 0.0) * self.weight
+
+
+def _variances(points: Floats, means: Floats, of_run: npt.NDArray[np.intp], size: Floats) -> Floats:
+    squares = np.zeros_like(means)
+    np.add.at(squares, of_run, (points - means[of_run]) ** 2)
+    return squares / size

@@ -1,0 +1,199 @@
+"""A trained classifier as a file: NumPy arrays and JSON in one archive (.npz), never pickled."""
+
+from __future__ import annotations
+
+import io
+import json
+import os
+import zipfile
+import zlib
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import terragrip
+from terragrip.errors import InputError
+from terragrip.files import refuse_missing, replacing, unreadable
+from terragrip.ground.classifier import GroundClassifier
+from terragrip.ground.expert import Expert
+from terragrip.ground.features import Layout
+from terragrip.ground.kernel_machine import KernelMachine
+from terragrip.ground.standardization import Standardization
+
+FORMAT = "terragrip ground classifier"
+VERSION = 1
+
+# Arrays of an expert, with their shapes in terms of features, vectors, pairs, classes.
+_ARRAYS = {
+    "centre": "f",
+    "scale": "f",
+    "weight": "f",
+    "support": "vf",
+    "weights": "vp",
+    "offsets": "p",
+    "class_offsets": "k",
+    "usual": "22",
+    "strange": "s",
+}
+
+
+def save(classifier: GroundClassifier, path: str | os.PathLike[str]) -> None:
+    """Write a fitted classifier; the file appears whole or not at all. Raises InputError if it cannot be written."""
+    layout = classifier._layout
+    header = {
+        "format": FORMAT,
+        "version": VERSION,
+        "terragrip": terragrip.__version__,
+        "parameters": {k: _plain(v) for k, v in classifier.get_params().items()},
+        "classes": classifier.classes_.tolist(),
+        "features": list(classifier.feature_names_in_),
+        "layout": {"window": float(layout.window), "period": layout.period, "size": layout.size},
+        "held": classifier._held,
+        "notes": list(classifier.notes_),
+        "experts": [
+            {
+                "families": sorted(e.families),
+                "features": list(e.features),
+                "slope": e.slope,
+                "width": e.machine.width,
+            }
+            for e in classifier._experts
+        ],
+    }
+    arrays: dict[str, Any] = {"header": np.frombuffer(json.dumps(header).encode(), dtype=np.uint8)}
+    for number, expert in enumerate(classifier._experts):
+        scaling, machine = expert.standardization, expert.machine
+        held = (
+            scaling.centre,
+            scaling.scale,
+            scaling.weight,
+            machine.support,
+            machine.weights,
+            machine.offsets,
+            expert.offsets,
+            expert.usual,
+            expert.strange,
+        )
+        arrays |= {f"{name}_{number}": array for name, array in zip(_ARRAYS, held, strict=True)}
+    with replacing(path) as temporary, temporary.open("wb") as stream:
+        np.savez_compressed(stream, **arrays)
+
+
+def load(path: str | os.PathLike[str]) -> GroundClassifier:
+    """Read a classifier that `save` wrote. Raises InputError on a missing, foreign, damaged or newer file."""
+    refuse_missing(path, suffixes=(".npz",))
+    try:
+        content = Path(path).read_bytes()
+    except OSError as error:
+        raise unreadable(path, error) from error
+    try:
+        with np.load(io.BytesIO(content), allow_pickle=False) as archive:
+            header = json.loads(bytes(archive["header"]))
+            if not isinstance(header, dict) or header.get("format") != FORMAT:
+                raise _foreign(path)
+            version = header.get("version")
+            if not isinstance(version, int) or version > VERSION:
+                mend = "update terragrip, or train it anew"
+                raise InputError(
+                    f"is of version {version!r}, this terragrip reads {VERSION}", file=path, mend=mend
+                )
+            return _rebuild(header, archive)
+    except InputError:
+        raise
+    except (zipfile.BadZipFile, zlib.error, EOFError, OSError, NotImplementedError, RuntimeError) as error:
+        if content[:2] == b"PK":
+            raise _damaged(path, error) from error
+        raise _foreign(path) from error
+    except (AttributeError, IndexError, KeyError, TypeError, ValueError, SyntaxError, OverflowError) as error:
+        if content[:2] == b"PK" and b"header.npy" in content:
+            raise _damaged(path, error) from error
+        raise _foreign(path) from error
+
+
+def _rebuild(header: dict[str, Any], archive: Any) -> GroundClassifier:
+    """The classifier of a header and its arrays; raises KeyError, TypeError or ValueError on what does not fit."""
+    classifier = GroundClassifier(**header["parameters"])
+    try:
+        classifier._check_parameters()
+    except InputError as error:
+        raise ValueError(error) from error
+    layout = header["layout"]
+    numbers = [
+        layout["window"],
+        *layout["period"].values(),
+        *layout["size"].values(),
+        *header["held"].values(),
+    ]
+    if not all(isinstance(x, int | float) and 0 < x < float("inf") for x in numbers):
+        raise ValueError("a period or a size is no positive number")
+    classes = np.array(header["classes"])
+    if classes.ndim != 1 or len(np.unique(classes)) != len(classes) or len(classes) < 2:
+        raise ValueError("the classes are not two or more different labels")
+    names = [str(name) for name in header["features"]]
+    known = set(names)
+    experts = []
+    for number, of_expert in enumerate(header["experts"]):
+        features = tuple(of_expert["features"])
+        if not features or not known.issuperset(features):
+            raise ValueError("an expert's features are not among the classifier's")
+        a = {name: archive[f"{name}_{number}"] for name in _ARRAYS}
+        _check_shapes(a, len(features), len(classes))
+        machine = KernelMachine(
+            a["support"], a["weights"], a["offsets"], float(of_expert["width"]), len(classes)
+        )
+        scaling = Standardization(a["centre"], a["scale"], a["weight"])
+        experts.append(
+            Expert(
+                frozenset(of_expert["families"]),
+                features,
+                scaling,
+                machine,
+                float(of_expert["slope"]),
+                a["class_offsets"],
+                a["usual"],
+                a["strange"],
+            )
+        )
+    if not experts:
+        raise ValueError("there is no expert")
+    classifier._experts = experts
+    classifier._layout = Layout(float(layout["window"]), dict(layout["period"]), dict(layout["size"]))
+    classifier._held = dict(header["held"])
+    classifier._fitted(classes, tuple(names), tuple(str(note) for note in header["notes"]))
+    return classifier
+
+
+def _check_shapes(arrays: dict[str, Any], features: int, classes: int) -> None:
+    from terragrip.ground.expert import LEVELS
+
+    sizes = {
+        "f": features,
+        "v": len(arrays["support"]),
+        "p": classes * (classes - 1) // 2,
+        "k": classes,
+        "2": 2,
+        "s": len(LEVELS),
+    }
+    for name, letters in _ARRAYS.items():
+        array = arrays[name]
+        if array.shape != tuple(sizes[letter] for letter in letters) or array.dtype.kind != "f":
+            raise ValueError(f"{name} has shape {array.shape}")
+        if np.isnan(array).any():
+            raise ValueError(f"{name} holds NaN")
+    if not len(arrays["support"]):
+        raise ValueError("there is no support vector")
+
+
+def _plain(value: Any) -> Any:
+    return value.item() if isinstance(value, np.generic) else value
+
+
+def _foreign(path: str | os.PathLike[str]) -> InputError:
+    return InputError(
+        "is no ground classifier", file=path, mend="name a file that GroundClassifier.save wrote"
+    )
+
+
+def _damaged(path: str | os.PathLike[str], error: Exception) -> InputError:
+    return InputError(f"is damaged ({error})", file=path, mend="copy it again, or train it anew")

@@ -1,0 +1,131 @@
+"""Windows to train on: as many of each ground, cut from whole recordings, with folds that keep recordings together."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from terragrip.ground.channels import FAMILIES, Signals
+from terragrip.ground.features import Layout, families_needed, features_of
+from terragrip.ground.wheel_features import Table
+from terragrip.ground.windows import window_starts
+
+Floats = npt.NDArray[np.float64]
+Codes = npt.NDArray[np.intp]
+
+_FOLDS = 5
+_FINEST, _COARSEST = 1 / 8, 1 / 2  # of a window: the step between training windows
+_SLOWEST = 2.0  # samples a window that a family must have
+_PRESENT = 0.5  # share of a family's own features that makes it measured
+
+
+@dataclass(frozen=True)
+class TrainingSet:
+    """Features (n, features) by name, with the class code, the recording and the fold (n,) of each window."""
+
+    names: tuple[str, ...]
+    features: Floats
+    codes: Codes
+    groups: Codes
+    folds: Codes
+    by_recording: bool
+
+
+def layout_of(signals: Sequence[Signals], window: float) -> tuple[Layout, tuple[str, ...]]:
+    """Sample period and usual size of each family over all recordings, and the families too slow for the window."""
+    period, size, slow = {}, {}, []
+    for family in FAMILIES:
+        having = [s for s in signals if s.families.get(family)]
+        periods = [min(c.period for c in s.families[family].values()) for s in having]
+        if not having:
+            continue
+        usual = float(np.median(periods))
+        if window < _SLOWEST * usual:
+            slow.append(family)
+            continue
+        period[family] = usual
+        body = family in ("angular velocity", "acceleration")
+        sizes = [
+            np.sqrt(
+                np.mean(
+                    [c.values.var() if body else (c.values**2).mean() for c in s.families[family].values()]
+                )
+            )
+            for s in having
+        ]
+        moving = [s for s in sizes if s > 0]
+        size[family] = float(np.median(moving)) if moving else 1.0
+    return Layout(window, period, size), tuple(slow)
+
+
+def collect(
+    signals: Sequence[Signals], codes: Codes, layout: Layout, most: int, random: np.random.Generator
+) -> TrainingSet:
+    """Cut and describe windows: up to ``most`` of each class, the closer together the less there is of it."""
+    spans = np.array([max(s.end - s.start, layout.window) for s in signals])
+    total = np.bincount(codes, weights=spans)
+    step = np.clip(total / most, _FINEST * layout.window, _COARSEST * layout.window)
+    tables, sources = [], []
+    starts_of = []
+    for k, recorded in enumerate(signals):
+        starts = window_starts(recorded.start, recorded.end, layout.window, float(step[codes[k]]))
+        tables.append(features_of(recorded, starts, layout))
+        sources.append(np.full(len(starts), k))
+        starts_of.append((starts - recorded.start) / max(recorded.end - recorded.start, layout.window))
+    source, along = np.concatenate(sources), np.concatenate(starts_of)
+    names = tuple(dict.fromkeys(name for table in tables for name in table))
+    features = np.concatenate([matrix(t, names, len(s)) for t, s in zip(tables, sources, strict=True)])
+    keep = _balanced(codes[source], most, random)
+    source, along, features = source[keep], along[keep], features[keep]
+    held_out, by_recording = deal(codes, np.bincount(source, minlength=len(codes)), random)
+    # With one recording of a class there is no other to hold out; stretches of it have to do.
+    folds = held_out[source] if by_recording else np.minimum((along * _FOLDS).astype(int), _FOLDS - 1)
+    return TrainingSet(names, features, codes[source], source, folds, by_recording)
+
+
+def matrix(table: Table, names: Sequence[str], rows: int) -> Floats:
+    """The features (rows, names) of a table, NaN where it lacks one."""
+    missing = np.full(rows, np.nan)
+    return (
+        np.column_stack([table.get(name, missing) for name in names]) if len(names) else np.empty((rows, 0))
+    )
+
+
+def measured_families(names: Sequence[str], features: Floats) -> dict[str, npt.NDArray[np.bool_]]:
+    """Which windows (n,) each sensor family was measured in, judged by its own features."""
+    own: dict[str, list[int]] = {}
+    for k, name in enumerate(names):
+        needed = families_needed(name)
+        if len(needed) == 1:
+            own.setdefault(next(iter(needed)), []).append(k)
+    known = np.isfinite(features)
+    return {family: known[:, columns].mean(axis=1) >= _PRESENT for family, columns in own.items()}
+
+
+def deal(codes: Codes, windows: Codes, random: np.random.Generator) -> tuple[Codes, bool]:
+    """Fold (recordings,) of each recording, every class spread over all folds; False where a class has but one."""
+    fewest = int(np.bincount(codes).min())
+    count = min(_FOLDS, fewest)
+    folds = np.zeros(len(codes), dtype=np.intp)
+    if count < 2:
+        return folds, False
+    for code in np.unique(codes):
+        mine = np.flatnonzero(codes == code)
+        mine = mine[np.lexsort((random.random(len(mine)), -windows[mine]))]
+        held = np.zeros(count)
+        for recording in mine:  # the longest first, each to the emptiest fold
+            fold = int(held.argmin())
+            folds[recording] = fold
+            held[fold] += max(windows[recording], 1)
+    return folds, True
+
+
+def _balanced(codes: Codes, most: int, random: np.random.Generator) -> Codes:
+    kept = []
+    for code in np.unique(codes):
+        mine = np.flatnonzero(codes == code)
+        kept.append(mine if len(mine) <= most else random.choice(mine, most, replace=False))
+    return np.sort(np.concatenate(kept))

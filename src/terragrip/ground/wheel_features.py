@@ -1,0 +1,93 @@
+"""What wheels tell of the ground: how evenly they turn, and how much effort they take."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from terragrip.ground.vibration import moments
+
+Floats = npt.NDArray[np.float64]
+Table = dict[str, Floats]
+
+FLOOR = 0.02  # of a channel's usual size: what counts as none
+
+
+def log_size(values: Floats, size: float) -> Floats:
+    """Logarithm of sizes relative to the usual one, finite at none."""
+    return np.log(np.maximum(values / size, 0.0) + FLOOR)
+
+
+def over_wheels(values: Floats) -> tuple[Floats, Floats, Floats]:
+    """Mean, greatest and least over the wheels that are measured (axis 1)."""
+    measured = np.isfinite(values)
+    count = measured.sum(axis=1)
+    mean = np.where(measured, values, 0.0).sum(axis=1) / np.where(count, count, np.nan)
+    return mean, np.fmax.reduce(values, axis=1), np.fmin.reduce(values, axis=1)
+
+
+def motion(speed: Floats, size: float) -> Table:
+    """How the wheels are driven and how evenly they turn; speed (windows, wheels, samples)."""
+    pace, fastest, slowest = over_wheels(np.abs(speed))
+    net = over_wheels(speed)[0]
+    usual = pace.mean(axis=-1)
+    base = usual + FLOOR * size
+    parting = (over_wheels(speed)[1] - over_wheels(speed)[2]) / 2
+    along = moments(pace)
+    step = np.sqrt(over_wheels(np.diff(speed, axis=-1) ** 2)[0].mean(axis=-1))
+    spread = over_wheels(speed.std(axis=-1))
+    ends = max(pace.shape[-1] // 4, 1)
+    straight = np.abs(net).mean(axis=-1) > 0.3 * usual
+    return {
+        "pace": log_size(usual, size),
+        "direction": np.where(straight, np.sign(net.mean(axis=-1)), 0.0) + 0.0 * usual,
+        "straightness": np.abs(net).mean(axis=-1) / base,
+        "turn": parting.mean(axis=-1) / base,
+        "turn size": parting.mean(axis=-1) / size,
+        "turn spread": log_size(parting.std(axis=-1), size),
+        "fastest": fastest.mean(axis=-1) / size,
+        "slowest": slowest.mean(axis=-1) / size,
+        "spread": log_size(along["spread"], size),
+        "evenness": log_size(along["spread"], 1.0 * size) - log_size(usual, size),
+        "lag": along["lag"],
+        "roughness": log_size(step, size),
+        "roughness per speed": np.log(step / base + FLOOR),
+        "greatest spread": log_size(spread[1], size),
+        "least spread": log_size(spread[2], size),
+        "trend": (pace[:, -ends:].mean(axis=-1) - pace[:, :ends].mean(axis=-1)) / base,
+    }
+
+
+def effort_of(torque: Floats, size: float) -> Table:
+    """The resistance proxy: how much torque (or current), how evenly, and how it is shared among the wheels."""
+    effort = np.abs(torque)
+    mean = over_wheels(effort)[0]
+    level = mean.mean(axis=-1)
+    base = level + FLOOR * size
+    along = moments(mean)
+    step = np.sqrt(over_wheels(np.diff(torque, axis=-1) ** 2)[0].mean(axis=-1))
+    hardest = over_wheels(effort.mean(axis=-1))
+    spread = over_wheels(torque.std(axis=-1))
+    found = {
+        "level": log_size(level, size),
+        "spread": log_size(along["spread"], size),
+        "evenness": np.log(along["spread"] / base + FLOOR),
+        "kurtosis": along["kurtosis"],
+        "peak": along["peak"],
+        "lag": along["lag"],
+        "least": log_size(mean.min(axis=-1), size),
+        "greatest": log_size(mean.max(axis=-1), size),
+        "roughness": log_size(step, size),
+        "roughness per level": np.log(step / base + FLOOR),
+        "hardest wheel": log_size(hardest[1], size),
+        "easiest wheel": log_size(hardest[2], size),
+        "greatest spread": log_size(spread[1], size),
+        "least spread": log_size(spread[2], size),
+        "imbalance": log_size(hardest[1], size) - log_size(hardest[2], size),
+    }
+    flat = np.sort(effort.reshape(len(effort), -1), axis=-1)  # NaN sorts to the end
+    count = np.isfinite(flat).sum(axis=-1)
+    for share in (0.1, 0.25, 0.5, 0.75, 0.9):
+        at = np.clip(np.rint(share * (count - 1)), 0, None).astype(int)
+        found[f"quantile {share:g}"] = log_size(flat[np.arange(len(flat)), at], size)
+    return found
