@@ -98,6 +98,13 @@ def test_a_missing_column_is_named(name):
         blocks_of(columns, dict.fromkeys(WHEELS, "front"), file="e.parquet")
 
 
+def test_a_distance_that_is_none_is_named():
+    columns = table(drive(8, [("fine", FINE, 5)]))
+    columns["distance"][17] = np.nan
+    with pytest.raises(InputError, match="column distance, row 17: nan is no distance"):
+        blocks_of(columns, {w: "front" for w in WHEELS})
+
+
 def test_no_row():
     columns = {k: v[:0] for k, v in table(drive(7, [("fine", FINE, 5)])).items()}
     with pytest.raises(InputError, match="holds no row"):

@@ -82,6 +82,13 @@ def test_a_library_without_the_soils_driven_says_so(library):
     assert ground.notes == ("No soil of the library fits any of the drive: all of it is unknown.",)
 
 
+def test_what_no_soil_can_be_is_unknown(library):
+    estimates = drive(13, [("fine", FINE, 30)])
+    estimates.columns["soil_resistance"] *= 1e5
+    ground = analyse(estimates, library)[0]
+    assert ground.soils == ("unknown",)
+
+
 def test_twins_share_the_probability(library):
     """Two soils that cannot be told apart: half each, whichever was driven."""
     twins = SoilLibrary({**library, "twin": replace(library["fine"], name="twin")})

@@ -157,7 +157,7 @@ def _notes(
     known = timeline.known
     if not known.any():
         said.append(
-            "No stretch of the drive tells of the ground: it stands, spins, or is flagged throughout."
+            "No stretch of the drive tells of the ground: it stands, spins, is flagged or lacks values throughout."
         )
     elif library and (timeline.soil[known] == UNKNOWN).all():
         said.append("No soil of the library fits any of the drive: all of it is unknown.")
@@ -170,7 +170,7 @@ def _notes(
             f"{short} stretch{'es' * (short > 1)} between changes {'are' if short > 1 else 'is'} too short for vehicle and tool "
             "to be on together, and no section."
         )
-    if len(known) and known.mean() < 0.5:
+    if 0 < known.mean() < 0.5:
         said.append(
             f"Only {100 * known.mean():.0f} % of the drive tells of the ground; elsewhere the soil is carried on."
         )

@@ -35,8 +35,9 @@ SCALES = np.array([0.15, 0.22, 0.33, 0.47, 0.66, 0.9, 1.2, 1.6])
 """Scale a of the paper's prototype curve: ice to dry concrete."""
 ROUGHNESSES = np.array([-6.4, -5.7, -5.0, -4.3])
 """ln of rho_s's SD within a block."""
-CELLS = RESISTANCES.size * SCALES.size * ROUGHNESSES.size
-"""How many soils the unknown one may be."""
+GRID = RESISTANCES.size * SCALES.size * ROUGHNESSES.size
+CELLS = GRID + 1
+"""How many soils the unknown one may be; the last is none on the grid, of the broad law alone."""
 
 # Within such a soil, as the simulated campaign's soils have it in the mean.
 _SCALE_SPREAD = 0.12
@@ -48,7 +49,8 @@ _ROUGHNESS_COVARIANCE = np.array([[0.50, 0.24], [0.24, 0.32]])
 def cells(blocks: Blocks, roughness: Array | None) -> Array:
     """Tempered log likelihoods (blocks, CELLS) of known blocks; `roughness` (blocks, 2), None where it is not told."""
     rows = len(blocks)
-    broad = broad_level(blocks)[:, None, None, None]
+    level = broad_level(blocks)
+    broad = level[:, None, None, None]
     adhesion = _adhesion(blocks)[:, None, :, None]
     spread = (_RESISTANCE_SPREAD * np.exp(ROUGHNESSES)) ** 2 + _LEAST_RESISTANCE_SD**2
     off = blocks.resistance[:, None, None] - RESISTANCES
@@ -56,7 +58,10 @@ def cells(blocks: Blocks, roughness: Array | None) -> Array:
     out = tempered(mixed(adhesion + resistance, broad), LEVEL_TIME)
     if roughness is not None:
         out = out + textures(roughness)[:, :, None, None]
-    return np.asarray(out.reshape(rows, CELLS))
+    none = tempered(level, LEVEL_TIME)
+    if roughness is not None:
+        none = none + tempered(broad_roughness(roughness), ROUGHNESS_TIME)
+    return np.column_stack([out.reshape(rows, GRID), none])
 
 
 def textures(roughness: Array) -> Array:

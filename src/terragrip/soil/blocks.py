@@ -113,7 +113,7 @@ def blocks_of(
 
     columns: those of `needed_columns`, (rows,) each; where there are any, their `_std` (else they count as exact) and
     `vertical_load_<axle>`. `axle_of`: the driven wheels and their axles. `origin` [s]: where the count starts (default: the first row).
-    `before`: number and streak of the block before, of a drive that goes on. Raises InputError where a column is missing or no row is.
+    `before`: number and streak of the block before, of a drive that goes on. Raises InputError where a column or a distance is missing, or no row is.
     """
     wheels = tuple(axle_of)
     for name in needed_columns(wheels):
@@ -127,6 +127,15 @@ def blocks_of(
     time = np.asarray(columns["time"], dtype=float)
     if not time.size:
         raise InputError("holds no row", file=file, mend="estimate a log that is not empty")
+    distance = np.asarray(columns["distance"], dtype=float)
+    if not np.isfinite(distance).all():
+        row = int(np.argmin(np.isfinite(distance)))
+        raise InputError(
+            f"{distance[row]} is no distance",
+            file=file,
+            place=f"column distance, row {row}",
+            mend="write the estimates anew with terragrip estimate",
+        )
     first = float(time[0]) if origin is None else origin
     count = np.floor((time - first) / PERIOD + 1e-9).astype(np.int64)
     begin = np.flatnonzero(np.concatenate(([True], count[1:] != count[:-1])))
@@ -167,7 +176,7 @@ def blocks_of(
         rows=size,
         usable=usable,
         streak=_streak(count[begin], 2 * usable >= size, before),
-        travelled=np.asarray(columns["distance"], dtype=float)[begin + size - 1],
+        travelled=distance[begin + size - 1],
         resistance=level[:, 0],
         resistance_variance=variance("soil_resistance_std")[:, 0],
         adhesion=mu,
