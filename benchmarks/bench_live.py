@@ -1,12 +1,13 @@
 """The live service as a user runs it: delay, drops, processor and memory, and what kills cost.
 
-    python benchmarks/bench_live.py [--seconds 60] [--kills 20]
+    python benchmarks/bench_live.py [--seconds 60] [--kills 20] [--write]
 
 `terragrip live` runs as a process of its own, held to one core, with UDP in and out and a record. This process sends the
 samples of a made-up pull at a steady rate from another core, and takes the time from sending a sample to receiving its
 estimate. All of it runs in real time (SCHED_RR) where the system allows that, so that other work on the machine does not count.
 The peer is a step of filterpy's UKF on the same model (peer.py): without reading, recording or sending anything.
 Then the process is killed at random moments, and what a restart has is compared with what was sent.
+--write puts the table into docs/live.md.
 """
 
 from __future__ import annotations
@@ -35,6 +36,8 @@ from terragrip.live import read_record
 from terragrip.recording import Recording
 from terragrip.vehicle import Vehicle
 
+DOCUMENT = Path(__file__).resolve().parents[1] / "docs" / "live.md"
+BEGIN, END = "<!-- made by benchmarks/bench_live.py --write -->", "<!-- end -->"
 CORES = sorted(os.sched_getaffinity(0))
 
 
@@ -63,6 +66,7 @@ def main() -> None:
     parser.add_argument(
         "--kills", type=int, default=20, help="how often the process is killed; 0 leaves it out"
     )
+    parser.add_argument("--write", action="store_true", help="put the table into docs/live.md")
     options = parser.parse_args()
     prefer()
     with tempfile.TemporaryDirectory(prefix="terragrip-bench-") as name:
@@ -71,11 +75,25 @@ def main() -> None:
         frame, load = pull.recording(vehicle, 20.0)
         _, step = peer.run(pull.problem(vehicle, frame, load), 1000)
         log = Recording.from_frame(frame)
-        print(f"peer: filterpy's UKF, {1e6 * step:.0f} us a step")
-        for rate in (1000, 100):
+        lines = [
+            f"Peer: a step of filterpy's UKF, {1e6 * step:.0f} us in this run.",
+            "",
+            "| rate, Hz | estimates missing | not recorded | delay median, ms | p99, ms | most, ms | of a core | us a sample "
+            "| of the peer's step | memory, MB |",
+            "|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|",
+        ]
+        lines += [
             bench_rate(log, vehicle_file, folder / f"at{rate}", rate, options.seconds, step)
+            for rate in (1000, 100)
+        ]
         if options.kills:
-            bench_kills(log, vehicle, vehicle_file, folder / "killed", options.kills)
+            lines += ["", bench_kills(log, vehicle, vehicle_file, folder / "killed", options.kills)]
+    text = "\n".join(lines)
+    print(text)
+    if options.write:
+        before, _, rest = DOCUMENT.read_text(encoding="utf-8").partition(BEGIN)
+        after = rest.partition(END)[2]
+        DOCUMENT.write_text(f"{before}{BEGIN}\n\n{text}\n\n{END}{after}", encoding="utf-8")
 
 
 def prefer(pid: int = 0) -> None:
@@ -121,7 +139,8 @@ def until_ready(ports: Ports, process: subprocess.Popen[bytes]) -> None:
 
 def bench_rate(
     log: Recording, vehicle_file: Path, record: Path, rate: int, seconds: float, step: float
-) -> None:
+) -> str:
+    """A row of the table: the service at one rate."""
     count = round(rate * seconds)
     samples, ports = messages(log, rate, count), Ports.free()
     process = start(vehicle_file, record, ports)
@@ -139,11 +158,10 @@ def bench_rate(
     kept, _ = read_record(record)
     delay = 1e3 * (got - sent)
     p50, p99, most = np.nanpercentile(delay, [50, 99, 100])
-    print(
-        f"{rate} Hz, {seconds:.0f} s: {count - np.isfinite(got).sum()} of {count} estimates missing, {dropped[0]} dropped, "
-        f"{count - len(kept)} not recorded; delay {p50:.2f} ms median, {p99:.2f} ms p99, {most:.1f} ms most; "
-        f"{100 * used / seconds:.1f} % of a core, {1e6 * used / count:.0f} us a sample "
-        f"({used / count / step:.2f} of the peer's step alone), {peak:.0f} MB at most"
+    missing, unkept = count - np.isfinite(got).sum(), count - len(kept)
+    return (
+        f"| {rate} | {missing} of {count} ({dropped[0]} dropped) | {unkept} | {p50:.2f} | {p99:.2f} | {most:.1f} "
+        f"| {100 * used / seconds:.1f} % | {1e6 * used / count:.0f} | {used / count / step:.2f} | {peak:.0f} |"
     )
 
 
@@ -191,7 +209,7 @@ def memory(pid: int) -> float:
     return next(int(line.split()[1]) for line in lines if line.startswith("VmHWM")) / 1024
 
 
-def bench_kills(log: Recording, vehicle: Vehicle, vehicle_file: Path, record: Path, kills: int) -> None:
+def bench_kills(log: Recording, vehicle: Vehicle, vehicle_file: Path, record: Path, kills: int) -> str:
     """Kill the process again and again while samples come; compare the record with what was sent, and with one run."""
     rate, ports, generator = 200, Ports.free(), random.Random(7)
     samples = messages(log, rate, 400_000)
@@ -218,9 +236,9 @@ def bench_kills(log: Recording, vehicle: Vehicle, vehicle_file: Path, record: Pa
         np.array_equal(through.columns[name], estimates.columns[name], equal_nan=True)
         for name in through.columns
     )
-    print(
+    return (
         f"{kills} kills at random moments, {rate} Hz: the record ends {1e3 * np.median(down):.0f} ms before the kill in the "
-        f"median, {1e3 * max(down):.0f} ms at most; its {last} estimates {'are' if same else 'ARE NOT'} those of one run, bit for bit"
+        f"median, {1e3 * max(down):.0f} ms at most; its {last} estimates {'are' if same else 'ARE NOT'} those of one run, bit for bit."
     )
 
 
