@@ -12,6 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from terragrip.errors import InputError
+from terragrip.estimation.arrow import choices, floats, texts
 from terragrip.estimation.engine import EVENTS
 
 if TYPE_CHECKING:
@@ -115,17 +116,13 @@ class Estimates:
         """The whole table as an Arrow table without copies, with its metadata."""
         import pyarrow as pa
 
-        arrays: dict[str, Any] = {name: pa.array(values) for name, values in self._numbers()}
-        arrays |= {name: _text_array(values) for name, values in self.labels.items()}
+        arrays: dict[str, Any] = {name: floats(values) for name, values in self._numbers()}
+        arrays |= {name: texts(values) for name, values in self.labels.items()}
         arrays["event"] = self._events()
         return pa.table(arrays).replace_schema_metadata({METADATA_KEY: self.metadata()})
 
     def _events(self) -> pa.Array:
-        import pyarrow as pa
-
-        return pa.DictionaryArray.from_arrays(pa.array(self.event_codes.view(np.int8)), list(EVENTS)).cast(
-            pa.string()
-        )
+        return choices(self.event_codes, EVENTS)
 
     def _numbers(self) -> Iterator[tuple[str, Floats]]:
         yield "time", self.time
@@ -207,12 +204,6 @@ def parquet_options(schema: pa.Schema) -> dict[str, Any]:
         "use_dictionary": texts or False,
         "use_byte_stream_split": floats,
     }
-
-
-def _text_array(values: npt.NDArray[np.object_]) -> Any:
-    import pyarrow as pa
-
-    return pa.array(values, type=pa.string())
 
 
 def _event_codes(table: pa.Table, source: str | None) -> npt.NDArray[np.uint8]:

@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     from terragrip.soil.library import SoilLibrary
     from terragrip.vehicle import Vehicle
 
-ROWS = 20_000  # a segment is closed after so many rows
+ROWS = 10_000  # a segment is closed after so many rows
 SECONDS = 60.0  # or so long after its first arrival
 
 
@@ -66,6 +66,9 @@ class Recorder:
         self._lock = locked(folder)
         self._thread = ThreadPoolExecutor(1, thread_name_prefix="record")
         self._closing: list[Future[None]] = []
+        self._thread.submit(
+            _load_parquet
+        )  # now, or it would hold up the estimates when the first segment closes
         self._syncing: Future[None] | None = None
         self.opening: list[Output] = []  # what opening brought: that a run goes on
         self._opened: float | None = None  # arrival of the segment's first output
@@ -204,3 +207,7 @@ class Recorder:
         """Let go of the folder after a failure, leaving what is there."""
         self._thread.shutdown(cancel_futures=True)
         os.close(self._lock)
+
+
+def _load_parquet() -> None:
+    import pyarrow.parquet  # noqa: F401

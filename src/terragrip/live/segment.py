@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from terragrip.estimation.arrow import floats
 from terragrip.estimation.engine import EVENTS
 from terragrip.live.core import Ground, Output, Refusal, Row
 from terragrip.live.event import Event
@@ -102,7 +103,7 @@ class Segment:
         import pyarrow as pa
 
         columns = {"time": self.time, "arrival": self.arrival, **self.channels}
-        return pa.table({name: pa.array(np.frombuffer(c)) for name, c in columns.items()})
+        return pa.table({name: floats(np.frombuffer(c)) for name, c in columns.items()})
 
     def to_estimates(self, estimator: TractionEstimator) -> Estimates:
         """The rows' estimates as a table."""
