@@ -478,7 +478,7 @@ def test_matlab_objects_are_named_with_the_way_out(tmp_path: Path) -> None:
         item.attrs["MATLAB_object_decode"] = np.int32(3)
     table = read_table(path)
     assert "v" in table.columns
-    assert any("left out: tt; export them there" in note for note in table.notes)
+    assert any("left out: tt (timetable); export them there" in note for note in table.notes)
 
 
 # --- NMEA ----------------------------------------------------------------------------------------------------------

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import os
 import struct
 import warnings
@@ -36,13 +37,16 @@ def needed(module: str, what: str) -> Any:
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # of other people's modules, at import
-            return import_module(module)
+            found = import_module(module)
     except ModuleNotFoundError as error:
         missing = (error.name or module).partition(".")[0]
         raise InputError(
             f"to read {what} the Python package {missing!r} is needed",
             mend="pip install 'terragrip[formats]'",
         ) from error
+    # What its logger has to say of a damaged file, the InputError or a note says.
+    logging.getLogger(module.partition(".")[0]).setLevel(logging.CRITICAL + 1)
+    return found
 
 
 @contextmanager

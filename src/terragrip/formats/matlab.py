@@ -1,9 +1,9 @@
-"""MATLAB files: version 5 by SciPy, version 7.3 (HDF5) by h5py; other HDF5 files of plain datasets too.
+"""MATLAB files: version 5, and version 7.3 (HDF5) by h5py; other HDF5 files of plain datasets too.
 
 What is a signal: a numeric column that has a time vector beside it (in the same struct, or at the top), Simulink's "structure
 with time" and arrays with ``tout``, a struct with Time and Data as a timeseries is exported, and lists of these with names
 as the elements of a Dataset. Objects of MATLAB classes (timetable, timeseries, Dataset, string, datetime) are written in a
-form of MATLAB's own that neither library reads: they are named in the notes, with the line that exports them.
+form that MATLAB keeps to itself: they are named in the notes, with the line that exports them.
 """
 
 from __future__ import annotations
@@ -19,6 +19,7 @@ from terragrip.errors import InputError
 from terragrip.files import sha256
 from terragrip.formats.boundary import needed, reading
 from terragrip.formats.kind import Databases
+from terragrip.formats.mat5 import Array, Opaque, read_mat5
 from terragrip.formats.signals import Signal, SignalLog
 from terragrip.formats.table import LogTable, Wanted
 
@@ -32,24 +33,6 @@ _WIDEST = 32  # columns of a matrix that are signals
 _DEEPEST = 12
 _DATENUM = (600_000.0, 800_000.0)  # days since year 0: 1642 to 2190
 _DATENUM_1970 = 719_529.0
-
-
-class Opaque:
-    """An object of a MATLAB class, which cannot be read."""
-
-
-@dataclass(frozen=True, eq=False)
-class Stored:
-    """A numeric array in a file, read when it is asked for; ``shape`` as in MATLAB."""
-
-    data: Any
-    shape: tuple[int, ...]
-    transposed: bool
-
-    def read(self) -> npt.NDArray[Any]:
-        """The array."""
-        found = np.asarray(self.data[()])
-        return found.T if self.transposed else found
 
 
 @dataclass
@@ -68,40 +51,23 @@ def read_matlab(path: str, wanted: Wanted | None, databases: Databases) -> Signa
         head = stream.read(8)
     found = _Found()
     if head.startswith(b"MATLAB 5"):
-        with reading(path, "MATLAB file", *_of_scipy()):
-            tree = _version_5(path)
-        return _finished(tree, path, wanted, found)
+        with reading(path, "MATLAB file"):
+            return _finished(read_mat5(path), path, wanted, found)
     h5py = needed("h5py", "a MATLAB 7.3 file")
-    with reading(path, "MATLAB file"), h5py.File(path, "r") as file:
+    with reading(path, "MATLAB file", RuntimeError), h5py.File(path, "r") as file:
         tree = {
             name: _of_hdf5(file, item, 0, h5py) for name, item in file.items() if not name.startswith("#")
         }
         return _finished(tree, path, wanted, found)
 
 
-def _of_scipy() -> tuple[type[Exception], ...]:
-    from scipy.io.matlab import MatReadError
-
-    return (MatReadError,)
-
-
-def _version_5(path: str) -> dict[str, Any]:
-    from scipy.io import loadmat
-
-    tree = loadmat(path, simplify_cells=True)
-    return {
-        name: value
-        for name, value in tree.items()
-        if not name.startswith("__") or name == "__function_workspace__"
-    }
-
-
 def _of_hdf5(file: Any, item: Any, depth: int, h5py: Any) -> Any:
-    """A group or dataset as mapping, list, text, `Stored` or `Opaque`."""
+    """A group or dataset as mapping, list, text, `Array` or `Opaque`."""
     if depth > _DEEPEST:
         return None
     if "MATLAB_object_decode" in item.attrs:
-        return Opaque()
+        kind = item.attrs.get("MATLAB_class", b"")
+        return Opaque(kind.decode("ascii", "replace") if isinstance(kind, bytes) else "")
     if isinstance(item, h5py.Group):
         return {name: _of_hdf5(file, part, depth + 1, h5py) for name, part in item.items()}
     if not isinstance(item, h5py.Dataset) or "MATLAB_empty" in item.attrs:
@@ -115,7 +81,9 @@ def _of_hdf5(file: Any, item: Any, depth: int, h5py: Any) -> Any:
     if item.dtype.names:
         return {name: np.asarray(item[name]) for name in item.dtype.names}
     if item.dtype.kind in "fiub":
-        return Stored(item, tuple(reversed(item.shape)) if kind else item.shape, bool(kind))
+        if not kind:
+            return Array(item.shape, lambda: np.asarray(item[()]))
+        return Array(tuple(reversed(item.shape)), lambda: np.asarray(item[()]).T)
     return None
 
 
@@ -173,8 +141,8 @@ def _walk(value: Any, name: str, found: _Found, depth: int) -> None:
     """Find the signals under a value."""
     if depth > _DEEPEST:
         return
-    if isinstance(value, Opaque) or _is_opaque(value):
-        found.opaque.append(name.removeprefix("__") or "an object")
+    if isinstance(value, Opaque):
+        found.opaque.append(f"{name} ({value.kind})" if value.kind else name)
     elif isinstance(value, Mapping):
         _walk_struct(value, name, found, depth)
     elif isinstance(value, list) or (isinstance(value, np.ndarray) and value.dtype == object):
@@ -261,14 +229,8 @@ def _is_list(value: Any) -> bool:
     return isinstance(value, list | tuple | np.ndarray)
 
 
-def _is_opaque(value: Any) -> bool:
-    return type(value).__name__ in ("MatlabOpaque", "MatlabFunction") or (
-        isinstance(value, np.ndarray) and value.dtype.names is not None and "s0" in value.dtype.names
-    )
-
-
 def _is_numeric(value: Any) -> bool:
-    return isinstance(value, Stored) or (
+    return isinstance(value, Array) or (
         isinstance(value, np.ndarray) and value.dtype.kind in "fiub" and value.ndim > 0
     )
 
@@ -281,7 +243,7 @@ def _is_vector(value: Any) -> bool:
 
 
 def _read(value: Any) -> npt.NDArray[Any]:
-    return value.read() if isinstance(value, Stored) else value
+    return value.read() if isinstance(value, Array) else value
 
 
 def _seconds(clock: npt.NDArray[Any], scale: float) -> Floats:

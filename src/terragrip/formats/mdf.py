@@ -1,113 +1,114 @@
-"""ASAM MDF 3 and 4 (MF4): measured signals, and raw CAN frames with a DBC or the table of J1939, by asammdf."""
+"""ASAM MDF 3 and 4 (MF4): measured signals, and raw CAN frames with a DBC or the table of J1939, by asammdf.
+
+asammdf runs in a process of its own (`terragrip.formats.mdf_worker` says why).
+"""
 
 from __future__ import annotations
 
-import logging
-from collections.abc import Iterator, Sequence
+import json
+import subprocess
+import sys
+from importlib.util import find_spec
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
+from terragrip.errors import InputError
 from terragrip.files import sha256
-from terragrip.formats.boundary import needed, reading
-from terragrip.formats.can.catalog import EXTENDED, catalog
+from terragrip.formats.boundary import needed
+from terragrip.formats.can.catalog import catalog
 from terragrip.formats.can.frames import Frames
 from terragrip.formats.can.log import finished
 from terragrip.formats.kind import Databases
 from terragrip.formats.signals import Signal, SignalLog
 from terragrip.formats.table import Wanted
 
-_BLOCK = 200_000  # records at once, so that memory stays small
-_BUS_EVENT = 2  # flag of a channel group that holds frames (ASAM MDF 4)
-_FRAME = "CAN_DataFrame"
+_WORKER = "terragrip.formats.mdf_worker"
 
 
 def read_mdf(path: str, wanted: Wanted | None, databases: Databases) -> SignalLog:
     """Read an MDF file; raises InputError if it is damaged, or holds neither signals nor known frames."""
-    asammdf = needed("asammdf", "an MDF file")
-    logging.getLogger("asammdf").setLevel(logging.CRITICAL)  # what it has to say, the error says
-    error = asammdf.blocks.utils.MdfException
-    with reading(path, "MDF file", error), asammdf.MDF(path) as file:
-        start = file.start_time.timestamp()
-        buses = [k for k, group in enumerate(file.groups) if _holds_frames(group)]
-        names, signals = _signals(file, wanted, set(buses), start)
-        frames = Frames(catalog(databases), wanted)
-        for group in buses:
-            for time, identifiers, lengths, data in _frames(file, group):
+    frames = Frames(catalog(databases), wanted)
+    with _Worker(path) as worker:
+        head = worker.hear()
+        start, units = float(head["start"]), dict(head["units"])
+        worker.say([name for name in units if wanted is None or wanted(name)])
+        signals: dict[str, Signal] = {}
+        clocks: dict[int, npt.NDArray[np.float64]] = {}
+        while "end" not in (message := worker.hear()):
+            if "frames" in message:
+                time, identifiers, lengths, data = (worker.array() for _ in range(4))
                 frames.take_many(start + time, identifiers, lengths, data)
+                continue
+            group = int(message["group"])
+            time = clocks[group] if message["shared"] else start + worker.array()
+            clocks.setdefault(group, time)
+            values = worker.array()
+            signals[str(message["name"])] = Signal(
+                time, values.astype(object) if values.dtype.kind == "U" else values, message["unit"] or None
+            )
     if not frames.count:
-        return SignalLog(names, signals, path, sha256(path))
+        return SignalLog(tuple(units), signals, path, sha256(path))
     log = finished(frames, path, (), databases, refuse_unknown=not signals)
-    return SignalLog((*names, *log.names), signals | log.signals, path, log.sha256, log.notes)
+    return SignalLog((*units, *log.names), signals | log.signals, path, log.sha256, log.notes)
 
 
-def _holds_frames(group: Any) -> bool:
-    flags = getattr(group.channel_group, "flags", 0)
-    return bool(flags & _BUS_EVENT) and any(channel.name.startswith(_FRAME) for channel in group.channels)
+class _Worker:
+    """The process that reads a file, and what it says."""
 
+    def __init__(self, path: str) -> None:
+        self._path = path
+        if find_spec("asammdf") is None:
+            needed("asammdf", "an MDF file")  # says what to install
 
-def _signals(
-    file: Any, wanted: Wanted | None, buses: set[int], start: float
-) -> tuple[tuple[str, ...], dict[str, Signal]]:
-    """All names of measured signals, and the wanted ones; of several of one name, the later are ``name@group``."""
-    names: dict[str, tuple[int, int]] = {}
-    for k, group in enumerate(file.groups):
-        if k in buses or getattr(group.channel_group, "flags", 0) & _BUS_EVENT:
-            continue
-        for index, channel in enumerate(group.channels):
-            if file.masters_db.get(k) != index:
-                names[channel.name if channel.name not in names else f"{channel.name}@{k}"] = k, index
-    found: dict[str, Signal] = {}
-    clocks: dict[int, npt.NDArray[np.float64]] = {}
-    for name, (group, index) in names.items():
-        if wanted is not None and not wanted(name):
-            continue
-        signal = file.get(group=group, index=index)
-        values = _values(signal.samples)
-        if values is None or not len(values):
-            continue
-        time = clocks.setdefault(group, start + signal.timestamps)
-        if len(time) != len(values):  # invalid samples are left out of some signals of a group
-            time = start + signal.timestamps
-        found[name] = Signal(time, values, signal.unit or None)
-    return tuple(names), found
-
-
-def _values(samples: npt.NDArray[Any]) -> npt.NDArray[Any] | None:
-    """Samples (n,) as numbers or texts; None of arrays and structures."""
-    if samples.ndim != 1 or samples.dtype.names:
-        return None
-    if samples.dtype.kind in "fiub":
-        return samples.astype(np.float64)
-    if samples.dtype.kind == "S":
-        return np.array([s.decode("utf-8", "replace") for s in samples.tolist()], dtype=object)
-    return samples.astype(object) if samples.dtype.kind == "U" else None
-
-
-def _frames(file: Any, group: int) -> Iterator[tuple[Any, Any, Any, Any]]:
-    """Blocks of frames: time, identifiers with `EXTENDED`, lengths (n,) and payloads (n, bytes)."""
-    count = file.groups[group].channel_group.cycles_nr
-    for first in range(0, count, _BLOCK):
-        block = file.get(
-            _FRAME, group=group, raw=True, record_offset=first, record_count=min(_BLOCK, count - first)
+    def __enter__(self) -> _Worker:
+        self._process = subprocess.Popen(
+            [sys.executable, "-W", "ignore", "-m", _WORKER, self._path],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.DEVNULL,
         )
-        fields = block.samples
-        identifiers = fields[f"{_FRAME}.ID"].astype(np.int64) & 0x1FFFFFFF
-        extended = (
-            fields[f"{_FRAME}.IDE"] > 0 if f"{_FRAME}.IDE" in fields.dtype.names else identifiers > 0x7FF
+        return self
+
+    def __exit__(self, *failure: object) -> None:
+        self._process.kill()
+        self._process.communicate()
+
+    def say(self, names: list[str]) -> None:
+        """Tell which signals are wanted."""
+        assert self._process.stdin is not None
+        try:
+            self._process.stdin.write(json.dumps(names).encode() + b"\n")
+            self._process.stdin.flush()
+        except OSError as error:
+            raise self._damaged("it ends the reader") from error
+
+    def hear(self) -> dict[str, Any]:
+        """The next message; raises InputError where the reader failed or ended."""
+        assert self._process.stdout is not None
+        line = self._process.stdout.readline()
+        if not line.endswith(b"\n"):
+            raise self._damaged("it ends the reader")
+        message: dict[str, Any] = json.loads(line)
+        if "error" in message:
+            raise self._damaged(str(message["error"]))
+        return message
+
+    def array(self) -> npt.NDArray[Any]:
+        """The next array."""
+        try:
+            return np.lib.format.read_array(self, allow_pickle=False)  # type: ignore[arg-type]  # it reads as a file does
+        except ValueError as error:
+            raise self._damaged("it ends the reader") from error
+
+    def read(self, size: int) -> bytes:
+        """Bytes of an array, for NumPy."""
+        assert self._process.stdout is not None
+        return self._process.stdout.read(size)
+
+    def _damaged(self, why: str) -> InputError:
+        said = " ".join(why.split())[:100]
+        return InputError(
+            f"is a damaged MDF file, or none ({said})", file=self._path, mend="copy or record it again"
         )
-        identifiers |= np.where(extended, EXTENDED, 0)
-        data = _payloads(fields[f"{_FRAME}.DataBytes"])
-        lengths = np.minimum(fields[f"{_FRAME}.DataLength"].astype(np.int64), data.shape[1])
-        yield block.timestamps, identifiers, lengths, data
-
-
-def _payloads(column: npt.NDArray[Any]) -> npt.NDArray[np.uint8]:
-    """Payloads as rows (n, bytes), from rows or from byte strings of any length."""
-    if column.ndim == 2:
-        return column
-    parts: Sequence[bytes] = [bytes(cell) for cell in column.tolist()]
-    width = max(map(len, parts), default=8)
-    joined = b"".join(part.ljust(width, b"\0") for part in parts)
-    return np.frombuffer(joined, np.uint8).reshape(len(parts), width)

@@ -100,7 +100,7 @@ def _by_python_can(
         # Opened here, since a reader that refuses the file leaves it open.
         with open(path, "rb") if binary else open(path, encoding="utf-8", errors="replace") as stream:
             _take_messages(frames, getattr(can, reader)(stream))
-    except (*DAMAGE, can.CanError) as error:
+    except (*DAMAGE, can.CanError, needed("can.io.blf", f"a {kind}").BLFParseError) as error:
         said = " ".join(str(error).split())[:80] or type(error).__name__
         if not frames.count:
             raise InputError(

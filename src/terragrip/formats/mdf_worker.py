@@ -1,0 +1,156 @@
+"""The part of reading MDF files that runs in a process of its own: ``python -m terragrip.formats.mdf_worker FILE``.
+
+A damaged file can end asammdf's process (a segmentation fault in its C extension) or fill memory, so it gets one that may
+end. Standard output carries JSON lines and NumPy arrays, as `terragrip.formats.mdf` reads them: what the file holds; then,
+once the wanted names came in on standard input, their samples; then the frames, block by block; then the end.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import resource
+import sys
+from collections.abc import Iterator, Sequence
+from typing import Any, BinaryIO
+
+import numpy as np
+import numpy.typing as npt
+
+from terragrip.formats.can.catalog import EXTENDED
+
+BLOCK = 200_000
+"""Records at once, so that memory stays small."""
+_BUS_EVENT = 2  # flag of a channel group that holds frames (ASAM MDF 4)
+_FRAME = "CAN_DataFrame"
+_MEMORY = 3 << 30  # bytes of address space beyond what the imports take
+_SECONDS, _BYTES_A_SECOND = 60, 1 << 20  # of the processor: so many, and one more for so many bytes
+
+
+def main() -> int:
+    """Serve one file; anything that goes wrong becomes a line with the reason."""
+    out = os.fdopen(os.dup(sys.stdout.fileno()), "wb")
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # what libraries print is none of it
+    try:
+        import asammdf
+
+        _limit(sys.argv[1])
+        with asammdf.MDF(sys.argv[1]) as file:
+            _serve(file, out)
+            _say(out, {"end": True})
+    except Exception as error:  # noqa: BLE001 - whatever a damaged file brings is told to the one who asked
+        with contextlib.suppress(OSError):
+            _say(out, {"error": f"{type(error).__name__}: {error}"[:200]})
+        return 1
+    return 0
+
+
+def _limit(path: str) -> None:
+    """Bound what a damaged file may cost."""
+    with open("/proc/self/statm") as stream:
+        taken = int(stream.read().split()[0]) * resource.getpagesize()
+    for what, most in (
+        (resource.RLIMIT_AS, taken + _MEMORY),
+        (resource.RLIMIT_CPU, _SECONDS + os.path.getsize(path) // _BYTES_A_SECOND),
+    ):
+        hard = resource.getrlimit(what)[1]
+        limit = most if hard == resource.RLIM_INFINITY else min(most, hard)
+        resource.setrlimit(what, (limit, hard))
+
+
+def _serve(file: Any, out: BinaryIO) -> None:
+    buses = [k for k, group in enumerate(file.groups) if _is_bus(group)]
+    names = _names(file, set(buses))
+    units = {name: str(file.groups[g].channels[i].unit or "") for name, (g, i) in names.items()}
+    _say(out, {"start": file.start_time.timestamp(), "units": units})
+    clocks: dict[int, int] = {}
+    for name in json.loads(sys.stdin.readline()):
+        group, index = names[name]
+        signal = file.get(group=group, index=index)
+        values = _values(signal.samples)
+        if values is None or not len(values):
+            continue
+        # Invalid samples are left out of some signals of a group: those have a clock of their own.
+        shared = clocks.get(group) == len(values)
+        clocks.setdefault(group, len(values))
+        _say(out, {"name": name, "unit": signal.unit or "", "group": group, "shared": shared})
+        if not shared:
+            _send(out, np.asarray(signal.timestamps, dtype=np.float64))
+        _send(out, values)
+    for group in (k for k in buses if any(c.name.startswith(_FRAME) for c in file.groups[k].channels)):
+        for block in _frames(file, group):
+            _say(out, {"frames": True})
+            for array in block:
+                _send(out, array)
+
+
+def _is_bus(group: Any) -> bool:
+    return bool(getattr(group.channel_group, "flags", 0) & _BUS_EVENT)
+
+
+def _names(file: Any, buses: set[int]) -> dict[str, tuple[int, int]]:
+    """Group and index of each measured signal; of several of one name, the later are ``name@group``."""
+    names: dict[str, tuple[int, int]] = {}
+    for k, group in enumerate(file.groups):
+        for index, channel in enumerate(group.channels if k not in buses else ()):
+            if file.masters_db.get(k) != index:
+                names[channel.name if channel.name not in names else f"{channel.name}@{k}"] = k, index
+    return names
+
+
+def _values(samples: npt.NDArray[Any]) -> npt.NDArray[Any] | None:
+    """Samples (n,) as numbers or texts; None of arrays and structures."""
+    if samples.ndim != 1 or samples.dtype.names:
+        return None
+    if samples.dtype.kind in "fiub":
+        return samples.astype(np.float64)
+    if samples.dtype.kind == "S":
+        return np.array([s.decode("utf-8", "replace") for s in samples.tolist()], dtype=np.str_)
+    return samples if samples.dtype.kind == "U" else None
+
+
+def _frames(file: Any, group: int) -> Iterator[tuple[npt.NDArray[Any], ...]]:
+    """Blocks of frames: time, identifiers with `EXTENDED`, lengths (n,) and payloads (n, bytes)."""
+    count = file.groups[group].channel_group.cycles_nr
+    for first in range(0, count, BLOCK):
+        block = file.get(
+            _FRAME, group=group, raw=True, record_offset=first, record_count=min(BLOCK, count - first)
+        )
+        fields = block.samples
+        identifiers = fields[f"{_FRAME}.ID"].astype(np.int64) & 0x1FFFFFFF
+        wide = fields[f"{_FRAME}.IDE"] > 0 if f"{_FRAME}.IDE" in fields.dtype.names else identifiers > 0x7FF
+        identifiers |= np.where(wide, EXTENDED, 0)
+        data = _payloads(fields[f"{_FRAME}.DataBytes"])
+        lengths = np.minimum(fields[f"{_FRAME}.DataLength"].astype(np.int64), data.shape[1])
+        yield np.asarray(block.timestamps, dtype=np.float64), identifiers, lengths, data
+
+
+def _payloads(column: npt.NDArray[Any]) -> npt.NDArray[np.uint8]:
+    """Payloads as rows (n, bytes), from rows or from byte strings of any length."""
+    if column.ndim == 2:
+        return column
+    parts: Sequence[bytes] = [bytes(cell) for cell in column.tolist()]
+    width = max(map(len, parts), default=8)
+    joined = b"".join(part.ljust(width, b"\0") for part in parts)
+    return np.frombuffer(joined, np.uint8).reshape(len(parts), width)
+
+
+def _say(out: BinaryIO, message: dict[str, Any]) -> None:
+    out.write(json.dumps(message).encode() + b"\n")
+    out.flush()
+
+
+def _send(out: BinaryIO, array: npt.NDArray[Any]) -> None:
+    np.lib.format.write_array(_Plain(out), np.ascontiguousarray(array), allow_pickle=False)
+
+
+class _Plain:
+    """A stream that NumPy takes for no file, so that it keeps to `write` and the order of bytes."""
+
+    def __init__(self, out: BinaryIO) -> None:
+        self.write = out.write
+
+
+if __name__ == "__main__":
+    sys.exit(main())
