@@ -102,7 +102,7 @@ def test_a_distance_that_is_none_is_named():
     columns = table(drive(8, [("fine", FINE, 5)]))
     columns["distance"][17] = np.nan
     with pytest.raises(InputError, match="column distance, row 17: nan is no distance"):
-        blocks_of(columns, {w: "front" for w in WHEELS})
+        blocks_of(columns, dict.fromkeys(WHEELS, "front"))
 
 
 def test_no_row():

@@ -113,7 +113,7 @@ def blocks_of(
 
     columns: those of `needed_columns`, (rows,) each; where there are any, their `_std` (else they count as exact) and
     `vertical_load_<axle>`. `axle_of`: the driven wheels and their axles. `origin` [s]: where the count starts (default: the first row).
-    `before`: number and streak of the block before, of a drive that goes on. Raises InputError where a column or a distance is missing, or no row is.
+    `before`: number and streak of the block before, of a drive that goes on. InputError where a column, a distance or every row is missing.
     """
     wheels = tuple(axle_of)
     for name in needed_columns(wheels):
