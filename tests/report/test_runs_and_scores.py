@@ -108,8 +108,23 @@ def test_tables_set_off_the_default_and_carry_the_papers_figures(drive: Drive) -
     tables = method_tables([c for run in runs for c in compare(run)], "bank")
     sensor, truth = tables
     assert sensor.strong == {0}
-    assert sensor.header[5:8] == ("µ: R² whole", "µ: R² without spell", "µ: NRMSE without spell")
-    assert sensor.rows[-1][5:8] == ("0.445", "0.848", "0.090")
+    assert sensor.header[6:9] == ("µ: R² whole", "µ: R² without spell", "µ: NRMSE without spell")
+    assert sensor.rows[-1][6:9] == ("0.445", "0.848", "0.090")
     assert not any("paper" in row[0] for row in truth.rows)
     scores = [score for run in runs if (score := truth_score(run))]
     assert truth_table(scores, "ukf").strong == {1}
+
+
+def test_rows_in_events_are_left_out_and_are_stuck_where_no_truth_says_it(drive: Drive) -> None:
+    run = drive()
+    events = (
+        {"kind": "stuck", "start": 60.0, "end": 64.95},
+        {"kind": "standstill", "start": 0.0, "end": 9.0},
+    )
+    told = Run(run.name, run.estimates, run.method, run.truth, run.recording, run.vehicle, events)
+    kappa = next(c for c in compare(told) if (c.quantity, c.against) == ("net_traction", "sensor"))
+    assert kappa.without_flagged is not None
+    assert kappa.without_flagged == kappa.without_stuck
+    bare = Run(run.name, run.estimates, run.method, events=events)
+    assert bare.stuck.sum() == 100
+    assert (bare.stuck == run.stuck).all()

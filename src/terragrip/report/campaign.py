@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import signal
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from terragrip.report.intervals import Coverage, run_coverage
 from terragrip.report.runs import Run
@@ -198,6 +198,7 @@ def _record(name: str, seed: int) -> tuple[str, Recording]:
 def _estimate(name: str, seed: int, vehicle: Vehicle, folder: Path) -> EstimatedRun:
     """One run from scenario to saved estimates and scores."""
     from terragrip.estimation import DEFAULT, METHODS, estimate
+    from terragrip.ground.analysis import analyse
     from terragrip.report.campaign_soils import true_pairs
     from terragrip.soil.estimates import GatheredRuns
 
@@ -207,14 +208,15 @@ def _estimate(name: str, seed: int, vehicle: Vehicle, folder: Path) -> Estimated
     estimates.write(path)
     gathered = GatheredRuns()
     gathered.add(estimates, name)
-    shown = _run(name, estimates, result, vehicle)
+    events = analyse(estimates, None, name)[0].events if name in BENCHMARKS else ()
+    shown = _run(name, estimates, result, vehicle, events)
     comparisons: list[Comparison] = []
     scores: list[TruthScore | None] = []
     if name in BENCHMARKS:
         comparisons += compare_truth(shown)
         for method in METHODS:
             others = estimate(result.recording, vehicle, method=method)
-            run = shown if method == DEFAULT else _run(name, others, result, vehicle)
+            run = shown if method == DEFAULT else _run(name, others, result, vehicle, events)
             comparisons += compare(run)
             scores.append(truth_score(run))
     return EstimatedRun(
@@ -231,8 +233,13 @@ def _estimate(name: str, seed: int, vehicle: Vehicle, folder: Path) -> Estimated
     )
 
 
-def _run(name: str, estimates: Estimates, result: SimulationResult, vehicle: Vehicle) -> Run:
-    """The report's view of one estimated run."""
-    return Run(
-        name, estimates.to_pandas(), estimates.method, result.truth, result.recording.to_pandas(), vehicle
-    )
+def _run(
+    name: str,
+    estimates: Estimates,
+    result: SimulationResult,
+    vehicle: Vehicle,
+    events: Sequence[Mapping[str, Any]] = (),
+) -> Run:
+    """The report's view of one estimated run; `events` are the default method's, for every method."""
+    table, recording = estimates.to_pandas(), result.recording.to_pandas()
+    return Run(name, table, estimates.method, result.truth, recording, vehicle, tuple(events))

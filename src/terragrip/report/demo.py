@@ -162,6 +162,13 @@ def _headlines(campaign: EstimatedCampaign, default: str) -> tuple[Headline, ...
             Headline(number(cut.r2), "the same without the stuck spell", f"paper {PAPER_R2_WITHOUT_STUCK}"),
             Headline(number(cut.nrmse), "its NRMSE", f"paper {PAPER_NRMSE}"),
         ]
+        if sensor.without_flagged:
+            label = "R² without the rows that the estimates' own events flag, no window cut by hand"
+            found.append(
+                Headline(
+                    number(sensor.without_flagged.r2), label, f"paper {PAPER_R2_WITHOUT_STUCK}, cut by hand"
+                )
+            )
     if truth and truth.without_outlier:
         value = number(truth.without_outlier.r2)
         found.append(

@@ -60,7 +60,7 @@ def report_of(
         if progress is not None:
             progress(done, total)
 
-    summaries, shown, gathered = _read(paths, step)
+    summaries, shown, gathered = _read(paths, grounds, step)
     campaign = gathered.learn() if gathered.pairs else Campaign({}, {}, ())
     step(total - 1)
     if not shown:
@@ -112,7 +112,7 @@ def report_of(
 
 
 def _read(
-    paths: Sequence[Path], step: Callable[[int], None]
+    paths: Sequence[Path], grounds: Sequence[Ground], step: Callable[[int], None]
 ) -> tuple[list[_Summary], list[Run], GatheredRuns]:
     """A summary of each run, the SHOWN most telling runs (most stretches of soil, then a sensor, then the longest), all pairs."""
     summaries: list[_Summary] = []
@@ -123,7 +123,10 @@ def _read(
         if len(estimates) < 2:
             raise InputError("holds fewer than two rows", file=path, mend="leave it out")
         gathered.add(estimates, path.stem, file=str(path))
-        run = Run(path.stem, estimates.to_pandas(), estimates.method, vehicle=estimates.vehicle)
+        happened = tuple(event for ground in grounds if ground.run == path.stem for event in ground.events)
+        run = Run(
+            path.stem, estimates.to_pandas(), estimates.method, vehicle=estimates.vehicle, events=happened
+        )
         summaries.append(_summary(run))
         if run.wheels and run.moving.any():
             worth = (len(label_stretches(run.soil)), run.sensor_wheel is not None, summaries[-1].duration)

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,6 +25,9 @@ LEAST_SENSOR_LOAD = 0.1
 air has no adhesion, only noise over nothing."""
 
 
+STUCK = ("stuck", "push")
+FLAGGED = ("stuck", "push", "immobilization", "outlier")
+"""Events whose rows say little of the ground."""
 LEAST_PUSH = 1.0
 """An operator's push that counts [N]."""
 AFTER_STUCK = 2.0
@@ -36,7 +40,8 @@ class Run:
     """One recorded or simulated drive.
 
     `estimates` is an Estimates table (DESIGN §3). `truth`, of a simulation, and `recording`, what was
-    measured, have the same rows; `vehicle` is the one that was estimated with. Each may be absent.
+    measured, have the same rows; `vehicle` is the one that was estimated with. `events`: what the ground room
+    found (kind, start, end). Each may be absent.
     """
 
     name: str
@@ -45,6 +50,7 @@ class Run:
     truth: pd.DataFrame | None = None
     recording: pd.DataFrame | None = None
     vehicle: Vehicle | None = None
+    events: tuple[Mapping[str, Any], ...] = ()
 
     def __post_init__(self) -> None:
         for what, table in (("truth", self.truth), ("recording", self.recording)):
@@ -163,9 +169,7 @@ class Run:
         """Where the vehicle is stuck: by the simulation's truth, else by the events of the estimates."""
         if self.truth is not None and "stuck" in self.truth:
             return self.truth["stuck"].to_numpy(dtype=np.bool_)
-        if "event" in self.estimates:
-            return np.asarray(self.estimates["event"].isin(["stuck", "push"]).to_numpy(), dtype=np.bool_)
-        return np.zeros(len(self.time), dtype=np.bool_)
+        return self._during(STUCK)
 
     @cached_property
     def outlier(self) -> BoolArray:
@@ -175,6 +179,21 @@ class Run:
         if spells:
             first, last = max(spells, key=lambda spell: self.time[spell[1]] - self.time[spell[0]])
             found = (self.time >= self.time[first]) & (self.time <= self.time[last] + AFTER_STUCK)
+        return found
+
+    @cached_property
+    def flagged(self) -> BoolArray:
+        """Rows that the product itself flags, without a look at truth or sensor: inside an event of FLAGGED."""
+        return self._during(FLAGGED)
+
+    def _during(self, kinds: tuple[str, ...]) -> BoolArray:
+        """Rows inside an event of `kinds`, by the estimates' column or by `events`."""
+        found = np.zeros(len(self.time), dtype=np.bool_)
+        if "event" in self.estimates:
+            found |= np.asarray(self.estimates["event"].isin(kinds).to_numpy(), dtype=np.bool_)
+        for event in self.events:
+            if event["kind"] in kinds:
+                found |= (self.time >= event["start"]) & (self.time <= event["end"])
         return found
 
     @cached_property

@@ -20,7 +20,7 @@ PAPER_R2_WHOLE, PAPER_R2_WITHOUT_STUCK, PAPER_NRMSE = 0.445, 0.848, 0.09
 QUANTITIES = ("net_traction", "adhesion")
 TRUTH = "the truth itself"
 """Stands in a method's place where the simulated truth is compared with the sensor."""
-PARTS = ("whole", "without_outlier", "without_stuck")
+PARTS = ("whole", "without_outlier", "without_stuck", "without_flagged")
 """Which rows of a run are compared."""
 
 
@@ -30,7 +30,8 @@ class Comparison:
 
     `quantity` is ``adhesion`` (mu, as the paper compares) or ``net_traction`` (kappa); `against` is
     ``sensor`` or ``truth``. `whole` holds every row; `without_outlier` leaves out the longest stuck spell,
-    as the paper does; `without_stuck` leaves out all of them. None where it cannot be scored.
+    as the paper does; `without_stuck` leaves out all of them; `without_flagged` what :attr:`Run.flagged` flags, no window
+    chosen by hand. None where it cannot be scored.
     """
 
     run: str
@@ -40,6 +41,7 @@ class Comparison:
     whole: Agreement | None
     without_outlier: Agreement | None
     without_stuck: Agreement | None
+    without_flagged: Agreement | None
 
     def to_dict(self) -> dict[str, Any]:
         """Plain values, ready for JSON."""
@@ -167,12 +169,12 @@ def _table(rows: list[Comparison], caption: str, default: str) -> Table:
         cells.append(tuple(row))
     strong = {i for i, (_, method) in enumerate(pairs) if method == default}
     if rows[0].against == "sensor":
-        paper = (number(PAPER_R2_WHOLE), number(PAPER_R2_WITHOUT_STUCK), number(PAPER_NRMSE), "–")
-        cells.append(("multi2, paper (field), aukf-fs", "–", "–", "–", "–", *paper))
-    columns = ("R² whole", "R² without spell", "NRMSE without spell", "R² never stuck")
+        paper = (number(PAPER_R2_WHOLE), number(PAPER_R2_WITHOUT_STUCK), number(PAPER_NRMSE), "–", "–")
+        cells.append(("multi2, paper (field), aukf-fs", "–", "–", "–", "–", "–", *paper))
+    columns = ("R² whole", "R² without spell", "NRMSE without spell", "R² never stuck", "R² unflagged")
     return Table(
         caption + ": over every row; without the longest stuck spell, as the paper does; without any row in "
-        "which the vehicle is stuck.",
+        "which the vehicle is stuck; without the rows that the estimates' own events flag.",
         ("run, method", *(f"{symbol}: {column}" for symbol in ("κ", "µ") for column in columns)),
         tuple(cells),
         frozenset(strong),
@@ -181,20 +183,21 @@ def _table(rows: list[Comparison], caption: str, default: str) -> Table:
 
 def _figures(c: Comparison | None) -> list[str]:
     if c is None:
-        return ["–"] * 4
-    whole, cut, free = c.whole, c.without_outlier, c.without_stuck
+        return ["–"] * 5
+    whole, cut, free, told = c.whole, c.without_outlier, c.without_stuck, c.without_flagged
     return [
         number(whole.r2 if whole else None),
         number(cut.r2 if cut else None),
         number(cut.nrmse if cut else None),
         number(free.r2 if free else None),
+        number(told.r2 if told else None),
     ]
 
 
 def _parts(run: Run, reference: FloatArray, estimate: FloatArray) -> list[Agreement | None]:
     """Agreement over the rows of each of PARTS."""
     every = np.ones(len(estimate), dtype=np.bool_)
-    return [_agreement(reference, estimate, rows) for rows in (every, ~run.outlier, ~run.stuck)]
+    return [_agreement(reference, estimate, rows) for rows in (every, ~run.outlier, ~run.stuck, ~run.flagged)]
 
 
 def _agreement(reference: FloatArray, estimate: FloatArray, rows: Any) -> Agreement | None:
