@@ -51,6 +51,7 @@ MARGIN = 2.0
 WAYS = ("offline", "online", "adwin")
 ALONE = 2
 """How many seeds also drive the single-soil runs."""
+DRAWN = 50
 DOCUMENT = Path(__file__).resolve().parents[1] / "docs/ground.md"
 PICTURE = DOCUMENT.parent / "images/ground-reliability.svg"
 BEGIN, END = "<!-- made by benchmarks/bench_ground.py --write -->", "<!-- end -->"
@@ -389,17 +390,22 @@ def _targets(drives: Sequence[Drive]) -> str:
 
 
 def draw(drives: Sequence[Drive]) -> None:
-    """The reliability diagram."""
-    from terragrip.report.style import new_figure, on_paper, styled, to_svg
+    """The reliability diagram; bins of fewer than `DRAWN` blocks are left out."""
+    from terragrip.report.style import BLUE, GREEN, ORANGE, PURPLE, new_figure, on_paper, styled, to_svg
 
     def panel(axes: Any, together: bool) -> None:
         axes.plot([0.3, 1], [0.3, 1], "--", color="0.6", linewidth=1)
-        for key, marker in zip(KEYS, "osD^", strict=True):
-            bins = _bins(drives, key, together)
+        for key, marker, color in zip(KEYS, "osD^", (BLUE, ORANGE, GREEN, PURPLE), strict=True):
+            bins = [one for one in _bins(drives, key, together) if one.count >= DRAWN]
             axes.plot(
-                [b.stated for b in bins], [b.right for b in bins], marker=marker, markersize=4, label=key
+                [b.stated for b in bins],
+                [b.right for b in bins],
+                marker=marker,
+                markersize=4,
+                color=color,
+                label=key,
             )
-        axes.set(xlabel="stated probability of the soil [–]", xlim=(0.3, 1.02), ylim=(0, 1.02))
+        axes.set(xlabel="stated probability of the soil [–]", xlim=(0.3, 1.03), ylim=(0, 1.02))
         axes.set_title("fine and wet taken as one" if together else "all soils")
 
     figure = new_figure(8.0, 3.6)
