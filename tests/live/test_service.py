@@ -10,7 +10,7 @@ import struct
 import numpy as np
 import pytest
 
-from drives import robot
+from drives import drive, robot
 from machine import events, messages, rows_of, running, until
 from terragrip.errors import InputError
 from terragrip.estimation import TractionEstimator
@@ -272,3 +272,61 @@ async def test_sources_with_clocks_of_their_own_share_one_time_base(vehicle, sho
     # Sent together, they stand within a few ms of each other, and on the machine's clock.
     assert np.median(np.abs(speeds[:, None] - wheels).min(axis=1)) < 0.02
     assert abs(times[-1] - rows[-1].arrival) < 5.0
+
+
+async def test_a_warning_of_the_estimator_is_an_event_once(vehicle, short, monkeypatch):
+    """Whatever the kernel says when; here it is made to say it."""
+    service = Service(vehicle, ["udp://127.0.0.1:1"])
+    update = TractionEstimator.update
+
+    def sinking(self, sample):
+        estimate = update(self, sample)
+        estimate.event = "immobilization" if 1.0 < estimate.time < 2.0 else ""
+        return estimate
+
+    monkeypatch.setattr(TractionEstimator, "update", sinking)
+    async with running(service):
+        for time, values in list(rows_of(short.recording))[:300]:
+            service.feeds[0].sample(time, values)
+        await until(lambda: service.core.rows == 300)
+    (text,) = events(service, "immobilization")
+    assert text.startswith("about to dig in: ground speed 0.6")
+    assert "slip up to" in text
+
+
+async def test_a_replay_waits_for_its_sinks(tmp_path, vehicle, short):
+    """6000 rows as fast as they go into a sink that takes them one by one: none is dropped."""
+    many = drive(60.0).recording
+    log = tmp_path / "drive.parquet"
+    many.to_pandas().to_parquet(log)
+    service = Service(vehicle, [f"replay:{log}?speed=max"], ["udp://127.0.0.1:9?rate=1000"])
+    (outbox,) = service.outboxes
+    got = []
+
+    class Slow:
+        async def run(self, box):
+            await asyncio.sleep(0.2)
+            box.connected()
+            while True:
+                got.append(await box.get())
+                await asyncio.sleep(0)
+
+    service.sinks[0] = (service.sinks[0][0], Slow())
+    await service.run()
+    assert outbox.dropped == 0
+    assert sum(message.kind == "estimate" for message in got) == len(many)
+
+
+async def test_a_flood_is_all_accounted_for(vehicle, short, port, sender):
+    """Messages of 150 samples, and room for 100: what is not estimated is counted as dropped, and missing."""
+    service = Service(vehicle, [f"udp://127.0.0.1:{port}"], capacity=100)
+    kept = ("time", "ground_speed", "wheel_speed_fl", "drive_torque_fl")
+    every = [json.dumps({name: row[name] for name in kept}) for row in messages(short.recording, 600)]
+    async with running(service):
+        for first in range(0, 600, 150):
+            sender.send("\n".join(every[first : first + 150]).encode())
+            await asyncio.sleep(0.05)
+        await until(lambda: events(service, "behind") and service.core.rows == 400)
+        await until(lambda: service.core.counts.by_channel["ground_speed"]["dropped"] == 200)
+    mine = service.core.counts.by_channel["ground_speed"]
+    assert (mine["received"], mine["missing"]) == (400, 150)

@@ -25,6 +25,12 @@ if TYPE_CHECKING:
     from terragrip.vehicle import Vehicle
 
 WINDOW = 0.02  # s
+_WARNINGS = {
+    "immobilization": "about to dig in",
+    "stuck": "stuck",
+    "push": "the tool pushes",
+}
+"""Events of the estimator that a driver wants to hear of, in words."""
 
 Values = dict[str, float]
 
@@ -120,6 +126,7 @@ class Core:
         self.clocks = [SourceClock(align) for _ in settings.sources]
         self.estimator: TractionEstimator | None = None
         self.rows = 0
+        self._event = ""  # the last row's
         if settings.channels:
             self._begin(settings.channels)
 
@@ -191,6 +198,10 @@ class Core:
                 continue
             self.rows += 1
             out.append(Row(row.arrival, row.values, estimate))
+            if estimate.event != self._event:
+                self._event = estimate.event
+                if estimate.event in _WARNINGS:
+                    out.append(self._warning(estimate))
             if self.ground is not None:
                 state = self.ground.update(estimate)
                 if state is not None:
@@ -200,6 +211,16 @@ class Core:
             out.append(Event(self.time, kind, self.settings.sources[source], text))
         self.reorder.changes.clear()
         return out
+
+    def _warning(self, estimate: Estimate) -> Event:
+        """The estimator's event as one of ours, with what the machine did."""
+        slips = {w: estimate[f"slip_{w}"] for w in self.vehicle.wheels}
+        known = {wheel: slip for wheel, slip in slips.items() if slip == slip}
+        most = max(known, key=lambda wheel: abs(known[wheel]), default=None)
+        text = f"{_WARNINGS[estimate.event]}: ground speed {estimate.ground_speed:.2f} m/s"
+        if most is not None:
+            text += f", slip up to {100 * known[most]:.0f} % ({most})"
+        return Event(estimate.time, estimate.event, "estimator", text)
 
     def _seen(self, first: Pending) -> Collection[str]:
         pending = [name for row in self.reorder.pending for name in row.values]
@@ -216,6 +237,7 @@ class Core:
             "reorder": self.reorder.state(),
             "counts": self.counts.state(),
             "rows": self.rows,
+            "event": self._event,
             "ground": base64.b64encode(self.ground.snapshot()).decode() if self.ground else "",
         }
 
@@ -231,7 +253,7 @@ class Core:
         found.counts = Counts.from_state(state["counts"])
         found.reorder.counts = found.counts
         found.reorder.restore(state["reorder"])
-        found.rows = state["rows"]
+        found.rows, found._event = state["rows"], state["event"]
         if state["ground"] and found.estimator is not None:
             from terragrip.ground.live import LiveGround
 

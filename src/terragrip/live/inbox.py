@@ -41,8 +41,7 @@ class Inbox:
 
     async def room(self) -> None:
         """Wait until at least half of the place is free, and sinks keep up: for sources that can wait."""
-        while self.busy():
-            await asyncio.sleep(_BREATH)
+        await asyncio.sleep(_BREATH if self.busy() else 0.0)
         while len(self.samples) > self.capacity // 2:
             self._room.clear()
             await self._room.wait()

@@ -20,7 +20,7 @@ class Outbox:
         self.step = 0.0 if "rate" not in uri.options else 1.0 / uri.number("rate", 1.0)
         self.columns = Columns(uri.options["columns"]) if "columns" in uri.options else None
         self.dropped = self.sent = 0
-        self.is_connected = False
+        self.is_lost = False
         self.direct: Callable[[Message], None] | None = None  # a sink that never waits takes messages at once
         self.connected: Callable[[], None] = lambda: None  # a sink calls it once it has its other side
         self._queue: deque[Message] = deque()
@@ -78,8 +78,8 @@ class Outbox:
 
     @property
     def is_busy(self) -> bool:
-        """Whether a sink that is connected has half of the queue before it."""
-        return self.is_connected and len(self._queue) > self.capacity // 2
+        """Whether a sink that is not lost has half of the queue before it."""
+        return not self.is_lost and len(self._queue) > self.capacity // 2
 
     def __len__(self) -> int:
         return len(self._queue)

@@ -34,6 +34,7 @@ if TYPE_CHECKING:
 _AT_ONCE = 64  # samples between two turns of sources and sinks
 _HOUSEKEEPING = 0.1  # s
 _SYNC = 0.5  # s
+_BREATH = 0.002  # s for sinks that have enough to do
 _BEHIND = 1.0  # s
 _LINGER = 2.0  # s for sinks to take the last messages
 
@@ -204,6 +205,9 @@ class Service:
 
     def _work(self) -> None:
         """Estimate what is there; come again for more, or for a row that waits."""
+        if not self._real_time and self.inbox.busy():
+            self._loop.call_later(_BREATH, self._guarded, self._work)
+            return
         self._drain()
         if self.inbox.samples:
             self._later(self._work)

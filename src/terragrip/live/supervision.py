@@ -31,13 +31,13 @@ async def supervise_sink(sink: Sink, outbox: Outbox, note: Note) -> None:
         note({"event": {"time": None, "kind": kind, "source": outbox.uri.name, "text": text}})
 
     def lost(why: str) -> None:
-        outbox.is_connected = False
+        outbox.is_lost = True
         if not state["lost"]:
             tell("sink_lost", why)
         state["lost"] = True
 
     def back() -> None:
-        outbox.is_connected = True
+        outbox.is_lost = False
         if state["lost"]:
             tell("sink_back", "connected again")
         state["lost"] = False
