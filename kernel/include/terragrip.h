@@ -70,7 +70,7 @@ typedef struct {
     tg_real huber;           /* soft weighting beyond this many SDs of a channel's innovation; 0 = off */
     tg_real alpha, beta, kappa; /* unscented; 1, 2, 0. The centre weight must not be negative */
     tg_real rate;            /* adaptation: eta, 0.05 */
-    tg_real memory;          /* adaptation: exponential memory of C, s, 3 */
+    tg_real memory;          /* adaptation: exponential memory of the innovations' products, s, 3 */
     int32_t stride;          /* adaptation: a step of A every `stride` updates, 5 */
     tg_real window;          /* supervisor: W, s, 0.5 */
     tg_real wheel_speed_min; /* supervisor: omega_min, rad/s */
@@ -326,8 +326,7 @@ typedef struct { /* sensitivities to ln a_j, one lane a parameter */
     tg_real scale[TG_ROWS];              /* a_j */
     tg_real dx[TG_MAX_STATES * TG_ROWS]; /* state by parameter, `stride` apart */
     tg_real dP[TG_PAIRS * TG_ROWS];      /* the triangle row >= column, row by row, by parameter */
-    tg_real C[TG_MAX_WHEELS + 1][TG_MAX_WHEELS + 1]; /* mean of the innovations' products */
-    int32_t seen[TG_MAX_WHEELS + 1][TG_MAX_WHEELS + 1];
+    tg_real C[TG_MAX_WHEELS + 1][TG_MAX_WHEELS + 1]; /* mean product of the whitened innovations; I at first */
     int32_t updates;                     /* with every wheel and ground speed */
 } tg_adaptation_state;
 

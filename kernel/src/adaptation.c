@@ -1,8 +1,8 @@
-/* Adaptation of Q by the innovations (PHYSICS 6, the MIT rule): A = diag(a_j) descends V = tr(dS dS'), dS the normalised difference of
- * the innovations' mean product C from the filter's S. Sensitivities to ln a_j run through the whole recursion, one lane a parameter.
+/* Adaptation of Q by the innovations (PHYSICS 6, the MIT rule): A = diag(a_j) descends V = tr(dS dS'), dS the difference from I of C, the
+ * mean product of whitened innovations (docs/decisions/0024-whitened-innovations.md). Sensitivities to ln a_j run through the whole
+ * recursion, one lane a parameter.
  *
- * Channels are taken one by one, so S = T diag(variance) T' with T unit triangular from the gains; any square root of S serves, since V
- * and its derivatives are traces. */
+ * Channels are taken one by one, so S = T diag(variance) T' with T unit triangular from the gains. */
 #include "filter.h"
 
 #define SCALE_MIN ((tg_real)0.05)
@@ -121,9 +121,7 @@ TG_INLINE void descend(tg_adaptation_state *s, const tg_filter *f, const tgi_res
 {
     tg_lanes excess[TG_MAX_WHEELS + 1][TG_MAX_WHEELS + 1];
     for (int c = 0; c <= n; c++)
-        for (int b = 0; b <= n; b++) excess[c][b] = lanes_all(s->C[result->channel[c]][result->channel[b]]);
-    whiten(result, n + 1, excess, n);
-    for (int c = 0; c <= n; c++) excess[c][c] = lanes_sub(excess[c][c], lanes_all(1)); /* S itself, whitened */
+        for (int b = 0; b <= n; b++) excess[c][b] = lanes_all(s->C[result->channel[c]][result->channel[b]] - (c == b));
     for (int l = 0; l < stride; l += TG_LANES) {
         tg_lanes dS[TG_MAX_WHEELS + 1][TG_MAX_WHEELS + 1], slope = lanes_all(0), curvature = lanes_all(0);
         for (int c = 0; c <= n; c++)
@@ -143,30 +141,24 @@ TG_INLINE void descend(tg_adaptation_state *s, const tg_filter *f, const tgi_res
 }
 #undef DP
 
-/* (T diag(variance) T')_cb = S of the c-th and b-th channel taken. */
-static tg_real innovation_covariance(const tgi_result *result, int c, int b, int n)
-{
-    tg_real sum = 0;
-    for (int k = 0; k <= c && k <= b; k++)
-        sum += (k == c ? 1 : result->gain[k][n + 1 + result->channel[c]]) * (k == b ? 1 : result->gain[k][n + 1 + result->channel[b]]) *
-               result->residual_variance[k];
-    return sum;
-}
-
-/* C towards the weighted innovations' product, over the outputs taken; returns how many those are. */
+/* C towards the products of the innovations, weighted and whitened by S of the very step, over the outputs taken; returns how many those
+ * are. */
 static int remember_innovations(tg_adaptation_state *s, const tg_filter *f, const tgi_plan *plan, const tgi_result *result)
 {
     const int n = f->wheels;
-    const tg_real rate = -tgi_expm1(-plan->passage.dt / f->tuning.memory);
+    const tg_real share = -tgi_expm1(-plan->passage.dt / f->tuning.memory);
+    tg_real left[TG_MAX_WHEELS + 1], white[TG_MAX_WHEELS + 1]; /* T^-1 of the innovations, and over its SD */
     int count = 0;
-    while (count < result->taken && result->channel[count] <= n) count++;
+    for (; count < result->taken && result->channel[count] <= n; count++) {
+        const int o = result->channel[count];
+        left[count] = tgi_sqrt(result->weight[o]) * result->innovation[o];
+        for (int b = 0; b < count; b++) left[count] -= result->gain[b][n + 1 + o] * left[b];
+        white[count] = left[count] / tgi_sqrt(result->residual_variance[count]);
+    }
     for (int c = 0; c < count; c++)
         for (int b = 0; b < count; b++) {
-            const int o = result->channel[c], p = result->channel[b];
-            const tg_real product = tgi_sqrt(result->weight[o] * result->weight[p]) * result->innovation[o] * result->innovation[p];
-            if (!s->seen[o][p]) s->C[o][p] = innovation_covariance(result, c, b, n);
-            s->seen[o][p] = 1;
-            s->C[o][p] += rate * (product - s->C[o][p]);
+            tg_real *const C = &s->C[result->channel[c]][result->channel[b]];
+            *C += share * (white[c] * white[b] - *C);
         }
     return count;
 }
@@ -190,7 +182,6 @@ static void copy(tg_adaptation_state *to, const tg_adaptation_state *from, int r
     memcpy(to->dx, from->dx, (size_t)(rows * stride) * sizeof *to->dx);
     memcpy(to->dP, from->dP, (size_t)(pair(rows, 0) * stride) * sizeof *to->dP);
     memcpy(to->C, from->C, sizeof to->C);
-    memcpy(to->seen, from->seen, sizeof to->seen);
     to->updates = from->updates;
 }
 

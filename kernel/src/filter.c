@@ -93,8 +93,10 @@ tg_status tg_filter_init(tg_filter *f, const tg_machine *machine, const tg_tunin
     memcpy(f->u, u, sizeof u);
     if (tuning->policy == TG_BANK)
         tgi_bank_init(f);
-    else
+    else {
         for (int j = 0; j < rows; j++) f->policy.adaptation.scale[j] = 1;
+        for (int c = 0; c <= n; c++) f->policy.adaptation.C[c][c] = 1;
+    }
     tgi_supervisor_init(f);
     return TG_OK;
 }

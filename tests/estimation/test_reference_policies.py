@@ -129,7 +129,7 @@ def test_a_step_of_A_lowers_the_mismatch(factor):
     S = seen.covariance + R
     C = factor * S
     adaptation = adaptive.adaptation
-    adaptation.C, adaptation.rate = C, 0.05
+    adaptation.C, adaptation.rate = factor * np.eye(2), 0.05
     stepped = adaptation.stepped_scale(S, H @ adaptation.dP @ H.T)
     assert np.all((stepped > 1) == (factor > 1))
     before, after = settled(np.ones(2)).filter, settled(stepped).filter
@@ -195,25 +195,45 @@ def test_A_stays_within_its_bounds():
     assert smallest == 0.05
 
 
-def test_A_remembers_softened_innovations_pair_by_pair():
+def test_A_remembers_innovations_softened_and_whitened_by_the_S_of_their_step():
     F = H = np.eye(2)
+    P0, order = np.array([[3.0, 1.0], [1.0, 8.0]]), (1, 0)
     adaptive = AdaptiveFilter(
-        KalmanFilter(F, H, np.zeros((2, 2)), np.eye(2), [0, 0], np.diag([3.0, 8.0]), huber=2.0),
+        KalmanFilter(F, H, np.zeros((2, 2)), np.eye(2), [0, 0], P0, huber=2.0),
         [0, 0],
         2,
         memory=2.0,
+        order=order,
     )
-    adaptive.step([10.0, np.nan], dt=0.0)  # SD 2: w = .4; no time passes, so C is the S with R/w
-    assert adaptive.adaptation.C[0, 0] == pytest.approx(3 + 1 / 0.4)
-    assert np.isnan(adaptive.adaptation.C[0, 1])
-    before, seen = adaptive.adaptation.C[0, 0], adaptive.filter.observe()
-    update = adaptive.step([20.0, 1.0], dt=0.5)
+    np.testing.assert_array_equal(adaptive.adaptation.C, np.eye(2))
+    adaptive.step([10.0, np.nan], dt=0.5)  # alone: SD 2, so w = .4, and S = 3 + 1/.4
     share = 1 - np.exp(-0.5 / 2.0)
-    weighted = update.weight[0] * update.innovation[0] ** 2
+    C = np.eye(2)
+    C[0, 0] += share * (0.4 * 10.0**2 / (3 + 1 / 0.4) - 1)
+    np.testing.assert_allclose(adaptive.adaptation.C, C)
+    seen = adaptive.filter.observe()
+    update = adaptive.step([20.0, 1.0], dt=0.5)
     assert update.weight[0] < 0.5
-    assert adaptive.adaptation.C[0, 0] == pytest.approx(before + share * (weighted - before))
-    start = seen.covariance[1, 1] + 1
-    assert adaptive.adaptation.C[1, 1] == pytest.approx(start + share * (1 - start))
+    S = (seen.covariance + np.diag(1 / update.weight))[::-1, ::-1]
+    white = np.linalg.solve(np.linalg.cholesky(S), (np.sqrt(update.weight) * update.innovation)[::-1])[::-1]
+    np.testing.assert_allclose(adaptive.adaptation.C, C + share * (np.outer(white, white) - C))
+
+
+def test_a_wide_start_and_jumping_steps_leave_A_alone():
+    """Neither says anything of Q: innovations that are as large as S says, a hundredfold different from one to the next."""
+    rng = np.random.default_rng(3)
+    F, H, R = np.eye(2), np.eye(2), np.diag([0.01, 0.01])
+    walk = np.array([0.5, 0.5])
+    adaptive = AdaptiveFilter(KalmanFilter(F, H, np.zeros((2, 2)), R, [0, 0], 1e6 * np.eye(2)), walk, 2)
+    truth = 1e3 * rng.standard_normal(2)
+    scales = []
+    for k in range(3000):
+        dt = 0.01 if k % 2 else 1.0
+        truth = truth + np.sqrt(walk * dt) * rng.standard_normal(2)
+        adaptive.step(truth + 0.1 * rng.standard_normal(2), dt=dt)
+        scales.append(adaptive.adaptation.scale)
+    assert np.min(scales) > 0.2
+    assert np.max(scales) < 5
 
 
 def test_gamma_blends_between_the_given_and_the_adapted_noise():

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -28,20 +29,30 @@ DAMPING = 1e-3
 class Adaptation:
     """Scales a_j of the n process noises, their sensitivities, and the remembered innovations (R).
 
-    C, an exponential mean of ν νᵀ that starts as S, is compared with the filter's own S. With S = L Lᵀ and ΔS = L⁻¹(C - S)L⁻ᵀ,
-    V = tr(ΔS ΔSᵀ) is driven down: ln a_j moves by -η g_j/h_j, clipped to ±0.2, with g_j = 2 tr(ΔS ∂ΔS_j),
-    h_j = 2‖∂ΔS_j‖² + 1e-3 and ∂ΔS_j = -L⁻¹ ∂S_j L⁻ᵀ (the derivative of L is left out). ∂S_j runs through the
-    filter's whole recursion: the one-step derivative is exactly zero for the noises of μ and ρ_s.
+    Innovations are whitened by the S = L Lᵀ of their own step, e = L⁻¹ν, and C, an exponential mean of e eᵀ that starts as I,
+    is compared with I (docs/decisions/0024-whitened-innovations.md). With ΔS = C - I, V = tr(ΔS ΔSᵀ) is driven down: ln a_j moves by
+    -η g_j/h_j, clipped to ±0.2, with g_j = 2 tr(ΔS ∂ΔS_j), h_j = 2‖∂ΔS_j‖² + 1e-3 and ∂ΔS_j = -L⁻¹ ∂S_j L⁻ᵀ of the present
+    step. ∂S_j runs through the filter's whole recursion: the one-step derivative is exactly zero for the noises of μ and ρ_s.
 
     Parameters
     ----------
     states: n. outputs: the first m channels take part. rate: η. memory: of C, s.
     stride: a step of A at every stride-th update that has all m channels.
+    order: of the m outputs in ν, which decides what L is; None: as they come.
     """
 
     def __init__(
-        self, states: int, outputs: int, *, rate: float, memory: float, stride: int, dtype: Any = np.float64
+        self,
+        states: int,
+        outputs: int,
+        *,
+        rate: float,
+        memory: float,
+        stride: int,
+        order: Sequence[int] | None = None,
+        dtype: Any = np.float64,
     ) -> None:
+        self.order = np.arange(outputs) if order is None else np.array(order)
         self.outputs, self.rate, self.memory, self.stride = outputs, rate, memory, stride
         self.scale: Vector = np.ones(states, dtype)
         """a_j, (n,)."""
@@ -49,8 +60,8 @@ class Adaptation:
         """∂x/∂ln a_j, (n parameters, n)."""
         self.dP: NDArray[Any] = np.zeros((states, states, states), dtype)
         """∂P/∂ln a_j, (n parameters, n, n)."""
-        self.C: Matrix = np.full((outputs, outputs), np.nan, dtype)
-        """Remembered ν νᵀ, (m, m); NaN for a pair of channels that was never there together."""
+        self.C: Matrix = np.eye(outputs, dtype=dtype)
+        """Remembered e eᵀ, (m, m), in the order of the channels."""
         self._complete_updates = 0
 
     def predict(self, F: Matrix, excitation: Vector) -> None:
@@ -63,29 +74,29 @@ class Adaptation:
     def update(self, update: Update, dt: float) -> None:
         """Remember the innovations of a step of dt, step A if it is time, and carry the sensitivities on."""
         m = self.outputs
-        present = update.present[:m]
-        if present.any():
+        order = self.order[update.present[:m][self.order]]
+        if len(order):
             S = update.observation.covariance[:m, :m] + update.noise[:m, :m]
-            self._remember(S, present, np.sqrt(update.weight[:m]) * update.innovation[:m], dt)
-            if present.all():
+            self._remember(S, order, np.sqrt(update.weight[:m]) * update.innovation[:m], dt)
+            if len(order) == m:
                 self._complete_updates += 1
                 if self._complete_updates % self.stride == 0:
                     H = update.observation.matrix[:m]
                     self.scale = self.stepped_scale(S, H @ self.dP @ H.T)
         self._carry(update)
 
-    def _remember(self, S: Matrix, present: NDArray[np.bool_], innovation: Vector, dt: float) -> None:
-        block = np.ix_(present, present)
-        self.C[block] = np.where(np.isnan(self.C[block]), S[block], self.C[block])
+    def _remember(self, S: Matrix, order: NDArray[np.intp], innovation: Vector, dt: float) -> None:
+        block = np.ix_(order, order)
+        white = solve_lower(cholesky(S[block]), innovation[order])
         share = -np.expm1(-self.C.dtype.type(dt) / self.memory)
-        observed = np.outer(innovation[present], innovation[present])
-        self.C[block] += share * (observed - self.C[block])
+        self.C[block] += share * (np.outer(white, white) - self.C[block])
 
     def stepped_scale(self, S: Matrix, dS: NDArray[Any]) -> Vector:
         """a (n,) after one step with the innovation covariance S (m, m), of sensitivities dS (n, m, m)."""
-        L = cholesky(S)
-        mismatch = _whitened(L, self.C - S)
-        gradient_of_mismatch = [-_whitened(L, one) for one in dS]
+        block = np.ix_(self.order, self.order)
+        L = cholesky(S[block])
+        mismatch = self.C[block] - np.eye(self.outputs)
+        gradient_of_mismatch = [-_whitened(L, one[block]) for one in dS]
         g = np.array([2 * np.sum(mismatch * one) for one in gradient_of_mismatch])
         h = np.array([2 * np.sum(one * one) for one in gradient_of_mismatch]) + DAMPING
         step = np.clip(-self.rate * g / h, -LARGEST_STEP, LARGEST_STEP)
@@ -129,7 +140,7 @@ class AdaptiveFilter:
     ----------
     filter: its own Q is not used. walk: variance of each state's random walk per second, (n,).
     outputs: how many of the channels, from the first, take part in the adaptation.
-    rate, memory [s], stride: of :class:`Adaptation`.
+    rate, memory [s], stride, order: of :class:`Adaptation`.
     """
 
     def __init__(
@@ -141,11 +152,18 @@ class AdaptiveFilter:
         rate: float = 0.05,
         memory: float = 3.0,
         stride: int = 5,
+        order: Sequence[int] | None = None,
     ) -> None:
         self.filter = filter
         self.walk: Vector = np.asarray(walk, dtype=filter.P.dtype)
         self.adaptation = Adaptation(
-            filter.x.size, outputs, rate=rate, memory=memory, stride=stride, dtype=filter.P.dtype
+            filter.x.size,
+            outputs,
+            rate=rate,
+            memory=memory,
+            stride=stride,
+            order=order,
+            dtype=filter.P.dtype,
         )
 
     def predict(self, u: Any, dt: float, *, gamma: float = 1.0, extra: ArrayLike = 0.0) -> Prediction:

@@ -106,6 +106,7 @@ class TractionFilter:
                     rate=tuning.rate,
                     memory=tuning.memory,
                     stride=tuning.stride,
+                    order=(*reversed(range(n)), n),  # as channels are taken: last wheel first, then v
                 )
         # the γ of calm travel until the supervisor has spoken
         gamma = {"adaptive": 1.0, "supervised": RULES[0, 0]}.get(tuning.policy, 0.0)

@@ -1,0 +1,62 @@
+"""Standard deviations of slip, net traction and efficiency against sampling: draws from the filter's own joint distribution, with
+the considered constants and the wheel radius, go through the definitions of PHYSICS §2."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from drives import GRAVITY, MASS, RADIUS, TIRE, WHEELS, drive, robot
+from terragrip import _kernel
+from terragrip.estimation import TractionEstimator
+from terragrip.estimation.batch import prepared
+from terragrip.physics.slip import slip as slip_of
+
+DRAWS = 100_000
+WHEEL_RADIUS = 0.02
+COLUMNS = 7  # torque gain of each wheel, drawbar, slope, the tyres' rolling resistance
+
+
+def joint(estimator: TractionEstimator, recording: Any) -> tuple[Any, Any, Any]:
+    """Mean (10,), covariance (10, 10) and considered columns (k, 10) after the recording's last row, state order."""
+    engine, ffi, lib = estimator.engine, _kernel.ffi, _kernel.lib
+    time, columns = prepared(estimator, recording)
+    last = engine.record(time, columns)[-1].copy()
+    assert len(last) > lib.tg_record_length(4, COLUMNS) > len(last) - 40  # the row's scene follows
+    x, P, s = np.empty(10), np.empty((10, 10)), np.empty((COLUMNS, 10))
+    pointers = (ffi.cast("double *", a.ctypes.data) for a in (last, x, P, s))
+    assert lib.tg_record_moments(4, COLUMNS, *pointers) == lib.TG_OK
+    return x, P, s
+
+
+@pytest.mark.parametrize("slip", [0.03, 0.12, 0.35])
+def test_spreads_agree_with_sampling(slip):
+    made = drive(12.0, slip=lambda t: slip + 0.0 * t, seed=5)
+    vehicle = robot(
+        uncertainty={
+            "drive_torque_gain": 0.02, "drawbar_offset": 6.0, "slope": 0.01, "tire_rolling_resistance": 0.003,
+            "wheel_radius": WHEEL_RADIUS,
+        }
+    )  # fmt: skip
+    x, P, s = joint(TractionEstimator.for_recording(made.recording, vehicle, "kalman"), made.recording)
+    whole = TractionEstimator.for_recording(made.recording, vehicle, "kalman").update_block(made.recording)
+    last = {name: whole[name][-1] for name in whole.columns}
+    np.testing.assert_allclose(x[5:9], [last[f"adhesion_{w}"] for w in WHEELS], rtol=1e-12)
+
+    rng = np.random.default_rng(0)
+    drawn = rng.multivariate_normal(x, P, DRAWS, method="cholesky") + rng.standard_normal((DRAWS, len(s))) @ s
+    error = WHEEL_RADIUS * rng.standard_normal(
+        (DRAWS, 1)
+    )  # of the radius: more of it, less force in a torque
+    loads = np.repeat([last["vertical_load_front"] / 2, last["vertical_load_rear"] / 2], 2)
+    mu, rho = drawn[:, 5:9], drawn[:, 9:]
+    rho = rho - error * (x[5:9] @ loads) / (MASS * GRAVITY)
+    mu = mu * (1 - error)
+    found = slip_of(drawn[:, :4], drawn[:, 4:5], RADIUS * (1 + error))
+    net = mu - rho
+    efficiency = np.where(net > 0, net / (mu + TIRE) * (1 - found), 0.0)
+    for name, values in (("slip", found), ("net_traction", net), ("efficiency", efficiency)):
+        stated = np.array([last[f"{name}_{w}_std"] for w in WHEELS])
+        np.testing.assert_allclose(stated, values.std(axis=0), rtol=0.04, err_msg=name)
