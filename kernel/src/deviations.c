@@ -69,5 +69,8 @@ void tgi_deviations(tg_estimator *e, const tg_input *u, const tg_real *mu)
         d++;
     }
     if (spread->vertical_load > 0) shift_loads(e, mu, d++);
-    if (spread->acceleration_bias > 0) d->accelerometer = -spread->acceleration_bias;
+    if (spread->acceleration_bias > 0) {
+        d->accelerometer = -spread->acceleration_bias;
+        d->acceleration = e->slope.running ? -spread->acceleration_bias : 0; /* the slope takes it along, see slope.c */
+    }
 }

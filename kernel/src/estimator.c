@@ -2,8 +2,7 @@
 #include "estimator.h"
 
 #define TG_JOLT_MEMORY 5 /* s */
-#define TG_SWING 2 /* samples that a jolt lasts */
-#define TG_UNMODELLED ((tg_real)2.5) /* share of the jolts that rho_s may hold, with the swings of several rows */
+#define TG_SWING ((tg_real)2) /* samples that a jolt lasts */
 #define TG_LONGEST_WALK 30 /* s of random walk that a gap adds at most: beyond it the ground is simply unknown */
 
 /* ---- the filter ---- */
@@ -224,7 +223,7 @@ static void report(tg_estimator *e, const tg_drive *drive, tg_estimate *out)
     e->scene.direction = (tg_real)e->direction;
     e->scene.standing = (tg_real)e->standing;
     e->scene.seen_motion = (tg_real)e->seen_motion;
-    e->scene.unmodelled = TG_UNMODELLED * (e->jolt - e->constants.least_jolt) / tgi_square(e->settings.machine.gravity);
+    e->scene.roughness = e->roughness.square;
     tgi_traction(&e->settings, &e->belief, (const tg_real(*)[TG_ROWS])e->consider.s, &e->scene, o);
     o[TG_OUT_NIS] = e->belief.nis;
     o[TG_OUT_CHANNELS] = (tg_real)e->belief.channels;
@@ -256,6 +255,7 @@ tg_status tg_estimator_update(tg_estimator *e, const tg_sample *sample, tg_estim
     tgi_reckon(e, &drive, course == TG_GO ? dt : 0, &row, q);
     if (!go_on(e, &row, &drive, course, dt, q)) gap = 1;
     balance_forces(e, &drive, row.time);
+    tgi_watch_roughness(e, course == TG_GO && !gap, dt);
     if (course == TG_GO && !row.reckoned && !isnan(row.value[TG_GROUND_SPEED])) tgi_remember_slip(e, &drive, dt);
 
     if (course == TG_GO && !gap) e->distance += (double)((travelled + tgi_fabs(e->belief.x[n + 1])) / 2 * dt);

@@ -7,7 +7,8 @@
 #include <string.h>
 
 #define TG_SPIKE 4 /* an increment beyond this many of its usual SDs is a spike */
-#define TG_INPUT_LAG ((tg_real)0.1) /* s */
+#define TG_INPUT_LAG ((tg_real)0.07) /* s */
+#define TG_ROUGH_LOAD 5 /* variance of a wheel's relative load over that of rho_s, on rough ground (R) */
 
 typedef struct { /* an input between its samples */
     tg_real value;    /* filtered */
@@ -40,7 +41,7 @@ typedef struct { /* what a row's values need beside the belief; all reals, so th
     tg_real load[8]; /* wheel, N */
     tg_real hub[8];  /* wheel, m/s: what its hub is faster than the vehicle, along the travel */
     tg_real direction, standing, seen_motion;
-    tg_real unmodelled; /* variance of rho_s from forces that the model does not know */
+    tg_real roughness; /* mean square of what rho_s wanders over rough ground, see roughness.c */
     tg_real anew; /* the filter was started anew: nothing links this row to the one before */
 } tgi_scene;
 
@@ -77,6 +78,10 @@ typedef struct { /* low-passed while the ground speed is measured; the whole veh
     tg_real slip, adhesion;
 } tgi_slip_memory;
 
+typedef struct { /* of the estimated soil resistance: low-passed, and the mean square of what is faster */
+    tg_real slow, square;
+} tgi_roughness;
+
 typedef struct { /* what follows from the settings alone */
     tg_real limit[TG_SLOTS];        /* beyond it a value is a defect; negative: this machine has no such channel */
     tg_real inverse_gain[TG_SLOTS];
@@ -110,6 +115,7 @@ struct tg_estimator {
     tg_lowpass wheel_speed[8], ground_speed, acceleration, lateral, balance;
     tgi_slip_memory slip_memory;
     tgi_slope slope;
+    tgi_roughness roughness;
     double ground_time;        /* of the last measured ground speed */
     tg_real jolt;              /* variance of the accelerometer about the model, (m/s^2)^2 */
     tg_input held;             /* inputs of the last row, along the travel */
@@ -156,6 +162,10 @@ tg_real tgi_slope_update(tg_estimator *e, const tg_row *row, tg_real pitch, tg_r
 /* reckoning.c */
 void tgi_remember_slip(tg_estimator *e, const tg_drive *drive, tg_real dt);
 void tgi_reckon(tg_estimator *e, const tg_drive *drive, tg_real dt, tg_row *row, tg_real *q);
+
+/* roughness.c; variance that it adds to an adhesion */
+TG_INLINE tg_real tgi_rough_adhesion(const tgi_scene *scene, tg_real mu) { return TG_ROUGH_LOAD * scene->roughness * mu * mu; }
+void tgi_watch_roughness(tg_estimator *e, int32_t flowing, tg_real dt);
 
 /* algebraic.c */
 void tgi_algebraic(tg_estimator *e, const tg_row *row, const tg_drive *drive, int32_t anew);

@@ -1,6 +1,7 @@
 /* Inputs of the model: held between their samples, and the noise that holding them makes. */
 #include "estimator.h"
 
+#define TG_BUMPS ((tg_real)2e-3) /* m^2/s^3: forces of bumps on the speed, which an accelerometer would show */
 #define TG_UNKNOWN_SLOPE ((tg_real)0.01) /* rad^2, of a pitch never seen or long silent */
 
 /* The input itself is filtered as a random walk in noise, with a time constant of at most TG_INPUT_LAG: between two wheel speeds a raw
@@ -83,6 +84,7 @@ void tgi_input_noise(const tg_estimator *e, double time, tg_real dt, tg_real *q)
                  * tgi_square(c->inverse_inertia[i]);
     if (e->drawbar.count > 0 || s->towing)
         q[n] += held_noise(e, &e->drawbar, time, dt, s->noise[TG_DRAWBAR_FORCE], c->unknown_pull) * tgi_square(c->inverse_mass);
+    if (!e->slope.running) q[n] += TG_BUMPS * dt;
     if (e->pitch.count > 0)
         q[n] += held_noise(e, &e->pitch, time, dt, s->noise[TG_PITCH], TG_UNKNOWN_SLOPE) * tgi_square(s->machine.gravity);
 }

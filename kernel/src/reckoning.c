@@ -3,13 +3,14 @@
 #include "estimator.h"
 
 #define TG_SILENCE ((tg_real)0.5)    /* s without a ground speed after which it is reckoned */
-#define TG_SLIP_MEMORY ((tg_real)1)  /* s over which slip and adhesion are remembered */
+#define TG_SLIP_MEMORY ((tg_real)0.3) /* s over which slip and adhesion are remembered */
 #define TG_STEEPNESS ((tg_real)11.36) /* k of mu = A (1 - exp(-k s)), the paper's prototype curve (PHYSICS 5) */
 #define TG_MOST_SLOPE ((tg_real)0.4) /* of slip over adhesion */
-#define TG_SLIP_SPREAD ((tg_real)0.03) /* SD of a remembered slip; its variance grows by a fifth a second */
+#define TG_SLIP_SPREAD ((tg_real)0.04) /* SD of a remembered slip; its variance grows by a fifth a second */
 #define TG_ALIKE ((tg_real)0.3)      /* s over which the error of a reckoned speed stays alike */
-#define TG_CARRIED_ALIKE ((tg_real)0.1) /* s, of one that the accelerometer carries on */
-#define TG_UNKNOWN_FORCE ((tg_real)0.03) /* m^2/s^3 of noise on the speed while it is only reckoned */
+#define TG_CARRIED_ALIKE ((tg_real)0.5) /* s, of one that the accelerometer carries on */
+#define TG_UNKNOWN_FORCE ((tg_real)0.03) /* m^2/s^3 of noise on the speed while it is only reckoned, */
+#define TG_CARRIED_FORCE ((tg_real)0.003) /* or carried on */
 
 /* Mean rim speed and mean adhesion over the load, along the travel. */
 static void means(const tg_estimator *e, const tg_drive *drive, tg_real *rim, tg_real *adhesion)
@@ -60,7 +61,7 @@ void tgi_reckon(tg_estimator *e, const tg_drive *drive, tg_real dt, tg_row *row,
     tg_real silence = (tg_real)(row->time - e->ground_time), rim, adhesion;
     if (silence < TG_SILENCE || !row->measured || !(dt > 0)) return;
     means(e, drive, &rim, &adhesion);
-    tg_real spread = tgi_square(TG_SLIP_SPREAD) * (1 + silence / 5), alike = TG_ALIKE;
+    tg_real spread = tgi_square(TG_SLIP_SPREAD) * (1 + silence / 5), alike = TG_ALIKE, force = TG_UNKNOWN_FORCE;
     if (spread > tgi_square((tg_real)0.15)) spread = tgi_square((tg_real)0.15);
     tg_real speed = (tg_real)e->direction * rim * (1 - slip_at(&e->slip_memory, adhesion));
     tg_real variance = tgi_square(rim) * spread + tgi_square((tg_real)0.01);
@@ -69,9 +70,10 @@ void tgi_reckon(tg_estimator *e, const tg_drive *drive, tg_real dt, tg_row *row,
         speed = e->slope.speed;
         variance = e->slope.speed_variance;
         alike = TG_CARRIED_ALIKE;
+        force = TG_CARRIED_FORCE;
     }
     row->value[TG_GROUND_SPEED] = speed;
     row->ground_variance = variance * (1 + 2 * alike / dt);
     row->reckoned = 1;
-    q[e->settings.machine.wheels] += TG_UNKNOWN_FORCE * dt;
+    q[e->settings.machine.wheels] += force * dt;
 }

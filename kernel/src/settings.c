@@ -16,8 +16,8 @@ static int is_spread(tg_real x)
     return is_number(x) && x >= 0;
 }
 
-/* Tuned on the simulation's scenarios accuracy-clean and accuracy-faults, seeds 1000 to 1013, and on nothing else: walks, scales of the
- * bank, and the constants at the head of this floor's files. */
+/* Tuned on the simulation's scenarios accuracy-clean and accuracy-faults, seeds 1000 to 1019, and on nothing else: walks, scales of the
+ * bank, and the constants at the head of this floor's files (docs/decisions/0027, 0028). */
 tg_settings tg_default_settings(void)
 {
     tg_settings s;
@@ -48,7 +48,7 @@ tg_status tg_tune_walks(tg_settings *s)
 {
     if (!s || s->machine.wheels < 1 || s->machine.wheels > TG_MAX_WHEELS) return TG_BAD_ARGUMENT;
     const int32_t n = s->machine.wheels;
-    const tg_real rim = (tg_real)1e-3, ground = (tg_real)1e-4, adhesion = (tg_real)2.5e-3, resistance = (tg_real)3e-4;
+    const tg_real rim = (tg_real)1e-3, ground = (tg_real)1e-4, adhesion = (tg_real)2e-3, resistance = (tg_real)3e-4;
     for (int32_t i = 0; i < n; i++) {
         if (!is_positive(s->machine.radius[i])) return TG_NOT_POSITIVE;
         s->tuning.walk[i] = rim / tgi_square(s->machine.radius[i]);

@@ -40,6 +40,13 @@ TG_INLINE void gather(const tg_belief *b, const tg_real (*S)[TG_ROWS], const int
     }
 }
 
+/* Rough ground (roughness.c): rho_s may hold all of what it wanders, and the wheels' loads move with it. */
+TG_INLINE void roughen(tgi_moments *c, const tg_real *x, const tgi_scene *scene, const int n)
+{
+    c->rr += scene->roughness;
+    for (int i = 0; i < n; i++) c->mm[i] += tgi_rough_adhesion(scene, x[i]);
+}
+
 TG_INLINE tg_real root(tg_real variance) { return tgi_sqrt(variance > 0 ? variance : 0); }
 
 /* Slip lies in [-1, 1], so no spread above 1 says more than 1 does; the same is said of the efficiency. */
@@ -124,7 +131,7 @@ void tgi_traction(const tg_settings *s, const tg_belief *b, const tg_real (*S)[T
     thrust /= s->machine.mass * s->machine.gravity;
 #define TRACTION(n, stride)         \
     gather(b, S, n, stride, &c);    \
-    c.rr += scene->unmodelled;      \
+    roughen(&c, b->x, scene, n);    \
     traction(s, b->x, &c, scene->hub, thrust, o, n)
     TG_BY_WHEELS(n, TRACTION)
 #undef TRACTION
