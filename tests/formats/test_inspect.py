@@ -78,6 +78,26 @@ def test_a_ready_log_needs_no_profile(tmp_path: Path, log: pd.DataFrame) -> None
     json.dumps(found.to_dict(), allow_nan=False)
 
 
+def test_time_has_no_noise(tmp_path: Path, log: pd.DataFrame) -> None:
+    path = tmp_path / "log.csv"
+    log.to_csv(path, index=False)
+    clock = next(column for column in inspect(path).columns if column.name == "time")
+    assert (clock.noise, clock.rate, clock.held_period) == (None, None, None)
+    assert (clock.minimum, clock.maximum) == (log["time"].min(), log["time"].max())
+
+
+@pytest.mark.parametrize("rows", [0, 500])
+def test_an_empty_column_of_ours_is_told_as_empty(tmp_path: Path, rows: int) -> None:
+    path = tmp_path / "log.csv"
+    turning = (f"{k * 0.01},,{1 + 0.01 * np.sin(k)}" for k in range(rows))
+    path.write_text("\n".join(["time,ground_speed,wheel_speed_l", *turning]) + "\n")
+    found = inspect(path)
+    kinds = {column.name: column.kind for column in found.columns}
+    assert kinds["ground_speed"] == "empty"
+    assert found.rows == rows
+    assert "ground_speed" in found.to_text()
+
+
 def test_the_proposed_profile_works_as_it_stands(tmp_path: Path) -> None:
     rng = np.random.default_rng(0)
     n = 600

@@ -76,7 +76,9 @@ def _correlation(a: Floats, b: Floats) -> tuple[Floats, npt.NDArray[np.intp]]:
 
     size = next_fast_len(len(a) + len(b) - 1, real=True)
     masks = [np.isfinite(x).astype(np.float64) for x in (a, b)]
-    values = [np.where(m > 0, x - np.nanmean(x), 0.0) for x, m in zip((a, b), masks, strict=True)]
+    values = [
+        np.where(m > 0, x - np.nansum(x) / max(m.sum(), 1.0), 0.0) for x, m in zip((a, b), masks, strict=True)
+    ]
     fa, fb = rfft(values[0], size), np.conj(rfft(values[1], size))
     ma, mb = rfft(masks[0], size), np.conj(rfft(masks[1], size))
     sa, sb = rfft(values[0] ** 2, size), np.conj(rfft(values[1] ** 2, size))

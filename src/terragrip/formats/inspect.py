@@ -135,8 +135,7 @@ def inspect(
         rows=len(next(iter(seen.columns.values()), ())) if base is None else len(base),
         time=None if stamp is None or base is None else _time_summary(stamp[0], stamp[1], base),
         columns=tuple(
-            _column_summary(n, c, seen.units.get(n), seen.clocks.get(n, base))
-            for n, c in seen.columns.items()
+            _column_summary(n, c, seen.units.get(n), seen.clock_of(n)) for n, c in seen.columns.items()
         ),
         recognised={channel: proposal.columns for channel, proposal in proposals.items()},
         missing=tuple(missing_channels(proposals, stamp is not None)),
@@ -187,6 +186,11 @@ class _Seen:
         )
         dated = stamp is not None and stamp[0] in dates
         return cls(log.columns, log.units, stamp, instants, {}, since_1970=large or dated)
+
+    def clock_of(self, name: str) -> Floats | None:
+        """The instants of a column; None of the time column, which has no rate or noise of its own."""
+        own = self.stamp is not None and name == self.stamp[0]
+        return self.clocks.get(name, None if own else self.base)
 
     def numbers(self) -> dict[str, Floats]:
         """The numeric columns but time."""

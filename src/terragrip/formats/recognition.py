@@ -249,7 +249,10 @@ def _unit_for(
     for unit in (stated, *(_UNITS[word] for word in sorted(_words(name)) if word in _UNITS)):
         if unit and _fits(unit, target):
             return unit, ""
-    size = float(np.quantile(np.abs(values[np.isfinite(values)]), 0.95))
+    known = np.abs(values[np.isfinite(values)])
+    if not len(known):
+        return target, ""
+    size = float(np.quantile(known, 0.95))
     if target == "rad" and (in_degrees or size > 1.6):
         return "deg", "the sizes tell degrees"
     if channel in ("latitude", "longitude") and size < 1.6:
