@@ -223,6 +223,7 @@ static void report(tg_estimator *e, const tg_drive *drive, tg_estimate *out)
     e->scene.direction = (tg_real)e->direction;
     e->scene.standing = (tg_real)e->standing;
     e->scene.seen_motion = (tg_real)e->seen_motion;
+    e->scene.mean_load = e->settings.machine.mass * e->settings.machine.gravity / (tg_real)e->settings.machine.wheels;
     e->scene.roughness = e->roughness.square;
     tgi_traction(&e->settings, &e->belief, (const tg_real(*)[TG_ROWS])e->consider.s, &e->scene, o);
     o[TG_OUT_NIS] = e->belief.nis;

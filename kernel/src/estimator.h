@@ -8,7 +8,7 @@
 
 #define TG_SPIKE 4 /* an increment beyond this many of its usual SDs is a spike */
 #define TG_INPUT_LAG ((tg_real)0.07) /* s */
-#define TG_ROUGH_LOAD 5 /* variance of a wheel's relative load over that of rho_s, on rough ground (R) */
+#define TG_ROUGH_LOAD 8 /* variance of a wheel's load, over the mean load, over that of rho_s, on rough ground (R) */
 
 typedef struct { /* an input between its samples */
     tg_real value;    /* filtered */
@@ -41,6 +41,7 @@ typedef struct { /* what a row's values need beside the belief; all reals, so th
     tg_real load[8]; /* wheel, N */
     tg_real hub[8];  /* wheel, m/s: what its hub is faster than the vehicle, along the travel */
     tg_real direction, standing, seen_motion;
+    tg_real mean_load; /* at rest on level ground, N */
     tg_real roughness; /* mean square of what rho_s wanders over rough ground, see roughness.c */
     tg_real anew; /* the filter was started anew: nothing links this row to the one before */
 } tgi_scene;
@@ -163,8 +164,13 @@ tg_real tgi_slope_update(tg_estimator *e, const tg_row *row, tg_real pitch, tg_r
 void tgi_remember_slip(tg_estimator *e, const tg_drive *drive, tg_real dt);
 void tgi_reckon(tg_estimator *e, const tg_drive *drive, tg_real dt, tg_row *row, tg_real *q);
 
-/* roughness.c; variance that it adds to an adhesion */
-TG_INLINE tg_real tgi_rough_adhesion(const tgi_scene *scene, tg_real mu) { return TG_ROUGH_LOAD * scene->roughness * mu * mu; }
+/* roughness.c; variance that it adds to wheel i's adhesion: the ground moves a force, the lighter wheel feels it more */
+TG_INLINE tg_real tgi_rough_adhesion(const tgi_scene *scene, int32_t i, tg_real mu)
+{
+    const tg_real part = mu * scene->mean_load / scene->load[i];
+    return TG_ROUGH_LOAD * scene->roughness * part * part;
+}
+
 void tgi_watch_roughness(tg_estimator *e, int32_t flowing, tg_real dt);
 
 /* algebraic.c */

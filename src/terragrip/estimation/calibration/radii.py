@@ -25,7 +25,7 @@ import numpy as np
 import numpy.typing as npt
 
 from terragrip.estimation.calibration.result import Evidence, Unknown
-from terragrip.estimation.calibration.sharing import block_covariance
+from terragrip.estimation.calibration.sharing import block_covariance, effective_blocks
 from terragrip.estimation.calibration.windows import Windows
 from terragrip.estimation.calibration.zeros import Spell, evidence
 from terragrip.physics.loads import GRAVITY
@@ -95,14 +95,13 @@ def rolling_radii(
     used = passes[:, None] & (code >= 0)[:, None] & (np.abs(adhesion) < _LOW * most[code][:, None])
     if not used[free].any():
         return Unknown("wheel_radius", "no zero-pull window has a plausible adhesion")
-    scale, covariance, steepness = _fit(windows, vehicle, adhesion, code, most, used, block)
+    scale, own, steepness, stretches = _fit(windows, vehicle, adhesion, code, most, used, block)
     radius = vehicle.wheel_radius * scale
     typical = float(np.average(steepness[code[free]]))
-    variance = np.diag(covariance) + _considered(vehicle, typical)
+    variance = own + _considered(vehicle, typical)
     slip = float(np.mean(1 - windows.hub_speed[free] / (windows.wheel_speed[free] * radius)))
     told = evidence(windows, [Spell(int(k), int(k)) for k in np.flatnonzero(free)], sources)
-    stretches = len(np.unique(block[np.any(used, axis=1)]))
-    factor = float(stdtrit(max(1, stretches - 3), 0.975))  # radius, C and A are fitted
+    factor = float(stdtrit(max(1.0, stretches - 1), 0.975))
     return Rolling(radius, np.sqrt(variance), factor, slip, told)
 
 
@@ -166,10 +165,10 @@ def _fit(
     most: Floats,
     used: Bools,
     block: npt.NDArray[np.intp],
-) -> tuple[Floats, Floats, Floats]:
-    """Least squares for the radii over the file's, ln C_j and ln A_j; the covariance is over blocks of track.
+) -> tuple[Floats, Floats, Floats, float]:
+    """Least squares for the radii over the file's, ln C_j and ln A_j; the variance is over blocks of track.
 
-    Returns the scale (w,), the covariance (w, w) of its logarithm, and C (soils,).
+    Returns the scale (w,), the variance (w,) of its logarithm, C (soils,), and how many blocks the radii rest on.
     """
     w, soils = len(vehicle.wheels), len(most)
     shared = np.flatnonzero(vehicle.driven)[:1].tolist() + np.flatnonzero(~vehicle.driven).tolist()
@@ -210,8 +209,16 @@ def _fit(
     score = np.einsum("nwp,nw->np", rows, weight * scaled)
     rooted = rows * np.sqrt(weight)[..., None]
     informed = np.any(used, axis=1)
-    covariance = block_covariance(normal, rooted[informed], score[informed], block[informed], np.diag(prior))
-    return np.exp(values[group]), covariance[np.ix_(group, group)], np.exp(values[count : count + soils])
+    # Few blocks may look calmer than they are. What single windows scatter is a floor: blocks can only hang together.
+    variance = np.max(
+        [
+            np.diag(block_covariance(normal, rooted[informed], score[informed], labels, np.diag(prior)))
+            for labels in (block[informed], np.arange(int(informed.sum())))
+        ],
+        axis=0,
+    )
+    held = min(effective_blocks(normal, rooted[informed], block[informed], k) for k in range(count))
+    return np.exp(values[group]), variance[group], np.exp(values[count : count + soils]), held
 
 
 def _considered(vehicle: Vehicle, steepness: float) -> Floats:

@@ -266,6 +266,17 @@ def block_covariance(normal: Floats, jacobian: Floats, score: Floats, block: Int
     return np.asarray(shifts.T @ shifts * (count - 1) / count + inverse @ prior @ inverse)
 
 
+def effective_blocks(normal: Floats, jacobian: Floats, block: Ints, unknown: int) -> float:
+    """How many equal blocks would tell one unknown as well as these do: (Σγ)²/Σγ², γ a block's part of its variance.
+
+    Arguments as in `block_covariance`; Carter, Schnepel and Steigerwald, Review of Economics and Statistics 99, 2017.
+    """
+    labels, code = np.unique(block, return_inverse=True)
+    part = np.zeros(len(labels))
+    np.add.at(part, code, np.sum((jacobian @ _inverse(normal)[unknown]) ** 2, axis=1))
+    return float(np.sum(part) ** 2 / np.sum(part**2)) if part.any() else 1.0
+
+
 def _inverse(matrix: Floats) -> Floats:
     """Inverse of a positive semidefinite matrix after scaling its diagonal to 1; what is not told stays 0."""
     size = np.sqrt(np.maximum(np.diag(matrix), 1e-300))

@@ -1,0 +1,83 @@
+"""Whether 95 % intervals hold what they claim, on simulated drives (development seeds) with ordinary sensor errors.
+
+The vehicle is the user's, not the machine's: torque gains 2 % off, a drawbar offset, a biased accelerometer, unknown slope.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from terragrip.estimation import estimate
+from terragrip.recording import Recording
+from terragrip.simulation import SimulationResult, simulate
+from terragrip.vehicle import Vehicle
+
+SEEDS = (1002, 1010)
+WHEELS = ("fl", "fr", "rl", "rr")
+QUANTITIES = tuple([f"{kind}_{w}" for kind in ("adhesion", "slip") for w in WHEELS] + ["soil_resistance"])
+SENSED = ("acceleration_x", "acceleration_y", "acceleration_z", "pitch")
+
+
+@cache
+def drive(scenario: str, seed: int) -> SimulationResult:
+    return simulate(scenario, seed)
+
+
+def without(recording: Recording, channels: tuple[str, ...]) -> Recording:
+    kept = {name: values for name, values in recording.channels.items() if name not in channels}
+    return replace(recording, channels=kept)
+
+
+@cache
+def held(scenario: str, missing: tuple[str, ...] = ()) -> dict[str, dict[str, NDArray[np.bool_]]]:
+    """By quantity and soil: whether each interval holds the truth, while moving and with nobody pushing."""
+    found: dict[str, dict[str, list[NDArray[np.bool_]]]] = {name: {} for name in QUANTITIES}
+    for seed in SEEDS:
+        result = drive(scenario, seed)
+        truth, estimates = result.truth, estimate(without(result.recording, missing), result.vehicle)
+        counts = (np.abs(truth["true_ground_speed"]) > 0.05) & (np.abs(truth["true_assist_force"]) < 1)
+        for name in QUANTITIES:
+            error = estimates[name] - truth[f"true_{name}"].to_numpy()
+            inside = np.abs(error) <= 1.96 * estimates[f"{name}_std"]
+            for soil in ("hard", "fine", "wet", "coarse", "grass"):
+                rows = counts.to_numpy() & (truth["soil"] == soil).to_numpy() & np.isfinite(error)
+                found[name].setdefault(soil, []).append(inside[rows])
+    return {n: {soil: np.concatenate(parts) for soil, parts in by.items()} for n, by in found.items()}
+
+
+@pytest.mark.parametrize("scenario", ["accuracy-clean", "accuracy-faults"])
+@pytest.mark.parametrize("missing", [(), SENSED[:3], SENSED], ids=["all", "no accelerometer", "nor pitch"])
+def test_intervals_hold_the_truth(scenario: str, missing: tuple[str, ...]) -> None:
+    for kind in ("adhesion", "slip", "soil_resistance"):
+        own = [by for name, by in held(scenario, missing).items() if name.startswith(kind)]
+        share = float(np.mean(np.concatenate([part for by in own for part in by.values()])))
+        assert 0.90 <= share <= 0.99, kind
+
+
+@pytest.mark.parametrize("scenario", ["accuracy-clean", "accuracy-faults"])
+def test_intervals_hold_the_truth_on_rough_ground_and_on_smooth(scenario: str) -> None:
+    """Rough ground moves load between the wheels and the body over them, which no channel here measures."""
+    for name, by_soil in held(scenario).items():
+        for soil, inside in by_soil.items():
+            assert np.mean(inside) > 0.85, (name, soil)
+
+
+def test_what_the_accelerometer_reads_too_much_moves_resistance_but_not_speed() -> None:
+    """The slope is found from the motion: bias and slope are then one error, which the ground speed does not feel."""
+    result = drive("accuracy-clean", SEEDS[0])
+    spread = {}
+    for bias in (0.001, 0.3):
+        data = result.vehicle.to_dict()
+        data["uncertainty"]["acceleration_bias"] = bias
+        found = estimate(result.recording, Vehicle.from_dict(data))
+        rows = found["time"] > 20.0
+        spread[bias] = {
+            name: float(np.median(found[f"{name}_std"][rows])) for name in ("ground_speed", "soil_resistance")
+        }
+    assert spread[0.3]["soil_resistance"] == pytest.approx(0.3 / 9.81, rel=0.1)
+    assert spread[0.3]["ground_speed"] < 1.05 * spread[0.001]["ground_speed"]
