@@ -227,6 +227,9 @@ def calibration_text(named: dict[str, Verdicts]) -> str:
             weight = 1 / pd.Series(truth).map(pd.Series(truth).value_counts()).to_numpy()
             top = chances.max(axis=1)
             inside = (top >= low) & (top < high)
+            if not inside.any():
+                cells += ["", ""]
+                continue
             w = weight[inside]
             cells += [
                 f"{np.average(top[inside], weights=w):.3f}",

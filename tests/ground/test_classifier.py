@@ -227,6 +227,26 @@ def test_the_same_seed_gives_the_same_classifier_and_scikit_learn_can_clone_it(h
     assert first.n_features_in_ == len(first.feature_names_in_)
 
 
+def test_scikit_learn_can_cross_validate_it() -> None:
+    from sklearn.model_selection import cross_val_score
+
+    tables, labels = drives(range(1000, 1004), ("hard", "loose"), seconds=20.0)
+    scores = cross_val_score(GroundClassifier(max_windows=40, rejection=0), tables, labels, cv=2)
+    assert scores.min() > 0.85
+
+
+def test_a_long_drive_is_judged_as_its_parts_are(classifier: GroundClassifier) -> None:
+    """More windows than are worked on at a time, every 0.01 s."""
+    table = drive("loose", 1013, 30.0)
+    found = classifier.predict_proba([table])
+    try:
+        often = classifier.set_params(step=0.01).predict_proba([table])
+    finally:
+        classifier.set_params(step=None)
+    assert len(often) > 2000
+    np.testing.assert_allclose(often[::170][: len(found)], found, atol=1e-6)
+
+
 def test_labels_may_be_numbers() -> None:
     tables, labels = drives(range(1000, 1002), ("hard", "loose"), seconds=20.0)
     found = GroundClassifier().fit(tables, [7 if g == "hard" else 9 for g in labels])

@@ -79,6 +79,12 @@ class GroundClassifier:
             setattr(self, name, value)
         return self
 
+    def __sklearn_tags__(self) -> Any:
+        """What scikit-learn's cross-validation asks an estimator: that it is a classifier."""
+        from sklearn.utils import ClassifierTags, Tags, TargetTags
+
+        return Tags("classifier", TargetTags(required=True), classifier_tags=ClassifierTags())
+
     def __repr__(self) -> str:
         defaults = inspect.signature(type(self)).parameters
         told = (f"{n}={v!r}" for n, v in self.get_params().items() if v != defaults[n].default)
@@ -204,10 +210,9 @@ class GroundClassifier:
         chances = np.full((len(features), len(self.classes_)), 1.0 / len(self.classes_))
         novelty = np.full(len(features), np.nan)
         open_rows = np.ones(len(features), dtype=bool)
+        nowhere = np.zeros(len(features), dtype=bool)
         for expert in self._experts:  # from most features to fewest
-            fits = open_rows & np.all(
-                [measured.get(f, ~open_rows) & open_rows for f in expert.families], axis=0
-            )
+            fits = open_rows & np.all([measured.get(f, nowhere) for f in expert.families], axis=0)
             if fits.any():
                 columns = [self._column[name] for name in expert.features]
                 chances[fits], strange = expert.judge(features[fits][:, columns])

@@ -29,6 +29,7 @@ Floats = npt.NDArray[np.float64]
 
 SPEED, TORQUE, GROUND, TURN, ACCELERATION = FAMILIES
 _SAME_RATE = 1.2
+_BLOCK = 2000  # windows at a time bound the memory of a long drive
 
 
 @dataclass(frozen=True)
@@ -45,6 +46,9 @@ def features_of(signals: Signals, starts: Floats, layout: Layout) -> Table:
 
     A family of sensors that the recording or the layout lacks gives none.
     """
+    if len(starts) > _BLOCK:
+        blocks = [features_of(signals, starts[k : k + _BLOCK], layout) for k in range(0, len(starts), _BLOCK)]
+        return {name: np.concatenate([block[name] for block in blocks]) for name in blocks[0]}
     found: Table = {}
     usable = {f: c for f, c in signals.families.items() if f in layout.period}
     with np.errstate(invalid="ignore", divide="ignore"):

@@ -18,6 +18,7 @@ Codes = npt.NDArray[np.intp]
 
 _FOLDS = 5
 _FINEST, _COARSEST = 1 / 8, 1 / 2  # of a window: the step between training windows
+_SPARE = 8  # times the windows wanted that are cut at most
 _SLOWEST = 2.0  # samples a window that a family must have
 _PRESENT = 0.5  # share of a family's own features that makes it measured
 
@@ -67,7 +68,8 @@ def collect(
     """Cut and describe windows: up to ``most`` of each class, the closer together the less there is of it."""
     spans = np.array([max(s.end - s.start, layout.window) for s in signals])
     total = np.bincount(codes, weights=spans)
-    step = np.clip(total / most, _FINEST * layout.window, _COARSEST * layout.window)
+    coarsest = np.maximum(_COARSEST * layout.window, total / (_SPARE * most))
+    step = np.clip(total / most, _FINEST * layout.window, coarsest)
     tables, sources = [], []
     starts_of = []
     for k, recorded in enumerate(signals):
