@@ -59,13 +59,17 @@ BEGIN, END = "<!-- made by benchmarks/bench_ground.py --write -->", "<!-- end --
 
 @dataclass
 class Told:
-    """Changes of one way on some drives: borders, how many were found, changes told, false ones, hours driven, delays [s]."""
+    """Changes of one way on some drives: borders, how many were found, changes told, hours driven, delays [s]; of each change its stated
+    probability and whether it was right; of each right one its error in time and its stated SD [s]."""
 
     borders: int = 0
     found: int = 0
     told: int = 0
     hours: float = 0.0
     delays: list[float] = field(default_factory=list)
+    stated: list[float] = field(default_factory=list)
+    right: list[bool] = field(default_factory=list)
+    errors: list[tuple[float, float]] = field(default_factory=list)
 
     def add(self, other: Told) -> None:
         self.borders += other.borders
@@ -73,6 +77,9 @@ class Told:
         self.told += other.told
         self.hours += other.hours
         self.delays += other.delays
+        self.stated += other.stated
+        self.right += other.right
+        self.errors += other.errors
 
     @property
     def recall(self) -> float:
@@ -249,7 +256,10 @@ def match(some: Sequence[Change], spans: Sequence[tuple[float, float, float, boo
             taken.add(free[0])
             continue
         out.told += 1
+        out.stated.append(change.probability)
+        out.right.append(bool(free))
         if free:
+            out.errors.append((change.time - spans[free[0]][2], change.std))
             taken.add(free[0])
             out.found += 1
             if change.told is not None:
@@ -260,7 +270,13 @@ def match(some: Sequence[Change], spans: Sequence[tuple[float, float, float, boo
 def tables(drives: Sequence[Drive], seeds: Sequence[int]) -> str:
     """Markdown: changes, soils, unknown, confusion, reliability, targets."""
     parts = [f"Seeds {seeds[0]} to {seeds[-1]}; the other machine's library is of seed {LIBRARY_SEED}.\n"]
-    parts += ["### Changes\n", _changes_table(drives), "### Soils\n", _soils_table(drives)]
+    parts += [
+        "### Changes\n",
+        _changes_table(drives),
+        _honesty_table(drives),
+        "### Soils\n",
+        _soils_table(drives),
+    ]
     parts += ["### A soil that the library does not hold\n", _unknown_table(drives)]
     parts += [
         "### Which for which\n",
@@ -303,6 +319,25 @@ def _changes_table(drives: Sequence[Drive]) -> str:
                 f"| {group} ({one.hours:.2f} h) | {way} | {one.borders or ''} | {scores} | {one.false_an_hour:.1f} | {delay} |"
             )
     return "\n".join(lines) + "\n"
+
+
+def _honesty_table(drives: Sequence[Drive]) -> str:
+    lines = [
+        "| way | stated probability, mean | share right | stated SD, rms s | error in time, SD s | its mean s |",
+        "|---|---:|---:|---:|---:|---:|",
+    ]
+    for way in ("offline", "online"):
+        one = _pooled(drives, way)
+        error, sd = np.array(one.errors).T
+        shares = f"{np.mean(one.stated):.3f} | {np.mean(one.right):.3f}"
+        lines.append(
+            f"| {way} | {shares} | {np.sqrt(np.mean(sd**2)):.2f} | {error.std():.2f} | {error.mean():+.2f} |"
+        )
+    return (
+        "All drives; errors in time against the soil under the centre of gravity.\n\n"
+        + "\n".join(lines)
+        + "\n"
+    )
 
 
 def _soils_table(drives: Sequence[Drive]) -> str:
