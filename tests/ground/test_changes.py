@@ -41,7 +41,7 @@ def predictive(model: Model, x: np.ndarray) -> np.ndarray:
 def test_evidence_is_the_product_of_student_predictives(seed, n):
     model = replace(Model.of(GROUND), weight=np.ones(4))
     x = model.mean + np.random.default_rng(seed).standard_normal((n, 4)) * 0.1
-    found = model.evidence(np.array([float(n)]), x.sum(axis=0)[None], (x**2).sum(axis=0)[None])
+    found = model.evidence(np.full((1, 4), float(n)), x.sum(axis=0)[None], (x**2).sum(axis=0)[None])
     assert found[0] == pytest.approx(predictive(model, x).sum(), rel=1e-9, abs=1e-8)
 
 
@@ -86,13 +86,13 @@ def test_pull_alone_is_no_change():
 def test_correlation_lowers_what_a_block_counts_for():
     """First-order noise: weights near (1 - r)/(1 + r), white noise near 1; steps of the level do not pass for correlation."""
     rng = np.random.default_rng(0)
-    white = rng.standard_normal((4000, 1))
-    red = np.zeros((4000, 1))
+    white = rng.standard_normal(4000)
+    red = np.zeros(4000)
     for k in range(1, 4000):
         red[k] = 0.7 * red[k - 1] + np.sqrt(1 - 0.49) * white[k]
-    assert weights(white)[0] == pytest.approx(1, abs=0.1)
-    assert weights(red)[0] == pytest.approx(0.3 / 1.7, rel=0.35)
-    assert weights(white + 8 * (np.arange(4000) // 400 % 2)[:, None])[0] == pytest.approx(1, abs=0.1)
+    assert weights(white) == pytest.approx(1, abs=0.1)
+    assert weights(red) == pytest.approx(0.3 / 1.7, rel=0.35)
+    assert weights(white + 8 * (np.arange(4000) // 400 % 2)) == pytest.approx(1, abs=0.1)
 
 
 def test_standing_still_changes_nothing():

@@ -79,29 +79,29 @@ def changes_of(
 
 
 def _prepared(blocks: Blocks, names: Sequence[str]) -> tuple[Array, Model, NDArray[np.bool_]]:
-    """Complete rows of those signals that the drive has, their model, and which blocks they are."""
+    """Signals of the blocks that tell any (NaN: not told), their model, and which blocks these are."""
     for name in names:
         if name not in SIGNALS:
             raise InputError(f"there is no signal {name!r}", mend=f"take of {', '.join(SIGNALS)}")
     every = signals_of(blocks, tuple(names))
-    there = np.isfinite(every).sum(axis=0) >= 0.5 * blocks.known.sum()
-    every = np.where(there, every, np.array([LAWS[name].mean for name in names]))
-    told = np.isfinite(every).all(axis=1) & blocks.known
-    signals = every[told]
-    usual = Model.of(names)
-    measured = weights(signals) if len(signals) >= LEAST_FOR_WEIGHTS else usual.weight
-    return signals, Model.of(names, np.where(there, measured, 1e-9)), told
+    told = np.isfinite(every).any(axis=1)
+    signals, usual = every[told], Model.of(names).weight
+    enough = np.isfinite(signals).sum(axis=0) >= LEAST_FOR_WEIGHTS
+    measured = np.array(
+        [weights(x[np.isfinite(x)]) if ok else w for x, ok, w in zip(signals.T, enough, usual, strict=True)]
+    )
+    return signals, Model.of(names, measured), told
 
 
-def weights(signals: Array) -> Array:
-    """What a block counts for, (signals,): (1 - r)/(1 + r), r the correlation of neighbours, as of a first-order process.
+def weights(signal: Array) -> float:
+    """What a block counts for: (1 - r)/(1 + r), r the correlation of neighbours in a signal (blocks,), as of a first-order process.
 
     r from medians of squared differences one and six blocks apart, so that changes of the ground do not pass for correlation.
     """
-    near = np.median((signals[1:] - signals[:-1]) ** 2, axis=0)
-    far = np.median((signals[6:] - signals[:-6]) ** 2, axis=0)
-    r = np.clip(1 - near / np.maximum(far, 1e-300), 0.0, 0.9)
-    return np.asarray((1 - r) / (1 + r))
+    near = np.median((signal[1:] - signal[:-1]) ** 2)
+    far = np.median((signal[6:] - signal[:-6]) ** 2)
+    r = np.clip(1 - near / max(far, 1e-300), 0.0, 0.9)
+    return float((1 - r) / (1 + r))
 
 
 class _Cost:
@@ -111,8 +111,12 @@ class _Cost:
     min_size = LEAST
 
     def __init__(self, signals: Array, model: Model) -> None:
-        self._sum = np.vstack([np.zeros(signals.shape[1]), np.cumsum(signals, axis=0)])
-        self._square = np.vstack([np.zeros(signals.shape[1]), np.cumsum(signals**2, axis=0)])
+        told = np.isfinite(signals)
+        filled = np.where(told, signals, 0.0)
+        zero = np.zeros((1, signals.shape[1]))
+        self._count, self._sum, self._square = (
+            np.vstack([zero, np.cumsum(x, axis=0)]) for x in (told.astype(float), filled, filled**2)
+        )
         self._model = model
         self.signal = signals
         self._end, self._costs = -1, np.zeros(0)
@@ -133,8 +137,8 @@ class _Cost:
 
     def of(self, start: NDArray[np.int64], end: NDArray[np.int64]) -> Array:
         """Costs of the stretches [start, end), (stretches,)."""
-        total, square = self._sum[end] - self._sum[start], self._square[end] - self._square[start]
-        return -2 * self._model.evidence((end - start).astype(float), total, square)
+        count, total, square = (x[end] - x[start] for x in (self._count, self._sum, self._square))
+        return -2 * self._model.evidence(count, total, square)
 
 
 def _pelt(cost: _Cost, price: float) -> list[int]:
@@ -173,6 +177,11 @@ def _change(
     middle = 0.5 * (low + high)
     time = float((weight * middle).sum())
     variance = (weight * ((middle - time) ** 2 + np.maximum(high - low, PERIOD) ** 2 / 12)).sum()
-    moved = signals[border:after].mean(axis=0) - signals[before:border].mean(axis=0)
-    shift = {name: round(float(x) / LAWS[name].within, 2) for name, x in zip(names, moved, strict=True)}
+    shift = {}
+    for k, name in enumerate(names):
+        one, other = (
+            part[np.isfinite(part)] for part in (signals[before:border, k], signals[border:after, k])
+        )
+        if one.size and other.size:
+            shift[name] = round(float(other.mean() - one.mean()) / LAWS[name].within, 2)
     return Change(time, float(np.sqrt(variance)), float(1 / (1 + np.exp(-odds))), shift)

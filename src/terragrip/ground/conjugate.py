@@ -46,9 +46,9 @@ class Model:
         )
 
     def evidence(self, count: Array, total: Array, square: Array) -> Array:
-        """Log evidence of stretches, summed over signals: from the number of their blocks (stretches,), sums and sums of squares of the
-        signals (stretches, signals)."""
-        n = count[:, None] * self.weight
+        """Log evidence of stretches, summed over signals: from how many blocks tell each signal, their sums and sums of squares, all
+        (stretches, signals)."""
+        n = count * self.weight
         kappa, alpha = self.count + n, self.shape + n / 2
         first, second = total * self.weight, square * self.weight
         middle = (self.count * self.mean + first) / kappa
