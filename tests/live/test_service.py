@@ -6,6 +6,7 @@ import asyncio
 import json
 import socket
 import struct
+import threading
 
 import numpy as np
 import pytest
@@ -16,6 +17,7 @@ from terragrip.errors import InputError
 from terragrip.estimation import TractionEstimator
 from terragrip.formats import Profile
 from terragrip.live import read_record
+from terragrip.live.door import Door
 from terragrip.live.service import Service
 
 pytestmark = pytest.mark.asyncio
@@ -330,3 +332,22 @@ async def test_a_flood_is_all_accounted_for(vehicle, short, port, sender):
         await until(lambda: service.core.counts.by_channel["ground_speed"]["dropped"] == 200)
     mine = service.core.counts.by_channel["ground_speed"]
     assert (mine["received"], mine["missing"]) == (400, 150)
+
+
+async def test_a_thread_that_is_too_fast_is_held_back_and_counted(vehicle, port):
+    service = Service(vehicle, [f"udp://127.0.0.1:{port}"])
+    async with running(service):
+        door, taken = Door(service.feeds[0], most=10), []
+
+        def flood():
+            for k in range(500):
+                door.hand(taken.append, k)
+
+        thread = threading.Thread(target=flood)
+        thread.start()
+        thread.join()  # the loop stands still meanwhile
+        await until(lambda: len(taken) == 10)
+        door.hand(taken.append, 500)
+        await until(lambda: events(service, "behind"))
+    assert taken == [*range(10), 500]
+    assert service.core.counts.by_channel[f"(udp://127.0.0.1:{port})"]["dropped"] == 490

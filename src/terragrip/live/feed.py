@@ -86,6 +86,11 @@ class Feed:
         self._note({"fate": "unreadable", "channels": [f"({self.name})"]})
         self._event("unreadable", f"a message was {why}", key="message")
 
+    def dropped(self, number: int) -> None:
+        """Messages were given up before anyone looked into them."""
+        self._note({"fate": "dropped", "channels": [f"({self.name})"], "number": number})
+        self._event("behind", f"{number} messages dropped unread", key="dropped")
+
     def _say_unreadable(self) -> None:
         wrong, self.decoder.unreadable = self.decoder.unreadable, {}
         self._note({"fate": "unreadable", "channels": list(wrong)})

@@ -8,12 +8,14 @@ from typing import Any
 
 from terragrip.live.can import check, errors, open_bus
 from terragrip.live.decode import Decoder
+from terragrip.live.door import Door
 from terragrip.live.feed import Feed, Lost
 from terragrip.live.frames import FrameDecoder
 from terragrip.live.uri import Uri
 
 _PATIENCE = 0.2  # s
 _AT_ONCE = 64  # frames
+_BATCHES = 256
 
 
 class CanSource:
@@ -34,7 +36,7 @@ class CanSource:
 
     async def run(self, feed: Feed) -> None:
         """Feed frames; raises Lost where the bus is not there or goes away."""
-        loop, done = asyncio.get_running_loop(), threading.Event()
+        door, done = Door(feed, _BATCHES), threading.Event()
         bus = await asyncio.to_thread(open_bus, self.uri)
         feed.one_layout = False
         feed.connected()
@@ -49,7 +51,7 @@ class CanSource:
                 if frame is not None:
                     batch.append(frame)
                 if batch:
-                    loop.call_soon_threadsafe(self._take, feed, batch)
+                    door.hand(self._take, feed, batch)
 
         reader = asyncio.ensure_future(asyncio.to_thread(read))
         try:

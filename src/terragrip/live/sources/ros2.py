@@ -9,6 +9,7 @@ from typing import Any
 
 from terragrip.errors import InputError
 from terragrip.live.decode import Decoder
+from terragrip.live.door import Door
 from terragrip.live.feed import Feed, Lost
 from terragrip.live.payload import Unreadable
 from terragrip.live.ros2 import Reader, domain_of, has_rclpy, ros_name
@@ -39,7 +40,7 @@ class Ros2Source:
 
     async def run(self, feed: Feed) -> None:
         """Feed messages; raises Lost where the other side is not there."""
-        loop, reader = asyncio.get_running_loop(), Reader(self._decoder)
+        door, reader = Door(feed), Reader(self._decoder)
         feed.one_layout = False
 
         def take(topic: str, kind: str, data: bytes) -> None:
@@ -52,7 +53,7 @@ class Ros2Source:
                 feed.fields(fields)
 
         def heard(topic: str, kind: str, data: bytes) -> None:  # in another thread
-            loop.call_soon_threadsafe(take, topic, kind, data)
+            door.hand(take, topic, kind, data)
 
         await (self._by_rclpy if self.by_rclpy else self._by_zenoh)(feed, heard)
 

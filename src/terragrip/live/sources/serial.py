@@ -8,6 +8,7 @@ from pathlib import Path
 
 from terragrip.errors import InputError
 from terragrip.live.decode import Decoder
+from terragrip.live.door import Door
 from terragrip.live.feed import Feed, Lost
 from terragrip.live.nmea import fields_of
 from terragrip.live.payload import Unreadable
@@ -34,7 +35,7 @@ class SerialSource:
         """Feed sentences; raises Lost where the device is not there or goes away."""
         import serial
 
-        loop, done = asyncio.get_running_loop(), threading.Event()
+        door, done = Door(feed), threading.Event()
         try:
             line = serial.Serial(str(Path(self.uri.path)), self.baud, timeout=0.2)
         except (serial.SerialException, ValueError) as error:
@@ -49,7 +50,7 @@ class SerialSource:
                 *whole, rest = rest.split(b"\n")
                 rest = rest[-_LONGEST:]
                 for sentence in whole:
-                    loop.call_soon_threadsafe(self._take, feed, sentence)
+                    door.hand(self._take, feed, sentence)
 
         try:
             await asyncio.to_thread(read)

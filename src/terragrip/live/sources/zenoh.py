@@ -6,6 +6,7 @@ import asyncio
 from typing import Any
 
 from terragrip.live.decode import Decoder
+from terragrip.live.door import Door
 from terragrip.live.feed import Feed
 from terragrip.live.uri import Uri
 from terragrip.live.zenoh import config, key_of, open_session
@@ -23,12 +24,11 @@ class ZenohSource:
 
     async def run(self, feed: Feed) -> None:
         """Feed samples; raises Lost where the other side is not there. Zenoh itself connects again later."""
-        loop = asyncio.get_running_loop()
+        door = Door(feed)
         session = await asyncio.to_thread(open_session, self.uri)
 
         def heard(sample: Any) -> None:  # in a thread of Zenoh's
-            data, key = bytes(sample.payload), str(sample.key_expr)
-            loop.call_soon_threadsafe(lambda: feed.message(data, topic=key))
+            door.hand(self._take, feed, bytes(sample.payload), str(sample.key_expr))
 
         try:
             session.declare_subscriber(self.key, heard)
@@ -36,6 +36,9 @@ class ZenohSource:
             await asyncio.Event().wait()
         finally:
             await asyncio.to_thread(session.close)
+
+    def _take(self, feed: Feed, data: bytes, key: str) -> None:
+        feed.message(data, topic=key)
 
 
 def open_source(uri: Uri, decoder: Decoder) -> ZenohSource:
