@@ -84,7 +84,7 @@ def _prepared(blocks: Blocks, names: Sequence[str]) -> tuple[Array, Model, NDArr
         if name not in SIGNALS:
             raise InputError(f"there is no signal {name!r}", mend=f"take of {', '.join(SIGNALS)}")
     every = signals_of(blocks, tuple(names))
-    told = np.isfinite(every).any(axis=1)
+    told = np.asarray(np.isfinite(every).any(axis=1))
     signals, usual = every[told], Model.of(names).weight
     enough = np.isfinite(signals).sum(axis=0) >= LEAST_FOR_WEIGHTS
     measured = np.array(
