@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import json
 import struct
+import subprocess
+import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -468,6 +470,30 @@ def test_matlab_structure_with_time_and_a_dataset_as_exported(tmp_path: Path) ->
     assert np.allclose(recording["ground_speed"], SPEED)
     assert np.allclose(recording["wheel_speed_rl"], SPEED / 0.2 + 2)
     assert np.allclose(recording["drawbar_force"][::2], 100 * SPEED[::2])
+
+
+TABLES = """
+import sys
+import matio, numpy as np, pandas as pd
+t, v = np.arange(200) / 20, np.arange(200.0)
+spans = pd.Index(pd.to_timedelta(t, unit="s").as_unit("ms"), name="Time")
+run = pd.DataFrame({"ground_speed": v, "gear": np.arange(200) % 3}, index=spans)
+table = pd.DataFrame({"t": t[:50], "pull": 2 * v[:50]})
+matio.save_to_mat(sys.argv[1], {"run": run, "table": table}, version=sys.argv[2])
+"""
+
+
+@pytest.mark.parametrize("version", ["v7", "v7.3"])
+def test_matlab_tables_and_timetables(tmp_path: Path, version: str) -> None:
+    # In a process of its own: importing mat-io changes how pandas behaves.
+    path = tmp_path / "log.mat"
+    subprocess.run([sys.executable, "-W", "ignore", "-c", TABLES, str(path), version], check=True)
+    table = read_table(path)
+    assert np.array_equal(table.columns["run.ground_speed"], np.arange(COUNT))
+    assert np.allclose(table.columns["time"], TIME)
+    pull = table.columns["table.pull"]
+    assert np.array_equal(pull[np.isfinite(pull)], 2 * np.arange(50))
+    assert not table.notes
 
 
 def test_matlab_objects_are_named_with_the_way_out(tmp_path: Path) -> None:

@@ -2,8 +2,8 @@
 
 What is a signal: a numeric column that has a time vector beside it (in the same struct, or at the top), Simulink's "structure
 with time" and arrays with ``tout``, a struct with Time and Data as a timeseries is exported, and lists of these with names
-as the elements of a Dataset. Objects of MATLAB classes (timetable, timeseries, Dataset, string, datetime) are written in a
-form that MATLAB keeps to itself: they are named in the notes, with the line that exports them.
+as the elements of a Dataset. Tables and timetables are read by mat-io. Other objects of MATLAB classes (timeseries, Dataset,
+datetime) are written in a form that MATLAB keeps to itself: they are named in the notes, with the line that exports them.
 """
 
 from __future__ import annotations
@@ -22,6 +22,8 @@ from terragrip.formats.kind import Databases
 from terragrip.formats.mat5 import Array, Opaque, read_mat5
 from terragrip.formats.signals import Signal, SignalLog
 from terragrip.formats.table import LogTable, Wanted
+from terragrip.formats.worker import Worker
+from terragrip.recording.schema import TIME
 
 Floats = npt.NDArray[np.float64]
 
@@ -31,28 +33,30 @@ _DATA = ("data", "values")
 _NAMES = ("name", "label", "signalname", "blockname")
 _WIDEST = 32  # columns of a matrix that are signals
 _DEEPEST = 12
+_USER_BLOCK, _HDF5 = 512, b"\x89HDF\r\n\x1a\n"
 _DATENUM = (600_000.0, 800_000.0)  # days since year 0: 1642 to 2190
 _DATENUM_1970 = 719_529.0
 
 
 @dataclass
 class _Found:
-    """Signals by name, with what their clock and column are read from; ``opaque`` objects; vectors without a clock."""
+    """Signals by name, with what their clock and column are read from; ``opaque`` objects with their class; vectors without a clock."""
 
     signals: dict[str, tuple[Any, Any, int | None]] = field(default_factory=dict)
     scales: dict[int, float] = field(default_factory=dict)
-    opaque: list[str] = field(default_factory=list)
+    opaque: dict[str, str] = field(default_factory=dict)
     loose: dict[str, Any] = field(default_factory=dict)
 
 
 def read_matlab(path: str, wanted: Wanted | None, databases: Databases) -> SignalLog | LogTable:
     """Read a MATLAB file; raises InputError if it is damaged, or holds no numeric column."""
     with open(path, "rb") as stream:
-        head = stream.read(8)
+        head = stream.read(_USER_BLOCK + len(_HDF5))
     found = _Found()
-    if head.startswith(b"MATLAB 5"):
+    if not (head.startswith((_HDF5, b"MATLAB 7.3")) or head[_USER_BLOCK:] == _HDF5):
         with reading(path, "MATLAB file"):
-            return _finished(read_mat5(path), path, wanted, found)
+            tree = read_mat5(path)
+            return _finished(tree, path, wanted, found)
     h5py = needed("h5py", "a MATLAB 7.3 file")
     with reading(path, "MATLAB file", RuntimeError), h5py.File(path, "r") as file:
         tree = {
@@ -92,6 +96,8 @@ def _finished(
 ) -> SignalLog | LogTable:
     """The wanted signals of what a file holds."""
     _walk(tree, "", found, 0)
+    if any(kind in ("table", "timetable") for kind in found.opaque.values()):
+        _take_tables(path, found)
     notes = _notes(found)
     if not found.signals and not found.loose:
         problem = "holds no numeric column"
@@ -113,14 +119,38 @@ def _finished(
     return SignalLog(tuple(found.signals), signals, path, sha256(path), tuple(notes))
 
 
+def _take_tables(path: str, found: _Found) -> None:
+    """Read tables and timetables by mat-io, in a process of its own; those that it cannot read stay opaque."""
+    names = [
+        name for name, kind in found.opaque.items() if kind in ("table", "timetable") and "." not in name
+    ]
+    try:
+        with Worker("terragrip.formats.matlab_worker", "matio", path, "MATLAB file") as worker:
+            worker.say(names)
+            while "end" not in (message := worker.hear()):
+                columns = {str(column): worker.array() for column in message["columns"]}
+                clock = worker.array() if message["clock"] else None
+                name = str(message["name"])
+                del found.opaque[name]
+                table = {key: _loaded(values) for key, values in columns.items()}
+                _walk_struct(table if clock is None else {**table, TIME: _loaded(clock)}, name, found, 1)
+    except InputError:
+        return  # the notes name what is left
+
+
+def _loaded(values: npt.NDArray[Any]) -> Array:
+    return Array(values.shape, lambda: values)
+
+
 def _notes(found: _Found) -> list[str]:
     if not found.opaque:
         return []
-    more = f" and {len(found.opaque) - 6} more" if len(found.opaque) > 6 else ""
+    shown = [f"{name} ({kind})" if kind else name for name, kind in found.opaque.items()]
+    more = f" and {len(shown) - 6} more" if len(shown) > 6 else ""
     return [
-        f"Objects that MATLAB alone can read were left out: {', '.join(found.opaque[:6])}{more}; export them there, a "
-        "timetable by writetimetable(x, 'x.csv') or x = struct('time', seconds(x.Time - x.Time(1)), 'speed', x.speed), a "
-        "Dataset's element by s.Time = e.Values.Time; s.Data = e.Values.Data."
+        f"Objects that MATLAB alone can read were left out: {', '.join(shown[:6])}{more}; export them there, a timeseries "
+        "by s = struct('Time', x.Time, 'Data', x.Data), a Dataset's element by its Values likewise, a timetable by "
+        "writetimetable(x, 'x.csv')."
     ]
 
 
@@ -142,7 +172,7 @@ def _walk(value: Any, name: str, found: _Found, depth: int) -> None:
     if depth > _DEEPEST:
         return
     if isinstance(value, Opaque):
-        found.opaque.append(f"{name} ({value.kind})" if value.kind else name)
+        found.opaque[name] = value.kind
     elif isinstance(value, Mapping):
         _walk_struct(value, name, found, depth)
     elif isinstance(value, list) or (isinstance(value, np.ndarray) and value.dtype == object):

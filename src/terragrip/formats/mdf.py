@@ -5,32 +5,23 @@ asammdf runs in a process of its own (`terragrip.formats.mdf_worker` says why).
 
 from __future__ import annotations
 
-import json
-import subprocess
-import sys
-from importlib.util import find_spec
-from typing import Any
-
 import numpy as np
 import numpy.typing as npt
 
-from terragrip.errors import InputError
 from terragrip.files import sha256
-from terragrip.formats.boundary import needed
 from terragrip.formats.can.catalog import catalog
 from terragrip.formats.can.frames import Frames
 from terragrip.formats.can.log import finished
 from terragrip.formats.kind import Databases
 from terragrip.formats.signals import Signal, SignalLog
 from terragrip.formats.table import Wanted
-
-_WORKER = "terragrip.formats.mdf_worker"
+from terragrip.formats.worker import Worker
 
 
 def read_mdf(path: str, wanted: Wanted | None, databases: Databases) -> SignalLog:
     """Read an MDF file; raises InputError if it is damaged, or holds neither signals nor known frames."""
     frames = Frames(catalog(databases), wanted)
-    with _Worker(path) as worker:
+    with Worker("terragrip.formats.mdf_worker", "asammdf", path, "MDF file") as worker:
         head = worker.hear()
         start, units = float(head["start"]), dict(head["units"])
         worker.say([name for name in units if wanted is None or wanted(name)])
@@ -52,63 +43,3 @@ def read_mdf(path: str, wanted: Wanted | None, databases: Databases) -> SignalLo
         return SignalLog(tuple(units), signals, path, sha256(path))
     log = finished(frames, path, (), databases, refuse_unknown=not signals)
     return SignalLog((*units, *log.names), signals | log.signals, path, log.sha256, log.notes)
-
-
-class _Worker:
-    """The process that reads a file, and what it says."""
-
-    def __init__(self, path: str) -> None:
-        self._path = path
-        if find_spec("asammdf") is None:
-            needed("asammdf", "an MDF file")  # says what to install
-
-    def __enter__(self) -> _Worker:
-        self._process = subprocess.Popen(
-            [sys.executable, "-W", "ignore", "-m", _WORKER, self._path],
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.DEVNULL,
-        )
-        return self
-
-    def __exit__(self, *failure: object) -> None:
-        self._process.kill()
-        self._process.communicate()
-
-    def say(self, names: list[str]) -> None:
-        """Tell which signals are wanted."""
-        assert self._process.stdin is not None
-        try:
-            self._process.stdin.write(json.dumps(names).encode() + b"\n")
-            self._process.stdin.flush()
-        except OSError as error:
-            raise self._damaged("it ends the reader") from error
-
-    def hear(self) -> dict[str, Any]:
-        """The next message; raises InputError where the reader failed or ended."""
-        assert self._process.stdout is not None
-        line = self._process.stdout.readline()
-        if not line.endswith(b"\n"):
-            raise self._damaged("it ends the reader")
-        message: dict[str, Any] = json.loads(line)
-        if "error" in message:
-            raise self._damaged(str(message["error"]))
-        return message
-
-    def array(self) -> npt.NDArray[Any]:
-        """The next array."""
-        try:
-            return np.lib.format.read_array(self, allow_pickle=False)  # type: ignore[arg-type]  # it reads as a file does
-        except ValueError as error:
-            raise self._damaged("it ends the reader") from error
-
-    def read(self, size: int) -> bytes:
-        """Bytes of an array, for NumPy."""
-        assert self._process.stdout is not None
-        return self._process.stdout.read(size)
-
-    def _damaged(self, why: str) -> InputError:
-        said = " ".join(why.split())[:100]
-        return InputError(
-            f"is a damaged MDF file, or none ({said})", file=self._path, mend="copy or record it again"
-        )

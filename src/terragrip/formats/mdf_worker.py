@@ -7,65 +7,37 @@ once the wanted names came in on standard input, their samples; then the frames,
 
 from __future__ import annotations
 
-import contextlib
-import json
-import os
-import resource
 import sys
 from collections.abc import Iterator, Sequence
-from typing import Any, BinaryIO
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from terragrip.formats.can.catalog import EXTENDED
+from terragrip.formats.worker import Outlet, serve
 
 BLOCK = 200_000
 """Records at once, so that memory stays small."""
 _BUS_EVENT = 2  # flag of a channel group that holds frames (ASAM MDF 4)
 _FRAME = "CAN_DataFrame"
-_MEMORY = 3 << 30  # bytes of address space beyond what the imports take
-_SECONDS, _BYTES_A_SECOND = 60, 1 << 20  # of the processor: so many, and one more for so many bytes
 
 
-def main() -> int:
-    """Serve one file; anything that goes wrong becomes a line with the reason."""
-    out = os.fdopen(os.dup(sys.stdout.fileno()), "wb")
-    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # what libraries print is none of it
-    try:
-        import asammdf
+def work(path: str, out: Outlet) -> None:
+    """Serve one file."""
+    import asammdf
 
-        _limit(sys.argv[1])
-        with asammdf.MDF(sys.argv[1]) as file:
-            _serve(file, out)
-            _say(out, {"end": True})
-    except Exception as error:  # noqa: BLE001 - whatever a damaged file brings is told to the one who asked
-        with contextlib.suppress(OSError):
-            _say(out, {"error": f"{type(error).__name__}: {error}"[:200]})
-        return 1
-    return 0
+    with asammdf.MDF(path) as file:
+        _serve(file, out)
 
 
-def _limit(path: str) -> None:
-    """Bound what a damaged file may cost."""
-    with open("/proc/self/statm") as stream:
-        taken = int(stream.read().split()[0]) * resource.getpagesize()
-    for what, most in (
-        (resource.RLIMIT_AS, taken + _MEMORY),
-        (resource.RLIMIT_CPU, _SECONDS + os.path.getsize(path) // _BYTES_A_SECOND),
-    ):
-        hard = resource.getrlimit(what)[1]
-        limit = most if hard == resource.RLIM_INFINITY else min(most, hard)
-        resource.setrlimit(what, (limit, hard))
-
-
-def _serve(file: Any, out: BinaryIO) -> None:
+def _serve(file: Any, out: Outlet) -> None:
     buses = [k for k, group in enumerate(file.groups) if _is_bus(group)]
     names = _names(file, set(buses))
     units = {name: str(file.groups[g].channels[i].unit or "") for name, (g, i) in names.items()}
-    _say(out, {"start": file.start_time.timestamp(), "units": units})
+    out.say({"start": file.start_time.timestamp(), "units": units})
     clocks: dict[int, int] = {}
-    for name in json.loads(sys.stdin.readline()):
+    for name in out.hear():
         group, index = names[name]
         signal = file.get(group=group, index=index)
         values = _values(signal.samples)
@@ -74,15 +46,15 @@ def _serve(file: Any, out: BinaryIO) -> None:
         # Invalid samples are left out of some signals of a group: those have a clock of their own.
         shared = clocks.get(group) == len(values)
         clocks.setdefault(group, len(values))
-        _say(out, {"name": name, "unit": signal.unit or "", "group": group, "shared": shared})
+        out.say({"name": name, "unit": signal.unit or "", "group": group, "shared": shared})
         if not shared:
-            _send(out, np.asarray(signal.timestamps, dtype=np.float64))
-        _send(out, values)
+            out.send(np.asarray(signal.timestamps, dtype=np.float64))
+        out.send(values)
     for group in (k for k in buses if any(c.name.startswith(_FRAME) for c in file.groups[k].channels)):
         for block in _frames(file, group):
-            _say(out, {"frames": True})
+            out.say({"frames": True})
             for array in block:
-                _send(out, array)
+                out.send(array)
 
 
 def _is_bus(group: Any) -> bool:
@@ -136,21 +108,5 @@ def _payloads(column: npt.NDArray[Any]) -> npt.NDArray[np.uint8]:
     return np.frombuffer(joined, np.uint8).reshape(len(parts), width)
 
 
-def _say(out: BinaryIO, message: dict[str, Any]) -> None:
-    out.write(json.dumps(message).encode() + b"\n")
-    out.flush()
-
-
-def _send(out: BinaryIO, array: npt.NDArray[Any]) -> None:
-    np.lib.format.write_array(_Plain(out), np.ascontiguousarray(array), allow_pickle=False)
-
-
-class _Plain:
-    """A stream that NumPy takes for no file, so that it keeps to `write` and the order of bytes."""
-
-    def __init__(self, out: BinaryIO) -> None:
-        self.write = out.write
-
-
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(serve("asammdf", work))
