@@ -213,3 +213,26 @@ def test_a_dbc_that_is_none_is_refused(tmp_path, vehicle):
     (tmp_path / "no.dbc").write_text("nothing")
     with pytest.raises(InputError, match=r"no\.dbc"):
         Service(vehicle, [f"can:x?interface=virtual&dbc={tmp_path / 'no.dbc'}"])
+
+
+def test_the_ground_is_a_frame_too(vehicle):
+    from terragrip.live.message import GROUND, SOIL, Message
+    from terragrip.live.sinks.can import CanSink
+    from terragrip.live.uri import Uri
+
+    sink = CanSink(Uri.parse("can:x?interface=virtual", {"can": ("interface",)}, "sink"), vehicle)
+    message = cantools.database.load_file(DBC).get_message_by_name("TG_Ground")
+
+    def soil(time, name):
+        by_soil = {"hard": 0.2, "soft": 0.7, "unknown": 0.1}
+        data = {"time": time, "soil": name, "probability": by_soil[name], "probabilities": by_soil}
+        ((identifier, payload),) = sink.frames_of(Message(SOIL, time, data=data))
+        assert identifier == message.frame_id
+        return payload
+
+    assert soil(10.0, "soft")[2:5] == b"\xff\xff\xff"
+    assert sink.frames_of(Message(GROUND, 9.0, data={"time": 9.0, "std": 0.3, "probability": 0.9})) == []
+    assert message.decode(soil(12.5, "soft")) == pytest.approx(
+        {"SoilNumber": 2, "SoilProbability": 0.7, "ChangeProbability": 0.9, "ChangeAge": 3.5}, abs=0.003
+    )
+    assert message.decode(soil(13.0, "unknown"))["SoilNumber"] == 0

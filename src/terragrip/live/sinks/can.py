@@ -9,9 +9,11 @@ from typing import TYPE_CHECKING, Any
 
 from terragrip.errors import InputError
 from terragrip.estimation.engine import EVENTS
+from terragrip.ground.labels import UNKNOWN
 from terragrip.live.can import check, errors, open_bus
 from terragrip.live.core import Row
 from terragrip.live.feed import Lost
+from terragrip.live.message import GROUND, SOIL, Message
 from terragrip.live.outbox import Outbox
 from terragrip.live.uri import Uri
 
@@ -48,6 +50,7 @@ class CanSink:
         self._database: Any = cantools.database.load_file(DBC)
         self._wheels = vehicle.wheels
         self._counter = 0
+        self._change: tuple[float, float] | None = None  # time and probability of the last one
 
     async def run(self, outbox: Outbox) -> None:
         """Send frames; raises Lost where the bus goes away or takes nothing any more."""
@@ -57,13 +60,32 @@ class CanSink:
         try:
             outbox.connected()
             while True:
-                row = (await outbox.get()).row
-                for identifier, data in self.frames(row) if row is not None else ():
+                for identifier, data in self.frames_of(await outbox.get()):
                     bus.send(can.Message(arbitration_id=identifier, is_extended_id=True, data=data))
         except errors() as error:
             raise Lost(f"the bus: {error}") from error
         finally:
             bus.shutdown()
+
+    def frames_of(self, message: Message) -> list[tuple[int, bytes]]:
+        """Identifier and payload of each frame that a message becomes: of an estimate, and of what the ground is."""
+        if message.row is not None:
+            return self.frames(message.row)
+        data = message.data or {}
+        if message.kind == GROUND:
+            self._change = (data["time"], data["probability"])
+        return [self._ground(data)] if message.kind == SOIL else []
+
+    def _ground(self, data: dict[str, Any]) -> tuple[int, bytes]:
+        known = [name for name in data["probabilities"] if name != UNKNOWN]
+        time, probability = self._change or (math.nan, math.nan)
+        values = {
+            "SoilNumber": 0 if data["soil"] not in known else 1 + known.index(data["soil"]),
+            "SoilProbability": data["probability"],
+            "ChangeProbability": probability,
+            "ChangeAge": data["time"] - time,
+        }
+        return self._frame("TG_Ground", values)
 
     def frames(self, row: Row) -> list[tuple[int, bytes]]:
         """Identifier and payload of each frame of a row."""

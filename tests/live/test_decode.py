@@ -1,0 +1,101 @@
+"""A message gives what the same profile makes of the same row of a log."""
+
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from terragrip.errors import InputError
+from terragrip.formats import Profile
+from terragrip.live.decode import Decoder
+
+PROFILE = {
+    "time": {"from": "t", "unit": "ms"},
+    "channels": {
+        "ground_speed": {"from": "v", "unit": "km/h", "invalid": [[60, 100]], "sign": -1},
+        "wheel_speed_fl": {"from": "rpm_left", "unit": "rpm", "scale": 0.1, "offset": 2.0},
+        "wheel_speed_fr": {"from": ["absent", "*_right"], "unit": "rpm"},
+        "drive_torque_fl": {
+            "from": "power",
+            "over": "rpm_left",
+            "over_minimum": 5.0,
+            "scale": 9.5,
+            "unit": "N m",
+        },
+        "pitch": {"pitch_of": ["qx", "qy", "qz", "qw"]},
+        "roll": {"roll_of": ["qx", "qy", "qz", "qw"]},
+        "drawbar_force": {"from": "nowhere", "else": {"norm_of": ["px", "py"], "unit": "kN"}},
+        "altitude": {"from": "gone", "optional": True},
+        "acceleration_z": {"constant": 9.81},
+    },
+}
+
+
+@pytest.fixture(scope="module")
+def log():
+    draws = np.random.default_rng(3)
+    names = ["v", "rpm_left", "rpm_right", "power", "px", "py", "qx", "qy", "qz", "qw"]
+    table = pd.DataFrame(draws.uniform(-40, 90, (50, len(names))), columns=names)
+    table[["qx", "qy", "qz", "qw"]] = draws.uniform(0.1, 1.0, (50, 4))
+    quaternion = table[["qx", "qy", "qz", "qw"]].to_numpy()
+    table[["qx", "qy", "qz", "qw"]] = quaternion / np.linalg.norm(quaternion, axis=1, keepdims=True)
+    table.insert(0, "t", 10.0 * np.arange(50))
+    return table
+
+
+def test_as_a_profile_makes_of_a_log(log):
+    recording = Profile.from_dict(PROFILE).apply(log)
+    decoder = Decoder(Profile.from_dict(PROFILE))
+    for k, fields in enumerate(log.to_dict("records")):
+        ((stamp, values),) = decoder.samples(fields)
+        expected = {
+            name: float(column[k]) for name, column in recording.channels.items() if np.isfinite(column[k])
+        }
+        assert stamp == pytest.approx(recording.time[k])
+        assert values == pytest.approx(expected, rel=1e-12)
+    assert not decoder.unreadable
+
+
+def test_a_delay_makes_a_sample_of_its_own():
+    profile = {"channels": {"ground_speed": {"from": "v", "delay": "50 ms"}, "wheel_speed_fl": {"from": "w"}}}
+    found = Decoder(Profile.from_dict(profile)).samples({"time": 1.0, "v": 2.0, "w": 3.0})
+    assert dict(found) == {0.95: {"ground_speed": 2.0}, 1.0: {"wheel_speed_fl": 3.0}}
+
+
+def test_the_better_source_wins_once_it_speaks():
+    decoder = Decoder(Profile.from_dict({"channels": {"ground_speed": {"from": ["radar", "gnss"]}}}))
+    assert decoder.samples({"gnss": 1.0}) == [(None, {"ground_speed": 1.0})]
+    assert decoder.samples({"radar": 2.0}) == [(None, {"ground_speed": 2.0})]
+    assert decoder.samples({"gnss": 1.0}) == []
+
+
+def test_a_divisor_may_come_in_a_message_of_its_own():
+    over = {"from": "power", "over": "speed", "over_minimum": 0.5, "unit": "N m"}
+    decoder = Decoder(Profile.from_dict({"channels": {"drive_torque_fl": over}}))
+    assert decoder.samples({"power": 10.0}) == []
+    assert decoder.samples({"speed": 4.0}) == []
+    assert decoder.samples({"power": 10.0}) == [(None, {"drive_torque_fl": 2.5})]
+
+
+def test_the_sources_own_units_count_where_the_profile_is_silent():
+    decoder = Decoder(Profile.from_dict({"channels": {"ground_speed": "v"}}))
+    decoder.units = {"v": "km/h"}
+    assert decoder.samples({"v": 36.0}) == [(None, {"ground_speed": pytest.approx(10.0)})]
+
+
+def test_nanoseconds_since_1970_keep_their_digits():
+    decoder = Decoder(
+        Profile.from_dict(
+            {"time": {"from": "ns", "unit": "ns", "zero": "first"}, "channels": {"ground_speed": "v"}}
+        )
+    )
+    first = 1_700_000_000_123_456_789
+    stamps = [decoder.samples({"ns": first + 1000 * k, "v": 1.0})[0][0] for k in range(3)]
+    assert stamps == pytest.approx([0.0, 1e-6, 2e-6], abs=1e-12)
+
+
+def test_what_looks_ahead_is_refused():
+    profile = Profile.from_dict({"channels": {"ground_speed": {"derivative_of": ["x", "y"], "unit": "m"}}})
+    with pytest.raises(InputError, match="looks ahead"):
+        Decoder(profile)
