@@ -75,3 +75,16 @@ def test_interval_holds_the_mean_ground():
         found = mean_over_ground(curve, slip, mu, metres, run, 0.02, bootstrap=200)
         held += found.interval[0] <= A <= found.interval[1]
     assert held >= 34
+
+
+def test_an_error_that_all_runs_share_widens_the_interval():
+    slip, mu, metres, run = drive(1005, 0.1)
+    curve = AdhesionCurve(bootstrap=0).fit(slip, mu, run)
+    plain = mean_over_ground(curve, slip, mu, metres, run)
+    wide = mean_over_ground(curve, slip, mu, metres, run, common_sd=0.05)
+    assert wide.mean == plain.mean
+    for side in (0, 1):
+        own = abs(plain.interval[side] - plain.mean)
+        assert abs(wide.interval[side] - wide.mean) == pytest.approx(
+            np.hypot(own, 1.96 * 0.05 * plain.mean), rel=1e-4
+        )

@@ -69,6 +69,7 @@ class GatheredRuns:
     makers: set[str] = field(default_factory=set)
     periods: list[float] = field(default_factory=list)
     masses: list[float] = field(default_factory=list)
+    common_sd: float = 0.0
     wheels: int = 1
 
     def add(self, estimates: Estimates, run: str, soil: str | None = None, file: str | None = None) -> None:
@@ -85,7 +86,9 @@ class GatheredRuns:
             self.blocks.setdefault(name, []).append(found)
         self.makers.add(maker(estimates))
         self.periods.append(float(np.median(np.diff(estimates.time))) if len(estimates) > 1 else np.nan)
-        self.masses.append(estimates.vehicle.mass)
+        vehicle = estimates.vehicle
+        self.masses.append(vehicle.mass)
+        self.common_sd = max(self.common_sd, torque_scale_sd(vehicle))
         self.wheels = max(self.wheels, len(estimates.wheels))
 
     def join(self, other: GatheredRuns) -> None:
@@ -97,6 +100,7 @@ class GatheredRuns:
         self.makers |= other.makers
         self.periods += other.periods
         self.masses += other.masses
+        self.common_sd = max(self.common_sd, other.common_sd)
         self.wheels = max(self.wheels, other.wheels)
 
     def learn(
@@ -113,12 +117,20 @@ class GatheredRuns:
             float(np.nanmedian(self.periods)) if self.periods else 0.01,
             self.wheels,
             source=f"{len(self.runs)} runs: {names}",
+            common_sd=self.common_sd,
         )
         plain = {name: learned.soil for name, learned in campaign.soils.items()}
         method = next(iter(self.makers)) if len(self.makers) == 1 else "several methods"
         signed = with_signatures(plain, self.blocks, method)
         learned = {name: replace(one, soil=signed[name]) for name, one in campaign.soils.items()}
         return replace(campaign, soils=learned)
+
+
+def torque_scale_sd(vehicle: Vehicle) -> float:
+    """Relative SD of the mean torque scale of all wheels, by the vehicle's stated uncertainty: every log of the machine shares it."""
+    known = vehicle.uncertainty
+    own, common = known.drive_torque_gain or 0.0, known.drive_torque_gain_common or 0.0
+    return float(np.hypot(own / np.sqrt(len(vehicle.wheels)), common))
 
 
 def labelled_blocks(estimates: Estimates, soil: str | None, file: str) -> Iterator[tuple[str, Blocks]]:

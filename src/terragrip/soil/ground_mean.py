@@ -47,6 +47,7 @@ def mean_over_ground(
     metres: ArrayLike,
     cluster: ArrayLike | None = None,
     slip_std: ArrayLike = 0.0,
+    common_sd: float = 0.0,
     bootstrap: int = 1000,
     seed: int = 0,
 ) -> GroundMean | None:
@@ -54,7 +55,9 @@ def mean_over_ground(
 
     metres: path of the wheel that each sample stands for [m]; cluster: integer labels (run) for the interval; slip_std: SD of
     the random part of each slip, taken as 0 where it is NaN and as 0.1 where it is more. Samples count where adhesion exceeds
-    that of the curve at the bins' lowest slip. None where the fit has other free parameters than one scale, or no sample counts.
+    that of the curve at the bins' lowest slip. common_sd: relative SD of an error of adhesion that all runs share (the machine's
+    torque scale); no drawing of runs shows it, so it widens the interval. None where the fit has other free parameters than one
+    scale, or no sample counts.
     """
     if curve.model != "exponential" or curve.free_ != ("a",):
         return None
@@ -78,7 +81,7 @@ def mean_over_ground(
         if abs(a - before) < 1e-6 * a:
             break
     interval = _interval(
-        mu[counts] * dx[counts], height[counts] * dx[counts], labels[counts], a, bootstrap, seed
+        mu[counts] * dx[counts], height[counts] * dx[counts], labels[counts], a, bootstrap, seed, common_sd
     )
     shift = a / plain - 1
     matters = abs(shift) > MATTERS
@@ -101,9 +104,15 @@ def _height(curve: AdhesionCurve, slip: Array, noise: Array) -> Array:
 
 
 def _interval(
-    above: Array, below: Array, labels: NDArray[np.int64], a: float, bootstrap: int, seed: int
+    above: Array,
+    below: Array,
+    labels: NDArray[np.int64],
+    a: float,
+    bootstrap: int,
+    seed: int,
+    common_sd: float,
 ) -> tuple[float, float] | None:
-    """95 % interval of the ratio of sums, clusters drawn with replacement, widened as `AdhesionCurve` does."""
+    """95 % interval of the ratio of sums, clusters drawn with replacement, widened as `AdhesionCurve` does and by what is common to all."""
     _, index = np.unique(labels, return_inverse=True)
     sums = np.stack([np.bincount(index, weights=values) for values in (above, below)])
     clusters = sums.shape[1]
@@ -116,4 +125,5 @@ def _interval(
     widen = stdtrit(clusters - 1, 0.975) / 1.959964 * np.sqrt(clusters / (clusters - 1))
     found = a + (top / np.maximum(bottom, 1e-300) - a) * widen
     low, high = np.percentile(found[bottom > 0], [2.5, 97.5])
-    return float(low), float(high)
+    shared = 1.959964 * common_sd * a
+    return a - float(np.hypot(a - low, shared)), a + float(np.hypot(high - a, shared))

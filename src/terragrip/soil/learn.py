@@ -111,11 +111,13 @@ def learn_soils(
     sample_period: float = 0.01,
     wheels: int = 4,
     source: str = "",
+    common_sd: float = 0.0,
 ) -> Campaign:
     """Fit a curve to each soil of the pairs; compare forms, correct for slip noise, say what to drive next.
 
     `curve`: an unfitted AdhesionCurve with the settings to use (default: the paper's). `bins` by soil; default the curve's,
-    on grass the paper's up to 40 %. `mass` [kg] gives the pulls of the advice. Raises InputError where no pair is labelled.
+    on grass the paper's up to 40 %. `mass` [kg] gives the pulls of the advice. `common_sd`: relative SD of adhesion's error that all
+    runs share, for the interval by metres. Raises InputError where no pair is labelled.
     """
     template = curve or AdhesionCurve()
     special = PAPER_BINS if bins is None else bins
@@ -130,7 +132,7 @@ def learn_soils(
     for name, parts in sorted(grouped.items()):
         settings = special.get(name, template.bins)
         try:
-            learned = _learn(name, parts, template, settings, mass, sample_period, wheels, source)
+            learned = _learn(name, parts, template, settings, mass, sample_period, wheels, source, common_sd)
         except InputError as error:
             missed[name] = str(error)
             words.append(f"{name}: not fitted, {error}.")
@@ -174,6 +176,7 @@ def _learn(
     sample_period: float,
     wheels: int,
     source: str,
+    common_sd: float,
 ) -> LearnedSoil:
     slip = np.concatenate([part.slip for part in parts])
     adhesion = np.concatenate([part.adhesion for part in parts])
@@ -217,7 +220,7 @@ def _learn(
         soil = replace(soil, fit={**soil.fit, "slip_noise": shown})
     metres = np.concatenate([part.metres for part in parts])
     ground = mean_over_ground(
-        curve, slip, adhesion, metres, cluster, noise, template.bootstrap, template.seed
+        curve, slip, adhesion, metres, cluster, noise, common_sd, template.bootstrap, template.seed
     )
     if ground is not None:
         interval = None if ground.interval is None else list(ground.interval)
