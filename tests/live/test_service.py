@@ -351,3 +351,12 @@ async def test_a_thread_that_is_too_fast_is_held_back_and_counted(vehicle, port)
         await until(lambda: events(service, "behind"))
     assert taken == [*range(10), 500]
     assert service.core.counts.by_channel[f"(udp://127.0.0.1:{port})"]["dropped"] == 490
+
+
+async def test_wheels_of_other_names_are_said(vehicle, short, port, sender):
+    service = Service(vehicle, [f"udp://127.0.0.1:{port}"])
+    async with running(service):
+        for message in messages(short.recording, 30):
+            sender.send({name.replace("_fl", "_left"): value for name, value in message.items()})
+        await until(lambda: service.core.rows == 30)
+    assert events(service, "schema") == ["no speed of the wheel fl yet; the vehicle has no wheel left"]

@@ -9,6 +9,7 @@ from pydantic import Field, model_validator
 
 from terragrip.document import Fault, Part
 
+_LONGEST = 1 << 16  # bytes, of a datagram
 _ORDER = {"little": "<", "big": ">"}
 
 
@@ -35,6 +36,10 @@ class Payload(Part):
         if (self.format == "struct") != bool(self.layout):
             raise Fault("layout goes with format struct", "write e.g. 'layout: d4f'", ("layout",))
         packer = self.packer
+        if packer.size > _LONGEST:
+            raise Fault(
+                f"the layout takes {packer.size} bytes", f"a message has at most {_LONGEST}", ("layout",)
+            )
         count = len(packer.unpack(bytes(packer.size)))
         if count != len(self.fields):
             raise Fault(

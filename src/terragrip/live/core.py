@@ -188,7 +188,10 @@ class Core:
 
     def _release(self, rows: list[Pending], out: list[Output]) -> list[Output]:
         for row in rows:
-            estimator = self.estimator or self._begin(self._seen(row))
+            estimator = self.estimator
+            if estimator is None:
+                estimator = self._begin(self._seen(row))
+                out += self._lacking(row)
             try:
                 estimate = estimator.update({**row.values, "time": row.time})
             except InputError as error:
@@ -221,6 +224,19 @@ class Core:
         if most is not None:
             text += f", slip up to {100 * known[most]:.0f} % ({most})"
         return Event(estimate.time, estimate.event, "estimator", text)
+
+    def _lacking(self, first: Pending) -> list[Output]:
+        """An event where the first rows lack a wheel's speed, or bear wheels that the vehicle has not."""
+        seen = {name for row in (first, *self.reorder.pending) for name in row.values}
+        wheels = [name.removeprefix("wheel_speed_") for name in seen if name.startswith("wheel_speed_")]
+        absent = [wheel for wheel in self.vehicle.wheels if wheel not in wheels]
+        strange = sorted(wheel for wheel in wheels if wheel not in self.vehicle.wheels)
+        if not absent:
+            return []
+        text = f"no speed of the wheel {', '.join(absent)} yet"
+        if strange:
+            text += f"; the vehicle has no wheel {', '.join(strange[:4])}"
+        return [Event(first.time, "schema", self.settings.sources[next(iter(first.origin.values()))], text)]
 
     def _seen(self, first: Pending) -> Collection[str]:
         pending = [name for row in self.reorder.pending for name in row.values]

@@ -20,6 +20,7 @@ Sample = tuple[float | None, Values]
 """Stamp [s] on the source's clock, None where the message bears none; and values."""
 
 _HUGE = 1e300
+_NAMES = 1000  # of fields, beyond which a sender makes them up
 
 
 _LAYOUTS = 256  # sets of fields whose plan is kept
@@ -137,7 +138,9 @@ class Decoder:
         for name, raw in fields.items():
             ours = known.get(name)
             if ours is None:
-                ours = known[name] = is_channel(name) and not name.startswith(REFERENCE)
+                ours = is_channel(name) and not name.startswith(REFERENCE) and len(known) < _NAMES
+                if len(known) < _NAMES:
+                    known[name] = ours
             if ours:
                 value = raw if type(raw) is float and -_HUGE < raw < _HUGE else self._number(name, raw)
                 if value is not None:
