@@ -119,7 +119,7 @@ def plain_probabilities(x: np.ndarray, hazard: float, model: Model) -> np.ndarra
 
 
 def test_the_detector_is_the_plain_recursion(monkeypatch):
-    blocks = estimates_blocks(drive(3, [("fine", FINE, 8), ("grass", GRASS, 8)]))
+    blocks = estimates_blocks(drive(3, [("fine", FINE, 5), ("grass", GRASS, 3)]))
     blocks = blocks[blocks.known]
     x, model = signals_of(blocks), replace(Model.of(GROUND), weight=np.ones(4))
     monkeypatch.setattr("terragrip.ground.online_changes._LEAST", 0.0)
