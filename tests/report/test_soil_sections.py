@@ -111,5 +111,8 @@ def test_without_soils_each_section_says_why() -> None:
         assert section.omitted is not None
         assert "soil label" in section.omitted
         assert not section.content
-    missed = soil_sections.fits([], {"clay": "1 slip bins"})
+    missed = {"clay": "1 slip bins"}
+    for section in (soil_sections.both_maxima([], 0.02, missed), soil_sections.trust([], missed)):
+        assert section.omitted == "Left out: no soil could be fitted."
+    missed = soil_sections.fits([], missed)
     assert missed.prose == ("clay: not fitted, 1 slip bins.",)

@@ -84,10 +84,10 @@ def report_of(
             sections.online_curve(
                 main, {one.name: one.learned.soil.parameters.get("a", np.nan) for one in curves}
             ),
-            soil_sections.both_maxima(curves, tire),
+            soil_sections.both_maxima(curves, tire, campaign.not_fitted),
             soil_sections.fits(curves, campaign.not_fitted),
-            soil_sections.trust(curves),
-            soil_sections.what_is_missing(curves),
+            soil_sections.trust(curves, campaign.not_fitted),
+            soil_sections.what_is_missing(curves, campaign.not_fitted),
             sections.soils(main, together),
             ground_sections.recognised(grounds),
             ground_sections.section_points(grounds),

@@ -92,15 +92,16 @@ def online_curve(run: Run, scales: Mapping[str, float], told: str = "of the fits
         "scale a of the curve [–]",
         estimate,
         std,
-        truth=steps,
+        truth=steps if np.isfinite(steps).any() else None,
         limits=(0.0, 1.25 * float(top)),
         reference=f"a {told}",
     )
+    beside = f", beside the a {told}" if lane.truth is not None else ""
     picture = Picture(
         f"online-{run.name}",
         timeline(run, [lane]),
         f"{'Simulated run' if run.truth is not None else 'Run'} {run.name}: the scale a of µ(s) = a g(s), learned from single pairs "
-        f"of slip and adhesion as they come, with its 95 % interval, beside the a {told}. With a the whole curve is known at each instant; "
+        f"of slip and adhesion as they come, with its 95 % interval{beside}. With a the whole curve is known at each instant; "
         "the interval widens where slip is too small to teach, and begins anew where the ground changes.",
         f"Scale of the adhesion curve over time in {run.name}",
     )
@@ -144,11 +145,14 @@ def soils(run: Run, together: Sequence[Run]) -> Section:
     pooled_picture = Picture(
         "soils",
         draw_crosses(pooled, ("measured", "estimated", "true"), what),
-        f"Mean ± SD of slip and {what} by soil over the {sim}runs {names([r.name for r in together])}, {said}. "
+        f"Mean ± SD of slip and {what} by soil over the {sim}run{'s' * (len(together) > 1)} {names([r.name for r in together])}, "
+        f"{said}. "
         + (
             "Measured slip comes from the raw speeds, so its SD holds their noise."
             if run.recording is not None
             else "The sensor's traction stands at the estimated slip."
+            if run.sensor_wheel is not None
+            else ""
         ),
         "Crosses of slip and traction by soil, measured, estimated and true",
     )

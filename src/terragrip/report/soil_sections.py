@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from types import MappingProxyType
 
 from terragrip.report.curves import SoilCurves, draw_all_maxima, draw_both_maxima, draw_fits, maxima
 from terragrip.report.page import Picture, Section, Table, names, number, percent
@@ -12,9 +13,11 @@ from terragrip.soil.library import Soil, SoilLibrary
 from terragrip.soil.literature import paper_soils
 from terragrip.soil.missing import in_words
 
+NOTHING: Mapping[str, str] = MappingProxyType({})
 FIRST = "hard"
 """The soil that the paper shows alone; else the one with the most bins stands there."""
 NO_SOILS = "Left out: no sample of these estimates carries a soil label, so there is no curve to fit."
+NONE_FITTED = "Left out: no soil could be fitted."
 
 
 def told_by_all(
@@ -39,11 +42,13 @@ def told_by_all(
     return sorted(found, key=lambda one: (one.name != FIRST, -len(one.learned.soil.bins)))
 
 
-def both_maxima(curves: Sequence[SoilCurves], tire_resistance: float) -> Section:
+def both_maxima(
+    curves: Sequence[SoilCurves], tire_resistance: float, not_fitted: Mapping[str, str] = NOTHING
+) -> Section:
     """mu(s) and eta(s) with both maxima: the paper's argument for knowing the curve."""
     title = "Adhesion and efficiency over slip"
     if not curves:
-        return Section("maxima", title, omitted=NO_SOILS)
+        return Section("maxima", title, omitted=NONE_FITTED if not_fitted else NO_SOILS)
     first = curves[0]
     truth = ", dashed: the simulated truth" if first.truth is not None else ""
     pictures: list[Picture | Table] = [
@@ -80,12 +85,19 @@ def fits(curves: Sequence[SoilCurves], not_fitted: Mapping[str, str]) -> Section
         return Section(
             "curves",
             title,
-            omitted=NO_SOILS if not missed else "Left out: no soil could be fitted.",
+            omitted=NO_SOILS if not missed else NONE_FITTED,
             prose=missed,
         )
     first, rest = curves[0], curves[1:]
     said = _voices(curves)
     settings = first.learned.curve.bins_.settings
+    alike = [
+        one
+        for one in curves
+        if one.truth and one.paper and one.truth.parameters.get("a") == one.paper.parameters["a"]
+    ]
+    if len(alike) == len(curves):
+        said += "; the simulated soils were made with the paper's a, so that both lie on one line"
     how = (
         f"Bins of {percent(settings.width, 0)} slip from {percent(settings.lower, 0)} to {percent(settings.upper, 0)}, each with at least "
         f"{settings.minimum} samples; samples on a transition or under an event are left out."
@@ -116,11 +128,11 @@ def fits(curves: Sequence[SoilCurves], not_fitted: Mapping[str, str]) -> Section
     return Section("curves", title, missed, tuple(content))
 
 
-def trust(curves: Sequence[SoilCurves]) -> Section:
+def trust(curves: Sequence[SoilCurves], not_fitted: Mapping[str, str] = NOTHING) -> Section:
     """What the data fix and what not, whether the form follows them, what slip noise and varying ground do."""
     title = "How far the curves can be trusted"
     if not curves:
-        return Section("trust", title, omitted=NO_SOILS)
+        return Section("trust", title, omitted=NONE_FITTED if not_fitted else NO_SOILS)
     rows = tuple(_trust_row(one) for one in curves)
     table = Table(
         "Each fit's badge: do the data fix what was fitted (condition number; beyond 10 000 they do not), does its form follow them "
@@ -144,11 +156,11 @@ def trust(curves: Sequence[SoilCurves]) -> Section:
     return Section("trust", title, (_free_shape(curves[0]), *words), (table,))
 
 
-def what_is_missing(curves: Sequence[SoilCurves]) -> Section:
+def what_is_missing(curves: Sequence[SoilCurves], not_fitted: Mapping[str, str] = NOTHING) -> Section:
     """Which slips lack data, and which pull and speed fill them."""
     title = "What to drive next"
     if not curves:
-        return Section("missing", title, omitted=NO_SOILS)
+        return Section("missing", title, omitted=NONE_FITTED if not_fitted else NO_SOILS)
     rows = tuple(
         (
             one.name,
