@@ -109,7 +109,7 @@ class Service:
         self.statistics = Statistics(self)
         self.prediction = Prediction(self.core)
         self.listeners: list[Callable[[Message], None]] = [outbox.put for outbox in self.outboxes]
-        self._real_time = all(source.real_time for source in self.sources)
+        self.is_real_time = all(source.real_time for source in self.sources)
         self._stopped = False
         self._done: Any = None  # a future, once `run` runs
         self._waking: asyncio.TimerHandle | None = None
@@ -205,7 +205,7 @@ class Service:
 
     def _work(self) -> None:
         """Estimate what is there; come again for more, or for a row that waits."""
-        if not self._real_time and self.inbox.busy():
+        if not self.is_real_time and self.inbox.busy():
             self._loop.call_later(_BREATH, self._guarded, self._work)
             return
         self._drain()
@@ -213,7 +213,7 @@ class Service:
             self._later(self._work)
             return
         pending = self.core.reorder.pending
-        if pending and self._real_time and self._waking is None:
+        if pending and self.is_real_time and self._waking is None:
             left = pending[0].arrival + self.core.settings.window - self.inbox.clock()
             self._waking = self._loop.call_later(max(left, 0.0) + 1e-4, self._guarded, self._tick)
 
@@ -290,7 +290,7 @@ class Service:
         dropped, self.inbox.dropped = self.inbox.dropped, type(self.inbox.dropped)()
         for channel, mine in dropped.by_channel.items():
             self.note({"fate": "dropped", "channels": [channel], "number": mine["dropped"]})
-        if self._real_time:
+        if self.is_real_time:
             for feed in self.feeds:
                 self.statistics.watch_silence(feed, now)
             lag = now - self.inbox.samples[0][0] if self.inbox.samples else 0.0

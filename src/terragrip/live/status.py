@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import sys
 import time
 from collections.abc import Iterator
@@ -25,7 +26,8 @@ def shown(service: Service, quiet: bool) -> Iterator[None]:
         yield
         return
     if not sys.stderr.isatty():
-        service.listeners.append(_print_event)
+        if not logging.getLogger("terragrip").isEnabledFor(logging.INFO):  # else the log says it
+            service.listeners.append(_print_event)
         yield
         return
     from rich.console import Console
@@ -72,9 +74,10 @@ def table(service: Service) -> Any:
 def head(service: Service) -> list[str]:
     """The lines above the tables."""
     s, core = service.statistics, service.core
+    delay = f"delay {1e3 * s.delay:.1f} ms   " if service.is_real_time else ""
     lines = [
         f"time {core.time:.1f} s   {s.row_rate:.0f} rows/s   {s.sample_rate:.0f} samples/s   "
-        f"delay {1e3 * s.delay:.1f} ms   {len(service.inbox.samples)} waiting   {core.rows} rows"
+        f"{delay}{len(service.inbox.samples)} waiting   {core.rows} rows"
         if core.rows else "waiting for the first sample"
     ]  # fmt: skip
     if s.last is not None:
