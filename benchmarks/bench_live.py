@@ -199,9 +199,12 @@ def listen(sink: socket.socket, got: np.ndarray, rate: int, dropped: list[int]) 
 
 
 def usage(pid: int) -> float:
-    """Seconds of processor that a process has used."""
-    fields = Path(f"/proc/{pid}/stat").read_text().rsplit(")", 1)[1].split()
-    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+    """Seconds of processor that a process's threads have used, as the scheduler counted them.
+
+    Not from /proc/PID/stat, which on many kernels counts by ticks: what wakes at 100 Hz is then counted wrong.
+    """
+    threads = Path(f"/proc/{pid}/task").glob("*/schedstat")
+    return sum(int(path.read_text().split()[0]) for path in threads) / 1e9
 
 
 def memory(pid: int) -> float:
