@@ -5,7 +5,7 @@
 #include "filter.h"
 
 #define APART 50              /* snapshots a window */
-#define CLOCK_TOLERANCE 1e-9  /* s: a sum of dt is no exact multiple of the window */
+#define CLOCK_TOLERANCE 1e-6  /* s: a sum of dt, in single precision too, is no exact multiple of the window */
 
 static const tg_real RULES[3][3] = { /* rows: wheel speeds small, medium, large; columns: ground speed */
     {(tg_real)0.1, (tg_real)0.4, (tg_real)0.8},

@@ -12,7 +12,7 @@ RULES = np.array([[0.1, 0.4, 0.8], [0.4, 0.6, 0.9], [0.8, 0.9, 1.0]])
 """Outputs of the zero-order Sugeno system: rows small, medium, large D_ω, columns D_v (R)."""
 SNAPSHOTS = 50
 """How many instants of one window are kept."""
-SLACK = 1e-9
+SLACK = 1e-6
 """s; two sums of the same time steps may differ by rounding."""
 SLIP_SCALE = 0.25
 """The change of slip that counts as 1 (R, ours)."""

@@ -1,0 +1,93 @@
+"""Rounding decides nothing: another origin of time, or the build in single precision that a controller runs, give the same events and the
+same estimates to a thousandth of their spread. Snapshots of single precision continue to the bit, and no other takes them."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from importlib import import_module
+from typing import Any
+
+import numpy as np
+import pytest
+
+from drives import WHEELS, drive, robot
+from terragrip.errors import InputError
+from terragrip.estimation import METHODS, Estimates, TractionEstimator, engine, estimate
+from terragrip.recording import Recording
+
+
+@pytest.fixture
+def single(monkeypatch: pytest.MonkeyPatch) -> Any:
+    """From a call on, estimators are of single precision."""
+    module = import_module("terragrip._kernel_float")
+
+    def switch() -> None:
+        monkeypatch.setattr(engine, "ffi", module.ffi)
+        monkeypatch.setattr(engine, "lib", module.lib)
+
+    return switch
+
+
+def turning(t: Any) -> Any:
+    return 0.6 + 0.25 * np.sin(t / 2)
+
+
+def faulty_drive() -> Recording:
+    """Accelerometer, a second and more without ground speed, a spike."""
+    log = drive(40.0, rate=50.0, speed=turning, imu=True, seed=2).recording
+    log.channels["ground_speed"][800:900] = np.nan
+    log.channels["wheel_speed_rr"][300] += 3.0
+    return log
+
+
+def assert_alike(one: Estimates, other: Estimates) -> None:
+    np.testing.assert_array_equal(one["event"], other["event"])
+    quantities = ("adhesion", "slip", "net_traction", "efficiency", "wheel_speed")
+    for name in (
+        *(f"{q}_{w}" for q in quantities for w in WHEELS),
+        "ground_speed",
+        "soil_resistance",
+        "curve_a",
+    ):
+        sd = np.maximum(other[f"{name}_std"], 1e-4)  # the algebraic method knows its first speeds to the bit
+        assert np.nanmax(np.abs(one[name] - other[name]) / sd) < 1e-3, name
+        assert np.nanmax(np.abs(one[f"{name}_std"] - other[f"{name}_std"]) / sd) < 1e-3, name
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_single_precision_gives_the_estimates_of_double(method, single):
+    log = faulty_drive()
+    double = estimate(log, robot(), method=method)
+    single()
+    rough = estimate(log, robot(), method=method)
+    assert_alike(rough, double)
+    assert not np.array_equal(rough["adhesion_rr"], double["adhesion_rr"])  # it is the other build
+
+
+@pytest.mark.parametrize("origin", [1.0 / 3.0, 1e4 / 7.0])
+def test_another_origin_of_time_gives_the_same_estimates(origin):
+    log = faulty_drive()
+    later = replace(log, time=log.time + origin)
+    assert not np.array_equal(np.diff(later.time), np.diff(log.time))
+    assert_alike(estimate(later, robot()), estimate(log, robot()))
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_a_snapshot_of_single_precision_continues_to_the_bit(method, single):
+    log = drive(6.0, rate=50.0, seed=3).recording
+    samples = [
+        {"time": float(t), **{name: float(v[k]) for name, v in log.channels.items()}}
+        for k, t in enumerate(log.time)
+    ]
+    in_double = TractionEstimator(robot(), method).snapshot()
+    single()
+    whole, first = TractionEstimator(robot(), method), TractionEstimator(robot(), method)
+    expected = [whole.update(sample).to_dict() for sample in samples]
+    for sample in samples[:150]:
+        first.update(sample)
+    rest = TractionEstimator.restore(first.snapshot())
+    assert [str(rest.update(sample).to_dict()) for sample in samples[150:]] == [
+        str(e) for e in expected[150:]
+    ]
+    with pytest.raises(InputError, match="another version or machine"):
+        TractionEstimator.restore(in_double)
