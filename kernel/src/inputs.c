@@ -2,7 +2,7 @@
 #include "estimator.h"
 
 #define TG_BUMPS ((tg_real)2e-3) /* m^2/s^3: forces of bumps on the speed, which an accelerometer would show */
-#define TG_LATE ((tg_real)1.5) /* intervals after which a sample is missing; not 1, where rounding would decide */
+#define TG_LATE ((tg_real)1.01) /* intervals after which a sample is late; not 1, where rounding would decide */
 #define TG_UNKNOWN_SLOPE ((tg_real)0.01) /* rad^2, of a pitch never seen or long silent */
 
 /* The input itself is filtered as a random walk in noise, with a time constant of at most TG_INPUT_LAG: between two wheel speeds a raw
