@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -38,7 +39,7 @@ class Channel:
     time: Floats
     values: Floats
 
-    @property
+    @cached_property
     def period(self) -> float:
         """Median time [s] between samples; NaN for fewer than two."""
         return float(np.median(np.diff(self.time))) if len(self.time) > 1 else np.nan

@@ -231,7 +231,8 @@ def _yaw(
         channels["angular_velocity_z"], starts, layout.window, _period(TURN, channels, layout)
     )
     wheel = speeds[0]
-    parting = (over_wheels(wheel)[1] - over_wheels(wheel)[2]).mean(axis=-1) / (2 * layout.size[SPEED])
+    _, most, least = over_wheels(wheel)
+    parting = (most - least).mean(axis=-1) / (2 * layout.size[SPEED])
     rate = np.abs(turning.mean(axis=-1)) / layout.size[TURN]
     return {
         "yaw rate": np.log(rate + FLOOR),

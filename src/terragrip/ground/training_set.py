@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 import numpy.typing as npt
@@ -98,13 +99,21 @@ def matrix(table: Table, names: Sequence[str], rows: int) -> Floats:
 
 def measured_families(names: Sequence[str], features: Floats) -> dict[str, npt.NDArray[np.bool_]]:
     """Which windows (n,) each sensor family was measured in, judged by its own features."""
+    known = np.isfinite(features)
+    return {
+        f: known[:, columns].mean(axis=1) >= _PRESENT for f, columns in _own_columns(tuple(names)).items()
+    }
+
+
+@lru_cache(maxsize=8)
+def _own_columns(names: tuple[str, ...]) -> dict[str, list[int]]:
+    """The columns of the features that rest on one family alone, by family."""
     own: dict[str, list[int]] = {}
     for k, name in enumerate(names):
         needed = families_needed(name)
         if len(needed) == 1:
             own.setdefault(next(iter(needed)), []).append(k)
-    known = np.isfinite(features)
-    return {family: known[:, columns].mean(axis=1) >= _PRESENT for family, columns in own.items()}
+    return own
 
 
 def deal(codes: Codes, windows: Codes, random: np.random.Generator) -> tuple[Codes, bool]:

@@ -29,10 +29,10 @@ def over_wheels(values: Floats) -> tuple[Floats, Floats, Floats]:
 def motion(speed: Floats, size: float) -> Table:
     """How the wheels are driven and how evenly they turn; speed (windows, wheels, samples)."""
     pace, fastest, slowest = over_wheels(np.abs(speed))
-    net = over_wheels(speed)[0]
+    net, most, least = over_wheels(speed)
     usual = pace.mean(axis=-1)
     base = usual + FLOOR * size
-    parting = (over_wheels(speed)[1] - over_wheels(speed)[2]) / 2
+    parting = (most - least) / 2
     along = moments(pace)
     step = np.sqrt(over_wheels(np.diff(speed, axis=-1) ** 2)[0].mean(axis=-1))
     spread = over_wheels(speed.std(axis=-1))
@@ -48,7 +48,7 @@ def motion(speed: Floats, size: float) -> Table:
         "fastest": fastest.mean(axis=-1) / size,
         "slowest": slowest.mean(axis=-1) / size,
         "spread": log_size(along["spread"], size),
-        "evenness": log_size(along["spread"], 1.0 * size) - log_size(usual, size),
+        "evenness": log_size(along["spread"], size) - log_size(usual, size),
         "lag": along["lag"],
         "roughness": log_size(step, size),
         "roughness per speed": np.log(step / base + FLOOR),
