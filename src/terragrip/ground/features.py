@@ -95,9 +95,7 @@ def _stack(
     channels: dict[str, Channel], starts: Floats, layout: Layout, period: float, lead: Channel
 ) -> Floats:
     """Samples (windows, channels, samples) on one grid."""
-    return np.stack(
-        [samples_in(c, starts, layout.window, period, anchor=lead) for c in channels.values()], axis=1
-    )
+    return samples_in(list(channels.values()), starts, layout.window, period, lead)
 
 
 def _lead(channels: dict[str, Channel]) -> Channel:
@@ -160,7 +158,7 @@ def _ground(
     channels = usable[GROUND]
     period = _period(GROUND, channels, layout)
     size = layout.size[GROUND]
-    moving = samples_in(channels["ground_speed"], starts, layout.window, period)
+    moving = _stack(channels, starts, layout, period, channels["ground_speed"])[:, 0]
     level = np.abs(moving).mean(axis=-1)
     found = _named(
         GROUND,
@@ -227,9 +225,9 @@ def _yaw(
     channels = usable[TURN]
     if "angular_velocity_z" not in channels:
         return {}
-    turning = samples_in(
-        channels["angular_velocity_z"], starts, layout.window, _period(TURN, channels, layout)
-    )
+    about_z = {"angular_velocity_z": channels["angular_velocity_z"]}
+    period = _period(TURN, channels, layout)
+    turning = _stack(about_z, starts, layout, period, about_z["angular_velocity_z"])[:, 0]
     wheel = speeds[0]
     _, most, least = over_wheels(wheel)
     parting = (most - least).mean(axis=-1) / (2 * layout.size[SPEED])

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 import numpy.typing as npt
 
@@ -25,24 +27,32 @@ def window_starts(start: float, end: float, window: float, step: float) -> Float
 
 
 def samples_in(
-    channel: Channel, starts: Floats, window: float, period: float, anchor: Channel | None = None
+    channels: Sequence[Channel], starts: Floats, window: float, period: float, lead: Channel
 ) -> Floats:
-    """Values (windows, samples) of a channel every ``period`` [s] from its first sample in each window.
+    """Values (windows, channels, samples) every ``period`` [s] from the first sample of ``lead`` in each window.
 
-    Between samples they are interpolated, so a regular channel comes out as it was measured. ``anchor`` gives
-    the instants in place of the channel itself, so that channels can be compared. A window that is measured
-    in less than four fifths of its samples is NaN throughout.
+    Between samples they are interpolated, so a regular channel comes out as it was measured. A window that a
+    channel was measured in for less than four fifths of the samples is NaN throughout.
     """
     count = max(round(window / period), 1)
-    lead = (anchor or channel).time
-    first = np.minimum(np.searchsorted(lead, starts - 1e-6 * period), len(lead) - 1)
-    instants = lead[first][:, None] + period * np.arange(count)
-    values = np.interp(instants, channel.time, channel.values)
-    right = np.searchsorted(channel.time, instants)
-    before = channel.time[np.maximum(right - 1, 0)]
-    after = channel.time[np.minimum(right, len(channel.time) - 1)]
-    near = np.minimum(np.abs(instants - before), np.abs(after - instants))
+    first = np.minimum(np.searchsorted(lead.time, starts - 1e-6 * period), len(lead.time) - 1)
+    instants = lead.time[first][:, None] + period * np.arange(count)
     inside = (instants > starts[:, None] - period) & (instants < starts[:, None] + window + period)
-    measured = (near <= _NEAR * max(period, channel.period)) & inside
-    values[measured.mean(axis=1) < _MEASURED] = np.nan
-    return values
+    found = np.empty((len(starts), len(channels), count))
+    before: Channel | None = None
+    measured = np.empty(0, dtype=bool)
+    for k, channel in enumerate(channels):
+        if before is None or not np.array_equal(channel.time, before.time):
+            near = _distance(channel.time, instants) <= _NEAR * max(period, channel.period)
+            measured = (near & inside).mean(axis=1) >= _MEASURED
+        found[:, k] = np.interp(instants, channel.time, channel.values)
+        found[~measured, k] = np.nan
+        before = channel
+    return found
+
+
+def _distance(time: Floats, instants: Floats) -> Floats:
+    """Time [s] from each instant to the nearest sample."""
+    right = np.searchsorted(time, instants)
+    before = np.abs(instants - time[np.maximum(right - 1, 0)])
+    return np.minimum(before, np.abs(time[np.minimum(right, len(time) - 1)] - instants))
