@@ -412,6 +412,8 @@ def _targets(drives: Sequence[Drive]) -> str:
     rows = [
         ("borders found, offline", offline.recall, 0.9, True),
         ("precision of changes, offline", offline.precision, 0.85, True),
+        ("borders found, while driving", online.recall, 0.9, True),
+        ("precision of changes, while driving", online.precision, 0.85, True),
         ("rows with the right soil, offline, another machine's library, %", right, 88.0, True),
         ("median delay of a change told while driving, s", float(np.median(online.delays)), 3.0, False),
     ]
