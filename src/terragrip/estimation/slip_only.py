@@ -8,17 +8,16 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from terragrip.errors import InputError
 from terragrip.estimation import zero_slip
-from terragrip.estimation.engine import EVENTS, wheel_radii
+from terragrip.estimation.engine import EVENTS
 from terragrip.estimation.estimates import Estimates
-from terragrip.estimation.noise import channel_noise, logged_noise
+from terragrip.estimation.noise import channel_noise, logged_noise, sensor_of
+from terragrip.estimation.rim_speeds import DRIVE, RimSpeed, rim_speeds, zero_of
 from terragrip.estimation.slip_filter import Walks, choose_walks, run
 from terragrip.physics.slip import slip
 from terragrip.recording import Recording, held_periods, unit_warnings, without_held
@@ -27,25 +26,10 @@ from terragrip.vehicle import Vehicle
 Floats = npt.NDArray[np.float64]
 
 METHOD = "slip-only"
-DRIVE = "drive"
-"""Name of the wheel that stands for all driven ones, where only the drive train's speed was logged."""
-
 _STANDSTILL = 0.05  # m/s
 _GAP = 2.0  # s
-_RADIUS = 0.02  # relative SD of a radius that nothing calibrated
 _PASSED_ON = ("drawbar_force", "latitude", "longitude", "altitude")
 _OUTLIER, _STILL, _AWAY = (EVENTS.index(name) for name in ("outlier", "standstill", "gap"))
-
-
-@dataclass(frozen=True)
-class RimSpeed:
-    """A wheel's rim speed (n,) [m/s] by the radius that counts, its SD, the radius [m] and its relative SD."""
-
-    wheel: str
-    values: Floats
-    noise: float
-    radius: float
-    spread: float
 
 
 def is_slip_only(recording: Recording, vehicle: Vehicle) -> bool:
@@ -75,14 +59,18 @@ def estimate_slip(
     """
     periods = dict(held_periods(recording) if held is None else held)
     log = without_held(recording, periods)
-    logged = logged_noise(recording, vehicle, periods)
     mine = dict(sensors or {})
+    logged = {
+        name: sd
+        for name, sd in logged_noise(recording, vehicle, periods).items()
+        if sensor_of(name) not in mine
+    }
     used = tuple(
         n for n in log.channels if n == "ground_speed" or n.startswith(("wheel_speed_", "wheel_based"))
     )
     noise, guessed = channel_noise(vehicle, used, {**{k: v for k, v in logged.items() if k in used}, **mine})
-    zero = {name: _zero(recording, vehicle, name) for name in used if name != "ground_speed"}
-    rims, notes = _rim_speeds(log, vehicle, noise, zero)
+    zero = {name: zero_of(recording, vehicle, name) for name in used if name != "ground_speed"}
+    rims, notes = rim_speeds(log, vehicle, noise, zero)
     step = _STANDSTILL if standstill_speed is None else standstill_speed
     speeds = np.stack([log.channels["ground_speed"], *(rim.values for rim in rims)], axis=1)
     sds = np.array([noise["ground_speed"], *(rim.noise for rim in rims)])
@@ -111,101 +99,6 @@ _WHAT_IS_MISSING = (
     "There is no drive torque: slip, speeds and distance are estimated, and maps of slip can be drawn; adhesion, soil "
     "resistance, net traction and efficiency cannot be had."
 )
-
-
-def _zero(recording: Recording, vehicle: Vehicle, name: str) -> zero_slip.Ratio | None:
-    """The zero-slip ratio of a channel in this log."""
-    radius = _radius_of(vehicle, name)
-    return zero_slip.lightest(*zero_slip.ratios(recording, name, radius))
-
-
-def _radius_of(vehicle: Vehicle, name: str) -> float:
-    """What takes a channel to m/s by the vehicle file."""
-    if name == "wheel_based_speed":
-        return 1.0
-    wheel = name.removeprefix("wheel_speed_")
-    if wheel not in vehicle.wheels:
-        mend = f"its wheels are {', '.join(vehicle.wheels)}"
-        raise InputError(f"the vehicle has no wheel {wheel}", place=f"column {name}", mend=mend)
-    return float(wheel_radii(vehicle)[1][vehicle.wheels.index(wheel)])
-
-
-def _rim_speeds(
-    log: Recording, vehicle: Vehicle, noise: Mapping[str, float], zero: Mapping[str, zero_slip.Ratio | None]
-) -> tuple[list[RimSpeed], list[str]]:
-    """The rim speeds that slip is told from, and sentences on their radii."""
-    notes: list[str] = []
-    rims: list[RimSpeed] = []
-    stated = vehicle.uncertainty.wheel_radius
-    for wheel in log.wheels:
-        name = f"wheel_speed_{wheel}"
-        radius = _radius_of(vehicle, name)
-        values = radius * log.channels[name] + _hub(log, vehicle, wheel)
-        rims.append(
-            RimSpeed(wheel, values, radius * noise[name], radius, _RADIUS if stated is None else stated)
-        )
-        notes += _told(f"wheel {wheel}", zero[name], radius, "the vehicle file says")
-    if rims:
-        if "wheel_based_speed" in log.channels:
-            notes.append("wheel_based_speed is not used: the wheels have speeds of their own.")
-        return rims, notes
-    supposed = float(np.mean(np.asarray(vehicle.wheel_radius)[vehicle.driven]))
-    scale, spread, said = _scale_of_drive(vehicle, zero["wheel_based_speed"], supposed, stated)
-    values = scale * log.channels["wheel_based_speed"]
-    sd = scale * noise["wheel_based_speed"]
-    return [RimSpeed(DRIVE, values, sd, scale * supposed, spread)], said
-
-
-def _scale_of_drive(
-    vehicle: Vehicle, zero: zero_slip.Ratio | None, supposed: float, stated: float | None
-) -> tuple[float, float, list[str]]:
-    """Factor of the drive train's speed, its relative SD, and the sentence on it."""
-    calibrated = vehicle.calibration.wheel_radius
-    driven = [w for w, d in zip(vehicle.wheels, vehicle.driven, strict=True) if d]
-    if all(wheel in calibrated for wheel in driven):
-        of_file = [vehicle.wheel_data[vehicle.wheels.index(wheel)].radius for wheel in driven]
-        scale = float(np.mean([calibrated[w] / r for w, r in zip(driven, of_file, strict=True)]))
-        spread = _RADIUS if stated is None else stated
-        return scale, spread, _told("the drive", zero, supposed / scale, "before calibration")
-    if zero is None:
-        return (
-            1.0,
-            _RADIUS,
-            [
-                "The log is too short to tell the zero-slip radius: slip is against the speed as the machine gives it, "
-                f"to about {100 * _RADIUS:.0f} %."
-            ],
-        )
-    return (
-        zero.value,
-        zero.std,
-        [
-            *_told("the drive", zero, supposed, "the vehicle file says"),
-            "Slip counts from there: the lightest tenth of steady stretches is called zero. Calibrate on a pass without load "
-            "to make it absolute.",
-        ],
-    )
-
-
-def _told(what: str, zero: zero_slip.Ratio | None, radius: float, beside: str) -> list[str]:
-    if zero is None:
-        return []
-    return [
-        f"Zero-slip radius of {what} in this log: {zero.value * radius:.4f} ± {zero.std * radius:.4f} m, from the lightest "
-        f"tenth of {zero.windows} steady windows ({beside} {radius:.4f} m)."
-    ]
-
-
-def _hub(log: Recording, vehicle: Vehicle, wheel: str) -> Floats | float:
-    """What a turn takes off the speed of a wheel's hub [m/s] (n,): yaw rate times the wheel's distance to the left."""
-    if not vehicle.track or "angular_velocity_z" not in log.channels:
-        return 0.0
-    own = np.flatnonzero(vehicle.wheel_axle == vehicle.wheel_axle[vehicle.wheels.index(wheel)])
-    place = int(np.searchsorted(own, vehicle.wheels.index(wheel)))
-    side = float(np.linspace(vehicle.track / 2, -vehicle.track / 2, len(own))[place]) if len(own) > 1 else 0.0
-    yaw = log.channels["angular_velocity_z"]
-    known = np.isfinite(yaw)
-    return side * np.interp(log.time, log.time[known], yaw[known]) if known.any() else 0.0
 
 
 def _anew(time: Floats, speeds: Floats, gap: float) -> npt.NDArray[np.bool_]:

@@ -1,15 +1,12 @@
 """MATLAB files: version 5, and version 7.3 (HDF5) by h5py; other HDF5 files of plain datasets too.
 
-What is a signal: a numeric column that has a time vector beside it (in the same struct, or at the top), Simulink's "structure
-with time" and arrays with ``tout``, a struct with Time and Data as a timeseries is exported, and lists of these with names
-as the elements of a Dataset. Tables and timetables are read by mat-io. Other objects of MATLAB classes (timeseries, Dataset,
+Tables and timetables are read by mat-io. Other objects of MATLAB classes (timeseries, Dataset,
 datetime) are written in a form that MATLAB keeps to itself: they are named in the notes, with the line that exports them.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -20,6 +17,7 @@ from terragrip.files import sha256
 from terragrip.formats.boundary import needed, reading
 from terragrip.formats.kind import Databases
 from terragrip.formats.mat5 import Array, Opaque, read_mat5
+from terragrip.formats.matlab_signals import Found, walk, walk_struct
 from terragrip.formats.signals import Signal, SignalLog
 from terragrip.formats.table import LogTable, Wanted
 from terragrip.formats.worker import Worker
@@ -27,32 +25,17 @@ from terragrip.recording.schema import TIME
 
 Floats = npt.NDArray[np.float64]
 
-_TIMES = ("time", "t", "tout", "timestamp", "time_s", "t_s", "time_ms", "t_ms", "time_us", "time_ns")
-_SCALES = {"ms": 1e-3, "us": 1e-6, "ns": 1e-9}
-_DATA = ("data", "values")
-_NAMES = ("name", "label", "signalname", "blockname")
-_WIDEST = 32  # columns of a matrix that are signals
 _DEEPEST = 12
 _USER_BLOCK, _HDF5 = 512, b"\x89HDF\r\n\x1a\n"
 _DATENUM = (600_000.0, 800_000.0)  # days since year 0: 1642 to 2190
 _DATENUM_1970 = 719_529.0
 
 
-@dataclass
-class _Found:
-    """Signals by name, with what their clock and column are read from; ``opaque`` objects with their class; vectors without a clock."""
-
-    signals: dict[str, tuple[Any, Any, int | None]] = field(default_factory=dict)
-    scales: dict[int, float] = field(default_factory=dict)
-    opaque: dict[str, str] = field(default_factory=dict)
-    loose: dict[str, Any] = field(default_factory=dict)
-
-
 def read_matlab(path: str, wanted: Wanted | None, databases: Databases) -> SignalLog | LogTable:
     """Read a MATLAB file; raises InputError if it is damaged, or holds no numeric column."""
     with open(path, "rb") as stream:
         head = stream.read(_USER_BLOCK + len(_HDF5))
-    found = _Found()
+    found = Found()
     if not (head.startswith((_HDF5, b"MATLAB 7.3")) or head[_USER_BLOCK:] == _HDF5):
         with reading(path, "MATLAB file"):
             tree = read_mat5(path)
@@ -92,10 +75,10 @@ def _of_hdf5(file: Any, item: Any, depth: int, h5py: Any) -> Any:
 
 
 def _finished(
-    tree: Mapping[str, Any], path: str, wanted: Wanted | None, found: _Found
+    tree: Mapping[str, Any], path: str, wanted: Wanted | None, found: Found
 ) -> SignalLog | LogTable:
     """The wanted signals of what a file holds."""
-    _walk(tree, "", found, 0)
+    walk(tree, "", found, 0)
     if any(kind in ("table", "timetable") for kind in found.opaque.values()):
         _take_tables(path, found)
     notes = _notes(found)
@@ -119,7 +102,7 @@ def _finished(
     return SignalLog(tuple(found.signals), signals, path, sha256(path), tuple(notes))
 
 
-def _take_tables(path: str, found: _Found) -> None:
+def _take_tables(path: str, found: Found) -> None:
     """Read tables and timetables by mat-io, in a process of its own; those that it cannot read stay opaque."""
     names = [
         name for name, kind in found.opaque.items() if kind in ("table", "timetable") and "." not in name
@@ -133,7 +116,7 @@ def _take_tables(path: str, found: _Found) -> None:
                 name = str(message["name"])
                 del found.opaque[name]
                 table = {key: _loaded(values) for key, values in columns.items()}
-                _walk_struct(table if clock is None else {**table, TIME: _loaded(clock)}, name, found, 1)
+                walk_struct(table if clock is None else {**table, TIME: _loaded(clock)}, name, found, 1)
     except InputError:
         return  # the notes name what is left
 
@@ -142,7 +125,7 @@ def _loaded(values: npt.NDArray[Any]) -> Array:
     return Array(values.shape, lambda: values)
 
 
-def _notes(found: _Found) -> list[str]:
+def _notes(found: Found) -> list[str]:
     if not found.opaque:
         return []
     shown = [f"{name} ({kind})" if kind else name for name, kind in found.opaque.items()]
@@ -165,111 +148,6 @@ def _table_of(loose: Mapping[str, Any], path: str, wanted: Wanted | None, notes:
         if wanted is None or wanted(name)
     }
     return LogTable(tuple(names), columns, {}, path, sha256(path), tuple(notes))
-
-
-def _walk(value: Any, name: str, found: _Found, depth: int) -> None:
-    """Find the signals under a value."""
-    if depth > _DEEPEST:
-        return
-    if isinstance(value, Opaque):
-        found.opaque[name] = value.kind
-    elif isinstance(value, Mapping):
-        _walk_struct(value, name, found, depth)
-    elif isinstance(value, list) or (isinstance(value, np.ndarray) and value.dtype == object):
-        for k, part in enumerate(list(np.ravel(value)) if isinstance(value, np.ndarray) else value):
-            own = _own_name(part)
-            _walk(part, _joined(name, own) if own else f"{name}[{k}]", found, depth + 1)
-
-
-def _walk_struct(struct: Mapping[str, Any], name: str, found: _Found, depth: int) -> None:
-    lower = {key.lower(): key for key in struct}
-    clock_name = next((lower[key] for key in _TIMES if key in lower and _is_vector(struct[lower[key]])), None)
-    clock = None if clock_name is None else struct[clock_name]
-    if clock is not None and clock_name is not None:
-        length = int(np.prod(clock.shape))
-        found.scales[id(clock)] = _SCALES.get(clock_name.rpartition("_")[2].lower(), 1.0)
-        if "signals" in lower and _structure_with_time(struct[lower["signals"]], clock, length, name, found):
-            return
-        for key, part in struct.items():
-            if key != clock_name and _is_numeric(part) and length in part.shape[:2]:
-                plain = key.lower() in _DATA and name
-                _add(found, name if plain else _joined(name, key), clock, part, length)
-    for key, part in struct.items():
-        if _is_numeric(part):
-            if clock is None and _is_vector(part):
-                found.loose[_joined(name, key)] = part
-        elif key.lower() == "values" and isinstance(part, Mapping):
-            _walk(part, name, found, depth + 1)  # a Dataset's element: its name is the signal's
-        elif key.lower() in ("elements", "signals") and not isinstance(part, str):
-            own = _own_name(part)  # one element alone is no list
-            _walk(part, _joined(name, own) if own else name, found, depth + 1)
-        elif not isinstance(part, str):
-            _walk(part, _joined(name, key), found, depth + 1)
-
-
-def _structure_with_time(signals: Any, clock: Any, length: int, name: str, found: _Found) -> bool:
-    """Simulink's "structure with time": whether ``signals`` is such a list, whose values were taken."""
-    parts = (
-        [signals] if isinstance(signals, Mapping) else list(np.ravel(signals)) if _is_list(signals) else []
-    )
-    if isinstance(signals, Mapping) and isinstance(
-        signals.get("values"), list
-    ):  # a struct array of version 7.3
-        rows = len(signals["values"])
-        parts = [
-            {key: part[k] for key, part in signals.items() if _is_list(part) and len(part) == rows}
-            for k in range(rows)
-        ]
-    taken = False
-    for k, part in enumerate(parts):
-        if (
-            isinstance(part, Mapping)
-            and _is_numeric(part.get("values"))
-            and length in part["values"].shape[:2]
-        ):
-            own = _own_name(part) or f"signals[{k}]"
-            _add(found, _joined(name, own), clock, part["values"], length)
-            taken = True
-    return taken
-
-
-def _add(found: _Found, name: str, clock: Any, values: Any, length: int) -> None:
-    """Add a vector, or the columns of a matrix with a row for each instant."""
-    width = int(np.prod(values.shape)) // max(length, 1)
-    if width == 1:
-        found.signals[name] = clock, values, None
-    elif values.shape[0] == length and len(values.shape) == 2 and width <= _WIDEST:
-        for k in range(width):
-            found.signals[f"{name}[{k}]"] = clock, values, k
-
-
-def _own_name(part: Any) -> str:
-    """The name that a struct says it has; empty if none."""
-    if not isinstance(part, Mapping):
-        return ""
-    named = (part[key] for key in part if key.lower() in _NAMES)
-    return next((text.strip() for text in named if isinstance(text, str) and text.strip()), "")
-
-
-def _joined(name: str, key: str) -> str:
-    return f"{name}.{key}" if name else key
-
-
-def _is_list(value: Any) -> bool:
-    return isinstance(value, list | tuple | np.ndarray)
-
-
-def _is_numeric(value: Any) -> bool:
-    return isinstance(value, Array) or (
-        isinstance(value, np.ndarray) and value.dtype.kind in "fiub" and value.ndim > 0
-    )
-
-
-def _is_vector(value: Any) -> bool:
-    if not _is_numeric(value):
-        return False
-    size = int(np.prod(value.shape))
-    return size > 1 and size == max(value.shape)
 
 
 def _read(value: Any) -> npt.NDArray[Any]:

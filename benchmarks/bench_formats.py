@@ -1,0 +1,169 @@
+"""Memory and speed of reading large logs: peak memory over the size of the file, and seconds a gigabyte.
+
+    python benchmarks/bench_formats.py [megabytes, default 100] [kinds, default all]
+
+Writes a candump log, an MF4 file (signals, and bus logging) and an MCAP file of that size, most of which nobody asks for,
+and reads what a profile asks for in a process of its own. The peer, where there is one, is the plain loop of the library
+that reads the same file without keeping anything. What is wanted: memory stays far below the file's size, so that 5 GB fit
+into 2 GB.
+"""
+
+from __future__ import annotations
+
+import struct
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+import numpy as np
+
+CHILD = """
+import resource, sys, time
+begun = time.perf_counter()
+{code}
+peak = max(resource.getrusage(w).ru_maxrss for w in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN))
+print(time.perf_counter() - begun, peak / 1024)
+"""
+READ = """
+import terragrip as tg
+from terragrip.formats import Profile
+profile = Profile.from_dict({profile!r})
+recording = tg.read({path!r}, profile)
+assert len(recording) > 1000
+"""
+PEERS = {
+    "candump": "import can\nfor message in can.CanutilsLogReader({path!r}): pass",
+    "mcap": "from mcap.stream_reader import StreamReader\nfor record in StreamReader(open({path!r}, 'rb')).records: pass",
+    "mf4 bus": "import asammdf\nfile = asammdf.MDF({path!r})\nfile.get('CAN_DataFrame', raw=True)",
+    "mf4 signals": "import asammdf\nfile = asammdf.MDF({path!r})\nfor n in ('v', 'u'): file.get(n)",
+}
+TRACTOR = {
+    "channels": {"wheel_based_speed": "WheelBasedMachineSpeed", "ground_speed": "GroundBasedMachineSpeed"}
+}
+NAMED = {"channels": {"wheel_based_speed": "u", "ground_speed": "v"}}
+TOPIC = {"channels": {"wheel_based_speed": "/speed.u", "ground_speed": "/speed.v"}}
+
+
+def candump(path: Path, size: int) -> None:
+    """Mostly frames of other identifiers, as on a real bus."""
+    with path.open("w") as stream:
+        first = 0
+        while stream.tell() < size:
+            lines = []
+            for k in range(first, first + 20_000):
+                stamp = 1.7e9 + k * 5e-4
+                other = k % 20
+                identifier = {0: "0CFE48F0", 1: "0CFE4980"}.get(other, f"18FF{other:02X}17")
+                speed = struct.pack("<HIBB", 2000 + k % 100, 0, 255, 0xFD).hex().upper()
+                lines.append(f"({stamp:.6f}) can0 {identifier}#{speed}\n")
+            first += 20_000
+            stream.writelines(lines)
+
+
+def mf4_bus(path: Path, size: int) -> None:
+    """A bus log as loggers write it."""
+    import asammdf
+
+    kind = np.dtype(
+        [("CAN_DataFrame.BusChannel", "u1"), ("CAN_DataFrame.ID", "<u4"), ("CAN_DataFrame.IDE", "u1"),
+         ("CAN_DataFrame.DLC", "u1"), ("CAN_DataFrame.DataLength", "u1"), ("CAN_DataFrame.DataBytes", "(8,)u1")]
+    )  # fmt: skip
+    count = size // (kind.itemsize + 8)
+    records = np.zeros(count, kind)
+    other = np.arange(count) % 20
+    records["CAN_DataFrame.ID"] = np.where(
+        other == 0, 0x0CFE48F0, np.where(other == 1, 0x0CFE4980, 0x18FF0017 + 256 * other)
+    )
+    records["CAN_DataFrame.IDE"], records["CAN_DataFrame.DLC"], records["CAN_DataFrame.DataLength"] = 1, 8, 8
+    records["CAN_DataFrame.DataBytes"] = np.frombuffer(struct.pack("<HIBB", 2000, 0, 255, 0xFD), np.uint8)
+    source = asammdf.Source("CAN", "CAN", "", asammdf.Source.SOURCE_BUS, asammdf.Source.BUS_TYPE_CAN)
+    with asammdf.MDF() as file:
+        file.append(
+            asammdf.Signal(records, np.arange(count) * 5e-4, name="CAN_DataFrame", source=source),
+            acq_source=source,
+        )
+        file.save(path, overwrite=True)
+
+
+def mf4_signals(path: Path, size: int) -> None:
+    """Fifty signals of one clock, of which two are wanted."""
+    import asammdf
+
+    count = size // (51 * 8)
+    time_ = np.arange(count) * 1e-2
+    with asammdf.MDF() as file:
+        names = ["v", "u", *(f"s{k}" for k in range(48))]
+        file.append([asammdf.Signal(2 + 0.1 * np.sin(time_ + k), time_, name=n) for k, n in enumerate(names)])
+        file.save(path, overwrite=True)
+
+
+def mcap(path: Path, size: int) -> None:
+    """Camera images beside a small topic of JSON."""
+    from mcap.writer import CompressionType, Writer
+
+    image = np.random.default_rng(0).bytes(50_000)
+    with path.open("wb") as stream:
+        writer = Writer(stream, compression=CompressionType.NONE)
+        writer.start()
+        schema = writer.register_schema("speed", "jsonschema", b"{}")
+        speed = writer.register_channel("/speed", "json", schema)
+        camera = writer.register_channel("/camera", "jpeg", 0)
+        for k in range(size // 51_000):
+            for j in range(10):
+                stamp = (k * 10 + j) * 10_000_000
+                writer.add_message(speed, stamp, b'{"u": 2.1, "v": 2.0}', stamp)
+            writer.add_message(camera, stamp, image, stamp)
+        writer.finish()
+
+
+def measured(code: str) -> tuple[float, float]:
+    """Seconds and peak MB of a process of its own."""
+    done = subprocess.run(
+        [sys.executable, "-W", "ignore", "-c", CHILD.format(code=code)],
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    seconds, peak = map(float, done.stdout.split()[-2:])
+    return seconds, peak
+
+
+CASES = {
+    "candump": (candump, "log.log", TRACTOR),
+    "mf4 bus": (mf4_bus, "bus.mf4", TRACTOR),
+    "mf4 signals": (mf4_signals, "signals.mf4", NAMED),
+    "mcap": (mcap, "log.mcap", TOPIC),
+}
+
+
+def main() -> None:
+    """Print the table."""
+    size = int(sys.argv[1] if len(sys.argv) > 1 else 100) * 1_000_000
+    chosen = sys.argv[2:] or list(CASES)
+    idle = measured("import terragrip as tg\nfrom terragrip.formats import Profile\nimport numpy, pandas")[1]
+    print(f"peak memory of a process that reads nothing: {idle:.0f} MB\n")
+    print("| log | MB | peak MB | beyond idle, of the file | s | s of the library's own loop | ratio |")
+    print("|---|---|---|---|---|---|---|")
+    with tempfile.TemporaryDirectory() as folder:
+        for name in chosen:
+            _, file, profile = CASES[name]
+            path = Path(folder) / file
+            # In a process of its own: a child's peak memory begins with its parent's.
+            subprocess.run([sys.executable, __file__, "--write", name, str(path), str(size)], check=True)
+            megabytes = path.stat().st_size / 1e6
+            seconds, peak = measured(READ.format(profile=profile, path=str(path)))
+            peer, _ = measured(PEERS[name].format(path=str(path)))
+            share, ratio = (peak - idle) / megabytes, seconds / peer
+            print(
+                f"| {name} | {megabytes:.0f} | {peak:.0f} | {share:.2f} | {seconds:.1f} | {peer:.1f} | {ratio:.2f} |",
+                flush=True,
+            )
+            path.unlink()
+
+
+if __name__ == "__main__":
+    if sys.argv[1:2] == ["--write"]:
+        CASES[sys.argv[2]][0](Path(sys.argv[3]), int(sys.argv[4]))
+    else:
+        main()

@@ -1,0 +1,138 @@
+"""What in a MATLAB file is a signal.
+
+A numeric column that has a time vector beside it (in the same struct, or at the top), Simulink's "structure with time" and
+arrays with ``tout``, a struct with Time and Data as a timeseries is exported, and lists of these with names, as the elements
+of a Dataset.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from terragrip.formats.mat5 import Array, Opaque
+
+_TIMES = ("time", "t", "tout", "timestamp", "time_s", "t_s", "time_ms", "t_ms", "time_us", "time_ns")
+_SCALES = {"ms": 1e-3, "us": 1e-6, "ns": 1e-9}
+_DATA = ("data", "values")
+_NAMES = ("name", "label", "signalname", "blockname")
+_WIDEST = 32  # columns of a matrix that are signals
+_DEEPEST = 12
+
+
+@dataclass
+class Found:
+    """Signals by name, with what their clock and column are read from; ``opaque`` objects with their class; vectors without a clock."""
+
+    signals: dict[str, tuple[Any, Any, int | None]] = field(default_factory=dict)
+    scales: dict[int, float] = field(default_factory=dict)
+    opaque: dict[str, str] = field(default_factory=dict)
+    loose: dict[str, Any] = field(default_factory=dict)
+
+
+def walk(value: Any, name: str, found: Found, depth: int) -> None:
+    """Find the signals under a value."""
+    if depth > _DEEPEST:
+        return
+    if isinstance(value, Opaque):
+        found.opaque[name] = value.kind
+    elif isinstance(value, Mapping):
+        walk_struct(value, name, found, depth)
+    elif isinstance(value, list) or (isinstance(value, np.ndarray) and value.dtype == object):
+        for k, part in enumerate(list(np.ravel(value)) if isinstance(value, np.ndarray) else value):
+            own = _own_name(part)
+            walk(part, _joined(name, own) if own else f"{name}[{k}]", found, depth + 1)
+
+
+def walk_struct(struct: Mapping[str, Any], name: str, found: Found, depth: int) -> None:
+    lower = {key.lower(): key for key in struct}
+    clock_name = next((lower[key] for key in _TIMES if key in lower and _is_vector(struct[lower[key]])), None)
+    clock = None if clock_name is None else struct[clock_name]
+    if clock is not None and clock_name is not None:
+        length = int(np.prod(clock.shape))
+        found.scales[id(clock)] = _SCALES.get(clock_name.rpartition("_")[2].lower(), 1.0)
+        if "signals" in lower and _structure_with_time(struct[lower["signals"]], clock, length, name, found):
+            return
+        for key, part in struct.items():
+            if key != clock_name and _is_numeric(part) and length in part.shape[:2]:
+                plain = key.lower() in _DATA and name
+                _add(found, name if plain else _joined(name, key), clock, part, length)
+    for key, part in struct.items():
+        if _is_numeric(part):
+            if clock is None and _is_vector(part):
+                found.loose[_joined(name, key)] = part
+        elif key.lower() == "values" and isinstance(part, Mapping):
+            walk(part, name, found, depth + 1)  # a Dataset's element: its name is the signal's
+        elif key.lower() in ("elements", "signals") and not isinstance(part, str):
+            own = _own_name(part)  # one element alone is no list
+            walk(part, _joined(name, own) if own else name, found, depth + 1)
+        elif not isinstance(part, str):
+            walk(part, _joined(name, key), found, depth + 1)
+
+
+def _structure_with_time(signals: Any, clock: Any, length: int, name: str, found: Found) -> bool:
+    """Simulink's "structure with time": whether ``signals`` is such a list, whose values were taken."""
+    parts = (
+        [signals] if isinstance(signals, Mapping) else list(np.ravel(signals)) if _is_list(signals) else []
+    )
+    if isinstance(signals, Mapping) and isinstance(
+        signals.get("values"), list
+    ):  # a struct array of version 7.3
+        rows = len(signals["values"])
+        parts = [
+            {key: part[k] for key, part in signals.items() if _is_list(part) and len(part) == rows}
+            for k in range(rows)
+        ]
+    taken = False
+    for k, part in enumerate(parts):
+        if (
+            isinstance(part, Mapping)
+            and _is_numeric(part.get("values"))
+            and length in part["values"].shape[:2]
+        ):
+            own = _own_name(part) or f"signals[{k}]"
+            _add(found, _joined(name, own), clock, part["values"], length)
+            taken = True
+    return taken
+
+
+def _add(found: Found, name: str, clock: Any, values: Any, length: int) -> None:
+    """Add a vector, or the columns of a matrix with a row for each instant."""
+    width = int(np.prod(values.shape)) // max(length, 1)
+    if width == 1:
+        found.signals[name] = clock, values, None
+    elif values.shape[0] == length and len(values.shape) == 2 and width <= _WIDEST:
+        for k in range(width):
+            found.signals[f"{name}[{k}]"] = clock, values, k
+
+
+def _own_name(part: Any) -> str:
+    """The name that a struct says it has; empty if none."""
+    if not isinstance(part, Mapping):
+        return ""
+    named = (part[key] for key in part if key.lower() in _NAMES)
+    return next((text.strip() for text in named if isinstance(text, str) and text.strip()), "")
+
+
+def _joined(name: str, key: str) -> str:
+    return f"{name}.{key}" if name else key
+
+
+def _is_list(value: Any) -> bool:
+    return isinstance(value, list | tuple | np.ndarray)
+
+
+def _is_numeric(value: Any) -> bool:
+    return isinstance(value, Array) or (
+        isinstance(value, np.ndarray) and value.dtype.kind in "fiub" and value.ndim > 0
+    )
+
+
+def _is_vector(value: Any) -> bool:
+    if not _is_numeric(value):
+        return False
+    size = int(np.prod(value.shape))
+    return size > 1 and size == max(value.shape)
