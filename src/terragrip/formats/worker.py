@@ -22,7 +22,7 @@ import numpy.typing as npt
 from terragrip.errors import InputError
 from terragrip.formats.boundary import needed
 
-_MEMORY = 3 << 30  # bytes of address space beyond what the imports take
+_MEMORY = 3 << 30  # bytes of address space beyond what the imports and the file take
 _SECONDS, _BYTES_A_SECOND = 60, 1 << 20  # of the processor: so many, and one more for so many bytes
 _ENDED = "it ends the reader"
 
@@ -130,9 +130,10 @@ def _limit(path: str) -> None:
     """Bound what a damaged file may cost."""
     with open("/proc/self/statm") as stream:
         taken = int(stream.read().split()[0]) * resource.getpagesize()
+    size = os.path.getsize(path)  # which may be mapped
     for what, most in (
-        (resource.RLIMIT_AS, taken + _MEMORY),
-        (resource.RLIMIT_CPU, _SECONDS + os.path.getsize(path) // _BYTES_A_SECOND),
+        (resource.RLIMIT_AS, taken + size + _MEMORY),
+        (resource.RLIMIT_CPU, _SECONDS + size // _BYTES_A_SECOND),
     ):
         hard = resource.getrlimit(what)[1]
         limit = most if hard == resource.RLIM_INFINITY else min(most, hard)
