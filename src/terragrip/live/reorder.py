@@ -1,15 +1,16 @@
 """Samples into rows in the order of time, as soon as nothing earlier can be expected, and never later than a window.
 
-Each channel of each source is a stream; regular ones have a period, the median of their last steps. The earliest row
-waits for streams that are due by its instant, for at most ``window`` seconds after it came. So in good order nothing waits
-(an estimate follows its sample at once), a sample out of order finds its place, and parts of one instant that come in
-several messages become one row. A stream that stays away for LOST periods is no longer waited for.
+Channels of a source that have always come together are a stream; a regular one has a period, the median of its last steps.
+The earliest row waits for streams that are due by its instant, for at most ``window`` seconds after it came. So in good
+order nothing waits (an estimate follows its sample at once), a sample out of order finds its place, and parts of one
+instant that come in several messages become one row. A stream that stays away for LOST periods is no longer waited for.
 """
 
 from __future__ import annotations
 
 from collections import deque
-from dataclasses import dataclass, field
+from collections.abc import Collection
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 from terragrip.live.counts import Counts
@@ -19,6 +20,7 @@ _STEPS = 15  # of which the median is the period
 _FEWEST = 4  # steps before a period is known
 _LEARNING = 2.0  # s after which a stream without a period counts as irregular
 _RECENT = 512  # rows remembered to tell a doubled sample from a late one
+_LAYOUTS = 256  # sets of channels of which is kept which streams they are
 _BEGINNING = float("-inf")
 
 Values = dict[str, float]
@@ -26,8 +28,10 @@ Values = dict[str, float]
 
 @dataclass(slots=True)
 class Stream:
-    """One channel of one source, in the order of time."""
+    """Channels of one source that have always come together, in the order of time."""
 
+    source: int
+    channels: tuple[str, ...]
     first: float
     last: float
     due_from: float  # instant from which the next sample is one period away
@@ -43,9 +47,10 @@ class Stream:
         missing = 0
         if 0.0 < self.period < float("inf") and step > 1.5 * self.period:
             missing = round(step / self.period) - 1
-        self.steps.append(step)
-        if len(self.steps) > _STEPS:
-            del self.steps[0]
+        if len(self.steps) < _STEPS:
+            self.steps.append(step)
+        else:
+            self.steps[self.count % _STEPS] = step
         self.count += 1
         # Often at first, then now and then: a period hardly changes.
         if self.count >= _FEWEST and (self.count < 2 * _STEPS or self.count % 8 == 0):
@@ -70,6 +75,11 @@ class Stream:
             return time - self.due_from > 1.5 * self.period
         return self.due_from + self.period - self.tolerance <= time
 
+    def without(self, channels: Collection[str]) -> Stream:
+        """The same past for the channels that are not among these."""
+        rest = tuple(name for name in self.channels if name not in channels)
+        return replace(self, channels=rest, steps=list(self.steps))
+
 
 @dataclass(slots=True)
 class Pending:
@@ -87,7 +97,8 @@ class Reorder:
     def __init__(self, window: float, counts: Counts) -> None:
         self.window = window
         self.counts = counts
-        self.streams: dict[tuple[int, str], Stream] = {}
+        self.streams: list[Stream] = []
+        self._those: dict[tuple[tuple[str, int], ...], tuple[list[Stream], list[Stream], bool]] = {}
         self.pending: list[Pending] = []
         self.released = _BEGINNING
         self._recent: deque[tuple[float, tuple[str, ...]]] = deque(maxlen=_RECENT)
@@ -131,50 +142,80 @@ class Reorder:
         return out
 
     def _complete(self, row: Pending) -> bool:
-        """Whether nothing is due that the row lacks, and each of its streams was met before (a new one may bring brothers)."""
-        time, origin, streams = row.time, row.origin, self.streams
-        met = 0
-        for (source, name), stream in streams.items():
-            present = origin.get(name) == source
-            if present:
-                met += 1
-                if time <= stream.due_from + 1.5 * stream.period and stream.period:
-                    continue  # regular, and in its turn: the common case
-            if stream.awaited(time, present):
+        """Whether nothing is due that the row lacks, and each of its channels was met before (a new one may bring brothers)."""
+        present, absent, met = self._streams_of(row)
+        time = row.time
+        for stream in present:
+            if not (stream.period and time <= stream.due_from + 1.5 * stream.period) and stream.awaited(
+                time, True
+            ):
                 return False
-        return met == len(origin)
+        for stream in absent:
+            if stream.awaited(time, False):
+                return False
+        return met
+
+    def _streams_of(self, row: Pending) -> tuple[list[Stream], list[Stream], bool]:
+        """The streams that the row holds and those it lacks, and whether these are all its channels.
+
+        A stream of which the row holds a part only becomes two.
+        """
+        key = tuple(row.origin.items())
+        found = self._those.get(key)
+        if found is not None:
+            return found
+        present: list[Stream] = []
+        absent: list[Stream] = []
+        for stream in list(self.streams):
+            mine = [name for name in stream.channels if row.origin.get(name) == stream.source]
+            if mine and len(mine) < len(stream.channels):
+                rest = stream.without(mine)
+                stream.channels = tuple(mine)
+                self.streams.append(rest)
+                self._those.clear()
+                absent.append(rest)
+            (present if mine else absent).append(stream)
+        met = sum(len(stream.channels) for stream in present) == len(row.origin)
+        if len(self._those) < _LAYOUTS:
+            self._those[key] = present, absent, met
+        return present, absent, met
 
     def _release(self, row: Pending, expired: bool) -> Pending:
+        present, absent, met = self._streams_of(row)
         del self.pending[0]
         self.released = row.time
         self._recent.append((row.time, tuple(row.values)))
-        for name, source in row.origin.items():
-            stream = self.streams.get((source, name))
-            if stream is None:
-                self.streams[source, name] = Stream(row.time, row.time, row.time)
-                continue
+        for stream in present:
             if stream.overdue >= LOST:
-                self.changes.append(("channel_back", source, name))
+                self.changes += [("channel_back", stream.source, name) for name in stream.channels]
             stream.overdue = 0
             missing = stream.step_to(row.time)
             if missing:
-                self.counts.add("missing", (name,), missing)
+                self.counts.add("missing", stream.channels, missing)
         if expired:
-            self._give_up(row)
+            self._give_up(row.time, absent)
+        if not met:
+            self._meet(row, {(stream.source, name) for stream in present for name in stream.channels})
         return row
 
-    def _give_up(self, row: Pending) -> None:
+    def _meet(self, row: Pending, known: Collection[tuple[int, str]]) -> None:
+        """Begin a stream for each source's channels that no stream holds yet."""
+        for source in dict.fromkeys(row.origin.values()):
+            new = tuple(n for n, s in row.origin.items() if s == source and (s, n) not in known)
+            if new:
+                self.streams.append(Stream(source, new, row.time, row.time, row.time))
+        self._those.clear()
+
+    def _give_up(self, time: float, absent: list[Stream]) -> None:
         """Streams that were due and did not come in time are not waited for at this instant again."""
-        for (source, name), stream in self.streams.items():
-            if row.origin.get(name) == source or not stream.awaited(row.time, present=False):
+        for stream in absent:
+            if stream.period == 0.0 or not stream.awaited(time, present=False):
                 continue
-            if stream.period == 0.0:
-                continue
-            while stream.due_from + stream.period - stream.tolerance <= row.time and stream.overdue < LOST:
+            while stream.due_from + stream.period - stream.tolerance <= time and stream.overdue < LOST:
                 stream.due_from += stream.period
                 stream.overdue += 1
             if stream.overdue >= LOST:
-                self.changes.append(("channel_lost", source, name))
+                self.changes += [("channel_lost", stream.source, name) for name in stream.channels]
 
     def flush(self) -> list[Pending]:
         """All that is left, in order: the source has ended."""
@@ -184,9 +225,7 @@ class Reorder:
         """As JSON holds it, to the last bit."""
         return {
             "released": self.released,
-            "streams": [
-                [*key, {n: getattr(s, n) for n in Stream.__slots__}] for key, s in self.streams.items()
-            ],
+            "streams": [{n: getattr(s, n) for n in Stream.__slots__} for s in self.streams],
             "pending": [{n: getattr(p, n) for n in Pending.__slots__} for p in self.pending],
             "recent": list(self._recent),
         }
@@ -194,6 +233,7 @@ class Reorder:
     def restore(self, state: dict[str, Any]) -> None:
         """Take over what `state` gave."""
         self.released = state["released"]
-        self.streams = {(source, name): Stream(**one) for source, name, one in state["streams"]}
+        self.streams = [Stream(**{**one, "channels": tuple(one["channels"])}) for one in state["streams"]]
+        self._those.clear()
         self.pending = [Pending(**one) for one in state["pending"]]
         self._recent = deque(((when, tuple(names)) for when, names in state["recent"]), maxlen=_RECENT)
