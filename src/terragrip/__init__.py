@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from terragrip.estimation import estimate as estimate
     from terragrip.formats import Profile as Profile
     from terragrip.formats import read as read
-    from terragrip.ground.classifier import GroundClassifier as GroundClassifier
+    from terragrip.ground.classification.classifier import GroundClassifier as GroundClassifier
     from terragrip.recording import Recording as Recording
     from terragrip.simulation import simulate as simulate
     from terragrip.soil.fit import AdhesionCurve as AdhesionCurve
@@ -34,7 +34,7 @@ _HOME = {
     "calibrate": "terragrip.estimation",
     "simulate": "terragrip.simulation",
     "AdhesionCurve": "terragrip.soil.fit",
-    "GroundClassifier": "terragrip.ground.classifier",
+    "GroundClassifier": "terragrip.ground.classification.classifier",
     "InputError": "terragrip.errors",
 }
 

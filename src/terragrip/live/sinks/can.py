@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from terragrip.errors import InputError
 from terragrip.estimation.engine import EVENTS
-from terragrip.ground.labels import UNKNOWN
+from terragrip.ground.classification.labels import UNKNOWN
 from terragrip.live.can import check, errors, open_bus
 from terragrip.live.core import Row
 from terragrip.live.feed import Lost

@@ -11,7 +11,7 @@ import pytest
 
 from terragrip import GroundClassifier
 
-BENCHMARKS = Path(__file__).resolve().parents[2] / "benchmarks"
+BENCHMARKS = Path(__file__).resolve().parents[3] / "benchmarks"
 
 LEARNT = {
     "ASPHALT": ("01", "03", "05"),

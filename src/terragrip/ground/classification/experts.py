@@ -8,9 +8,9 @@ import numpy as np
 import numpy.typing as npt
 
 from terragrip.errors import InputError
-from terragrip.ground.expert import Expert, train
-from terragrip.ground.features import ACCELERATION, GROUND, TORQUE, TURN, families_needed
-from terragrip.ground.training_set import TrainingSet, measured_families
+from terragrip.ground.classification.expert import Expert, train
+from terragrip.ground.classification.features import ACCELERATION, GROUND, TORQUE, TURN, families_needed
+from terragrip.ground.classification.training_set import TrainingSet, measured_families
 
 FEWEST_WINDOWS = 10  # a class
 

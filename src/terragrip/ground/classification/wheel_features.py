@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from terragrip.ground.vibration import moments
+from terragrip.ground.classification.vibration import moments
 
 Floats = npt.NDArray[np.float64]
 Table = dict[str, Floats]

@@ -9,10 +9,10 @@ from functools import lru_cache
 import numpy as np
 import numpy.typing as npt
 
-from terragrip.ground.channels import FAMILIES, Signals
-from terragrip.ground.features import Layout, families_needed, features_of
-from terragrip.ground.wheel_features import Table
-from terragrip.ground.windows import window_starts
+from terragrip.ground.classification.channels import FAMILIES, Signals
+from terragrip.ground.classification.features import Layout, families_needed, features_of
+from terragrip.ground.classification.wheel_features import Table
+from terragrip.ground.classification.windows import window_starts
 
 Floats = npt.NDArray[np.float64]
 Codes = npt.NDArray[np.intp]

@@ -9,8 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from terragrip.ground.kernel_machine import KernelMachine
-from terragrip.ground.standardization import Standardization
+from terragrip.ground.classification.kernel_machine import KernelMachine
+from terragrip.ground.classification.standardization import Standardization
 
 Floats = npt.NDArray[np.float64]
 Codes = npt.NDArray[np.intp]

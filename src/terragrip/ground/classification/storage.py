@@ -15,11 +15,11 @@ import numpy as np
 import terragrip
 from terragrip.errors import InputError
 from terragrip.files import refuse_missing, replacing, unreadable
-from terragrip.ground.classifier import GroundClassifier
-from terragrip.ground.expert import Expert
-from terragrip.ground.features import Layout
-from terragrip.ground.kernel_machine import KernelMachine
-from terragrip.ground.standardization import Standardization
+from terragrip.ground.classification.classifier import GroundClassifier
+from terragrip.ground.classification.expert import Expert
+from terragrip.ground.classification.features import Layout
+from terragrip.ground.classification.kernel_machine import KernelMachine
+from terragrip.ground.classification.standardization import Standardization
 
 FORMAT = "terragrip ground classifier"
 VERSION = 1
@@ -165,7 +165,7 @@ def _rebuild(header: dict[str, Any], archive: Any) -> GroundClassifier:
 
 
 def _check_shapes(arrays: dict[str, Any], features: int, classes: int) -> None:
-    from terragrip.ground.expert import LEVELS
+    from terragrip.ground.classification.expert import LEVELS
 
     sizes = {
         "f": features,

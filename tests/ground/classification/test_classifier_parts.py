@@ -8,12 +8,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 from sklearn.svm import SVC
 
-from terragrip.ground.channels import Channel
-from terragrip.ground.expert import calibrate, probabilities
-from terragrip.ground.kernel_machine import PENALTY, WIDTH, KernelMachine, votes
-from terragrip.ground.training_set import deal
-from terragrip.ground.vibration import band_edges, band_energies
-from terragrip.ground.windows import samples_in, window_starts
+from terragrip.ground.classification.channels import Channel
+from terragrip.ground.classification.expert import calibrate, probabilities
+from terragrip.ground.classification.kernel_machine import PENALTY, WIDTH, KernelMachine, votes
+from terragrip.ground.classification.training_set import deal
+from terragrip.ground.classification.vibration import band_edges, band_energies
+from terragrip.ground.classification.windows import samples_in, window_starts
 
 
 @pytest.mark.parametrize("classes", [2, 3, 5])

@@ -13,8 +13,8 @@ from functools import cache
 import numpy as np
 import numpy.typing as npt
 
-from terragrip.ground.channels import FAMILIES, Channel, Signals
-from terragrip.ground.vibration import (
+from terragrip.ground.classification.channels import FAMILIES, Channel, Signals
+from terragrip.ground.classification.vibration import (
     band_edges,
     band_energies,
     likeness,
@@ -22,8 +22,15 @@ from terragrip.ground.vibration import (
     spectral_shape,
     unsteadiness,
 )
-from terragrip.ground.wheel_features import FLOOR, Table, effort_of, log_size, motion, over_wheels
-from terragrip.ground.windows import samples_in
+from terragrip.ground.classification.wheel_features import (
+    FLOOR,
+    Table,
+    effort_of,
+    log_size,
+    motion,
+    over_wheels,
+)
+from terragrip.ground.classification.windows import samples_in
 
 Floats = npt.NDArray[np.float64]
 

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
-from terragrip.ground.channels import Channel
+from terragrip.ground.classification.channels import Channel
 
 Floats = npt.NDArray[np.float64]
 

@@ -11,12 +11,12 @@ import numpy as np
 import numpy.typing as npt
 
 from terragrip.errors import InputError
-from terragrip.ground.channels import held_channels, signals_of, tables_of
-from terragrip.ground.experts import FEWEST_WINDOWS, train_experts
-from terragrip.ground.features import features_of
-from terragrip.ground.labels import UNKNOWN, classes_of, one_each
-from terragrip.ground.training_set import collect, layout_of, matrix, measured_families
-from terragrip.ground.windows import window_starts
+from terragrip.ground.classification.channels import held_channels, signals_of, tables_of
+from terragrip.ground.classification.experts import FEWEST_WINDOWS, train_experts
+from terragrip.ground.classification.features import features_of
+from terragrip.ground.classification.labels import UNKNOWN, classes_of, one_each
+from terragrip.ground.classification.training_set import collect, layout_of, matrix, measured_families
+from terragrip.ground.classification.windows import window_starts
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -177,7 +177,7 @@ class GroundClassifier:
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write the classifier to one file that holds numbers and text only; raises InputError if it cannot."""
-        from terragrip.ground.storage import save
+        from terragrip.ground.classification.storage import save
 
         self._check_fitted()
         save(self, path)
@@ -185,7 +185,7 @@ class GroundClassifier:
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> GroundClassifier:
         """Read a classifier that `save` wrote; raises InputError on a foreign, damaged or newer file."""
-        from terragrip.ground.storage import load
+        from terragrip.ground.classification.storage import load
 
         return load(path)
 
