@@ -95,6 +95,22 @@ def test_slow_and_fast_channels_live_side_by_side():
     assert counts.total("missing") == 0
 
 
+@given(st.tuples(*[st.sets(st.integers(30, 69), max_size=5)] * 3))
+def test_missing_is_counted_by_channel_however_messages_are_composed(absent):
+    """Three channels, each absent from some rows (from few, or its period were another): so many are missing."""
+    buffer, counts, _ = settled(channels=("a", "b", "c"))
+    for k in range(30, 71):
+        now = 1.0 + k * STEP
+        values = {name: 1.0 for name, gone in zip("abc", absent, strict=True) if k not in gone}
+        if values:
+            buffer.add(now, 0, k * STEP, values)
+        buffer.ready(now)
+    buffer.ready(5.0)
+    for name, gone in zip("abc", absent, strict=True):
+        assert counts.by_channel.get(name, {"missing": 0})["missing"] == len(gone)
+    assert sorted(name for stream in buffer.streams for name in stream.channels) == ["a", "b", "c"]
+
+
 @given(st.permutations(range(40)), st.integers(0, 2**32 - 1))
 def test_whatever_the_order_rows_come_out_sorted_and_all_is_accounted_for(order, seed):
     buffer, counts, out = settled(window=0.03)
