@@ -67,15 +67,16 @@ class SignalLog:
                 )
             return LogTable((TIME, *self.names), {}, {}, self.source, self.sha256, tuple(notes), clocked=True)
         place = dict(zip(orders, rows, strict=True))
-        columns: dict[str, npt.NDArray[Any]] = {TIME: base - base[0]}
+        start = float(base[0]) if base[0] > SINCE_1970 else None
+        base -= base[0]
+        columns: dict[str, npt.NDArray[Any]] = {TIME: base}
         for name, signal in self.signals.items():
             order, row = orders[id(signal.time)], place[id(signal.time)]
             columns[name] = _spread(signal.values[order], row, len(base))
-        doubled = sum(len(row) - len(np.unique(row)) for row in rows)
+        doubled = sum(int(np.sum(row[1:] == row[:-1])) for row in rows)
         if doubled:
             notes.append(f"{doubled} samples repeat the instant of the one before them and take its place.")
         units = {name: s.unit for name, s in self.signals.items() if s.unit}
-        start = float(base[0]) if base[0] > SINCE_1970 else None
         return LogTable(
             (TIME, *self.names), columns, units, self.source, self.sha256, tuple(notes), start, clocked=True
         )
@@ -95,28 +96,31 @@ def _other_time(name: str) -> str:
     return f"signal.{TIME}" if name == TIME else name
 
 
-def _order(time: Floats) -> npt.NDArray[np.intp]:
-    """Places (m,) of the finite stamps in the order of time."""
+def _order(time: Floats) -> npt.NDArray[np.intp] | slice:
+    """Places (m,) of the finite stamps in the order of time; all of them where they are in order."""
+    if bool(np.isfinite(time).all()) and bool((time[1:] >= time[:-1]).all()):
+        return slice(None)
     known = np.flatnonzero(np.isfinite(time))
-    if len(known) == len(time) and bool((np.diff(time) >= 0).all()):
-        return known
     return known[np.argsort(time[known], kind="stable")]
 
 
-def _union(clocks: list[Floats]) -> tuple[Floats, list[npt.NDArray[np.intp]]]:
-    """The instants (m,) of sorted clocks, and the row (n,) of each of their samples."""
+def _union(clocks: list[Floats]) -> tuple[Floats, list[npt.NDArray[np.int32]]]:
+    """The instants (m,) of sorted clocks, and the row (n,) of each of their samples. Frugal, since logs are long."""
     if not clocks:
         return np.empty(0), []
     stamps = np.concatenate(clocks)
     if not len(stamps):
-        return stamps, [np.empty(0, dtype=np.intp) for _ in clocks]
+        return stamps, [np.empty(0, dtype=np.int32) for _ in clocks]
     order = np.argsort(stamps, kind="stable")
-    apart = np.diff(stamps[order]) > _tolerance(clocks)
-    group = np.r_[0, np.cumsum(apart)]
-    row = np.empty(len(stamps), dtype=np.intp)
-    row[order] = group
+    stamps = stamps[order]
+    apart = np.empty(len(stamps), dtype=bool)
+    apart[0] = True
+    np.greater(stamps[1:] - stamps[:-1], _tolerance(clocks), out=apart[1:])
+    row = np.empty(len(stamps), dtype=np.int32)
+    row[order] = np.cumsum(apart, dtype=np.int32) - np.int32(1)
+    del order
     ends = np.cumsum([len(clock) for clock in clocks])[:-1]
-    return stamps[order][np.r_[True, apart]], np.split(row, ends)
+    return stamps[apart], np.split(row, ends)
 
 
 def _tolerance(clocks: list[Floats]) -> float:
@@ -124,7 +128,7 @@ def _tolerance(clocks: list[Floats]) -> float:
     return _SAME * min((s for s in spacings if s > 0), default=0.0)
 
 
-def _spread(values: npt.NDArray[Any], rows: npt.NDArray[np.intp], length: int) -> npt.NDArray[Any]:
+def _spread(values: npt.NDArray[Any], rows: npt.NDArray[np.int32], length: int) -> npt.NDArray[Any]:
     if values.dtype.kind in "fiub":
         found = np.full(length, np.nan)
         found[rows] = values

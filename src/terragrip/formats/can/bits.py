@@ -125,4 +125,5 @@ def decode(
             backward = by_name[field.reverse]
             values = np.where(present(backward) & (raw(backward) == 0), -values, values)
         found[field.name] = values
+    raws.clear()  # the functions above know each other, and would keep it until Python looks for such circles
     return found
