@@ -98,7 +98,7 @@ static void measured(const tg_estimator *e, const tg_row *row, tg_real *y, tg_re
     const tg_real d = (tg_real)e->direction;
     for (int32_t i = 0; i < n; i++) {
         y[i] = d * row->value[TG_WHEEL_SPEED + i];
-        r[i] = e->constants.variance[TG_WHEEL_SPEED + i];
+        r[i] = row->held_wheels >> i & 1 ? row->wheel_variance[i] : e->constants.variance[TG_WHEEL_SPEED + i];
     }
     y[n] = d * row->value[TG_GROUND_SPEED];
     r[n] = row->ground_variance;
@@ -126,13 +126,29 @@ static tg_real supervisor_of(const tg_estimator *e, const tg_step *step)
     return mean;
 }
 
-/* A channel that the filter trusts much less than usual. A reckoned ground speed is no measurement. */
+/* A channel that the filter trusts much less than usual. A reckoned ground speed or a held wheel speed is no measurement. */
 static int32_t is_outlier(const tg_estimator *e, const tg_row *row, const tg_step *step)
 {
-    const int32_t n = e->settings.machine.wheels;
+    const int32_t n = e->settings.machine.wheels, made_up = row->held_wheels | (row->reckoned ? 1 << n : 0);
     int32_t found = 0;
-    for (int32_t c = 0; c < n + 2; c++) found |= step->weight[c] < e->settings.outlier_weight && !(row->reckoned && c == n);
+    for (int32_t c = 0; c < n + 2; c++) found |= step->weight[c] < e->settings.outlier_weight && !(made_up >> c & 1);
     return found;
+}
+
+/* NIS of the channels that were measured, each by itself where others were not. */
+static void watch_consistency(tg_estimator *e, const tg_row *row, const tg_step *step, const tg_real *r)
+{
+    tg_belief *const b = &e->belief;
+    b->nis = step->nis;
+    b->channels = step->channels;
+    if (!row->held_wheels) return;
+    b->nis = 0;
+    b->channels = 0;
+    for (int32_t c = 0; c < e->settings.machine.wheels + 2; c++) {
+        if (isnan(step->innovation[c]) || row->held_wheels >> c & 1) continue;
+        b->nis += tgi_square(step->innovation[c]) / (step->innovation_variance[c] + r[c] * (1 / step->weight[c] - 1));
+        b->channels++;
+    }
 }
 
 /* Predict over dt, in pieces where it is long, and update. Returns 0 where the filter had to start anew. */
@@ -164,8 +180,7 @@ static int32_t advance(tg_estimator *e, tg_row *row, const tg_drive *drive, tg_r
     }
     follow(e, e->deviation);
     watch_jolts(e, &step, r[s->machine.wheels + 1], dt);
-    e->belief.nis = step.nis;
-    e->belief.channels = step.channels;
+    watch_consistency(e, row, &step, r);
     e->belief.supervisor = supervisor_of(e, &step);
     row->outlier |= is_outlier(e, row, &step);
     return 1;
@@ -254,6 +269,7 @@ tg_status tg_estimator_update(tg_estimator *e, const tg_sample *sample, tg_estim
     tg_course course = course_of(e, &row, was_standing, turned, &gap);
     if (!e->started) e->ground_time = row.time;
     tgi_reckon(e, &drive, course == TG_GO ? dt : 0, &row, q);
+    if (e->settings.method == TG_FILTERED) tgi_hold_wheels(e, course == TG_GO ? dt : 0, &row);
     if (!go_on(e, &row, &drive, course, dt, q)) gap = 1;
     balance_forces(e, &drive, row.time);
     tgi_watch_roughness(e, course == TG_GO && !gap, dt);

@@ -34,6 +34,8 @@ typedef struct { /* one row, calibrated and checked, in the vehicle's own direct
     int32_t measured; /* any wheel or ground speed */
     int32_t outlier;
     int32_t reckoned; /* the ground speed is not measured but reckoned */
+    int32_t held_wheels; /* bits: the wheel's speed is not measured but held, with this variance */
+    tg_real wheel_variance[8];
     tg_real ground_variance;
 } tg_row;
 
@@ -110,6 +112,8 @@ struct tg_estimator {
     tg_real last_raw[TG_SLOTS];
     double last_raw_time[TG_SLOTS];
     tg_hold torque[8], drawbar, pitch, axle_load[8];
+    tg_hold wheel[8];          /* speeds, once a row was seen that lacks one */
+    int32_t sparse_wheels;
     tg_real yaw_rate;
     double yaw_time;           /* of its last sample */
     double slow_time;          /* when the ground speed was last near 0 */
@@ -159,6 +163,9 @@ tg_status tgi_filter_anew(tg_filter *f, tg_consider *c, const tg_settings *s);
 /* slope.c */
 void tgi_slope_correct(tgi_slope *s, tg_real speed, tg_real noise);
 tg_real tgi_slope_update(tg_estimator *e, const tg_row *row, tg_real pitch, tg_real dt);
+
+/* wheels.c */
+void tgi_hold_wheels(tg_estimator *e, tg_real dt, tg_row *row);
 
 /* reckoning.c */
 void tgi_remember_slip(tg_estimator *e, const tg_drive *drive, tg_real dt);

@@ -47,6 +47,7 @@ tg_status tgi_clean(tg_estimator *e, const tg_sample *sample, tg_row *row)
     row->outlier = outlier;
     row->measured = measured;
     row->reckoned = 0;
+    row->held_wheels = 0;
     return TG_OK;
 }
 
