@@ -153,7 +153,7 @@ def trust(curves: Sequence[SoilCurves], not_fitted: Mapping[str, str] = NOTHING)
         for one in curves
         if one.learned.verdict is not None and not one.learned.verdict.follows
     ]
-    return Section("trust", title, (_free_shape(curves[0]), *words), (table,))
+    return Section("trust", title, (_free_shape(curves[0]), *words), (table, *_ranking(curves)))
 
 
 def what_is_missing(curves: Sequence[SoilCurves], not_fitted: Mapping[str, str] = NOTHING) -> Section:
@@ -292,6 +292,18 @@ def _trust_row(one: SoilCurves) -> tuple[str, ...]:
         corrected,
         "–" if ground is None else f"{number(ground.mean)} ({_interval(ground.interval)})",
     )
+
+
+def _ranking(curves: Sequence[SoilCurves]) -> list[Table]:
+    """Errors of every form of curve on runs left out, by soil; no table where no soil has enough bins to compare."""
+    told = {one.name: one.learned.verdict.ranking for one in curves if one.learned.verdict is not None}
+    forms = sorted({score.form for ranking in told.values() for score in ranking})
+    rows = []
+    for name, ranking in told.items():
+        errors = {score.form: number(score.error, 4) for score in ranking}
+        rows.append((name, ranking[0].form, *(errors.get(form, "–") for form in forms)))
+    caption = "Root-mean-square error of each form of curve on the bin means of runs left out of its fit; the smallest is the best."
+    return [Table(caption, ("soil", "best form", *forms), tuple(rows))] if rows else []
 
 
 def _free_shape(one: SoilCurves) -> str:
