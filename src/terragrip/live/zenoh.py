@@ -29,6 +29,14 @@ def config(uri: Uri) -> Any:
 
     found = zenoh.Config()
     ends = {name: [e for e in uri.options.get(name, "").split(",") if e] for name in ("connect", "listen")}
+    for end in ends["listen"]:
+        host = end.partition("/")[2].rpartition(":")[0].strip("[]")
+        if not Uri(end, "", host=host).is_loopback():
+            raise InputError(
+                f"anyone could connect to {end}",
+                place=uri.text,
+                mend="listen on tcp/127.0.0.1:7447, or connect to a router",
+            )
     scout = uri.options.get("scout", "0")
     if scout not in ("0", "1"):
         raise InputError(f"scout is {scout!r}", place=uri.text, mend="give 0 or 1")
