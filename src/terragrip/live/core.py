@@ -147,7 +147,7 @@ class Core:
 
     def take(self, arrival: float, source: int, stamp: float, values: Values) -> list[Output]:
         """A sample of ``source`` (its place in the settings), stamped by its own clock [s]; SI values by column."""
-        self.counts.add("received", values)
+        self.counts.received(values)
         clock = self.clocks[source]
         going, refused, jump = clock.take(arrival, stamp, values)
         out: list[Output] = []

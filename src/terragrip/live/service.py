@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 
 _AT_ONCE = 64  # samples between two turns of sources and sinks
 _HOUSEKEEPING = 0.1  # s
-_SYNC = 0.5  # s
+_SYNC = 0.8  # s: with writing, under a second
 _BREATH = 0.002  # s for sinks that have enough to do
 _BEHIND = 1.0  # s
 _LINGER = 2.0  # s for sinks to take the last messages
