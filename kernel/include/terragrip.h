@@ -211,7 +211,10 @@ typedef enum {
     TG_EVENT_NONE = 0,
     TG_EVENT_OUTLIER = 1,    /* a value far from what the filter or its own past expects, taken softly */
     TG_EVENT_STANDSTILL = 2, /* slip and efficiency are undefined (NaN); adhesion and resistance are held */
-    TG_EVENT_GAP = 3         /* nothing measured for longer than `gap`, or nothing yet: values before the first are NaN */
+    TG_EVENT_GAP = 3,        /* nothing measured for longer than `gap`, or nothing yet: values before the first are NaN */
+    TG_EVENT_IMMOBILIZATION = 4, /* a warning: the wheels dig, the vehicle is about to get stuck */
+    TG_EVENT_STUCK = 5,      /* the wheels turn, the vehicle hardly moves */
+    TG_EVENT_PUSH = 6        /* something pushes from behind while the wheels pull: a tool that runs up */
 } tg_event;
 
 typedef enum { TG_FILTERED = 0, TG_ALGEBRAIC = 1 } tg_method;
@@ -240,6 +243,19 @@ typedef struct { /* spreads (1 SD) of constants that the data cannot tell; 0 = k
     tg_real wheel_radius;           /* relative */
     tg_real acceleration_bias;      /* m/s^2 */
 } tg_uncertainty;
+
+typedef struct { /* when the estimator warns of immobilization; slips are of the driven wheels' mean, low-passed */
+    tg_real duration;               /* s that the signs must last, */
+    tg_real looks;                  /* and over how many measurements of the ground speed in a row */
+    tg_real slip;                   /* a slip below this, less `confidence` of its SDs, is no sign */
+    tg_real confidence;
+    tg_real rise;                   /* by how much slip is above its own mean over about 1 s */
+    tg_real grip;                   /* adhesion at this slip, over that of the last 5 s, below which the ground gives way */
+    tg_real high_slip;              /* beyond this slip a rise alone is a sign */
+    tg_real stuck_travel, free_travel; /* ground over rim speed: below the first stuck, free again above the second */
+    tg_real push, thrust;           /* push from behind, and thrust meanwhile, over the weight */
+    tg_real push_duration;          /* s */
+} tg_watch_settings;
 
 typedef struct {
     int32_t method;                 /* tg_method */
@@ -270,6 +286,7 @@ typedef struct {
     tg_real outlier_weight;         /* a channel weighted below this flags the row */
     tg_real load_filter;            /* s, low-pass of the acceleration that moves the loads */
     tg_real algebraic_filter;       /* s, low-pass of every signal of the algebraic method */
+    tg_watch_settings watch;
 } tg_settings;
 
 typedef struct tg_estimator tg_estimator;

@@ -248,6 +248,15 @@ static void report(tg_estimator *e, const tg_drive *drive, tg_estimate *out)
     for (int32_t k = 0; k < e->settings.axles; k++) o[TG_OUT_VERTICAL_LOAD + k] = drive->axle_load[k];
 }
 
+/* What blinds comes first, then what stops the vehicle. */
+static int32_t event_of(const tg_estimator *e, const tg_row *row, int32_t gap)
+{
+    if (gap) return TG_EVENT_GAP;
+    if (e->standing) return TG_EVENT_STANDSTILL;
+    const int32_t watched = tgi_watched(e);
+    return watched != TG_EVENT_NONE ? watched : row->outlier ? TG_EVENT_OUTLIER : TG_EVENT_NONE;
+}
+
 tg_status tg_estimator_update(tg_estimator *e, const tg_sample *sample, tg_estimate *out)
 {
     if (!e || !sample || !out) return TG_BAD_ARGUMENT;
@@ -285,10 +294,11 @@ tg_status tg_estimator_update(tg_estimator *e, const tg_sample *sample, tg_estim
     tgi_along(e, &drive, &e->held);
     out->time = row.time;
     out->distance = e->distance;
-    out->event = gap || course == TG_WAIT ? TG_EVENT_GAP : e->standing ? TG_EVENT_STANDSTILL
-               : row.outlier ? TG_EVENT_OUTLIER : TG_EVENT_NONE;
     report(e, &drive, out);
-    tgi_curves(e, course == TG_GO && out->event == TG_EVENT_NONE, dt, e->standing ? 0 : travelled * dt, drive.load, out->value);
+    tgi_watch_over(e, &row, &drive, course == TG_GO || course == TG_ANEW, dt, out->value);
+    out->event = event_of(e, &row, gap || course == TG_WAIT);
+    const int32_t learn = out->event == TG_EVENT_NONE || out->event == TG_EVENT_IMMOBILIZATION;
+    tgi_curves(e, course == TG_GO && learn && !row.outlier, dt, e->standing ? 0 : travelled * dt, drive.load, out->value);
     return TG_OK;
 }
 

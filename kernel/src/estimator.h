@@ -85,6 +85,15 @@ typedef struct { /* of the estimated soil resistance: low-passed, and the mean s
     tg_real slow, square;
 } tgi_roughness;
 
+typedef struct { /* the eye on immobilization; means over the driven wheels, along the travel */
+    tg_real slip, slow_slip, rim, slow_rim, adhesion, curve; /* low-passed; curve: 1 - exp(-k slip) */
+    tg_real mean_adhesion, mean_curve, age; /* of the ground so far, over `age` s of looking at most */
+    tg_real grip, grip_before; /* adhesion, and what the ground so far would give at this slip, each with a floor */
+    tg_real evidence, spinning, pushed; /* s that each has held */
+    double time;               /* of the last look */
+    int32_t seen, looks, sinking, stuck, pushing; /* looks: how many in a row showed the signs */
+} tgi_watch;
+
 typedef struct { /* what follows from the settings alone */
     tg_real limit[TG_SLOTS];        /* beyond it a value is a defect; negative: this machine has no such channel */
     tg_real inverse_gain[TG_SLOTS];
@@ -126,6 +135,7 @@ struct tg_estimator {
     tg_input held;             /* inputs of the last row, along the travel */
     tg_belief belief;
     tg_algebra algebra;
+    tgi_watch watch;
     tgi_scene scene;           /* of the last row */
     tg_curve curve, wheel_curve[8];
     tg_real curve_std, wheel_curve_std[8];
@@ -186,6 +196,10 @@ void tgi_algebraic(tg_estimator *e, const tg_row *row, const tg_drive *drive, in
 /* curves.c */
 void tgi_no_curves(tg_estimator *e);
 void tgi_curves(tg_estimator *e, int32_t learn, tg_real dt, tg_real distance, const tg_real *load, tg_real *o);
+
+/* immobilization.c */
+void tgi_watch_over(tg_estimator *e, const tg_row *row, const tg_drive *drive, int32_t moving, tg_real dt, const tg_real *o);
+int32_t tgi_watched(const tg_estimator *e); /* tg_event */
 
 /* traction.c */
 void tgi_traction(const tg_settings *s, const tg_belief *b, const tg_real (*S)[TG_ROWS], const tgi_scene *scene, tg_real *o);

@@ -16,6 +16,25 @@ static int is_spread(tg_real x)
     return is_number(x) && x >= 0;
 }
 
+/* Tuned on the drives of simulation/soft_spots.py, seeds 1000 to 1019, and on nothing else. */
+static tg_watch_settings default_watch(void)
+{
+    tg_watch_settings w;
+    w.duration = (tg_real)0.5;
+    w.looks = 3;
+    w.slip = (tg_real)0.1;
+    w.confidence = 1;
+    w.rise = (tg_real)0.025;
+    w.grip = (tg_real)0.95;
+    w.high_slip = (tg_real)0.35;
+    w.stuck_travel = (tg_real)0.1;
+    w.free_travel = (tg_real)0.4;
+    w.push = (tg_real)0.005;
+    w.thrust = (tg_real)0.05;
+    w.push_duration = (tg_real)0.1;
+    return w;
+}
+
 /* Tuned on the simulation's scenarios accuracy-clean and accuracy-faults, seeds 1000 to 1019, and on nothing else: walks, scales of the
  * bank, and the constants at the head of this floor's files (docs/decisions/0027, 0028). */
 tg_settings tg_default_settings(void)
@@ -40,6 +59,7 @@ tg_settings tg_default_settings(void)
     s.outlier_weight = (tg_real)0.5;
     s.load_filter = (tg_real)0.2;
     s.algebraic_filter = (tg_real)0.25;
+    s.watch = default_watch();
     return s;
 }
 
@@ -80,7 +100,9 @@ static tg_status check_numbers(const tg_settings *s)
     const tg_real spreads[] = {u->drive_torque_gain, u->drive_torque_gain_common, u->drive_torque_offset, u->drawbar_gain, u->drawbar_offset, u->slope,
                                u->tire_rolling_resistance, u->vertical_load, u->wheel_radius, u->acceleration_bias,
                                s->slope_spread, s->standstill_speed, s->outlier_weight, s->load_filter, s->center_of_gravity_height,
-                               s->hitch_height};
+                               s->hitch_height, s->watch.duration, s->watch.looks, s->watch.slip, s->watch.confidence, s->watch.rise, s->watch.grip,
+                               s->watch.high_slip, s->watch.stuck_travel, s->watch.free_travel, s->watch.push, s->watch.thrust,
+                               s->watch.push_duration};
     const tg_real positive[] = {s->prior_adhesion_std, s->prior_resistance_std, s->gap, s->max_step, s->algebraic_filter,
                                 s->noise[TG_GROUND_SPEED], s->noise[TG_ACCELERATION_X]};
     for (size_t k = 0; k < sizeof spreads / sizeof *spreads; k++)

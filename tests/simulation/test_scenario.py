@@ -180,3 +180,15 @@ def test_a_sensor_on_a_wheel_that_is_not_there_is_refused(quiet):
         InputError, match=r"sensors.wheel_speed.wheels: no wheel 'xx'; wheels are fl, fr, rl, rr"
     ):
         simulate(quiet(sensors={"wheel_speed": {"rate": 10, "wheels": ["xx"]}}))
+
+
+@pytest.mark.parametrize(
+    ("spot", "said"),
+    [
+        ({"at": 5, "length": 1.0, "edge": 0.6}, "two edges are longer than it"),
+        ({"at": 5, "adhesion_loss": 0.6, "adhesion_fall": 0.6}, "more adhesion is lost than there is"),
+    ],
+)
+def test_an_impossible_soft_spot_is_refused(spot, said):
+    with pytest.raises(InputError, match=said):
+        Scenario.from_dict({"extends": "constant", "soft_spots": [spot]})

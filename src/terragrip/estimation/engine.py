@@ -19,7 +19,7 @@ from terragrip.vehicle import BidermanRadius, HadekelRadius, Vehicle, Wheel
 Floats = npt.NDArray[np.float64]
 
 EVENTS = ("", "outlier", "standstill", "gap", "immobilization", "stuck", "push")
-"""Texts of the ``event`` column. The kernel gives the first four (tg_event), the ground layer the others."""
+"""Texts of the ``event`` column, in the order of tg_event."""
 
 _BLOCK = 1 << 18  # rows a call: Ctrl-C and progress get a turn between calls
 
@@ -31,6 +31,14 @@ class Thresholds:
     gap: float | None = None
     standstill_speed: float | None = None
     max_step: float | None = None
+
+
+def watch_limits() -> dict[str, float]:
+    """The thresholds by which the estimator flags rows: tg_watch_settings, ``gap`` [s] and ``standstill_speed`` [m/s]."""
+    settings = lib.tg_default_settings()
+    names = [name for name, _ in ffi.typeof("tg_watch_settings").fields]
+    found = {name: float(getattr(settings.watch, name)) for name in names}
+    return found | {"gap": float(settings.gap), "standstill_speed": float(settings.standstill_speed)}
 
 
 def sample_slots(vehicle: Vehicle) -> dict[str, int]:

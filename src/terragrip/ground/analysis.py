@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +12,7 @@ from numpy.typing import NDArray
 from terragrip.estimation import Estimates
 from terragrip.ground.changes import LENGTH, Change, changes_of
 from terragrip.ground.emissions import Emissions
+from terragrip.ground.events import events
 from terragrip.ground.online_changes import OnlineSettings, online_changes
 from terragrip.ground.recognition import Chain, ForwardFilter, by_soil
 from terragrip.ground.result import Ground, Timeline
@@ -69,7 +69,7 @@ def analyse(
         soils,
         changes,
         sections,
-        _events(estimates),
+        tuple(event.to_dict() for event in events(estimates)),
         timeline,
         _notes(blocks, emissions, timeline, len(stretches) - len(sections), library is not None),
         {"recording": estimates.about.get("recording", {}), "online": chosen.online},
@@ -135,19 +135,6 @@ def _stretches(estimates: Estimates, changes: Sequence[Change], timeline: Timeli
         probabilities = {name: round(float(p), 4) for name, p in zip(timeline.names, mean, strict=True)}
         found.append(Stretch(first, last, probabilities))
     return found
-
-
-def _events(estimates: Estimates) -> tuple[dict[str, Any], ...]:
-    """Spells of the `event` column."""
-    codes = estimates.event_codes
-    begin = np.flatnonzero(np.concatenate(([True], codes[1:] != codes[:-1])))
-    end = np.append(begin[1:], codes.size) - 1
-    names = estimates["event"]
-    return tuple(
-        {"kind": str(names[a]), "start": float(estimates.time[a]), "end": float(estimates.time[b]), "why": ""}
-        for a, b in zip(begin, end, strict=True)
-        if names[a]
-    )
 
 
 def _notes(

@@ -16,6 +16,7 @@ typedef struct { /* what changes seldom: the driver and where soft spots came to
     int32_t mode;
     double mode_since, trouble_since, free_since, assist;
     double spot_position[8], spot_left[8]; /* where each soft spot lies, and how much of it is left */
+    double sunk[8][2];                     /* slip-sinkage of each axle in it, 0..1 */
     int32_t command_index;
 } conduct;
 
@@ -59,8 +60,10 @@ static void curve_at(const plant_ground *g, int32_t soil, double slip, double *m
 }
 
 static double spot_share(const plant_machine *m, const conduct *c, int32_t k, double x) {
-    const double d = (x - c->spot_position[k]) / m->spot[k].length;
-    return fabs(d) < 0.5 ? c->spot_left[k] * 0.5 * (1.0 + cos(6.283185307179586 * d)) : 0.0;
+    const double d = fabs(x - c->spot_position[k]) / m->spot[k].length, edge = m->spot[k].edge;
+    if (!(d < 0.5)) return 0.0;
+    const double ramp = (d - (0.5 - edge)) / (2.0 * edge); /* below 0 on the plateau, 0.5 at the rim */
+    return c->spot_left[k] * 0.5 * (1.0 + cos(6.283185307179586 * fmax(ramp, 0.0)));
 }
 
 /* Friction that builds up over a travel K (Dahl's model; for soil, Janosi and Hanamoto's shear displacement K), with a
@@ -170,25 +173,27 @@ static void derive(const plant_machine *m, const plant_ground *g, const conduct 
         const double x = y[X] + (axle ? 0.0 : m->wheelbase), r = m->radius[i], w = y[OMEGA + i];
         const place p = locate(g, x);
         const double side = track ? -0.5 * m->track : 0.5 * m->track, hub = v * (1.0 - side * f->curvature);
-        double keep = 1.0, sink = 0.0, by_rim, by_hub, mu, dmu;
+        double keep = 1.0, sink = 0.0, stretch = 1.0, by_rim, by_hub, mu, dmu;
         for (int k = 0; k < m->spots; k++) {
-            const double share = spot_share(m, c, k, x);
-            keep *= 1.0 - m->spot[k].adhesion_loss * share;
-            sink += m->spot[k].resistance[axle] * share;
+            const plant_spot *spot = &m->spot[k];
+            const double share = spot_share(m, c, k, x), sunk = c->sunk[k][axle];
+            keep *= 1.0 - (spot->adhesion_loss + spot->adhesion_fall * sunk) * share;
+            sink += spot->resistance[axle] * (1.0 + spot->sinkage * sunk) * share;
+            stretch += spot->loosening * share;
         }
         const double slip = slip_of(r * w, hub, m->slip_speed, &by_rim, &by_hub), size = fabs(slip);
         const int32_t from = g->soil_from[track][p.i], to = g->soil_to[track][p.i];
         const double scale = keep * at(g->adhesion_scale[track], p);
-        curve_at(g, from, size, &mu, &dmu);
+        curve_at(g, from, size / stretch, &mu, &dmu);
         if (to != from) {
             double other, dother;
             const double blend = at(g->blend[track], p);
-            curve_at(g, to, size, &other, &dother);
+            curve_at(g, to, size / stretch, &other, &dother);
             mu += blend * (other - mu);
             dmu += blend * (dother - dmu);
         }
         mu *= slip < 0 ? -scale : scale;
-        dmu *= scale;
+        dmu *= scale / stretch;
         const double ground = at(g->elevation[track], p), gradient = at(g->gradient[track], p);
         const double static_load = 0.5 * weight * (axle ? 1.0 - m->rear_to_cg / m->wheelbase : m->rear_to_cg / m->wheelbase);
         const double load = fmax(0.0, static_load + m->tire_stiffness * (ground - y[Z + i]) +
@@ -272,6 +277,17 @@ static void grind(const plant_machine *m, conduct *c, double h, const double *y)
         }
 }
 
+/* A wheel digs itself in by the soil that it moves: sinkage follows slip over a length of the rim's travel (R). */
+static void sink_in(const plant_machine *m, conduct *c, double h, const double *y) {
+    for (int a = 0; a < 2; a++) {
+        const int i = 2 * a;
+        const double rim = 0.5 * (m->radius[i] * y[OMEGA + i] + m->radius[i + 1] * y[OMEGA + i + 1]);
+        const double larger = fmax(fmax(fabs(rim), fabs(y[V])), m->slip_speed), slip = fmin(fabs(rim - y[V]) / larger, 1.0);
+        for (int k = 0; k < m->spots; k++)
+            c->sunk[k][a] += (1.0 - exp(-h * larger / m->spot[k].sinkage_length)) * (slip - c->sunk[k][a]);
+    }
+}
+
 static void enter(conduct *c, int32_t mode, double time) {
     c->mode = mode;
     c->mode_since = time;
@@ -287,6 +303,7 @@ static void drive(const plant_machine *m, conduct *c, double time, double h, con
             c->spot_position[k] = y[X] + (front_sinks ? m->wheelbase : 0.0) + m->spot[k].ahead;
         }
     grind(m, c, h, y);
+    sink_in(m, c, h, y);
     const double want = command_at(m, c->command_index, time) * m->radius[0];
     const double share = want > 0.05 ? y[V] / want : 1.0;
     const double in_mode = time - c->mode_since;
@@ -344,10 +361,16 @@ static void record(const plant_machine *m, const plant_ground *g, const conduct 
     for (int k = 0; k < 3; k++) row[PLANT_SPOT1 + k] = k < m->spots ? c->spot_position[k] : NAN;
 }
 
+static int lengths_positive(const plant_machine *m) {
+    for (int k = 0; k < m->spots && k < 8; k++)
+        if (!(m->spot[k].edge > 0 && m->spot[k].edge <= 0.5 && m->spot[k].sinkage_length > 0)) return 0;
+    return 1;
+}
+
 static int usable(const plant_machine *m, const plant_ground *g) {
     return m && g && g->count >= 2 && g->spacing > 0 && g->soils >= 1 && g->curve_intervals >= 1 && m->tools >= 0 &&
            m->tools <= 2 && m->spots >= 0 && m->spots <= 8 && m->commands >= 1 && m->mass > 0 && m->motor_lag > 0 &&
-           m->slip_speed > 0 && m->wheel_rest_speed > 0;
+           m->slip_speed > 0 && m->wheel_rest_speed > 0 && lengths_positive(m);
 }
 
 static void settle(const plant_machine *m, conduct *c) {

@@ -93,8 +93,13 @@ typedef struct { /* a place where the wheels sink; triggered by time or lying at
     double time;
     double ahead;
     double length;
+    double edge;            /* share of the length over which it begins, and ends: 0..0.5 */
     double resistance[2];   /* added rho_s, front and rear */
+    double sinkage;         /* what full slip-sinkage adds to that, relative */
+    double sinkage_length;  /* m of the rim's travel over which sinkage follows |slip| */
+    double loosening;       /* the slip that an adhesion takes grows to 1 + this of itself */
     double adhesion_loss;   /* 0..1 */
+    double adhesion_fall;   /* adhesion lost besides at full slip-sinkage: a curve that peaks and falls */
     double wear;            /* m of wheel slippage over which it falls to 1/e, ground away; 0: never */
 } plant_spot;
 

@@ -171,6 +171,9 @@ def _spots_and_driver(machine: Any, scenario: Scenario) -> None:
         out.time = 0.0 if spot.at_time is None else spot.at_time
         out.ahead, out.length, out.adhesion_loss = spot.ahead, spot.length, spot.adhesion_loss
         out.wear = spot.wear or 0.0
+        out.edge = 0.5 if spot.edge is None else spot.edge / spot.length
+        for name in ("sinkage", "sinkage_length", "loosening", "adhesion_fall"):
+            setattr(out, name, getattr(spot, name))
         out.resistance[0], out.resistance[1] = spot.front, spot.rear
     driver, out = scenario.driver, machine.driver
     out.enabled = int(driver.acts)

@@ -184,23 +184,36 @@ class Route(Part):
 class SoftSpot(Part):
     """A place where wheels sink: at position ``at`` [m], or just before the machine when time ``at_time`` [s] comes.
 
-    Added rolling resistance of the ``front`` and the ``rear`` axle, and the adhesion lost, over ``length`` [m]. With
-    ``wear``, spinning wheels grind it away: to 1/e after that much slippage [m].
+    Added rolling resistance of the ``front`` and the ``rear`` axle, and the adhesion lost, over ``length`` [m], which begins
+    and ends over ``edge`` [m] (default: half the length). Loose ground gives way further: the slip that an adhesion takes is
+    1 + ``loosening`` of the ground's own (the shear displacement K of Janosi and Hanamoto). Slip digs wheels in: at full
+    slip-sinkage the added resistance is 1 + ``sinkage`` of itself, and ``adhesion_fall`` is lost besides, so that the curve
+    peaks and falls; sinkage follows slip over ``sinkage_length`` [m] of the rim's travel. With ``wear``, spinning wheels
+    grind the spot away: to 1/e after that much slippage [m].
     """
 
     at: Coordinate | None = None
     at_time: Time | None = None
     ahead: Coordinate = 0.3
     length: PositiveLength = 0.6
+    edge: PositiveLength | None = None
     front: Ratio = 0.0
     rear: Ratio = 0.0
+    sinkage: Ratio = 0.0
+    sinkage_length: PositiveLength = 0.5
+    loosening: Ratio = 0.0
     adhesion_loss: Share = 0.0
+    adhesion_fall: Share = 0.0
     wear: PositiveLength | None = None
 
     @model_validator(mode="after")
     def _one_place(self) -> Self:
         if (self.at is None) == (self.at_time is None):
             raise Refusal("needs one place", "give 'at:' [m] or 'at_time:' [s]")
+        if self.edge is not None and self.edge > 0.5 * self.length:
+            raise Refusal("two edges are longer than it", "shorten 'edge:' to half the length", ("edge",))
+        if self.adhesion_loss + self.adhesion_fall > 1:
+            raise Refusal("more adhesion is lost than there is", "let both sum to 1", ("adhesion_fall",))
         return self
 
 
