@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from terragrip.vehicle import Vehicle
 
 DBC = Path(__file__).parents[1] / "terragrip.dbc"
-RATE = "10"  # Hz: 18 frames a row on four wheels and more than this is much for a machine's bus
+RATE = "10"  # Hz: nine frames a row on four wheels, which is 5 % of 250 kbit/s
 _MOST = 8  # wheels
 
 _VEHICLE = {
