@@ -206,8 +206,18 @@ def test_refusals(tmp_path: Path, dbc: Path) -> None:
     tractor = write_log(tmp_path / "log.blf", drive(1000, 10.0).frames)
     with pytest.raises(InputError, match="is missing"):
         read(tractor)
+    with pytest.raises(InputError, match="map its signals in a profile: tractor-isobus, ros2-4wd"):
+        read(tractor)
+    with pytest.raises(InputError, match=r"'tractor-isobos' is no file.*did you mean 'tractor-isobus'"):
+        read(tractor, "tractor-isobos")
     with pytest.raises(InputError, match="no such file"):
         read(tractor, "tractor-isobus", dbc=tmp_path / "absent.dbc")
+    wrong = read_table(
+        tractor, databases=(dbc,)
+    )  # a DBC that lacks every message of the log: said, and the table serves
+    assert any(
+        "None of the DBC's messages occurs in the log (Floats, Wheels)" in note for note in wrong.notes
+    )
     (tmp_path / "broken.dbc").write_text("BO_ x\n")
     with pytest.raises(InputError, match="is no DBC that can be read"):
         read(tractor, "tractor-isobus", dbc=tmp_path / "broken.dbc")
@@ -237,5 +247,7 @@ def test_measured_john_deere(shared: Callable[[str], Path]) -> None:
         assert np.nanmax(np.abs(table.columns["WheelBasedVehicleSpeed"])) == 0
         assert any("milliseconds" in note for note in table.notes)
     assert np.nanmax(read_table(folder / "highRPM1.csv").columns["EngineSpeed"]) == 1259.5
-    with pytest.raises(InputError, match="column ground_speed: holds no value"):
+    with pytest.raises(
+        InputError, match='signal GroundBasedMachineSpeed: holds no value: it was sent as "not available"'
+    ):
         read(folder / "idle10sec.csv", "tractor-isobus")

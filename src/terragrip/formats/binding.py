@@ -21,7 +21,15 @@ def bound(profile: Profile, log: LogTable, *, partial: bool = False) -> tuple[Pr
     channels: dict[str, Source] = {}
     for name, origin in profile.channels.items():
         found = next((own for source in origin.chain if (own := _bound(source, log)) is not None), None)
-        if found is not None:
+        silent = (
+            log.clocked and found is not None and not all(_holds(log, column) for column in found.columns)
+        )
+        if silent and not (origin.optional or partial):
+            assert found is not None
+            problem = 'holds no value: it was sent as "not available" or "error" throughout'
+            mend = "name another source in the profile, or join a log that has it (--with)"
+            raise InputError(problem, file=log.source, place=f"signal {', '.join(found.columns)}", mend=mend)
+        if found is not None and not silent:
             channels[name] = found
             if len(origin.chain) > 1 or any("*" in c for c in origin.columns) or len(origin.candidates) > 1:
                 notes.append(f"{name} is from {', '.join(found.columns)}.")

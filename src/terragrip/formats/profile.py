@@ -33,7 +33,7 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import BeforeValidator, Field, field_validator, model_validator
 
 from terragrip.document import Fault, Part, read_yaml, validate
-from terragrip.errors import nearest
+from terragrip.errors import InputError, nearest
 from terragrip.formats.payload import Payload
 from terragrip.recording import Recording
 from terragrip.recording.schema import (
@@ -194,6 +194,11 @@ class Profile(Part):
         own = Path(__file__).with_name("profiles") / f"{path}.yaml"
         if os.fspath(path) in SHIPPED and not Path(path).is_file():
             return validate(cls, read_yaml(own))
+        name = os.fspath(path)
+        if not Path(path).exists() and Path(path).parent == Path() and not Path(path).suffix:
+            close = nearest(name, SHIPPED)
+            mend = f"did you mean {close!r}?" if close else f"those are {', '.join(SHIPPED)}"
+            raise InputError(f"{name!r} is no file, and no profile that comes with Terragrip", mend=mend)
         found = validate(cls, read_yaml(path))
         here = Path(path).parent
         return found.model_copy(update={"dbc": tuple(os.fspath(here / name) for name in found.dbc)})

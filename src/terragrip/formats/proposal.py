@@ -31,10 +31,8 @@ def missing_channels(proposals: Mapping[str, Proposal], has_time: bool) -> list[
             "No drive torque was found: slip, its zero-slip radius, distance and maps of slip can be had; adhesion, soil "
             "resistance, net traction and efficiency cannot, and no soil can be learned."
         )
-    else:
-        said += [
-            f"No drive torque was found for wheel {wheel}: its axle must be undriven." for wheel in without
-        ]
+        return said
+    said += [f"No drive torque was found for wheel {wheel}: its axle must be undriven." for wheel in without]
     if "drawbar_force" not in proposals:
         said.append("No drawbar force was found: the vehicle is taken to tow nothing.")
     if "acceleration_x" not in proposals:
@@ -74,12 +72,14 @@ def profile_text(
         proposal = proposals[channel]
         doubt = f"   # ? {proposal.doubt}" if proposal.doubt else ""
         lines.append(f"  {channel}: {_flow(proposal.entry)}{doubt}")
-    if not wheel_names_in(proposals):
+    if not wheel_names_in(proposals) and "wheel_based_speed" not in proposals:
         lines.append("  # wheel_speed_fl: {from: ???, unit: rad/s}   # needed: one for each wheel")
     if "ground_speed" not in proposals:
         lines.append("  # ground_speed: {from: ???, unit: m/s}   # needed: or derivative_of two positions")
     if not any(channel.startswith("drive_torque_") for channel in proposals):
-        lines.append("  # drive_torque_fl: {from: ???, unit: N m}   # needed for each driven wheel")
+        lines.append(
+            "  # drive_torque_fl: {from: ???, unit: N m}   # of each driven wheel; without, slip alone"
+        )
     return "\n".join(lines) + "\n"
 
 

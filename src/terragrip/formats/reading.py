@@ -125,7 +125,7 @@ def _require(table: LogTable) -> None:
     except InputError as error:
         if not table.clocked:
             raise
-        mend = f"map its signals in a profile ('terragrip inspect' proposes one; {', '.join(SHIPPED)} come with it)"
+        mend = f"map its signals in a profile: {', '.join(SHIPPED)}, or your own ('terragrip inspect' proposes one)"
         raise InputError(error.problem, file=error.file, place=error.place, mend=mend) from error
 
 

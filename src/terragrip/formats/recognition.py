@@ -24,7 +24,7 @@ _ENDS = {"front": "f", "rear": "r", "back": "r"}
 _AXES = {"x": "x", "y": "y", "z": "z"}
 _NOT_MEASURED = {
     *("cmd", "command", "commanded", "set", "setpoint", "target", "desired", "ref", "demand", "std", "var", "cov"),
-    *("temp", "temperature", "voltage", "volt", "status", "state", "id", "count", "index", "idx", "raw"),
+    *("temp", "temperature", "voltage", "volt", "status", "state", "id", "count", "index", "idx", "raw", "engine"),
 }  # fmt: skip
 _TURNING = {"omega", "w", "rpm", "vel", "velocity", "speed", "rps", "wheelspeed", "rotation"}
 _TORQUE = {"torque", "m", "moment", "tq", "trq", "tau"}
