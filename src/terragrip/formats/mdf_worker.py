@@ -27,7 +27,7 @@ def work(path: str, out: Outlet) -> None:
     """Serve one file."""
     import asammdf
 
-    with asammdf.MDF(path) as file:
+    with asammdf.MDF(path, process_bus_logging=False) as file:  # it would read all frames at once
         _serve(file, out)
 
 
