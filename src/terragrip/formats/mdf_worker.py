@@ -27,7 +27,8 @@ def work(path: str, out: Outlet) -> None:
     """Serve one file."""
     import asammdf
 
-    with asammdf.MDF(path, process_bus_logging=False) as file:  # it would read all frames at once
+    options: dict[str, Any] = {"process_bus_logging": False}  # else it reads all frames when it opens a file
+    with asammdf.MDF(path, **options) as file:
         _serve(file, out)
 
 
