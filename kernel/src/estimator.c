@@ -3,6 +3,7 @@
 
 #define TG_JOLT_MEMORY 5 /* s */
 #define TG_SWING ((tg_real)2) /* samples that a jolt lasts */
+#define TG_BATCH 16
 #define TG_LONGEST_WALK 30 /* s of random walk that a gap adds at most: beyond it the ground is simply unknown */
 
 /* ---- the filter ---- */
@@ -308,29 +309,57 @@ static void fill(tg_sample *sample, const double *time, const double *const *in,
     for (int32_t k = 0; k < count; k++) sample->value[given[k]] = (tg_real)in[given[k]][row];
 }
 
+/* Rows are handed over in batches: one row at a time would touch a page of every column each time. */
+typedef struct {
+    double value[TG_OUT_SLOTS][TG_BATCH];
+    int32_t wanted[TG_OUT_SLOTS], columns;
+    size_t first, rows;
+} batch;
+
+static void keep(batch *b, const tg_estimate *estimate)
+{
+    const size_t place = b->rows++;
+    for (int32_t k = 0; k < b->columns; k++) {
+        const int32_t slot = b->wanted[k];
+        b->value[k][place] = slot == TG_OUT_DISTANCE ? estimate->distance : (double)estimate->value[slot]; /* unrounded on the float build */
+    }
+}
+
+static void hand_over(batch *b, double *const *out)
+{
+    for (int32_t k = 0; k < b->columns; k++) memcpy(out[b->wanted[k]] + b->first, b->value[k], b->rows * sizeof(double));
+    b->first += b->rows;
+    b->rows = 0;
+}
+
 tg_status tg_estimator_block(tg_estimator *e, size_t rows, const double *time, const double *const *in, double *const *out,
                              uint8_t *event, size_t *done)
 {
     if (!e || !time || !in || !out || !event || !done) return TG_BAD_ARGUMENT;
     tg_sample sample[2]; /* the next one is filled while this one is worked on: lanes cannot be read right after their parts are written */
     tg_estimate estimate;
-    int32_t given[TG_SLOTS], wanted[TG_OUT_SLOTS], n_given = 0, n_wanted = 0;
+    batch kept;
+    int32_t given[TG_SLOTS], n_given = 0;
+    tg_status status = TG_OK;
     for (int32_t k = 0; k < TG_SLOTS; k++) {
         sample[0].value[k] = sample[1].value[k] = (tg_real)NAN;
         if (in[k]) given[n_given++] = k;
     }
+    kept.columns = 0;
+    kept.first = kept.rows = 0;
     for (int32_t k = 0; k < TG_OUT_SLOTS; k++)
-        if (out[k]) wanted[n_wanted++] = k;
+        if (out[k]) kept.wanted[kept.columns++] = k;
     *done = 0;
     if (rows > 0) fill(&sample[0], time, in, given, n_given, 0);
     for (; *done < rows; ++*done) {
-        size_t row = *done;
+        const size_t row = *done;
         if (row + 1 < rows) fill(&sample[(row + 1) % 2], time, in, given, n_given, row + 1);
-        tg_status status = tg_estimator_update(e, &sample[row % 2], &estimate);
-        if (status != TG_OK) return status;
-        for (int32_t k = 0; k < n_wanted; k++) out[wanted[k]][row] = (double)estimate.value[wanted[k]];
-        if (out[TG_OUT_DISTANCE]) out[TG_OUT_DISTANCE][row] = estimate.distance; /* unrounded on the float build */
+        status = tg_estimator_update(e, &sample[row % 2], &estimate);
+        if (status != TG_OK) break;
         event[row] = (uint8_t)estimate.event;
+        keep(&kept, &estimate);
+        if (kept.rows == TG_BATCH) hand_over(&kept, out);
     }
-    return TG_OK;
+    hand_over(&kept, out);
+    return status;
 }
