@@ -35,18 +35,18 @@ class RimSpeed:
 
 def zero_of(recording: Recording, vehicle: Vehicle, name: str) -> zero_slip.Ratio | None:
     """The zero-slip ratio of a channel in this log."""
-    radius = _radius_of(vehicle, name)
+    radius = _radius_of(vehicle, name, recording.source)
     return zero_slip.lightest(*zero_slip.ratios(recording, name, radius))
 
 
-def _radius_of(vehicle: Vehicle, name: str) -> float:
+def _radius_of(vehicle: Vehicle, name: str, source: str | None) -> float:
     """What takes a channel to m/s by the vehicle file."""
     if name == "wheel_based_speed":
         return 1.0
     wheel = name.removeprefix("wheel_speed_")
     if wheel not in vehicle.wheels:
         mend = f"its wheels are {', '.join(vehicle.wheels)}"
-        raise InputError(f"the vehicle has no wheel {wheel}", place=f"column {name}", mend=mend)
+        raise InputError(f"the vehicle has no wheel {wheel}", file=source, place=f"column {name}", mend=mend)
     return float(wheel_radii(vehicle)[1][vehicle.wheels.index(wheel)])
 
 
@@ -59,7 +59,7 @@ def rim_speeds(
     stated = vehicle.uncertainty.wheel_radius
     for wheel in log.wheels:
         name = f"wheel_speed_{wheel}"
-        radius = _radius_of(vehicle, name)
+        radius = _radius_of(vehicle, name, log.source)
         values = radius * log.channels[name] + _hub(log, vehicle, wheel)
         rims.append(
             RimSpeed(wheel, values, radius * noise[name], radius, _RADIUS if stated is None else stated)

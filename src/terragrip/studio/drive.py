@@ -41,14 +41,6 @@ def spans(labels: npt.NDArray[Any], time: Floats) -> list[dict[str, Any]]:
     return found[:MOST_SPANS]
 
 
-def events(table: Estimates) -> list[dict[str, Any]]:
-    """What happened: kind, start and end [s], why."""
-    return [
-        {"kind": span["name"], "start": span["start"], "end": span["end"], "why": ""}
-        for span in spans(table["event"], table.time)
-    ]
-
-
 def window(
     table: Estimates, recording: Recording | None, names: list[str], start: float, end: float, width: int
 ) -> tuple[bool, Floats, list[Floats]]:

@@ -17,7 +17,7 @@ import numpy as np
 from terragrip import __version__
 from terragrip.errors import InputError
 from terragrip.estimation.engine import EVENTS
-from terragrip.studio.drive import events
+from terragrip.ground.events import events
 
 if TYPE_CHECKING:
     from terragrip.estimation import Estimates
@@ -44,10 +44,7 @@ async def replayed(table: Estimates, speed: float, start: float) -> AsyncIterato
         {"kind": "hello", "version": __version__, "vehicle": table.vehicle.name, "columns": names, "wheels": list(table.wheels),
          "events": list(EVENTS), "replay": {"start": float(table.time[0]), "end": float(table.time[-1])}}
     )  # fmt: skip
-    told = [
-        {"kind": e["kind"], "source": "estimator", "time": e["start"], "text": e["why"]}
-        for e in events(table)
-    ]
+    told = [{"kind": e.kind, "source": "estimator", "time": e.start, "text": e.why} for e in events(table)]
     soils = _soils(table)
     row = int(np.searchsorted(table.time, start))
     loop = asyncio.get_running_loop()

@@ -10,6 +10,7 @@ from fastapi import APIRouter, Query, Response
 
 from terragrip.errors import InputError
 from terragrip.estimation.estimates import Estimates
+from terragrip.ground.events import events
 from terragrip.studio import drive
 from terragrip.studio.api.files import Named, finite
 from terragrip.studio.state import Here, Studio
@@ -50,7 +51,7 @@ def about(studio: Here, path: Named) -> dict[str, Any]:
             "vehicle": table.vehicle.name,
             "radius": dict(zip(table.vehicle.wheels, table.vehicle.wheel_radius.tolist(), strict=True)),
             "notes": list(table.notes),
-            "events": drive.events(table),
+            "events": [event.to_dict() for event in events(table)],
             "soils": drive.spans(table["soil"], table.time) if "soil" in table else [],
             "ground": _ground(studio, path),
         }
