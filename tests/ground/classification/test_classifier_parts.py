@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from sklearn.ensemble import ExtraTreesClassifier
 from sklearn.svm import SVC
 
 from terragrip.ground.classification.channels import Channel
 from terragrip.ground.classification.expert import calibrate, probabilities
+from terragrip.ground.classification.forest import Forest
 from terragrip.ground.classification.kernel_machine import PENALTY, WIDTH, KernelMachine, votes
 from terragrip.ground.classification.training_set import deal
 from terragrip.ground.classification.vibration import band_edges, band_energies
@@ -107,11 +111,45 @@ def test_every_class_is_left_in_training_whatever_fold_is_held_out(listed: list[
             assert (folds == fold).any()
 
 
-def test_calibration_finds_the_slope_that_made_the_labels() -> None:
+def test_calibration_finds_the_slopes_that_made_the_labels() -> None:
+    """Of three parts that are scored, the labels follow the first twice as much as the second, and not the third."""
     random = np.random.default_rng(4)
-    scores = random.uniform(-1, 1, (20000, 3))
-    chances = probabilities(scores, 3.0, np.array([0.5, 0.0, -0.5]))
+    scores = random.uniform(-1, 1, (3, 20000, 3))
+    chances = probabilities(scores, np.array([3.0, 1.5, 0.0]), np.array([0.5, 0.0, -0.5]))
     codes = np.array([random.choice(3, p=row) for row in chances])
-    slope, offsets = calibrate(scores, codes, np.full(len(codes), 1 / len(codes)))
-    assert slope == pytest.approx(3.0, rel=0.05)
+    slopes, offsets = calibrate(scores, codes, np.full(len(codes), 1 / len(codes)))
+    np.testing.assert_allclose(slopes[:2], [3.0, 1.5], rtol=0.05)
+    assert slopes[2] < 0.2  # slopes are positive: none comes near zero only
     assert offsets[0] - offsets[2] == pytest.approx(1.0, abs=0.1)
+
+
+@pytest.mark.parametrize("classes", [2, 5])
+def test_numpy_evaluates_the_forest_as_scikit_learn_does(classes: int) -> None:
+    """Also at features that equal a threshold in single precision, and where one was not measured."""
+    random = np.random.default_rng(classes)
+    codes = np.arange(300) % classes
+    points = random.standard_normal((300, 4)) + codes[:, None]
+    points[:, 1] = np.rint(4 * points[:, 1]) / 4
+    points[::7, 2] = np.nan
+    fresh = random.standard_normal((1200, 4)) + 1.0
+    fresh[:, 1] = np.rint(4 * fresh[:, 1]) / 4
+    fresh[3, 2] = np.nan
+    mean = np.nanmean(points, axis=0)
+    theirs = ExtraTreesClassifier(100, min_samples_leaf=2, class_weight="balanced", random_state=3)
+    theirs.fit(np.where(np.isfinite(points), points, mean), codes)
+    ours = Forest.fit(points, codes, seed=3)
+    expected = theirs.predict_proba(np.where(np.isfinite(fresh), fresh, mean))
+    np.testing.assert_allclose(np.exp(ours.decide(fresh)), expected + 0.01, atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("name", "value"), [("left", 10**6), ("right", 0), ("feature", 9), ("feature", -1), ("roots", -1)]
+)
+def test_nodes_that_make_no_tree_are_refused(name: str, value: int) -> None:
+    random = np.random.default_rng(0)
+    forest = Forest.fit(random.standard_normal((60, 3)), np.arange(60) % 2, seed=0)
+    forest.check()
+    changed = getattr(forest, name).copy()
+    changed[2] = value
+    with pytest.raises(ValueError, match="node"):
+        replace(forest, **{name: changed}).check()

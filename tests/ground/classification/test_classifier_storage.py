@@ -56,7 +56,7 @@ def test_loaded_it_says_exactly_the_same(
 
 def test_the_file_holds_numbers_and_text_only(content: bytes) -> None:
     with np.load(io.BytesIO(content), allow_pickle=False) as archive:
-        assert all(archive[name].dtype.kind in "fu" for name in archive.files)
+        assert all(archive[name].dtype.kind in "fiu" for name in archive.files)
 
 
 def test_a_stored_classifier_needs_no_scikit_learn(content: bytes, tmp_path: Path) -> None:
@@ -123,7 +123,8 @@ def rewritten(content: bytes, path: Path, **changes: object) -> Path:
 @pytest.mark.parametrize(
     ("changes", "said"),
     [
-        ({"version": 2}, "newer\\b|version 2"),
+        ({"version": 1}, "version 1"),
+        ({"version": 3}, "version 3"),
         ({"version": "x"}, "version 'x'"),
         ({"format": "a cake"}, "no ground classifier"),
         ({"classes": ["hard"]}, "damaged"),

@@ -45,8 +45,9 @@ class GroundClassifier:
     ``drive_torque_<wheel>`` in any unit or as ``motor_current_<wheel>``. Sensors may be missing in any of them:
     there is an expert for each set of sensors, and a window goes to the one that uses most of what it holds.
 
-    Method: support vector machines (Boser, Guyon, Vapnik 1992) on features of the window (`features`); probabilities
-    after Platt (1999) from recordings held out, all grounds taken to be equally likely beforehand.
+    Method: support vector machines (Boser, Guyon, Vapnik 1992) on features of the window (`features`), beside them
+    extremely randomised trees (Geurts, Ernst, Wehenkel 2006) where only wheels are measured; probabilities after
+    Platt (1999) from recordings held out, all grounds taken to be equally likely beforehand.
     """
 
     def __init__(
@@ -122,7 +123,7 @@ class GroundClassifier:
             notes.append(
                 "A ground has but one recording: probabilities are learnt within runs and too sure on new ones."
             )
-        self._experts, said = train_experts(training, classes)
+        self._experts, said = train_experts(training, classes, int(random.integers(2**31)))
         notes += said
         self._layout, self._held = layout, held
         self._fitted(classes, training.names, tuple(notes))

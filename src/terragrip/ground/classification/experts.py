@@ -3,13 +3,22 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Sequence
 
 import numpy as np
 import numpy.typing as npt
 
 from terragrip.errors import InputError
 from terragrip.ground.classification.expert import Expert, train
-from terragrip.ground.classification.features import ACCELERATION, GROUND, TORQUE, TURN, families_needed
+from terragrip.ground.classification.features import (
+    ACCELERATION,
+    GROUND,
+    SPEED,
+    TORQUE,
+    TURN,
+    families_needed,
+    of_one_wheel,
+)
 from terragrip.ground.classification.training_set import TrainingSet, measured_families
 
 FEWEST_WINDOWS = 10  # a class
@@ -19,7 +28,9 @@ _STAND_IN_FOLDS = 3
 _MANY = 600  # windows a class, of which one family alone is learnt from every third
 
 
-def train_experts(training: TrainingSet, classes: npt.NDArray[np.generic]) -> tuple[list[Expert], list[str]]:
+def train_experts(
+    training: TrainingSet, classes: npt.NDArray[np.generic], seed: int
+) -> tuple[list[Expert], list[str]]:
     """An expert for each set of sensors in which every class has windows enough, the most features first; and notes.
 
     Raises InputError if there is no such set.
@@ -27,8 +38,8 @@ def train_experts(training: TrainingSet, classes: npt.NDArray[np.generic]) -> tu
     measured = measured_families(training.names, training.features)
     found: list[Expert] = []
     for families in _sensor_sets(training, measured):
-        names = [name for name in training.names if families_needed(name) <= families]
-        columns = [k for k, name in enumerate(training.names) if families_needed(name) <= families]
+        columns = _columns(training.names, families)
+        names = [training.names[k] for k in columns]
         rows = np.flatnonzero(np.all([measured[f] for f in families], axis=0))
         folds = training.folds
         if found:  # stand-ins for the first are kept cheap
@@ -43,7 +54,7 @@ def train_experts(training: TrainingSet, classes: npt.NDArray[np.generic]) -> tu
                 training.groups[rows],
                 renumbered,
             )
-            found.append(train(families, names, *of_rows, threads=min(4, os.cpu_count() or 1)))
+            found.append(train(families, names, *of_rows, threads=min(4, os.cpu_count() or 1), seed=seed))
     if not found:
         counts = np.bincount(training.codes, minlength=len(classes))
         rarest = int(counts.argmin())
@@ -53,6 +64,15 @@ def train_experts(training: TrainingSet, classes: npt.NDArray[np.generic]) -> tu
     unused = frozenset(measured).difference(*(expert.families for expert in found))
     notes = [f"Not measured on every ground, so not used: {', '.join(sorted(unused))}."] if unused else []
     return sorted(found, key=lambda e: (-len(e.features), sorted(e.families))), notes
+
+
+def _columns(names: Sequence[str], families: frozenset[str]) -> list[int]:
+    """The features of a set of sensors; of wheels' speeds and efforts together also those of single wheels, which come last."""
+    fits = [k for k, name in enumerate(names) if families_needed(name) <= families]
+    single = [k for k in fits if of_one_wheel(names[k])]
+    return [k for k in fits if k not in single] + (
+        single if {SPEED, TORQUE} <= families and not families & _BODY else []
+    )
 
 
 def _sensor_sets(training: TrainingSet, measured: dict[str, npt.NDArray[np.bool_]]) -> list[frozenset[str]]:

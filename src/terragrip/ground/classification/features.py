@@ -24,7 +24,9 @@ from terragrip.ground.classification.vibration import (
 )
 from terragrip.ground.classification.wheel_features import (
     FLOOR,
+    ONE_WHEEL,
     Table,
+    each_wheel,
     effort_of,
     log_size,
     motion,
@@ -62,9 +64,11 @@ def features_of(signals: Signals, starts: Floats, layout: Layout) -> Table:
         speeds = _wheels(usable.get(SPEED, {}), starts, layout, SPEED)
         if speeds is not None:
             found |= _named(SPEED, motion(speeds[0], layout.size[SPEED]))
+            found |= _each(SPEED, usable[SPEED], speeds[0], layout)
         torques = _wheels(usable.get(TORQUE, {}), starts, layout, TORQUE)
         if torques is not None:
             found |= _named(TORQUE, effort_of(torques[0], layout.size[TORQUE]))
+            found |= _each(TORQUE, usable[TORQUE], torques[0], layout)
             if speeds is not None:
                 beside = _drive_beside_motion(usable, starts, layout, torques)
                 found |= _named(f"{SPEED}+{TORQUE}", beside)
@@ -85,6 +89,16 @@ def features_of(signals: Signals, starts: Floats, layout: Layout) -> Table:
 def families_needed(feature: str) -> frozenset[str]:
     """The sensor families that a feature rests on, read from its name."""
     return frozenset(feature.partition(": ")[0].split("+"))
+
+
+def of_one_wheel(feature: str) -> bool:
+    """Whether a feature is of one wheel, so that it depends on the wheels' names."""
+    return feature.partition(": ")[2].startswith(ONE_WHEEL)
+
+
+def _each(family: str, channels: dict[str, Channel], values: Floats, layout: Layout) -> Table:
+    wheels = [name.partition("_")[2].partition("_")[2] for name in channels]
+    return _named(family, each_wheel(values, wheels, layout.size[family]))
 
 
 def _named(sensors: str, features: Table) -> Table:

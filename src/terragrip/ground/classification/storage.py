@@ -16,13 +16,14 @@ import terragrip
 from terragrip.errors import InputError
 from terragrip.files import refuse_missing, replacing, unreadable
 from terragrip.ground.classification.classifier import GroundClassifier
-from terragrip.ground.classification.expert import Expert
-from terragrip.ground.classification.features import Layout
+from terragrip.ground.classification.expert import LEVELS, Expert
+from terragrip.ground.classification.features import Layout, of_one_wheel
+from terragrip.ground.classification.forest import Forest
 from terragrip.ground.classification.kernel_machine import KernelMachine
 from terragrip.ground.classification.standardization import Standardization
 
 FORMAT = "terragrip ground classifier"
-VERSION = 1
+VERSION = 2
 
 # Arrays of an expert, with their shapes in terms of features, vectors, pairs, classes.
 _ARRAYS = {
@@ -35,6 +36,15 @@ _ARRAYS = {
     "class_offsets": "k",
     "usual": "22",
     "strange": "s",
+}
+_FOREST = {
+    "centre": "F",
+    "roots": "t",
+    "feature": "n",
+    "threshold": "n",
+    "left": "n",
+    "right": "n",
+    "share": "nk",
 }
 
 
@@ -55,7 +65,7 @@ def save(classifier: GroundClassifier, path: str | os.PathLike[str]) -> None:
             {
                 "families": sorted(e.families),
                 "features": list(e.features),
-                "slope": e.slope,
+                "slopes": e.slopes.tolist(),
                 "width": e.machine.width,
             }
             for e in classifier._experts
@@ -76,6 +86,8 @@ def save(classifier: GroundClassifier, path: str | os.PathLike[str]) -> None:
             expert.strange,
         )
         arrays |= {f"{name}_{number}": array for name, array in zip(_ARRAYS, held, strict=True)}
+        if expert.forest is not None:
+            arrays |= {f"forest_{name}_{number}": getattr(expert.forest, name) for name in _FOREST}
     with replacing(path) as temporary, temporary.open("wb") as stream:
         np.savez_compressed(stream, **arrays)
 
@@ -93,7 +105,7 @@ def load(path: str | os.PathLike[str]) -> GroundClassifier:
             if not isinstance(header, dict) or header.get("format") != FORMAT:
                 raise _foreign(path)
             version = header.get("version")
-            if not isinstance(version, int) or version > VERSION:
+            if version != VERSION:
                 mend = "update terragrip, or train it anew"
                 raise InputError(
                     f"is of version {version!r}, this terragrip reads {VERSION}", file=path, mend=mend
@@ -138,7 +150,12 @@ def _rebuild(header: dict[str, Any], archive: Any) -> GroundClassifier:
         if not features or not known.issuperset(features):
             raise ValueError("an expert's features are not among the classifier's")
         a = {name: archive[f"{name}_{number}"] for name in _ARRAYS}
-        _check_shapes(a, len(features), len(classes))
+        shared = sum(not of_one_wheel(name) for name in features)
+        _check_shapes(a, _ARRAYS, {**_sizes(shared, len(classes)), "v": len(a["support"])})
+        forest = _forest(archive, number, len(features), len(classes)) if shared < len(features) else None
+        slopes = np.array(of_expert["slopes"], dtype=float)
+        if slopes.shape != (1 if forest is None else 2,) or not (slopes > 0).all():
+            raise ValueError("the slopes are not one for each part")
         machine = KernelMachine(
             a["support"], a["weights"], a["offsets"], float(of_expert["width"]), len(classes)
         )
@@ -149,7 +166,8 @@ def _rebuild(header: dict[str, Any], archive: Any) -> GroundClassifier:
                 features,
                 scaling,
                 machine,
-                float(of_expert["slope"]),
+                forest,
+                slopes,
                 a["class_offsets"],
                 a["usual"],
                 a["strange"],
@@ -164,25 +182,32 @@ def _rebuild(header: dict[str, Any], archive: Any) -> GroundClassifier:
     return classifier
 
 
-def _check_shapes(arrays: dict[str, Any], features: int, classes: int) -> None:
-    from terragrip.ground.classification.expert import LEVELS
+def _forest(archive: Any, number: int, features: int, classes: int) -> Forest:
+    a = {name: archive[f"forest_{name}_{number}"] for name in _FOREST}
+    sizes = {"F": features, "t": len(a["roots"]), "n": len(a["feature"]), "k": classes}
+    _check_shapes(a, _FOREST, sizes, whole=("roots", "feature", "left", "right"))
+    forest = Forest(**a)
+    forest.check()
+    return forest
 
-    sizes = {
-        "f": features,
-        "v": len(arrays["support"]),
-        "p": classes * (classes - 1) // 2,
-        "k": classes,
-        "2": 2,
-        "s": len(LEVELS),
-    }
-    for name, letters in _ARRAYS.items():
+
+def _sizes(features: int, classes: int) -> dict[str, int]:
+    return {"f": features, "p": classes * (classes - 1) // 2, "k": classes, "2": 2, "s": len(LEVELS)}
+
+
+def _check_shapes(
+    arrays: dict[str, Any], shapes: dict[str, str], sizes: dict[str, int], whole: tuple[str, ...] = ()
+) -> None:
+    """Raise ValueError on an array that is empty, holds NaN, or has another shape or type."""
+    for name, letters in shapes.items():
         array = arrays[name]
-        if array.shape != tuple(sizes[letter] for letter in letters) or array.dtype.kind != "f":
+        kind = "i" if name in whole else "f"
+        if array.shape != tuple(sizes[letter] for letter in letters) or array.dtype.kind != kind:
             raise ValueError(f"{name} has shape {array.shape}")
+        if not array.size:
+            raise ValueError(f"{name} is empty")
         if np.isnan(array).any():
             raise ValueError(f"{name} holds NaN")
-    if not len(arrays["support"]):
-        raise ValueError("there is no support vector")
 
 
 def _plain(value: Any) -> Any:

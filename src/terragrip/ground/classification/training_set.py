@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from terragrip.ground.classification.channels import FAMILIES, Signals
-from terragrip.ground.classification.features import Layout, families_needed, features_of
+from terragrip.ground.classification.features import Layout, families_needed, features_of, of_one_wheel
 from terragrip.ground.classification.wheel_features import Table
 from terragrip.ground.classification.windows import window_starts
 
@@ -111,7 +111,7 @@ def _own_columns(names: tuple[str, ...]) -> dict[str, list[int]]:
     own: dict[str, list[int]] = {}
     for k, name in enumerate(names):
         needed = families_needed(name)
-        if len(needed) == 1:
+        if len(needed) == 1 and not of_one_wheel(name):
             own.setdefault(next(iter(needed)), []).append(k)
     return own
 

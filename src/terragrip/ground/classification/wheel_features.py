@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 import numpy.typing as npt
 
@@ -10,6 +12,7 @@ from terragrip.ground.classification.vibration import moments
 Floats = npt.NDArray[np.float64]
 Table = dict[str, Floats]
 
+ONE_WHEEL = "at "
 FLOOR = 0.02  # of a channel's usual size: what counts as none
 
 
@@ -56,6 +59,23 @@ def motion(speed: Floats, size: float) -> Table:
         "least spread": log_size(spread[2], size),
         "trend": (pace[:, -ends:].mean(axis=-1) - pace[:, :ends].mean(axis=-1)) / base,
     }
+
+
+def each_wheel(values: Floats, wheels: Sequence[str], size: float) -> Table:
+    """Each wheel by its name; values (windows, wheels, samples). Names begin with `ONE_WHEEL`."""
+    found: Table = {}
+    for k, wheel in enumerate(wheels):
+        own = values[:, k] / size
+        parts = {
+            "mean": own.mean(axis=-1),
+            "least": own.min(axis=-1),
+            "greatest": own.max(axis=-1),
+            "level": np.log(np.abs(own).mean(axis=-1) + FLOOR),
+            "spread": np.log(own.std(axis=-1) + FLOOR),
+            "step": np.log(np.abs(np.diff(own, axis=-1)).mean(axis=-1) + FLOOR),
+        }
+        found |= {f"{ONE_WHEEL}{wheel} {name}": part for name, part in parts.items()}
+    return found
 
 
 def effort_of(torque: Floats, size: float) -> Table:

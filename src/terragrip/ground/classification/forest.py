@@ -1,0 +1,111 @@
+"""Extremely randomised trees that are fitted by scikit-learn and evaluated by NumPy: arrays alone, as `kernel_machine`."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from terragrip.errors import InputError
+
+Floats = npt.NDArray[np.float64]
+Codes = npt.NDArray[np.intp]
+
+_TREES = 100
+_LEAF = 2  # windows
+_DOUBT = 0.01  # added to a probability before its logarithm: no leaf is sure
+
+
+@dataclass(frozen=True)
+class Forest:
+    """All trees' nodes in one list, a child after its parent; a leaf leads to itself.
+
+    ``centre`` (features,) stands where a feature was not measured; ``roots`` (trees,); ``feature``, ``threshold``, ``left``
+    and ``right`` (nodes,); ``share`` (nodes, classes) of each class in a leaf, every class weighing the same.
+    """
+
+    centre: npt.NDArray[np.float32]
+    roots: npt.NDArray[np.int32]
+    feature: npt.NDArray[np.int32]
+    threshold: npt.NDArray[np.float32]
+    left: npt.NDArray[np.int32]
+    right: npt.NDArray[np.int32]
+    share: npt.NDArray[np.float32]
+
+    @classmethod
+    def fit(cls, features: Floats, codes: Codes, seed: int) -> Forest:
+        """Fit to ``features`` (n, features; NaN = not measured) with class ``codes`` (n,) 0..K-1 (Geurts et al. 2006).
+
+        Raises InputError if scikit-learn is missing.
+        """
+        measured = np.isfinite(features)
+        count = np.maximum(measured.sum(axis=0), 1)
+        centre = (np.where(measured, features, 0.0).sum(axis=0) / count).astype(np.float32)
+        trees = [one.tree_ for one in _trees(seed).fit(_filled(features, centre), codes).estimators_]
+        sizes = [tree.node_count for tree in trees]
+        roots = np.r_[0, np.cumsum(sizes)[:-1]].astype(np.int32)
+        own = np.arange(sum(sizes))
+        first = np.repeat(roots, sizes)
+        leaf = np.concatenate([tree.children_left for tree in trees]) < 0
+        left, right = (
+            np.where(leaf, own, first + np.concatenate([getattr(tree, side) for tree in trees]))
+            for side in ("children_left", "children_right")
+        )
+        feature = np.where(leaf, 0, np.concatenate([tree.feature for tree in trees]))
+        share = np.concatenate([tree.value[:, 0] for tree in trees]) * leaf[:, None]
+        share /= np.where(leaf, share.sum(axis=1), 1.0)[:, None]
+        threshold = _rounded_down(np.concatenate([tree.threshold for tree in trees]))
+        whole = (array.astype(np.int32) for array in (feature, left, right))
+        feature, left, right = whole
+        return cls(centre, roots, feature, threshold, left, right, share.astype(np.float32))
+
+    def decide(self, features: Floats) -> Floats:
+        """Log probabilities (n, classes), no class being ruled out, of windows with these features (n, features)."""
+        found = np.empty((len(features), self.share.shape[1]))
+        for begin in range(0, len(features), 1000):  # bounds the memory of a long drive
+            block = _filled(features[begin : begin + 1000], self.centre)
+            rows = np.arange(len(block))[:, None]
+            node = np.broadcast_to(self.roots, (len(block), len(self.roots)))
+            while True:
+                low = block[rows, self.feature[node]] <= self.threshold[node]
+                onward = np.where(low, self.left[node], self.right[node])
+                if np.array_equal(onward, node):
+                    break
+                node = onward
+            found[begin : begin + 1000] = self.share[node].mean(axis=1)
+        return np.log(found + _DOUBT)
+
+    def check(self) -> None:
+        """Raise ValueError on nodes that do not make trees."""
+        own = np.arange(len(self.feature))
+        ends = self.left == own
+        onward = (self.left > own) & (self.right > own) | ends & (self.right == own)
+        inside = (np.maximum(self.left, self.right) < len(own)) & (self.feature >= 0)
+        if not (onward & inside & (self.feature < len(self.centre))).all():
+            raise ValueError("a node leads out of its tree")
+        if not len(self.roots) or self.roots.min() < 0 or self.roots.max() >= len(own):
+            raise ValueError("a root is no node")
+
+
+def _filled(features: Floats, centre: npt.NDArray[np.float32]) -> npt.NDArray[np.float32]:
+    single = features.astype(np.float32)
+    return np.where(np.isfinite(single), single, centre)
+
+
+def _rounded_down(threshold: Floats) -> npt.NDArray[np.float32]:
+    """Single precision that single-precision features compare with as with the double."""
+    single = threshold.astype(np.float32)
+    return np.where(single > threshold, np.nextafter(single, np.float32(-np.inf)), single)
+
+
+def _trees(seed: int) -> Any:
+    try:
+        from sklearn.ensemble import ExtraTreesClassifier
+    except ImportError:
+        mend = "pip install 'terragrip[ground]'"
+        raise InputError("scikit-learn is needed to train a GroundClassifier", mend=mend) from None
+    return ExtraTreesClassifier(
+        _TREES, min_samples_leaf=_LEAF, class_weight="balanced", n_jobs=1, random_state=seed
+    )
