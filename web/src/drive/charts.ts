@@ -87,7 +87,7 @@ export class Charts {
   /** The charts share the room, down to what can be read; then they scroll. */
   private height(): number {
     const many = Math.max(this.plots.length, this.count, 1);
-    return Math.max(Math.floor((this.element.clientHeight - 12) / many) - HEAD, LOWEST);
+    return Math.max(Math.floor((this.element.clientHeight - 34) / many) - HEAD, LOWEST);
   }
 
   private later(): void {

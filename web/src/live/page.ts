@@ -83,7 +83,7 @@ export const page: Page = (main, { notices, query }) => {
   function warn(kind: string, text: string): void {
     warnedAt = feed.ring.now;
     warning.hidden = false;
-    fill(warning, h("strong", {}, WARNING[kind] ?? kind), text ? ` ${text}` : "");
+    fill(warning, h("strong", {}, WARNING[kind] ?? kind), text ? ` ${brief(text)}` : "");
   }
 
   function numbers(): void {
@@ -152,6 +152,11 @@ export const page: Page = (main, { notices, query }) => {
     traces.close();
   };
 };
+
+/** What a driver can read at a glance: without the rule behind it, which the list of events tells. */
+function brief(text: string): string {
+  return text.split(/: the (?:warning|flag)/)[0] ?? text;
+}
 
 function tile(title: string, unit: string): { element: HTMLElement; set: (value: string, more: string) => void } {
   const number = h("span", { class: "big" }, "–");

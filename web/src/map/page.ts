@@ -58,6 +58,7 @@ export const page: Page = (main, { notices, query }) => {
 
   const forgetTheme = onTheme(() => {
     if (map.isStyleLoaded()) map.setPaintProperty("paper", "background-color", color("panel"));
+    if (map.getLayer("track-rim")) map.setPaintProperty("track-rim", "line-color", color("muted"));
     void draw();
   });
 
@@ -98,7 +99,8 @@ export const page: Page = (main, { notices, query }) => {
       return;
     }
     const [time, lon, lat, values] = track.data as [Float64Array, Float64Array, Float64Array, Float64Array | undefined];
-    const [low, high] = values ? spread(values) : [0, 1];
+    // A stuck wheel's slip must not wash out the rest of the scale.
+    const [low, high] = values ? spread(values.filter((_, i) => !eventAt(time[i] as number))) : [0, 1];
     const paint = (i: number): string => {
       const t = time[i] as number;
       if (quantity.value === "soil") return color(soilColor(soilAt(t)));
@@ -144,7 +146,7 @@ export const page: Page = (main, { notices, query }) => {
       pen.fillStyle = SCALE(i / 179);
       pen.fillRect(i, 0, 1, 10);
     }
-    fill(legend, h("span", {}, asked?.title ?? ""), h("span", {}, digits(low * scale), bar, `${digits(high * scale)} ${asked?.unit ?? ""}`), h("span", { class: "hint" }, "5 % to 95 % of the run"));
+    fill(legend, h("span", {}, asked?.title ?? ""), h("span", {}, digits(low * scale), bar, `${digits(high * scale)} ${asked?.unit ?? ""}`), h("span", { class: "hint" }, "5 % to 95 % of the run, rows with events left out"));
   }
 
   function replace(id: string, features: GeoJSON.Feature[], type: "line" | "circle"): void {
@@ -155,6 +157,10 @@ export const page: Page = (main, { notices, query }) => {
       return;
     }
     map.addSource(id, { type: "geojson", data });
+    if (type === "line") {
+      // A rim, so that the dark end of the scale stands out on a dark ground too.
+      map.addLayer({ id: `${id}-rim`, source: id, type: "line", layout: { "line-cap": "round", "line-join": "round" }, paint: { "line-color": color("muted"), "line-width": 8 } });
+    }
     if (type === "line") map.addLayer({ id, source: id, type: "line", layout: { "line-cap": "round", "line-join": "round" }, paint: { "line-color": ["get", "shade"], "line-width": 5 } });
     else map.addLayer({ id, source: id, type: "circle", paint: { "circle-radius": 7, "circle-color": color("paper"), "circle-stroke-width": 3, "circle-stroke-color": color("ink") } });
   }
@@ -220,7 +226,7 @@ export const page: Page = (main, { notices, query }) => {
     const at = placed.corners ?? (await corners(picture, map.getBounds()));
     if (!at) return;
     map.addSource("base", { type: "image", url: new URL(address("basemap/picture", { path: picture }), location.href).href, coordinates: at });
-    map.addLayer({ id: "base", type: "raster", source: "base" }, map.getLayer("track") ? "track" : undefined);
+    map.addLayer({ id: "base", type: "raster", source: "base" }, map.getLayer("track-rim") ? "track-rim" : undefined);
   }
 
   async function reload(): Promise<void> {
