@@ -29,6 +29,7 @@ import terragrip as tg
 from can_frames import START, drive
 from terragrip.errors import InputError
 from terragrip.formats import inspect, read
+from terragrip.formats.mat5 import Array, read_mat5
 from terragrip.formats.reading import read_table
 
 COUNT = 200
@@ -470,6 +471,33 @@ def test_matlab_structure_with_time_and_a_dataset_as_exported(tmp_path: Path) ->
     assert np.allclose(recording["ground_speed"], SPEED)
     assert np.allclose(recording["wheel_speed_rl"], SPEED / 0.2 + 2)
     assert np.allclose(recording["drawbar_force"][::2], 100 * SPEED[::2])
+
+
+@pytest.mark.parametrize("packed", [False, True])
+def test_mat5_agrees_with_scipy(tmp_path: Path, packed: bool) -> None:
+    draws = np.random.default_rng(1000)
+    content = {
+        "matrix": draws.standard_normal((3, 4)),
+        "long": draws.standard_normal((500, 3)),
+        **{kind: np.arange(5, dtype=kind) for kind in ("int8", "uint16", "int32", "uint64", "float32")},
+        "flags": np.array([[True, False]]),
+        "text": "hällo",
+        "struct": {"x": 1.0, "deep": {"y": np.arange(6.0).reshape(2, 3), "name": "q"}},
+        "cell": np.array([1.0, "two", np.arange(3)], dtype=object),
+        "structs": np.array([(1, 2.5), (3, 4.5)], dtype=[("p", "i4"), ("q", "f8")]),
+        "empty": np.empty((0, 3)),
+    }
+    scipy.io.savemat(tmp_path / "log.mat", content, do_compression=packed)
+    found, oracle = read_mat5(tmp_path / "log.mat"), scipy.io.loadmat(tmp_path / "log.mat")
+    for name, value in found.items():
+        if isinstance(value, Array):
+            assert np.array_equal(value.read(), oracle[name]), name
+            assert value.shape == oracle[name].shape
+    assert found["text"] == "hällo"
+    assert np.array_equal(found["struct"]["deep"]["y"].read(), np.arange(6.0).reshape(2, 3))
+    assert [part["q"].read()[0, 0] for part in found["structs"]] == [2.5, 4.5]
+    assert found["cell"][1] == "two"
+    assert set(found) - {"empty"} == set(content) - {"empty"}
 
 
 TABLES = """
