@@ -63,19 +63,20 @@ def motion(speed: Floats, size: float) -> Table:
 
 def each_wheel(values: Floats, wheels: Sequence[str], size: float) -> Table:
     """Each wheel by its name; values (windows, wheels, samples). Names begin with `ONE_WHEEL`."""
-    found: Table = {}
-    for k, wheel in enumerate(wheels):
-        own = values[:, k] / size
-        parts = {
-            "mean": own.mean(axis=-1),
-            "least": own.min(axis=-1),
-            "greatest": own.max(axis=-1),
-            "level": np.log(np.abs(own).mean(axis=-1) + FLOOR),
-            "spread": np.log(own.std(axis=-1) + FLOOR),
-            "step": np.log(np.abs(np.diff(own, axis=-1)).mean(axis=-1) + FLOOR),
-        }
-        found |= {f"{ONE_WHEEL}{wheel} {name}": part for name, part in parts.items()}
-    return found
+    own = values / size
+    parts = {
+        "mean": own.mean(axis=-1),
+        "least": own.min(axis=-1),
+        "greatest": own.max(axis=-1),
+        "level": np.log(np.abs(own).mean(axis=-1) + FLOOR),
+        "spread": np.log(own.std(axis=-1) + FLOOR),
+        "step": np.log(np.abs(np.diff(own, axis=-1)).mean(axis=-1) + FLOOR),
+    }
+    return {
+        f"{ONE_WHEEL}{wheel} {name}": part[:, k]
+        for k, wheel in enumerate(wheels)
+        for name, part in parts.items()
+    }
 
 
 def effort_of(torque: Floats, size: float) -> Table:
