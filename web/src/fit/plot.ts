@@ -71,7 +71,8 @@ export class Plot {
       layer.width = Math.round(width * devicePixelRatio);
       layer.height = Math.round(height * devicePixelRatio);
     }
-    this.redraw("view");
+    for (const layer of [0, 1, 2]) this.stale.add(layer);
+    this.draw(); // at once: the new size has emptied the canvases
   }
 
   private draw(): void {

@@ -45,7 +45,7 @@ export class Traces {
     this.watcher = new ResizeObserver(() => {
       this.canvas.width = this.element.clientWidth * devicePixelRatio;
       this.canvas.height = this.element.clientHeight * devicePixelRatio;
-      this.redraw();
+      this.draw(); // at once: the new size has emptied the canvas
     });
     this.watcher.observe(this.element);
   }
