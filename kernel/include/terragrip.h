@@ -249,7 +249,8 @@ typedef struct { /* when the estimator warns of immobilization; slips are of the
     tg_real looks;                  /* and over how many measurements of the ground speed in a row */
     tg_real slip;                   /* a slip below this, less `confidence` of its SDs, is no sign */
     tg_real confidence;
-    tg_real rise;                   /* by how much slip is above its own mean over about 1 s */
+    tg_real rise;                   /* by how much slip is above its own mean over about 1 s, */
+    tg_real level;                  /* and, less those SDs, above its own mean over 5 s */
     tg_real grip;                   /* adhesion at this slip, over that of the last 5 s, below which the ground gives way */
     tg_real high_slip;              /* beyond this slip a rise alone is a sign */
     tg_real stuck_travel, free_travel; /* ground over rim speed: below the first stuck, free again above the second */

@@ -86,8 +86,8 @@ typedef struct { /* of the estimated soil resistance: low-passed, and the mean s
 } tgi_roughness;
 
 typedef struct { /* the eye on immobilization; means over the driven wheels, along the travel */
-    tg_real slip, slow_slip, rim, slow_rim, adhesion, curve; /* low-passed; curve: 1 - exp(-k slip) */
-    tg_real mean_adhesion, mean_curve, age; /* of the ground so far, over `age` s of looking at most */
+    tg_real slip, middle_slip, slow_slip, rim, slow_rim, adhesion, curve; /* low-passed; curve: 1 - exp(-k slip) */
+    tg_real mean_slip, mean_adhesion, mean_curve, age; /* of the ground so far, over `age` s of looking at most */
     tg_real grip, grip_before; /* adhesion, and what the ground so far would give at this slip, each with a floor */
     tg_real evidence, spinning, pushed; /* s that each has held */
     double time;               /* of the last look */

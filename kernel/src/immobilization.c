@@ -3,7 +3,9 @@
 #include "estimator.h"
 
 #define TG_FAST ((tg_real)0.1)  /* s, low-pass of what is looked at */
+#define TG_MIDDLE ((tg_real)0.3) /* s, low-pass that slip falls below as soon as the vehicle recovers */
 #define TG_SLOW 1               /* s, low-pass of what it is compared with */
+#define TG_BACK 3               /* times as fast the evidence is lost without the signs as it came */
 #define TG_GRIP_FAST ((tg_real)0.2)
 #define TG_GRIP_MEMORY 5        /* s over which the ground's grip is remembered */
 #define TG_LONGEST_LOOK ((tg_real)1.5) /* s between two looks: after more, what was seen is forgotten */
@@ -63,21 +65,22 @@ static void forget_motion(tgi_watch *w)
     w->sinking = w->stuck = w->pushing = 0;
 }
 
-/* Seconds that something holds, and half as fast back: neither a jolt nor a sample decides. */
-static tg_real count_seconds(tg_real seconds, tg_real dt, int32_t holds, tg_real most)
+/* Seconds that something holds, and `back` times as fast back: neither a jolt nor a sample decides. */
+static tg_real count_seconds(tg_real seconds, tg_real dt, int32_t holds, tg_real back, tg_real most)
 {
-    seconds += holds ? dt : -2 * dt;
+    seconds += holds ? dt : -back * dt;
     return seconds < 0 ? 0 : seconds > most ? most : seconds;
 }
 
 /* The wheels go on as commanded, slip rises for a while above what it was, and the ground gives less adhesion for it than before: the
- * wheels dig. Slip beyond `high_slip` needs no such comparison. */
+ * wheels dig. Slip beyond `high_slip` needs no such comparison. After a hit on a root slip falls again: no sign from then on. */
 static int32_t digs(const tg_watch_settings *s, const tgi_watch *w, tg_real doubt, tg_real least_rim)
 {
     const tg_real sure = w->slip - doubt, rise = w->slip - w->slow_slip;
     const int32_t steady = w->rim < TG_FASTER * w->slow_rim + (tg_real)0.02 && w->rim > least_rim;
     const int32_t worse = sure > s->slip && w->grip < s->grip * w->grip_before;
-    return steady && rise > s->rise && (worse || sure > s->high_slip);
+    const int32_t rises = rise > s->rise && w->slip > w->middle_slip && sure - w->mean_slip > s->level;
+    return steady && rises && (worse || sure > s->high_slip);
 }
 
 /* 1 - exp(-k s) of the prototype curve. */
@@ -90,18 +93,20 @@ static void track(tgi_watch *w, const look *l, tg_real confidence, tg_real dt)
 {
     const tg_real curve = curve_at(l->slip - confidence * l->deviation), middle = curve_at(l->slip);
     if (!w->seen) {
-        w->slip = w->slow_slip = l->slip;
+        w->slip = w->middle_slip = w->slow_slip = l->slip;
         w->rim = w->slow_rim = l->rim;
         w->adhesion = l->adhesion;
         w->curve = curve;
     }
     w->seen = 1;
     w->slip += dt / (TG_FAST + dt) * (l->slip - w->slip);
+    w->middle_slip += dt / (TG_MIDDLE + dt) * (l->slip - w->middle_slip);
     w->slow_slip += dt / (TG_SLOW + dt) * (l->slip - w->slow_slip);
     w->rim += dt / (TG_FAST + dt) * (l->rim - w->rim);
     w->slow_rim += dt / (TG_SLOW + dt) * (l->rim - w->slow_rim);
     w->adhesion += dt / (TG_GRIP_FAST + dt) * (l->adhesion - w->adhesion);
     w->curve += dt / (TG_GRIP_FAST + dt) * (curve - w->curve);
+    remember(&w->mean_slip, w->age, dt, TG_GRIP_MEMORY, l->slip);
     remember(&w->mean_adhesion, w->age, dt, TG_GRIP_MEMORY, l->adhesion);
     remember(&w->mean_curve, w->age, dt, TG_GRIP_MEMORY, middle > TG_LEAST_GRIP ? middle : TG_LEAST_GRIP);
     w->age += dt;
@@ -116,7 +121,7 @@ static void judge(tg_estimator *e, const look *l, tg_real dt)
     tgi_watch *w = &e->watch;
     const tg_real least_rim = 3 * e->settings.standstill_speed;
     const int32_t holds = digs(s, w, confidence_at(s, dt) * l->deviation, least_rim) || (w->sinking && w->slip > s->high_slip);
-    w->evidence = count_seconds(w->evidence, dt, holds, 2 * s->duration);
+    w->evidence = count_seconds(w->evidence, dt, holds, TG_BACK, 2 * s->duration);
     w->looks = !holds ? 0 : w->looks < 100 ? w->looks + 1 : 100;
     w->sinking = (w->evidence >= s->duration && w->looks >= (int32_t)s->looks) || (w->sinking && w->evidence > 0);
 
@@ -140,7 +145,7 @@ static void judge_push(tg_estimator *e, const tg_drive *drive, const tg_real *o,
     if (least < 2 * e->settings.noise[TG_DRAWBAR_FORCE]) least = 2 * e->settings.noise[TG_DRAWBAR_FORCE];
     const int32_t bar = e->drawbar.count > 0 && (tg_real)e->direction * drive->calm_drawbar < -least;
     const int32_t unexplained = o[TG_OUT_SOIL_RESISTANCE] + 2 * o[TG_OUT_SOIL_RESISTANCE_STD] < 0;
-    w->pushed = count_seconds(w->pushed, dt, (bar || unexplained) && thrust > s->thrust * weight, s->push_duration);
+    w->pushed = count_seconds(w->pushed, dt, (bar || unexplained) && thrust > s->thrust * weight, 2, s->push_duration);
     w->pushing = w->pushed >= s->push_duration || (w->pushing && w->pushed > 0);
 }
 

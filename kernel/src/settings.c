@@ -20,12 +20,13 @@ static int is_spread(tg_real x)
 static tg_watch_settings default_watch(void)
 {
     tg_watch_settings w;
-    w.duration = (tg_real)0.5;
+    w.duration = (tg_real)0.55;
     w.looks = 3;
-    w.slip = (tg_real)0.1;
+    w.slip = (tg_real)0.08;
     w.confidence = 1;
-    w.rise = (tg_real)0.025;
-    w.grip = (tg_real)0.95;
+    w.rise = (tg_real)0.015;
+    w.level = (tg_real)0.035;
+    w.grip = (tg_real)0.92;
     w.high_slip = (tg_real)0.35;
     w.stuck_travel = (tg_real)0.1;
     w.free_travel = (tg_real)0.4;
@@ -100,7 +101,7 @@ static tg_status check_numbers(const tg_settings *s)
     const tg_real spreads[] = {u->drive_torque_gain, u->drive_torque_gain_common, u->drive_torque_offset, u->drawbar_gain, u->drawbar_offset, u->slope,
                                u->tire_rolling_resistance, u->vertical_load, u->wheel_radius, u->acceleration_bias,
                                s->slope_spread, s->standstill_speed, s->outlier_weight, s->load_filter, s->center_of_gravity_height,
-                               s->hitch_height, s->watch.duration, s->watch.looks, s->watch.slip, s->watch.confidence, s->watch.rise, s->watch.grip,
+                               s->hitch_height, s->watch.duration, s->watch.looks, s->watch.slip, s->watch.confidence, s->watch.rise, s->watch.level, s->watch.grip,
                                s->watch.high_slip, s->watch.stuck_travel, s->watch.free_travel, s->watch.push, s->watch.thrust,
                                s->watch.push_duration};
     const tg_real positive[] = {s->prior_adhesion_std, s->prior_resistance_std, s->gap, s->max_step, s->algebraic_filter,

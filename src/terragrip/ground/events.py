@@ -70,7 +70,8 @@ def _immobilization(estimates: Estimates, rows: NDArray[np.intp]) -> str:
     return (
         f"The wheels begin to dig: within a second slip went from {was:.0%} to {slip:.0%} and ground speed from "
         f"{abs(went):.2f} to {abs(speed):.2f} m/s while the wheels {rim}, and adhesion went from {had:.2f} to {grip:.2f}: "
-        f"the warning comes when slip above {limits['slip']:.0%} rises for {limits['duration']:g} s and brings less than "
+        f"the warning comes when slip above {limits['slip']:.0%} and well above its usual level rises for "
+        f"{limits['duration']:g} s and brings less than "
         f"{limits['grip']:.0%} of the adhesion that the ground before gave at such slip, or rises beyond "
         f"{limits['high_slip']:.0%}."
     )

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from math import exp, isnan
 
 STEEPNESS = 11.36
-FAST, GRIP_FAST, SLOW, MEMORY, LONGEST_LOOK, SELDOM = 0.1, 0.2, 1.0, 5.0, 1.5, 0.15
+FAST, MIDDLE, GRIP_FAST, SLOW, MEMORY, LONGEST_LOOK, SELDOM, BACK = 0.1, 0.3, 0.2, 1.0, 5.0, 1.5, 0.15, 3
 
 
 def curve_at(slip: float) -> float:
@@ -24,6 +24,7 @@ class Watch:
 
     limits: Mapping[str, float]
     age: float = 0.0
+    mean_slip: float = 0.0
     mean_adhesion: float = 0.0
     mean_curve: float = 0.0
 
@@ -50,23 +51,25 @@ class Watch:
         confidence = self.limits["confidence"] * max(1.0, dt / SELDOM)
         sure = curve_at(slip - confidence * sd)
         if self.time is None:
-            self.slip = self.slow = slip
+            self.slip = self.middle = self.slow = slip
             self.rim = self.slow_rim = rim
             self.adhesion, self.curve = adhesion, sure
         self.time = time
         self.slip += dt / (FAST + dt) * (slip - self.slip)
+        self.middle += dt / (MIDDLE + dt) * (slip - self.middle)
         self.slow += dt / (SLOW + dt) * (slip - self.slow)
         self.rim += dt / (FAST + dt) * (rim - self.rim)
         self.slow_rim += dt / (SLOW + dt) * (rim - self.slow_rim)
         self.adhesion += dt / (GRIP_FAST + dt) * (adhesion - self.adhesion)
         self.curve += dt / (GRIP_FAST + dt) * (sure - self.curve)
-        self._learn(dt, adhesion, max(curve_at(slip), 0.05))
+        self._learn(dt, slip, adhesion, max(curve_at(slip), 0.05))
         self._judge(dt, self.slip - confidence * sd, rim, travel)
         return "stuck" if self.stuck else "immobilization" if self.sinking else ""
 
-    def _learn(self, dt: float, adhesion: float, curve: float) -> None:
+    def _learn(self, dt: float, slip: float, adhesion: float, curve: float) -> None:
         if dt > 0:
             gain = dt / (min(MEMORY, self.age) + dt)
+            self.mean_slip += gain * (slip - self.mean_slip)
             self.mean_adhesion += gain * (adhesion - self.mean_adhesion)
             self.mean_curve += gain * (curve - self.mean_curve)
         self.age += dt
@@ -76,9 +79,11 @@ class Watch:
         before = self.mean_adhesion / self.mean_curve * self.curve if self.mean_curve > 0 else self.adhesion
         worse = sure > limits["slip"] and self.adhesion + 0.03 < limits["grip"] * (max(before, 0.0) + 0.03)
         steady = turning and self.rim < 1.12 * self.slow_rim + 0.02
-        digs = steady and self.slip - self.slow > limits["rise"] and (worse or sure > limits["high_slip"])
+        rises = self.slip - self.slow > limits["rise"] and self.slip > self.middle
+        rises = rises and sure - self.mean_slip > limits["level"]
+        digs = steady and rises and (worse or sure > limits["high_slip"])
         digs = digs or (self.sinking and self.slip > limits["high_slip"])
-        change = dt if digs else -2 * dt
+        change = dt if digs else -BACK * dt
         self.evidence = min(max(self.evidence + change, 0.0), 2 * limits["duration"])
         self.looks = self.looks + 1 if digs else 0
         begins = self.evidence >= limits["duration"] and self.looks >= limits["looks"]
