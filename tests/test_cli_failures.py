@@ -129,7 +129,7 @@ def test_interruption_inside_a_command(say: Say, monkeypatch: pytest.MonkeyPatch
 def test_library_warnings_do_not_reach_standard_error(monkeypatch: pytest.MonkeyPatch) -> None:
     code = (
         "import sys, warnings; import terragrip.formats as f; from terragrip.cli import main\n"
-        "def warn(*_): warnings.warn('hm'); raise f.read('missing.csv')\n"
+        "def warn(*_, **__): warnings.warn('hm'); raise f.read('missing.csv')\n"
         "f.inspect = warn; sys.exit(main(['inspect', 'missing.csv']))"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
@@ -161,7 +161,7 @@ def test_a_reader_that_goes_away_is_no_traceback() -> None:
 def test_verbose_logs_to_standard_error_by_structlog() -> None:
     code = (
         "import logging, sys; import terragrip.formats as f; from terragrip.cli import main\n"
-        "def inspect(*_): logging.getLogger('terragrip.formats').info('looking', extra={'rows': 3}); raise f.read('m.csv')\n"
+        "def inspect(*_, **__): logging.getLogger('terragrip.formats').info('looking', extra={'rows': 3}); raise f.read('m.csv')\n"
         "f.inspect = inspect; sys.exit(main(['--verbose', 'inspect', 'm.csv']))"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from conftest import learned
+from ground_library import learned
 from terragrip.estimation import TractionEstimator, estimate
 from terragrip.ground.analysis import Settings, analyse
 from terragrip.ground.live import LiveGround
