@@ -49,7 +49,28 @@ def test_hills_hits_and_stops_are_not_called_stuck():
         kinds = [e.kind for e in events(estimate(result.recording, result.vehicle))]
         assert "stuck" not in kinds
         warned += kinds.count("immobilization")
-    assert warned <= 1  # a hit that leaves half the speed looks like the begin of it
+    assert warned == 0
+
+
+def test_a_hit_that_the_vehicle_recovers_from_is_no_warning_and_one_that_it_does_not_is():
+    limits = watch_limits()
+
+    def told(recovers):
+        watch, flags = Watch(limits), []
+        for k in range(1000):
+            t = 0.01 * k
+            since = max(t - 8.0, 0.0)
+            slip = 0.06 + (0.14 * min(since / 0.3, 1.0))
+            if recovers and since > 0.3:
+                slip = 0.06 + 0.14 * max(1 - (since - 0.3) / 0.6, 0.0)
+            elif since > 0.3:
+                slip += 0.1 * (since - 0.3)
+            flags.append(watch.look(t, slip, 0.01, 0.25, 0.6, 0.6 * (1 - slip)))
+        return flags
+
+    assert set(told(recovers=True)) == {""}
+    late = told(recovers=False)
+    assert 8.0 + limits["duration"] <= 0.01 * late.index("immobilization") < 9.5
 
 
 def test_the_reason_names_signals_thresholds_and_values(soft):
