@@ -68,15 +68,25 @@ def _speed_ratio(recording: Recording, wheel: str, radius: float) -> float | Non
     speed, turning = recording.channels.get("ground_speed"), recording.channels.get(f"wheel_speed_{wheel}")
     if speed is None or turning is None:
         return None
+    pairs = _pairs(recording.time, speed, turning)
+    if pairs is None:
+        return None
+    ground, rim = np.abs(pairs[0]), radius * np.abs(pairs[1])
+    moving = (ground > 0.3 * np.quantile(ground, 0.95)) & (rim > 0.3 * np.quantile(rim, 0.95))
+    moving &= (ground > 0) & (rim > 0)
+    return float(np.median(rim[moving] / ground[moving])) if moving.sum() >= 10 else None
+
+
+def _pairs(time: Floats, speed: Floats, turning: Floats) -> tuple[Floats, Floats] | None:
+    """About `_ENOUGH` pairs of ground speed and wheel speed at one time; None where either has fewer than two values."""
+    few = slice(None, None, max(1, len(time) // _ENOUGH))
+    if np.isfinite(speed[few]).all() and np.isfinite(turning[few]).all() and len(time) > 1:
+        return speed[few], turning[few]
     known, rows = np.flatnonzero(np.isfinite(speed)), np.flatnonzero(np.isfinite(turning))
     if len(known) < 2 or len(rows) < 2:
         return None
     rows = rows[:: max(1, len(rows) // _ENOUGH)]
-    rim = radius * np.abs(turning[rows])
-    ground = np.abs(np.interp(recording.time[rows], recording.time[known], speed[known]))
-    moving = (ground > 0.3 * np.quantile(ground, 0.95)) & (rim > 0.3 * np.quantile(rim, 0.95))
-    moving &= (ground > 0) & (rim > 0)
-    return float(np.median(rim[moving] / ground[moving])) if moving.sum() >= 10 else None
+    return np.interp(time[rows], time[known], speed[known]), turning[rows]
 
 
 def _angle_warnings(recording: Recording) -> list[str]:
