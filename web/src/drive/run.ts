@@ -98,11 +98,21 @@ export function panelsOf(run: Run, wheels: string[]): Panel[] {
     { key: "torque", title: "Drive torque, measured", unit: "N m", traces: wheels.flatMap((w) => measured(`drive_torque_${w}`, w, color(w)).map(solid)) },
     { key: "drawbar", title: "Drawbar force, measured", unit: "N", traces: measured("drawbar_force", "pull", "green").map(solid) },
     { key: "curve", title: "Online curve: a", unit: "–", traces: one("curve_a", "a", "green"), low: 0, high: 2.5 },
-    { key: "nis", title: "Filter's honesty: NIS", unit: "–", traces: one("nis", "NIS", "vermillion"), levels: [{ value: run.wheels.length + 1, label: "expected" }], low: 0, high: 6 * (run.wheels.length + 1) },
+    { key: "nis", title: "Filter's honesty: NIS", unit: "–", traces: one("nis", "NIS", "vermillion"), levels: nisLevels(run.wheels.length + 1), low: 0, high: 6 * (run.wheels.length + 1) },
     { key: "supervisor", title: "Supervisor γ", unit: "–", traces: one("supervisor", "γ", "orange"), low: 0, high: 1.02 },
     { key: "load", title: "Vertical load", unit: "N", traces: run.columns.filter((c) => c.startsWith("vertical_load_")).map((column, i) => ({ column, label: column.slice(14), color: WHEEL_COLORS[i] ?? "blue", band: false, scale: 1 })) },
   ];
   return panels.filter((panel) => panel.traces.length > 0);
+}
+
+/** The expectation of NIS and its 2.5 % and 97.5 % points for `n` channels: chi-squared by Wilson and Hilferty (1931). */
+export function nisLevels(n: number): { value: number; label: string }[] {
+  const point = (z: number): number => n * (1 - 2 / (9 * n) + z * Math.sqrt(2 / (9 * n))) ** 3;
+  return [
+    { value: point(-1.96), label: "2.5 %" },
+    { value: n, label: "expected" },
+    { value: point(1.96), label: "97.5 %" },
+  ];
 }
 
 function solid(trace: Trace): Trace {

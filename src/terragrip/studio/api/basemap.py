@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 from pathlib import Path
 from typing import Any
 
@@ -44,9 +45,8 @@ def picture(studio: Here, path: Named) -> Response:
     with _mercator(target, path) as raster:
         scale = min(1.0, LARGEST / max(raster.width, raster.height))
         shape = max(int(raster.height * scale), 1), max(int(raster.width * scale), 1)
-        bands = raster.read(
-            list(range(1, min(raster.count, 3) + 1)), out_shape=(min(raster.count, 3), *shape)
-        )
+        colors = 3 if raster.src_dataset.count >= 3 else 1  # the map's own transparency comes after them
+        bands = raster.read(list(range(1, colors + 1)), out_shape=(colors, *shape))
         mask = raster.dataset_mask(out_shape=shape)
     return Response(_png(_eight_bits(bands), mask), media_type="image/png")
 
@@ -82,12 +82,10 @@ def _eight_bits(bands: Any) -> Any:
 
 
 def _png(bands: Any, mask: Any) -> bytes:
-    from rasterio.io import MemoryFile
+    from PIL import Image
 
     colors = bands if len(bands) == 3 else np.repeat(bands[:1], 3, axis=0)
-    with MemoryFile() as memory:
-        with memory.open(
-            driver="PNG", width=mask.shape[1], height=mask.shape[0], count=4, dtype="uint8"
-        ) as out:
-            out.write(np.concatenate((colors, mask[None].astype(np.uint8))))
-        return bytes(memory.read())
+    picture = np.moveaxis(np.concatenate((colors, mask[None].astype(np.uint8))), 0, -1)
+    out = io.BytesIO()
+    Image.fromarray(np.ascontiguousarray(picture), "RGBA").save(out, "PNG")
+    return out.getvalue()
