@@ -236,7 +236,7 @@ def test_a_turned_picture_is_calibrated_to_half_a_per_cent_of_the_axis(
     page.wait_for_function(
         "() => window.terragripFit.state.kept.pictures['scan.png'].lines[0].points.length === 3"
     )
-    page.wait_for_timeout(300)
+    page.wait_for_timeout(1000)
     kept = json.loads((folder / "scan.png.picture.json").read_text())
     np.testing.assert_allclose(kept["lines"][0]["points"], wanted, atol=0.005)
 

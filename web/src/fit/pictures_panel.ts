@@ -14,6 +14,7 @@ export class PicturesPanel {
   /** The line that clicks on the plot go to. */
   private digitising: { path: string; line: number } | null = null;
   private files: string[] = [];
+  private sending: Promise<void> = Promise.resolve();
 
   constructor(
     private state: State,
@@ -94,12 +95,21 @@ export class PicturesPanel {
     this.state.kept.pictures[path] = calibration;
     this.state.commit();
     this.state.changed(redraw);
-    await tried(() => send("PUT", "picture", calibration, { path, by: ME }));
+    await this.store(path);
+  }
+
+  /** Send a calibration as it is when its turn comes: two requests at once could arrive the wrong way round. */
+  private store(path: string): Promise<void> {
+    this.sending = this.sending.then(async () => {
+      const now = this.state.kept.pictures[path];
+      if (now) await tried(() => send("PUT", "picture", now, { path, by: ME }));
+    });
+    return this.sending;
   }
 
   /** Send what undo or redo brought back to the server too. */
   keepAll(): void {
-    for (const [path, calibration] of Object.entries(this.state.kept.pictures)) void tried(() => send("PUT", "picture", calibration, { path, by: ME }));
+    for (const path of Object.keys(this.state.kept.pictures)) void this.store(path);
   }
 
   /** A click on the plot: a point of the line being digitised; with shift the nearest is removed. */
