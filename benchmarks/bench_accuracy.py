@@ -21,6 +21,7 @@ from pathlib import Path
 import numpy as np
 
 from calibration_drive import calibrate_machine
+from marked import put
 from oracle import oracle
 from terragrip.estimation import Estimates, estimate
 from terragrip.estimation.consistency import agreement, coverage, mean_absolute_error, nis_consistency
@@ -37,7 +38,7 @@ TARGETS = {
     "faults": {"r2_below_oracle": 0.03, "slip_mae": 0.016, "rho_s_mae": 0.012},
 }
 DOCUMENT = Path(__file__).resolve().parents[1] / "docs/methods.md"
-BEGIN, END = "<!-- made by benchmarks/bench_accuracy.py --write -->", "<!-- end -->"
+BEGIN = "<!-- made by benchmarks/bench_accuracy.py --write -->"
 
 
 @dataclass(frozen=True)
@@ -82,7 +83,7 @@ def main() -> None:
     text = tables(drives, arguments.seeds)
     print("\n" + text)
     if arguments.write:
-        write(text)
+        put(DOCUMENT, BEGIN, text)
         print(f"written to {DOCUMENT}")
 
 
@@ -193,14 +194,6 @@ def _targets(drives: Sequence[Drive]) -> str:
                 f"| rows whose 95 % interval holds {label} | {name} | {share:.1f} % | 90–99 % | {met} |"
             )
     return "\n".join(lines) + "\n"
-
-
-def write(text: str) -> None:
-    """Replace what stands between the marks in docs/methods.md."""
-    old = DOCUMENT.read_text(encoding="utf-8")
-    before, rest = old.split(BEGIN, 1)
-    after = rest.split(END, 1)[1]
-    DOCUMENT.write_text(f"{before}{BEGIN}\n\n{text}\n{END}{after}", encoding="utf-8")
 
 
 if __name__ == "__main__":

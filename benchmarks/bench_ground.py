@@ -26,6 +26,7 @@ from typing import Any
 import numpy as np
 
 from calibration_drive import calibrate_machine
+from marked import put
 from terragrip.estimation import Estimates, calibrate, estimate
 from terragrip.ground.analysis import Settings, analyse
 from terragrip.ground.baseline import adwin_changes
@@ -54,7 +55,7 @@ ALONE = 2
 DRAWN = 50
 DOCUMENT = Path(__file__).resolve().parents[1] / "docs/ground.md"
 PICTURE = DOCUMENT.parent / "images/ground-reliability.svg"
-BEGIN, END = "<!-- made by benchmarks/bench_ground.py --write -->", "<!-- end -->"
+BEGIN = "<!-- made by benchmarks/bench_ground.py --write -->"
 
 
 @dataclass
@@ -125,7 +126,7 @@ def main() -> None:
     text = tables(drives, arguments.seeds)
     print("\n" + text)
     if arguments.write:
-        write(text)
+        put(DOCUMENT, BEGIN, text)
         draw(drives)
         print(f"written to {DOCUMENT} and {PICTURE}")
 
@@ -453,14 +454,6 @@ def draw(drives: Sequence[Drive]) -> None:
         axes[0].set_ylabel("share that was right [–]")
         axes[0].legend(fontsize=8, loc="upper left")
     PICTURE.write_text(on_paper(to_svg(figure)), encoding="utf-8")
-
-
-def write(text: str) -> None:
-    """Replace what stands between the marks in docs/ground.md."""
-    old = DOCUMENT.read_text(encoding="utf-8")
-    before, rest = old.split(BEGIN, 1)
-    after = rest.split(END, 1)[1]
-    DOCUMENT.write_text(f"{before}{BEGIN}\n\n{text}\n{END}{after}", encoding="utf-8")
 
 
 if __name__ == "__main__":

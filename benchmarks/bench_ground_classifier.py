@@ -24,6 +24,7 @@ from sklearn.metrics import balanced_accuracy_score, confusion_matrix, roc_auc_s
 from sklearn.model_selection import StratifiedGroupKFold, StratifiedKFold
 
 import borealtc
+from marked import put
 from terragrip import GroundClassifier
 
 DOCUMENT = Path(__file__).resolve().parents[1] / "docs" / "ground-classifier.md"
@@ -310,9 +311,7 @@ def main() -> None:
         f"all {time.perf_counter() - begin:.0f} s"
     )
     if arguments.write:
-        page = DOCUMENT.read_text(encoding="utf-8")
-        before, after = page.split(BEGIN)[0], page.split(END)[1]
-        DOCUMENT.write_text(f"{before}{BEGIN}\n\n{text}\n\n{END}{after}", encoding="utf-8")
+        put(DOCUMENT, BEGIN, text, END)
 
 
 if __name__ == "__main__":

@@ -19,6 +19,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
+from marked import put
 from terragrip.estimation import estimate
 from terragrip.ground.events import events
 from terragrip.simulation import SimulationResult, simulate
@@ -34,7 +35,7 @@ STOPPED, TURNING = 0.03, 0.15  # m/s of ground and rim
 SPOT = 6.0  # m: here the spot may begin
 LATER = 8.0  # s
 DOCUMENT = Path(__file__).resolve().parents[1] / "docs/events.md"
-BEGIN, END = "<!-- made by benchmarks/bench_immobilization.py --write -->", "<!-- end -->"
+BEGIN = "<!-- made by benchmarks/bench_immobilization.py --write -->"
 
 
 @dataclass
@@ -145,10 +146,7 @@ def main() -> None:
     text = table(tallies)
     print(text)
     if arguments.write:
-        said = f"Seeds {arguments.seeds[0]} to {arguments.seeds[1]}.\n\n{text}"
-        old = DOCUMENT.read_text(encoding="utf-8")
-        before, rest = old.split(BEGIN)
-        DOCUMENT.write_text(f"{before}{BEGIN}\n{said}\n{END}{rest.split(END)[1]}", encoding="utf-8")
+        put(DOCUMENT, BEGIN, f"Seeds {arguments.seeds[0]} to {arguments.seeds[1]}.\n\n{text}")
 
 
 if __name__ == "__main__":

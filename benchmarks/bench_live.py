@@ -31,13 +31,14 @@ import numpy as np
 
 import peer
 import pull
+from marked import put
 from terragrip.estimation import TractionEstimator
 from terragrip.live import read_record
 from terragrip.recording import Recording
 from terragrip.vehicle import Vehicle
 
 DOCUMENT = Path(__file__).resolve().parents[1] / "docs" / "live.md"
-BEGIN, END = "<!-- made by benchmarks/bench_live.py --write -->", "<!-- end -->"
+BEGIN = "<!-- made by benchmarks/bench_live.py --write -->"
 CORES = sorted(os.sched_getaffinity(0))
 
 
@@ -92,9 +93,7 @@ def main() -> None:
     text = "\n".join(lines)
     print(text)
     if options.write:
-        before, _, rest = DOCUMENT.read_text(encoding="utf-8").partition(BEGIN)
-        after = rest.partition(END)[2]
-        DOCUMENT.write_text(f"{before}{BEGIN}\n\n{text}\n\n{END}{after}", encoding="utf-8")
+        put(DOCUMENT, BEGIN, text)
 
 
 def prefer(pid: int = 0) -> None:

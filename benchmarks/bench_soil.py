@@ -21,6 +21,7 @@ from pathlib import Path
 import numpy as np
 from scipy.optimize import curve_fit
 
+from marked import put
 from terragrip.physics.adhesion import CURVES
 from terragrip.report.campaign import estimate_campaign
 from terragrip.report.campaign_soils import fits_of_truth, soils_of_scenario
@@ -30,7 +31,7 @@ from terragrip.soil.fit import FREE, AdhesionCurve
 SEEDS = tuple(range(3000, 3008))
 TARGET_A, TARGET_R2 = 0.05, 0.93
 DOCUMENT = Path(__file__).resolve().parents[1] / "docs/soils.md"
-BEGIN, END = "<!-- made by benchmarks/bench_soil.py --write -->", "<!-- end -->"
+BEGIN = "<!-- made by benchmarks/bench_soil.py --write -->"
 REPETITIONS = 1000
 DRAWS = 100
 """Repetitions that the peer is timed on."""
@@ -182,11 +183,12 @@ def main() -> None:
     said = verdicts(scores)
     print(table(scores), *said, sep="\n")
     if options.write:
-        text = DOCUMENT.read_text(encoding="utf-8")
-        begin, end = text.index(BEGIN) + len(BEGIN), text.index(END)
         seeds = f"Seeds {options.seeds[0]} to {options.seeds[-1]}, {len(options.seeds)} campaigns of 68 runs."
-        body = "\n".join(["", seeds, "", table(scores), "", *(f"- {line}" for line in (*said, *fast)), ""])
-        DOCUMENT.write_text(text[:begin] + body + text[end:], encoding="utf-8")
+        put(
+            DOCUMENT,
+            BEGIN,
+            "\n".join([seeds, "", table(scores), "", *(f"- {line}" for line in (*said, *fast))]),
+        )
 
 
 if __name__ == "__main__":
