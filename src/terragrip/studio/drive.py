@@ -9,7 +9,6 @@ import numpy as np
 import numpy.typing as npt
 
 from terragrip.errors import InputError
-from terragrip.files import sha256
 from terragrip.studio.tables import buckets, extremes
 
 if TYPE_CHECKING:
@@ -93,23 +92,23 @@ def recording_of(studio: Studio, table: Estimates) -> tuple[Path, Recording] | N
     wanted, name = about.get("sha256"), Path(str(about.get("source") or "")).name
     if not wanted or not name:
         return None
-    for item in studio.folder.items():
-        if item.kind != "recording" or Path(item.path).name != name:
-            continue
-        path = studio.folder.file(item.path)
-        if studio.fingerprints.get(path) != wanted:
-            continue
-        try:
-            recording = studio.recordings.get(path)
-        except InputError:  # it needs a profile
-            return None
-        return (path, recording) if len(recording) == len(table) else None
-    return None
+    path = studio.origins.get(wanted)
+    if path is None or not path.is_file() or studio.fingerprints.get(path) != wanted:
+        path = _find(studio, name, wanted)
+    if path is None:
+        return None
+    studio.origins[wanted] = path
+    try:
+        recording = studio.recordings.get(path)
+    except InputError:  # it needs a profile
+        return None
+    return (path, recording) if len(recording) == len(table) else None
 
 
-def fingerprint(path: Path) -> str:
-    """SHA-256 of a file."""
-    return sha256(path)
+def _find(studio: Studio, name: str, wanted: str) -> Path | None:
+    """The recording of a name and a SHA-256 in the folder: a walk through all of it, so not for every request."""
+    paths = (studio.folder.file(item.path) for item in studio.folder.items() if item.kind == "recording")
+    return next((p for p in paths if p.name == name and studio.fingerprints.get(p) == wanted), None)
 
 
 def sample(table: Estimates, recording: Recording | None, time: float) -> dict[str, Any]:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 from fastapi import Depends
 from fastapi.requests import HTTPConnection
 
-from terragrip.studio.drive import fingerprint
+from terragrip.files import sha256
 from terragrip.studio.folder import Folder
 from terragrip.studio.jobs import Jobs
 from terragrip.studio.notices import Notices
@@ -53,7 +53,8 @@ class Studio:
         self.jobs = Jobs(self.notices, self.folder.root)
         self.estimates: Tables[Estimates] = Tables(_estimates)
         self.recordings: Tables[Recording] = Tables(_recording)
-        self.fingerprints: Tables[str] = Tables(fingerprint, 500)
+        self.fingerprints: Tables[str] = Tables(sha256, 500)
+        self.origins: dict[str, Path] = {}  # where the recording of a SHA-256 was found
         self.upload_limit, self.live = upload_limit, live
 
 

@@ -108,7 +108,7 @@ export class Charts {
     }
     const list = [...names];
     const [start, end] = this.range;
-    const width = Math.max(Math.round((this.plots[0]?.box.clientWidth ?? 700) * 1), 100);
+    const width = Math.max(this.plots[0]?.box.clientWidth ?? 700, 100);
     const found = await tried(async () => {
       try {
         return await columns("drive/window", { path: this.path, start, end, width }, list, pending.signal);

@@ -21,7 +21,7 @@ export function drawAxes(ink: Ink, view: View): void {
     ink.text(digits(y), left - 8, py, muted, "end");
   }
   ink.line([left, top, left, height - bottom, width - right, height - bottom], { color: muted });
-  for (const zero of [view.y.low < 0 && view.y.high > 0]) if (zero) ink.line([left, view.py(0), width - right, view.py(0)], { color: muted });
+  if (view.y.low < 0 && view.y.high > 0) ink.line([left, view.py(0), width - right, view.py(0)], { color: muted });
   ink.text("slip s [%]", (left + width - right) / 2, height - 10, ink_, "middle");
   ink.text("adhesion µ (gross traction ratio less ρt) [–]", 14, (top + height - bottom) / 2, ink_, "middle", true);
 }

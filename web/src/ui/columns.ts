@@ -11,7 +11,7 @@ export interface Columns {
 
 export async function columns(path: string, query: Query, many: string[], signal?: AbortSignal): Promise<Columns> {
   const list = many.map((name) => `column=${encodeURIComponent(name)}`).join("&");
-  const answer = await request(`${path}`, query, { signal: signal ?? null }, list);
+  const answer = await request(path, query, { signal: signal ?? null }, list);
   return unpack(await answer.arrayBuffer());
 }
 
