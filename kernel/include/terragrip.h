@@ -204,7 +204,8 @@ enum {
     TG_OUT_CURVE_STD = 97,
     TG_OUT_WHEEL_CURVE = 98, /* + wheel */
     TG_OUT_WHEEL_CURVE_STD = 106,
-    TG_OUT_SLOTS = 114
+    TG_OUT_ADAPTATION = 114, /* + state: a_j of A_k as this row used it; written by the adaptive and the supervised policy only */
+    TG_OUT_SLOTS = 132
 };
 
 typedef enum {
@@ -228,7 +229,7 @@ typedef struct {
     double time;
     double distance;
     int32_t event;          /* tg_event */
-    tg_real value[114];
+    tg_real value[132];
 } tg_estimate;
 
 typedef struct { /* spreads (1 SD) of constants that the data cannot tell; 0 = known */

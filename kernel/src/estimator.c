@@ -249,6 +249,15 @@ static void report(tg_estimator *e, const tg_drive *drive, tg_estimate *out)
     for (int32_t k = 0; k < e->settings.axles; k++) o[TG_OUT_VERTICAL_LOAD + k] = drive->axle_load[k];
 }
 
+/* A_k before this row moves it: with gamma of the row it makes the row's Q (PHYSICS 6). */
+static void tell_adaptation(const tg_estimator *e, tg_real *o)
+{
+    const int32_t policy = e->settings.tuning.policy;
+    if (policy != TG_ADAPTIVE && policy != TG_SUPERVISED) return;
+    for (int32_t j = 0; j < e->filter.states; j++)
+        o[TG_OUT_ADAPTATION + j] = e->filter.policy.adaptation.scale[tgi_row(e->filter.wheels, j)];
+}
+
 /* What blinds comes first, then what stops the vehicle. */
 static int32_t event_of(const tg_estimator *e, const tg_row *row, int32_t gap)
 {
@@ -280,6 +289,7 @@ tg_status tg_estimator_update(tg_estimator *e, const tg_sample *sample, tg_estim
     if (!e->started) e->ground_time = row.time;
     tgi_reckon(e, &drive, course == TG_GO ? dt : 0, &row, q);
     if (e->settings.method == TG_FILTERED) tgi_hold_wheels(e, course == TG_GO ? dt : 0, &row);
+    tell_adaptation(e, out->value);
     if (!go_on(e, &row, &drive, course, dt, q)) gap = 1;
     balance_forces(e, &drive, row.time);
     tgi_watch_roughness(e, course == TG_GO && !gap, dt);

@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from terragrip._kernel import ffi, lib
 from terragrip.errors import InputError
-from terragrip.estimation.methods import Method
+from terragrip.estimation.methods import ADAPTIVE, FILTERED, SUPERVISED, Method
 from terragrip.physics.loads import GRAVITY, lateral_shares
 from terragrip.physics.radius import biderman_deflection, hadekel_deflection, loaded_radius, rolling_radius
 from terragrip.vehicle import BidermanRadius, HadekelRadius, Vehicle, Wheel
@@ -57,8 +57,11 @@ def sample_slots(vehicle: Vehicle) -> dict[str, int]:
     }
 
 
-def estimate_slots(vehicle: Vehicle) -> dict[str, int]:
-    """The place in tg_estimate.value of each column of an estimates table, in the table's order."""
+def estimate_slots(vehicle: Vehicle, *, adaptive: bool = False) -> dict[str, int]:
+    """The place in tg_estimate.value of each column of an estimates table, in the table's order.
+
+    ``adaptive``: with A_k, ``adaptation_<state>`` of each state, which the adaptive and the supervised policy have.
+    """
     slots = {"distance": lib.TG_OUT_DISTANCE}
 
     def take(name: str, slot: int, std: int, place: int = 0) -> None:
@@ -84,6 +87,11 @@ def estimate_slots(vehicle: Vehicle) -> dict[str, int]:
     slots["nis"] = lib.TG_OUT_NIS
     slots["channels"] = lib.TG_OUT_CHANNELS
     slots["supervisor"] = lib.TG_OUT_SUPERVISOR
+    if adaptive:
+        states = [f"{quantity}_{w}" for quantity in ("wheel_speed", "adhesion") for w in vehicle.wheels]
+        states.insert(len(vehicle.wheels), "ground_speed")
+        for j, state in enumerate((*states, "soil_resistance")):
+            slots[f"adaptation_{state}"] = lib.TG_OUT_ADAPTATION + j
     return slots
 
 
@@ -92,7 +100,9 @@ class Engine:
 
     def __init__(self, vehicle: Vehicle, settings: Any) -> None:
         self._slots_in = sample_slots(vehicle)
-        self._slots_out = estimate_slots(vehicle)
+        adaptive = settings.method == FILTERED and settings.tuning.policy in (ADAPTIVE, SUPERVISED)
+        self._slots_out = estimate_slots(vehicle, adaptive=adaptive)
+        self._used = 1 + max(self._slots_out.values())
         self.inputs = tuple(self._slots_in)
         self.outputs = tuple(self._slots_out)
         self._memory = ffi.new("char[]", lib.tg_estimator_size() + 64)
@@ -111,8 +121,8 @@ class Engine:
         self.index_out = self._slots_out
 
     def unpack(self, values: Any) -> list[float]:
-        """All places of a tg_estimate's values as floats."""
-        found: list[float] = ffi.unpack(values, lib.TG_OUT_SLOTS)
+        """The places of a tg_estimate's values that hold columns, and those between, as floats."""
+        found: list[float] = ffi.unpack(values, self._used)
         return found
 
     def update(self) -> int:

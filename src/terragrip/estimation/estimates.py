@@ -41,7 +41,9 @@ class Estimates:
     constants that data cannot tell. ``channels`` is how many channels an update took, the expectation of
     ``nis``. ``supervisor`` is γ of the supervised policy, 1 under `aukf`, 0 under a fixed policy; under `bank`
     it is where the expected scale of the noise stands between the smallest (0) and the largest (1), on a
-    logarithmic scale. ``curve_a`` (vehicle, and of each wheel) is the scale of the adhesion curve known so far
+    logarithmic scale. ``adaptation_<state>`` (of `aukf` and `aukf-fs` alone) are the factors a_j on the diagonal of
+    A_k, one a state of the filter, by which the process noise of the row was Q_k = [I + γ_k (A_k - I)] Q_0
+    (PHYSICS §6). ``curve_a`` (vehicle, and of each wheel) is the scale of the adhesion curve known so far
     (docs/kernel.md). NaN stands only where ``event`` says why: slip and efficiency at ``standstill``, and
     speeds in a ``gap`` before anything was measured.
     """

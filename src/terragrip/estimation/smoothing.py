@@ -33,8 +33,9 @@ def run_smoothed(
     """Filter all rows of the recording forwards, then smooth them backwards.
 
     ``estimator`` must not be `algebraic`; it stands after the last row when this returns. ``nis``,
-    ``supervisor``, ``distance``, loads and events are those of the forward pass. ``block`` rows are held in
-    memory at a time; it does not change the result. ``progress`` counts every row twice: there and back.
+    ``supervisor``, ``adaptation_<state>``, ``distance``, loads and events are those of the forward pass.
+    ``block`` rows are held in memory at a time; it does not change the result. ``progress`` counts every row
+    twice: there and back.
     """
     engine = estimator.engine
     time, columns = prepared(estimator, recording)
