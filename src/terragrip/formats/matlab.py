@@ -1,12 +1,14 @@
 """MATLAB files: version 5, and version 7.3 (HDF5) by h5py; other HDF5 files of plain datasets too.
 
-Tables and timetables are read by mat-io. Other objects of MATLAB classes (timeseries, Dataset,
-datetime) are written in a form that MATLAB keeps to itself: they are named in the notes, with the line that exports them.
+Objects of MATLAB classes (timetable, timeseries, Simulink's Dataset, datetime) are read by mat-io and `matlab_objects`; what
+cannot be read is named in the notes.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from contextlib import ExitStack
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -17,11 +19,11 @@ from terragrip.files import sha256
 from terragrip.formats.boundary import needed, reading
 from terragrip.formats.kind import Databases
 from terragrip.formats.mat5 import Array, Opaque, read_mat5
-from terragrip.formats.matlab_signals import Found, walk, walk_struct
+from terragrip.formats.matlab_objects import IN_RECORDS
+from terragrip.formats.matlab_signals import Found, walk
 from terragrip.formats.signals import Signal, SignalLog
 from terragrip.formats.table import LogTable, Wanted
 from terragrip.formats.worker import Worker
-from terragrip.recording.schema import TIME
 
 Floats = npt.NDArray[np.float64]
 
@@ -29,23 +31,22 @@ _DEEPEST = 12
 _USER_BLOCK, _HDF5 = 512, b"\x89HDF\r\n\x1a\n"
 _DATENUM = (600_000.0, 800_000.0)  # days since year 0: 1642 to 2190
 _DATENUM_1970 = 719_529.0
+_NO_OBJECTS = ("", "function", "sparse", "function_handle")
 
 
 def read_matlab(path: str, wanted: Wanted | None, databases: Databases) -> SignalLog | LogTable:
     """Read a MATLAB file; raises InputError if it is damaged, or holds no numeric column."""
     with open(path, "rb") as stream:
         head = stream.read(_USER_BLOCK + len(_HDF5))
-    found = Found()
     if not (head.startswith((_HDF5, b"MATLAB 7.3")) or head[_USER_BLOCK:] == _HDF5):
         with reading(path, "MATLAB file"):
-            tree = read_mat5(path)
-            return _finished(tree, path, wanted, found)
+            return _with_objects(read_mat5(path), path, wanted)
     h5py = needed("h5py", "a MATLAB 7.3 file")
     with reading(path, "MATLAB file", RuntimeError), h5py.File(path, "r") as file:
         tree = {
             name: _of_hdf5(file, item, 0, h5py) for name, item in file.items() if not name.startswith("#")
         }
-        return _finished(tree, path, wanted, found)
+        return _with_objects(tree, path, wanted)
 
 
 def _of_hdf5(file: Any, item: Any, depth: int, h5py: Any) -> Any:
@@ -74,13 +75,72 @@ def _of_hdf5(file: Any, item: Any, depth: int, h5py: Any) -> Any:
     return None
 
 
+def _with_objects(tree: dict[str, Any], path: str, wanted: Wanted | None) -> SignalLog | LogTable:
+    """The wanted signals of a file's variables; objects of MATLAB classes are read by mat-io, in a process of its own."""
+    names = [name for name, value in tree.items() if _holds_object(value)]
+    if not names:
+        return _finished(tree, path, wanted)
+    with ExitStack() as kept:  # the process lives until its arrays were read
+        try:
+            worker = kept.enter_context(
+                Worker("terragrip.formats.matlab_worker", "matio", path, "MATLAB file")
+            )
+            worker.say(names)
+            read = worker.hear()["tree"]
+        except InputError:
+            return _finished(tree, path, wanted)  # the notes name what is left
+        known = {name: merged(tree[name], _of_worker(part, worker)) for name, part in read.items()}
+        return _finished({**tree, **known}, path, wanted, tuple(names))
+
+
+def _holds_object(value: Any) -> bool:
+    if isinstance(value, Opaque):
+        return value.kind not in _NO_OBJECTS
+    parts = value.values() if isinstance(value, Mapping) else value if isinstance(value, list) else ()
+    return any(_holds_object(part) for part in parts)
+
+
+def _of_worker(node: Any, worker: Worker) -> Any:
+    """What the worker said of a value, its arrays read when they are asked for."""
+    if not isinstance(node, dict):
+        return None
+    if "struct" in node:
+        return {key: _of_worker(part, worker) for key, part in node["struct"].items()}
+    if "list" in node:
+        return [_of_worker(part, worker) for part in node["list"]]
+    if "array" in node:
+        return Array(tuple(node["shape"]), partial(_asked, worker, node["array"]))
+    return Opaque(node["object"]) if "object" in node else node["text"]
+
+
+def _asked(worker: Worker, number: int) -> npt.NDArray[Any]:
+    worker.say(number)
+    return worker.array()
+
+
+def merged(own: Any, objects: Any) -> Any:
+    """What was read here, with what mat-io made of the objects in it."""
+    if isinstance(own, Opaque):
+        return own if objects is None else objects
+    if isinstance(own, Mapping) and isinstance(objects, Mapping):
+        return {key: merged(part, objects.get(key)) for key, part in own.items()}
+    if isinstance(own, list) and isinstance(objects, list) and len(own) == len(objects):
+        return [merged(part, other) for part, other in zip(own, objects, strict=True)]
+    return own
+
+
 def _finished(
-    tree: Mapping[str, Any], path: str, wanted: Wanted | None, found: Found
+    tree: Mapping[str, Any], path: str, wanted: Wanted | None, objects: tuple[str, ...] = ()
 ) -> SignalLog | LogTable:
-    """The wanted signals of what a file holds."""
+    """The wanted signals of what a file holds; ``objects`` are variables with objects, named where nothing is found in them."""
+    found = Found()
     walk(tree, "", found, 0)
-    if any(kind in ("table", "timetable") for kind in found.opaque.values()):
-        _take_tables(path, found)
+    for name in objects:
+        here = [
+            n for n in (*found.signals, *found.opaque) if n == name or n.startswith((f"{name}.", f"{name}["))
+        ]
+        if not here and not isinstance(tree[name], Array | str):
+            found.opaque[name] = "without a series"
     notes = _notes(found)
     if not found.signals and not found.loose:
         problem = "holds no numeric column"
@@ -90,51 +150,36 @@ def _finished(
     if not found.signals:
         return _table_of(found.loose, path, wanted, notes)
     clocks: dict[int, Floats] = {}
+    arrays: dict[int, npt.NDArray[Any]] = {}
     signals = {}
     for name, (clock, values, column) in found.signals.items():
         if wanted is not None and not wanted(name):
             continue
         if id(clock) not in clocks:
             clocks[id(clock)] = _seconds(_read(clock).ravel(), found.scales.get(id(clock), 1.0))
-        array = _read(values)
-        flat = array.reshape(len(clocks[id(clock)]), -1)[:, column or 0]
-        signals[name] = Signal(clocks[id(clock)], np.asarray(flat, dtype=np.float64))
+        if id(values) not in arrays:
+            arrays = {id(values): _read(values)}  # columns of one matrix stand side by side
+        flat = arrays[id(values)].reshape(len(clocks[id(clock)]), -1)[:, column or 0]
+        signals[name] = Signal(clocks[id(clock)], np.array(flat, dtype=np.float64), found.units.get(name))
     return SignalLog(tuple(found.signals), signals, path, sha256(path), tuple(notes))
 
 
-def _take_tables(path: str, found: Found) -> None:
-    """Read tables and timetables by mat-io, in a process of its own; those that it cannot read stay opaque."""
-    names = [
-        name for name, kind in found.opaque.items() if kind in ("table", "timetable") and "." not in name
-    ]
-    try:
-        with Worker("terragrip.formats.matlab_worker", "matio", path, "MATLAB file") as worker:
-            worker.say(names)
-            while "end" not in (message := worker.hear()):
-                columns = {str(column): worker.array() for column in message["columns"]}
-                clock = worker.array() if message["clock"] else None
-                name = str(message["name"])
-                del found.opaque[name]
-                table = {key: _loaded(values) for key, values in columns.items()}
-                walk_struct(table if clock is None else {**table, TIME: _loaded(clock)}, name, found, 1)
-    except InputError:
-        return  # the notes name what is left
-
-
-def _loaded(values: npt.NDArray[Any]) -> Array:
-    return Array(values.shape, lambda: values)
-
-
 def _notes(found: Found) -> list[str]:
-    if not found.opaque:
-        return []
-    shown = [f"{name} ({kind})" if kind else name for name, kind in found.opaque.items()]
-    more = f" and {len(shown) - 6} more" if len(shown) > 6 else ""
-    return [
-        f"Objects that MATLAB alone can read were left out: {', '.join(shown[:6])}{more}; export them there, a timeseries "
-        "by s = struct('Time', x.Time, 'Data', x.Data), a Dataset's element by its Values likewise, a timetable by "
-        "writetimetable(x, 'x.csv')."
-    ]
+    notes = []
+    records = [name for name, kind in found.opaque.items() if kind == IN_RECORDS]
+    if records:
+        notes.append(
+            f"The samples of {', '.join(records[:6])} are in records that MATLAB alone can read, as it saves a Dataset with -v7.3: "
+            f"save it there by save('log.mat', '{records[0].partition('.')[0]}', '-v7')."
+        )
+    shown = [f"{n} ({kind})" if kind else n for n, kind in found.opaque.items() if kind != IN_RECORDS]
+    if shown:
+        more = f" and {len(shown) - 6} more" if len(shown) > 6 else ""
+        notes.append(
+            f"Objects that MATLAB alone can read were left out: {', '.join(shown[:6])}{more}; export them there as arrays or "
+            "structs, a table by writetable(x, 'x.csv')."
+        )
+    return notes
 
 
 def _table_of(loose: Mapping[str, Any], path: str, wanted: Wanted | None, notes: list[str]) -> LogTable:

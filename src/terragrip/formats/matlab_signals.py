@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from terragrip.formats.mat5 import Array, Opaque
+from terragrip.units import is_common
 
 _TIMES = ("time", "t", "tout", "timestamp", "time_s", "t_s", "time_ms", "t_ms", "time_us", "time_ns")
 _SCALES = {"ms": 1e-3, "us": 1e-6, "ns": 1e-9}
@@ -29,6 +30,7 @@ class Found:
 
     signals: dict[str, tuple[Any, Any, int | None]] = field(default_factory=dict)
     scales: dict[int, float] = field(default_factory=dict)
+    units: dict[str, str] = field(default_factory=dict)
     opaque: dict[str, str] = field(default_factory=dict)
     loose: dict[str, Any] = field(default_factory=dict)
 
@@ -59,7 +61,8 @@ def walk_struct(struct: Mapping[str, Any], name: str, found: Found, depth: int) 
         for key, part in struct.items():
             if key != clock_name and _is_numeric(part) and length in part.shape[:2]:
                 plain = key.lower() in _DATA and name
-                _add(found, name if plain else _joined(name, key), clock, part, length)
+                unit = struct[lower["unit"]] if plain and "unit" in lower else None
+                _add(found, name if plain else _joined(name, key), clock, part, length, unit)
     for key, part in struct.items():
         if _is_numeric(part):
             if clock is None and _is_vector(part):
@@ -99,14 +102,19 @@ def _structure_with_time(signals: Any, clock: Any, length: int, name: str, found
     return taken
 
 
-def _add(found: Found, name: str, clock: Any, values: Any, length: int) -> None:
+def _add(found: Found, name: str, clock: Any, values: Any, length: int, unit: Any = None) -> None:
     """Add a vector, or the columns of a matrix with a row for each instant."""
     width = int(np.prod(values.shape)) // max(length, 1)
     if width == 1:
-        found.signals[name] = clock, values, None
+        added: dict[str, int | None] = {name: None}
     elif values.shape[0] == length and len(values.shape) == 2 and width <= _WIDEST:
-        for k in range(width):
-            found.signals[f"{name}[{k}]"] = clock, values, k
+        added = {f"{name}[{k}]": k for k in range(width)}
+    else:
+        return
+    for own, column in added.items():
+        found.signals[own] = clock, values, column
+        if isinstance(unit, str) and is_common(unit):
+            found.units[own] = unit
 
 
 def _own_name(part: Any) -> str:

@@ -1,7 +1,7 @@
-"""Tables and timetables of MATLAB files: ``python -m terragrip.formats.matlab_worker FILE``.
+"""Objects in MATLAB files: ``python -m terragrip.formats.matlab_worker FILE``.
 
-mat-io reads MATLAB's objects with C code that came from SciPy, which a damaged file can crash: so it gets a process that may
-end (`terragrip.formats.worker`). It hears the names of variables and says the numeric columns of each, and its clock.
+mat-io reads MATLAB's objects with code that a damaged file can crash: so it gets a process that may end
+(`terragrip.formats.worker`). It hears the names of variables, says what is in them, and sends the arrays that it is asked for.
 """
 
 from __future__ import annotations
@@ -13,35 +13,34 @@ import numpy as np
 import numpy.typing as npt
 
 from terragrip.formats.boundary import needed
+from terragrip.formats.mat5 import Opaque
+from terragrip.formats.matlab_objects import plain
 from terragrip.formats.worker import Outlet, serve
 
 
 def work(path: str, out: Outlet) -> None:
     """Serve one file."""
-    matio = needed("matio", "a MATLAB table")
+    matio = needed("matio", "an object of MATLAB")
     names = out.hear()
-    for name, frame in matio.load_from_mat(path, variable_names=names).items():
-        if name not in names or not hasattr(frame, "columns"):
-            continue
-        columns = {str(c): frame[c].to_numpy() for c in frame.columns if frame[c].dtype.kind in "fiub"}
-        clock = _seconds(frame.index)
-        out.say({"name": name, "columns": list(columns), "clock": clock is not None})
-        for values in columns.values():
-            out.send(values.astype(np.float64))
-        if clock is not None:
-            out.send(clock)
+    loaded = matio.load_from_mat(path, variable_names=names)
+    arrays: list[npt.NDArray[Any]] = []
+    out.say({"tree": {name: skeleton(plain(loaded.pop(name)), arrays) for name in names if name in loaded}})
+    while (number := out.hear()) is not None:
+        out.send(np.asarray(arrays[number], dtype=np.float64))
 
 
-def _seconds(index: Any) -> npt.NDArray[np.float64] | None:
-    """Row times in seconds, dates since 1970; None of a table without row times."""
-    if index.dtype.kind == "m":
-        return np.asarray(index.to_numpy() / np.timedelta64(1, "s"), dtype=np.float64)
-    if index.dtype.kind == "M":
-        if getattr(index, "tz", None) is not None:
-            index = index.tz_convert("UTC").tz_localize(None)
-        since = index.to_numpy() - np.datetime64(0, "s")
-        return np.asarray(since / np.timedelta64(1, "s"), dtype=np.float64)
-    return None
+def skeleton(value: Any, arrays: list[npt.NDArray[Any]]) -> Any:
+    """A plain value for JSON: what it is, an array by its place in ``arrays``."""
+    if isinstance(value, dict):
+        return {"struct": {key: skeleton(part, arrays) for key, part in value.items()}}
+    if isinstance(value, list):
+        return {"list": [skeleton(part, arrays) for part in value]}
+    if isinstance(value, np.ndarray):
+        arrays.append(value)
+        return {"array": len(arrays) - 1, "shape": list(value.shape)}
+    if isinstance(value, Opaque):
+        return {"object": value.kind}
+    return {"text": value} if isinstance(value, str) else None
 
 
 if __name__ == "__main__":

@@ -104,6 +104,7 @@ class Outlet:
     def send(self, array: npt.NDArray[Any]) -> None:
         """Send an array."""
         np.lib.format.write_array(self, np.ascontiguousarray(array), allow_pickle=False)
+        self._out.flush()
 
     def hear(self) -> Any:
         """What the other side says."""

@@ -1,0 +1,202 @@
+"""What objects of MATLAB classes hold, as plain structs, lists, texts and arrays, so that signals are found in them.
+
+The layouts are those of the classes' own MATLAB code (R2010b to R2023b): ``timeseries`` keeps ``Data_``, and in ``TimeInfo``
+either ``Time_`` or ``Start_``, ``Increment_`` and ``Length``; ``Simulink.SimulationData.Dataset`` saves a struct with ``Storage``,
+whose ``Elements`` are signals, states and the like, each with ``Name`` and ``Values``; ``Simulink.SimulationOutput`` keeps
+``Data``. Any other object is taken as a struct of its properties.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from terragrip.formats.mat5 import Opaque
+
+_DEEPEST = 24
+_MOST = 1 << 16  # parts of all cells, structs and objects
+_TICKS = {"weeks": 604_800.0, "days": 86_400.0, "hours": 3600.0, "minutes": 60.0, "seconds": 1.0,
+          "milliseconds": 1e-3, "microseconds": 1e-6, "nanoseconds": 1e-9}  # fmt: skip
+_SERIES = ("timeseries", "Simulink.Timeseries")
+
+
+@dataclass
+class _Room:
+    """How much deeper a value may go, and how many parts all of it may have: handles can refer to each other."""
+
+    depth: int = _DEEPEST
+    parts: list[int] = field(default_factory=lambda: [_MOST])
+
+    def inner(self) -> _Room:
+        return _Room(self.depth - 1, self.parts)
+
+    def taken(self) -> bool:
+        self.parts[0] -= 1
+        return self.depth < 0 or self.parts[0] < 0
+
+
+def plain(value: Any, room: _Room | None = None) -> Any:
+    """A value as mat-io gives it, without objects: mapping, list, text, numeric array, `Opaque` or None.
+
+    A series becomes ``{"Time": (n,) s, "Data": (n, columns), "Unit": text}``, a Dataset ``{"Elements": [...]}``, a table a
+    mapping of its columns with its row times as ``time`` [s]. What cannot be read is `Opaque` with its class.
+    """
+    room = room or _Room()
+    if room.taken():
+        return None
+    if hasattr(value, "classname") and hasattr(value, "properties"):
+        return _of_object(value, room)
+    if hasattr(value, "columns") and hasattr(value, "index"):
+        return _of_table(value)
+    if isinstance(value, Mapping):
+        return {str(key): plain(part, room.inner()) for key, part in value.items()}
+    if isinstance(value, str):
+        return value
+    return _of_array(np.asarray(value), room) if isinstance(value, np.ndarray | np.generic) else None
+
+
+def _of_array(value: npt.NDArray[Any], room: _Room) -> Any:
+    if value.dtype.names:
+        structs = [
+            {name: plain(part[name], room.inner()) for name in value.dtype.names}
+            for part in value.ravel(order="F")[:_MOST]
+        ]
+        return structs[0] if len(structs) == 1 else structs
+    if value.dtype.kind == "O":
+        return [plain(part, room.inner()) for part in value.ravel(order="F")[:_MOST]]
+    if value.dtype.kind in "UST":
+        texts = [str(text) for text in value.ravel(order="F")[:_MOST]]
+        return texts[0] if len(texts) == 1 else texts or ""
+    if value.dtype.kind in "mM":
+        return _seconds(value)
+    return np.asarray(value) if value.dtype.kind in "fiub" else None
+
+
+def _of_object(value: Any, room: _Room) -> Any:
+    kind, held = str(value.classname), value.properties
+    if isinstance(held, Mapping) and kind in _SERIES:
+        return _series(held) or Opaque(kind)
+    if not isinstance(held, Mapping):
+        return Opaque(kind)
+    if set(held) == {"any"}:  # what the class's own saveobj made of it
+        held = held["any"]
+    content = plain(held, room.inner())
+    if not isinstance(content, Mapping):
+        return content
+    for key in ("Storage", "Storage_"):  # of a Dataset
+        if isinstance(content.get(key), Mapping | Opaque):
+            return content[key]
+    if isinstance(content.get("Elements_", content.get("Elements")), list):
+        return _storage(content, kind)
+    if kind == "Simulink.SimulationOutput":
+        return content.get("Data")
+    if "Values" in content:
+        return {"Name": _name_of(content), "Values": content["Values"]}
+    return content
+
+
+def _storage(content: Mapping[str, Any], kind: str) -> Any:
+    """The elements of a Dataset; those that MATLAB keeps outside of the variable are named by what they are."""
+    elements = content.get("Elements_", content.get("Elements"))
+    if any(_in_records(element) for element in elements):
+        return Opaque(IN_RECORDS)
+    return {"Elements": elements}
+
+
+IN_RECORDS = "Dataset saved with -v7.3"
+"""Stands for a Dataset whose samples are in records of Simulink's own, outside of the variable."""
+
+
+def _in_records(part: Any) -> bool:
+    if not isinstance(part, Mapping):
+        return False
+    return any(key in part for key in ("DataR2", "TimeR2")) or any(
+        _in_records(inner) for inner in part.values()
+    )
+
+
+def _name_of(element: Mapping[str, Any]) -> str:
+    """The name of a Dataset's element; of one without a name, that of its block."""
+    for key in ("Name", "PropagatedName"):
+        if isinstance(element.get(key), str) and element[key].strip():
+            return str(element[key])
+    block = element.get("BlockPath")
+    while isinstance(block, Mapping | list) and block:
+        parts = block if isinstance(block, list) else list(block.values())
+        block = next((part for part in parts if isinstance(part, str | list | Mapping) and part), None)
+    return block.rpartition("/")[2].strip() if isinstance(block, str) else ""
+
+
+def _series(held: Mapping[str, Any]) -> dict[str, Any] | None:
+    about = _properties(held.get("TimeInfo"))
+    time = _times(held, about)
+    data = next((d for d in map(_numeric, (held.get("Data_"), held.get("Data"))) if d is not None), None)
+    if time is None or data is None:
+        return None
+    count = len(time)
+    if data.ndim == 2 and data.shape[0] == count:
+        rows = data
+    elif data.shape[-1] == count:
+        rows = np.moveaxis(data, -1, 0).reshape(count, -1)
+    else:
+        return None
+    found: dict[str, Any] = {"Time": time, "Data": rows}
+    unit = plain(_properties(held.get("DataInfo")).get("Units"))
+    if isinstance(unit, Mapping):
+        unit = unit.get("Name")  # a Simulink.SimulationData.Unit
+    return found | ({"Unit": unit} if isinstance(unit, str) and unit.strip() else {})
+
+
+def _times(held: Mapping[str, Any], about: Mapping[str, Any]) -> npt.NDArray[np.float64] | None:
+    """The instants (n,) [s] of a series, written out or as a regular clock."""
+    text = plain(about.get("Units"))
+    tick = _TICKS.get(text.strip().lower(), 1.0) if isinstance(text, str) else 1.0
+    written = (about.get("Time_"), held.get("Time_"), held.get("Time"))
+    time = next((t for t in map(_numeric, written) if t is not None), None)
+    if time is not None:
+        return np.asarray(time, dtype=np.float64).ravel() * tick
+    start, step, count = (_scalar(about.get(key)) for key in ("Start_", "Increment_", "Length"))
+    if start is None or step is None or count is None or not 0 < count < 1e10:
+        return None
+    data = next((d for d in map(_numeric, (held.get("Data_"), held.get("Data"))) if d is not None), None)
+    if data is None or int(count) not in data.shape:
+        return None  # a damaged length would ask for any memory
+    return np.asarray((start + step * np.arange(int(count))) * tick, dtype=np.float64)
+
+
+def _properties(value: Any) -> Mapping[str, Any]:
+    held = getattr(value, "properties", value)
+    return held if isinstance(held, Mapping) else {}
+
+
+def _numeric(value: Any) -> npt.NDArray[Any] | None:
+    if isinstance(value, np.ndarray) and value.dtype.kind in "fiub" and value.size:
+        return np.asarray(value)
+    return None
+
+
+def _scalar(value: Any) -> float | None:
+    array = _numeric(value) if isinstance(value, np.ndarray) else None
+    return float(array.ravel()[0]) if array is not None and np.isfinite(array.ravel()[0]) else None
+
+
+def _of_table(frame: Any) -> dict[str, Any]:
+    columns: dict[str, Any] = {
+        str(name): frame[name].to_numpy() for name in frame.columns if frame[name].dtype.kind in "fiub"
+    }
+    index = frame.index
+    if getattr(index, "tz", None) is not None:
+        index = index.tz_convert("UTC").tz_localize(None)
+    if index.dtype.kind in "mM":
+        columns["time"] = _seconds(index.to_numpy())
+    return columns
+
+
+def _seconds(value: npt.NDArray[Any]) -> npt.NDArray[np.float64]:
+    """Spans in seconds, dates since 1970; a missing one is NaN."""
+    since = value - np.datetime64(0, "s") if value.dtype.kind == "M" else value
+    return np.where(np.isnat(value), np.nan, since / np.timedelta64(1, "s")).astype(np.float64)
