@@ -37,6 +37,31 @@ def fill(folder: Path, scenario: str = "multi2", seed: int = 0) -> None:
     soils_of([folder / f"{scenario}-estimates.parquet"]).library().write(folder / "soils.json")
 
 
+def fill_long(folder: Path, rows: int, scenario: str = "multi2", seed: int = 0) -> str:
+    """Recording and estimates of one simulated run driven over and over until there are `rows`; returns the estimates' name."""
+    import numpy as np
+    import polars as pl
+
+    import terragrip as tg
+    from terragrip.simulation import Scenario
+
+    made = tg.simulate(Scenario.load(scenario), seed)
+    made.save(folder)
+    (folder / "truth.parquet").unlink()
+    (folder / "true_parameters.json").unlink()
+    once = pl.read_parquet(folder / "recording.parquet")
+    (folder / "recording.parquet").unlink()
+    times = once["time"].to_numpy()
+    lap = times[-1] - times[0] + 0.01
+    laps = -(-rows // len(once))
+    time = np.concatenate([times + k * lap for k in range(laps)])[:rows]
+    long = pl.concat([once] * laps)[:rows].with_columns(pl.Series("time", time))
+    long.write_parquet(folder / "long.parquet")
+    table = tg.estimate(tg.read(folder / "long.parquet"), tg.Vehicle.load(folder / "vehicle.yaml"))
+    table.write(folder / "long-estimates.parquet")
+    return "long-estimates.parquet"
+
+
 @contextlib.contextmanager
 def studio(folder: Path) -> Iterator[tuple[str, int]]:
     """Serve the folder; gives the address and the process's number."""

@@ -306,6 +306,40 @@ def test_drive_zooms_brushes_and_explains_a_sample(page: Any, served: Served) ->
     page.click("text=Panels")
     page.check("text=Filter's honesty: NIS")
     page.wait_for_selector('[aria-label="Filter\'s honesty: NIS over time"]')
+    page.focus(".charts")
+    shown = "() => window.terragripDrive.charts.range"
+    before = page.evaluate(shown)
+    page.keyboard.press("ArrowRight")
+    after = page.evaluate(shown)
+    assert after[0] - before[0] == pytest.approx(0.1 * (before[1] - before[0]))
+    assert after[1] - after[0] == pytest.approx(before[1] - before[0])
+    page.keyboard.press("Home")
+    assert page.evaluate(shown) == page.evaluate("() => window.terragripDrive.charts.whole")
+
+
+def test_drive_draws_what_the_filter_adapts(page: Any, served: Served, folder: Path) -> None:
+    import terragrip as tg
+
+    recording, vehicle = tg.read(folder / "recording.parquet"), tg.Vehicle.load(folder / "vehicle.yaml")
+    tg.estimate(recording, vehicle, "aukf-fs").write(folder / "adaptive.parquet")
+    page.goto(f"{served.url}/#/drive?path=adaptive.parquet")
+    page.wait_for_selector(".charts[data-rows]")
+    page.click("text=Panels")
+    page.check("text=Adaptation A")
+    panel = page.wait_for_selector('[aria-label="Adaptation A over time"]')
+    assert [text.strip() for text in panel.query_selector(".legend").inner_text().split("\n")] == [
+        "µ rl", "µ rr", "ρs", "ω rl", "ω rr", "v",
+    ]  # fmt: skip
+    drawn = """() => {
+      const canvas = [...document.querySelectorAll(".chart")].at(-1).querySelector("canvas");
+      const ink = getComputedStyle(document.documentElement).getPropertyValue("--purple").trim();
+      const rgb = [1, 3, 5].map((k) => parseInt(ink.slice(k, k + 2), 16));
+      const { data } = canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height);
+      let count = 0;
+      for (let i = 0; i < data.length; i += 4) if (rgb.every((c, k) => Math.abs(data[i + k] - c) < 40)) count++;
+      return count;
+    }"""
+    page.wait_for_function(f"() => ({drawn})() > 200")  # the right rear wheel's trace
 
 
 def test_a_live_replay_follows_pauses_and_recovers(page: Any, served: Served) -> None:

@@ -12,9 +12,11 @@ import pytest
 from fastapi.testclient import TestClient
 from hypothesis import given
 from hypothesis import strategies as st
+from scipy.stats import chi2
 
 from terragrip.estimation import Estimates
-from terragrip.studio.tables import buckets, extremes
+from terragrip.studio.shown import Shown, consistency
+from terragrip.studio.tables import Extremes, are_long, buckets, extremes
 
 RUN = "estimates.parquet"
 
@@ -27,7 +29,7 @@ def unpack(content: bytes) -> dict[str, Any]:
 
 
 def window(client: TestClient, **query: Any) -> dict[str, Any]:
-    answer = client.get("/api/drive/window", params={"path": RUN, **query})
+    answer = client.get("/api/drive/window", params={"path": RUN, "width": 1000, **query})
     assert answer.status_code == 200, answer.text
     return unpack(answer.content)
 
@@ -52,6 +54,87 @@ def test_buckets_keep_the_extremes_of_what_is_shown(
     shown = column[starts[0] : starts[-1]]
     np.testing.assert_array_equal(np.fmin.reduce(low), np.fmin.reduce(shown))
     np.testing.assert_array_equal(np.fmax.reduce(high), np.fmax.reduce(shown))
+
+
+@given(
+    seed=st.integers(0, 2**32 - 1),
+    width=st.integers(1, 12),
+    part=st.tuples(st.floats(0, 1), st.floats(0, 1)),
+    unknown=st.floats(0, 1),
+)
+def test_long_buckets_from_blocks_are_those_from_rows(
+    seed: int, width: int, part: tuple[float, float], unknown: float
+) -> None:
+    rng = np.random.default_rng(seed)
+    time = np.cumsum(rng.exponential(size=4000) ** 6)  # with long gaps
+    column = np.where(rng.random(4000) < unknown, np.nan, rng.standard_normal(4000))
+    start, end = (x * time[-1] for x in sorted(part))
+    starts = buckets(time, start, end, width)
+    if not are_long(int(starts[-1] - starts[0]), width) or len(starts) < 3:
+        return
+    rows = column[starts[0] : starts[-1]]
+    expected = extremes(rows, starts - starts[0])
+    found = Extremes(column).of(column.__getitem__, starts)
+    np.testing.assert_array_equal(found, expected)
+
+
+def test_a_long_run_shows_every_extreme_whatever_the_window(made: Path) -> None:
+    """The run driven over and over, 300 000 rows: what a window shows against its rows looked at one by one."""
+    short = Estimates.read(made / RUN)
+    laps = -(-300_000 // len(short))
+    time = np.concatenate([short.time + k * (short.time[-1] + 0.01) for k in range(laps)])
+    columns = {name: np.tile(short[name], laps) for name in ("slip_rr", "slip_rr_std", "ground_speed")}
+    table = Estimates(time, columns, np.tile(short.event_codes, laps), {}, short.about)
+    shown = Shown(table)
+    for start, end in ((0.0, time[-1]), (301.7, 2405.0), (1000.0, 1010.0)):
+        cut, at, (slip, high) = shown.window(None, ["slip_rr", "slip_rr:high"], start, end, 200)
+        assert cut
+        assert len(at) <= 400
+        assert np.all(np.diff(at) >= 0)
+        inside = (time >= start) & (time <= end)
+        edges = np.flatnonzero(inside)[[0, -1]] + (-1, 1)
+        wide = slice(max(edges[0], 0), edges[1] + 1)
+        assert np.nanmin(slip) == np.nanmin(columns["slip_rr"][wide])
+        assert np.nanmax(slip) == np.nanmax(columns["slip_rr"][wide])
+        limit = columns["slip_rr"] + 1.959964 * columns["slip_rr_std"]
+        assert np.nanmax(high) == np.nanmax(limit[wide])
+
+
+def test_nis_is_judged_by_chi_squared_of_the_channels_taken() -> None:
+    """Rows of an honest filter with four or five channels, or none: the mean is about 1, 95 % of it in the band."""
+    rng = np.random.default_rng(5)
+    time = np.arange(0, 2000, 0.1)
+    channels = rng.choice([0, 4, 5], size=len(time))
+    honest = np.where(
+        channels > 0, rng.chisquare(np.maximum(channels, 1)), 7.0
+    )  # without a channel it says nothing
+    judged = consistency(time, honest, channels.astype(float))
+    within = (judged["low"] <= judged["mean"]) & (judged["mean"] <= judged["high"])
+    assert 0.94 < within.mean() < 0.96
+    assert np.nanmean(judged["mean"]) == pytest.approx(1, abs=0.02)
+    too_sure = consistency(time, 2 * honest, channels.astype(float))
+    assert np.mean(too_sure["mean"] > too_sure["high"]) > 0.8
+    row = 5000
+    near = np.abs(time - time[row]) <= 0.5 + 1e-9
+    degrees = channels[near].sum()
+    assert judged["mean"][row] == pytest.approx(honest[near & (channels > 0)].sum() / degrees)
+    assert judged["high"][row] == pytest.approx(chi2.ppf(0.975, degrees) / degrees)
+    silent = consistency(time, honest, np.zeros(len(time)))
+    assert np.isnan([silent["mean"], silent["low"], silent["high"]]).all()
+
+
+def test_the_filters_honesty_is_shown_of_an_adaptive_method(client: TestClient, folder: Path) -> None:
+    import terragrip as tg
+
+    recording, vehicle = tg.read(folder / "recording.parquet"), tg.Vehicle.load(folder / "vehicle.yaml")
+    table = tg.estimate(recording.select(slice(0, 500)), vehicle, "aukf-fs")
+    table.write(folder / "adaptive.parquet")
+    about = client.get("/api/drive", params={"path": "adaptive.parquet"}).json()
+    wanted = ["adaptation_adhesion_rr", "adaptation_soil_resistance", "supervisor", "nis:mean", "nis:low"]
+    assert {name.partition(":")[0] for name in wanted} <= set(about["columns"])
+    shown = window(client, path="adaptive.parquet", column=wanted, start=table.time[0], end=table.time[-1])
+    np.testing.assert_array_equal(shown["adaptation_adhesion_rr"], table["adaptation_adhesion_rr"])
+    assert "adaptation_adhesion_rr" not in client.get("/api/drive", params={"path": RUN}).json()["columns"]
 
 
 def test_a_whole_run_is_cut_and_a_short_window_is_not(client: TestClient, folder: Path) -> None:
@@ -98,7 +181,8 @@ def test_another_recording_of_that_name_is_not_taken_for_it(client: TestClient, 
     "query",
     [
         {"column": "nothing"},
-        {"column": "nis:low"},
+        {"column": "supervisor:low"},
+        {"column": "slip_rr:mean"},
         {"column": "slip_rr:middle"},
         {"column": "slip_rr", "end": -1},
         {"column": "slip_rr", "start": "nan"},

@@ -9,7 +9,6 @@ import numpy as np
 import numpy.typing as npt
 
 from terragrip.errors import InputError
-from terragrip.studio.tables import buckets, extremes
 
 if TYPE_CHECKING:
     from terragrip.estimation import Estimates
@@ -18,9 +17,6 @@ if TYPE_CHECKING:
 
 Floats = npt.NDArray[np.float64]
 
-LEVEL = 1.959964
-"""Standard deviations of a 95 % interval."""
-MEASURED = "measured:"
 SPAN = 0.5
 """Seconds before and after a sample that `why` compares."""
 MOST_SPANS = 2000
@@ -38,52 +34,6 @@ def spans(labels: npt.NDArray[Any], time: Floats) -> list[dict[str, Any]]:
         if labels[a]
     ]
     return found[:MOST_SPANS]
-
-
-def window(
-    table: Estimates, recording: Recording | None, names: list[str], start: float, end: float, width: int
-) -> tuple[bool, Floats, list[Floats]]:
-    """Columns between two times, cut to `width` buckets: (whether cut, time, columns), all of one length.
-
-    A name is a column, its 95 % limit (``slip_rl:low``, ``slip_rl:high``), or a channel of the recording (``measured:ground_speed``).
-    Where it is cut, a bucket is two points: its smallest and its largest value, so that no spike is lost. Raises InputError on a name
-    that is not there.
-    """
-    starts = buckets(table.time, start, end, width)
-    first, last = int(starts[0]), int(starts[-1])
-    cut = len(starts) - 1 < last - first
-    found = []
-    for name in names:
-        values, side = _values(table, recording, name)
-        if not cut:
-            found.append(np.asarray(values[first:last], dtype=np.float64))
-            continue
-        low, high = extremes(values, starts)
-        pair = {"low": (low, low), "high": (high, high)}.get(side, (low, high))
-        found.append(np.stack(pair, axis=1).ravel())
-    if not cut:
-        return False, table.time[first:last], found
-    begin = table.time[starts[:-1]]
-    following = np.r_[begin[1:], table.time[last - 1]]
-    return True, np.stack((begin, (begin + following) / 2), axis=1).ravel(), found
-
-
-def _values(table: Estimates, recording: Recording | None, name: str) -> tuple[Floats, str]:
-    if name.startswith(MEASURED):
-        channel = name.removeprefix(MEASURED)
-        if recording is None or channel not in recording.channels:
-            raise InputError("is not in the recording", place=f"column {name}")
-        return recording.channels[channel], ""
-    column, _, side = name.partition(":")
-    if column not in table.columns or side not in ("", "low", "high"):
-        raise InputError("is not in the estimates", place=f"column {name}")
-    values = table.columns[column]
-    if not side:
-        return values, ""
-    if f"{column}_std" not in table.columns:
-        raise InputError("has no interval", place=f"column {name}")
-    spread = LEVEL * table.columns[f"{column}_std"]
-    return (values - spread if side == "low" else values + spread), side
 
 
 def recording_of(studio: Studio, table: Estimates) -> tuple[Path, Recording] | None:

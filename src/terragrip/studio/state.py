@@ -13,6 +13,7 @@ from terragrip.files import sha256
 from terragrip.studio.folder import Folder
 from terragrip.studio.jobs import Jobs
 from terragrip.studio.notices import Notices
+from terragrip.studio.shown import Shown
 from terragrip.studio.tables import Tables
 
 if TYPE_CHECKING:
@@ -52,6 +53,7 @@ class Studio:
         self.notices = Notices(self.folder)
         self.jobs = Jobs(self.notices, self.folder.root)
         self.estimates: Tables[Estimates] = Tables(_estimates)
+        self.shown: Tables[Shown] = Tables(lambda path: Shown(self.estimates.get(path)))
         self.recordings: Tables[Recording] = Tables(_recording)
         self.fingerprints: Tables[str] = Tables(sha256, 500)
         self.origins: dict[str, Path] = {}  # where the recording of a SHA-256 was found

@@ -6,10 +6,19 @@ import { columns } from "../ui/columns";
 import { digits, fill, h } from "../ui/dom";
 import { tried } from "../ui/notes";
 import { color, onTheme } from "../ui/theme";
+import { bands, columnsOfBuckets } from "./buckets";
+import { hearKeys, hearPointers, type Range } from "./gestures";
 import { EVENT_COLORS, soilColor, type Panel, type Run } from "./run";
 
 const SYNC = "drive";
 const [LOWEST, HEAD] = [116, 26];
+/** Rows are fetched for more than is shown, this share of it on either side, so that a pan finds them there. */
+const MARGIN = 0.5;
+/** Rows fetched for more than so many times what is shown are too coarse. */
+const COARSE = 3;
+const SOON = 40; // ms
+const LINE = uPlot.paths.linear?.() as uPlot.Series.PathBuilder;
+const MARKS = [0.05, 0.2, 1, 5, 50]; // of a logarithmic axis
 
 export class Charts {
   readonly element = h("div", { class: "charts" });
@@ -23,6 +32,7 @@ export class Charts {
   private run: Run | null = null;
   private path = "";
   private pending: AbortController | null = null;
+  private fetched: { range: Range; cut: boolean; width: number } | null = null;
   private timer = 0;
   private forget: () => void;
   private watcher: ResizeObserver;
@@ -34,6 +44,12 @@ export class Charts {
       this.later();
     });
     this.watcher.observe(this.element);
+    hearKeys(this.element, this);
+  }
+
+  /** All times of the run. */
+  get whole(): Range {
+    return this.run ? [this.run.start, this.run.end] : [0, 1];
   }
 
   close(): void {
@@ -72,10 +88,13 @@ export class Charts {
   private build(panels: Panel[]): void {
     for (const { plot } of this.plots) plot.destroy();
     fill(this.element);
+    this.pending?.abort();
+    this.pending = this.fetched = null;
     this.count = panels.length;
     this.plots = panels.map((panel, i) => {
-      const legend = h("div", { class: "legend" }, panel.traces.map((t) => h("span", {}, h("i", { class: `swatch ${t.color}` }), t.label)));
-      const box = h("div", { class: "chart", role: "img", "aria-label": `${panel.title} over time` }, h("div", { class: "chart-head" }, h("h3", {}, `${panel.title} [${panel.unit}]`), legend));
+      const legend = h("div", { class: "legend" }, panel.traces.map((t) => h("span", {}, h("i", { class: `swatch ${t.color}${t.dash ? " dashed" : ""}` }), t.label)));
+      const about = panel.about ? h("span", { class: "hint about", title: panel.about }, panel.about) : null;
+      const box = h("div", { class: "chart", role: "img", "aria-label": `${panel.title} over time` }, h("div", { class: "chart-head" }, h("h3", {}, `${panel.title} [${panel.unit}]`), legend, about));
       this.element.append(box);
       const plot = new uPlot(this.options(panel, box.clientWidth || 700, i === panels.length - 1), [[]], box);
       this.hear(plot);
@@ -87,78 +106,94 @@ export class Charts {
   /** The charts share the room, down to what can be read; then they scroll. */
   private height(): number {
     const many = Math.max(this.plots.length, this.count, 1);
-    return Math.max(Math.floor((this.element.clientHeight - 34) / many) - HEAD, LOWEST);
+    return Math.max(Math.floor((this.element.clientHeight - 12) / many) - HEAD, LOWEST);
   }
 
   private later(): void {
-    clearTimeout(this.timer);
-    this.timer = window.setTimeout(() => void this.fetch(), 60);
+    if (!this.timer) this.timer = window.setTimeout(() => void this.fetch(), SOON);
   }
 
+  /** Whether the rows at hand are enough for what is shown. */
+  private served(width: number): boolean {
+    const has = this.fetched;
+    if (!has || has.width !== width) return false;
+    const [low, high] = this.range;
+    const [start, end] = this.whole;
+    const inside = has.range[0] <= Math.max(low, start) && has.range[1] >= Math.min(high, end);
+    return inside && (!has.cut || has.range[1] - has.range[0] <= COARSE * (high - low));
+  }
+
+  /** Fetch rows where those at hand do not do; again, where the range has moved on meanwhile. */
   private async fetch(): Promise<void> {
-    if (!this.run || !this.plots.length) return;
-    this.pending?.abort();
-    const pending = (this.pending = new AbortController());
+    this.timer = 0;
+    if (!this.run || !this.plots.length || this.pending) return;
+    const width = Math.max(this.plots[0]?.box.clientWidth ?? 700, 100);
+    if (this.served(width)) return;
     const names = new Set<string>();
     for (const { panel } of this.plots) {
       for (const t of panel.traces) {
         names.add(t.column);
-        if (t.band) names.add(`${t.column}:low`).add(`${t.column}:high`);
+        if (t.band) names.add(`${t.band}:low`).add(`${t.band}:high`);
       }
     }
-    const list = [...names];
-    const [start, end] = this.range;
-    const width = Math.max(this.plots[0]?.box.clientWidth ?? 700, 100);
+    const [low, high] = this.range;
+    const [start, end] = [Math.max(low - MARGIN * (high - low), this.run.start), Math.min(high + MARGIN * (high - low), this.run.end)];
+    const buckets = Math.min(Math.ceil((width * (end - start)) / (high - low)), 5000);
+    const pending = (this.pending = new AbortController());
     const found = await tried(async () => {
       try {
-        return await columns("drive/window", { path: this.path, start, end, width }, list, pending.signal);
+        return await columns("drive/window", { path: this.path, start, end, width: buckets }, [...names], pending.signal);
       } catch (error) {
         if (error instanceof DOMException && error.name === "AbortError") return undefined;
         throw error;
       }
     });
-    if (!found || pending.signal.aborted) return;
+    if (this.pending !== pending) return; // other charts by now
+    this.pending = null;
+    if (!found) return;
+    this.fetched = { range: [start, end], cut: found.cut, width };
     const at = new Map(found.names.map((name, i) => [name, found.data[i] as Float64Array]));
     const time = found.data[0] as Float64Array;
     for (const { panel, plot } of this.plots) {
       const data: (Float64Array | (number | null)[])[] = [time];
       for (const t of panel.traces) {
-        if (t.band) data.push(shown(at.get(`${t.column}:low`), t.scale), shown(at.get(`${t.column}:high`), t.scale));
+        if (t.band) data.push(shown(at.get(`${t.band}:low`), t.scale), shown(at.get(`${t.band}:high`), t.scale));
         data.push(shown(at.get(t.column), t.scale));
       }
       plot.setData(data as uPlot.AlignedData, false);
-      plot.setScale("x", { min: start, max: end });
+      plot.setScale("x", { min: this.range[0], max: this.range[1] });
     }
     this.element.dataset["rows"] = String(found.count);
+    this.later();
   }
 
   private options(panel: Panel, width: number, last: boolean): uPlot.Options {
     const series: uPlot.Series[] = [{}];
-    const bands: uPlot.Band[] = [];
+    const log = panel.log !== undefined;
     for (const t of panel.traces) {
       const shade = color(t.color);
       if (t.band) {
-        const plain = { stroke: "transparent", width: 0, points: { show: false } };
-        series.push({ ...plain }, { ...plain });
-        bands.push({ series: [series.length - 1, series.length - 2], fill: `color-mix(in srgb, ${shade} 22%, transparent)` });
+        const unseen = { paths: () => null, points: { show: false } }; // they count for the scale
+        series.push({ ...unseen }, { ...unseen });
       }
-      series.push({ label: t.label, stroke: shade, width: 1.4, points: { show: false }, ...(t.dash ? { dash: t.dash } : {}) });
+      series.push({ label: t.label, stroke: shade, width: 1.4, paths: (...of) => (this.fetched?.cut ? null : LINE(...of)), points: { show: false }, ...(t.dash ? { dash: t.dash } : {}) });
     }
     const axis = { stroke: color("muted"), grid: { stroke: color("grid"), width: 1 }, ticks: { stroke: color("grid"), width: 1 }, font: "11px system-ui, sans-serif" };
     return {
       width,
       height: this.height(),
+      padding: [6, 20, 0, 0],
       legend: { show: false },
       cursor: { sync: { key: SYNC }, drag: { x: true, y: false, setScale: false }, points: { show: false }, y: false },
-      scales: { x: { time: false, range: () => this.range }, y: { range: (_, low, high) => limits(low, high, panel) } },
+      scales: { x: { time: false, range: () => this.range }, y: log ? { distr: 3, range: () => panel.log as Range } : { range: (_, low, high) => limits(low, high, panel) } },
       axes: [
-        { ...axis, size: last ? 40 : 26, ticks: { ...axis.ticks, size: 4 }, gap: 3, ...(last ? { label: "time [s]", labelSize: 14, labelFont: "11px system-ui, sans-serif" } : {}), values: (_, ticks) => ticks.map((v) => digits(v, 6)) },
-        { ...axis, size: 52, space: 24, values: (_, ticks) => ticks.map((v) => digits(v, 4)) },
+        { ...axis, size: 24, ticks: { ...axis.ticks, size: 4 }, gap: 3, values: (_, ticks) => ticks.map((v) => `${digits(v, 6)}${last ? " s" : ""}`) },
+        { ...axis, size: 52, space: 24, ...(log ? { splits: () => MARKS, filter: (_: uPlot, at: number[]) => at } : {}), values: (_, ticks) => ticks.map((v) => digits(v, 4)) },
       ],
       series,
-      bands,
       hooks: {
         drawClear: [(plot) => this.spans(plot)],
+        drawAxes: [(plot) => (this.fetched?.cut ? columnsOfBuckets(plot, panel.traces) : bands(plot, panel.traces))],
         draw: [(plot) => levels(plot, panel)],
         setCursor: [(plot) => plot.cursor.left !== undefined && this.onCursor?.(plot.cursor.left >= 0 ? plot.posToVal(plot.cursor.left, "x") : null)],
         setSelect: [
@@ -174,17 +209,7 @@ export class Charts {
   }
 
   private hear(plot: uPlot): void {
-    plot.over.addEventListener(
-      "wheel",
-      (event) => {
-        if (!event.ctrlKey && !event.shiftKey && Math.abs(event.deltaX) < Math.abs(event.deltaY) && !event.altKey) return;
-        event.preventDefault();
-        const at = plot.posToVal(event.offsetX, "x");
-        const factor = Math.exp((event.deltaY || event.deltaX) * 0.0015);
-        this.zoom([at + (this.range[0] - at) * factor, at + (this.range[1] - at) * factor]);
-      },
-      { passive: false },
-    );
+    hearPointers(plot.over, this);
     plot.over.addEventListener("dblclick", () => this.run && this.zoom([this.run.start, this.run.end]));
     plot.over.addEventListener("click", (event) => this.onPick?.(plot.posToVal(event.offsetX, "x")));
   }

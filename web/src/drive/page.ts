@@ -10,6 +10,7 @@ import { EVENT_COLORS, panelsOf, soilColor, type Run } from "./run";
 
 const FIRST = ["adhesion", "slip", "resistance", "speed"];
 const KEY = "terragrip-drive-panels";
+const HINT = "Drag, shift+wheel or two fingers zoom; arrow keys, sideways wheel or one finger pan; double click shows the whole run.";
 
 interface Sample {
   row: number;
@@ -122,12 +123,13 @@ export const page: Page = (main, { notices, query }) => {
       soils.map((name) => h("span", {}, h("i", { class: `patch ${soilColor(name)}` }), name)),
       kinds.map((kind) => h("span", {}, h("i", { class: `strip ${EVENT_COLORS[kind] ?? "ink"}` }), kind)),
       run.recording ? null : h("span", { class: "hint" }, "The recording is not in this folder: measured channels are left out."),
-      h("span", { class: "hint" }, "drag to zoom, shift+wheel to zoom, double click for the whole run"),
     );
   }
 
   async function open(wanted: string): Promise<void> {
+    const reading = window.setTimeout(() => fill(legend, h("span", { class: "hint" }, `Reading ${wanted} …`)), 200);
     const found = await tried(() => get<Run>("drive", { path: wanted }));
+    clearTimeout(reading);
     if (!found) return;
     path = wanted;
     run = found;
@@ -137,6 +139,7 @@ export const page: Page = (main, { notices, query }) => {
     fill(planeWheel, found.wheels.map((wheel) => h("option", { value: wheel, selected: wheel === found.wheels.at(-1) }, wheel)));
     drawWheels();
     drawLegend();
+    hover(null);
     draw();
     void drawPlane();
   }
@@ -203,7 +206,7 @@ export const page: Page = (main, { notices, query }) => {
 
   function hover(time: number | null): void {
     if (time === null || !run) {
-      readout.value = "";
+      readout.value = run ? HINT : "";
       return;
     }
     const soil = run.soils.find((s) => s.start <= time && s.end >= time)?.name;

@@ -42,8 +42,9 @@ export interface Trace {
   column: string;
   label: string;
   color: string;
-  /** Also ask for the 95 % interval. */
-  band: boolean;
+  /** The column whose 95 % limits are drawn around it; empty: none. */
+  band: string;
+  bandColor?: string;
   dash?: number[];
   /** From SI to what is shown. */
   scale: number;
@@ -58,6 +59,10 @@ export interface Panel {
   levels?: { value: number; label: string }[];
   low?: number;
   high?: number;
+  /** The ends of a logarithmic axis. */
+  log?: [number, number];
+  /** What it is, for who does not know. */
+  about?: string;
 }
 
 const WHEEL_COLORS = ["blue", "vermillion", "green", "purple", "orange", "sky", "muted", "ink"];
@@ -71,15 +76,15 @@ export function panelsOf(run: Run, wheels: string[]): Panel[] {
   const each = (name: string, scale = 1): Trace[] =>
     wheels
       .filter((wheel) => has(`${name}_${wheel}`))
-      .map((wheel) => ({ column: `${name}_${wheel}`, label: wheel, color: color(wheel), band: has(`${name}_${wheel}_std`), scale }));
+      .map((wheel) => ({ column: `${name}_${wheel}`, label: wheel, color: color(wheel), band: has(`${name}_${wheel}_std`) ? `${name}_${wheel}` : "", scale }));
   const measured = (name: string, label: string, shade: string, scale = 1): Trace[] =>
-    meant(name) ? [{ column: `measured:${name}`, label, color: shade, band: false, dash: DASH, scale }] : [];
+    meant(name) ? [{ column: `measured:${name}`, label, color: shade, band: "", dash: DASH, scale }] : [];
   const one = (column: string, label: string, shade = "blue", scale = 1): Trace[] =>
-    has(column) ? [{ column, label, color: shade, band: has(`${column}_std`), scale }] : [];
+    has(column) ? [{ column, label, color: shade, band: has(`${column}_std`) ? column : "", scale }] : [];
   const speeds = wheels.flatMap((wheel): Trace[] => {
     const scale = run.radius[wheel] ?? 1;
     const own = has(`wheel_speed_${wheel}`)
-      ? [{ column: `wheel_speed_${wheel}`, label: `r ω ${wheel}`, color: color(wheel), band: false, scale }]
+      ? [{ column: `wheel_speed_${wheel}`, label: `r ω ${wheel}`, color: color(wheel), band: "", scale }]
       : [];
     return own;
   });
@@ -98,11 +103,59 @@ export function panelsOf(run: Run, wheels: string[]): Panel[] {
     { key: "torque", title: "Drive torque, measured", unit: "N m", traces: wheels.flatMap((w) => measured(`drive_torque_${w}`, w, color(w)).map(solid)) },
     { key: "drawbar", title: "Drawbar force, measured", unit: "N", traces: measured("drawbar_force", "pull", "green").map(solid) },
     { key: "curve", title: "Online curve: a", unit: "–", traces: one("curve_a", "a", "green"), low: 0, high: 2.5 },
-    { key: "nis", title: "Filter's honesty: NIS", unit: "–", traces: one("nis", "NIS", "vermillion"), levels: nisLevels(run.wheels.length + 1), low: 0, high: 6 * (run.wheels.length + 1) },
-    { key: "supervisor", title: "Supervisor γ", unit: "–", traces: one("supervisor", "γ", "orange"), low: 0, high: 1.02 },
-    { key: "load", title: "Vertical load", unit: "N", traces: run.columns.filter((c) => c.startsWith("vertical_load_")).map((column, i) => ({ column, label: column.slice(14), color: WHEEL_COLORS[i] ?? "blue", band: false, scale: 1 })) },
+    { key: "nis", title: "Filter's honesty: NIS", unit: "–", ...nis(run) },
+    {
+      key: "supervisor",
+      title: run.method === "bank" ? "Bank: scale of the noise" : "Supervisor γ",
+      unit: "–",
+      traces: one("supervisor", run.method === "bank" ? "0 smallest, 1 largest" : "γ", "orange"),
+      low: 0,
+      high: 1.02,
+      about: run.method === "bank" ? "Where the expected scale of the process noise stands between the bank's smallest and largest." : "How far A is let through: Q = [I + γ (A − I)] Q₀.",
+    },
+    {
+      key: "adaptation",
+      title: "Adaptation A",
+      unit: "×Q₀",
+      traces: adaptation(run, wheels, color),
+      levels: [{ value: 1, label: "" }],
+      log: [0.03, 80],
+      about: "The diagonal of A: by how much innovations ask for more (above 1) or less process noise of each state. Q = [I + γ (A − I)] Q₀.",
+    },
+    { key: "load", title: "Vertical load", unit: "N", traces: run.columns.filter((c) => c.startsWith("vertical_load_")).map((column, i) => ({ column, label: column.slice(14), color: WHEEL_COLORS[i] ?? "blue", band: "", scale: 1 })) },
   ];
   return panels.filter((panel) => panel.traces.length > 0);
+}
+
+/** NIS over the channels taken, a mean of a second, with its limits; of older estimates each row's NIS. */
+function nis(run: Run): Pick<Panel, "traces" | "levels" | "about" | "low" | "high"> {
+  const trace = { label: "NIS", color: "vermillion", band: "", scale: 1 };
+  const about = "How large innovations are against what the filter expects of them";
+  if (!run.columns.includes("nis")) return { traces: [] };
+  if (!run.columns.includes("channels")) {
+    const n = run.wheels.length + 1;
+    return { traces: [{ ...trace, column: "nis" }], levels: nisLevels(n), low: 0, high: 6 * n, about: `${about}.` };
+  }
+  return {
+    traces: [{ ...trace, column: "nis:mean", label: "NIS / channels, mean of 1 s", band: "nis", bandColor: "muted" }],
+    levels: [{ value: 1, label: "" }],
+    low: 0,
+    high: 5,
+    about: `${about}: 1 of an honest filter, 95 % of the time in the band; above it the filter is too sure of itself.`,
+  };
+}
+
+/** A trace a state of the shown wheels; A is diagonal. */
+function adaptation(run: Run, wheels: string[], color: (wheel: string) => string): Trace[] {
+  const states: [string, string, string, number[]?][] = [
+    ...wheels.map((w): [string, string, string] => [`adhesion_${w}`, `µ ${w}`, color(w)]),
+    ["soil_resistance", "ρs", "ink"],
+    ...wheels.map((w): [string, string, string, number[]] => [`wheel_speed_${w}`, `ω ${w}`, color(w), DASH]),
+    ["ground_speed", "v", "ink", DASH],
+  ];
+  return states
+    .filter(([state]) => run.columns.includes(`adaptation_${state}`))
+    .map(([state, label, shade, dash]) => ({ column: `adaptation_${state}`, label, color: shade, band: "", scale: 1, ...(dash ? { dash } : {}) }));
 }
 
 /** The expectation of NIS and its 2.5 % and 97.5 % points for `n` channels: chi-squared by Wilson and Hilferty (1931). */

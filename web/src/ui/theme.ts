@@ -2,6 +2,7 @@
 
 const KEY = "terragrip-theme";
 const listeners = new Set<() => void>();
+const colors = new Map<string, string>(); // of the theme: looking them up costs more than drawing
 
 export type Theme = "light" | "dark";
 
@@ -28,12 +29,18 @@ export function onTheme(listener: () => void): () => void {
 
 function apply(): void {
   document.documentElement.dataset.theme = theme();
+  colors.clear();
   for (const listener of listeners) listener();
 }
 
 /** A colour of the style sheet by its name, such as "ink". */
 export function color(name: string): string {
-  return getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim();
+  let found = colors.get(name);
+  if (found === undefined) {
+    found = getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim();
+    if (found) colors.set(name, found); // else the sheet is not there yet
+  }
+  return found;
 }
 
 /** Okabe and Ito's palette by names of the style sheet, in the order that new curves take them. */

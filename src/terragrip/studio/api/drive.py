@@ -13,6 +13,7 @@ from terragrip.estimation.estimates import Estimates
 from terragrip.ground.events import events
 from terragrip.studio import drive
 from terragrip.studio.api.files import Named, finite
+from terragrip.studio.shown import MEASURED
 from terragrip.studio.state import Here, Studio
 from terragrip.studio.tables import packed
 
@@ -67,9 +68,10 @@ def window(
     table = _table(studio, path)
     if not len(table) or end <= start:
         raise InputError("holds nothing between these times", file=path)
-    found = drive.recording_of(studio, table) if any(c.startswith(drive.MEASURED) for c in column) else None
+    found = drive.recording_of(studio, table) if any(c.startswith(MEASURED) for c in column) else None
     recording = None if found is None else found[1]
-    cut, time, columns = drive.window(table, recording, column, start, end, width)
+    shown = studio.shown.get(studio.folder.file(path))
+    cut, time, columns = shown.window(recording, column, start, end, width)
     head = {"columns": ["time", *column], "count": len(time), "cut": cut}
     return Response(packed(head, [time, *columns]), media_type=BINARY)
 

@@ -1,0 +1,100 @@
+/** Intervals as areas; and rows cut to buckets, a column of pixels each from its smallest to its largest value: a line through them
+ * would cost a frame. */
+
+import type uPlot from "uplot";
+import { color } from "../ui/theme";
+import type { Trace } from "./run";
+
+type Values = ArrayLike<number | null>;
+const LEAST = 1.4; // pixels of a column's height
+const DASH = 4;
+
+/** Which of a chart's series hold a trace: its limits (where it has any), then itself. */
+function* seriesOf(plot: uPlot, traces: Trace[]): Generator<{ trace: Trace; low?: Values; high?: Values; values: Values }> {
+  let at = 1;
+  for (const trace of traces) {
+    const limits = trace.band ? { low: plot.data[at++] as Values, high: plot.data[at++] as Values } : {};
+    const values = plot.data[at++] as Values | undefined;
+    if (values) yield { trace, ...limits, values };
+  }
+}
+
+function clipped(plot: uPlot, draw: (pen: CanvasRenderingContext2D) => void): void {
+  const { ctx, bbox } = plot;
+  ctx.save();
+  ctx.beginPath();
+  ctx.rect(Math.round(bbox.left), Math.round(bbox.top), Math.round(bbox.width), Math.round(bbox.height)); // whole pixels: a plain clip
+  ctx.clip();
+  draw(ctx);
+  ctx.restore();
+}
+
+const tint = (trace: Trace): string => `color-mix(in srgb, ${color(trace.bandColor ?? trace.color)} 22%, transparent)`;
+
+/** Rows as they are: each trace's interval as one area; where it is unknown it breaks. */
+export function bands(plot: uPlot, traces: Trace[]): void {
+  const time = plot.data[0];
+  clipped(plot, (pen) => {
+    for (const { trace, low, high } of seriesOf(plot, traces)) {
+      if (!low || !high) continue;
+      pen.fillStyle = tint(trace);
+      for (let i = 0; i < time.length; i++) {
+        if (low[i] === null || high[i] === null) continue;
+        const from = i;
+        pen.beginPath();
+        for (; i < time.length && low[i] !== null && high[i] !== null; i++) pen.lineTo(plot.valToPos(time[i] as number, "x", true), plot.valToPos(high[i] as number, "y", true));
+        for (let k = i - 1; k >= from; k--) pen.lineTo(plot.valToPos(time[k] as number, "x", true), plot.valToPos(low[k] as number, "y", true));
+        pen.fill();
+      }
+    }
+  });
+}
+
+/** Buckets, two points each: intervals, then values over them. */
+export function columnsOfBuckets(plot: uPlot, traces: Trace[]): void {
+  clipped(plot, (pen) => {
+    for (const { trace, low, high, values } of seriesOf(plot, traces)) {
+      if (low && high) {
+        pen.fillStyle = tint(trace);
+        for (const [x, width, top, bottom] of pixels(plot, low, high, 0)) pen.fillRect(x, top, width, bottom - top);
+      }
+      pen.fillStyle = color(trace.color);
+      const least = LEAST * devicePixelRatio;
+      let [before, after] = [NaN, NaN]; // the last column's top and bottom
+      for (const [x, width, top, bottom] of pixels(plot, values, values, 1)) {
+        const from = top > after ? after : top;
+        const to = bottom < before ? before : bottom;
+        [before, after] = [top, bottom];
+        if (trace.dash && x % (2 * DASH * devicePixelRatio) >= DASH * devicePixelRatio) continue;
+        const more = Math.max(least - (to - from), 0);
+        pen.fillRect(x, from - more / 2, width, to - from + more);
+      }
+    }
+  });
+}
+
+/** Left, width, top and bottom of each column of pixels; `low` and `high` are read at a bucket's first and `odd` second point. A column
+ * of what is unknown is left out, and NaN ends what the next one joins on to. */
+function* pixels(plot: uPlot, low: Values, high: Values, odd: 0 | 1): Generator<[number, number, number, number]> {
+  const time = plot.data[0];
+  const { left, width } = plot.bbox;
+  const { min, max } = plot.scales["x"] ?? {};
+  const [begin, end] = [min ?? 0, max ?? 1];
+  const scale = width / (end - begin);
+  const x = (t: number): number => Math.round(left + (t - begin) * scale);
+  let [at, top, bottom] = [-Infinity, Infinity, -Infinity];
+  for (let i = 0; i + 1 < time.length; i += 2) {
+    const [from, to] = [x(time[i] as number), x(time[i + 2] ?? (time[i + 1] as number))];
+    if (to < left || from > left + width) continue;
+    if (from !== at) [at, top, bottom] = [from, Infinity, -Infinity];
+    const [least, most] = [low[i], high[i + odd]];
+    if (typeof least === "number" && typeof most === "number") {
+      top = Math.min(top, plot.valToPos(most, "y", true));
+      bottom = Math.max(bottom, plot.valToPos(least, "y", true));
+    }
+    if (to === from) continue; // the next bucket falls on the same pixels
+    if (bottom >= top) yield [from, to - from, top, bottom];
+    else yield [from, 0, NaN, NaN];
+    at = -Infinity;
+  }
+}
