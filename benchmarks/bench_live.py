@@ -13,7 +13,6 @@ Then the process is killed at random moments, and what a restart has is compared
 from __future__ import annotations
 
 import argparse
-import contextlib
 import json
 import os
 import random
@@ -32,6 +31,7 @@ import numpy as np
 import peer
 import pull
 from marked import put
+from priority import prefer
 from terragrip.estimation import TractionEstimator
 from terragrip.live import read_record
 from terragrip.recording import Recording
@@ -94,12 +94,6 @@ def main() -> None:
     print(text)
     if options.write:
         put(DOCUMENT, BEGIN, text)
-
-
-def prefer(pid: int = 0) -> None:
-    """Before all ordinary processes, where the system allows it."""
-    with contextlib.suppress(OSError):
-        os.sched_setscheduler(pid, os.SCHED_RR, os.sched_param(10))
 
 
 def start(vehicle_file: Path, record: Path, ports: Ports) -> subprocess.Popen[bytes]:

@@ -34,15 +34,19 @@ const tint = (trace: Trace): string => `color-mix(in srgb, ${color(trace.bandCol
 /** Rows as they are: each trace's interval as one area; where it is unknown it breaks. */
 export function bands(plot: uPlot, traces: Trace[]): void {
   const time = plot.data[0];
+  const { min, max } = plot.scales["x"] ?? {};
+  let [first, last] = [0, time.length];
+  while (first + 1 < last && (time[first + 1] as number) < (min ?? 0)) first++;
+  while (last - 2 > first && (time[last - 2] as number) > (max ?? 0)) last--;
   clipped(plot, (pen) => {
     for (const { trace, low, high } of seriesOf(plot, traces)) {
       if (!low || !high) continue;
       pen.fillStyle = tint(trace);
-      for (let i = 0; i < time.length; i++) {
+      for (let i = first; i < last; i++) {
         if (low[i] === null || high[i] === null) continue;
         const from = i;
         pen.beginPath();
-        for (; i < time.length && low[i] !== null && high[i] !== null; i++) pen.lineTo(plot.valToPos(time[i] as number, "x", true), plot.valToPos(high[i] as number, "y", true));
+        for (; i < last && low[i] !== null && high[i] !== null; i++) pen.lineTo(plot.valToPos(time[i] as number, "x", true), plot.valToPos(high[i] as number, "y", true));
         for (let k = i - 1; k >= from; k--) pen.lineTo(plot.valToPos(time[k] as number, "x", true), plot.valToPos(low[k] as number, "y", true));
         pen.fill();
       }

@@ -18,7 +18,14 @@ const MARGIN = 0.5;
 const COARSE = 3;
 const SOON = 40; // ms
 const LINE = uPlot.paths.linear?.() as uPlot.Series.PathBuilder;
+const MANY = 300; // points of a line
 const MARKS = [0.05, 0.2, 1, 5, 50]; // of a logarithmic axis
+
+interface Fetched {
+  range: Range;
+  cut: boolean;
+  width: number;
+}
 
 export class Charts {
   readonly element = h("div", { class: "charts" });
@@ -32,7 +39,10 @@ export class Charts {
   private run: Run | null = null;
   private path = "";
   private pending: AbortController | null = null;
-  private fetched: { range: Range; cut: boolean; width: number } | null = null;
+  private fetched: Fetched | null = null; // what is drawn
+  private coming: Fetched | null = null; // and what will be in the next frame
+  private arrived = new Map<uPlot, uPlot.AlignedData>();
+  private frame = 0;
   private timer = 0;
   private forget: () => void;
   private watcher: ResizeObserver;
@@ -57,6 +67,7 @@ export class Charts {
     this.watcher.disconnect();
     this.pending?.abort();
     clearTimeout(this.timer);
+    cancelAnimationFrame(this.frame);
     for (const { plot } of this.plots) plot.destroy();
   }
 
@@ -76,9 +87,23 @@ export class Charts {
     let [low, high] = range;
     if (high - low < least) [low, high] = [(low + high - least) / 2, (low + high + least) / 2];
     this.range = [Math.max(low, run.start), Math.min(high, run.end)];
-    for (const { plot } of this.plots) plot.setScale("x", { min: this.range[0], max: this.range[1] });
+    this.redraw();
     this.onRange?.(this.range);
     this.later();
+  }
+
+  /** Once a frame at most, with the rows that have arrived. */
+  private redraw(): void {
+    this.frame ||= requestAnimationFrame(() => {
+      this.frame = 0;
+      for (const { plot } of this.plots) {
+        const data = this.arrived.get(plot);
+        if (data) plot.setData(data, false);
+        plot.setScale("x", { min: this.range[0], max: this.range[1] });
+      }
+      if (this.arrived.size) this.fetched = this.coming;
+      this.arrived.clear();
+    });
   }
 
   private rebuild(): void {
@@ -89,7 +114,8 @@ export class Charts {
     for (const { plot } of this.plots) plot.destroy();
     fill(this.element);
     this.pending?.abort();
-    this.pending = this.fetched = null;
+    this.pending = this.fetched = this.coming = null;
+    this.arrived.clear();
     this.count = panels.length;
     this.plots = panels.map((panel, i) => {
       const legend = h("div", { class: "legend" }, panel.traces.map((t) => h("span", {}, h("i", { class: `swatch ${t.color}${t.dash ? " dashed" : ""}` }), t.label)));
@@ -115,7 +141,7 @@ export class Charts {
 
   /** Whether the rows at hand are enough for what is shown. */
   private served(width: number): boolean {
-    const has = this.fetched;
+    const has = this.coming;
     if (!has || has.width !== width) return false;
     const [low, high] = this.range;
     const [start, end] = this.whole;
@@ -151,7 +177,7 @@ export class Charts {
     if (this.pending !== pending) return; // other charts by now
     this.pending = null;
     if (!found) return;
-    this.fetched = { range: [start, end], cut: found.cut, width };
+    this.coming = { range: [start, end], cut: found.cut, width };
     const at = new Map(found.names.map((name, i) => [name, found.data[i] as Float64Array]));
     const time = found.data[0] as Float64Array;
     for (const { panel, plot } of this.plots) {
@@ -160,10 +186,10 @@ export class Charts {
         if (t.band) data.push(shown(at.get(`${t.band}:low`), t.scale), shown(at.get(`${t.band}:high`), t.scale));
         data.push(shown(at.get(t.column), t.scale));
       }
-      plot.setData(data as uPlot.AlignedData, false);
-      plot.setScale("x", { min: this.range[0], max: this.range[1] });
+      this.arrived.set(plot, data as uPlot.AlignedData);
     }
     this.element.dataset["rows"] = String(found.count);
+    this.redraw();
     this.later();
   }
 
@@ -176,7 +202,7 @@ export class Charts {
         const unseen = { paths: () => null, points: { show: false } }; // they count for the scale
         series.push({ ...unseen }, { ...unseen });
       }
-      series.push({ label: t.label, stroke: shade, width: 1.4, paths: (...of) => (this.fetched?.cut ? null : LINE(...of)), points: { show: false }, ...(t.dash ? { dash: t.dash } : {}) });
+      series.push({ label: t.label, stroke: shade, width: 1.4, paths: (...of) => (this.fetched?.cut ? null : line(...of)), points: { show: false }, ...(t.dash ? { dash: t.dash } : {}) });
     }
     const axis = { stroke: color("muted"), grid: { stroke: color("grid"), width: 1 }, ticks: { stroke: color("grid"), width: 1 }, font: "11px system-ui, sans-serif" };
     return {
@@ -223,8 +249,10 @@ export class Charts {
     const soils = run.soils.length ? run.soils : (run.ground?.sections ?? []).map((s) => ({ name: s.soil, start: s.start, end: s.end }));
     ctx.save();
     for (const span of soils) {
+      const [from, to] = [x(span.start), x(span.end)];
+      if (to <= from) continue;
       ctx.fillStyle = `color-mix(in srgb, ${color(soilColor(span.name))} 12%, transparent)`;
-      ctx.fillRect(x(span.start), bbox.top, Math.max(x(span.end) - x(span.start), 0), bbox.height);
+      ctx.fillRect(from, bbox.top, to - from, bbox.height);
     }
     const strip = 5 * devicePixelRatio;
     for (const event of run.events) {
@@ -237,13 +265,18 @@ export class Charts {
   }
 }
 
-function shown(values: Float64Array | undefined, scale: number): (number | null)[] {
-  const out: (number | null)[] = new Array(values?.length ?? 0);
-  for (let i = 0; i < out.length; i++) {
-    const v = (values as Float64Array)[i] as number;
-    out[i] = Number.isNaN(v) ? null : v * scale;
-  }
-  return out;
+/** A line through all points; of many, a pixel of the screen wide: wider ones cost twenty times as much without a graphics processor. */
+function line(...of: Parameters<uPlot.Series.PathBuilder>): uPlot.Series.Paths | null {
+  const [plot, number, from, to] = of;
+  (plot.series[number] as uPlot.Series).width = to - from > MANY ? 1 / devicePixelRatio : 1.4;
+  return LINE(...of);
+}
+
+/** Values in the unit that is shown; where one is unknown, an array with null for it, as uPlot has it. */
+function shown(values: Float64Array | undefined, scale: number): Float64Array | (number | null)[] {
+  if (!values) return [];
+  const scaled = scale === 1 ? values : values.map((v) => v * scale);
+  return scaled.some(Number.isNaN) ? Array.from(scaled, (v) => (Number.isNaN(v) ? null : v)) : scaled;
 }
 
 /** The range of the data, held inside what the panel can sensibly show. */
