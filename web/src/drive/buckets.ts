@@ -1,5 +1,5 @@
-/** Intervals as areas; and rows cut to buckets, a column of pixels each from its smallest to its largest value: a line through them
- * would cost a frame. */
+/** Intervals as areas; and, where there are more points than pixels, a column of pixels each from its smallest to its largest value: a
+ * line through them would cost a frame. */
 
 import type uPlot from "uplot";
 import { color } from "../ui/theme";
@@ -31,13 +31,18 @@ function clipped(plot: uPlot, draw: (pen: CanvasRenderingContext2D) => void): vo
 
 const tint = (trace: Trace): string => `color-mix(in srgb, ${color(trace.bandColor ?? trace.color)} 22%, transparent)`;
 
+/** Whether a chart's points are so many that they are drawn as columns. */
+export function isDense(plot: uPlot): boolean {
+  const { min, max } = plot.scales["x"] ?? {};
+  return plot.valToIdx(max ?? 1) - plot.valToIdx(min ?? 0) > plot.bbox.width / devicePixelRatio;
+}
+
 /** Rows as they are: each trace's interval as one area; where it is unknown it breaks. */
 export function bands(plot: uPlot, traces: Trace[]): void {
   const time = plot.data[0];
   const { min, max } = plot.scales["x"] ?? {};
-  let [first, last] = [0, time.length];
-  while (first + 1 < last && (time[first + 1] as number) < (min ?? 0)) first++;
-  while (last - 2 > first && (time[last - 2] as number) > (max ?? 0)) last--;
+  const first = Math.max(plot.valToIdx(min ?? 0) - 1, 0);
+  const last = Math.min(plot.valToIdx(max ?? 1) + 2, time.length);
   clipped(plot, (pen) => {
     for (const { trace, low, high } of seriesOf(plot, traces)) {
       if (!low || !high) continue;
@@ -54,18 +59,18 @@ export function bands(plot: uPlot, traces: Trace[]): void {
   });
 }
 
-/** Buckets, two points each: intervals, then values over them. */
-export function columnsOfBuckets(plot: uPlot, traces: Trace[]): void {
+/** Intervals, then values over them; `points` of each bucket: 2 where rows were cut, 1 where they are as they were. */
+export function columnsOfBuckets(plot: uPlot, traces: Trace[], points: 1 | 2): void {
   clipped(plot, (pen) => {
     for (const { trace, low, high, values } of seriesOf(plot, traces)) {
       if (low && high) {
         pen.fillStyle = tint(trace);
-        for (const [x, width, top, bottom] of pixels(plot, low, high, 0)) pen.fillRect(x, top, width, bottom - top);
+        for (const [x, width, top, bottom] of pixels(plot, low, high, points, 0)) pen.fillRect(x, top, width, bottom - top);
       }
       pen.fillStyle = color(trace.color);
       const least = LEAST * devicePixelRatio;
       let [before, after] = [NaN, NaN]; // the last column's top and bottom
-      for (const [x, width, top, bottom] of pixels(plot, values, values, 1)) {
+      for (const [x, width, top, bottom] of pixels(plot, values, values, points, points - 1)) {
         const from = top > after ? after : top;
         const to = bottom < before ? before : bottom;
         [before, after] = [top, bottom];
@@ -77,9 +82,9 @@ export function columnsOfBuckets(plot: uPlot, traces: Trace[]): void {
   });
 }
 
-/** Left, width, top and bottom of each column of pixels; `low` and `high` are read at a bucket's first and `odd` second point. A column
+/** Left, width, top and bottom of each column of pixels; `high` is read `later` points after `low`. A column
  * of what is unknown is left out, and NaN ends what the next one joins on to. */
-function* pixels(plot: uPlot, low: Values, high: Values, odd: 0 | 1): Generator<[number, number, number, number]> {
+function* pixels(plot: uPlot, low: Values, high: Values, points: number, later: number): Generator<[number, number, number, number]> {
   const time = plot.data[0];
   const { left, width } = plot.bbox;
   const { min, max } = plot.scales["x"] ?? {};
@@ -87,11 +92,11 @@ function* pixels(plot: uPlot, low: Values, high: Values, odd: 0 | 1): Generator<
   const scale = width / (end - begin);
   const x = (t: number): number => Math.round(left + (t - begin) * scale);
   let [at, top, bottom] = [-Infinity, Infinity, -Infinity];
-  for (let i = 0; i + 1 < time.length; i += 2) {
-    const [from, to] = [x(time[i] as number), x(time[i + 2] ?? (time[i + 1] as number))];
+  for (let i = 0; i + points <= time.length; i += points) {
+    const [from, to] = [x(time[i] as number), x(time[i + points] ?? (time[i + points - 1] as number))];
     if (to < left || from > left + width) continue;
     if (from !== at) [at, top, bottom] = [from, Infinity, -Infinity];
-    const [least, most] = [low[i], high[i + odd]];
+    const [least, most] = [low[i], high[i + later]];
     if (typeof least === "number" && typeof most === "number") {
       top = Math.min(top, plot.valToPos(most, "y", true));
       bottom = Math.max(bottom, plot.valToPos(least, "y", true));

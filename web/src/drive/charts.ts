@@ -6,7 +6,7 @@ import { columns } from "../ui/columns";
 import { digits, fill, h } from "../ui/dom";
 import { tried } from "../ui/notes";
 import { color, onTheme } from "../ui/theme";
-import { bands, columnsOfBuckets } from "./buckets";
+import { bands, columnsOfBuckets, isDense } from "./buckets";
 import { hearKeys, hearPointers, type Range } from "./gestures";
 import { EVENT_COLORS, soilColor, type Panel, type Run } from "./run";
 
@@ -193,6 +193,10 @@ export class Charts {
     this.later();
   }
 
+  private isDense(plot: uPlot): boolean {
+    return this.fetched?.cut || isDense(plot);
+  }
+
   private options(panel: Panel, width: number, last: boolean): uPlot.Options {
     const series: uPlot.Series[] = [{}];
     const log = panel.log !== undefined;
@@ -202,7 +206,7 @@ export class Charts {
         const unseen = { paths: () => null, points: { show: false } }; // they count for the scale
         series.push({ ...unseen }, { ...unseen });
       }
-      series.push({ label: t.label, stroke: shade, width: 1.4, paths: (...of) => (this.fetched?.cut ? null : line(...of)), points: { show: false }, ...(t.dash ? { dash: t.dash } : {}) });
+      series.push({ label: t.label, stroke: shade, width: 1.4, paths: (...of) => (this.isDense(of[0]) ? null : line(...of)), points: { show: false }, ...(t.dash ? { dash: t.dash } : {}) });
     }
     const axis = { stroke: color("muted"), grid: { stroke: color("grid"), width: 1 }, ticks: { stroke: color("grid"), width: 1 }, font: "11px system-ui, sans-serif" };
     return {
@@ -219,7 +223,7 @@ export class Charts {
       series,
       hooks: {
         drawClear: [(plot) => this.spans(plot)],
-        drawAxes: [(plot) => (this.fetched?.cut ? columnsOfBuckets(plot, panel.traces) : bands(plot, panel.traces))],
+        drawAxes: [(plot) => (this.isDense(plot) ? columnsOfBuckets(plot, panel.traces, this.fetched?.cut ? 2 : 1) : bands(plot, panel.traces))],
         draw: [(plot) => levels(plot, panel)],
         setCursor: [(plot) => plot.cursor.left !== undefined && this.onCursor?.(plot.cursor.left >= 0 ? plot.posToVal(plot.cursor.left, "x") : null)],
         setSelect: [
