@@ -262,3 +262,37 @@ def test_ground_of_the_run_is_shown_where_it_lies_beside_it(client: TestClient, 
     }
     (folder / "estimates-ground.json").write_text(json.dumps(ground))
     assert client.get("/api/drive", params={"path": RUN}).json()["ground"]["sections"] == ground["sections"]
+
+
+def test_estimates_of_slip_alone_open_as_any(client: TestClient, folder: Path) -> None:
+    import terragrip as tg
+
+    recording = tg.read(folder / "recording.parquet")
+    bare = {
+        n: c
+        for n, c in recording.channels.items()
+        if not n.startswith(("drive_torque_", "true_", "wheel_force"))
+    }
+    east = 13 + np.arange(len(recording)) * 1e-7
+    frame = {"time": recording.time, **bare, "latitude": np.full(len(recording), 51.0), "longitude": east}
+    table = tg.estimate(tg.Recording.from_frame(frame), tg.Vehicle.load(folder / "vehicle.yaml"))
+    table.write(folder / "slip.parquet")
+    about = client.get("/api/drive", params={"path": "slip.parquet"}).json()
+    assert about["method"] == "slip-only"
+    wheel, middle = about["wheels"][-1], float(table.time[len(table) // 2])
+    ends = {"start": about["start"], "end": about["end"]}
+    query: dict[str, Any] = {
+        "path": "slip.parquet",
+        "column": [f"slip_{wheel}", f"slip_{wheel}:low"],
+        "width": 100,
+        **ends,
+    }
+    shown = client.get("/api/drive/window", params=query)
+    assert np.isfinite(unpack(shown.content)[f"slip_{wheel}"]).any()
+    plane = client.get("/api/drive/plane", params={"path": "slip.parquet", "wheel": wheel, **ends})
+    assert plane.json() == {"slip": [], "adhesion": [], "time": []}
+    sample = client.get("/api/drive/sample", params={"path": "slip.parquet", "time": middle}).json()
+    assert sample["why"]
+    assert all("Without a torque there is no adhesion." in one or "undefined" in one for one in sample["why"])
+    track = client.get("/api/drive/track", params={"path": "slip.parquet", "column": [f"slip_{wheel}"]})
+    assert unpack(track.content)["longitude"][-1] > 13

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -15,9 +16,11 @@ from terragrip.errors import InputError
 from terragrip.estimation.methods import DEFAULT, METHODS
 
 if TYPE_CHECKING:
+    from terragrip.recording import Recording
     from terragrip.vehicle import Vehicle
 
 _LONG = 100_000_000  # bytes of a Parquet file; ten times as much in memory
+_MANY = 1_000_000  # rows whose estimates do not fit memory at ease
 
 
 def command(
@@ -89,17 +92,25 @@ def _estimate(
     log: Path, vehicle: Vehicle, target: Path, sources: Sources, method: str, smooth: bool, step: Step
 ) -> str:
     """Estimate one log into a file and return the summary; a long Parquet file goes through in blocks."""
-    from terragrip.formats import iter_parquet, read
+    from terragrip.formats import read
 
     plain = not (sources.profile or sources.dbc or sources.others or smooth)
-    rows = _rows_of_a_long_log(log) if plain else 0
-    if rows:
+    found = _blocks_of_a_long_log(log) if plain else None
+    if found is not None:
         from terragrip.estimation import estimate_blocks
 
-        blocks = iter_parquet(log)
-        return estimate_blocks(blocks, vehicle, target, method, progress=lambda done: step(done, rows))
+        blocks, rows = found
+        return estimate_blocks(
+            blocks, vehicle, target, method, progress=lambda done: step(min(done, rows), rows)
+        )
     path = [log, *sources.others] if sources.others else log
     recording = read(path, sources.profile, dbc=sources.dbc)
+    if len(recording) > _MANY and not smooth:
+        from terragrip.estimation import estimate_in_parts
+
+        return estimate_in_parts(
+            recording, vehicle, target, method, progress=lambda done: step(done, len(recording))
+        )
     from terragrip.estimation import estimate
 
     estimates = estimate(recording, vehicle, method, smooth=smooth, progress=step)
@@ -107,13 +118,29 @@ def _estimate(
     return estimates.summary()
 
 
+def _blocks_of_a_long_log(log: Path) -> tuple[Iterator[Recording], int] | None:
+    """A table too large to be held in memory at ease, in blocks, and about how many rows it has; None of another log."""
+    from terragrip.formats.csv import is_long
+    from terragrip.formats.kind import CSV, PARQUET, kind_of
+
+    kind = kind_of(log)
+    if kind is CSV and is_long(str(log)):
+        from terragrip.formats.csv_blocks import has_torque, iter_csv, rows_of
+
+        blocks = iter_csv(log) if has_torque(log) else None
+        return None if blocks is None else (blocks, rows_of(log))
+    rows = _rows_of_a_long_log(log) if kind is PARQUET else 0
+    if not rows:
+        return None
+    from terragrip.formats import iter_parquet
+
+    return iter_parquet(log), rows
+
+
 def _rows_of_a_long_log(log: Path) -> int:
     """Rows of a Parquet file that is too large to be held in memory at ease, else 0."""
-    if not log.is_file() or log.stat().st_size < _LONG:
+    if log.stat().st_size < _LONG:
         return 0
-    with log.open("rb") as stream:
-        if stream.read(4) != b"PAR1":
-            return 0
     from pyarrow import ArrowException
     from pyarrow.parquet import read_metadata
 

@@ -11,6 +11,7 @@ from terragrip.errors import InputError
 from terragrip.estimation.batch import GAP, flag_before_gaps, run
 from terragrip.estimation.estimator import TractionEstimator
 from terragrip.estimation.methods import DEFAULT
+from terragrip.estimation.slip_only import is_slip_only, slip_in_parts
 from terragrip.estimation.summary import Tally
 from terragrip.files import replacing
 
@@ -43,9 +44,39 @@ def estimate_blocks(
 
     Raises InputError as :func:`estimate` does, on no block at all, and where the file cannot be written.
     """
+    parts = _estimated(blocks, vehicle, method, sensors, held, gap, standstill_speed)
+    return _written(_flagged(parts), output, progress)
+
+
+def estimate_in_parts(
+    recording: Recording,
+    vehicle: Vehicle,
+    output: str | os.PathLike[str],
+    method: str = DEFAULT,
+    *,
+    rows: int = 200_000,
+    progress: Callable[[int], None] | None = None,
+) -> str:
+    """Estimate a recording that fits memory, of which the estimates do not, into a Parquet file; return its summary.
+
+    Noise and held channels are found in the whole recording, so that the rows are those of :func:`estimate`. Raises
+    InputError as `estimate_blocks` does.
+    """
+    if is_slip_only(recording, vehicle):
+        return _written(slip_in_parts(recording, vehicle, rows), output, progress)
+    recording.check_against(vehicle)
+    estimator = TractionEstimator.for_recording(recording, vehicle, method)
+    parts = (recording.select(slice(k, k + rows)) for k in range(0, len(recording), rows))
+    return _written(_flagged(run(estimator, part, flag=False) for part in parts), output, progress)
+
+
+def _written(
+    parts: Iterator[Estimates], output: str | os.PathLike[str], progress: Callable[[int], None] | None
+) -> str:
+    """Write parts of estimates to a Parquet file, which appears whole or not at all; returns their summary."""
     tally, notes = Tally(), dict[str, None]()
     with replacing(output) as temporary, _Writer(temporary) as writer:
-        for part in _flagged(_estimated(blocks, vehicle, method, sensors, held, gap, standstill_speed)):
+        for part in parts:
             writer.write(part)
             tally.add(part)
             notes.update(dict.fromkeys(part.notes))

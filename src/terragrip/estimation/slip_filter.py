@@ -7,6 +7,8 @@ pass for slip. Backwards by Rauch, Tung and Striebel (1965). (R), our own constr
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -64,6 +66,88 @@ def choose_walks(time: Floats, speeds: Floats, noise: Floats, anew: npt.NDArray[
     return Walks(jerk, change)
 
 
+class SlipFilter:
+    """The filter, sample by sample; `run` is its steps one after another.
+
+    ``noise`` (1 + wheels,): SDs of ground speed and rim speeds [m/s]. ``state`` (2 + wheels,) and ``covariance``, its rows, are those
+    after the last step; after `take`, ``nis``, ``taken`` and ``outlier`` say how its samples fitted, as in `Filtered`. Plain
+    numbers: at this size they are ten times as fast as arrays.
+    """
+
+    def __init__(self, noise: Sequence[float] | Floats, walks: Walks) -> None:
+        self.walks = walks
+        self._variance = [float(sd) ** 2 for sd in noise]
+        self._prior = [_PRIOR[0] ** 2, _PRIOR[1] ** 2, *[_PRIOR[2] ** 2] * (len(noise) - 1)]
+        self.refused = [0] * len(noise)
+        self.likelihood = self.nis = 0.0
+        self.taken, self.outlier = 0, False
+        self.state: list[float] = []
+        self.covariance: list[list[float]] = []
+        self.anew()
+
+    def anew(self) -> None:
+        """Nothing is known of the motion from here on."""
+        size = len(self._prior)
+        self.state = [0.0] * size
+        self.covariance = [[self._prior[i] if i == j else 0.0 for j in range(size)] for i in range(size)]
+
+    def ahead(self, dt: float) -> None:
+        """Go ``dt`` [s] on."""
+        x, p, q = self.state, self.covariance, self.walks.jerk
+        x[0] += dt * x[1]
+        first, second = p[0], p[1]
+        for j, value in enumerate(second):
+            first[j] += dt * value
+        for row in p:
+            row[0] += dt * row[1]
+        first[0] += q * dt**3 / 3
+        first[1] += q * dt**2 / 2
+        second[0] += q * dt**2 / 2
+        second[1] += q * dt
+        change = self.walks.change * dt
+        for i in range(2, len(x)):
+            p[i][i] += change
+
+    def take(self, speeds: Sequence[float]) -> None:
+        """Take samples (1 + wheels,) [m/s] of this instant, NaN where not measured."""
+        x, p = self.state, self.covariance
+        self.nis, self.taken, self.outlier = 0.0, 0, False
+        for c, speed in enumerate(speeds):
+            if not math.isfinite(speed):
+                continue
+            column, variance = self._seen(c)
+            innovation = speed - x[0] - (x[c + 1] if c else 0.0)
+            ratio = innovation * innovation / variance
+            if ratio > _GATE**2 and self.refused[c] < _PATIENCE:
+                self.refused[c] += 1
+                self.outlier = True
+                self.likelihood -= 0.5 * (_GATE**2 + math.log(variance))
+                continue
+            if self.refused[c] >= _PATIENCE and ratio > _GATE**2:
+                # So many in a row are no outliers: the motion is not what was thought.
+                for i, more in enumerate(self._prior):
+                    p[i][i] += more
+                column, variance = self._seen(c)
+            self.refused[c] = 0
+            for i, share in enumerate(column):
+                gain = share / variance
+                x[i] += gain * innovation
+                row = p[i]
+                for j, other in enumerate(column):
+                    row[j] -= gain * other
+            self.nis += ratio
+            self.taken += 1
+            self.likelihood -= 0.5 * (ratio + math.log(variance))
+
+    def _seen(self, channel: int) -> tuple[list[float], float]:
+        """Covariance (n,) of the state with a channel, and the variance of its innovation: ground speed sees v, a wheel v + d."""
+        if channel == 0:
+            column = [row[0] for row in self.covariance]
+            return column, column[0] + self._variance[0]
+        column = [row[0] + row[channel + 1] for row in self.covariance]
+        return column, column[0] + column[channel + 1] + self._variance[channel]
+
+
 def run(
     time: Floats,
     speeds: Floats,
@@ -72,75 +156,40 @@ def run(
     walks: Walks,
     *,
     smooth: bool = False,
+    going: SlipFilter | None = None,
+    since: float | None = None,
 ) -> Filtered:
     """Filter a log, forwards or both ways.
 
     Parameters
     ----------
     time: (n,) s. speeds: (n, 1 + wheels) m/s, ground speed first, NaN where not measured. noise: (1 + wheels,) their SDs.
-    anew: (n,) rows before which nothing is known of the motion. walks: see `Walks`. smooth: run backwards too.
+    anew: (n,) rows before which nothing is known of the motion. walks: see `Walks`. smooth: run backwards too. going: a
+    filter that goes on from the instant ``since`` [s].
     """
     rows, channels = speeds.shape
     size = channels + 1
     state, covariance = np.empty((rows, size)), np.empty((rows, size, size))
     ahead = np.empty((rows, size, size)) if smooth else None  # predicted covariances
     nis, taken, outlier = np.zeros(rows), np.zeros(rows), np.zeros(rows, dtype=bool)
-    refused = [0] * channels
-    steps = np.diff(time, prepend=time[0])
-    measured = np.isfinite(speeds)
-    x, p = np.zeros(size), np.zeros((size, size))
-    likelihood = 0.0
-    for k in range(rows):
-        if k == 0 or anew[k]:
-            x, p = np.zeros(size), np.diag(np.square([*_PRIOR[:2], *[_PRIOR[2]] * (channels - 1)]))
-        else:
-            x, p = _ahead(x, p, float(steps[k]), walks)
+    steps = np.diff(time, prepend=time[0] if since is None else since)
+    one = SlipFilter(noise, walks) if going is None else going
+    for k, (dt, fresh, samples) in enumerate(
+        zip(steps.tolist(), anew.tolist(), speeds.tolist(), strict=True)
+    ):
+        if fresh:
+            one.anew()
+        elif k or going is not None:
+            one.ahead(dt)
         if ahead is not None:
-            ahead[k] = p
-        for c in np.flatnonzero(measured[k]):
-            # Ground speed sees v; a wheel sees v and its own d.
-            column = p[:, 0] if c == 0 else p[:, 0] + p[:, c + 1]
-            variance = column[0] + (0.0 if c == 0 else column[c + 1]) + noise[c] ** 2
-            innovation = speeds[k, c] - x[0] - (0.0 if c == 0 else x[c + 1])
-            ratio = innovation * innovation / variance
-            if ratio > _GATE**2 and refused[c] < _PATIENCE:
-                refused[c] += 1
-                outlier[k] = True
-                likelihood -= 0.5 * (_GATE**2 + np.log(variance))
-                continue
-            if refused[c] >= _PATIENCE and ratio > _GATE**2:
-                # So many in a row are no outliers: the motion is not what was thought.
-                p = p + np.diag(np.square([*_PRIOR[:2], *[_PRIOR[2]] * (channels - 1)]))
-                column = p[:, 0] if c == 0 else p[:, 0] + p[:, c + 1]
-                variance = column[0] + (0.0 if c == 0 else column[c + 1]) + noise[c] ** 2
-            refused[c] = 0
-            x = x + column * (innovation / variance)
-            p = p - np.outer(column, column) / variance
-            nis[k] += ratio
-            taken[k] += 1
-            likelihood -= 0.5 * (ratio + np.log(variance))
-        state[k], covariance[k] = x, p
-    found = Filtered(state, covariance, nis, taken, outlier, float(likelihood))
+            ahead[k] = one.covariance
+        one.take(samples)
+        state[k], covariance[k] = one.state, one.covariance
+        nis[k], taken[k], outlier[k] = one.nis, one.taken, one.outlier
+    found = Filtered(state, covariance, nis, taken, outlier, one.likelihood)
     if ahead is not None:
         _backwards(found, ahead, steps, anew)
     return found
-
-
-def _ahead(x: Floats, p: Floats, dt: float, walks: Walks) -> tuple[Floats, Floats]:
-    """State and covariance a time step later."""
-    x = x.copy()
-    x[0] += dt * x[1]
-    p = p.copy()
-    p[0, :] += dt * p[1, :]
-    p[:, 0] += dt * p[:, 1]
-    q = walks.jerk
-    p[0, 0] += q * dt**3 / 3
-    p[0, 1] += q * dt**2 / 2
-    p[1, 0] += q * dt**2 / 2
-    p[1, 1] += q * dt
-    rest = np.arange(2, len(x))
-    p[rest, rest] += walks.change * dt
-    return x, p
 
 
 def _backwards(found: Filtered, ahead: Floats, steps: Floats, anew: npt.NDArray[np.bool_]) -> None:

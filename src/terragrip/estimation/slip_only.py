@@ -7,7 +7,8 @@ cannot be had, so their columns are absent.
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -17,19 +18,17 @@ from terragrip.estimation import zero_slip
 from terragrip.estimation.engine import EVENTS
 from terragrip.estimation.estimates import Estimates
 from terragrip.estimation.noise import channel_noise, logged_noise, sensor_of
-from terragrip.estimation.rim_speeds import DRIVE, RimSpeed, rim_speeds, zero_of
-from terragrip.estimation.slip_filter import Walks, choose_walks, run
-from terragrip.physics.slip import slip
+from terragrip.estimation.rim_speeds import DRIVE, rim_speeds, zero_of
+from terragrip.estimation.slip_columns import GAP, STANDSTILL, Place, Rim, columns_of
+from terragrip.estimation.slip_filter import Filtered, SlipFilter, Walks, choose_walks, run
 from terragrip.recording import Recording, held_periods, unit_warnings, without_held
 from terragrip.vehicle import Vehicle
 
 Floats = npt.NDArray[np.float64]
 
 METHOD = "slip-only"
-_STANDSTILL = 0.05  # m/s
-_GAP = 2.0  # s
 _PASSED_ON = ("drawbar_force", "latitude", "longitude", "altitude")
-_OUTLIER, _STILL, _AWAY = (EVENTS.index(name) for name in ("outlier", "standstill", "gap"))
+_OUTLIER, _STILL, _GAP = (EVENTS.index(name) for name in ("outlier", "standstill", "gap"))
 
 
 def is_slip_only(recording: Recording, vehicle: Vehicle) -> bool:
@@ -57,6 +56,80 @@ def estimate_slip(
 
     Raises InputError where a wheel of the log is not the vehicle's.
     """
+    found = _prepared(recording, vehicle, sensors, held, gap, standstill_speed)
+    filtered = run(found.time, found.speeds, found.sds, found.anew, found.walks, smooth=smooth)
+    if progress is not None:
+        progress(len(recording), len(recording))
+    return found.estimates(recording, filtered, found.whole(), smooth=smooth)
+
+
+def slip_in_parts(recording: Recording, vehicle: Vehicle, rows: int) -> Iterator[Estimates]:
+    """What `estimate_slip` gives, ``rows`` rows at a time, so that the estimates need not fit memory."""
+    found = _prepared(recording, vehicle, None, None, None, None)
+    going, since = SlipFilter(found.sds, found.walks), None
+    place = Place()
+    for first in range(0, len(recording), rows):
+        part = slice(first, first + rows)
+        time, anew = found.time[part], found.anew[part]
+        filtered = run(time, found.speeds[part], found.sds, anew, found.walks, going=going, since=since)
+        estimates = found.estimates(recording.select(part), filtered, _Rows(part, place))
+        since = float(time[-1])
+        place = Place(float(estimates["distance"][-1]), since, float(estimates["ground_speed"][-1]))
+        yield estimates
+
+
+@dataclass(frozen=True)
+class _Rows:
+    """Rows of a log, and where the machine was before them."""
+
+    rows: slice
+    before: Place
+
+
+@dataclass(frozen=True, eq=False)
+class _Prepared:
+    """What a log's filter needs: instants (n,), speeds (n, 1 + wheels), their SDs, where motion begins anew; and what is told of it."""
+
+    time: Floats
+    speeds: Floats
+    sds: Floats
+    anew: npt.NDArray[np.bool_]
+    walks: Walks
+    rims: tuple[Rim, ...]
+    standstill: float
+    about: dict[str, Any]
+    notes: tuple[str, ...]
+
+    def whole(self) -> _Rows:
+        return _Rows(slice(None), Place())
+
+    def estimates(
+        self, recording: Recording, found: Filtered, of: _Rows, *, smooth: bool = False
+    ) -> Estimates:
+        """The table of the recording's rows."""
+        columns = columns_of(
+            found.state, found.covariance, self.rims, self.time[of.rows], self.standstill, of.before
+        )
+        columns |= {"nis": found.nis, "channels": found.channels}
+        event = _events(found.state, self.rims, found.outlier, _away(self.anew)[of.rows], self.standstill)
+        for name in (*_PASSED_ON, *recording.references):
+            if name in recording.channels:
+                columns[name] = recording.channels[name]
+        notes = (*self.notes, *_against_travel(found.state, self.rims))
+        about = {**self.about, "smooth": smooth}
+        return Estimates(
+            self.time[of.rows], columns, event, dict(recording.labels), about, tuple(dict.fromkeys(notes))
+        )
+
+
+def _prepared(
+    recording: Recording,
+    vehicle: Vehicle,
+    sensors: Mapping[str, float] | None,
+    held: Mapping[str, float] | None,
+    gap: float | None,
+    standstill_speed: float | None,
+) -> _Prepared:
     periods = dict(held_periods(recording) if held is None else held)
     log = without_held(recording, periods)
     mine = dict(sensors or {})
@@ -71,28 +144,25 @@ def estimate_slip(
     noise, guessed = channel_noise(vehicle, used, {**{k: v for k, v in logged.items() if k in used}, **mine})
     zero = {name: zero_of(recording, vehicle, name) for name in used if name != "ground_speed"}
     rims, notes = rim_speeds(log, vehicle, noise, zero)
-    step = _STANDSTILL if standstill_speed is None else standstill_speed
     speeds = np.stack([log.channels["ground_speed"], *(rim.values for rim in rims)], axis=1)
     sds = np.array([noise["ground_speed"], *(rim.noise for rim in rims)])
-    anew = _anew(log.time, speeds, _GAP if gap is None else gap)
+    anew = _anew(log.time, speeds, GAP if gap is None else gap)
     walks = choose_walks(log.time, speeds, sds, anew)
-    found = run(log.time, speeds, sds, anew, walks, smooth=smooth)
-    notes += _against_travel(found.state, rims)
-    columns = _columns(found.state, found.covariance, rims, log.time, step)
-    columns |= {"nis": found.nis, "channels": found.channels}
-    event = _events(found.state, rims, found.outlier, anew, step)
-    for name in (*_PASSED_ON, *recording.references):
-        if name in recording.channels:
-            columns[name] = recording.channels[name]
-    if progress is not None:
-        progress(len(log), len(log))
     if guessed:
         shown = ", ".join(f"{name} ({noise[name]:.3g})" for name in guessed)
         notes.append(f"The noise of {shown} is a guess from the vehicle's size: give it under 'sensors'.")
     heard = [note for note in recording.notes if not note.startswith("There is no drawbar_force")]
-    said = (*heard, *unit_warnings(recording, vehicle), _WHAT_IS_MISSING, *notes)
-    about = _about(recording, vehicle, noise, periods, walks, zero, smooth=smooth)
-    return Estimates(log.time, columns, event, dict(recording.labels), about, tuple(dict.fromkeys(said)))
+    return _Prepared(
+        log.time,
+        speeds,
+        sds,
+        anew,
+        walks,
+        tuple(Rim(rim.wheel, rim.radius, rim.spread) for rim in rims),
+        STANDSTILL if standstill_speed is None else standstill_speed,
+        _about(recording, vehicle, noise, periods, walks, zero),
+        (*heard, *unit_warnings(recording, vehicle), _WHAT_IS_MISSING, *notes),
+    )
 
 
 _WHAT_IS_MISSING = (
@@ -109,52 +179,13 @@ def _anew(time: Floats, speeds: Floats, gap: float) -> npt.NDArray[np.bool_]:
     return np.asarray(silence > gap)
 
 
-def _columns(
-    state: Floats, covariance: Floats, rims: list[RimSpeed], time: Floats, standstill: float
-) -> dict[str, Floats]:
-    """The table's columns (n,) from the filter's state and covariance."""
-    v = state[:, 0]
-    steps = np.diff(time, prepend=time[0])
-    found = {
-        "distance": np.cumsum(steps * (np.abs(v) + np.abs(np.r_[v[:1], v[:-1]])) / 2),
-        "ground_speed": v,
-        "ground_speed_std": np.sqrt(np.maximum(covariance[:, 0, 0], 0.0)),
-    }
-    slips: dict[str, Floats] = {}
-    for i, rim in enumerate(rims):
-        k = i + 2
-        u = v + state[:, k]
-        with_v = covariance[:, 0, 0] + covariance[:, 0, k]
-        spread = with_v + covariance[:, 0, k] + covariance[:, k, k]
-        found[f"wheel_speed_{rim.wheel}"] = u / rim.radius
-        found[f"wheel_speed_{rim.wheel}_std"] = np.sqrt(np.maximum(spread, 0.0)) / rim.radius
-        slips[f"slip_{rim.wheel}"], slips[f"slip_{rim.wheel}_std"] = _slip(
-            v, u, np.stack([covariance[:, 0, 0], with_v, spread], axis=1), rim.spread, standstill
-        )
-    return found | slips
-
-
-def _slip(v: Floats, u: Floats, spread: Floats, radius: float, standstill: float) -> tuple[Floats, Floats]:
-    """Slip (paper eq. 5) and its SD (n,) by first derivatives; ``spread`` (n, 3): variances of v, of v with u, of u."""
-    value = slip(u, v, 1.0, standstill_speed=standstill)
-    travel, rim = np.abs(v), np.abs(u)
-    driving = rim >= travel
-    safe = np.where(np.isfinite(value), np.maximum(travel, rim), 1.0)
-    # Driving: 1 - |v|/|u|; braking: -1 + |u|/|v|.
-    by_v = -np.sign(v) * np.where(driving, safe, rim) / safe**2
-    by_u = np.sign(u) * np.where(driving, travel, safe) / safe**2
-    variance = by_v**2 * spread[:, 0] + 2 * by_v * by_u * spread[:, 1] + by_u**2 * spread[:, 2]
-    variance += (radius * np.where(driving, travel, rim) / safe) ** 2
-    return value, np.where(np.isfinite(value), np.sqrt(np.maximum(variance, 0.0)), np.nan)
-
-
-def _against_travel(state: Floats, rims: list[RimSpeed]) -> list[str]:
+def _against_travel(state: Floats, rims: Sequence[Rim]) -> list[str]:
     """A sentence on wheels that turn backward while the machine goes forward, most of the time."""
     v = state[:, 0]
     odd = []
     for i, rim in enumerate(rims):
         u = v + state[:, i + 2]
-        moving = (np.abs(v) > _STANDSTILL) & (np.abs(u) > _STANDSTILL)
+        moving = (np.abs(v) > STANDSTILL) & (np.abs(u) > STANDSTILL)
         if moving.any() and np.mean((u * v)[moving] < 0) > 0.5:
             odd.append(rim.wheel)
     if not odd:
@@ -166,9 +197,9 @@ def _against_travel(state: Floats, rims: list[RimSpeed]) -> list[str]:
 
 def _events(
     state: Floats,
-    rims: list[RimSpeed],
+    rims: Sequence[Rim],
     outlier: npt.NDArray[np.bool_],
-    anew: npt.NDArray[np.bool_],
+    away: npt.NDArray[np.bool_],
     standstill: float,
 ) -> npt.NDArray[np.uint8]:
     event = np.where(outlier, _OUTLIER, 0).astype(np.uint8)
@@ -176,10 +207,15 @@ def _events(
     for i in range(len(rims)):
         fastest = np.maximum(fastest, np.abs(state[:, 0] + state[:, i + 2]))
     event[fastest <= standstill] = _STILL
+    event[away] = _GAP
+    return event
+
+
+def _away(anew: npt.NDArray[np.bool_]) -> npt.NDArray[np.bool_]:
+    """Rows (n,) on both sides of a gap."""
     after = anew.copy()
     after[0] = False
-    event[after | np.r_[after[1:], False]] = _AWAY
-    return event
+    return np.asarray(after | np.r_[after[1:], False])
 
 
 def _about(
@@ -189,8 +225,6 @@ def _about(
     held: Mapping[str, float],
     walks: Walks,
     zero: Mapping[str, zero_slip.Ratio | None],
-    *,
-    smooth: bool,
 ) -> dict[str, Any]:
     """What the table was made from, ready for JSON."""
     from terragrip import __version__
@@ -198,7 +232,7 @@ def _about(
     about = {
         "version": __version__,
         "method": METHOD,
-        "smooth": smooth,
+        "smooth": False,
         "vehicle": vehicle.to_dict(),
         "recording": {"source": recording.source, "sha256": recording.sha256},
         "settings": {

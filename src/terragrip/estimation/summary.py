@@ -17,7 +17,8 @@ if TYPE_CHECKING:
 
 Floats = npt.NDArray[np.float64]
 
-_SAMPLE = 20_000  # rows a block that medians are taken from
+_SAMPLE = 20_000  # rows a block that medians are taken from,
+_MOST = 200_000  # and rows in all
 _EXPECTED = (0.7, 1.4)  # of the normalised innovation squared a channel
 
 
@@ -37,6 +38,8 @@ class Tally:
     sample: dict[str, list[Floats]] = field(default_factory=dict)
     _first: float | None = None
     _last_event: int = 0
+    _every: int = 1
+    _sampled: int = 0
 
     def add(self, block: Estimates) -> None:
         """Count a block that follows the ones before it."""
@@ -54,7 +57,11 @@ class Tally:
         chosen = moving[:: max(1, len(moving) // _SAMPLE)]
         for name in (n for _, n, _ in _quantities(self.wheels) if n in block):
             for column in (name, f"{name}_std"):
-                self.sample.setdefault(column, []).append(block[column][chosen])
+                self.sample.setdefault(column, []).append(block[column][chosen[:: self._every]])
+        self._sampled += len(chosen[:: self._every])
+        if self._sampled > _MOST:  # half of them do as well
+            self.sample = {name: [np.concatenate(parts)[::2]] for name, parts in self.sample.items()}
+            self._every, self._sampled = 2 * self._every, (self._sampled + 1) // 2
 
     def _count_events(self, codes: npt.NDArray[np.uint8]) -> None:
         starts = np.flatnonzero(np.diff(codes, prepend=np.uint8(self._last_event)))

@@ -21,7 +21,8 @@ if TYPE_CHECKING:
     import pyarrow as pa
 
 SUFFIXES = (".csv", ".txt", ".tsv", ".dat", ".csv.gz", ".txt.gz", ".tsv.gz")
-_GZIP = b"\x1f\x8b"
+GZIP = b"\x1f\x8b"
+_LONG, _LONG_PACKED = 256 << 20, 32 << 20  # bytes
 _BLANKS = re.compile(rb"[ \t]+")
 _MISSING = [
     *("", "NaN", "nan", "NAN", "-nan", "-NaN", "NA", "N/A", "n/a", "#N/A", "<NA>", "null", "NULL", "None"),
@@ -40,25 +41,48 @@ def read_csv(path: str | os.PathLike[str], wanted: Wanted | None = None) -> LogT
 
     source = os.fspath(path)
     refuse_missing(source, suffixes=SUFFIXES)
+    if is_long(source):
+        from terragrip.formats.csv_blocks import read_long_csv
+
+        found = read_long_csv(source, wanted)
+        if found is not None:
+            return found
     try:
         raw = Path(source).read_bytes()
     except OSError as error:
         raise unreadable(source, error) from error
     digest = hashlib.sha256(raw).hexdigest()
-    if raw.startswith(_GZIP):
+    if raw.startswith(GZIP):
         raw = _unzip(raw, source)
     if not raw.strip():
         raise InputError("is empty", file=source, mend="give a table with a header and rows")
     data = to_text(raw, source)
     dialect = detect(data, source)
-    body, notes = _body(data, dialect)
+    body, notes = body_of(data, dialect, dialect.start)
+    names = dialect.names
+    chosen = chosen_of(dialect, wanted, source)
+    columns = parse(body, dialect, chosen, source)
+    return LogTable(tuple(n for n in names if n), columns, dialect.units, source, digest, tuple(notes))
+
+
+def is_long(source: str) -> bool:
+    """Whether a file is so long that it is read in blocks; a packed one unpacks to some ten times its size."""
+    try:
+        with open(source, "rb") as stream:
+            packed = stream.read(2) == GZIP
+        return os.path.getsize(source) > (_LONG_PACKED if packed else _LONG)
+    except OSError as error:
+        raise unreadable(source, error) from error
+
+
+def chosen_of(dialect: Dialect, wanted: Wanted | None, source: str) -> list[int]:
+    """The places of the wanted columns; raises InputError where one stands twice."""
     names = dialect.names
     chosen = [k for k, name in enumerate(names) if name and (wanted is None or wanted(name))]
     twice = next((names[k] for k in chosen if names.count(names[k]) > 1), None)
     if twice is not None:
         raise InputError("stands twice", file=source, place=f"column {twice}", mend="keep one of them")
-    columns = _parse(body, dialect, chosen, source)
-    return LogTable(tuple(n for n in names if n), columns, dialect.units, source, digest, tuple(notes))
+    return chosen
 
 
 def _unzip(raw: bytes, source: str) -> bytes:
@@ -72,25 +96,30 @@ def _unzip(raw: bytes, source: str) -> bytes:
         ) from error
 
 
-def _body(data: bytes, dialect: Dialect) -> tuple[bytes | memoryview, list[str]]:
-    """The rows under the header; a last line that was cut off while writing is left out, with a note."""
-    body: bytes | memoryview = memoryview(data)[dialect.start :]
+def body_of(
+    data: bytes, dialect: Dialect, start: int, *, more: bool = False
+) -> tuple[bytes | memoryview, list[str]]:
+    """The rows from ``start`` on; a last line that was cut off while writing is left out, with a note.
+
+    ``more``: there are rows before these.
+    """
+    body: bytes | memoryview = memoryview(data)[start:]
     notes = []
     if not data.endswith(b"\n"):
         last = data.rfind(b"\n") + 1
         cells = split(data[last:].decode("utf-8", "replace"), dialect.separator)
-        if last > dialect.start and data[last:].strip() and len(cells) < len(dialect.names):
-            body = memoryview(data)[dialect.start : last]
+        if (last > start or more) and data[last:].strip() and len(cells) < len(dialect.names):
+            body = memoryview(data)[start:last]
             notes.append("The last row is cut off and was left out.")
     if dialect.separator == " ":
         body = b"\n".join(_BLANKS.sub(b"\t", line.strip()) for line in bytes(body).splitlines())
     return body, notes
 
 
-def _parse(
-    body: bytes | memoryview, dialect: Dialect, chosen: list[int], source: str
+def parse(
+    body: bytes | memoryview, dialect: Dialect, chosen: list[int], source: str, first: int = 0
 ) -> dict[str, npt.NDArray[Any]]:
-    """The chosen columns by name."""
+    """The chosen columns by name; ``first``: rows before these."""
     import pyarrow as pa
 
     names = dialect.names
@@ -101,8 +130,8 @@ def _parse(
     try:
         table = _arrow(body, dialect, chosen, types)
     except (pa.ArrowInvalid, pa.ArrowKeyError) as error:
-        texts = _arrow_of_texts(body, dialect, chosen, error, source)
-        return {names[k]: _numbers_of_texts(names[k], texts.column(_field(k)), source) for k in chosen}
+        texts = _arrow_of_texts(body, dialect, chosen, error, source, first)
+        return {names[k]: _numbers_of_texts(names[k], texts.column(_field(k)), source, first) for k in chosen}
     return {names[k]: from_arrow(names[k], table.column(_field(k)), source) for k in chosen}
 
 
@@ -138,7 +167,7 @@ def _arrow(body: bytes | memoryview, dialect: Dialect, chosen: list[int], types:
 
 
 def _arrow_of_texts(
-    body: bytes | memoryview, dialect: Dialect, chosen: list[int], error: Exception, source: str
+    body: bytes | memoryview, dialect: Dialect, chosen: list[int], error: Exception, source: str, first: int
 ) -> pa.Table:
     """The columns as texts, where they cannot be read as numbers; raises InputError where rows do not fit."""
     import pyarrow as pa
@@ -146,14 +175,14 @@ def _arrow_of_texts(
     try:
         return _arrow(body, dialect, chosen, {_field(k): pa.string() for k in chosen})
     except (pa.ArrowInvalid, pa.ArrowKeyError):
-        raise _ragged(bytes(body), dialect, error, source) from error
+        raise _ragged(bytes(body), dialect, error, source, first) from error
 
 
-def _ragged(body: bytes, dialect: Dialect, error: Exception, source: str) -> InputError:
+def _ragged(body: bytes, dialect: Dialect, error: Exception, source: str, first: int) -> InputError:
     """The InputError that names the first row of another width than the header."""
     separator, width = "\t" if dialect.separator == " " else dialect.separator, len(dialect.names)
     lines = (line for line in body.decode("utf-8", "replace").splitlines() if line.strip())
-    for row, line in enumerate(lines, start=1):
+    for row, line in enumerate(lines, start=first + 1):
         cells = len(split(line, separator))
         if cells != width:
             problem = f"has {cells} cells, the header {width}"
@@ -162,7 +191,7 @@ def _ragged(body: bytes, dialect: Dialect, error: Exception, source: str) -> Inp
     return InputError(problem, file=source, mend="look for unbalanced quotes")
 
 
-def _numbers_of_texts(name: str, column: pa.ChunkedArray, source: str) -> npt.NDArray[Any]:
+def _numbers_of_texts(name: str, column: pa.ChunkedArray, source: str, first: int) -> npt.NDArray[Any]:
     """Texts as numbers; a schema column raises InputError at the first that is none, another stays text."""
     cells = column.to_pylist()
     found = np.full(len(cells), np.nan)
@@ -175,7 +204,7 @@ def _numbers_of_texts(name: str, column: pa.ChunkedArray, source: str) -> npt.ND
             if name in LABELS or not (is_channel(name) or name == TIME):
                 return np.array(cells, dtype=object)
             shown = repr(cell) if len(cell) <= 30 else repr(cell[:27] + "...")
-            place = f"column {name}, row {row + 1}"
+            place = f"column {name}, row {first + row + 1}"
             mend = "leave the cell empty or give a number"
             raise InputError(f"{shown} is not a number", file=source, place=place, mend=mend) from None
     return found

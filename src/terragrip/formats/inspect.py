@@ -13,10 +13,10 @@ import numpy.typing as npt
 from terragrip.errors import InputError
 from terragrip.formats.profile import SHIPPED, Profile
 from terragrip.formats.proposal import is_ready, missing_channels, profile_text
-from terragrip.formats.reading import read, read_log
+from terragrip.formats.reading import is_own, read, read_log, recording_of
 from terragrip.formats.recognition import find_time, propose
 from terragrip.formats.signals import SINCE_1970, SignalLog
-from terragrip.formats.table import LogTable
+from terragrip.formats.table import LogTable, Sparse
 from terragrip.recording import Recording, unit_warnings
 from terragrip.recording.held import fresh_samples, held_period, measured_part
 from terragrip.recording.noise import white_noise
@@ -25,6 +25,12 @@ from terragrip.units import factor_to
 from terragrip.vehicle import Vehicle
 
 Floats = npt.NDArray[np.float64]
+
+_LONG, _ENOUGH = 200_000_000, 60_000_000  # bytes of a log that is looked at in parts, and of these parts
+_SPARSE = (
+    "The log is long ({:.1f} GB): one of every {} blocks of its records was looked at, all over it. Counts and shares are of "
+    "these; gaps are not looked for."
+)
 
 
 @dataclass(frozen=True)
@@ -106,11 +112,17 @@ def inspect(
     """
     machine = vehicle if isinstance(vehicle, Vehicle) or vehicle is None else Vehicle.load(vehicle)
     databases = tuple(dbc)
-    log = read_log(path, databases=databases)
+    chosen = profile if isinstance(profile, Profile) or profile is None else Profile.load(profile)
+    size = _size(path)
+    every = max(1, round(size / _ENOUGH)) if size > _LONG else 1
+    log = read_log(path, Sparse(every) if every > 1 else None, (*databases, *(chosen.dbc if chosen else ())))
     warnings, recording = list(log.notes), None
+    if every > 1:
+        warnings.insert(0, _SPARSE.format(size / 1e9, every))
     fitting: tuple[str, ...] = ()
     try:
-        recording = read(path, profile, dbc=databases)
+        # A long log is not read a second time.
+        recording = read(path, chosen, dbc=databases) if every == 1 else _recording(log, chosen)
         warnings += [note for note in recording.notes if note not in warnings]
     except InputError as error:
         if profile is not None:
@@ -126,16 +138,17 @@ def inspect(
             warnings.append(_cause(error))
     if recording is not None and profile is not None:
         log = _as_table(recording, log)
-    seen = _Seen.of(log)
+    seen = _Seen.of(log, whole=every == 1)
     proposals = propose(seen.numbers(), seen.texts(), seen.units)
     stamp, base = seen.stamp, seen.base
     return Inspection(
         file=str(log.source),
         sha256=str(log.sha256),
         rows=len(next(iter(seen.columns.values()), ())) if base is None else len(base),
-        time=None if stamp is None or base is None else _time_summary(stamp[0], stamp[1], base),
+        time=None if stamp is None or base is None else _time_summary(stamp[0], stamp[1], base, seen.whole),
         columns=tuple(
-            _column_summary(n, c, seen.units.get(n), seen.clock_of(n)) for n, c in seen.columns.items()
+            _column_summary(n, c, seen.units.get(n), seen.clock_of(n), seen.whole)
+            for n, c in seen.columns.items()
         ),
         recognised={channel: proposal.columns for channel, proposal in proposals.items()},
         missing=tuple(missing_channels(proposals, stamp is not None)),
@@ -161,9 +174,10 @@ class _Seen:
     base: Floats | None
     clocks: dict[str, Floats]
     since_1970: bool
+    whole: bool  # no block of the log was left out
 
     @classmethod
-    def of(cls, log: LogTable | SignalLog) -> _Seen:
+    def of(cls, log: LogTable | SignalLog, *, whole: bool) -> _Seen:
         if isinstance(log, SignalLog):
             base = log.instants()
             first = float(base[0]) if len(base) else 0.0
@@ -174,6 +188,7 @@ class _Seen:
                 base - first,
                 {name: signal.time - first for name, signal in log.signals.items()},
                 since_1970=False,
+                whole=whole,
             )
         numbers = {n: c.astype(np.float64) for n, c in log.columns.items() if c.dtype.kind in "fiub"}
         dates = tuple(n for n, c in log.columns.items() if c.dtype.kind == "M")
@@ -185,7 +200,7 @@ class _Seen:
             and _is_large(log.columns[stamp[0]], stamp[1])
         )
         dated = stamp is not None and stamp[0] in dates
-        return cls(log.columns, log.units, stamp, instants, {}, since_1970=large or dated)
+        return cls(log.columns, log.units, stamp, instants, {}, since_1970=large or dated, whole=whole)
 
     def clock_of(self, name: str) -> Floats | None:
         """The instants of a column; None of the time column, which has no rate or noise of its own."""
@@ -204,6 +219,26 @@ class _Seen:
     def texts(self) -> tuple[str, ...]:
         """The names of the text columns."""
         return tuple(n for n, c in self.columns.items() if c.dtype.kind == "O")
+
+
+def _size(path: str | os.PathLike[str]) -> int:
+    """Bytes of a log that is a file or a folder; 0 where there is none, for the reader to name."""
+    try:
+        if os.path.isdir(path):
+            return sum(entry.stat().st_size for entry in os.scandir(path) if entry.is_file())
+        return os.path.getsize(path)
+    except OSError:
+        return 0
+
+
+def _recording(log: LogTable | SignalLog, profile: Profile | None) -> Recording:
+    """The recording of what was read of a log."""
+    if isinstance(log, LogTable):
+        return recording_of(log, profile)
+    wants = is_own if profile is None else profile.wants
+    return recording_of(
+        replace(log, signals={n: s for n, s in log.signals.items() if wants(n)}).table(), profile
+    )
 
 
 def _fitting(log: LogTable | SignalLog) -> tuple[str, ...]:
@@ -252,13 +287,13 @@ def _seconds(column: npt.NDArray[Any], unit: str) -> Floats:
     return np.asarray(column, dtype=np.float64) * factor_to(unit, "s")
 
 
-def _time_summary(name: str, unit: str, time: Floats) -> TimeSummary | None:
+def _time_summary(name: str, unit: str, time: Floats, whole: bool) -> TimeSummary | None:
     known = time[np.isfinite(time)]
     if len(known) < 2:
         return None
     spacing = np.diff(known)
     low, middle, high = (float(q) for q in np.quantile(spacing, [0.05, 0.5, 0.95]))
-    wide = np.flatnonzero(spacing > max(5 * middle, 0.5))
+    wide = np.flatnonzero(spacing > max(5 * middle, 0.5)) if whole else np.empty(0, dtype=np.intp)
     longest = wide[np.argsort(spacing[wide])[::-1][:5]]
     return TimeSummary(
         column=name,
@@ -276,8 +311,16 @@ def _time_summary(name: str, unit: str, time: Floats) -> TimeSummary | None:
     )
 
 
+def _spanned(time: Floats, whole: bool) -> float:
+    """How long (n,) instants last [s], without the blocks that were left out."""
+    if whole:
+        return float(time[-1] - time[0])
+    steps = np.diff(time)
+    return float(steps[steps < 100 * np.median(steps)].sum()) or 1.0
+
+
 def _column_summary(
-    name: str, column: npt.NDArray[Any], unit: str | None, time: Floats | None
+    name: str, column: npt.NDArray[Any], unit: str | None, time: Floats | None, whole: bool
 ) -> ColumnSummary:
     rows = max(len(column), 1)
     if column.dtype.kind == "O":
@@ -302,7 +345,7 @@ def _column_summary(
             fresh = fresh_samples(when, sample, held)
             when, sample = when[fresh], sample[fresh]
         noise = white_noise(when, sample)
-        rate = 1 / held if held is not None else count / float(time[-1] - time[0])
+        rate = 1 / held if held is not None else count / _spanned(time, whole)
     return ColumnSummary(
         name, "number", unit, count, 1 - count / rows, rate, held, noise, low, q05, middle, q95, high
     )

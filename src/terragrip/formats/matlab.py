@@ -22,13 +22,14 @@ from terragrip.formats.mat5 import Array, Opaque, read_mat5
 from terragrip.formats.matlab_objects import IN_RECORDS
 from terragrip.formats.matlab_signals import Found, walk
 from terragrip.formats.signals import Signal, SignalLog
-from terragrip.formats.table import LogTable, Wanted
+from terragrip.formats.table import LogTable, Wanted, every_of, kept_rows
 from terragrip.formats.worker import Worker
 
 Floats = npt.NDArray[np.float64]
 
 _DEEPEST = 12
 _USER_BLOCK, _HDF5 = 512, b"\x89HDF\r\n\x1a\n"
+_BLOCK = 10_000  # samples that are kept or left out together, where a log is looked at in parts
 _DATENUM = (600_000.0, 800_000.0)  # days since year 0: 1642 to 2190
 _DATENUM_1970 = 719_529.0
 _NO_OBJECTS = ("", "function", "sparse", "function_handle")
@@ -150,16 +151,20 @@ def _finished(
     if not found.signals:
         return _table_of(found.loose, path, wanted, notes)
     clocks: dict[int, Floats] = {}
+    lengths: dict[int, int] = {}
     arrays: dict[int, npt.NDArray[Any]] = {}
     signals = {}
     for name, (clock, values, column) in found.signals.items():
         if wanted is not None and not wanted(name):
             continue
         if id(clock) not in clocks:
-            clocks[id(clock)] = _seconds(_read(clock).ravel(), found.scales.get(id(clock), 1.0))
+            whole = _seconds(_read(clock).ravel(), found.scales.get(id(clock), 1.0))
+            lengths[id(clock)] = len(whole)
+            clocks[id(clock)] = whole[kept_rows(len(whole), _BLOCK, every_of(wanted))]
         if id(values) not in arrays:
             arrays = {id(values): _read(values)}  # columns of one matrix stand side by side
-        flat = arrays[id(values)].reshape(len(clocks[id(clock)]), -1)[:, column or 0]
+        flat = arrays[id(values)].reshape(lengths[id(clock)], -1)[:, column or 0]
+        flat = flat[kept_rows(len(flat), _BLOCK, every_of(wanted))]
         signals[name] = Signal(clocks[id(clock)], np.array(flat, dtype=np.float64), found.units.get(name))
     return SignalLog(tuple(found.signals), signals, path, sha256(path), tuple(notes))
 

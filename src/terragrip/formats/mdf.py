@@ -14,8 +14,10 @@ from terragrip.formats.can.frames import Frames
 from terragrip.formats.can.log import finished
 from terragrip.formats.kind import Databases
 from terragrip.formats.signals import Signal, SignalLog
-from terragrip.formats.table import Wanted
+from terragrip.formats.table import Wanted, every_of, kept_rows
 from terragrip.formats.worker import Worker
+
+_BLOCK = 10_000  # samples that are kept or left out together, where a log is looked at in parts
 
 
 def read_mdf(path: str, wanted: Wanted | None, databases: Databases) -> SignalLog:
@@ -33,9 +35,14 @@ def read_mdf(path: str, wanted: Wanted | None, databases: Databases) -> SignalLo
                 frames.take_many(start + time, identifiers, lengths, data)
                 continue
             group = int(message["group"])
-            time = clocks[group] if message["shared"] else start + worker.array()
+            if not message["shared"]:
+                time = worker.array()
+                time = start + time[kept_rows(len(time), _BLOCK, every_of(wanted))]
+            else:
+                time = clocks[group]
             clocks.setdefault(group, time)
             values = worker.array()
+            values = values[kept_rows(len(values), _BLOCK, every_of(wanted))]
             signals[str(message["name"])] = Signal(
                 time, values.astype(object) if values.dtype.kind == "U" else values, message["unit"] or None
             )

@@ -7,6 +7,7 @@ once the wanted names came in on standard input, their samples; then the frames,
 
 from __future__ import annotations
 
+import mmap
 import sys
 from collections.abc import Iterator, Sequence
 from typing import Any
@@ -51,11 +52,20 @@ def _serve(file: Any, out: Outlet) -> None:
         if not shared:
             out.send(np.asarray(signal.timestamps, dtype=np.float64))
         out.send(values)
+        _let_go(file)
     for group in (k for k in buses if any(c.name.startswith(_FRAME) for c in file.groups[k].channels)):
         for block in _frames(file, group):
             out.say({"frames": True})
             for array in block:
                 out.send(array)
+            _let_go(file)
+
+
+def _let_go(file: Any) -> None:
+    """Give back the memory of what was read of a mapped file, which the system would keep for as long as it can."""
+    mapped = getattr(getattr(file, "_mdf", None), "_file", None)
+    if isinstance(mapped, mmap.mmap):
+        mapped.madvise(mmap.MADV_DONTNEED)
 
 
 def _is_bus(group: Any) -> bool:

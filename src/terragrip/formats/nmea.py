@@ -20,9 +20,10 @@ from terragrip.files import sha256, unreadable
 from terragrip.formats.boundary import needed
 from terragrip.formats.kind import Databases
 from terragrip.formats.signals import Signal, SignalLog
-from terragrip.formats.table import Wanted
+from terragrip.formats.table import Wanted, every_of, skips
 
 _SENTENCE = re.compile(r"\$[A-Z]{2}(RMC|VTG|GGA),[^$!*\r\n]{0,120}\*[0-9A-Fa-f]{2}")
+_BLOCK = 20_000  # lines that are read or left out together, where a log is looked at in parts
 _LONGEST = 4096  # characters of a line
 _DAY = 86400.0
 _KNOT, _KMH = 1852 / 3600, 1 / 3.6
@@ -82,8 +83,9 @@ def read_nmea(path: str, wanted: Wanted | None, databases: Databases) -> SignalL
     track = _Track()
     try:
         with Path(path).open(encoding="ascii", errors="replace", newline="\n") as stream:
-            for line in iter(lambda: stream.readline(_LONGEST), ""):
-                _take_line(line, track, pynmea2)
+            for number, line in enumerate(iter(lambda: stream.readline(_LONGEST), "")):
+                if not skips(number, _BLOCK, every_of(wanted)):
+                    _take_line(line, track, pynmea2)
     except OSError as error:
         raise unreadable(path, error) from error
     if not track.columns:

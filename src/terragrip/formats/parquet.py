@@ -4,23 +4,23 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Iterator
-from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
 import numpy.typing as npt
 
 from terragrip.errors import InputError
 from terragrip.files import refuse_missing, sha256
-from terragrip.formats.table import LogTable, Wanted, from_arrow
-from terragrip.recording import Recording, checks
-from terragrip.recording.columns import numbers, seconds, texts
+from terragrip.formats.blocks import recordings
+from terragrip.formats.table import LogTable, Wanted, every_of, from_arrow
+from terragrip.recording import Recording
 from terragrip.recording.schema import LABELS, TIME, is_channel
 
 if TYPE_CHECKING:
+    import pyarrow as pa
     import pyarrow.parquet as pq
 
 MAGIC = b"PAR1"
+_BLOCK = 20_000  # rows that are read or left out together, where a log is looked at in parts
 
 
 def read_parquet(path: str | os.PathLike[str], wanted: Wanted | None = None) -> LogTable:
@@ -30,7 +30,7 @@ def read_parquet(path: str | os.PathLike[str], wanted: Wanted | None = None) -> 
         names = tuple(str(name) for name in file.schema_arrow.names)
         chosen = [name for name in names if wanted is None or wanted(name)]
         _refuse_twice(names, chosen, source)
-        table = _guarded(source, lambda: file.read(columns=chosen))
+        table = _guarded(source, lambda: _parts(file, chosen, every_of(wanted)))
     columns = {}
     for name in chosen:
         try:
@@ -41,7 +41,17 @@ def read_parquet(path: str | os.PathLike[str], wanted: Wanted | None = None) -> 
     return LogTable(names, columns, {}, source, sha256(source))
 
 
-def iter_parquet(path: str | os.PathLike[str], rows: int = 500_000) -> Iterator[Recording]:
+def _parts(file: pq.ParquetFile, chosen: list[str], every: int) -> pa.Table:
+    """The chosen columns, of every ``every`` blocks one."""
+    import pyarrow as pa
+
+    if every <= 1:
+        return file.read(columns=chosen)
+    batches = file.iter_batches(batch_size=_BLOCK, columns=chosen)
+    return pa.Table.from_batches([batch for k, batch in enumerate(batches) if k % every == 0])
+
+
+def iter_parquet(path: str | os.PathLike[str], rows: int = 200_000) -> Iterator[Recording]:
     """Read a Parquet file with the recording's own columns in blocks of ``rows``, so that memory stays small.
 
     The blocks together are the recording that `terragrip.formats.read` gives, and raise the same InputErrors,
@@ -52,41 +62,13 @@ def iter_parquet(path: str | os.PathLike[str], rows: int = 500_000) -> Iterator[
         names = tuple(str(name) for name in file.schema_arrow.names)
         chosen = [name for name in names if name == TIME or name in LABELS or is_channel(name)]
         _refuse_twice(names, chosen, source)
-        checks.require_columns(names, source)
-        notes, digest = tuple(checks.remarks(names)), sha256(source)
         batches = file.iter_batches(batch_size=rows, columns=chosen)
-        silent, first, after = set(chosen), 0, None
-        while (batch := _guarded(source, lambda: next(batches, None))) is not None:
-            columns = {n: from_arrow(n, batch.column(n), source) for n in chosen}
-            if columns[TIME].dtype.kind == "M":
-                problem, mend = "holds dates", "give seconds, or read the file whole"
-                raise InputError(problem, file=source, place=f"column {TIME}", mend=mend)
-            block = _block(columns, source, first, after, silent)
-            first, after = first + len(block), float(block.time[-1])
-            yield replace(block, sha256=digest, notes=notes)
-        if first == 0:
-            checks.check_time(np.empty(0), source)
-        for name in silent:
-            checks.refuse_empty(name, source)
 
+        def blocks() -> Iterator[dict[str, npt.NDArray[Any]]]:
+            while (batch := _guarded(source, lambda: next(batches, None))) is not None:
+                yield {name: from_arrow(name, batch.column(name), source) for name in chosen}
 
-def _block(
-    columns: dict[str, npt.NDArray[Any]], source: str, first_row: int, after: float | None, silent: set[str]
-) -> Recording:
-    """One checked block; takes the channels that hold a value out of ``silent``."""
-    time, _ = seconds(columns[TIME], source)
-    checks.check_time(time, source, first_row=first_row, after=after)
-    channels, labels = {}, {}
-    for name, column in columns.items():
-        if name in LABELS:
-            labels[name] = texts(name, column, len(time), source)
-        elif name != TIME:
-            values = numbers(name, column, time, source)
-            checks.refuse_infinite(name, values, time, source, first_row=first_row)
-            channels[name] = values
-            if name in silent and not np.isnan(values).all():
-                silent.discard(name)
-    return Recording(time, channels, labels, source)
+        yield from recordings(blocks(), names, chosen, source)
 
 
 def _opened(source: str) -> pq.ParquetFile:

@@ -5,18 +5,15 @@ from __future__ import annotations
 import os
 from collections.abc import Sequence
 
-import numpy as np
-
 from terragrip.errors import InputError
 from terragrip.formats.conversion import Part
 from terragrip.formats.kind import Databases, kind_of
 from terragrip.formats.profile import SHIPPED, Profile
 from terragrip.formats.signals import SignalLog
-from terragrip.formats.table import LogTable, Wanted
+from terragrip.formats.table import LogTable, Wanted, in_si
 from terragrip.recording import Recording, checks
 from terragrip.recording.columns import seconds
-from terragrip.recording.schema import LABELS, TIME, is_channel, unit_of
-from terragrip.units import UnitError, factor_to
+from terragrip.recording.schema import LABELS, TIME, is_channel
 
 PathLike = str | os.PathLike[str]
 
@@ -50,11 +47,17 @@ def read(
         raise InputError("there are several profiles for one log", file=path, mend="give one profile")
     chosen = _loaded(profile)  # type: ignore[arg-type]  # a sequence was refused above
     if chosen is not None:
-        return chosen.apply(read_table(path, chosen.wants, (*databases, *chosen.dbc)))
-    table = read_table(path, _own, databases)
+        return recording_of(read_table(path, chosen.wants, (*databases, *chosen.dbc)), chosen)
+    return recording_of(read_table(path, is_own, databases), None)
+
+
+def recording_of(table: LogTable, profile: Profile | None) -> Recording:
+    """The recording that a table is by a profile, or without one by its own names; raises InputError as `read` does."""
+    if profile is not None:
+        return profile.apply(table)
     _require(table)
     notes = [*table.notes, *checks.remarks(table.names)]
-    return Recording.from_frame(_in_si(table), table.source, sha256=table.sha256, notes=notes)
+    return Recording.from_frame(in_si(table), table.source, sha256=table.sha256, notes=notes)
 
 
 def read_table(path: PathLike, wanted: Wanted | None = None, databases: Databases = ()) -> LogTable:
@@ -72,7 +75,8 @@ def read_log(path: PathLike, wanted: Wanted | None = None, databases: Databases 
     return kind.reader()(os.fspath(path), wanted, databases)
 
 
-def _own(name: str) -> bool:
+def is_own(name: str) -> bool:
+    """Whether a column goes by the recording's own names."""
     return name == TIME or name in LABELS or is_channel(name)
 
 
@@ -106,7 +110,7 @@ def _part(path: PathLike, profile: Profile | None, databases: Databases) -> Part
         return converted(
             profile, read_table(path, profile.wants, (*databases, *profile.dbc) if can else ()), partial=True
         )
-    table = read_table(path, _own, databases if kind_of(path).takes_databases else ())
+    table = read_table(path, is_own, databases if kind_of(path).takes_databases else ())
     if TIME not in table.columns:
         raise InputError(
             "is missing",
@@ -114,7 +118,7 @@ def _part(path: PathLike, profile: Profile | None, databases: Databases) -> Part
             place=f"column {TIME}",
             mend="name it in a profile for this source",
         )
-    columns = _in_si(table)
+    columns = in_si(table)
     time, _ = seconds(columns.pop(TIME), table.source)
     return Part(time, columns, table.source, table.sha256, table.notes, {}, table.start)
 
@@ -127,21 +131,3 @@ def _require(table: LogTable) -> None:
             raise
         mend = f"map its signals in a profile: {', '.join(SHIPPED)}, or your own ('terragrip inspect' proposes one)"
         raise InputError(error.problem, file=error.file, place=error.place, mend=mend) from error
-
-
-def _in_si(table: LogTable) -> dict[str, np.ndarray]:
-    """The columns, in the schema's units where the file states its own."""
-    columns = dict(table.columns)
-    for name, unit in table.units.items():
-        target = unit_of(name)
-        if target is None or name not in columns or columns[name].dtype.kind not in "fiu":
-            continue
-        try:
-            factor = factor_to(unit, target)
-        except UnitError as error:
-            raise InputError(
-                error.problem, file=table.source, place=f"column {name}", mend=error.mend
-            ) from error
-        if factor != 1.0:
-            columns[name] = columns[name] * np.float64(factor)
-    return columns

@@ -10,8 +10,38 @@ import numpy as np
 import numpy.typing as npt
 
 from terragrip.errors import InputError
+from terragrip.recording.schema import unit_of
+from terragrip.units import UnitError, factor_to
 
 Wanted = Callable[[str], bool]
+
+
+@dataclass(frozen=True)
+class Sparse:
+    """All columns, but of every ``every`` blocks of records one: for a look at a log that is too long to hold."""
+
+    every: int
+
+    def __call__(self, name: str) -> bool:
+        return True
+
+
+def every_of(wanted: Wanted | None) -> int:
+    """Of how many blocks of records one is read."""
+    return wanted.every if isinstance(wanted, Sparse) else 1
+
+
+def skips(number: int, block: int, every: int) -> bool:
+    """Whether the record of this ``number`` is in a block that is not read."""
+    return every > 1 and (number // block) % every > 0
+
+
+def kept_rows(count: int, block: int, every: int) -> npt.NDArray[np.intp] | slice:
+    """Which of ``count`` rows are in a block that is read."""
+    if every <= 1:
+        return slice(None)
+    rows = np.arange(count)
+    return rows[(rows // block) % every == 0]
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,6 +61,24 @@ class LogTable:
     notes: tuple[str, ...] = ()
     start: float | None = None
     clocked: bool = False
+
+
+def in_si(table: LogTable) -> dict[str, npt.NDArray[Any]]:
+    """The columns, in the schema's units where the file states its own; raises InputError where it states another quantity."""
+    columns = dict(table.columns)
+    for name, unit in table.units.items():
+        target = unit_of(name)
+        if target is None or name not in columns or columns[name].dtype.kind not in "fiu":
+            continue
+        try:
+            factor = factor_to(unit, target)
+        except UnitError as error:
+            raise InputError(
+                error.problem, file=table.source, place=f"column {name}", mend=error.mend
+            ) from error
+        if factor != 1.0:
+            columns[name] = columns[name] * np.float64(factor)
+    return columns
 
 
 def from_arrow(name: str, column: Any, source: str | None) -> npt.NDArray[Any]:

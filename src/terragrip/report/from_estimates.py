@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -13,7 +13,7 @@ import numpy as np
 from terragrip import __version__
 from terragrip.errors import InputError
 from terragrip.estimation import Estimates
-from terragrip.report import ground_sections, residuals, sections, soil_sections
+from terragrip.report import ground_sections, residuals, sections, slip_sections, soil_sections
 from terragrip.report.page import Page, Section, Table, names, number
 from terragrip.report.runs import Run, label_stretches
 from terragrip.report.scores import Comparison, compare
@@ -70,8 +70,6 @@ def report_of(
             mend="give estimates of a drive, not of a standstill",
         )
     main, together = shown[0], sorted(shown, key=lambda run: run.name)
-    curves = soil_sections.told_by_all(campaign, library)
-    tire = main.vehicle.tire_rolling_resistance if main.vehicle is not None else 0.0
     comparisons: list[Comparison] = [c for run in together for c in compare(run)]
     page = Page(
         title,
@@ -79,21 +77,15 @@ def report_of(
         f"{sum(one.distance for one in summaries):.0f} m, estimated by {names(sorted({one.method for one in summaries}))}. "
         f"Drawn over time: {names([run.name for run in together])}.",
         (
-            *(sections.tracking(run) for run in together),
-            sections.slip_and_resistance(main),
-            sections.online_curve(
-                main, {one.name: one.learned.soil.parameters.get("a", np.nan) for one in curves}
-            ),
-            soil_sections.both_maxima(curves, tire, campaign.not_fitted),
-            soil_sections.fits(curves, campaign.not_fitted),
-            soil_sections.trust(curves, campaign.not_fitted),
-            soil_sections.what_is_missing(curves, campaign.not_fitted),
-            sections.soils(main, together),
+            *(_sections(main, together, campaign, library) if main.has_adhesion else _of_slip(together)),
             ground_sections.recognised(grounds),
             ground_sections.section_points(grounds),
             ground_sections.events(grounds),
-            residuals.section(main),
-            sections.methods(comparisons, [], main.method),
+            *(
+                [residuals.section(main), sections.methods(comparisons, [], main.method)]
+                if main.has_adhesion
+                else []
+            ),
             sections.honesty(main, []),
             _runs(summaries),
         ),
@@ -122,19 +114,52 @@ def _read(
         estimates = Estimates.read(path)
         if len(estimates) < 2:
             raise InputError("holds fewer than two rows", file=path, mend="leave it out")
-        gathered.add(estimates, path.stem, file=str(path))
+        if any(name.startswith("adhesion_") for name in estimates.columns):
+            gathered.add(estimates, path.stem, file=str(path))
         happened = tuple(event for ground in grounds if ground.run == path.stem for event in ground.events)
-        run = Run(
-            path.stem, estimates.to_pandas(), estimates.method, vehicle=estimates.vehicle, events=happened
-        )
+        table = estimates.to_pandas()
+        table.attrs["zero_slip"] = estimates.about.get("zero_slip")
+        run = Run(path.stem, table, estimates.method, vehicle=estimates.vehicle, events=happened)
         summaries.append(_summary(run))
         if run.wheels and run.moving.any():
-            worth = (len(label_stretches(run.soil)), run.sensor_wheel is not None, summaries[-1].duration)
+            soils = len(label_stretches(run.soil)) if run.has_adhesion else -1
+            worth = (soils, run.sensor_wheel is not None, summaries[-1].duration)
             kept = sorted([*kept, (worth, run)], key=lambda one: one[0], reverse=True)[:SHOWN]
         step(number_)
     if kept and len(kept) == SHOWN and kept[1][0][0] < 2 <= kept[0][0][0]:
         kept = kept[:1]  # a run on one soil says nothing beside one over several
     return summaries, [run for _, run in kept], gathered
+
+
+def _sections(
+    main: Run, together: Sequence[Run], campaign: Campaign, library: SoilLibrary | None
+) -> Iterator[Section]:
+    """Traction over time, slip and resistance, curves and operating points; of drawn runs without torques slip alone."""
+    curves = soil_sections.told_by_all(campaign, library)
+    tire = main.vehicle.tire_rolling_resistance if main.vehicle is not None else 0.0
+    yield from (sections.tracking(run) for run in together if run.has_adhesion)
+    yield sections.slip_and_resistance(main)
+    yield from (one for run in together if not run.has_adhesion for one in slip_sections.of(run))
+    yield sections.online_curve(
+        main, {one.name: one.learned.soil.parameters.get("a", np.nan) for one in curves}
+    )
+    yield soil_sections.both_maxima(curves, tire, campaign.not_fitted)
+    yield soil_sections.fits(curves, campaign.not_fitted)
+    yield soil_sections.trust(curves, campaign.not_fitted)
+    yield soil_sections.what_is_missing(curves, campaign.not_fitted)
+    yield sections.soils(main, [run for run in together if run.has_adhesion])
+
+
+def _of_slip(together: Sequence[Run]) -> Iterator[Section]:
+    """What can be told where no run has a torque, and what cannot."""
+    for run in together:
+        yield from slip_sections.of(run)
+    yield Section(
+        "without-torque",
+        "Adhesion and traction",
+        omitted="Left out: the logs have no drive torque. With it come adhesion and traction over time, adhesion curves of the soils "
+        "with fits and what to trust, operating points, what to drive next, and residuals.",
+    )
 
 
 def _summary(run: Run) -> _Summary:

@@ -69,14 +69,24 @@ class Run:
 
     @cached_property
     def wheels(self) -> tuple[str, ...]:
-        """The wheels with an estimated adhesion, in the table's order."""
+        """The wheels with an estimated adhesion, of estimates without any those with a slip; in the table's order."""
+        return self._named("adhesion_") or self._named("slip_")
+
+    @cached_property
+    def has_adhesion(self) -> bool:
+        """Whether torques were measured; else there are slip and speeds alone."""
+        return bool(self._named("adhesion_"))
+
+    def _named(self, quantity: str) -> tuple[str, ...]:
         columns = (str(name) for name in self.estimates.columns)
-        named = (name for name in columns if name.startswith("adhesion_") and not name.endswith("_std"))
-        return tuple(name.removeprefix("adhesion_") for name in named)
+        named = (name for name in columns if name.startswith(quantity) and not name.endswith("_std"))
+        return tuple(name.removeprefix(quantity) for name in named)
 
     @cached_property
     def sensor_wheel(self) -> str | None:
-        """The wheel that carries a reference force sensor, or None."""
+        """The wheel that carries a reference force sensor, or None; of slip alone no sensor tells anything."""
+        if not self.has_adhesion:
+            return None
         columns = set(self._measured.columns)
         for wheel in self.wheels:
             if {f"wheel_force_x_{wheel}", f"wheel_force_z_{wheel}"} <= columns:

@@ -206,6 +206,12 @@ def estimates_blocks(
 
     Raises InputError as `blocks_of`, and where the table holds no vehicle.
     """
+    if not any(name.startswith("adhesion_") for name in estimates.columns):
+        raise InputError(
+            "holds slip but no adhesion: the ground is told by adhesion and soil resistance, which need drive torques",
+            file=file,
+            mend="estimate a log with torques; slip alone changes with the pull, on one and the same ground",
+        )
     columns = {name: estimates[name] for name in estimates.names}
     if rows is not None:
         columns["event"] = np.where(rows, columns["event"], "gap")

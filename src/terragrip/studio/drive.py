@@ -84,11 +84,13 @@ def why(table: Estimates, recording: Recording | None, row: int) -> list[str]:
     """Why adhesion moved around a sample: a sentence a wheel, the wheel that moved most first.
 
     Compares the half second before with the half second after by the torque balance of a wheel (PHYSICS 1):
-    mu = (M - J domega/dt - r rho_w omega)/(r F_z) - rho_t, one term changed at a time.
+    mu = (M - J domega/dt - r rho_w omega)/(r F_z) - rho_t, one term changed at a time. Of slip alone: how that moved.
     """
     before, after = _half_seconds(table.time, row)
     if before.stop - before.start < 2 or after.stop - after.start < 2:
         return ["Too close to the end of the drive to compare before with after."]
+    if not any(name.startswith("adhesion_") for name in table.columns):
+        return [_of_slip(table, wheel, before, after) for wheel in table.wheels]
     sentences = []
     for wheel in table.wheels:
         moved = _mean(table[f"adhesion_{wheel}"], after) - _mean(table[f"adhesion_{wheel}"], before)
@@ -96,6 +98,20 @@ def why(table: Estimates, recording: Recording | None, row: int) -> list[str]:
             sentences.append((abs(moved), _sentence(table, recording, wheel, before, after, moved)))
     sentences.sort(key=lambda pair: -pair[0])
     return [text for _, text in sentences]
+
+
+def _of_slip(table: Estimates, wheel: str, before: slice, after: slice) -> str:
+    """How slip alone moved, and which of the speeds moved it; there is no torque, so no adhesion."""
+    moved = [
+        _mean(table[name], after) - _mean(table[name], before)
+        for name in (f"slip_{wheel}", f"wheel_speed_{wheel}", "ground_speed")
+    ]
+    if not np.isfinite(moved).all():
+        return f"{wheel}: slip is undefined before or after."
+    return (
+        f"{wheel}: slip {100 * moved[0]:+.1f} points within {2 * SPAN:g} s; wheel speed {moved[1]:+.2f} rad/s, ground speed "
+        f"{moved[2]:+.2f} m/s. Without a torque there is no adhesion."
+    )
 
 
 def _half_seconds(time: Floats, row: int) -> tuple[slice, slice]:

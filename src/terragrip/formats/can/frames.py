@@ -11,9 +11,10 @@ import numpy.typing as npt
 
 from terragrip.formats.can.catalog import EXTENDED, Catalog, Message, group_of, source_of
 from terragrip.formats.can.transport import CONNECTION, DATA, Transport, is_fast
-from terragrip.formats.table import Wanted
+from terragrip.formats.table import Wanted, every_of, skips
 
 _CLASSIC = 8  # bytes
+_BLOCK = 20_000  # frames that are read or left out together, where a log is looked at in parts
 NO_SENDER = -1
 """The sender of a message that does not name one."""
 
@@ -73,8 +74,17 @@ class Frames:
     transport: Transport = field(default_factory=Transport)
     _routes: dict[int, Callable[[float, bytes], None] | None] = field(default_factory=dict)
 
+    _number: int = 0  # frames so far, with those left out
+
+    def __post_init__(self) -> None:
+        self.every = every_of(self.wanted)
+
     def take(self, time: float, identifier: int, payload: bytes) -> None:
         """Take a data frame; ``identifier`` has `EXTENDED` set where it has 29 bits."""
+        if self.every > 1:
+            self._number += 1
+            if skips(self._number - 1, _BLOCK, self.every):
+                return
         self.count += 1
         if self.first is None:
             self.first = time
@@ -95,6 +105,10 @@ class Frames:
         data: npt.NDArray[np.uint8],
     ) -> None:
         """Take data frames (n,) with payloads (n, bytes), as `take` does one by one."""
+        skipped = skips(self._number, _BLOCK, self.every)
+        self._number += len(time)
+        if skipped:
+            return
         self.count += len(time)
         if self.first is None and len(time):
             self.first = float(time[0])

@@ -78,9 +78,11 @@ def window(
 
 @router.get("/drive/plane")
 def plane(studio: Here, path: Named, wheel: str, start: Time, end: Time) -> dict[str, Any]:
-    """Adhesion over slip of one wheel between two times, thinned evenly."""
+    """Adhesion over slip of one wheel between two times, thinned evenly; no point where slip alone is known."""
     table = _table(studio, path)
     _known(table, wheel)
+    if f"adhesion_{wheel}" not in table.columns:
+        return {"slip": [], "adhesion": [], "time": []}
     first, last = np.searchsorted(table.time, [start, end], "left")
     rows = slice(int(first), max(int(last), int(first) + 1), max(int(last - first) // PLANE, 1))
     plain: dict[str, Any] = finite(

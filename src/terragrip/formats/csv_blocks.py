@@ -1,0 +1,187 @@
+"""Text tables too long to be read whole: block by block, cut at the ends of lines."""
+
+from __future__ import annotations
+
+import gzip
+import os
+import zlib
+from collections.abc import Iterator
+from contextlib import closing
+from typing import Any, BinaryIO
+
+import numpy as np
+import numpy.typing as npt
+
+from terragrip.errors import InputError
+from terragrip.files import sha256, unreadable
+from terragrip.formats.blocks import recordings
+from terragrip.formats.csv import GZIP, body_of, chosen_of, parse
+from terragrip.formats.dialect import HEAD, Dialect, detect, to_text
+from terragrip.formats.table import LogTable, Wanted, every_of, in_si
+from terragrip.recording import Recording
+from terragrip.recording.schema import LABELS, TIME, is_channel
+
+Column = npt.NDArray[Any]
+
+_BLOCK = 16 << 20  # bytes
+_ROWS = 200_000  # of a block that is estimated
+_LOOK = 2 << 20  # bytes, where only some blocks are looked at
+
+
+def read_long_csv(source: str, wanted: Wanted | None) -> LogTable | None:
+    """Read the wanted columns of a table, as `terragrip.formats.csv.read_csv` does; None where its lines cannot be told."""
+    dialect = _dialect(source)
+    if dialect is None:
+        return None
+    chosen = chosen_of(dialect, wanted, source)
+    every = every_of(wanted)
+    rows = rows_of(source) // every
+    parts = {dialect.names[k]: _Growing(rows) for k in chosen}
+    notes: dict[str, None] = {}
+    for columns, said in _blocks(source, dialect, chosen, every):
+        notes |= dict.fromkeys(said)
+        for name, column in columns.items():
+            parts[name].add(column)
+    joined = {name: part.whole() for name, part in parts.items()}
+    names = tuple(name for name in dialect.names if name)
+    return LogTable(names, joined, dialect.units, source, sha256(source), tuple(notes))
+
+
+class _Growing:
+    """A column that grows by blocks. Blocks are copied as they come: kept and joined at the end, they would stand twice."""
+
+    def __init__(self, rows: int) -> None:
+        self._rows, self._count = int(1.05 * rows) + 1000, 0
+        self._values: Column | None = None
+
+    def add(self, block: Column) -> None:
+        """Append a block; of numbers and texts, all become objects."""
+        if self._values is None:
+            self._values = np.empty(max(self._rows, len(block)), block.dtype)
+        known = self._values
+        kind = known.dtype if known.dtype == block.dtype else _common(known.dtype, block.dtype)
+        end = self._count + len(block)
+        if kind != known.dtype or end > len(known):
+            self._values = np.empty(max(end + end // 4, len(known)), kind)
+            self._values[: self._count] = known[: self._count]
+        self._values[self._count : end] = block
+        self._count = end
+
+    def whole(self) -> Column:
+        """The column so far."""
+        return np.empty(0) if self._values is None else self._values[: self._count]
+
+
+def _common(first: np.dtype[Any], second: np.dtype[Any]) -> np.dtype[Any]:
+    if {first.kind, second.kind} <= set("fiu") or first.kind == second.kind:
+        return np.promote_types(first, second)
+    return np.dtype(object)
+
+
+def iter_csv(path: str | os.PathLike[str]) -> Iterator[Recording] | None:
+    """A long table with the recording's own columns in blocks, so that memory stays small; None where its lines cannot be told.
+
+    The blocks together are the recording that `terragrip.formats.read` gives, and raise the same InputErrors, each when its
+    block is reached.
+    """
+    source = os.fspath(path)
+    dialect = _dialect(source)
+    if dialect is None:
+        return None
+    chosen = chosen_of(dialect, lambda name: name == TIME or name in LABELS or is_channel(name), source)
+    own = [dialect.names[k] for k in chosen]
+    said: list[str] = []
+    size = int(np.clip(_ROWS * os.path.getsize(source) / rows_of(source), 1 << 20, 4 * _BLOCK))
+
+    def found() -> Iterator[dict[str, Column]]:
+        for columns, notes in _blocks(source, dialect, chosen, 1, size):
+            said.extend(notes)
+            yield in_si(LogTable(dialect.names, columns, dialect.units, source))
+
+    return recordings(found(), tuple(name for name in dialect.names if name), own, source, said)
+
+
+def has_torque(path: str | os.PathLike[str]) -> bool:
+    """Whether a long table has a drive torque under the recording's own names; without one, slip takes the whole log."""
+    dialect = _dialect(os.fspath(path))
+    return dialect is not None and any(name.startswith("drive_torque_") for name in dialect.names)
+
+
+def rows_of(path: str | os.PathLike[str]) -> int:
+    """About how many rows a long table has, by the length of its first ones."""
+    with closing(_opened(os.fspath(path))) as stream:
+        head = stream.read(HEAD)
+        total = os.path.getsize(path) * (10 if isinstance(stream, gzip.GzipFile) else 1)
+    return max(1, round(total / len(head) * head.count(b"\n")))
+
+
+def _dialect(source: str) -> Dialect | None:
+    with closing(_opened(source)) as stream:
+        head = _read(stream, HEAD, source)
+    if b"\n" not in head or head.startswith((b"\xff\xfe", b"\xfe\xff")) or head.count(0) > 0.2 * len(head):
+        return None
+    return detect(to_text(head[: head.rindex(b"\n") + 1], source), source)
+
+
+def _blocks(
+    source: str, dialect: Dialect, chosen: list[int], every: int, size: int | None = None
+) -> Iterator[tuple[dict[str, Column], list[str]]]:
+    """The chosen columns in blocks of ``size`` bytes, of every ``every`` blocks one, with notes."""
+    row = 0
+    for number, (data, is_first) in enumerate(_lines(source, size or (_BLOCK if every == 1 else _LOOK))):
+        if number % every:
+            continue
+        text = _utf8(data)
+        # A byte order mark, comments and the header stand in the first block only.
+        start = detect(text, source).start if is_first else 0
+        body, notes = body_of(text, dialect, start, more=not is_first)
+        columns = parse(body, dialect, chosen, source, row)
+        row += max((len(column) for column in columns.values()), default=0)
+        yield columns, notes
+
+
+def _lines(source: str, size: int) -> Iterator[tuple[bytes, bool]]:
+    """Blocks of whole lines, and whether each is the first."""
+    rest, is_first = b"", True
+    with closing(_opened(source)) as stream:
+        while data := _read(stream, size, source):
+            data = rest + data
+            end = data.rfind(b"\n") + 1
+            rest = data[end:]
+            if len(rest) > 4 * size:
+                raise InputError("has no line ends", file=source, mend="give a table of text, a row a line")
+            if end:
+                yield data[:end], is_first
+                is_first = False
+    if rest.strip():
+        yield rest, is_first
+
+
+def _opened(source: str) -> BinaryIO:
+    try:
+        with open(source, "rb") as stream:
+            packed = stream.read(2) == GZIP
+        return gzip.open(source, "rb") if packed else open(source, "rb")  # type: ignore[return-value]
+    except OSError as error:
+        raise unreadable(source, error) from error
+
+
+def _read(stream: BinaryIO, size: int, source: str) -> bytes:
+    try:
+        return stream.read(size)
+    except (EOFError, zlib.error, gzip.BadGzipFile) as error:
+        problem = f"is a damaged gzip file ({error})"
+        raise InputError(problem, file=source, mend="copy or pack it again") from error
+    except OSError as error:
+        raise unreadable(source, error) from error
+
+
+def _utf8(data: bytes) -> bytes:
+    data = data.removeprefix(b"\xef\xbb\xbf")
+    if data.isascii():
+        return data
+    try:
+        data.decode("utf-8")
+    except UnicodeDecodeError:
+        return data.decode("latin-1").encode()
+    return data

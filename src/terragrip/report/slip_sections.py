@@ -1,0 +1,181 @@
+"""Sections of a drive of which slip alone is known: over time, how often which, and where."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from terragrip.report.page import Picture, Section, Table, names, number
+from terragrip.report.runs import FloatArray, Run
+from terragrip.report.style import ESTIMATED, INK, new_figure, styled, to_svg
+from terragrip.report.timeline import Lane, timeline
+
+_EARTH = 6_371_008.8
+"""Mean radius of the earth [m] (IUGG); maps of a field need no better."""
+_POINTS = 2000
+"""Places that a map is drawn with."""
+_EDGES = (-0.05, 0.0, 0.05, 0.10, 0.15, 0.20, 0.30, 0.50, 1.0)
+_UNSURE = 0.15
+"""SD of slip beyond which a row says nothing of it."""
+
+
+def of(run: Run) -> tuple[Section, ...]:
+    """All sections of a run."""
+    return over_time(run), histogram(run), place(run)
+
+
+def over_time(run: Run) -> Section:
+    """Slip of each wheel, and the speeds that it comes from."""
+    lanes = [_lane(run, f"slip_{wheel}", f"slip s, {wheel} [–]") for wheel in run.wheels]
+    lanes.append(_lane(run, "ground_speed", "ground speed [m/s]"))
+    wheels = names(
+        [f"wheel {wheel}" if wheel != "drive" else "the driven wheels as one" for wheel in run.wheels]
+    )
+    picture = Picture(
+        f"slip-{run.name}",
+        timeline(run, lanes),
+        f"Run {run.name}, from speeds alone: slip of {wheels}, and ground speed (bottom), over time with 95 % intervals. At "
+        "standstill slip is undefined.",
+        f"Slip and ground speed over time in {run.name}",
+    )
+    return Section(f"slip-{run.name}", f"Slip in {run.name}", zero_told(run), (picture,))
+
+
+def zero_told(run: Run) -> tuple[str, ...]:
+    """Where slip counts from: the zero-slip radius of the log, as the estimates tell it."""
+    found = run.estimates.attrs.get("zero_slip") or {}
+    radii = [
+        f"{wheel}: rim speed times {one['ratio']:.4f} ± {one['std']:.4f} is ground speed at zero slip"
+        for wheel, one in found.items()
+    ]
+    if not radii:
+        return ("Slip counts from the radius of the vehicle file.",)
+    return (
+        f"The lightest tenth of the log's steady stretches ({'; '.join(radii)}) tells the zero. Where the vehicle is calibrated, slip "
+        "counts from the calibrated radius instead.",
+    )
+
+
+def histogram(run: Run) -> Section:
+    """How much of the way was driven at which slip."""
+    title = f"How often which slip in {run.name}"
+    wheel = run.shown_wheel
+    slip, way = _rows(run, wheel)
+    if not len(slip) or way.sum() <= 0:
+        return Section(
+            f"slip-histogram-{run.name}", title, omitted="Left out: no stretch of the drive tells of slip."
+        )
+    figure = new_figure(height=3.2)
+    with styled():
+        plot = figure.subplots()
+        low, high = np.percentile(slip, [0.3, 99.7])
+        share, edges = np.histogram(
+            slip, bins=60, range=(min(low, 0.0), max(high, 0.05)), weights=way / way.sum()
+        )
+        plot.stairs(100 * share, edges, fill=True, color=ESTIMATED, alpha=0.6, linewidth=0)
+        plot.axvline(0.0, color=INK, linewidth=0.7)
+        plot.set_xlabel(f"slip s, {wheel} [–]")
+        plot.set_ylabel("share of the way [%]")
+        drawn = to_svg(figure)
+    median, ninety = _weighted(slip, way, 0.5), _weighted(slip, way, 0.9)
+    picture = Picture(
+        f"slip-histogram-{run.name}",
+        drawn,
+        f"Run {run.name}: share of the way driven at each slip. Half of it was below {number(100 * median, 1)} %, nine tenths below "
+        f"{number(100 * ninety, 1)} %.",
+        f"Histogram of slip by way in {run.name}",
+    )
+    parts, _ = np.histogram(np.clip(slip, _EDGES[0], _EDGES[-1]), bins=_EDGES, weights=way)
+    rows = tuple(
+        (f"{100 * a:.0f} to {100 * b:.0f} %", number(metres, 0), f"{number(100 * metres / way.sum(), 1)} %")
+        for a, b, metres in zip(_EDGES, _EDGES[1:], parts, strict=False)
+        if metres > 0
+    )
+    table = Table(
+        "Way by slip; what lies beyond either end is in the last bin there.",
+        ("slip", "way [m]", "share"),
+        rows,
+    )
+    return Section(f"slip-histogram-{run.name}", title, (), (picture, table))
+
+
+def place(run: Run) -> Section:
+    """Slip where it was driven, on a plane by metres east and north."""
+    title = f"Slip by place in {run.name}"
+    if not {"latitude", "longitude"} <= set(run.estimates.columns):
+        return Section(
+            f"slip-map-{run.name}",
+            title,
+            omitted="Left out: the log has no position (latitude and longitude).",
+        )
+    north, east = np.radians(run.estimated("latitude")), np.radians(run.estimated("longitude"))
+    slip, std = run.estimated(f"slip_{run.shown_wheel}"), run.estimated(f"slip_{run.shown_wheel}_std")
+    fixed = np.isfinite(north) & np.isfinite(east)
+    if fixed.sum() < 2:
+        return Section(
+            f"slip-map-{run.name}", title, omitted="Left out: the log has fewer than two positions."
+        )
+    instants, rows = run.time[fixed], np.flatnonzero(np.isfinite(slip) & (std < _UNSURE))
+    rows = rows[:: max(1, len(rows) // _POINTS)]
+    if not len(rows):
+        return Section(
+            f"slip-map-{run.name}", title, omitted="Left out: no stretch of the drive tells of slip."
+        )
+    middle = float(np.median(north[fixed]))
+    y = _EARTH * (np.interp(run.time[rows], instants, north[fixed]) - middle)
+    x = (
+        _EARTH
+        * np.cos(middle)
+        * (np.interp(run.time[rows], instants, east[fixed]) - float(np.median(east[fixed])))
+    )
+    figure = new_figure(height=5.0)
+    with styled():
+        plot = figure.subplots()
+        shown: Any = plot.scatter(
+            x,
+            y,
+            c=100 * slip[rows],
+            s=7,
+            cmap="cividis",
+            vmin=0.0,
+            vmax=max(5.0, 100 * float(np.percentile(slip[rows], 99))),
+        )
+        plot.set_aspect("equal", adjustable="datalim")
+        plot.set_xlabel("east [m]")
+        plot.set_ylabel("north [m]")
+        bar = figure.colorbar(shown, ax=plot)
+        bar.set_label("slip [%]")
+        drawn = to_svg(figure)
+    picture = Picture(
+        f"slip-map-{run.name}",
+        drawn,
+        f"Run {run.name}: slip where it was driven, metres from {np.degrees(middle):.5f}°, "
+        f"{np.degrees(float(np.median(east[fixed]))):.5f}°. Rows whose slip is known to worse than {_UNSURE:g} are left out.",
+        f"Map of slip in {run.name}",
+    )
+    return Section(f"slip-map-{run.name}", title, (), (picture,))
+
+
+def _rows(run: Run, wheel: str) -> tuple[FloatArray, FloatArray]:
+    """Slip (n,) and the way [m] (n,) of the rows that know it."""
+    slip, std = run.estimated(f"slip_{wheel}"), run.estimated(f"slip_{wheel}_std")
+    way = np.diff(run.estimated("distance"), prepend=run.estimated("distance")[0])
+    rows = np.isfinite(slip) & (std < _UNSURE) & np.isfinite(way)
+    return slip[rows], way[rows]
+
+
+def _weighted(values: FloatArray, weights: FloatArray, share: float) -> float:
+    """The value under which a share of the weights lies."""
+    order = np.argsort(values)
+    total = np.cumsum(weights[order])
+    return float(values[order][int(np.searchsorted(total, share * total[-1]))])
+
+
+def _lane(run: Run, column: str, label: str) -> Lane:
+    """A lane of a column; what is hardly known, at a crawl, does not set its height."""
+    values, std = run.estimated(column), run.estimated(f"{column}_std")
+    rows = run.moving & np.isfinite(values) & (std < _UNSURE)
+    low, high = np.percentile(values[rows], [0.3, 99.7]) if rows.any() else (0.0, 1.0)
+    margin = 0.15 * (high - low) or 0.1
+    return Lane(label, values, std, limits=(float(low - margin), float(high + margin)))

@@ -1,0 +1,177 @@
+"""Logs that are read, looked at and estimated in blocks give what they give as a whole."""
+
+from __future__ import annotations
+
+import gzip
+import sys
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pyarrow.parquet as pq
+import pytest
+
+import terragrip as tg
+from can_frames import drive, write_log
+from terragrip.errors import InputError
+from terragrip.estimation import estimate_in_parts
+from terragrip.formats import csv, csv_blocks, inspect, iter_csv
+from terragrip.formats.reading import read_table
+from terragrip.vehicle import Vehicle
+
+TEXTS = {
+    "plain": ("time,ground_speed,wheel_speed_l,gear\n", "{t},{v},{w},{k}\n"),
+    "units and comments": ("# by hand\ntime;ground_speed;wheel_speed_l\ns;km/h;rpm\n", "{t};{v};{w}\n"),
+    "decimal comma": ("time;ground_speed;wheel_speed_l\n", "{c};{c};1,5\n"),
+    "blanks": ("time ground_speed wheel_speed_l\n", " {t}   {v}  {w}\n"),
+    "labels": ("time,ground_speed,wheel_speed_l,soil\n", "{t},{v},{w},Löß {s}\n"),
+    "empty cells": ("time,ground_speed,wheel_speed_l,late\n", "{t},{v},,{late}\n"),
+    "a text among numbers": ("time,ground_speed,wheel_speed_l,odd\n", "{t},{v},{w},{odd}\n"),
+}
+
+
+def text_of(kind: str, rows: int = 400) -> str:
+    head, row = TEXTS[kind]
+    lines = (
+        row.format(
+            t=k / 100, v=1 + k % 7 / 10, w=5 + k % 5, k=k, s=k // 150, c=str(k / 100).replace(".", ","),
+            late=k if k > 300 else "", odd="x" if k == 250 else k,
+        )
+        for k in range(rows)
+    )  # fmt: skip
+    return head + "".join(lines)
+
+
+@pytest.fixture
+def in_blocks(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Read any text table in blocks of a kilobyte."""
+    monkeypatch.setattr(csv, "_LONG", 0)
+    monkeypatch.setattr(csv, "_LONG_PACKED", 0)
+    monkeypatch.setattr(csv_blocks, "_BLOCK", 1000)
+
+
+@pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig", "latin-1", "gzip"])
+@pytest.mark.parametrize("kind", list(TEXTS))
+def test_a_table_in_blocks_is_the_table(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, kind: str, encoding: str
+) -> None:
+    path = tmp_path / "log.csv"
+    if encoding == "gzip":
+        path.write_bytes(gzip.compress(text_of(kind).encode()))
+    else:
+        path.write_text(text_of(kind), encoding=encoding)
+    whole = read_table(path)
+    monkeypatch.setattr(csv, "_LONG", 0)
+    monkeypatch.setattr(csv, "_LONG_PACKED", 0)
+    monkeypatch.setattr(csv_blocks, "_BLOCK", 1000)
+    found = read_table(path)
+    assert (found.names, found.units, found.sha256) == (whole.names, whole.units, whole.sha256)
+    for name, column in whole.columns.items():
+        if name == "odd":  # blocks of numbers alone stay numbers, beside the text
+            assert [str(float(c)) if str(c) != "x" else "x" for c in found.columns[name]][249:252] == [
+                "249.0",
+                "x",
+                "251.0",
+            ]
+        elif column.dtype.kind == "O":
+            assert found.columns[name].tolist() == column.tolist()
+        else:
+            assert np.array_equal(found.columns[name], column, equal_nan=True)
+
+
+@pytest.mark.usefixtures("in_blocks")
+def test_what_is_wrong_in_a_late_block_is_named_by_its_row(tmp_path: Path) -> None:
+    path = tmp_path / "log.csv"
+    lines = text_of("plain").splitlines(keepends=True)
+    for row, line, said in (
+        (350, "3.49,fast,5,1\n", "column ground_speed, row 350: 'fast' is not a number"),
+        (360, "3.59,1.0,5\n", "row 360: has 3 cells, the header 4"),
+    ):
+        path.write_text("".join([*lines[:row], line, *lines[row + 1 :]]))
+        with pytest.raises(InputError, match=said):
+            tg.read(path)
+    path.write_text("".join(lines) + "4.00,1.")
+    cut = tg.read(path)
+    assert len(cut) == 400
+    assert "The last row is cut off and was left out." in cut.notes
+    path.write_bytes(gzip.compress("".join(lines).encode())[:-30])
+    with pytest.raises(InputError, match="is a damaged gzip file"):
+        tg.read(path)
+
+
+def drive_of_a_robot(rows: int = 3000) -> pd.DataFrame:
+    draws, time = np.random.default_rng(1000), np.arange(rows) / 50
+    speed = 1 + 0.3 * np.sin(time / 3)
+    wheels = {f"wheel_speed_{w}": speed / 0.2 / 0.9 + 0.02 * draws.standard_normal(rows) for w in ("l", "r")}
+    torques = {f"drive_torque_{w}": 15 + draws.standard_normal(rows) for w in ("l", "r")}
+    return pd.DataFrame(
+        {"time": time, "ground_speed": speed + 0.01 * draws.standard_normal(rows), **wheels, **torques}
+    )
+
+
+def robot() -> Vehicle:
+    axle = {"mass": 60, "wheels": ["l", "r"]}
+    return Vehicle.from_dict({"mass": 60, "axles": {"axle": axle}, "wheel": {"radius": 0.2, "inertia": 0.1}})
+
+
+def test_blocks_of_a_long_table_are_its_recording(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = tmp_path / "log.csv"
+    frame = drive_of_a_robot()
+    dates = frame.assign(time=pd.Timestamp("2026-05-01") + pd.to_timedelta(frame["time"], unit="s"))
+    monkeypatch.setattr(csv_blocks, "_ROWS", 500)
+    for table in (frame, dates):
+        table.to_csv(path, index=False)
+        whole, blocks = tg.read(path), list(iter_csv(path) or ())
+        monkeypatch.setattr(csv_blocks, "_BLOCK", 10_000)
+        assert np.allclose(np.concatenate([b.time for b in blocks]), whole.time, atol=1e-12)
+        for name, values in whole.channels.items():
+            assert np.array_equal(np.concatenate([b[name] for b in blocks]), values)
+        assert blocks[-1].sha256 == whole.sha256
+        assert blocks[-1].notes == whole.notes
+
+
+@pytest.mark.parametrize("torque", [True, False])
+def test_estimates_in_parts_are_the_estimates(tmp_path: Path, torque: bool) -> None:
+    frame = drive_of_a_robot()
+    frame.loc[1000:1300, ["ground_speed", "wheel_speed_l", "wheel_speed_r"]] = np.nan  # a gap
+    if not torque:
+        frame = frame.drop(columns=["drive_torque_l", "drive_torque_r"])
+    recording = tg.Recording.from_frame(frame)
+    whole = tg.estimate(recording, robot())
+    target = tmp_path / "estimates.parquet"
+    summary = estimate_in_parts(recording, robot(), target, rows=437)
+    assert summary == whole.summary()
+    parts = pq.read_table(target).to_pandas()
+    expected = whole.to_pandas()
+    assert list(parts) == list(expected)
+    for name in expected.columns.drop("event"):
+        assert np.allclose(parts[name], expected[name], rtol=1e-12, atol=1e-12, equal_nan=True), name
+    assert parts["event"].tolist() == expected["event"].tolist()
+
+
+@pytest.mark.parametrize("kind", ["csv", "parquet", "blf"])
+def test_a_long_log_is_looked_at_in_parts(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, kind: str) -> None:
+    path = tmp_path / f"log.{kind}"
+    if kind == "blf":
+        write_log(path, drive(1000, 60.0).frames)
+    else:
+        frame = drive_of_a_robot(30_000)
+        frame.to_csv(path, index=False) if kind == "csv" else frame.to_parquet(path)
+    whole = inspect(path)
+    module = sys.modules["terragrip.formats.inspect"]
+    size = path.stat().st_size
+    monkeypatch.setattr(module, "_LONG", size // 2)
+    monkeypatch.setattr(module, "_ENOUGH", size / 4)
+    monkeypatch.setattr(csv, "_LONG", 0)
+    monkeypatch.setattr(csv_blocks, "_LOOK", size // 40)
+    monkeypatch.setattr("terragrip.formats.parquet._BLOCK", 500)
+    monkeypatch.setattr("terragrip.formats.can.frames._BLOCK", 100)
+    some = inspect(path)
+    assert "one of every 4 blocks" in some.warnings[0]
+    assert some.rows < whole.rows / 2
+    assert (some.recognised, some.ready, some.fitting) == (whole.recognised, whole.ready, whole.fitting)
+    for few, all_ in zip(some.columns, whole.columns, strict=True):
+        assert few.name == all_.name
+        if all_.rate is not None:
+            assert few.rate == pytest.approx(all_.rate, rel=0.05)
+            assert few.median == pytest.approx(all_.median, rel=0.2, abs=0.1)
