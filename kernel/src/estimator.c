@@ -3,7 +3,7 @@
 
 #define TG_JOLT_MEMORY 5 /* s */
 #define TG_SWING ((tg_real)2) /* samples that a jolt lasts */
-#define TG_BATCH 16
+#define TG_BATCH 32
 #define TG_LONGEST_WALK 30 /* s of random walk that a gap adds at most: beyond it the ground is simply unknown */
 
 /* ---- the filter ---- */
@@ -319,25 +319,22 @@ static void fill(tg_sample *sample, const double *time, const double *const *in,
     for (int32_t k = 0; k < count; k++) sample->value[given[k]] = (tg_real)in[given[k]][row];
 }
 
-/* Rows are handed over in batches: one row at a time would touch a page of every column each time. */
+/* Rows are handed over in batches, column after column: one row at a time would touch a page of every column each time. */
 typedef struct {
-    double value[TG_OUT_SLOTS][TG_BATCH];
+    tg_estimate row[TG_BATCH];
     int32_t wanted[TG_OUT_SLOTS], columns;
     size_t first, rows;
 } batch;
 
-static void keep(batch *b, const tg_estimate *estimate)
-{
-    const size_t place = b->rows++;
-    for (int32_t k = 0; k < b->columns; k++) {
-        const int32_t slot = b->wanted[k];
-        b->value[k][place] = slot == TG_OUT_DISTANCE ? estimate->distance : (double)estimate->value[slot]; /* unrounded on the float build */
-    }
-}
-
 static void hand_over(batch *b, double *const *out)
 {
-    for (int32_t k = 0; k < b->columns; k++) memcpy(out[b->wanted[k]] + b->first, b->value[k], b->rows * sizeof(double));
+    for (int32_t k = 0; k < b->columns; k++) {
+        const int32_t slot = b->wanted[k];
+        double *const to = out[slot] + b->first;
+        for (size_t j = 0; j < b->rows; j++) to[j] = (double)b->row[j].value[slot];
+    }
+    if (out[TG_OUT_DISTANCE]) /* unrounded on the float build */
+        for (size_t j = 0; j < b->rows; j++) out[TG_OUT_DISTANCE][b->first + j] = b->row[j].distance;
     b->first += b->rows;
     b->rows = 0;
 }
@@ -347,7 +344,6 @@ tg_status tg_estimator_block(tg_estimator *e, size_t rows, const double *time, c
 {
     if (!e || !time || !in || !out || !event || !done) return TG_BAD_ARGUMENT;
     tg_sample sample[2]; /* the next one is filled while this one is worked on: lanes cannot be read right after their parts are written */
-    tg_estimate estimate;
     batch kept;
     int32_t given[TG_SLOTS], n_given = 0;
     tg_status status = TG_OK;
@@ -364,10 +360,11 @@ tg_status tg_estimator_block(tg_estimator *e, size_t rows, const double *time, c
     for (; *done < rows; ++*done) {
         const size_t row = *done;
         if (row + 1 < rows) fill(&sample[(row + 1) % 2], time, in, given, n_given, row + 1);
-        status = tg_estimator_update(e, &sample[row % 2], &estimate);
+        tg_estimate *const estimate = &kept.row[kept.rows];
+        status = tg_estimator_update(e, &sample[row % 2], estimate);
         if (status != TG_OK) break;
-        event[row] = (uint8_t)estimate.event;
-        keep(&kept, &estimate);
+        event[row] = (uint8_t)estimate->event;
+        kept.rows++;
         if (kept.rows == TG_BATCH) hand_over(&kept, out);
     }
     hand_over(&kept, out);

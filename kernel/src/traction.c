@@ -68,7 +68,8 @@ TG_INLINE tgi_slip slip_of(tg_real omega, tg_real v, tg_real radius, tg_real lea
 }
 
 /* All wheels, delta method. `mean` is the mean adhesion over the load: what a common radius error does to rho_s. */
-TG_INLINE void traction(const tg_settings *s, const tg_real *x, const tgi_moments *c, const tg_real *hub, tg_real mean, tg_real *o, const int n)
+TG_INLINE void traction(const tg_settings *restrict s, const tg_real *restrict x, const tgi_moments *restrict c, const tg_real *restrict hub,
+                        tg_real mean, tg_real *restrict o, const int n)
 {
     const tg_real rho = x[n], v = x[n + 1], error = s->uncertainty.wheel_radius;
     const tg_real tire = s->machine.tire_rolling_resistance, least = (tg_real)0.02;
@@ -122,7 +123,8 @@ static void leave_open(const tgi_scene *scene, int32_t n, tg_real *o)
 
 /* All values that follow from the belief. Speeds get back the vehicle's own signs; mu, rho_s, slip and kappa stay in the direction of
  * travel. */
-void tgi_traction(const tg_settings *s, const tg_belief *b, const tg_real (*S)[TG_ROWS], const tgi_scene *scene, tg_real *o)
+void tgi_traction(const tg_settings *restrict s, const tg_belief *restrict b, const tg_real (*restrict S)[TG_ROWS], const tgi_scene *restrict scene,
+                  tg_real *restrict o)
 {
     const int32_t n = s->machine.wheels;
     tg_real thrust = 0;

@@ -72,9 +72,14 @@ def _speed_ratio(recording: Recording, wheel: str, radius: float) -> float | Non
     if pairs is None:
         return None
     ground, rim = np.abs(pairs[0]), radius * np.abs(pairs[1])
-    moving = (ground > 0.3 * np.quantile(ground, 0.95)) & (rim > 0.3 * np.quantile(rim, 0.95))
-    moving &= (ground > 0) & (rim > 0)
+    moving = (ground > 0.3 * _high(ground)) & (rim > 0.3 * _high(rim)) & (ground > 0) & (rim > 0)
     return float(np.median(rim[moving] / ground[moving])) if moving.sum() >= 10 else None
+
+
+def _high(values: Floats) -> float:
+    """What 5 % of the values (n,), n > 0, reach."""
+    rank = int(0.95 * (len(values) - 1))
+    return float(np.partition(values, rank)[rank])
 
 
 def _pairs(time: Floats, speed: Floats, turning: Floats) -> tuple[Floats, Floats] | None:
