@@ -108,11 +108,15 @@ RadiusModel = Annotated[FixedRadius | HadekelRadius | BidermanRadius, Field(disc
 
 
 class Wheel(Part):
-    """A wheel: ``radius`` [m] (unloaded, given a ``radius_model``), ``inertia`` [kg m²], ``width`` [m]."""
+    """A wheel: ``radius`` [m] (unloaded, given a ``radius_model``), ``inertia`` [kg m²], ``width`` [m].
+
+    ``mass`` [kg]: of what hangs outside a force sensor in its axle; only a comparison with that sensor asks for it.
+    """
 
     radius: _Radius
     inertia: _Inertia
     width: Annotated[float, *_quantity("m", 0.005, 3, likely=("mm", "cm"))] | None = None
+    mass: _Mass | None = None
     radius_model: RadiusModel | None = None
 
     @model_validator(mode="after")

@@ -5,11 +5,21 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from terragrip.errors import InputError
 from terragrip.report.runs import Run, label_stretches, stretches
-from terragrip.report.scores import compare, compare_truth, find, method_tables, truth_score, truth_table
+from terragrip.report.scores import (
+    compare,
+    compare_truth,
+    find,
+    method_tables,
+    sensor_table,
+    truth_score,
+    truth_table,
+)
+from terragrip.simulation import simulate
 
 Drive = Callable[..., Run]
 
@@ -124,7 +134,52 @@ def test_rows_in_events_are_left_out_and_are_stuck_where_no_truth_says_it(drive:
     told = Run(run.name, run.estimates, run.method, run.truth, run.recording, run.vehicle, events)
     kappa = next(c for c in compare(told) if (c.quantity, c.against) == ("net_traction", "sensor"))
     assert kappa.without_flagged is not None
-    assert kappa.without_flagged == kappa.without_stuck
+    # a standstill is left out as it is, a stuck spell from 1 s before to 2 s after
+    assert told.flagged[told.time <= 9.0].all()
+    assert (
+        told.flagged[told.time > 9.0] == ((told.time >= 59) & (told.time <= 66.95))[told.time > 9.0]
+    ).all()
+    assert kappa.without_flagged.count == (~told.flagged).sum()
     bare = Run(run.name, run.estimates, run.method, events=events)
     assert bare.stuck.sum() == 100
     assert (bare.stuck == run.stuck).all()
+
+
+def test_the_sensor_reads_what_equation_1_says() -> None:
+    """Simulated with exact sensors on a flat, even soil: the true kappa, over the sensor's load, is the sensor's reading."""
+    result = simulate("constant", seed=1)
+    table = result.recording.to_pandas()
+    truth = result.truth.assign(true_slope=0.0)
+    columns = {f"adhesion_{wheel}": truth[f"true_adhesion_{wheel}"] for wheel in result.vehicle.wheels}
+    columns |= {
+        f"net_traction_{wheel}": truth[f"true_net_traction_{wheel}"] for wheel in result.vehicle.wheels
+    }
+    columns |= {f"vertical_load_{axle}": truth[f"true_vertical_load_{axle}"] for axle in ("front", "rear")}
+    estimates = pd.DataFrame({"time": truth["time"], **columns})
+    run = Run("constant", estimates, "bank", truth, table, result.vehicle)
+    measured, expected, true = run.measured_ratio(), run.sensor_ratio(), run.true_sensor_ratio()
+    assert measured is not None
+    assert expected is not None
+    assert true is not None
+    steady = (run.time > 10) & np.isfinite(measured)
+    assert steady.sum() > 500
+    np.testing.assert_allclose(expected[steady], measured[steady], atol=2e-3)
+    np.testing.assert_allclose(true[steady], measured[steady], atol=2e-3)
+    # kappa itself reads a seventh less: the sensor's load lacks the wheel
+    assert np.median(measured[steady] / run.estimated("net_traction_rr")[steady]) == pytest.approx(
+        1.15, abs=0.03
+    )
+
+
+def test_without_the_wheels_mass_the_sensor_is_compared_with_kappa_only(drive: Drive) -> None:
+    run = drive()
+    assert run.sensor_ratio() is None
+    table = sensor_table(run)
+    assert table is not None
+    assert [row[0] for row in table.rows] == [
+        "κ as it is",
+        "µ, as the paper compares",
+        "the paper's µ in its field",
+    ]
+    assert table.rows[-1][1:3] == ("0.445", "0.848 (cut by hand)")
+    assert sensor_table(Run(run.name, run.estimates, run.method)) is None

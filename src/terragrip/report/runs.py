@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from terragrip.errors import InputError
+from terragrip.units import STANDARD_GRAVITY
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -26,8 +27,11 @@ air has no adhesion, only noise over nothing."""
 
 
 STUCK = ("stuck", "push")
-FLAGGED = ("stuck", "push", "immobilization", "outlier")
-"""Events whose rows say little of the ground."""
+FLAGGED = ("standstill", "stuck", "push", "immobilization", "outlier")
+"""Events whose rows say little of the ground; at standstill the estimates are held, not made."""
+BEFORE_STUCK = 1.0
+"""Seconds before a stuck or push event that belong to it: the jolt that stops the vehicle, and the time that the event waits
+until it is sure (0.55 s, docs/events.md)."""
 LEAST_PUSH = 1.0
 """An operator's push that counts [N]."""
 AFTER_STUCK = 2.0
@@ -123,6 +127,39 @@ class Run:
         with np.errstate(divide="ignore", invalid="ignore"):
             return np.where(load > LEAST_SENSOR_LOAD * typical, force / load, np.nan)
 
+    def sensor_ratio(self) -> FloatArray | None:
+        """What the reference sensor reads if the estimates are right: :func:`axle_ratio`, (n,).
+
+        None without a sensor or the mass of its wheel. Loads are the axle's estimated one, shared alike by its wheels; without an
+        accelerometer the wheel's inertia is left out.
+        """
+        wheel, mass = self.sensor_wheel, self._wheel_mass
+        if wheel is None or mass is None or self.vehicle is None:
+            return None
+        axle = next(name for name, axle in self.vehicle.axles.items() if wheel in axle.wheels)
+        if f"vertical_load_{axle}" not in self.estimates:
+            return None
+        load = self.estimated(f"vertical_load_{axle}") / len(self.vehicle.axles[axle].wheels)
+        measured = "acceleration_x" in self._measured
+        force = self._everywhere("acceleration_x") if measured else np.zeros(len(load))
+        return axle_ratio(self.estimated(f"net_traction_{wheel}"), load, force, mass)
+
+    def true_sensor_ratio(self) -> FloatArray | None:
+        """The same of a simulation's true net traction, load and motion, (n,): without the gradient under that one wheel."""
+        wheel, mass = self.sensor_wheel, self._wheel_mass
+        names = (f"net_traction_{wheel}", f"vertical_load_{wheel}", "acceleration", "slope")
+        kappa, load, acceleration, slope = (self.true(name) for name in names)
+        if mass is None or kappa is None or load is None or acceleration is None or slope is None:
+            return None
+        return axle_ratio(kappa, load, acceleration + STANDARD_GRAVITY * np.sin(slope), mass)
+
+    @property
+    def _wheel_mass(self) -> float | None:
+        """Mass of the shown wheel [kg], None where the vehicle file does not say."""
+        if self.vehicle is None:
+            return None
+        return self.vehicle.wheel_data[self.vehicle.wheels.index(self.shown_wheel)].mass
+
     def measured_slip(self) -> FloatArray | None:
         """Slip of the shown wheel from the recorded speeds (paper eq. 5), (n,), NaN where no ground speed is.
 
@@ -143,8 +180,7 @@ class Run:
 
     def _everywhere(self, channel: str) -> FloatArray:
         """A recorded channel (n,), linear between its samples."""
-        assert self.recording is not None
-        values = self.recording[channel].to_numpy(dtype=np.float64)
+        values = self._measured[channel].to_numpy(dtype=np.float64)
         known = np.isfinite(values)
         return np.interp(self.time, self.time[known], values[known]) if known.any() else values
 
@@ -193,8 +229,13 @@ class Run:
 
     @cached_property
     def flagged(self) -> BoolArray:
-        """Rows that the product itself flags, without a look at truth or sensor: inside an event of FLAGGED."""
-        return self._during(FLAGGED)
+        """Rows that the product itself flags, without a look at truth or sensor: inside an event of FLAGGED, and from
+        BEFORE_STUCK before to AFTER_STUCK after one of STUCK, the same for all."""
+        found = self._during(FLAGGED)
+        for first, last in stretches(self._during(STUCK)):
+            start, end = self.time[first] - BEFORE_STUCK, self.time[last] + AFTER_STUCK
+            found |= (self.time >= start) & (self.time <= end)
+        return found
 
     def _during(self, kinds: tuple[str, ...]) -> BoolArray:
         """Rows inside an event of `kinds`, by the estimates' column or by `events`."""
@@ -226,6 +267,18 @@ class Run:
     def _measured(self) -> pd.DataFrame:
         """The table that carries the references: the recording where it is there, else the estimates."""
         return self.estimates if self.recording is None else self.recording
+
+
+def axle_ratio(
+    net_traction: FloatArray, load: FloatArray, specific_force: FloatArray, mass: float
+) -> FloatArray:
+    """F_x/F_z in the axle of a wheel of `mass` [kg] (n,): (κ F_z - m_w a)/(F_z - m_w g) (PHYSICS §2, paper eq. 1).
+
+    `net_traction` κ, `load` F_z [N] and `specific_force` dv/dt + g sinθ [m/s²] are (n,); NaN where the load is the wheel's own.
+    """
+    carried = load - mass * STANDARD_GRAVITY
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.where(carried > 0, (net_traction * load - mass * specific_force) / carried, np.nan)
 
 
 def stretches(mask: BoolArray) -> list[tuple[int, int]]:

@@ -11,13 +11,15 @@ import numpy as np
 from terragrip.errors import InputError
 from terragrip.estimation.consistency import Agreement, agreement, coverage, mean_absolute_error
 from terragrip.report.page import Table, number, percent
-from terragrip.report.runs import FloatArray, Run
+from terragrip.report.runs import AFTER_STUCK, BEFORE_STUCK, FLAGGED, FloatArray, Run
 
 PAPER_R2_WHOLE, PAPER_R2_WITHOUT_STUCK, PAPER_NRMSE = 0.445, 0.848, 0.09
 """The paper's figures for its field run `multi2`: R² whole, R² and NRMSE without 245-255 s."""
 
 
 QUANTITIES = ("net_traction", "adhesion")
+SENSOR_RATIO = "sensor_ratio"
+"""What the sensor reads if estimate or truth is right (PHYSICS §2): kappa over the load without the wheel, less its inertia."""
 TRUTH = "the truth itself"
 """Stands in a method's place where the simulated truth is compared with the sensor."""
 PARTS = ("whole", "without_outlier", "without_stuck", "without_flagged")
@@ -28,7 +30,7 @@ PARTS = ("whole", "without_outlier", "without_stuck", "without_flagged")
 class Comparison:
     """One estimated quantity of one run against one reference.
 
-    `quantity` is ``adhesion`` (mu, as the paper compares) or ``net_traction`` (kappa); `against` is
+    `quantity` is ``adhesion`` (mu, as the paper compares), ``net_traction`` (kappa) or ``sensor_ratio``; `against` is
     ``sensor`` or ``truth``. `whole` holds every row; `without_outlier` leaves out the longest stuck spell,
     as the paper does; `without_stuck` leaves out all of them; `without_flagged` what :attr:`Run.flagged` flags, no window
     chosen by hand. None where it cannot be scored.
@@ -74,9 +76,13 @@ class TruthScore:
 
 
 def compare(run: Run) -> list[Comparison]:
-    """Every comparison that `run` allows: mu and kappa of the sensor's wheel, against sensor and truth."""
+    """Every comparison that `run` allows: mu and kappa of the sensor's wheel, against sensor and truth, and SENSOR_RATIO."""
     wheel, sensor = run.shown_wheel, run.measured_ratio()
     result = []
+    expected = run.sensor_ratio()
+    if sensor is not None and expected is not None:
+        parts = _parts(run, sensor, expected)
+        result.append(Comparison(run.name, run.method, SENSOR_RATIO, "sensor", *parts))
     for quantity in QUANTITIES:
         name = f"{quantity}_{wheel}"
         for against, reference in (("sensor", sensor), ("truth", run.true(name))):
@@ -87,10 +93,11 @@ def compare(run: Run) -> list[Comparison]:
 
 
 def compare_truth(run: Run) -> list[Comparison]:
-    """The truth itself against the sensor: what no estimate can be expected to exceed. Empty without both."""
+    """The truth itself against the sensor: what no estimate can be expected to exceed by much. Empty without both."""
     sensor, result = run.measured_ratio(), []
-    for quantity in QUANTITIES:
-        truth = run.true(f"{quantity}_{run.shown_wheel}")
+    for quantity in (SENSOR_RATIO, *QUANTITIES):
+        whole = quantity == SENSOR_RATIO
+        truth = run.true_sensor_ratio() if whole else run.true(f"{quantity}_{run.shown_wheel}")
         if sensor is not None and truth is not None:
             parts = _parts(run, sensor, truth)
             result.append(Comparison(run.name, TRUTH, quantity, "sensor", *parts))
@@ -112,6 +119,43 @@ def truth_score(run: Run) -> TruthScore | None:
         covered.append(coverage(truth, estimate, std, mask=rows))
     mu = agreement(_present(run.true(columns[0])), run.estimated(columns[0]), rows)
     return TruthScore(run.name, run.method, mu.r2, *errors, *covered)
+
+
+def sensor_table(run: Run) -> Table | None:
+    """R² against the reference sensor with all samples and with the flagged ones left out, beside the paper's two figures and,
+    in simulation, the truth's own. None without a sensor."""
+    estimated = {c.quantity: c for c in compare(run) if c.against == "sensor"}
+    true = {c.quantity: c for c in compare_truth(run)}
+    named = {
+        SENSOR_RATIO: "what the sensor should read, from κ",
+        "net_traction": "κ as it is",
+        "adhesion": "µ, as the paper compares",
+    }
+    rows = [
+        (what, *_two_r2(estimated[quantity]), *(_two_r2(true.get(quantity)) if true else ()))
+        for quantity, what in named.items()
+        if quantity in estimated
+    ]
+    if not rows:
+        return None
+    own = ("the truth's own, all", "the truth's own, flagged left out") if true else ()
+    paper = (number(PAPER_R2_WHOLE), f"{number(PAPER_R2_WITHOUT_STUCK)} (cut by hand)")
+    rows.append(("the paper's µ in its field", *paper, *("–" for _ in own)))
+    return Table(
+        f"R² of {run.name}, {run.method}, against the force sensor of wheel {run.sensor_wheel}. Left out is what the estimates' own "
+        f"events flag, no window cut by hand: {percent(float(run.flagged.mean()))} of the rows ({', '.join(FLAGGED)}, and from "
+        f"{BEFORE_STUCK:g} s before to {AFTER_STUCK:g} s after each stuck or push). The load that the sensor carries lacks the "
+        "wheel's weight" + (", which the first row allows for." if SENSOR_RATIO in estimated else "."),
+        ("compared", "all samples", "flagged left out", *own),
+        tuple(rows),
+        frozenset({0}),
+    )
+
+
+def _two_r2(c: Comparison | None) -> tuple[str, str]:
+    """R² with all samples and with the flagged ones left out."""
+    whole, told = (c.whole, c.without_flagged) if c else (None, None)
+    return number(whole.r2 if whole else None), number(told.r2 if told else None)
 
 
 def method_tables(comparisons: Sequence[Comparison], default: str) -> list[Table]:

@@ -17,7 +17,7 @@ from terragrip.report.intervals import (
 from terragrip.report.operating_points import cross_table, draw_crosses, section_crosses, soil_crosses
 from terragrip.report.page import Picture, Section, Table, names, number
 from terragrip.report.runs import FloatArray, Run, stretches
-from terragrip.report.scores import Comparison, TruthScore, method_tables, truth_table
+from terragrip.report.scores import Comparison, TruthScore, method_tables, sensor_table, truth_table
 from terragrip.report.timeline import Lane, timeline
 
 if TYPE_CHECKING:
@@ -54,7 +54,9 @@ def tracking(run: Run, prose: Sequence[str] = ()) -> Section:
         f"The same from {start:.0f} to {end:.0f} s, around {about}.",
         f"Traction of wheel {wheel} in {run.name}, zoomed to {start:.0f} to {end:.0f} s",
     )
-    return Section(f"tracking-{run.name}", f"Traction in {run.name}", tuple(prose), (whole, near))
+    scored = sensor_table(run)
+    shown = (whole, near) if scored is None else (whole, near, scored)
+    return Section(f"tracking-{run.name}", f"Traction in {run.name}", tuple(prose), shown)
 
 
 def slip_and_resistance(run: Run) -> Section:
