@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import json
 import os
+import struct
 from array import array
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -32,7 +34,7 @@ class Segment:
     number: int
     time: array[float] = field(default_factory=lambda: array("d"))
     arrival: array[float] = field(default_factory=lambda: array("d"))
-    estimates: array[float] = field(default_factory=lambda: array("d"))
+    estimates: bytearray = field(default_factory=bytearray)  # packed: many times quicker than array.extend
     codes: array[int] = field(default_factory=lambda: array("B"))
     channels: dict[str, array[float]] = field(default_factory=dict)
     refusals: list[Refusal] = field(default_factory=list)
@@ -62,7 +64,8 @@ class Segment:
         rows = len(self.time)
         self.time.append(row.estimate.time)
         self.arrival.append(row.arrival)
-        self.estimates.extend(row.estimate.values)
+        values = row.estimate.values
+        self.estimates += _packer(len(values)).pack(*values)
         self.codes.append(EVENTS.index(row.estimate.event))
         for name, column in self.channels.items():
             column.append(row.values.get(name, float("nan")))
@@ -122,6 +125,11 @@ class Segment:
         about = about_run(estimator, None, None, smooth=False)
         codes = np.frombuffer(self.codes, dtype=np.uint8)
         return Estimates(np.frombuffer(self.time), columns, codes, {}, about)
+
+
+@cache
+def _packer(count: int) -> struct.Struct:
+    return struct.Struct(f"={count}d")
 
 
 @contextmanager
