@@ -368,6 +368,23 @@ def test_the_map_draws_the_track_and_changes_its_colours(page: Any, served: Serv
     assert "grass" in page.inner_text(".legend-row")
 
 
+def test_a_brush_is_the_same_on_drive_and_map_and_in_another_tab(page: Any, served: Served) -> None:
+    page.goto(f"{served.url}/#/drive?path=estimates.parquet")
+    page.wait_for_selector(".charts[data-rows]")
+    other = page.context.new_page()
+    other.goto(f"{served.url}/#/map?path=estimates.parquet")
+    other.wait_for_function("() => window.terragripMap?.map.getSource('track')")
+    assert other.input_value("#map-run") == "estimates.parquet"
+    page.evaluate("() => window.terragripDrive.charts.zoom([10, 20])")
+    other.wait_for_function("() => window.terragripMap.charts.range.join() === '10,20'")
+    other.evaluate("() => window.terragripMap.charts.zoom([12, 18])")
+    page.wait_for_function("() => window.terragripDrive.charts.range.join() === '12,18'")
+    other.close()
+    page.click("nav >> text=Map")
+    page.wait_for_function("() => window.terragripMap?.charts.range.join() === '12,18'")
+    assert page.input_value("#map-run") == "estimates.parquet"
+
+
 @pytest.mark.parametrize("theme", ["light", "dark"])
 @pytest.mark.parametrize("where", ["#/start", "#/fit?path=estimates.parquet", "#/drive", "#/live", "#/map"])
 def test_axe_finds_nothing_serious(browser: Any, served: Served, where: str, theme: str) -> None:

@@ -1,6 +1,7 @@
 /** A run over time: measured against estimated, with intervals, soils, events and what the filter thinks of itself. */
 
 import { get, type Item } from "../ui/api";
+import { brush, brushed, onBrush } from "../ui/brush";
 import { digits, fill, h } from "../ui/dom";
 import { tried } from "../ui/notes";
 import type { Page } from "../ui/page";
@@ -141,7 +142,14 @@ export const page: Page = (main, { notices, query }) => {
     drawLegend();
     hover(null);
     draw();
+    follow();
     void drawPlane();
+  }
+
+  /** Show the times brushed on the map, or in another tab. */
+  function follow(): void {
+    const other = brushed();
+    if (other && other.path === path) charts.zoom(other.range);
   }
 
   async function drawPlane(): Promise<void> {
@@ -219,7 +227,8 @@ export const page: Page = (main, { notices, query }) => {
   charts.onCursor = hover;
   charts.onPick = (time) => void pick(time);
   let soon = 0;
-  charts.onRange = () => {
+  charts.onRange = (range) => {
+    brush(path, range);
     clearTimeout(soon);
     soon = window.setTimeout(() => void drawPlane(), 150);
   };
@@ -233,16 +242,18 @@ export const page: Page = (main, { notices, query }) => {
     const folder = await tried(() => get<{ items: Item[] }>("folder"));
     const runs = (folder?.items ?? []).filter((item) => item.kind === "estimates").map((item) => item.path);
     fill(choice, runs.length ? runs.map((name) => h("option", { value: name, selected: name === path }, name)) : h("option", { value: "" }, "No estimates in the folder"));
-    const wanted = query.get("path");
+    const wanted = query.get("path") ?? brushed()?.path;
     if (!path && runs.length) await open(wanted && runs.includes(wanted) ? wanted : (runs[0] as string));
     if (!runs.length) fill(charts.element, h("p", { class: "hint empty" }, "Nothing to show yet: open a recording on the folder page and estimate it."));
   }
 
+  const unfollow = onBrush(follow);
   const forget = notices.on((notice) => notice.kind === "folder" && void reload());
   void reload();
   Object.assign(window, { terragripDrive: { charts } });
   return () => {
     forget();
+    unfollow();
     charts.close();
     plane.close();
   };

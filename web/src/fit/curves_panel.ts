@@ -201,7 +201,7 @@ export class CurvesPanel {
       { class: `result${sameCurve(curve) ? "" : " stale"}`, "aria-live": "polite" },
       h("p", {}, sameCurve(curve) ? "" : "The sliders have left this fit."),
       h("table", {}, h("thead", {}, h("tr", {}, h("th", {}, ""), h("th", {}, "fit"), h("th", {}, "95 % interval"))), h("tbody", {}, rows, effective)),
-      h("p", {}, `R² ${digits(fit.r2)}   NRMSE ${digits(fit.nrmse)}   ${fit.bins.length} bins`),
+      h("p", {}, `R² ${digits(fit.r2)}, NRMSE ${digits(fit.nrmse)}, ${fit.bins.length} bins`),
       h("p", { class: `badge ${badge.identifiable ? "good" : "poor"}` }, badge.identifiable ? "identifiable" : "not identifiable", ` (condition ${digits(badge.condition, 2)})`),
       fit.notes.map((text) => h("p", { class: "hint" }, text)),
     );

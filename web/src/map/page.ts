@@ -6,6 +6,7 @@ import workerUrl from "maplibre-gl/dist/maplibre-gl-worker.mjs?worker&url";
 import { EVENT_COLORS, panelsOf, soilColor, type Run } from "../drive/run";
 import { Charts } from "../drive/charts";
 import { address, get, type Item } from "../ui/api";
+import { brush, brushed, onBrush } from "../ui/brush";
 import { columns, type Columns } from "../ui/columns";
 import { digits, fill, h } from "../ui/dom";
 import { note, tried } from "../ui/notes";
@@ -78,6 +79,7 @@ export const page: Page = (main, { notices, query }) => {
     if (!found) return;
     path = wanted;
     run = found;
+    choice.value = wanted;
     history.replaceState(null, "", `#/map?path=${encodeURIComponent(wanted)}`);
     const before = quantity.value;
     fill(quantity, names().map((n) => h("option", { value: n.value }, n.title)));
@@ -85,6 +87,13 @@ export const page: Page = (main, { notices, query }) => {
     charts.show(path, found, panelsOf(found, found.wheels.slice(-1)).filter((p) => p.key === "slip"));
     await draw();
     frame();
+    follow();
+  }
+
+  /** Show the times brushed on the drive page, or in another tab. */
+  function follow(): void {
+    const other = brushed();
+    if (other && other.path === path) charts.zoom(other.range);
   }
 
   async function draw(): Promise<void> {
@@ -192,6 +201,7 @@ export const page: Page = (main, { notices, query }) => {
 
   charts.onCursor = mark;
   charts.onRange = ([start, end]) => {
+    brush(path, [start, end]);
     if (!track?.count || !run) return;
     if (start <= run.start && end >= run.end) return frame();
     const time = track.data[0] as Float64Array;
@@ -237,15 +247,17 @@ export const page: Page = (main, { notices, query }) => {
     fill(choice, runs.length ? runs.map((name) => h("option", { value: name, selected: name === path }, name)) : h("option", { value: "" }, "No estimates in the folder"));
     const before = base.value;
     fill(base, h("option", { value: "" }, "No basemap"), pictures.map((name) => h("option", { value: name, selected: name === before }, name)));
-    const wanted = query.get("path");
+    const wanted = query.get("path") ?? brushed()?.path;
     if (!path && runs.length) await open(wanted && runs.includes(wanted) ? wanted : (runs[0] as string));
   }
 
+  const unfollow = onBrush(follow);
   const forget = notices.on((notice) => notice.kind === "folder" && void reload());
   void reload();
   Object.assign(window, { terragripMap: { map, charts } });
   return () => {
     forget();
+    unfollow();
     forgetTheme();
     charts.close();
     map.remove();

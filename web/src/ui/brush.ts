@@ -1,0 +1,33 @@
+/** The run and the times that Drive and Map show: kept from page to page, and shared with the browser's other tabs. */
+
+export interface Brush {
+  path: string;
+  range: [number, number];
+}
+
+const channel = new BroadcastChannel("terragrip-brush");
+const listeners = new Set<(brush: Brush) => void>();
+let now: Brush | null = null;
+
+/** What was brushed last, here or in another tab. */
+export function brushed(): Brush | null {
+  return now;
+}
+
+/** Other times are shown. */
+export function brush(path: string, range: [number, number]): void {
+  if (now && now.path === path && now.range[0] === range[0] && now.range[1] === range[1]) return; // also what another tab has just told
+  now = { path, range };
+  channel.postMessage(now);
+}
+
+/** Told of what other tabs brush, until the returned function is called. */
+export function onBrush(listener: (brush: Brush) => void): () => void {
+  listeners.add(listener);
+  return () => listeners.delete(listener);
+}
+
+channel.addEventListener("message", (event: MessageEvent<Brush>) => {
+  now = event.data;
+  for (const listener of listeners) listener(event.data);
+});
