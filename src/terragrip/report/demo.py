@@ -165,12 +165,7 @@ def _headlines(campaign: EstimatedCampaign, default: str) -> tuple[Headline, ...
             Headline(
                 number(told.r2),
                 "the same without the rows that the estimates' own events flag, no window cut by hand",
-                f"paper {PAPER_R2_WITHOUT_STUCK}, cut by hand",
-            ),
-            Headline(
-                number(itself.without_flagged.r2),
-                "the simulated truth's own R², same rows",
-                "sensor noise, bumps",
+                f"paper {PAPER_R2_WITHOUT_STUCK}, cut by hand; the truth itself {number(itself.without_flagged.r2)}",
             ),
             Headline(number(told.nrmse), "NRMSE, same rows", f"paper {PAPER_NRMSE}"),
         ]
@@ -197,8 +192,8 @@ def _sensor_prose(run: Run) -> tuple[str, ...]:
     if run.stuck.any():
         said.append(
             "While the vehicle is stuck its tool slides up and pushes: the force on the axle falls or turns "
-            "negative, the torque and with it the estimate stay high. The paper cuts the longest such spell out "
-            "by hand; here the simulation knows when it was, and scores stand with and without it."
+            "negative, the torque and with it µ stay high. The paper cuts the longest such spell out by hand; here the "
+            "estimates' own events flag all of them, and R² stands with and without the flagged rows."
         )
     return tuple(said)
 
