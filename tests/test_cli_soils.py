@@ -125,6 +125,23 @@ def test_free_shape_weights_and_other_bins(write: Write, tmp_path: Path) -> None
     assert set(soil["interval"]) == {"A", "k", "d"}
 
 
+def test_the_papers_bins_alone_or_beside_those_by_pull(write: Write, tmp_path: Path) -> None:
+    files = [write(f"r{i}") for i in range(5)]
+    both = learn(tmp_path / "both.json", *files, "--metres", 2, "--quiet")["soils"]["fine"]
+    paper = learn(tmp_path / "paper.json", *files, "--by", "slip", "--quiet")["soils"]["fine"]
+    assert both["settings"]["by"] == "pull"
+    assert both["settings"]["metres"] == 2
+    assert min(row["metres"] for row in both["bins"]) >= 2
+    assert paper["settings"]["by"] == "slip"
+    assert both["by_slip"]["parameters"] == paper["parameters"]
+    assert both["by_slip"]["bins"] == paper["bins"]
+
+
+@pytest.mark.parametrize(("option", "value"), [("--by", "colour"), ("--metres", 0), ("--runs", 0)])
+def test_bins_that_are_none(write: Write, fails: Fails, option: str, value: object) -> None:
+    assert "--by, --metres, --runs" in fails(write("one"), option, value)
+
+
 def test_no_labels(write: Write, fails: Fails, tmp_path: Path) -> None:
     file = write("bare", soil="")
     assert "no sample has a soil label" in fails(file)

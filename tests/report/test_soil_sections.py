@@ -46,9 +46,9 @@ def test_the_table_holds_the_papers_numbers_ours_and_the_truth(curves: list[Soil
     assert cells["fine"]["library"] == "0.777"
     assert cells["hard"]["library"] == "–"
     for name, a in (("hard", 1.42), ("fine", 0.85)):
-        assert float(cells[name]["ours, by bins"]) == pytest.approx(a, rel=0.03)
-        assert float(cells[name]["ours, by metres"]) == pytest.approx(a, rel=0.03)
-        assert float(cells[name]["true pairs, by bins"]) == pytest.approx(a, abs=1e-3)
+        assert float(cells[name]["ours, by pull"]) == pytest.approx(a, rel=0.03)
+        assert float(cells[name]["ours, by slip"]) == pytest.approx(a, rel=0.03)
+        assert float(cells[name]["true pairs, by pull"]) == pytest.approx(a, abs=1e-3)
     row = dict(zip(quality.header, quality.rows[0], strict=True))
     assert (row["soil"], row["NRMSE: paper"], row["R²: paper"], row["runs"]) == (
         "hard",
@@ -56,7 +56,7 @@ def test_the_table_holds_the_papers_numbers_ours_and_the_truth(curves: list[Soil
         "0.975",
         "6",
     )
-    assert float(row["R²: ours"]) > 0.97
+    assert float(row["R²: ours, by pull"]) > 0.97
 
 
 def test_hard_stands_first_and_alone_as_in_the_paper(curves: list[SoilCurves]) -> None:
@@ -66,9 +66,10 @@ def test_hard_stands_first_and_alone_as_in_the_paper(curves: list[SoilCurves]) -
         assert "simulated truth" in picture.svg
         assert "simulated truth" in picture.caption
         assert "95 %" in picture.caption
-    # a mark and a bar for each used bin of hard
-    bins = len(curves[0].learned.soil.bins)
-    assert 40 < bins <= 55
+    # a mark and a bar for each used bin of hard, by pull and by slip
+    learned = curves[0].learned
+    assert 40 < int(learned.by_slip.bins_.used.sum()) <= 55
+    bins = len(learned.soil.bins) + int(learned.by_slip.bins_.used.sum())
     assert pictures[0].svg.count("<use") >= bins
 
 

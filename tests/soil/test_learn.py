@@ -7,6 +7,8 @@ import pytest
 
 from terragrip.errors import InputError
 from terragrip.physics.adhesion import CURVES
+from terragrip.soil.bins import BinSettings
+from terragrip.soil.fit import AdhesionCurve
 from terragrip.soil.learn import learn_soils, usable_pairs
 from terragrip.soil.transitions import settled
 
@@ -64,6 +66,49 @@ def test_pull_of_the_advice_brings_the_vehicle_there():
     assert (low, high) == pytest.approx((0.30, 0.60))
     mu = CURVES["exponential"].value(np.array([low, high]), {"a": 0.85})
     assert gap.pull == pytest.approx(tuple((mu - 0.1) * 139 * 9.81), rel=0.05)
+
+
+def test_the_papers_bins_stand_beside_those_by_pull():
+    pairs = [p for seed in range(8) for p in usable_pairs(table(seed), WHEELS, 2.6, f"run {seed}")]
+    learned = learn_soils(pairs).soils["fine"]
+    assert learned.curve.bins_.settings.by == "pull"
+    slip, adhesion = (
+        np.concatenate([getattr(p, k) for p in pairs if p.soil == "fine"]) for k in ("slip", "adhesion")
+    )
+    plain = AdhesionCurve(bootstrap=0).fit(slip, adhesion)
+    assert learned.by_slip.parameters_ == pytest.approx(plain.parameters_)
+    assert learned.soil.to_dict()["by_slip"]["r2"] == pytest.approx(plain.r2_)
+    only = learn_soils(pairs, AdhesionCurve()).soils["fine"]
+    assert only.curve is only.by_slip
+    assert only.soil.parameters == pytest.approx(plain.parameters_)
+    assert "by_slip" not in only.soil.to_dict()
+
+
+def test_a_curve_that_falls_is_sorted_by_slip():
+    """Past its top one pull has two slips."""
+    peaked = {"A": 0.5, "k": 20.0, "d": 0.6}
+    pairs = []
+    for seed in range(6):
+        columns = table(seed)
+        rng = np.random.default_rng(seed)
+        for w in WHEELS:
+            mu = CURVES["effective"].value(columns[f"slip_{w}"], peaked)
+            columns[f"adhesion_{w}"] = mu + 0.01 * rng.standard_normal(mu.size)
+        pairs += usable_pairs(columns, WHEELS, 2.6, f"run {seed}")
+    campaign = learn_soils(pairs, AdhesionCurve("effective", bins=BinSettings(by="pull")))
+    learned = campaign.soils["fine"]
+    assert learned.curve is learned.by_slip
+    assert learned.curve.parameters_ == pytest.approx(peaked, rel=0.05)
+    assert any("falls within the bins" in words for words in campaign.words)
+
+
+def test_few_pulls_are_sorted_by_slip():
+    campaign = learn_soils(
+        usable_pairs(table(1, upper=0.3), WHEELS, 2.6, "run"),
+        AdhesionCurve(bins=BinSettings(by="pull", metres=15)),
+    )
+    assert campaign.soils["fine"].curve is campaign.soils["fine"].by_slip
+    assert any("of 4 needed" in words for words in campaign.words)
 
 
 def test_no_labels():

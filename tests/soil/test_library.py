@@ -75,6 +75,18 @@ BAD = {
     "text for a number": '{"soils": {"a": {"model": "exponential", "parameters": {"a": "x"}}}}',
     "NaN": '{"soils": {"a": {"model": "exponential", "parameters": {"a": NaN}}}}',
     "interval of three": '{"soils": {"a": {"model": "exponential", "parameters": {"a": 1}, "interval": {"a": [1, 2, 3]}}}}',
+    **{
+        f"{key} that is none": '{"soils": {"a": {"model": "exponential", "parameters": {"a": 1}, "KEY": VALUE}}}'.replace(
+            "KEY", key
+        ).replace("VALUE", value)
+        for key, value in {
+            "interval": "[1]",
+            "free": '[["a"]]',
+            "settings": "7",
+            "identifiability": '{"condition": 1.0}',
+            "by_slip": '{"parameters": {}}',
+        }.items()
+    },
     "bins that are none": '{"soils": {"a": {"model": "exponential", "parameters": {"a": 1}, "bins": 3}}}',
     "points that are not numbers": '{"soils": {"a": {"model": "exponential", "parameters": {"a": 1}, "bins": [{"slip": "x"}]}}}',
 }

@@ -37,7 +37,18 @@ def command(
         float, typer.Option(help="Highest slip of the bins; on grass 0.40 as the paper.")
     ] = 0.60,
     width: Annotated[float, typer.Option(help="Width of a bin.")] = 0.01,
-    minimum: Annotated[int, typer.Option(help="Fewest samples of a bin.")] = 10,
+    by: Annotated[
+        str,
+        typer.Option(
+            metavar="pull|slip",
+            help="What sorts samples into bins: the vehicle's pull, or each sample's own slip as in the paper.",
+        ),
+    ] = "pull",
+    metres: Annotated[
+        float, typer.Option(help="By pull: fewest metres of way of a bin; shorter ones are joined.")
+    ] = 4.0,
+    runs: Annotated[int, typer.Option(help="By pull: fewest runs of a bin.")] = 2,
+    minimum: Annotated[int, typer.Option(help="By slip: fewest samples of a bin.")] = 10,
     soil: Annotated[
         str | None, typer.Option(metavar="NAME", help="The soil of all rows, for logs without labels.")
     ] = None,
@@ -56,10 +67,11 @@ def command(
     """Learn adhesion-slip curves of soils.
 
     Pairs of slip and adhesion where vehicle and tool stand on one soil and nothing is flagged, in slip bins; a curve for each soil with
-    intervals, R2, NRMSE, what the data cannot tell, and what to drive next.
+    intervals, R2, NRMSE, what the data cannot tell, and what to drive next. Samples are sorted by the vehicle's pull, since slip answers
+    to weak and strong spots; the paper's fit, sorted by slip, stands beside it.
     """
     from terragrip.errors import InputError
-    from terragrip.soil.bins import PAPER_BINS, BinSettings
+    from terragrip.soil.bins import BinSettings
     from terragrip.soil.digitised import soils_of_points
     from terragrip.soil.estimates import soils_of
     from terragrip.soil.fit import FREE, AdhesionCurve
@@ -70,11 +82,16 @@ def command(
     base = SoilLibrary.load(merge) if merge else None
     other = SoilLibrary.load(compare) if compare else None
     try:
-        bins = BinSettings(width, lower, upper, minimum)
+        bins = BinSettings(width, lower, upper, minimum, by, metres, runs)
     except ValueError as error:
-        raise InputError(str(error), place="--width, --lower, --upper", mend="choose other bins") from None
+        raise InputError(
+            str(error), place="--width, --lower, --upper, --by, --metres, --runs", mend="choose other bins"
+        ) from None
     curve = AdhesionCurve(model, FREE if free else None, weights="count" if weights else None, bins=bins)
-    special = PAPER_BINS if bins == BinSettings() else {}
+    usual = BinSettings()
+    special: dict[str, BinSettings] | None = (
+        None if (width, lower, upper) == (usual.width, usual.lower, usual.upper) else {}
+    )
     estimates = [path for path in inputs if path.suffix.lower() not in (".json", ".csv")]
     library = SoilLibrary({})
     words: list[str] = []
@@ -135,15 +152,16 @@ def comparison(library: SoilLibrary, other: SoilLibrary, path: Path | None) -> s
 
 
 def table(library: Mapping[str, Soil]) -> str:
-    """The library as lines of text: soil, model, free parameters with intervals, a by metres of ground, R2, NRMSE, bins, the badge."""
+    """The library as lines of text: soil, model, free parameters with intervals, R2, NRMSE, bins and what sorted them, the paper's way
+    (a and R2 with bins by slip), the badge."""
     head = (
         "soil",
         "model",
         "parameters (95 % interval)",
-        "a by metres",
         "R2",
         "NRMSE",
         "bins",
+        "sorted by slip",
         "data fix it",
     )
     rows: list[tuple[str, ...]] = [head]
@@ -157,11 +175,20 @@ def table(library: Mapping[str, Soil]) -> str:
                 + (f" ({interval[0]:.3g} to {interval[1]:.3g})" if interval else "")
             )
         score = ["" if value is None else f"{value:.3f}" for value in (one.r2, one.nrmse)]
-        metres, badge = one.fit.get("ground_mean"), one.fit.get("identifiability")
-        by_metres = f"{metres['a']:.3g}" if metres else ""
+        badge, settings = one.fit.get("identifiability"), one.fit.get("settings") or {}
         fixed = "" if not badge else "yes" if badge["identifiable"] else f"no ({badge['condition']:.1g})"
-        rows.append((name, one.model, ", ".join(words), by_metres, *score, str(len(one.bins) or ""), fixed))
+        bins = f"{len(one.bins)} by {settings.get('by', 'slip')}" if one.bins else ""
+        rows.append((name, one.model, ", ".join(words), *score, bins, _by_slip(one), fixed))
     widths = [max(len(row[i]) for row in rows) for i in range(len(head))]
     return "\n".join(
         "  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip() for row in rows
     )
+
+
+def _by_slip(soil: Soil) -> str:
+    """The paper's way, each sample sorted by its own slip, where another stands first: the free parameters and R2."""
+    paper = soil.fit.get("by_slip")
+    if not paper:
+        return ""
+    free = soil.fit.get("free", list(soil.parameters))
+    return ", ".join(f"{key} {paper['parameters'][key]:.3g}" for key in free) + f", R2 {paper['r2']:.3f}"

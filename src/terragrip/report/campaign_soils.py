@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -10,7 +11,7 @@ import numpy as np
 from terragrip.errors import InputError
 from terragrip.soil.estimates import whole_length
 from terragrip.soil.fit import AdhesionCurve
-from terragrip.soil.learn import Campaign, RunPairs, usable_pairs
+from terragrip.soil.learn import Campaign, RunPairs, bin_parts, usable_pairs
 from terragrip.soil.library import Soil
 
 if TYPE_CHECKING:
@@ -30,17 +31,16 @@ def true_pairs(estimates: Estimates, result: SimulationResult, run: str) -> list
     return usable_pairs(columns, estimates.wheels, whole_length(estimates.vehicle), run)
 
 
-def fits_of_truth(campaign: Campaign, pairs: Sequence[RunPairs]) -> dict[str, AdhesionCurve]:
-    """The fit of each of the campaign's soils on true pairs, same bins, no intervals."""
+def fits_of_truth(
+    campaign: Campaign, pairs: Sequence[RunPairs], by: str | None = None
+) -> dict[str, AdhesionCurve]:
+    """The fit of each of the campaign's soils on true pairs, bins by the same settings (sorted `by` another quantity), no intervals."""
     found = {}
     for name, learned in campaign.soils.items():
         parts = [part for part in pairs if part.soil == name]
-        curve = AdhesionCurve(bins=learned.curve.bins, bootstrap=0)
+        settings = learned.curve.bins if by is None else replace(learned.curve.bins, by=by)
         try:
-            found[name] = curve.fit(
-                np.concatenate([part.slip for part in parts]),
-                np.concatenate([part.adhesion for part in parts]),
-            )
+            found[name] = learned.curve.unfitted(bootstrap=0).fit_bins(bin_parts(parts, settings))
         except (InputError, ValueError):  # too few bins: what the truth does not show is left out
             continue
     return found

@@ -41,7 +41,8 @@ class SoilCurves:
     """One soil's curve as everyone tells it.
 
     `learned`: from these estimates. `paper`: the paper's soil of that name. `library`: of the library that was given. `truth`: what a
-    simulation made the soil with; `true_pairs`: the fit of `learned` on the simulation's true slip and adhesion. None where there is none.
+    simulation made the soil with; `true_pairs`: the fit of `learned` on the simulation's true slip and adhesion; `true_by_slip`: the
+    paper's fit on them. None where there is none.
     """
 
     name: str
@@ -50,6 +51,12 @@ class SoilCurves:
     library: Soil | None = None
     truth: Soil | None = None
     true_pairs: AdhesionCurve | None = None
+    true_by_slip: AdhesionCurve | None = None
+
+    @property
+    def by_slip(self) -> AdhesionCurve | None:
+        """The paper's fit where it stands beside another; None where it is the one that counts."""
+        return None if self.learned.by_slip is self.learned.curve else self.learned.by_slip
 
 
 @dataclass(frozen=True)
@@ -154,26 +161,25 @@ def draw_all_maxima(curves: Sequence[SoilCurves], tire_resistance: float) -> str
 
 def _draw_fit(plot: Axes, told: SoilCurves) -> dict[str, Any]:
     """Draw one soil; the legend's entries by label."""
-    bins = told.learned.curve.bins_
-    used = bins.used
-    named: dict[str, Any] = {
-        "bins of the estimates, mean ± SD": plot.errorbar(
-            bins.slip[used],
-            bins.mean[used],
-            yerr=bins.std[used],
-            fmt="x",
-            color=MUTED,
-            ecolor=MUTED,
-            elinewidth=0.7,
-            markersize=4,
-        )
-    }
+    named: dict[str, Any] = {}
+    paper, counts = told.learned.by_slip, told.learned.curve
+    named["bins by slip, mean ± SD"] = _draw_bins(plot, paper, "x", MUTED, 4)
+    if counts is not paper:
+        named["bins by pull, mean ± SD"] = _draw_bins(plot, counts, "o", BLUE, 3.5)
     if told.learned.curve.samples_ is not None:
         low, high = told.learned.curve.band(SLIPS)
         named["95 % of the fit"] = plot.fill_between(SLIPS, low, high, color=BLUE, alpha=0.22, linewidth=0)
     lines: list[tuple[str, Array | None, dict[str, Any]]] = [
-        ("fit to the bins", told.learned.curve.predict(SLIPS), {"color": BLUE, "linewidth": 1.8}),
-        ("mean of the ground", _of_ground(told), {"color": BLUE, "linewidth": 1.2, "linestyle": "--"}),
+        (
+            "fit to the bins" + (" by pull" if counts is not paper else ""),
+            counts.predict(SLIPS),
+            {"color": BLUE, "linewidth": 1.8},
+        ),
+        (
+            "fit by slip, the paper's way",
+            paper.predict(SLIPS) if counts is not paper else None,
+            {"color": MUTED, "linewidth": 1.4, "linestyle": "--"},
+        ),
         ("paper", _value(told.paper), {"color": ORANGE, "linewidth": 1.4, "linestyle": "-."}),
         (
             "library",
@@ -190,11 +196,20 @@ def _draw_fit(plot: Axes, told: SoilCurves) -> dict[str, Any]:
     return named
 
 
-def _of_ground(told: SoilCurves) -> Array | None:
-    found = told.learned.ground_mean
-    if found is None:
-        return None
-    return told.learned.curve.predict(SLIPS) * (found.mean / found.plain)
+def _draw_bins(plot: Axes, curve: AdhesionCurve, marker: str, color: str, size: float) -> Any:
+    """Means of the used bins with SD bars."""
+    bins = curve.bins_
+    used = bins.used
+    return plot.errorbar(
+        bins.slip[used],
+        bins.mean[used],
+        yerr=bins.std[used],
+        fmt=marker,
+        color=color,
+        ecolor=color,
+        elinewidth=0.7,
+        markersize=size,
+    )
 
 
 def _value(soil: Soil | None) -> Array | None:

@@ -36,6 +36,7 @@ from terragrip.report.scores import (
     Comparison,
     find,
 )
+from terragrip.soil.bins import BY_SLIP
 
 SEED = 0
 """The campaign's seed, as `simulate_campaign` has it: with it the demo's numbers can be repeated."""
@@ -110,7 +111,10 @@ def _page(campaign: EstimatedCampaign, seed: int, seconds: float) -> Page:
     true_pairs = [part for run in runs for part in run.true_pairs]
     truth = soils_of_scenario(main.name, true_pairs)
     curves = soil_sections.told_by_all(
-        campaign.soils, truth=truth, true_pairs=fits_of_truth(campaign.soils, true_pairs)
+        campaign.soils,
+        truth=truth,
+        true_pairs=fits_of_truth(campaign.soils, true_pairs),
+        true_by_slip=fits_of_truth(campaign.soils, true_pairs, BY_SLIP),
     )
     tire = campaign.vehicle.tire_rolling_resistance
     scales = {name: soil.parameters["a"] for name, soil in truth.items()}

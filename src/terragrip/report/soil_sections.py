@@ -7,8 +7,9 @@ from types import MappingProxyType
 
 from terragrip.report.curves import SoilCurves, draw_all_maxima, draw_both_maxima, draw_fits, maxima
 from terragrip.report.page import Picture, Section, Table, names, number, percent
+from terragrip.soil.bins import BY_PULL
 from terragrip.soil.fit import FREE, AdhesionCurve
-from terragrip.soil.learn import Campaign
+from terragrip.soil.learn import Campaign, scales_apart
 from terragrip.soil.library import Soil, SoilLibrary
 from terragrip.soil.literature import paper_soils
 from terragrip.soil.missing import in_words
@@ -25,6 +26,7 @@ def told_by_all(
     library: SoilLibrary | None = None,
     truth: Mapping[str, Soil] | None = None,
     true_pairs: Mapping[str, AdhesionCurve] | None = None,
+    true_by_slip: Mapping[str, AdhesionCurve] | None = None,
 ) -> list[SoilCurves]:
     """The campaign's soils, the one to show first in front, each with what paper, library and simulation tell of it."""
     paper = paper_soils()
@@ -36,6 +38,7 @@ def told_by_all(
             library.get(name) if library is not None else None,
             truth.get(name) if truth is not None else None,
             true_pairs.get(name) if true_pairs is not None else None,
+            true_by_slip.get(name) if true_by_slip is not None else None,
         )
         for name, learned in campaign.soils.items()
     ]
@@ -90,7 +93,6 @@ def fits(curves: Sequence[SoilCurves], not_fitted: Mapping[str, str]) -> Section
         )
     first, rest = curves[0], curves[1:]
     said = _voices(curves)
-    settings = first.learned.curve.bins_.settings
     alike = [
         one
         for one in curves
@@ -98,10 +100,7 @@ def fits(curves: Sequence[SoilCurves], not_fitted: Mapping[str, str]) -> Section
     ]
     if len(alike) == len(curves):
         said += "; the simulated soils were made with the paper's a, so that both lie on one line"
-    how = (
-        f"Bins of {percent(settings.width, 0)} slip from {percent(settings.lower, 0)} to {percent(settings.upper, 0)}, each with at least "
-        f"{settings.minimum} samples; samples on a transition or under an event are left out."
-    )
+    how = _preparation(curves)
     content: list[Picture | Table] = [
         Picture(
             f"fit-{_stem(first.name)}",
@@ -136,18 +135,14 @@ def trust(curves: Sequence[SoilCurves], not_fitted: Mapping[str, str] = NOTHING)
     rows = tuple(_trust_row(one) for one in curves)
     table = Table(
         "Each fit's badge: do the data fix what was fitted (condition number; beyond 10 000 they do not), does its form follow them "
-        "(whole runs left out), what the spread of the slip estimate does to it, and a counted by metres of ground instead of by bins.",
-        (
-            "soil",
-            "data fix the fit",
-            "form follows",
-            "slip SD",
-            "parameter, corrected for slip noise",
-            "by metres of ground (95 %)",
-        ),
+        "(whole runs left out), how noisy the slip estimate is (median SD), and the fitted parameters corrected for that noise.",
+        ("soil", "data fix the fit", "form follows", "slip SD", "parameter, corrected for slip noise"),
         rows,
     )
     words = [f"{one.name}: {note}" for one in curves for note in one.learned.curve.notes_]
+    words += [
+        f"{one.name}: {sentence}" for one in curves for sentence in [scales_apart(one.learned)] if sentence
+    ]
     words += [
         f"{one.name}: {one.learned.verdict.sentence}"
         for one in curves
@@ -186,24 +181,42 @@ def what_is_missing(curves: Sequence[SoilCurves], not_fitted: Mapping[str, str] 
     return Section("missing", title, words, (table,))
 
 
+def _preparation(curves: Sequence[SoilCurves]) -> str:
+    """How samples became bins."""
+    settings = curves[0].learned.curve.bins_.settings
+    said = (
+        f"Bins of {percent(settings.width, 0)} slip from {percent(settings.lower, 0)} to {percent(settings.upper, 0)}; "
+        "samples on a transition or under an event are left out."
+    )
+    if any(one.learned.curve.bins_.settings.by == BY_PULL for one in curves):
+        said += (
+            " By pull: each sample goes into the bin whose slip the mean curve gives for the vehicle's pull, so that a bin holds weak and "
+            f"strong ground alike; bins of less than {settings.metres:g} m or {settings.runs} runs are joined. Slips "
+            "beyond them are met where the ground gives way, not by a steady pull: there the curve is the prototype's shape, and the bins "
+            "by slip show what was met."
+        )
+    return f"{said} By slip, the paper's way: each sample by its own slip, at least {settings.minimum} samples a bin."
+
+
 def _quality_table(curves: Sequence[SoilCurves]) -> Table:
-    """NRMSE and R² of the fits: the paper's, ours, and the same fit on true pairs."""
-    true = any(one.true_pairs is not None for one in curves)
+    """NRMSE and R² of the fits: the paper's, ours, ours the paper's way, and the same fit on true pairs."""
+    true, both = _true(curves), _both(curves)
     rows = []
     for one in curves:
         row = [one.name]
         for key in ("nrmse", "r2"):
             row += [number(getattr(one.paper, key, None)), number(getattr(one.learned.soil, key))]
+            row += [number(getattr(one.by_slip, f"{key}_", None))] * both
             row += [number(getattr(one.true_pairs, f"{key}_", None))] * true
-        rows.append(
-            (*row, str(len(one.learned.soil.bins)), str(len({part.run for part in one.learned.pairs})))
-        )
+        runs = len({part.run for part in one.learned.pairs})
+        rows.append((*row, str(len(one.learned.soil.bins)), str(runs)))
+    ours = ("ours, by pull", "ours, by slip") if both else ("ours",)
     head = [
-        f"{what}: {who}" for what in ("NRMSE", "R²") for who in ("paper", "ours", *(["true pairs"] * true))
+        f"{what}: {who}" for what in ("NRMSE", "R²") for who in ("paper", *ours, *(["true pairs"] * true))
     ]
-    ending = ' "True pairs": the same fit on the simulation\'s own slip and adhesion.' if true else ""
+    ending = ' "True pairs": the same fit as ours on the simulation\'s own slip and adhesion.' if true else ""
     return Table(
-        "Quality of the fits on bin means, as in the paper's Table 1 (its figures come from the field)."
+        "Quality of the fits on bin means, as in the paper's Table 1 (its figures come from the field, its bins are by slip)."
         + ending,
         ("soil", *head, "bins", "runs"),
         tuple(rows),
@@ -211,36 +224,58 @@ def _quality_table(curves: Sequence[SoilCurves]) -> Table:
 
 
 def _scale_table(curves: Sequence[SoilCurves]) -> Table:
-    """The scale a: paper, ours with interval, by metres of ground, of true pairs, of the truth, of the library."""
-    true, given = any(one.truth is not None for one in curves), any(one.library is not None for one in curves)
+    """The scale a: paper, ours with interval, ours the paper's way, both of true pairs, of the truth, of the library."""
+    true, both = _true(curves), _both(curves)
+    given = any(one.library is not None for one in curves)
     rows = []
     for one in curves:
-        ground = one.learned.ground_mean
         row = [
             one.name,
             _scale(one.paper),
             _scale(one.learned.soil),
             _interval(one.learned.soil.interval.get("a")),
         ]
-        row += [number(ground.mean if ground else None), _interval(ground.interval if ground else None)]
+        if both:
+            row += [
+                _fitted_scale(one.by_slip),
+                _interval(one.by_slip.interval_.get("a") if one.by_slip else None),
+            ]
         if true:
             row += [
-                number(one.true_pairs.parameters_.get("a") if one.true_pairs else None),
+                _fitted_scale(one.true_pairs),
+                *([_fitted_scale(one.true_by_slip)] * both),
                 _scale(one.truth),
             ]
         rows.append((*row, *([_scale(one.library)] * given)))
-    head = ("soil", "paper", "ours, by bins", "95 %", "ours, by metres", "95 %")
-    ending = (
-        " The truth is what the soil was made with, the mean over its ground; the true pairs' fit shows what sorting by slip does to it."
-        if true
-        else ""
-    )
-    return Table(
-        "The scale a of the prototype curve (µ at full slip is 0.476 a). By bins: the paper's fit, each bin counts alike. By metres: "
-        "the mean curve of the ground driven over; bins of high slip gather the weak spots." + ending,
-        (*head, *(("true pairs, by bins", "truth") if true else ()), *(("library",) if given else ())),
-        tuple(rows),
-    )
+    head = [
+        "soil",
+        "paper",
+        *(("ours, by pull", "95 %", "ours, by slip", "95 %") if both else ("ours", "95 %")),
+    ]
+    if true:
+        head += ["true pairs, by pull", "true pairs, by slip", "truth"] if both else ["true pairs", "truth"]
+    said = "The scale a of the prototype curve (µ at full slip is 0.476 a)."
+    if both:
+        said += (
+            " By pull: bins of the vehicle's pull, each a fair sample of the ground. By slip: the paper's bins; "
+            "those of high slip gather the weak spots."
+        )
+    if true:
+        said += " The truth is what the soil was made with, the mean over its ground; true pairs show what the sorting alone does."
+    return Table(said, (*head, *(("library",) if given else ())), tuple(rows))
+
+
+def _true(curves: Sequence[SoilCurves]) -> bool:
+    return any(one.true_pairs is not None for one in curves)
+
+
+def _both(curves: Sequence[SoilCurves]) -> bool:
+    """Whether the paper's fit stands beside another."""
+    return any(one.by_slip is not None for one in curves)
+
+
+def _fitted_scale(curve: AdhesionCurve | None) -> str:
+    return number(curve.parameters_.get("a") if curve is not None else None)
 
 
 def _maxima_table(curves: Sequence[SoilCurves], tire_resistance: float) -> Table:
@@ -273,12 +308,7 @@ def _maxima_table(curves: Sequence[SoilCurves], tire_resistance: float) -> Table
 
 
 def _trust_row(one: SoilCurves) -> tuple[str, ...]:
-    badge, noise, verdict, ground = (
-        one.learned.curve.identifiability_,
-        one.learned.slip_noise,
-        one.learned.verdict,
-        one.learned.ground_mean,
-    )
+    badge, noise, verdict = one.learned.curve.identifiability_, one.learned.slip_noise, one.learned.verdict
     corrected = "–"
     if noise is not None:
         corrected = ", ".join(
@@ -290,7 +320,6 @@ def _trust_row(one: SoilCurves) -> tuple[str, ...]:
         "–" if verdict is None else "yes" if verdict.follows else f"no: take {verdict.proposal}",
         number(noise.slip_std if noise else None),
         corrected,
-        "–" if ground is None else f"{number(ground.mean)} ({_interval(ground.interval)})",
     )
 
 
@@ -326,8 +355,11 @@ def _free_shape(one: SoilCurves) -> str:
 
 
 def _voices(curves: Sequence[SoilCurves]) -> str:
-    said = ["mean and SD of each bin", "the paper's fit to them with its 95 % interval"]
-    said += ["the mean curve of the ground"] * any(one.learned.ground_mean is not None for one in curves)
+    both = _both(curves)
+    said = ["mean and SD of each bin" + " by pull and by slip" * both]
+    said += ["the fit" + " to those by pull" * both + " with its 95 % interval"] + [
+        "the paper's fit by slip"
+    ] * both
     for field, what in (
         ("paper", "the paper's curve"),
         ("library", "the library's curve"),

@@ -1,4 +1,7 @@
-"""Slip bins: the paper's data preparation (1 % bins from 5 % to 60 %, mean and SD of each), kept by cluster for the bootstrap."""
+"""Slip bins: the paper's data preparation (1 % bins from 5 % to 60 %, mean and SD of each), kept by cluster for the bootstrap.
+
+`pull_bins` makes the same `Bins` of pairs sorted by the vehicle's pull.
+"""
 
 from __future__ import annotations
 
@@ -8,26 +11,51 @@ from dataclasses import asdict, dataclass, field
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from terragrip.physics.adhesion import CURVES, PROTOTYPE
+
 Array = NDArray[np.float64]
+
+BY_SLIP, BY_PULL = "slip", "pull"
 
 
 @dataclass(frozen=True)
 class BinSettings:
-    """How pairs become bins: width, range of slip, the fewest samples that make a bin. Recorded in every result.
+    """How pairs become bins. Recorded in every result; slips are fractions.
 
-    Slips are fractions. Raises ValueError where the range is empty or the width not positive.
+    width, lower, upper: of the bins. by: "slip" sorts each pair by its own slip (the paper); "pull" by the slip that the soil's mean curve
+    gives for the vehicle's pull (`pull_bins`). minimum: fewest samples of a bin by slip. metres, runs: fewest metres of way and
+    fewest runs of a bin by pull; bins short of them are joined to the next. With 4 m, of ground that varies over about a metre, the
+    standard error of a bin's mean is half of the SD within it or less.
+    Raises ValueError where the range is empty, the width not positive, or a least number below its own least.
     """
 
     width: float = 0.01
     lower: float = 0.05
     upper: float = 0.60
     minimum: int = 10
+    by: str = BY_SLIP
+    metres: float = 4.0
+    runs: int = 2
 
     def __post_init__(self) -> None:
+        if self.by not in (BY_SLIP, BY_PULL):
+            raise ValueError(f"pairs are sorted by 'slip' or by 'pull', not by {self.by!r}")
         if not (self.width > 0 and self.upper - self.lower >= self.width and self.minimum >= 1):
             raise ValueError(
                 f"slip bins of {self.width:g} from {self.lower:g} to {self.upper:g} with at least {self.minimum} samples are no bins"
             )
+        if not (self.metres > 0 and self.runs >= 1):
+            raise ValueError(f"slip bins of at least {self.metres:g} m from {self.runs} runs are no bins")
+
+    @property
+    def least(self) -> float:
+        """The least weight of a bin: samples by slip, metres by pull."""
+        return self.metres if self.by == BY_PULL else float(self.minimum)
+
+    @property
+    def least_said(self) -> str:
+        """`least` in words."""
+        return f"{self.metres:g} m of way" if self.by == BY_PULL else f"{self.minimum} samples"
 
     @property
     def edges(self) -> Array:
@@ -35,8 +63,8 @@ class BinSettings:
         count = round((self.upper - self.lower) / self.width)
         return np.asarray(self.lower + self.width * np.arange(count + 1), dtype=float)
 
-    def to_dict(self) -> dict[str, float]:
-        """The settings as plain numbers."""
+    def to_dict(self) -> dict[str, float | str]:
+        """The settings as plain numbers and words."""
         return asdict(self)
 
 
@@ -49,7 +77,9 @@ class Bins:
     """Pairs sorted into slip bins. Arrays have shape (bins,); the `cluster_` arrays (clusters, bins).
 
     A cluster is a set of samples that are not independent of each other: a run, or a stretch of one.
-    Bins with fewer than `settings.minimum` samples hold NaN in slip, mean and std.
+    By slip: bins with too few samples hold NaN in slip, mean and std; `cluster_count` holds samples, `cluster_slip` sums of slip.
+    By pull: every bin is used; `cluster_count` holds metres, `cluster_slip` sums of slip on `pull_bins`' scale, and `reference` is the
+    scale a of the curve that the pulls were sorted with.
     """
 
     settings: BinSettings
@@ -61,11 +91,28 @@ class Bins:
     cluster_sum: Array = field(repr=False)
     cluster_slip: Array = field(repr=False)
     left_out: int = 0
+    reference: float | None = None
 
     @property
     def used(self) -> NDArray[np.bool_]:
-        """Which bins hold enough samples."""
-        return self.count >= self.settings.minimum
+        """Which bins hold enough."""
+        return np.asarray(np.isfinite(self.mean))
+
+    @property
+    def weight(self) -> Array:
+        """Samples (by slip) or metres (by pull) of each bin."""
+        return np.asarray(self.cluster_count.sum(axis=0))
+
+    def drawn(self, times: Array, least: float | None = None) -> tuple[Array, Array, NDArray[np.bool_]]:
+        """Slip, mean and enough, each (draws, bins), with every cluster taken `times` (draws, clusters).
+
+        `enough`: the bin is used and the draw holds `least` of it (default: the settings'); elsewhere slip and mean mean nothing.
+        """
+        n = times @ self.cluster_count
+        enough = self.used & (n >= (self.settings.least if least is None else least))
+        safe = np.where(enough, n, 1.0)
+        slip = times @ self.cluster_slip / safe
+        return slip_of(slip) if self.settings.by == BY_PULL else slip, times @ self.cluster_sum / safe, enough
 
     @property
     def clusters(self) -> int:
@@ -74,12 +121,27 @@ class Bins:
 
     def to_list(self) -> list[dict[str, float]]:
         """The used bins as soils.json holds them."""
-        rows = zip(self.slip, self.mean, self.std, self.count, strict=True)
+        columns = {"slip": self.slip, "mean": self.mean, "std": self.std, "count": self.count}
+        if self.settings.by == BY_PULL:
+            columns["metres"] = self.weight
         return [
-            {"slip": float(s), "mean": float(m), "std": float(d), "count": int(c)}
-            for (s, m, d, c), used in zip(rows, self.used, strict=True)
-            if used
+            {name: values[i].item() for name, values in columns.items()} for i in np.flatnonzero(self.used)
         ]
+
+
+_SLIPS = np.linspace(0.0, 0.6, 6001)
+_HEIGHTS = CURVES["exponential"].value(_SLIPS, {**PROTOTYPE, "a": 1.0})
+
+
+def height_of(slip: ArrayLike) -> Array:
+    """The prototype curve of scale 1 at slips of any shape: the scale that slips are averaged on by pull."""
+    return CURVES["exponential"].value(slip, {**PROTOTYPE, "a": 1.0})
+
+
+def slip_of(height: ArrayLike) -> Array:
+    """The slip at which the prototype curve of scale 1 has `height` (any shape), odd; heights past its top give 0.6."""
+    h = np.asarray(height, dtype=float)
+    return np.asarray(np.sign(h) * np.interp(np.abs(h), _HEIGHTS, _SLIPS))
 
 
 def bin_pairs(

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from terragrip.errors import InputError
 from terragrip.physics.adhesion import CURVES
-from terragrip.soil.bins import Bins
+from terragrip.soil.bins import BY_PULL, Bins
 from terragrip.soil.least_squares import INTERCEPT, solve, starts
 
 Array = NDArray[np.float64]
@@ -107,12 +107,16 @@ def _run_folds(bins: Bins, folds: int) -> list[Split]:
 
 def _split(bins: Bins, train: NDArray[np.int64], test: NDArray[np.int64]) -> Split:
     parts: list[Array] = []
-    for rows, least in ((train, bins.settings.minimum), (test, max(bins.settings.minimum // 2, 1))):
-        n = bins.cluster_count[rows].sum(axis=0)
-        enough = n >= least
-        safe = np.where(enough, n, 1.0)
-        slip = bins.cluster_slip[rows].sum(axis=0) / safe
-        parts += [slip, bins.cluster_sum[rows].sum(axis=0) / safe, enough.astype(float)]
+    least, by_pull = bins.settings.least, bins.settings.by == BY_PULL
+    # by pull a bin is as wide as its least asks: what a fold keeps of it is less
+    for rows, needed in (
+        (train, least / 2 if by_pull else least),
+        (test, least / 10 if by_pull else least / 2),
+    ):
+        times = np.zeros((1, len(bins.cluster_count)))
+        times[0, rows] = 1.0
+        slip, mean, enough = bins.drawn(times, needed)
+        parts += [slip[0], mean[0], enough[0].astype(float)]
     return tuple(parts)  # type: ignore[return-value]
 
 
@@ -141,13 +145,16 @@ def _score(form: str, splits: Sequence[Split]) -> FormScore:
     held, free = _parameters(form)
     errors = []
     for slip, mean, weight, test_slip, test_mean, test_weight in splits:
+        if np.count_nonzero(weight) < len(free) or not test_weight.any():
+            continue
         begin = starts(model, free, np.where(weight > 0, mean, np.nan))
         many = np.ones((len(begin), 1))
         x, cost = solve(model, free, held, many * slip, many * mean, many * weight, begin)
         found = {**held, **dict(zip(free, x[int(np.argmin(cost))], strict=True))}
         drop = found.pop(INTERCEPT, 0.0)
         off = (model.value(test_slip, found, drop) - test_mean)[test_weight > 0]
-        if off.size:
-            errors.append(float(np.sqrt(np.mean(off**2))))
+        errors.append(float(np.sqrt(np.mean(off**2))))
+    if not errors:
+        raise InputError("the runs are too unlike to compare forms on one left out", mend="drive more runs")
     error = float(np.mean(errors))
     return FormScore(form, error, float(np.std(errors) / np.sqrt(len(errors))), len(free))

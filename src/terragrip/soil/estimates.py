@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from terragrip.errors import InputError
 from terragrip.estimation import Estimates
 from terragrip.soil.bins import BinSettings
-from terragrip.soil.blocks import Blocks, estimates_blocks
+from terragrip.soil.blocks import Blocks, driven_wheels, estimates_blocks
 from terragrip.soil.fit import AdhesionCurve
 from terragrip.soil.learn import Campaign, RunPairs, learn_soils, usable_pairs
 from terragrip.soil.signature import maker, with_signatures
@@ -144,7 +144,9 @@ def labelled_blocks(estimates: Estimates, soil: str | None, file: str) -> Iterat
 def pairs_of(estimates: Estimates, run: str, soil: str | None = None) -> list[RunPairs]:
     """Usable pairs of one table: vehicle and tool on one soil, no event; `soil` names all rows."""
     columns = {name: estimates[name] for name in estimates.names} | {"soil": _labels(estimates, soil)}
-    return usable_pairs(columns, estimates.wheels, whole_length(estimates.vehicle), run)
+    driven = driven_wheels(estimates.vehicle)
+    wheels = [w for w in estimates.wheels if w in driven] or list(estimates.wheels)
+    return usable_pairs(columns, wheels, whole_length(estimates.vehicle), run)
 
 
 def _labels(estimates: Estimates, soil: str | None) -> NDArray[np.object_]:

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from terragrip.errors import InputError
 from terragrip.physics.adhesion import CURVES, CurveModel, effective_parameters
-from terragrip.soil.bins import Bins, BinSettings, bin_pairs
+from terragrip.soil.bins import BY_SLIP, Bins, BinSettings, bin_pairs
 from terragrip.soil.identifiability import Identifiability, judge
 from terragrip.soil.least_squares import INTERCEPT, solve, starts
 
@@ -31,6 +31,8 @@ class AdhesionCurve:
     bins : BinSettings.
     bootstrap : repetitions for the 95 % intervals, 0 = none. Runs are drawn, not samples: samples of one run are not independent.
     seed : of the bootstrap.
+    common_sd : relative SD of an error of adhesion that all runs share (the machine's torque scale); no drawing of runs shows it, so it
+        widens the intervals.
 
     After `fit`: `parameters_` (all of the model's, and intercept), `free_`, `interval_` {name: (low, high)}, `r2_`, `nrmse_`, `bins_`,
     `identifiability_`, `notes_` (plain sentences). Where the data do not fix the four parameters of eq. 8 one by one, `interval_`
@@ -46,6 +48,7 @@ class AdhesionCurve:
         bins: BinSettings | None = None,
         bootstrap: int = 1000,
         seed: int = 0,
+        common_sd: float = 0.0,
     ) -> None:
         if model not in CURVES:
             raise InputError(f"no curve model {model!r}", mend=f"take one of {', '.join(CURVES)}")
@@ -53,14 +56,16 @@ class AdhesionCurve:
             raise InputError(f"no weighting {weights!r}", mend="take None or 'count'")
         self.model, self.fixed, self.intercept, self.weights = model, fixed, intercept, weights
         self.bins, self.bootstrap, self.seed = bins or BinSettings(), bootstrap, seed
+        self.common_sd = common_sd
 
     def fit(self, slip: ArrayLike, adhesion: ArrayLike, run: ArrayLike | None = None) -> AdhesionCurve:
         """Fit to pairs, each of shape (n,); `run` (n,) are integer or string labels of what is not independent.
 
+        Pairs are sorted by slip; bins by pull need to know the pull: `pull_bins.bin_by_pull` and `fit_bins`.
         Raises InputError where the data hold fewer used bins than free parameters, or only one.
         """
         labels = None if run is None else np.unique(np.ravel(np.asarray(run)), return_inverse=True)[1]
-        return self.fit_bins(bin_pairs(slip, adhesion, labels, self.bins))
+        return self.fit_bins(bin_pairs(slip, adhesion, labels, replace(self.bins, by=BY_SLIP)))
 
     def fit_bins(self, bins: Bins) -> AdhesionCurve:
         """Fit to bins that stand already. Raises as `fit`."""
@@ -72,7 +77,7 @@ class AdhesionCurve:
         if np.count_nonzero(used) < need:
             raise InputError(
                 f"{np.count_nonzero(used)} slip bins between {bins.settings.lower:.0%} and {bins.settings.upper:.0%} hold "
-                f"{bins.settings.minimum} samples or more, too few to fit {', '.join(free)}",
+                f"{bins.settings.least_said} or more, too few to fit {', '.join(free)}",
                 mend="drive at more slips, or widen the bins",
             )
         slip, mean = bins.slip[used], bins.mean[used]
@@ -164,7 +169,7 @@ class AdhesionCurve:
         if self.weights is None:
             return bins.used.astype(float)
         with np.errstate(invalid="ignore", divide="ignore"):
-            weight = bins.count / np.maximum(bins.std, 1e-3) ** 2
+            weight = bins.weight / np.maximum(bins.std, 1e-3) ** 2
         return np.where(bins.used, weight / np.nanmax(np.where(bins.used, weight, np.nan)), 0.0)
 
     def _resample(
@@ -173,8 +178,7 @@ class AdhesionCurve:
         """Intervals from drawing clusters with replacement, widened by t and n/(n-1) for few clusters."""
         bins = self.bins_
         alive = bins.cluster_count.sum(axis=1) > 0
-        count, total, slips = bins.cluster_count[alive], bins.cluster_sum[alive], bins.cluster_slip[alive]
-        clusters = len(count)
+        clusters = int(np.count_nonzero(alive))
         if clusters < 3:
             self.notes_.append(
                 f"All samples come from {clusters} run{'s' * (clusters != 1)}: no interval can be told; "
@@ -183,16 +187,13 @@ class AdhesionCurve:
             return
         rng = np.random.default_rng(self.seed)
         draws = rng.multinomial(clusters, np.full(clusters, 1 / clusters), size=self.bootstrap).astype(float)
-        n = draws @ count
-        used = bins.used & (n >= bins.settings.minimum)
-        safe = np.where(used, n, 1.0)
-        weights = self._bin_weights(bins) * used
+        times = np.zeros((self.bootstrap, alive.size))
+        times[:, alive] = draws
+        slip, mean, used = bins.drawn(times)
         enough = np.count_nonzero(used, axis=1) >= max(len(free), 2)
-        slip, mean, weight = (
-            (draws @ slips / safe)[enough],
-            (draws @ total / safe)[enough],
-            weights[enough],
-        )
+        slip, mean, weight = slip[enough], mean[enough], (self._bin_weights(bins) * used)[enough]
+        if self.common_sd:
+            mean *= 1 + self.common_sd * rng.standard_normal((len(mean), 1))
         begin = np.repeat(best[None, :], len(slip), axis=0)
         x, _ = solve(curve, free, held, slip, mean, weight, begin, iterations=25)
         widen = _student(clusters - 1) / 1.959964 * np.sqrt(clusters / (clusters - 1))
@@ -206,12 +207,13 @@ class AdhesionCurve:
             for name, (low, high) in ((k, np.percentile(v, [2.5, 97.5])) for k, v in columns.items())
         }
 
-    def with_bins(self, **changes: float) -> AdhesionCurve:
-        """The same curve, not fitted, with other bin settings."""
-        other = replace(self.bins, **changes)  # type: ignore[arg-type]
-        return AdhesionCurve(
-            self.model, self.fixed, self.intercept, self.weights, other, self.bootstrap, self.seed
-        )
+    def unfitted(self, **changes: Any) -> AdhesionCurve:
+        """The same curve, not fitted; `changes` are arguments of the constructor."""
+        same = {
+            name: getattr(self, name)
+            for name in ("model", "fixed", "intercept", "weights", "bins", "bootstrap", "seed", "common_sd")
+        }
+        return AdhesionCurve(**{**same, **changes})
 
 
 def _student(freedom: int) -> float:

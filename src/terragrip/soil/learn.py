@@ -10,12 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from terragrip.errors import InputError
-from terragrip.soil.bins import PAPER_BINS, Bins, BinSettings, bin_pairs
-from terragrip.soil.choice import LEAST_BINS, FormVerdict, compare_forms
+from terragrip.soil.bins import BY_PULL, BY_SLIP, PAPER_BINS, Bins, BinSettings, bin_pairs
+from terragrip.soil.choice import FORMS, LEAST_BINS, FormVerdict, compare_forms
 from terragrip.soil.fit import AdhesionCurve
-from terragrip.soil.ground_mean import GroundMean, mean_over_ground
 from terragrip.soil.library import Soil, SoilLibrary
 from terragrip.soil.missing import Gap, in_words, what_to_drive
+from terragrip.soil.pull_bins import bin_by_pull
 from terragrip.soil.slip_noise import SlipNoise, correct_slip_noise
 from terragrip.soil.transitions import settled
 
@@ -26,18 +26,26 @@ STRETCH = 10.0
 FEW_RUNS = 5
 POOR = 0.5
 """R2 below which a fit carries a warning."""
+APART = 0.03
+"""Relative difference of the scale by pull from that by slip beyond which it is said."""
+FALL = 0.05
+"""Share of its top by which a curve must come down within the bins to make sorting by pull unfit."""
+DEFAULT = BinSettings(by=BY_PULL)
+"""How a campaign's pairs become bins."""
 
 
 @dataclass(frozen=True)
 class RunPairs:
-    """The usable pairs of one run on one soil: slip, adhesion and slip noise (n,), wheel after wheel; the stretch of `STRETCH` metres
-    that each lies in and the metres that it stands for (n,); rho_s and speed (rows,)."""
+    """The usable pairs of one run on one soil: slip, adhesion and slip noise (n,), wheel after wheel; the vehicle's pull, its wheels'
+    mean adhesion, at that instant (n,); the stretch of `STRETCH` metres that each lies in and the metres of the vehicle's way that it
+    stands for, the wheels sharing a row's (n,); rho_s and speed (rows,)."""
 
     run: str
     soil: str
     slip: Array
     adhesion: Array
     slip_std: Array
+    pull: Array
     stretch: NDArray[np.int64]
     metres: Array
     resistance: Array
@@ -46,13 +54,17 @@ class RunPairs:
 
 @dataclass(frozen=True)
 class LearnedSoil:
-    """One soil's fit with all that the report shows beside it."""
+    """One soil's fit with all that the report shows beside it.
+
+    `curve`: the fit that counts, `slip_noise`: what noise of slip does to it. `by_slip`: the paper's, each pair sorted by its own slip
+    (`curve` itself where that one counts).
+    """
 
     soil: Soil
     curve: AdhesionCurve
+    by_slip: AdhesionCurve
     verdict: FormVerdict | None
     slip_noise: SlipNoise | None
-    ground_mean: GroundMean | None
     gaps: tuple[Gap, ...]
     pairs: tuple[RunPairs, ...] = field(repr=False)
 
@@ -76,8 +88,8 @@ def usable_pairs(
 ) -> list[RunPairs]:
     """Pairs of one estimates table by soil: labelled, settled (vehicle and tool on one soil), no event.
 
-    columns: `distance`, `soil`, `event`, `soil_resistance`, `ground_speed` and, of each wheel, `slip_<w>`, `slip_<w>_std`, `adhesion_<w>`,
-    arrays of shape (rows,). `length` [m] from the label's reference point to the rearmost wheel or tool.
+    columns: `distance`, `soil`, `event`, `soil_resistance`, `ground_speed` and, of each of the driven `wheels`, `slip_<w>`,
+    `slip_<w>_std`, `adhesion_<w>`, arrays of shape (rows,). `length` [m] from the label's reference point to the rearmost wheel or tool.
     """
     soil = np.asarray(columns["soil"], dtype=object)
     good = settled(columns["distance"], soil, length) & (np.asarray(columns["event"], dtype=object) == "")
@@ -87,15 +99,21 @@ def usable_pairs(
     for name in sorted(set(soil[good])):
         rows = good & (soil == name)
         stretch = np.floor(distance[rows] / STRETCH).astype(np.int64)
+        of_wheels = {
+            quantity: np.stack([np.asarray(columns[quantity.format(w)], dtype=float)[rows] for w in wheels])
+            for quantity in ("slip_{}", "adhesion_{}", "slip_{}_std")
+        }
+        slip, adhesion, noise = of_wheels.values()
         out.append(
             RunPairs(
                 run,
                 str(name),
-                np.concatenate([np.asarray(columns[f"slip_{w}"], dtype=float)[rows] for w in wheels]),
-                np.concatenate([np.asarray(columns[f"adhesion_{w}"], dtype=float)[rows] for w in wheels]),
-                np.concatenate([np.asarray(columns[f"slip_{w}_std"], dtype=float)[rows] for w in wheels]),
+                slip.ravel(),
+                adhesion.ravel(),
+                noise.ravel(),
+                np.tile(adhesion.mean(axis=0), len(wheels)),
                 np.tile(stretch, len(wheels)),
-                np.tile(steps[rows], len(wheels)),
+                np.tile(steps[rows] / len(wheels), len(wheels)),
                 np.asarray(columns["soil_resistance"], dtype=float)[rows],
                 np.asarray(columns["ground_speed"], dtype=float)[rows],
             )
@@ -115,12 +133,16 @@ def learn_soils(
 ) -> Campaign:
     """Fit a curve to each soil of the pairs; compare forms, correct for slip noise, say what to drive next.
 
-    `curve`: an unfitted AdhesionCurve with the settings to use (default: the paper's). `bins` by soil; default the curve's,
-    on grass the paper's up to 40 %. `mass` [kg] gives the pulls of the advice. `common_sd`: relative SD of adhesion's error that all
-    runs share, for the interval by metres. Raises InputError where no pair is labelled.
+    `curve`: an unfitted AdhesionCurve with the settings to use (default: the paper's shape on bins by pull). `bins` by soil; default the
+    curve's, on grass the paper's range up to 40 %. Bins by pull give way to bins by slip where adhesion falls within the bins (past the
+    top one pull has two slips) or too few of them are filled; a note says so. `mass` [kg] gives the pulls of
+    the advice. `common_sd`: relative SD of adhesion's error that all runs share; it widens the intervals.
+    Raises InputError where no pair is labelled.
     """
-    template = curve or AdhesionCurve()
-    special = PAPER_BINS if bins is None else bins
+    template = (curve or AdhesionCurve(bins=DEFAULT)).unfitted(common_sd=common_sd)
+    special = bins
+    if special is None:
+        special = {name: replace(template.bins, upper=one.upper) for name, one in PAPER_BINS.items()}
     grouped: dict[str, list[RunPairs]] = {}
     for part in pairs:
         grouped.setdefault(part.soil, []).append(part)
@@ -132,7 +154,9 @@ def learn_soils(
     for name, parts in sorted(grouped.items()):
         settings = special.get(name, template.bins)
         try:
-            learned = _learn(name, parts, template, settings, mass, sample_period, wheels, source, common_sd)
+            learned = _learn(
+                name, parts, template.unfitted(bins=settings), mass, sample_period, wheels, source
+            )
         except InputError as error:
             missed[name] = str(error)
             words.append(f"{name}: not fitted, {error}.")
@@ -147,11 +171,7 @@ def learn_soils(
             if learned.slip_noise and learned.slip_noise.matters
             else []
         )
-        words += (
-            [f"{name}: {learned.ground_mean.sentence}"]
-            if learned.ground_mean and learned.ground_mean.matters
-            else []
-        )
+        words += [f"{name}: {sentence}" for sentence in [scales_apart(learned)] if sentence]
         words += in_words(name, learned.gaps) if learned.gaps else []
     return Campaign(soils, missed, tuple(words))
 
@@ -167,65 +187,128 @@ def _clusters(parts: Sequence[RunPairs]) -> tuple[NDArray[np.int64], bool]:
     ), False
 
 
+def bin_parts(parts: Sequence[RunPairs], settings: BinSettings) -> Bins:
+    """Bins of one soil's pairs, clusters as the bootstrap draws them: runs, or stretches of runs where there are few."""
+    slip, adhesion, pull, metres = (_joined(parts, name) for name in ("slip", "adhesion", "pull", "metres"))
+    cluster, _ = _clusters(parts)
+    if settings.by == BY_PULL:
+        return bin_by_pull(slip, adhesion, pull, metres, cluster, settings)
+    return bin_pairs(slip, adhesion, cluster, settings)
+
+
+def scales_apart(learned: LearnedSoil) -> str:
+    """A sentence where the scale by pull and the paper's by slip differ by more than APART; else nothing."""
+    if learned.curve is learned.by_slip or learned.curve.free_ != ("a",):
+        return ""
+    a, paper = (one.parameters_["a"] for one in (learned.curve, learned.by_slip))
+    if abs(a / paper - 1) <= APART:
+        return ""
+    return (
+        f"Sorted by pull, a is {a:.3g}; sorted by slip, as the paper does, {paper:.3g}: "
+        "bins of slip gather weak spots and the noise of slip."
+    )
+
+
+def _joined(parts: Sequence[RunPairs], name: str) -> Array:
+    return np.concatenate([getattr(part, name) for part in parts])
+
+
 def _learn(
     name: str,
     parts: Sequence[RunPairs],
     template: AdhesionCurve,
-    settings: BinSettings,
     mass: float | None,
     sample_period: float,
     wheels: int,
     source: str,
-    common_sd: float,
 ) -> LearnedSoil:
-    slip = np.concatenate([part.slip for part in parts])
-    adhesion = np.concatenate([part.adhesion for part in parts])
-    noise = np.concatenate([part.slip_std for part in parts])
-    cluster, by_run = _clusters(parts)
-    curve = AdhesionCurve(
-        template.model,
-        template.fixed,
-        template.intercept,
-        template.weights,
-        settings,
-        template.bootstrap,
-        template.seed,
-    )
-    binned: Bins = bin_pairs(slip, adhesion, cluster, settings)
-    curve.fit_bins(binned)
-    if curve.r2_ <= 0:
-        raise InputError(
-            f"the {curve.model} curve explains nothing of its {np.count_nonzero(binned.used)} bins (R2 {curve.r2_:.2f}): "
-            "slip may have been too small to tell from its noise",
-            mend="drive at more slip",
-        )
+    sorted_by_slip = bin_parts(parts, replace(template.bins, by=BY_SLIP))
+    curve, by_slip = _fits(parts, template, sorted_by_slip)
+    verdict = _compared(curve.bins_)
     if curve.r2_ < POOR:
         curve.notes_.append(f"The curve explains little of the bins (R2 {curve.r2_:.2f}): take it as a hint.")
-    if curve.interval_ and not by_run:
+    if curve.interval_ and not _clusters(parts)[1]:
         curve.notes_.append(
             f"The intervals come from stretches of {STRETCH:g} m of {len(parts)} run{'s' * (len(parts) > 1)}: "
             "they do not hold how much runs differ."
         )
-    resistance = np.concatenate([part.resistance for part in parts])
-    speed = np.concatenate([part.speed for part in parts])
+    resistance, speed = _joined(parts, "resistance"), _joined(parts, "speed")
     soil = Soil.from_curve(name, curve, source, (float(np.nanmean(resistance)), float(np.nanstd(resistance))))
-    verdict = compare_forms(binned) if np.count_nonzero(binned.used) >= LEAST_BINS else None
-    corrected = correct_slip_noise(curve, slip, adhesion, noise) if np.isfinite(noise).any() else None
-    if corrected is not None:
+    if by_slip is not curve:
+        papers = by_slip.to_dict()
+        shown = {key: papers[key] for key in ("parameters", "interval", "r2", "nrmse", "bins", "settings")}
+        soil = replace(soil, fit={**soil.fit, "by_slip": shown})
+    noise = _joined(parts, "slip_std")
+    corrected = None
+    if np.isfinite(noise).any():
+        slip, adhesion, pull, metres = (_joined(parts, key) for key in ("slip", "adhesion", "pull", "metres"))
+        corrected = correct_slip_noise(curve, slip, adhesion, noise, pull, metres)
         shown = {
             "plain": dict(corrected.plain),
             "corrected": dict(corrected.corrected),
             "slip_std": corrected.slip_std,
         }
         soil = replace(soil, fit={**soil.fit, "slip_noise": shown})
-    metres = np.concatenate([part.metres for part in parts])
-    ground = mean_over_ground(
-        curve, slip, adhesion, metres, cluster, noise, common_sd, template.bootstrap, template.seed
-    )
-    if ground is not None:
-        interval = None if ground.interval is None else list(ground.interval)
-        of_ground = {"a": ground.mean, "interval": interval, "metres": ground.metres}
-        soil = replace(soil, fit={**soil.fit, "ground_mean": of_ground})
     usual = float(np.nanmedian(speed))
-    gaps = what_to_drive(soil, binned, mass, sample_period, wheels, usual) if mass else []
-    return LearnedSoil(soil, curve, verdict, corrected, ground, tuple(gaps), tuple(parts))
+    gaps = what_to_drive(soil, sorted_by_slip, mass, sample_period, wheels, usual) if mass else []
+    return LearnedSoil(soil, curve, by_slip, verdict, corrected, tuple(gaps), tuple(parts))
+
+
+def _fits(
+    parts: Sequence[RunPairs], template: AdhesionCurve, sorted_by_slip: Bins
+) -> tuple[AdhesionCurve, AdhesionCurve]:
+    """The fit that counts and the paper's by slip, which may be one. Raises InputError with too few slips, or no fit."""
+    paper = template.unfitted(bins=sorted_by_slip.settings).fit_bins(sorted_by_slip)
+    if template.bins.by == BY_PULL:
+        if _falls(sorted_by_slip):
+            why = "the curve falls within the bins, so that one pull has two slips"
+        else:
+            try:
+                return _explaining(
+                    template.unfitted().fit_bins(_enough(bin_parts(parts, template.bins)))
+                ), paper
+            except InputError as error:
+                why = error.problem
+        paper.notes_.append(f"Sorted by slip, not by pull: {why}.")
+    return _explaining(paper), paper
+
+
+def _compared(bins: Bins) -> FormVerdict | None:
+    """The verdict on the paper's form; None where the bins cannot tell."""
+    try:
+        return compare_forms(bins)
+    except InputError:
+        return None
+
+
+def _falls(bins: Bins) -> bool:
+    """Whether adhesion falls by more than FALL of its top within the bins: by the best form, where the paper's cannot follow them."""
+    verdict = _compared(bins)
+    if verdict is None or verdict.proposal is None:
+        return False
+    model, intercept = FORMS[verdict.proposal]
+    values = (
+        AdhesionCurve(model, intercept=intercept, bootstrap=0).fit_bins(bins).predict(bins.slip[bins.used])
+    )
+    return bool(values.max() - values[-1] > FALL * abs(values.max()))
+
+
+def _enough(bins: Bins) -> Bins:
+    """The bins by pull themselves. Raises InputError where there are fewer than LEAST_BINS."""
+    filled = int(np.count_nonzero(bins.used))
+    if filled < LEAST_BINS:
+        raise InputError(
+            f"the pulls fill {filled} bin{'s' * (filled != 1)} with {bins.settings.least_said}, of {LEAST_BINS} needed"
+        )
+    return bins
+
+
+def _explaining(curve: AdhesionCurve) -> AdhesionCurve:
+    """The fitted curve itself. Raises InputError where it explains nothing of its bins."""
+    if curve.r2_ <= 0:
+        raise InputError(
+            f"the {curve.model} curve explains nothing of its {np.count_nonzero(curve.bins_.used)} bins (R2 {curve.r2_:.2f}): "
+            "slip may have been too small to tell from its noise",
+            mend="drive at more slip",
+        )
+    return curve

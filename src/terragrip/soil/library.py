@@ -220,7 +220,10 @@ def _soil(name: str, entry: Any, file: str) -> Soil:
     except ValueError as error:
         raise InputError(str(error), file=file, place=place) from None
     interval = {}
-    for key, pair in (entry.get("interval") or {}).items():
+    intervals = entry.get("interval") or {}
+    if not isinstance(intervals, dict):
+        raise InputError("is not a mapping", file=file, place=f"{place}.interval")
+    for key, pair in intervals.items():
         where = f"{place}.interval.{key}"
         if not isinstance(pair, list) or len(pair) != 2:
             raise InputError("is not a pair of numbers", file=file, place=where)
@@ -231,6 +234,7 @@ def _soil(name: str, entry: Any, file: str) -> Soil:
     for i, row in enumerate(bins):
         for key, value in row.items():
             _number(value, file, f"{place}.bins[{i}].{key}")
+    _refuse_bad_fit(entry, values, file, place)
     resistance = entry.get("resistance")
     known = {"model", "parameters", "interval", "r2", "nrmse", "bins", "resistance", "spread", "source"}
     return Soil(
@@ -246,6 +250,29 @@ def _soil(name: str, entry: Any, file: str) -> Soil:
         source=str(entry.get("source") or ""),
         fit={k: v for k, v in entry.items() if k not in known},
     )
+
+
+def _refuse_bad_fit(entry: Mapping[str, Any], values: Mapping[str, float], file: str, place: str) -> None:
+    """InputError where what a fit tells beside its curve cannot be read: free parameters, settings, badge, the paper's fit by slip."""
+    free = entry.get("free", [])
+    if not isinstance(free, list) or not all(isinstance(name, str) and name in values for name in free):
+        raise InputError("is not a list of the soil's parameters", file=file, place=f"{place}.free")
+    for key in ("settings", "identifiability", "by_slip"):
+        if not isinstance(entry.get(key, {}), dict | None):
+            raise InputError("is not a mapping", file=file, place=f"{place}.{key}")
+    badge, by_slip = entry.get("identifiability"), entry.get("by_slip")
+    if badge:
+        _number(badge.get("condition"), file, f"{place}.identifiability.condition")
+        if not isinstance(badge.get("identifiable"), bool):
+            raise InputError(
+                "is neither true nor false", file=file, place=f"{place}.identifiability.identifiable"
+            )
+    if by_slip:
+        parameters = by_slip.get("parameters")
+        if not isinstance(parameters, dict) or not set(values) <= set(parameters):
+            raise InputError("has not the soil's parameters", file=file, place=f"{place}.by_slip")
+        for key, value in (*parameters.items(), ("r2", by_slip.get("r2"))):
+            _number(value, file, f"{place}.by_slip.{key}")
 
 
 def _pair(value: Any, file: str, place: str) -> tuple[float, float] | None:

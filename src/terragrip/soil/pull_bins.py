@@ -1,0 +1,123 @@
+"""Slip bins of pairs sorted by the vehicle's pull: each bin is then a fair sample of the ground.
+
+Slip answers to the ground: under one pull a weak spot slips more than a strong one. Sorted by their own slip, bins of high slip gather
+weak spots, and bins at 5 % leave the strongest ground out (decision 0042); noise of slip sorts too. The pull does not answer to the spot.
+So a pair goes into the bin of the slip that the soil's mean curve gives for the vehicle's pull, its driven wheels' mean adhesion.
+The bin's adhesion is the mean over its metres. Its slip is the mean too, on the scale of the prototype curve g (PHYSICS 5): a spot of
+scale a_i has mu_i = a_i g(s_i), so that mean(mu) = a mean(g(s)), which the plain mean of s would miss where the curve bends.
+
+This asks that the pull is given and slip follows, as in the field. Where slip is set and the pull follows (a single-wheel test bench), sort
+by slip. It asks too that the curve does not fall within the bins: past its top one pull has two slips.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from terragrip.soil.bins import Bins, BinSettings, height_of, slip_of
+
+Array = NDArray[np.float64]
+
+_ROUNDS = 30
+_CLOSE = 1e-4
+
+
+def bin_by_pull(
+    slip: ArrayLike,
+    adhesion: ArrayLike,
+    pull: ArrayLike,
+    metres: ArrayLike,
+    cluster: ArrayLike | None = None,
+    settings: BinSettings | None = None,
+    reference: float | None = None,
+) -> Bins:
+    """Sort pairs, each array of shape (n,), into slip bins by the pull.
+
+    pull: the mean adhesion of the vehicle's driven wheels at that instant [-]; metres: way of the vehicle that the pair stands for [m];
+    cluster: integer labels (run) of what is not independent (default: one). A bin short of `settings.metres` or
+    `settings.runs` (clusters, if there are as many) is joined to the next, the last to the one before.
+    reference: scale a of the curve that sorts; by default the one that the bins then give (fixed point, PHYSICS 5's least squares).
+    `std` of a bin is the SD of adhesion about the curve through it. Pairs without slip, adhesion, pull or way, and pulls outside
+    the range, are left out and counted. ValueError if the lengths differ.
+    """
+    chosen = settings or BinSettings(by="pull")
+    columns = [np.ravel(np.asarray(x, dtype=float)) for x in (slip, adhesion, pull, metres)]
+    labels = np.zeros(columns[0].size, dtype=np.int64) if cluster is None else np.ravel(np.asarray(cluster))
+    if len({labels.size, *(x.size for x in columns)}) > 1:
+        raise ValueError(f"columns of {', '.join(str(x.size) for x in (*columns, labels))} pairs")
+    good = np.isfinite(columns).all(axis=0) & (columns[3] > 0)
+    s, mu, z, dx = (x[good] for x in columns)
+    _, compact = np.unique(labels[good], return_inverse=True)
+    height, clusters = height_of(s), int(compact.max()) + 1 if compact.size else 1
+    edges, runs = height_of(chosen.edges), min(chosen.runs, clusters)
+    cells = edges.size - 1
+
+    def sums(values: Array) -> Array:
+        found = np.bincount(flat, weights=values[inside], minlength=clusters * cells)
+        return found.astype(float).reshape(clusters, cells)
+
+    a = _start(mu, height, dx, edges[0]) if reference is None else reference
+    for _ in range(_ROUNDS):
+        index = np.searchsorted(a * edges, z, side="right") - 1
+        inside = (index >= 0) & (index < cells) & (a > 0)
+        flat = compact[inside] * cells + index[inside]
+        way, total, heights = sums(dx), sums(mu * dx), sums(height * dx)
+        groups = _joined(way, chosen.metres, runs)
+        weight, mean, level = (_grouped(x, groups).sum(axis=0) for x in (way, total, heights))
+        mean, level = mean / weight, level / weight
+        before, a = a, float(mean @ level / max(level @ level, 1e-300)) if groups else a
+        if reference is not None or not groups or abs(a - before) < _CLOSE * abs(before):
+            break
+    group_of = np.full(cells, -1)
+    for k, group in enumerate(groups):
+        group_of[group] = k
+    own = group_of[index[inside]]
+    inside[inside] = own >= 0
+    own = own[own >= 0]
+    through = np.where(level > 0, mean / np.where(level > 0, level, 1.0), 0.0)
+    off = mu[inside] - mean[own] - through[own] * (height[inside] - level[own])
+    square = np.bincount(own, weights=dx[inside] * off**2, minlength=len(groups))
+    return Bins(
+        settings=chosen,
+        slip=slip_of(level),
+        mean=mean,
+        std=np.sqrt(square / weight),
+        count=np.bincount(own, minlength=len(groups)).astype(np.int64),
+        cluster_count=_grouped(way, groups),
+        cluster_sum=_grouped(total, groups),
+        cluster_slip=_grouped(heights, groups),
+        left_out=int(labels.size - own.size),
+        reference=a,
+    )  # fmt: skip
+
+
+def _start(mu: Array, height: Array, dx: Array, lowest: float) -> float:
+    """A first scale: of all pairs above the bins' lowest slip, by metres."""
+    counts = height > lowest
+    below = float((height * dx)[counts].sum())
+    return float((mu * dx)[counts].sum()) / below if below > 0 else 1.0
+
+
+def _joined(way: Array, metres: float, runs: int) -> list[list[int]]:
+    """Neighbouring cells joined, from the lowest up, until each group holds `metres` from `runs` clusters; way: (clusters, cells)."""
+    groups: list[list[int]] = []
+    open_ = []
+    for cell in range(way.shape[1]):
+        open_.append(cell)
+        held = way[:, open_].sum(axis=1)
+        if held.sum() >= metres and np.count_nonzero(held) >= runs:
+            groups.append(open_)
+            open_ = []
+    if groups and way[:, open_].sum() > 0:
+        groups[-1] += open_
+    return groups
+
+
+def _grouped(values: Array, groups: Sequence[Sequence[int]]) -> Array:
+    """Columns summed by group: (clusters, cells) to (clusters, groups)."""
+    return np.asarray(
+        np.stack([values[:, g].sum(axis=1) for g in groups], axis=1) if groups else values[:, :0]
+    )
