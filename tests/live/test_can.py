@@ -205,8 +205,30 @@ def send(bus, message, signals) -> None:
 
 
 def test_a_profile_without_wheel_speeds_is_refused(vehicle):
+    profile = Profile.from_dict({"channels": {"ground_speed": "v"}})
     with pytest.raises(InputError, match="the profile gives no wheel_speed_fl"):
-        Service(vehicle, ["can:x?interface=virtual"], profile=Profile.load("tractor-isobus"))
+        Service(vehicle, ["can:x?interface=virtual"], profile=profile)
+
+
+@pytest.mark.asyncio
+async def test_a_stock_tractors_bus_gives_slip(tmp_path, vehicle):
+    import can
+
+    source = f"can:{tmp_path.name}?interface=virtual"
+    service = Service(vehicle, [source], profile=Profile.load("tractor-isobus"))
+    with can.Bus(interface="virtual", channel=tmp_path.name) as bus:
+        async with running(service):
+            await asyncio.sleep(0.1)
+            for _ in range(100):
+                for identifier, speed in ((0x0CFE48F0, 2000), (0x0CFE4980, 1800)):
+                    data = struct.pack("<HIBB", speed, 0, 255, 0xFD)
+                    bus.send(can.Message(arbitration_id=identifier, data=data, is_extended_id=True))
+                await asyncio.sleep(0.01)
+            await until(lambda: service.core.counts.by_channel["wheel_based_speed"]["received"] == 100)
+            await asyncio.sleep(0.1)
+    rows = [m.row for m in service.seen if m.kind == "estimate" and not m.row.predicted]
+    assert rows[-1].estimate.slip_drive == pytest.approx(0.1, abs=0.01)  # 1 - 1.8/2
+    assert not events(service, "schema")
 
 
 def test_a_dbc_that_is_none_is_refused(tmp_path, vehicle):

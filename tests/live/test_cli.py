@@ -88,7 +88,10 @@ def run(capsys, files, *options: str) -> tuple[int, str, str]:
         (["--source", "udp://127.0.0.1:9", "--held", "speed=1"], "is no channel and period"),
         (["--source", "udp://127.0.0.1:9", "--method", "aukf-sf"], "did you mean"),
         (["--source", "udp://127.0.0.1:9", "--library", "no.json"], "no such file"),
-        (["--source", "can:x?interface=virtual", "--profile", "tractor-isobus"], "gives no wheel_speed_fl"),
+        (
+            ["--source", "can:x?interface=virtual", "--profile", "tractor-isobus", "--ground"],
+            "need drive torques",
+        ),
     ],
 )
 def test_what_cannot_be_is_one_line_and_exit_2(capsys, files, options, said):

@@ -17,6 +17,7 @@ from terragrip.estimation.methods import DEFAULT, method_named
 from terragrip.recording import Recording, unit_warnings
 
 if TYPE_CHECKING:
+    from terragrip.estimation.slip_estimator import SlipEstimator
     from terragrip.vehicle import Vehicle
 
 Floats = npt.NDArray[np.float64]
@@ -140,7 +141,7 @@ def flag_before_gaps(event: npt.NDArray[np.uint8]) -> None:
 
 
 def about_run(
-    estimator: TractionEstimator, source: str | None, sha256: str | None, *, smooth: bool
+    estimator: TractionEstimator | SlipEstimator, source: str | None, sha256: str | None, *, smooth: bool
 ) -> dict[str, Any]:
     """What the table was made from, ready for JSON."""
     from terragrip import __version__

@@ -167,6 +167,11 @@ class TractionEstimator:
         return self._engine.outputs
 
     @property
+    def places(self) -> dict[str, int]:
+        """Where in an estimate's values each column stands."""
+        return self._engine.index_out
+
+    @property
     def engine(self) -> Engine:
         """The kernel's estimator behind this one."""
         return self._engine
@@ -189,7 +194,7 @@ class TractionEstimator:
                 value = get(name)
                 values[slot] = math.nan if value is None else value
         except TypeError:
-            raise _unusable(sample, engine.inputs) from None
+            raise unusable(sample, engine.inputs) from None
         status = engine.update()
         if status:
             raise self._refused(status, sample)
@@ -251,7 +256,7 @@ class TractionEstimator:
 
     def _refused(self, status: int, sample: Mapping[str, float | None]) -> InputError:
         if status == 2:
-            return _unusable(sample, ("time", *self._engine.inputs))
+            return unusable(sample, ("time", *self._engine.inputs))
         return refusal(status, f"time {sample.get('time')}")
 
 
@@ -261,7 +266,7 @@ def default_channels(vehicle: Vehicle) -> tuple[str, ...]:
     return (*(f"wheel_speed_{w}" for w in vehicle.wheels), "ground_speed", *torques)
 
 
-def _unusable(sample: Mapping[str, Any], names: Collection[str]) -> InputError:
+def unusable(sample: Mapping[str, Any], names: Collection[str]) -> InputError:
     """Name the value in a sample that is no finite number."""
     for name in ("time", *names):
         value = sample.get(name)

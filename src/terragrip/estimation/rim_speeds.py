@@ -39,6 +39,17 @@ def zero_of(recording: Recording, vehicle: Vehicle, name: str) -> zero_slip.Rati
     return zero_slip.lightest(*zero_slip.ratios(recording, name, radius))
 
 
+def radius_before_any_log(vehicle: Vehicle, name: str) -> tuple[float, float, float]:
+    """What takes a channel to m/s, the radius [m] that it stands for, and its relative SD, by the vehicle file alone."""
+    stated = vehicle.uncertainty.wheel_radius
+    if name != "wheel_based_speed":
+        radius = _radius_of(vehicle, name, None)
+        return radius, radius, _RADIUS if stated is None else stated
+    supposed = _radius_of_file(vehicle)
+    scale, spread, _ = _scale_of_drive(vehicle, None, supposed, stated)
+    return scale, scale * supposed, spread
+
+
 def _radius_of(vehicle: Vehicle, name: str, source: str | None) -> float:
     """What takes a channel to m/s by the vehicle file."""
     if name == "wheel_based_speed":
@@ -69,11 +80,17 @@ def rim_speeds(
         if "wheel_based_speed" in log.channels:
             notes.append("wheel_based_speed is not used: the wheels have speeds of their own.")
         return rims, notes
-    supposed = float(np.mean(np.asarray(vehicle.wheel_radius)[vehicle.driven]))
+    supposed = _radius_of_file(vehicle)
     scale, spread, said = _scale_of_drive(vehicle, zero["wheel_based_speed"], supposed, stated)
     values = scale * log.channels["wheel_based_speed"]
     sd = scale * noise["wheel_based_speed"]
     return [RimSpeed(DRIVE, values, sd, scale * supposed, spread)], said
+
+
+def _radius_of_file(vehicle: Vehicle) -> float:
+    """The driven wheels' mean radius [m] as the vehicle file says it, before calibration."""
+    radii = [data.radius for data, driven in zip(vehicle.wheel_data, vehicle.driven, strict=True) if driven]
+    return float(np.mean(radii))
 
 
 def _scale_of_drive(
@@ -86,7 +103,7 @@ def _scale_of_drive(
         of_file = [vehicle.wheel_data[vehicle.wheels.index(wheel)].radius for wheel in driven]
         scale = float(np.mean([calibrated[w] / r for w, r in zip(driven, of_file, strict=True)]))
         spread = _RADIUS if stated is None else stated
-        return scale, spread, _told("the drive", zero, supposed / scale, "before calibration")
+        return scale, spread, _told("the drive", zero, supposed, "before calibration")
     if zero is None:
         return (
             1.0,

@@ -8,6 +8,7 @@ little-endian doubles instead: time [s], 1 if predicted, the event's place in ``
 from __future__ import annotations
 
 import json
+import math
 import struct
 from collections.abc import AsyncGenerator
 from typing import TYPE_CHECKING
@@ -26,10 +27,14 @@ OPTIONS = ("rate", "columns", "format", "token")
 
 
 class Broadcast:
-    """``put`` takes a message for all; ``subscribe`` gives one client's frames."""
+    """``columns`` and ``wheels``: those of the estimates to come. ``put`` takes a message for all; ``subscribe`` gives one client's
+    frames.
+    """
 
     def __init__(self, vehicle: Vehicle) -> None:
         self._vehicle = vehicle
+        self.columns = tuple(estimate_slots(vehicle))
+        self.wheels = tuple(vehicle.wheels)
         self._clients: list[Outbox] = []
         self._dropped = 0
 
@@ -53,11 +58,11 @@ class Broadcast:
         if uri.options.get("format", "json") not in ("json", "binary"):
             raise InputError(f"has no format {uri.options['format']!r}", place=request, mend="json or binary")
         client = Outbox(uri)
-        every = list(estimate_slots(self._vehicle))
+        every = list(self.columns)
         columns = every if client.columns is None else [n for n in every if client.columns.wants(n)]
         hello = {
             "kind": "hello", "version": __version__, "vehicle": self._vehicle.name, "columns": columns,
-            "wheels": list(self._vehicle.wheels), "events": list(EVENTS),
+            "wheels": list(self.wheels), "events": list(EVENTS),
         }  # fmt: skip
         packer = struct.Struct(f"<{3 + len(columns)}d")
         self._clients.append(client)
@@ -69,7 +74,7 @@ class Broadcast:
                 if binary and row is not None:
                     values, places = row.estimate.values, row.estimate.places
                     event = EVENTS.index(row.estimate.event)
-                    numbers = (values[places[name]] for name in columns)
+                    numbers = (values[places[n]] if n in places else math.nan for n in columns)
                     yield packer.pack(row.estimate.time, row.predicted, event, *numbers)
                 else:
                     yield _named(

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 from terragrip.errors import InputError
 from terragrip.estimation.estimator import Estimate, TractionEstimator, default_channels
 from terragrip.estimation.methods import DEFAULT
+from terragrip.estimation.slip_estimator import SlipEstimator, restored, speeds_alone
 from terragrip.live.clock import SourceClock
 from terragrip.live.counts import Counts
 from terragrip.live.event import Event
@@ -124,21 +125,24 @@ class Core:
         self.reorder = Reorder(settings.window, self.counts)
         align = len(settings.sources) > 1
         self.clocks = [SourceClock(align) for _ in settings.sources]
-        self.estimator: TractionEstimator | None = None
+        self.estimator: TractionEstimator | SlipEstimator | None = None
         self.rows = 0
         self._event = ""  # the last row's
         if settings.channels:
             self._begin(settings.channels)
 
-    def _begin(self, channels: Collection[str]) -> TractionEstimator:
-        self.estimator = TractionEstimator(
-            self.vehicle, self.settings.method, channels=channels, held=self.settings.held
-        )
+    def _begin(self, channels: Collection[str]) -> TractionEstimator | SlipEstimator:
+        held = self.settings.held
+        if speeds_alone(channels, self.vehicle):
+            self.estimator = SlipEstimator(self.vehicle, channels, held=held)
+            return self.estimator
+        estimator = TractionEstimator(self.vehicle, self.settings.method, channels=channels, held=held)
+        self.estimator = estimator
         if self.settings.ground:
             from terragrip.ground.live import LiveGround
 
-            self.ground = LiveGround(self.estimator, self.library)
-        return self.estimator
+            self.ground = LiveGround(estimator, self.library)
+        return estimator
 
     @property
     def time(self) -> float:
@@ -230,6 +234,8 @@ class Core:
         seen = {name for row in (first, *self.reorder.pending) for name in row.values}
         wheels = [name.removeprefix("wheel_speed_") for name in seen if name.startswith("wheel_speed_")]
         absent = [wheel for wheel in self.vehicle.wheels if wheel not in wheels]
+        if isinstance(self.estimator, SlipEstimator) and not wheels:
+            return []
         strange = sorted(wheel for wheel in wheels if wheel not in self.vehicle.wheels)
         if not absent:
             return []
@@ -240,7 +246,10 @@ class Core:
 
     def _seen(self, first: Pending) -> Collection[str]:
         pending = [name for row in self.reorder.pending for name in row.values]
-        return tuple(dict.fromkeys([*default_channels(self.vehicle), *first.values, *pending]))
+        seen = dict.fromkeys([*first.values, *pending])
+        if "wheel_based_speed" in seen and speeds_alone(seen, self.vehicle):
+            return tuple(seen)
+        return tuple(dict.fromkeys([*default_channels(self.vehicle), *seen]))
 
     def state(self) -> dict[str, Any]:
         """Everything, as JSON holds it, to the last bit."""
@@ -264,13 +273,13 @@ class Core:
 
         found = cls(Vehicle.from_dict(state["vehicle"]), Settings.from_dict(state["settings"]), library)
         snapshot = base64.b64decode(state["estimator"])
-        found.estimator = TractionEstimator.restore(snapshot) if snapshot else None
+        found.estimator = restored(snapshot) if snapshot else None
         found.clocks = [SourceClock.from_state(one) for one in state["clocks"]]
         found.counts = Counts.from_state(state["counts"])
         found.reorder.counts = found.counts
         found.reorder.restore(state["reorder"])
         found.rows, found._event = state["rows"], state["event"]
-        if state["ground"] and found.estimator is not None:
+        if state["ground"] and isinstance(found.estimator, TractionEstimator):
             from terragrip.ground.live import LiveGround
 
             found.ground = LiveGround.restore(base64.b64decode(state["ground"]), found.estimator, library)

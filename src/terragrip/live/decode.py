@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from terragrip.errors import InputError
+from terragrip.estimation.slip_estimator import speeds_alone
 from terragrip.formats.profile import Profile, Source, matching
 from terragrip.recording.schema import LABELS, REFERENCE, TIME, is_channel, unit_of
 from terragrip.units import factor_to, quantity
@@ -239,12 +240,17 @@ def _refuse_looking_ahead(name: str, source: Source) -> None:
 
 
 def check_channels(profile: Profile, vehicle: Vehicle) -> None:
-    """Raise InputError where the profile lacks what the filter cannot do without."""
+    """Raise InputError where the profile lacks what the filter cannot do without.
+
+    Without any torque slip alone is estimated: of the wheels that have a speed, or of the drive train as one.
+    """
+    if speeds_alone(profile.channels, vehicle):
+        return
     needed = ["ground_speed", *(f"wheel_speed_{wheel}" for wheel in vehicle.wheels)]
     lacking = [name for name in needed if name not in profile.channels]
     if lacking:
         raise InputError(
             f"the profile gives no {lacking[0]}",
             place="--profile",
-            mend="live estimates need the ground speed and each wheel's speed; record the log, and terragrip estimate gives slip",
+            mend="live estimates need the ground speed and each wheel's speed; without torques wheel_based_speed does as well",
         )

@@ -6,6 +6,7 @@ The filter itself does not move: samples that were only delayed find it as if no
 from __future__ import annotations
 
 from terragrip.estimation.estimator import TractionEstimator
+from terragrip.estimation.slip_estimator import SlipEstimator, restored
 from terragrip.live.core import Core, Row
 
 _PATIENCE = 0.3  # s of silence, or
@@ -17,7 +18,7 @@ class Prediction:
 
     def __init__(self, core: Core) -> None:
         self._core = core
-        self._copy: TractionEstimator | None = None
+        self._copy: TractionEstimator | SlipEstimator | None = None
         self._rows = -1
 
     def at(self, now: float, last_arrival: float, period: float) -> Row | None:
@@ -27,6 +28,6 @@ class Prediction:
         if core.estimator is None or not core.rows or silence < max(_PATIENCE, _PERIODS * period):
             return None
         if self._copy is None or self._rows != core.rows:
-            self._copy, self._rows = TractionEstimator.restore(core.estimator.snapshot()), core.rows
+            self._copy, self._rows = restored(core.estimator.snapshot()), core.rows
         estimate = self._copy.update({"time": core.time + silence})
         return Row(now, {}, estimate, predicted=True)

@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 
     from terragrip.estimation.estimates import Estimates
     from terragrip.estimation.estimator import TractionEstimator
+    from terragrip.estimation.slip_estimator import SlipEstimator
 
 RECORDING, ESTIMATES, REFUSED, EVENT_LINES, GROUND = "recording", "estimates", "refused", "events", "ground"
 
@@ -75,7 +76,7 @@ class Segment:
                     self.channels[name] = array("d", [float("nan")]) * rows
                     self.channels[name].append(value)
 
-    def write(self, folder: Path, estimator: TractionEstimator | None) -> None:
+    def write(self, folder: Path, estimator: TractionEstimator | SlipEstimator | None) -> None:
         """Write the segment's files; raises OSError."""
         if len(self) and estimator is not None:
             import pyarrow.parquet as pq
@@ -108,7 +109,7 @@ class Segment:
         columns = {"time": self.time, "arrival": self.arrival, **self.channels}
         return pa.table({name: floats(np.frombuffer(c)) for name, c in columns.items()})
 
-    def to_estimates(self, estimator: TractionEstimator) -> Estimates:
+    def to_estimates(self, estimator: TractionEstimator | SlipEstimator) -> Estimates:
         """The rows' estimates as a table."""
         import numpy as np
 
@@ -116,9 +117,7 @@ class Segment:
         from terragrip.estimation.estimates import Estimates
 
         table = np.frombuffer(self.estimates).reshape(len(self), -1)
-        columns = {
-            name: np.ascontiguousarray(table[:, place]) for name, place in estimator.engine.index_out.items()
-        }
+        columns = {name: np.ascontiguousarray(table[:, place]) for name, place in estimator.places.items()}
         for name in ("latitude", "longitude", "altitude"):
             if name in self.channels:
                 columns[name] = np.frombuffer(self.channels[name])

@@ -84,8 +84,12 @@ def head(service: Service) -> list[str]:
         e = s.last.estimate
         state = "predicted, nothing comes in" if s.last.predicted else e.event or "driving"
         lines.append(
-            f"{state}   v {e.ground_speed:.2f} ± {e.ground_speed_std:.2f} m/s   "
-            f"soil resistance {e.soil_resistance:.3f} ± {e.soil_resistance_std:.3f}"
+            f"{state}   v {e.ground_speed:.2f} ± {e.ground_speed_std:.2f} m/s"
+            + (
+                f"   soil resistance {e.soil_resistance:.3f} ± {e.soil_resistance_std:.3f}"
+                if "soil_resistance" in e.places
+                else "   slip alone: there is no torque"
+            )
         )
     lossy = [f"{box.uri.name} {box.dropped}" for box in service.outboxes if box.dropped]
     if lossy:
@@ -97,8 +101,16 @@ def head(service: Service) -> list[str]:
 
 
 def _wheels(row: Row, table: Any) -> Any:
-    shown = table("wheel", "slip %", "adhesion", "net traction", "efficiency %")
     estimate = row.estimate
+    if not any(name.startswith("adhesion_") for name in estimate.places):
+        shown = table("wheel", "slip %", "zero-slip radius m")
+        for name in estimate.places:
+            if name.startswith("slip_") and not name.endswith("_std"):
+                wheel = name.removeprefix("slip_")
+                radius = _with_std(estimate, f"zero_slip_radius_{wheel}", 1.0, 3)
+                shown.add_row(wheel, _with_std(estimate, name, 100.0, 1), radius)
+        return shown
+    shown = table("wheel", "slip %", "adhesion", "net traction", "efficiency %")
     for name in estimate.places:
         if name.startswith("adhesion_") and not name.endswith("_std"):
             wheel = name.removeprefix("adhesion_")

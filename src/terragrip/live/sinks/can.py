@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 from terragrip.errors import InputError
 from terragrip.estimation.engine import EVENTS
+from terragrip.estimation.estimator import Estimate
+from terragrip.estimation.rim_speeds import DRIVE
 from terragrip.ground.classification.labels import UNKNOWN
 from terragrip.live.can import check, errors, open_bus
 from terragrip.live.core import Row
@@ -49,6 +51,7 @@ class CanSink:
         uri.options.setdefault("rate", RATE)
         self._database: Any = cantools.database.load_file(DBC)
         self._wheels = vehicle.wheels
+        self._driven = {w for w, d in zip(vehicle.wheels, vehicle.driven, strict=True) if d}
         self._counter = 0
         self._change: tuple[float, float] | None = None  # time and probability of the last one
 
@@ -90,7 +93,7 @@ class CanSink:
     def frames(self, row: Row) -> list[tuple[int, bytes]]:
         """Identifier and payload of each frame of a row."""
         estimate = row.estimate
-        values: dict[str, float] = {ours: estimate[column] for ours, column in _VEHICLE.items()}
+        values: dict[str, float] = {ours: _of(estimate, column) for ours, column in _VEHICLE.items()}
         values |= {
             "Event": EVENTS.index(estimate.event),
             "Predicted": row.predicted,
@@ -102,8 +105,11 @@ class CanSink:
             for number, wheel in enumerate(self._wheels, 1):
                 values = {}
                 for ours, quantity in quantities.items():
-                    values[f"{ours}{number}"] = estimate[f"{quantity}_{wheel}"]
-                    values[f"{ours}Std{number}"] = estimate[f"{quantity}_{wheel}_std"]
+                    own = f"{quantity}_{wheel}"
+                    if own not in estimate.places and wheel in self._driven:
+                        own = f"{quantity}_{DRIVE}"  # the drive train's speed stands for all driven wheels
+                    values[f"{ours}{number}"] = _of(estimate, own)
+                    values[f"{ours}Std{number}"] = _of(estimate, f"{own}_std")
                 found.append(self._frame(f"{message}{number}", values))
         return found
 
@@ -111,6 +117,11 @@ class CanSink:
         message = self._database.get_message_by_name(name)
         raw = {signal.name: _raw(signal, values[signal.name]) for signal in message.signals}
         return message.frame_id, message.encode(raw, scaling=False, strict=False)
+
+
+def _of(estimate: Estimate, column: str) -> float:
+    """A column of an estimate; missing where estimates have none such, as those of slip alone."""
+    return float(estimate[column]) if column in estimate.places else math.nan
 
 
 def _raw(signal: Any, value: float) -> int:
