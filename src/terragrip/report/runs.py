@@ -147,18 +147,20 @@ class Run:
     def true_sensor_ratio(self) -> FloatArray | None:
         """The same of a simulation's true net traction, load and motion, (n,): without the gradient under that one wheel."""
         wheel, mass = self.sensor_wheel, self._wheel_mass
+        if mass is None:
+            return None
         names = (f"net_traction_{wheel}", f"vertical_load_{wheel}", "acceleration", "slope")
         kappa, load, acceleration, slope = (self.true(name) for name in names)
-        if mass is None or kappa is None or load is None or acceleration is None or slope is None:
+        if kappa is None or load is None or acceleration is None or slope is None:
             return None
         return axle_ratio(kappa, load, acceleration + STANDARD_GRAVITY * np.sin(slope), mass)
 
     @property
     def _wheel_mass(self) -> float | None:
-        """Mass of the shown wheel [kg], None where the vehicle file does not say."""
-        if self.vehicle is None:
+        """Mass of the wheel with the sensor [kg], None without one or where the vehicle file does not say."""
+        if self.vehicle is None or self.sensor_wheel is None:
             return None
-        return self.vehicle.wheel_data[self.vehicle.wheels.index(self.shown_wheel)].mass
+        return self.vehicle.wheel_data[self.vehicle.wheels.index(self.sensor_wheel)].mass
 
     def measured_slip(self) -> FloatArray | None:
         """Slip of the shown wheel from the recorded speeds (paper eq. 5), (n,), NaN where no ground speed is.
