@@ -16,6 +16,7 @@ from terragrip.cli.demo import command as demo
 from terragrip.cli.estimate import command as estimate
 from terragrip.cli.failure import INTERRUPTED, report
 from terragrip.cli.ground import command as ground
+from terragrip.cli.ground_classifier import app as ground_classifier
 from terragrip.cli.inspect import command as inspect
 from terragrip.cli.live import command as live
 from terragrip.cli.report import command as report_command
@@ -37,6 +38,7 @@ app.command("estimate")(estimate)
 app.command("calibrate")(calibrate)
 app.command("soils")(soils)
 app.command("ground")(ground)
+app.add_typer(ground_classifier, name="ground-classifier")
 app.command("report")(report_command)
 app.command("simulate")(simulate)
 app.command("live")(live)

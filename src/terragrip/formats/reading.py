@@ -5,6 +5,8 @@ from __future__ import annotations
 import os
 from collections.abc import Sequence
 
+import numpy as np
+
 from terragrip.errors import InputError
 from terragrip.formats.conversion import Part
 from terragrip.formats.kind import Databases, kind_of
@@ -60,6 +62,27 @@ def recording_of(table: LogTable, profile: Profile | None) -> Recording:
     return Recording.from_frame(in_si(table), table.source, sha256=table.sha256, notes=notes)
 
 
+def read_channels(
+    paths: Sequence[PathLike],
+    profile: Profile | PathLike | None = None,
+    *,
+    dbc: Sequence[PathLike] = (),
+    also: tuple[str, ...] = (),
+) -> dict[str, np.ndarray]:
+    """The channels that one drive's logs hold, whatever they are, as columns by name: a body sensor alone will do.
+
+    As `read`, but ``ground_speed`` and wheel speeds may be missing, each log is read by the profile as far as it goes, and
+    columns whose names begin with one of ``also`` are kept as they are. Raises InputError as `read`.
+    """
+    chosen = _loaded(profile)
+    parts = [_part(path, chosen, tuple(dbc), also) for path in paths]
+    if len(parts) == 1:
+        return {TIME: parts[0].time, **parts[0].columns}
+    from terragrip.formats.sources import joined
+
+    return joined(parts)[0]
+
+
 def read_table(path: PathLike, wanted: Wanted | None = None, databases: Databases = ()) -> LogTable:
     """Read the ``wanted`` columns of a log by their own names (None: all); raises InputError if it is no log."""
     log = read_log(path, wanted, databases)
@@ -101,8 +124,8 @@ def _each(
     return found
 
 
-def _part(path: PathLike, profile: Profile | None, databases: Databases) -> Part:
-    """The channels of one of several sources."""
+def _part(path: PathLike, profile: Profile | None, databases: Databases, also: tuple[str, ...] = ()) -> Part:
+    """The channels of one of several sources; without a profile also columns whose names begin with one of ``also``."""
     from terragrip.formats.conversion import converted
 
     if profile is not None:
@@ -110,7 +133,11 @@ def _part(path: PathLike, profile: Profile | None, databases: Databases) -> Part
         return converted(
             profile, read_table(path, profile.wants, (*databases, *profile.dbc) if can else ()), partial=True
         )
-    table = read_table(path, is_own, databases if kind_of(path).takes_databases else ())
+    table = read_table(
+        path,
+        lambda name: is_own(name) or name.startswith(also),
+        databases if kind_of(path).takes_databases else (),
+    )
     if TIME not in table.columns:
         raise InputError(
             "is missing",

@@ -26,6 +26,14 @@ def merged(parts: Sequence[Part]) -> Recording:
 
     Raises InputError where a source has no usable channel or time, and for whatever `Recording.from_frame` refuses.
     """
+    frame, source, digests, notes, noise = joined(parts)
+    return Recording.from_frame(frame, source, sha256=digests, notes=notes, noise=noise)
+
+
+def joined(
+    parts: Sequence[Part],
+) -> tuple[dict[str, Any], str, str, tuple[str, ...], dict[str, float]]:
+    """Columns, source, digests, notes and noise of what `merged` makes a recording of; none is asked for but time."""
     reference = parts[0]
     signals: dict[str, Signal] = {}
     notes: list[str] = list(reference.notes)
@@ -51,9 +59,7 @@ def merged(parts: Sequence[Part]) -> Recording:
     origin = min(float(s.time[0]) for s in signals.values() if len(s.time))
     frame: dict[str, Any] = {**table.columns, TIME: table.columns[TIME] + origin}
     digests = "+".join(part.sha256 or "" for part in parts)
-    return Recording.from_frame(
-        frame, table.source, sha256=digests, notes=tuple(dict.fromkeys((*notes, *table.notes))), noise=noise
-    )
+    return frame, str(table.source), digests, tuple(dict.fromkeys((*notes, *table.notes))), noise
 
 
 def _known(values: npt.NDArray[Any]) -> npt.NDArray[np.bool_]:

@@ -117,7 +117,7 @@ def test_calibration_finds_the_slopes_that_made_the_labels() -> None:
     scores = random.uniform(-1, 1, (3, 20000, 3))
     chances = probabilities(scores, np.array([3.0, 1.5, 0.0]), np.array([0.5, 0.0, -0.5]))
     codes = np.array([random.choice(3, p=row) for row in chances])
-    slopes, offsets = calibrate(scores, codes, np.full(len(codes), 1 / len(codes)))
+    slopes, offsets = calibrate(scores, codes, np.full(len(codes), 1 / len(codes)), len(codes))
     np.testing.assert_allclose(slopes[:2], [3.0, 1.5], rtol=0.05)
     assert slopes[2] < 0.2  # slopes are positive: none comes near zero only
     assert offsets[0] - offsets[2] == pytest.approx(1.0, abs=0.1)

@@ -123,8 +123,8 @@ def rewritten(content: bytes, path: Path, **changes: object) -> Path:
 @pytest.mark.parametrize(
     ("changes", "said"),
     [
-        ({"version": 1}, "version 1"),
-        ({"version": 3}, "version 3"),
+        ({"version": 2}, "version 2"),
+        ({"version": 4}, "version 4"),
         ({"version": "x"}, "version 'x'"),
         ({"format": "a cake"}, "no ground classifier"),
         ({"classes": ["hard"]}, "damaged"),

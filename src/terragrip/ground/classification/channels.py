@@ -20,9 +20,10 @@ from terragrip.recording.schema import TIME
 Floats = npt.NDArray[np.float64]
 
 # A motor current stands in for the torque: what is learnt does not depend on the gain between them.
+CURRENT = ("motor_current_",)
 PREFIXES = {
     "wheel speed": ("wheel_speed_",),
-    "torque": ("drive_torque_", "motor_current_"),
+    "torque": ("drive_torque_", *CURRENT),
     "ground speed": ("ground_speed",),
     "angular velocity": ("angular_velocity_x", "angular_velocity_y", "angular_velocity_z"),
     "acceleration": ("acceleration_x", "acceleration_y", "acceleration_z"),

@@ -15,6 +15,7 @@ from terragrip.ground.classification.channels import held_channels, signals_of, 
 from terragrip.ground.classification.experts import FEWEST_WINDOWS, train_experts
 from terragrip.ground.classification.features import features_of
 from terragrip.ground.classification.labels import UNKNOWN, classes_of, one_each
+from terragrip.ground.classification.neighbours import nearby_mean, smoothed
 from terragrip.ground.classification.training_set import collect, layout_of, matrix, measured_families
 from terragrip.ground.classification.windows import window_starts
 
@@ -200,12 +201,12 @@ class GroundClassifier:
             signals = signals_of(table, self._held)
             starts = self._starts(signals)
             features = matrix(features_of(signals, starts, self._layout), self._names, len(starts))
-            found, novelty = self._ask(features)
-            chances.append(smoothed(found, round(self.smooth / self._step / 2)))
+            found, novelty = self._ask(features, starts)
+            chances.append(smoothed(found, starts, self.smooth / 2))
             novelties.append(novelty)
         return np.concatenate(chances), np.concatenate(novelties)
 
-    def _ask(self, features: Floats) -> tuple[Floats, Floats]:
+    def _ask(self, features: Floats, starts: Floats) -> tuple[Floats, Floats]:
         """Send each window to the expert that uses most of what it holds."""
         measured = measured_families(self._names, features)
         chances = np.full((len(features), len(self.classes_)), 1.0 / len(self.classes_))
@@ -217,7 +218,9 @@ class GroundClassifier:
             if fits.any():
                 columns = [self._column[name] for name in expert.features]
                 chances[fits], strange = expert.judge(features[fits][:, columns])
-                novelty[fits] = expert.novelty(strange)
+                if self.smooth:  # neighbours that the same expert judged
+                    strange = nearby_mean(strange, starts[fits], self.smooth / 2)
+                novelty[fits] = expert.strangeness.novelty(strange, self.smooth)
                 open_rows &= ~fits
         return chances, novelty
 
@@ -259,15 +262,3 @@ class GroundClassifier:
                     f" to {high:g}" if high < np.inf else ""
                 )
                 raise InputError(f"{value!r} is out of range", place=name, mend=mend)
-
-
-def smoothed(chances: Floats, reach: int) -> Floats:
-    """Probabilities (windows, classes) by the mean log probability of the ``reach`` windows on either side."""
-    if reach < 1 or len(chances) < 2:
-        return chances
-    logs = np.cumsum(np.vstack([np.zeros(chances.shape[1]), np.log(chances + 1e-9)]), axis=0)
-    rows = np.arange(len(chances))
-    high, low = np.minimum(rows + reach + 1, len(chances)), np.maximum(rows - reach, 0)
-    mean = (logs[high] - logs[low]) / (high - low)[:, None]
-    odds = np.exp(mean - mean.max(axis=1, keepdims=True))
-    return odds / odds.sum(axis=1, keepdims=True)

@@ -4,103 +4,118 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
+from typing import Any, cast
 
 import numpy as np
 import numpy.typing as npt
 
-from terragrip.ground.classification.features import of_one_wheel
+from terragrip.ground.classification.discriminants import Discriminants
 from terragrip.ground.classification.forest import Forest
 from terragrip.ground.classification.kernel_machine import KernelMachine
+from terragrip.ground.classification.motion_law import MotionLaw
+from terragrip.ground.classification.novelty import Strangeness
+from terragrip.ground.classification.roles import roles_of
 from terragrip.ground.classification.standardization import Standardization
 
 Floats = npt.NDArray[np.float64]
 Codes = npt.NDArray[np.intp]
 
-LEVELS: Floats = np.r_[0.0, np.geomspace(1e-4, 1.0, 400)]
+_OFFSET = 0.5  # SD beforehand, in log odds: classes weigh the same, so offsets are small
+
+
+@dataclass(frozen=True)
+class Examples:
+    """Windows to learn from: features (n, features), and of each its class code, recording, start [s] and the part of a
+    cross-validation that holds it out (n,)."""
+
+    features: Floats
+    codes: Codes
+    groups: Codes
+    starts: Floats
+    folds: Codes
+
+
+@dataclass(frozen=True)
+class Parts:
+    """What judges a window: a machine; a forest where some features are of single wheels; a law where the motion is known."""
+
+    standardization: Standardization
+    machine: KernelMachine
+    discriminants: Discriminants
+    forest: Forest | None
+    law: MotionLaw | None
+
+    @classmethod
+    def fit(cls, names: Sequence[str], windows: Examples, rows: npt.NDArray[np.bool_], seed: int) -> Parts:
+        """Fit all parts to some ``rows`` (n,) of the windows, whose features have these names."""
+        roles, features, codes = roles_of(names), windows.features[rows], windows.codes[rows]
+        own = features[:, roles.machine]
+        scaling = Standardization.fit(own, codes, windows.groups[rows])
+        points = scaling.apply(own)
+        law = (
+            MotionLaw.fit(features[:, roles.motion], features[:, roles.effects], codes) if roles.law else None
+        )
+        forest = Forest.fit(features, codes, seed) if roles.forest else None
+        machine = KernelMachine.fit(points, codes)
+        return cls(scaling, machine, Discriminants.fit(points, codes), forest, law)
+
+    def decide(self, names: Sequence[str], features: Floats) -> tuple[Floats, Floats]:
+        """Scores (parts, n, classes), the machine's first, and what makes windows strange (3, n), more being stranger."""
+        roles = roles_of(names)
+        points = self.standardization.apply(features[:, roles.machine])
+        scores, distance = self.machine.decide(points)
+        every = [scores]
+        if self.forest is not None:
+            every.append(self.forest.decide(features))
+        if self.law is not None:
+            every.append(self.law.decide(features[:, roles.motion], features[:, roles.effects]))
+        odd = np.stack([-scores.max(axis=1), distance, self.discriminants.distance(points)])
+        return np.stack(every), odd
 
 
 @dataclass(frozen=True)
 class Expert:
-    """A machine on the features of one set of sensor families, and beside it a forest where some are of single wheels.
-
-    The machine takes the first features, the forest all: those of single wheels stand last. ``slopes`` (1 or 2,) of the
-    machine's and the forest's scores, and ``offsets`` (classes,), turn scores into probabilities; ``usual`` is mean and SD
-    of the score of the winner and of the log distance (2, 2), ``strange`` (levels,) the strangeness that a share of known
-    windows exceeds.
-    """
+    """The parts for one set of sensor families, ``slopes`` (parts,) of their scores and ``offsets`` (classes,) that turn scores
+    into probabilities, and the strangeness of known windows."""
 
     families: frozenset[str]
     features: tuple[str, ...]
-    standardization: Standardization
-    machine: KernelMachine
-    forest: Forest | None
+    parts: Parts
     slopes: Floats
     offsets: Floats
-    usual: Floats
-    strange: Floats
+    strangeness: Strangeness
 
     def judge(self, features: Floats) -> tuple[Floats, Floats]:
         """Probabilities (n, classes) and strangeness (n,) of windows with these features (n, features)."""
-        own = features[:, : len(self.standardization.centre)]
-        scores, distance = self.machine.decide(self.standardization.apply(own))
-        every = [scores] if self.forest is None else [scores, self.forest.decide(features)]
-        chances = probabilities(np.stack(every), self.slopes, self.offsets)
-        return chances, strangeness(scores, distance, self.usual)
-
-    def novelty(self, strange: Floats) -> Floats:
-        """Share (n,) of windows on known grounds, from runs not trained on, that are at least as strange."""
-        return np.interp(strange, self.strange[::-1], LEVELS[::-1])
+        scores, odd = self.parts.decide(self.features, features)
+        return probabilities(scores, self.slopes, self.offsets), self.strangeness.of(odd)
 
 
 def train(
-    families: frozenset[str],
-    names: Sequence[str],
-    features: Floats,
-    codes: Codes,
-    groups: Codes,
-    folds: Codes,
-    threads: int,
-    seed: int,
+    families: frozenset[str], names: Sequence[str], windows: Examples, threads: int, seed: int
 ) -> Expert:
-    """Fit an expert; ``folds`` (n,) says which part of a cross-validation a window is held out in.
-
-    What is said of probabilities and strangeness is learnt from windows of recordings that were held out.
-    """
-
-    shared = sum(not of_one_wheel(name) for name in names)
-    own = features[:, :shared]
-
-    def fitted(rows: npt.NDArray[np.bool_]) -> tuple[Standardization, KernelMachine, Forest | None]:
-        scaling = Standardization.fit(own[rows], codes[rows], groups[rows])
-        machine = KernelMachine.fit(scaling.apply(own[rows]), codes[rows])
-        forest = Forest.fit(features[rows], codes[rows], seed) if shared < len(names) else None
-        return scaling, machine, forest
-
+    """Fit an expert; what is said of probabilities and strangeness is learnt from windows of recordings that were held out."""
+    codes, folds = windows.codes, windows.folds
     everything = np.ones(len(codes), dtype=bool)
-    parts = [everything, *(folds != fold for fold in range(int(folds.max()) + 1))]
-    with ThreadPoolExecutor(threads) as pool:  # the solver works outside the interpreter's lock
-        machines = list(pool.map(fitted, parts))
-    classes = machines[0][1].classes
-    parts_of = 1 if machines[0][2] is None else 2
-    every, distance = np.empty((parts_of, len(codes), classes)), np.empty(len(codes))
-    for fold, (scaling, machine, forest) in enumerate(machines[1:]):
-        out = folds == fold
-        every[0, out], distance[out] = machine.decide(scaling.apply(own[out]))
-        if forest is not None:
-            every[1, out] = forest.decide(features[out])
-    scores = every[0]
-    weight = 1.0 / np.bincount(codes)[codes]
-    weight /= weight.sum()
-    slopes, offsets = calibrate(every, codes, weight)
-    best = scores.max(axis=1)
-    usual = np.array([_mean_and_spread(best, weight), _mean_and_spread(distance, weight)])
-    odd = strangeness(scores, distance, usual)
-    order = np.argsort(-odd)
-    share = np.cumsum(weight[order])
-    levels = np.interp(LEVELS, np.r_[0.0, share], np.r_[odd[order[0]] + 1e-6, odd[order]])
-    strange = np.minimum.accumulate(levels) - 1e-12 * np.arange(len(levels), dtype=float)
-    return Expert(families, tuple(names), *machines[0], slopes, offsets, usual, strange)
+    learnt_from = [everything, *(folds != fold for fold in range(int(folds.max()) + 1))]
+    # The solvers work outside the interpreter's lock; threads of the linear algebra's own would only wait for one another.
+    with _one_thread_each(), ThreadPoolExecutor(threads) as pool:
+        fitted = list(pool.map(lambda rows: Parts.fit(names, windows, rows, seed), learnt_from))
+        held_out = [(parts, windows.features[folds == k]) for k, parts in enumerate(fitted[1:])]
+        found = list(pool.map(lambda pair: pair[0].decide(names, pair[1]), held_out))
+    scores = np.empty((len(found[0][0]), len(codes), found[0][0].shape[2]))
+    odd = np.empty((len(found[0][1]), len(codes)))
+    for fold, (of_scores, of_odd) in enumerate(found):
+        scores[:, folds == fold], odd[:, folds == fold] = of_scores, of_odd
+    same = np.ones(len(codes))
+    strangeness = Strangeness.fit(odd, _class_weights(same, codes), windows.groups, windows.starts)
+    # Windows of one recording err together: a long one tells more than a short one, but not in proportion.
+    _, of_recording, size = np.unique(windows.groups, return_inverse=True, return_counts=True)
+    weight = _class_weights(same / np.sqrt(size[of_recording]), codes)
+    slopes, offsets = calibrate(scores, codes, weight, len(size))
+    return Expert(families, tuple(names), fitted[0], slopes, offsets, strangeness)
 
 
 def probabilities(scores: Floats, slopes: Floats, offsets: Floats) -> Floats:
@@ -110,19 +125,11 @@ def probabilities(scores: Floats, slopes: Floats, offsets: Floats) -> Floats:
     return odds / odds.sum(axis=1, keepdims=True)
 
 
-def strangeness(scores: Floats, distance: Floats, usual: Floats) -> Floats:
-    """How far (n,) windows are from any known ground: no class wins clearly, and nothing known lies near.
-
-    Each is measured in its own standard deviations over known windows; their sum tells more than either.
-    """
-    (best, spread), (far, width) = usual
-    return (best - scores.max(axis=1)) / spread + (distance - far) / width
-
-
-def calibrate(scores: Floats, codes: Codes, weight: Floats) -> tuple[Floats, Floats]:
+def calibrate(scores: Floats, codes: Codes, weight: Floats, recordings: int) -> tuple[Floats, Floats]:
     """Slopes (parts,) and offsets (classes,) under which softmax probabilities of scores (parts, n, classes) are most likely.
 
-    Platt's scaling for many classes; with several parts it stacks them (Wolpert 1992), none with a slope below zero.
+    Platt's scaling for many classes; with several parts it stacks them (Wolpert 1992), none with a slope below zero. Offsets
+    are normal beforehand, and what speaks for others are as many witnesses as there are ``recordings``.
     """
     from scipy.optimize import minimize
 
@@ -134,20 +141,28 @@ def calibrate(scores: Floats, codes: Codes, weight: Floats) -> tuple[Floats, Flo
     def loss(parameters: Floats) -> tuple[float, Floats]:
         slopes, offsets = np.exp(parameters[:parts]), parameters[parts:]
         found = probabilities(scores, slopes, offsets)
-        # A weak pull to no offset keeps a class that never errs finite.
-        value = -(weight * np.log(found[rows, codes] + 1e-12)).sum() + 1e-3 * (parameters**2).sum()
+        value = -(weight * np.log(found[rows, codes] + 1e-12)).sum() + (pull * parameters**2).sum()
         off = (found - hit) * weight[:, None]
-        gradient = np.r_[slopes * (off * scores).sum(axis=(1, 2)), off.sum(axis=0)] + 2e-3 * parameters
+        gradient = np.r_[slopes * (off * scores).sum(axis=(1, 2)), off.sum(axis=0)] + 2 * pull * parameters
         return value, gradient
 
     classes = scores.shape[2]
+    # The weak pull on slopes keeps those of parts that never err finite.
+    pull = np.r_[np.full(parts, 1e-3), np.full(classes, 1e-4 + 0.5 / (_OFFSET**2 * recordings))]
     start = np.r_[np.ones(parts), np.zeros(classes)]
     bounds = [(-3, 5)] * parts + [(-8, 8)] * classes
     best = minimize(loss, start, jac=True, method="L-BFGS-B", bounds=bounds)
     return np.exp(best.x[:parts]), best.x[parts:]
 
 
-def _mean_and_spread(values: Floats, weight: Floats) -> tuple[float, float]:
-    mean = float((weight * values).sum())
-    spread = float(np.sqrt((weight * (values - mean) ** 2).sum()))
-    return mean, spread if spread > 1e-9 else 1.0
+def _class_weights(weight: Floats, codes: Codes) -> Floats:
+    """The weights (n,), scaled so that every class weighs the same and all together one."""
+    return weight / np.bincount(codes, weights=weight)[codes] / (int(codes.max()) + 1)
+
+
+def _one_thread_each() -> AbstractContextManager[Any]:
+    try:
+        from threadpoolctl import threadpool_limits  # type: ignore[import-untyped]
+    except ImportError:  # comes with scikit-learn, whose absence `KernelMachine.fit` names
+        return nullcontext()
+    return cast("AbstractContextManager[Any]", threadpool_limits(limits=1))

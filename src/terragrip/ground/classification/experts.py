@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from terragrip.errors import InputError
-from terragrip.ground.classification.expert import Expert, train
+from terragrip.ground.classification.expert import Examples, Expert, train
 from terragrip.ground.classification.features import (
     ACCELERATION,
     GROUND,
@@ -48,13 +48,14 @@ def train_experts(
                 rows = rows[::3]
         if _can_be_held_out(training.codes[rows], folds[rows], len(classes)):
             _, renumbered = np.unique(folds[rows], return_inverse=True)
-            of_rows = (
+            windows = Examples(
                 training.features[rows][:, columns],
                 training.codes[rows],
                 training.groups[rows],
+                training.starts[rows],
                 renumbered,
             )
-            found.append(train(families, names, *of_rows, threads=min(4, os.cpu_count() or 1), seed=seed))
+            found.append(train(families, names, windows, threads=min(4, os.cpu_count() or 1), seed=seed))
     if not found:
         counts = np.bincount(training.codes, minlength=len(classes))
         rarest = int(counts.argmin())
@@ -67,12 +68,10 @@ def train_experts(
 
 
 def _columns(names: Sequence[str], families: frozenset[str]) -> list[int]:
-    """The features of a set of sensors; of wheels' speeds and efforts together also those of single wheels, which come last."""
+    """The features of a set of sensors; of wheels' speeds and efforts alone also those of single wheels."""
     fits = [k for k, name in enumerate(names) if families_needed(name) <= families]
-    single = [k for k in fits if of_one_wheel(names[k])]
-    return [k for k in fits if k not in single] + (
-        single if {SPEED, TORQUE} <= families and not families & _BODY else []
-    )
+    single = {SPEED, TORQUE} <= families and not families & _BODY
+    return [k for k in fits if single or not of_one_wheel(names[k])]
 
 
 def _sensor_sets(training: TrainingSet, measured: dict[str, npt.NDArray[np.bool_]]) -> list[frozenset[str]]:

@@ -25,12 +25,14 @@ from terragrip.ground.classification.vibration import (
 from terragrip.ground.classification.wheel_features import (
     FLOOR,
     ONE_WHEEL,
+    SIDES,
     Table,
     each_wheel,
     effort_of,
     log_size,
     motion,
     over_wheels,
+    sides,
 )
 from terragrip.ground.classification.windows import samples_in
 
@@ -94,6 +96,11 @@ def families_needed(feature: str) -> frozenset[str]:
 def of_one_wheel(feature: str) -> bool:
     """Whether a feature is of one wheel, so that it depends on the wheels' names."""
     return feature.partition(": ")[2].startswith(ONE_WHEEL)
+
+
+def of_sides(feature: str) -> bool:
+    """Whether a feature compares the fastest wheel with the slowest, which is telling only beside the motion."""
+    return feature.partition(": ")[2].startswith(SIDES)
 
 
 def _each(family: str, channels: dict[str, Channel], values: Floats, layout: Layout) -> Table:
@@ -166,6 +173,9 @@ def _drive_beside_motion(
         floor = FLOOR * layout.size[TORQUE]
         fast, slow = np.nan_to_num(rate).argmax(axis=1), np.nan_to_num(rate, nan=np.inf).argmin(axis=1)
         found["fast against slow wheel"] = np.log((level[rows, fast] + floor) / (level[rows, slow] + floor))
+        if torque.shape[-1] > 2:
+            pair = np.abs(torque[:, [t for t, _ in own]]), speed[:, [s for _, s in own]]
+            found |= sides(*pair, layout.size[TORQUE], layout.size[SPEED])
     return found
 
 

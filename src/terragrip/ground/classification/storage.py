@@ -16,16 +16,21 @@ import terragrip
 from terragrip.errors import InputError
 from terragrip.files import refuse_missing, replacing, unreadable
 from terragrip.ground.classification.classifier import GroundClassifier
-from terragrip.ground.classification.expert import LEVELS, Expert
-from terragrip.ground.classification.features import Layout, of_one_wheel
+from terragrip.ground.classification.discriminants import Discriminants
+from terragrip.ground.classification.expert import Expert, Parts
+from terragrip.ground.classification.features import Layout
 from terragrip.ground.classification.forest import Forest
 from terragrip.ground.classification.kernel_machine import KernelMachine
+from terragrip.ground.classification.motion_law import MotionLaw
+from terragrip.ground.classification.novelty import LEVELS, SPANS, Strangeness
+from terragrip.ground.classification.roles import Roles, roles_of
 from terragrip.ground.classification.standardization import Standardization
 
 FORMAT = "terragrip ground classifier"
-VERSION = 2
+VERSION = 3
 
-# Arrays of an expert, with their shapes in terms of features, vectors, pairs, classes.
+# Arrays of an expert, with their shapes in terms of the machine's features, support vectors, pairs, classes, discriminants,
+# known windows, kinds of oddness, spans, levels.
 _ARRAYS = {
     "centre": "f",
     "scale": "f",
@@ -33,10 +38,13 @@ _ARRAYS = {
     "support": "vf",
     "weights": "vp",
     "offsets": "p",
+    "axes": "fd",
+    "points": "wd",
     "class_offsets": "k",
-    "usual": "22",
-    "strange": "s",
+    "usual": "32",
+    "levels": "Sl",
 }
+# All features, trees, nodes; and the law's features, effects, terms.
 _FOREST = {
     "centre": "F",
     "roots": "t",
@@ -46,6 +54,7 @@ _FOREST = {
     "right": "n",
     "share": "nk",
 }
+_LAW = {"centre": "b", "scale": "b", "whitening": "ee", "laws": "kre"}
 
 
 def save(classifier: GroundClassifier, path: str | os.PathLike[str]) -> None:
@@ -66,14 +75,15 @@ def save(classifier: GroundClassifier, path: str | os.PathLike[str]) -> None:
                 "families": sorted(e.families),
                 "features": list(e.features),
                 "slopes": e.slopes.tolist(),
-                "width": e.machine.width,
+                "width": e.parts.machine.width,
             }
             for e in classifier._experts
         ],
     }
     arrays: dict[str, Any] = {"header": np.frombuffer(json.dumps(header).encode(), dtype=np.uint8)}
     for number, expert in enumerate(classifier._experts):
-        scaling, machine = expert.standardization, expert.machine
+        parts = expert.parts
+        scaling, machine, discriminants = parts.standardization, parts.machine, parts.discriminants
         held = (
             scaling.centre,
             scaling.scale,
@@ -81,13 +91,16 @@ def save(classifier: GroundClassifier, path: str | os.PathLike[str]) -> None:
             machine.support,
             machine.weights,
             machine.offsets,
+            discriminants.axes,
+            discriminants.points,
             expert.offsets,
-            expert.usual,
-            expert.strange,
+            expert.strangeness.usual,
+            expert.strangeness.levels,
         )
         arrays |= {f"{name}_{number}": array for name, array in zip(_ARRAYS, held, strict=True)}
-        if expert.forest is not None:
-            arrays |= {f"forest_{name}_{number}": getattr(expert.forest, name) for name in _FOREST}
+        for kind, names, part in (("forest", _FOREST, parts.forest), ("law", _LAW, parts.law)):
+            if part is not None:
+                arrays |= {f"{kind}_{name}_{number}": getattr(part, name) for name in names}
     with replacing(path) as temporary, temporary.open("wb") as stream:
         np.savez_compressed(stream, **arrays)
 
@@ -149,30 +162,7 @@ def _rebuild(header: dict[str, Any], archive: Any) -> GroundClassifier:
         features = tuple(of_expert["features"])
         if not features or not known.issuperset(features):
             raise ValueError("an expert's features are not among the classifier's")
-        a = {name: archive[f"{name}_{number}"] for name in _ARRAYS}
-        shared = sum(not of_one_wheel(name) for name in features)
-        _check_shapes(a, _ARRAYS, {**_sizes(shared, len(classes)), "v": len(a["support"])})
-        forest = _forest(archive, number, len(features), len(classes)) if shared < len(features) else None
-        slopes = np.array(of_expert["slopes"], dtype=float)
-        if slopes.shape != (1 if forest is None else 2,) or not (slopes > 0).all():
-            raise ValueError("the slopes are not one for each part")
-        machine = KernelMachine(
-            a["support"], a["weights"], a["offsets"], float(of_expert["width"]), len(classes)
-        )
-        scaling = Standardization(a["centre"], a["scale"], a["weight"])
-        experts.append(
-            Expert(
-                frozenset(of_expert["families"]),
-                features,
-                scaling,
-                machine,
-                forest,
-                slopes,
-                a["class_offsets"],
-                a["usual"],
-                a["strange"],
-            )
-        )
+        experts.append(_expert(of_expert, features, len(classes), archive, number))
     if not experts:
         raise ValueError("there is no expert")
     classifier._experts = experts
@@ -180,6 +170,41 @@ def _rebuild(header: dict[str, Any], archive: Any) -> GroundClassifier:
     classifier._held = dict(header["held"])
     classifier._fitted(classes, tuple(names), tuple(str(note) for note in header["notes"]))
     return classifier
+
+
+def _expert(
+    header: dict[str, Any], features: tuple[str, ...], classes: int, archive: Any, number: int
+) -> Expert:
+    a = {name: archive[f"{name}_{number}"] for name in _ARRAYS}
+    roles = roles_of(features)
+    count = len(roles.machine)
+    sizes = {
+        "f": count,
+        "v": len(a["support"]),
+        "p": classes * (classes - 1) // 2,
+        "k": classes,
+        "d": min(classes - 1, count),
+        "w": len(a["points"]),
+        "3": 3,
+        "2": 2,
+        "S": len(SPANS),
+        "l": len(LEVELS),
+    }
+    _check_shapes(a, _ARRAYS, sizes)
+    forest = _forest(archive, number, len(features), classes) if roles.forest else None
+    law = _law(archive, number, roles, classes) if roles.law else None
+    slopes = np.array(header["slopes"], dtype=float)
+    if slopes.shape != (1 + roles.forest + roles.law,) or not (slopes > 0).all():
+        raise ValueError("the slopes are not one for each part")
+    parts = Parts(
+        Standardization(a["centre"], a["scale"], a["weight"]),
+        KernelMachine(a["support"], a["weights"], a["offsets"], float(header["width"]), classes),
+        Discriminants(a["axes"], a["points"]),
+        forest,
+        law,
+    )
+    strangeness = Strangeness(a["usual"], a["levels"])
+    return Expert(frozenset(header["families"]), features, parts, slopes, a["class_offsets"], strangeness)
 
 
 def _forest(archive: Any, number: int, features: int, classes: int) -> Forest:
@@ -191,8 +216,11 @@ def _forest(archive: Any, number: int, features: int, classes: int) -> Forest:
     return forest
 
 
-def _sizes(features: int, classes: int) -> dict[str, int]:
-    return {"f": features, "p": classes * (classes - 1) // 2, "k": classes, "2": 2, "s": len(LEVELS)}
+def _law(archive: Any, number: int, roles: Roles, classes: int) -> MotionLaw:
+    a = {name: archive[f"law_{name}_{number}"] for name in _LAW}
+    motion, effects = len(roles.motion), len(roles.effects)
+    _check_shapes(a, _LAW, {"b": motion + effects, "e": effects, "r": 1 + 2 * motion, "k": classes})
+    return MotionLaw(**a)
 
 
 def _check_shapes(

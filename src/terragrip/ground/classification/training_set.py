@@ -26,12 +26,13 @@ _PRESENT = 0.5  # share of a family's own features that makes it measured
 
 @dataclass(frozen=True)
 class TrainingSet:
-    """Features (n, features) by name, with the class code, the recording and the fold (n,) of each window."""
+    """Features (n, features) by name, with the class code, the recording, the start [s] and the fold (n,) of each window."""
 
     names: tuple[str, ...]
     features: Floats
     codes: Codes
     groups: Codes
+    starts: Floats
     folds: Codes
     by_recording: bool
 
@@ -66,7 +67,10 @@ def layout_of(signals: Sequence[Signals], window: float) -> tuple[Layout, tuple[
 def collect(
     signals: Sequence[Signals], codes: Codes, layout: Layout, most: int, random: np.random.Generator
 ) -> TrainingSet:
-    """Cut and describe windows: up to ``most`` of each class, the closer together the less there is of it."""
+    """Cut and describe windows: up to ``most`` of each class, the closer together the less there is of it.
+
+    Where there are more, every recording gives as many as it can: one long drive does not stand for its ground.
+    """
     spans = np.array([max(s.end - s.start, layout.window) for s in signals])
     total = np.bincount(codes, weights=spans)
     coarsest = np.maximum(_COARSEST * layout.window, total / (_SPARE * most))
@@ -77,16 +81,17 @@ def collect(
         starts = window_starts(recorded.start, recorded.end, layout.window, float(step[codes[k]]))
         tables.append(features_of(recorded, starts, layout))
         sources.append(np.full(len(starts), k))
-        starts_of.append((starts - recorded.start) / max(recorded.end - recorded.start, layout.window))
-    source, along = np.concatenate(sources), np.concatenate(starts_of)
+        starts_of.append(starts - recorded.start)
+    source, begin = np.concatenate(sources), np.concatenate(starts_of)
     names = tuple(dict.fromkeys(name for table in tables for name in table))
     features = np.concatenate([matrix(t, names, len(s)) for t, s in zip(tables, sources, strict=True)])
-    keep = _balanced(codes[source], most, random)
-    source, along, features = source[keep], along[keep], features[keep]
+    keep = _balanced(codes[source], source, most, random)
+    source, begin, features = source[keep], begin[keep], features[keep]
     held_out, by_recording = deal(codes, np.bincount(source, minlength=len(codes)), random)
     # With one recording of a class there is no other to hold out; stretches of it have to do.
-    folds = held_out[source] if by_recording else np.minimum((along * _FOLDS).astype(int), _FOLDS - 1)
-    return TrainingSet(names, features, codes[source], source, folds, by_recording)
+    part = np.minimum((begin / spans[source] * _FOLDS).astype(int), _FOLDS - 1)
+    folds = held_out[source] if by_recording else part
+    return TrainingSet(names, features, codes[source], source, begin, folds, by_recording)
 
 
 def matrix(table: Table, names: Sequence[str], rows: int) -> Floats:
@@ -134,9 +139,13 @@ def deal(codes: Codes, windows: Codes, random: np.random.Generator) -> tuple[Cod
     return folds, True
 
 
-def _balanced(codes: Codes, most: int, random: np.random.Generator) -> Codes:
+def _balanced(codes: Codes, source: Codes, most: int, random: np.random.Generator) -> Codes:
     kept = []
+    rarity = 1.0 / np.bincount(source)[source]
     for code in np.unique(codes):
         mine = np.flatnonzero(codes == code)
-        kept.append(mine if len(mine) <= most else random.choice(mine, most, replace=False))
+        if len(mine) > most:
+            chance = rarity[mine] / rarity[mine].sum()
+            mine = random.choice(mine, most, replace=False, p=chance)
+        kept.append(mine)
     return np.sort(np.concatenate(kept))

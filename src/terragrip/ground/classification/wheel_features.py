@@ -7,12 +7,13 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
-from terragrip.ground.classification.vibration import moments
+from terragrip.ground.classification.vibration import likeness, moments
 
 Floats = npt.NDArray[np.float64]
 Table = dict[str, Floats]
 
 ONE_WHEEL = "at "
+SIDES = "sides "
 FLOOR = 0.02  # of a channel's usual size: what counts as none
 
 
@@ -112,3 +113,45 @@ def effort_of(torque: Floats, size: float) -> Table:
         at = np.clip(np.rint(share * (count - 1)), 0, None).astype(int)
         found[f"quantile {share:g}"] = log_size(flat[np.arange(len(flat)), at], size)
     return found
+
+
+def sides(effort: Floats, speed: Floats, size: float, usual_speed: float) -> Table:
+    """How the fastest and the slowest wheel share the effort; effort and speed (windows, wheels, samples) of the same wheels.
+
+    In a turn the outer wheels push the vehicle round against the ground, and the inner ones brake: their difference is the
+    turning resistance, their sum the rolling resistance. Also how rough both are. Names begin with `SIDES`.
+    """
+    pace = np.abs(speed)
+    rate = pace.mean(axis=-1)
+    rows = np.arange(len(effort))
+    outer, inner = np.nan_to_num(rate).argmax(axis=1), np.nan_to_num(rate, nan=np.inf).argmin(axis=1)
+    fast, slow = effort[rows, outer], effort[rows, inner]
+    all_of, usual = over_wheels(effort)[0], over_wheels(rate)[0]
+    parting = np.abs(speed[rows, outer] - speed[rows, inner]).mean(axis=-1) / 2
+    difference = (fast - slow).mean(axis=-1) / size
+    travelled = over_wheels(effort * pace)[0].mean(axis=-1) / (usual + 0.1 * usual_speed)
+    speed_jerk = over_wheels(jerk(speed))[0]
+    found = {
+        "fast level": log_size(fast.mean(axis=-1), size),
+        "slow level": log_size(slow.mean(axis=-1), size),
+        "difference": np.clip(difference, -3.0, 3.0),
+        "difference size": log_size(np.abs(difference), 1.0),
+        "difference per turn": difference * usual_speed / (parting + 0.2 * usual + 0.1 * usual_speed),
+        "alike": likeness(fast, slow),
+        "jerk": log_size(jerk(all_of), size),
+        "jerk per level": np.log((jerk(all_of) / size + FLOOR) / (all_of.mean(axis=-1) / size + 2 * FLOOR)),
+        "jerk of difference": log_size(jerk(fast - slow), size),
+        "fast jerk": log_size(jerk(fast), size),
+        "slow jerk": log_size(jerk(slow), size),
+        "speed jerk": log_size(speed_jerk, usual_speed),
+        "speed jerk per speed": np.log(
+            (speed_jerk / usual_speed + FLOOR) / (usual / usual_speed + 2 * FLOOR)
+        ),
+        "per way": log_size(travelled, size),
+    }
+    return {f"{SIDES}{name}": values for name, values in found.items()}
+
+
+def jerk(values: Floats) -> Floats:
+    """Root mean square (...,) of the second differences of ``values`` (..., samples): what is left without slow changes."""
+    return np.asarray(np.sqrt((np.diff(values, 2, axis=-1) ** 2).mean(axis=-1)))

@@ -82,7 +82,9 @@ async def _send_all(socket: WebSocket, frames: AsyncIterator[str | bytes]) -> No
     for task in pending:
         task.cancel()
     await asyncio.gather(*pending, return_exceptions=True)
-    failures = [task.exception() for task in done]  # of both, where both ended: what is not looked at is logged
+    failures = [
+        task.exception() for task in done
+    ]  # of both, where both ended: what is not looked at is logged
     for failure in failures:
         if failure is not None:
             raise failure

@@ -1,0 +1,131 @@
+"""Labelled drives: from a table of files and labels, or from the label column of the drives themselves."""
+
+from __future__ import annotations
+
+import csv
+import os
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from terragrip.errors import InputError, nearest
+from terragrip.files import refuse_missing, unreadable
+
+Columns = Mapping[str, npt.NDArray[Any]]
+
+
+@dataclass(frozen=True)
+class LabelledDrive:
+    """The label of one drive, and its logs: the first and others of the same drive (a body sensor's, say)."""
+
+    label: str
+    logs: tuple[Path, ...]
+
+
+def read_labels(path: str | os.PathLike[str], logs: Sequence[Path] = ()) -> list[LabelledDrive]:
+    """Read a table (CSV) with columns ``file`` and ``label``, and perhaps ``with``: another log of the same drive.
+
+    Files are relative to the table's folder. Where ``logs`` are given, the table labels those: a row's file is the path or
+    the name of one. Raises InputError, naming the row, on a label that names no run, a run without a label or with two, an
+    empty label, and a file that is no such table.
+    """
+    found: list[LabelledDrive] = []
+    taken: dict[Path, int] = {}
+    folder = Path(path).parent
+    for row, cells in _rows(path):
+        place = f"row {row}"
+        name, label = cells["file"], cells["label"]
+        if not name or not label:
+            missing = "label" if name else "file"
+            raise InputError(
+                f"the {missing} is empty", file=path, place=place, mend="fill it, or leave the row out"
+            )
+        log = _named(name, logs, path, place) if logs else folder / name
+        others = tuple(
+            folder / other.strip() for other in (cells.get("with") or "").split("|") if other.strip()
+        )
+        for file in (log, *others):
+            if not file.exists():
+                raise InputError(
+                    f"there is no run {file}", file=path, place=place, mend="correct the file's name"
+                )
+        if log in taken:
+            problem = f"{name} is labelled in row {taken[log]} too"
+            raise InputError(problem, file=path, place=place, mend="name each run once")
+        taken[log] = row
+        found.append(LabelledDrive(label, (log, *others)))
+    for log in logs:
+        if log not in taken:
+            raise InputError(
+                f"holds no label for {log}", file=path, mend="add a row for it, or leave the log out"
+            )
+    if not found:
+        raise InputError("holds no run", file=path, mend="write a row for each run: file,label")
+    return found
+
+
+def stretches(columns: Columns, labels: npt.NDArray[Any], shortest: float) -> list[tuple[Columns, str]]:
+    """The stretches [s, at least ``shortest``] of one label of a drive with ``time``, each a table of its own, and its label.
+
+    An empty label is a stretch without one, which is left out.
+    """
+    time = np.asarray(columns["time"], dtype=float)
+    text = np.array(["" if label is None or label != label else str(label) for label in labels], dtype=str)
+    borders = np.flatnonzero(text[1:] != text[:-1]) + 1
+    found: list[tuple[Columns, str]] = []
+    for part in np.split(np.arange(len(text)), borders):
+        if len(part) > 1 and text[part[0]] and time[part[-1]] - time[part[0]] >= shortest:
+            rows = slice(int(part[0]), int(part[-1]) + 1)
+            found.append(({name: values[rows] for name, values in columns.items()}, str(text[part[0]])))
+    return found
+
+
+def _rows(path: str | os.PathLike[str]) -> list[tuple[int, dict[str, str]]]:
+    """The rows of the table by their number in the file, cells stripped."""
+    refuse_missing(path, suffixes=(".csv",))
+    try:
+        text = Path(path).read_text(encoding="utf-8-sig")
+    except UnicodeDecodeError:
+        raise InputError("is not a text file", file=path, mend="write a CSV: file,label") from None
+    except OSError as error:
+        raise unreadable(path, error) from error
+    head = text.partition("\n")[0]
+    separator = max(",;\t", key=head.count)
+    try:
+        listed = list(csv.reader(text.splitlines(), delimiter=separator))
+    except csv.Error as error:
+        raise InputError(f"is no table ({error})", file=path, mend="write a CSV: file,label") from None
+    names = [cell.strip().lower() for cell in listed[0]] if listed else []
+    for name in ("file", "label"):
+        if name not in names:
+            raise InputError("is missing", file=path, place=f"column {name}", mend="write a CSV: file,label")
+    rows = []
+    for number, cells in enumerate(listed[1:], 2):
+        if any(cell.strip() for cell in cells):
+            if len(cells) != len(names):
+                problem = f"has {len(cells)} cells for {len(names)} columns"
+                raise InputError(
+                    problem, file=path, place=f"row {number}", mend="put texts with separators in quotes"
+                )
+            rows.append((number, dict(zip(names, (cell.strip() for cell in cells), strict=True))))
+    return rows
+
+
+def _named(name: str, logs: Sequence[Path], path: str | os.PathLike[str], place: str) -> Path:
+    """The log that a row names, by path or by file name."""
+    wanted = Path(path).parent / name
+    for log in logs:
+        if name == str(log) or (wanted.exists() and log.exists() and log.samefile(wanted)):
+            return log
+    same = [log for log in logs if name in (log.name, log.stem)]
+    if len(same) == 1:
+        return same[0]
+    if same:
+        raise InputError(f"{len(same)} logs are named {name}", file=path, place=place, mend="write its path")
+    near = nearest(name, [log.name for log in logs])
+    mend = f"did you mean {near}?" if near else "name one of the logs given"
+    raise InputError(f"{name!r} names no run", file=path, place=place, mend=mend)
