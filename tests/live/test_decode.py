@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+
 import numpy as np
 import pandas as pd
 import pytest
@@ -9,6 +11,7 @@ import pytest
 from terragrip.errors import InputError
 from terragrip.formats import Profile
 from terragrip.live.decode import Decoder
+from terragrip.live.payload import Unreadable, from_json
 
 PROFILE = {
     "time": {"from": "t", "unit": "ms"},
@@ -99,3 +102,33 @@ def test_what_looks_ahead_is_refused():
     profile = Profile.from_dict({"channels": {"ground_speed": {"derivative_of": ["x", "y"], "unit": "m"}}})
     with pytest.raises(InputError, match="looks ahead"):
         Decoder(profile)
+
+
+ROW = '{"time": 1.5, "ground_speed": NaN, "soil": "Löss {"}'
+
+
+@pytest.mark.parametrize(
+    "data",
+    [
+        ROW.encode(),
+        f" \r\n{ROW}\n\n".encode(),
+        ROW.encode("utf-16"),
+        ROW.encode("utf-8-sig"),
+        f"[{ROW}]".encode(),
+        json.dumps(json.loads(ROW)).encode(),
+    ],
+)
+def test_json_is_read_however_it_is_written(data):
+    (fields,) = from_json(data)
+    assert (fields["time"], fields["soil"]) == (1.5, "Löss {")
+    assert np.isnan(fields["ground_speed"])
+
+
+@pytest.mark.parametrize("data", [b"", b"{", b'{"a": 1} x', b'{"a": 1}, {"b": 2}', b"\xff\xfe{", b"7"])
+def test_what_is_no_json_object_is_said(data):
+    with pytest.raises(Unreadable, match="JSON"):
+        from_json(data)
+
+
+def test_json_lines_are_samples():
+    assert from_json(b'{"a": 1}\n{"a": 2}\n') == [{"a": 1}, {"a": 2}]

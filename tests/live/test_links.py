@@ -63,8 +63,14 @@ async def test_ros_2_by_zenoh(vehicle, short, port):
         }
     )
     got = []
+
+    def hear(sample):
+        estimate = json.loads(store.deserialize_cdr(bytes(sample.payload), "std_msgs/msg/String").data)
+        if not estimate["predicted"]:  # on a busy machine the sender falls silent for long enough
+            got.append(estimate["time"])
+
     with zenoh.open(config) as other:
-        other.declare_subscriber("7/terragrip/estimate/*/*", lambda s: got.append(bytes(s.payload)))
+        other.declare_subscriber("7/terragrip/estimate/*/*", hear)
         at = f"connect=tcp/127.0.0.1:{port}&domain=7"
         service = Service(
             vehicle, [f"ros2:/joints,/gnss/vel?{at}"], [f"ros2:/terragrip?{at}"], profile=profile, window=0.5
@@ -79,8 +85,7 @@ async def test_ros_2_by_zenoh(vehicle, short, port):
             await until(
                 lambda: service.core.rows == 100 and len(got) >= 100 and service.feeds[0].unreadable == 1
             )
-    text = store.deserialize_cdr(got[99], "std_msgs/msg/String").data
-    assert json.loads(text)["time"] == pytest.approx(5.0 + short.recording.time[99])
+    assert got == pytest.approx((5.0 + short.recording.time[:100]).tolist())
     measured = [m.row for m in service.seen if m.kind == "estimate" and not m.row.predicted]
     sent = short.recording.channels["drive_torque_rr"][:100]
     assert [row.values["drive_torque_rr"] for row in measured] == sent.tolist()

@@ -35,7 +35,7 @@ def unpacker(payload: Payload | None) -> Unpack:
 def from_json(data: bytes) -> list[Fields]:
     """JSON objects: one, several in a list, or one a line. Nested ones are flattened: ``wheel.fl``."""
     try:
-        found = json.loads(data)
+        found = _loaded(data)
     except UnicodeDecodeError:
         raise Unreadable(f"no JSON: {len(data)} bytes that are no text") from None
     except (ValueError, RecursionError):
@@ -49,6 +49,22 @@ def from_json(data: bytes) -> list[Fields]:
     if data.count(b"{") == len(objects) and data.count(b"[") == (found is objects):
         return objects  # nothing is nested; braces within texts only cost a second look
     return [_flat(one) for one in objects]
+
+
+def _loaded(data: bytes) -> Any:
+    """As ``json.loads``; a plain object in UTF-8, which nearly all messages are, at half the work."""
+    if data[:1] == b"{":
+        try:
+            text = data.decode()
+            found, end = _DECODE(text)
+        except ValueError:
+            return json.loads(data)  # tells what is wrong, and knows other encodings
+        if end == len(text):
+            return found
+    return json.loads(data)
+
+
+_DECODE = json.JSONDecoder().raw_decode
 
 
 def _flat(nested: Fields, prefix: str = "", depth: int = 0) -> Fields:

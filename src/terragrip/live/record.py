@@ -180,6 +180,7 @@ class Recorder:
     def write(self) -> None:
         """Hand what came in to the system, after which a kill cannot lose it; raises OSError, also a thread's."""
         self._ahead.write()
+        self.segment.settle()
         while self._closing and self._closing[0].done():
             self._closing.pop(0).result()
 

@@ -25,6 +25,8 @@ if TYPE_CHECKING:
     from terragrip.estimation.estimator import TractionEstimator
     from terragrip.estimation.slip_estimator import SlipEstimator
 
+_TOGETHER = 64  # rows
+
 RECORDING, ESTIMATES, REFUSED, EVENT_LINES, GROUND = "recording", "estimates", "refused", "events", "ground"
 
 
@@ -41,25 +43,34 @@ class Segment:
     refusals: list[Refusal] = field(default_factory=list)
     events: list[Event] = field(default_factory=list)
     ground: list[Ground] = field(default_factory=list)
+    _waiting: list[Row] = field(default_factory=list)  # laid flat together: quicker than one by one
 
     def __len__(self) -> int:
-        return len(self.time)
+        return len(self.time) + len(self._waiting)
 
     @property
     def size(self) -> int:
         """Outputs in it: rows, events, refusals and states of the ground."""
-        return len(self.time) + len(self.events) + len(self.refusals) + len(self.ground)
+        return len(self) + len(self.events) + len(self.refusals) + len(self.ground)
 
     def add(self, output: Output) -> None:
         """Take one output of the core."""
         if isinstance(output, Row):
-            self._add_row(output)
+            self._waiting.append(output)
+            if len(self._waiting) >= _TOGETHER:
+                self.settle()
         elif isinstance(output, Event):
             self.events.append(output)
         elif isinstance(output, Ground):
             self.ground.append(output)
         else:
             self.refusals.append(output)
+
+    def settle(self) -> None:
+        """Lay the rows flat that have come since the last call."""
+        rows, self._waiting = self._waiting, []
+        for row in rows:
+            self._add_row(row)
 
     def _add_row(self, row: Row) -> None:
         rows = len(self.time)
@@ -78,6 +89,7 @@ class Segment:
 
     def write(self, folder: Path, estimator: TractionEstimator | SlipEstimator | None) -> None:
         """Write the segment's files; raises OSError."""
+        self.settle()
         if len(self) and estimator is not None:
             import pyarrow.parquet as pq
 
@@ -106,6 +118,7 @@ class Segment:
         import numpy as np
         import pyarrow as pa
 
+        self.settle()
         columns = {"time": self.time, "arrival": self.arrival, **self.channels}
         return pa.table({name: floats(np.frombuffer(c)) for name, c in columns.items()})
 
@@ -116,6 +129,7 @@ class Segment:
         from terragrip.estimation.batch import about_run
         from terragrip.estimation.estimates import Estimates
 
+        self.settle()
         table = np.frombuffer(self.estimates).reshape(len(self), -1)
         columns = {name: np.ascontiguousarray(table[:, place]) for name, place in estimator.places.items()}
         for name in ("latitude", "longitude", "altitude"):

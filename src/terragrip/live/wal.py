@@ -36,6 +36,9 @@ class WriteAhead:
         self._numbers = {name: k for k, name in enumerate(names or [])}
         self._packers: dict[tuple[str, ...], tuple[struct.Struct, tuple[int, ...]]] = {}
         self._buffer: list[bytes] = []
+        self._samples: list[
+            tuple[float, int, float, dict[str, float]]
+        ] = []  # framed together: quicker than one by one
         if append_at is None:
             self._buffer.append(MAGIC)
         else:
@@ -43,20 +46,29 @@ class WriteAhead:
             os.lseek(self._file, append_at, os.SEEK_SET)
 
     def _frame(self, content: bytes) -> None:
+        self._frame_samples()
+        self._append(content)
+
+    def _append(self, content: bytes) -> None:
         self._buffer.append(_HEAD.pack(len(content), zlib.crc32(content)))
         self._buffer.append(content)
 
     def sample(self, arrival: float, source: int, stamp: float, values: dict[str, float]) -> None:
-        """A sample as the core takes it."""
-        names = tuple(values)
-        packer, numbers = self._packers.get(names) or self._packer(names)
-        self._frame(packer.pack(b"S", arrival, source, stamp, len(numbers), *numbers, *values.values()))
+        """A sample as the core takes it; ``values`` must stay as they are until the next `write`."""
+        self._samples.append((arrival, source, stamp, values))
+
+    def _frame_samples(self) -> None:
+        samples, self._samples = self._samples, []
+        for arrival, source, stamp, values in samples:
+            names = tuple(values)
+            packer, numbers = self._packers.get(names) or self._packer(names)
+            self._append(packer.pack(b"S", arrival, source, stamp, len(numbers), *numbers, *values.values()))
 
     def _packer(self, names: tuple[str, ...]) -> tuple[struct.Struct, tuple[int, ...]]:
         for name in names:
             if name not in self._numbers:
                 self._numbers[name] = len(self._numbers)
-                self._frame(b"C" + name.encode())
+                self._append(b"C" + name.encode())
         found = (
             struct.Struct(f"<cdHdH{len(names)}H{len(names)}d"),
             tuple(self._numbers[name] for name in names),
@@ -83,10 +95,11 @@ class WriteAhead:
     @property
     def dirty(self) -> bool:
         """Whether frames wait to be written."""
-        return bool(self._buffer)
+        return bool(self._buffer or self._samples)
 
     def write(self) -> None:
         """Hand the frames to the system; raises OSError."""
+        self._frame_samples()
         if self._buffer:
             data = memoryview(b"".join(self._buffer))
             self._buffer.clear()
