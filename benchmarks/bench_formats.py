@@ -1,11 +1,13 @@
 """Memory and speed of reading large logs: peak memory over the size of the file, and seconds a gigabyte.
 
     python benchmarks/bench_formats.py [megabytes, default 100] [kinds, default all]
+    python benchmarks/bench_formats.py --large [megabytes, default 5000]
 
 Writes a candump log, an MF4 file (signals, and bus logging) and an MCAP file of that size, most of which nobody asks for,
 and reads what a profile asks for in a process of its own. The peer, where there is one, is the plain loop of the library
 that reads the same file without keeping anything. What is wanted: memory stays far below the file's size, so that 5 GB fit
-into 2 GB.
+into 2 GB. ``--large`` tries that: a CSV of 40 columns and an MF4 bus log of that size (as much room again on the disk) go
+through `tg.read`, ``terragrip inspect`` and ``terragrip estimate``, with the peak of all memory, mapped files and all.
 """
 
 from __future__ import annotations
@@ -39,6 +41,22 @@ NAMED = {"channels": {"wheel_based_speed": "u", "ground_speed": "v"}}
 TOPIC = {"channels": {"wheel_based_speed": "/speed.u", "ground_speed": "/speed.v"}}
 
 
+FRAME = np.dtype(
+    [("CAN_DataFrame.BusChannel", "u1"), ("CAN_DataFrame.ID", "<u4"), ("CAN_DataFrame.IDE", "u1"),
+     ("CAN_DataFrame.DLC", "u1"), ("CAN_DataFrame.DataLength", "u1"), ("CAN_DataFrame.DataBytes", "(8,)u1")]
+)  # fmt: skip
+VEHICLE = """
+mass: 60 kg
+wheelbase: 0.6 m
+center_of_gravity_height: 0.3 m
+hitch_height: 0.25 m
+axles:
+  front: {mass: 30 kg, wheels: [fl, fr]}
+  rear: {mass: 30 kg, wheels: [rl, rr]}
+wheel: {radius: 0.2 m, inertia: 0.1 kg m^2}
+"""
+
+
 def candump(path: Path, size: int) -> None:
     """Mostly frames of other identifiers, as on a real bus."""
     with path.open("w") as stream:
@@ -59,12 +77,8 @@ def mf4_bus(path: Path, size: int) -> None:
     """A bus log as loggers write it."""
     import asammdf
 
-    kind = np.dtype(
-        [("CAN_DataFrame.BusChannel", "u1"), ("CAN_DataFrame.ID", "<u4"), ("CAN_DataFrame.IDE", "u1"),
-         ("CAN_DataFrame.DLC", "u1"), ("CAN_DataFrame.DataLength", "u1"), ("CAN_DataFrame.DataBytes", "(8,)u1")]
-    )  # fmt: skip
-    count = size // (kind.itemsize + 8)
-    records = np.zeros(count, kind)
+    count = size // (FRAME.itemsize + 8)
+    records = np.zeros(count, FRAME)
     other = np.arange(count) % 20
     records["CAN_DataFrame.ID"] = np.where(
         other == 0, 0x0CFE48F0, np.where(other == 1, 0x0CFE4980, 0x18FF0017 + 256 * other)
@@ -78,6 +92,66 @@ def mf4_bus(path: Path, size: int) -> None:
             acq_source=source,
         )
         file.save(path, overwrite=True)
+
+
+def long_csv(path: Path, size: int) -> None:
+    """A robot's log at 100 Hz beside 29 columns that nobody asks for, 10 000 rows again and again under new stamps."""
+    draws, rows = np.random.default_rng(0), 10_000
+    speed = 1 + 0.2 * np.sin(np.arange(rows) / 300)
+    wheels = [speed / 0.2 / 0.9 + 0.02 * draws.standard_normal(rows) for _ in range(4)]
+    torques = [15 + draws.standard_normal(rows) for _ in range(4)]
+    others = [draws.standard_normal(rows) for _ in range(29)]
+    pull = 200 + 4 * draws.standard_normal(rows)
+    columns = [speed + 0.01 * draws.standard_normal(rows), *wheels, *torques, pull, *others]
+    lines = [",".join(f"{column[k]:.5f}" for column in columns) for k in range(rows)]
+    corners = ("fl", "fr", "rl", "rr")
+    names = [
+        "time",
+        "ground_speed",
+        *(f"wheel_speed_{w}" for w in corners),
+        *(f"drive_torque_{w}" for w in corners),
+    ]
+    with path.open("w") as stream:
+        stream.write(",".join([*names, "drawbar_force", *(f"extra_{k}" for k in range(29))]) + "\n")
+        written, first = 0, 0
+        while written < size:
+            text = "".join(f"{(first + k) / 100:.2f},{line}\n" for k, line in enumerate(lines))
+            stream.write(text)
+            written, first = written + len(text), first + rows
+
+
+def long_mf4(path: Path, size: int) -> None:
+    """`mf4_bus` written block by block: 2 kHz of 20 messages, of which two are wanted, with slip in them."""
+    import asammdf
+
+    source = asammdf.Source("CAN", "CAN", "", asammdf.Source.SOURCE_BUS, asammdf.Source.BUS_TYPE_CAN)
+    rows, draws = 2_000_000, np.random.default_rng(0)
+    file = asammdf.MDF(temporary_folder=path.parent)
+    for first in range(0, size // (FRAME.itemsize + 8), rows):
+        count = first + np.arange(rows)
+        other, time_ = count % 20, count * 5e-4
+        speed = 2000 + 300 * np.sin(time_ / 20)
+        raw = np.where(other == 0, speed / (0.94 - 0.05 * np.sin(time_ / 7)), speed)
+        raw = (raw + 20 * draws.standard_normal(rows)).astype(np.uint16)
+        data = np.zeros((rows, 8), np.uint8)
+        data[:, 0], data[:, 1], data[:, 6], data[:, 7] = raw & 255, raw >> 8, 255, 0xFD
+        records = np.zeros(rows, FRAME)
+        known = np.where(other == 0, 0x0CFE48F0, 0x0CFE4980)
+        records["CAN_DataFrame.ID"] = np.where(other < 2, known, 0x18FF0017 + 256 * other)
+        records["CAN_DataFrame.IDE"], records["CAN_DataFrame.DLC"], records["CAN_DataFrame.DataLength"] = (
+            1,
+            8,
+            8,
+        )
+        records["CAN_DataFrame.DataBytes"] = data
+        if first:
+            file.extend(0, [(time_, None), (records, None)])
+        else:
+            file.append(
+                asammdf.Signal(records, time_, name="CAN_DataFrame", source=source), acq_source=source
+            )
+    file.save(path, overwrite=True)
+    file.close()
 
 
 def mf4_signals(path: Path, size: int) -> None:
@@ -111,12 +185,19 @@ def mcap(path: Path, size: int) -> None:
         writer.finish()
 
 
-def measured(code: str) -> tuple[float, float]:
-    """Seconds and peak MB of a process of its own with its children: memory that is theirs, not the mapped file's."""
+def measured(
+    code: str, *command: str, kinds: tuple[str, ...] = ("RssAnon", "RssShmem")
+) -> tuple[float, float]:
+    """Seconds and peak MB of a process of its own with its children: memory that is theirs, not the mapped file's.
+
+    ``kinds``: what counts, by its names in /proc; ``command`` in place of Python's ``code``.
+    """
     begun, peak = time.perf_counter(), 0
-    process = subprocess.Popen([sys.executable, "-W", "ignore", "-c", code])
+    process = subprocess.Popen(
+        command or [sys.executable, "-W", "ignore", "-c", code], stdout=subprocess.DEVNULL
+    )
     while process.poll() is None:
-        peak = max(peak, sum(own_memory(number) for number in family(process.pid)))
+        peak = max(peak, sum(own_memory(number, kinds) for number in family(process.pid)))
         time.sleep(0.01)
     if process.returncode:
         sys.exit(f"the process failed: {code}")
@@ -132,13 +213,13 @@ def family(number: int) -> list[int]:
     return [number, *(grandchild for child in children for grandchild in family(int(child)))]
 
 
-def own_memory(number: int) -> int:
-    """Resident memory [kB] of a process without what is mapped from files."""
+def own_memory(number: int, kinds: tuple[str, ...]) -> int:
+    """Resident memory [kB] of a process, of some kinds."""
     try:
         lines = Path(f"/proc/{number}/status").read_text().splitlines()
     except OSError:
         return 0
-    return sum(int(line.split()[1]) for line in lines if line.startswith(("RssAnon", "RssShmem")))
+    return sum(int(line.split()[1]) for line in lines if line.startswith(kinds))
 
 
 CASES = {
@@ -149,8 +230,44 @@ CASES = {
 }
 
 
+LARGE = {
+    "CSV, 11 of 40 columns wanted": (long_csv, "log.csv", ()),
+    "MF4 bus, two of 20 messages wanted": (long_mf4, "bus.mf4", ("--profile", "tractor-isobus")),
+}
+
+
+def large(size: int) -> None:
+    """Print the table of logs of gigabytes."""
+    print("| log | MB | what | peak MB | s |")
+    print("|---|---:|---|---:|---:|")
+    with tempfile.TemporaryDirectory() as folder:
+        vehicle = Path(folder) / "vehicle.yaml"
+        vehicle.write_text(VEHICLE)
+        for name, (_, file, profile) in LARGE.items():
+            path, out = Path(folder) / file, Path(folder) / "estimates.parquet"
+            subprocess.run(
+                [sys.executable, __file__, "--write-large", name, str(path), str(size)], check=True
+            )
+            megabytes, command = path.stat().st_size / 1e6, (sys.executable, "-m", "terragrip")
+            work = {
+                "`tg.read`": (f"import terragrip as tg; tg.read({str(path)!r}, *{profile[1:]!r})",),
+                "`terragrip inspect`": ("", *command, "inspect", str(path)),
+                "`terragrip estimate`": (
+                    "", *command, "estimate", str(path), "--vehicle", str(vehicle), *profile, "-o", str(out), "--quiet",
+                ),
+            }  # fmt: skip
+            for what, arguments in work.items():
+                seconds, peak = measured(*arguments, kinds=("VmRSS",))
+                print(f"| {name} | {megabytes:.0f} | {what} | {peak:.0f} | {seconds:.0f} |", flush=True)
+            path.unlink()
+            out.unlink()
+
+
 def main() -> None:
     """Print the table."""
+    if sys.argv[1:2] == ["--large"]:
+        large(int(sys.argv[2] if len(sys.argv) > 2 else 5000) * 1_000_000)
+        return
     size = int(sys.argv[1] if len(sys.argv) > 1 else 100) * 1_000_000
     chosen = sys.argv[2:] or list(CASES)
     idle = measured("import terragrip as tg\nfrom terragrip.formats import Profile\nimport numpy, pandas")[1]
@@ -174,7 +291,8 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    if sys.argv[1:2] == ["--write"]:
-        CASES[sys.argv[2]][0](Path(sys.argv[3]), int(sys.argv[4]))
+    if sys.argv[1:2] in (["--write"], ["--write-large"]):
+        writers = CASES if sys.argv[1] == "--write" else LARGE
+        writers[sys.argv[2]][0](Path(sys.argv[3]), int(sys.argv[4]))
     else:
         main()

@@ -175,3 +175,22 @@ def test_measured_pathfinder_takes_positions_not_odometry(shared: Callable[[str]
         f"wheel_speed_{w}" for w in ("fl", "fr", "rl", "rr")
     ]
     assert found.recognised["ground_speed"] == ("gps_e", "gps_n")
+
+
+def test_a_speed_that_says_nothing_is_named_and_a_shaft_is_no_ground(tmp_path: Path) -> None:
+    time = np.arange(500) / 10
+    path = tmp_path / "log.csv"
+    frame = {
+        "time": time,
+        "WheelBasedVehicleSpeed": 0.0 * time,
+        "RearPTOSpeed": 540 + np.sin(time),
+        
+    }
+    pd.DataFrame(frame).to_csv(path, index=False)
+    found = inspect(path)
+    assert "ground_speed" not in found.recognised
+    assert any(
+        "WheelBasedVehicleSpeed goes by the name of wheel_based_speed, but is 0 throughout" in w
+        for w in found.warnings
+    )
+    assert any("nor a drive train's (wheel_based_speed)" in sentence for sentence in found.missing)

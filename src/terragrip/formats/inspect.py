@@ -14,7 +14,7 @@ from terragrip.errors import InputError
 from terragrip.formats.profile import SHIPPED, Profile
 from terragrip.formats.proposal import is_ready, missing_channels, profile_text
 from terragrip.formats.reading import is_own, read, read_log, recording_of
-from terragrip.formats.recognition import find_time, propose
+from terragrip.formats.recognition import find_time, propose, silent
 from terragrip.formats.signals import SINCE_1970, SignalLog
 from terragrip.formats.table import LogTable, Sparse
 from terragrip.recording import Recording, unit_warnings
@@ -139,7 +139,9 @@ def inspect(
     if recording is not None and profile is not None:
         log = _as_table(recording, log)
     seen = _Seen.of(log, whole=every == 1)
-    proposals = propose(seen.numbers(), seen.texts(), seen.units)
+    numbers = seen.numbers()
+    proposals = propose(numbers, seen.texts(), seen.units)
+    warnings += silent(numbers, proposals)
     stamp, base = seen.stamp, seen.base
     return Inspection(
         file=str(log.source),

@@ -20,11 +20,15 @@ def missing_channels(proposals: Mapping[str, Proposal], has_time: bool) -> list[
     said = [] if has_time else ["No time column was found: it is needed, in seconds that run forward."]
     wheels = [w for w in wheel_names_in(proposals) if f"wheel_speed_{w}" in proposals]
     if not wheels and "wheel_based_speed" not in proposals:
-        said.append("No wheel speed was found: nothing can be estimated without.")
+        said.append(
+            "No wheel speed was found, nor a drive train's (wheel_based_speed): nothing can be estimated without."
+        )
     if "ground_speed" not in proposals:
         said.append(
             "No ground speed was found: there is no slip and no resistance without; positions will do."
         )
+    if not wheels and "wheel_based_speed" not in proposals:
+        return said  # nothing else matters
     without = [wheel for wheel in wheels if f"drive_torque_{wheel}" not in proposals]
     if len(without) == len(wheels) and (wheels or "wheel_based_speed" in proposals):
         said.append(

@@ -42,6 +42,8 @@ _OVER_GROUND = {
     "body": 1,
 }
 _NOT_OVER_GROUND = {
+    "pto",
+    "shaft",
     "wheel",
     "omega",
     "angular",
@@ -137,6 +139,20 @@ def propose(
         if name in LABELS or _words(name) & {"soil", "terrain", "surface"}:
             proposals.setdefault("soil", Proposal({"from": name}))
     return proposals
+
+
+def silent(numbers: Mapping[str, Floats], proposals: Mapping[str, Proposal]) -> list[str]:
+    """Sentences on columns that go by the name of a speed or torque which was not found, but hold nothing or never change."""
+    said = []
+    for name, values in numbers.items():
+        guess = _channel_of(name)
+        if guess is None or guess[0] in proposals or _varies(values):
+            continue
+        if guess[0].startswith(("ground_speed", "wheel_based_speed", "wheel_speed_", "drive_torque_")):
+            known = values[np.isfinite(values)]
+            held = f"is {known[0]:.4g} throughout" if len(known) else "holds no value"
+            said.append(f"{name} goes by the name of {guess[0]}, but {held}.")
+    return said[:6]
 
 
 def _channel_of(name: str) -> tuple[str, int, str] | None:
