@@ -126,7 +126,7 @@ def test_unusable_inputs_are_one_line(files, tmp_path, capsys):
     assert "did you mean adhesion_std?" in fails(capsys, out, files[0], "--signal", "adhesion_stt")
     newer = tmp_path / "newer.json"
     newer.write_text(json.dumps({**json.loads(soils.read_text()), "version": 99}))
-    assert "newer.json: library version 99" in fails(capsys, out, files[0], "--library", newer)
+    assert "newer.json: is of version 99" in fails(capsys, out, files[0], "--library", newer)
     broken = json.loads(soils.read_text())
     broken["soils"]["fine"]["signature"]["level"] = "high"
     newer.write_text(json.dumps(broken))

@@ -179,7 +179,7 @@ def spoiled(change: Callable[[dict[str, Any]], Any]) -> str:
 @pytest.mark.parametrize(
     ("text", "said"),
     [
-        (spoiled(lambda x: x.update(version=99)), "library version 99"),
+        (spoiled(lambda x: x.update(version=99)), "is of version 99"),
         (spoiled(lambda x: x["soils"]["hard"].update(model="cubic")), "curve model 'cubic' is not known"),
         (spoiled(lambda x: x["soils"]["hard"]["parameters"].update(a="much")), "'much' is not a number"),
         (spoiled(lambda x: x["soils"]["hard"]["parameters"].update(a=float("nan"))), "nan is not a number"),

@@ -1,8 +1,10 @@
-"""A YAML file of the user's, read so that every complaint names the key, the line and the mend."""
+"""A file of the user's (YAML) or of ours (JSON), read so that every complaint names the key, the line and the mend."""
 
 from __future__ import annotations
 
+import json
 import os
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, TypeVar
@@ -105,6 +107,37 @@ def validate(model: type[ModelT], document: Document | Any, *, file: str | None 
         return model.model_validate(document.data)
     except ValidationError as error:
         raise _input_error(error, document) from error
+
+
+def read_json(
+    path: str | os.PathLike[str],
+    key: str,
+    version: int,
+    writer: str,
+    *,
+    pairs: Callable[[list[tuple[str, Any]]], Any] | None = None,
+) -> dict[str, Any]:
+    """Read a JSON object that holds ``key`` and was written by ``writer``, of a ``version`` up to the given one.
+
+    ``pairs``: what makes an object of its pairs. Raises InputError: no such file, not JSON, without the key, of a newer version.
+    """
+    file = os.fspath(path)
+    refuse_missing(file, suffixes=(".json",))
+    mend = f"give a file written by {writer}"
+    try:
+        with open(file, encoding="utf-8") as stream:
+            data = json.load(stream, object_pairs_hook=pairs)
+    except (UnicodeDecodeError, json.JSONDecodeError, RecursionError) as error:
+        raise InputError(f"not JSON ({error})", file=file, mend=mend) from None
+    except OSError as error:
+        raise unreadable(file, error) from None
+    if not isinstance(data, dict) or key not in data:
+        raise InputError(f"holds no {key!r}", file=file, mend=mend)
+    found = data.get("version", version)
+    if not isinstance(found, int) or found > version:
+        problem = f"is of version {found}, this terragrip reads up to {version}"
+        raise InputError(problem, file=file, mend="update terragrip")
+    return data
 
 
 def _read_text(file: str) -> str:

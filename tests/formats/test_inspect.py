@@ -184,7 +184,6 @@ def test_a_speed_that_says_nothing_is_named_and_a_shaft_is_no_ground(tmp_path: P
         "time": time,
         "WheelBasedVehicleSpeed": 0.0 * time,
         "RearPTOSpeed": 540 + np.sin(time),
-        
     }
     pd.DataFrame(frame).to_csv(path, index=False)
     found = inspect(path)

@@ -200,37 +200,29 @@ def ros_messages(store: Any) -> list[tuple[str, str, list[Any]]]:
 
 
 def write_ros1(path: Path) -> Path:
-    store = get_typestore(Stores.ROS1_NOETIC)
-    store.register(get_types_from_msg(CUSTOM, "farm_msgs/msg/Pull"))
     with Writer1(path) as bag:
-        for topic, kind, messages in ros_messages(store):
-            connection = bag.add_connection(topic, kind, typestore=store)
-            for message in messages:
-                stamp = message.header.stamp
-                bag.write(
-                    connection,
-                    stamp.sec * SNS + stamp.nanosec + 3_000_000,
-                    store.serialize_ros1(message, kind),
-                )
+        fill(bag, Stores.ROS1_NOETIC, "serialize_ros1")
     return path
 
 
 def write_ros2(path: Path, plugin: StoragePlugin, topics: tuple[str, ...] = ()) -> Path:
-    store = get_typestore(Stores.ROS2_HUMBLE)
-    store.register(get_types_from_msg(CUSTOM, "farm_msgs/msg/Pull"))
     with Writer2(path, version=9, storage_plugin=plugin) as bag:
-        for topic, kind, messages in ros_messages(store):
-            if topics and topic not in topics:
-                continue
-            connection = bag.add_connection(topic, kind, typestore=store)
-            for message in messages:
-                stamp = message.header.stamp
-                bag.write(
-                    connection,
-                    stamp.sec * SNS + stamp.nanosec + 3_000_000,
-                    store.serialize_cdr(message, kind),
-                )
+        fill(bag, Stores.ROS2_HUMBLE, "serialize_cdr", topics)
     return path
+
+
+def fill(bag: Any, stores: Stores, serialize: str, topics: tuple[str, ...] = ()) -> None:
+    """Write the robot's messages, of some topics or of all, received 3 ms after their stamps."""
+    store = get_typestore(stores)
+    store.register(get_types_from_msg(CUSTOM, "farm_msgs/msg/Pull"))
+    for topic, kind, messages in ros_messages(store):
+        if topics and topic not in topics:
+            continue
+        connection = bag.add_connection(topic, kind, typestore=store)
+        for message in messages:
+            stamp = message.header.stamp
+            received = stamp.sec * SNS + stamp.nanosec + 3_000_000
+            bag.write(connection, received, getattr(store, serialize)(message, kind))
 
 
 WRITERS: dict[str, Callable[[Path], Path]] = {

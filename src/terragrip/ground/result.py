@@ -12,8 +12,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from terragrip.document import read_json
 from terragrip.errors import InputError
-from terragrip.files import refuse_missing, replacing
+from terragrip.files import replacing
 from terragrip.ground.changes import Change
 from terragrip.ground.sections import Section
 
@@ -122,25 +123,7 @@ def write(
 def read(path: str | os.PathLike[str]) -> tuple[Ground, ...]:
     """Read ground.json, a `Ground` a drive. Raises InputError: no such file, not JSON, of a newer version, or not what `write` writes."""
     file = os.fspath(path)
-    refuse_missing(file, suffixes=(".json",))
-    try:
-        with open(file, encoding="utf-8") as stream:
-            data = json.load(stream)
-    except (UnicodeDecodeError, json.JSONDecodeError, RecursionError) as error:
-        raise InputError(
-            f"not JSON ({error})", file=file, mend="give a file written by 'terragrip ground'"
-        ) from None
-    except OSError as error:
-        raise InputError(f"cannot be read ({error.strerror})", file=file) from None
-    if not isinstance(data, dict) or "sections" not in data:
-        raise InputError("holds no 'sections'", file=file, mend="give a file written by 'terragrip ground'")
-    version = data.get("version", VERSION)
-    if not isinstance(version, int) or version > VERSION:
-        raise InputError(
-            f"is of version {version}, this terragrip reads up to {VERSION}",
-            file=file,
-            mend="update terragrip",
-        )
+    data = read_json(file, "sections", VERSION, "'terragrip ground'")
     try:
         return tuple(_ground(one, data) for one in data["runs"])
     except (KeyError, TypeError, ValueError, AttributeError) as error:

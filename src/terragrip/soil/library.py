@@ -12,8 +12,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from terragrip.document import read_json
 from terragrip.errors import InputError
-from terragrip.files import refuse_missing, replacing
+from terragrip.files import replacing
 from terragrip.physics.adhesion import CURVES
 from terragrip.soil.fit import AdhesionCurve
 
@@ -101,33 +102,12 @@ class SoilLibrary(Mapping[str, Soil]):
     def load(cls, path: str | os.PathLike[str]) -> SoilLibrary:
         """Read soils.json. InputError: no such file, not JSON, a newer version, two soils of one name, a number that is none."""
         file = os.fspath(path)
-        refuse_missing(file)
         try:
-            with open(file, encoding="utf-8") as stream:
-                data = json.load(stream, object_pairs_hook=_refuse_twins)
+            data = read_json(file, "soils", VERSION, "'terragrip soils'", pairs=_refuse_twins)
         except _Twin as twin:
             raise InputError(f"two entries are named {twin}", file=file, mend="rename one") from None
-        except (UnicodeDecodeError, json.JSONDecodeError, RecursionError) as error:
-            raise InputError(
-                f"not JSON ({error})", file=file, mend="give a soils.json written by 'terragrip soils'"
-            ) from None
-        except OSError as error:
-            raise InputError(f"cannot be read ({error.strerror})", file=file) from None
-        return cls._from_data(data, file)
-
-    @classmethod
-    def _from_data(cls, data: Any, file: str) -> SoilLibrary:
-        if not isinstance(data, dict) or not isinstance(data.get("soils"), dict):
-            raise InputError(
-                "holds no 'soils'", file=file, mend="give a soils.json written by 'terragrip soils'"
-            )
-        version = data.get("version", VERSION)
-        if not isinstance(version, int) or version > VERSION:
-            raise InputError(
-                f"library version {version}, this terragrip reads up to {VERSION}",
-                file=file,
-                mend="update terragrip",
-            )
+        if not isinstance(data["soils"], dict):
+            raise InputError("holds no 'soils'", file=file, mend="give a file written by 'terragrip soils'")
         soils = {name: _soil(name, entry, file) for name, entry in data["soils"].items()}
         return cls(soils, data.get("provenance") or {}, data.get("not_fitted") or {})
 
