@@ -99,6 +99,20 @@ def test_what_is_wrong_in_a_late_block_is_named_by_its_row(tmp_path: Path) -> No
         tg.read(path)
 
 
+def test_a_small_file_that_unpacks_to_a_large_one_is_read_in_blocks(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / "log.csv"
+    path.write_bytes(gzip.compress(text_of("plain").encode()))
+    whole = tg.read(path)
+    monkeypatch.setattr(csv, "_LONG", 1000)
+    monkeypatch.setattr(csv_blocks, "_BLOCK", 1000)
+    assert np.array_equal(tg.read(path)["ground_speed"], whole["ground_speed"])
+    path.write_bytes(gzip.compress(bytes(100_000)))
+    with pytest.raises(InputError, match="is not a table of text"):
+        tg.read(path)
+
+
 def drive_of_a_robot(rows: int = 3000) -> pd.DataFrame:
     draws, time = np.random.default_rng(1000), np.arange(rows) / 50
     speed = 1 + 0.3 * np.sin(time / 3)

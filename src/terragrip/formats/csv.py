@@ -42,9 +42,7 @@ def read_csv(path: str | os.PathLike[str], wanted: Wanted | None = None) -> LogT
     source = os.fspath(path)
     refuse_missing(source, suffixes=SUFFIXES)
     if is_long(source):
-        from terragrip.formats.csv_blocks import read_long_csv
-
-        found = read_long_csv(source, wanted)
+        found = _in_blocks(source, wanted)
         if found is not None:
             return found
     try:
@@ -54,6 +52,11 @@ def read_csv(path: str | os.PathLike[str], wanted: Wanted | None = None) -> LogT
     digest = hashlib.sha256(raw).hexdigest()
     if raw.startswith(GZIP):
         raw = _unzip(raw, source)
+        if len(raw) > _LONG:  # it unpacks to more than its size lets expect
+            found = _in_blocks(source, wanted)
+            if found is None:
+                raise InputError("is not a table of text", file=source, mend="give a CSV or Parquet file")
+            return found
     if not raw.strip():
         raise InputError("is empty", file=source, mend="give a table with a header and rows")
     data = to_text(raw, source)
@@ -85,11 +88,20 @@ def chosen_of(dialect: Dialect, wanted: Wanted | None, source: str) -> list[int]
     return chosen
 
 
+def _in_blocks(source: str, wanted: Wanted | None) -> LogTable | None:
+    from terragrip.formats.csv_blocks import read_long_csv
+
+    return read_long_csv(source, wanted)
+
+
 def _unzip(raw: bytes, source: str) -> bytes:
+    """What a packed file holds, up to a byte more than is read at once."""
     import gzip
+    import io
 
     try:
-        return gzip.decompress(raw)
+        with gzip.GzipFile(fileobj=io.BytesIO(raw)) as stream:
+            return stream.read(_LONG + 1)
     except (OSError, EOFError, zlib.error) as error:
         raise InputError(
             f"is a damaged gzip file ({error})", file=source, mend="copy or pack it again"
