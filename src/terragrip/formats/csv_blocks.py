@@ -16,7 +16,7 @@ from terragrip.errors import InputError
 from terragrip.files import sha256, unreadable
 from terragrip.formats.blocks import recordings
 from terragrip.formats.csv import GZIP, body_of, chosen_of, parse
-from terragrip.formats.dialect import HEAD, Dialect, detect, to_text
+from terragrip.formats.dialect import HEAD, Dialect, detect, in_utf8, to_text
 from terragrip.formats.table import LogTable, Wanted, every_of, in_si
 from terragrip.recording import Recording
 from terragrip.recording.schema import LABELS, TIME, is_channel
@@ -131,7 +131,7 @@ def _blocks(
     for number, (data, is_first) in enumerate(_lines(source, size or (_BLOCK if every == 1 else _LOOK))):
         if number % every:
             continue
-        text = _utf8(data)
+        text = in_utf8(data.removeprefix(b"\xef\xbb\xbf"))
         # A byte order mark, comments and the header stand in the first block only.
         start = detect(text, source).start if is_first else 0
         body, notes = body_of(text, dialect, start, more=not is_first)
@@ -174,14 +174,3 @@ def _read(stream: BinaryIO, size: int, source: str) -> bytes:
         raise InputError(problem, file=source, mend="copy or pack it again") from error
     except OSError as error:
         raise unreadable(source, error) from error
-
-
-def _utf8(data: bytes) -> bytes:
-    data = data.removeprefix(b"\xef\xbb\xbf")
-    if data.isascii():
-        return data
-    try:
-        data.decode("utf-8")
-    except UnicodeDecodeError:
-        return data.decode("latin-1").encode()
-    return data

@@ -65,6 +65,11 @@ def to_text(data: bytes, source: str) -> bytes:
         raise _binary(source)
     if b"\n" not in data:
         data = data.replace(b"\r", b"\n")
+    return in_utf8(data)
+
+
+def in_utf8(data: bytes) -> bytes:
+    """Text as UTF-8; what is not UTF-8 is taken for Latin-1."""
     if data.isascii():
         return data
     try:
