@@ -11,6 +11,7 @@ from typing import Any
 from PIL import Image
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "benchmarks"))
+import terragrip as tg
 from studio_session import browser, fill, studio
 
 IMAGES = Path(__file__).parent / "images"
@@ -20,6 +21,15 @@ def drive(page: Any) -> None:
     page.wait_for_selector(".charts[data-rows]")
     page.locator(".u-over").first.click(position={"x": 560, "y": 40})
     page.wait_for_selector(".why")
+
+
+def honesty(page: Any) -> None:
+    page.evaluate(
+        '() => localStorage.setItem(\'terragrip-drive-panels\', \'["adhesion","nis","supervisor","adaptation"]\')'
+    )
+    page.reload()
+    drive(page)
+    page.evaluate("() => localStorage.removeItem('terragrip-drive-panels')")
 
 
 def live(page: Any) -> None:
@@ -41,13 +51,15 @@ def start(page: Any) -> None:
 
 
 def shrink(picture: bytes, target: Path) -> None:
-    """A palette of 128 colours is enough for a page, at a quarter of the size."""
-    Image.open(io.BytesIO(picture)).convert("RGB").quantize(128, dither=0).save(target, optimize=True)
+    """A palette of 256 colours is enough for a page, at a third of the size; chosen so that small patches keep theirs."""
+    whole = Image.open(io.BytesIO(picture)).convert("RGB")
+    whole.quantize(256, Image.Quantize.MAXCOVERAGE, dither=0).save(target, optimize=True)
 
 
 PAGES = {
     "start": ("", start),
     "drive": ("#/drive?path={run}", drive),
+    "honesty": ("#/drive?path=multi2-aukf-fs.parquet", honesty),
     "live": ("#/live?replay={run}&speed=5", live),
     "map": ("#/map?path={run}", map_page),
     "fit": ("#/fit?path={run}", fit),
@@ -59,6 +71,8 @@ def main() -> None:
         folder = Path(made) / "field-days"
         folder.mkdir()
         fill(folder)
+        recording, vehicle = tg.read(folder / "multi2.parquet"), tg.Vehicle.load(folder / "vehicle.yaml")
+        tg.estimate(recording, vehicle, "aukf-fs").write(folder / "multi2-aukf-fs.parquet")
         run = next(folder.glob("*-estimates.parquet")).name
         with studio(folder) as (url, _):
             for theme in ("light", "dark"):
