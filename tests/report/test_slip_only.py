@@ -65,3 +65,11 @@ def test_the_ground_says_what_it_needs(tmp_path: Path, capfd: pytest.CaptureFixt
     assert "holds slip but no adhesion" in said[0]
     assert "estimate a log with torques" in said[0]
     assert not (tmp_path / "ground.json").exists()
+
+
+def test_it_is_said_where_slip_counts_from(tmp_path: Path) -> None:
+    found = by_anchor(report_of([drive(tmp_path, position=False)]).sections)
+    said = found["slip-bare"].prose[0]
+    assert "from the log's own zero" in said
+    ratio = float(said.split("drive: ")[1].split(" ±")[0])
+    assert ratio == pytest.approx(1 / 1.03, abs=0.005)  # the machine's own speed was made 3 % too fast

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from terragrip.estimation.rim_speeds import DRIVE
 from terragrip.report.page import Picture, Section, Table, names, number
 from terragrip.report.runs import FloatArray, Run
 from terragrip.report.style import ESTIMATED, INK, new_figure, styled, to_svg
@@ -30,7 +31,7 @@ def over_time(run: Run) -> Section:
     lanes = [_lane(run, f"slip_{wheel}", f"slip s, {wheel} [–]") for wheel in run.wheels]
     lanes.append(_lane(run, "ground_speed", "ground speed [m/s]"))
     wheels = names(
-        [f"wheel {wheel}" if wheel != "drive" else "the driven wheels as one" for wheel in run.wheels]
+        [f"wheel {wheel}" if wheel != DRIVE else "the driven wheels as one" for wheel in run.wheels]
     )
     picture = Picture(
         f"slip-{run.name}",
@@ -43,18 +44,27 @@ def over_time(run: Run) -> Section:
 
 
 def zero_told(run: Run) -> tuple[str, ...]:
-    """Where slip counts from: the zero-slip radius of the log, as the estimates tell it."""
+    """Where slip counts from, and what the log's own lightest stretches say beside it."""
     found = run.estimates.attrs.get("zero_slip") or {}
-    radii = [
-        f"{wheel}: rim speed times {one['ratio']:.4f} ± {one['std']:.4f} is ground speed at zero slip"
-        for wheel, one in found.items()
-    ]
-    if not radii:
-        return ("Slip counts from the radius of the vehicle file.",)
-    return (
-        f"The lightest tenth of the log's steady stretches ({'; '.join(radii)}) tells the zero. Where the vehicle is calibrated, slip "
-        "counts from the calibrated radius instead.",
+    told = "; ".join(f"{wheel}: {one['ratio']:.4f} ± {one['std']:.4f}" for wheel, one in found.items())
+    beside = (
+        f" In the lightest tenth of the log's steady stretches ground speed over rim speed, by the vehicle file's radius, is {told}."
+        if told
+        else ""
     )
+    vehicle = run.vehicle
+    calibrated = vehicle is not None and all(
+        wheel in vehicle.calibration.wheel_radius
+        for wheel, driven in zip(vehicle.wheels, vehicle.driven, strict=True)
+        if driven
+    )
+    if calibrated:
+        return (f"Slip counts from the calibrated radius.{beside}",)
+    if DRIVE in found:
+        return (
+            f"Slip counts from the log's own zero: calibrate on a pass without load to make it absolute.{beside}",
+        )
+    return (f"Slip counts from the radius of the vehicle file.{beside}",)
 
 
 def histogram(run: Run) -> Section:
