@@ -57,14 +57,14 @@ class Fit:
 
 @dataclass(frozen=True)
 class Score:
-    """One soil of one seed. `corrected`: the error of a by pull once freed of slip noise. `kept`: bins by pull were not given up."""
+    """One soil of one seed. `plain`: the error of a by pull not freed of slip noise. `kept`: bins by pull were not given up."""
 
     soil: str
     by_pull: Fit
     by_slip: Fit
     true_by_pull: Fit
     true_by_slip: Fit
-    corrected: float
+    plain: float
     kept: bool
 
 
@@ -81,8 +81,8 @@ def campaign_scores(seed: int) -> list[Score]:
         assert noise is not None
         fits = (learned.curve, learned.by_slip, *(one[name] for one in of_truth))
         by_pull, by_slip, true_by_pull, true_by_slip = (Fit.of(curve, a) for curve in fits)
-        corrected, kept = noise.corrected["a"] / a - 1, learned.curve is not learned.by_slip
-        scores.append(Score(name, by_pull, by_slip, true_by_pull, true_by_slip, corrected, kept))
+        plain, kept = noise.plain["a"] / a - 1, learned.curve is not learned.by_slip
+        scores.append(Score(name, by_pull, by_slip, true_by_pull, true_by_slip, plain, kept))
     return scores
 
 
@@ -97,17 +97,17 @@ WAYS = {
 def table(scores: Sequence[Score]) -> str:
     """A row a soil and way: mean and worst over the seeds."""
     lines = [
-        "| soil | bins | error of a, mean (worst) | freed of slip noise | 95 % holds | R², mean (worst) |",
+        "| soil | bins | error of a, mean (worst) | with slip noise | 95 % holds | R², mean (worst) |",
         "|---|---|---:|---:|---:|---:|",
     ]
     for soil in sorted({score.soil for score in scores}):
         mine = [score for score in scores if score.soil == soil]
         for way, field in WAYS.items():
             fits: list[Fit] = [getattr(score, field) for score in mine]
-            freed = _errors([score.corrected for score in mine]) if field == "by_pull" else ""
+            plain = _errors([score.plain for score in mine]) if field == "by_pull" else ""
             held = "" if fits[0].held is None else f"{sum(bool(fit.held) for fit in fits)} of {len(fits)}"
             r2 = [fit.r2 for fit in fits]
-            cells = (_errors([fit.error for fit in fits]), freed, held, f"{np.mean(r2):.3f} ({min(r2):.3f})")
+            cells = (_errors([fit.error for fit in fits]), plain, held, f"{np.mean(r2):.3f} ({min(r2):.3f})")
             lines.append(f"| {soil} | {way} | {' | '.join(cells)} |")
     return "\n".join(lines)
 

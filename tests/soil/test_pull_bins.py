@@ -13,7 +13,6 @@ from terragrip.soil.bins import BinSettings, slip_of
 from terragrip.soil.fit import AdhesionCurve
 from terragrip.soil.library import SoilLibrary
 from terragrip.soil.pull_bins import bin_by_pull
-from terragrip.soil.slip_noise import correct_slip_noise
 
 A = 0.9
 GRID = np.linspace(0.0, 0.6, 6001)
@@ -122,12 +121,17 @@ def test_an_error_that_all_runs_share_widens_the_interval():
     assert wide[1] - wide[0] == pytest.approx(expected, rel=0.25)
 
 
-def test_noise_of_slip_is_followed_back():
-    """Noise enters by the curve's bend alone; the interval, which holds how runs differ, does not hold it."""
-    slip, mu, metres, run = drive(1006, 0.0, slip_noise=0.04)
-    curve = fit(slip, mu, metres, run)
-    found = correct_slip_noise(curve, slip, mu, np.full(slip.size, 0.04), mu, metres)
-    assert abs(found.corrected["a"] - A) < 0.5 * abs(found.plain["a"] - A)
+@pytest.mark.parametrize("sd", [0.01, 0.03])
+def test_noise_of_slip_is_taken_out(sd):
+    """It enters by the curve's bend alone, always upwards."""
+    slip, mu, metres, run = drive(1006, 0.0, slip_noise=sd)
+    plain = fit(slip, mu, metres, run).parameters_["a"]
+    bins = bin_by_pull(slip, mu, mu, metres, run, BY_PULL, np.full(slip.size, sd))
+    freed = AdhesionCurve(bins=BY_PULL, bootstrap=0).fit_bins(bins).parameters_["a"]
+    assert plain > A
+    assert abs(freed - A) < max(0.3 * (plain - A), 1e-3)
+    without = bin_by_pull(slip, mu, mu, metres, run, BY_PULL, np.full(slip.size, np.nan))
+    np.testing.assert_array_equal(without.slip, bin_by_pull(slip, mu, mu, metres, run, BY_PULL).slip)
 
 
 def test_nothing_to_sort_is_no_bin():

@@ -135,8 +135,9 @@ def trust(curves: Sequence[SoilCurves], not_fitted: Mapping[str, str] = NOTHING)
     rows = tuple(_trust_row(one) for one in curves)
     table = Table(
         "Each fit's badge: do the data fix what was fitted (condition number; beyond 10 000 they do not), does its form follow them "
-        "(whole runs left out), how noisy the slip estimate is (median SD), and the fitted parameters corrected for that noise.",
-        ("soil", "data fix the fit", "form follows", "slip SD", "parameter, corrected for slip noise"),
+        "(whole runs left out), how noisy the slip estimate is (median SD), and the fitted parameters as that "
+        "noise leaves them and freed of it (by pull the freed count).",
+        ("soil", "data fix the fit", "form follows", "slip SD", "parameter, with slip noise → freed"),
         rows,
     )
     words = [f"{one.name}: {note}" for one in curves for note in one.learned.curve.notes_]

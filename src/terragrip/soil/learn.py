@@ -16,7 +16,7 @@ from terragrip.soil.fit import AdhesionCurve
 from terragrip.soil.library import Soil, SoilLibrary
 from terragrip.soil.missing import Gap, in_words, what_to_drive
 from terragrip.soil.pull_bins import bin_by_pull
-from terragrip.soil.slip_noise import SlipNoise, correct_slip_noise
+from terragrip.soil.slip_noise import SlipNoise, correct_slip_noise, shifted
 from terragrip.soil.transitions import settled
 
 Array = NDArray[np.float64]
@@ -56,8 +56,8 @@ class RunPairs:
 class LearnedSoil:
     """One soil's fit with all that the report shows beside it.
 
-    `curve`: the fit that counts, `slip_noise`: what noise of slip does to it. `by_slip`: the paper's, each pair sorted by its own slip
-    (`curve` itself where that one counts).
+    `curve`: the fit that counts, by pull freed of slip noise; `slip_noise`: what that noise does to it. `by_slip`: the paper's, each pair
+    sorted by its own slip (`curve` itself where that one counts).
     """
 
     soil: Soil
@@ -189,10 +189,12 @@ def _clusters(parts: Sequence[RunPairs]) -> tuple[NDArray[np.int64], bool]:
 
 def bin_parts(parts: Sequence[RunPairs], settings: BinSettings) -> Bins:
     """Bins of one soil's pairs, clusters as the bootstrap draws them: runs, or stretches of runs where there are few."""
-    slip, adhesion, pull, metres = (_joined(parts, name) for name in ("slip", "adhesion", "pull", "metres"))
+    slip, adhesion, pull, metres, noise = (
+        _joined(parts, name) for name in ("slip", "adhesion", "pull", "metres", "slip_std")
+    )
     cluster, _ = _clusters(parts)
     if settings.by == BY_PULL:
-        return bin_by_pull(slip, adhesion, pull, metres, cluster, settings)
+        return bin_by_pull(slip, adhesion, pull, metres, cluster, settings, noise)
     return bin_pairs(slip, adhesion, cluster, settings)
 
 
@@ -238,11 +240,9 @@ def _learn(
         papers = by_slip.to_dict()
         shown = {key: papers[key] for key in ("parameters", "interval", "r2", "nrmse", "bins", "settings")}
         soil = replace(soil, fit={**soil.fit, "by_slip": shown})
-    noise = _joined(parts, "slip_std")
     corrected = None
-    if np.isfinite(noise).any():
-        slip, adhesion, pull, metres = (_joined(parts, key) for key in ("slip", "adhesion", "pull", "metres"))
-        corrected = correct_slip_noise(curve, slip, adhesion, noise, pull, metres)
+    if np.isfinite(_joined(parts, "slip_std")).any():
+        corrected = _of_noise(parts, curve)
         shown = {
             "plain": dict(corrected.plain),
             "corrected": dict(corrected.corrected),
@@ -271,6 +271,18 @@ def _fits(
                 why = error.problem
         paper.notes_.append(f"Sorted by slip, not by pull: {why}.")
     return _explaining(paper), paper
+
+
+def _of_noise(parts: Sequence[RunPairs], curve: AdhesionCurve) -> SlipNoise:
+    """What noise of slip does to the fit that counts: by pull it is freed of it, by slip it is as it is (the paper's)."""
+    slip, adhesion, noise = (_joined(parts, key) for key in ("slip", "adhesion", "slip_std"))
+    if curve.bins_.settings.by == BY_SLIP:
+        return correct_slip_noise(curve, slip, adhesion, noise)
+    exact = [replace(part, slip_std=np.zeros_like(part.slip_std)) for part in parts]
+    plain = curve.unfitted(bootstrap=0).fit_bins(bin_parts(exact, curve.bins)).parameters_
+    free = curve.free_
+    freed = {name: curve.parameters_[name] for name in free}
+    return shifted(curve, freed, {name: plain[name] for name in free}, slip, noise, "the fit is freed of it")
 
 
 def _compared(bins: Bins) -> FormVerdict | None:

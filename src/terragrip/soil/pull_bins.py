@@ -4,7 +4,8 @@ Slip answers to the ground: under one pull a weak spot slips more than a strong 
 weak spots, and bins at 5 % leave the strongest ground out (decision 0042); noise of slip sorts too. The pull does not answer to the spot.
 So a pair goes into the bin of the slip that the soil's mean curve gives for the vehicle's pull, its driven wheels' mean adhesion.
 The bin's adhesion is the mean over its metres. Its slip is the mean too, on the scale of the prototype curve g (PHYSICS 5): a spot of
-scale a_i has mu_i = a_i g(s_i), so that mean(mu) = a mean(g(s)), which the plain mean of s would miss where the curve bends.
+scale a_i has mu_i = a_i g(s_i), so that mean(mu) = a mean(g(s)), which the plain mean of s would miss where the curve bends. Random errors
+of slip cancel in that mean but for g's bend, which is known: the mean of e^(-k s) under normal errors is e^(k^2 sigma^2 / 2) too large.
 
 This asks that the pull is given and slip follows, as in the field. Where slip is set and the pull follows (a single-wheel test bench), sort
 by slip. It asks too that the curve does not fall within the bins: past its top one pull has two slips.
@@ -17,10 +18,12 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from terragrip.physics.adhesion import PROTOTYPE
 from terragrip.soil.bins import Bins, BinSettings, height_of, slip_of
 
 Array = NDArray[np.float64]
 
+_WIDEST = 0.1
 _ROUNDS = 30
 _CLOSE = 1e-4
 
@@ -32,14 +35,15 @@ def bin_by_pull(
     metres: ArrayLike,
     cluster: ArrayLike | None = None,
     settings: BinSettings | None = None,
-    reference: float | None = None,
+    slip_std: ArrayLike | None = None,
 ) -> Bins:
     """Sort pairs, each array of shape (n,), into slip bins by the pull.
 
     pull: the mean adhesion of the vehicle's driven wheels at that instant [-]; metres: way of the vehicle that the pair stands for [m];
-    cluster: integer labels (run) of what is not independent (default: one). A bin short of `settings.metres` or
-    `settings.runs` (clusters, if there are as many) is joined to the next, the last to the one before.
-    reference: scale a of the curve that sorts; by default the one that the bins then give (fixed point, PHYSICS 5's least squares).
+    cluster: integer labels (run) of what is not independent (default: one). slip_std: SD of the random part of each slip, taken as 0 where
+    it is NaN and as 0.1 where it is more (default: exact). A bin short of `settings.metres` or `settings.runs`
+    (clusters, if there are as many) is joined to the next, the last to the one before. The scale of the curve that sorts is the one that
+    the bins then give (fixed point, PHYSICS 5's least squares).
     `std` of a bin is the SD of adhesion about the curve through it. Pairs without slip, adhesion, pull or way, and pulls outside
     the range, are left out and counted. ValueError if the lengths differ.
     """
@@ -51,7 +55,8 @@ def bin_by_pull(
     good = np.isfinite(columns).all(axis=0) & (columns[3] > 0)
     s, mu, z, dx = (x[good] for x in columns)
     _, compact = np.unique(labels[good], return_inverse=True)
-    height, clusters = height_of(s), int(compact.max()) + 1 if compact.size else 1
+    noise = np.zeros(labels.size) if slip_std is None else np.ravel(np.asarray(slip_std, dtype=float))
+    height, clusters = _unbiased(s, noise[good]), int(compact.max()) + 1 if compact.size else 1
     edges, runs = height_of(chosen.edges), min(chosen.runs, clusters)
     cells = edges.size - 1
 
@@ -59,7 +64,7 @@ def bin_by_pull(
         found = np.bincount(flat, weights=values[inside], minlength=clusters * cells)
         return found.astype(float).reshape(clusters, cells)
 
-    a = _start(mu, height, dx, edges[0]) if reference is None else reference
+    a = _start(mu, height, dx, edges[0])
     for _ in range(_ROUNDS):
         index = np.searchsorted(a * edges, z, side="right") - 1
         inside = (index >= 0) & (index < cells) & (a > 0)
@@ -69,7 +74,7 @@ def bin_by_pull(
         weight, mean, level = (_grouped(x, groups).sum(axis=0) for x in (way, total, heights))
         mean, level = mean / weight, level / weight
         before, a = a, float(mean @ level / max(level @ level, 1e-300)) if groups else a
-        if reference is not None or not groups or abs(a - before) < _CLOSE * abs(before):
+        if not groups or abs(a - before) < _CLOSE * abs(before):
             break
     group_of = np.full(cells, -1)
     for k, group in enumerate(groups):
@@ -92,6 +97,16 @@ def bin_by_pull(
         left_out=int(labels.size - own.size),
         reference=a,
     )  # fmt: skip
+
+
+def _unbiased(slip: Array, noise: Array) -> Array:
+    """The prototype's height (n,), at positive slips freed of what normal errors of SD `noise` (n,) do to it."""
+    share, slow, fast = PROTOTYPE["p"], PROTOTYPE["alpha_1"], PROTOTYPE["alpha_2"]
+    sd = np.clip(np.nan_to_num(noise), 0.0, _WIDEST)
+    freed = 1.0 - sum(
+        part * np.exp(rate * slip - (rate * sd) ** 2 / 2) for part, rate in ((share, slow), (1 - share, fast))
+    )
+    return np.asarray(np.where(slip > 0, freed, height_of(slip)))
 
 
 def _start(mu: Array, height: Array, dx: Array, lowest: float) -> float:

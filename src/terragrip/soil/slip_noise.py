@@ -1,7 +1,8 @@
 """What noise in slip does to a curve, and the correction: simulation-extrapolation (SIMEX, Cook and Stefanski 1994).
 
-Slip is itself an estimate. Samples sorted by a noisy slip flatten the steep part of the curve; sorted by pull, only the curve's bend
-lets noise through. Adding still more noise of known size shows how the parameters move with it; the trend is followed back to no noise.
+Slip is itself an estimate. Samples sorted by a noisy slip flatten the steep part of the curve. Adding still more noise of known size
+shows how the parameters move with it; the trend is followed back to no noise. Sorted by pull only the curve's bend lets noise through,
+and `pull_bins` takes that out.
 """
 
 from __future__ import annotations
@@ -13,9 +14,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from terragrip.errors import InputError
-from terragrip.soil.bins import BY_PULL, bin_pairs
+from terragrip.soil.bins import bin_pairs
 from terragrip.soil.fit import AdhesionCurve
-from terragrip.soil.pull_bins import bin_by_pull
 
 Array = NDArray[np.float64]
 
@@ -41,34 +41,26 @@ def correct_slip_noise(
     slip: ArrayLike,
     adhesion: ArrayLike,
     slip_std: ArrayLike,
-    pull: ArrayLike | None = None,
-    metres: ArrayLike | None = None,
     seed: int = 0,
 ) -> SlipNoise:
     """Refit `curve` (already fitted to these pairs) with added slip noise and follow the parameters back to none.
 
-    slip, adhesion, slip_std: shape (n,); slip_std is the SD of the random part of each slip (a wrong radius is not noise). pull and metres
-    (n,), as `bin_by_pull` takes them, where the curve's bins are by pull; the pulls stay sorted as they were.
+    slip, adhesion, slip_std: shape (n,); slip_std is the SD of the random part of each slip (a wrong radius is not noise).
+    The curve's bins are by slip.
     Good for noise up to about half the lowest bin's slip; beyond it, samples from below the range spoil the trend.
     About 20 000 pairs at most are used, evenly taken. A quadratic in the added variance is extrapolated to -1.
     Raises InputError where a noisy set holds too few bins.
     """
-    by_pull = curve.bins_.settings.by == BY_PULL
-    given = (slip, adhesion, slip_std, *((pull, metres) if by_pull else ()))
-    columns = np.stack([np.ravel(np.asarray(x, dtype=float)) for x in given])
+    columns = np.stack([np.ravel(np.asarray(x, dtype=float)) for x in (slip, adhesion, slip_std)])
     columns = columns[:, np.isfinite(columns).all(axis=0)]
     if not columns.size:
         raise InputError("no pair has a slip deviation", mend="give estimates written by this terragrip")
-    step = max(columns.shape[1] // SAMPLES, 1)
-    s, mu, sd, *others = columns[:, ::step]
+    s, mu, sd = columns[:, :: max(columns.shape[1] // SAMPLES, 1)]
 
     def again(noisy: Array) -> dict[str, float]:
-        if by_pull:
-            z, dx = others
-            bins = bin_by_pull(noisy, mu, z, step * dx, None, curve.bins_.settings, curve.bins_.reference)
-        else:
-            bins = bin_pairs(noisy, mu, None, curve.bins_.settings)
-        return curve.unfitted(bootstrap=0).fit_bins(bins).parameters_
+        return (
+            curve.unfitted(bootstrap=0).fit_bins(bin_pairs(noisy, mu, None, curve.bins_.settings)).parameters_
+        )
 
     rng = np.random.default_rng(seed)
     free = curve.free_
@@ -84,12 +76,24 @@ def correct_slip_noise(
     shift = dict(zip(free, (back[0] - table[0]).tolist(), strict=True))
     plain = {name: float(curve.parameters_[name]) for name in free}
     corrected = {name: plain[name] + shift[name] for name in free}
-    matters = any(_beyond(curve, name, plain[name], corrected[name]) for name in free)
+    return shifted(curve, corrected, plain, s, sd, "take the corrected curve")
+
+
+def shifted(
+    curve: AdhesionCurve,
+    corrected: Mapping[str, float],
+    plain: Mapping[str, float],
+    slip: Array,
+    slip_std: Array,
+    advice: str,
+) -> SlipNoise:
+    """What noise did to the free parameters of `curve`, in numbers and words; slip and its SD of all pairs (n,); `advice` if it matters."""
     settings = curve.bins_.settings
-    inside = (s >= settings.lower) & (s < settings.upper)
-    noise = float(np.median(sd[inside] if inside.any() else sd))
-    moves = ", ".join(f"{name} {plain[name]:.4g} -> {corrected[name]:.4g}" for name in free)
-    verdict = "it matters: take the corrected curve" if matters else "it does not matter here"
+    inside = (slip >= settings.lower) & (slip < settings.upper) & np.isfinite(slip_std)
+    noise = float(np.median(slip_std[inside])) if inside.any() else float(np.nanmedian(slip_std))
+    matters = any(_beyond(curve, name, plain[name], corrected[name]) for name in plain)
+    moves = ", ".join(f"{name} {plain[name]:.4g} -> {corrected[name]:.4g}" for name in plain)
+    verdict = f"it matters: {advice}" if matters else "it does not matter here"
     return SlipNoise(
         plain, corrected, noise, matters, f"Slip noise of {noise:.3f} (SD) moves {moves}; {verdict}."
     )
