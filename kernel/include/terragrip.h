@@ -245,15 +245,31 @@ typedef struct { /* spreads (1 SD) of constants that the data cannot tell; 0 = k
     tg_real acceleration_bias;      /* m/s^2 */
 } tg_uncertainty;
 
-typedef struct { /* when the estimator warns of immobilization; slips are of the driven wheels' mean, low-passed */
-    tg_real duration;               /* s that the signs must last, */
-    tg_real looks;                  /* and over how many measurements of the ground speed in a row */
-    tg_real slip;                   /* a slip below this, less `confidence` of its SDs, is no sign */
+enum { /* signs that the wheels dig, of the driven wheels' means; a change is a mean over a shorter time less one over a longer */
+    TG_SIGN_SLIP,               /* over 0.1 s, */
+    TG_SIGN_SLIP_CALM,          /* over 0.3 s */
+    TG_SIGN_SLIP_RISE,          /* 0.1 s less 1 s */
+    TG_SIGN_SLIP_UNUSUAL,       /* 0.3 s less 20 s, in usual spreads */
+    TG_SIGN_ASYMMETRY_CHANGE,   /* log of the leading axle's adhesion over the trailing one's: 0.1 s less 1 s, */
+    TG_SIGN_ASYMMETRY_LEVEL,    /* 1 s less 20 s, */
+    TG_SIGN_ASYMMETRY_UNUSUAL,  /* 0.3 s less 20 s, in usual spreads */
+    TG_SIGN_GRIP_UNUSUAL,       /* log of adhesion over what the prototype curve makes of the slip: 0.3 s less 20 s, in usual spreads */
+    TG_SIGN_ADHESION_CHANGE,    /* log of adhesion: 0.1 s less 1 s, */
+    TG_SIGN_ADHESION_LEVEL,     /* 0.3 s less 20 s */
+    TG_SIGN_RESISTANCE_CHANGE,  /* soil resistance: 0.1 s less 1 s, */
+    TG_SIGN_RESISTANCE_LEVEL,   /* 0.3 s less 3 s */
+    TG_SIGN_RIM_CHANGE,         /* log of the rim speed: 0.1 s less 1 s, */
+    TG_SIGN_RIM_LEVEL,          /* 0.3 s less 3 s */
+    TG_SIGNS
+};
+
+typedef struct { /* when the estimator warns of immobilization, and calls the vehicle stuck or pushed */
+    tg_real warn;                   /* low-passed score above which it warns: log odds that the vehicle stops within 3 s, in the fit */
+    tg_real release;                /* it warns on until the score is so much below that */
+    tg_real memory;                 /* s, low-pass of the score */
+    tg_real high_slip;              /* slip above this, less `confidence` of its SDs, adds to the score by itself */
     tg_real confidence;
-    tg_real rise;                   /* by how much slip is above its own mean over about 1 s, */
-    tg_real level;                  /* and, less those SDs, above its own mean over 5 s */
-    tg_real grip;                   /* adhesion at this slip, over that of the last 5 s, below which the ground gives way */
-    tg_real high_slip;              /* beyond this slip a rise alone is a sign */
+    tg_real stuck_duration;         /* s that the ground speed must stay below `stuck_travel` */
     tg_real stuck_travel, free_travel; /* ground over rim speed: below the first stuck, free again above the second */
     tg_real push, thrust;           /* push from behind, and thrust meanwhile, over the weight */
     tg_real push_duration;          /* s */
@@ -292,6 +308,8 @@ typedef struct {
 } tg_settings;
 
 typedef struct tg_estimator tg_estimator;
+/* Score of TG_SIGNS signs: log odds that the vehicle stops within 3 s, in the simulated drives that it was fitted to. */
+tg_real tg_digging_score(const tg_real *signs);
 size_t tg_estimator_size(void);
 /* Tuned thresholds, tuning and priors; the machine is left empty, and with it the random walks. */
 tg_settings tg_default_settings(void);

@@ -306,7 +306,7 @@ tg_status tg_estimator_update(tg_estimator *e, const tg_sample *sample, tg_estim
     out->time = row.time;
     out->distance = e->distance;
     report(e, &drive, out);
-    tgi_watch_over(e, &row, &drive, course == TG_GO || course == TG_ANEW, dt, out->value);
+    tgi_watch_over(e, &row, &drive, course == TG_GO || course == TG_ANEW, course == TG_ANEW || gap, dt, out->value);
     out->event = event_of(e, &row, gap || course == TG_WAIT);
     const int32_t learn = out->event == TG_EVENT_NONE || out->event == TG_EVENT_IMMOBILIZATION;
     tgi_curves(e, course == TG_GO && learn && !row.outlier, dt, e->standing ? 0 : travelled * dt, drive.load, out->value);

@@ -85,13 +85,33 @@ typedef struct { /* of the estimated soil resistance: low-passed, and the mean s
     tg_real slow, square;
 } tgi_roughness;
 
-typedef struct { /* the eye on immobilization; means over the driven wheels, along the travel */
-    tg_real slip, middle_slip, slow_slip, rim, slow_rim, adhesion, curve; /* low-passed; curve: 1 - exp(-k slip) */
-    tg_real mean_slip, mean_adhesion, mean_curve, age; /* of the ground so far, over `age` s of looking at most */
-    tg_real grip, grip_before; /* adhesion, and what the ground so far would give at this slip, each with a floor */
-    tg_real evidence, spinning, pushed; /* s that each has held */
-    double time;               /* of the last look */
-    int32_t seen, looks, sinking, stuck, pushing; /* looks: how many in a row showed the signs */
+typedef struct { /* means over the driven wheels, and over the rows of a look; along the travel */
+    tg_real slip, deviation, leading, trailing, adhesion; /* adhesion of the leading and the trailing axles, alike where there is but one */
+    tg_real resistance, rim, travel;
+} tgi_view;
+
+#define TG_SIGNALS 6
+#define TG_MEMORIES 5
+
+typedef struct { /* see digging.c */
+    tg_real leading, trailing, adhesion, curve; /* low-passed; curve: 1 - exp(-k slip) */
+    tg_real mean[TG_SIGNALS][TG_MEMORIES];
+    tg_real square[3];        /* mean square of slip's, asymmetry's and grip's wandering */
+    tg_real age, moved;       /* s of looking, in all and since the last rest */
+    tg_real deviation;        /* SD of the last look's slip */
+    int32_t seen;
+} tgi_signs;
+
+typedef struct { /* the eye on immobilization */
+    tgi_signs signs;
+    tgi_view sum;              /* of the rows since the last look, */
+    int32_t rows;              /* so many */
+    int32_t watching;          /* there was a look, or a row, since the motion began */
+    double look_time, seen_time; /* of the last look, or where the motion began; of the last measured ground speed */
+    tg_real score;             /* low-passed */
+    tg_real rim, spinning, pushed; /* m/s low-passed; s that each has held */
+    double stuck_time;         /* of the last row that was judged for being stuck */
+    int32_t turning, sinking, stuck, pushing; /* turning: rim holds a value */
 } tgi_watch;
 
 typedef struct { /* what follows from the settings alone */
@@ -197,8 +217,13 @@ void tgi_algebraic(tg_estimator *e, const tg_row *row, const tg_drive *drive, in
 void tgi_no_curves(tg_estimator *e);
 void tgi_curves(tg_estimator *e, int32_t learn, tg_real dt, tg_real distance, const tg_real *load, tg_real *o);
 
+/* digging.c */
+void tgi_signs_take(tgi_signs *s, const tgi_view *l, tg_real dt);
+void tgi_signs_rest(tgi_signs *s);
+void tgi_signs_features(const tgi_signs *s, tg_real *x);
+
 /* immobilization.c */
-void tgi_watch_over(tg_estimator *e, const tg_row *row, const tg_drive *drive, int32_t moving, tg_real dt, const tg_real *o);
+void tgi_watch_over(tg_estimator *e, const tg_row *row, const tg_drive *drive, int32_t moving, int32_t anew, tg_real dt, const tg_real *o);
 int32_t tgi_watched(const tg_estimator *e); /* tg_event */
 
 /* traction.c */

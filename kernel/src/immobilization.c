@@ -1,68 +1,81 @@
-/* Is the vehicle about to dig itself in, stuck, or pushed by its tool? Looked at where the ground speed was measured, for a reckoned
- * one follows from the slip last seen. All of it is ours (R); PHYSICS 7 says what a stuck vehicle looks like. */
+/* Is the vehicle about to dig itself in, stuck, or pushed by its tool? All of it is ours (R); PHYSICS 7 says what a stuck vehicle
+ * looks like. */
 #include "estimator.h"
 
-#define TG_FAST ((tg_real)0.1)  /* s, low-pass of what is looked at */
-#define TG_MIDDLE ((tg_real)0.3) /* s, low-pass that slip falls below as soon as the vehicle recovers */
-#define TG_SLOW 1               /* s, low-pass of what it is compared with */
-#define TG_BACK 3               /* times as fast the evidence is lost without the signs as it came */
-#define TG_GRIP_FAST ((tg_real)0.2)
-#define TG_GRIP_MEMORY 5        /* s over which the ground's grip is remembered */
-#define TG_LONGEST_LOOK ((tg_real)1.5) /* s between two looks: after more, what was seen is forgotten */
-#define TG_SELDOM ((tg_real)0.15) /* s between two looks */
-#define TG_STEEPNESS ((tg_real)11.36) /* k of the prototype curve mu = A (1 - exp(-k s)) (PHYSICS 5) */
-#define TG_LEAST_GRIP ((tg_real)0.05) /* of 1 - exp(-k s): less slip tells nothing of the grip */
-#define TG_GRIP_FLOOR ((tg_real)0.03) /* of mu: keeps the grip's ratio calm where there is little traction */
-#define TG_FASTER ((tg_real)1.12) /* rim speed over its own slow mean from which it counts as a change of command */
+#define TG_LOOK ((tg_real)0.095)      /* s between two looks for the signs of digging; rows in between are averaged */
+#define TG_LONGEST_STEP ((tg_real)0.6) /* s that a look counts at most */
+#define TG_NO_SCORE ((tg_real)-6)     /* the score is cut to this, and to as much above 0 */
+#define TG_HIGH_SLIP 20               /* score per unit of slip above `high_slip` */
+#define TG_SILENT ((tg_real)0.55)     /* s without a ground speed after which its slip is no sign by itself */
+#define TG_FAST ((tg_real)0.1)        /* s, low-pass of the rim speed */
+#define TG_LONGEST_LOOK ((tg_real)1.5) /* s between two measured ground speeds: after more, being stuck is judged anew */
 
-typedef struct {
-    tg_real slip, deviation, adhesion, rim, travel;
-} look;
+static void add(tgi_view *sum, const tgi_view *l, tg_real weight)
+{
+    sum->slip += weight * l->slip;
+    sum->deviation += weight * l->deviation;
+    sum->leading += weight * l->leading;
+    sum->trailing += weight * l->trailing;
+    sum->adhesion += weight * l->adhesion;
+    sum->resistance += weight * l->resistance;
+    sum->rim += weight * l->rim;
+    sum->travel += weight * l->travel;
+}
 
-/* Mean over the driven wheels (of none: all), along the travel. */
-static look look_at(const tg_estimator *e, const tg_real *o)
+/* Which end of the machine wheel i is at, along the travel: 1 leading, -1 trailing, 0 neither. */
+static int32_t end_of(const tg_estimator *e, int32_t i)
+{
+    const tg_real lever = (tg_real)e->direction * e->settings.load_transfer[e->settings.wheel_axle[i]];
+    return lever > 0 ? 1 : lever < 0 ? -1 : 0;
+}
+
+/* Means over the driven wheels (of none: all). */
+static tgi_view look_at(const tg_estimator *e, const tg_real *o)
 {
     const int32_t n = e->settings.machine.wheels;
-    look l = {0, 0, 0, 0, 0};
-    tg_real count = 0;
+    tgi_view l;
+    memset(&l, 0, sizeof l);
+    tg_real count = 0, ahead = 0, behind = 0;
     int32_t any = 0;
     for (int32_t i = 0; i < n; i++) any |= e->settings.driven[i];
     for (int32_t i = 0; i < n; i++) {
         if (any && !e->settings.driven[i]) continue;
-        const tg_real deviation = o[TG_OUT_SLIP_STD + i];
+        const tg_real deviation = o[TG_OUT_SLIP_STD + i], adhesion = o[TG_OUT_ADHESION + i];
+        const int32_t end = end_of(e, i);
         l.slip += o[TG_OUT_SLIP + i];
         if (deviation == deviation) l.deviation += deviation;
-        l.adhesion += o[TG_OUT_ADHESION + i];
-        l.rim += e->settings.rolling_radius[i] * tgi_fabs(o[TG_OUT_WHEEL_SPEED + i]);
+        l.adhesion += adhesion;
+        l.rim += e->settings.rolling_radius[i] * o[TG_OUT_WHEEL_SPEED + i];
         count += 1;
+        if (end > 0) {
+            l.leading += adhesion;
+            ahead += 1;
+        } else if (end < 0) {
+            l.trailing += adhesion;
+            behind += 1;
+        }
     }
     l.slip /= count;
     l.deviation /= count;
     l.adhesion /= count;
-    l.rim /= count;
+    l.rim = tgi_fabs(l.rim) / count; /* on the spot, wheels turn against each other: that goes nowhere, and is not stuck */
+    l.leading = ahead > 0 && behind > 0 ? l.leading / ahead : l.adhesion;
+    l.trailing = ahead > 0 && behind > 0 ? l.trailing / behind : l.adhesion;
+    l.resistance = o[TG_OUT_SOIL_RESISTANCE];
     l.travel = (tg_real)e->direction * o[TG_OUT_GROUND_SPEED];
     if (l.slip < (tg_real)-0.2) l.slip = (tg_real)-0.2;
     return l;
 }
 
-/* SDs of slip to be sure by: where the ground speed comes seldom, no mean over many makes up for its noise. */
-static tg_real confidence_at(const tg_watch_settings *s, tg_real since)
-{
-    return since > TG_SELDOM ? s->confidence * since / TG_SELDOM : s->confidence;
-}
-
-/* Low-pass with a plain mean at first. */
-static void remember(tg_real *mean, tg_real age, tg_real dt, tg_real tau, tg_real x)
-{
-    if (tau > age) tau = age;
-    if (dt > 0) *mean += dt / (tau + dt) * (x - *mean);
-}
-
 static void forget_motion(tgi_watch *w)
 {
-    w->seen = w->looks = 0;
-    w->evidence = w->spinning = w->pushed = 0;
-    w->sinking = w->stuck = w->pushing = 0;
+    tgi_signs_rest(&w->signs);
+    memset(&w->sum, 0, sizeof w->sum);
+    w->rows = w->watching = w->turning = 0;
+    w->score = TG_NO_SCORE;
+    w->seen_time = -1e9;
+    w->spinning = 0;
+    w->sinking = w->stuck = 0;
 }
 
 /* Seconds that something holds, and `back` times as fast back: neither a jolt nor a sample decides. */
@@ -72,66 +85,61 @@ static tg_real count_seconds(tg_real seconds, tg_real dt, int32_t holds, tg_real
     return seconds < 0 ? 0 : seconds > most ? most : seconds;
 }
 
-/* The wheels go on as commanded, slip rises for a while above what it was, and the ground gives less adhesion for it than before: the
- * wheels dig. Slip beyond `high_slip` needs no such comparison. After a hit on a root slip falls again: no sign from then on. */
-static int32_t digs(const tg_watch_settings *s, const tgi_watch *w, tg_real doubt, tg_real least_rim)
+/* Score of the signs now. Slip beyond `high_slip`, less some of its SDs, counts by itself, unless the ground speed is only reckoned. */
+static tg_real score_of(const tg_watch_settings *s, const tgi_signs *signs, tg_real silence)
 {
-    const tg_real sure = w->slip - doubt, rise = w->slip - w->slow_slip;
-    const int32_t steady = w->rim < TG_FASTER * w->slow_rim + (tg_real)0.02 && w->rim > least_rim;
-    const int32_t worse = sure > s->slip && w->grip < s->grip * w->grip_before;
-    const int32_t rises = rise > s->rise && w->slip > w->middle_slip && sure - w->mean_slip > s->level;
-    return steady && rises && (worse || sure > s->high_slip);
+    tg_real x[TG_SIGNS];
+    tgi_signs_features(signs, x);
+    tg_real score = tg_digging_score(x);
+    const tg_real high = x[TG_SIGN_SLIP] - s->confidence * signs->deviation - s->high_slip;
+    score = score < TG_NO_SCORE ? TG_NO_SCORE : score > -TG_NO_SCORE ? -TG_NO_SCORE : score;
+    return high > 0 && silence < TG_SILENT ? score + TG_HIGH_SLIP * high : score;
 }
 
-/* 1 - exp(-k s) of the prototype curve. */
-static tg_real curve_at(tg_real slip)
-{
-    return slip > 0 ? 1 - tgi_exp(-TG_STEEPNESS * slip) : 0;
-}
-
-static void track(tgi_watch *w, const look *l, tg_real confidence, tg_real dt)
-{
-    const tg_real curve = curve_at(l->slip - confidence * l->deviation), middle = curve_at(l->slip);
-    if (!w->seen) {
-        w->slip = w->middle_slip = w->slow_slip = l->slip;
-        w->rim = w->slow_rim = l->rim;
-        w->adhesion = l->adhesion;
-        w->curve = curve;
-    }
-    w->seen = 1;
-    w->slip += dt / (TG_FAST + dt) * (l->slip - w->slip);
-    w->middle_slip += dt / (TG_MIDDLE + dt) * (l->slip - w->middle_slip);
-    w->slow_slip += dt / (TG_SLOW + dt) * (l->slip - w->slow_slip);
-    w->rim += dt / (TG_FAST + dt) * (l->rim - w->rim);
-    w->slow_rim += dt / (TG_SLOW + dt) * (l->rim - w->slow_rim);
-    w->adhesion += dt / (TG_GRIP_FAST + dt) * (l->adhesion - w->adhesion);
-    w->curve += dt / (TG_GRIP_FAST + dt) * (curve - w->curve);
-    remember(&w->mean_slip, w->age, dt, TG_GRIP_MEMORY, l->slip);
-    remember(&w->mean_adhesion, w->age, dt, TG_GRIP_MEMORY, l->adhesion);
-    remember(&w->mean_curve, w->age, dt, TG_GRIP_MEMORY, middle > TG_LEAST_GRIP ? middle : TG_LEAST_GRIP);
-    w->age += dt;
-    const tg_real expected = w->mean_curve > 0 ? w->mean_adhesion / w->mean_curve * w->curve : w->adhesion;
-    w->grip = w->adhesion + TG_GRIP_FLOOR;
-    w->grip_before = (expected > 0 ? expected : 0) + TG_GRIP_FLOOR;
-}
-
-static void judge(tg_estimator *e, const look *l, tg_real dt)
+static void watch_digging(tg_estimator *e, const tg_row *row, const tgi_view *now)
 {
     const tg_watch_settings *s = &e->settings.watch;
     tgi_watch *w = &e->watch;
-    const tg_real least_rim = 3 * e->settings.standstill_speed;
-    const int32_t holds = digs(s, w, confidence_at(s, dt) * l->deviation, least_rim) || (w->sinking && w->slip > s->high_slip);
-    w->evidence = count_seconds(w->evidence, dt, holds, TG_BACK, 2 * s->duration);
-    w->looks = !holds ? 0 : w->looks < 100 ? w->looks + 1 : 100;
-    w->sinking = (w->evidence >= s->duration && w->looks >= (int32_t)s->looks) || (w->sinking && w->evidence > 0);
-
-    const int32_t turning = w->rim > least_rim, held_up = turning && l->travel < s->stuck_travel * l->rim;
-    w->spinning = held_up ? w->spinning + dt : 0;
-    w->stuck = turning && (w->spinning >= s->duration || (w->stuck && l->travel < s->free_travel * l->rim));
-    if (w->stuck) { /* too late for a warning, and none while it comes free */
-        w->evidence = 0;
+    add(&w->sum, now, 1);
+    w->rows++;
+    const tg_real since = w->watching ? (tg_real)(row->time - w->look_time) : 0;
+    if (w->watching && since < TG_LOOK) return;
+    tgi_view l;
+    memset(&l, 0, sizeof l);
+    add(&l, &w->sum, 1 / (tg_real)w->rows);
+    memset(&w->sum, 0, sizeof w->sum);
+    w->rows = 0;
+    w->watching = 1;
+    w->look_time = row->time;
+    tgi_signs_take(&w->signs, &l, since);
+    if (w->stuck || l.rim < 3 * e->settings.standstill_speed) { /* too late for a warning, or nowhere to go */
+        w->score = TG_NO_SCORE;
         w->sinking = 0;
+        return;
     }
+    const tg_real step = since < TG_LONGEST_STEP ? since : TG_LONGEST_STEP;
+    w->score += step / (s->memory + step) * (score_of(s, &w->signs, (tg_real)(row->time - w->seen_time)) - w->score);
+    w->sinking = w->score > s->warn || (w->sinking && w->score > s->warn - s->release);
+}
+
+/* Where the ground speed was measured, for a reckoned one follows from the slip last seen. */
+static void watch_stuck(tg_estimator *e, const tg_row *row, const tgi_view *l)
+{
+    const tg_watch_settings *s = &e->settings.watch;
+    tgi_watch *w = &e->watch;
+    tg_real dt = w->turning ? (tg_real)(row->time - w->stuck_time) : 0;
+    if (dt > TG_LONGEST_LOOK) {
+        dt = 0;
+        w->turning = w->stuck = 0;
+        w->spinning = 0;
+    }
+    w->rim = w->turning ? w->rim + dt / (TG_FAST + dt) * (l->rim - w->rim) : l->rim;
+    w->turning = 1;
+    w->stuck_time = row->time;
+    const int32_t turning = w->rim > 3 * e->settings.standstill_speed, held_up = turning && l->travel < s->stuck_travel * l->rim;
+    w->spinning = held_up ? w->spinning + dt : 0;
+    w->stuck = turning && (w->spinning >= s->stuck_duration || (w->stuck && l->travel < s->free_travel * l->rim));
+    if (w->stuck) w->sinking = 0;
 }
 
 /* What pushes from behind: a bar under pressure, or, without a cell, a resistance that is less than none. */
@@ -149,29 +157,25 @@ static void judge_push(tg_estimator *e, const tg_drive *drive, const tg_real *o,
     w->pushing = w->pushed >= s->push_duration || (w->pushing && w->pushed > 0);
 }
 
-/* After a row's values were worked out; `moving`: the filter went on with it. */
-void tgi_watch_over(tg_estimator *e, const tg_row *row, const tg_drive *drive, int32_t moving, tg_real dt, const tg_real *o)
+/* After a row's values were worked out; `moving`: the filter went on with it, `anew`: from a new start. */
+void tgi_watch_over(tg_estimator *e, const tg_row *row, const tg_drive *drive, int32_t moving, int32_t anew, tg_real dt, const tg_real *o)
 {
     tgi_watch *w = &e->watch;
-    if (e->standing || !e->seen_motion) {
-        forget_motion(w);
-        return;
+    const int32_t rests = e->standing || !e->seen_motion;
+    if (rests || !moving || anew || isnan(o[TG_OUT_SLIP])) forget_motion(w);
+    if (rests) {
+        w->pushed = 0;
+        w->pushing = 0;
     }
-    if (!moving) return;
+    if (rests || !moving) return;
     judge_push(e, drive, o, dt);
-    if (row->reckoned || isnan(row->value[TG_GROUND_SPEED]) || isnan(o[TG_OUT_SLIP])) {
-        if (w->seen && row->time - w->time > (double)TG_LONGEST_LOOK) forget_motion(w);
-        return;
+    if (isnan(o[TG_OUT_SLIP])) return;
+    const tgi_view l = look_at(e, o);
+    if (!row->reckoned && !isnan(row->value[TG_GROUND_SPEED])) {
+        w->seen_time = row->time;
+        watch_stuck(e, row, &l);
     }
-    const look l = look_at(e, o);
-    tg_real since = w->seen ? (tg_real)(row->time - w->time) : 0;
-    if (since > TG_LONGEST_LOOK) {
-        forget_motion(w);
-        since = 0;
-    }
-    track(w, &l, confidence_at(&e->settings.watch, since), since);
-    judge(e, &l, since);
-    w->time = row->time;
+    watch_digging(e, row, &l);
 }
 
 int32_t tgi_watched(const tg_estimator *e)

@@ -16,18 +16,16 @@ static int is_spread(tg_real x)
     return is_number(x) && x >= 0;
 }
 
-/* Tuned on the drives of simulation/soft_spots.py, seeds 1000 to 1019, and on nothing else. */
+/* Tuned on the drives of simulation/soft_spots.py, seeds 1000 to 1199, and on nothing else. */
 static tg_watch_settings default_watch(void)
 {
     tg_watch_settings w;
-    w.duration = (tg_real)0.55;
-    w.looks = 3;
-    w.slip = (tg_real)0.08;
-    w.confidence = 1;
-    w.rise = (tg_real)0.015;
-    w.level = (tg_real)0.035;
-    w.grip = (tg_real)0.92;
-    w.high_slip = (tg_real)0.35;
+    w.warn = 1;
+    w.release = 2;
+    w.memory = (tg_real)0.4;
+    w.high_slip = (tg_real)0.3;
+    w.confidence = 2;
+    w.stuck_duration = (tg_real)0.5;
     w.stuck_travel = (tg_real)0.1;
     w.free_travel = (tg_real)0.4;
     w.push = (tg_real)0.005;
@@ -101,16 +99,16 @@ static tg_status check_numbers(const tg_settings *s)
     const tg_real spreads[] = {u->drive_torque_gain, u->drive_torque_gain_common, u->drive_torque_offset, u->drawbar_gain, u->drawbar_offset, u->slope,
                                u->tire_rolling_resistance, u->vertical_load, u->wheel_radius, u->acceleration_bias,
                                s->slope_spread, s->standstill_speed, s->outlier_weight, s->load_filter, s->center_of_gravity_height,
-                               s->hitch_height, s->watch.duration, s->watch.looks, s->watch.slip, s->watch.confidence, s->watch.rise, s->watch.level, s->watch.grip,
-                               s->watch.high_slip, s->watch.stuck_travel, s->watch.free_travel, s->watch.push, s->watch.thrust,
+                               s->hitch_height, s->watch.release, s->watch.high_slip, s->watch.confidence,
+                               s->watch.stuck_duration, s->watch.stuck_travel, s->watch.free_travel, s->watch.push, s->watch.thrust,
                                s->watch.push_duration};
-    const tg_real positive[] = {s->prior_adhesion_std, s->prior_resistance_std, s->gap, s->max_step, s->algebraic_filter,
+    const tg_real positive[] = {s->watch.memory, s->prior_adhesion_std, s->prior_resistance_std, s->gap, s->max_step, s->algebraic_filter,
                                 s->noise[TG_GROUND_SPEED], s->noise[TG_ACCELERATION_X]};
     for (size_t k = 0; k < sizeof spreads / sizeof *spreads; k++)
         if (!is_spread(spreads[k])) return TG_NOT_POSITIVE;
     for (size_t k = 0; k < sizeof positive / sizeof *positive; k++)
         if (!is_positive(positive[k])) return TG_NOT_POSITIVE;
-    if (!is_number(s->prior_adhesion) || !is_number(s->prior_resistance)) return TG_NOT_FINITE;
+    if (!is_number(s->watch.warn) || !is_number(s->prior_adhesion) || !is_number(s->prior_resistance)) return TG_NOT_FINITE;
     for (int32_t k = 0; k < TG_SLOTS; k++) {
         if (!is_number(s->offset[k])) return TG_NOT_FINITE;
         if (!is_positive(s->gain[k]) || !is_spread(s->noise[k]) || !is_spread(s->held_period[k])) return TG_NOT_POSITIVE;

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -39,6 +39,11 @@ def watch_limits() -> dict[str, float]:
     names = [name for name, _ in ffi.typeof("tg_watch_settings").fields]
     found = {name: float(getattr(settings.watch, name)) for name in names}
     return found | {"gap": float(settings.gap), "standstill_speed": float(settings.standstill_speed)}
+
+
+def digging_score(signs: Iterable[float]) -> float:
+    """Log odds that the vehicle stops within 3 s, of the signs TG_SIGN_* (R; in the simulated drives it was fitted to)."""
+    return float(lib.tg_digging_score(ffi.new("tg_real[]", list(signs))))
 
 
 def sample_slots(vehicle: Vehicle) -> dict[str, int]:

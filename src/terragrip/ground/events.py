@@ -9,12 +9,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from terragrip.estimation import Estimates
-from terragrip.estimation.engine import EVENTS, watch_limits
+from terragrip.estimation.engine import EVENTS, digging_score, watch_limits
+from terragrip.estimation.reference.immobilization import ASYMMETRY, GRIP, SIGNS, SLIP, Watch, rows_of
 
 Array = NDArray[np.float64]
 
 CLOSE = 0.3
 """s: spells of one kind that lie closer are one event."""
+
+RECALL = 60.0
+"""s before a warning from which its signs are worked out again: what is usual goes back 20 s."""
+LEAST_GAIN = 0.5
+"""Of the score: what adds less is no reason."""
 
 
 @dataclass(frozen=True)
@@ -64,17 +70,45 @@ def _immobilization(estimates: Estimates, rows: NDArray[np.intp]) -> str:
     limits, first = watch_limits(), rows[:1]
     before = _second_before(estimates, rows[0])
     slip, was = _mean(estimates, "slip", first)[0], np.nanmean(_mean(estimates, "slip", before))
-    grip, had = _mean(estimates, "adhesion", first)[0], np.nanmean(_mean(estimates, "adhesion", before))
     speed, went = estimates["ground_speed"][rows[0]], np.nanmean(estimates["ground_speed"][before])
     rim = _rim_change(estimates, before, rows[0])
+    told = _leading_signs(estimates, int(rows[0]))
     return (
         f"The wheels begin to dig: within a second slip went from {was:.0%} to {slip:.0%} and ground speed from "
-        f"{abs(went):.2f} to {abs(speed):.2f} m/s while the wheels {rim}, and adhesion went from {had:.2f} to {grip:.2f}: "
-        f"the warning comes when slip above {limits['slip']:.0%} and well above its usual level rises for "
-        f"{limits['duration']:g} s and brings less than "
-        f"{limits['grip']:.0%} of the adhesion that the ground before gave at such slip, or rises beyond "
-        f"{limits['high_slip']:.0%}."
+        f"{abs(went):.2f} to {abs(speed):.2f} m/s while the wheels {rim}{told}; the warning comes when the signs' "
+        f"score, log odds of a full stop within 3 s in simulated drives, is above {limits['warn']:g} over "
+        f"{limits['memory']:g} s, and slip beyond {limits['high_slip']:.0%} adds to it by itself."
     )
+
+
+def _leading_signs(estimates: Estimates, row: int) -> str:
+    """What adds most to the score of a warning that starts at ``row``: each group of signs against what is usual."""
+    if "vehicle" not in estimates.about:
+        return ""
+    first = int(np.searchsorted(estimates.time, estimates.time[row] - RECALL))
+    watch, part = Watch(watch_limits()), slice(first, row + 1)
+    measured = np.ones(len(estimates), bool)
+    for seen in rows_of(estimates, measured, part):
+        watch.take(seen)
+    if not watch.signs.seen:
+        return ""
+    signs, means = dict(zip(SIGNS, watch.signs.features(), strict=True)), watch.signs.mean
+    usual = float(means[SLIP, -1])
+    ratio, grip = (float(np.exp(means[k, 1] - means[k, -1])) for k in (ASYMMETRY, GRIP))
+    groups = {
+        f"slip is {signs['slip_calm'] - usual:.0%} above its usual {usual:.0%}, {signs['slip_unusual']:.1f} times its "
+        "usual wandering": {"slip": usual, "slip_calm": usual, "slip_rise": 0.0, "slip_unusual": 0.0},
+        f"the leading wheels' adhesion over the trailing ones' is {ratio:.0%} of the usual": {
+            name: 0.0 for name in SIGNS if name.startswith("asymmetry")
+        },
+        f"adhesion is {grip:.0%} of what the ground before would give at such slip": {
+            name: 0.0 for name in SIGNS if name.startswith(("grip", "adhesion", "resistance"))
+        },
+    }
+    score = digging_score(list(signs.values()))
+    gains = {text: score - digging_score(list((signs | calm).values())) for text, calm in groups.items()}
+    leading = [text for text in sorted(gains, key=lambda text: -gains[text]) if gains[text] > LEAST_GAIN]
+    return ", because " + ", and ".join(leading[:2]) if leading else ""
 
 
 def _second_before(estimates: Estimates, row: np.intp) -> NDArray[np.intp]:
@@ -102,8 +136,8 @@ def _stuck(estimates: Estimates, rows: NDArray[np.intp]) -> str:
     adhesion = float(np.nanmedian(_mean(estimates, "adhesion", rows)))
     return (
         f"The wheels turn at {turning:.2f} rad/s and the vehicle moves at {speed:.2f} m/s, with adhesion at {adhesion:.2f} "
-        f"from the drive torques: stuck where ground speed stays below {limits['stuck_travel']:.0%} of the wheels' rim speed, "
-        f"free again above {limits['free_travel']:.0%}."
+        f"from the drive torques: stuck where ground speed stays below {limits['stuck_travel']:.0%} of the wheels' rim speed "
+        f"for {limits['stuck_duration']:g} s, free again above {limits['free_travel']:.0%}."
     )
 
 

@@ -1,0 +1,281 @@
+"""Fit the score of the warning of immobilization to simulated drives, and write it into the kernel.
+
+    python benchmarks/fit_immobilization.py [--seeds 1000 1199] [--cache DIRECTORY] [--workers 2] [--write]
+
+The signs (terragrip.estimation.reference.immobilization) of drives into soft spots and of rough healthy ones, for each seed
+on both curves and at three rates without a drawbar cell; of every third seed also as a vehicle with one driven axle would
+show them, without front and rear to compare. Told apart: looks within AHEAD seconds before a full stop in a spot, and looks
+of healthy driving, or before the spot. The score is the log odds, a sum of small trees (scikit-learn's gradient boosting),
+monotone in slip, in the asymmetry of the axles and in grip. A cross-validation over seeds is printed first.
+--write puts the table into kernel/src/digging_table.h. Needs scikit-learn (extra `classifier`).
+"""
+
+from __future__ import annotations
+
+import argparse
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from sklearn.ensemble import HistGradientBoostingClassifier
+
+from bench_immobilization import LATER, SPOT, Tally, full_stop
+from terragrip.estimation import estimate
+from terragrip.estimation.engine import EVENTS, watch_limits
+from terragrip.estimation.reference.immobilization import (
+    HIGH_SLIP,
+    LONGEST_STEP,
+    NO_SCORE,
+    SIGNS,
+    SILENT,
+    Row,
+    Watch,
+    rows_of,
+)  # fmt: skip
+from terragrip.simulation import simulate
+from terragrip.simulation.soft_spots import CURVES, healthy_drive, soft_spot_drive
+
+Array = NDArray[np.float64]
+
+SENSORS: dict[str, dict[str, Any]] = {
+    "100 Hz": {"drawbar": False},
+    "10 Hz": {"rate": 10.0, "drawbar": False},
+    "ground speed 2 Hz": {"rate": 50.0, "drawbar": False, "ground_rate": 2.0},
+}
+AHEAD = 3.0  # s
+FOLDS = 4
+RISING = dict.fromkeys(("slip", "slip_calm", "slip_rise", "slip_unusual"), 1)
+FALLING = dict.fromkeys(("asymmetry_change", "asymmetry_level", "asymmetry_unusual", "grip_unusual"), -1)
+MODEL = {
+    "max_iter": 120,
+    "max_leaf_nodes": 8,
+    "learning_rate": 0.12,
+    "min_samples_leaf": 150,
+    "l2_regularization": 5.0,
+    "monotonic_cst": [(RISING | FALLING).get(name, 0) for name in SIGNS],
+    "early_stopping": False,
+}
+TABLE = Path(__file__).resolve().parents[1] / "kernel/src/digging_table.h"
+
+
+@dataclass
+class Drive:
+    """The looks of one drive: time [s], signs, SD of slip, silence of the ground speed [s], whether it was stuck; looks
+    where the motion began anew. Full stop (NaN: none), begin of the spot and end of the drive [s]."""
+
+    seed: int
+    curve: str
+    sensors: str
+    kind: str
+    time: Array
+    signs: Array
+    deviation: Array
+    silence: Array
+    stuck: NDArray[np.bool_]
+    fresh: NDArray[np.bool_]
+    stop: float
+    begun: float
+    end: float
+
+    def labels(self) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+        """Looks that foretell a stop, and looks that may be learned from."""
+        t, ahead = self.time, np.zeros(len(self.time), bool)
+        use = ~self.stuck
+        if self.kind == "healthy":
+            return ahead, use & ~(t >= self.stop - LATER)
+        if np.isnan(self.stop):
+            return ahead, use & (t <= self.begun)
+        ahead = (t > self.stop - AHEAD) & (t < self.stop) & (t > self.begun)
+        return ahead, use & (t < self.stop) & ((t < self.begun) | (t > self.stop - AHEAD))
+
+
+def looks(rows: list[Row], stuck: NDArray[np.bool_]) -> dict[str, Array]:
+    """What a watch sees, look by look."""
+    watch = Watch(watch_limits() | {"stuck_duration": np.inf})
+    found: list[list[float]] = []
+    fresh, total, count, seen = True, 0.0, 0, -np.inf
+    for row, held in zip(rows, stuck.tolist(), strict=True):
+        watch.take(row)
+        if np.isnan(row.slip):
+            fresh, total, count, seen = True, 0.0, 0, -np.inf
+            continue
+        seen = row.time if row.measured else seen
+        total, count = total + row.deviation, count + 1
+        if watch.looked:
+            signs = watch.signs.features()
+            found.append([row.time, total / count, min(row.time - seen, 9.0), held, fresh, *signs])
+            fresh, total, count = False, 0.0, 0
+    table = np.array(found)
+    names = ("time", "deviation", "silence", "stuck", "fresh")
+    return {name: table[:, k] for k, name in enumerate(names)} | {"signs": table[:, len(names) :]}
+
+
+def drive_of(job: tuple[int, str, str, str, str | None]) -> Drive:
+    seed, curve, sensors, kind, cache = job
+    kept = Path(cache or ".") / f"{sensors}_{curve}_{kind}_{seed}.npz".replace(" ", "-")
+    if cache and kept.exists():
+        with np.load(kept) as held:
+            return Drive(seed, curve, sensors, kind, **{name: held[name][()] for name in held.files})
+    options = SENSORS[sensors]
+    scenario = (
+        soft_spot_drive(seed, curve, **options)
+        if kind == "spot"
+        else healthy_drive(seed, curve, faults=seed % 2 == 0, **options)
+    )
+    result = simulate(scenario, seed)
+    table, truth = estimate(result.recording, result.vehicle), result.truth
+    measured = np.isfinite(result.recording.channels["ground_speed"])
+    seen = looks(rows_of(table, measured), table.event_codes == EVENTS.index("stuck"))
+    stop, time = full_stop(truth), truth["time"].to_numpy()
+    begun = float(time[np.argmax(truth["true_distance"].to_numpy() > SPOT)])
+    flags = {name: seen.pop(name).astype(bool) for name in ("stuck", "fresh")}
+    found: dict[str, Any] = {
+        **seen, **flags, "stop": np.nan if stop is None else stop, "begun": begun, "end": float(time[-1]),
+    }  # fmt: skip
+    if cache:
+        Path(cache).mkdir(parents=True, exist_ok=True)
+        np.savez(kept, **found)
+    return Drive(seed, curve, sensors, kind, **found)
+
+
+def fit(drives: list[Drive]) -> HistGradientBoostingClassifier:
+    signs, ahead = [], []
+    alike = [k for k, name in enumerate(SIGNS) if name.startswith("asymmetry")]
+    for drive in drives:
+        label, use = drive.labels()
+        signs.append(drive.signs[use])
+        ahead.append(label[use])
+        if drive.seed % 3 == 0:
+            one_axle = drive.signs[use].copy()
+            one_axle[:, alike] = 0
+            signs.append(one_axle)
+            ahead.append(label[use])
+    return HistGradientBoostingClassifier(**MODEL).fit(np.concatenate(signs), np.concatenate(ahead))
+
+
+def warnings_of(drive: Drive, scores: Array, limits: dict[str, float]) -> list[float]:
+    """Starts of the warnings [s]: the kernel's rule, over the scores of the looks."""
+    found, level, on, last = [], NO_SCORE, False, -np.inf
+    high = drive.signs[:, 0] - limits["confidence"] * drive.deviation - limits["high_slip"]
+    raw = np.clip(scores, NO_SCORE, -NO_SCORE) + np.where(
+        drive.silence < SILENT, HIGH_SLIP * np.maximum(high, 0), 0
+    )
+    step = np.where(drive.fresh, 0.0, np.diff(drive.time, prepend=drive.time[0])).clip(0, LONGEST_STEP)
+    for t, score, dt, fresh, stuck in zip(drive.time, raw, step, drive.fresh, drive.stuck, strict=True):
+        if fresh or stuck:
+            level, on = NO_SCORE, False
+            if stuck:
+                continue
+        level += dt / (limits["memory"] + dt) * (score - level)
+        was, on = on, level > limits["warn"] or (on and level > limits["warn"] - limits["release"])
+        if on and not was and t - last > 0.3:
+            found.append(float(t))
+        if on:
+            last = t
+    return found
+
+
+def judge(drive: Drive, scores: Array, limits: dict[str, float]) -> Tally:
+    starts = warnings_of(drive, scores, limits)
+    if drive.kind == "healthy":
+        end = drive.end if np.isnan(drive.stop) else drive.stop - LATER
+        return Tally(false=sum(t < end for t in starts), seconds=max(end, 0.0))
+    if np.isnan(drive.stop) or drive.stop < drive.begun:
+        return Tally()
+    before = [t for t in starts if drive.begun < t < drive.stop]
+    return Tally(leads=[drive.stop - before[0]]) if before else Tally(missed=1)
+
+
+def raw_score(model: HistGradientBoostingClassifier, signs: Array) -> Array:
+    return np.asarray(model.decision_function(signs), float)
+
+
+def cross_validate(drives: list[Drive], *, one_axle: bool) -> None:
+    limits = watch_limits()
+    tallies: dict[tuple[str, str], Tally] = {}
+    for fold in range(FOLDS):
+        model = fit([d for d in drives if d.seed % FOLDS != fold])
+        for drive in (d for d in drives if d.seed % FOLDS == fold):
+            signs = drive.signs.copy()
+            if one_axle:
+                signs[:, [k for k, name in enumerate(SIGNS) if name.startswith("asymmetry")]] = 0
+            tally = tallies.setdefault((drive.sensors, drive.curve), Tally())
+            tally.add(judge(drive, raw_score(model, signs), limits))
+    print("One driven axle:" if one_axle else "Cross-validation over seeds:")
+    for (sensors, curve), tally in tallies.items():
+        row = tally.row()
+        print(
+            f"  {sensors:18s} {curve:10s} stops {row[0]} missed {row[1]} lead {row[2]} (10 %: {row[3]}) s false in 30 min {row[7]}"
+        )
+
+
+def table_of(model: HistGradientBoostingClassifier, drives: int) -> str:
+    """The fitted trees as C."""
+    branches: list[str] = []
+    leaves: list[str] = []
+    roots: list[str] = []
+
+    def place(nodes: Any, k: int) -> int:
+        node = nodes[k]
+        if node["is_leaf"]:
+            leaves.append(f"R({node['value']:.5g})")
+            return -len(leaves)
+        mine = len(branches)
+        branches.append("")
+        below, above = place(nodes, int(node["left"])), place(nodes, int(node["right"]))
+        branches[mine] = f"{{R({node['num_threshold']:.6g}), {node['feature_idx']}, {below}, {above}}}"
+        return mine
+
+    for (predictor,) in model._predictors:
+        roots.append(str(place(predictor.nodes, 0)))
+    base = float(np.ravel(model._baseline_prediction)[0])
+    lines = [
+        f"/* Made by benchmarks/fit_immobilization.py --write from {drives} simulated drives; not to be edited. */",
+        "#ifndef TG_DIGGING_TABLE_H", "#define TG_DIGGING_TABLE_H", '#include "estimator.h"', "",
+        "#define R(x) ((tg_real)(x))", f"#define TG_DIGGING_BASE ((tg_real)({base:.6g}))", f"#define TG_DIGGING_TREES {len(roots)}", "",
+        "typedef struct { /* below: where to go if the sign TG_SIGN_* is at most `at`; a leaf k is -k - 1 */",
+        "    tg_real at;", "    int16_t sign, below, above;", "} tgi_branch;", "",
+        "static const int16_t digging_root[TG_DIGGING_TREES] = {", *_wrapped(roots), "};", "",
+        f"static const tgi_branch digging_branch[{len(branches)}] = {{", *_wrapped(branches), "};", "",
+        f"static const tg_real digging_leaf[{len(leaves)}] = {{", *_wrapped(leaves), "};", "#undef R", "#endif", "",
+    ]  # fmt: skip
+    return "\n".join(lines)
+
+
+def _wrapped(items: list[str]) -> list[str]:
+    lines = [""]
+    for item in items:
+        if len(lines[-1]) + len(item) > 130:
+            lines.append("")
+        lines[-1] += f" {item}," if lines[-1] else f"    {item},"
+    return lines
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
+    parser.add_argument("--seeds", type=int, nargs=2, default=(1000, 1199), metavar=("FIRST", "LAST"))
+    parser.add_argument("--cache", help="directory that keeps the looks of the drives")
+    parser.add_argument("--workers", type=int, default=1)
+    parser.add_argument("--write", action="store_true", help="put the table into the kernel")
+    arguments = parser.parse_args()
+    seeds = range(arguments.seeds[0], arguments.seeds[1] + 1)
+    jobs = [
+        (seed, curve, sensors, kind, arguments.cache)
+        for sensors in SENSORS
+        for curve in CURVES
+        for seed in seeds
+        for kind in ("spot", "healthy")
+    ]
+    with ProcessPoolExecutor(arguments.workers) as pool:
+        drives = list(pool.map(drive_of, jobs, chunksize=8))
+    cross_validate(drives, one_axle=False)
+    cross_validate(drives, one_axle=True)
+    if arguments.write:
+        TABLE.write_text(table_of(fit(drives), len(drives)), encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()
