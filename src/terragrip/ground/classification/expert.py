@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
@@ -48,7 +47,7 @@ class Parts:
     law: MotionLaw | None
 
     @classmethod
-    def fit(cls, names: Sequence[str], windows: Examples, rows: npt.NDArray[np.bool_], seed: int) -> Parts:
+    def fit(cls, names: tuple[str, ...], windows: Examples, rows: npt.NDArray[np.bool_], seed: int) -> Parts:
         """Fit all parts to some ``rows`` (n,) of the windows, whose features have these names."""
         roles, features, codes = roles_of(names), windows.features[rows], windows.codes[rows]
         own = features[:, roles.machine]
@@ -61,7 +60,7 @@ class Parts:
         machine = KernelMachine.fit(points, codes)
         return cls(scaling, machine, Discriminants.fit(points, codes), forest, law)
 
-    def decide(self, names: Sequence[str], features: Floats) -> tuple[Floats, Floats]:
+    def decide(self, names: tuple[str, ...], features: Floats) -> tuple[Floats, Floats]:
         """Scores (parts, n, classes), the machine's first, and what makes windows strange (3, n), more being stranger."""
         roles = roles_of(names)
         points = self.standardization.apply(features[:, roles.machine])
@@ -94,7 +93,7 @@ class Expert:
 
 
 def train(
-    families: frozenset[str], names: Sequence[str], windows: Examples, threads: int, seed: int
+    families: frozenset[str], names: tuple[str, ...], windows: Examples, threads: int, seed: int
 ) -> Expert:
     """Fit an expert; what is said of probabilities and strangeness is learnt from windows of recordings that were held out."""
     codes, folds = windows.codes, windows.folds
@@ -115,7 +114,7 @@ def train(
     _, of_recording, size = np.unique(windows.groups, return_inverse=True, return_counts=True)
     weight = _class_weights(same / np.sqrt(size[of_recording]), codes)
     slopes, offsets = calibrate(scores, codes, weight, len(size))
-    return Expert(families, tuple(names), fitted[0], slopes, offsets, strangeness)
+    return Expert(families, names, fitted[0], slopes, offsets, strangeness)
 
 
 def probabilities(scores: Floats, slopes: Floats, offsets: Floats) -> Floats:

@@ -39,7 +39,7 @@ def train_experts(
     found: list[Expert] = []
     for families in _sensor_sets(training, measured):
         columns = _columns(training.names, families)
-        names = [training.names[k] for k in columns]
+        names = tuple(training.names[k] for k in columns)
         rows = np.flatnonzero(np.all([measured[f] for f in families], axis=0))
         folds = training.folds
         if found:  # stand-ins for the first are kept cheap

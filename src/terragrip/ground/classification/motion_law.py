@@ -64,9 +64,11 @@ class MotionLaw:
     def decide(self, motion: Floats, effects: Floats) -> Floats:
         """Log probabilities (n, classes), no class being ruled out, of windows with this motion (n, m) and these effects (n, e)."""
         m = motion.shape[1]
-        terms = _terms(motion, self.centre[:m], self.scale[:m])
-        values = _scaled(effects, self.centre[m:], self.scale[m:]) @ self.whitening
-        square = np.stack([((values - terms @ law) ** 2).sum(axis=1) for law in self.laws], axis=1)
+        terms = _terms(motion, self.centre[:m], self.scale[:m]).astype(np.float32)
+        values = _scaled(effects, self.centre[m:], self.scale[m:]).astype(np.float32) @ self.whitening
+        square = np.stack(
+            [((values - terms @ law) ** 2).sum(axis=1, dtype=float) for law in self.laws], axis=1
+        )
         logs = -0.5 * min(_INDEPENDENT / effects.shape[1], 1.0) * square
         chances = np.exp(logs - logs.max(axis=1, keepdims=True))
         chances /= chances.sum(axis=1, keepdims=True)

@@ -7,8 +7,8 @@ show is also judged *given* the motion (`motion_law`). Whatever a single wheel t
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 import numpy.typing as npt
@@ -35,7 +35,8 @@ class Roles:
         return bool(len(self.effects))
 
 
-def roles_of(features: Sequence[str]) -> Roles:
+@lru_cache(maxsize=64)
+def roles_of(features: tuple[str, ...]) -> Roles:
     """The parts' columns among these features."""
     names = list(features)
     shared = [k for k, name in enumerate(names) if not of_one_wheel(name)]

@@ -97,9 +97,7 @@ def collect(
 def matrix(table: Table, names: Sequence[str], rows: int) -> Floats:
     """The features (rows, names) of a table, NaN where it lacks one."""
     missing = np.full(rows, np.nan)
-    return (
-        np.column_stack([table.get(name, missing) for name in names]) if len(names) else np.empty((rows, 0))
-    )
+    return np.array([table.get(name, missing) for name in names]).T if len(names) else np.empty((rows, 0))
 
 
 def measured_families(names: Sequence[str], features: Floats) -> dict[str, npt.NDArray[np.bool_]]:
