@@ -9,7 +9,7 @@ from terragrip.report.curves import SoilCurves, draw_all_maxima, draw_both_maxim
 from terragrip.report.page import Picture, Section, Table, names, number, percent
 from terragrip.soil.bins import BY_PULL
 from terragrip.soil.fit import FREE, AdhesionCurve
-from terragrip.soil.learn import Campaign, scales_apart
+from terragrip.soil.learn import APART, Campaign, scales_apart
 from terragrip.soil.library import Soil, SoilLibrary
 from terragrip.soil.literature import paper_soils
 from terragrip.soil.missing import in_words
@@ -141,9 +141,12 @@ def trust(curves: Sequence[SoilCurves], not_fitted: Mapping[str, str] = NOTHING)
         rows,
     )
     words = [f"{one.name}: {note}" for one in curves for note in one.learned.curve.notes_]
-    words += [
-        f"{one.name}: {sentence}" for one in curves for sentence in [scales_apart(one.learned)] if sentence
-    ]
+    apart = [one.name for one in curves if scales_apart(one.learned)]
+    if apart:
+        words.append(
+            f"On {names(apart)} the scale by pull and the paper's by slip differ by over {percent(APART, 0)}: bins of slip gather "
+            "weak spots and the noise of slip."
+        )
     words += [
         f"{one.name}: {one.learned.verdict.sentence}"
         for one in curves
