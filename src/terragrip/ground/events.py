@@ -96,7 +96,7 @@ def _leading_signs(estimates: Estimates, row: int) -> str:
     usual = float(means[SLIP, -1])
     ratio, grip = (float(np.exp(means[k, 1] - means[k, -1])) for k in (ASYMMETRY, GRIP))
     groups = {
-        f"slip is {signs['slip_calm'] - usual:.0%} above its usual {usual:.0%}, {signs['slip_unusual']:.1f} times its "
+        f"slip is {100 * (signs['slip_calm'] - usual):.0f} points above its usual {usual:.0%}, {signs['slip_unusual']:.1f} times its "
         "usual wandering": {"slip": usual, "slip_calm": usual, "slip_rise": 0.0, "slip_unusual": 0.0},
         f"the leading wheels' adhesion over the trailing ones' is {ratio:.0%} of the usual": {
             name: 0.0 for name in SIGNS if name.startswith("asymmetry")
