@@ -34,7 +34,7 @@ class GroundClassifier:
     step: time from one window to the next in prediction [s]; None: one window, so that they do not overlap.
     rejection: share of windows on known grounds, from runs not trained on, that may be called ``unknown``;
         0 never says unknown where any trained set of sensors was measured.
-    smooth: length of time [s] over which neighbouring windows of one recording share their evidence; 0: each
+    smooth: length of time [s] over which neighbouring windows of one recording share their evidence, novelty too; 0: each
         window is judged by itself alone.
     max_windows: windows of each ground to train on; rarer grounds are cut into windows that overlap more.
     random_state: seed of the draws in training; the same data and seed give the same classifier.
@@ -47,8 +47,9 @@ class GroundClassifier:
     there is an expert for each set of sensors, and a window goes to the one that uses most of what it holds.
 
     Method: support vector machines (Boser, Guyon, Vapnik 1992) on features of the window (`features`), beside them
-    extremely randomised trees (Geurts, Ernst, Wehenkel 2006) where only wheels are measured; probabilities after
-    Platt (1999) from recordings held out, all grounds taken to be equally likely beforehand.
+    what the sensors show given the motion (`motion_law`) where wheel speeds are, and extremely randomised trees (Geurts,
+    Ernst, Wehenkel 2006) where only wheels are; probabilities after Platt (1999) from recordings held out, all grounds
+    taken to be equally likely beforehand.
     """
 
     def __init__(
