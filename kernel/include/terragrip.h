@@ -351,7 +351,7 @@ typedef struct { /* an affine map of the state: omega' = phi omega + b mu, v' = 
     tg_real q[TG_ROWS];
 } tg_passage;
 
-typedef struct { /* one lane a mode of the bank */
+typedef struct { /* one lane a mode of the bank; where the filter is formed, u[k][i], i <= k, holds P[k][i] itself */
     tg_real x[TG_ROWS][TG_MODES], d[TG_ROWS][TG_MODES], u[TG_MAX_STATES][TG_ROWS][TG_MODES];
     tg_real gain[TG_MAX_CHANNELS][TG_ROWS][TG_MODES];
     tg_real probability[TG_MODES];
@@ -387,7 +387,7 @@ struct tg_filter {
     tg_real walk[TG_ROWS];
     tg_real x[TG_ROWS], d[TG_ROWS], u[TG_MAX_STATES * TG_ROWS]; /* without a bank */
     tg_real P[TG_MAX_STATES * TG_ROWS];  /* instead of d and u, where `formed`: rows `stride` apart, columns to the diagonal hold */
-    int32_t formed;
+    int32_t formed;                      /* covariances are held, not factors */
     int32_t factor_steps;                /* still to be taken with factors */
     tg_real x_prior[TG_ROWS];            /* of the last step, before its update */
     tg_passage passage;                  /* of the last step */

@@ -313,12 +313,13 @@ tg_status tg_filter_factors(const tg_filter *f, int32_t mode, tg_real *U, tg_rea
     const int bank = f->tuning.policy == TG_BANK;
     if (mode < 0 || mode >= (bank ? TG_MODES : 1)) return TG_BAD_ARGUMENT;
     tg_real u[TG_MAX_STATES * TG_ROWS], d[TG_ROWS];
-    if (!bank && tgi_factors_of(f, u, d) != TG_OK) return TG_DIVERGED;
+    const tg_status status = bank ? tgi_bank_factors_of(f, mode, u, d) : tgi_factors_of(f, u, d);
+    if (status != TG_OK) return TG_DIVERGED;
     for (int k = 0; k < f->states; k++) {
-        D[k] = bank ? f->policy.bank.d[k][mode] : d[k];
+        D[k] = d[k];
         for (int e = 0; e < f->states; e++) {
             const int i = tgi_row(f->wheels, e);
-            U[e * f->states + k] = i > k ? 0 : bank ? f->policy.bank.u[k][i][mode] : u[k * f->stride + i];
+            U[e * f->states + k] = i > k ? 0 : u[k * f->stride + i];
         }
     }
     return TG_OK;
@@ -381,9 +382,10 @@ tg_status tg_filter_restart(tg_filter *f, tg_real walk_time, const tg_real *outp
     memset(&passage, 0, sizeof passage);
     for (int j = 0; j <= n; j++) passage.q[j] = f->walk[j] * walk_time;
     for (int o = 0; o <= n; o++) passage.q[n + 1 + o] = variances[tgi_channel(n, o)];
-    if (f->tuning.policy == TG_BANK)
-        tgi_bank_restart(f, outputs, &passage);
-    else {
+    if (f->tuning.policy == TG_BANK) {
+        const tg_status status = tgi_bank_restart(f, outputs, &passage);
+        if (status != TG_OK) return status;
+    } else {
         tg_real u[TG_MAX_STATES * TG_ROWS], d[TG_ROWS];
         if (tgi_factors_of(f, u, d) != TG_OK) return TG_DIVERGED;
         tgi_restart(n, f->stride, passage.q, u, d);

@@ -1,0 +1,102 @@
+/* Inside the bank: what its two ways share, by factors (bank.c) and on the covariances themselves (bank_direct.c). One lane a mode. */
+#ifndef TG_BANK_H
+#define TG_BANK_H
+#include "filter.h"
+
+typedef struct { /* P = U diag(d) U' by u[k][i], i <= k; or, where formed, P[k][i] itself in its place */
+    tg_lanes x[TG_ROWS], d[TG_ROWS], u[TG_MAX_STATES][TG_ROWS];
+} tgi_modes;
+
+typedef struct {
+    tgi_modes state;
+    tg_lanes probability;                     /* prior */
+    tg_lanes gain[TG_MAX_CHANNELS][TG_ROWS];
+    tg_lanes residual[TG_MAX_CHANNELS], variance[TG_MAX_CHANNELS], offset[TG_MAX_CHANNELS]; /* offset: of y expected, from the mixture's */
+    tg_lanes nis, volume;
+    tg_real x_prior[TG_ROWS];
+    tg_real innovation[TG_MAX_CHANNELS], innovation_variance[TG_MAX_CHANNELS], weight[TG_MAX_CHANNELS];
+    int32_t taken, channel[TG_MAX_CHANNELS];
+} tgi_update;
+
+TG_INLINE tg_lanes bank_zeros(void) { return lanes_all(0); }
+TG_INLINE tg_real bank_mean(tg_lanes probability, tg_lanes a) { return lanes_sum(lanes_mul(probability, a)); }
+
+/* share[i]: weight of mode i in each mode's mixture, `elapsed` s after the last mixing. The probabilities move by the transition matrix. */
+TG_INLINE void bank_shares(const tg_filter *f, double elapsed, tg_lanes *probability, tg_lanes *share)
+{
+    const tg_real stay = tgi_exp(-(tg_real)elapsed / f->tuning.dwell), leave = (1 - stay) / (tg_real)(TG_MODES - 1);
+    tg_lanes total = bank_zeros();
+    for (int i = 0; i < TG_MODES; i++) {
+        tg_real row[TG_MODES];
+        for (int j = 0; j < TG_MODES; j++) row[j] = (i == j ? stay : leave) * lanes_at(*probability, i);
+        share[i] = lanes_load(row);
+        total = lanes_add(total, share[i]);
+    }
+    for (int i = 0; i < TG_MODES; i++) share[i] = lanes_div(share[i], total);
+    *probability = total;
+}
+
+/* Means of the modes, mixed; away[i]: of mode i from each mixture. */
+TG_INLINE tg_lanes bank_mix_mean(const tg_lanes *share, tg_lanes x, tg_lanes *away)
+{
+    tg_lanes mixed = bank_zeros();
+    for (int i = 0; i < TG_MODES; i++) mixed = lanes_mul_add(share[i], lanes_all(lanes_at(x, i)), mixed);
+    for (int i = 0; i < TG_MODES; i++) away[i] = lanes_sub(lanes_all(lanes_at(x, i)), mixed);
+    return mixed;
+}
+
+/* The affine map on one vector a mode: a column of factors, or the means. */
+TG_INLINE void bank_map(const tg_passage *p, const tg_lanes *from, tg_lanes *to, const int n)
+{
+    tg_lanes v = lanes_mul_sub(lanes_all(p->g), from[n], from[n + 1]);
+    for (int i = 0; i < n; i++) v = lanes_mul_add(lanes_all(p->c[i]), from[i], v);
+    for (int i = 0; i <= n; i++) to[i] = from[i];
+    to[n + 1] = v;
+    for (int i = 0; i < n; i++)
+        to[n + 2 + i] = lanes_mul_add(lanes_all(p->b[i]), from[i], lanes_mul(lanes_all(p->phi[i]), from[n + 2 + i]));
+}
+
+/* Predicted means. */
+TG_INLINE void bank_move(const tgi_plan *plan, const tg_lanes *from, tg_lanes *to, const int n)
+{
+    bank_map(&plan->passage, from, to, n);
+    for (int i = n + 1; i < TG_TWICE(n); i++) to[i] = lanes_add(to[i], lanes_all(plan->shift[i]));
+}
+
+/* Innovations of the mixture and their variances, and the weights, before any channel is taken. S: each mode's own variances. */
+TG_INLINE void bank_innovations(const tg_filter *f, const tgi_plan *plan, const tg_lanes *S, tgi_update *out, const int n)
+{
+    for (int o = 0; o < n + 2; o++) {
+        if (!plan->present[o]) continue;
+        tg_lanes expected = o <= n ? out->state.x[n + 1 + o] : lanes_all(plan->accelerometer_shift);
+        for (int i = 0; o > n && i <= n; i++) expected = lanes_mul_add(lanes_all(plan->accelerometer[i]), out->state.x[i], expected);
+        const tg_real centre = bank_mean(out->probability, expected);
+        out->offset[o] = lanes_sub(expected, lanes_all(centre));
+        out->innovation[o] = plan->y[o] - centre;
+        out->innovation_variance[o] = bank_mean(out->probability, lanes_mul_add(out->offset[o], out->offset[o], S[o]));
+        out->weight[o] = tgi_weight(f->tuning.huber, out->innovation[o], out->innovation_variance[o]);
+    }
+}
+
+/* Residual of the accelerometer after the channels before it. */
+TG_INLINE tg_lanes bank_jolt(const tgi_plan *plan, const tg_lanes *x, const int n)
+{
+    tg_lanes residual = lanes_all(plan->y[n + 1] - plan->accelerometer_shift);
+    for (int i = 0; i <= n; i++) residual = lanes_mul_sub(lanes_all(plan->accelerometer[i]), x[i], residual);
+    return residual;
+}
+
+/* What a channel leaves: its residual, and the variance of that. */
+TG_INLINE void bank_note(tgi_update *out, int o, tg_lanes residual, tg_lanes variance, tg_lanes inverse)
+{
+    out->nis = lanes_mul_add(lanes_mul(residual, residual), inverse, out->nis);
+    out->volume = lanes_mul(out->volume, variance);
+    out->channel[out->taken] = o;
+    out->residual[out->taken] = residual;
+    out->variance[out->taken++] = variance;
+}
+
+/* bank_direct.c: the step up to the last channel on the covariances `before`, which are mixed first where `mixes` tells. Whether the bound of
+ * direct.h holds in every mode; else neither `before` nor `out` is of use. Up to four wheels. */
+int tgi_bank_direct(const tg_filter *f, const tgi_plan *plan, int mixes, const tg_lanes *noise, tgi_modes *before, tgi_update *out);
+#endif
