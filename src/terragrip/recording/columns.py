@@ -25,7 +25,7 @@ def columns_of(frame: Any, source: str | None) -> dict[str, npt.NDArray[Any]]:
     if isinstance(frame, Mapping):
         pairs = list(frame.items())
     elif package == "pandas" and hasattr(frame, "columns"):
-        pairs = [(name, _from_pandas(frame.iloc[:, k])) for k, name in enumerate(frame.columns)]
+        pairs = [(name, _from_pandas(series)) for name, series in frame.items()]
     elif package == "polars" and hasattr(frame, "get_columns"):
         pairs = [(series.name, series.to_numpy()) for series in frame.get_columns()]
     elif package == "pyarrow" and hasattr(frame, "column_names"):

@@ -114,7 +114,10 @@ def _named(sensors: str, features: Table) -> Table:
 
 def _period(family: str, channels: dict[str, Channel], layout: Layout) -> float:
     """The trained period where the recording's is about that, else the recording's own."""
-    own = min(channel.period for channel in channels.values())
+    clocks = {
+        (len(c.time), c.time[0], c.time[-1]): c for c in channels.values()
+    }  # one sensor's channels share theirs
+    own = min(channel.period for channel in clocks.values())
     trained = layout.period[family]
     return trained if 1 / _SAME_RATE < own / trained < _SAME_RATE else own
 
