@@ -49,15 +49,18 @@ AHEAD = 3.0  # s
 FOLDS = 4
 RISING = dict.fromkeys(("slip", "slip_calm", "slip_rise", "slip_unusual"), 1)
 FALLING = dict.fromkeys(("asymmetry_change", "asymmetry_level", "asymmetry_unusual", "grip_unusual"), -1)
+LEAVES = 8  # a tree: as many as a byte has bits
 MODEL = {
     "max_iter": 120,
-    "max_leaf_nodes": 8,
+    "max_leaf_nodes": LEAVES,
     "learning_rate": 0.12,
     "min_samples_leaf": 150,
     "l2_regularization": 5.0,
     "monotonic_cst": [(RISING | FALLING).get(name, 0) for name in SIGNS],
     "early_stopping": False,
 }
+Split = tuple[int, str, int, int]
+"""Sign, threshold, tree, and bits of the leaves that stay where the sign is above."""
 TABLE = Path(__file__).resolve().parents[1] / "kernel/src/digging_table.h"
 
 
@@ -214,33 +217,43 @@ def cross_validate(drives: list[Drive], *, one_axle: bool) -> None:
 
 def table_of(model: HistGradientBoostingClassifier, drives: int) -> str:
     """The fitted trees as C."""
-    branches: list[str] = []
+    splits: list[Split] = []
     leaves: list[str] = []
-    roots: list[str] = []
 
-    def place(nodes: Any, k: int) -> int:
+    def place(nodes: Any, k: int, tree: int) -> int:
+        """Puts what lies below node k into the lists, leaves from left to right; returns their bits."""
         node = nodes[k]
         if node["is_leaf"]:
-            leaves.append(f"R({node['value']:.5g})")
-            return -len(leaves)
-        mine = len(branches)
-        branches.append("")
-        below, above = place(nodes, int(node["left"])), place(nodes, int(node["right"]))
-        branches[mine] = f"{{R({node['num_threshold']:.6g}), {node['feature_idx']}, {below}, {above}}}"
-        return mine
+            leaves.append(f"{node['value']:.5g}")
+            return 1 << (len(leaves) - 1 - LEAVES * tree)
+        below = place(nodes, int(node["left"]), tree)
+        splits.append((int(node["feature_idx"]), f"{node['num_threshold']:.6g}", tree, 255 ^ below))
+        return below | place(nodes, int(node["right"]), tree)
 
-    for (predictor,) in model._predictors:
-        roots.append(str(place(predictor.nodes, 0)))
-    base = float(np.ravel(model._baseline_prediction)[0])
+    for tree, (predictor,) in enumerate(model._predictors):
+        place(predictor.nodes, 0, tree)
+        leaves += ["0"] * (LEAVES * (tree + 1) - len(leaves))
+    return trees_as_c(f"{float(np.ravel(model._baseline_prediction)[0]):.6g}", splits, leaves, drives)
+
+
+def trees_as_c(base: str, splits: list[Split], leaves: list[str], drives: int) -> str:
+    """The header: splits sorted by sign and threshold, as `tg_digging_score` goes through them."""
+    splits = sorted(splits, key=lambda split: (split[0], float(split[1])))
+    first = [sum(sign < s for sign, *_ in splits) for s in range(len(SIGNS) + 1)]
+    count = f"[{len(splits)}]"
     lines = [
-        f"/* Made by benchmarks/fit_immobilization.py --write from {drives} simulated drives; not to be edited. */",
+        f"/* Made by benchmarks/fit_immobilization.py --write from {drives} simulated drives; not to be edited.",
+        " *",
+        " * Splits by sign (TG_SIGN_*) and rising threshold: a sign above `at` rules out those leaves of `tree` that `mask` lacks. */",
         "#ifndef TG_DIGGING_TABLE_H", "#define TG_DIGGING_TABLE_H", '#include "estimator.h"', "",
-        "#define R(x) ((tg_real)(x))", f"#define TG_DIGGING_BASE ((tg_real)({base:.6g}))", f"#define TG_DIGGING_TREES {len(roots)}", "",
-        "typedef struct { /* below: where to go if the sign TG_SIGN_* is at most `at`; a leaf k is -k - 1 */",
-        "    tg_real at;", "    int16_t sign, below, above;", "} tgi_branch;", "",
-        "static const int16_t digging_root[TG_DIGGING_TREES] = {", *_wrapped(roots), "};", "",
-        f"static const tgi_branch digging_branch[{len(branches)}] = {{", *_wrapped(branches), "};", "",
-        f"static const tg_real digging_leaf[{len(leaves)}] = {{", *_wrapped(leaves), "};", "#undef R", "#endif", "",
+        "#define R(x) ((tg_real)(x))", f"#define TG_DIGGING_BASE ((tg_real)({base}))",
+        f"#define TG_DIGGING_TREES {len(leaves) // LEAVES}", f"#define TG_DIGGING_LEAVES {LEAVES} /* a tree */", "",
+        "static const int16_t digging_first[TG_SIGNS + 1] = {", *_wrapped([str(k) for k in first]), "};", "",
+        f"static const tg_real digging_at{count} = {{", *_wrapped([f"R({at})" for _, at, _, _ in splits]), "};", "",
+        f"static const uint8_t digging_tree{count} = {{", *_wrapped([str(tree) for _, _, tree, _ in splits]), "};", "",
+        f"static const uint8_t digging_mask{count} = {{", *_wrapped([str(mask) for *_, mask in splits]), "};", "",
+        "static const tg_real digging_leaf[TG_DIGGING_TREES * TG_DIGGING_LEAVES] = {",
+        *_wrapped([f"R({leaf})" for leaf in leaves]), "};", "#undef R", "#endif", "",
     ]  # fmt: skip
     return "\n".join(lines)
 
