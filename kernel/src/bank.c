@@ -345,21 +345,22 @@ TG_INLINE tg_status with_factors(const tg_filter *f, const tgi_plan *plan, int m
 }
 
 /* What a sound step leaves. */
-TG_INLINE void commit(tg_filter *f, const tgi_update *out, const tg_real *probability, int mixes, int counts, int formed, const int n)
+TG_INLINE void commit(tg_filter *f, const tgi_plan *plan, const tgi_update *out, const tg_real *probability, int mixes, int formed, const int n)
 {
     tg_bank_state *const bank = &f->policy.bank;
     store(f, &out->state, formed);
-    if (!formed) f->factor_steps = f->factor_steps > 0 ? f->factor_steps - 1 : TGI_FACTOR_STEPS;
+    if (!formed) tgi_count_factors(f);
     for (int b = 0; b < TG_MODES; b++) bank->probability[b] = probability[b];
     for (int c = 0; c < out->taken; c++) {
         f->channel[c] = out->channel[c];
         for (int i = 0; i < TG_TWICE(n); i++) lanes_store(bank->gain[c][i], out->gain[c][i]);
     }
+    for (int i = 0; out->taken && i <= n; i++) f->accelerometer[i] = plan->accelerometer[i];
     memcpy(f->x_prior, out->x_prior, sizeof(tg_real) * (size_t)f->states);
     if (mixes) {
         bank->mixed = f->clock;
         bank->updates = 0;
-    } else if (counts)
+    } else if (plan->count)
         bank->updates++;
 }
 
@@ -393,8 +394,7 @@ TG_INLINE tg_status bank_step(tg_filter *f, tgi_plan *plan, tg_step *step, const
     if (!formed && !is_finite(&out, f->states, 0)) return TG_DIVERGED;
     if (!tgi_finite(nis) || !tgi_finite(log_likelihood)) return TG_DIVERGED;
     for (int j = 0; j < TG_TWICE(n); j++) plan->passage.q[j] = bank_mean(out.probability, noise[j]);
-    commit(f, &out, probability, mixes, plan->count > 0, formed, n);
-    for (int i = 0; out.taken && i <= n; i++) f->accelerometer[i] = plan->accelerometer[i];
+    commit(f, plan, &out, probability, mixes, formed, n);
     if (step) report(f, plan, &out, nis, log_likelihood, step);
     return TG_OK;
 }

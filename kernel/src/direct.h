@@ -15,6 +15,9 @@
 #define TGI_SHARES (TGI_NOISE_SHARE * TGI_NOISE_SHARE) /* both halves together, which proves as much */
 #define TGI_FACTOR_STEPS 16 /* with factors, after the bound did not hold */
 
+/* After a step with factors. */
+TG_INLINE void tgi_count_factors(tg_filter *f) { f->factor_steps = f->factor_steps > 0 ? f->factor_steps - 1 : TGI_FACTOR_STEPS; }
+
 typedef struct {
     tg_lanes mu, rest, omega;
 } tgi_gain;

@@ -60,7 +60,7 @@ def train(
     beside = [path for path in (labels, profile, *(dbc or ())) if path is not None]
     target = check_file(output, [*(logs or ()), *beside], suffixes=(".npz",))
     classifier = GroundClassifier(window, random_state=seed)
-    classifier._check_parameters()
+    classifier.check_parameters()
     tables, grounds, sources = _labelled(logs or [], labels, column, profile, dbc or [], window, quiet)
     with progress("train", quiet) as step:
         step(0, 1)
@@ -121,7 +121,7 @@ def predict(
     known.set_params(step=step, smooth=smooth)
     if rejection is not None:
         known.set_params(rejection=rejection)
-    known._check_parameters()
+    known.check_parameters()
     told: list[pd.DataFrame] = []
     with progress("ground-classifier", quiet) as show:
         for number, log in enumerate(logs, 1):

@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import math
 import struct
-import zlib
 from collections.abc import Collection, Iterator, Mapping
 from typing import TYPE_CHECKING, Any, Self
 
@@ -13,6 +12,7 @@ from terragrip.errors import InputError
 from terragrip.estimation.engine import EVENTS, Engine, Thresholds, refusal, settings_of
 from terragrip.estimation.methods import DEFAULT, method_named
 from terragrip.estimation.noise import channel_noise
+from terragrip.estimation.sealed import seal, unseal
 from terragrip.vehicle import Vehicle
 
 if TYPE_CHECKING:
@@ -228,16 +228,13 @@ class TractionEstimator:
         }
         text = json.dumps(about).encode()
         body = struct.pack("<I", len(text)) + text + self._engine.snapshot()
-        return _SNAPSHOT_MAGIC + struct.pack("<I", zlib.crc32(body)) + body
+        return seal(_SNAPSHOT_MAGIC, body)
 
     @classmethod
     def restore(cls, data: bytes) -> Self:
         """The estimator of a snapshot; raises InputError if the bytes are damaged or of another version."""
-        start = len(_SNAPSHOT_MAGIC) + 4
-        if data[: len(_SNAPSHOT_MAGIC)] != _SNAPSHOT_MAGIC or len(data) < start + 4:
-            raise refusal(6, None)
-        body = data[start:]
-        if struct.unpack("<I", data[start - 4 : start])[0] != zlib.crc32(body):
+        body = unseal(_SNAPSHOT_MAGIC, data)
+        if len(body) < 4:
             raise refusal(6, None)
         length = struct.unpack("<I", body[:4])[0]
         about = json.loads(body[4 : 4 + length])

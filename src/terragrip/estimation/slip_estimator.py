@@ -9,18 +9,17 @@ from __future__ import annotations
 
 import json
 import math
-import struct
-import zlib
 from collections.abc import Collection, Mapping
 from typing import Any, Self
 
 import numpy as np
 
 from terragrip.errors import InputError
-from terragrip.estimation.engine import Thresholds, refusal
+from terragrip.estimation.engine import Thresholds
 from terragrip.estimation.estimator import Estimate, TractionEstimator, unusable
 from terragrip.estimation.noise import channel_noise
 from terragrip.estimation.rim_speeds import DRIVE, radius_before_any_log
+from terragrip.estimation.sealed import seal, unseal
 from terragrip.estimation.slip_columns import GAP, STANDSTILL, Place, Rim, columns_of
 from terragrip.estimation.slip_filter import SlipFilter, Walks
 from terragrip.estimation.slip_only import METHOD
@@ -174,18 +173,12 @@ class SlipEstimator:
             "heard": self._heard,
             "fresh": self._fresh,
         }
-        body = json.dumps(about).encode()
-        return _MAGIC + struct.pack("<I", zlib.crc32(body)) + body
+        return seal(_MAGIC, json.dumps(about).encode())
 
     @classmethod
     def restore(cls, data: bytes) -> Self:
         """The estimator of a snapshot; raises InputError if the bytes are damaged or of another version."""
-        start = len(_MAGIC) + 4
-        body = data[start:]
-        whole = data[: len(_MAGIC)] == _MAGIC and len(data) > start
-        if not whole or struct.unpack("<I", data[start - 4 : start])[0] != zlib.crc32(body):
-            raise refusal(6, None)
-        about: dict[str, Any] = json.loads(body)
+        about: dict[str, Any] = json.loads(unseal(_MAGIC, data))
         found = cls(
             Vehicle.from_dict(about["vehicle"]),
             about["channels"],

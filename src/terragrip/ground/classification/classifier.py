@@ -99,7 +99,7 @@ class GroundClassifier:
         Raises InputError (a ValueError) on parameters out of range, on labels that are not one for each recording,
         fewer than two grounds, recordings without a usable channel, or too short; and if scikit-learn is missing.
         """
-        self._check_parameters()
+        self.check_parameters()
         tables = tables_of(recordings)
         classes, codes = classes_of(labels, len(tables))
         held = held_channels(tables)
@@ -195,7 +195,7 @@ class GroundClassifier:
     def _judge(self, tables: list[tuple[Floats, dict[str, Floats], str]]) -> tuple[Floats, Floats]:
         """Probabilities (windows, classes) and novelty (windows,) of all windows."""
         self._check_fitted()
-        self._check_parameters()
+        self.check_parameters()
         count = len(self.classes_)
         chances, novelties = [np.empty((0, count))], [np.empty(0)]
         for table in tables:
@@ -245,7 +245,8 @@ class GroundClassifier:
         if not hasattr(self, "classes_"):
             raise InputError("the classifier knows no ground yet", mend="call fit(recordings, labels) first")
 
-    def _check_parameters(self) -> None:
+    def check_parameters(self) -> None:
+        """Raises InputError at the first parameter out of its range; `fit` and `predict` ask for themselves."""
         ranges = {
             "window": (0.0, np.inf, False),
             "step": (0.0, np.inf, False),

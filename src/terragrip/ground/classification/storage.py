@@ -140,7 +140,7 @@ def _rebuild(header: dict[str, Any], archive: Any) -> GroundClassifier:
     """The classifier of a header and its arrays; raises KeyError, TypeError or ValueError on what does not fit."""
     classifier = GroundClassifier(**header["parameters"])
     try:
-        classifier._check_parameters()
+        classifier.check_parameters()
     except InputError as error:
         raise ValueError(error) from error
     layout = header["layout"]
