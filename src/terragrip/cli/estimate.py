@@ -144,9 +144,12 @@ def _rows_of_a_long_log(log: Path) -> int:
     from pyarrow import ArrowException
     from pyarrow.parquet import read_metadata
 
+    from terragrip.recording.schema import has_torque
+
     try:
         metadata = read_metadata(log)
-        torque = any(name.startswith("drive_torque_") for name in metadata.schema.names)
-        return int(metadata.num_rows) if torque else 0  # slip alone takes the whole log
+        return (
+            int(metadata.num_rows) if has_torque(metadata.schema.names) else 0
+        )  # slip alone takes the whole log
     except (ArrowException, OSError):  # damaged: let the reader say what is wrong
         return 0

@@ -23,6 +23,7 @@ from terragrip.estimation.sealed import seal, unseal
 from terragrip.estimation.slip_columns import GAP, STANDSTILL, Place, Rim, columns_of
 from terragrip.estimation.slip_filter import SlipFilter, Walks
 from terragrip.estimation.slip_only import METHOD
+from terragrip.recording.schema import has_torque
 from terragrip.vehicle import Vehicle
 
 _MAGIC = b"TGRIPSL1"
@@ -32,8 +33,7 @@ _WALKS = Walks(0.05, 1e-3)  # the middle of the grid that a whole log chooses fr
 def speeds_alone(channels: Collection[str], vehicle: Vehicle) -> bool:
     """Whether samples of these columns hold speeds, and no torque though the vehicle drives wheels."""
     wheels = any(name == "wheel_based_speed" or name.startswith("wheel_speed_") for name in channels)
-    torque = any(name.startswith("drive_torque_") for name in channels)
-    return bool(vehicle.driven.any()) and wheels and "ground_speed" in channels and not torque
+    return bool(vehicle.driven.any()) and wheels and "ground_speed" in channels and not has_torque(channels)
 
 
 class SlipEstimator:
@@ -82,10 +82,12 @@ class SlipEstimator:
         ] = {}  # instant and value of a held channel's last true update
         state, covariance = self._arrays()
         found = columns_of(state, covariance, self._rims, np.zeros(1), self._standstill, Place())
-        self.columns = (*found, *self._zero(), "nis", "channels")
+        zero = self._zero_slip()
+        self._zero = tuple(zero.values())
+        self.columns = (*found, *zero, "nis", "channels")
         self.places = {name: k for k, name in enumerate(self.columns)}
 
-    def _zero(self) -> dict[str, float]:
+    def _zero_slip(self) -> dict[str, float]:
         """The radii that slip counts from, with their SDs."""
         return {
             f"zero_slip_radius_{rim.wheel}{end}": value
@@ -151,7 +153,7 @@ class SlipEstimator:
         fastest = max(abs(x[0]), *(abs(x[0] + slip) for slip in x[2:]))
         event = "outlier" if own.outlier else ""
         event = "gap" if after_gap else "standstill" if fastest <= self._standstill else event
-        values = [*numbers.values(), *self._zero().values(), own.nis, float(own.taken)]
+        values = [*numbers.values(), *self._zero, own.nis, float(own.taken)]
         return Estimate(time, event, values, self.places)
 
     def snapshot(self) -> bytes:

@@ -22,6 +22,7 @@ from terragrip.estimation.rim_speeds import DRIVE, rim_speeds, zero_of
 from terragrip.estimation.slip_columns import GAP, STANDSTILL, Place, Rim, columns_of
 from terragrip.estimation.slip_filter import Filtered, SlipFilter, Walks, choose_walks, run
 from terragrip.recording import Recording, held_periods, unit_warnings, without_held
+from terragrip.recording.schema import has_torque
 from terragrip.vehicle import Vehicle
 
 Floats = npt.NDArray[np.float64]
@@ -33,8 +34,7 @@ _OUTLIER, _STILL, _GAP = (EVENTS.index(name) for name in ("outlier", "standstill
 
 def is_slip_only(recording: Recording, vehicle: Vehicle) -> bool:
     """Whether the recording has speeds, and no torque of any wheel though the vehicle drives some."""
-    torque = any(name.startswith("drive_torque_") for name in recording.channels)
-    return bool(vehicle.driven.any()) and not torque
+    return bool(vehicle.driven.any()) and not has_torque(recording.channels)
 
 
 def estimate_slip(
@@ -88,12 +88,14 @@ class _Rows:
 
 @dataclass(frozen=True, eq=False)
 class _Prepared:
-    """What a log's filter needs: instants (n,), speeds (n, 1 + wheels), their SDs, where motion begins anew; and what is told of it."""
+    """What a log's filter needs: instants (n,), speeds (n, 1 + wheels), their SDs, where motion begins anew and
+    which rows stand at such a gap; and what is told of it."""
 
     time: Floats
     speeds: Floats
     sds: Floats
     anew: npt.NDArray[np.bool_]
+    away: npt.NDArray[np.bool_]
     walks: Walks
     rims: tuple[Rim, ...]
     standstill: float
@@ -111,7 +113,7 @@ class _Prepared:
             found.state, found.covariance, self.rims, self.time[of.rows], self.standstill, of.before
         )
         columns |= {"nis": found.nis, "channels": found.channels}
-        event = _events(found.state, self.rims, found.outlier, _away(self.anew)[of.rows], self.standstill)
+        event = _events(found.state, self.rims, found.outlier, self.away[of.rows], self.standstill)
         for name in (*_PASSED_ON, *recording.references):
             if name in recording.channels:
                 columns[name] = recording.channels[name]
@@ -157,6 +159,7 @@ def _prepared(
         speeds,
         sds,
         anew,
+        _away(anew),
         walks,
         tuple(Rim(rim.wheel, rim.radius, rim.spread) for rim in rims),
         STANDSTILL if standstill_speed is None else standstill_speed,

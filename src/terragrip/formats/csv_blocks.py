@@ -18,8 +18,8 @@ from terragrip.formats.blocks import recordings
 from terragrip.formats.csv import GZIP, body_of, chosen_of, parse
 from terragrip.formats.dialect import HEAD, Dialect, detect, in_utf8, to_text
 from terragrip.formats.table import LogTable, Wanted, every_of, in_si
-from terragrip.recording import Recording
-from terragrip.recording.schema import LABELS, TIME, is_channel
+from terragrip.recording import Recording, schema
+from terragrip.recording.schema import is_own
 
 Column = npt.NDArray[Any]
 
@@ -88,7 +88,7 @@ def iter_csv(path: str | os.PathLike[str]) -> Iterator[Recording] | None:
     dialect = _dialect(source)
     if dialect is None:
         return None
-    chosen = chosen_of(dialect, lambda name: name == TIME or name in LABELS or is_channel(name), source)
+    chosen = chosen_of(dialect, is_own, source)
     own = [dialect.names[k] for k in chosen]
     said: list[str] = []
     size = int(np.clip(_ROWS * os.path.getsize(source) / rows_of(source), 1 << 20, 4 * _BLOCK))
@@ -104,7 +104,7 @@ def iter_csv(path: str | os.PathLike[str]) -> Iterator[Recording] | None:
 def has_torque(path: str | os.PathLike[str]) -> bool:
     """Whether a long table has a drive torque under the recording's own names; without one, slip takes the whole log."""
     dialect = _dialect(os.fspath(path))
-    return dialect is not None and any(name.startswith("drive_torque_") for name in dialect.names)
+    return dialect is not None and schema.has_torque(dialect.names)
 
 
 def rows_of(path: str | os.PathLike[str]) -> int:

@@ -13,14 +13,14 @@ import numpy.typing as npt
 from terragrip.errors import InputError
 from terragrip.formats.profile import SHIPPED, Profile
 from terragrip.formats.proposal import is_ready, missing_channels, profile_text
-from terragrip.formats.reading import is_own, read, read_log, recording_of
+from terragrip.formats.reading import read, read_log, recording_of
 from terragrip.formats.recognition import find_time, propose, silent
 from terragrip.formats.signals import SINCE_1970, SignalLog
 from terragrip.formats.table import LogTable, Sparse
 from terragrip.recording import Recording, unit_warnings
 from terragrip.recording.held import fresh_samples, held_period, measured_part
 from terragrip.recording.noise import white_noise
-from terragrip.recording.schema import TIME, unit_of
+from terragrip.recording.schema import TIME, has_torque, is_own, unit_of
 from terragrip.units import factor_to
 from terragrip.vehicle import Vehicle
 
@@ -262,7 +262,7 @@ def _fitting(log: LogTable | SignalLog) -> tuple[str, ...]:
 
 
 def _without_torque(recording: Recording) -> bool:
-    return not any(name.startswith("drive_torque_") for name in recording.channels)
+    return not has_torque(recording.channels)
 
 
 def _is_large(column: npt.NDArray[Any], unit: str) -> bool:

@@ -90,7 +90,7 @@ def _with_objects(tree: dict[str, Any], path: str, wanted: Wanted | None) -> Sig
             read = worker.hear()["tree"]
         except InputError:
             return _finished(tree, path, wanted)  # the notes name what is left
-        known = {name: merged(tree[name], _of_worker(part, worker)) for name, part in read.items()}
+        known = {name: _merged(tree[name], _of_worker(part, worker)) for name, part in read.items()}
         return _finished({**tree, **known}, path, wanted, tuple(names))
 
 
@@ -119,14 +119,14 @@ def _asked(worker: Worker, number: int) -> npt.NDArray[Any]:
     return worker.array()
 
 
-def merged(own: Any, objects: Any) -> Any:
+def _merged(own: Any, objects: Any) -> Any:
     """What was read here, with what mat-io made of the objects in it."""
     if isinstance(own, Opaque):
         return own if objects is None else objects
     if isinstance(own, Mapping) and isinstance(objects, Mapping):
-        return {key: merged(part, objects.get(key)) for key, part in own.items()}
+        return {key: _merged(part, objects.get(key)) for key, part in own.items()}
     if isinstance(own, list) and isinstance(objects, list) and len(own) == len(objects):
-        return [merged(part, other) for part, other in zip(own, objects, strict=True)]
+        return [_merged(part, other) for part, other in zip(own, objects, strict=True)]
     return own
 
 

@@ -90,8 +90,9 @@ def _of_object(value: Any, room: _Room) -> Any:
     for key in ("Storage", "Storage_"):  # of a Dataset
         if isinstance(content.get(key), Mapping | Opaque):
             return content[key]
-    if isinstance(content.get("Elements_", content.get("Elements")), list):
-        return _storage(content, kind)
+    elements = content.get("Elements_", content.get("Elements"))
+    if isinstance(elements, list):
+        return _storage(elements)
     if kind == "Simulink.SimulationOutput":
         return content.get("Data")
     if "Values" in content:
@@ -99,9 +100,8 @@ def _of_object(value: Any, room: _Room) -> Any:
     return content
 
 
-def _storage(content: Mapping[str, Any], kind: str) -> Any:
+def _storage(elements: list[Any]) -> Any:
     """The elements of a Dataset; those that MATLAB keeps outside of the variable are named by what they are."""
-    elements = content.get("Elements_", content.get("Elements"))
     if any(_in_records(element) for element in elements):
         return Opaque(IN_RECORDS)
     return {"Elements": elements}

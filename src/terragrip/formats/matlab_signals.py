@@ -42,14 +42,14 @@ def walk(value: Any, name: str, found: Found, depth: int) -> None:
     if isinstance(value, Opaque):
         found.opaque[name] = value.kind
     elif isinstance(value, Mapping):
-        walk_struct(value, name, found, depth)
+        _walk_struct(value, name, found, depth)
     elif isinstance(value, list) or (isinstance(value, np.ndarray) and value.dtype == object):
         for k, part in enumerate(list(np.ravel(value)) if isinstance(value, np.ndarray) else value):
             own = _own_name(part)
             walk(part, _joined(name, own) if own else f"{name}[{k}]", found, depth + 1)
 
 
-def walk_struct(struct: Mapping[str, Any], name: str, found: Found, depth: int) -> None:
+def _walk_struct(struct: Mapping[str, Any], name: str, found: Found, depth: int) -> None:
     lower = {key.lower(): key for key in struct}
     clock_name = next((lower[key] for key in _TIMES if key in lower and _is_vector(struct[lower[key]])), None)
     clock = None if clock_name is None else struct[clock_name]

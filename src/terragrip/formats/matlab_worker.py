@@ -24,17 +24,17 @@ def work(path: str, out: Outlet) -> None:
     names = out.hear()
     loaded = matio.load_from_mat(path, variable_names=names)
     arrays: list[npt.NDArray[Any]] = []
-    out.say({"tree": {name: skeleton(plain(loaded.pop(name)), arrays) for name in names if name in loaded}})
+    out.say({"tree": {name: _skeleton(plain(loaded.pop(name)), arrays) for name in names if name in loaded}})
     while (number := out.hear()) is not None:
         out.send(np.asarray(arrays[number], dtype=np.float64))
 
 
-def skeleton(value: Any, arrays: list[npt.NDArray[Any]]) -> Any:
+def _skeleton(value: Any, arrays: list[npt.NDArray[Any]]) -> Any:
     """A plain value for JSON: what it is, an array by its place in ``arrays``."""
     if isinstance(value, dict):
-        return {"struct": {key: skeleton(part, arrays) for key, part in value.items()}}
+        return {"struct": {key: _skeleton(part, arrays) for key, part in value.items()}}
     if isinstance(value, list):
-        return {"list": [skeleton(part, arrays) for part in value]}
+        return {"list": [_skeleton(part, arrays) for part in value]}
     if isinstance(value, np.ndarray):
         arrays.append(value)
         return {"array": len(arrays) - 1, "shape": list(value.shape)}

@@ -80,11 +80,11 @@ def read_nmea(path: str, wanted: Wanted | None, databases: Databases) -> SignalL
     sentence is readable.
     """
     pynmea2 = needed("pynmea2", "an NMEA 0183 log")
-    track = _Track()
+    track, every = _Track(), every_of(wanted)
     try:
         with Path(path).open(encoding="ascii", errors="replace", newline="\n") as stream:
             for number, line in enumerate(iter(lambda: stream.readline(_LONGEST), "")):
-                if not skips(number, _BLOCK, every_of(wanted)):
+                if not skips(number, _BLOCK, every):
                     _take_line(line, track, pynmea2)
     except OSError as error:
         raise unreadable(path, error) from error

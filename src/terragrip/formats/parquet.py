@@ -13,7 +13,7 @@ from terragrip.files import refuse_missing, sha256
 from terragrip.formats.blocks import recordings
 from terragrip.formats.table import LogTable, Wanted, every_of, from_arrow
 from terragrip.recording import Recording
-from terragrip.recording.schema import LABELS, TIME, is_channel
+from terragrip.recording.schema import is_own
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -60,7 +60,7 @@ def iter_parquet(path: str | os.PathLike[str], rows: int = 200_000) -> Iterator[
     source = os.fspath(path)
     with _opened(source) as file:
         names = tuple(str(name) for name in file.schema_arrow.names)
-        chosen = [name for name in names if name == TIME or name in LABELS or is_channel(name)]
+        chosen = [name for name in names if is_own(name)]
         _refuse_twice(names, chosen, source)
         batches = file.iter_batches(batch_size=rows, columns=chosen)
 

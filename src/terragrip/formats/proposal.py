@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 
 from terragrip.formats.recognition import Proposal
 from terragrip.recording import Recording
-from terragrip.recording.schema import wheel_names_in
+from terragrip.recording.schema import has_torque, wheel_names_in
 
 _PLAIN = re.compile(r"[A-Za-z_][A-Za-z0-9_./-]*$")
 _LIKE_YAML = {"yes", "no", "on", "off", "true", "false", "null", "y", "n"}
@@ -80,7 +80,7 @@ def profile_text(
         lines.append("  # wheel_speed_fl: {from: ???, unit: rad/s}   # needed: one for each wheel")
     if "ground_speed" not in proposals:
         lines.append("  # ground_speed: {from: ???, unit: m/s}   # needed: or derivative_of two positions")
-    if not any(channel.startswith("drive_torque_") for channel in proposals):
+    if not has_torque(proposals):
         lines.append(
             "  # drive_torque_fl: {from: ???, unit: N m}   # of each driven wheel; without, slip alone"
         )

@@ -15,7 +15,7 @@ from terragrip.formats.signals import SignalLog
 from terragrip.formats.table import LogTable, Wanted, in_si
 from terragrip.recording import Recording, checks
 from terragrip.recording.columns import seconds
-from terragrip.recording.schema import LABELS, TIME, is_channel
+from terragrip.recording.schema import TIME, is_own
 
 PathLike = str | os.PathLike[str]
 
@@ -96,11 +96,6 @@ def read_log(path: PathLike, wanted: Wanted | None = None, databases: Databases 
         mend = "leave out --dbc, or 'dbc:' in the profile"
         raise InputError(f"is a {kind.title}, which needs no DBC", file=path, mend=mend)
     return kind.reader()(os.fspath(path), wanted, databases)
-
-
-def is_own(name: str) -> bool:
-    """Whether a column goes by the recording's own names."""
-    return name == TIME or name in LABELS or is_channel(name)
 
 
 def _loaded(profile: Profile | PathLike | None) -> Profile | None:

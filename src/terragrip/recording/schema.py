@@ -40,6 +40,16 @@ def is_channel(name: str) -> bool:
     return name in CHANNELS or name.startswith(REFERENCE) or split_channel(name) is not None
 
 
+def is_own(name: str) -> bool:
+    """Whether a column goes by the recording's own names: time, a label, a channel or a reference."""
+    return name == TIME or name in LABELS or is_channel(name)
+
+
+def has_torque(names: Iterable[str]) -> bool:
+    """Whether any of the columns is a wheel's drive torque; without one, slip is all that can be told."""
+    return any(name.startswith("drive_torque_") for name in names)
+
+
 def unit_of(name: str) -> str | None:
     """The unit of a column of the schema, None for a label, a reference or a foreign column."""
     if name == TIME:

@@ -49,7 +49,7 @@ class Shown:
         starts = buckets(time, start, end, width)
         first, last = int(starts[0]), int(starts[-1])
         cut = len(starts) - 1 < last - first
-        long = are_long(last - first, width) and len(starts) > 2
+        long = are_long(last - first, width)
         found = []
         for name in names:
             values = self._values(recording, name)
