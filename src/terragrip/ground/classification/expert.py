@@ -10,6 +10,7 @@ from typing import Any, cast
 import numpy as np
 import numpy.typing as npt
 
+from terragrip.ground.classification.chances import softmax
 from terragrip.ground.classification.discriminants import Discriminants
 from terragrip.ground.classification.forest import Forest
 from terragrip.ground.classification.kernel_machine import KernelMachine
@@ -119,9 +120,7 @@ def train(
 
 def probabilities(scores: Floats, slopes: Floats, offsets: Floats) -> Floats:
     """Softmax (n, classes) of the scaled, added and shifted scores (parts, n, classes)."""
-    logits = np.tensordot(slopes, scores, axes=1) + offsets
-    odds = np.exp(logits - logits.max(axis=1, keepdims=True))
-    return odds / odds.sum(axis=1, keepdims=True)
+    return softmax(np.tensordot(slopes, scores, axes=1) + offsets)
 
 
 def calibrate(scores: Floats, codes: Codes, weight: Floats, recordings: int) -> tuple[Floats, Floats]:

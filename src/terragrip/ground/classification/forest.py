@@ -9,13 +9,14 @@ import numpy as np
 import numpy.typing as npt
 
 from terragrip.errors import InputError
+from terragrip.ground.classification.chances import doubting_log
+from terragrip.ground.classification.standardization import centre_of
 
 Floats = npt.NDArray[np.float64]
 Codes = npt.NDArray[np.intp]
 
 _TREES = 100
 _LEAF = 2  # windows
-_DOUBT = 0.01  # added to a probability before its logarithm: no leaf is sure
 
 
 @dataclass(frozen=True)
@@ -40,9 +41,7 @@ class Forest:
 
         Raises InputError if scikit-learn is missing.
         """
-        measured = np.isfinite(features)
-        count = np.maximum(measured.sum(axis=0), 1)
-        centre = (np.where(measured, features, 0.0).sum(axis=0) / count).astype(np.float32)
+        centre = centre_of(features).astype(np.float32)
         trees = [one.tree_ for one in _trees(seed).fit(_filled(features, centre), codes).estimators_]
         sizes = [tree.node_count for tree in trees]
         roots = np.r_[0, np.cumsum(sizes)[:-1]].astype(np.int32)
@@ -75,7 +74,7 @@ class Forest:
                     break
                 node = onward
             found[begin : begin + 1000] = self.share[node].mean(axis=1)
-        return np.log(found + _DOUBT)
+        return doubting_log(found)
 
     def check(self) -> None:
         """Raise ValueError on nodes that do not make trees."""

@@ -7,14 +7,15 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from terragrip.ground.classification.chances import doubting_log, softmax
+from terragrip.ground.classification.standardization import centre_of, scale_about, scaled
+
 Floats = npt.NDArray[np.float64]
 Singles = npt.NDArray[np.float32]
 
-_LIMIT = 3.5  # standard deviations, as `standardization`
 _RIDGE = 30.0  # windows: a law stays near that of all grounds where it has few
 _FLOOR = 0.05  # of a feature's variance
 _INDEPENDENT = 4.0  # features: together they tell as much as so many that do not repeat each other
-_DOUBT = 0.01  # as `forest`
 
 
 @dataclass(frozen=True)
@@ -37,13 +38,10 @@ class MotionLaw:
     def fit(cls, motion: Floats, effects: Floats, codes: npt.NDArray[np.intp]) -> MotionLaw:
         """Fit to ``motion`` (n, m) and ``effects`` (n, e), NaN = not measured, with class ``codes`` (n,) 0..K-1."""
         features = np.hstack([motion, effects])
-        measured = np.isfinite(features)
-        count = np.maximum(measured.sum(axis=0), 1)
-        centre = np.where(measured, features, 0.0).sum(axis=0) / count
-        scale = np.sqrt((np.where(measured, features - centre, 0.0) ** 2).sum(axis=0) / count)
-        scale = np.where(scale > 1e-9 * (1.0 + np.abs(centre)), scale, np.inf)
+        centre = centre_of(features)
+        scale = scale_about(centre, features)
         m = motion.shape[1]
-        terms, values = _terms(motion, centre[:m], scale[:m]), _scaled(effects, centre[m:], scale[m:])
+        terms, values = _terms(motion, centre[:m], scale[:m]), scaled(effects, centre[m:], scale[m:])
         common = _regression(terms, values)
         rest = values - terms @ common
         laws, covariance = [], np.zeros((values.shape[1],) * 2)
@@ -65,25 +63,17 @@ class MotionLaw:
         """Log probabilities (n, classes), no class being ruled out, of windows with this motion (n, m) and these effects (n, e)."""
         m = motion.shape[1]
         terms = _terms(motion, self.centre[:m], self.scale[:m]).astype(np.float32)
-        values = _scaled(effects, self.centre[m:], self.scale[m:]).astype(np.float32) @ self.whitening
+        values = scaled(effects, self.centre[m:], self.scale[m:]).astype(np.float32) @ self.whitening
         square = np.stack(
             [((values - terms @ law) ** 2).sum(axis=1, dtype=float) for law in self.laws], axis=1
         )
         logs = -0.5 * min(_INDEPENDENT / effects.shape[1], 1.0) * square
-        chances = np.exp(logs - logs.max(axis=1, keepdims=True))
-        chances /= chances.sum(axis=1, keepdims=True)
-        return np.asarray(np.log(chances + _DOUBT))
-
-
-def _scaled(features: Floats, centre: Floats, scale: Floats) -> Floats:
-    """On one scale and within limits; what was not measured lies at the centre."""
-    points = np.clip((features - centre) / scale, -_LIMIT, _LIMIT)
-    return np.where(np.isfinite(points), points, 0.0)
+        return doubting_log(softmax(logs))
 
 
 def _terms(motion: Floats, centre: Floats, scale: Floats) -> Floats:
     """Constant, linear and square terms (n, 1 + 2 m)."""
-    points = _scaled(motion, centre, scale)
+    points = scaled(motion, centre, scale)
     return np.column_stack([np.ones(len(points)), points, points**2])
 
 

@@ -5,6 +5,8 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
+from terragrip.ground.classification.chances import softmax
+
 Floats = npt.NDArray[np.float64]
 
 
@@ -27,6 +29,4 @@ def smoothed(chances: Floats, starts: Floats, reach: float) -> Floats:
     """Probabilities (n, classes) by the mean log probability of the windows that begin within ``reach`` [s] of each."""
     if reach <= 0 or len(chances) < 2:
         return chances
-    mean = nearby_mean(np.log(chances + 1e-9), starts, reach)
-    odds = np.exp(mean - mean.max(axis=1, keepdims=True))
-    return np.asarray(odds / odds.sum(axis=1, keepdims=True))
+    return softmax(nearby_mean(np.log(chances + 1e-9), starts, reach))

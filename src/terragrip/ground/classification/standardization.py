@@ -30,13 +30,9 @@ class Standardization:
         A feature that differs from run to run on one ground as much as between grounds tells little about a run
         never seen; its weight is the root of the ratio of the two variances.
         """
-        measured = np.isfinite(features)
-        count = np.maximum(measured.sum(axis=0), 1)
-        centre = np.where(measured, features, 0.0).sum(axis=0) / count
-        rest = np.where(measured, features - centre, 0.0)
-        scale = np.sqrt((rest**2).sum(axis=0) / count)
-        scale = np.where(scale > 1e-9 * (1.0 + np.abs(centre)), scale, np.inf)  # a constant says nothing
-        points = cls(centre, scale, np.ones(features.shape[1])).apply(features)
+        centre = centre_of(features)
+        scale = scale_about(centre, features)
+        points = scaled(features, centre, scale)
         runs, of_run = np.unique(groups, return_inverse=True)
         size = np.bincount(of_run).astype(float)[:, None]
         means = np.stack([points[of_run == r].mean(axis=0) for r in range(len(runs))])
@@ -51,8 +47,30 @@ class Standardization:
 
     def apply(self, features: Floats) -> Floats:
         """Features (n, features) on one scale; what is not measured lies at the centre."""
-        points = np.clip((features - self.centre) / self.scale, -_LIMIT, _LIMIT)
-        return np.where(np.isfinite(points), points, 0.0) * self.weight
+        return scaled(features, self.centre, self.scale) * self.weight
+
+
+def centre_of(features: Floats) -> Floats:
+    """Mean (features,) of the measured values of ``features`` (n, features; NaN = not measured); 0 where there are none."""
+    measured = np.isfinite(features)
+    return np.asarray(np.where(measured, features, 0.0).sum(axis=0) / _count(measured))
+
+
+def scale_about(centre: Floats, features: Floats) -> Floats:
+    """SD (features,) of the measured values about ``centre`` (features,); infinite for a constant, which says nothing."""
+    measured = np.isfinite(features)
+    scale = np.sqrt((np.where(measured, features - centre, 0.0) ** 2).sum(axis=0) / _count(measured))
+    return np.where(scale > 1e-9 * (1.0 + np.abs(centre)), scale, np.inf)
+
+
+def scaled(features: Floats, centre: Floats, scale: Floats) -> Floats:
+    """Features (n, features) in standard deviations, within limits; what was not measured lies at the centre."""
+    points = np.clip((features - centre) / scale, -_LIMIT, _LIMIT)
+    return np.where(np.isfinite(points), points, 0.0)
+
+
+def _count(measured: npt.NDArray[np.bool_]) -> npt.NDArray[np.intp]:
+    return np.maximum(measured.sum(axis=0), 1)
 
 
 def _variances(points: Floats, means: Floats, of_run: npt.NDArray[np.intp], size: Floats) -> Floats:
