@@ -191,18 +191,14 @@ def _of_log(error: InputError, sources: list[Path]) -> InputError:
 def _judged(known: GroundClassifier, columns: Any, log: Path) -> pd.DataFrame:
     """The windows of one drive, as they are written."""
     try:
-        windows, novelty = known.windows([columns]), known.novelty([columns])
-        ground, chances = known.predict([columns]), known.predict_proba([columns])
+        table = known.judge([columns])
     except InputError as error:
         raise _of_log(error, [log]) from None
-    if not (novelty == novelty).any():
+    if not table["novelty"].notna().any():
         wanted = "; ".join(" + ".join(s) for s in known.sensors_[-3:])
         raise InputError("holds none of the sensors learnt", file=log, mend=f"give e.g. {wanted}")
-    table = windows.drop(columns="recording")
+    table = table.drop(columns="recording")
     table.insert(0, "file", log.name)
-    table["ground"], table["novelty"] = ground, novelty
-    for k, name in enumerate(known.classes_):
-        table[f"probability_{name}"] = chances[:, k]
     return table
 
 

@@ -182,6 +182,16 @@ def test_windows_say_whose_row_is_whose(classifier: GroundClassifier) -> None:
     assert classifier.predict(tables)[3] == "unknown"  # 1 s of data in a window of 1.7 s
 
 
+def test_judging_once_tells_what_each_question_is_told(classifier: GroundClassifier, held_out: tuple) -> None:
+    shown = held_out[0][:2]
+    judged = classifier.judge(shown)
+    pd.testing.assert_frame_equal(judged[["recording", "start", "end"]], classifier.windows(shown))
+    assert judged["ground"].tolist() == classifier.predict(shown).tolist()
+    assert np.array_equal(judged["novelty"], classifier.novelty(shown))
+    chances = judged[[f"probability_{name}" for name in classifier.classes_]]
+    assert np.array_equal(chances, classifier.predict_proba(shown))
+
+
 def test_each_window_is_judged_from_its_own_time_only(classifier: GroundClassifier) -> None:
     table = drive("hard", 1015, 10.2)
     other = pd.concat([table[table.time < 5.1], drive("loose", 1016, 10.2)[lambda t: t.time >= 5.1]])

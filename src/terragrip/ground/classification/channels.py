@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -31,6 +31,14 @@ PREFIXES = {
 FAMILIES = tuple(PREFIXES)
 
 _HELD = 1.5  # sample periods
+
+
+class Columns(NamedTuple):
+    """What is used of a recording: time (n,) [s], values (n,) by column, NaN = not measured, and the recording's name."""
+
+    time: Floats
+    values: dict[str, Floats]
+    name: str
 
 
 @dataclass(frozen=True)
@@ -65,8 +73,8 @@ def family_of(column: str) -> str | None:
     return None
 
 
-def tables_of(recordings: Any) -> list[tuple[Floats, dict[str, Floats], str]]:
-    """Time, used channels and name of each recording (a Recording, a DataFrame or a mapping of columns).
+def tables_of(recordings: Any) -> list[Columns]:
+    """What is used of each recording (a Recording, a DataFrame or a mapping of columns).
 
     Ground speed and wheel speeds may be missing: what is there is used. Raises InputError naming the recording
     on anything that is no list of tables, and on time or values that are unusable.
@@ -83,7 +91,7 @@ def tables_of(recordings: Any) -> list[tuple[Floats, dict[str, Floats], str]]:
     return [_table(recording, k) for k, recording in enumerate(listed)]
 
 
-def held_channels(tables: Sequence[tuple[Floats, dict[str, Floats], str]]) -> dict[str, float]:
+def held_channels(tables: Sequence[Columns]) -> dict[str, float]:
     """Update period [s] of each channel whose logger repeats values, judged on all recordings together."""
     found = {}
     for name in sorted({name for _, channels, _ in tables for name in channels}):
@@ -105,7 +113,7 @@ def held_channels(tables: Sequence[tuple[Floats, dict[str, Floats], str]]) -> di
     return found
 
 
-def signals_of(table: tuple[Floats, dict[str, Floats], str], held: Mapping[str, float]) -> Signals:
+def signals_of(table: Columns, held: Mapping[str, float]) -> Signals:
     """The usable channels of a table from `tables_of`; repeats of a held channel count as not measured."""
     time, channels, _ = table
     families: dict[str, dict[str, Channel]] = {}
@@ -120,11 +128,11 @@ def signals_of(table: tuple[Floats, dict[str, Floats], str], held: Mapping[str, 
     return Signals(float(time[0]), float(time[-1]) + period, families)
 
 
-def _table(recording: Any, index: int) -> tuple[Floats, dict[str, Floats], str]:
+def _table(recording: Any, index: int) -> Columns:
     name = f"recordings[{index}]"
     if isinstance(recording, Recording):
         used = {n: v for n, v in recording.channels.items() if family_of(n)}
-        return recording.time, used, recording.source or name
+        return Columns(recording.time, used, recording.source or name)
     columns = columns_of(recording, name)
     if TIME not in columns:
         raise InputError("is missing", file=name, place=f"column {TIME}", mend="add the instants in seconds")
@@ -136,4 +144,4 @@ def _table(recording: Any, index: int) -> tuple[Floats, dict[str, Floats], str]:
             values = numbers(column, cells, time, name)
             refuse_infinite(column, values, time, name)
             channels[column] = values
-    return time, channels, name
+    return Columns(time, channels, name)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import inspect
 import os
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
@@ -13,11 +13,9 @@ import numpy.typing as npt
 from terragrip.errors import InputError
 from terragrip.ground.classification.channels import held_channels, signals_of, tables_of
 from terragrip.ground.classification.experts import FEWEST_WINDOWS, train_experts
-from terragrip.ground.classification.features import features_of
 from terragrip.ground.classification.labels import UNKNOWN, classes_of, one_each
-from terragrip.ground.classification.neighbours import nearby_mean, smoothed
-from terragrip.ground.classification.training_set import collect, layout_of, matrix, measured_families
-from terragrip.ground.classification.windows import window_starts
+from terragrip.ground.classification.learnt import Judgement, Learnt
+from terragrip.ground.classification.training_set import collect, layout_of
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -125,11 +123,8 @@ class GroundClassifier:
             notes.append(
                 "A ground has but one recording: probabilities are learnt within runs and too sure on new ones."
             )
-        self._experts, said = train_experts(training, classes, int(random.integers(2**31)))
-        notes += said
-        self._layout, self._held = layout, held
-        self._fitted(classes, training.names, tuple(notes))
-        return self
+        experts, said = train_experts(training, classes, int(random.integers(2**31)))
+        return self._know(Learnt(classes, training.names, tuple(experts), layout, held, (*notes, *said)))
 
     def predict(self, recordings: Iterable[Any]) -> npt.NDArray[Any]:
         """The label (windows,) of each window, ``"unknown"`` where none fits; recordings follow one another.
@@ -137,38 +132,39 @@ class GroundClassifier:
         `windows` tells which recording and time a row belongs to. Raises InputError as `fit` does on tables that
         cannot be read, and if not fitted.
         """
-        found, novelty = self._judge(tables_of(recordings))
-        labels = self.classes_[found.argmax(axis=1)]
-        strange = ~(novelty >= self.rejection)  # NaN, too
-        if not strange.any():
-            return labels
-        if labels.dtype.kind != "U":
-            labels = labels.astype(object)
-        return np.where(strange, np.array(UNKNOWN, dtype=object if labels.dtype == object else None), labels)
+        return self._told(self._judge(recordings))
 
     def predict_proba(self, recordings: Iterable[Any]) -> Floats:
         """Probability (windows, classes) of each class in ``classes_``, given that it is one of them.
 
         A window without usable sensors has equal probabilities. Raises InputError as `predict`.
         """
-        return self._judge(tables_of(recordings))[0]
+        return _joined([one.probabilities for one in self._judge(recordings)], len(self.classes_))
 
     def novelty(self, recordings: Iterable[Any]) -> Floats:
         """Share (windows,) of windows on known grounds, from runs not trained on, that would look as strange.
 
         `predict` says unknown below ``rejection``. NaN where no usable sensor was measured. Raises InputError as `predict`.
         """
-        return self._judge(tables_of(recordings))[1]
+        return _joined([one.novelty for one in self._judge(recordings)])
 
     def windows(self, recordings: Iterable[Any]) -> pd.DataFrame:
         """Which window each row of a prediction is: columns ``recording`` (its number), ``start`` and ``end`` [s]."""
-        import pandas as pd
+        learnt = self._known()
+        return _windows([learnt.windows(table, self.step) for table in tables_of(recordings)], learnt)
 
-        self._check_fitted()
-        starts = [self._starts(signals_of(t, self._held)) for t in tables_of(recordings)]
-        numbers = np.repeat(np.arange(len(starts)), [len(s) for s in starts])
-        begin = np.concatenate(starts) if starts else np.empty(0)
-        return pd.DataFrame({"recording": numbers, "start": begin, "end": begin + self._layout.window})
+    def judge(self, recordings: Iterable[Any]) -> pd.DataFrame:
+        """All that is told of every window, judged once: the columns of `windows`, ``ground`` (`predict`), ``novelty`` and
+        ``probability_<class>`` (`predict_proba`). Raises InputError as `predict`.
+        """
+        judged = self._judge(recordings)
+        table = _windows([one.starts for one in judged], self._known())
+        table["ground"] = self._told(judged)
+        table["novelty"] = _joined([one.novelty for one in judged])
+        chances = _joined([one.probabilities for one in judged], len(self.classes_))
+        for k, name in enumerate(self.classes_):
+            table[f"probability_{name}"] = chances[:, k]
+        return table
 
     def score(self, recordings: Iterable[Any], labels: Sequence[Any]) -> float:
         """Share of windows whose label is that of their recording; unknown counts as wrong. Raises InputError."""
@@ -182,8 +178,7 @@ class GroundClassifier:
         """Write the classifier to one file that holds numbers and text only; raises InputError if it cannot."""
         from terragrip.ground.classification.storage import save
 
-        self._check_fitted()
-        save(self, path)
+        save(self.get_params(), self._known(), path)
 
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> GroundClassifier:
@@ -192,58 +187,44 @@ class GroundClassifier:
 
         return load(path)
 
-    def _judge(self, tables: list[tuple[Floats, dict[str, Floats], str]]) -> tuple[Floats, Floats]:
-        """Probabilities (windows, classes) and novelty (windows,) of all windows."""
-        self._check_fitted()
+    @classmethod
+    def restored(cls, parameters: Mapping[str, Any], learnt: Learnt) -> Self:
+        """A fitted classifier of its parameters and what it has learnt; raises InputError on parameters out of range."""
+        classifier = cls(**parameters)
+        classifier.check_parameters()
+        return classifier._know(learnt)
+
+    def _judge(self, recordings: Iterable[Any]) -> list[Judgement]:
+        """Judge all windows of each recording."""
+        learnt = self._known()
         self.check_parameters()
-        count = len(self.classes_)
-        chances, novelties = [np.empty((0, count))], [np.empty(0)]
-        for table in tables:
-            signals = signals_of(table, self._held)
-            starts = self._starts(signals)
-            features = matrix(features_of(signals, starts, self._layout), self._names, len(starts))
-            found, novelty = self._ask(features, starts)
-            chances.append(smoothed(found, starts, self.smooth / 2))
-            novelties.append(novelty)
-        return np.concatenate(chances), np.concatenate(novelties)
+        return [learnt.judge(table, self.step, self.smooth) for table in tables_of(recordings)]
 
-    def _ask(self, features: Floats, starts: Floats) -> tuple[Floats, Floats]:
-        """Send each window to the expert that uses most of what it holds."""
-        measured = measured_families(self._names, features)
-        chances = np.full((len(features), len(self.classes_)), 1.0 / len(self.classes_))
-        novelty = np.full(len(features), np.nan)
-        open_rows = np.ones(len(features), dtype=bool)
-        nowhere = np.zeros(len(features), dtype=bool)
-        for expert in self._experts:  # from most features to fewest
-            fits = open_rows & np.all([measured.get(f, nowhere) for f in expert.families], axis=0)
-            if fits.any():
-                columns = [self._column[name] for name in expert.features]
-                chances[fits], strange = expert.judge(features[fits][:, columns])
-                if self.smooth:  # neighbours that the same expert judged
-                    strange = nearby_mean(strange, starts[fits], self.smooth / 2)
-                novelty[fits] = expert.strangeness.novelty(strange, self.smooth)
-                open_rows &= ~fits
-        return chances, novelty
+    def _told(self, judged: list[Judgement]) -> npt.NDArray[Any]:
+        """The likeliest class of each window, or unknown."""
+        found = _joined([one.probabilities for one in judged], len(self.classes_))
+        labels = self.classes_[found.argmax(axis=1)]
+        strange = ~(_joined([one.novelty for one in judged]) >= self.rejection)  # NaN, too
+        if not strange.any():
+            return labels
+        if labels.dtype.kind != "U":
+            labels = labels.astype(object)
+        return np.where(strange, np.array(UNKNOWN, dtype=object if labels.dtype == object else None), labels)
 
-    def _starts(self, signals: Any) -> Floats:
-        return window_starts(signals.start, signals.end, self._layout.window, self._step)
+    def _know(self, learnt: Learnt) -> Self:
+        self._learnt = learnt
+        self.classes_ = learnt.classes
+        self.feature_names_in_ = np.array(learnt.features, dtype=object)
+        self.n_features_in_ = len(learnt.features)
+        self.sensors_ = tuple(tuple(sorted(expert.families)) for expert in learnt.experts)
+        self.notes_ = learnt.notes
+        return self
 
-    @property
-    def _step(self) -> float:
-        return self._layout.window if self.step is None else self.step
-
-    def _fitted(self, classes: npt.NDArray[Any], names: tuple[str, ...], notes: tuple[str, ...]) -> None:
-        self.classes_ = classes
-        self.feature_names_in_ = np.array(names, dtype=object)
-        self.n_features_in_ = len(names)
-        self._names = names
-        self.sensors_ = tuple(tuple(sorted(expert.families)) for expert in self._experts)
-        self.notes_ = notes
-        self._column = {name: k for k, name in enumerate(names)}
-
-    def _check_fitted(self) -> None:
-        if not hasattr(self, "classes_"):
+    def _known(self) -> Learnt:
+        """What was learnt; raises InputError if nothing was."""
+        if not hasattr(self, "_learnt"):
             raise InputError("the classifier knows no ground yet", mend="call fit(recordings, labels) first")
+        return self._learnt
 
     def check_parameters(self) -> None:
         """Raises InputError at the first parameter out of its range; `fit` and `predict` ask for themselves."""
@@ -264,3 +245,16 @@ class GroundClassifier:
                     f" to {high:g}" if high < np.inf else ""
                 )
                 raise InputError(f"{value!r} is out of range", place=name, mend=mend)
+
+
+def _joined(parts: list[Floats], *columns: int) -> Floats:
+    """The recordings' rows (windows, *columns) one after another."""
+    return np.concatenate([np.empty((0, *columns)), *parts])
+
+
+def _windows(starts: list[Floats], learnt: Learnt) -> pd.DataFrame:
+    import pandas as pd
+
+    numbers = np.repeat(np.arange(len(starts)), [len(s) for s in starts])
+    begin = _joined(starts)
+    return pd.DataFrame({"recording": numbers, "start": begin, "end": begin + learnt.layout.window})

@@ -7,6 +7,7 @@ import json
 import os
 import zipfile
 import zlib
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -21,55 +22,55 @@ from terragrip.ground.classification.expert import Expert, Parts
 from terragrip.ground.classification.features import Layout
 from terragrip.ground.classification.forest import Forest
 from terragrip.ground.classification.kernel_machine import KernelMachine
+from terragrip.ground.classification.learnt import Learnt
 from terragrip.ground.classification.motion_law import MotionLaw
 from terragrip.ground.classification.novelty import LEVELS, SPANS, Strangeness
-from terragrip.ground.classification.roles import Roles, roles_of
+from terragrip.ground.classification.roles import roles_of
 from terragrip.ground.classification.standardization import Standardization
 
 FORMAT = "terragrip ground classifier"
 VERSION = 3
 
-# Arrays of an expert, with their shapes in terms of the machine's features, support vectors, pairs, classes, discriminants,
-# known windows, kinds of oddness, spans, levels.
-_ARRAYS = {
-    "centre": "f",
-    "scale": "f",
-    "weight": "f",
-    "support": "vf",
-    "weights": "vp",
-    "offsets": "p",
-    "axes": "fd",
-    "points": "wd",
-    "class_offsets": "k",
-    "usual": "32",
-    "levels": "Sl",
+
+# Arrays of an expert's parts, with their shapes in terms of the machine's features, support vectors, pairs, classes,
+# discriminants, known windows, kinds of oddness, spans, levels; all features, trees, nodes; the law's features, effects, terms.
+_PARTS = {
+    "standardization": {"centre": "f", "scale": "f", "weight": "f"},
+    "machine": {"support": "vf", "weights": "vp", "offsets": "p"},
+    "discriminants": {"axes": "fd", "points": "wd"},
+    "strangeness": {"usual": "32", "levels": "Sl"},
+    "forest": {
+        "centre": "F",
+        "roots": "t",
+        "feature": "n",
+        "threshold": "n",
+        "left": "n",
+        "right": "n",
+        "share": "nk",
+    },
+    "law": {"centre": "b", "scale": "b", "whitening": "ee", "laws": "kre"},
 }
-# All features, trees, nodes; and the law's features, effects, terms.
-_FOREST = {
-    "centre": "F",
-    "roots": "t",
-    "feature": "n",
-    "threshold": "n",
-    "left": "n",
-    "right": "n",
-    "share": "nk",
-}
-_LAW = {"centre": "b", "scale": "b", "whitening": "ee", "laws": "kre"}
+_WHOLE = ("roots", "feature", "left", "right")
+_PREFIXED = ("forest", "law")  # their arrays' names in the file begin with the part's
+_OFFSETS = "class_offsets"
 
 
-def save(classifier: GroundClassifier, path: str | os.PathLike[str]) -> None:
-    """Write a fitted classifier; the file appears whole or not at all. Raises InputError if it cannot be written."""
-    layout = classifier._layout
+def save(parameters: Mapping[str, Any], learnt: Learnt, path: str | os.PathLike[str]) -> None:
+    """Write what was learnt with a classifier's parameters; the file appears whole or not at all.
+
+    Raises InputError if it cannot be written.
+    """
+    layout = learnt.layout
     header = {
         "format": FORMAT,
         "version": VERSION,
         "terragrip": terragrip.__version__,
-        "parameters": {k: _plain(v) for k, v in classifier.get_params().items()},
-        "classes": classifier.classes_.tolist(),
-        "features": list(classifier.feature_names_in_),
+        "parameters": {k: _plain(v) for k, v in parameters.items()},
+        "classes": learnt.classes.tolist(),
+        "features": list(learnt.features),
         "layout": {"window": float(layout.window), "period": layout.period, "size": layout.size},
-        "held": classifier._held,
-        "notes": list(classifier.notes_),
+        "held": dict(learnt.held),
+        "notes": list(learnt.notes),
         "experts": [
             {
                 "families": sorted(e.families),
@@ -77,30 +78,12 @@ def save(classifier: GroundClassifier, path: str | os.PathLike[str]) -> None:
                 "slopes": e.slopes.tolist(),
                 "width": e.parts.machine.width,
             }
-            for e in classifier._experts
+            for e in learnt.experts
         ],
     }
     arrays: dict[str, Any] = {"header": np.frombuffer(json.dumps(header).encode(), dtype=np.uint8)}
-    for number, expert in enumerate(classifier._experts):
-        parts = expert.parts
-        scaling, machine, discriminants = parts.standardization, parts.machine, parts.discriminants
-        held = (
-            scaling.centre,
-            scaling.scale,
-            scaling.weight,
-            machine.support,
-            machine.weights,
-            machine.offsets,
-            discriminants.axes,
-            discriminants.points,
-            expert.offsets,
-            expert.strangeness.usual,
-            expert.strangeness.levels,
-        )
-        arrays |= {f"{name}_{number}": array for name, array in zip(_ARRAYS, held, strict=True)}
-        for kind, names, part in (("forest", _FOREST, parts.forest), ("law", _LAW, parts.law)):
-            if part is not None:
-                arrays |= {f"{kind}_{name}_{number}": getattr(part, name) for name in names}
+    for number, expert in enumerate(learnt.experts):
+        arrays |= {f"{name}_{number}": array for name, array in _arrays(expert).items()}
     with replacing(path) as temporary, temporary.open("wb") as stream:
         np.savez_compressed(stream, **arrays)
 
@@ -123,7 +106,11 @@ def load(path: str | os.PathLike[str]) -> GroundClassifier:
                 raise InputError(
                     f"is of version {version!r}, this terragrip reads {VERSION}", file=path, mend=mend
                 )
-            return _rebuild(header, archive)
+            learnt = _learnt(header, archive)
+            try:
+                return GroundClassifier.restored(header["parameters"], learnt)
+            except InputError as error:
+                raise ValueError(error) from error
     except InputError:
         raise
     except (zipfile.BadZipFile, zlib.error, EOFError, OSError, NotImplementedError, RuntimeError) as error:
@@ -136,13 +123,30 @@ def load(path: str | os.PathLike[str]) -> GroundClassifier:
         raise _foreign(path) from error
 
 
-def _rebuild(header: dict[str, Any], archive: Any) -> GroundClassifier:
-    """The classifier of a header and its arrays; raises KeyError, TypeError or ValueError on what does not fit."""
-    classifier = GroundClassifier(**header["parameters"])
-    try:
-        classifier.check_parameters()
-    except InputError as error:
-        raise ValueError(error) from error
+def _arrays(expert: Expert) -> dict[str, Any]:
+    """The arrays of an expert by their names in the file."""
+    parts = expert.parts
+    held = {
+        "standardization": parts.standardization,
+        "machine": parts.machine,
+        "discriminants": parts.discriminants,
+        "strangeness": expert.strangeness,
+        "forest": parts.forest,
+        "law": parts.law,
+    }
+    there = {name: part for name, part in held.items() if part is not None}
+    found = {
+        _key(name, field): getattr(part, field) for name, part in there.items() for field in _PARTS[name]
+    }
+    return {_OFFSETS: expert.offsets, **found}
+
+
+def _key(part: str, field: str) -> str:
+    return f"{part}_{field}" if part in _PREFIXED else field
+
+
+def _learnt(header: dict[str, Any], archive: Any) -> Learnt:
+    """What a header and its arrays say was learnt; raises KeyError, TypeError or ValueError on what does not fit."""
     layout = header["layout"]
     numbers = [
         layout["window"],
@@ -157,7 +161,7 @@ def _rebuild(header: dict[str, Any], archive: Any) -> GroundClassifier:
         raise ValueError("the classes are not two or more different labels")
     names = [str(name) for name in header["features"]]
     known = set(names)
-    experts = []
+    experts: list[Expert] = []
     for number, of_expert in enumerate(header["experts"]):
         features = tuple(of_expert["features"])
         if not features or not known.issuperset(features):
@@ -165,72 +169,76 @@ def _rebuild(header: dict[str, Any], archive: Any) -> GroundClassifier:
         experts.append(_expert(of_expert, features, len(classes), archive, number))
     if not experts:
         raise ValueError("there is no expert")
-    classifier._experts = experts
-    classifier._layout = Layout(float(layout["window"]), dict(layout["period"]), dict(layout["size"]))
-    classifier._held = dict(header["held"])
-    classifier._fitted(classes, tuple(names), tuple(str(note) for note in header["notes"]))
-    return classifier
+    return Learnt(
+        classes,
+        tuple(names),
+        tuple(experts),
+        Layout(float(layout["window"]), dict(layout["period"]), dict(layout["size"])),
+        dict(header["held"]),
+        tuple(str(note) for note in header["notes"]),
+    )
 
 
 def _expert(
     header: dict[str, Any], features: tuple[str, ...], classes: int, archive: Any, number: int
 ) -> Expert:
-    a = {name: archive[f"{name}_{number}"] for name in _ARRAYS}
     roles = roles_of(features)
-    count = len(roles.machine)
+    machine, motion, effects = len(roles.machine), len(roles.motion), len(roles.effects)
     sizes = {
-        "f": count,
-        "v": len(a["support"]),
+        "f": machine,
         "p": classes * (classes - 1) // 2,
         "k": classes,
-        "d": min(classes - 1, count),
-        "w": len(a["points"]),
+        "d": min(classes - 1, machine),
         "3": 3,
         "2": 2,
         "S": len(SPANS),
         "l": len(LEVELS),
+        "F": len(features),
+        "b": motion + effects,
+        "e": effects,
+        "r": 1 + 2 * motion,
     }
-    _check_shapes(a, _ARRAYS, sizes)
-    forest = _forest(archive, number, len(features), classes) if roles.forest else None
-    law = _law(archive, number, roles, classes) if roles.law else None
+
+    def part(name: str) -> dict[str, Any]:
+        arrays = {field: archive[f"{_key(name, field)}_{number}"] for field in _PARTS[name]}
+        _check_shapes(arrays, _PARTS[name], sizes)
+        return arrays
+
     slopes = np.array(header["slopes"], dtype=float)
     if slopes.shape != (1 + roles.forest + roles.law,) or not (slopes > 0).all():
         raise ValueError("the slopes are not one for each part")
+    forest = Forest(**part("forest")) if roles.forest else None
+    if forest is not None:
+        forest.check()
     parts = Parts(
-        Standardization(a["centre"], a["scale"], a["weight"]),
-        KernelMachine(a["support"], a["weights"], a["offsets"], float(header["width"]), classes),
-        Discriminants(a["axes"], a["points"]),
+        Standardization(**part("standardization")),
+        KernelMachine(**part("machine"), width=float(header["width"]), classes=classes),
+        Discriminants(**part("discriminants")),
         forest,
-        law,
+        MotionLaw(**part("law")) if roles.law else None,
     )
-    strangeness = Strangeness(a["usual"], a["levels"])
-    return Expert(frozenset(header["families"]), features, parts, slopes, a["class_offsets"], strangeness)
+    offsets = {_OFFSETS: archive[f"{_OFFSETS}_{number}"]}
+    _check_shapes(offsets, {_OFFSETS: "k"}, sizes)
+    strangeness = Strangeness(**part("strangeness"))
+    return Expert(frozenset(header["families"]), features, parts, slopes, offsets[_OFFSETS], strangeness)
 
 
-def _forest(archive: Any, number: int, features: int, classes: int) -> Forest:
-    a = {name: archive[f"forest_{name}_{number}"] for name in _FOREST}
-    sizes = {"F": features, "t": len(a["roots"]), "n": len(a["feature"]), "k": classes}
-    _check_shapes(a, _FOREST, sizes, whole=("roots", "feature", "left", "right"))
-    forest = Forest(**a)
-    forest.check()
-    return forest
+def _check_shapes(arrays: dict[str, Any], shapes: dict[str, str], sizes: dict[str, int]) -> None:
+    """Raise ValueError on an array that is empty, holds NaN, or has another shape or type.
 
-
-def _law(archive: Any, number: int, roles: Roles, classes: int) -> MotionLaw:
-    a = {name: archive[f"law_{name}_{number}"] for name in _LAW}
-    motion, effects = len(roles.motion), len(roles.effects)
-    _check_shapes(a, _LAW, {"b": motion + effects, "e": effects, "r": 1 + 2 * motion, "k": classes})
-    return MotionLaw(**a)
-
-
-def _check_shapes(
-    arrays: dict[str, Any], shapes: dict[str, str], sizes: dict[str, int], whole: tuple[str, ...] = ()
-) -> None:
-    """Raise ValueError on an array that is empty, holds NaN, or has another shape or type."""
+    A size that ``sizes`` does not give is free, but one in all of these arrays.
+    """
+    free: dict[str, int] = {}
     for name, letters in shapes.items():
         array = arrays[name]
-        kind = "i" if name in whole else "f"
-        if array.shape != tuple(sizes[letter] for letter in letters) or array.dtype.kind != kind:
+        kind = "i" if name in _WHOLE else "f"
+        if array.ndim != len(letters) or array.dtype.kind != kind:
+            raise ValueError(f"{name} has shape {array.shape}")
+        wanted = [
+            sizes[x] if x in sizes else free.setdefault(x, n)
+            for x, n in zip(letters, array.shape, strict=True)
+        ]
+        if list(array.shape) != wanted:
             raise ValueError(f"{name} has shape {array.shape}")
         if not array.size:
             raise ValueError(f"{name} is empty")
