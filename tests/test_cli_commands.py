@@ -14,7 +14,6 @@ import pandas as pd
 import pytest
 
 from terragrip import Vehicle
-from terragrip.cli import estimate as estimate_command
 from terragrip.cli import main
 from terragrip.estimation import Estimates
 
@@ -116,7 +115,7 @@ def test_a_long_file_in_blocks_gives_the_same_table(
 ) -> None:
     words = ["estimate", drive / "recording.parquet", "--vehicle", drive / "vehicle.yaml", "-q", "-o"]
     run(*words, tmp_path / "whole.parquet")
-    monkeypatch.setattr(estimate_command, "_LONG", 0)
+    monkeypatch.setattr("terragrip.formats.parquet._LONG", 0)
     run(*words, tmp_path / "blocks.parquet")
     whole, blocks = (Estimates.read(tmp_path / f"{name}.parquet") for name in ("whole", "blocks"))
     assert np.array_equal(whole["adhesion_rr"], blocks["adhesion_rr"], equal_nan=True)

@@ -5,7 +5,9 @@ from __future__ import annotations
 import gzip
 import sys
 from pathlib import Path
+from typing import Any
 
+import h5py
 import numpy as np
 import pandas as pd
 import pyarrow.parquet as pq
@@ -15,7 +17,8 @@ import terragrip as tg
 from can_frames import drive, write_log
 from terragrip.errors import InputError
 from terragrip.estimation import estimate_in_parts
-from terragrip.formats import csv, csv_blocks, inspect, iter_csv
+from terragrip.formats import Profile, csv, csv_blocks, inspect, iter_csv
+from terragrip.formats.long_logs import long_log, recordings_of
 from terragrip.formats.reading import read_table
 from terragrip.vehicle import Vehicle
 
@@ -132,7 +135,7 @@ def test_blocks_of_a_long_table_are_its_recording(tmp_path: Path, monkeypatch: p
     path = tmp_path / "log.csv"
     frame = drive_of_a_robot()
     dates = frame.assign(time=pd.Timestamp("2026-05-01") + pd.to_timedelta(frame["time"], unit="s"))
-    monkeypatch.setattr(csv_blocks, "_ROWS", 500)
+    monkeypatch.setattr(csv_blocks, "ROWS", 500)
     for table in (frame, dates):
         table.to_csv(path, index=False)
         whole, blocks = tg.read(path), list(iter_csv(path) or ())
@@ -142,6 +145,99 @@ def test_blocks_of_a_long_table_are_its_recording(tmp_path: Path, monkeypatch: p
             assert np.array_equal(np.concatenate([b[name] for b in blocks]), values)
         assert blocks[-1].sha256 == whole.sha256
         assert blocks[-1].notes == whole.notes
+
+
+PROFILE = {
+    "time": {"from": "stamp", "unit": "ms", "zero": "first"},
+    "channels": {
+        "ground_speed": {"from": "*v", "unit": "km/h", "invalid": [0]},
+        "acceleration_x": {"from": "not_there", "optional": True},
+        "pitch": {"pitch_of": ["qx", "qy", "qz", "qw"]},
+        **{f"wheel_speed_{w}": {"from": f"omega_{w}", "unit": "rpm", "sign": -1} for w in ("l", "r")},
+        **{f"drive_torque_{w}": {"from": f"amps_{w}", "scale": 2.0} for w in ("l", "r")},
+    },
+}
+
+
+def foreign(rows: int = 3000) -> pd.DataFrame:
+    """`drive_of_a_robot` under other names and units."""
+    frame = drive_of_a_robot(rows)
+    turn = np.sin(frame["time"]) / 5
+    return pd.DataFrame(
+        {
+            "stamp": (1_750_000_000_000 + 20 * np.arange(rows)).astype(np.int64),
+            "v": (3.6 * frame["ground_speed"]).where(frame.index % 7 > 0, 0),
+            **{f"omega_{w}": -frame[f"wheel_speed_{w}"] * 30 / np.pi for w in ("l", "r")},
+            **{f"amps_{w}": frame[f"drive_torque_{w}"] / 2 for w in ("l", "r")},
+            **dict(
+                zip(("qx", "qy", "qz", "qw"), (0 * turn, np.sin(turn), 0 * turn, np.cos(turn)), strict=True)
+            ),
+        }
+    )
+
+
+def write_foreign(path: Path, frame: pd.DataFrame) -> Path:
+    if path.suffix == ".csv":
+        frame.to_csv(path, index=False)
+    elif path.suffix == ".parquet":
+        frame.to_parquet(path)
+    else:
+        with h5py.File(path, "w") as file:
+            for name, column in frame.items():
+                file[str(name)] = column.to_numpy().reshape(1, -1)
+                file[str(name)].attrs["MATLAB_class"] = np.bytes_("double")
+            file["t"] = (frame["stamp"].to_numpy() / 1000).reshape(1, -1)
+            file["t"].attrs["MATLAB_class"] = np.bytes_("double")
+    return path
+
+
+@pytest.mark.parametrize("suffix", [".csv", ".parquet", ".mat"])
+def test_blocks_through_a_profile_are_its_recording(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, suffix: str
+) -> None:
+    path, profile = write_foreign(tmp_path / f"log{suffix}", foreign()), Profile.from_dict(PROFILE)
+    whole = tg.read(path, profile)
+    monkeypatch.setattr(csv, "_LONG", 0)
+    for module in ("parquet", "matlab_long"):
+        monkeypatch.setattr(f"terragrip.formats.{module}._LONG", 0)
+    for module in ("csv_blocks", "parquet", "matlab_long"):
+        monkeypatch.setattr(f"terragrip.formats.{module}.ROWS", 500)
+    monkeypatch.setattr(csv_blocks, "_BLOCK", 10_000)
+    log = long_log(path)
+    assert log is not None
+    blocks = list(recordings_of(log, profile) or ())
+    assert len(blocks) > 3
+    assert np.allclose(np.concatenate([b.time for b in blocks]), whole.time, atol=1e-9)
+    assert set(blocks[0].channels) == set(whole.channels)
+    for name, values in whole.channels.items():
+        assert np.array_equal(np.concatenate([b[name] for b in blocks]), values, equal_nan=True), name
+    assert blocks[-1].sha256 == whole.sha256
+    assert set(blocks[-1].notes) == set(whole.notes)
+
+
+@pytest.mark.parametrize(
+    "channel",
+    [
+        {"derivative_of": ["x", "y"]},
+        {"from": ["v", "omega_l"]},
+        {"from": "*m*"},
+        {"from": "v", "delay": "50 ms"},
+        {"from": "v", "over": "qw", "over_minimum": 0.3},
+        {"from": "v", "else": {"from": "omega_l"}},
+    ],
+)
+def test_a_profile_that_looks_beside_a_row_takes_the_whole_log(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, channel: dict[str, Any]
+) -> None:
+    monkeypatch.setattr("terragrip.formats.parquet._LONG", 0)
+    log = long_log(write_foreign(tmp_path / "log.parquet", foreign(100)))
+    assert log is not None
+    profile = Profile.from_dict({**PROFILE, "channels": {**PROFILE["channels"], "ground_speed": channel}})
+    assert recordings_of(log, profile) is None
+    without = {n: c for n, c in PROFILE["channels"].items() if not n.startswith("drive")}
+    slip = Profile.from_dict({**PROFILE, "channels": without})
+    assert recordings_of(log, slip, with_torque=True) is None
+    assert recordings_of(log, slip) is not None
 
 
 @pytest.mark.parametrize("torque", [True, False])

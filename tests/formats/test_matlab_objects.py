@@ -69,8 +69,40 @@ elements = cell(
     signal("wheels", bus),
     signal("", series((100 * speed[::2]).reshape(-1, 1), t[::2]), "car/hitch/drawbar"),
 )
+records = []
+
+def record(values):
+    records.append(values)
+    return float(len(records) - 1)
+
+def leaf(data, time=None, unit="", kind="double", width=1, **attributes):
+    clock = dict(CompressedTime=np.array([[0.0, 0.05, float(len(t))]]), TimeR2=np.empty((0, 0)))
+    if time is not None:
+        clock = dict(CompressedTime=np.empty((0, 0)), TimeR2=record(time))
+    about = struct(Dimension=np.array([[width]], np.uint32), Complexity=np.array([[False]]), ClassName=kind, **attributes)
+    return struct(LeafMarker=chr(65279), ElementType="timeseries", IsEmpty=np.array([[False]]), Name="own",
+                  TimeUnits=struct(Class="char", Value="seconds"), Time=np.empty((0, 0)), DataR2=record(data),
+                  DataUnits=struct(Class="Simulink.SimulationData.Unit", Value=unit), SignalAttributes=about, **clock)
+
+def saved(name, values, path="car/block"):
+    return struct(ElementType="signal", Name=name, PropagatedName="", BlockPath=cell(path), PortIndex=1.0, Values=values)
+
 if len(sys.argv) > 3:
-    elements[0, 0] = struct(ElementType="signal", Name="v", Values=struct(DataR2=7.0, TimeR2=8.0))
+    fixed = struct(isSigned=np.array([[True]]), WordLength=np.array([[16]], np.int32), SlopeAdjustmentFactor=1.0,
+                   Exponent=np.array([[-8]], np.int32), Bias=2.0)
+    bus = struct(**{f"omega_{w}": leaf(speed / 0.2 + k) for k, w in enumerate(("fl", "fr", "rl", "rr"))})
+    elements = cell(
+        saved("ground_speed", leaf((3.6 * speed).astype("f4"), unit="km/h", kind="single")),
+        saved("wheels", bus),
+        saved("", leaf(100 * speed[::2], t[::2]), "car/hitch/drawbar"),
+        saved("pair", leaf(np.c_[speed, 3 * speed], width=2)),
+        saved("raw", leaf(np.arange(200, dtype="i2"), kind="fixed-point", ResolvedClassName="int16", FixedPointParameters=fixed)),
+        saved("lost", leaf(speed)),
+        saved("sub", leaf(speed)),
+    )
+    inner = cell(saved("deep", leaf(speed)))
+    elements[0, -1] = struct(ElementType="dataset", Name="sub", Values=inner)
+    lost = len(records) - 3
 kind = "Simulink.SimulationData.Storage." + ("MatFileDatasetStorage" if len(sys.argv) > 3 else "RamDatasetStorage")
 storage = Object({"any": struct(Version=2.0, Elements=elements)}, kind)
 dataset = Object({"any": struct(Name="logsout", Version=3.0, Storage=storage)}, "Simulink.SimulationData.Dataset")
@@ -83,8 +115,19 @@ content = {
 }
 if len(sys.argv) > 3:
     content = {"logsout": dataset, "ts": content["ts"]}
-saved = ["Simulink.SimulationData.Dataset", kind]
-matio.save_to_mat(sys.argv[1], content, version=sys.argv[2], saveobj_classes=saved)
+saved_classes = ["Simulink.SimulationData.Dataset", kind]
+matio.save_to_mat(sys.argv[1], content, version=sys.argv[2], saveobj_classes=saved_classes)
+if records:
+    import h5py
+    with h5py.File(sys.argv[1], "a") as file:
+        stream = file.create_group("#sigstream#")
+        stream["#nRecords#"] = np.array([len(records)], np.uint64)
+        for number, values in enumerate(records):
+            if number != lost:
+                one = stream.create_group(str(number))
+                one["#data#"] = np.frombuffer(values.tobytes(), np.uint8)
+                one["#length#"] = np.array([len(values)], np.uint64)
+                one["#sampleSize#"] = np.array([values.nbytes // len(values)], np.uint64)
 """
 
 
@@ -123,10 +166,28 @@ def test_the_shipped_profile_makes_a_recording_of_it(log: Path) -> None:
     assert inspect(log).fitting == ("simulink",)
 
 
-def test_a_dataset_in_records_of_its_own_is_named_with_the_way_out(tmp_path: Path) -> None:
-    table = read_table(write(tmp_path / "run.mat", "v7.3", "records"))
-    assert "ts[0]" in table.columns
-    assert any("save it there by save('log.mat', 'logsout', '-v7')" in note for note in table.notes)
+def test_a_dataset_saved_with_v73_is_read_from_its_records(tmp_path: Path) -> None:
+    log = write(tmp_path / "run.mat", "v7.3", "records")
+    table = read_table(log)
+    columns = table.columns
+    assert np.allclose(known(columns["logsout.ground_speed"]), 3.6 * SPEED, rtol=1e-6)  # of single precision
+    assert table.units["logsout.ground_speed"] == "km/h"
+    for k, wheel in enumerate(WHEELS):
+        assert np.allclose(known(columns[f"logsout.wheels.omega_{wheel}"]), SPEED / 0.2 + k)
+    assert np.allclose(
+        columns["logsout.drawbar"][::2], 100 * SPEED[::2]
+    )  # by its block's name, on a clock of its own
+    assert np.isnan(columns["logsout.drawbar"][1::2]).all()
+    assert np.allclose(columns["logsout.pair[1]"], 3 * SPEED)
+    assert np.allclose(columns["logsout.raw"], np.arange(COUNT) / 256 + 2)
+    assert np.allclose(columns["logsout.sub.deep"], SPEED)
+    assert np.allclose(columns["ts[1]"], 5 * SPEED)  # an object beside it
+    assert np.allclose(columns["time"], TIME)
+    assert len(table.notes) == 1  # of the record that is not there
+    assert "The samples of logsout.lost are in records that cannot be read here" in table.notes[0]
+    assert "save('log.mat', 'logsout', '-v7')" in table.notes[0]
+    recording = tg.read(log, "simulink")
+    assert np.allclose(recording["ground_speed"], SPEED, rtol=1e-6)
 
 
 def test_damaged_objects_are_read_or_refused_in_one_line(log: Path, tmp_path: Path) -> None:

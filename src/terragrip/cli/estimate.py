@@ -19,7 +19,6 @@ if TYPE_CHECKING:
     from terragrip.recording import Recording
     from terragrip.vehicle import Vehicle
 
-_LONG = 100_000_000  # bytes of a Parquet file; ten times as much in memory
 _MANY = 1_000_000  # rows whose estimates do not fit memory at ease
 
 
@@ -94,8 +93,7 @@ def _estimate(
     """Estimate one log into a file and return the summary; a long Parquet file goes through in blocks."""
     from terragrip.formats import read
 
-    plain = not (sources.profile or sources.dbc or sources.others or smooth)
-    found = _blocks_of_a_long_log(log) if plain else None
+    found = None if sources.dbc or sources.others or smooth else _blocks_of_a_long_log(log, sources.profile)
     if found is not None:
         from terragrip.estimation import estimate_blocks
 
@@ -118,38 +116,14 @@ def _estimate(
     return estimates.summary()
 
 
-def _blocks_of_a_long_log(log: Path) -> tuple[Iterator[Recording], int] | None:
+def _blocks_of_a_long_log(log: Path, profile: Path | None) -> tuple[Iterator[Recording], int] | None:
     """A table too large to be held in memory at ease, in blocks, and about how many rows it has; None of another log."""
-    from terragrip.formats.csv import is_long
-    from terragrip.formats.kind import CSV, PARQUET, kind_of
+    from terragrip.formats.long_logs import long_log, recordings_of
+    from terragrip.formats.profile import Profile
 
-    kind = kind_of(log)
-    if kind is CSV and is_long(str(log)):
-        from terragrip.formats.csv_blocks import has_torque, iter_csv, rows_of
-
-        blocks = iter_csv(log) if has_torque(log) else None
-        return None if blocks is None else (blocks, rows_of(log))
-    rows = _rows_of_a_long_log(log) if kind is PARQUET else 0
-    if not rows:
+    found = long_log(log)
+    if found is None:
         return None
-    from terragrip.formats import iter_parquet
-
-    return iter_parquet(log), rows
-
-
-def _rows_of_a_long_log(log: Path) -> int:
-    """Rows of a Parquet file that is too large to be held in memory at ease, else 0."""
-    if log.stat().st_size < _LONG:
-        return 0
-    from pyarrow import ArrowException
-    from pyarrow.parquet import read_metadata
-
-    from terragrip.recording.schema import has_torque
-
-    try:
-        metadata = read_metadata(log)
-        return (
-            int(metadata.num_rows) if has_torque(metadata.schema.names) else 0
-        )  # slip alone takes the whole log
-    except (ArrowException, OSError):  # damaged: let the reader say what is wrong
-        return 0
+    chosen = None if profile is None else Profile.load(profile)
+    blocks = recordings_of(found, chosen, with_torque=True)
+    return None if blocks is None else (blocks, found.rows)

@@ -9,6 +9,7 @@ import warnings
 import zlib
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass
 from importlib import import_module
 from typing import Any
 
@@ -67,3 +68,27 @@ def reading(source: str | os.PathLike[str], kind: str, *errors: type[Exception])
         raise InputError(
             f"is a damaged {kind}, or none ({said})", file=source, mend="copy or record it again"
         ) from error
+
+
+@dataclass
+class Seen:
+    """How many messages of a file were met so far."""
+
+    messages: int = 0
+
+
+@contextmanager
+def as_far_as_it_goes(
+    source: str | os.PathLike[str], kind: str, notes: list[str], *errors: type[Exception]
+) -> Iterator[Seen]:
+    """As `reading`, for a file of messages: one that is damaged behind some is taken as far as it goes, which a note says."""
+    seen = Seen()
+    try:
+        with reading(source, kind, *errors):
+            yield seen
+    except InputError as error:
+        if not seen.messages:
+            raise
+        notes.append(
+            f"The file ends early, or is damaged ({error.problem}); {seen.messages} messages before were read."
+        )

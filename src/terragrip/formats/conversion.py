@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -19,7 +19,7 @@ from terragrip.formats.derivation import (
     roll_of,
     yaw_of,
 )
-from terragrip.formats.profile import Profile, Rows, Source, TimeSource, rate_unit
+from terragrip.formats.profile import Profile, Rows, Source, TimeSource, matching, rate_unit
 from terragrip.formats.signals import SINCE_1970
 from terragrip.formats.table import LogTable
 from terragrip.formats.timebase import spread, union
@@ -80,6 +80,43 @@ def converted(profile: Profile, log: LogTable, *, partial: bool = False) -> Part
         channels = {n: spread(v, rows[delays[n]], len(instants)) for n, v in channels.items()}
         time = instants
     return Part(time, channels, log.source, log.sha256, (*log.notes, *notes), noise, start)
+
+
+def settled(profile: Profile, log: LogTable) -> tuple[Profile, list[str]] | None:
+    """The profile bound to a log's columns, and notes, where every row of its recording follows from that row of the log alone.
+
+    None where it does not: of several sources the values tell which counts, derivatives look at rows beside, delays shift them.
+    Of the log only names are looked at. Raises InputError as `bound` does.
+    """
+    for origin in profile.channels.values():
+        if origin.delay or any(one.derivative_of or one.over for one in origin.chain):
+            return None
+        if sum(_ways(one, log.names) for one in origin.chain) > 1:
+            return None
+    if profile.rows is not None:
+        return None
+    stub = np.zeros(1)
+    return bound(profile, replace(log, columns=dict.fromkeys(log.names, stub)))
+
+
+def _ways(origin: Source, names: tuple[str, ...]) -> int:
+    """In how many ways a log's columns could give a source."""
+    found = [len(matching(column, names)) for column in origin.columns]
+    return sum(found) if origin.candidates else int(np.prod(found))  # a constant can be given in one
+
+
+def converted_block(profile: Profile, block: LogTable, first: Any) -> dict[str, Column]:
+    """What a `settled` profile makes of consecutive rows of a log; ``first`` is the log's first stamp."""
+    stamps = block.columns[profile.time.column]
+    if profile.time.zero == "first" or stamps.dtype.kind == "M":
+        shifted = (stamps.astype(np.int64) if stamps.dtype.kind in "iu" else stamps) - first
+        block = replace(block, columns={**block.columns, profile.time.column: shifted})
+    zero = profile.time.model_copy(update={"zero": None})
+    time, _, _ = _time(zero, block)
+    return {
+        TIME: time,
+        **{name: _channel(name, origin, block, time)[0] for name, origin in profile.channels.items()},
+    }
 
 
 def _time(origin: TimeSource, log: LogTable) -> tuple[Floats, float | None, list[str]]:

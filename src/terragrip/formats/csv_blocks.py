@@ -14,17 +14,16 @@ import numpy.typing as npt
 
 from terragrip.errors import InputError
 from terragrip.files import sha256, unreadable
-from terragrip.formats.blocks import recordings
-from terragrip.formats.csv import GZIP, body_of, chosen_of, parse
+from terragrip.formats.csv import GZIP, body_of, chosen_of, is_long, parse
 from terragrip.formats.dialect import HEAD, Dialect, detect, in_utf8, to_text
-from terragrip.formats.table import LogTable, Wanted, every_of, in_si
-from terragrip.recording import Recording, schema
-from terragrip.recording.schema import is_own
+from terragrip.formats.long_logs import ROWS, LongLog, recordings_of
+from terragrip.formats.profile import Profile
+from terragrip.formats.table import LogTable, Wanted, every_of
+from terragrip.recording import Recording
 
 Column = npt.NDArray[Any]
 
 _BLOCK = 16 << 20  # bytes
-_ROWS = 200_000  # of a block that is estimated
 _LOOK = 2 << 20  # bytes, where only some blocks are looked at
 
 
@@ -78,33 +77,37 @@ def _common(first: np.dtype[Any], second: np.dtype[Any]) -> np.dtype[Any]:
     return np.dtype(object)
 
 
-def iter_csv(path: str | os.PathLike[str]) -> Iterator[Recording] | None:
-    """A long table with the recording's own columns in blocks, so that memory stays small; None where its lines cannot be told.
+def iter_csv(path: str | os.PathLike[str], profile: Profile | None = None) -> Iterator[Recording] | None:
+    """A table in blocks, so that memory stays small; None where its lines cannot be told, or rows need others beside them.
 
     The blocks together are the recording that `terragrip.formats.read` gives, and raise the same InputErrors, each when its
     block is reached.
     """
+    log = _as_long_log(os.fspath(path))
+    return None if log is None else recordings_of(log, profile)
+
+
+def long_csv(path: str | os.PathLike[str]) -> LongLog | None:
+    """A text table as a `LongLog`; None of a short one, or where its lines cannot be told."""
     source = os.fspath(path)
+    return _as_long_log(source) if is_long(source) else None
+
+
+def _as_long_log(source: str) -> LongLog | None:
     dialect = _dialect(source)
     if dialect is None:
         return None
-    chosen = chosen_of(dialect, is_own, source)
-    own = [dialect.names[k] for k in chosen]
+    rows = rows_of(source)
+    size = int(np.clip(ROWS * os.path.getsize(source) / rows, 1 << 20, 4 * _BLOCK))
     said: list[str] = []
-    size = int(np.clip(_ROWS * os.path.getsize(source) / rows_of(source), 1 << 20, 4 * _BLOCK))
 
-    def found() -> Iterator[dict[str, Column]]:
+    def blocks(names: list[str]) -> Iterator[dict[str, Column]]:
+        chosen = chosen_of(dialect, lambda name: name in names, source)
         for columns, notes in _blocks(source, dialect, chosen, 1, size):
             said.extend(notes)
-            yield in_si(LogTable(dialect.names, columns, dialect.units, source))
+            yield columns
 
-    return recordings(found(), tuple(name for name in dialect.names if name), own, source, said)
-
-
-def has_torque(path: str | os.PathLike[str]) -> bool:
-    """Whether a long table has a drive torque under the recording's own names; without one, slip takes the whole log."""
-    dialect = _dialect(os.fspath(path))
-    return dialect is not None and schema.has_torque(dialect.names)
+    return LongLog(tuple(n for n in dialect.names if n), dialect.units, source, rows, blocks, said)
 
 
 def rows_of(path: str | os.PathLike[str]) -> int:

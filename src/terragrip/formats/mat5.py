@@ -37,10 +37,20 @@ class Opaque:
 
 @dataclass(frozen=True, eq=False)
 class Array:
-    """A numeric array, read when it is asked for; ``shape`` as in MATLAB."""
+    """A numeric array, read when it is asked for; ``shape`` as in MATLAB.
+
+    ``part`` reads some rows of one column of a vector or matrix; without it the whole array is read for that.
+    """
 
     shape: tuple[int, ...]
     read: Callable[[], npt.NDArray[Any]]
+    part: Callable[[slice, int], npt.NDArray[Any]] | None = None
+
+    def column(self, number: int, length: int, rows: slice = slice(None)) -> npt.NDArray[Any]:
+        """Some rows of a column, where the array has ``length`` rows (or is a vector of as many numbers)."""
+        if self.part is not None:
+            return self.part(rows, number)
+        return self.read().reshape(length, -1)[rows, number]
 
 
 def read_mat5(path: str | os.PathLike[str]) -> dict[str, Any]:

@@ -19,61 +19,27 @@ from terragrip.files import sha256
 from terragrip.formats.boundary import needed, reading
 from terragrip.formats.kind import Databases
 from terragrip.formats.mat5 import Array, Opaque, read_mat5
-from terragrip.formats.matlab_objects import IN_RECORDS
-from terragrip.formats.matlab_signals import Found, walk
+from terragrip.formats.matlab_hdf5 import is_hdf5, tree_of
+from terragrip.formats.matlab_records import IN_RECORDS
+from terragrip.formats.matlab_signals import Found, seconds_of, walk
 from terragrip.formats.signals import Signal, SignalLog
 from terragrip.formats.table import LogTable, Wanted, every_of, kept_rows
 from terragrip.formats.worker import Worker
 
 Floats = npt.NDArray[np.float64]
 
-_DEEPEST = 12
-_USER_BLOCK, _HDF5 = 512, b"\x89HDF\r\n\x1a\n"
 _BLOCK = 10_000  # samples that are kept or left out together, where a log is looked at in parts
-_DATENUM = (600_000.0, 800_000.0)  # days since year 0: 1642 to 2190
-_DATENUM_1970 = 719_529.0
 _NO_OBJECTS = ("", "function", "sparse", "function_handle")
 
 
 def read_matlab(path: str, wanted: Wanted | None, databases: Databases) -> SignalLog | LogTable:
     """Read a MATLAB file; raises InputError if it is damaged, or holds no numeric column."""
-    with open(path, "rb") as stream:
-        head = stream.read(_USER_BLOCK + len(_HDF5))
-    if not (head.startswith((_HDF5, b"MATLAB 7.3")) or head[_USER_BLOCK:] == _HDF5):
+    if not is_hdf5(path):
         with reading(path, "MATLAB file"):
             return _with_objects(read_mat5(path), path, wanted)
     h5py = needed("h5py", "a MATLAB 7.3 file")
     with reading(path, "MATLAB file", RuntimeError), h5py.File(path, "r") as file:
-        tree = {
-            name: _of_hdf5(file, item, 0, h5py) for name, item in file.items() if not name.startswith("#")
-        }
-        return _with_objects(tree, path, wanted)
-
-
-def _of_hdf5(file: Any, item: Any, depth: int, h5py: Any) -> Any:
-    """A group or dataset as mapping, list, text, `Array` or `Opaque`."""
-    if depth > _DEEPEST:
-        return None
-    if "MATLAB_object_decode" in item.attrs:
-        kind = item.attrs.get("MATLAB_class", b"")
-        return Opaque(kind.decode("ascii", "replace") if isinstance(kind, bytes) else "")
-    if isinstance(item, h5py.Group):
-        return {name: _of_hdf5(file, part, depth + 1, h5py) for name, part in item.items()}
-    if not isinstance(item, h5py.Dataset) or "MATLAB_empty" in item.attrs:
-        return None
-    kind = item.attrs.get("MATLAB_class", b"")
-    if h5py.check_ref_dtype(item.dtype) is not None:
-        references = item[()].ravel()[: 1 << 16]
-        return [_of_hdf5(file, file[reference], depth + 1, h5py) for reference in references if reference]
-    if kind == b"char":
-        return "".join(map(chr, item[()].ravel(order="F").tolist()))
-    if item.dtype.names:
-        return {name: np.asarray(item[name]) for name in item.dtype.names}
-    if item.dtype.kind in "fiub":
-        if not kind:
-            return Array(item.shape, lambda: np.asarray(item[()]))
-        return Array(tuple(reversed(item.shape)), lambda: np.asarray(item[()]).T)
-    return None
+        return _with_objects(tree_of(file, h5py), path, wanted)
 
 
 def _with_objects(tree: dict[str, Any], path: str, wanted: Wanted | None) -> SignalLog | LogTable:
@@ -151,21 +117,25 @@ def _finished(
     if not found.signals:
         return _table_of(found.loose, path, wanted, notes)
     clocks: dict[int, Floats] = {}
-    lengths: dict[int, int] = {}
     arrays: dict[int, npt.NDArray[Any]] = {}
     signals = {}
     for name, (clock, values, column) in found.signals.items():
         if wanted is not None and not wanted(name):
             continue
+        length = int(np.prod(clock.shape))
+        rows = kept_rows(length, _BLOCK, every_of(wanted))
         if id(clock) not in clocks:
-            whole = _seconds(_read(clock).ravel(), found.scales.get(id(clock), 1.0))
-            lengths[id(clock)] = len(whole)
-            clocks[id(clock)] = whole[kept_rows(len(whole), _BLOCK, every_of(wanted))]
-        if id(values) not in arrays:
-            arrays = {id(values): _read(values)}  # columns of one matrix stand side by side
-        flat = arrays[id(values)].reshape(lengths[id(clock)], -1)[:, column or 0]
-        flat = flat[kept_rows(len(flat), _BLOCK, every_of(wanted))]
-        signals[name] = Signal(clocks[id(clock)], np.array(flat, dtype=np.float64), found.units.get(name))
+            whole = seconds_of(_read(clock).ravel(), found.scales.get(id(clock), 1.0))
+            clocks[id(clock)] = whole[rows]
+        if isinstance(values, Array) and values.part is not None:
+            flat = values.column(column or 0, length)
+        else:
+            if id(values) not in arrays:
+                arrays = {id(values): _read(values)}  # columns of one matrix stand side by side
+            flat = arrays[id(values)].reshape(length, -1)[:, column or 0]
+        signals[name] = Signal(
+            clocks[id(clock)], np.asarray(flat[rows], dtype=np.float64), found.units.get(name)
+        )
     return SignalLog(tuple(found.signals), signals, path, sha256(path), tuple(notes))
 
 
@@ -173,9 +143,10 @@ def _notes(found: Found) -> list[str]:
     notes = []
     records = [name for name, kind in found.opaque.items() if kind == IN_RECORDS]
     if records:
+        more = f" and {len(records) - 6} more" if len(records) > 6 else ""
         notes.append(
-            f"The samples of {', '.join(records[:6])} are in records that MATLAB alone can read, as it saves a Dataset with -v7.3: "
-            f"save it there by save('log.mat', '{records[0].partition('.')[0]}', '-v7')."
+            f"The samples of {', '.join(records[:6])}{more} are in records that cannot be read here (a Dataset saved with -v7.3): save "
+            f"it in MATLAB by save('log.mat', '{records[0].partition('.')[0]}', '-v7')."
         )
     shown = [f"{n} ({kind})" if kind else n for n, kind in found.opaque.items() if kind != IN_RECORDS]
     if shown:
@@ -202,11 +173,3 @@ def _table_of(loose: Mapping[str, Any], path: str, wanted: Wanted | None, notes:
 
 def _read(value: Any) -> npt.NDArray[Any]:
     return value.read() if isinstance(value, Array) else value
-
-
-def _seconds(clock: npt.NDArray[Any], scale: float) -> Floats:
-    """A time vector in seconds; days since year 0, as datenum gives them, count from 1970 then."""
-    time = np.asarray(clock, dtype=np.float64)
-    if len(time) and _DATENUM[0] < time[0] < _DATENUM[1] and np.median(np.abs(np.diff(time[:1000]))) < 0.01:
-        return (time - _DATENUM_1970) * 86400.0
-    return time * scale

@@ -3,7 +3,8 @@
 The layouts are those of the classes' own MATLAB code (R2010b to R2023b): ``timeseries`` keeps ``Data_``, and in ``TimeInfo``
 either ``Time_`` or ``Start_``, ``Increment_`` and ``Length``; ``Simulink.SimulationData.Dataset`` saves a struct with ``Storage``,
 whose ``Elements`` are signals, states and the like, each with ``Name`` and ``Values``; ``Simulink.SimulationOutput`` keeps
-``Data``. Any other object is taken as a struct of its properties.
+``Data``. Any other object is taken as a struct of its properties. A Dataset that was saved with ``-v7.3`` has structs in place of
+its series, which `terragrip.formats.matlab_records` reads.
 """
 
 from __future__ import annotations
@@ -19,8 +20,9 @@ from terragrip.formats.mat5 import Opaque
 
 _DEEPEST = 24
 _MOST = 1 << 16  # parts of all cells, structs and objects
-_TICKS = {"weeks": 604_800.0, "days": 86_400.0, "hours": 3600.0, "minutes": 60.0, "seconds": 1.0,
-          "milliseconds": 1e-3, "microseconds": 1e-6, "nanoseconds": 1e-9}  # fmt: skip
+TICKS = {"weeks": 604_800.0, "days": 86_400.0, "hours": 3600.0, "minutes": 60.0, "seconds": 1.0,
+         "milliseconds": 1e-3, "microseconds": 1e-6, "nanoseconds": 1e-9}  # fmt: skip
+"""Seconds by the names of MATLAB's units of time."""
 _SERIES = ("timeseries", "Simulink.Timeseries")
 
 
@@ -101,22 +103,18 @@ def _of_object(value: Any, room: _Room) -> Any:
 
 
 def _storage(elements: list[Any]) -> Any:
-    """The elements of a Dataset; those that MATLAB keeps outside of the variable are named by what they are."""
-    if any(_in_records(element) for element in elements):
-        return Opaque(IN_RECORDS)
-    return {"Elements": elements}
+    """The elements of a Dataset, each by its name."""
+    return {"Elements": [_element(element) for element in elements]}
 
 
-IN_RECORDS = "Dataset saved with -v7.3"
-"""Stands for a Dataset whose samples are in records of Simulink's own, outside of the variable."""
-
-
-def _in_records(part: Any) -> bool:
-    if not isinstance(part, Mapping):
-        return False
-    return any(key in part for key in ("DataR2", "TimeR2")) or any(
-        _in_records(inner) for inner in part.values()
-    )
+def _element(element: Any) -> Any:
+    """An element: as an object it is plain already; saved with ``-v7.3`` it is a struct."""
+    if not isinstance(element, Mapping) or "ElementType" not in element or "Values" not in element:
+        return element
+    values = element["Values"]
+    if element["ElementType"] == "dataset" and isinstance(values, list):
+        return {"Name": _name_of(element), **_storage(values)}
+    return {"Name": _name_of(element), "Values": values}
 
 
 def _name_of(element: Mapping[str, Any]) -> str:
@@ -154,7 +152,7 @@ def _series(held: Mapping[str, Any]) -> dict[str, Any] | None:
 def _times(held: Mapping[str, Any], about: Mapping[str, Any]) -> npt.NDArray[np.float64] | None:
     """The instants (n,) [s] of a series, written out or as a regular clock."""
     text = plain(about.get("Units"))
-    tick = _TICKS.get(text.strip().lower(), 1.0) if isinstance(text, str) else 1.0
+    tick = TICKS.get(text.strip().lower(), 1.0) if isinstance(text, str) else 1.0
     written = (about.get("Time_"), held.get("Time_"), held.get("Time"))
     time = next((t for t in map(_numeric, written) if t is not None), None)
     if time is not None:

@@ -12,6 +12,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from terragrip.formats.mat5 import Array, Opaque
 from terragrip.units import is_common
@@ -22,6 +23,8 @@ _DATA = ("data", "values")
 _NAMES = ("name", "label", "signalname", "blockname")
 _WIDEST = 32  # columns of a matrix that are signals
 _DEEPEST = 12
+_DATENUM = (600_000.0, 800_000.0)  # days since year 0: 1642 to 2190
+_DATENUM_1970 = 719_529.0
 
 
 @dataclass
@@ -67,7 +70,7 @@ def _walk_struct(struct: Mapping[str, Any], name: str, found: Found, depth: int)
         if _is_numeric(part):
             if clock is None and _is_vector(part):
                 found.loose[_joined(name, key)] = part
-        elif key.lower() == "values" and isinstance(part, Mapping):
+        elif key.lower() == "values" and isinstance(part, Mapping | Opaque):
             walk(part, name, found, depth + 1)  # a Dataset's element: its name is the signal's
         elif key.lower() in ("elements", "signals") and not isinstance(part, str):
             own = _own_name(part)  # one element alone is no list
@@ -144,3 +147,11 @@ def _is_vector(value: Any) -> bool:
         return False
     size = int(np.prod(value.shape))
     return size > 1 and size == max(value.shape)
+
+
+def seconds_of(clock: npt.NDArray[Any], scale: float) -> npt.NDArray[np.float64]:
+    """A time vector in seconds; days since year 0, as datenum gives them, count from 1970 then."""
+    time = np.asarray(clock, dtype=np.float64)
+    if len(time) and _DATENUM[0] < time[0] < _DATENUM[1] and np.median(np.abs(np.diff(time[:1000]))) < 0.01:
+        return (time - _DATENUM_1970) * 86400.0
+    return time * scale

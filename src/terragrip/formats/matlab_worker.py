@@ -13,8 +13,9 @@ import numpy as np
 import numpy.typing as npt
 
 from terragrip.formats.boundary import needed
-from terragrip.formats.mat5 import Opaque
-from terragrip.formats.matlab_objects import plain
+from terragrip.formats.mat5 import Array, Opaque
+from terragrip.formats.matlab_objects import TICKS, plain
+from terragrip.formats.matlab_records import records_of, resolved
 from terragrip.formats.worker import Outlet, serve
 
 
@@ -23,19 +24,24 @@ def work(path: str, out: Outlet) -> None:
     matio = needed("matio", "an object of MATLAB")
     names = out.hear()
     loaded = matio.load_from_mat(path, variable_names=names)
-    arrays: list[npt.NDArray[Any]] = []
-    out.say({"tree": {name: _skeleton(plain(loaded.pop(name)), arrays) for name in names if name in loaded}})
-    while (number := out.hear()) is not None:
-        out.send(np.asarray(arrays[number], dtype=np.float64))
+    arrays: list[Array] = []
+    with records_of(path) as records:
+        tree = {name: resolved(plain(loaded.pop(name)), records, TICKS) for name in names if name in loaded}
+        out.say({"tree": {name: _skeleton(value, arrays) for name, value in tree.items()}})
+        while (number := out.hear()) is not None:
+            out.send(np.asarray(arrays[number].read(), dtype=np.float64))
 
 
-def _skeleton(value: Any, arrays: list[npt.NDArray[Any]]) -> Any:
+def _skeleton(value: Any, arrays: list[Array]) -> Any:
     """A plain value for JSON: what it is, an array by its place in ``arrays``."""
     if isinstance(value, dict):
         return {"struct": {key: _skeleton(part, arrays) for key, part in value.items()}}
     if isinstance(value, list):
         return {"list": [_skeleton(part, arrays) for part in value]}
     if isinstance(value, np.ndarray):
+        held: npt.NDArray[Any] = value
+        value = Array(held.shape, lambda: held)
+    if isinstance(value, Array):
         arrays.append(value)
         return {"array": len(arrays) - 1, "shape": list(value.shape)}
     if isinstance(value, Opaque):

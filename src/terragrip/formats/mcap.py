@@ -3,22 +3,22 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any
 
-from terragrip.errors import InputError
-from terragrip.formats.boundary import DAMAGE, needed, reading
+from terragrip.formats.boundary import DAMAGE, as_far_as_it_goes, needed
 from terragrip.formats.kind import Databases
-from terragrip.formats.messages import Topic
-from terragrip.formats.ros import Types, log_of, ros_topic
+from terragrip.formats.mcap_records import records
+from terragrip.formats.messages import Parts, Topic
+from terragrip.formats.ros import Types, bag_topic, log_of
 from terragrip.formats.signals import SignalLog
 from terragrip.formats.table import Wanted
 
-_LARGEST = 1 << 30  # bytes of a record
 _EPOCH = ("timestamp", "stamp", "time")
 
-Decode = Callable[[bytes], Any]
+Take = Callable[[float, bytes], None]
+"""Takes a message that came at a time [s]; raises what its decoder raises on damage."""
 
 
 def read_mcap(path: str, wanted: Wanted | None, databases: Databases) -> SignalLog:
@@ -37,111 +37,78 @@ def collect(file: Path, wanted: Wanted | None, topics: dict[str, Topic], types: 
     exceptions = needed("mcap.exceptions", "an MCAP file")
     notes: list[str] = []
     schemas: dict[int, Any] = {}
-    decoders: dict[int, tuple[Topic, Decode | None]] = {}
+    channels: dict[int, tuple[Topic, Take | None]] = {}
     unreadable: dict[str, None] = {}
-    seen = 0
-    try:
-        with reading(file, "MCAP file", exceptions.McapError), file.open("rb") as stream:
-            for record in _records(stream, notes, exceptions.McapError):
-                kind = type(record).__name__
-                if kind == "Schema":
-                    schemas[record.id] = record
-                elif kind == "Channel" and record.id not in decoders:
-                    decoders[record.id] = _decoder(
-                        record, schemas.get(record.schema_id), wanted, topics, types
-                    )
-                    if decoders[record.id][1] is None:
-                        unreadable[f"{record.topic} ({record.message_encoding})"] = None
-                elif kind == "Message":
-                    seen += 1
-                    topic, decode = decoders[record.channel_id]
-                    if decode is None or not topic.is_wanted:
-                        continue
-                    try:
-                        message = decode(record.data)
-                    except (*DAMAGE, *types.errors):
-                        topic.bad += 1
-                        continue
-                    except Exception as error:
-                        if (
-                            type(error).__name__ != "DecodeError"
-                        ):  # protobuf's, whose module needs not be there
-                            raise
-                        topic.bad += 1
-                        continue
-                    topic.take(record.log_time * 1e-9, message)
-    except InputError as error:
-        if not seen:
-            raise
-        notes.append(
-            f"The file ends early, or is damaged ({error.problem}); {seen} messages before were read."
-        )
+    with (
+        as_far_as_it_goes(file, "MCAP file", notes, exceptions.McapError) as seen,
+        file.open("rb") as stream,
+    ):
+        for record in records(stream, notes):
+            if isinstance(record, tuple):
+                seen.messages += 1
+                number, time, content = record
+                topic, take = channels[number]
+                if take is not None and topic.is_wanted:
+                    _take(topic, take, time * 1e-9, content)
+            elif type(record).__name__ == "Schema":
+                schemas[record.id] = record
+            elif record.id not in channels:
+                channels[record.id] = _channel(record, schemas.get(record.schema_id), wanted, topics, types)
+                if channels[record.id][1] is None:
+                    unreadable[f"{record.topic} ({record.message_encoding})"] = None
     if unreadable:
         notes.append(f"Topics in an encoding that is not known were left out: {', '.join(unreadable)}.")
     return notes
 
 
-def _records(stream: Any, notes: list[str], error: type[Exception]) -> Iterator[Any]:
-    """Records of a file in its order, those of a chunk as if they stood alone; damaged chunks are left out."""
-    reader = needed("mcap.stream_reader", "an MCAP file")
-    damaged = 0
-    for record in reader.StreamReader(stream, emit_chunks=True, record_size_limit=_LARGEST).records:
-        if type(record).__name__ != "Chunk":
-            yield record
-            continue
-        try:
-            if record.uncompressed_size > _LARGEST:
-                raise ValueError("a chunk of over 1 GiB")
-            inside = reader.breakup_chunk(record, validate_crc=True)
-        except (*DAMAGE, error, *_packers()):
-            damaged += 1
-            continue
-        yield from inside
-    if damaged:
-        notes.append(f"{damaged} chunks are damaged and were left out.")
+def _take(topic: Topic, take: Take, receipt: float, content: bytes) -> None:
+    """Hand a message to its topic; one that cannot be read is counted."""
+    try:
+        take(receipt, content)
+    except DAMAGE:
+        topic.bad += 1
+    except Exception as error:
+        if type(error).__name__ != "DecodeError":  # protobuf's, whose module needs not be there
+            raise
+        topic.bad += 1
 
 
-def _packers() -> tuple[type[Exception], ...]:
-    """What the decompressors of MCAP raise on damaged data."""
-    found: list[type[Exception]] = []
-    for module, name in (("zstandard", "ZstdError"), ("backports.zstd", "ZstdError"), ("zstd", "Error")):
-        try:
-            found.append(getattr(__import__(module, fromlist=[name]), name))
-        except (ImportError, AttributeError):
-            continue
-    return tuple(found)
-
-
-def _decoder(
+def _channel(
     channel: Any, schema: Any, wanted: Wanted | None, topics: dict[str, Topic], types: Types
-) -> tuple[Topic, Decode | None]:
-    """The topic of a channel, and what reads its messages; None if its encoding is not known."""
+) -> tuple[Topic, Take | None]:
+    """The topic of a channel, and what takes its messages; None if its encoding is not known."""
     encoding = channel.message_encoding
     if encoding in ("cdr", "ros1") and schema is not None:
-        topic = topics.setdefault(channel.topic, ros_topic(channel.topic, wanted))
+        ros = bag_topic(channel.topic, wanted, topics)
         language = "idl" if schema.encoding.endswith("idl") else "msg"
         name = types.learn(schema.name, schema.data.decode("utf-8", "replace"), language)
-        if encoding == "ros1":
-            return topic, lambda data: types.store(name).deserialize_ros1(data, name)
-        return topic, lambda data: types.store(name).deserialize_cdr(data, name)
-    if encoding == "json":
-        return topics.setdefault(
-            channel.topic, Topic(channel.topic, _parts_of_json, _stamp_of_json, wanted)
-        ), json.loads
+        form = types.form(name, one=encoding == "ros1")
+        return ros, lambda receipt, content: ros.push(receipt, content, form)
     if encoding == "protobuf" and schema is not None:
-        topic = topics.setdefault(
-            channel.topic, Topic(channel.topic, _parts_of_protobuf, _stamp_of_protobuf, wanted)
-        )
+        topic = _topic(channel.topic, _parts_of_protobuf, _stamp_of_protobuf, wanted, topics)
         factory = needed("mcap_protobuf.decoder", "protobuf messages").DecoderFactory()
         try:
-            return topic, factory.decoder_for(encoding, schema)
+            decode = factory.decoder_for(encoding, schema)
         except Exception as error:
             if not isinstance(error, (*DAMAGE,)) and type(error).__name__ != "DecodeError":
                 raise
             return topic, None
-    return topics.setdefault(
-        channel.topic, Topic(channel.topic, _parts_of_json, _stamp_of_json, wanted)
-    ), None
+        return topic, lambda receipt, content: topic.take(receipt, decode(content))
+    topic = _topic(channel.topic, _parts_of_json, _stamp_of_json, wanted, topics)
+    if encoding == "json":
+        return topic, lambda receipt, content: topic.take(receipt, json.loads(content))
+    return topic, None
+
+
+def _topic(
+    name: str,
+    parts: Parts,
+    stamp: Callable[[Any], float | None],
+    wanted: Wanted | None,
+    topics: dict[str, Topic],
+) -> Topic:
+    """The topic of this name, of several channels the same one."""
+    return topics.setdefault(name, Topic(name, parts, stamp, wanted))
 
 
 def _parts_of_json(message: Any) -> Iterable[tuple[str, Any]]:

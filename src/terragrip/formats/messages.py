@@ -16,11 +16,13 @@ import numpy as np
 from terragrip.formats.signals import Signal
 from terragrip.formats.table import Wanted, every_of, skips
 
-_LONGEST_ARRAY = 16
+LONGEST_ARRAY = 16
+"""Numbers of a list beyond which none is a signal."""
 _LONGEST_LIST = 8  # messages in a message
 _DEEPEST = 8
 _BLOCK = 1000  # messages that are read or left out together, where a log is looked at in parts
 _OTHER_CLOCK = 1.0  # s between stamp and receipt from which the sender's clock is another one
+_TRIED = 20  # messages without a wanted field after which a topic has none: the first may be empty
 _QUICKEST = 0.05  # quantile of the delay that counts as no delay
 
 Parts = Callable[[Any], Iterable[tuple[str, Any]]]
@@ -29,7 +31,9 @@ Path = tuple[str | int, ...]
 
 
 @dataclass
-class _Column:
+class Column:
+    """A wanted field: where it stands in a message, and its values so far."""
+
     path: Path
     is_text: bool
     numbers: array[float] = field(default_factory=lambda: array("d"))
@@ -54,13 +58,13 @@ class Topic:
     strange: int = 0
     _receipts: array[float] = field(default_factory=lambda: array("d"))
     _stamps: array[float] = field(default_factory=lambda: array("d"))
-    _columns: dict[str, _Column] = field(default_factory=dict)
+    _columns: dict[str, Column] = field(default_factory=dict)
     _labels: tuple[str, ...] | None = None
 
     @property
     def is_wanted(self) -> bool:
-        """Whether any field is wanted; True until the first message told which there are."""
-        return bool(self._columns) or not self.count
+        """Whether any field is wanted; True until some messages told which there are."""
+        return bool(self._columns) or self.count < _TRIED
 
     def take(self, receipt: float, message: Any) -> None:
         """Take a message that came at ``receipt`` [s]."""
@@ -73,17 +77,27 @@ class Topic:
         sent = self.stamp(message)
         self._receipts.append(receipt)
         self._stamps.append(sent or np.nan)
+        for column, value in zip(self._columns.values(), self._values(message), strict=True):
+            if column.is_text:
+                column.texts.append(value)
+            else:
+                column.numbers.append(value)
+
+    def _values(self, message: Any) -> list[Any]:
+        """The wanted fields of a message, in the order of the columns; what is not there is NaN or None, and counted."""
         found: dict[Path, Any] = {}
         self._walk(message, (), found, {column.path[0] for column in self._columns.values() if column.path})
+        values: list[Any] = []
         for column in self._columns.values():
             value = found.get(column.path)
             if column.is_text:
                 known = isinstance(value, str)
-                column.texts.append(value if known else None)
+                values.append(value if known else None)
             else:
                 known = isinstance(value, bool | int | float | np.number | np.bool_)
-                column.numbers.append(float(value) if known else np.nan)  # type: ignore[arg-type]
+                values.append(float(value) if known else np.nan)  # type: ignore[arg-type]
             self.strange += not known
+        return values
 
     def fields(self, message: Any) -> dict[str, Any]:
         """The wanted fields of one message by name, for who takes messages as they come; nothing is collected."""
@@ -106,7 +120,8 @@ class Topic:
         notes += said
         found = {}
         for name, column in self._columns.items():
-            values = np.array(column.texts, dtype=object) if column.is_text else np.array(column.numbers)
+            # A view: the samples of a long log shall not stand twice.
+            values = np.array(column.texts, dtype=object) if column.is_text else np.frombuffer(column.numbers)
             # A column that a later message brought has no value before.
             missing = len(time) - len(values)
             if missing:
@@ -116,7 +131,7 @@ class Topic:
 
     def _time(self) -> tuple[np.ndarray, list[str]]:
         """When the values were measured: the sender's stamps where there are, on the receiver's clock."""
-        receipts, stamps = np.array(self._receipts), np.array(self._stamps)
+        receipts, stamps = np.frombuffer(self._receipts), np.frombuffer(self._stamps)
         if not len(stamps) or not np.isfinite(stamps).all():
             return receipts, []
         delay = receipts - stamps
@@ -147,7 +162,7 @@ class Topic:
             names[name] = None
             if name in self._columns or (self.wanted is not None and not self.wanted(name)):
                 continue
-            self._columns[name] = _Column(path, isinstance(value, str))
+            self._columns[name] = Column(path, isinstance(value, str))
         self.names = tuple(names)
 
     def _walk(self, value: Any, path: Path, found: dict[Path, Any], only: set[str | int] | None) -> None:
@@ -170,7 +185,7 @@ class Topic:
         if not len(values) or isinstance(values[0], str):
             return
         plain = isinstance(values[0], bool | int | float | np.number | np.bool_)
-        if len(values) > (_LONGEST_ARRAY if plain else _LONGEST_LIST):
+        if len(values) > (LONGEST_ARRAY if plain else _LONGEST_LIST):
             return
         named = self._labels if self._labels and len(self._labels) == len(values) and len(path) == 1 else None
         for k, value in enumerate(values):

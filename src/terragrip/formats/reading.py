@@ -86,7 +86,7 @@ def read_channels(
 def read_table(path: PathLike, wanted: Wanted | None = None, databases: Databases = ()) -> LogTable:
     """Read the ``wanted`` columns of a log by their own names (None: all); raises InputError if it is no log."""
     log = read_log(path, wanted, databases)
-    return log.table() if isinstance(log, SignalLog) else log
+    return log.table(release=True) if isinstance(log, SignalLog) else log
 
 
 def read_log(path: PathLike, wanted: Wanted | None = None, databases: Databases = ()) -> LogTable | SignalLog:

@@ -1,4 +1,4 @@
-"""ROS bags: ROS 1, and ROS 2 in SQLite or MCAP, by rosbags; messages of any type whose definition the bag holds."""
+"""ROS bags: ROS 1, and ROS 2 in SQLite or MCAP; messages of any type whose definition the bag holds."""
 
 from __future__ import annotations
 
@@ -10,36 +10,37 @@ from typing import Any
 
 from terragrip.errors import InputError
 from terragrip.files import sha256
-from terragrip.formats.boundary import DAMAGE, needed, reading
+from terragrip.formats.boundary import DAMAGE, as_far_as_it_goes, needed
 from terragrip.formats.kind import Databases
 from terragrip.formats.messages import Topic
+from terragrip.formats.ros_topic import RosTopic, Serialised
+from terragrip.formats.rosbag1 import Connection, records
 from terragrip.formats.signals import Signal, SignalLog
 from terragrip.formats.table import Wanted
 
 
 def read_ros1(path: str, wanted: Wanted | None, databases: Databases) -> SignalLog:
-    """Read a ROS 1 bag by topic and field; raises InputError if it is damaged or has no index."""
-    rosbag1 = needed("rosbags.rosbag1", "a ROS 1 bag")
+    """Read a ROS 1 bag by topic and field, with or without an index; raises InputError if it is damaged from the start.
+
+    A bag that was cut off is read as far as it goes.
+    """
     types = Types("ROS1_NOETIC")
-    topics: dict[int, Topic] = {}
-    names: dict[int, str] = {}
-    with reading(path, "ROS 1 bag", rosbag1.ReaderError, *types.errors), rosbag1.Reader(path) as bag:
-        for connection in bag.connections:
-            definition = getattr(connection.msgdef, "data", connection.msgdef)
-            names[connection.id] = types.learn(connection.msgtype, str(definition), "msg")
-            topics[connection.id] = ros_topic(connection.topic, wanted)
-        for connection in bag.connections:
-            topic, name = topics[connection.id], names[connection.id]
-            for _, receipt, raw in bag.messages(connections=[connection]):
-                if not topic.is_wanted:
-                    break
-                _take(
-                    topic,
-                    types,
-                    receipt,
-                    lambda name=name, raw=raw: types.store(name).deserialize_ros1(raw, name),
-                )
-    return log_of(topics.values(), path, types.notes())
+    topics: dict[str, Topic] = {}
+    connections: dict[int, tuple[RosTopic, Serialised]] = {}
+    notes: list[str] = []
+    with as_far_as_it_goes(path, "ROS 1 bag", notes) as seen, open(path, "rb") as stream:
+        for record in records(stream):
+            if isinstance(record, Connection):
+                name = types.learn(record.kind, record.definition, "msg")
+                topic = bag_topic(record.topic, wanted, topics)
+                connections.setdefault(record.number, (topic, types.form(name, one=True)))
+                continue
+            number, receipt, content = record
+            seen.messages += 1
+            topic, form = connections[number]
+            if topic.is_wanted:
+                topic.push(receipt, content, form)
+    return log_of(topics.values(), path, [*types.notes(), *notes])
 
 
 def read_ros2(path: str, wanted: Wanted | None, databases: Databases) -> SignalLog:
@@ -49,18 +50,15 @@ def read_ros2(path: str, wanted: Wanted | None, databases: Databases) -> SignalL
     """
     types = Types("LATEST")
     topics: dict[str, Topic] = {}
-    files = _files_of(path)
-    if files[0].suffix == ".mcap":
-        from terragrip.formats.mcap import collect
-
-        notes: list[str] = []
-        for file in files:
-            notes += collect(file, wanted, topics, types)
-        return log_of(topics.values(), path, [*types.notes(), *notes], files)
+    files, notes = _files_of(path), list[str]()
     for file in files:
-        with reading(file, "ROS 2 bag", sqlite3.Error, *types.errors), closing(_opened(file)) as base:
-            _collect(base, wanted, topics, types)
-    return log_of(topics.values(), path, types.notes(), files)
+        if files[0].suffix == ".mcap":
+            from terragrip.formats.mcap import collect
+
+            notes += collect(file, wanted, topics, types)
+        else:
+            _collect(file, wanted, topics, types, notes)
+    return log_of(topics.values(), path, [*types.notes(), *notes], files)
 
 
 class Types:
@@ -77,6 +75,7 @@ class Types:
         self._common: Any = None
         self.unknown: dict[str, None] = {}
         self.errors: tuple[type[Exception], ...] = (self._typesys.TypesysError, self._serde.SerdeError)
+        self._forms: dict[tuple[str, bool], Serialised] = {}
 
     def learn(self, name: str, definition: str, language: str) -> str:
         """Take a type's definition (``msg`` or ``idl``); returns the name that it goes by."""
@@ -104,6 +103,17 @@ class Types:
             self.unknown[name] = None
             raise KeyError(name)
         return self._known()
+
+    def form(self, name: str, *, one: bool) -> Serialised:
+        """How messages of a type are read; ``one``: they are serialised by ROS 1."""
+
+        def read(raw: bytes) -> Any:
+            store = self.store(name)
+            return store.deserialize_ros1(raw, name) if one else store.deserialize_cdr(raw, name)
+
+        return self._forms.setdefault(
+            (name, one), Serialised(name, one, read, lambda: self.store(name).fielddefs, self.errors)
+        )
 
     def notes(self) -> list[str]:
         """A sentence on the types that are unknown."""
@@ -140,6 +150,13 @@ def ros_topic(name: str, wanted: Wanted | None) -> Topic:
     return Topic(name, _parts, _stamp, wanted)
 
 
+def bag_topic(name: str, wanted: Wanted | None, topics: dict[str, Topic]) -> RosTopic:
+    """The topic of a bag of this name, of several connections the same one."""
+    found = topics.setdefault(f"ros {name}", RosTopic(name, _parts, _stamp, wanted))
+    assert isinstance(found, RosTopic)
+    return found
+
+
 def _parts(message: Any) -> Iterable[tuple[str, Any]]:
     fields = getattr(message, "__dataclass_fields__", None)
     if fields is None:
@@ -153,16 +170,6 @@ def _parts(message: Any) -> Iterable[tuple[str, Any]]:
 def _stamp(message: Any) -> float | None:
     stamp = getattr(getattr(message, "header", None), "stamp", None)
     return None if stamp is None else float(stamp.sec + 1e-9 * getattr(stamp, "nanosec", 0))
-
-
-def _take(topic: Topic, types: Types, receipt: int, read: Any) -> None:
-    """Read a message and hand it to its topic; one that cannot be read is counted."""
-    try:
-        message = read()
-    except (*DAMAGE, *types.errors):
-        topic.bad += 1
-        return
-    topic.take(receipt * 1e-9, message)
 
 
 def _files_of(path: str) -> list[Path]:
@@ -180,12 +187,39 @@ def _files_of(path: str) -> list[Path]:
     raise InputError("holds no bag file", file=path, mend=mend)
 
 
-def _opened(file: Path) -> sqlite3.Connection:
-    return sqlite3.connect(f"{file.absolute().as_uri()}?mode=ro&immutable=1", uri=True)
+def _collect(
+    file: Path, wanted: Wanted | None, topics: dict[str, Topic], types: Types, notes: list[str]
+) -> None:
+    """Read the messages of one SQLite file into their topics."""
+    with (
+        as_far_as_it_goes(file, "ROS 2 bag", notes, sqlite3.Error) as seen,
+        closing(sqlite3.connect(f"{file.absolute().as_uri()}?mode=ro&immutable=1", uri=True)) as base,
+    ):
+        known = _topics_of(base, wanted, topics, types)
+        last = -1
+        while True:
+            # A topic of which nothing is wanted is asked for no more: its images are not even read.
+            asked = ", ".join(str(number) for number, (topic, _) in known.items() if topic.is_wanted)
+            rows = base.execute(
+                "SELECT rowid, topic_id, timestamp, data FROM messages "
+                f"WHERE rowid > ? AND topic_id IN ({asked}) ORDER BY rowid",
+                (last,),
+            )
+            for place, number, receipt, raw in rows:
+                seen.messages += 1
+                topic, form = known[number]
+                topic.push(receipt * 1e-9, raw, form)
+                if not topic.is_wanted:
+                    last = place
+                    break
+            else:
+                break
 
 
-def _collect(base: sqlite3.Connection, wanted: Wanted | None, topics: dict[str, Topic], types: Types) -> None:
-    """Read the topics of one SQLite file."""
+def _topics_of(
+    base: sqlite3.Connection, wanted: Wanted | None, topics: dict[str, Topic], types: Types
+) -> dict[int, tuple[RosTopic, Serialised]]:
+    """The topics of a SQLite file by number, with how their messages are read."""
     tables = {row[0] for row in base.execute("SELECT name FROM sqlite_master WHERE type = 'table'")}
     if not {"topics", "messages"} <= tables:
         raise ValueError("it has no tables topics and messages")
@@ -194,23 +228,13 @@ def _collect(base: sqlite3.Connection, wanted: Wanted | None, topics: dict[str, 
             "SELECT topic_type, encoding, encoded_message_definition FROM message_definitions"
         ):
             types.learn(str(name), str(text), str(language).removeprefix("ros2"))
-    for number, name, kind, form in list(
-        base.execute("SELECT id, name, type, serialization_format FROM topics")
-    ):
-        if form != "cdr":
+    known: dict[int, tuple[RosTopic, Serialised]] = {}
+    for number, name, kind, form in base.execute("SELECT id, name, type, serialization_format FROM topics"):
+        if form == "cdr":
+            known[int(number)] = bag_topic(str(name), wanted, topics), types.form(str(kind), one=False)
+        else:
             types.unknown[f"{kind} ({form})"] = None
-            continue
-        topic = topics.setdefault(str(name), ros_topic(str(name), wanted))
-        rows = base.execute("SELECT timestamp, data FROM messages WHERE topic_id = ?", (number,))
-        for receipt, raw in rows:
-            if not topic.is_wanted:
-                break
-            _take(
-                topic,
-                types,
-                receipt,
-                lambda raw=raw, kind=str(kind): types.store(kind).deserialize_cdr(raw, kind),
-            )
+    return known
 
 
 def log_of(topics: Iterable[Topic], path: str, notes: list[str], files: Iterable[Path] = ()) -> SignalLog:

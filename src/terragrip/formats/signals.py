@@ -44,15 +44,16 @@ class SignalLog:
     sha256: str | None = None
     notes: tuple[str, ...] = field(default_factory=tuple)
 
-    def table(self) -> LogTable:
+    def table(self, *, release: bool = False) -> LogTable:
         """One table on the union of the instants, NaN where a signal was not measured; texts last until the next.
 
         Time counts from the first instant; the table's ``start`` says when that was, where stamps count from 1970.
         Stamps that are no finite number are left out and counted; of two samples at one instant the later one counts.
-        Raises InputError if no signal that was asked for has a sample.
+        ``release`` takes the signals out of this log one by one as they are spread, so that a long log does not stand in
+        memory twice. Raises InputError if no signal that was asked for has a sample.
         """
         if TIME in self.names or TIME in self.signals:
-            return self._renamed().table()
+            return self._renamed().table(release=release)
         clocks = {id(s.time): s.time for s in self.signals.values()}
         notes = list(self.notes)
         lost = sum(int(np.sum(~np.isfinite(t))) for t in clocks.values())
@@ -69,14 +70,15 @@ class SignalLog:
         place = dict(zip(orders, rows, strict=True))
         start = float(base[0]) if base[0] > SINCE_1970 else None
         base -= base[0]
-        columns: dict[str, npt.NDArray[Any]] = {TIME: base}
-        for name, signal in self.signals.items():
-            order, row = orders[id(signal.time)], place[id(signal.time)]
-            columns[name] = _spread(signal.values[order], row, len(base))
         doubled = sum(int(np.sum(row[1:] == row[:-1])) for row in rows)
         if doubled:
             notes.append(f"{doubled} samples repeat the instant of the one before them and take its place.")
         units = {name: s.unit for name, s in self.signals.items() if s.unit}
+        columns: dict[str, npt.NDArray[Any]] = {TIME: base}
+        for name in list(self.signals):
+            signal = self.signals.pop(name) if release else self.signals[name]
+            order, row = orders[id(signal.time)], place[id(signal.time)]
+            columns[name] = _spread(signal.values[order], row, len(base))
         return LogTable(
             (TIME, *self.names), columns, units, self.source, self.sha256, tuple(notes), start, clocked=True
         )
@@ -111,13 +113,14 @@ def _union(clocks: list[Floats]) -> tuple[Floats, list[npt.NDArray[np.int32]]]:
     stamps = np.concatenate(clocks)
     if not len(stamps):
         return stamps, [np.empty(0, dtype=np.int32) for _ in clocks]
-    order = np.argsort(stamps, kind="stable")
+    order = slice(None) if len(clocks) == 1 else np.argsort(stamps, kind="stable")
     stamps = stamps[order]
     apart = np.empty(len(stamps), dtype=bool)
     apart[0] = True
     np.greater(stamps[1:] - stamps[:-1], _tolerance(clocks), out=apart[1:])
     row = np.empty(len(stamps), dtype=np.int32)
-    row[order] = np.cumsum(apart, dtype=np.int32) - np.int32(1)
+    row[order] = np.cumsum(apart, dtype=np.int32)
+    row -= 1
     del order
     ends = np.cumsum([len(clock) for clock in clocks])[:-1]
     return stamps[apart], np.split(row, ends)
@@ -128,8 +131,14 @@ def _tolerance(clocks: list[Floats]) -> float:
     return _SAME * min((s for s in spacings if s > 0), default=0.0)
 
 
+def _rises(rows: npt.NDArray[np.int32]) -> bool:
+    return bool((rows[1:] > rows[:-1]).all())
+
+
 def _spread(values: npt.NDArray[Any], rows: npt.NDArray[np.int32], length: int) -> npt.NDArray[Any]:
     if values.dtype.kind in "fiub":
+        if values.dtype == np.float64 and len(rows) == length and _rises(rows):
+            return values  # measured at every instant
         found = np.full(length, np.nan)
         found[rows] = values
         return found

@@ -1,0 +1,65 @@
+"""Variables of MATLAB files of version 7.3, and of other HDF5 files, by h5py: numbers stay in the file until they are asked for."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from terragrip.formats.mat5 import Array, Opaque
+
+_DEEPEST = 12
+_USER_BLOCK, _HDF5 = 512, b"\x89HDF\r\n\x1a\n"
+
+
+def is_hdf5(path: str) -> bool:
+    """Whether a file is of version 7.3, or another HDF5 file."""
+    with open(path, "rb") as stream:
+        head = stream.read(_USER_BLOCK + len(_HDF5))
+    return head.startswith((_HDF5, b"MATLAB 7.3")) or head[_USER_BLOCK:] == _HDF5
+
+
+def tree_of(file: Any, h5py: Any) -> dict[str, Any]:
+    """The variables of an open file by name: mapping (struct), list (cell), text, `Array` or `Opaque`."""
+    return {name: _of_hdf5(file, item, 0, h5py) for name, item in file.items() if not name.startswith("#")}
+
+
+def _of_hdf5(file: Any, item: Any, depth: int, h5py: Any) -> Any:
+    """A group or dataset as mapping, list, text, `Array` or `Opaque`."""
+    if depth > _DEEPEST:
+        return None
+    if "MATLAB_object_decode" in item.attrs:
+        kind = item.attrs.get("MATLAB_class", b"")
+        return Opaque(kind.decode("ascii", "replace") if isinstance(kind, bytes) else "")
+    if isinstance(item, h5py.Group):
+        return {name: _of_hdf5(file, part, depth + 1, h5py) for name, part in item.items()}
+    if not isinstance(item, h5py.Dataset) or "MATLAB_empty" in item.attrs:
+        return None
+    kind = item.attrs.get("MATLAB_class", b"")
+    if h5py.check_ref_dtype(item.dtype) is not None:
+        references = item[()].ravel()[: 1 << 16]
+        return [_of_hdf5(file, file[reference], depth + 1, h5py) for reference in references if reference]
+    if kind == b"char":
+        return "".join(map(chr, item[()].ravel(order="F").tolist()))
+    if item.dtype.names:
+        return {name: np.asarray(item[name]) for name in item.dtype.names}
+    if item.dtype.kind in "fiub":
+        return _array_of_hdf5(item, turned=bool(kind))
+    return None
+
+
+def _array_of_hdf5(item: Any, *, turned: bool) -> Array:
+    """A dataset of numbers; ``turned``: by MATLAB, whose first axis is the last one in the file."""
+    shape = tuple(reversed(item.shape)) if turned else item.shape
+
+    def part(rows: slice, column: int) -> npt.NDArray[Any]:
+        place: tuple[Any, ...] = (rows,) if len(shape) == 1 else (rows, column)
+        if len(shape) == 2 and shape[0] == 1:
+            place = (0, rows)  # a row vector
+        return np.asarray(item[tuple(reversed(place)) if turned else place])
+
+    def read() -> npt.NDArray[Any]:
+        return np.asarray(item[()]).T if turned else np.asarray(item[()])
+
+    return Array(shape, read, part if len(shape) <= 2 else None)

@@ -1,0 +1,89 @@
+"""Large MATLAB files of version 7.3 in blocks of rows."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from terragrip.formats.boundary import needed, reading
+from terragrip.formats.long_logs import ROWS, LongLog
+from terragrip.formats.mat5 import Array
+from terragrip.formats.matlab_hdf5 import is_hdf5, tree_of
+from terragrip.formats.matlab_signals import Found, seconds_of, walk
+from terragrip.recording.schema import TIME
+
+_LONG = 100_000_000  # bytes
+
+
+def long_matlab(path: str) -> LongLog | None:
+    """A large file of version 7.3 all of whose signals share one clock, as a `LongLog`; None of any other."""
+    if os.path.getsize(path) < _LONG or not is_hdf5(path):
+        return None
+    h5py = needed("h5py", "a MATLAB 7.3 file")
+    with reading(path, "MATLAB file", RuntimeError), h5py.File(path, "r") as file:
+        found = _on_one_clock(tree_of(file, h5py))
+        if found is None or not _runs_forward(*found.clock):
+            return None
+        rows, names, units = found.clock[1], tuple(found.signals), found.units
+
+    def blocks(chosen: list[str]) -> Iterator[dict[str, npt.NDArray[Any]]]:
+        with reading(path, "MATLAB file", RuntimeError), h5py.File(path, "r") as file:
+            held = _on_one_clock(tree_of(file, h5py))
+            if held is None:
+                raise ValueError("it changed while it was read")
+            origin = None
+            for part in _parts_of(rows):
+                time = seconds_of(held.clock[0].column(0, rows, part).ravel(), held.scale)
+                origin = float(time[0]) if origin is None else origin
+                yield {TIME: time - origin} | {
+                    name: np.asarray(
+                        held.signals[name][0].column(held.signals[name][1], rows, part), np.float64
+                    )
+                    for name in chosen
+                }
+
+    return LongLog(names, units, path, rows, blocks, clocked=True)
+
+
+@dataclass(frozen=True)
+class _OneClock:
+    """Signals, each as its array and column there, on one ``clock`` of so many rows, whose unit has ``scale`` seconds."""
+
+    clock: tuple[Array, int]
+    scale: float
+    signals: dict[str, tuple[Array, int]]
+    units: dict[str, str]
+
+
+def _on_one_clock(tree: dict[str, Any]) -> _OneClock | None:
+    """The signals of a file if all of them share one clock, and parts of each can be read."""
+    found = Found()
+    walk(tree, "", found, 0)
+    clocks = {id(clock): clock for clock, _, _ in found.signals.values()}
+    if len(clocks) != 1 or found.opaque:
+        return None
+    ((key, clock),) = clocks.items()
+    arrays = {name: (values, column or 0) for name, (_, values, column) in found.signals.items()}
+    if any(not isinstance(a, Array) or a.part is None for a in (clock, *(a for a, _ in arrays.values()))):
+        return None
+    return _OneClock((clock, int(np.prod(clock.shape))), found.scales.get(key, 1.0), arrays, found.units)
+
+
+def _parts_of(rows: int) -> Iterator[slice]:
+    return (slice(first, min(first + ROWS, rows)) for first in range(0, rows, ROWS))
+
+
+def _runs_forward(clock: Array, rows: int) -> bool:
+    """Whether no stamp repeats, runs back or is missing, so that the rows are in the order of time."""
+    last = -np.inf
+    for part in _parts_of(rows):
+        time = np.asarray(clock.column(0, rows, part), np.float64)
+        if not (np.isfinite(time).all() and time[0] > last and bool((np.diff(time) > 0).all())):
+            return False
+        last = float(time[-1])
+    return True

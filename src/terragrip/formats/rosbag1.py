@@ -1,0 +1,129 @@
+"""The records of a ROS 1 bag (format 2.0) in the order of the file, with or without an index, as far as it goes.
+
+rosbags' own reader holds the whole index in memory, some 100 bytes a message, and reads no bag without one.
+"""
+
+from __future__ import annotations
+
+import bz2
+import struct
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import BinaryIO
+
+from terragrip.formats.boundary import needed
+
+_MAGIC = b"#ROSBAG V2.0\n"
+_MESSAGE, _CHUNK, _CONNECTION = 2, 5, 7
+_LARGEST = 1 << 30  # bytes of a record
+_LONGEST_HEADER = 1 << 16
+_LENGTH = struct.Struct("<I")
+_TIME = struct.Struct("<II")
+
+Message = tuple[int, float, bytes]
+"""A message: its connection, when it was received [s], its content."""
+
+
+@dataclass(frozen=True)
+class Connection:
+    """Who publishes: ``number``, topic, type and the definition of that."""
+
+    number: int
+    topic: str
+    kind: str
+    definition: str
+
+
+def records(stream: BinaryIO) -> Iterator[Connection | Message]:
+    """The connections and messages of a bag.
+
+    Raises ValueError, struct.error, LookupError or OSError where the bag is damaged or ends early.
+    """
+    if stream.read(len(_MAGIC)) != _MAGIC:
+        raise ValueError("it does not begin as ROS 1 bags do")
+    while head := stream.read(_LENGTH.size):
+        (length,) = _LENGTH.unpack(head)
+        if length > _LONGEST_HEADER:
+            raise ValueError("a record's header has over 64 KiB")
+        fields = _fields(_read(stream, length))
+        (size,) = _LENGTH.unpack(_read(stream, _LENGTH.size))
+        if size > _LARGEST:
+            raise ValueError("a record of over 1 GiB")
+        kind = fields[b"op"][0]
+        content = stream.read(size)
+        whole = len(content) == size
+        if kind == _CHUNK and (whole or fields[b"compression"] == b"none"):
+            yield from _inner(_unpacked(fields, content))
+        if not whole:
+            raise ValueError("it ends within a record")
+        if kind in (_MESSAGE, _CONNECTION):
+            yield _record(kind, fields, content)
+
+
+def _read(stream: BinaryIO, size: int) -> bytes:
+    found = stream.read(size)
+    if len(found) < size:
+        raise ValueError("it ends within a record")
+    return found
+
+
+def _fields(header: bytes) -> dict[bytes, bytes]:
+    """The fields of a header by name."""
+    found, place = {}, 0
+    while place < len(header):
+        (length,) = _LENGTH.unpack_from(header, place)
+        place += _LENGTH.size
+        if place + length > len(header):
+            raise ValueError("a field reaches beyond its header")
+        name, _, value = header[place : place + length].partition(b"=")
+        found[name] = value
+        place += length
+    return found
+
+
+def _unpacked(fields: dict[bytes, bytes], content: bytes) -> bytes:
+    """The records of a chunk."""
+    (size,) = _LENGTH.unpack(fields[b"size"])
+    if size > _LARGEST:
+        raise ValueError("a chunk of over 1 GiB")
+    packing = fields[b"compression"]
+    if packing == b"bz2":
+        return bz2.BZ2Decompressor().decompress(content, size)
+    if packing == b"lz4":
+        try:
+            unpacked: bytes = (
+                needed("lz4.frame", "a ROS 1 bag").LZ4FrameDecompressor().decompress(content, size)
+            )
+        except RuntimeError as error:
+            raise ValueError(str(error)) from error
+        return unpacked
+    if packing != b"none":
+        raise ValueError(f"its chunks are packed by {packing[:20]!r}")
+    return content
+
+
+def _inner(content: bytes) -> Iterator[Connection | Message]:
+    """The records in a chunk; raises as `records` does."""
+    place, end = 0, len(content)
+    while place < end:
+        (length,) = _LENGTH.unpack_from(content, place)
+        place += _LENGTH.size
+        fields = _fields(content[place : place + length])
+        (size,) = _LENGTH.unpack_from(content, place + length)
+        place += length + _LENGTH.size
+        if place + size > end:
+            raise ValueError("a record reaches beyond its chunk")
+        kind = fields[b"op"][0]
+        if kind in (_MESSAGE, _CONNECTION):
+            yield _record(kind, fields, content[place : place + size])
+        place += size
+
+
+def _record(kind: int, fields: dict[bytes, bytes], content: bytes) -> Connection | Message:
+    (number,) = _LENGTH.unpack(fields[b"conn"])
+    if kind == _MESSAGE:
+        seconds, rest = _TIME.unpack(fields[b"time"])
+        return number, seconds + 1e-9 * rest, content
+    about = _fields(content)
+    texts = (fields[b"topic"], about[b"type"], about[b"message_definition"])
+    return Connection(number, *(text.decode("utf-8", "replace") for text in texts))

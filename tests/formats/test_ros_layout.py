@@ -1,0 +1,174 @@
+"""Messages of one layout that are read at once give what rosbags gives of each."""
+
+from __future__ import annotations
+
+import bz2
+import random
+import struct
+from pathlib import Path
+from typing import Any
+
+import lz4.frame
+import numpy as np
+import pytest
+from rosbags.rosbag1 import Writer
+from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+
+from terragrip.errors import InputError
+from terragrip.formats.reading import read_table
+from terragrip.formats.ros import Types, bag_topic, ros_topic
+from test_logs import COUNT, write_ros1
+
+DEFINITION = """std_msgs/Header header
+bool locked
+string[] name
+float64[] velocity
+uint8 gear
+Inner[] parts
+string soil
+int16[3] triple
+float32[] samples
+Inner one
+uint8[] image
+int64 last
+================================================================================
+MSG: farm_msgs/Inner
+uint8 kind
+float64 value
+string label
+"""
+
+
+def make(store: Any, draws: random.Random) -> Any:
+    """A message whose lists and texts have any lengths."""
+    kinds = store.types
+    inner = kinds["farm_msgs/msg/Inner"]
+    extra = {"seq": 7} if "seq" in str(store.fielddefs["std_msgs/msg/Header"]) else {}
+    stamp = kinds["builtin_interfaces/msg/Time"](
+        sec=draws.choice([0, 1_750_000_000]), nanosec=draws.randrange(10**9)
+    )
+    joints = draws.choice([[], ["left", "right"], ["right", "left"], ["a", "b", "c"]])
+    numbers = [draws.random() for _ in range(draws.choice([len(joints), 2, 0]))]
+
+    def part() -> Any:
+        return inner(kind=draws.randrange(256), value=draws.random(), label="x" * draws.randrange(4))
+
+    return kinds["farm_msgs/msg/Odd"](
+        header=kinds["std_msgs/msg/Header"](stamp=stamp, frame_id="f" * draws.randrange(3), **extra),
+        locked=draws.random() < 0.5,
+        name=joints,
+        velocity=np.array(numbers),
+        gear=draws.randrange(256),
+        parts=[part() for _ in range(draws.choice([0, 1, 2]))],
+        soil=draws.choice(["", "clay", "sänd"]),
+        triple=np.array([draws.randrange(-9, 9) for _ in range(3)], dtype=np.int16),
+        samples=np.array([draws.random() for _ in range(draws.choice([0, 3, 40]))], dtype=np.float32),
+        one=part(),
+        image=np.zeros(draws.choice([0, 500]), dtype=np.uint8),
+        last=draws.randrange(-(2**40), 2**40),
+    )
+
+
+@pytest.mark.parametrize("one", [True, False])
+@pytest.mark.parametrize("layouts", [30, 60])  # 60: more than are kept
+def test_at_once_is_one_by_one(one: bool, layouts: int) -> None:
+    draws = random.Random(1000 + layouts)
+    stores = Stores.ROS1_NOETIC if one else Stores.ROS2_HUMBLE
+    types, store = Types(stores.name), get_typestore(stores)
+    store.register(get_types_from_msg(DEFINITION, "farm_msgs/msg/Odd"))
+    name = types.learn("farm_msgs/msg/Odd", DEFINITION, "msg")
+    form = types.form(name, one=one)
+    topic, other = bag_topic("/odd", None, {}), ros_topic("/odd", None)
+    write = store.serialize_ros1 if one else store.serialize_cdr
+    raws = [bytes(write(make(store, draws), name)) for _ in range(layouts)]
+    expected: list[dict[str, Any]] = []
+    for k in range(3000):
+        raw = draws.choice(raws)
+        raw = raw[: draws.randrange(len(raw))] if k % 97 == 0 else raw  # cut off
+        topic.push(float(k), raw, form)
+        try:
+            message = form.read(raw)
+        except Exception:  # noqa: BLE001 - whatever rosbags raises, this one cannot be read
+            continue
+        expected.append(other.fields(message))
+    signals, _ = topic.signals()
+    assert topic.count == len(expected)
+    assert topic.bad == 3000 - len(expected)
+    if layouts == 30:
+        assert set(signals) == {name for fields in expected for name in fields}
+    for name, signal in signals.items():
+        values = [fields.get(name) for fields in expected]
+        if signal.values.dtype == object:
+            assert signal.values.tolist() == values
+        else:
+            assert np.array_equal(signal.values, np.array(values, dtype=float), equal_nan=True), name
+
+
+def test_a_layout_is_learnt_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    store, draws = get_typestore(Stores.ROS2_HUMBLE), random.Random(1002)
+    store.register(get_types_from_msg(DEFINITION, "farm_msgs/msg/Odd"))
+    types = Types("LATEST")
+    form = types.form(types.learn("farm_msgs/msg/Odd", DEFINITION, "msg"), one=False)
+    raw = bytes(store.serialize_cdr(make(store, draws), "farm_msgs/msg/Odd"))
+    reads = []
+    monkeypatch.setattr(types, "store", lambda name, of=types.store: reads.append(name) or of(name))
+    topic = bag_topic("/odd", None, {})
+    for k in range(3000):
+        topic.push(float(k), raw, form)
+    assert len(topic.signals()[0]["/odd.last"].values) == 3000
+    assert len(reads) < 10
+
+
+@pytest.mark.parametrize("packing", ["none", "bz2", "lz4"])
+def test_a_ros1_bag_that_was_cut_off_is_read_as_far_as_it_goes(tmp_path: Path, packing: str) -> None:
+    bag = write_ros1(tmp_path / "run.bag") if packing == "none" else tmp_path / "packed.bag"
+    if packing != "none":
+        whole = write_ros1(tmp_path / "run.bag").read_bytes()
+        bag.write_bytes(packed(whole, packing))
+    content = bag.read_bytes()
+    pull = "/pull.pull"
+    assert np.array_equal(read_table(bag, lambda n: n == pull).columns[pull], 100 + np.arange(COUNT))
+    bag.write_bytes(content[: int(0.8 * len(content))])  # within the messages, so that the index is lost
+    if packing == "none":
+        table = read_table(bag, lambda n: n == pull)
+        assert any("ends early" in note for note in table.notes)
+        assert 10 < len(table.columns[pull]) < COUNT
+    else:  # all of it is in one chunk, which is of no use in part
+        bag.write_bytes(content[:-100])
+        with pytest.raises(InputError, match="is a damaged ROS 1 bag"):
+            read_table(bag)
+
+
+def packed(whole: bytes, packing: str) -> bytes:
+    """The bag with its chunks packed, and without what stands between them: index and bag header are not needed."""
+    pack = bz2.compress if packing == "bz2" else lz4.frame.compress
+    found, place = bytearray(whole[:13]), 13
+    while place < len(whole):
+        (length,) = struct.unpack_from("<I", whole, place)
+        header = whole[place + 4 : place + 4 + length]
+        (size,) = struct.unpack_from("<I", whole, place + 4 + length)
+        data = whole[place + 8 + length : place + 8 + length + size]
+        place += 8 + length + size
+        if b"op=\x05" in header:
+            fields = [b"op=\x05", b"compression=" + packing.encode(), b"size=" + struct.pack("<I", size)]
+            header = b"".join(struct.pack("<I", len(f)) + f for f in fields)
+            data = pack(data)
+            found += struct.pack("<I", len(header)) + header + struct.pack("<I", len(data)) + data
+    return bytes(found)
+
+
+def test_a_topic_whose_first_messages_are_empty(tmp_path: Path) -> None:
+    store = get_typestore(Stores.ROS1_NOETIC)
+    kinds = store.types
+    with Writer(tmp_path / "log.bag") as bag:
+        connection = bag.add_connection("/joint_states", "sensor_msgs/msg/JointState", typestore=store)
+        for k in range(100):
+            stamp = kinds["builtin_interfaces/msg/Time"](sec=1_750_000_000 + k, nanosec=0)
+            header = kinds["std_msgs/msg/Header"](seq=k, stamp=stamp, frame_id="")
+            names = ["fl", "fr"] if k > 2 else []
+            values = np.full(len(names), float(k))
+            message = kinds["sensor_msgs/msg/JointState"](header, names, values, values, values)
+            bag.write(connection, k * 10**9, store.serialize_ros1(message, "sensor_msgs/msg/JointState"))
+    wanted = "/joint_states.velocity.fr"
+    speed = read_table(tmp_path / "log.bag", lambda name: name == wanted).columns[wanted]
+    assert speed.tolist() == list(range(3, 100))
