@@ -151,7 +151,7 @@ def test_a_label_that_names_no_given_log_is_refused_and_a_log_without_one(
     assert said in capsys.readouterr().err
 
 
-def test_a_log_without_a_learnt_sensor_and_a_foreign_classifier_are_refused(
+def test_a_log_without_a_learnt_sensor_or_too_short_and_a_foreign_classifier_are_refused(
     folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     time = np.arange(0, 20, 0.1)
@@ -159,6 +159,9 @@ def test_a_log_without_a_learnt_sensor_and_a_foreign_classifier_are_refused(
     tell = ["ground-classifier", "predict", str(tmp_path / "body.csv"), "-o", str(tmp_path / "w.csv")]
     assert main([*tell, "-c", str(folder / "grounds.npz")]) == 2
     assert "body.csv: holds none of the sensors learnt" in capsys.readouterr().err
+    pd.read_csv(folder / "hard1.csv").head(5).to_csv(tmp_path / "body.csv", index=False)
+    assert main([*tell, "-c", str(folder / "grounds.npz")]) == 2
+    assert "too short for a window" in capsys.readouterr().err
     (tmp_path / "foreign.npz").write_bytes(b"PK")
     assert main([*tell, "-c", str(tmp_path / "foreign.npz")]) == 2
     assert "foreign.npz" in capsys.readouterr().err

@@ -195,6 +195,10 @@ def _judged(known: GroundClassifier, columns: Any, log: Path) -> pd.DataFrame:
     except InputError as error:
         raise _of_log(error, [log]) from None
     if not table["novelty"].notna().any():
+        length, window = columns["time"][-1] - columns["time"][0], table["end"][0] - table["start"][0]
+        if length < window:
+            problem = f"lasts {length:.3g} s, too short for a window of {window:.3g} s"
+            raise InputError(problem, file=log, mend="give a longer log")
         wanted = "; ".join(" + ".join(s) for s in known.sensors_[-3:])
         raise InputError("holds none of the sensors learnt", file=log, mend=f"give e.g. {wanted}")
     table = table.drop(columns="recording")

@@ -6,12 +6,14 @@ import csv
 import os
 import re
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from terragrip.errors import InputError
 from terragrip.files import refuse_missing, unreadable
+from terragrip.formats.dialect import to_text
 from terragrip.soil.bins import BinSettings
 from terragrip.soil.fit import AdhesionCurve
 from terragrip.soil.library import Soil, SoilLibrary
@@ -38,10 +40,7 @@ def read_points(path: str | os.PathLike[str]) -> list[DigitisedCurve]:
     file = os.fspath(path)
     refuse_missing(file)
     try:
-        with open(file, encoding="utf-8-sig") as stream:
-            text = stream.read()
-    except UnicodeDecodeError:
-        raise InputError("is not a text file", file=file, mend="export the points as CSV") from None
+        text = to_text(Path(file).read_bytes(), file).decode()
     except OSError as error:
         raise unreadable(file, error) from error
     rows = _rows(text)

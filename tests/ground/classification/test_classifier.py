@@ -272,6 +272,7 @@ def test_one_recording_of_a_ground_is_enough_but_is_told() -> None:
 
 GOOD = drive("hard", 1000, 20.0)
 OTHER = drive("wet", 1000, 20.0)
+STILL = GOOD[["time"]].assign(**dict.fromkeys(BODY, 1.0))
 
 
 @pytest.mark.parametrize(
@@ -305,8 +306,10 @@ OTHER = drive("wet", 1000, 20.0)
             [GOOD[["time", *BODY]], OTHER[["time", "wheel_speed_left"]]],
             ["hard", "wet"],
             {},
-            "no sensor with 10 windows of every ground",
+            "no sensor that was measured on every ground",
         ),
+        ([STILL, STILL], ["hard", "wet"], {}, "nothing measured differs"),
+        ([GOOD, OTHER.assign(acceleration_x=1.7e308)], ["hard", "wet"], {}, "1.7e+308 is no measurement"),
     ],
 )
 def test_what_cannot_be_learnt_from_is_refused_in_one_line(

@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from terragrip.errors import InputError
 from terragrip.recording import Recording, fresh_samples
-from terragrip.recording.checks import check_time, refuse_infinite
+from terragrip.recording.checks import check_time, place, refuse_infinite
 from terragrip.recording.columns import columns_of, numbers, seconds
 from terragrip.recording.held import held_period
 from terragrip.recording.schema import TIME
@@ -21,16 +21,19 @@ Floats = npt.NDArray[np.float64]
 
 # A motor current stands in for the torque: what is learnt does not depend on the gain between them.
 CURRENT = ("motor_current_",)
+TORQUE = ("drive_torque_",)
 PREFIXES = {
     "wheel speed": ("wheel_speed_",),
-    "torque": ("drive_torque_", *CURRENT),
+    "torque": (*TORQUE, *CURRENT),
     "ground speed": ("ground_speed",),
     "angular velocity": ("angular_velocity_x", "angular_velocity_y", "angular_velocity_z"),
     "acceleration": ("acceleration_x", "acceleration_y", "acceleration_z"),
 }
 FAMILIES = tuple(PREFIXES)
+BODY = ("angular velocity", "acceleration")
 
 _HELD = 1.5  # sample periods
+_LARGEST = 1e30  # of a measured value, in any unit: loggers fill gaps with the largest number they have
 
 
 class Columns(NamedTuple):
@@ -71,6 +74,11 @@ def family_of(column: str) -> str | None:
             if column == prefix or (open_ended and column.startswith(prefix) and len(column) > len(prefix)):
                 return family
     return None
+
+
+def wheel_of(column: str) -> str:
+    """The wheel of a column such as ``drive_torque_<wheel>``."""
+    return column.split("_", 2)[2]
 
 
 def tables_of(recordings: Any) -> list[Columns]:
@@ -132,6 +140,8 @@ def _table(recording: Any, index: int) -> Columns:
     name = f"recordings[{index}]"
     if isinstance(recording, Recording):
         used = {n: v for n, v in recording.channels.items() if family_of(n)}
+        for column, values in used.items():
+            _refuse_absurd(column, values, recording.time, name)
         return Columns(recording.time, used, recording.source or name)
     columns = columns_of(recording, name)
     if TIME not in columns:
@@ -143,5 +153,15 @@ def _table(recording: Any, index: int) -> Columns:
         if family_of(column):
             values = numbers(column, cells, time, name)
             refuse_infinite(column, values, time, name)
+            _refuse_absurd(column, values, time, name)
             channels[column] = values
     return Columns(time, channels, name)
+
+
+def _refuse_absurd(column: str, values: Floats, time: Floats, name: str) -> None:
+    """Raise InputError at the first value too large to be one."""
+    rows = np.flatnonzero(np.abs(values) > _LARGEST)
+    if len(rows):
+        where = place(column, int(rows[0]), time)
+        problem = f"{values[rows[0]]:.3g} is no measurement"
+        raise InputError(problem, file=name, place=where, mend="leave the cell empty instead")

@@ -12,6 +12,7 @@ import numpy.typing as npt
 
 from terragrip.errors import InputError
 from terragrip.ground.classification.channels import held_channels, signals_of, tables_of
+from terragrip.ground.classification.comparable import not_comparable, without
 from terragrip.ground.classification.experts import FEWEST_WINDOWS, train_experts
 from terragrip.ground.classification.labels import UNKNOWN, classes_of, one_each
 from terragrip.ground.classification.learnt import Judgement, Learnt
@@ -100,6 +101,8 @@ class GroundClassifier:
         self.check_parameters()
         tables = tables_of(recordings)
         classes, codes = classes_of(labels, len(tables))
+        left_out, notes = not_comparable(tables, codes)
+        tables = [without(table, left_out) for table in tables]
         held = held_channels(tables)
         signals = [signals_of(table, held) for table in tables]
         for recorded, (_, _, name) in zip(signals, tables, strict=True):
@@ -115,16 +118,14 @@ class GroundClassifier:
             raise InputError(problem, place="window", mend=f"take a window of {4 * fastest:.2g} s or more")
         random = np.random.default_rng(self.random_state)
         training = collect(signals, codes, layout, self.max_windows, random)
-        notes = [
+        notes += [
             f"{family}: sampled too slowly for windows of {self.window:g} s, not used." for family in slow
         ]
         notes += [f"{name}: logged with repeats, true updates every {p:.2g} s." for name, p in held.items()]
-        if not training.by_recording:
-            notes.append(
-                "A ground has but one recording: probabilities are learnt within runs and too sure on new ones."
-            )
         experts, said = train_experts(training, classes, int(random.integers(2**31)))
-        return self._know(Learnt(classes, training.names, tuple(experts), layout, held, (*notes, *said)))
+        used = {name for expert in experts for name in expert.features}
+        names = tuple(name for name in training.names if name in used)
+        return self._know(Learnt(classes, names, tuple(experts), layout, held, (*notes, *said), left_out))
 
     def predict(self, recordings: Iterable[Any]) -> npt.NDArray[Any]:
         """The label (windows,) of each window, ``"unknown"`` where none fits; recordings follow one another.

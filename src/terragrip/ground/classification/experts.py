@@ -9,21 +9,25 @@ import numpy as np
 import numpy.typing as npt
 
 from terragrip.errors import InputError
+from terragrip.ground.classification.channels import BODY
 from terragrip.ground.classification.expert import Examples, Expert, train
 from terragrip.ground.classification.features import (
-    ACCELERATION,
     GROUND,
     SPEED,
     TORQUE,
-    TURN,
     families_needed,
     of_one_wheel,
 )
+from terragrip.ground.classification.roles import roles_of
+from terragrip.ground.classification.standardization import centre_of, scale_about
 from terragrip.ground.classification.training_set import TrainingSet, measured_families
+
+Floats = npt.NDArray[np.float64]
 
 FEWEST_WINDOWS = 10  # a class
 
-_BODY = frozenset({ACCELERATION, TURN})
+_NEARLY_ALL = 0.9  # share of a class's windows
+_BODY = frozenset(BODY)
 _STAND_IN_FOLDS = 3
 _MANY = 600  # windows a class, of which one family alone is learnt from every third
 
@@ -36,42 +40,102 @@ def train_experts(
     Raises InputError if there is no such set.
     """
     measured = measured_families(training.names, training.features)
-    found: list[Expert] = []
-    for families in _sensor_sets(training, measured):
-        columns = _columns(training.names, families)
-        names = tuple(training.names[k] for k in columns)
-        rows = np.flatnonzero(np.all([measured[f] for f in families], axis=0))
-        folds = training.folds
-        if found:  # stand-ins for the first are kept cheap
-            folds = folds % _STAND_IN_FOLDS
-            if len(families) == 1 and len(rows) > _MANY * len(classes):
-                rows = rows[::3]
-        if _can_be_held_out(training.codes[rows], folds[rows], len(classes)):
-            _, renumbered = np.unique(folds[rows], return_inverse=True)
-            windows = Examples(
-                training.features[rows][:, columns],
-                training.codes[rows],
-                training.groups[rows],
-                training.starts[rows],
-                renumbered,
-            )
-            found.append(train(families, names, windows, threads=min(4, os.cpu_count() or 1), seed=seed))
+    sets = _sensor_sets(training, measured)
+    found = _trained(training, training.folds, sets, measured, seed)
+    within = not found  # too little is left of some ground with a recording held out
+    if within:
+        found = _trained(training, training.parts, sets, measured, seed)
     if not found:
-        counts = np.bincount(training.codes, minlength=len(classes))
-        rarest = int(counts.argmin())
-        problem = f"there is no sensor with {FEWEST_WINDOWS} windows of every ground"
-        mend = f"give more or longer recordings ({classes[rarest]!s} has {counts[rarest]} windows)"
-        raise InputError(problem, place="recordings", mend=mend)
+        raise _nothing_to_learn(training, classes, measured)
+    notes = []
+    if within or not training.by_recording:
+        notes.append(
+            "A ground has but one recording: probabilities are learnt within runs and too sure on new ones."
+        )
     unused = frozenset(measured).difference(*(expert.families for expert in found))
-    notes = [f"Not measured on every ground, so not used: {', '.join(sorted(unused))}."] if unused else []
+    if unused:
+        notes.append(f"Not measured on every ground, so not used: {', '.join(sorted(unused))}.")
+    lost = {n for e in found for n in _candidates(training.names, e.families)}.difference(
+        *(e.features for e in found)
+    )
+    if lost:
+        of = ", ".join(sorted(frozenset[str]().union(*map(families_needed, lost))))
+        notes.append(f"Not measured on every ground, so not used: {len(lost)} features of {of}.")
     return sorted(found, key=lambda e: (-len(e.features), sorted(e.families))), notes
 
 
-def _columns(names: Sequence[str], families: frozenset[str]) -> list[int]:
+def _trained(
+    training: TrainingSet,
+    folds: npt.NDArray[np.intp],
+    sets: Sequence[frozenset[str]],
+    measured: dict[str, npt.NDArray[np.bool_]],
+    seed: int,
+) -> list[Expert]:
+    """The experts that hold out the windows of one of ``folds`` (n,) at a time."""
+    found: list[Expert] = []
+    classes = int(training.codes.max()) + 1
+    for families in sets:
+        rows = np.flatnonzero(np.all([measured[f] for f in families], axis=0))
+        if found:  # stand-ins for the first are kept cheap
+            folds = folds % _STAND_IN_FOLDS
+            if len(families) == 1 and len(rows) > _MANY * classes:
+                rows = rows[::3]
+        codes = training.codes[rows]
+        if not _can_be_held_out(codes, folds[rows], classes):
+            continue
+        fitting = _candidates(training.names, families)
+        features = training.features[rows][:, [training.names.index(name) for name in fitting]]
+        shared = _on_every_ground(features, codes)
+        names, features = tuple(n for n, ok in zip(fitting, shared, strict=True) if ok), features[:, shared]
+        if not _differ(features[:, roles_of(names).machine]):
+            continue
+        _, renumbered = np.unique(folds[rows], return_inverse=True)
+        windows = Examples(features, codes, training.groups[rows], training.starts[rows], renumbered)
+        found.append(train(families, names, windows, threads=min(4, os.cpu_count() or 1), seed=seed))
+    return found
+
+
+def _candidates(names: Sequence[str], families: frozenset[str]) -> list[str]:
     """The features of a set of sensors; of wheels' speeds and efforts alone also those of single wheels."""
-    fits = [k for k, name in enumerate(names) if families_needed(name) <= families]
     single = {SPEED, TORQUE} <= families and not families & _BODY
-    return [k for k in fits if single or not of_one_wheel(names[k])]
+    return [n for n in names if families_needed(n) <= families and (single or not of_one_wheel(n))]
+
+
+def _on_every_ground(features: Floats, codes: npt.NDArray[np.intp]) -> npt.NDArray[np.bool_]:
+    """Which ``features`` (n, features) are measured in nearly all windows of every class.
+
+    One that some ground lacks would mark that ground by its absence.
+    """
+    there = np.isfinite(features)
+    shares = [there[codes == code].mean(axis=0) for code in np.unique(codes)]
+    return np.asarray(np.min(shares, axis=0) >= _NEARLY_ALL)
+
+
+def _differ(features: Floats) -> bool:
+    """Whether any of the ``features`` (n, features) differs from window to window."""
+    return bool(np.isfinite(scale_about(centre_of(features), features)).any())
+
+
+def _nothing_to_learn(
+    training: TrainingSet, classes: npt.NDArray[np.generic], measured: dict[str, npt.NDArray[np.bool_]]
+) -> InputError:
+    """Why there is no expert."""
+    windows = {f: np.bincount(training.codes[rows], minlength=len(classes)) for f, rows in measured.items()}
+    best = max(windows, key=lambda family: int(windows[family].min()))
+    rarest = int(windows[best].argmin())
+    fewest = int(windows[best][rarest])
+    if not fewest and np.bincount(training.codes)[rarest] >= FEWEST_WINDOWS:
+        problem = "there is no sensor that was measured on every ground"
+        mend = f"give recordings with the same channels ({classes[rarest]!s} lacks {best})"
+    elif fewest < FEWEST_WINDOWS:
+        problem = f"there is no sensor with {FEWEST_WINDOWS} windows of every ground"
+        mend = f"give more or longer recordings ({classes[rarest]!s} has {fewest} windows)"
+    else:
+        problem, mend = (
+            "nothing measured differs from window to window",
+            "give recordings of a vehicle that drives",
+        )
+    return InputError(problem, place="recordings", mend=mend)
 
 
 def _sensor_sets(training: TrainingSet, measured: dict[str, npt.NDArray[np.bool_]]) -> list[frozenset[str]]:

@@ -13,7 +13,7 @@ from functools import cache
 import numpy as np
 import numpy.typing as npt
 
-from terragrip.ground.classification.channels import FAMILIES, Channel, Signals
+from terragrip.ground.classification.channels import FAMILIES, Channel, Signals, wheel_of
 from terragrip.ground.classification.vibration import (
     band_edges,
     band_energies,
@@ -104,7 +104,7 @@ def of_sides(feature: str) -> bool:
 
 
 def _each(family: str, channels: dict[str, Channel], values: Floats, layout: Layout) -> Table:
-    wheels = [name.partition("_")[2].partition("_")[2] for name in channels]
+    wheels = [wheel_of(name) for name in channels]
     return _named(family, each_wheel(values, wheels, layout.size[family]))
 
 
@@ -163,12 +163,8 @@ def _drive_beside_motion(
     # Wheels are paired by name where both are measured; mean net effort needs no pairing.
     forward = over_wheels(torque)[0] * np.sign(net)
     found["net effort"] = forward.mean(axis=-1) / layout.size[TORQUE]
-    pairs = {name.rpartition("_")[2]: k for k, name in enumerate(usable[SPEED])}
-    own = [
-        (k, pairs[n.rpartition("_")[2]])
-        for k, n in enumerate(usable[TORQUE])
-        if n.rpartition("_")[2] in pairs
-    ]
+    pairs = {wheel_of(name): k for k, name in enumerate(usable[SPEED])}
+    own = [(k, pairs[wheel_of(n)]) for k, n in enumerate(usable[TORQUE]) if wheel_of(n) in pairs]
     if len(own) > 1:
         level = np.abs(torque[:, [t for t, _ in own]]).mean(axis=-1)
         rate = np.abs(speed[:, [s for _, s in own]]).mean(axis=-1)

@@ -14,6 +14,7 @@ import numpy.typing as npt
 
 from terragrip.errors import InputError, nearest
 from terragrip.files import refuse_missing, unreadable
+from terragrip.formats.dialect import to_text
 
 Columns = Mapping[str, npt.NDArray[Any]]
 
@@ -88,9 +89,7 @@ def _rows(path: str | os.PathLike[str]) -> list[tuple[int, dict[str, str]]]:
     """The rows of the table by their number in the file, cells stripped."""
     refuse_missing(path, suffixes=(".csv",))
     try:
-        text = Path(path).read_text(encoding="utf-8-sig")
-    except UnicodeDecodeError:
-        raise InputError("is not a text file", file=path, mend="write a CSV: file,label") from None
+        text = to_text(Path(path).read_bytes(), str(path)).decode()
     except OSError as error:
         raise unreadable(path, error) from error
     head = text.partition("\n")[0]

@@ -10,13 +10,16 @@ import numpy as np
 import numpy.typing as npt
 
 from terragrip.ground.classification.channels import Columns, Signals, signals_of
+from terragrip.ground.classification.comparable import without
 from terragrip.ground.classification.expert import Expert
 from terragrip.ground.classification.features import Layout, features_of
 from terragrip.ground.classification.neighbours import nearby_mean, smoothed
-from terragrip.ground.classification.training_set import matrix, measured_families
+from terragrip.ground.classification.training_set import PRESENT, matrix, measured_families
 from terragrip.ground.classification.windows import window_starts
 
 Floats = npt.NDArray[np.float64]
+
+_WHOLE = 0.9  # share of a family's own features that makes it measured as it was in training
 
 
 @dataclass(frozen=True)
@@ -31,7 +34,8 @@ class Judgement:
 @dataclass(frozen=True)
 class Learnt:
     """The classes, the features' names, the experts from most features to fewest, what recordings look like, the update
-    periods [s] of channels that are logged with repeats, and sentences for the user."""
+    periods [s] of channels that are logged with repeats, sentences for the user, and beginnings of columns that
+    are left out."""
 
     classes: npt.NDArray[np.generic]
     features: tuple[str, ...]
@@ -39,18 +43,22 @@ class Learnt:
     layout: Layout
     held: Mapping[str, float]
     notes: tuple[str, ...]
+    left_out: tuple[str, ...] = ()
 
     def windows(self, table: Columns, step: float | None) -> Floats:
         """Starts (n,) [s] of a table's windows, ``step`` [s] apart; None: one window."""
-        return self._starts(signals_of(table, self.held), step)
+        return self._starts(self._signals(table), step)
 
     def judge(self, table: Columns, step: float | None, smooth: float) -> Judgement:
         """Judge a table's windows; neighbours within a time ``smooth`` [s] share their evidence."""
-        signals = signals_of(table, self.held)
+        signals = self._signals(table)
         starts = self._starts(signals, step)
         features = matrix(features_of(signals, starts, self.layout), self.features, len(starts))
         chances, novelty = self._ask(features, starts, smooth)
         return Judgement(starts, smoothed(chances, starts, smooth / 2), novelty)
+
+    def _signals(self, table: Columns) -> Signals:
+        return signals_of(without(table, self.left_out), self.held)
 
     def _starts(self, signals: Signals, step: float | None) -> Floats:
         window = self.layout.window
@@ -58,20 +66,26 @@ class Learnt:
 
     def _ask(self, features: Floats, starts: Floats, smooth: float) -> tuple[Floats, Floats]:
         """Send each window to the expert that uses most of what it holds."""
-        measured = measured_families(self.features, features)
         chances = np.full((len(features), len(self.classes)), 1.0 / len(self.classes))
         novelty = np.full(len(features), np.nan)
         open_rows = np.ones(len(features), dtype=bool)
         nowhere = np.zeros(len(features), dtype=bool)
-        for expert in self.experts:
-            fits = open_rows & np.all([measured.get(f, nowhere) for f in expert.families], axis=0)
-            if fits.any():
-                columns = [self._column[name] for name in expert.features]
-                chances[fits], strange = expert.judge(features[fits][:, columns])
-                if smooth:  # neighbours that the same expert judged
-                    strange = nearby_mean(strange, starts[fits], smooth / 2)
-                novelty[fits] = expert.strangeness.novelty(strange, smooth)
-                open_rows &= ~fits
+        for least in (
+            _WHOLE,
+            PRESENT,
+        ):  # an axis that is missing now makes all of a body sensor's features strange
+            measured = measured_families(self.features, features, least)
+            for expert in self.experts:
+                fits = open_rows & np.all([measured.get(f, nowhere) for f in expert.families], axis=0)
+                if fits.any():
+                    columns = [self._column[name] for name in expert.features]
+                    chances[fits], strange = expert.judge(features[fits][:, columns])
+                    if smooth:  # neighbours that the same expert judged
+                        strange = nearby_mean(strange, starts[fits], smooth / 2)
+                    novelty[fits] = expert.strangeness.novelty(strange, smooth)
+                    open_rows &= ~fits
+            if not open_rows.any():
+                break
         return chances, novelty
 
     @cached_property

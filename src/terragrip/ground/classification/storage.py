@@ -70,6 +70,7 @@ def save(parameters: Mapping[str, Any], learnt: Learnt, path: str | os.PathLike[
         "features": list(learnt.features),
         "layout": {"window": float(layout.window), "period": layout.period, "size": layout.size},
         "held": dict(learnt.held),
+        "left_out": list(learnt.left_out),
         "notes": list(learnt.notes),
         "experts": [
             {
@@ -176,6 +177,7 @@ def _learnt(header: dict[str, Any], archive: Any) -> Learnt:
         Layout(float(layout["window"]), dict(layout["period"]), dict(layout["size"])),
         dict(header["held"]),
         tuple(str(note) for note in header["notes"]),
+        tuple(str(begin) for begin in header.get("left_out", ())),  # files of before it mattered have none
     )
 
 

@@ -9,7 +9,7 @@ from functools import lru_cache
 import numpy as np
 import numpy.typing as npt
 
-from terragrip.ground.classification.channels import FAMILIES, Signals
+from terragrip.ground.classification.channels import BODY, FAMILIES, Signals
 from terragrip.ground.classification.features import Layout, families_needed, features_of, of_one_wheel
 from terragrip.ground.classification.wheel_features import Table
 from terragrip.ground.classification.windows import window_starts
@@ -21,12 +21,17 @@ _FOLDS = 5
 _FINEST, _COARSEST = 1 / 8, 1 / 2  # of a window: the step between training windows
 _SPARE = 8  # times the windows wanted that are cut at most
 _SLOWEST = 2.0  # samples a window that a family must have
-_PRESENT = 0.5  # share of a family's own features that makes it measured
+PRESENT = 0.5
+"""Share of a family's own features that makes it measured."""
 
 
 @dataclass(frozen=True)
 class TrainingSet:
-    """Features (n, features) by name, with the class code, the recording, the start [s] and the fold (n,) of each window."""
+    """Features (n, features) by name, with the class code, the recording and the start [s] (n,) of each window.
+
+    ``folds`` (n,) to hold out: of whole recordings where there are two of every class (``by_recording``), else ``parts`` (n,),
+    stretches of recordings.
+    """
 
     names: tuple[str, ...]
     features: Floats
@@ -34,6 +39,7 @@ class TrainingSet:
     groups: Codes
     starts: Floats
     folds: Codes
+    parts: Codes
     by_recording: bool
 
 
@@ -50,7 +56,7 @@ def layout_of(signals: Sequence[Signals], window: float) -> tuple[Layout, tuple[
             slow.append(family)
             continue
         period[family] = usual
-        body = family in ("angular velocity", "acceleration")
+        body = family in BODY
         sizes = [
             np.sqrt(
                 np.mean(
@@ -88,10 +94,9 @@ def collect(
     keep = _balanced(codes[source], source, most, random)
     source, begin, features = source[keep], begin[keep], features[keep]
     held_out, by_recording = deal(codes, np.bincount(source, minlength=len(codes)), random)
-    # With one recording of a class there is no other to hold out; stretches of it have to do.
-    part = np.minimum((begin / spans[source] * _FOLDS).astype(int), _FOLDS - 1)
-    folds = held_out[source] if by_recording else part
-    return TrainingSet(names, features, codes[source], source, begin, folds, by_recording)
+    parts = np.minimum((begin / spans[source] * _FOLDS).astype(int), _FOLDS - 1)
+    folds = held_out[source] if by_recording else parts
+    return TrainingSet(names, features, codes[source], source, begin, folds, parts, by_recording)
 
 
 def matrix(table: Table, names: Sequence[str], rows: int) -> Floats:
@@ -100,12 +105,12 @@ def matrix(table: Table, names: Sequence[str], rows: int) -> Floats:
     return np.array([table.get(name, missing) for name in names]).T if len(names) else np.empty((rows, 0))
 
 
-def measured_families(names: Sequence[str], features: Floats) -> dict[str, npt.NDArray[np.bool_]]:
-    """Which windows (n,) each sensor family was measured in, judged by its own features."""
+def measured_families(
+    names: Sequence[str], features: Floats, least: float = PRESENT
+) -> dict[str, npt.NDArray[np.bool_]]:
+    """Which windows (n,) each sensor family was measured in: by the ``least`` share of its own features."""
     known = np.isfinite(features)
-    return {
-        f: known[:, columns].mean(axis=1) >= _PRESENT for f, columns in _own_columns(tuple(names)).items()
-    }
+    return {f: known[:, columns].mean(axis=1) >= least for f, columns in _own_columns(tuple(names)).items()}
 
 
 @lru_cache(maxsize=8)
