@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Self
 
@@ -25,6 +25,12 @@ Floats = npt.NDArray[np.float64]
 
 METADATA_KEY = b"terragrip"
 """Under it a Parquet file holds, as JSON, what the table was made from."""
+
+
+def wheels_with(quantity: str, columns: Iterable[str]) -> tuple[str, ...]:
+    """The wheels, in the columns' order, of which there is a ``<quantity>_<wheel>`` (other than a ``_std``)."""
+    begin = f"{quantity}_"
+    return tuple(n.removeprefix(begin) for n in columns if n.startswith(begin) and not n.endswith("_std"))
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,11 +86,12 @@ class Estimates:
     @property
     def wheels(self) -> tuple[str, ...]:
         """Names of the wheels, in the vehicle's order."""
-        return tuple(
-            name.removeprefix("slip_")
-            for name in self.columns
-            if name.startswith("slip_") and not name.endswith("_std")
-        )
+        return wheels_with("slip", self.columns)
+
+    @property
+    def has_adhesion(self) -> bool:
+        """Whether torques were measured; else there are slip and speeds alone."""
+        return bool(wheels_with("adhesion", self.columns))
 
     @property
     def method(self) -> str:

@@ -114,7 +114,7 @@ def _read(
         estimates = Estimates.read(path)
         if len(estimates) < 2:
             raise InputError("holds fewer than two rows", file=path, mend="leave it out")
-        if any(name.startswith("adhesion_") for name in estimates.columns):
+        if estimates.has_adhesion:
             gathered.add(estimates, path.stem, file=str(path))
         happened = tuple(event for ground in grounds if ground.run == path.stem for event in ground.events)
         table = estimates.to_pandas()

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from terragrip.errors import InputError
+from terragrip.estimation.estimates import wheels_with
 from terragrip.units import STANDARD_GRAVITY
 
 if TYPE_CHECKING:
@@ -74,17 +75,13 @@ class Run:
     @cached_property
     def wheels(self) -> tuple[str, ...]:
         """The wheels with an estimated adhesion, of estimates without any those with a slip; in the table's order."""
-        return self._named("adhesion_") or self._named("slip_")
+        columns = [str(name) for name in self.estimates.columns]
+        return wheels_with("adhesion", columns) or wheels_with("slip", columns)
 
     @cached_property
     def has_adhesion(self) -> bool:
         """Whether torques were measured; else there are slip and speeds alone."""
-        return bool(self._named("adhesion_"))
-
-    def _named(self, quantity: str) -> tuple[str, ...]:
-        columns = (str(name) for name in self.estimates.columns)
-        named = (name for name in columns if name.startswith(quantity) and not name.endswith("_std"))
-        return tuple(name.removeprefix(quantity) for name in named)
+        return bool(wheels_with("adhesion", map(str, self.estimates.columns)))
 
     @cached_property
     def sensor_wheel(self) -> str | None:

@@ -206,7 +206,7 @@ def estimates_blocks(
 
     Raises InputError as `blocks_of`, and where the table holds no vehicle.
     """
-    if not any(name.startswith("adhesion_") for name in estimates.columns):
+    if not estimates.has_adhesion:
         raise InputError(
             "holds slip but no adhesion: the ground is told by adhesion and soil resistance, which need drive torques",
             file=file,

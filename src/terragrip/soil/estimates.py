@@ -74,7 +74,7 @@ class GatheredRuns:
 
     def add(self, estimates: Estimates, run: str, soil: str | None = None, file: str | None = None) -> None:
         """Take one run; `soil` names all its rows, `file` is named where it is unusable."""
-        if not any(name.startswith("adhesion_") for name in estimates.columns):
+        if not estimates.has_adhesion:
             problem, mend = (
                 "holds slip but no adhesion, so no soil can be learned",
                 "estimate a log with torques",

@@ -89,7 +89,7 @@ def why(table: Estimates, recording: Recording | None, row: int) -> list[str]:
     before, after = _half_seconds(table.time, row)
     if before.stop - before.start < 2 or after.stop - after.start < 2:
         return ["Too close to the end of the drive to compare before with after."]
-    if not any(name.startswith("adhesion_") for name in table.columns):
+    if not table.has_adhesion:
         return [_of_slip(table, wheel, before, after) for wheel in table.wheels]
     sentences = []
     for wheel in table.wheels:
