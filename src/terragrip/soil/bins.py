@@ -129,13 +129,13 @@ class Bins:
         ]
 
 
-_SLIPS = np.linspace(0.0, 0.6, 6001)
-_HEIGHTS = CURVES["exponential"].value(_SLIPS, {**PROTOTYPE, "a": 1.0})
-
-
 def height_of(slip: ArrayLike) -> Array:
     """The prototype curve of scale 1 at slips of any shape: the scale that slips are averaged on by pull."""
     return CURVES["exponential"].value(slip, {**PROTOTYPE, "a": 1.0})
+
+
+_SLIPS = np.linspace(0.0, 0.6, 6001)
+_HEIGHTS = height_of(_SLIPS)
 
 
 def slip_of(height: ArrayLike) -> Array:

@@ -176,15 +176,13 @@ def learn_soils(
     return Campaign(soils, missed, tuple(words))
 
 
-def _clusters(parts: Sequence[RunPairs]) -> tuple[NDArray[np.int64], bool]:
-    """What is drawn by the bootstrap: runs, or stretches of runs where there are few. (labels (n,), whether they are runs)."""
+def _clusters(parts: Sequence[RunPairs]) -> NDArray[np.int64]:
+    """Labels (n,) of what is drawn by the bootstrap: runs, or stretches of runs where there are few."""
     run = np.repeat(np.arange(len(parts)), [part.slip.size for part in parts])
     if len(parts) >= FEW_RUNS:
-        return run, True
+        return run
     stretch = np.concatenate([part.stretch for part in parts])
-    return np.asarray(
-        np.unique(np.stack([run, stretch]), axis=1, return_inverse=True)[1].ravel(), dtype=np.int64
-    ), False
+    return np.asarray(run * (np.ptp(stretch) + 1) + stretch - stretch.min())
 
 
 def bin_parts(parts: Sequence[RunPairs], settings: BinSettings) -> Bins:
@@ -192,7 +190,7 @@ def bin_parts(parts: Sequence[RunPairs], settings: BinSettings) -> Bins:
     slip, adhesion, pull, metres, noise = (
         _joined(parts, name) for name in ("slip", "adhesion", "pull", "metres", "slip_std")
     )
-    cluster, _ = _clusters(parts)
+    cluster = _clusters(parts)
     if settings.by == BY_PULL:
         return bin_by_pull(slip, adhesion, pull, metres, cluster, settings, noise)
     return bin_pairs(slip, adhesion, cluster, settings)
@@ -225,11 +223,13 @@ def _learn(
     source: str,
 ) -> LearnedSoil:
     sorted_by_slip = bin_parts(parts, replace(template.bins, by=BY_SLIP))
-    curve, by_slip = _fits(parts, template, sorted_by_slip)
-    verdict = _compared(curve.bins_)
+    verdict = _compared(sorted_by_slip)
+    curve, by_slip = _fits(parts, template, sorted_by_slip, verdict)
+    if curve is not by_slip:
+        verdict = _compared(curve.bins_)
     if curve.r2_ < POOR:
         curve.notes_.append(f"The curve explains little of the bins (R2 {curve.r2_:.2f}): take it as a hint.")
-    if curve.interval_ and not _clusters(parts)[1]:
+    if curve.interval_ and len(parts) < FEW_RUNS:
         curve.notes_.append(
             f"The intervals come from stretches of {STRETCH:g} m of {len(parts)} run{'s' * (len(parts) > 1)}: "
             "they do not hold how much runs differ."
@@ -255,12 +255,15 @@ def _learn(
 
 
 def _fits(
-    parts: Sequence[RunPairs], template: AdhesionCurve, sorted_by_slip: Bins
+    parts: Sequence[RunPairs], template: AdhesionCurve, sorted_by_slip: Bins, verdict: FormVerdict | None
 ) -> tuple[AdhesionCurve, AdhesionCurve]:
-    """The fit that counts and the paper's by slip, which may be one. Raises InputError with too few slips, or no fit."""
+    """The fit that counts and the paper's by slip, which may be one; ``verdict`` is on the forms for the bins by slip.
+
+    Raises InputError with too few slips, or no fit.
+    """
     paper = template.unfitted(bins=sorted_by_slip.settings).fit_bins(sorted_by_slip)
     if template.bins.by == BY_PULL:
-        if _falls(sorted_by_slip):
+        if _falls(sorted_by_slip, verdict):
             why = "the curve falls within the bins, so that one pull has two slips"
         else:
             try:
@@ -293,9 +296,8 @@ def _compared(bins: Bins) -> FormVerdict | None:
         return None
 
 
-def _falls(bins: Bins) -> bool:
+def _falls(bins: Bins, verdict: FormVerdict | None) -> bool:
     """Whether adhesion falls by more than FALL of its top within the bins: by the best form, where the paper's cannot follow them."""
-    verdict = _compared(bins)
     if verdict is None or verdict.proposal is None:
         return False
     model, intercept = FORMS[verdict.proposal]
