@@ -125,9 +125,9 @@ def read_json(
     refuse_missing(file, suffixes=(".json",))
     mend = f"give a file written by {writer}"
     try:
-        with open(file, encoding="utf-8") as stream:
+        with open(file, encoding="utf-8-sig") as stream:
             data = json.load(stream, object_pairs_hook=pairs)
-    except (UnicodeDecodeError, json.JSONDecodeError, RecursionError) as error:
+    except (ValueError, RecursionError) as error:  # not text, not JSON, or a number of thousands of digits
         raise InputError(f"not JSON ({error})", file=file, mend=mend) from None
     except OSError as error:
         raise unreadable(file, error) from None

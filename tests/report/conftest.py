@@ -15,22 +15,9 @@ from terragrip.vehicle import Vehicle
 
 sys.path.insert(0, str(Path(__file__).parent))
 
-WHEELS = ("fl", "fr", "rl", "rr")
+from made_up import VEHICLE, WHEELS
+
 YAW_RATE = 0.1
-VEHICLE = {
-    "name": "made up",
-    "mass": 139.0,
-    "wheelbase": 0.6,
-    "track": 0.5,
-    "center_of_gravity_height": 0.3,
-    "axles": {
-        "front": {"mass": 54.0, "wheels": ["fl", "fr"]},
-        "rear": {"mass": 85.0, "wheels": ["rl", "rr"]},
-    },
-    "wheel": {"radius": 0.2, "inertia": 0.15},
-}
-
-
 def drive(name: str = "multi2", method: str = "bank", seconds: float = 120.0, seed: int = 0) -> Run:
     """A run over four sections of two soils, stuck from 60 to 65 s; estimates err by their stated SD."""
     rng = np.random.default_rng(seed)

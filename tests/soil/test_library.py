@@ -68,6 +68,7 @@ BAD = {
     "two soils of one name": '{"soils": {"a": {"model": "exponential", "parameters": {"a": 1}}, "a": {}}}',
     "newer version": '{"version": 9, "soils": {}}',
     "not JSON": "[",
+    "a number without end": f'{{"version": {"1" * 5000}, "soils": {{}}}}',
     "empty": "",
     "no soils": '{"soil": {}}',
     "unknown model": '{"soils": {"a": {"model": "x"}}}',

@@ -168,7 +168,7 @@ class SoilLibrary(Mapping[str, Soil]):
         return rows
 
 
-class _Twin(ValueError):
+class _Twin(Exception):
     pass
 
 
