@@ -13,7 +13,6 @@ from terragrip.formats.binding import bound
 from terragrip.formats.derivation import (
     derivative,
     fresh_positions,
-    metres_of,
     pitch_of,
     quotient,
     roll_of,
@@ -23,6 +22,7 @@ from terragrip.formats.profile import Profile, Rows, Source, TimeSource, matchin
 from terragrip.formats.signals import SINCE_1970
 from terragrip.formats.table import LogTable
 from terragrip.formats.timebase import spread, union
+from terragrip.physics.geodesy import metres_of
 from terragrip.recording import Recording
 from terragrip.recording.columns import columns_of, numbers, seconds, texts
 from terragrip.recording.schema import LABELS, TIME, unit_of

@@ -4,25 +4,24 @@ from __future__ import annotations
 
 import os
 import re
-import zlib
-from pathlib import Path
+from contextlib import closing
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
 
 from terragrip.errors import InputError
-from terragrip.files import refuse_missing, unreadable
+from terragrip.files import refuse_missing, sha256
 from terragrip.formats.dialect import Dialect, detect, split, to_text
 from terragrip.formats.table import LogTable, Wanted, from_arrow
+from terragrip.formats.text_file import is_packed, length_of, opened, read
 from terragrip.recording.schema import LABELS, TIME, is_channel
 
 if TYPE_CHECKING:
     import pyarrow as pa
 
 SUFFIXES = (".csv", ".txt", ".tsv", ".dat", ".csv.gz", ".txt.gz", ".tsv.gz")
-GZIP = b"\x1f\x8b"
-_LONG, _LONG_PACKED = 256 << 20, 32 << 20  # bytes
+_LONG = 256 << 20  # bytes
 _BLANKS = re.compile(rb"[ \t]+")
 _MISSING = [
     *("", "NaN", "nan", "NAN", "-nan", "-NaN", "NA", "N/A", "n/a", "#N/A", "<NA>", "null", "NULL", "None"),
@@ -37,26 +36,16 @@ def read_csv(path: str | os.PathLike[str], wanted: Wanted | None = None) -> LogT
     recording's schema must hold numbers. Raises InputError with row and content: no such file, empty, not a
     text table, no header, a row of another width, text in a number column.
     """
-    import hashlib
-
     source = os.fspath(path)
     refuse_missing(source, suffixes=SUFFIXES)
-    if is_long(source):
+    raw = None if is_long(source) else _whole(source)
+    if raw is None or len(raw) > _LONG:  # packed, it may unpack to more than its size lets expect
         found = _in_blocks(source, wanted)
         if found is not None:
             return found
-    try:
-        raw = Path(source).read_bytes()
-    except OSError as error:
-        raise unreadable(source, error) from error
-    digest = hashlib.sha256(raw).hexdigest()
-    if raw.startswith(GZIP):
-        raw = _unzip(raw, source)
-        if len(raw) > _LONG:  # it unpacks to more than its size lets expect
-            found = _in_blocks(source, wanted)
-            if found is None:
-                raise InputError("is not a table of text", file=source, mend="give a CSV or Parquet file")
-            return found
+        raw = _whole(source)
+        if len(raw) > _LONG and is_packed(source):  # there is no telling how much more
+            raise InputError("is not a table of text", file=source, mend="give a CSV or Parquet file")
     if not raw.strip():
         raise InputError("is empty", file=source, mend="give a table with a header and rows")
     data = to_text(raw, source)
@@ -65,17 +54,20 @@ def read_csv(path: str | os.PathLike[str], wanted: Wanted | None = None) -> LogT
     names = dialect.names
     chosen = chosen_of(dialect, wanted, source)
     columns = parse(body, dialect, chosen, source)
-    return LogTable(tuple(n for n in names if n), columns, dialect.units, source, digest, tuple(notes))
+    return LogTable(
+        tuple(n for n in names if n), columns, dialect.units, source, sha256(source), tuple(notes)
+    )
 
 
 def is_long(source: str) -> bool:
-    """Whether a file is so long that it is read in blocks; a packed one unpacks to some ten times its size."""
-    try:
-        with open(source, "rb") as stream:
-            packed = stream.read(2) == GZIP
-        return os.path.getsize(source) > (_LONG_PACKED if packed else _LONG)
-    except OSError as error:
-        raise unreadable(source, error) from error
+    """Whether a file is so long that it is read in blocks; raises InputError where it cannot be opened."""
+    return length_of(source) > _LONG
+
+
+def _whole(source: str) -> bytes:
+    """The content; of a packed file a byte more than is read at once at most."""
+    with closing(opened(source)) as stream:
+        return read(stream, _LONG + 1 if is_packed(source) else -1, source)
 
 
 def chosen_of(dialect: Dialect, wanted: Wanted | None, source: str) -> list[int]:
@@ -92,20 +84,6 @@ def _in_blocks(source: str, wanted: Wanted | None) -> LogTable | None:
     from terragrip.formats.csv_blocks import read_long_csv
 
     return read_long_csv(source, wanted)
-
-
-def _unzip(raw: bytes, source: str) -> bytes:
-    """What a packed file holds, up to a byte more than is read at once."""
-    import gzip
-    import io
-
-    try:
-        with gzip.GzipFile(fileobj=io.BytesIO(raw)) as stream:
-            return stream.read(_LONG + 1)
-    except (OSError, EOFError, zlib.error) as error:
-        raise InputError(
-            f"is a damaged gzip file ({error})", file=source, mend="copy or pack it again"
-        ) from error
 
 
 def body_of(

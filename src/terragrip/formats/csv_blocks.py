@@ -2,23 +2,22 @@
 
 from __future__ import annotations
 
-import gzip
 import os
-import zlib
 from collections.abc import Iterator
 from contextlib import closing
-from typing import Any, BinaryIO
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from terragrip.errors import InputError
-from terragrip.files import sha256, unreadable
-from terragrip.formats.csv import GZIP, body_of, chosen_of, is_long, parse
+from terragrip.files import sha256
+from terragrip.formats.csv import body_of, chosen_of, is_long, parse
 from terragrip.formats.dialect import HEAD, Dialect, detect, in_utf8, to_text
 from terragrip.formats.long_logs import ROWS, LongLog, recordings_of
 from terragrip.formats.profile import Profile
 from terragrip.formats.table import LogTable, Wanted, every_of
+from terragrip.formats.text_file import length_of, opened, read
 from terragrip.recording import Recording
 
 Column = npt.NDArray[Any]
@@ -29,13 +28,13 @@ _LOOK = 2 << 20  # bytes, where only some blocks are looked at
 
 def read_long_csv(source: str, wanted: Wanted | None) -> LogTable | None:
     """Read the wanted columns of a table, as `terragrip.formats.csv.read_csv` does; None where its lines cannot be told."""
-    dialect = _dialect(source)
-    if dialect is None:
+    looked_at = _looked_at(source)
+    if looked_at is None:
         return None
+    dialect, rows = looked_at
     chosen = chosen_of(dialect, wanted, source)
     every = every_of(wanted)
-    rows = rows_of(source) // every
-    parts = {dialect.names[k]: _Growing(rows) for k in chosen}
+    parts = {dialect.names[k]: _Growing(rows // every) for k in chosen}
     notes: dict[str, None] = {}
     for columns, said in _blocks(source, dialect, chosen, every):
         notes |= dict.fromkeys(said)
@@ -94,10 +93,10 @@ def long_csv(path: str | os.PathLike[str]) -> LongLog | None:
 
 
 def _as_long_log(source: str) -> LongLog | None:
-    dialect = _dialect(source)
-    if dialect is None:
+    looked_at = _looked_at(source)
+    if looked_at is None:
         return None
-    rows = rows_of(source)
+    dialect, rows = looked_at
     size = int(np.clip(ROWS * os.path.getsize(source) / rows, 1 << 20, 4 * _BLOCK))
     said: list[str] = []
 
@@ -110,20 +109,18 @@ def _as_long_log(source: str) -> LongLog | None:
     return LongLog(tuple(n for n in dialect.names if n), dialect.units, source, rows, blocks, said)
 
 
-def rows_of(path: str | os.PathLike[str]) -> int:
+def _rows_of(source: str, head: bytes) -> int:
     """About how many rows a long table has, by the length of its first ones."""
-    with closing(_opened(os.fspath(path))) as stream:
-        head = stream.read(HEAD)
-        total = os.path.getsize(path) * (10 if isinstance(stream, gzip.GzipFile) else 1)
-    return max(1, round(total / len(head) * head.count(b"\n")))
+    return max(1, round(length_of(source) / max(len(head), 1) * head.count(b"\n")))
 
 
-def _dialect(source: str) -> Dialect | None:
-    with closing(_opened(source)) as stream:
-        head = _read(stream, HEAD, source)
+def _looked_at(source: str) -> tuple[Dialect, int] | None:
+    """How a table is written, and about how many rows it has; None where its lines cannot be told."""
+    with closing(opened(source)) as stream:
+        head = read(stream, HEAD, source)
     if b"\n" not in head or head.startswith((b"\xff\xfe", b"\xfe\xff")) or head.count(0) > 0.2 * len(head):
         return None
-    return detect(to_text(head[: head.rindex(b"\n") + 1], source), source)
+    return detect(to_text(head[: head.rindex(b"\n") + 1], source), source), _rows_of(source, head)
 
 
 def _blocks(
@@ -136,7 +133,7 @@ def _blocks(
             continue
         text = in_utf8(data.removeprefix(b"\xef\xbb\xbf"))
         # A byte order mark, comments and the header stand in the first block only.
-        start = detect(text, source).start if is_first else 0
+        start = dialect.start if is_first else 0
         body, notes = body_of(text, dialect, start, more=not is_first)
         columns = parse(body, dialect, chosen, source, row)
         row += max((len(column) for column in columns.values()), default=0)
@@ -146,8 +143,8 @@ def _blocks(
 def _lines(source: str, size: int) -> Iterator[tuple[bytes, bool]]:
     """Blocks of whole lines, and whether each is the first."""
     rest, is_first = b"", True
-    with closing(_opened(source)) as stream:
-        while data := _read(stream, size, source):
+    with closing(opened(source)) as stream:
+        while data := read(stream, size, source):
             data = rest + data
             end = data.rfind(b"\n") + 1
             rest = data[end:]
@@ -158,22 +155,3 @@ def _lines(source: str, size: int) -> Iterator[tuple[bytes, bool]]:
                 is_first = False
     if rest.strip():
         yield rest, is_first
-
-
-def _opened(source: str) -> BinaryIO:
-    try:
-        with open(source, "rb") as stream:
-            packed = stream.read(2) == GZIP
-        return gzip.open(source, "rb") if packed else open(source, "rb")  # type: ignore[return-value]
-    except OSError as error:
-        raise unreadable(source, error) from error
-
-
-def _read(stream: BinaryIO, size: int, source: str) -> bytes:
-    try:
-        return stream.read(size)
-    except (EOFError, zlib.error, gzip.BadGzipFile) as error:
-        problem = f"is a damaged gzip file ({error})"
-        raise InputError(problem, file=source, mend="copy or pack it again") from error
-    except OSError as error:
-        raise unreadable(source, error) from error

@@ -23,12 +23,11 @@ from terragrip.formats.matlab_hdf5 import is_hdf5, tree_of
 from terragrip.formats.matlab_records import IN_RECORDS
 from terragrip.formats.matlab_signals import Found, seconds_of, walk
 from terragrip.formats.signals import Signal, SignalLog
-from terragrip.formats.table import LogTable, Wanted, every_of, kept_rows
+from terragrip.formats.table import LogTable, Wanted, kept_rows
 from terragrip.formats.worker import Worker
 
 Floats = npt.NDArray[np.float64]
 
-_BLOCK = 10_000  # samples that are kept or left out together, where a log is looked at in parts
 _NO_OBJECTS = ("", "function", "sparse", "function_handle")
 
 
@@ -123,7 +122,7 @@ def _finished(
         if wanted is not None and not wanted(name):
             continue
         length = int(np.prod(clock.shape))
-        rows = kept_rows(length, _BLOCK, every_of(wanted))
+        rows = kept_rows(length, wanted)
         if id(clock) not in clocks:
             whole = seconds_of(_read(clock).ravel(), found.scales.get(id(clock), 1.0))
             clocks[id(clock)] = whole[rows]

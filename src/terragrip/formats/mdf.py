@@ -14,10 +14,8 @@ from terragrip.formats.can.frames import Frames
 from terragrip.formats.can.log import finished
 from terragrip.formats.kind import Databases
 from terragrip.formats.signals import Signal, SignalLog
-from terragrip.formats.table import Wanted, every_of, kept_rows
+from terragrip.formats.table import Wanted, kept_rows
 from terragrip.formats.worker import Worker
-
-_BLOCK = 10_000  # samples that are kept or left out together, where a log is looked at in parts
 
 
 def read_mdf(path: str, wanted: Wanted | None, databases: Databases) -> SignalLog:
@@ -37,12 +35,12 @@ def read_mdf(path: str, wanted: Wanted | None, databases: Databases) -> SignalLo
             group = int(message["group"])
             if not message["shared"]:
                 time = worker.array()
-                time = start + time[kept_rows(len(time), _BLOCK, every_of(wanted))]
+                time = start + time[kept_rows(len(time), wanted)]
             else:
                 time = clocks[group]
             clocks.setdefault(group, time)
             values = worker.array()
-            values = values[kept_rows(len(values), _BLOCK, every_of(wanted))]
+            values = values[kept_rows(len(values), wanted)]
             signals[str(message["name"])] = Signal(
                 time, values.astype(object) if values.dtype.kind == "U" else values, message["unit"] or None
             )

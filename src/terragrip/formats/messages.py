@@ -14,13 +14,14 @@ from typing import Any
 import numpy as np
 
 from terragrip.formats.signals import Signal
-from terragrip.formats.table import Wanted, every_of, skips
+from terragrip.formats.table import Wanted, skips
 
 LONGEST_ARRAY = 16
 """Numbers of a list beyond which none is a signal."""
 _LONGEST_LIST = 8  # messages in a message
 _DEEPEST = 8
-_BLOCK = 1000  # messages that are read or left out together, where a log is looked at in parts
+BLOCK = 1000
+"""Messages that are read or left out together, where a log is looked at in parts."""
 _OTHER_CLOCK = 1.0  # s between stamp and receipt from which the sender's clock is another one
 _TRIED = 20  # messages without a wanted field after which a topic has none: the first may be empty
 _QUICKEST = 0.05  # quantile of the delay that counts as no delay
@@ -72,7 +73,7 @@ class Topic:
         if not self.count or labels != self._labels:
             self._learn(message, labels)
         self.count += 1
-        if not self._columns or skips(self.count - 1, _BLOCK, every_of(self.wanted)):
+        if not self._columns or skips(self.count - 1, BLOCK, self.wanted):
             return
         sent = self.stamp(message)
         self._receipts.append(receipt)

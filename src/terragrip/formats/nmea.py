@@ -20,7 +20,7 @@ from terragrip.files import sha256, unreadable
 from terragrip.formats.boundary import needed
 from terragrip.formats.kind import Databases
 from terragrip.formats.signals import Signal, SignalLog
-from terragrip.formats.table import Wanted, every_of, skips
+from terragrip.formats.table import Wanted, skips
 
 _SENTENCE = re.compile(r"\$[A-Z]{2}(RMC|VTG|GGA),[^$!*\r\n]{0,120}\*[0-9A-Fa-f]{2}")
 _BLOCK = 20_000  # lines that are read or left out together, where a log is looked at in parts
@@ -80,11 +80,11 @@ def read_nmea(path: str, wanted: Wanted | None, databases: Databases) -> SignalL
     sentence is readable.
     """
     pynmea2 = needed("pynmea2", "an NMEA 0183 log")
-    track, every = _Track(), every_of(wanted)
+    track = _Track()
     try:
         with Path(path).open(encoding="ascii", errors="replace", newline="\n") as stream:
             for number, line in enumerate(iter(lambda: stream.readline(_LONGEST), "")):
-                if not skips(number, _BLOCK, every):
+                if not skips(number, _BLOCK, wanted):
                     _take_line(line, track, pynmea2)
     except OSError as error:
         raise unreadable(path, error) from error

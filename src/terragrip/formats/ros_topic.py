@@ -14,14 +14,13 @@ import numpy as np
 import numpy.typing as npt
 
 from terragrip.formats.boundary import DAMAGE
-from terragrip.formats.messages import Column, Topic
+from terragrip.formats.messages import BLOCK, Column, Topic
 from terragrip.formats.ros_layout import Bytes, Layout, Path, layout_of
 from terragrip.formats.signals import Signal
-from terragrip.formats.table import every_of, skips
+from terragrip.formats.table import skips
 
 _TOGETHER, _BYTES = 2000, 4 << 20  # messages that are read at once, and their bytes
 _MOST_LAYOUTS = 32  # of a topic; where there are more, messages are read one by one
-_BLOCK = 1000  # messages that are read or left out together, where a log is looked at in parts
 _SECONDS: Path = ("header", "stamp", "sec")
 _NANOSECONDS: Path = ("header", "stamp", "nanosec")
 
@@ -84,7 +83,7 @@ class RosTopic(Topic):
                 self.count += 1
                 return
         self._number += 1
-        if skips(self._number - 1, _BLOCK, every_of(self.wanted)):
+        if skips(self._number - 1, BLOCK, self.wanted):
             self.count += 1
             return
         self._waiting.append(raw)

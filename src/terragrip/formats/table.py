@@ -14,6 +14,7 @@ from terragrip.recording.schema import unit_of
 from terragrip.units import UnitError, factor_to
 
 Wanted = Callable[[str], bool]
+_SAMPLES = 10_000  # of a signal that are kept or left out together, where a log is looked at in parts
 
 
 @dataclass(frozen=True)
@@ -31,17 +32,19 @@ def every_of(wanted: Wanted | None) -> int:
     return wanted.every if isinstance(wanted, Sparse) else 1
 
 
-def skips(number: int, block: int, every: int) -> bool:
-    """Whether the record of this ``number`` is in a block that is not read."""
+def skips(number: int, block: int, wanted: Wanted | None) -> bool:
+    """Whether the record of this ``number`` is in a block, of ``block`` records, that is not read."""
+    every = every_of(wanted)
     return every > 1 and (number // block) % every > 0
 
 
-def kept_rows(count: int, block: int, every: int) -> npt.NDArray[np.intp] | slice:
-    """Which of ``count`` rows are in a block that is read."""
+def kept_rows(count: int, wanted: Wanted | None) -> npt.NDArray[np.intp] | slice:
+    """Which of ``count`` samples of a signal are in a block that is read."""
+    every = every_of(wanted)
     if every <= 1:
         return slice(None)
     rows = np.arange(count)
-    return rows[(rows // block) % every == 0]
+    return rows[(rows // _SAMPLES) % every == 0]
 
 
 @dataclass(frozen=True, eq=False)

@@ -7,13 +7,12 @@ from typing import Any
 import numpy as np
 
 from terragrip.estimation.rim_speeds import DRIVE
+from terragrip.physics.geodesy import metres_of
 from terragrip.report.page import Picture, Section, Table, names, number
 from terragrip.report.runs import FloatArray, Run
 from terragrip.report.style import ESTIMATED, INK, new_figure, styled, to_svg
 from terragrip.report.timeline import Lane, timeline
 
-_EARTH = 6_371_008.8
-"""Mean radius of the earth [m] (IUGG); maps of a field need no better."""
 _POINTS = 2000
 """Places that a map is drawn with."""
 _EDGES = (-0.05, 0.0, 0.05, 0.10, 0.15, 0.20, 0.30, 0.50, 1.0)
@@ -119,7 +118,8 @@ def place(run: Run) -> Section:
             title,
             omitted="Left out: the log has no position (latitude and longitude).",
         )
-    north, east = np.radians(run.estimated("latitude")), np.radians(run.estimated("longitude"))
+    latitude, longitude = run.estimated("latitude"), run.estimated("longitude")
+    north, east = metres_of(latitude, longitude)
     slip, std = run.estimated(f"slip_{run.shown_wheel}"), run.estimated(f"slip_{run.shown_wheel}_std")
     fixed = np.isfinite(north) & np.isfinite(east)
     if fixed.sum() < 2:
@@ -132,13 +132,8 @@ def place(run: Run) -> Section:
         return Section(
             f"slip-map-{run.name}", title, omitted="Left out: no stretch of the drive tells of slip."
         )
-    middle = float(np.median(north[fixed]))
-    y = _EARTH * (np.interp(run.time[rows], instants, north[fixed]) - middle)
-    x = (
-        _EARTH
-        * np.cos(middle)
-        * (np.interp(run.time[rows], instants, east[fixed]) - float(np.median(east[fixed])))
-    )
+    y = np.interp(run.time[rows], instants, north[fixed] - np.median(north[fixed]))
+    x = np.interp(run.time[rows], instants, east[fixed] - np.median(east[fixed]))
     figure = new_figure(height=5.0)
     with styled():
         plot = figure.subplots()
@@ -160,8 +155,8 @@ def place(run: Run) -> Section:
     picture = Picture(
         f"slip-map-{run.name}",
         drawn,
-        f"Run {run.name}: slip where it was driven, metres from {np.degrees(middle):.5f}°, "
-        f"{np.degrees(float(np.median(east[fixed]))):.5f}°. Rows whose slip is known to worse than {_UNSURE:g} are left out.",
+        f"Run {run.name}: slip where it was driven, metres from {np.median(latitude[fixed]):.5f}°, "
+        f"{np.median(longitude[fixed]):.5f}°. Rows whose slip is known to worse than {_UNSURE:g} are left out.",
         f"Map of slip in {run.name}",
     )
     return Section(f"slip-map-{run.name}", title, (), (picture,))

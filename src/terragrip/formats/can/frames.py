@@ -83,7 +83,7 @@ class Frames:
         """Take a data frame; ``identifier`` has `EXTENDED` set where it has 29 bits."""
         if self.every > 1:
             self._number += 1
-            if skips(self._number - 1, _BLOCK, self.every):
+            if skips(self._number - 1, _BLOCK, self.wanted):
                 return
         self.count += 1
         if self.first is None:
@@ -105,7 +105,7 @@ class Frames:
         data: npt.NDArray[np.uint8],
     ) -> None:
         """Take data frames (n,) with payloads (n, bytes), as `take` does one by one."""
-        skipped = skips(self._number, _BLOCK, self.every)
+        skipped = skips(self._number, _BLOCK, self.wanted)
         self._number += len(time)
         if skipped:
             return
