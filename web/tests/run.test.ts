@@ -1,15 +1,5 @@
 import { expect, it } from "vitest";
-import { nisLevels, panelsOf, type Run } from "../src/drive/run";
-
-it("puts the bounds of NIS where chi-squared has them", () => {
-  // Tables of chi-squared: 5 degrees of freedom 0.831 and 12.833; 10 degrees 3.247 and 20.483.
-  for (const [n, low, high] of [[5, 0.831, 12.833], [10, 3.247, 20.483]] as const) {
-    const [lower, middle, upper] = nisLevels(n).map((level) => level.value);
-    expect(Math.abs((lower as number) - low)).toBeLessThan(0.05);
-    expect(middle).toBe(n);
-    expect(Math.abs((upper as number) - high)).toBeLessThan(0.05);
-  }
-});
+import { during, panelsOf, soilsOf, type Run } from "../src/drive/run";
 
 const WHEELS = ["rl", "rr"];
 const STATES = [...WHEELS.map((w) => `wheel_speed_${w}`), "ground_speed", ...WHEELS.map((w) => `adhesion_${w}`), "soil_resistance"];
@@ -34,6 +24,15 @@ it("shows the filter's honesty: NIS against its band, gamma, and each factor of 
   const [low, high] = panels.get("adaptation")?.log ?? [1, 1];
   expect(low).toBeLessThan(0.05); // the bounds of a factor
   expect(high).toBeGreaterThan(50);
+});
+
+it("tells soils from labels, else from what was recognised, and which stretch holds a time", () => {
+  const sections = [{ start: 0, end: 2, soil: "fine", probabilities: {} }, { start: 2, end: 4, soil: "grass", probabilities: {} }];
+  const recognised = { ...run("bank", []), ground: { path: "ground.json", sections, changes: [] } };
+  expect(soilsOf(recognised).map((s) => s.name)).toEqual(["fine", "grass"]);
+  const labels = [{ start: 1, end: 3, name: "hard" }];
+  expect(soilsOf({ ...recognised, soils: labels })).toEqual(labels);
+  expect([-1, 0, 3, 5].map((t) => during(sections, t)?.soil)).toEqual([undefined, "fine", "grass", undefined]);
 });
 
 it("has no panel for what a method does not estimate", () => {

@@ -2,13 +2,14 @@
 
 import uPlot from "uplot";
 import "uplot/dist/uPlot.min.css";
+import { brush, brushed, onBrush } from "../ui/brush";
 import { columns } from "../ui/columns";
 import { digits, fill, h } from "../ui/dom";
 import { tried } from "../ui/notes";
 import { color, onTheme } from "../ui/theme";
 import { bands, columnsOfBuckets, isDense } from "./buckets";
 import { hearKeys, hearPointers, type Range } from "./gestures";
-import { EVENT_COLORS, soilColor, type Panel, type Run } from "./run";
+import { EVENT_COLORS, soilColor, soilsOf, type Panel, type Run } from "./run";
 
 const SYNC = "drive";
 const [LOWEST, HEAD] = [116, 26];
@@ -30,17 +31,16 @@ interface Fetched {
 export class Charts {
   readonly element = h("div", { class: "charts" });
   /** The times shown. */
-  range: [number, number] = [0, 1];
+  range: Range = [0, 1];
   onCursor: ((time: number | null) => void) | null = null;
   onPick: ((time: number) => void) | null = null;
-  onRange: ((range: [number, number]) => void) | null = null;
+  onRange: ((range: Range) => void) | null = null;
   private plots: { panel: Panel; plot: uPlot; box: HTMLElement }[] = [];
   private count = 0;
   private run: Run | null = null;
   private path = "";
   private pending: AbortController | null = null;
-  private fetched: Fetched | null = null; // what is drawn
-  private coming: Fetched | null = null; // and what will be in the next frame
+  private fetched: Fetched | null = null;
   private arrived = new Map<uPlot, uPlot.AlignedData>();
   private frame = 0;
   private timer = 0;
@@ -48,7 +48,8 @@ export class Charts {
   private watcher: ResizeObserver;
 
   constructor() {
-    this.forget = onTheme(() => this.rebuild());
+    const forgets = [onTheme(() => this.rebuild()), onBrush(() => this.follow())];
+    this.forget = () => forgets.forEach((one) => one());
     this.watcher = new ResizeObserver(() => {
       for (const { plot, box } of this.plots) if (box.clientWidth > 80) plot.setSize({ width: box.clientWidth, height: this.height() });
       this.later();
@@ -75,12 +76,18 @@ export class Charts {
     const same = path === this.path;
     this.path = path;
     this.run = run;
-    if (!same) this.range = [run.start, run.end];
+    if (!same) this.range = this.whole;
     this.build(panels);
   }
 
-  /** Show other times; the rows come from the server a moment later. */
-  zoom(range: [number, number]): void {
+  /** Show the times brushed last, on another page or in another tab, where they are of this run. */
+  follow(): void {
+    const other = brushed();
+    if (other?.path === this.path) this.zoom(other.range);
+  }
+
+  /** Show other times, here and wherever this run is shown; the rows come from the server a moment later. */
+  zoom(range: Range): void {
     const run = this.run;
     if (!run) return;
     const least = Math.min(0.05, run.end - run.start);
@@ -88,6 +95,7 @@ export class Charts {
     if (high - low < least) [low, high] = [(low + high - least) / 2, (low + high + least) / 2];
     this.range = [Math.max(low, run.start), Math.min(high, run.end)];
     this.redraw();
+    brush(this.path, this.range);
     this.onRange?.(this.range);
     this.later();
   }
@@ -101,7 +109,6 @@ export class Charts {
         if (data) plot.setData(data, false);
         plot.setScale("x", { min: this.range[0], max: this.range[1] });
       }
-      if (this.arrived.size) this.fetched = this.coming;
       this.arrived.clear();
     });
   }
@@ -114,7 +121,7 @@ export class Charts {
     for (const { plot } of this.plots) plot.destroy();
     fill(this.element);
     this.pending?.abort();
-    this.pending = this.fetched = this.coming = null;
+    this.pending = this.fetched = null;
     this.arrived.clear();
     this.count = panels.length;
     this.plots = panels.map((panel, i) => {
@@ -141,7 +148,7 @@ export class Charts {
 
   /** Whether the rows at hand are enough for what is shown. */
   private served(width: number): boolean {
-    const has = this.coming;
+    const has = this.fetched;
     if (!has || has.width !== width) return false;
     const [low, high] = this.range;
     const [start, end] = this.whole;
@@ -163,7 +170,8 @@ export class Charts {
       }
     }
     const [low, high] = this.range;
-    const [start, end] = [Math.max(low - MARGIN * (high - low), this.run.start), Math.min(high + MARGIN * (high - low), this.run.end)];
+    const [first, last] = this.whole;
+    const [start, end] = [Math.max(low - MARGIN * (high - low), first), Math.min(high + MARGIN * (high - low), last)];
     const buckets = Math.min(Math.ceil((width * (end - start)) / (high - low)), 5000);
     const pending = (this.pending = new AbortController());
     const found = await tried(async () => {
@@ -177,7 +185,7 @@ export class Charts {
     if (this.pending !== pending) return; // other charts by now
     this.pending = null;
     if (!found) return;
-    this.coming = { range: [start, end], cut: found.cut, width };
+    this.fetched = { range: [start, end], cut: found.cut, width };
     const at = new Map(found.names.map((name, i) => [name, found.data[i] as Float64Array]));
     const time = found.data[0] as Float64Array;
     for (const { panel, plot } of this.plots) {
@@ -229,7 +237,7 @@ export class Charts {
         setSelect: [
           (plot) => {
             if (plot.select.width < 4) return;
-            const range: [number, number] = [plot.posToVal(plot.select.left, "x"), plot.posToVal(plot.select.left + plot.select.width, "x")];
+            const range: Range = [plot.posToVal(plot.select.left, "x"), plot.posToVal(plot.select.left + plot.select.width, "x")];
             plot.setSelect({ left: 0, width: 0, top: 0, height: 0 }, false);
             this.zoom(range);
           },
@@ -240,7 +248,7 @@ export class Charts {
 
   private hear(plot: uPlot): void {
     hearPointers(plot.over, this);
-    plot.over.addEventListener("dblclick", () => this.run && this.zoom([this.run.start, this.run.end]));
+    plot.over.addEventListener("dblclick", () => this.zoom(this.whole));
     plot.over.addEventListener("click", (event) => this.onPick?.(plot.posToVal(event.offsetX, "x")));
   }
 
@@ -250,9 +258,8 @@ export class Charts {
     if (!run) return;
     const { ctx, bbox } = plot;
     const x = (time: number): number => Math.min(Math.max(plot.valToPos(time, "x", true), bbox.left), bbox.left + bbox.width);
-    const soils = run.soils.length ? run.soils : (run.ground?.sections ?? []).map((s) => ({ name: s.soil, start: s.start, end: s.end }));
     ctx.save();
-    for (const span of soils) {
+    for (const span of soilsOf(run)) {
       const [from, to] = [x(span.start), x(span.end)];
       if (to <= from) continue;
       ctx.fillStyle = `color-mix(in srgb, ${color(soilColor(span.name))} 12%, transparent)`;
@@ -284,7 +291,7 @@ function shown(values: Float64Array | undefined, scale: number): Float64Array | 
 }
 
 /** The range of the data, held inside what the panel can sensibly show. */
-function limits(low: number | null, high: number | null, panel: Panel): [number, number] {
+function limits(low: number | null, high: number | null, panel: Panel): Range {
   let from = Math.max(low ?? 0, panel.low ?? -Infinity);
   let to = Math.min(high ?? 1, panel.high ?? Infinity);
   if (!(to > from)) [from, to] = [from - 0.5, from + 0.5];
@@ -295,18 +302,15 @@ function limits(low: number | null, high: number | null, panel: Panel): [number,
 function levels(plot: uPlot, panel: Panel): void {
   const { ctx, bbox } = plot;
   for (const level of panel.levels ?? []) {
-    const y = plot.valToPos(level.value, "y", true);
+    const y = plot.valToPos(level, "y", true);
     if (!(y > bbox.top && y < bbox.top + bbox.height)) continue;
     ctx.save();
-    ctx.strokeStyle = ctx.fillStyle = color("muted");
+    ctx.strokeStyle = color("muted");
     ctx.setLineDash([5 * devicePixelRatio, 4 * devicePixelRatio]);
     ctx.beginPath();
     ctx.moveTo(bbox.left, y);
     ctx.lineTo(bbox.left + bbox.width, y);
     ctx.stroke();
-    ctx.font = `${11 * devicePixelRatio}px system-ui, sans-serif`;
-    ctx.textAlign = "right";
-    ctx.fillText(level.label, bbox.left + bbox.width - 4, y - 4 * devicePixelRatio);
     ctx.restore();
   }
 }

@@ -1,13 +1,14 @@
 /** A run over time: measured against estimated, with intervals, soils, events and what the filter thinks of itself. */
 
 import { get, type Item } from "../ui/api";
-import { brush, brushed, onBrush } from "../ui/brush";
+import { brushed } from "../ui/brush";
 import { digits, fill, h } from "../ui/dom";
 import { tried } from "../ui/notes";
 import type { Page } from "../ui/page";
 import { Charts } from "./charts";
 import { Plane } from "./plane";
-import { EVENT_COLORS, panelsOf, soilColor, type Run } from "./run";
+import { zoomed } from "./gestures";
+import { during, EVENT_COLORS, panelsOf, soilColor, soilsOf, type Run } from "./run";
 
 const FIRST = ["adhesion", "slip", "resistance", "speed"];
 const KEY = "terragrip-drive-panels";
@@ -49,7 +50,7 @@ export const page: Page = (main, { notices, query }) => {
     h("span", { class: "spring" }),
     h("button", { type: "button", id: "zoom-in", click: () => zoom(0.5), "aria-label": "Zoom in" }, "+"),
     h("button", { type: "button", click: () => zoom(2), "aria-label": "Zoom out" }, "−"),
-    h("button", { type: "button", click: () => run && charts.zoom([run.start, run.end]) }, "Whole run"),
+    h("button", { type: "button", click: () => charts.zoom(charts.whole) }, "Whole run"),
   );
   main.append(
     h("section", { class: "middle", "aria-label": "Charts" }, tools, legend, charts.element, readout),
@@ -73,8 +74,7 @@ export const page: Page = (main, { notices, query }) => {
 
   function zoom(factor: number): void {
     const [low, high] = charts.range;
-    const middle = picked > low && picked < high ? picked : (low + high) / 2;
-    charts.zoom([middle + (low - middle) * factor, middle + (high - middle) * factor]);
+    charts.zoom(zoomed(charts.range, picked > low && picked < high ? picked : (low + high) / 2, factor));
   }
 
   function draw(): void {
@@ -117,7 +117,7 @@ export const page: Page = (main, { notices, query }) => {
 
   function drawLegend(): void {
     if (!run) return;
-    const soils = [...new Set((run.soils.length ? run.soils.map((s) => s.name) : (run.ground?.sections ?? []).map((s) => s.soil)))];
+    const soils = [...new Set(soilsOf(run).map((s) => s.name))];
     const kinds = [...new Set(run.events.map((event) => event.kind))];
     fill(
       legend,
@@ -142,14 +142,8 @@ export const page: Page = (main, { notices, query }) => {
     drawLegend();
     hover(null);
     draw();
-    follow();
+    charts.follow();
     void drawPlane();
-  }
-
-  /** Show the times brushed on the map, or in another tab. */
-  function follow(): void {
-    const other = brushed();
-    if (other && other.path === path) charts.zoom(other.range);
   }
 
   async function drawPlane(): Promise<void> {
@@ -187,7 +181,7 @@ export const page: Page = (main, { notices, query }) => {
       a_std: of("curve_a_std"),
     });
     const names = Object.keys(sample.values).filter((name) => !name.endsWith("_std"));
-    const event = run?.events.find((e) => e.start <= sample.time && e.end >= sample.time);
+    const event = during(run?.events, sample.time);
     fill(
       details,
       h("p", {}, h("strong", {}, `t = ${sample.time.toFixed(3)} s`), ` (row ${sample.row})`, sample.labels["soil"] ? `, ${sample.labels["soil"]}` : ""),
@@ -217,9 +211,9 @@ export const page: Page = (main, { notices, query }) => {
       readout.value = run ? HINT : "";
       return;
     }
-    const soil = run.soils.find((s) => s.start <= time && s.end >= time)?.name;
-    const section = run.ground?.sections.find((s) => s.start <= time && s.end >= time);
-    const event = run.events.find((e) => e.start <= time && e.end >= time);
+    const soil = during(run.soils, time)?.name;
+    const section = during(run.ground?.sections, time);
+    const event = during(run.events, time);
     const told = section ? `recognised: ${section.soil} (${digits(100 * (section.probabilities[section.soil] ?? 0), 2)} %)` : "";
     readout.value = [`t ${time.toFixed(2)} s`, soil, told, event && `${event.kind}${event.why ? `: ${event.why}` : ""}`].filter(Boolean).join("   ");
   }
@@ -227,8 +221,7 @@ export const page: Page = (main, { notices, query }) => {
   charts.onCursor = hover;
   charts.onPick = (time) => void pick(time);
   let soon = 0;
-  charts.onRange = (range) => {
-    brush(path, range);
+  charts.onRange = () => {
     clearTimeout(soon);
     soon = window.setTimeout(() => void drawPlane(), 150);
   };
@@ -247,13 +240,11 @@ export const page: Page = (main, { notices, query }) => {
     if (!runs.length) fill(charts.element, h("p", { class: "hint empty" }, "Nothing to show yet: open a recording on the folder page and estimate it."));
   }
 
-  const unfollow = onBrush(follow);
   const forget = notices.on((notice) => notice.kind === "folder" && void reload());
   void reload();
   Object.assign(window, { terragripDrive: { charts } });
   return () => {
     forget();
-    unfollow();
     charts.close();
     plane.close();
   };

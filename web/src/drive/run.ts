@@ -55,8 +55,8 @@ export interface Panel {
   title: string;
   unit: string;
   traces: Trace[];
-  /** Lines across the panel, such as the expected NIS. */
-  levels?: { value: number; label: string }[];
+  /** Values at which lines cross the panel, such as the expected NIS. */
+  levels?: number[];
   low?: number;
   high?: number;
   /** The ends of a logarithmic axis. */
@@ -65,7 +65,8 @@ export interface Panel {
   about?: string;
 }
 
-const WHEEL_COLORS = ["blue", "vermillion", "green", "purple", "orange", "sky", "muted", "ink"];
+/** Colours of wheels, in the order of the run's. */
+export const WHEEL_COLORS = ["blue", "vermillion", "green", "purple", "orange", "sky", "muted", "ink"];
 const DASH = [4, 4];
 
 /** All panels that the run has columns for; `wheels` are the chosen ones. */
@@ -118,7 +119,7 @@ export function panelsOf(run: Run, wheels: string[]): Panel[] {
       title: "Adaptation A",
       unit: "×Q₀",
       traces: adaptation(run, wheels, color),
-      levels: [{ value: 1, label: "" }],
+      levels: [1],
       log: [0.03, 80],
       about: "The diagonal of A: by how much innovations ask for more (above 1) or less process noise of each state. Q = [I + γ (A − I)] Q₀.",
     },
@@ -127,21 +128,16 @@ export function panelsOf(run: Run, wheels: string[]): Panel[] {
   return panels.filter((panel) => panel.traces.length > 0);
 }
 
-/** NIS over the channels taken, a mean of a second, with its limits; of older estimates each row's NIS. */
+/** NIS over the channels taken, a mean of a second, with its limits. */
 function nis(run: Run): Pick<Panel, "traces" | "levels" | "about" | "low" | "high"> {
-  const trace = { label: "NIS", color: "vermillion", band: "", scale: 1 };
-  const about = "How large innovations are against what the filter expects of them";
   if (!run.columns.includes("nis")) return { traces: [] };
-  if (!run.columns.includes("channels")) {
-    const n = run.wheels.length + 1;
-    return { traces: [{ ...trace, column: "nis" }], levels: nisLevels(n), low: 0, high: 6 * n, about: `${about}.` };
-  }
   return {
-    traces: [{ ...trace, column: "nis:mean", label: "NIS / channels, mean of 1 s", band: "nis", bandColor: "muted" }],
-    levels: [{ value: 1, label: "" }],
+    traces: [{ column: "nis:mean", label: "NIS / channels, mean of 1 s", color: "vermillion", band: "nis", bandColor: "muted", scale: 1 }],
+    levels: [1],
     low: 0,
     high: 5,
-    about: `${about}: 1 of an honest filter, 95 % of the time in the band; above it the filter is too sure of itself.`,
+    about:
+      "How large innovations are against what the filter expects of them: 1 of an honest filter, 95 % of the time in the band; above it the filter is too sure of itself.",
   };
 }
 
@@ -158,19 +154,19 @@ function adaptation(run: Run, wheels: string[], color: (wheel: string) => string
     .map(([state, label, shade, dash]) => ({ column: `adaptation_${state}`, label, color: shade, band: "", scale: 1, ...(dash ? { dash } : {}) }));
 }
 
-/** The expectation of NIS and its 2.5 % and 97.5 % points for `n` channels: chi-squared by Wilson and Hilferty (1931). */
-export function nisLevels(n: number): { value: number; label: string }[] {
-  const point = (z: number): number => n * (1 - 2 / (9 * n) + z * Math.sqrt(2 / (9 * n))) ** 3;
-  return [
-    { value: point(-1.96), label: "2.5 %" },
-    { value: n, label: "expected" },
-    { value: point(1.96), label: "97.5 %" },
-  ];
-}
-
 function solid(trace: Trace): Trace {
   const { dash: _, ...rest } = trace;
   return rest;
+}
+
+/** The stretches of soils that the run tells: its labels, else those recognised. */
+export function soilsOf(run: Run): Span[] {
+  return run.soils.length ? run.soils : (run.ground?.sections ?? []).map((s) => ({ name: s.soil, start: s.start, end: s.end }));
+}
+
+/** The first of some stretches that holds a time. */
+export function during<T extends { start: number; end: number }>(stretches: readonly T[] | undefined, time: number): T | undefined {
+  return stretches?.find((s) => s.start <= time && s.end >= time);
 }
 
 /** Colours of soils and events: soils are tints, events are strong. */

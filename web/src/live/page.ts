@@ -1,6 +1,6 @@
 /** The live page: big numbers for the cab, six traces, warnings. Fed by the live service, or by a run played again. */
 
-import { soilColor } from "../drive/run";
+import { soilColor, WHEEL_COLORS } from "../drive/run";
 import { get, type Item } from "../ui/api";
 import { digits, fill, h } from "../ui/dom";
 import { tried } from "../ui/notes";
@@ -10,7 +10,6 @@ import { Traces, type Trace } from "./traces";
 
 /** mu_max of the prototype curve over its scale a (PHYSICS 5). */
 const PEAK = 0.476;
-const WHEEL_COLORS = ["blue", "vermillion", "green", "purple", "orange", "sky", "muted", "ink"];
 const WARNING: Record<string, string> = {
   immobilization: "About to dig in",
   stuck: "Stuck",
@@ -153,9 +152,9 @@ export const page: Page = (main, { notices, query }) => {
   };
 };
 
-/** What a driver can read at a glance: without the rule behind it, which the list of events tells. */
+/** What a driver can read at a glance: what happens, without the figures and the rule after it, which the list of events tells. */
 function brief(text: string): string {
-  return text.split(/: the (?:warning|flag)/)[0] ?? text;
+  return text.split(": ")[0] ?? text;
 }
 
 function tile(title: string, unit: string): { element: HTMLElement; set: (value: string, more: string) => void } {

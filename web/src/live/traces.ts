@@ -29,7 +29,6 @@ export class Traces {
   private traces: Trace[] = [];
   private asked = false;
   private ranges = new Map<string, [number, number]>();
-  private palette = new Map<string, string>();
   private forget: () => void;
   private watcher: ResizeObserver;
 
@@ -38,10 +37,7 @@ export class Traces {
     private events: () => string[],
   ) {
     this.element.append(this.canvas);
-    this.forget = onTheme(() => {
-      this.palette.clear();
-      this.redraw();
-    });
+    this.forget = onTheme(() => this.redraw());
     this.watcher = new ResizeObserver(() => {
       this.canvas.width = this.element.clientWidth * devicePixelRatio;
       this.canvas.height = this.element.clientHeight * devicePixelRatio;
@@ -68,15 +64,6 @@ export class Traces {
       this.asked = false;
       this.draw();
     });
-  }
-
-  private ink(name: string): string {
-    let found = this.palette.get(name);
-    if (!found) {
-      found = color(name);
-      this.palette.set(name, found);
-    }
-    return found;
   }
 
   private draw(): void {
@@ -116,14 +103,14 @@ export class Traces {
     const px = (time: number): number => right - ((end - time) / this.span) * (right - left);
     const py = (v: number): number => bottom - ((v - low) / (high - low)) * (bottom - top);
     pen.font = "600 13px system-ui, sans-serif";
-    pen.fillStyle = this.ink("ink");
+    pen.fillStyle = color("ink");
     pen.textBaseline = "alphabetic";
     pen.textAlign = "left";
     pen.fillText(`${trace.title} [${trace.unit}]`, left, y0 + 16);
     pen.font = "12px system-ui, sans-serif";
     let x = left + pen.measureText(`${trace.title} [${trace.unit}]`).width + 34;
     for (const line of trace.lines.length > 1 ? trace.lines : []) {
-      pen.fillStyle = this.ink(line.color);
+      pen.fillStyle = color(line.color);
       pen.fillRect(x, y0 + 10, 12, 3);
       pen.fillText(line.label, x + 16, y0 + 16);
       x += 26 + pen.measureText(line.label).width;
@@ -132,12 +119,12 @@ export class Traces {
     pen.textAlign = "right";
     pen.textBaseline = "middle";
     for (const v of ticks({ low, high }, 4)) {
-      pen.strokeStyle = this.ink("grid");
+      pen.strokeStyle = color("grid");
       pen.beginPath();
       pen.moveTo(left, py(v));
       pen.lineTo(right, py(v));
       pen.stroke();
-      pen.fillStyle = this.ink("muted");
+      pen.fillStyle = color("muted");
       pen.fillText(digits(v), left - 6, py(v));
     }
     if (last) {
@@ -154,13 +141,13 @@ export class Traces {
       const at = ring.place(i);
       const code = ring.event[at] as number;
       if (!code || (ring.time[at] as number) > end) continue;
-      pen.fillStyle = this.ink(EVENT_COLORS[names[code] ?? ""] ?? "ink");
+      pen.fillStyle = color(EVENT_COLORS[names[code] ?? ""] ?? "ink");
       pen.fillRect(px(ring.time[at] as number) - 1, bottom - 3, 2, 5);
     }
     for (const line of trace.lines) {
       const values = ring.columns[ring.names.indexOf(line.column)];
       if (!values) continue;
-      pen.strokeStyle = this.ink(line.color);
+      pen.strokeStyle = color(line.color);
       pen.lineWidth = 1.6;
       pen.beginPath();
       let on = false;

@@ -3,10 +3,10 @@
 import "maplibre-gl/dist/maplibre-gl.css";
 import * as maplibre from "maplibre-gl";
 import workerUrl from "maplibre-gl/dist/maplibre-gl-worker.mjs?worker&url";
-import { EVENT_COLORS, panelsOf, soilColor, type Run } from "../drive/run";
+import { during, EVENT_COLORS, panelsOf, soilColor, type Run } from "../drive/run";
 import { Charts } from "../drive/charts";
 import { address, get, type Item } from "../ui/api";
-import { brush, brushed, onBrush } from "../ui/brush";
+import { brushed } from "../ui/brush";
 import { columns, type Columns } from "../ui/columns";
 import { digits, fill, h } from "../ui/dom";
 import { note, tried } from "../ui/notes";
@@ -87,13 +87,7 @@ export const page: Page = (main, { notices, query }) => {
     charts.show(path, found, panelsOf(found, found.wheels.slice(-1)).filter((p) => p.key === "slip"));
     await draw();
     frame();
-    follow();
-  }
-
-  /** Show the times brushed on the drive page, or in another tab. */
-  function follow(): void {
-    const other = brushed();
-    if (other && other.path === path) charts.zoom(other.range);
+    charts.follow();
   }
 
   async function draw(): Promise<void> {
@@ -134,11 +128,11 @@ export const page: Page = (main, { notices, query }) => {
   }
 
   function soilAt(t: number): string {
-    return run?.soils.find((s) => s.start <= t && s.end >= t)?.name ?? run?.ground?.sections.find((s) => s.start <= t && s.end >= t)?.soil ?? "";
+    return during(run?.soils, t)?.name ?? during(run?.ground?.sections, t)?.soil ?? "";
   }
 
   function eventAt(t: number) {
-    return run?.events.find((e) => e.start <= t && e.end >= t);
+    return during(run?.events, t);
   }
 
   function drawLegend(asked: { title: string; unit: string; scale: number } | undefined, low: number, high: number): void {
@@ -201,7 +195,6 @@ export const page: Page = (main, { notices, query }) => {
 
   charts.onCursor = mark;
   charts.onRange = ([start, end]) => {
-    brush(path, [start, end]);
     if (!track?.count || !run) return;
     if (start <= run.start && end >= run.end) return frame();
     const time = track.data[0] as Float64Array;
@@ -251,13 +244,11 @@ export const page: Page = (main, { notices, query }) => {
     if (!path && runs.length) await open(wanted && runs.includes(wanted) ? wanted : (runs[0] as string));
   }
 
-  const unfollow = onBrush(follow);
   const forget = notices.on((notice) => notice.kind === "folder" && void reload());
   void reload();
   Object.assign(window, { terragripMap: { map, charts } });
   return () => {
     forget();
-    unfollow();
     forgetTheme();
     charts.close();
     map.remove();
