@@ -1,4 +1,4 @@
-"""A studio process on a folder with a simulated run, and a browser in front of it: shared by the benchmark and the screenshots."""
+"""A studio process on a folder with a simulated run, and a browser in front of it: shared by the benchmark, the screenshots and tests."""
 
 from __future__ import annotations
 
@@ -23,14 +23,9 @@ ARGUMENTS = [
 def fill(folder: Path, scenario: str = "multi2", seed: int = 0) -> None:
     """Recording, vehicle, estimates, soil library and ground of one simulated run of the campaign."""
     import terragrip as tg
-    from terragrip.simulation import Scenario
     from terragrip.soil.estimates import soils_of
 
-    made = tg.simulate(Scenario.load(scenario), seed)
-    made.save(folder)
-    (folder / "truth.parquet").unlink()
-    (folder / "true_parameters.json").unlink()
-    (folder / "recording.parquet").rename(folder / f"{scenario}.parquet")
+    _simulated(folder, scenario, seed).rename(folder / f"{scenario}.parquet")
     tg.estimate(tg.read(folder / f"{scenario}.parquet"), tg.Vehicle.load(folder / "vehicle.yaml")).write(
         folder / f"{scenario}-estimates.parquet"
     )
@@ -43,14 +38,10 @@ def fill_long(folder: Path, rows: int, scenario: str = "multi2", seed: int = 0) 
     import polars as pl
 
     import terragrip as tg
-    from terragrip.simulation import Scenario
 
-    made = tg.simulate(Scenario.load(scenario), seed)
-    made.save(folder)
-    (folder / "truth.parquet").unlink()
-    (folder / "true_parameters.json").unlink()
-    once = pl.read_parquet(folder / "recording.parquet")
-    (folder / "recording.parquet").unlink()
+    recording = _simulated(folder, scenario, seed)
+    once = pl.read_parquet(recording)
+    recording.unlink()
     times = once["time"].to_numpy()
     lap = times[-1] - times[0] + 0.01
     laps = -(-rows // len(once))
@@ -60,6 +51,17 @@ def fill_long(folder: Path, rows: int, scenario: str = "multi2", seed: int = 0) 
     table = tg.estimate(tg.read(folder / "long.parquet"), tg.Vehicle.load(folder / "vehicle.yaml"))
     table.write(folder / "long-estimates.parquet")
     return "long-estimates.parquet"
+
+
+def _simulated(folder: Path, scenario: str, seed: int) -> Path:
+    """The recording of a simulated run, its vehicle beside it, without the truth."""
+    import terragrip as tg
+    from terragrip.simulation import Scenario
+
+    tg.simulate(Scenario.load(scenario), seed).save(folder)
+    (folder / "truth.parquet").unlink()
+    (folder / "true_parameters.json").unlink()
+    return folder / "recording.parquet"
 
 
 @contextlib.contextmanager
@@ -85,12 +87,17 @@ def studio(folder: Path) -> Iterator[tuple[str, int]]:
         process.wait(10)
 
 
+def chromium() -> str | None:
+    """Debian's chromium, or None."""
+    return shutil.which("chromium") or shutil.which("chromium-browser")
+
+
 @contextlib.contextmanager
 def browser() -> Iterator[Any]:
     """Debian's chromium by playwright."""
     from playwright.sync_api import sync_playwright
 
-    path = shutil.which("chromium") or shutil.which("chromium-browser")
+    path = chromium()
     if path is None:
         raise SystemExit("this needs chromium: apt-get install chromium")
     with sync_playwright() as started:

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-sys.path.insert(0, str(Path(__file__).parent))  # for browser_parts.py
+sys.path.insert(0, str(Path(__file__).parents[2] / "benchmarks"))  # for studio_session.py
 pytest.importorskip("fastapi", reason="the studio needs terragrip[studio]")
 
 from fastapi.testclient import TestClient

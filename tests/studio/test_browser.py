@@ -14,19 +14,21 @@ import numpy as np
 import pytest
 import uvicorn
 
-from browser_parts import AXE, chromium, problems
+from studio_session import browser as started_browser
+from studio_session import chromium
 from terragrip.physics.adhesion import CURVES
-from terragrip.studio.app import create_app
+from terragrip.studio.app import STATIC, create_app
 
-playwright = pytest.importorskip(
-    "playwright.sync_api", reason="SKIPPED LOUDLY: the browser tests need playwright"
-)
+pytest.importorskip("playwright.sync_api", reason="SKIPPED LOUDLY: the browser tests need playwright")
+
+AXE = Path(__file__).parents[2] / "web" / "node_modules" / "axe-core" / "axe.min.js"
+BUILT = (STATIC / "index.html").is_file() and AXE.is_file()
 
 pytestmark = [
     pytest.mark.skipif(
         chromium() is None, reason="no chromium: apt-get install chromium, or run `make test` as root"
     ),
-    pytest.mark.skipif(problems() is not None, reason=problems() or ""),
+    pytest.mark.skipif(not BUILT, reason="the pages are not built: `make studio` needs Node.js 20 or newer"),
     # playwright's loop and sockets are still open when pytest looks for what was left behind
     pytest.mark.filterwarnings("ignore::ResourceWarning", "ignore::pytest.PytestUnraisableExceptionWarning"),
 ]
@@ -62,12 +64,8 @@ class Served:
 
 @pytest.fixture(scope="module")
 def browser() -> Iterator[Any]:
-    with playwright.sync_playwright() as started:
-        running = started.chromium.launch(
-            executable_path=chromium(), args=["--no-sandbox", "--disable-gpu", "--disable-quic"]
-        )
+    with started_browser() as running:
         yield running
-        running.close()
 
 
 @pytest.fixture
@@ -395,7 +393,7 @@ def test_axe_finds_nothing_serious(browser: Any, served: Served, where: str, the
     tab.goto(f"{served.url}/{where}")
     tab.wait_for_selector("main select, main h1")
     tab.wait_for_timeout(500)
-    tab.add_script_tag(path=AXE)
+    tab.add_script_tag(path=str(AXE))
     found = tab.evaluate("() => axe.run(document, { resultTypes: ['violations'] })")
     serious = [
         (v["id"], v["nodes"][0]["html"][:120])
