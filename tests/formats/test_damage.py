@@ -106,7 +106,7 @@ def test_nothing_but_zeros_is_refused_by_the_reader_that_its_name_calls(tmp_path
 def test_a_missing_package_is_named_with_its_extra(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     with pytest.raises(InputError, match=r"'not_there' is needed; pip install 'terragrip\[formats\]'"):
         needed("not_there.at_all", "a log")
-    path = SAMPLES["blf"](tmp_path)
+    path = SAMPLES["asc"](tmp_path)
     monkeypatch.setitem(sys.modules, "can", None)
     with pytest.raises(InputError, match=r"pip install 'terragrip\[formats\]'"):
         read_table(path)

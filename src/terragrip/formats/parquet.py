@@ -100,7 +100,8 @@ def _opened(source: str) -> pq.ParquetFile:
     import pyarrow.parquet as pq
 
     refuse_missing(source, suffixes=(".parquet", ".pq"))
-    return _guarded(source, lambda: pq.ParquetFile(source))
+    # Read ahead, the whole file would stay in memory until it is closed.
+    return _guarded(source, lambda: pq.ParquetFile(source, pre_buffer=False))
 
 
 def _guarded(source: str, work: Callable[[], Any]) -> Any:

@@ -105,10 +105,10 @@ class Frames:
         data: npt.NDArray[np.uint8],
     ) -> None:
         """Take data frames (n,) with payloads (n, bytes), as `take` does one by one."""
-        skipped = skips(self._number, _BLOCK, self.wanted)
-        self._number += len(time)
-        if skipped:
-            return
+        if self.every > 1:
+            read = (self._number + np.arange(len(time))) // _BLOCK % self.every == 0
+            self._number += len(time)
+            time, identifiers, lengths, data = time[read], identifiers[read], lengths[read], data[read]
         self.count += len(time)
         if self.first is None and len(time):
             self.first = float(time[0])
@@ -128,6 +128,20 @@ class Frames:
             route = self._routes[int(identifiers[k])]
             if route is not None:
                 route(float(time[k]), data[k, : lengths[k]].tobytes())
+
+    def are_unwanted(self, identifier: int) -> bool:
+        """Whether frames of an identifier are of no use, so that they need not be parsed: `pass_by` counts them."""
+        if self.every > 1:
+            return False  # all are counted, to leave out blocks of them
+        if identifier not in self._routes:
+            self._routes[identifier] = self._route(identifier)
+        return self._routes[identifier] is None
+
+    def pass_by(self, identifier: int) -> None:
+        """Count a data frame of which nothing is wanted."""
+        self.count += 1
+        if identifier in self.unknown:
+            self.unknown[identifier] += 1
 
     def senders(self, message: Message) -> int:
         """How many have sent a message."""

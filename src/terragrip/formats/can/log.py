@@ -11,10 +11,11 @@ from typing import Any
 from terragrip.errors import InputError
 from terragrip.files import sha256, unreadable
 from terragrip.formats.boundary import DAMAGE, needed
+from terragrip.formats.can.blf import frames_of
 from terragrip.formats.can.catalog import EXTENDED, catalog
 from terragrip.formats.can.decoding import names_of, signals_of
 from terragrip.formats.can.frames import Frames
-from terragrip.formats.can.text_logs import Count, Frame, candump, layout_of, table
+from terragrip.formats.can.text_logs import Count, Frame, asc_lines, candump, layout_of, table
 from terragrip.formats.signals import SignalLog
 from terragrip.formats.table import Wanted
 
@@ -25,8 +26,14 @@ _BUSY = 20.0  # frames a second: a bus that speaks less is one whose stamps are 
 
 
 def read_blf(path: str, wanted: Wanted | None, databases: Databases) -> SignalLog:
-    """Vector BLF, by python-can."""
-    return _by_python_can(path, "BLFReader", "BLF log", wanted, databases)
+    """Vector BLF."""
+
+    def take(frames: Frames) -> None:
+        with open(path, "rb") as stream:
+            for block in frames_of(stream):
+                frames.take_many(*block)
+
+    return _as_far_as_it_goes(path, "BLF log", wanted, databases, take)
 
 
 def read_asc(path: str, wanted: Wanted | None, databases: Databases) -> SignalLog:
@@ -41,19 +48,19 @@ def read_trc(path: str, wanted: Wanted | None, databases: Databases) -> SignalLo
 
 def read_candump(path: str, wanted: Wanted | None, databases: Databases) -> SignalLog:
     """candump's log files and printed lines."""
-    return _from_lines(path, "candump log", wanted, databases, lambda lines, count: candump(lines, count))
+    return _from_lines(path, "candump log", wanted, databases, candump)
 
 
 def read_frame_table(path: str, wanted: Wanted | None, databases: Databases) -> SignalLog:
     """Tables with time, identifier (or pgn and source) and data columns."""
 
-    def frames(lines: Iterator[str], count: Count) -> Iterator[Frame]:
+    def parse(lines: Iterator[str], count: Count, frames: Frames) -> Iterator[Frame]:
         layout = layout_of(next(lines, ""))
         if layout is None:
             raise InputError("is no table of CAN frames", file=path, mend="give time, id and data columns")
         return table(lines, layout, count)
 
-    return _from_lines(path, "table of CAN frames", wanted, databases, frames)
+    return _from_lines(path, "table of CAN frames", wanted, databases, parse)
 
 
 def finished(
@@ -94,13 +101,31 @@ def _by_python_can(
     path: str, reader: str, kind: str, wanted: Wanted | None, databases: Databases
 ) -> SignalLog:
     can = needed("can", f"a {kind}")
-    frames, notes = Frames(catalog(databases), wanted), []
-    binary = reader == "BLFReader"
-    try:
+
+    def take(frames: Frames) -> None:
         # Opened here, since a reader that refuses the file leaves it open.
-        with open(path, "rb") if binary else open(path, encoding="utf-8", errors="replace") as stream:
-            _take_messages(frames, getattr(can, reader)(stream))
-    except (*DAMAGE, can.CanError, needed("can.io.blf", f"a {kind}").BLFParseError) as error:
+        with open(path, encoding="utf-8", errors="replace") as stream:
+            messages = getattr(can, reader)(stream)
+            if reader == "ASCReader":
+                messages.file = asc_lines(_bounded(stream), frames)
+            _take_messages(frames, messages)
+
+    return _as_far_as_it_goes(path, kind, wanted, databases, take, can.CanError)
+
+
+def _as_far_as_it_goes(
+    path: str,
+    kind: str,
+    wanted: Wanted | None,
+    databases: Databases,
+    take: Callable[[Frames], None],
+    *errors: type[Exception],
+) -> SignalLog:
+    """The signals of the frames that ``take`` hands over until it raises, which a note tells; ``errors``: the library's own."""
+    frames, notes = Frames(catalog(databases), wanted), []
+    try:
+        take(frames)
+    except (*DAMAGE, *errors) as error:
         said = " ".join(str(error).split())[:80] or type(error).__name__
         if not frames.count:
             raise InputError(
@@ -129,14 +154,14 @@ def _from_lines(
     kind: str,
     wanted: Wanted | None,
     databases: Databases,
-    parse: Callable[[Iterator[str], Count], Iterator[Frame]],
+    parse: Callable[[Iterator[str], Count, Frames], Iterator[Frame]],
 ) -> SignalLog:
     frames, count = Frames(catalog(databases), wanted), Count()
     last = 0.0
     try:
         with Path(path).open("rb") as stream:
             lines = io.TextIOWrapper(stream, encoding="utf-8", errors="replace", newline="\n")
-            for time, identifier, payload in parse(_bounded(lines), count):
+            for time, identifier, payload in parse(_bounded(lines), count, frames):
                 frames.take(time, identifier, payload)
                 last = time
     except OSError as error:

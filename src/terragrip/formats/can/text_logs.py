@@ -9,6 +9,7 @@ from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 
 from terragrip.formats.can.catalog import EXTENDED
+from terragrip.formats.can.frames import Frames
 
 Frame = tuple[float, int, bytes]
 
@@ -20,6 +21,7 @@ _COMPACT = re.compile(
 _SPACED = re.compile(
     r"\s*\((\d+\.\d+)\)\s+\S+\s+(?:[RT]X\s+\S+\s+\S+\s+)?([0-9A-Fa-f]{3}|[0-9A-Fa-f]{8})\s+\[\s*\d+\]\s*((?:[0-9A-Fa-f]{2}\s?)*)"
 )
+_STAMP = re.compile(r"\d+\.\d+")
 _NO_DATA = re.compile(r"#R\d?\b|remote request|ERRORFRAME|\b2[0-9A-Fa-f]{7}[# ]")
 _EIGHT = 8  # hexadecimal digits of a 29-bit identifier
 
@@ -51,17 +53,61 @@ class Count:
         self.bad += 1
 
 
-def candump(lines: Iterable[str], count: Count) -> Iterator[Frame]:
-    """Frames of candump's log file or of its printed lines; a line that is neither is counted."""
+def candump(lines: Iterable[str], count: Count, frames: Frames) -> Iterator[Frame]:
+    """Frames of candump's log file or of its printed lines; a line that is neither is counted.
+
+    Lines of frames that ``frames`` has no use for are counted there and not looked at any further.
+    """
+    unwanted: dict[str, int] = {}  # identifiers by what stands before the payload
     for number, line in enumerate(lines, 1):
+        mark = line.find("#")
+        head = line[max(mark - 8, 0) : mark]
+        if head in unwanted:
+            frames.pass_by(unwanted[head])
+            continue
         match = _COMPACT.match(line) or _SPACED.match(line)
         data = "" if match is None else "".join(match[3].split())
         if match is None or len(data) % 2:
             if line.strip() and not _NO_DATA.search(line):
                 count.add(number, line)
             continue
-        extended = EXTENDED if len(match[2]) == _EIGHT else 0
-        yield float(match[1]), int(match[2], 16) | extended, bytes.fromhex(data)
+        identifier = int(match[2], 16) | (EXTENDED if len(match[2]) == _EIGHT else 0)
+        if mark > 0 and frames.are_unwanted(identifier):
+            unwanted[head] = identifier
+        yield float(match[1]), identifier, bytes.fromhex(data)
+
+
+def asc_lines(lines: Iterable[str], frames: Frames) -> Iterator[str]:
+    """The lines of an ASC log, for python-can to read, but those of frames that ``frames`` has no use for and counts.
+
+    Stamps that count from the event before ("timestamps relative") are made to count from the start.
+    """
+    unwanted: dict[str, int | None] = {}
+    base, relative, now = 16, False, 0.0
+    for line in lines:
+        cells = line.split(None, 3)
+        if cells and cells[0].lower() == "base":
+            base, relative = 10 if "dec" in line.lower() else 16, "relative" in line.lower()
+        if relative and cells and _STAMP.fullmatch(cells[0]):
+            now += float(cells[0])
+            line = f"{now:.6f} {line.lstrip().partition(' ')[2]}"
+        if len(cells) == 4 and cells[1].isdigit() and cells[3].startswith(("Rx", "Tx")):
+            name = cells[2]
+            if name not in unwanted:
+                identifier = _asc_identifier(name, base)
+                passed = identifier is not None and frames.are_unwanted(identifier)
+                unwanted[name] = identifier if passed else None
+            elif (known := unwanted[name]) is not None:
+                frames.pass_by(known)
+                continue
+        yield line
+
+
+def _asc_identifier(text: str, base: int) -> int | None:
+    try:
+        return int(text[:-1], base) | EXTENDED if text[-1] in "xX" else int(text, base)
+    except ValueError:
+        return None
 
 
 @dataclass(frozen=True)
