@@ -18,6 +18,7 @@ from setuptools import Extension
 
 ROOT = Path(__file__).resolve().parent
 CPU_CHECK = "int tg_cpu_has_avx2(void);"
+TEXT = "size_t tg_json_members(int32_t count, const char *names, const int32_t *places, const double *values, char *out);"
 
 # -O3 without -ffast-math: NaN means "missing" here. errno and floating-point traps are read by nobody.
 # Contraction to fused multiply-add stays off, so that the portable and the AVX2 build give the same bits.
@@ -68,15 +69,26 @@ def kernel_bindings() -> list[Binding]:
     sources = tuple(sorted((ROOT / "kernel/src").glob("*.c")))
     if not sources:
         return []
-    cpu_check = ROOT / "kernel/python/cpu.c"
+    cpu_check, text = ROOT / "kernel/python/cpu.c", ROOT / "kernel/python/text.c"
     found = [
-        Binding("terragrip._kernel_portable", header, (*sources, cpu_check), declarations=CPU_CHECK),
+        Binding(
+            "terragrip._kernel_portable",
+            header,
+            (*sources, text, cpu_check),
+            declarations=f"{TEXT}\n{CPU_CHECK}",
+        ),
         Binding("terragrip._kernel_float", header, sources, real="float", flags=("-O2",)),
     ]
     if platform.machine() in ("x86_64", "AMD64"):
         # The generic schedule, made for older processors too, costs 5 % here (docs/decisions/0080).
         found.append(
-            Binding("terragrip._kernel_avx2", header, sources, flags=("-mavx2", "-mfma", "-mtune=skylake"))
+            Binding(
+                "terragrip._kernel_avx2",
+                header,
+                (*sources, text),
+                flags=("-mavx2", "-mfma", "-mtune=skylake"),
+                declarations=TEXT,
+            )
         )
     return found
 

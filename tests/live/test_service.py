@@ -279,14 +279,14 @@ async def test_sources_with_clocks_of_their_own_share_one_time_base(vehicle, sho
 async def test_a_warning_of_the_estimator_is_an_event_once(vehicle, short, monkeypatch):
     """Whatever the kernel says when; here it is made to say it."""
     service = Service(vehicle, ["udp://127.0.0.1:1"])
-    update = TractionEstimator.update
+    update = TractionEstimator.update_at
 
-    def sinking(self, sample):
-        estimate = update(self, sample)
+    def sinking(self, time, sample):
+        estimate = update(self, time, sample)
         estimate.event = "immobilization" if 1.0 < estimate.time < 2.0 else ""
         return estimate
 
-    monkeypatch.setattr(TractionEstimator, "update", sinking)
+    monkeypatch.setattr(TractionEstimator, "update_at", sinking)
     async with running(service):
         for time, values in list(rows_of(short.recording))[:300]:
             service.feeds[0].sample(time, values)
@@ -332,6 +332,22 @@ async def test_a_flood_is_all_accounted_for(vehicle, short, port, sender):
         await until(lambda: service.core.counts.by_channel["ground_speed"]["dropped"] == 200)
     mine = service.core.counts.by_channel["ground_speed"]
     assert (mine["received"], mine["missing"]) == (400, 150)
+
+
+async def test_datagrams_that_are_too_many_are_dropped_by_the_service_which_counts(
+    vehicle, short, port, sender
+):
+    """They come faster than they are estimated: none is lost unseen in the system's buffer."""
+    service = Service(vehicle, [f"udp://127.0.0.1:{port}"], capacity=20)
+    async with running(service):
+        sender.send(*messages(short.recording, 200))  # the loop stands still meanwhile
+        await until(lambda: events(service, "behind"))
+
+        def dropped() -> int:
+            return service.core.counts.by_channel["ground_speed"]["dropped"]
+
+        await until(lambda: service.core.rows + dropped() == 200)
+        assert dropped() > 0
 
 
 async def test_a_thread_that_is_too_fast_is_held_back_and_counted(vehicle, port):

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+import struct
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -21,6 +23,7 @@ Floats = npt.NDArray[np.float64]
 EVENTS = ("", "outlier", "standstill", "gap", "immobilization", "stuck", "push")
 """Texts of the ``event`` column, in the order of tg_event."""
 
+_MISSING = (math.nan,) * lib.TG_SLOTS
 _BLOCK = 1 << 18  # rows a call: Ctrl-C and progress get a turn between calls
 
 
@@ -121,18 +124,25 @@ class Engine:
             )
         self.sample = ffi.new("tg_sample *")
         self.estimate = ffi.new("tg_estimate *")
-        self.sample.value = [np.nan] * lib.TG_SLOTS
-        self.places_in = tuple(self._slots_in.items())
         self.index_out = self._slots_out
+        names: list[Any] = [None] * lib.TG_SLOTS  # no sample has a column None
+        for name, slot in self._slots_in.items():
+            names[slot] = name
+        self._names = tuple(names)
+        self._pack = struct.Struct(f"={1 + lib.TG_SLOTS}d").pack_into
+        self._room_in = ffi.buffer(self.sample)
+        self._room_out = ffi.buffer(self.estimate.value, 8 * self._used)
 
-    def unpack(self, values: Any) -> list[float]:
-        """The places of a tg_estimate's values that hold columns, and those between, as floats."""
-        found: list[float] = ffi.unpack(values, self._used)
+    def update(self, time: float, sample: Mapping[str, Any]) -> int:
+        """Take a sample and fill ``self.estimate``; returns tg_status. Raises struct.error on what is no number."""
+        self._pack(self._room_in, 0, time, *map(sample.get, self._names, _MISSING))
+        status: int = lib.tg_estimator_update(self._estimator, self.sample, self.estimate)
+        return status
+
+    def packed(self) -> bytes:
+        """A copy of the numbers in ``self.estimate``: doubles, a column of `outputs` at each place of ``index_out``."""
+        found: bytes = self._room_out[:]
         return found
-
-    def update(self) -> int:
-        """Take ``self.sample`` and fill ``self.estimate``; returns tg_status."""
-        return int(lib.tg_estimator_update(self._estimator, self.sample, self.estimate))
 
     def run(
         self,

@@ -29,38 +29,38 @@ class Estimate:
     :attr:`TractionEstimator.columns` as plain floats; NaN only where ``event`` says why.
     """
 
-    __slots__ = ("_places", "_values", "event", "time")
+    __slots__ = ("_values", "event", "packed", "places", "time")
 
-    def __init__(self, time: float, event: str, values: list[float], places: dict[str, int]) -> None:
+    def __init__(self, time: float, event: str, packed: bytes, places: dict[str, int]) -> None:
         self.time = time
         self.event = event
-        self._values = values
-        self._places = places
+        self.packed = (
+            packed  # the numbers as doubles in the machine's order: what only goes on need not become floats
+        )
+        self._values: tuple[float, ...] | None = None
+        self.places = places  # where in `values` each column stands
 
     def __getitem__(self, name: str) -> Any:
-        if name in self._places:
-            return self._values[self._places[name]]
+        if name in self.places:
+            return self.values[self.places[name]]
         if name in ("time", "event"):
             return getattr(self, name)
         raise KeyError(name)
 
     def __getattr__(self, name: str) -> float:
         try:
-            return self._values[self._places[name]]
+            return self.values[self.places[name]]
         except KeyError:
             raise AttributeError(f"an estimate has no {name!r}") from None
 
     def __iter__(self) -> Iterator[str]:
-        return iter(("time", *self._places, "event"))
+        return iter(("time", *self.places, "event"))
 
     @property
-    def places(self) -> dict[str, int]:
-        """Where in `values` each column stands."""
-        return self._places
-
-    @property
-    def values(self) -> list[float]:
-        """All numbers of the kernel's estimate, by `places`; the list is this estimate's own."""
+    def values(self) -> tuple[float, ...]:
+        """All numbers of the kernel's estimate, by `places`."""
+        if self._values is None:
+            self._values = struct.unpack(f"={len(self.packed) // 8}d", self.packed)
         return self._values
 
     def to_dict(self) -> dict[str, float | str]:
@@ -70,7 +70,7 @@ class Estimate:
     def __repr__(self) -> str:
         shown = ", ".join(
             f"{name}={self[name]:.4g}"
-            for name in self._places
+            for name in self.places
             if name.startswith(("adhesion", "slip", "soil"))
         )
         return f"Estimate(time={self.time:.6g}, event={self.event!r}, {shown})"
@@ -184,22 +184,30 @@ class TractionEstimator:
         InputError, and stays as it was, where time does not run forward, is missing, or a value is no finite
         number.
         """
+        time = sample.get("time")
+        if time is None:
+            raise unusable(sample, self._engine.inputs)
+        return self.update_at(time, sample)
+
+    def update_at(self, time: float, sample: Mapping[str, float | None]) -> Estimate:
+        """As `update`, with the instant [s] beside the sample."""
         engine = self._engine
-        row, get = engine.sample, sample.get
-        values = row.value
         try:
-            time = get("time")
-            row.time = math.nan if time is None else time
-            for name, slot in engine.places_in:
-                value = get(name)
-                values[slot] = math.nan if value is None else value
-        except TypeError:
-            raise unusable(sample, engine.inputs) from None
-        status = engine.update()
+            status = engine.update(time, sample)
+        except struct.error:
+            status = self._update_known(time, sample)
         if status:
-            raise self._refused(status, sample)
+            raise self._refused(status, {**sample, "time": time})
         out = engine.estimate
-        return Estimate(out.time, EVENTS[out.event], engine.unpack(out.value), engine.index_out)
+        return Estimate(out.time, EVENTS[out.event], engine.packed(), engine.index_out)
+
+    def _update_known(self, time: float, sample: Mapping[str, float | None]) -> int:
+        """A sample in which values are None; raises InputError on what is no number."""
+        known = {name: value for name, value in sample.items() if value is not None}
+        try:
+            return self._engine.update(time, known)
+        except struct.error:
+            raise unusable({**sample, "time": time}, self._engine.inputs) from None
 
     def update_block(self, recording: Recording) -> Estimates:
         """Take all rows of a recording; the same as `update` row by row. Raises InputError as `update` does."""
@@ -269,7 +277,7 @@ def unusable(sample: Mapping[str, Any], names: Collection[str]) -> InputError:
         value = sample.get(name)
         try:
             sound = value is None or (not math.isinf(value) and (name != "time" or not math.isnan(value)))
-        except TypeError:
+        except (TypeError, OverflowError):
             sound = False
         if not sound or (name == "time" and value is None):
             mend = (

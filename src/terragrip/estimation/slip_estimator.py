@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import json
 import math
+import struct
 from collections.abc import Collection, Mapping
 from typing import Any, Self
 
@@ -86,6 +87,7 @@ class SlipEstimator:
         self._zero = tuple(zero.values())
         self.columns = (*found, *zero, "nis", "channels")
         self.places = {name: k for k, name in enumerate(self.columns)}
+        self._pack = struct.Struct(f"={len(self.columns)}d").pack
 
     def _zero_slip(self) -> dict[str, float]:
         """The radii that slip counts from, with their SDs."""
@@ -101,17 +103,19 @@ class SlipEstimator:
     def update(self, sample: Mapping[str, float | None]) -> Estimate:
         """Take one sample and return the estimate at its instant; as `TractionEstimator.update`, and raises as that."""
         time = sample.get("time")
+        if time is None:
+            raise unusable(sample, self._inputs)
+        return self.update_at(time, sample)
+
+    def update_at(self, time: float, sample: Mapping[str, float | None]) -> Estimate:
+        """As `update`, with the instant [s] beside the sample."""
         values = [sample.get(name) for name in self._inputs]
         try:
-            sound = (
-                time is not None
-                and math.isfinite(time)
-                and not any(v is not None and math.isinf(v) for v in values)
-            )
+            sound = math.isfinite(time) and not any(v is not None and math.isinf(v) for v in values)
         except TypeError:
             sound = False
-        if not sound or time is None:
-            raise unusable(sample, self._inputs)
+        if not sound:
+            raise unusable({**sample, "time": time}, self._inputs)
         before = self._place.time
         if before is not None and time <= before:
             raise InputError(
@@ -153,8 +157,8 @@ class SlipEstimator:
         fastest = max(abs(x[0]), *(abs(x[0] + slip) for slip in x[2:]))
         event = "outlier" if own.outlier else ""
         event = "gap" if after_gap else "standstill" if fastest <= self._standstill else event
-        values = [*numbers.values(), *self._zero, own.nis, float(own.taken)]
-        return Estimate(time, event, values, self.places)
+        packed = self._pack(*numbers.values(), *self._zero, own.nis, float(own.taken))
+        return Estimate(time, event, packed, self.places)
 
     def snapshot(self) -> bytes:
         """Everything needed to go on later, bit for bit."""

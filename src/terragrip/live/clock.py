@@ -31,6 +31,19 @@ class SourceClock:
     arrival: float = 0.0
     waiting: list[Stamped] = field(default_factory=list)
 
+    def steady(self, arrival: float, stamp: float) -> float | None:
+        """The time of a sample where its stamp is as expected and none waits, as nearly always; None where `take` must look."""
+        lead = stamp - arrival
+        if self.offset is None or self.waiting or not -JUMP <= lead - self.lead <= JUMP:
+            return None
+        self.lead = lead
+        if stamp > self.newest:
+            self.newest = stamp
+        time = stamp + self.offset
+        if time > self.time:
+            self.time, self.arrival = time, arrival
+        return time
+
     def take(self, arrival: float, stamp: float, values: Values) -> tuple[list[Stamped], list[Values], float]:
         """One sample: what may go on (arrival, time, values), values refused, and by how much the clock jumped (0: not)."""
         lead = stamp - arrival

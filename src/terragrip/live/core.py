@@ -69,7 +69,7 @@ class Settings:
         return cls(**{**data, "sources": tuple(data["sources"]), "channels": tuple(data["channels"])})
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(slots=True)
 class Row:
     """A row that went into the estimator, and its estimate; ``arrival`` [s] of its first sample."""
 
@@ -152,9 +152,19 @@ class Core:
     def take(self, arrival: float, source: int, stamp: float, values: Values) -> list[Output]:
         """A sample of ``source`` (its place in the settings), stamped by its own clock [s]; SI values by column."""
         self.counts.received(values)
-        clock = self.clocks[source]
-        going, refused, jump = clock.take(arrival, stamp, values)
         out: list[Output] = []
+        time = self.clocks[source].steady(arrival, stamp)
+        if time is None:
+            self._unsteady(arrival, source, stamp, values, out)
+        else:
+            lost = self.reorder.add(arrival, source, time, values)
+            if lost:
+                out.append(Refusal(arrival, time, source, "late or doubled", lost))
+        return self._release(self.reorder.ready(arrival), out)
+
+    def _unsteady(self, arrival: float, source: int, stamp: float, values: Values, out: list[Output]) -> None:
+        """A sample whose clock has only begun, or may have jumped."""
+        going, refused, jump = self.clocks[source].take(arrival, stamp, values)
         for lost in refused:
             self.counts.add("clock", lost)
             out.append(Refusal(arrival, stamp, source, "clock", lost))
@@ -169,7 +179,6 @@ class Core:
             lost = self.reorder.add(when, source, time, one)
             if lost:
                 out.append(Refusal(when, time, source, "late or doubled", lost))
-        return self._release(self.reorder.ready(arrival), out)
 
     def tick(self, now: float) -> list[Output]:
         """Nothing came up to ``now``: rows that have waited for a window go on."""
@@ -197,9 +206,9 @@ class Core:
                 estimator = self._begin(self._seen(row))
                 out += self._lacking(row)
             try:
-                estimate = estimator.update({**row.values, "time": row.time})
+                estimate = estimator.update_at(row.time, row.values)
             except InputError as error:
-                source = next(iter(row.origin.values()))
+                source = row.parts[0][0]
                 out.append(Refusal(row.arrival, row.time, source, str(error), row.values))
                 out.append(Event(row.time, "refused", self.settings.sources[source], str(error)))
                 continue
@@ -213,11 +222,16 @@ class Core:
                 state = self.ground.update(estimate)
                 if state is not None:
                     out += _told(state)
+        if self.reorder.changes:
+            self._tell_changes(out)
+        return out
+
+    def _tell_changes(self, out: list[Output]) -> None:
+        """Events of channels that went and came."""
         for kind, source, channel in self.reorder.changes:
             text = f"{channel} no longer comes" if kind == "channel_lost" else f"{channel} comes again"
             out.append(Event(self.time, kind, self.settings.sources[source], text))
         self.reorder.changes.clear()
-        return out
 
     def _warning(self, estimate: Estimate) -> Event:
         """The estimator's event as one of ours, with what the machine did."""
@@ -242,7 +256,7 @@ class Core:
         text = f"no speed of the wheel {', '.join(absent)} yet"
         if strange:
             text += f"; the vehicle has no wheel {', '.join(strange[:4])}"
-        return [Event(first.time, "schema", self.settings.sources[next(iter(first.origin.values()))], text)]
+        return [Event(first.time, "schema", self.settings.sources[first.parts[0][0]], text)]
 
     def _seen(self, first: Pending) -> Collection[str]:
         pending = [name for row in self.reorder.pending for name in row.values]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
 from terragrip.live.decode import Decoder
@@ -43,6 +43,7 @@ class Feed:
         self._unpack, self._note = unpack, note
         self._said: dict[str, float] = {}
         self._layouts: dict[frozenset[str], None] = {}
+        self._last_layout: frozenset[str] = frozenset()
         self._since_layout = 0
 
     def message(self, data: bytes, arrival: float | None = None, *, topic: str | None = None) -> None:
@@ -57,6 +58,15 @@ class Feed:
             found = [{str(topic): number}]
         for fields in found:
             self.fields(fields if topic is None else self._of_topic(topic, fields), arrival)
+
+    def burst(self, messages: Iterable[bytes]) -> None:
+        """Messages that came together: what they bring is estimated before this returns, not a turn of the loop later."""
+        self.inbox.begin()
+        try:
+            for data in messages:
+                self.message(data)
+        finally:
+            self.inbox.end()
 
     def _of_topic(self, topic: str, fields: Mapping[str, Any]) -> Mapping[str, Any]:
         """Fields by their own names, and by ``topic/name`` where the profile asks for that."""
@@ -73,7 +83,10 @@ class Feed:
         if self.decoder.unreadable:
             self._say_unreadable()
         if self.one_layout:
-            self._watch_layout(fields.keys(), bool(samples))
+            if fields.keys() == self._last_layout:
+                self._since_layout += 1
+            else:
+                self._watch_layout(frozenset(fields), bool(samples))
 
     def sample(self, stamp: float | None, values: Values, arrival: float | None = None) -> None:
         """A sample that needs no decoding."""
@@ -97,8 +110,8 @@ class Feed:
         for channel, what in wrong.items():
             self._event("unreadable", f"{channel} was {what}, not a number", key=channel)
 
-    def _watch_layout(self, names: Any, useful: bool) -> None:
-        layout = frozenset(names)
+    def _watch_layout(self, layout: frozenset[str], useful: bool) -> None:
+        self._last_layout = layout
         if layout in self._layouts:
             self._since_layout += 1
             return

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
 from fnmatch import fnmatchcase
-from operator import itemgetter
 from typing import Any
 
+from terragrip._kernel import ffi, lib
 from terragrip.live.core import Row
 from terragrip.live.event import Event
 
+_DIGITS = 17  # characters of a number at most
 ESTIMATE, EVENT, STATUS, SOIL, GROUND = "estimate", "event", "status", "soil", "ground"
 
 
@@ -34,8 +34,10 @@ class Message:
         """The message as a JSON object; of an estimate, ``columns`` or all of them. Missing numbers are null."""
         found = self._json.get(columns)
         if found is None:
-            found = json.dumps(self.data).encode() if self.row is None else (columns or _EVERY).json(self.row)
-            self._json[columns] = found
+            row = self.row
+            found = self._json[columns] = (
+                json.dumps(self.data).encode() if row is None else (columns or _EVERY).json(row)
+            )
         return found
 
 
@@ -46,8 +48,6 @@ class Columns:
         self._patterns = [part.strip() for part in text.split(",") if part.strip()]
         self._of: object = None
         self._places: dict[str, int] = {}
-        self._template = ""
-        self._pick: Callable[[list[float]], tuple[float, ...]] = tuple
 
     def wants(self, name: str) -> bool:
         """Whether a column is wanted."""
@@ -59,30 +59,28 @@ class Columns:
         if self._of is not every:
             self._of = every
             self._places = {name: place for name, place in every.items() if self.wants(name)}
-            self._template = "".join(f',"{name}":%.9g' for name in self._places)
-            places = list(self._places.values())
-            one = slice(places[0], places[0] + 1) if len(places) == 1 else None
-            self._pick = (
-                (lambda values: tuple(values[one]))
-                if one
-                else itemgetter(*places)
-                if places
-                else lambda values: ()
-            )
+            members = b"".join(f',"{name}":\0'.encode() for name in self._places)
+            self._members = ffi.new("char[]", members)
+            self._slots = ffi.new("int32_t[]", list(self._places.values()))
+            self._out = ffi.new("char[]", len(members) + _DIGITS * len(self._places))
+            self._text = ffi.buffer(self._out)
         return self._places
 
     def json(self, row: Row) -> bytes:
         """The row as a JSON object, numbers to nine digits; a missing one is null."""
-        self.places(row)
         estimate = row.estimate
-        numbers = self._template % self._pick(estimate.values)
-        if ":nan" in numbers:
-            numbers = numbers.replace(":nan", ":null")
+        if self._of is not estimate.places:
+            self.places(row)
+        length = lib.tg_json_members(
+            len(self._places),
+            self._members,
+            self._slots,
+            ffi.from_buffer("double[]", estimate.packed),
+            self._out,
+        )
         predicted = "true" if row.predicted else "false"
-        return (
-            f'{{"time":{estimate.time!r},"arrival":{row.arrival!r},"event":"{estimate.event}","predicted":{predicted}'
-            f"{numbers}}}"
-        ).encode()
+        head = f'{{"time":{estimate.time!r},"arrival":{row.arrival!r},"event":"{estimate.event}","predicted":{predicted}'
+        return b"%b%b}" % (head.encode(), self._text[:length])
 
 
 _EVERY = Columns()

@@ -95,7 +95,7 @@ class Recorder:
             self.core = load_snapshot(self.folder, number)
             clear(self.folder, number)
             refuse_other(self.folder, self.core, vehicle, settings, library)
-        self.segment, self._wal, torn = Segment(number + 1), None, 0
+        self.segment, ahead, torn = Segment(number + 1), None, 0
         for segment, reading, more in replay(self.folder, number, self.core):
             if more:
                 self._close_segment(segment, self.core.state(), None)
@@ -104,9 +104,8 @@ class Recorder:
                 self.segment, torn = segment, reading.size - reading.good
                 if reading.good:
                     path = wal_path(self.folder, segment.number)
-                    self._wal = WriteAhead(path, append_at=reading.good, names=reading.names)
-        if self._wal is None:
-            self._wal = self._open_wal()
+                    ahead = WriteAhead(path, append_at=reading.good, names=reading.names)
+        self._ahead = self._open_wal() if ahead is None else ahead
         if self.core.rows:
             text = f"resumed after {self.core.rows} rows, the last at {self.core.time:.6g} s"
             if torn:
@@ -120,15 +119,11 @@ class Recorder:
         wal.beginning({"segment": self.segment.number})
         return wal
 
-    @property
-    def _ahead(self) -> WriteAhead:
-        assert self._wal is not None
-        return self._wal
-
     def take(self, arrival: float, source: int, stamp: float, values: Values) -> list[Output]:
         """See `Core.take`; raises OSError where a segment cannot be begun."""
         self._ahead.sample(arrival, source, stamp, values)
-        return self._kept(self.core.take(arrival, source, stamp, values), arrival)
+        outputs = self.core.take(arrival, source, stamp, values)
+        return self._kept(outputs, arrival) if outputs else outputs
 
     def tick(self, now: float) -> list[Output]:
         """See `Core.tick`."""
@@ -166,8 +161,8 @@ class Recorder:
         state = self.core.state()
         encoded = json.dumps(state)  # now: the state's lists go on changing
         self.segment, self._opened = Segment(old.number + 1), None
-        self._wal = self._open_wal()
-        self._wal.write()
+        self._ahead = self._open_wal()
+        self._ahead.write()
         self._closing.append(self._thread.submit(self._close_segment, old, encoded, wal))
 
     def _close_segment(self, segment: Segment, state: dict[str, Any] | str, wal: WriteAhead | None) -> None:

@@ -37,33 +37,38 @@ class Stream:
     due_from: float  # instant from which the next sample is one period away
     period: float = 0.0  # s; 0 = not known yet, inf = irregular
     tolerance: float = 0.0  # s
-    steps: list[float] = field(default_factory=list)
+    steps: deque[float] = field(default_factory=lambda: deque(maxlen=_STEPS))
     count: int = 0
     overdue: int = 0
+    hole: float = float("inf")  # s: a longer step is one over missing samples
+    calm: float = _BEGINNING  # up to this instant nothing is missing
 
     def step_to(self, time: float) -> int:
         """A sample at ``time``; returns how many are missing before it."""
         step = time - self.last
-        missing = 0
-        if 0.0 < self.period < float("inf") and step > 1.5 * self.period:
-            missing = round(step / self.period) - 1
-        if len(self.steps) < _STEPS:
-            self.steps.append(step)
-        else:
-            self.steps[self.count % _STEPS] = step
-        self.count += 1
+        missing = round(step / self.period) - 1 if step > self.hole else 0
+        self.steps.append(step)
+        count = self.count = self.count + 1
         # Often at first, then now and then: a period hardly changes.
-        if self.count >= _FEWEST and (self.count < 2 * _STEPS or self.count % 8 == 0):
+        if not count % 8 or _FEWEST <= count < 2 * _STEPS:
             self._learn()
         self.last = self.due_from = time
+        self.calm = time + 1.5 * self.period
         return missing
+
+    def give_up(self) -> None:
+        """The sample that is due will not come."""
+        self.due_from += self.period
+        self.calm += self.period
+        self.overdue += 1
 
     def _learn(self) -> None:
         steps = sorted(self.steps)
         period = steps[len(steps) // 2]
         spread = sorted(abs(step - period) for step in steps)[len(steps) // 2]
         self.tolerance = 4.0 * spread + 1e-6 * period
-        self.period = period if self.tolerance < 0.4 * period else float("inf")
+        regular = self.tolerance < 0.4 * period
+        self.period, self.hole = (period, 1.5 * period) if regular else (float("inf"), float("inf"))
 
     def awaited(self, time: float, present: bool) -> bool:
         """Whether a row at ``time``, with or without a sample of this stream, should wait for it."""
@@ -72,23 +77,38 @@ class Stream:
         if self.period == 0.0:
             return time - self.first < _LEARNING
         if present:
-            return time - self.due_from > 1.5 * self.period
+            return time > self.calm
         return self.due_from + self.period - self.tolerance <= time
 
     def without(self, channels: Collection[str]) -> Stream:
         """The same past for the channels that are not among these."""
         rest = tuple(name for name in self.channels if name not in channels)
-        return replace(self, channels=rest, steps=list(self.steps))
+        return replace(self, channels=rest, steps=deque(self.steps, _STEPS))
+
+
+Parts = tuple[tuple[int, tuple[str, ...]], ...]
+"""Sources and the channels that each gave."""
 
 
 @dataclass(slots=True)
 class Pending:
-    """A row to be: ``values`` by channel, ``origin`` the source of each."""
+    """A row to be: ``values`` by channel, and ``parts``, which source gave which."""
 
     time: float
     arrival: float
     values: Values
-    origin: dict[str, int]
+    parts: Parts
+
+    def merge(self, source: int, values: Values) -> Values:
+        """Add what the row has not yet; returns what it has."""
+        new = {name: value for name, value in values.items() if name not in self.values}
+        if new:
+            self.values = {**self.values, **new}  # not in place: what came in belongs to others too
+            self.parts = (*self.parts, (source, tuple(new)))
+        return {name: value for name, value in values.items() if name not in new}
+
+
+_Those = tuple[list[Stream], list[Stream], bool]
 
 
 class Reorder:
@@ -98,7 +118,7 @@ class Reorder:
         self.window = window
         self.counts = counts
         self.streams: list[Stream] = []
-        self._those: dict[tuple[tuple[str, int], ...], tuple[list[Stream], list[Stream], bool]] = {}
+        self._those: dict[Parts, _Those] = {}
         self.pending: list[Pending] = []
         self.released = _BEGINNING
         self._recent: deque[tuple[float, tuple[str, ...]]] = deque(maxlen=_RECENT)
@@ -113,14 +133,9 @@ class Reorder:
         while place and pending[place - 1].time > time:
             place -= 1
         if not place or pending[place - 1].time != time:
-            pending.insert(place, Pending(time, arrival, dict(values), dict.fromkeys(values, source)))
+            pending.insert(place, Pending(time, arrival, values, ((source, tuple(values)),)))
             return {}
-        row, doubled = pending[place - 1], {}
-        for name, value in values.items():
-            if name in row.values:
-                doubled[name] = value
-            else:
-                row.values[name], row.origin[name] = value, source
+        doubled = pending[place - 1].merge(source, values)
         self.counts.add("doubled", doubled)
         return doubled
 
@@ -135,39 +150,23 @@ class Reorder:
         out = []
         while self.pending:
             row = self.pending[0]
+            those = self._those.get(row.parts) or self._streams_of(row)
             expired = now - row.arrival >= self.window
-            if not expired and not self._complete(row):
+            if not expired and not _complete(row.time, those):
                 break
-            out.append(self._release(row, expired))
+            out.append(self._release(row, those, expired))
         return out
 
-    def _complete(self, row: Pending) -> bool:
-        """Whether nothing is due that the row lacks, and each of its channels was met before (a new one may bring brothers)."""
-        present, absent, met = self._streams_of(row)
-        time = row.time
-        for stream in present:
-            if not (stream.period and time <= stream.due_from + 1.5 * stream.period) and stream.awaited(
-                time, True
-            ):
-                return False
-        for stream in absent:
-            if stream.awaited(time, False):
-                return False
-        return met
-
-    def _streams_of(self, row: Pending) -> tuple[list[Stream], list[Stream], bool]:
+    def _streams_of(self, row: Pending) -> _Those:
         """The streams that the row holds and those it lacks, and whether these are all its channels.
 
         A stream of which the row holds a part only becomes two.
         """
-        key = tuple(row.origin.items())
-        found = self._those.get(key)
-        if found is not None:
-            return found
+        origin = {name: source for source, names in row.parts for name in names}
         present: list[Stream] = []
         absent: list[Stream] = []
         for stream in list(self.streams):
-            mine = [name for name in stream.channels if row.origin.get(name) == stream.source]
+            mine = [name for name in stream.channels if origin.get(name) == stream.source]
             if mine and len(mine) < len(stream.channels):
                 rest = stream.without(mine)
                 stream.channels = tuple(mine)
@@ -175,20 +174,21 @@ class Reorder:
                 self._those.clear()
                 absent.append(rest)
             (present if mine else absent).append(stream)
-        met = sum(len(stream.channels) for stream in present) == len(row.origin)
+        met = sum(len(stream.channels) for stream in present) == len(origin)
         if len(self._those) < _LAYOUTS:
-            self._those[key] = present, absent, met
+            self._those[row.parts] = present, absent, met
         return present, absent, met
 
-    def _release(self, row: Pending, expired: bool) -> Pending:
-        present, absent, met = self._streams_of(row)
+    def _release(self, row: Pending, those: _Those, expired: bool) -> Pending:
+        present, absent, met = those
         del self.pending[0]
         self.released = row.time
-        self._recent.append((row.time, tuple(row.values)))
+        self._recent.append((row.time, row.parts[0][1] if len(row.parts) == 1 else tuple(row.values)))
         for stream in present:
-            if stream.overdue >= LOST:
-                self.changes += [("channel_back", stream.source, name) for name in stream.channels]
-            stream.overdue = 0
+            if stream.overdue:
+                if stream.overdue >= LOST:
+                    self.changes += [("channel_back", stream.source, name) for name in stream.channels]
+                stream.overdue = 0
             missing = stream.step_to(row.time)
             if missing:
                 self.counts.add("missing", stream.channels, missing)
@@ -200,8 +200,8 @@ class Reorder:
 
     def _meet(self, row: Pending, known: Collection[tuple[int, str]]) -> None:
         """Begin a stream for each source's channels that no stream holds yet."""
-        for source in dict.fromkeys(row.origin.values()):
-            new = tuple(n for n, s in row.origin.items() if s == source and (s, n) not in known)
+        for source in dict.fromkeys(source for source, _ in row.parts):
+            new = tuple(n for s, names in row.parts for n in names if s == source and (s, n) not in known)
             if new:
                 self.streams.append(Stream(source, new, row.time, row.time, row.time))
         self._those.clear()
@@ -212,20 +212,25 @@ class Reorder:
             if stream.period == 0.0 or not stream.awaited(time, present=False):
                 continue
             while stream.due_from + stream.period - stream.tolerance <= time and stream.overdue < LOST:
-                stream.due_from += stream.period
-                stream.overdue += 1
+                stream.give_up()
             if stream.overdue >= LOST:
                 self.changes += [("channel_lost", stream.source, name) for name in stream.channels]
 
     def flush(self) -> list[Pending]:
         """All that is left, in order: the source has ended."""
-        return [self._release(self.pending[0], expired=False) for _ in range(len(self.pending))]
+        out = []
+        while self.pending:
+            row = self.pending[0]
+            out.append(self._release(row, self._streams_of(row), expired=False))
+        return out
 
     def state(self) -> dict[str, Any]:
         """As JSON holds it, to the last bit."""
         return {
             "released": self.released,
-            "streams": [{n: getattr(s, n) for n in Stream.__slots__} for s in self.streams],
+            "streams": [
+                {**{n: getattr(s, n) for n in Stream.__slots__}, "steps": list(s.steps)} for s in self.streams
+            ],
             "pending": [{n: getattr(p, n) for n in Pending.__slots__} for p in self.pending],
             "recent": list(self._recent),
         }
@@ -233,7 +238,25 @@ class Reorder:
     def restore(self, state: dict[str, Any]) -> None:
         """Take over what `state` gave."""
         self.released = state["released"]
-        self.streams = [Stream(**{**one, "channels": tuple(one["channels"])}) for one in state["streams"]]
+        self.streams = [
+            Stream(**{**one, "channels": tuple(one["channels"]), "steps": deque(one["steps"], _STEPS)})
+            for one in state["streams"]
+        ]
         self._those.clear()
-        self.pending = [Pending(**one) for one in state["pending"]]
+        self.pending = [
+            Pending(**{**one, "parts": tuple((source, tuple(names)) for source, names in one["parts"])})
+            for one in state["pending"]
+        ]
         self._recent = deque(((when, tuple(names)) for when, names in state["recent"]), maxlen=_RECENT)
+
+
+def _complete(time: float, those: _Those) -> bool:
+    """Whether nothing is due that the row lacks, and each of its channels was met before (a new one may bring brothers)."""
+    present, absent, met = those
+    for stream in present:
+        if time > stream.calm and stream.awaited(time, True):
+            return False
+    for stream in absent:
+        if stream.awaited(time, False):
+            return False
+    return met

@@ -6,10 +6,9 @@ import json
 import os
 import struct
 from array import array
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
-from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -19,6 +18,8 @@ from terragrip.live.core import Ground, Output, Refusal, Row
 from terragrip.live.event import Event
 
 if TYPE_CHECKING:
+    import numpy as np
+    import numpy.typing as npt
     import pyarrow as pa
 
     from terragrip.estimation.estimates import Estimates
@@ -26,8 +27,19 @@ if TYPE_CHECKING:
     from terragrip.estimation.slip_estimator import SlipEstimator
 
 _TOGETHER = 64  # rows
+_STAMP = struct.Struct("=ddB")  # time, arrival, code of the event
+_CODES = {event: code for code, event in enumerate(EVENTS)}
 
 RECORDING, ESTIMATES, REFUSED, EVENT_LINES, GROUND = "recording", "estimates", "refused", "events", "ground"
+
+
+@dataclass(slots=True)
+class _Rows:
+    """Rows that hold the same channels: their places in the segment, and their values one behind the other."""
+
+    pack: Callable[..., bytes]
+    places: array[int] = field(default_factory=lambda: array("q"))
+    values: bytearray = field(default_factory=bytearray)
 
 
 @dataclass(slots=True)
@@ -35,26 +47,21 @@ class Segment:
     """What came out of the core since the last segment was closed. Rows lie flat, 8 bytes a number."""
 
     number: int
-    time: array[float] = field(default_factory=lambda: array("d"))
-    arrival: array[float] = field(default_factory=lambda: array("d"))
-    estimates: bytearray = field(default_factory=bytearray)  # packed: many times quicker than array.extend
-    codes: array[int] = field(default_factory=lambda: array("B"))
-    channels: dict[str, array[float]] = field(default_factory=dict)
+    size: int = 0  # outputs in it: rows, events, refusals and states of the ground
+    stamps: bytearray = field(default_factory=bytearray)  # _STAMP of each row
+    estimates: bytearray = field(default_factory=bytearray)
+    measured: dict[tuple[str, ...], _Rows] = field(default_factory=dict)
     refusals: list[Refusal] = field(default_factory=list)
     events: list[Event] = field(default_factory=list)
     ground: list[Ground] = field(default_factory=list)
     _waiting: list[Row] = field(default_factory=list)  # laid flat together: quicker than one by one
 
     def __len__(self) -> int:
-        return len(self.time) + len(self._waiting)
-
-    @property
-    def size(self) -> int:
-        """Outputs in it: rows, events, refusals and states of the ground."""
-        return len(self) + len(self.events) + len(self.refusals) + len(self.ground)
+        return len(self.stamps) // _STAMP.size + len(self._waiting)
 
     def add(self, output: Output) -> None:
         """Take one output of the core."""
+        self.size += 1
         if isinstance(output, Row):
             self._waiting.append(output)
             if len(self._waiting) >= _TOGETHER:
@@ -68,24 +75,33 @@ class Segment:
 
     def settle(self) -> None:
         """Lay the rows flat that have come since the last call."""
-        rows, self._waiting = self._waiting, []
-        for row in rows:
-            self._add_row(row)
+        laid = len(self) - len(self._waiting)
+        for place, row in enumerate(self._waiting, laid):
+            estimate, names = row.estimate, tuple(row.values)
+            alike = self.measured.get(names)
+            if alike is None:
+                alike = self.measured[names] = _Rows(struct.Struct(f"={len(names)}d").pack)
+            alike.places.append(place)
+            alike.values += alike.pack(*row.values.values())
+            self.stamps += _STAMP.pack(estimate.time, row.arrival, _CODES[estimate.event])
+            self.estimates += estimate.packed
+        self._waiting.clear()
 
-    def _add_row(self, row: Row) -> None:
-        rows = len(self.time)
-        self.time.append(row.estimate.time)
-        self.arrival.append(row.arrival)
-        values = row.estimate.values
-        self.estimates += _packer(len(values)).pack(*values)
-        self.codes.append(EVENTS.index(row.estimate.event))
-        for name, column in self.channels.items():
-            column.append(row.values.get(name, float("nan")))
-        if not row.values.keys() <= self.channels.keys():
-            for name, value in row.values.items():
-                if name not in self.channels:
-                    self.channels[name] = array("d", [float("nan")]) * rows
-                    self.channels[name].append(value)
+    def _stamps(self) -> npt.NDArray[np.void]:
+        import numpy as np
+
+        return np.frombuffer(self.stamps, dtype=[("time", "=f8"), ("arrival", "=f8"), ("code", "u1")])
+
+    def channels(self) -> dict[str, npt.NDArray[np.float64]]:
+        """What was measured, a column (n,) each; NaN where a row has none."""
+        import numpy as np
+
+        found = {name: np.full(len(self), np.nan) for names in self.measured for name in names}
+        for names, rows in self.measured.items():
+            table = np.frombuffer(rows.values).reshape(-1, len(names))
+            for name, column in zip(names, table.T, strict=True):
+                found[name][np.frombuffer(rows.places, dtype=np.int64)] = column
+        return found
 
     def write(self, folder: Path, estimator: TractionEstimator | SlipEstimator | None) -> None:
         """Write the segment's files; raises OSError."""
@@ -115,12 +131,12 @@ class Segment:
 
     def to_recording(self) -> pa.Table:
         """The rows as they were measured, with the arrival of each [s since 1970]."""
-        import numpy as np
         import pyarrow as pa
 
         self.settle()
-        columns = {"time": self.time, "arrival": self.arrival, **self.channels}
-        return pa.table({name: floats(np.frombuffer(c)) for name, c in columns.items()})
+        stamps = self._stamps()
+        columns = {"time": stamps["time"], "arrival": stamps["arrival"], **self.channels()}
+        return pa.table({name: floats(column) for name, column in columns.items()})
 
     def to_estimates(self, estimator: TractionEstimator | SlipEstimator) -> Estimates:
         """The rows' estimates as a table."""
@@ -132,17 +148,14 @@ class Segment:
         self.settle()
         table = np.frombuffer(self.estimates).reshape(len(self), -1)
         columns = {name: np.ascontiguousarray(table[:, place]) for name, place in estimator.places.items()}
-        for name in ("latitude", "longitude", "altitude"):
-            if name in self.channels:
-                columns[name] = np.frombuffer(self.channels[name])
+        measured = self.channels()
+        columns |= {
+            name: measured[name] for name in ("latitude", "longitude", "altitude") if name in measured
+        }
         about = about_run(estimator, None, None, smooth=False)
-        codes = np.frombuffer(self.codes, dtype=np.uint8)
-        return Estimates(np.frombuffer(self.time), columns, codes, {}, about)
-
-
-@cache
-def _packer(count: int) -> struct.Struct:
-    return struct.Struct(f"={count}d")
+        stamps = self._stamps()
+        time, codes = (np.ascontiguousarray(stamps[name]) for name in ("time", "code"))
+        return Estimates(time, columns, codes, {}, about)
 
 
 @contextmanager

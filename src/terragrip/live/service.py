@@ -34,6 +34,9 @@ if TYPE_CHECKING:
 
 _AT_ONCE = 64  # samples between two turns of sources and sinks
 _HOUSEKEEPING = 0.1  # s
+_GRACE = (
+    0.05  # s: so long the next sample may take to come, whose turn of the loop then does the housekeeping
+)
 _SYNC = 0.8  # s: with writing, under a second
 _BREATH = 0.002  # s for sinks that have enough to do
 _BEHIND = 1.0  # s
@@ -116,6 +119,8 @@ class Service:
         self._stopped = False
         self._done: Any = None  # a future, once `run` runs
         self._waking: asyncio.TimerHandle | None = None
+        self._house: asyncio.TimerHandle | None = None
+        self._house_due = float("inf")  # on the inbox's clock
         self._record_failure: str | None = None
 
     def _slip_alone(self, vehicle: Vehicle, settings: Settings) -> None:
@@ -166,10 +171,11 @@ class Service:
         for task in takers:
             task.add_done_callback(self._sink_done)
         self.inbox.filled = lambda: self._later(self._work)
+        self.inbox.work = self._work_now
         if self.recorder is not None:
             self._dispatch(self.recorder.opening)
         self._later(self._work)
-        self._loop.call_later(_HOUSEKEEPING, self._guarded, self._keep_house)
+        self._later_house(_HOUSEKEEPING)
         try:
             if not self._stopped:
                 await self._done
@@ -236,6 +242,9 @@ class Service:
             left = pending[0].arrival + self.core.settings.window - self.inbox.clock()
             self._waking = self._loop.call_later(max(left, 0.0) + 1e-4, self._guarded, self._tick)
 
+    def _work_now(self) -> None:
+        self._guarded(self._work)
+
     def _tick(self) -> None:
         self._waking = None
         now = self.inbox.clock()
@@ -245,13 +254,21 @@ class Service:
 
     def _drain(self) -> None:
         samples = self.inbox.samples
-        for _ in range(min(len(samples), _AT_ONCE)):
+        if not samples:
+            return
+        count = min(len(samples), _AT_ONCE)
+        for _ in range(count):
             sample = samples.popleft()
-            outputs = self._safely(self._engine.take, *sample)
-            self.statistics.sample(sample[1], sample[0])
-            if outputs:
+            try:
+                outputs = self._engine.take(*sample)
+            except OSError as error:
+                self._without_record(error)
+            else:
                 self._dispatch(outputs)
+        self.statistics.samples(count, sample[0])
         self.inbox.taken()
+        if sample[0] >= self._house_due:  # here, since the processor is awake, and warm
+            self._keep_house(_GRACE)
 
     def _safely(self, act: Callable[..., list[Output]], *arguments: Any) -> list[Output]:
         """Do it; where the record cannot be written, say so and go on without."""
@@ -289,7 +306,9 @@ class Service:
         for output in outputs:
             if isinstance(output, Row):
                 self.statistics.row(output, self.inbox.clock())
-                self._publish(Message(ESTIMATE, output.estimate.time, output))
+                message = Message(ESTIMATE, output.estimate.time, output)
+                for listen in self.listeners:
+                    listen(message)
             elif isinstance(output, Ground):
                 self.statistics.ground = output
                 data = output.to_dict()
@@ -302,10 +321,18 @@ class Service:
                 logger.info("%s: %s: %s", output.source, output.kind, output.text)
                 self._publish(Message.of_event(output))
 
-    def _keep_house(self) -> None:
-        self._loop.call_later(_HOUSEKEEPING, self._guarded, self._keep_house)
-        self._write()
+    def _later_house(self, seconds: float) -> None:
+        if self._house is not None:
+            self._house.cancel()
+        self._house = self._loop.call_later(seconds, self._guarded, self._keep_house)
+
+    def _keep_house(self, grace: float = 0.0) -> None:
+        """What is done ten times a second."""
         now = self.inbox.clock()
+        self._later_house(_HOUSEKEEPING + grace)
+        if self.is_real_time:
+            self._house_due = now + _HOUSEKEEPING
+        self._write()
         dropped, self.inbox.dropped = self.inbox.dropped, type(self.inbox.dropped)()
         for channel, mine in dropped.by_channel.items():
             self.note({"fate": "dropped", "channels": [channel], "number": mine["dropped"]})

@@ -35,21 +35,19 @@ class Statistics:
         self._began, self._rows, self._samples, self._delays = now, 0, 0, 0.0
         self._synced = self._behind = now - _EVERY
 
-    def sample(self, source: int, arrival: float) -> None:
-        """A sample went into the core."""
-        self._samples += 1
-        self._arrivals[source] = arrival
+    def samples(self, count: int, arrival: float) -> None:
+        """Samples went into the core, the last one of this arrival."""
+        self._samples += count
         if arrival > self.last_arrival:
             self.last_arrival = arrival
 
     def row(self, row: Row, now: float) -> None:
         """A row came out of it."""
+        before, self.last = self.last, row
         if row.predicted:
-            self.last = row
             return
-        if self.last is not None and not self.last.predicted:
-            self.period += 0.1 * (row.estimate.time - self.last.estimate.time - self.period)
-        self.last = row
+        if before is not None and not before.predicted:
+            self.period += 0.1 * (row.estimate.time - before.estimate.time - self.period)
         self._rows += 1
         self._delays += now - row.arrival
 

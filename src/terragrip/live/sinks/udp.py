@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import socket
 import struct
 from typing import TYPE_CHECKING
 
@@ -32,28 +33,42 @@ class UdpSink:
 
     async def run(self, outbox: Outbox) -> None:
         """Send messages; raises Lost where the system does not let us."""
-        loop = asyncio.get_running_loop()
         try:
-            transport, _ = await loop.create_datagram_endpoint(
-                asyncio.DatagramProtocol, remote_addr=(self.uri.host, self.port)
-            )
+            link = await self._socket()
         except OSError as error:
             raise Lost(f"cannot send to {self.uri.host} ({error.strerror or error})") from error
         outbox.connected()
 
         def send(message: Message) -> None:
-            data = self._encoded(message, outbox)
-            if data:
-                transport.sendto(data)
+            data = self._packed(message, outbox) if self.packed else message.json(outbox.columns)
+            try:
+                if data:
+                    link.send(data)
+            except ConnectionRefusedError:
+                pass  # nobody listens yet; the next may be heard
+            except BlockingIOError:
+                outbox.dropped += 1
+            except OSError as error:
+                raise Lost(f"cannot send to {self.uri.host} ({error.strerror or error})") from error
 
-        try:
+        with link:
             await outbox.deliver(send)
-        finally:
-            transport.close()
 
-    def _encoded(self, message: Message, outbox: Outbox) -> bytes:
-        if not self.packed:
-            return message.json(outbox.columns)
+    async def _socket(self) -> socket.socket:
+        loop = asyncio.get_running_loop()
+        (family, kind, protocol, _, address), *_ = await loop.getaddrinfo(
+            self.uri.host, self.port, type=socket.SOCK_DGRAM
+        )
+        link = socket.socket(family, kind, protocol)
+        try:
+            link.setblocking(False)
+            link.connect(address)
+        except OSError:
+            link.close()
+            raise
+        return link
+
+    def _packed(self, message: Message, outbox: Outbox) -> bytes:
         row = message.row
         if message.kind != ESTIMATE or row is None:
             return b""

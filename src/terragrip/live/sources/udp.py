@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import socket
-from typing import Any
+from time import monotonic
 
 from terragrip.errors import InputError
 from terragrip.live.decode import Decoder
@@ -12,6 +12,9 @@ from terragrip.live.feed import Feed, Lost
 from terragrip.live.uri import Uri
 
 _BUFFER = 4 << 20  # bytes: a burst must not be lost in the system, where nobody counts
+_LONGEST = 1 << 16  # bytes of a datagram
+_PRESSED = 5e-4  # s since the last were done, within which the next mean that there are more
+_TOGETHER = 256  # datagrams
 
 
 class UdpSource:
@@ -36,16 +39,15 @@ class UdpSource:
         failed: asyncio.Future[str] = loop.create_future()
         try:
             link = self._socket()
-            transport, _ = await loop.create_datagram_endpoint(
-                lambda: _Receiver(feed, self.allowed, failed), sock=link
-            )
         except OSError as error:
             raise Lost(f"cannot listen ({error.strerror or error})") from error
+        loop.add_reader(link, _Receiver(link, feed, self.allowed, failed).read)
         feed.connected()
         try:
             raise Lost(await failed)
         finally:
-            transport.close()
+            loop.remove_reader(link)
+            link.close()
 
     def _socket(self) -> socket.socket:
         family = socket.AF_INET6 if ":" in self.uri.host else socket.AF_INET
@@ -60,19 +62,42 @@ class UdpSource:
         return link
 
 
-class _Receiver(asyncio.DatagramProtocol):
-    def __init__(self, feed: Feed, allowed: frozenset[str], failed: asyncio.Future[str]) -> None:
-        self._feed, self._allowed, self._failed = feed, allowed, failed
+class _Receiver:
+    """Takes datagrams as they come: one a turn of the loop; where the next are there already, many, so that what is too
+    much is dropped, and counted, by the inbox, not by the system.
+    """
 
-    def datagram_received(self, data: bytes, address: tuple[Any, ...]) -> None:
-        if self._allowed and address[0] not in self._allowed:
-            self._feed.spoiled(f"from {address[0]}, which is not allowed")
+    def __init__(
+        self, link: socket.socket, feed: Feed, allowed: frozenset[str], failed: asyncio.Future[str]
+    ) -> None:
+        self._link, self._feed, self._allowed, self._failed = link, feed, allowed, failed
+        self._done = 0.0
+
+    def read(self) -> None:
+        """The socket has datagrams."""
+        pressed = monotonic() - self._done < _PRESSED
+        found: list[bytes] = []
+        try:
+            self._take(found)
+            while pressed and len(found) < _TOGETHER:
+                self._take(found)
+        except (BlockingIOError, InterruptedError):
+            pass
+        except OSError as error:
+            if not self._failed.done():
+                self._failed.set_result(str(error.strerror or error))
+        self._feed.burst(found)
+        self._done = monotonic()
+
+    def _take(self, found: list[bytes]) -> None:
+        if not self._allowed:
+            found.append(self._link.recv(_LONGEST))
             return
-        self._feed.message(data)
-
-    def connection_lost(self, error: Exception | None) -> None:
-        if not self._failed.done():
-            self._failed.set_result(str(error or "closed"))
+        data, address = self._link.recvfrom(_LONGEST)
+        if address[0] in self._allowed:
+            found.append(data)
+        else:
+            self._feed.spoiled(f"from {address[0]}, which is not allowed")
 
 
 def open_source(uri: Uri, decoder: Decoder) -> UdpSource:

@@ -1,0 +1,60 @@
+"""Estimates as text: numbers as printf writes them, whatever they are."""
+
+from __future__ import annotations
+
+import json
+import math
+import struct
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from terragrip.estimation.estimator import Estimate
+from terragrip.live.core import Row
+from terragrip.live.message import Columns
+
+
+def row(values: dict[str, float], time: float = 1.5, predicted: bool = False) -> Row:
+    places = {name: place for place, name in enumerate(values)}
+    packed = struct.pack(f"={len(values)}d", *values.values())
+    return Row(1.7e9 + 0.123456, {}, Estimate(time, "outlier", packed, places), predicted)
+
+
+@given(st.lists(st.floats(), min_size=1, max_size=4), st.floats(0, 1e9))
+def test_numbers_are_what_printf_writes_to_nine_digits(numbers, time):
+    values = {f"slip_{k}": number for k, number in enumerate(numbers)}
+    found = json.loads(Columns().json(row(values, time)))
+    assert (found["time"], found["arrival"], found["event"]) == (time, 1.7e9 + 0.123456, "outlier")
+    for name, number in values.items():
+        if math.isfinite(number):
+            # printf rounds the number itself, we its nine digits: they may differ in the ninth on a tie.
+            assert found[name] == pytest.approx(float(f"{number:.9g}"), rel=1.01e-8, abs=0)
+            assert found[name] == pytest.approx(number, rel=5.01e-9, abs=0)
+        else:
+            assert found[name] is None
+
+
+@pytest.mark.parametrize(
+    ("number", "text"),
+    [
+        (0.0, "0"), (1.0, "1"), (-0.25, "-0.25"), (123456789.4, "123456789"), (0.1, "0.1"), (12000.0, "12000"),
+        (999999999.7, "1e9"), (1.5e-5, "0.000015"), (1.5e-6, "1.5e-6"), (-2e300, "-2e300"), (0.99999999996, "1"),
+        (5e-324, "4.94065646e-324"), (3.14159265358979, "3.14159265"),
+    ],
+)  # fmt: skip
+def test_numbers_are_short(number, text):
+    assert Columns().json(row({"nis": number})).endswith(f',"nis":{text}}}'.encode())
+
+
+def test_only_the_wanted_columns_are_written():
+    values = {"slip_fl": 0.1, "slip_fl_std": 0.2, "nis": 3.0, "channels": 9.0}
+    found = json.loads(Columns("slip_*, channels").json(row(values, predicted=True)))
+    assert list(found) == ["time", "arrival", "event", "predicted", "slip_fl", "slip_fl_std", "channels"]
+    assert found["predicted"] is True
+    assert json.loads(Columns("curve_*").json(row(values))).keys() == {
+        "time",
+        "arrival",
+        "event",
+        "predicted",
+    }
