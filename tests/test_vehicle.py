@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+import yaml
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from terragrip.errors import InputError
-from terragrip.vehicle import Vehicle
+from terragrip.vehicle import Axle, Calibration, Sensors, Uncertainty, Vehicle, Wheel
 
 GOOD = """\
 name: Innok Heros 444
@@ -224,3 +226,14 @@ def test_any_bytes_are_refused(tmp_path_factory: pytest.TempPathFactory, content
     path.write_bytes(content)
     with pytest.raises(InputError):
         Vehicle.load(path)
+
+
+def test_the_page_on_the_vehicle_file_holds_a_file_that_loads_and_names_every_key() -> None:
+    page = (Path(__file__).parents[1] / "docs" / "vehicle.md").read_text(encoding="utf-8")
+    blocks = re.findall(r"```yaml\n(.*?)```", page, re.DOTALL)
+    vehicle = Vehicle.from_dict(yaml.safe_load("".join(blocks)))
+    assert vehicle.wheels == ("fl", "fr", "rl", "rr")
+    assert vehicle.uncertainty.drive_torque_gain == pytest.approx(0.02)
+    named = set(re.findall(r"\w+", page))
+    for part in (Vehicle, Axle, Wheel, Sensors, Uncertainty, Calibration):
+        assert named.issuperset(part.model_fields), part

@@ -31,7 +31,7 @@ def train(
     logs: Annotated[
         list[Path] | None,
         typer.Argument(
-            metavar="[LOG]...", help="Logs of any known format (docs/formats.md); or those of --labels."
+            metavar="LOG", help="Logs of any known format (docs/formats.md); or those of --labels."
         ),
     ] = None,
     labels: Annotated[
@@ -81,7 +81,7 @@ def train(
 @app.command("predict")
 def predict(
     logs: Annotated[
-        list[Path], typer.Argument(metavar="LOG...", help="Logs of any known format (docs/formats.md).")
+        list[Path], typer.Argument(metavar="LOG", help="Logs of any known format (docs/formats.md).")
     ],
     classifier: Annotated[
         Path, typer.Option("--classifier", "-c", metavar="FILE", help="What 'train' wrote, grounds.npz.")
@@ -101,7 +101,11 @@ def predict(
     ] = 0.0,
     rejection: Annotated[
         float | None,
-        typer.Option(metavar="SHARE", help="Share of windows on known grounds that may be called unknown."),
+        typer.Option(
+            metavar="SHARE",
+            help="Share of windows on known grounds that may be called unknown; "
+            "default: as trained, 0.02.",,
+        ),
     ] = None,
     quiet: Quiet = False,
 ) -> None:
