@@ -103,8 +103,7 @@ def predict(
         float | None,
         typer.Option(
             metavar="SHARE",
-            help="Share of windows on known grounds that may be called unknown; "
-            "default: as trained, 0.02.",,
+            help="Share of windows on known grounds that may be called unknown; default: as trained, 0.02.",
         ),
     ] = None,
     quiet: Quiet = False,
