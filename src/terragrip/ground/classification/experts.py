@@ -125,8 +125,8 @@ def _nothing_to_learn(
     rarest = int(windows[best].argmin())
     fewest = int(windows[best][rarest])
     if not fewest and np.bincount(training.codes)[rarest] >= FEWEST_WINDOWS:
-        problem = "there is no sensor that was measured on every ground"
-        mend = f"give recordings with the same channels ({classes[rarest]!s} lacks {best})"
+        problem = "there is no sensor that was measured through whole windows on every ground"
+        mend = f"give recordings with the same channels, longer than a window ({classes[rarest]!s} has none with {best})"
     elif fewest < FEWEST_WINDOWS:
         problem = f"there is no sensor with {FEWEST_WINDOWS} windows of every ground"
         mend = f"give more or longer recordings ({classes[rarest]!s} has {fewest} windows)"
