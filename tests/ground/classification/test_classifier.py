@@ -308,7 +308,7 @@ STILL = GOOD[["time"]].assign(**dict.fromkeys(BODY, 1.0))
             {},
             "no sensor that was measured through whole windows on every ground",
         ),
-        ([GOOD.head(60)] * 12, ["hard", "wet"] * 6, {}, "longer than a window"),
+        ([GOOD.head(60)] * 24, ["hard", "wet"] * 12, {}, "longer than a window"),
         ([STILL, STILL], ["hard", "wet"], {}, "nothing measured differs"),
         ([GOOD, OTHER.assign(acceleration_x=1.7e308)], ["hard", "wet"], {}, "1.7e+308 is no measurement"),
     ],
