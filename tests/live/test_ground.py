@@ -12,7 +12,7 @@ from machine import events, rows_of
 from terragrip.estimation import TractionEstimator
 from terragrip.ground.live import LiveGround
 from terragrip.live import Recorder, read_record
-from terragrip.live.core import Ground, Settings
+from terragrip.live.core import Core, Ground, Settings
 from terragrip.live.service import Service
 from terragrip.soil.library import Soil, SoilLibrary
 
@@ -49,7 +49,7 @@ def test_a_restart_goes_on_with_the_same_ground(tmp_path, recording, library, ve
     settings = Settings(("replay:test",), channels=tuple(recording.channels), ground=True)
     got, rows = [], list(rows_of(recording))
     for first, last in ((0, 1234), (1234, 2222), (2222, len(rows))):
-        recorder = Recorder(tmp_path, vehicle, settings, library=library, rows=700)
+        recorder = Recorder(tmp_path, Core(vehicle, settings, library), rows=700)
         for time, values in rows[first:last]:
             got += [out for out in recorder.take(time, 0, time, values) if isinstance(out, Ground)]
         recorder.write()

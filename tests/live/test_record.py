@@ -18,7 +18,7 @@ from terragrip import read
 from terragrip.errors import InputError
 from terragrip.estimation import Estimates, TractionEstimator
 from terragrip.live import Recorder, read_record
-from terragrip.live.core import Settings
+from terragrip.live.core import Core, Settings
 from terragrip.live.wal import Reading
 
 KILLS = 100
@@ -81,7 +81,7 @@ def test_killed_a_hundred_times_it_ends_as_if_never_interrupted(tmp_path, vehicl
 
     # Segments of 150 rows: kills hit every step of closing one. On a quick machine a drive ends before the kills do: then another begins.
     def act():
-        play(Recorder(tmp_path / f"r{drives}", vehicle, settings, rows=150), rows, pause=0.004)
+        play(Recorder(tmp_path / f"r{drives}", Core(vehicle, settings), rows=150), rows, pause=0.004)
 
     while kills < KILLS:
         if killed_child(act, random.uniform(0.0, 0.15)):
@@ -89,7 +89,7 @@ def test_killed_a_hundred_times_it_ends_as_if_never_interrupted(tmp_path, vehicl
             drives += 1
         else:
             kills += 1
-    play(Recorder(tmp_path / f"r{drives}", vehicle, settings, rows=150), rows)
+    play(Recorder(tmp_path / f"r{drives}", Core(vehicle, settings), rows=150), rows)
     assert_as_never_interrupted(tmp_path / f"r{drives}", recording, vehicle)
 
 
@@ -97,7 +97,7 @@ def test_at_most_the_frames_behind_the_last_write_are_lost(tmp_path, vehicle, sh
     rows, settings = list(rows_of(short.recording)), settings_for(short.recording)
 
     def act():
-        recorder = Recorder(tmp_path, vehicle, settings)
+        recorder = Recorder(tmp_path, Core(vehicle, settings))
         for stamp, values in rows[:437]:
             recorder.take(stamp, 0, stamp, values)
             recorder.write()
@@ -113,14 +113,14 @@ def test_at_most_the_frames_behind_the_last_write_are_lost(tmp_path, vehicle, sh
 @pytest.mark.parametrize("cut", [1, 7, 30, 100])
 def test_a_torn_end_is_cut_off_and_said(tmp_path, vehicle, short, cut):
     rows, settings = list(rows_of(short.recording)), settings_for(short.recording)
-    recorder = Recorder(tmp_path, vehicle, settings)
+    recorder = Recorder(tmp_path, Core(vehicle, settings))
     for stamp, values in rows[:100]:
         recorder.take(stamp, 0, stamp, values)
     recorder.write()
     recorder.abandon()
     wal = tmp_path / "wal-000001.log"
     wal.write_bytes(wal.read_bytes()[:-cut])
-    again = Recorder(tmp_path, vehicle, settings)
+    again = Recorder(tmp_path, Core(vehicle, settings))
     assert again.core.rows in (98, 99)
     assert "torn" in again.segment.events[-1].text
     play(again, rows)
@@ -128,11 +128,11 @@ def test_a_torn_end_is_cut_off_and_said(tmp_path, vehicle, short, cut):
 
 
 def test_a_flipped_byte_ends_the_reading_there(tmp_path, vehicle, short):
-    recorder = Recorder(tmp_path, vehicle, settings_for(short.recording))
+    recorder = Recorder(tmp_path, Core(vehicle, settings_for(short.recording)))
     for stamp, values in list(rows_of(short.recording))[:50]:
         recorder.take(stamp, 0, stamp, values)
     recorder.close()
-    recorder = Recorder(tmp_path, vehicle, settings_for(short.recording))
+    recorder = Recorder(tmp_path, Core(vehicle, settings_for(short.recording)))
     for stamp, values in list(rows_of(short.recording))[50:100]:
         recorder.take(stamp, 0, stamp, values)
     recorder.write()
@@ -148,7 +148,7 @@ def test_a_flipped_byte_ends_the_reading_there(tmp_path, vehicle, short):
 
 
 def test_segments_are_files_that_every_command_reads(tmp_path, vehicle, short):
-    play(Recorder(tmp_path, vehicle, settings_for(short.recording), rows=250), rows_of(short.recording))
+    play(Recorder(tmp_path, Core(vehicle, settings_for(short.recording)), rows=250), rows_of(short.recording))
     names = sorted(path.name for path in tmp_path.glob("*.parquet"))
     assert names == [f"{kind}-00000{k}.parquet" for kind in ("estimates", "recording") for k in (1, 2, 3)]
     assert len(read(tmp_path / "recording-000002.parquet")) == 250
@@ -158,7 +158,7 @@ def test_segments_are_files_that_every_command_reads(tmp_path, vehicle, short):
 
 
 def test_what_was_refused_is_kept_too(tmp_path, vehicle, short):
-    recorder = Recorder(tmp_path, vehicle, settings_for(short.recording))
+    recorder = Recorder(tmp_path, Core(vehicle, settings_for(short.recording)))
     rows = list(rows_of(short.recording))
     for stamp, values in [*rows[:100], rows[20]]:
         recorder.take(stamp, 0, stamp, values)
@@ -170,9 +170,9 @@ def test_what_was_refused_is_kept_too(tmp_path, vehicle, short):
 
 def test_another_vehicle_or_a_second_writer_is_refused(tmp_path, vehicle, short):
     settings = settings_for(short.recording)
-    recorder = Recorder(tmp_path, vehicle, settings)
+    recorder = Recorder(tmp_path, Core(vehicle, settings))
     with pytest.raises(InputError, match="in use"):
-        Recorder(tmp_path, vehicle, settings)
+        Recorder(tmp_path, Core(vehicle, settings))
     recorder.close()
     other = robot(
         mass=150.0,
@@ -182,14 +182,14 @@ def test_another_vehicle_or_a_second_writer_is_refused(tmp_path, vehicle, short)
         },
     )
     with pytest.raises(InputError, match="another vehicle"):
-        Recorder(tmp_path, other, settings)
+        Recorder(tmp_path, Core(other, settings))
     with pytest.raises(InputError, match="made with window"):
-        Recorder(tmp_path, vehicle, Settings(settings.sources, window=1.0, channels=settings.channels))
+        Recorder(tmp_path, Core(vehicle, Settings(settings.sources, window=1.0, channels=settings.channels)))
     (tmp_path / "snapshot-000000.json").unlink(missing_ok=True)
     for path in tmp_path.glob("snapshot-*"):
         path.write_text(path.read_text().replace('"rows"', '"rowz"'))
         with pytest.raises(InputError, match="is damaged"):
-            Recorder(tmp_path, vehicle, settings)
+            Recorder(tmp_path, Core(vehicle, settings))
 
 
 def test_no_record_is_said(tmp_path):

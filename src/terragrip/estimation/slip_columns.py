@@ -12,6 +12,7 @@ from terragrip.physics.slip import slip
 
 Floats = npt.NDArray[np.float64]
 
+METHOD = "slip-only"
 STANDSTILL = 0.05  # m/s
 GAP = 2.0  # s
 

@@ -21,9 +21,8 @@ from terragrip.estimation.estimator import Estimate, TractionEstimator, unusable
 from terragrip.estimation.noise import channel_noise
 from terragrip.estimation.rim_speeds import DRIVE, radius_before_any_log
 from terragrip.estimation.sealed import seal, unseal
-from terragrip.estimation.slip_columns import GAP, STANDSTILL, Place, Rim, columns_of
+from terragrip.estimation.slip_columns import GAP, METHOD, STANDSTILL, Place, Rim, columns_of
 from terragrip.estimation.slip_filter import SlipFilter, Walks
-from terragrip.estimation.slip_only import METHOD
 from terragrip.recording.schema import has_torque
 from terragrip.vehicle import Vehicle
 

@@ -19,7 +19,7 @@ from terragrip.estimation.engine import EVENTS
 from terragrip.estimation.estimates import Estimates
 from terragrip.estimation.noise import channel_noise, logged_noise, sensor_of
 from terragrip.estimation.rim_speeds import DRIVE, rim_speeds, zero_of
-from terragrip.estimation.slip_columns import GAP, STANDSTILL, Place, Rim, columns_of
+from terragrip.estimation.slip_columns import GAP, METHOD, STANDSTILL, Place, Rim, columns_of
 from terragrip.estimation.slip_filter import Filtered, SlipFilter, Walks, choose_walks, run
 from terragrip.recording import Recording, held_periods, unit_warnings, without_held
 from terragrip.recording.schema import has_torque
@@ -27,7 +27,6 @@ from terragrip.vehicle import Vehicle
 
 Floats = npt.NDArray[np.float64]
 
-METHOD = "slip-only"
 _PASSED_ON = ("drawbar_force", "latitude", "longitude", "altitude")
 _OUTLIER, _STILL, _GAP = (EVENTS.index(name) for name in ("outlier", "standstill", "gap"))
 

@@ -10,31 +10,28 @@ from __future__ import annotations
 import json
 import math
 import struct
-from collections.abc import AsyncGenerator
-from typing import TYPE_CHECKING
+from collections.abc import AsyncGenerator, Sequence
 
 from terragrip import __version__
 from terragrip.errors import InputError
-from terragrip.estimation.engine import EVENTS, estimate_slots
+from terragrip.estimation.engine import EVENTS
+from terragrip.estimation.estimates import wheels_with
 from terragrip.live.message import ESTIMATE, Message
 from terragrip.live.outbox import Outbox
 from terragrip.live.uri import Uri
-
-if TYPE_CHECKING:
-    from terragrip.vehicle import Vehicle
 
 OPTIONS = ("rate", "columns", "format", "token")
 
 
 class Broadcast:
-    """``columns`` and ``wheels``: those of the estimates to come. ``put`` takes a message for all; ``subscribe`` gives one client's
-    frames.
+    """``vehicle``: its name; ``columns``: those of the estimates to come. ``put`` takes a message for all; ``subscribe`` gives one
+    client's frames.
     """
 
-    def __init__(self, vehicle: Vehicle) -> None:
+    def __init__(self, vehicle: str, columns: Sequence[str]) -> None:
         self._vehicle = vehicle
-        self.columns = tuple(estimate_slots(vehicle))
-        self.wheels = tuple(vehicle.wheels)
+        self.columns = tuple(columns)
+        self.wheels = wheels_with("slip", columns)
         self._clients: list[Outbox] = []
         self._dropped = 0
 
@@ -61,7 +58,7 @@ class Broadcast:
         every = list(self.columns)
         columns = every if client.columns is None else [n for n in every if client.columns.wants(n)]
         hello = {
-            "kind": "hello", "version": __version__, "vehicle": self._vehicle.name, "columns": columns,
+            "kind": "hello", "version": __version__, "vehicle": self._vehicle, "columns": columns,
             "wheels": list(self.wheels), "events": list(EVENTS),
         }  # fmt: skip
         packer = struct.Struct(f"<{3 + len(columns)}d")

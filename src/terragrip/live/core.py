@@ -12,6 +12,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from terragrip.errors import InputError
+from terragrip.estimation.engine import estimate_slots
 from terragrip.estimation.estimator import Estimate, TractionEstimator, default_channels
 from terragrip.estimation.methods import DEFAULT
 from terragrip.estimation.slip_estimator import SlipEstimator, restored, speeds_alone
@@ -143,6 +144,11 @@ class Core:
 
             self.ground = LiveGround(estimator, self.library)
         return estimator
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """Columns of the estimates to come; where the channels are not known yet, those that torques give."""
+        return tuple(estimate_slots(self.vehicle)) if self.estimator is None else self.estimator.columns
 
     @property
     def time(self) -> float:

@@ -12,11 +12,11 @@ import json
 import os
 from concurrent.futures import Future, ThreadPoolExecutor
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from terragrip.errors import InputError
 from terragrip.files import unwritable
-from terragrip.live.core import Core, Output, Settings, Values
+from terragrip.live.core import Core, Output, Values
 from terragrip.live.record_folder import (
     SOILS,
     clear,
@@ -31,10 +31,6 @@ from terragrip.live.record_folder import (
 from terragrip.live.segment import Segment
 from terragrip.live.wal import WriteAhead
 
-if TYPE_CHECKING:
-    from terragrip.soil.library import SoilLibrary
-    from terragrip.vehicle import Vehicle
-
 ROWS = 10_000  # a segment is closed after so many rows
 SECONDS = 60.0  # or so long after its first arrival
 
@@ -45,7 +41,7 @@ class Recorder:
     Parameters
     ----------
     folder: made if absent. If it holds a record, the run goes on from its end.
-    vehicle, settings, library: as `Core` takes them; must be the record's.
+    core: one that has taken nothing yet. The record's takes its place; vehicle, settings and library must be the same.
     rows, seconds: when a segment is closed.
 
     Raises InputError if the folder cannot be used, is in use, or holds the record of another vehicle or other settings.
@@ -54,10 +50,8 @@ class Recorder:
     def __init__(
         self,
         folder: Path,
-        vehicle: Vehicle,
-        settings: Settings,
+        core: Core,
         *,
-        library: SoilLibrary | None = None,
         rows: int = ROWS,
         seconds: float = SECONDS,
     ) -> None:
@@ -73,7 +67,7 @@ class Recorder:
         self.opening: list[Output] = []  # what opening brought: that a run goes on
         self._opened: float | None = None  # arrival of the segment's first output
         try:
-            self._resume(vehicle, settings, library)
+            self._resume(core)
         except OSError as error:
             self.abandon()
             raise unwritable(folder, error, "free space or choose another folder") from error
@@ -81,20 +75,20 @@ class Recorder:
             self.abandon()
             raise
 
-    def _resume(self, vehicle: Vehicle, settings: Settings, library: SoilLibrary | None) -> None:
+    def _resume(self, core: Core) -> None:
         for part in self.folder.glob(".*.part"):
             part.unlink()
         number = last_snapshot(self.folder)
         if number is None:
-            if library is not None:
-                library.write(self.folder / SOILS)
-            self.core = Core(vehicle, settings, library)
+            if core.library is not None:
+                core.library.write(self.folder / SOILS)
+            self.core = core
             write_snapshot(self.folder, 0, self.core.state())
             number = 0
         else:
             self.core = load_snapshot(self.folder, number)
             clear(self.folder, number)
-            refuse_other(self.folder, self.core, vehicle, settings, library)
+            refuse_other(self.folder, self.core, core)
         self.segment, ahead, torn = Segment(number + 1), None, 0
         for segment, reading, more in replay(self.folder, number, self.core):
             if more:

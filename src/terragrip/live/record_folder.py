@@ -13,15 +13,13 @@ from typing import TYPE_CHECKING, Any
 
 from terragrip.errors import InputError
 from terragrip.files import unwritable
-from terragrip.live.core import Core, Output, Settings
+from terragrip.live.core import Core, Output
 from terragrip.live.segment import ESTIMATES, RECORDING, Segment, durable, sync_folder
 from terragrip.live.wal import Reading
 
 if TYPE_CHECKING:
     from terragrip.estimation.estimates import Estimates
     from terragrip.recording import Recording
-    from terragrip.soil.library import SoilLibrary
-    from terragrip.vehicle import Vehicle
 
 SOILS = "soils.json"
 
@@ -101,19 +99,17 @@ def locked(folder: Path) -> int:
     return file
 
 
-def refuse_other(
-    folder: Path, core: Core, vehicle: Vehicle, settings: Settings, library: SoilLibrary | None
-) -> None:
-    before, now = core.settings.to_dict(), settings.to_dict()
+def refuse_other(folder: Path, kept: Core, wanted: Core) -> None:
+    before, now = kept.settings.to_dict(), wanted.settings.to_dict()
     for name in before:
         if before[name] != now[name]:
             raise InputError(
                 f"the record was made with {name} {before[name]}, not {now[name]}",
                 file=folder, place="--record", mend="give the same, or choose another folder",
             )  # fmt: skip
-    soils = [None if one is None else one.to_dict() for one in (core.library, library)]
+    soils = [None if one is None else one.to_dict() for one in (kept.library, wanted.library)]
     for what, same in (
-        ("vehicle file", core.vehicle.to_dict() == vehicle.to_dict()),
+        ("vehicle file", kept.vehicle.to_dict() == wanted.vehicle.to_dict()),
         ("soil library", soils[0] == soils[1]),
     ):
         if same:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from terragrip.errors import InputError
 from terragrip.estimation.methods import DEFAULT, method_named
-from terragrip.estimation.slip_estimator import SlipEstimator, speeds_alone
+from terragrip.estimation.slip_estimator import SlipEstimator
 from terragrip.live.core import WINDOW, Core, Ground, Output, Row, Settings
 from terragrip.live.decode import Decoder, check_channels
 from terragrip.live.event import Event
@@ -83,8 +83,6 @@ class Service:
             )
         decoders = [Decoder(profile) for _ in sources]
         opened = [open_source(text, decoder) for text, decoder in zip(sources, decoders, strict=True)]
-        self.sinks = [open_sink(text, vehicle) for text in sinks]
-        self.outboxes = [Outbox(uri) for uri, _ in self.sinks]
         self.sources: list[Source] = [source for _, source in opened]
         if profile is not None:
             check_channels(profile, vehicle)
@@ -97,10 +95,16 @@ class Service:
         settings = Settings(
             names, method, window, tuple(channels), dict(held or {}), ground or library is not None
         )
-        if speeds_alone(channels, vehicle):
-            self._slip_alone(vehicle, settings)
-        self.recorder = None if record is None else Recorder(record, vehicle, settings, library=library)
-        self.core = Core(vehicle, settings, library) if self.recorder is None else self.recorder.core
+        core = Core(vehicle, settings, library)
+        if settings.ground and isinstance(core.estimator, SlipEstimator):
+            raise InputError(
+                "the ground is told by adhesion and soil resistance, which need drive torques",
+                place="--ground", mend="leave it out: the sources give speeds alone",
+            )  # fmt: skip
+        self.sinks = [open_sink(text, vehicle, core.columns) for text in sinks]
+        self.outboxes = [Outbox(uri) for uri, _ in self.sinks]
+        self.recorder = None if record is None else Recorder(record, core)
+        self.core = core if self.recorder is None else self.recorder.core
         self._engine: Core | Recorder = self.core if self.recorder is None else self.recorder
         self.inbox = Inbox(capacity)
         self.inbox.busy = lambda: any(outbox.is_busy for outbox in self.outboxes)
@@ -122,22 +126,6 @@ class Service:
         self._house: asyncio.TimerHandle | None = None
         self._house_due = float("inf")  # on the inbox's clock
         self._record_failure: str | None = None
-
-    def _slip_alone(self, vehicle: Vehicle, settings: Settings) -> None:
-        """No source has a torque: tell the sinks which columns there are; raises InputError where the ground is to be followed."""
-        if settings.ground:
-            raise InputError(
-                "the ground is told by adhesion and soil resistance, which need drive torques",
-                place="--ground", mend="leave it out: the sources give speeds alone",
-            )  # fmt: skip
-        columns = SlipEstimator(vehicle, settings.channels).columns
-        for _, sink in self.sinks:
-            broadcast = getattr(sink, "broadcast", None)
-            if broadcast is not None:
-                broadcast.columns = columns
-                broadcast.wheels = tuple(
-                    n[5:] for n in columns if n.startswith("slip_") and not n.endswith("_std")
-                )
 
     def stop(self) -> None:
         """Let `run` come to its end."""

@@ -9,6 +9,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
+from terragrip.estimation.estimates import wheels_with
 from terragrip.live.core import Row
 from terragrip.live.message import Message
 
@@ -102,25 +103,22 @@ def head(service: Service) -> list[str]:
 
 def _wheels(row: Row, table: Any) -> Any:
     estimate = row.estimate
-    if not any(name.startswith("adhesion_") for name in estimate.places):
+    wheels = wheels_with("adhesion", estimate.places)
+    if not wheels:
         shown = table("wheel", "slip %", "zero-slip radius m")
-        for name in estimate.places:
-            if name.startswith("slip_") and not name.endswith("_std"):
-                wheel = name.removeprefix("slip_")
-                radius = _with_std(estimate, f"zero_slip_radius_{wheel}", 1.0, 3)
-                shown.add_row(wheel, _with_std(estimate, name, 100.0, 1), radius)
+        for wheel in wheels_with("slip", estimate.places):
+            radius = _with_std(estimate, f"zero_slip_radius_{wheel}", 1.0, 3)
+            shown.add_row(wheel, _with_std(estimate, f"slip_{wheel}", 100.0, 1), radius)
         return shown
     shown = table("wheel", "slip %", "adhesion", "net traction", "efficiency %")
-    for name in estimate.places:
-        if name.startswith("adhesion_") and not name.endswith("_std"):
-            wheel = name.removeprefix("adhesion_")
-            shown.add_row(
-                wheel,
-                _with_std(estimate, f"slip_{wheel}", 100.0, 1),
-                _with_std(estimate, f"adhesion_{wheel}", 1.0, 2),
-                _with_std(estimate, f"net_traction_{wheel}", 1.0, 2),
-                _with_std(estimate, f"efficiency_{wheel}", 100.0, 0),
-            )
+    for wheel in wheels:
+        shown.add_row(
+            wheel,
+            _with_std(estimate, f"slip_{wheel}", 100.0, 1),
+            _with_std(estimate, f"adhesion_{wheel}", 1.0, 2),
+            _with_std(estimate, f"net_traction_{wheel}", 1.0, 2),
+            _with_std(estimate, f"efficiency_{wheel}", 100.0, 0),
+        )
     return shown
 
 

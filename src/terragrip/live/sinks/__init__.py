@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 from importlib import import_module
 from typing import TYPE_CHECKING, Protocol
 
@@ -37,9 +37,9 @@ class Sink(Protocol):
         """Take messages for ever; raises Lost where the other side went away."""
 
 
-def open_sink(text: str, vehicle: Vehicle) -> tuple[Uri, Sink]:
-    """The sink of a URI; raises InputError if it names none, or the package it needs is missing."""
+def open_sink(text: str, vehicle: Vehicle, columns: Sequence[str]) -> tuple[Uri, Sink]:
+    """The sink of a URI for estimates of these columns; raises InputError if it names none, or the package it needs is missing."""
     uri = Uri.parse(text, OPTIONS, "sink")
     with packages_of(uri):
-        sink: Sink = import_module(f"{__name__}.{_HOMES[uri.scheme]}").open_sink(uri, vehicle)
+        sink: Sink = import_module(f"{__name__}.{_HOMES[uri.scheme]}").open_sink(uri, vehicle, columns)
     return uri, sink

@@ -20,6 +20,8 @@ from terragrip.live.outbox import Outbox
 from terragrip.live.uri import Uri
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from terragrip.vehicle import Vehicle
 
 DBC = Path(__file__).parents[1] / "terragrip.dbc"
@@ -133,6 +135,6 @@ def _raw(signal: Any, value: float) -> int:
     return min(max(raw, 0), most)
 
 
-def open_sink(uri: Uri, vehicle: Vehicle) -> CanSink:
+def open_sink(uri: Uri, vehicle: Vehicle, columns: Sequence[str]) -> CanSink:
     """See `terragrip.live.sinks.open_sink`."""
     return CanSink(uri, vehicle)

@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from terragrip.errors import InputError
-from terragrip.estimation.engine import estimate_slots
 from terragrip.files import unwritable
 from terragrip.live.feed import Lost
 from terragrip.live.message import EVENT, STATUS, Message
@@ -16,6 +15,8 @@ from terragrip.live.schemas import NAMES, schema_of
 from terragrip.live.uri import Uri
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from terragrip.vehicle import Vehicle
 
 _FLUSH = 1.0  # s
@@ -26,7 +27,7 @@ _SEGMENT = 600.0  # s in one MCAP file
 class FoxgloveSink:
     """``foxglove://127.0.0.1:8765?mcap=FOLDER``: topics /terragrip/estimate, /ground, /soil, /event, /status."""
 
-    def __init__(self, uri: Uri, vehicle: Vehicle) -> None:
+    def __init__(self, uri: Uri, vehicle: Vehicle, columns: Sequence[str]) -> None:
         import foxglove
 
         self.uri, self._vehicle = uri, vehicle
@@ -37,12 +38,11 @@ class FoxgloveSink:
             )  # fmt: skip
         self._folder = Path(uri.options["mcap"]) if "mcap" in uri.options else None
         self._context = foxglove.Context()
-        columns = list(estimate_slots(vehicle))
         self._channels = {kind: self._channel(kind, columns) for kind in NAMES}
         self._writer: Any = None
         self._began = self._flushed = 0.0
 
-    def _channel(self, kind: str, columns: list[str]) -> Any:
+    def _channel(self, kind: str, columns: Sequence[str]) -> Any:
         import json
 
         import foxglove
@@ -115,6 +115,6 @@ def _nanoseconds(message: Message) -> int:
     return max(0, round(1e9 * message.time))
 
 
-def open_sink(uri: Uri, vehicle: Vehicle) -> FoxgloveSink:
+def open_sink(uri: Uri, vehicle: Vehicle, columns: Sequence[str]) -> FoxgloveSink:
     """See `terragrip.live.sinks.open_sink`."""
-    return FoxgloveSink(uri, vehicle)
+    return FoxgloveSink(uri, vehicle, columns)

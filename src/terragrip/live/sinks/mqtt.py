@@ -10,6 +10,8 @@ from terragrip.live.outbox import Outbox
 from terragrip.live.uri import Uri
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from terragrip.vehicle import Vehicle
 
 
@@ -40,6 +42,6 @@ class MqttSink:
             raise Lost(f"the broker: {error.strerror or error}") from error
 
 
-def open_sink(uri: Uri, vehicle: Vehicle) -> MqttSink:
+def open_sink(uri: Uri, vehicle: Vehicle, columns: Sequence[str]) -> MqttSink:
     """See `terragrip.live.sinks.open_sink`."""
     return MqttSink(uri)

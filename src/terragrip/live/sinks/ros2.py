@@ -16,6 +16,8 @@ from terragrip.live.ros2 import STRING, STRING_HASH, dds_name, domain_of, has_rc
 from terragrip.live.uri import Uri
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from terragrip.vehicle import Vehicle
 
 
@@ -89,6 +91,6 @@ def cdr_string(text: bytes) -> bytes:
     return struct.pack("<BBHI", 0, 1, 0, len(text) + 1) + text + b"\0"
 
 
-def open_sink(uri: Uri, vehicle: Vehicle) -> Ros2Sink:
+def open_sink(uri: Uri, vehicle: Vehicle, columns: Sequence[str]) -> Ros2Sink:
     """See `terragrip.live.sinks.open_sink`."""
     return Ros2Sink(uri)

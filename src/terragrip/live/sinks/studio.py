@@ -15,17 +15,19 @@ from terragrip.live.outbox import Outbox
 from terragrip.live.uri import Uri
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from terragrip.vehicle import Vehicle
 
 
 class StudioSink:
     """``studio://127.0.0.1:8766``. Beyond this machine clients must know the token."""
 
-    def __init__(self, uri: Uri, vehicle: Vehicle) -> None:
+    def __init__(self, uri: Uri, vehicle: Vehicle, columns: Sequence[str]) -> None:
         import websockets.asyncio.server  # noqa: F401  # so that a missing package is said at once
 
         self.uri = uri
-        self.broadcast = Broadcast(vehicle)
+        self.broadcast = Broadcast(vehicle.name, columns)
         self._credentials = Credentials.find()
         if not uri.is_loopback() and not self._credentials.token:
             raise InputError(
@@ -81,6 +83,6 @@ class StudioSink:
             await frames.aclose()
 
 
-def open_sink(uri: Uri, vehicle: Vehicle) -> StudioSink:
+def open_sink(uri: Uri, vehicle: Vehicle, columns: Sequence[str]) -> StudioSink:
     """See `terragrip.live.sinks.open_sink`."""
-    return StudioSink(uri, vehicle)
+    return StudioSink(uri, vehicle, columns)

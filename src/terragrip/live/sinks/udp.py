@@ -14,6 +14,8 @@ from terragrip.live.outbox import Outbox
 from terragrip.live.uri import Uri
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from terragrip.vehicle import Vehicle
 
 
@@ -78,6 +80,6 @@ class UdpSink:
         return struct.pack(f"<{1 + len(numbers)}d", row.estimate.time, *numbers)
 
 
-def open_sink(uri: Uri, vehicle: Vehicle) -> UdpSink:
+def open_sink(uri: Uri, vehicle: Vehicle, columns: Sequence[str]) -> UdpSink:
     """See `terragrip.live.sinks.open_sink`."""
     return UdpSink(uri)

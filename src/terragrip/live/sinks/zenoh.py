@@ -11,6 +11,8 @@ from terragrip.live.uri import Uri
 from terragrip.live.zenoh import config, key_of, open_session
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from terragrip.vehicle import Vehicle
 
 
@@ -42,6 +44,6 @@ class ZenohSink:
             await asyncio.to_thread(session.close)
 
 
-def open_sink(uri: Uri, vehicle: Vehicle) -> ZenohSink:
+def open_sink(uri: Uri, vehicle: Vehicle, columns: Sequence[str]) -> ZenohSink:
     """See `terragrip.live.sinks.open_sink`."""
     return ZenohSink(uri)
