@@ -18,7 +18,8 @@ from setuptools import Extension
 
 ROOT = Path(__file__).resolve().parent
 CPU_CHECK = "int tg_cpu_has_avx2(void);"
-TEXT = "size_t tg_json_members(int32_t count, const char *names, const int32_t *places, const double *values, char *out);"
+TEXT = """size_t tg_json_row(const char *head, int32_t count, const char *names, const int32_t *places, const char *values,
+char *out);"""
 
 # -O3 without -ffast-math: NaN means "missing" here. errno and floating-point traps are read by nobody.
 # Contraction to fused multiply-add stays off, so that the portable and the AVX2 build give the same bits.

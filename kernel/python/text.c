@@ -1,10 +1,10 @@
-/* Columns of an estimate as members of a JSON object: for programs that send estimates as text, many a second. */
+/* An estimate as a JSON object: for programs that send estimates as text, many a second. */
 #include <math.h>
 #include <stddef.h>
 #include <stdint.h>
 #include <string.h>
 
-size_t tg_json_members(int32_t count, const char *names, const int32_t *places, const double *values, char *out);
+size_t tg_json_row(const char *head, int32_t count, const char *names, const int32_t *places, const char *values, char *out);
 
 static const double POWERS[] = {1e0,  1e1,  1e2,  1e3,  1e4,  1e5,  1e6,  1e7,  1e8,  1e9,  1e10, 1e11,
                                 1e12, 1e13, 1e14, 1e15, 1e16, 1e17, 1e18, 1e19, 1e20, 1e21, 1e22};
@@ -79,16 +79,19 @@ static char *number(char *out, double value)
     return copied(out, text + whole, (size_t)(length - whole));
 }
 
-/* Write `names`, each with what stands around it and ended by a zero, and behind each the value at its place: null where it is NaN or
- * infinite. `out` holds the names and 17 characters a number; returns the length. */
-size_t tg_json_members(int32_t count, const char *names, const int32_t *places, const double *values, char *out)
+/* Write `head`, then of each column its name, with what stands around it and ended by a zero, and the number at its place among
+ * `values`, the bytes of doubles: null where it is NaN or infinite; then the closing brace. `out` holds all that with 17 characters a
+ * number; returns the length. */
+size_t tg_json_row(const char *head, int32_t count, const char *names, const int32_t *places, const char *values, char *out)
 {
-    char *end = out;
+    char *end = copied(out, head, strlen(head));
     for (int32_t k = 0; k < count; k++) {
         const size_t length = strlen(names);
-        end = copied(end, names, length);
-        end = number(end, values[places[k]]);
+        double value;
+        memcpy(&value, values + (size_t)places[k] * sizeof value, sizeof value); /* bytes need not be aligned */
+        end = number(copied(end, names, length), value);
         names += length + 1;
     }
+    *end++ = '}';
     return (size_t)(end - out);
 }

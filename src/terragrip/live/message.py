@@ -11,6 +11,7 @@ from terragrip.live.core import Row
 from terragrip.live.event import Event
 
 _DIGITS = 17  # characters of a number at most
+_HEAD = 200  # characters before the columns at most
 ESTIMATE, EVENT, STATUS, SOIL, GROUND = "estimate", "event", "status", "soil", "ground"
 
 
@@ -62,7 +63,8 @@ class Columns:
             members = b"".join(f',"{name}":\0'.encode() for name in self._places)
             self._members = ffi.new("char[]", members)
             self._slots = ffi.new("int32_t[]", list(self._places.values()))
-            self._out = ffi.new("char[]", len(members) + _DIGITS * len(self._places))
+            self._count = len(self._places)
+            self._out = ffi.new("char[]", _HEAD + len(members) + _DIGITS * self._count)
             self._text = ffi.buffer(self._out)
         return self._places
 
@@ -71,16 +73,15 @@ class Columns:
         estimate = row.estimate
         if self._of is not estimate.places:
             self.places(row)
-        length = lib.tg_json_members(
-            len(self._places),
-            self._members,
-            self._slots,
-            ffi.from_buffer("double[]", estimate.packed),
-            self._out,
+        head = (
+            f'{{"time":{estimate.time!r},"arrival":{row.arrival!r},"event":"{estimate.event}",'
+            f'"predicted":{"true" if row.predicted else "false"}'
         )
-        predicted = "true" if row.predicted else "false"
-        head = f'{{"time":{estimate.time!r},"arrival":{row.arrival!r},"event":"{estimate.event}","predicted":{predicted}'
-        return b"%b%b}" % (head.encode(), self._text[:length])
+        length = lib.tg_json_row(
+            head.encode(), self._count, self._members, self._slots, estimate.packed, self._out
+        )
+        text: bytes = self._text[:length]
+        return text
 
 
 _EVERY = Columns()
