@@ -1,13 +1,14 @@
 """Memory and speed of reading large logs: peak memory over the size of the file, and seconds a gigabyte.
 
     python benchmarks/bench_formats.py [megabytes, default 100] [kinds, default all]
-    python benchmarks/bench_formats.py --large [megabytes, default 5000]
+    python benchmarks/bench_formats.py --large [megabytes, default 5000] [words of the logs' names, default all]
 
 Writes a candump log, an MF4 file (signals, and bus logging) and an MCAP file of that size, most of which nobody asks for,
 and reads what a profile asks for in a process of its own. The peer, where there is one, is the plain loop of the library
 that reads the same file without keeping anything. What is wanted: memory stays far below the file's size, so that 5 GB fit
-into 2 GB. ``--large`` tries that: a CSV of 40 columns and an MF4 bus log of that size (as much room again on the disk) go
-through `tg.read`, ``terragrip inspect`` and ``terragrip estimate``, with the peak of all memory, mapped files and all.
+into 2 GB. ``--large`` tries that with the logs of `large_logs` (as much room again on the disk): they go through `tg.read`,
+``terragrip inspect`` and ``terragrip estimate``, with the peak of all memory, mapped files and all; the peer reads a log of a tenth
+of the size.
 """
 
 from __future__ import annotations
@@ -20,6 +21,8 @@ import time
 from pathlib import Path
 
 import numpy as np
+
+from large_logs import FRAME, LARGE, Large, profile_of_struct
 
 READ = """
 import terragrip as tg
@@ -41,10 +44,6 @@ NAMED = {"channels": {"wheel_based_speed": "u", "ground_speed": "v"}}
 TOPIC = {"channels": {"wheel_based_speed": "/speed.u", "ground_speed": "/speed.v"}}
 
 
-FRAME = np.dtype(
-    [("CAN_DataFrame.BusChannel", "u1"), ("CAN_DataFrame.ID", "<u4"), ("CAN_DataFrame.IDE", "u1"),
-     ("CAN_DataFrame.DLC", "u1"), ("CAN_DataFrame.DataLength", "u1"), ("CAN_DataFrame.DataBytes", "(8,)u1")]
-)  # fmt: skip
 VEHICLE = """
 mass: 60 kg
 wheelbase: 0.6 m
@@ -92,66 +91,6 @@ def mf4_bus(path: Path, size: int) -> None:
             acq_source=source,
         )
         file.save(path, overwrite=True)
-
-
-def long_csv(path: Path, size: int) -> None:
-    """A robot's log at 100 Hz beside 29 columns that nobody asks for, 10 000 rows again and again under new stamps."""
-    draws, rows = np.random.default_rng(0), 10_000
-    speed = 1 + 0.2 * np.sin(np.arange(rows) / 300)
-    wheels = [speed / 0.2 / 0.9 + 0.02 * draws.standard_normal(rows) for _ in range(4)]
-    torques = [15 + draws.standard_normal(rows) for _ in range(4)]
-    others = [draws.standard_normal(rows) for _ in range(29)]
-    pull = 200 + 4 * draws.standard_normal(rows)
-    columns = [speed + 0.01 * draws.standard_normal(rows), *wheels, *torques, pull, *others]
-    lines = [",".join(f"{column[k]:.5f}" for column in columns) for k in range(rows)]
-    corners = ("fl", "fr", "rl", "rr")
-    names = [
-        "time",
-        "ground_speed",
-        *(f"wheel_speed_{w}" for w in corners),
-        *(f"drive_torque_{w}" for w in corners),
-    ]
-    with path.open("w") as stream:
-        stream.write(",".join([*names, "drawbar_force", *(f"extra_{k}" for k in range(29))]) + "\n")
-        written, first = 0, 0
-        while written < size:
-            text = "".join(f"{(first + k) / 100:.2f},{line}\n" for k, line in enumerate(lines))
-            stream.write(text)
-            written, first = written + len(text), first + rows
-
-
-def long_mf4(path: Path, size: int) -> None:
-    """`mf4_bus` written block by block: 2 kHz of 20 messages, of which two are wanted, with slip in them."""
-    import asammdf
-
-    source = asammdf.Source("CAN", "CAN", "", asammdf.Source.SOURCE_BUS, asammdf.Source.BUS_TYPE_CAN)
-    rows, draws = 2_000_000, np.random.default_rng(0)
-    file = asammdf.MDF(temporary_folder=path.parent)
-    for first in range(0, size // (FRAME.itemsize + 8), rows):
-        count = first + np.arange(rows)
-        other, time_ = count % 20, count * 5e-4
-        speed = 2000 + 300 * np.sin(time_ / 20)
-        raw = np.where(other == 0, speed / (0.94 - 0.05 * np.sin(time_ / 7)), speed)
-        raw = (raw + 20 * draws.standard_normal(rows)).astype(np.uint16)
-        data = np.zeros((rows, 8), np.uint8)
-        data[:, 0], data[:, 1], data[:, 6], data[:, 7] = raw & 255, raw >> 8, 255, 0xFD
-        records = np.zeros(rows, FRAME)
-        known = np.where(other == 0, 0x0CFE48F0, 0x0CFE4980)
-        records["CAN_DataFrame.ID"] = np.where(other < 2, known, 0x18FF0017 + 256 * other)
-        records["CAN_DataFrame.IDE"], records["CAN_DataFrame.DLC"], records["CAN_DataFrame.DataLength"] = (
-            1,
-            8,
-            8,
-        )
-        records["CAN_DataFrame.DataBytes"] = data
-        if first:
-            file.extend(0, [(time_, None), (records, None)])
-        else:
-            file.append(
-                asammdf.Signal(records, time_, name="CAN_DataFrame", source=source), acq_source=source
-            )
-    file.save(path, overwrite=True)
-    file.close()
 
 
 def mf4_signals(path: Path, size: int) -> None:
@@ -230,43 +169,59 @@ CASES = {
 }
 
 
-LARGE = {
-    "CSV, 11 of 40 columns wanted": (long_csv, "log.csv", ()),
-    "MF4 bus, two of 20 messages wanted": (long_mf4, "bus.mf4", ("--profile", "tractor-isobus")),
-}
-
-
-def large(size: int) -> None:
+def large(size: int, words: list[str]) -> None:
     """Print the table of logs of gigabytes."""
-    print("| log | MB | what | peak MB | s |")
-    print("|---|---:|---|---:|---:|")
-    with tempfile.TemporaryDirectory() as folder:
-        vehicle = Path(folder) / "vehicle.yaml"
-        vehicle.write_text(VEHICLE)
-        for name, (_, file, profile) in LARGE.items():
-            path, out = Path(folder) / file, Path(folder) / "estimates.parquet"
-            subprocess.run(
-                [sys.executable, __file__, "--write-large", name, str(path), str(size)], check=True
+    print("| log | MB | what | peak MB | s | MB/s | MB/s of the library's own loop |")
+    print("|---|---:|---|---:|---:|---:|---:|")
+    for name, log in LARGE.items():
+        if all(word.lower() in name.lower() for word in words):
+            with tempfile.TemporaryDirectory() as folder:
+                tried(name, log, size, Path(folder))
+
+
+def tried(name: str, log: Large, size: int, folder: Path) -> None:
+    """Print the rows of one log."""
+    vehicle, out, path = folder / "vehicle.yaml", folder / "estimates.parquet", folder / log.file
+    vehicle.write_text(VEHICLE)
+    (folder / "struct.yaml").write_text(profile_of_struct())
+    profile = [word.format(folder=folder) for word in log.profile]
+    peer = f"{own_pace(name, log, size // 10, path):.0f}" if log.loop else ""
+    write(name, path, size)
+    megabytes, command = path.stat().st_size / 1e6, (sys.executable, "-m", "terragrip")
+    work = {
+        "`tg.read`": (f"import terragrip as tg; tg.read({str(path)!r}, *{profile[1:]!r})",),
+        "`terragrip inspect`": ("", *command, "inspect", str(path)),
+        "`terragrip estimate`": (
+            "", *command, "estimate", str(path), "--vehicle", str(vehicle), *profile, "-o", str(out), "--quiet",
+        ),
+    }  # fmt: skip
+    for what, arguments in work.items():
+        if log.recording_fits or what != "`tg.read`":
+            seconds, peak = measured(*arguments, kinds=("VmRSS",))
+            pace = megabytes / seconds
+            print(
+                f"| {name} | {megabytes:.0f} | {what} | {peak:.0f} | {seconds:.0f} | {pace:.0f} | {peer} |",
+                flush=True,
             )
-            megabytes, command = path.stat().st_size / 1e6, (sys.executable, "-m", "terragrip")
-            work = {
-                "`tg.read`": (f"import terragrip as tg; tg.read({str(path)!r}, *{profile[1:]!r})",),
-                "`terragrip inspect`": ("", *command, "inspect", str(path)),
-                "`terragrip estimate`": (
-                    "", *command, "estimate", str(path), "--vehicle", str(vehicle), *profile, "-o", str(out), "--quiet",
-                ),
-            }  # fmt: skip
-            for what, arguments in work.items():
-                seconds, peak = measured(*arguments, kinds=("VmRSS",))
-                print(f"| {name} | {megabytes:.0f} | {what} | {peak:.0f} | {seconds:.0f} |", flush=True)
-            path.unlink()
-            out.unlink()
+
+
+def own_pace(name: str, log: Large, size: int, path: Path) -> float:
+    """MB/s of the library's own loop over a log of this size."""
+    write(name, path, size)
+    seconds, _ = measured(log.loop.format(path=str(path)))
+    return path.stat().st_size / 1e6 / seconds
+
+
+def write(name: str, path: Path, size: int) -> None:
+    """Write a log in a process of its own, which takes its memory with it."""
+    path.unlink(missing_ok=True)
+    subprocess.run([sys.executable, __file__, "--write-large", name, str(path), str(size)], check=True)
 
 
 def main() -> None:
     """Print the table."""
     if sys.argv[1:2] == ["--large"]:
-        large(int(sys.argv[2] if len(sys.argv) > 2 else 5000) * 1_000_000)
+        large(int(sys.argv[2] if len(sys.argv) > 2 else 5000) * 1_000_000, sys.argv[3:])
         return
     size = int(sys.argv[1] if len(sys.argv) > 1 else 100) * 1_000_000
     chosen = sys.argv[2:] or list(CASES)
@@ -291,8 +246,9 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    if sys.argv[1:2] in (["--write"], ["--write-large"]):
-        writers = CASES if sys.argv[1] == "--write" else LARGE
-        writers[sys.argv[2]][0](Path(sys.argv[3]), int(sys.argv[4]))
+    if sys.argv[1:2] == ["--write"]:
+        CASES[sys.argv[2]][0](Path(sys.argv[3]), int(sys.argv[4]))
+    elif sys.argv[1:2] == ["--write-large"]:
+        LARGE[sys.argv[2]].write(Path(sys.argv[3]), int(sys.argv[4]))
     else:
         main()
