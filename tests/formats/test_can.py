@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 import struct
 from collections.abc import Callable
+from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
 import can
@@ -359,3 +360,55 @@ def test_asc_stamps_that_count_from_the_event_before(tmp_path: Path) -> None:
     again = read_table(log).columns
     assert np.allclose(again["time"], whole["time"], atol=1e-5)
     assert np.array_equal(again["GroundBasedMachineSpeed"], whole["GroundBasedMachineSpeed"], equal_nan=True)
+
+
+def blanks(data: bytes) -> str:
+    return data.hex(" ").upper()
+
+
+DATE = datetime(2025, 6, 15, 12, 0, tzinfo=UTC)
+TEXTS = {
+    "candump -l": lambda t, i, d: f"({START + t:.6f}) can0 {i:08X}#{d.hex()}",
+    "candump -L -x": lambda t, i, d: f"({START + t:.6f}) can0 {i:08X}#{d.hex()} R",
+    "candump -ta": lambda t, i, d: f" ({START + t:.6f})  can0  {i:08X}   [8]  {blanks(d)}",
+    "candump -ta -x -a": lambda t, i, d: (
+        f" ({START + t:.6f})  can0  RX - -  {i:08X}   [8]  {blanks(d)}   '........'"
+    ),
+    "candump -tA": lambda t, i, d: (
+        f" ({DATE + timedelta(seconds=t):%Y-%m-%d %H:%M:%S.%f})  can0  {i:08X}   [8]  {blanks(d)}"
+    ),
+    "candump -tz": lambda t, i, d: f" ({t:010.6f})  can0  {i:08X}   [8]  {blanks(d)}",
+    "FD frames": lambda t, i, d: f"({START + t:.6f}) can0 {i:08X}##1{d.hex()}",
+    "TRC 1.0": lambda t, i, d: f"{1:6d}) {1000 * t:9.0f} {i:08X}  8  {blanks(d)}",
+    "TRC 1.1": lambda t, i, d: f"{1:6d}) {1000 * t:11.1f}  Rx {i:08X}  8  {blanks(d)}",
+    "TRC 1.3": lambda t, i, d: f"{1:6d}) {1000 * t:11.3f} 1  Rx {i:08X} -  8  {blanks(d)}",
+    "TRC 2.0": lambda t, i, d: f"{1:6d} {1000 * t:11.3f} DT {i:08X} Rx 8 {blanks(d)}",
+    "TRC 2.1": lambda t, i, d: f"{1:6d} {1000 * t:11.3f} DT 1 {i:08X} Rx - 8 {blanks(d)}",
+}
+HEADS = {
+    "TRC 1.0": ";  made by PCAN-Explorer\n;\n",
+    **{f"TRC 1.{k}": f";$FILEVERSION=1.{k}\n;$STARTTIME=45000.5\n;\n" for k in (1, 3)},
+    "TRC 2.0": ";$FILEVERSION=2.0\n;$STARTTIME=45000.5\n;$COLUMNS=N,O,T,I,d,l,D\n",
+    "TRC 2.1": ";$FILEVERSION=2.1\n;$STARTTIME=45000.5\n;$COLUMNS=N,O,T,B,I,d,R,L,D\n",
+}
+
+
+@pytest.mark.parametrize("form", [*TEXTS, "candump -td"])
+def test_forms_of_text_logs_by_their_content(tmp_path: Path, form: str) -> None:
+    frames = [(t - START, i, d) for t, i, d in drive(1000, 40.0).frames]
+    written, last = TEXTS.get(form, TEXTS["candump -tz"]), 0.0
+    text = HEADS.get(form, "")
+    for t, i, d in frames:
+        text, last = text + written(t - last if form == "candump -td" else t, i, d) + "\n", t
+    path = tmp_path / "log.txt"  # the name tells nothing
+    path.write_text(text)
+    recording = read(path, "tractor-isobus")
+    assert np.allclose(recording.time, [t for t, _, _ in frames], atol=1e-3)
+    assert np.isfinite(recording["ground_speed"]).sum() == 200
+
+
+def test_printed_frames_without_stamps_say_what_to_do(tmp_path: Path) -> None:
+    path = tmp_path / "log.txt"
+    path.write_text("".join(f"  can0  {i:08X}   [8]  {blanks(d)}\n" for _, i, d in drive(1000, 5.0).frames))
+    with pytest.raises(InputError, match=r"line 1 .*: its frames have no stamps; record it by candump -l"):
+        read(path, "tractor-isobus")

@@ -7,6 +7,7 @@ import hashlib
 import subprocess
 import sys
 from collections.abc import Callable
+from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
 import numpy as np
@@ -16,7 +17,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from terragrip.errors import InputError
-from terragrip.formats import read, read_table
+from terragrip.formats import Profile, inspect, read, read_table
 from terragrip.recording import Recording
 
 
@@ -243,3 +244,64 @@ def test_reading_leaves_pandas_asleep(tmp_path: Path, log: pd.DataFrame, suffix:
         "sys.exit(bool({'pandas', 'polars', 'pint', 'scipy'} & set(sys.modules)))"
     )
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
+
+
+ROWS = 200
+
+
+@pytest.mark.parametrize(
+    "before", ["Logger: X200\nSerial: 12\n\n", "% by hand\n", "// export\n# 3 Hz\n", "Kunde;Müller;\n"]
+)
+@pytest.mark.parametrize("separator", [",", ";", "\t"])
+def test_lines_before_the_header_are_passed_over(tmp_path: Path, before: str, separator: str) -> None:
+    names = ("time", "ground_speed", "wheel_speed_l", "drive_torque_l", "drawbar_force", "soil")
+    text = before + separator.join(names) + "\n"
+    for k in range(ROWS):
+        cells = [f"{k / 10:.1f}", *(f"{k + j}.5" for j in range(4)), "clay"]
+        text += separator.join(cells).replace(".", "," if separator == ";" else ".") + "\n"
+    path = tmp_path / "log.csv"
+    path.write_text(text)
+    table = read_table(path)
+    assert table.names == names
+    assert np.array_equal(table.columns["drawbar_force"], np.arange(ROWS) + 3.5)
+
+
+def test_a_header_that_lacks_a_name_is_no_line_before_it(tmp_path: Path) -> None:
+    path = tmp_path / "log.csv"
+    path.write_text("time,ground_speed,wheel_speed_l\n" + "0.1,a,c,d\n" * 20)
+    with pytest.raises(InputError, match="row 1: has 4 cells, the header 3"):
+        read_table(path)
+
+
+@pytest.mark.parametrize(
+    ("form", "is_date"),
+    [
+        ("%H:%M:%S.%f", False),
+        ("%d.%m.%Y %H:%M:%S,%f", True),
+        ("%Y/%m/%d %H:%M:%S.%f", True),
+        ("%Y-%m-%d %H:%M:%S,%f", True),
+    ],
+)
+@pytest.mark.parametrize("name", ["time", "Zeit"])
+def test_times_and_dates_as_loggers_write_them(tmp_path: Path, form: str, is_date: bool, name: str) -> None:
+    start = datetime(2026, 5, 1, 23, 59, 55, tzinfo=UTC)  # past midnight
+    stamps = [start + timedelta(milliseconds=100 * k) for k in range(ROWS)]
+    path = tmp_path / "log.csv"
+    rows = (f"{t.strftime(form)};{k},5;3,0\n" for k, t in enumerate(stamps))
+    path.write_text(f"{name};ground_speed;wheel_speed_l\n" + "".join(rows))
+    table = read_table(path)
+    assert (table.columns[name].dtype.kind == "M") is is_date
+    channels = {"ground_speed": "ground_speed", "wheel_speed_l": "wheel_speed_l"}
+    profile = Profile.from_dict({"time": {"from": name, "zero": "first"}, "channels": channels})
+    assert np.allclose(read(path, profile).time, np.arange(ROWS) / 10, atol=1e-6)
+    if name == "time" and is_date:
+        assert np.allclose(read(path).time, np.arange(ROWS) / 10, atol=1e-6)
+        assert inspect(path).time is not None
+
+
+def test_texts_that_are_no_times_stay_texts(tmp_path: Path) -> None:
+    path = tmp_path / "log.csv"
+    path.write_text("time,remark,day\n0,12:00:00,31.02.2026 10:00:00\n1,later,01.13.2026 10:00:00\n")
+    columns = read_table(path).columns
+    assert columns["remark"].tolist() == ["12:00:00", "later"]
+    assert columns["day"].dtype == object

@@ -15,6 +15,7 @@ from terragrip.files import refuse_missing, sha256
 from terragrip.formats.dialect import Dialect, detect, split, to_text
 from terragrip.formats.table import LogTable, Wanted, from_arrow
 from terragrip.formats.text_file import is_packed, length_of, opened, read
+from terragrip.formats.written_times import times_of
 from terragrip.recording.schema import LABELS, TIME, is_channel
 
 if TYPE_CHECKING:
@@ -122,7 +123,16 @@ def parse(
     except (pa.ArrowInvalid, pa.ArrowKeyError) as error:
         texts = _arrow_of_texts(body, dialect, chosen, error, source, first)
         return {names[k]: _numbers_of_texts(names[k], texts.column(_field(k)), source, first) for k in chosen}
-    return {names[k]: from_arrow(names[k], table.column(_field(k)), source) for k in chosen}
+    found = {names[k]: from_arrow(names[k], table.column(_field(k)), source) for k in chosen}
+    return {name: _as_times(name, column) for name, column in found.items()}
+
+
+def _as_times(name: str, column: npt.NDArray[Any]) -> npt.NDArray[Any]:
+    """A column, with times and dates that Arrow took for text."""
+    if column.dtype != object or name in LABELS:
+        return column
+    times = times_of(column.tolist())
+    return column if times is None else times
 
 
 def _is_number_column(name: str, body: bytes | memoryview, dialect: Dialect, index: int) -> bool:
@@ -184,6 +194,9 @@ def _ragged(body: bytes, dialect: Dialect, error: Exception, source: str, first:
 def _numbers_of_texts(name: str, column: pa.ChunkedArray, source: str, first: int) -> npt.NDArray[Any]:
     """Texts as numbers; a schema column raises InputError at the first that is none, another stays text."""
     cells = column.to_pylist()
+    times = times_of(cells) if name == TIME or not (is_channel(name) or name in LABELS) else None
+    if times is not None:
+        return times
     found = np.full(len(cells), np.nan)
     for row, cell in enumerate(cells):
         if cell is None:

@@ -12,7 +12,10 @@ from terragrip.units import is_common
 
 HEAD = 1 << 16  # bytes that are looked at
 _SEPARATORS = (",", ";", "\t", "|")
+_COMMENTS = (b"#", b"%", b"//")
+_LONGEST_PREAMBLE = 30  # lines
 _NUMBER = re.compile(r"[+-]?(\d+[.,]?\d*|[.,]\d+)([eE][+-]?\d+)?$")
+_NAME = re.compile(r"[^\W\d]|[/\[]")
 _EMPTY = ("", "nan", "na", "n/a", "null", "none", "-", "--", "inf", "-inf")
 _WITH_UNIT = re.compile(r"(.+?)\s*(?:\[\s*([^\]]*?)\s*\]|\(\s*([^)]*?)\s*\))$")
 _BINARY = bytes(range(9)) + bytes(range(14, 32)) + b"\x7f"
@@ -82,8 +85,8 @@ def in_utf8(data: bytes) -> bytes:
 def detect(data: bytes, source: str) -> Dialect:
     """Detect how the table in ``data`` (UTF-8) is written; raises InputError where it is none.
 
-    The separator and decimal sign that make the most cells of the first rows numbers win; lines that begin with
-    ``#`` before the header are passed over.
+    The separator and decimal sign that make the most cells of the first rows numbers win; before the header, lines that begin
+    with ``#``, ``%`` or ``//`` are passed over, and so are lines that are no rows of the table, as loggers write them.
     """
     start = _skip_comments(data)
     head = data[start : start + HEAD]
@@ -95,6 +98,8 @@ def detect(data: bytes, source: str) -> Dialect:
     if lines[0].lower().startswith("sep="):  # Excel's own hint
         start = _after_lines(data, start, 1)
         lines = lines[1:] or [""]
+    before = _preamble(lines)
+    start, lines = _after_lines(data, start, before), lines[before:]
     separator, decimal = _best(lines)
     header = split(lines[0], separator)
     second = split(lines[1], separator) if len(lines) > 1 else []
@@ -113,6 +118,26 @@ def detect(data: bytes, source: str) -> Dialect:
     names, said = _names_and_units(header)
     units = {names[header.index(h)]: u for h, u in units.items() if u}
     return Dialect(separator, decimal, names, {**said, **units}, _after_lines(data, start, rows))
+
+
+def _preamble(lines: list[str]) -> int:
+    """How many lines stand before the header: far narrower than the table's rows, which begin with names, not with numbers."""
+    best = (1, 0)
+    for separator in _SEPARATORS:
+        widths = [len(split(line, separator)) for line in lines]
+        rows = widths[len(widths) // 2 :]
+        width = max(set(rows), key=rows.count)
+        if width < 2 or rows.count(width) < 0.9 * len(rows):
+            continue
+        if widths[0] > 1 and widths[0] >= 0.75 * width:
+            return 0  # the header, though it may lack a name
+        header = next((k for k, own in enumerate(widths) if own in (width, width + 1)), len(lines))
+        if not 0 < header <= min(_LONGEST_PREAMBLE, len(lines) - 2):
+            continue
+        cells = split(lines[header], separator)
+        if sum(bool(_NAME.match(cell)) for cell in cells) > len(cells) / 2:
+            best = max(best, (width, header))
+    return best[1]
 
 
 def split(line: str, separator: str) -> list[str]:
@@ -187,7 +212,7 @@ def _skip_comments(data: bytes) -> int:
         end = data.find(b"\n", start)
         end = len(data) if end < 0 else end + 1
         line = data[start:end].strip()
-        if line and not line.startswith(b"#"):
+        if line and not line.startswith(_COMMENTS):
             return start
         start = end
     return start

@@ -39,8 +39,10 @@ _NMEA = re.compile(
     rb"^[^$!\r\n]{0,60}[$!](?:[A-Z]{2}[A-Z]{3}|P[A-Z]{3,}),[\x20-\x7e]*\*?[0-9A-Fa-f]{0,2}\r?$", re.MULTILINE
 )
 _CANDUMP = re.compile(
-    rb"^\s*\(\d+\.\d+\)\s+\S+\s+(?:[RT]X\s+\S+\s+\S+\s+)?[0-9A-Fa-f]{3,8}(?:#|\s+\[)", re.MULTILINE
+    rb"^\s*(?:\((?:\d{4}-\d\d-\d\d )?[\d:]+\.\d+\)\s+)?\S+\s+(?:[RT]X\s+\S+\s+\S+\s+)?[0-9A-Fa-f]{3,8}(?:#[0-9A-Fa-fR#]|\s+\[\s*\d+\])",
+    re.MULTILINE,
 )
+_TRC = re.compile(rb"^\s*\d+\)\s+\d+(?:\.\d+)?\s+(?:\d+\s+)?(?:[RT]x\s+)?[0-9A-Fa-f]{4,8}\s", re.IGNORECASE)
 _ASC = re.compile(rb"\A(?:\s*//[^\n]*\n)*\s*(?:date\s|base\s+(?:hex|dec))", re.IGNORECASE)
 
 
@@ -131,6 +133,8 @@ def _text_kind(head: bytes) -> Kind | None:
         return None
     if sum(bool(_CANDUMP.match(line)) for line in lines) > len(lines) / 3:
         return CANDUMP
+    if sum(bool(_TRC.match(line)) for line in lines) > len(lines) / 3:
+        return TRC  # version 1.0 has no head
     if sum(bool(_NMEA.match(line)) for line in lines[:-1] or lines) > len(lines) / 3:
         return NMEA
     header = lines[0].lower()

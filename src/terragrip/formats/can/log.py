@@ -167,12 +167,14 @@ def _from_lines(
     except OSError as error:
         raise unreadable(path, error) from error
     if count.bad > _MOST_BAD * (count.bad + frames.count):
-        raise InputError(
+        problem, mend = (
             f"is a damaged {kind}, or none: {count.bad} lines hold no frame",
-            file=path,
-            place=f"line {count.first} ({count.shown!r})",
-            mend="copy or record it again",
+            "copy or record it again",
         )
+        if count.unstamped:
+            problem, mend = "its frames have no stamps", "record it by candump -l, or with -t a"
+        place = f"line {count.first} ({count.shown!r})"
+        raise InputError(problem, file=path, place=place, mend=mend)
     notes = []
     if count.bad:
         notes.append(f"{count.bad} lines hold no frame, the first is line {count.first}; they were left out.")

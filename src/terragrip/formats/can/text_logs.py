@@ -4,25 +4,35 @@ from __future__ import annotations
 
 import base64
 import binascii
+import itertools
 import re
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
+from datetime import UTC, datetime
 
 from terragrip.formats.can.catalog import EXTENDED
 from terragrip.formats.can.frames import Frames
 
 Frame = tuple[float, int, bytes]
 
+_TIME = r"\s*\((\d+\.\d+|\d{4}-\d\d-\d\d \d\d:\d\d:\d\d\.\d+)\)\s+\S+\s+"
 # (1600000000.000000) can0 18FE4800#0000030405060708 R
 _COMPACT = re.compile(
-    r"\s*\((\d+\.\d+)\)\s+\S+\s+([0-9A-Fa-f]{3}|[0-9A-Fa-f]{8})#(?:#[0-9A-Fa-f])?([0-9A-Fa-f]*)(?:\s+[RT])?\s*$"
+    _TIME + r"([0-9A-Fa-f]{3}|[0-9A-Fa-f]{8})#(?:#[0-9A-Fa-f])?([0-9A-Fa-f]*)(?:\s+[RT])?\s*$"
 )
 # (1600000000.000000)  can0  RX - -  18FE4800   [8]  00 00 03
 _SPACED = re.compile(
-    r"\s*\((\d+\.\d+)\)\s+\S+\s+(?:[RT]X\s+\S+\s+\S+\s+)?([0-9A-Fa-f]{3}|[0-9A-Fa-f]{8})\s+\[\s*\d+\]\s*((?:[0-9A-Fa-f]{2}\s?)*)"
+    _TIME
+    + r"(?:[RT]X\s+\S+\s+\S+\s+)?([0-9A-Fa-f]{3}|[0-9A-Fa-f]{8})\s+\[\s*\d+\]\s*((?:[0-9A-Fa-f]{2}\s?)*)"
 )
+_UNSTAMPED = re.compile(r"\s*\w+\s+(?:[0-9A-Fa-f]{3}|[0-9A-Fa-f]{8})(?:#|\s+\[)")
 _STAMP = re.compile(r"\d+\.\d+")
 _NO_DATA = re.compile(r"#R\d?\b|remote request|ERRORFRAME|\b2[0-9A-Fa-f]{7}[# ]")
+_HEAD, _BACK, _LONGEST_STEP = (
+    200,
+    0.2,
+    1e6,
+)  # frames that tell what stamps count from: steps run back often, and are short
 _EIGHT = 8  # hexadecimal digits of a 29-bit identifier
 
 _TIMES = {
@@ -45,6 +55,7 @@ class Count:
     bad: int = 0
     first: int = 0
     shown: str = ""
+    unstamped: bool = False
 
     def add(self, number: int, line: str) -> None:
         """Count a line."""
@@ -56,13 +67,32 @@ class Count:
 def candump(lines: Iterable[str], count: Count, frames: Frames) -> Iterator[Frame]:
     """Frames of candump's log file or of its printed lines; a line that is neither is counted.
 
-    Lines of frames that ``frames`` has no use for are counted there and not looked at any further.
+    Stamps are seconds, dates (``-t A``, taken for UTC) or the time since the frame before (``-t d``). Lines of frames that ``frames``
+    has no use for are counted there and not looked at any further.
     """
+    passing: list[Frames] = []
+    found = _candump(lines, count, frames, passing)
+    head = list(itertools.islice(found, _HEAD))
+    stamps = [stamp for stamp, _, _ in head]
+    back = sum(after < before for before, after in itertools.pairwise(stamps))
+    if len(head) < 3 or back < _BACK * len(head) or max(stamps) > _LONGEST_STEP:
+        passing.append(frames)
+        yield from head
+        yield from found
+        return
+    now = 0.0
+    for step, identifier, payload in itertools.chain(head, found):  # every one, since steps add up
+        now += step
+        yield now, identifier, payload
+
+
+def _candump(lines: Iterable[str], count: Count, frames: Frames, passing: list[Frames]) -> Iterator[Frame]:
+    """Frames with their stamps as they are; once ``passing`` holds ``frames``, lines of no use are passed by."""
     unwanted: dict[str, int] = {}  # identifiers by what stands before the payload
     for number, line in enumerate(lines, 1):
         mark = line.find("#")
         head = line[max(mark - 8, 0) : mark]
-        if head in unwanted:
+        if passing and head in unwanted:
             frames.pass_by(unwanted[head])
             continue
         match = _COMPACT.match(line) or _SPACED.match(line)
@@ -70,11 +100,22 @@ def candump(lines: Iterable[str], count: Count, frames: Frames) -> Iterator[Fram
         if match is None or len(data) % 2:
             if line.strip() and not _NO_DATA.search(line):
                 count.add(number, line)
+                count.unstamped = count.unstamped or bool(_UNSTAMPED.match(line))
             continue
         identifier = int(match[2], 16) | (EXTENDED if len(match[2]) == _EIGHT else 0)
+        # Only log files, whose lines have no blanks in the payload, are of the size that makes this worth while.
         if mark > 0 and frames.are_unwanted(identifier):
             unwanted[head] = identifier
-        yield float(match[1]), identifier, bytes.fromhex(data)
+        yield _seconds(match[1]), identifier, bytes.fromhex(data)
+
+
+def _seconds(stamp: str) -> float:
+    """A stamp of candump [s]; a date since 1970."""
+    if "-" not in stamp:
+        return float(stamp)
+    whole, _, part = stamp.partition(".")
+    date = datetime.strptime(whole, "%Y-%m-%d %H:%M:%S").replace(tzinfo=UTC)
+    return date.timestamp() + float(f"0.{part}")
 
 
 def asc_lines(lines: Iterable[str], frames: Frames) -> Iterator[str]:
