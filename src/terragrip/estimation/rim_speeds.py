@@ -33,6 +33,11 @@ class RimSpeed:
     spread: float
 
 
+def wheel_of(channel: str) -> str:
+    """The wheel whose speed a channel is: that of its name, or DRIVE."""
+    return DRIVE if channel == "wheel_based_speed" else channel.removeprefix("wheel_speed_")
+
+
 def zero_of(recording: Recording, vehicle: Vehicle, name: str) -> zero_slip.Ratio | None:
     """The zero-slip ratio of a channel in this log."""
     radius = _radius_of(vehicle, name, recording.source)
@@ -54,7 +59,7 @@ def _radius_of(vehicle: Vehicle, name: str, source: str | None) -> float:
     """What takes a channel to m/s by the vehicle file."""
     if name == "wheel_based_speed":
         return 1.0
-    wheel = name.removeprefix("wheel_speed_")
+    wheel = wheel_of(name)
     if wheel not in vehicle.wheels:
         mend = f"its wheels are {', '.join(vehicle.wheels)}"
         raise InputError(f"the vehicle has no wheel {wheel}", file=source, place=f"column {name}", mend=mend)

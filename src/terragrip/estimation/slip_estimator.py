@@ -19,7 +19,7 @@ from terragrip.errors import InputError
 from terragrip.estimation.engine import Thresholds
 from terragrip.estimation.estimator import Estimate, TractionEstimator, unusable
 from terragrip.estimation.noise import channel_noise
-from terragrip.estimation.rim_speeds import DRIVE, radius_before_any_log
+from terragrip.estimation.rim_speeds import radius_before_any_log, wheel_of
 from terragrip.estimation.sealed import seal, unseal
 from terragrip.estimation.slip_columns import GAP, METHOD, STANDSTILL, Place, Rim, columns_of
 from terragrip.estimation.slip_filter import SlipFilter, Walks
@@ -68,9 +68,9 @@ class SlipEstimator:
         self.noise, self.guessed = channel_noise(vehicle, self._inputs, sensors)
         radii = [radius_before_any_log(vehicle, name) for name in names]
         self._factors = (1.0, *(factor for factor, _, _ in radii))
-        wheels = [name.removeprefix("wheel_speed_").replace("wheel_based_speed", DRIVE) for name in names]
         self._rims = tuple(
-            Rim(w, radius, spread) for w, (_, radius, spread) in zip(wheels, radii, strict=True)
+            Rim(wheel_of(name), radius, spread)
+            for name, (_, radius, spread) in zip(names, radii, strict=True)
         )
         sds = [self.noise[name] * factor for name, factor in zip(self._inputs, self._factors, strict=True)]
         self._filter = SlipFilter(sds, walks)

@@ -18,7 +18,7 @@ from terragrip.estimation import zero_slip
 from terragrip.estimation.engine import EVENTS
 from terragrip.estimation.estimates import Estimates
 from terragrip.estimation.noise import channel_noise, logged_noise, sensor_of
-from terragrip.estimation.rim_speeds import DRIVE, rim_speeds, zero_of
+from terragrip.estimation.rim_speeds import rim_speeds, wheel_of, zero_of
 from terragrip.estimation.slip_columns import GAP, METHOD, STANDSTILL, Place, Rim, columns_of
 from terragrip.estimation.slip_filter import Filtered, SlipFilter, Walks, choose_walks, run
 from terragrip.recording import Recording, held_periods, unit_warnings, without_held
@@ -243,7 +243,7 @@ def _about(
             "walks": {"jerk": walks.jerk, "change": walks.change},
         },
         "zero_slip": {
-            name.removeprefix("wheel_speed_").replace("wheel_based_speed", DRIVE): {
+            wheel_of(name): {
                 "ratio": ratio.value,
                 "std": ratio.std,
                 "windows": ratio.windows,
