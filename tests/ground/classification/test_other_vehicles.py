@@ -68,6 +68,20 @@ def test_where_both_are_logged_either_torque_or_current_is_learnt_from() -> None
     assert found.score(shown, truth) > 0.85
 
 
+def test_a_ground_recorded_at_another_rate_is_said() -> None:
+    tables, labels = drives(TRAINED)
+    slow = [
+        t[t["wheel_speed_left"].notna() | (np.arange(len(t)) % 3 == 0)] if g == "wet" else t
+        for t, g in zip(tables, labels, strict=True)
+    ]
+    assert not any("rate" in note for note in learnt(*wheels_only(TRAINED)).notes_)
+    found = learnt(slow, labels)
+    assert [note.partition(":")[0] for note in found.notes_ if "may be the rate" in note] == [
+        "angular velocity",
+        "acceleration",
+    ]
+
+
 def test_the_words_in_wheels_names_do_not_matter() -> None:
     plain, worded = ("a", "b", "c", "d"), ("front_left", "front_right", "rear_left", "rear_right")
     told = [

@@ -32,6 +32,8 @@ PREFIXES = {
 FAMILIES = tuple(PREFIXES)
 BODY = ("angular velocity", "acceleration")
 
+SAME_RATE = 1.2
+"""Ratio of periods up to which two rates are one."""
 _HELD = 1.5  # sample periods
 _LARGEST = 1e30  # of a measured value, in any unit: loggers fill gaps with the largest number they have
 
@@ -64,6 +66,13 @@ class Signals:
     start: float
     end: float
     families: dict[str, dict[str, Channel]]
+
+
+def shortest_period(channels: Mapping[str, Channel]) -> float:
+    """The period [s] of the fastest of some channels."""
+    # One sensor's channels share their clock, whose period is worked out once.
+    clocks = {(len(c.time), c.time[0], c.time[-1]): c for c in channels.values()}
+    return min(channel.period for channel in clocks.values())
 
 
 def family_of(column: str) -> str | None:

@@ -11,8 +11,8 @@ import numpy as np
 import numpy.typing as npt
 
 from terragrip.errors import InputError
-from terragrip.ground.classification.channels import held_channels, signals_of, tables_of
-from terragrip.ground.classification.comparable import not_comparable, without
+from terragrip.ground.classification.channels import held_channels, shortest_period, signals_of, tables_of
+from terragrip.ground.classification.comparable import not_comparable, rates_apart, without
 from terragrip.ground.classification.experts import FEWEST_WINDOWS, train_experts
 from terragrip.ground.classification.labels import UNKNOWN, classes_of, one_each
 from terragrip.ground.classification.learnt import Judgement, Learnt
@@ -109,11 +109,10 @@ class GroundClassifier:
             if not recorded.families:
                 mend = "give wheel_speed_*, drive_torque_*, acceleration_* or angular_velocity_* columns, or leave it out"
                 raise InputError("holds no usable channel", file=name, mend=mend)
+        notes += rates_apart(signals, codes)
         layout, slow = layout_of(signals, self.window)
         if not layout.period:
-            fastest = min(
-                c.period for s in signals for family in s.families.values() for c in family.values()
-            )
+            fastest = min(shortest_period(family) for one in signals for family in one.families.values())
             problem = f"{self.window:g} s is shorter than two samples, which come every {fastest:.3g} s"
             raise InputError(problem, place="window", mend=f"take a window of {4 * fastest:.2g} s or more")
         random = np.random.default_rng(self.random_state)

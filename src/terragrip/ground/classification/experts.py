@@ -42,15 +42,16 @@ def train_experts(
     measured = measured_families(training.names, training.features)
     sets = _sensor_sets(training, measured)
     found = _trained(training, training.folds, sets, measured, seed)
-    within = not found  # too little is left of some ground with a recording held out
+    within = training.by_recording and not found  # too little is left of a ground with a recording held out
     if within:
         found = _trained(training, training.parts, sets, measured, seed)
     if not found:
         raise _nothing_to_learn(training, classes, measured)
     notes = []
     if within or not training.by_recording:
+        one = "one recording that is long enough" if within else "one recording"
         notes.append(
-            "A ground has but one recording: probabilities are learnt within runs and too sure on new ones."
+            f"A ground has but {one}: probabilities are learnt within runs and too sure on new ones."
         )
     unused = frozenset(measured).difference(*(expert.families for expert in found))
     if unused:

@@ -13,7 +13,14 @@ from functools import cache
 import numpy as np
 import numpy.typing as npt
 
-from terragrip.ground.classification.channels import FAMILIES, Channel, Signals, wheel_of
+from terragrip.ground.classification.channels import (
+    FAMILIES,
+    SAME_RATE,
+    Channel,
+    Signals,
+    shortest_period,
+    wheel_of,
+)
 from terragrip.ground.classification.vibration import (
     band_edges,
     band_energies,
@@ -39,7 +46,6 @@ from terragrip.ground.classification.windows import samples_in
 Floats = npt.NDArray[np.float64]
 
 SPEED, TORQUE, GROUND, TURN, ACCELERATION = FAMILIES
-_SAME_RATE = 1.2
 _BLOCK = 2000  # windows at a time bound the memory of a long drive
 
 
@@ -114,12 +120,8 @@ def _named(sensors: str, features: Table) -> Table:
 
 def _period(family: str, channels: dict[str, Channel], layout: Layout) -> float:
     """The trained period where the recording's is about that, else the recording's own."""
-    clocks = {
-        (len(c.time), c.time[0], c.time[-1]): c for c in channels.values()
-    }  # one sensor's channels share theirs
-    own = min(channel.period for channel in clocks.values())
-    trained = layout.period[family]
-    return trained if 1 / _SAME_RATE < own / trained < _SAME_RATE else own
+    own, trained = shortest_period(channels), layout.period[family]
+    return trained if 1 / SAME_RATE < own / trained < SAME_RATE else own
 
 
 def _stack(

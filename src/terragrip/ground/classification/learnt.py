@@ -70,10 +70,8 @@ class Learnt:
         novelty = np.full(len(features), np.nan)
         open_rows = np.ones(len(features), dtype=bool)
         nowhere = np.zeros(len(features), dtype=bool)
-        for least in (
-            _WHOLE,
-            PRESENT,
-        ):  # an axis that is missing now makes all of a body sensor's features strange
+        # Whole sensors first: an axis that is missing makes all that the others of a body sensor tell look strange.
+        for least in (_WHOLE, PRESENT):
             measured = measured_families(self.features, features, least)
             for expert in self.experts:
                 fits = open_rows & np.all([measured.get(f, nowhere) for f in expert.families], axis=0)

@@ -9,7 +9,7 @@ from functools import lru_cache
 import numpy as np
 import numpy.typing as npt
 
-from terragrip.ground.classification.channels import BODY, FAMILIES, Signals
+from terragrip.ground.classification.channels import BODY, FAMILIES, Signals, shortest_period
 from terragrip.ground.classification.features import Layout, families_needed, features_of, of_one_wheel
 from terragrip.ground.classification.wheel_features import Table
 from terragrip.ground.classification.windows import window_starts
@@ -48,7 +48,7 @@ def layout_of(signals: Sequence[Signals], window: float) -> tuple[Layout, tuple[
     period, size, slow = {}, {}, []
     for family in FAMILIES:
         having = [s for s in signals if s.families.get(family)]
-        periods = [min(c.period for c in s.families[family].values()) for s in having]
+        periods = [shortest_period(s.families[family]) for s in having]
         if not having:
             continue
         usual = float(np.median(periods))
