@@ -68,7 +68,10 @@ def command(
     Samples from any number of sources, estimates to any number of sinks; Ctrl-C ends it with the record whole.
     """
     import asyncio
+    import os
 
+    # Before pyarrow loads: its own allocator keeps 5 MB more, for a record that writes once a minute.
+    os.environ.setdefault("ARROW_DEFAULT_MEMORY_POOL", "system")
     from terragrip.formats import Profile
     from terragrip.live.service import Service
     from terragrip.vehicle import Vehicle

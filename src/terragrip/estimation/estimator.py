@@ -34,9 +34,7 @@ class Estimate:
     def __init__(self, time: float, event: str, packed: bytes, places: dict[str, int]) -> None:
         self.time = time
         self.event = event
-        self.packed = (
-            packed  # the numbers as doubles in the machine's order: what only goes on need not become floats
-        )
+        self.packed = packed  # doubles: what is only passed on need not become floats
         self._values: tuple[float, ...] | None = None
         self.places = places  # where in `values` each column stands
 
@@ -58,7 +56,7 @@ class Estimate:
 
     @property
     def values(self) -> tuple[float, ...]:
-        """All numbers of the kernel's estimate, by `places`."""
+        """All numbers of ``packed``, by `places`."""
         if self._values is None:
             self._values = struct.unpack(f"={len(self.packed) // 8}d", self.packed)
         return self._values

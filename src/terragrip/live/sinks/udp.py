@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import errno
 import socket
 import struct
 from typing import TYPE_CHECKING
@@ -17,6 +18,10 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from terragrip.vehicle import Vehicle
+
+
+_PASSING = {errno.EAGAIN, errno.ENOBUFS, errno.EMSGSIZE}
+"""What concerns one message, not the way."""
 
 
 class UdpSink:
@@ -48,10 +53,10 @@ class UdpSink:
                     link.send(data)
             except ConnectionRefusedError:
                 pass  # nobody listens yet; the next may be heard
-            except BlockingIOError:
-                outbox.dropped += 1
             except OSError as error:
-                raise Lost(f"cannot send to {self.uri.host} ({error.strerror or error})") from error
+                if error.errno not in _PASSING:
+                    raise Lost(f"cannot send to {self.uri.host} ({error.strerror or error})") from error
+                outbox.dropped += 1
 
         with link:
             await outbox.deliver(send)
