@@ -319,22 +319,34 @@ asc = _texts(
 )
 
 
+OBJECT = np.dtype(
+    [("mark", "S4"), ("header", "<u2"), ("version", "<u2"), ("size", "<u4"), ("type", "<u4"), ("flags", "<u4"),
+     ("client", "<u2"), ("object_version", "<u2"), ("stamp", "<u8"), ("channel", "<u2"), ("frame_flags", "u1"), ("dlc", "u1"),
+     ("id", "<u4"), ("data", "(8,)u1")]
+)  # fmt: skip
+
+
 def blf(path: Path, size: int) -> None:
-    """BLF by python-can's writer, not compressed, so that its containers hold as much as the file."""
+    """BLF of classic CAN messages in containers of 128 kB, not packed, so that these hold as much as the file."""
     import can
 
-    identifiers, data = frames(20_000)
-    messages = [
-        can.Message(arbitration_id=int(i), is_extended_id=True, data=d.tobytes())
-        for i, d in zip(identifiers, data, strict=True)
-    ]
-    with can.BLFWriter(path, compression_level=0) as writer:
-        first = 0
-        while path.stat().st_size < size:
-            for k, message in enumerate(messages):
-                message.timestamp = 1.75e9 + (first + k) * 5e-4
-                writer.on_message_received(message)
-            first += len(messages)
+    with can.BLFWriter(path) as writer:
+        writer.on_message_received(can.Message(timestamp=1.75e9))  # for the head of the file
+    rows = (128 << 10) // OBJECT.itemsize // 20 * 20
+    identifiers, data = frames(rows)
+    objects = np.zeros(rows, OBJECT)
+    objects["mark"], objects["header"], objects["version"], objects["size"] = b"LOBJ", 32, 1, OBJECT.itemsize
+    objects["type"], objects["flags"], objects["channel"], objects["dlc"] = 86, 2, 1, 8
+    objects["id"], objects["data"] = identifiers | 0x80000000, data
+    head = struct.pack("<4sHHLL", b"LOBJ", 16, 1, 32 + objects.nbytes, 10) + struct.pack(
+        "<H6xL4x", 0, objects.nbytes
+    )
+    with path.open("r+b") as stream:
+        stream.seek(144)
+        stream.truncate()
+        for first in range(0, size // OBJECT.itemsize, rows):
+            objects["stamp"] = (first + np.arange(rows)) * 500_000  # ns
+            stream.write(head + objects.tobytes())
 
 
 @dataclass(frozen=True)

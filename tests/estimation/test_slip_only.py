@@ -100,6 +100,14 @@ def test_wheels_standstill_gap_and_intervals() -> None:
         assert 0.85 < np.mean(np.abs(error) < 1.96 * spread) <= 1.0
 
 
+def test_gaps_are_found_block_by_block_as_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    log = speeds_of(0.1, gap=True)
+    whole = tg.estimate(log, robot())
+    for rows in (40, 641):  # the gap begins in row 601 and ends in row 680
+        monkeypatch.setattr("terragrip.estimation.slip_only._BLOCK", rows)
+        assert tg.estimate(log, robot())["event"].tolist() == whole["event"].tolist()
+
+
 def test_an_outlier_is_flagged_and_a_leap_is_followed() -> None:
     log = speeds_of(0.0)
     speed = log["ground_speed"].copy()

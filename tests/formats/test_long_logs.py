@@ -258,10 +258,10 @@ def test_estimates_in_parts_are_the_estimates(tmp_path: Path, torque: bool) -> N
     assert parts["event"].tolist() == expected["event"].tolist()
 
 
-@pytest.mark.parametrize("kind", ["csv", "parquet", "blf"])
+@pytest.mark.parametrize("kind", ["csv", "parquet", "blf", "asc", "log"])
 def test_a_long_log_is_looked_at_in_parts(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, kind: str) -> None:
     path = tmp_path / f"log.{kind}"
-    if kind == "blf":
+    if kind in ("blf", "asc", "log"):
         write_log(path, drive(1000, 60.0).frames)
     else:
         frame = drive_of_a_robot(30_000)

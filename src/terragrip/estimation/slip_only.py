@@ -28,6 +28,7 @@ from terragrip.vehicle import Vehicle
 Floats = npt.NDArray[np.float64]
 
 _PASSED_ON = ("drawbar_force", "latitude", "longitude", "altitude")
+_BLOCK = 1_000_000  # rows
 _OUTLIER, _STILL, _GAP = (EVENTS.index(name) for name in ("outlier", "standstill", "gap"))
 
 
@@ -147,6 +148,8 @@ def _prepared(
     rims, notes = rim_speeds(log, vehicle, noise, zero)
     speeds = np.stack([log.channels["ground_speed"], *(rim.values for rim in rims)], axis=1)
     sds = np.array([noise["ground_speed"], *(rim.noise for rim in rims)])
+    radii = tuple(Rim(rim.wheel, rim.radius, rim.spread) for rim in rims)
+    del rims  # whose speeds stand in the array now
     anew = _anew(log.time, speeds, GAP if gap is None else gap)
     walks = choose_walks(log.time, speeds, sds, anew)
     if guessed:
@@ -160,7 +163,7 @@ def _prepared(
         anew,
         _away(anew),
         walks,
-        tuple(Rim(rim.wheel, rim.radius, rim.spread) for rim in rims),
+        radii,
         STANDSTILL if standstill_speed is None else standstill_speed,
         _about(recording, vehicle, noise, periods, walks, zero),
         (*heard, *unit_warnings(recording, vehicle), _WHAT_IS_MISSING, *notes),
@@ -174,11 +177,15 @@ _WHAT_IS_MISSING = (
 
 
 def _anew(time: Floats, speeds: Floats, gap: float) -> npt.NDArray[np.bool_]:
-    """Rows (n,) before which no speed was measured for longer than ``gap`` [s], and the first."""
-    measured = np.isfinite(speeds).any(axis=1)
-    last = np.maximum.accumulate(np.where(measured, time, -np.inf))
-    silence = time - np.r_[-np.inf, last[:-1]]
-    return np.asarray(silence > gap)
+    """Rows (n,) before which no speed was measured for longer than ``gap`` [s], and the first. In blocks, since logs are long."""
+    found, heard = np.empty(len(time), dtype=bool), -np.inf
+    for first in range(0, len(time), _BLOCK):
+        part = slice(first, first + _BLOCK)
+        measured = np.isfinite(speeds[part]).any(axis=1)
+        last = np.maximum.accumulate(np.r_[heard, np.where(measured, time[part], -np.inf)])
+        found[part] = time[part] - last[:-1] > gap
+        heard = float(last[-1])
+    return found
 
 
 def _against_travel(state: Floats, rims: Sequence[Rim]) -> list[str]:

@@ -129,6 +129,13 @@ class Frames:
             if route is not None:
                 route(float(time[k]), data[k, : lengths[k]].tobytes())
 
+    def leaves_out_next(self) -> bool:
+        """Whether the next frame is in a block that is not looked at; it then counts as the next but needs not be parsed."""
+        if not skips(self._number, _BLOCK, self.wanted):
+            return False
+        self._number += 1
+        return True
+
     def are_unwanted(self, identifier: int) -> bool:
         """Whether frames of an identifier are of no use, so that they need not be parsed: `pass_by` counts them."""
         if self.every > 1:

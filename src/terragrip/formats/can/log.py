@@ -58,7 +58,7 @@ def read_frame_table(path: str, wanted: Wanted | None, databases: Databases) -> 
         layout = layout_of(next(lines, ""))
         if layout is None:
             raise InputError("is no table of CAN frames", file=path, mend="give time, id and data columns")
-        return table(lines, layout, count)
+        return table(lines, layout, count, frames)
 
     return _from_lines(path, "table of CAN frames", wanted, databases, parse)
 

@@ -95,6 +95,8 @@ def _candump(lines: Iterable[str], count: Count, frames: Frames, passing: list[F
         if passing and head in unwanted:
             frames.pass_by(unwanted[head])
             continue
+        if passing and frames.leaves_out_next():
+            continue
         match = _COMPACT.match(line) or _SPACED.match(line)
         data = "" if match is None else "".join(match[3].split())
         if match is None or len(data) % 2:
@@ -134,6 +136,8 @@ def asc_lines(lines: Iterable[str], frames: Frames) -> Iterator[str]:
             line = f"{now:.6f} {line.lstrip().partition(' ')[2]}"
         if len(cells) == 4 and cells[1].isdigit() and cells[3].startswith(("Rx", "Tx")):
             name = cells[2]
+            if frames.leaves_out_next():
+                continue
             if name not in unwanted:
                 identifier = _asc_identifier(name, base)
                 passed = identifier is not None and frames.are_unwanted(identifier)
@@ -195,10 +199,12 @@ def layout_of(header: str) -> Layout | None:
     )
 
 
-def table(lines: Iterable[str], layout: Layout, count: Count) -> Iterator[Frame]:
+def table(lines: Iterable[str], layout: Layout, count: Count, frames: Frames) -> Iterator[Frame]:
     """Frames of a table of which the header was taken; a line that holds none is counted."""
     read = _identifier(layout)
     for number, line in enumerate(lines, 2):
+        if frames.leaves_out_next():
+            continue
         cells = line.rstrip("\r\n").split(layout.separator)
         if len(cells) != layout.width:
             if line.strip():
