@@ -18,6 +18,7 @@ from terragrip.estimation import TractionEstimator
 from terragrip.formats import Profile
 from terragrip.live import read_record
 from terragrip.live.door import Door
+from terragrip.live.message import STATUS, Message
 from terragrip.live.service import Service
 
 pytestmark = pytest.mark.asyncio
@@ -332,6 +333,16 @@ async def test_a_flood_is_all_accounted_for(vehicle, short, port, sender):
         await until(lambda: service.core.counts.by_channel["ground_speed"]["dropped"] == 200)
     mine = service.core.counts.by_channel["ground_speed"]
     assert (mine["received"], mine["missing"]) == (400, 150)
+
+
+async def test_a_message_too_long_for_a_datagram_is_counted_and_its_sink_stays(vehicle, port):
+    service = Service(vehicle, [f"udp://127.0.0.1:{port}"], ["udp://127.0.0.1:9"])
+    (outbox,) = service.outboxes
+    async with running(service):
+        outbox.put(Message(STATUS, 0.0, data={"text": "x" * 70_000}))
+        await asyncio.sleep(0.05)
+    assert outbox.dropped == 1
+    assert events(service, "sink_lost") == []
 
 
 async def test_datagrams_that_are_too_many_are_dropped_by_the_service_which_counts(

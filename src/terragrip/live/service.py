@@ -294,9 +294,7 @@ class Service:
         for output in outputs:
             if isinstance(output, Row):
                 self.statistics.row(output, self.inbox.clock())
-                message = Message(ESTIMATE, output.estimate.time, output)
-                for listen in self.listeners:
-                    listen(message)
+                self._publish(Message(ESTIMATE, output.estimate.time, output))
             elif isinstance(output, Ground):
                 self.statistics.ground = output
                 data = output.to_dict()
