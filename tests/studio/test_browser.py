@@ -364,6 +364,8 @@ def test_the_map_draws_the_track_and_changes_its_colours(page: Any, served: Serv
     page.select_option("#map-quantity", "soil")
     page.wait_for_function(f"() => ({shades})() === 1")
     assert "grass" in page.inner_text(".legend-row")
+    drawn = "() => getComputedStyle(document.querySelector('.legend-row .strip')).backgroundColor"
+    assert page.evaluate(drawn) not in ("rgba(0, 0, 0, 0)", "transparent")
 
 
 def test_a_brush_is_the_same_on_drive_and_map_and_in_another_tab(page: Any, served: Served) -> None:

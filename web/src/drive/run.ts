@@ -183,9 +183,9 @@ export function soilColor(name: string): string {
 
 export const EVENT_COLORS: Record<string, string> = {
   immobilization: "vermillion",
-  stuck: "bad",
+  stuck: "ink",
   push: "purple",
   standstill: "muted",
-  gap: "ink",
+  gap: "sky",
   outlier: "orange",
 };
