@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import struct
+from array import array
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -129,9 +130,11 @@ class Engine:
         for name, slot in self._slots_in.items():
             names[slot] = name
         self._names = tuple(names)
-        self._pack = struct.Struct(f"={1 + lib.TG_SLOTS}d").pack_into
+        real = ffi.sizeof("tg_real")
+        self._doubles = real == ffi.sizeof("double")  # else the kernel in single precision, as tests have it
+        self._pack = struct.Struct(f"=d{lib.TG_SLOTS}{'d' if self._doubles else 'f'}").pack_into
         self._room_in = ffi.buffer(self.sample)
-        self._room_out = ffi.buffer(self.estimate.value, 8 * self._used)
+        self._room_out = ffi.buffer(self.estimate.value, real * self._used)
 
     def update(self, time: float, sample: Mapping[str, Any]) -> int:
         """Take a sample and fill ``self.estimate``; returns tg_status. Raises struct.error on what is no number."""
@@ -141,6 +144,8 @@ class Engine:
 
     def packed(self) -> bytes:
         """A copy of the numbers in ``self.estimate``: doubles, a column of `outputs` at each place of ``index_out``."""
+        if not self._doubles:
+            return array("d", ffi.unpack(self.estimate.value, self._used)).tobytes()
         found: bytes = self._room_out[:]
         return found
 
