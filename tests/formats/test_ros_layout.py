@@ -17,7 +17,7 @@ from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 from terragrip.errors import InputError
 from terragrip.formats.reading import read_table
 from terragrip.formats.ros import Types, bag_topic, ros_topic
-from test_logs import COUNT, write_ros1
+from test_logs import COUNT, fill, write_ros1
 
 DEFINITION = """std_msgs/Header header
 bool locked
@@ -137,6 +137,30 @@ def test_a_ros1_bag_that_was_cut_off_is_read_as_far_as_it_goes(tmp_path: Path, p
         bag.write_bytes(content[:-100])
         with pytest.raises(InputError, match="is a damaged ROS 1 bag"):
             read_table(bag)
+
+
+def test_a_ros1_bag_with_a_damaged_chunk_is_read_around_it(tmp_path: Path) -> None:
+    path = tmp_path / "run.bag"
+    bag = Writer(path)
+    bag.set_compression(Writer.CompressionFormat.LZ4)
+    bag.chunk_threshold = 20_000
+    with bag:
+        fill(bag, Stores.ROS1_NOETIC, "serialize_ros1")
+    whole = read_table(path).columns
+    content = bytearray(path.read_bytes())
+    chunks = [k for k in range(len(content)) if content.startswith(b"compression=lz4", k)]
+    assert len(chunks) > 5
+    middle = chunks[len(chunks) // 2] + 200
+    content[middle : middle + 50] = bytes(50)
+    path.write_bytes(content)
+    table = read_table(path)
+    assert any("chunks are damaged" in note for note in table.notes)
+    left = (
+        np.isfinite(table.columns["/pull.pull"]).sum()
+        + np.isfinite(table.columns["/imu.linear_acceleration.z"]).sum()
+    )
+    before = np.isfinite(whole["/pull.pull"]).sum() + np.isfinite(whole["/imu.linear_acceleration.z"]).sum()
+    assert 0.5 * before < left < before
 
 
 def packed(whole: bytes, packing: str) -> bytes:

@@ -32,20 +32,15 @@ def long_matlab(path: str) -> LongLog | None:
         rows, names, units = found.clock[1], tuple(found.signals), found.units
 
     def blocks(chosen: list[str]) -> Iterator[dict[str, npt.NDArray[Any]]]:
-        with reading(path, "MATLAB file", RuntimeError), h5py.File(path, "r") as file:
-            held = _on_one_clock(tree_of(file, h5py))
-            if held is None:
-                raise ValueError("it changed while it was read")
-            origin = None
+        origin = None
+        with h5py.File(path, "r") as file:
+            with reading(path, "MATLAB file", RuntimeError):
+                held = _on_one_clock(tree_of(file, h5py))
             for part in _parts_of(rows):
-                time = seconds_of(held.clock[0].column(0, rows, part).ravel(), held.scale)
-                origin = float(time[0]) if origin is None else origin
-                yield {TIME: time - origin} | {
-                    name: np.asarray(
-                        held.signals[name][0].column(held.signals[name][1], rows, part), np.float64
-                    )
-                    for name in chosen
-                }
+                with reading(path, "MATLAB file", RuntimeError):
+                    block = _block(held, chosen, part)
+                origin = float(block[TIME][0]) if origin is None else origin
+                yield {**block, TIME: block[TIME] - origin}
 
     return LongLog(names, units, path, rows, blocks, clocked=True)
 
@@ -72,6 +67,18 @@ def _on_one_clock(tree: dict[str, Any]) -> _OneClock | None:
     if any(not isinstance(a, Array) or a.part is None for a in (clock, *(a for a, _ in arrays.values()))):
         return None
     return _OneClock((clock, int(np.prod(clock.shape))), found.scales.get(key, 1.0), arrays, found.units)
+
+
+def _block(held: _OneClock | None, chosen: list[str], part: slice) -> dict[str, npt.NDArray[np.float64]]:
+    """Some rows of the chosen signals, and their stamps [s]; raises ValueError where the file has changed."""
+    if held is None:
+        raise ValueError("it changed while it was read")
+    clock, rows = held.clock
+    block = {TIME: seconds_of(clock.column(0, rows, part), held.scale)}
+    for name in chosen:
+        values, column = held.signals[name]
+        block[name] = np.asarray(values.column(column, rows, part), np.float64)
+    return block
 
 
 def _parts_of(rows: int) -> Iterator[slice]:

@@ -85,7 +85,7 @@ def _channel(
         form = types.form(name, one=encoding == "ros1")
         return ros, lambda receipt, content: ros.push(receipt, content, form)
     if encoding == "protobuf" and schema is not None:
-        topic = _topic(channel.topic, _parts_of_protobuf, _stamp_of_protobuf, wanted, topics)
+        topic = _topic(channel.topic, _parts_of_protobuf, _stamp_of_protobuf, getattr, wanted, topics)
         factory = needed("mcap_protobuf.decoder", "protobuf messages").DecoderFactory()
         try:
             decode = factory.decoder_for(encoding, schema)
@@ -94,7 +94,7 @@ def _channel(
                 raise
             return topic, None
         return topic, lambda receipt, content: topic.take(receipt, decode(content))
-    topic = _topic(channel.topic, _parts_of_json, _stamp_of_json, wanted, topics)
+    topic = _topic(channel.topic, _parts_of_json, _stamp_of_json, dict.__getitem__, wanted, topics)
     if encoding == "json":
         return topic, lambda receipt, content: topic.take(receipt, json.loads(content))
     return topic, None
@@ -104,11 +104,12 @@ def _topic(
     name: str,
     parts: Parts,
     stamp: Callable[[Any], float | None],
+    field_of: Callable[[Any, str], Any],
     wanted: Wanted | None,
     topics: dict[str, Topic],
 ) -> Topic:
     """The topic of this name, of several channels the same one."""
-    return topics.setdefault(name, Topic(name, parts, stamp, wanted))
+    return topics.setdefault(name, Topic(name, parts, stamp, wanted, field_of=field_of))
 
 
 def _parts_of_json(message: Any) -> Iterable[tuple[str, Any]]:

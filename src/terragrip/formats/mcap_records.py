@@ -44,11 +44,9 @@ def records(stream: BinaryIO, notes: list[str]) -> Iterator[Any]:
             yield _record(kind, content)
             continue
         try:
-            inside = _unpacked(content)
+            yield from _inner(_unpacked(content))
         except (*DAMAGE, needed("mcap.exceptions", "an MCAP file").McapError, *_packers()):
             damaged += 1
-            continue
-        yield from _inner(inside)
     if damaged:
         notes.append(f"{damaged} chunks are damaged and were left out.")
 

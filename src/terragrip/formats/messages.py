@@ -45,14 +45,16 @@ class Column:
 class Topic:
     """Collects the wanted fields of one topic's messages.
 
-    ``parts`` gives the fields of a message; ``stamp`` the sender's time [s], if the message has one. ``strange``: values
-    that are not there, or of another kind than in the first message.
+    ``parts`` gives the fields of a message; ``stamp`` the sender's time [s], if the message has one; ``field_of`` one field by
+    name, where there is a short way to it: it raises LookupError, TypeError or AttributeError where the field is not there.
+    ``strange``: values that are not there, or of another kind than in the first message.
     """
 
     name: str
     parts: Parts
     stamp: Callable[[Any], float | None]
     wanted: Wanted | None = None
+    field_of: Callable[[Any, str], Any] | None = None
     names: tuple[str, ...] = ()
     count: int = 0
     bad: int = 0
@@ -86,19 +88,25 @@ class Topic:
 
     def _values(self, message: Any) -> list[Any]:
         """The wanted fields of a message, in the order of the columns; what is not there is NaN or None, and counted."""
-        found: dict[Path, Any] = {}
-        self._walk(message, (), found, {column.path[0] for column in self._columns.values() if column.path})
         values: list[Any] = []
-        for column in self._columns.values():
-            value = found.get(column.path)
+        for column, value in zip(self._columns.values(), self._held(message), strict=True):
             if column.is_text:
                 known = isinstance(value, str)
                 values.append(value if known else None)
             else:
                 known = isinstance(value, bool | int | float | np.number | np.bool_)
-                values.append(float(value) if known else np.nan)  # type: ignore[arg-type]
+                values.append(float(value) if known else np.nan)
             self.strange += not known
         return values
+
+    def _held(self, message: Any) -> list[Any]:
+        """What stands in a message where the columns are, None where nothing does."""
+        paths = [column.path for column in self._columns.values()]
+        if self.field_of is None or self._labels is not None:
+            found: dict[Path, Any] = {}
+            self._walk(message, (), found, {path[0] for path in paths if path})
+            return [found.get(path) for path in paths]
+        return [_at(message, path, self.field_of) for path in paths]
 
     def fields(self, message: Any) -> dict[str, Any]:
         """The wanted fields of one message by name, for who takes messages as they come; nothing is collected."""
@@ -191,6 +199,17 @@ class Topic:
         named = self._labels if self._labels and len(self._labels) == len(values) and len(path) == 1 else None
         for k, value in enumerate(values):
             self._walk(value, (*path, k if named is None else named[k]), found, None)
+
+
+def _at(message: Any, path: Path, field_of: Callable[[Any, str], Any]) -> Any:
+    """What stands at a path in a message, None if nothing does."""
+    value = message
+    try:
+        for step in path:
+            value = value[step] if isinstance(step, int) else field_of(value, step)
+    except (LookupError, TypeError, AttributeError):
+        return None
+    return value
 
 
 def _shown(path: Path) -> str:

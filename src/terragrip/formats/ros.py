@@ -28,8 +28,9 @@ def read_ros1(path: str, wanted: Wanted | None, databases: Databases) -> SignalL
     topics: dict[str, Topic] = {}
     connections: dict[int, tuple[RosTopic, Serialised]] = {}
     notes: list[str] = []
+    lost = 0
     with as_far_as_it_goes(path, "ROS 1 bag", notes) as seen, open(path, "rb") as stream:
-        for record in records(stream):
+        for record in records(stream, notes):
             if isinstance(record, Connection):
                 name = types.learn(record.kind, record.definition, "msg")
                 topic = bag_topic(record.topic, wanted, topics)
@@ -37,9 +38,14 @@ def read_ros1(path: str, wanted: Wanted | None, databases: Databases) -> SignalL
                 continue
             number, receipt, content = record
             seen.messages += 1
+            if number not in connections:
+                lost += 1  # who sent it was told in a part that is damaged
+                continue
             topic, form = connections[number]
             if topic.is_wanted:
                 topic.push(receipt, content, form)
+    if lost:
+        notes.append(f"{lost} messages are of connections that are not described, and were left out.")
     return log_of(topics.values(), path, [*types.notes(), *notes])
 
 

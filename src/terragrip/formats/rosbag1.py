@@ -11,14 +11,14 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import BinaryIO
 
-from terragrip.formats.boundary import needed
+from terragrip.formats.boundary import DAMAGE, needed
 
 _MAGIC = b"#ROSBAG V2.0\n"
-_MESSAGE, _CHUNK, _CONNECTION = 2, 5, 7
+_MESSAGE, _BAG, _CHUNK, _CONNECTION = 2, 3, 5, 7
 _LARGEST = 1 << 30  # bytes of a record
 _LONGEST_HEADER = 1 << 16
 _LENGTH = struct.Struct("<I")
-_TIME = struct.Struct("<II")
+_TIME, _PLACE = struct.Struct("<II"), struct.Struct("<Q")
 
 Message = tuple[int, float, bytes]
 """A message: its connection, when it was received [s], its content."""
@@ -34,30 +34,60 @@ class Connection:
     definition: str
 
 
-def records(stream: BinaryIO) -> Iterator[Connection | Message]:
-    """The connections and messages of a bag.
+def records(stream: BinaryIO, notes: list[str]) -> Iterator[Connection | Message]:
+    """The connections and messages of a bag; what is damaged within a chunk is left out, which ``notes`` tell.
 
     Raises ValueError, struct.error, LookupError or OSError where the bag is damaged or ends early.
     """
     if stream.read(len(_MAGIC)) != _MAGIC:
         raise ValueError("it does not begin as ROS 1 bags do")
-    while head := stream.read(_LENGTH.size):
-        (length,) = _LENGTH.unpack(head)
-        if length > _LONGEST_HEADER:
-            raise ValueError("a record's header has over 64 KiB")
-        fields = _fields(_read(stream, length))
-        (size,) = _LENGTH.unpack(_read(stream, _LENGTH.size))
-        if size > _LARGEST:
-            raise ValueError("a record of over 1 GiB")
-        kind = fields[b"op"][0]
-        content = stream.read(size)
-        whole = len(content) == size
+    damaged = 0
+    while (record := _next(stream)) is not None:
+        kind, fields, content, whole = record
+        if kind == _BAG and whole:
+            yield from _indexed(stream, fields)
         if kind == _CHUNK and (whole or fields[b"compression"] == b"none"):
-            yield from _inner(_unpacked(fields, content))
+            try:
+                yield from _inner(_unpacked(fields, content))
+            except DAMAGE:
+                damaged += whole
         if not whole:
             raise ValueError("it ends within a record")
         if kind in (_MESSAGE, _CONNECTION):
             yield _record(kind, fields, content)
+    if damaged:
+        notes.append(f"{damaged} chunks are damaged; what of them cannot be read was left out.")
+
+
+def _next(stream: BinaryIO) -> tuple[int, dict[bytes, bytes], bytes, bool] | None:
+    """Kind, fields and content of the next record, and whether that is whole; None at the end."""
+    head = stream.read(_LENGTH.size)
+    if not head:
+        return None
+    (length,) = _LENGTH.unpack(head)
+    if length > _LONGEST_HEADER:
+        raise ValueError("a record's header has over 64 KiB")
+    fields = _fields(_read(stream, length))
+    (size,) = _LENGTH.unpack(_read(stream, _LENGTH.size))
+    if size > _LARGEST:
+        raise ValueError("a record of over 1 GiB")
+    content = stream.read(size)
+    return fields[b"op"][0], fields, content, len(content) == size
+
+
+def _indexed(stream: BinaryIO, fields: dict[bytes, bytes]) -> Iterator[Connection]:
+    """The connections that the index at the end repeats, if there is one: the chunk that told first may be damaged."""
+    here = stream.tell()
+    try:
+        (place,) = _PLACE.unpack(fields.get(b"index_pos", bytes(8)))
+        if here < place < stream.seek(0, 2):
+            stream.seek(place)
+            while (record := _next(stream)) is not None and record[0] == _CONNECTION:
+                yield _connection(*record[1:3])
+    except DAMAGE:
+        pass  # the records before it tell, too
+    finally:
+        stream.seek(here)
 
 
 def _read(stream: BinaryIO, size: int) -> bytes:
@@ -120,10 +150,15 @@ def _inner(content: bytes) -> Iterator[Connection | Message]:
 
 
 def _record(kind: int, fields: dict[bytes, bytes], content: bytes) -> Connection | Message:
+    if kind == _CONNECTION:
+        return _connection(fields, content)
     (number,) = _LENGTH.unpack(fields[b"conn"])
-    if kind == _MESSAGE:
-        seconds, rest = _TIME.unpack(fields[b"time"])
-        return number, seconds + 1e-9 * rest, content
+    seconds, rest = _TIME.unpack(fields[b"time"])
+    return number, seconds + 1e-9 * rest, content
+
+
+def _connection(fields: dict[bytes, bytes], content: bytes) -> Connection:
+    (number,) = _LENGTH.unpack(fields[b"conn"])
     about = _fields(content)
     texts = (fields[b"topic"], about[b"type"], about[b"message_definition"])
     return Connection(number, *(text.decode("utf-8", "replace") for text in texts))
