@@ -18,6 +18,8 @@ sys.path.insert(0, str(Path(__file__).parent))
 from made_up import VEHICLE, WHEELS
 
 YAW_RATE = 0.1
+
+
 def drive(name: str = "multi2", method: str = "bank", seconds: float = 120.0, seed: int = 0) -> Run:
     """A run over four sections of two soils, stuck from 60 to 65 s; estimates err by their stated SD."""
     rng = np.random.default_rng(seed)
