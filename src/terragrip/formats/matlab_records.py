@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from terragrip.formats.boundary import needed
+from terragrip.formats.boundary import DAMAGE, needed
 from terragrip.formats.mat5 import Array, Opaque
 
 _STREAM = "#sigstream#"
@@ -55,7 +55,7 @@ def resolved(value: Any, records: Any, ticks: Mapping[str, float]) -> Any:
     if _is_series(value):
         try:
             return _series(value, records, ticks)
-        except (LookupError, ValueError, TypeError, AttributeError):
+        except DAMAGE:
             return Opaque(IN_RECORDS)
     return {key: resolved(part, records, ticks) for key, part in value.items()}
 
@@ -134,7 +134,7 @@ def _data(struct: Mapping[str, Any], about: Mapping[str, Any], records: Any, cou
             raise ValueError("not as many samples as instants")
         return Array((count, width), lambda: slope * values.reshape(count, width) + bias)
     length, size, read = _record(records, struct["DataR2"])
-    if length * size != count * width * (size // width) or size % width:
+    if length != count or size % width:
         raise ValueError("not as many samples as instants")
     dtype = np.dtype(f"<{_fixed_kind(about, size // width) if kind in _FIXED else _CLASSES[kind]}")
     if dtype.itemsize * width != size:

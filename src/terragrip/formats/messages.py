@@ -72,7 +72,7 @@ class Topic:
     def take(self, receipt: float, message: Any) -> None:
         """Take a message that came at ``receipt`` [s]."""
         labels = self._names_of_entries(message)
-        if not self.count or labels != self._labels:
+        if not self._columns or labels != self._labels:
             self._learn(message, labels)
         self.count += 1
         if not self._columns or skips(self.count - 1, BLOCK, self.wanted):
