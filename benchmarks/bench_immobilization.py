@@ -4,7 +4,8 @@
 
 Drives into soft spots and rough but healthy ones (terragrip.simulation.soft_spots), for each seed on the paper's prototype
 curve and on one that peaks and falls, as seen by four sets of sensors. A full stop: ground speed first under 0.03 m/s with
-turning wheels, by the truth. A warning counts from its start; missed: none before the full stop, once the spot has begun.
+turning wheels, by the truth. A warning counts from its start; missed: none before the full stop, once the spot has begun;
+a vehicle that never gets that far says nothing about spots.
 False: a warning on a healthy drive, where the machine did not stop within LATER seconds; of a drive on which it got stuck
 by itself, only what is earlier than that counts, as time too. --write puts the table into docs/events.md.
 """
@@ -15,6 +16,7 @@ import argparse
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -25,7 +27,8 @@ from terragrip.ground.events import events
 from terragrip.simulation import SimulationResult, simulate
 from terragrip.simulation.soft_spots import CURVES, healthy_drive, soft_spot_drive
 
-SENSORS = {
+KINDS = ("spot", "healthy")
+SENSORS: dict[str, dict[str, Any]] = {
     "100 Hz, drawbar cell": {},
     "100 Hz": {"drawbar": False},
     "10 Hz": {"rate": 10.0, "drawbar": False},
@@ -67,46 +70,63 @@ class Tally:
         ]
 
 
-def full_stop(truth: pd.DataFrame) -> float | None:
-    """When the vehicle first stands with turning wheels [s], None where it never does."""
+@dataclass(frozen=True)
+class Course:
+    """What befell a vehicle, by the truth [s]: its first full stop (NaN: none), where the spot may begin (infinite: never
+    reached) and the end."""
+
+    stop: float
+    begun: float
+    end: float
+
+
+def course_of(truth: pd.DataFrame) -> Course:
+    """A full stop: it first stands with turning wheels."""
     wheels = [c for c in truth if c.startswith("true_wheel_speed_")]
+    time, distance = truth["time"].to_numpy(), truth["true_distance"].to_numpy()
     rim = 0.2 * truth[wheels].abs().mean(axis=1).to_numpy()
-    held = (truth["true_ground_speed"].to_numpy() < STOPPED) & (rim > TURNING)
-    held &= truth["true_distance"].to_numpy() > 2.0
-    return float(truth["time"].to_numpy()[np.argmax(held)]) if held.any() else None
+    held = (truth["true_ground_speed"].to_numpy() < STOPPED) & (rim > TURNING) & (distance > 2.0)
+    reached = distance > SPOT
+    return Course(
+        stop=float(time[np.argmax(held)]) if held.any() else np.nan,
+        begun=float(time[np.argmax(reached)]) if reached.any() else np.inf,
+        end=float(time[-1]),
+    )
 
 
-def warnings_of(result: SimulationResult) -> list[float]:
-    """Starts of the warnings [s]."""
-    found = events(estimate(result.recording, result.vehicle))
-    return [event.start for event in found if event.kind == "immobilization"]
-
-
-def judge_spot(result: SimulationResult) -> Tally:
-    stop, truth = full_stop(result.truth), result.truth
-    begun = float(truth["time"].to_numpy()[np.argmax(truth["true_distance"].to_numpy() > SPOT)])
-    starts = [t for t in warnings_of(result) if t > begun]
-    if stop is None:
-        return Tally(passed=1, passed_warned=int(bool(starts)))
-    if stop < begun:
+def judge(kind: str, course: Course, starts: list[float]) -> Tally:
+    """Warnings that start at ``starts`` [s], on a drive into a spot or a healthy one."""
+    if kind == "healthy":
+        end = course.end if np.isnan(course.stop) else course.stop - LATER
+        return Tally(false=sum(t < end for t in starts), seconds=max(end, 0.0))
+    starts = [t for t in starts if t > course.begun]
+    if np.isinf(course.begun) or course.stop < course.begun:
         return Tally()  # it never got there
-    before = [t for t in starts if t < stop]
-    return Tally(leads=[stop - before[0]]) if before else Tally(missed=1)
+    if np.isnan(course.stop):
+        return Tally(passed=1, passed_warned=int(bool(starts)))
+    before = [t for t in starts if t < course.stop]
+    return Tally(leads=[course.stop - before[0]]) if before else Tally(missed=1)
 
 
-def judge_healthy(result: SimulationResult) -> Tally:
-    stop = full_stop(result.truth)
-    end = float(result.truth["time"].iloc[-1]) if stop is None else stop - LATER
-    return Tally(false=sum(t < end for t in warnings_of(result)), seconds=max(end, 0.0))
+def simulated(kind: str, seed: int, curve: str, sensors: dict[str, Any]) -> SimulationResult:
+    """A drive into a soft spot, or a healthy one; healthy ones of even seeds with faults."""
+    scenario = (
+        soft_spot_drive(seed, curve, **sensors)
+        if kind == "spot"
+        else healthy_drive(seed, curve, faults=seed % 2 == 0, **sensors)
+    )
+    return simulate(scenario, seed)
 
 
 def score(job: tuple[int, str, str]) -> Tally:
     """One seed, curve and set of sensors."""
     seed, curve, name = job
-    sensors = SENSORS[name]
-    tally = judge_spot(simulate(soft_spot_drive(seed, curve, **sensors), seed))  # type: ignore[arg-type]
-    healthy = healthy_drive(seed, curve, faults=seed % 2 == 0, **sensors)  # type: ignore[arg-type]
-    tally.add(judge_healthy(simulate(healthy, seed)))
+    tally = Tally()
+    for kind in KINDS:
+        result = simulated(kind, seed, curve, SENSORS[name])
+        found = events(estimate(result.recording, result.vehicle))
+        starts = [event.start for event in found if event.kind == "immobilization"]
+        tally.add(judge(kind, course_of(result.truth), starts))
     return tally
 
 

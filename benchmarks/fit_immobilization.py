@@ -1,11 +1,11 @@
 """Fit the score of the warning of immobilization to simulated drives, and write it into the kernel.
 
-    python benchmarks/fit_immobilization.py [--seeds 1000 1199] [--cache DIRECTORY] [--workers 2] [--write]
+    python benchmarks/fit_immobilization.py [--seeds 1000 1199 5000 5699] [--cache DIRECTORY] [--workers 2] [--write]
 
 The signs (terragrip.estimation.reference.immobilization) of drives into soft spots and of rough healthy ones, for each seed
 on both curves and at three rates without a drawbar cell; of every third seed also as a vehicle with one driven axle would
 show them, without front and rear to compare. Told apart: looks within AHEAD seconds before a full stop in a spot, and looks
-of healthy driving, or before the spot. The score is the log odds, a sum of small trees (scikit-learn's gradient boosting),
+of healthy driving (every fourth), or before the spot. The score is the log odds, a sum of small trees (scikit-learn's gradient boosting),
 monotone in slip, in the asymmetry of the axles and in grip. A cross-validation over seeds is printed first.
 --write puts the table into kernel/src/digging_table.h. Needs scikit-learn (extra `classifier`).
 """
@@ -13,8 +13,9 @@ monotone in slip, in the asymmetry of the axles and in grip. A cross-validation 
 from __future__ import annotations
 
 import argparse
+from collections.abc import Callable
 from concurrent.futures import ProcessPoolExecutor
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
@@ -22,7 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 from sklearn.ensemble import HistGradientBoostingClassifier
 
-from bench_immobilization import LATER, SPOT, Tally, full_stop
+from bench_immobilization import KINDS, LATER, Course, Tally, course_of, judge, simulated
 from terragrip.estimation import estimate
 from terragrip.estimation.engine import EVENTS, watch_limits
 from terragrip.estimation.reference.immobilization import (
@@ -35,8 +36,7 @@ from terragrip.estimation.reference.immobilization import (
     Watch,
     rows_of,
 )  # fmt: skip
-from terragrip.simulation import simulate
-from terragrip.simulation.soft_spots import CURVES, healthy_drive, soft_spot_drive
+from terragrip.simulation.soft_spots import CURVES
 
 Array = NDArray[np.float64]
 
@@ -46,14 +46,18 @@ SENSORS: dict[str, dict[str, Any]] = {
     "ground speed 2 Hz": {"rate": 50.0, "drawbar": False, "ground_rate": 2.0},
 }
 AHEAD = 3.0  # s
-FOLDS = 4
+FOLDS = 2
+PEAKING = 8.0
+"""Weight of looks before a stop on the curve that peaks, where the time is short."""
+THIN = 4
+"""Of so many looks of healthy driving, one is learned from, and counts for all."""
 RISING = dict.fromkeys(("slip", "slip_calm", "slip_rise", "slip_unusual"), 1)
 FALLING = dict.fromkeys(("asymmetry_change", "asymmetry_level", "asymmetry_unusual", "grip_unusual"), -1)
 LEAVES = 8  # a tree: as many as a byte has bits
 MODEL = {
     "max_iter": 120,
     "max_leaf_nodes": LEAVES,
-    "learning_rate": 0.12,
+    "learning_rate": 0.2,
     "min_samples_leaf": 150,
     "l2_regularization": 5.0,
     "monotonic_cst": [(RISING | FALLING).get(name, 0) for name in SIGNS],
@@ -67,32 +71,30 @@ TABLE = Path(__file__).resolve().parents[1] / "kernel/src/digging_table.h"
 @dataclass
 class Drive:
     """The looks of one drive: time [s], signs, SD of slip, silence of the ground speed [s], whether it was stuck; looks
-    where the motion began anew. Full stop (NaN: none), begin of the spot and end of the drive [s]."""
+    where the motion began anew."""
 
     seed: int
     curve: str
     sensors: str
     kind: str
+    course: Course
     time: Array
     signs: Array
     deviation: Array
     silence: Array
     stuck: NDArray[np.bool_]
     fresh: NDArray[np.bool_]
-    stop: float
-    begun: float
-    end: float
 
     def labels(self) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
         """Looks that foretell a stop, and looks that may be learned from."""
-        t, ahead = self.time, np.zeros(len(self.time), bool)
+        t, course, ahead = self.time, self.course, np.zeros(len(self.time), bool)
         use = ~self.stuck
-        if self.kind == "healthy":
-            return ahead, use & ~(t >= self.stop - LATER)
-        if np.isnan(self.stop):
-            return ahead, use & (t <= self.begun)
-        ahead = (t > self.stop - AHEAD) & (t < self.stop) & (t > self.begun)
-        return ahead, use & (t < self.stop) & ((t < self.begun) | (t > self.stop - AHEAD))
+        if self.kind == "healthy" or course.stop < course.begun:
+            return ahead, use & ~(t >= course.stop - LATER)
+        if np.isnan(course.stop):
+            return ahead, use & (t <= course.begun)
+        ahead = (t > course.stop - AHEAD) & (t < course.stop) & (t > course.begun)
+        return ahead, use & (t < course.stop) & ((t < course.begun) | (t > course.stop - AHEAD))
 
 
 def looks(rows: list[Row], stuck: NDArray[np.bool_]) -> dict[str, Array]:
@@ -121,97 +123,95 @@ def drive_of(job: tuple[int, str, str, str, str | None]) -> Drive:
     kept = Path(cache or ".") / f"{sensors}_{curve}_{kind}_{seed}.npz".replace(" ", "-")
     if cache and kept.exists():
         with np.load(kept) as held:
-            return Drive(seed, curve, sensors, kind, **{name: held[name][()] for name in held.files})
-    options = SENSORS[sensors]
-    scenario = (
-        soft_spot_drive(seed, curve, **options)
-        if kind == "spot"
-        else healthy_drive(seed, curve, faults=seed % 2 == 0, **options)
-    )
-    result = simulate(scenario, seed)
-    table, truth = estimate(result.recording, result.vehicle), result.truth
-    measured = np.isfinite(result.recording.channels["ground_speed"])
-    seen = looks(rows_of(table, measured), table.event_codes == EVENTS.index("stuck"))
-    stop, time = full_stop(truth), truth["time"].to_numpy()
-    begun = float(time[np.argmax(truth["true_distance"].to_numpy() > SPOT)])
-    flags = {name: seen.pop(name).astype(bool) for name in ("stuck", "fresh")}
-    found: dict[str, Any] = {
-        **seen, **flags, "stop": np.nan if stop is None else stop, "begun": begun, "end": float(time[-1]),
-    }  # fmt: skip
-    if cache:
-        Path(cache).mkdir(parents=True, exist_ok=True)
-        np.savez(kept, **found)
-    return Drive(seed, curve, sensors, kind, **found)
+            found: dict[str, Any] = {name: held[name][()] for name in held.files}
+    else:
+        result = simulated(kind, seed, curve, SENSORS[sensors])
+        table = estimate(result.recording, result.vehicle)
+        measured = np.isfinite(result.recording.channels["ground_speed"])
+        seen = looks(rows_of(table, measured), table.event_codes == EVENTS.index("stuck"))
+        flags = {name: seen.pop(name).astype(bool) for name in ("stuck", "fresh")}
+        found = {**seen, **flags, **asdict(course_of(result.truth))}
+        if cache:
+            Path(cache).mkdir(parents=True, exist_ok=True)
+            np.savez(kept, **found)
+    course = Course(**{name: float(found.pop(name)) for name in ("stop", "begun", "end")})
+    return Drive(seed, curve, sensors, kind, course, **found)
+
+
+def one_axle(signs: Array) -> Array:
+    """Signs as a vehicle with one driven axle has them: front and rear alike."""
+    signs = signs.copy()
+    signs[:, [k for k, name in enumerate(SIGNS) if name.startswith("asymmetry")]] = 0
+    return signs
 
 
 def fit(drives: list[Drive]) -> HistGradientBoostingClassifier:
-    signs, ahead = [], []
-    alike = [k for k, name in enumerate(SIGNS) if name.startswith("asymmetry")]
+    signs, ahead, weight = [], [], []
     for drive in drives:
         label, use = drive.labels()
-        signs.append(drive.signs[use])
-        ahead.append(label[use])
-        if drive.seed % 3 == 0:
-            one_axle = drive.signs[use].copy()
-            one_axle[:, alike] = 0
-            signs.append(one_axle)
+        counts = np.where(label & (drive.curve == "peaking"), PEAKING, 1.0)
+        if drive.kind == "healthy":
+            use &= np.arange(len(use)) % THIN == drive.seed % THIN
+            counts *= THIN
+        seen = drive.signs[use]
+        for shown in (seen, one_axle(seen)) if drive.seed % 3 == 0 else (seen,):
+            signs.append(shown)
             ahead.append(label[use])
-    return HistGradientBoostingClassifier(**MODEL).fit(np.concatenate(signs), np.concatenate(ahead))
+            weight.append(counts[use])
+    model = HistGradientBoostingClassifier(**MODEL)
+    return model.fit(np.concatenate(signs), np.concatenate(ahead), sample_weight=np.concatenate(weight))
 
 
 def warnings_of(drive: Drive, scores: Array, limits: dict[str, float]) -> list[float]:
     """Starts of the warnings [s]: the kernel's rule, over the scores of the looks."""
     found, level, on, last = [], NO_SCORE, False, -np.inf
-    high = drive.signs[:, 0] - limits["confidence"] * drive.deviation - limits["high_slip"]
-    raw = np.clip(scores, NO_SCORE, -NO_SCORE) + np.where(
-        drive.silence < SILENT, HIGH_SLIP * np.maximum(high, 0), 0
-    )
+    slip = drive.signs[:, 0]
+    high = np.maximum(slip - limits["confidence"] * drive.deviation - limits["high_slip"], 0)
+    high = np.where(drive.silence < SILENT, HIGH_SLIP * high, 0)
+    stands = slip > 1 - limits["stuck_travel"]  # as far as the looks tell
     step = np.where(drive.fresh, 0.0, np.diff(drive.time, prepend=drive.time[0])).clip(0, LONGEST_STEP)
-    for t, score, dt, fresh, stuck in zip(drive.time, raw, step, drive.fresh, drive.stuck, strict=True):
+    looks = (drive.time, np.clip(scores, NO_SCORE, -NO_SCORE), high, stands, step, drive.fresh, drive.stuck)
+    for t, score, more, standing, dt, fresh, stuck in zip(*(x.tolist() for x in looks), strict=True):
         if fresh or stuck:
             level, on = NO_SCORE, False
             if stuck:
                 continue
         level += dt / (limits["memory"] + dt) * (score - level)
-        was, on = on, level > limits["warn"] or (on and level > limits["warn"] - limits["release"])
+        now = level + more
+        was, on = (
+            on,
+            (now > limits["warn"] and not standing) or (on and now > limits["warn"] - limits["release"]),
+        )
         if on and not was and t - last > 0.3:
-            found.append(float(t))
+            found.append(t)
         if on:
             last = t
     return found
 
 
-def judge(drive: Drive, scores: Array, limits: dict[str, float]) -> Tally:
-    starts = warnings_of(drive, scores, limits)
-    if drive.kind == "healthy":
-        end = drive.end if np.isnan(drive.stop) else drive.stop - LATER
-        return Tally(false=sum(t < end for t in starts), seconds=max(end, 0.0))
-    if np.isnan(drive.stop) or drive.stop < drive.begun:
-        return Tally()
-    before = [t for t in starts if drive.begun < t < drive.stop]
-    return Tally(leads=[drive.stop - before[0]]) if before else Tally(missed=1)
-
-
-def raw_score(model: HistGradientBoostingClassifier, signs: Array) -> Array:
-    return np.asarray(model.decision_function(signs), float)
-
-
-def cross_validate(drives: list[Drive], *, one_axle: bool) -> None:
+def cross_validate(drives: list[Drive]) -> None:
     limits = watch_limits()
-    tallies: dict[tuple[str, str], Tally] = {}
+    vehicles: dict[str, Callable[[Array], Array]] = {
+        "all axles driven": np.asarray,
+        "one driven axle": one_axle,
+    }
+    tallies: dict[tuple[str, str, str], Tally] = {}
     for fold in range(FOLDS):
         model = fit([d for d in drives if d.seed % FOLDS != fold])
-        for drive in (d for d in drives if d.seed % FOLDS == fold):
-            signs = drive.signs.copy()
-            if one_axle:
-                signs[:, [k for k, name in enumerate(SIGNS) if name.startswith("asymmetry")]] = 0
-            tally = tallies.setdefault((drive.sensors, drive.curve), Tally())
-            tally.add(judge(drive, raw_score(model, signs), limits))
-    print("One driven axle:" if one_axle else "Cross-validation over seeds:")
-    for (sensors, curve), tally in tallies.items():
+        left_out = [d for d in drives if d.seed % FOLDS == fold]
+        ends = np.cumsum([len(d.time) for d in left_out])[:-1]
+        signs = np.concatenate([d.signs for d in left_out])
+        for vehicle, seen in vehicles.items():
+            scores = np.split(model.decision_function(seen(signs)), ends)
+            for drive, score in zip(left_out, scores, strict=True):
+                tally = tallies.setdefault((vehicle, drive.sensors, drive.curve), Tally())
+                tally.add(judge(drive.kind, drive.course, warnings_of(drive, score, limits)))
+    print("Cross-validation over seeds:")
+    for names, tally in sorted(tallies.items()):
         row = tally.row()
         print(
-            f"  {sensors:18s} {curve:10s} stops {row[0]} missed {row[1]} lead {row[2]} (10 %: {row[3]}) s false in 30 min {row[7]}"
+            f"  {' '.join(f'{name:18s}' for name in names)} stops {row[0]} missed {row[1]} lead {row[2]} (10 %: {row[3]}) s "
+            f"false in 30 min {row[7]}"
         )
 
 
@@ -269,23 +269,27 @@ def _wrapped(items: list[str]) -> list[str]:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
-    parser.add_argument("--seeds", type=int, nargs=2, default=(1000, 1199), metavar=("FIRST", "LAST"))
+    parser.add_argument(
+        "--seeds", type=int, nargs="+", default=(1000, 1199, 5000, 5699), metavar="FIRST LAST"
+    )
     parser.add_argument("--cache", help="directory that keeps the looks of the drives")
     parser.add_argument("--workers", type=int, default=1)
     parser.add_argument("--write", action="store_true", help="put the table into the kernel")
     arguments = parser.parse_args()
-    seeds = range(arguments.seeds[0], arguments.seeds[1] + 1)
+    ends = arguments.seeds
+    seeds = [
+        seed for first, last in zip(ends[::2], ends[1::2], strict=True) for seed in range(first, last + 1)
+    ]
     jobs = [
         (seed, curve, sensors, kind, arguments.cache)
         for sensors in SENSORS
         for curve in CURVES
         for seed in seeds
-        for kind in ("spot", "healthy")
+        for kind in KINDS
     ]
     with ProcessPoolExecutor(arguments.workers) as pool:
         drives = list(pool.map(drive_of, jobs, chunksize=8))
-    cross_validate(drives, one_axle=False)
-    cross_validate(drives, one_axle=True)
+    cross_validate(drives)
     if arguments.write:
         TABLE.write_text(table_of(fit(drives), len(drives)), encoding="utf-8")
 

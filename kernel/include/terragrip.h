@@ -264,7 +264,7 @@ enum { /* signs that the wheels dig, of the driven wheels' means; a change is a 
 };
 
 typedef struct { /* when the estimator warns of immobilization, and calls the vehicle stuck or pushed */
-    tg_real warn;                   /* low-passed score above which it warns: log odds that the vehicle stops within 3 s, in the fit */
+    tg_real warn;                   /* low-passed score above which it warns, of a vehicle that does not stand */
     tg_real release;                /* it warns on until the score is so much below that */
     tg_real memory;                 /* s, low-pass of the score */
     tg_real high_slip;              /* slip above this, less `confidence` of its SDs, adds to the score by itself */
@@ -308,7 +308,7 @@ typedef struct {
 } tg_settings;
 
 typedef struct tg_estimator tg_estimator;
-/* Score of TG_SIGNS signs: log odds that the vehicle stops within 3 s, in the simulated drives that it was fitted to. */
+/* Score of TG_SIGNS signs: how much they look like the 3 s before a full stop, as log odds in the weighted drives it was fitted to. */
 tg_real tg_digging_score(const tg_real *signs);
 size_t tg_estimator_size(void);
 /* Tuned thresholds, tuning and priors; the machine is left empty, and with it the random walks. */

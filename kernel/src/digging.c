@@ -45,7 +45,6 @@ void tgi_signs_take(tgi_signs *s, const tgi_view *l, tg_real dt)
     s->seen = 1;
     s->age += dt;
     s->moved += dt;
-    s->deviation = l->deviation;
 }
 
 /* A rest or a gap: what the motion was is forgotten, what is usual is kept. */

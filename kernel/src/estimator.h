@@ -98,7 +98,6 @@ typedef struct { /* see digging.c */
     tg_real mean[TG_SIGNALS][TG_MEMORIES];
     tg_real square[3];        /* mean square of slip's, asymmetry's and grip's wandering */
     tg_real age, moved;       /* s of looking, in all and since the last rest */
-    tg_real deviation;        /* SD of the last look's slip */
     int32_t seen;
 } tgi_signs;
 

@@ -5,7 +5,7 @@
 #define TG_LOOK ((tg_real)0.095)      /* s between two looks for the signs of digging; rows in between are averaged */
 #define TG_LONGEST_STEP ((tg_real)0.6) /* s that a look counts at most */
 #define TG_NO_SCORE ((tg_real)-6)     /* the score is cut to this, and to as much above 0 */
-#define TG_HIGH_SLIP 20               /* score per unit of slip above `high_slip` */
+#define TG_HIGH_SLIP 10               /* score per unit of slip above `high_slip` */
 #define TG_SILENT ((tg_real)0.55)     /* s without a ground speed after which its slip is no sign by itself */
 #define TG_FAST ((tg_real)0.1)        /* s, low-pass of the rim speed */
 #define TG_LONGEST_LOOK ((tg_real)1.5) /* s between two measured ground speeds: after more, being stuck is judged anew */
@@ -85,15 +85,17 @@ static tg_real count_seconds(tg_real seconds, tg_real dt, int32_t holds, tg_real
     return seconds < 0 ? 0 : seconds > most ? most : seconds;
 }
 
-/* Score of the signs now. Slip beyond `high_slip`, less some of its SDs, counts by itself, unless the ground speed is only reckoned. */
-static tg_real score_of(const tg_watch_settings *s, const tgi_signs *signs, tg_real silence)
+static tg_real score_of(const tg_real *signs)
 {
-    tg_real x[TG_SIGNS];
-    tgi_signs_features(signs, x);
-    tg_real score = tg_digging_score(x);
-    const tg_real high = x[TG_SIGN_SLIP] - s->confidence * signs->deviation - s->high_slip;
-    score = score < TG_NO_SCORE ? TG_NO_SCORE : score > -TG_NO_SCORE ? -TG_NO_SCORE : score;
-    return high > 0 && silence < TG_SILENT ? score + TG_HIGH_SLIP * high : score;
+    const tg_real score = tg_digging_score(signs);
+    return score < TG_NO_SCORE ? TG_NO_SCORE : score > -TG_NO_SCORE ? -TG_NO_SCORE : score;
+}
+
+/* What slip beyond `high_slip`, less some of its SDs, adds at once, unless the ground speed is only reckoned. */
+static tg_real score_of_high_slip(const tg_watch_settings *s, tg_real slip, tg_real deviation, tg_real silence)
+{
+    const tg_real high = slip - s->confidence * deviation - s->high_slip;
+    return high > 0 && silence < TG_SILENT ? TG_HIGH_SLIP * high : 0;
 }
 
 static void watch_digging(tg_estimator *e, const tg_row *row, const tgi_view *now)
@@ -118,8 +120,12 @@ static void watch_digging(tg_estimator *e, const tg_row *row, const tgi_view *no
         return;
     }
     const tg_real step = since < TG_LONGEST_STEP ? since : TG_LONGEST_STEP;
-    w->score += step / (s->memory + step) * (score_of(s, &w->signs, (tg_real)(row->time - w->seen_time)) - w->score);
-    w->sinking = w->score > s->warn || (w->sinking && w->score > s->warn - s->release);
+    tg_real signs[TG_SIGNS];
+    tgi_signs_features(&w->signs, signs);
+    w->score += step / (s->memory + step) * (score_of(signs) - w->score);
+    const tg_real score = w->score + score_of_high_slip(s, signs[TG_SIGN_SLIP], l.deviation, (tg_real)(row->time - w->seen_time));
+    const int32_t begins = score > s->warn && w->spinning <= 0; /* of a vehicle that stands already nothing is foretold */
+    w->sinking = begins || (w->sinking && score > s->warn - s->release);
 }
 
 /* Where the ground speed was measured, for a reckoned one follows from the slip last seen. */

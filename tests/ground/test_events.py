@@ -77,6 +77,10 @@ def test_a_steady_drive_and_a_short_hit_are_no_warning():
     assert told_by(lambda t: (0.06 + 0.12 * (25 < t < 25.3), 1.0)) == []
 
 
+def test_a_vehicle_that_stands_at_once_is_stuck_without_a_warning():
+    assert told_by(lambda t: (0.06 if t < 25 else 1.0, 1.0)) == []
+
+
 def test_the_score_rises_with_slip_and_falls_with_grip():
     calm = dict.fromkeys(SIGNS, 0.0) | {"slip": 0.1, "slip_calm": 0.1}
     rng = np.random.default_rng(0)

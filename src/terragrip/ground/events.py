@@ -76,7 +76,7 @@ def _immobilization(estimates: Estimates, rows: NDArray[np.intp]) -> str:
     return (
         f"The wheels begin to dig: within a second slip went from {was:.0%} to {slip:.0%} and ground speed from "
         f"{abs(went):.2f} to {abs(speed):.2f} m/s while the wheels {rim}{told}; the warning comes when the signs' "
-        f"score, log odds of a full stop within 3 s in simulated drives, is above {limits['warn']:g} over "
+        f"score, of how much they look like the 3 s before a full stop in simulated drives, is above {limits['warn']:g} over "
         f"{limits['memory']:g} s, and slip beyond {limits['high_slip']:.0%} adds to it by itself."
     )
 

@@ -25,7 +25,7 @@ SIGNS = (
 """The kernel's TG_SIGN_*, in their order; terragrip.h tells what each is."""
 
 STEEPNESS, FORCES, LOOK, LONGEST_STEP, LONGEST_LOOK, FAST = 11.36, 0.2, 0.095, 0.6, 1.5, 0.1
-NO_SCORE, HIGH_SLIP, SILENT = -6.0, 20.0, 0.55
+NO_SCORE, HIGH_SLIP, SILENT = -6.0, 10.0, 0.55
 MEMORY = np.array([0.1, 0.3, 1.0, 3.0, 20.0])
 RESTARTED = MEMORY < 3
 SPREAD_MEMORY = 8.0
@@ -205,14 +205,14 @@ class Watch:
             self.score, self.sinking = NO_SCORE, False
             return
         signs = self.signs.features()
-        score = min(max(digging_score(signs), NO_SCORE), -NO_SCORE)
-        high = signs[0] - self.limits["confidence"] * float(look[1]) - self.limits["high_slip"]
-        if high > 0 and row.time - self.seen_time < SILENT:
-            score += HIGH_SLIP * high
         step = min(since, LONGEST_STEP)
+        score = min(max(digging_score(signs), NO_SCORE), -NO_SCORE)
         self.score += step / (self.limits["memory"] + step) * (score - self.score)
+        high = signs[0] - self.limits["confidence"] * float(look[1]) - self.limits["high_slip"]
+        score = self.score + (HIGH_SLIP * max(high, 0.0) if row.time - self.seen_time < SILENT else 0.0)
         warn = self.limits["warn"]
-        self.sinking = self.score > warn or (self.sinking and self.score > warn - self.limits["release"])
+        begins = score > warn and self.spinning <= 0
+        self.sinking = begins or (self.sinking and score > warn - self.limits["release"])
 
     def _judge_stuck(self, row: Row) -> None:
         limits = self.limits
