@@ -5,8 +5,8 @@
 The signs (terragrip.estimation.reference.immobilization) of drives into soft spots and of rough healthy ones, for each seed
 on both curves and at three rates without a drawbar cell; of every third seed also as a vehicle with one driven axle would
 show them, without front and rear to compare. Told apart: looks within AHEAD seconds before a full stop in a spot, and looks
-of healthy driving (every fourth), or before the spot. The score is the log odds, a sum of small trees (scikit-learn's gradient boosting),
-monotone in slip, in the asymmetry of the axles and in grip. A cross-validation over seeds is printed first.
+of healthy driving, or before the spot. The score is the log odds in drives so weighted, a sum of small trees (scikit-learn's
+gradient boosting), monotone in slip, in the asymmetry of the axles and in grip. A cross-validation over seeds is printed first.
 --write puts the table into kernel/src/digging_table.h. Needs scikit-learn (extra `classifier`).
 """
 
@@ -170,18 +170,16 @@ def warnings_of(drive: Drive, scores: Array, limits: dict[str, float]) -> list[f
     high = np.where(drive.silence < SILENT, HIGH_SLIP * high, 0)
     stands = slip > 1 - limits["stuck_travel"]  # as far as the looks tell
     step = np.where(drive.fresh, 0.0, np.diff(drive.time, prepend=drive.time[0])).clip(0, LONGEST_STEP)
-    looks = (drive.time, np.clip(scores, NO_SCORE, -NO_SCORE), high, stands, step, drive.fresh, drive.stuck)
-    for t, score, more, standing, dt, fresh, stuck in zip(*(x.tolist() for x in looks), strict=True):
+    columns = (drive.time, np.clip(scores, NO_SCORE, -NO_SCORE), high, stands, step, drive.fresh, drive.stuck)
+    for t, score, more, standing, dt, fresh, stuck in zip(*(x.tolist() for x in columns), strict=True):
         if fresh or stuck:
             level, on = NO_SCORE, False
             if stuck:
                 continue
         level += dt / (limits["memory"] + dt) * (score - level)
         now = level + more
-        was, on = (
-            on,
-            (now > limits["warn"] and not standing) or (on and now > limits["warn"] - limits["release"]),
-        )
+        begins = now > limits["warn"] and not standing
+        was, on = on, begins or (on and now > limits["warn"] - limits["release"])
         if on and not was and t - last > 0.3:
             found.append(t)
         if on:
