@@ -89,7 +89,7 @@ def settled(profile: Profile, log: LogTable) -> tuple[Profile, list[str]] | None
     Of the log only names are looked at. Raises InputError as `bound` does.
     """
     for origin in profile.channels.values():
-        if origin.delay or any(one.derivative_of or one.over for one in origin.chain):
+        if any(one.derivative_of or one.over or one.delay for one in origin.chain):
             return None
         if sum(_ways(one, log.names) for one in origin.chain) > 1:
             return None
