@@ -19,6 +19,7 @@ from terragrip.errors import InputError
 from terragrip.estimation import Estimates, TractionEstimator
 from terragrip.live import Recorder, read_record
 from terragrip.live.core import Core, Settings
+from terragrip.live.record_folder import last_snapshot, write_snapshot
 from terragrip.live.wal import Reading
 
 KILLS = 100
@@ -190,6 +191,16 @@ def test_another_vehicle_or_a_second_writer_is_refused(tmp_path, vehicle, short)
         path.write_text(path.read_text().replace('"rows"', '"rowz"'))
         with pytest.raises(InputError, match="is damaged"):
             Recorder(tmp_path, Core(vehicle, settings))
+
+
+def test_a_snapshot_of_another_version_is_refused_in_one_line(tmp_path, vehicle, short):
+    core = Core(vehicle, settings_for(short.recording))
+    Recorder(tmp_path, core).close()
+    state = core.state()
+    del state["reorder"]["released"]  # whole by its check sum, but with other entries
+    write_snapshot(tmp_path, last_snapshot(tmp_path), state)
+    with pytest.raises(InputError, match="another version"):
+        Recorder(tmp_path, Core(vehicle, settings_for(short.recording)))
 
 
 def test_no_record_is_said(tmp_path):
