@@ -7,7 +7,7 @@ on both curves and at three rates without a drawbar cell; of every third seed al
 show them, without front and rear to compare. Told apart: looks within AHEAD seconds before a full stop in a spot, and looks
 of healthy driving, or before the spot. The score is the log odds in drives so weighted, a sum of small trees (scikit-learn's
 gradient boosting), monotone in slip, in the asymmetry of the axles and in grip. A cross-validation over seeds is printed first.
---write puts the table into kernel/src/digging_table.h. Needs scikit-learn (extra `classifier`).
+--write puts the table into kernel/src/digging_table.h. Needs scikit-learn (extra `ground`).
 """
 
 from __future__ import annotations
