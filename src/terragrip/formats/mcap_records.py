@@ -11,12 +11,12 @@ from collections.abc import Iterator
 from typing import Any, BinaryIO
 
 from terragrip.formats.boundary import DAMAGE, needed
+from terragrip.formats.record_bytes import LARGEST, exactly
 
 _MAGIC = b"\x89MCAP0\r\n"
 _FOOTER, _SCHEMA, _CHANNEL, _MESSAGE, _CHUNK, _DATA_END = 2, 3, 4, 5, 6, 15
 _HEAD = struct.Struct("<BQ")  # kind and length of a record
 _OF_MESSAGE = struct.Struct("<HIQQ")  # channel, sequence, time of log and of publication [ns]
-_LARGEST = 1 << 30  # bytes of a record
 
 Message = tuple[int, int, bytes]
 """A message: its channel, when it was logged [ns], its content."""
@@ -31,15 +31,15 @@ def records(stream: BinaryIO, notes: list[str]) -> Iterator[Any]:
         raise ValueError("it does not begin as MCAP files do")
     damaged = 0
     while True:
-        kind, length = _HEAD.unpack(_read(stream, _HEAD.size))
+        kind, length = _HEAD.unpack(exactly(stream, _HEAD.size))
         if kind in (_FOOTER, _DATA_END):
             break
         if kind not in (_SCHEMA, _CHANNEL, _MESSAGE, _CHUNK):
             _pass(stream, length)
             continue
-        if length > _LARGEST:
+        if length > LARGEST:
             raise ValueError("a record of over 1 GiB")
-        content = _read(stream, length)
+        content = exactly(stream, length)
         if kind != _CHUNK:
             yield _record(kind, content)
             continue
@@ -51,18 +51,11 @@ def records(stream: BinaryIO, notes: list[str]) -> Iterator[Any]:
         notes.append(f"{damaged} chunks are damaged and were left out.")
 
 
-def _read(stream: BinaryIO, size: int) -> bytes:
-    found = stream.read(size)
-    if len(found) < size:
-        raise ValueError("it ends within a record")
-    return found
-
-
 def _pass(stream: BinaryIO, size: int) -> None:
     """Go on behind a record, which must be there."""
     if size:
         stream.seek(size - 1, io.SEEK_CUR)
-        _read(stream, 1)
+        exactly(stream, 1)
 
 
 def _record(kind: int, content: bytes) -> Any:
@@ -79,7 +72,7 @@ def _unpacked(content: bytes) -> bytes:
     reader = needed("mcap.stream_reader", "an MCAP file")
     stream = needed("mcap.data_stream", "an MCAP file").ReadDataStream(io.BytesIO(content))
     chunk = needed("mcap.records", "an MCAP file").Chunk.read(stream)
-    if chunk.uncompressed_size > _LARGEST:
+    if chunk.uncompressed_size > LARGEST:
         raise ValueError("a chunk of over 1 GiB")
     unpacked, size = reader.get_chunk_data_stream(chunk, validate_crc=True)
     return bytes(unpacked.read(size))

@@ -12,10 +12,10 @@ from dataclasses import dataclass
 from typing import BinaryIO
 
 from terragrip.formats.boundary import DAMAGE, needed
+from terragrip.formats.record_bytes import LARGEST, exactly
 
 _MAGIC = b"#ROSBAG V2.0\n"
 _MESSAGE, _BAG, _CHUNK, _CONNECTION = 2, 3, 5, 7
-_LARGEST = 1 << 30  # bytes of a record
 _LONGEST_HEADER = 1 << 16
 _LENGTH = struct.Struct("<I")
 _TIME, _PLACE = struct.Struct("<II"), struct.Struct("<Q")
@@ -67,9 +67,9 @@ def _next(stream: BinaryIO) -> tuple[int, dict[bytes, bytes], bytes, bool] | Non
     (length,) = _LENGTH.unpack(head)
     if length > _LONGEST_HEADER:
         raise ValueError("a record's header has over 64 KiB")
-    fields = _fields(_read(stream, length))
-    (size,) = _LENGTH.unpack(_read(stream, _LENGTH.size))
-    if size > _LARGEST:
+    fields = _fields(exactly(stream, length))
+    (size,) = _LENGTH.unpack(exactly(stream, _LENGTH.size))
+    if size > LARGEST:
         raise ValueError("a record of over 1 GiB")
     content = stream.read(size)
     return fields[b"op"][0], fields, content, len(content) == size
@@ -90,13 +90,6 @@ def _indexed(stream: BinaryIO, fields: dict[bytes, bytes]) -> Iterator[Connectio
         stream.seek(here)
 
 
-def _read(stream: BinaryIO, size: int) -> bytes:
-    found = stream.read(size)
-    if len(found) < size:
-        raise ValueError("it ends within a record")
-    return found
-
-
 def _fields(header: bytes) -> dict[bytes, bytes]:
     """The fields of a header by name."""
     found, place = {}, 0
@@ -114,7 +107,7 @@ def _fields(header: bytes) -> dict[bytes, bytes]:
 def _unpacked(fields: dict[bytes, bytes], content: bytes) -> bytes:
     """The records of a chunk."""
     (size,) = _LENGTH.unpack(fields[b"size"])
-    if size > _LARGEST:
+    if size > LARGEST:
         raise ValueError("a chunk of over 1 GiB")
     packing = fields[b"compression"]
     if packing == b"bz2":
