@@ -20,7 +20,7 @@ KERNEL_SOURCES := $(wildcard kernel/src/*.c)
 KERNEL_HEADERS := $(wildcard kernel/include/*.h kernel/src/*.h kernel/tests/*.h)
 KERNEL_TESTS := $(patsubst kernel/tests/%.c,%,$(wildcard kernel/tests/*.c))
 BUILD_INPUTS := pyproject.toml setup.py cffi_build.py $(KERNEL_SOURCES) $(KERNEL_HEADERS) \
-	$(wildcard kernel/python/*.c src/terragrip/*/*.c src/terragrip/*/*.h)
+	$(wildcard kernel/python/*.[ch] src/terragrip/*/*.c src/terragrip/*/*.h)
 
 .PHONY: help demo test lint kernel-test web-test pytest studio system bench lock clean
 

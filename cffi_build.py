@@ -18,8 +18,6 @@ from setuptools import Extension
 
 ROOT = Path(__file__).resolve().parent
 CPU_CHECK = "int tg_cpu_has_avx2(void);"
-TEXT = """size_t tg_json_row(const char *head, int32_t count, const char *names, const int32_t *places, const char *values,
-char *out);"""
 
 # -O3 without -ffast-math: NaN means "missing" here. errno and floating-point traps are read by nobody.
 # Contraction to fused multiply-add stays off, so that the portable and the AVX2 build give the same bits.
@@ -29,10 +27,10 @@ HIDDEN = "-fvisibility=hidden"
 
 @dataclass(frozen=True)
 class Binding:
-    """One extension module: its name, public header, C sources, extra flags and extra declarations."""
+    """One extension module: its name, public headers, C sources, extra flags and extra declarations."""
 
     name: str
-    header: Path
+    headers: tuple[Path, ...]
     sources: tuple[Path, ...]
     real: str = "double"
     flags: tuple[str, ...] = ()
@@ -43,10 +41,11 @@ class Binding:
         return [("TG_FLOAT", None)] if self.real == "float" else []
 
     def ffi(self, *, api: bool) -> FFI:
-        """Parse the header's declarations; in API mode also the C code that includes it."""
+        """Parse the headers' declarations; in API mode also the C code that includes them."""
         builder = FFI()
-        builder.cdef(declarations(self.header, self.real) + self.declarations)
-        builder.set_source(self.name, f'#include "{self.header.name}"\n{self.declarations}' if api else None)
+        builder.cdef("".join(declarations(header, self.real) for header in self.headers) + self.declarations)
+        included = "".join(f'#include "{header.name}"\n' for header in self.headers)
+        builder.set_source(self.name, included + self.declarations if api else None)
         return builder
 
 
@@ -70,25 +69,23 @@ def kernel_bindings() -> list[Binding]:
     sources = tuple(sorted((ROOT / "kernel/src").glob("*.c")))
     if not sources:
         return []
-    cpu_check, text = ROOT / "kernel/python/cpu.c", ROOT / "kernel/python/text.c"
+    python = ROOT / "kernel/python"
+    live = tuple(python / name for name in ("express.c", "number.c", "text.c"))
+    headers = (header, python / "live.h")
     found = [
         Binding(
-            "terragrip._kernel_portable",
-            header,
-            (*sources, text, cpu_check),
-            declarations=f"{TEXT}\n{CPU_CHECK}",
+            "terragrip._kernel_portable", headers, (*sources, *live, python / "cpu.c"), declarations=CPU_CHECK
         ),
-        Binding("terragrip._kernel_float", header, sources, real="float", flags=("-O2",)),
+        Binding("terragrip._kernel_float", (header,), sources, real="float", flags=("-O2",)),
     ]
     if platform.machine() in ("x86_64", "AMD64"):
         # The generic schedule, made for older processors too, costs 5 % here (docs/decisions/0080).
         found.append(
             Binding(
                 "terragrip._kernel_avx2",
-                header,
-                (*sources, text),
+                headers,
+                (*sources, *live),
                 flags=("-mavx2", "-mfma", "-mtune=skylake"),
-                declarations=TEXT,
             )
         )
     return found
@@ -99,7 +96,7 @@ def plant_bindings() -> list[Binding]:
     folder = ROOT / "src/terragrip/simulation"
     if not (folder / "plant.c").exists():
         return []
-    return [Binding("terragrip.simulation._plant", folder / "plant.h", (folder / "plant.c",))]
+    return [Binding("terragrip.simulation._plant", (folder / "plant.h",), (folder / "plant.c",))]
 
 
 def python_headers_exist() -> bool:
@@ -114,7 +111,7 @@ def extension(binding: Binding, generated: Path) -> Extension:
     loads the shared library named ``<module>_library``.
     """
     api = python_headers_exist()
-    folders = {path.parent.relative_to(ROOT) for path in (binding.header, *binding.sources)}
+    folders = {path.parent.relative_to(ROOT) for path in (*binding.headers, *binding.sources)}
     name, sources, flags = binding.name, list(binding.sources), [*FLAGS, *binding.flags]
     if api:
         glue = generated / f"{binding.name}.c"

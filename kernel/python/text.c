@@ -4,7 +4,7 @@
 #include <stdint.h>
 #include <string.h>
 
-size_t tg_json_row(const char *head, int32_t count, const char *names, const int32_t *places, const char *values, char *out);
+#include "live.h"
 
 static const double POWERS[] = {1e0,  1e1,  1e2,  1e3,  1e4,  1e5,  1e6,  1e7,  1e8,  1e9,  1e10, 1e11,
                                 1e12, 1e13, 1e14, 1e15, 1e16, 1e17, 1e18, 1e19, 1e20, 1e21, 1e22};
@@ -79,9 +79,6 @@ static char *number(char *out, double value)
     return copied(out, text + whole, (size_t)(length - whole));
 }
 
-/* Write `head`, then of each column its name, with what stands around it and ended by a zero, and the number at its place among
- * `values`, the bytes of doubles: null where it is NaN or infinite; then the closing brace. `out` holds all that with 17 characters a
- * number; returns the length. */
 size_t tg_json_row(const char *head, int32_t count, const char *names, const int32_t *places, const char *values, char *out)
 {
     char *end = copied(out, head, strlen(head));

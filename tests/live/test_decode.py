@@ -132,3 +132,8 @@ def test_what_is_no_json_object_is_said(data):
 
 def test_json_lines_are_samples():
     assert from_json(b'{"a": 1}\n{"a": 2}\n') == [{"a": 1}, {"a": 2}]
+
+
+def test_a_message_of_the_time_alone_is_no_sample_however_often_it_comes():
+    decoder = Decoder(None)
+    assert [decoder.samples({"time": float(k)}) for k in range(3)] == [[], [], []]

@@ -108,16 +108,16 @@ class Engine:
     """One tg_estimator. ``settings`` is a tg_settings structure; raises InputError if the kernel refuses it."""
 
     def __init__(self, vehicle: Vehicle, settings: Any) -> None:
-        self._slots_in = sample_slots(vehicle)
+        self.slots_in = sample_slots(vehicle)
         adaptive = settings.method == FILTERED and settings.tuning.policy in (ADAPTIVE, SUPERVISED)
         self._slots_out = estimate_slots(vehicle, adaptive=adaptive)
         self._used = 1 + max(self._slots_out.values())
-        self.inputs = tuple(self._slots_in)
+        self.inputs = tuple(self.slots_in)
         self.outputs = tuple(self._slots_out)
         self._memory = ffi.new("char[]", lib.tg_estimator_size() + 64)
         address = int(ffi.cast("uintptr_t", self._memory))
-        self._estimator = ffi.cast("tg_estimator *", address + -address % 64)
-        status = lib.tg_estimator_init(self._estimator, settings)
+        self.handle = ffi.cast("tg_estimator *", address + -address % 64)  # lives as long as this object
+        status = lib.tg_estimator_init(self.handle, settings)
         if status != lib.TG_OK:
             raise InputError(
                 f"the estimator cannot work with this vehicle ({_STATUS.get(status, status)})",
@@ -127,7 +127,7 @@ class Engine:
         self.estimate = ffi.new("tg_estimate *")
         self.index_out = self._slots_out
         names: list[Any] = [None] * lib.TG_SLOTS  # no sample has a column None
-        for name, slot in self._slots_in.items():
+        for name, slot in self.slots_in.items():
             names[slot] = name
         self._names = tuple(names)
         real = ffi.sizeof("tg_real")
@@ -139,7 +139,7 @@ class Engine:
     def update(self, time: float, sample: Mapping[str, Any]) -> int:
         """Take a sample and fill ``self.estimate``; returns tg_status. Raises struct.error on what is no number."""
         self._pack(self._room_in, 0, time, *map(sample.get, self._names, _MISSING))
-        status: int = lib.tg_estimator_update(self._estimator, self.sample, self.estimate)
+        status: int = lib.tg_estimator_update(self.handle, self.sample, self.estimate)
         return status
 
     def packed(self) -> bytes:
@@ -162,7 +162,7 @@ class Engine:
         Raises InputError with the row where the kernel refuses one; the rows before it have been taken.
         """
         rows = len(time)
-        sources = {self._slots_in[name]: values for name, values in columns.items()}
+        sources = {self.slots_in[name]: values for name, values in columns.items()}
         targets = {self._slots_out[name]: values for name, values in out.items()}
         done = ffi.new("size_t *")
         for first in range(0, rows, _BLOCK):
@@ -170,7 +170,7 @@ class Engine:
             places_in = _pointers(sources, lib.TG_SLOTS, first)
             places_out = _pointers(targets, lib.TG_OUT_SLOTS, first)
             status = lib.tg_estimator_block(
-                self._estimator,
+                self.handle,
                 last - first,
                 _pointer(time, first),
                 places_in,
@@ -185,14 +185,14 @@ class Engine:
 
     def smooth_carry(self) -> Floats:
         """Room for what smoothing carries from block to block."""
-        return np.zeros(lib.tg_smooth_carry(self._estimator))
+        return np.zeros(lib.tg_smooth_carry(self.handle))
 
     def record(self, time: Floats, columns: Mapping[str, Floats]) -> Floats:
         """Take rows and return their records (n, length), for `smooth`."""
-        records = np.empty((len(time), lib.tg_smooth_length(self._estimator)))
-        sources = _pointers({self._slots_in[k]: v for k, v in columns.items()}, lib.TG_SLOTS, 0)
+        records = np.empty((len(time), lib.tg_smooth_length(self.handle)))
+        sources = _pointers({self.slots_in[k]: v for k, v in columns.items()}, lib.TG_SLOTS, 0)
         status = lib.tg_estimator_record(
-            self._estimator, len(time), _pointer(time, 0), sources, _pointer(records, 0)
+            self.handle, len(time), _pointer(time, 0), sources, _pointer(records, 0)
         )
         if status != lib.TG_OK:
             raise refusal(status, None)
@@ -205,25 +205,25 @@ class Engine:
         targets = _pointers({self._slots_out[k]: v for k, v in out.items()}, lib.TG_OUT_SLOTS, 0)
         behind = ffi.NULL if following is None else _pointer(following, 0)
         status = lib.tg_estimator_smooth(
-            self._estimator, len(records), _pointer(records, 0), behind, _pointer(carry, 0), targets
+            self.handle, len(records), _pointer(records, 0), behind, _pointer(carry, 0), targets
         )
         if status != lib.TG_OK:
             raise refusal(status, None)
 
     def new_ground(self) -> None:
         """Forget the adhesion curves: the ground is another one."""
-        lib.tg_estimator_new_ground(self._estimator)
+        lib.tg_estimator_new_ground(self.handle)
 
     def snapshot(self) -> bytes:
         """The estimator as bytes that continue bit for bit."""
         size = lib.tg_snapshot_size()
         data = ffi.new("uint8_t[]", size)
-        lib.tg_estimator_snapshot(self._estimator, data)
+        lib.tg_estimator_snapshot(self.handle, data)
         return bytes(ffi.buffer(data, size))
 
     def restore(self, data: bytes) -> None:
         """Continue from a snapshot; raises InputError if it is damaged or another kernel's."""
-        status = lib.tg_estimator_restore(self._estimator, ffi.from_buffer("uint8_t[]", data), len(data))
+        status = lib.tg_estimator_restore(self.handle, ffi.from_buffer("uint8_t[]", data), len(data))
         if status != lib.TG_OK:
             raise refusal(status, None)
 

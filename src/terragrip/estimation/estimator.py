@@ -196,6 +196,11 @@ class TractionEstimator:
             status = self._update_known(time, sample)
         if status:
             raise self._refused(status, {**sample, "time": time})
+        return self.latest()
+
+    def latest(self) -> Estimate:
+        """The estimate that the kernel made last."""
+        engine = self._engine
         out = engine.estimate
         return Estimate(out.time, EVENTS[out.event], engine.packed(), engine.index_out)
 

@@ -16,6 +16,7 @@ from terragrip.estimation.engine import estimate_slots
 from terragrip.estimation.estimator import Estimate, TractionEstimator, default_channels
 from terragrip.estimation.methods import DEFAULT
 from terragrip.estimation.slip_estimator import SlipEstimator, restored, speeds_alone
+from terragrip.live.block import Block
 from terragrip.live.clock import SourceClock
 from terragrip.live.counts import Counts
 from terragrip.live.event import Event
@@ -128,7 +129,7 @@ class Core:
         self.clocks = [SourceClock(align) for _ in settings.sources]
         self.estimator: TractionEstimator | SlipEstimator | None = None
         self.rows = 0
-        self._event = ""  # the last row's
+        self.event = ""  # the last row's
         if settings.channels:
             self._begin(settings.channels)
 
@@ -220,10 +221,7 @@ class Core:
                 continue
             self.rows += 1
             out.append(Row(row.arrival, row.values, estimate))
-            if estimate.event != self._event:
-                self._event = estimate.event
-                if estimate.event in _WARNINGS:
-                    out.append(self._warning(estimate))
+            self._watch(estimate, out)
             if self.ground is not None:
                 state = self.ground.update(estimate)
                 if state is not None:
@@ -231,6 +229,26 @@ class Core:
         if self.reorder.changes:
             self._tell_changes(out)
         return out
+
+    def passed(self, block: Block) -> list[Output]:
+        """Rows that the estimator has taken already, as `take` would have given them; returns what they bring beside."""
+        self.counts.received(block.channels, len(block))
+        clock = self.clocks[block.source]
+        for arrival, stamp in zip(block.arrivals, block.stamps, strict=True):
+            clock.steady(arrival, stamp)
+        self.reorder.passed(block.source, block.channels, [estimate.time for estimate in block.estimates])
+        self.rows += len(block)
+        out: list[Output] = []
+        for estimate in block.estimates:
+            self._watch(estimate, out)
+        return out
+
+    def _watch(self, estimate: Estimate, out: list[Output]) -> None:
+        """An event where a warning begins."""
+        if estimate.event != self.event:
+            self.event = estimate.event
+            if estimate.event in _WARNINGS:
+                out.append(self._warning(estimate))
 
     def _tell_changes(self, out: list[Output]) -> None:
         """Events of channels that went and came."""
@@ -282,7 +300,7 @@ class Core:
             "reorder": self.reorder.state(),
             "counts": self.counts.state(),
             "rows": self.rows,
-            "event": self._event,
+            "event": self.event,
             "ground": base64.b64encode(self.ground.snapshot()).decode() if self.ground else "",
         }
 
@@ -298,7 +316,7 @@ class Core:
         found.counts = Counts.from_state(state["counts"])
         found.reorder.counts = found.counts
         found.reorder.restore(state["reorder"])
-        found.rows, found._event = state["rows"], state["event"]
+        found.rows, found.event = state["rows"], state["event"]
         if state["ground"] and isinstance(found.estimator, TractionEstimator):
             from terragrip.ground.live import LiveGround
 

@@ -24,10 +24,10 @@ class Counts:
             self.add("received", names, number)
         return self._by_channel
 
-    def received(self, channels: Iterable[str]) -> None:
-        """Count one more received of each channel; quicker than `add`, since channels mostly come together."""
+    def received(self, channels: Iterable[str], number: int = 1) -> None:
+        """Count more received of each channel; quicker than `add`, since channels mostly come together."""
         names = tuple(channels)
-        self._together[names] = self._together.get(names, 0) + 1
+        self._together[names] = self._together.get(names, 0) + number
 
     def add(self, fate: str, channels: Iterable[str], number: int = 1) -> None:
         """Count ``number`` more of ``fate`` (one of `FATES`) for each channel."""

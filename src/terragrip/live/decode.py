@@ -77,6 +77,10 @@ class Decoder:
         """Whether the profile names a field."""
         return self.profile is not None and self.profile.wants(name)
 
+    def is_sound(self, fields: Mapping[str, Any]) -> bool:
+        """Whether the fields are the time and channels by their own names, as those of the message before."""
+        return self.profile is None and self._sound == fields.keys()
+
     def samples(self, fields: Mapping[str, Any]) -> list[Sample]:
         """The samples of one message: one, or several where channels have delays of their own; none without a value."""
         if self.profile is None:
@@ -153,7 +157,7 @@ class Decoder:
                 value = raw if type(raw) is float and -_HUGE < raw < _HUGE else self._number(name, raw)
                 if value is not None:
                     values[name] = value
-        if len(values) == len(fields) - 1 and TIME in fields and self._sound != fields.keys():
+        if 0 < len(values) == len(fields) - 1 and TIME in fields and self._sound != fields.keys():
             self._sound = frozenset(fields)
         return [(self._stamp(fields), values)] if values else []
 

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from terragrip.live.decode import Decoder
 from terragrip.live.inbox import Inbox, Values
-from terragrip.live.payload import Unpack, Unreadable
+from terragrip.live.payload import Unpack, Unreadable, from_json
 
 Note = Callable[[dict[str, Any]], None]
 
@@ -40,6 +40,8 @@ class Feed:
         self.messages = self.unreadable = 0
         self.is_lost = False
         self.one_layout = True  # messages are of few kinds, so that another one is worth an event
+        # A shorter way for messages, if it can take them:
+        self.express: Callable[[Sequence[bytes]], bool] = lambda messages: False
         self._unpack, self._note = unpack, note
         self._said: dict[str, float] = {}
         self._layouts: dict[frozenset[str], None] = {}
@@ -59,8 +61,10 @@ class Feed:
         for fields in found:
             self.fields(fields if topic is None else self._of_topic(topic, fields), arrival)
 
-    def burst(self, messages: Iterable[bytes]) -> None:
+    def burst(self, messages: Sequence[bytes]) -> None:
         """Messages that came together: what they bring is estimated before this returns, not a turn of the loop later."""
+        if self.express(messages):
+            return
         self.inbox.begin()
         try:
             for data in messages:
@@ -87,6 +91,25 @@ class Feed:
                 self._since_layout += 1
             else:
                 self._watch_layout(frozenset(fields), bool(samples))
+
+    def members(self, message: bytes) -> tuple[str, ...]:
+        """The names in a message, in their order, if it is one JSON object of `time` and channels alone; else none."""
+        if self.decoder.profile is not None or self._unpack is not from_json:
+            return ()
+        try:
+            found = self._unpack(message)
+        except Unreadable:
+            return ()
+        return tuple(found[0]) if len(found) == 1 and self.decoder.is_sound(found[0]) else ()
+
+    def is_settled_on(self, layout: frozenset[str]) -> bool:
+        """Whether messages of these fields are nothing new."""
+        return self.one_layout and self._last_layout == layout
+
+    def passed(self, number: int) -> None:
+        """So many messages of the last layout went the express way."""
+        self.messages += number
+        self._since_layout += number
 
     def sample(self, stamp: float | None, values: Values, arrival: float | None = None) -> None:
         """A sample that needs no decoding."""

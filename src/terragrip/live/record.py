@@ -16,6 +16,7 @@ from typing import Any
 
 from terragrip.errors import InputError
 from terragrip.files import unwritable
+from terragrip.live.block import Block
 from terragrip.live.core import Core, Output, Values
 from terragrip.live.record_folder import (
     SOILS,
@@ -119,14 +120,17 @@ class Recorder:
         outputs = self.core.take(arrival, source, stamp, values)
         return self._kept(outputs, arrival) if outputs else outputs
 
+    def passed(self, block: Block) -> list[Output]:
+        """See `Core.passed`; raises OSError where a segment cannot be begun."""
+        self._ahead.block(block)
+        outputs = self.core.passed(block)
+        self.segment.add_block(block)
+        return self._kept(outputs, block.arrivals[-1])
+
     def tick(self, now: float) -> list[Output]:
         """See `Core.tick`."""
         self._ahead.tick(now)
         return self._kept(self.core.tick(now), now)
-
-    def due(self, now: float) -> bool:
-        """See `Core.due`."""
-        return self.core.due(now)
 
     def flush(self) -> list[Output]:
         """See `Core.flush`."""
@@ -142,7 +146,7 @@ class Recorder:
         segment = self.segment
         for output in outputs:
             segment.add(output)
-        if now is not None and outputs:
+        if now is not None and segment.size:
             if self._opened is None:
                 self._opened = now
             if segment.size >= self._rows or now - self._opened >= self._seconds:

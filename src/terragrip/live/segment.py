@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 
 from terragrip.estimation.arrow import floats
 from terragrip.estimation.engine import EVENTS
+from terragrip.live.block import Block
 from terragrip.live.core import Ground, Output, Refusal, Row
 from terragrip.live.event import Event
 
@@ -73,14 +74,30 @@ class Segment:
         else:
             self.refusals.append(output)
 
+    def add_block(self, block: Block) -> None:
+        """Take rows that have passed."""
+        self.settle()
+        first, width, size = len(self), block.width, len(block)
+        alike = self._alike(block.channels)
+        alike.places.extend(range(first, first + size))
+        for k, (arrival, estimate) in enumerate(zip(block.arrivals, block.estimates, strict=True)):
+            alike.values += block.numbers[k * width + 2 : (k + 1) * width].tobytes()
+            self.stamps += _STAMP.pack(estimate.time, arrival, _CODES[estimate.event])
+            self.estimates += estimate.packed
+        self.size += size
+
+    def _alike(self, names: tuple[str, ...]) -> _Rows:
+        found = self.measured.get(names)
+        if found is None:
+            found = self.measured[names] = _Rows(struct.Struct(f"={len(names)}d").pack)
+        return found
+
     def settle(self) -> None:
         """Lay the rows flat that have come since the last call."""
         laid = len(self) - len(self._waiting)
         for place, row in enumerate(self._waiting, laid):
             estimate, names = row.estimate, tuple(row.values)
-            alike = self.measured.get(names)
-            if alike is None:
-                alike = self.measured[names] = _Rows(struct.Struct(f"={len(names)}d").pack)
+            alike = self._alike(names)
             alike.places.append(place)
             alike.values += alike.pack(*row.values.values())
             self.stamps += _STAMP.pack(estimate.time, row.arrival, _CODES[estimate.event])

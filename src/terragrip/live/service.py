@@ -12,8 +12,10 @@ from typing import TYPE_CHECKING, Any
 from terragrip.errors import InputError
 from terragrip.estimation.methods import DEFAULT, method_named
 from terragrip.estimation.slip_estimator import SlipEstimator
+from terragrip.live.block import Block
 from terragrip.live.core import WINDOW, Core, Ground, Output, Row, Settings
 from terragrip.live.decode import Decoder, check_channels
+from terragrip.live.engine import LiveEngine
 from terragrip.live.event import Event
 from terragrip.live.feed import Feed
 from terragrip.live.inbox import CAPACITY, Inbox
@@ -33,11 +35,12 @@ if TYPE_CHECKING:
     from terragrip.vehicle import Vehicle
 
 _AT_ONCE = 64  # samples between two turns of sources and sinks
-_HOUSEKEEPING = 0.1  # s
+_HOUSEKEEPING = 0.25  # s
 _GRACE = (
     0.05  # s: so long the next sample may take to come, whose turn of the loop then does the housekeeping
 )
-_SYNC = 0.8  # s: with writing, under a second
+_SILENCE = 0.1  # s: without samples it is done so often
+_SYNC = 0.7  # s: with writing, under a second
 _BREATH = 0.002  # s for sinks that have enough to do
 _BEHIND = 1.0  # s
 _LINGER = 2.0  # s for sinks to take the last messages
@@ -103,21 +106,22 @@ class Service:
             )  # fmt: skip
         self.sinks = [open_sink(text, vehicle, core.columns) for text in sinks]
         self.outboxes = [Outbox(uri) for uri, _ in self.sinks]
-        self.recorder = None if record is None else Recorder(record, core)
-        self.core = core if self.recorder is None else self.recorder.core
-        self._engine: Core | Recorder = self.core if self.recorder is None else self.recorder
+        recorder = None if record is None else Recorder(record, core)
+        core = core if recorder is None else recorder.core
+        self.engine = LiveEngine(core, recorder)
+        self._opening = [] if recorder is None else recorder.opening
         self.inbox = Inbox(capacity)
         self.inbox.busy = lambda: any(outbox.is_busy for outbox in self.outboxes)
         payload = None if profile is None else profile.payload
         self.feeds = [
             Feed(
                 k, text, decoders[k], unpacker(payload), self.inbox, self.note,
-                after=self.core.clocks[k].newest,
+                after=core.clocks[k].newest,
             )
             for k, text in enumerate(names)
         ]  # fmt: skip
         self.statistics = Statistics(self)
-        self.prediction = Prediction(self.core)
+        self.prediction = Prediction(core)
         self.listeners: list[Callable[[Message], None]] = [outbox.put for outbox in self.outboxes]
         self.is_real_time = all(source.real_time for source in self.sources)
         self._stopped = False
@@ -125,7 +129,14 @@ class Service:
         self._waking: asyncio.TimerHandle | None = None
         self._house: asyncio.TimerHandle | None = None
         self._house_due = float("inf")  # on the inbox's clock
-        self._record_failure: str | None = None
+        if len(self.feeds) == 1 and self.is_real_time:
+            self.feeds[0].express = self._express
+            self.engine.allow_express(self.feeds[0], self._publish_row, self._passed)
+
+    @property
+    def core(self) -> Core:
+        """What is known of the run so far."""
+        return self.engine.core
 
     def stop(self) -> None:
         """Let `run` come to its end."""
@@ -135,7 +146,7 @@ class Service:
 
     def note(self, note: dict[str, Any]) -> None:
         """What a source or sink has to say: counts, an event."""
-        self._dispatch(self._safely(self._engine.note, note))
+        self._dispatch(self.engine.note(note))
 
     async def run(self) -> None:
         """Estimate until the sources have ended or `stop` was called; then close the record whole.
@@ -160,14 +171,13 @@ class Service:
             task.add_done_callback(self._sink_done)
         self.inbox.filled = lambda: self._later(self._work)
         self.inbox.work = self._work_now
-        if self.recorder is not None:
-            self._dispatch(self.recorder.opening)
+        self._dispatch(self._opening)
         self._later(self._work)
         self._later_house(_HOUSEKEEPING)
         try:
             if not self._stopped:
                 await self._done
-            self._dispatch(self._safely(self._engine.flush))
+            self._dispatch(self.engine.flush())
             self.announce()
             for outbox in self.outboxes:
                 await outbox.emptied(_LINGER)
@@ -177,13 +187,13 @@ class Service:
             for task in (*watched, *takers):
                 task.cancel()
             await asyncio.gather(*watched, *takers, return_exceptions=True)
-            self._close_record()
+            self.engine.close()
         for task in (*watched, *takers):
             if not task.cancelled() and (failure := task.exception()) is not None:
                 raise failure
-        if self._record_failure:
+        if self.engine.failure:
             raise InputError(
-                self._record_failure, place="--record", mend="free space or choose another folder"
+                self.engine.failure, place="--record", mend="free space or choose another folder"
             )
 
     def _source_done(self, watched: list[asyncio.Task[None]]) -> None:
@@ -213,8 +223,11 @@ class Service:
         try:
             act()
         except Exception as failure:  # noqa: BLE001 - raised by `run`
-            if not self._done.done():
-                self._done.set_exception(failure)
+            self._fail(failure)
+
+    def _fail(self, failure: Exception) -> None:
+        if not self._done.done():
+            self._done.set_exception(failure)
 
     def _work(self) -> None:
         """Estimate what is there; come again for more, or for a row that waits."""
@@ -225,9 +238,9 @@ class Service:
         if self.inbox.samples:
             self._later(self._work)
             return
-        pending = self.core.reorder.pending
-        if pending and self.is_real_time and self._waking is None:
-            left = pending[0].arrival + self.core.settings.window - self.inbox.clock()
+        until = self.engine.waiting_until
+        if until is not None and self.is_real_time and self._waking is None:
+            left = until - self.inbox.clock()
             self._waking = self._loop.call_later(max(left, 0.0) + 1e-4, self._guarded, self._tick)
 
     def _work_now(self) -> None:
@@ -236,8 +249,8 @@ class Service:
     def _tick(self) -> None:
         self._waking = None
         now = self.inbox.clock()
-        if not self.inbox.samples and self._engine.due(now):
-            self._dispatch(self._safely(self._engine.tick, now))
+        if not self.inbox.samples:
+            self._dispatch(self.engine.tick(now))
         self._work()
 
     def _drain(self) -> None:
@@ -247,54 +260,43 @@ class Service:
         count = min(len(samples), _AT_ONCE)
         for _ in range(count):
             sample = samples.popleft()
-            try:
-                outputs = self._engine.take(*sample)
-            except OSError as error:
-                self._without_record(error)
-            else:
-                self._dispatch(outputs)
+            self._dispatch(self.engine.take(*sample))
         self.statistics.samples(count, sample[0])
         self.inbox.taken()
         if sample[0] >= self._house_due:  # here, since the processor is awake, and warm
-            self._keep_house(_GRACE)
+            self._keep_house()
 
-    def _safely(self, act: Callable[..., list[Output]], *arguments: Any) -> list[Output]:
-        """Do it; where the record cannot be written, say so and go on without."""
+    def _express(self, messages: Sequence[bytes]) -> bool:
+        """The express way of a message; False where it, or these, must go the ordinary one, with all before them settled."""
+        lone = len(messages) == 1 and not self.inbox.samples and not self._stopped
         try:
-            return act(*arguments)
-        except OSError as error:
-            self._without_record(error)
-            return []
+            if not lone or not self.engine.express(messages[0]):
+                self.engine.settle()
+                return False
+            if self.engine.is_full:
+                self.engine.settle()
+            if self.inbox.clock() >= self._house_due:
+                self._keep_house()
+        except Exception as failure:  # noqa: BLE001 - raised by `run`
+            self._fail(failure)
+        return True
 
-    def _write(self) -> None:
-        if self.recorder is not None:
-            try:
-                self.recorder.write()
-            except OSError as error:
-                self._without_record(error)
+    def _publish_row(self, row: Row) -> None:
+        self._publish(Message(ESTIMATE, row.estimate.time, row))
 
-    def _without_record(self, error: OSError) -> None:
-        assert self.recorder is not None
-        self._record_failure = f"the record stopped at {self.core.time:.6g} s ({error.strerror or error})"
-        self.recorder.abandon()
-        self.recorder, self._engine = None, self.core
-        self._dispatch([Event(self.core.time, "record_failed", "record", self._record_failure)])
-
-    def _close_record(self) -> None:
-        if self.recorder is None:
-            return
-        try:
-            self.recorder.close()
-        except OSError as error:
-            self._record_failure = (
-                f"the record's last segment could not be closed ({error.strerror or error})"
-            )
+    def _passed(self, block: Block, outputs: list[Output]) -> None:
+        """Rows went the express way: they are published already."""
+        for arrival, estimate, told in zip(block.arrivals, block.estimates, block.told, strict=True):
+            self.statistics.row(Row(arrival, {}, estimate), told)
+        self.statistics.samples(len(block), block.arrivals[-1])
+        self.feeds[block.source].passed(len(block))
+        self._dispatch(outputs)
 
     def _dispatch(self, outputs: list[Output]) -> None:
         for output in outputs:
             if isinstance(output, Row):
                 self.statistics.row(output, self.inbox.clock())
-                self._publish(Message(ESTIMATE, output.estimate.time, output))
+                self._publish_row(output)
             elif isinstance(output, Ground):
                 self.statistics.ground = output
                 data = output.to_dict()
@@ -312,13 +314,14 @@ class Service:
             self._house.cancel()
         self._house = self._loop.call_later(seconds, self._guarded, self._keep_house)
 
-    def _keep_house(self, grace: float = 0.0) -> None:
-        """What is done ten times a second."""
+    def _keep_house(self) -> None:
+        """What is done four times a second, and more often while nothing comes."""
         now = self.inbox.clock()
-        self._later_house(_HOUSEKEEPING + grace)
         if self.is_real_time:
             self._house_due = now + _HOUSEKEEPING
-        self._write()
+        self._dispatch(self.engine.write())
+        silent = now - self.statistics.last_arrival > _SILENCE
+        self._later_house(_SILENCE if silent else _HOUSEKEEPING + _GRACE)
         dropped, self.inbox.dropped = self.inbox.dropped, type(self.inbox.dropped)()
         for channel, mine in dropped.by_channel.items():
             self.note({"fate": "dropped", "channels": [channel], "number": mine["dropped"]})
@@ -333,11 +336,8 @@ class Service:
                 self._dispatch([predicted])
         if self.statistics.second(now):
             self.announce()
-        if self.recorder is not None and self.statistics.due_sync(now, _SYNC):
-            try:
-                self.recorder.sync()
-            except OSError as error:
-                self._without_record(error)
+        if self.statistics.due_sync(now, _SYNC):
+            self._dispatch(self.engine.sync())
 
     def announce(self) -> None:
         """Send the status to whom it concerns."""

@@ -3,6 +3,7 @@
 A frame is its length and the CRC-32 of its content (little-endian uint32 each), then the content: a kind byte and
     C  the name of the next channel number, UTF-8
     S  arrival (f64), source (u16), stamp (f64), n (u16), n channel numbers (u16), n values (f64)
+    R  source (u16), n (u16), n channel numbers (u16), then of each of some samples arrival, stamp and n values (f64)
     T  a tick at an instant (f64)
     N  a note, JSON
     F  a flush
@@ -14,10 +15,15 @@ from __future__ import annotations
 import json
 import os
 import struct
+import sys
 import zlib
+from array import array
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from terragrip.live.block import Block
 
 MAGIC = b"TGWAL1\r\n"
 _HEAD = struct.Struct("<II")
@@ -76,6 +82,13 @@ class WriteAhead:
         self._packers[names] = found
         return found
 
+    def block(self, block: Block) -> None:
+        """Samples as the core takes them one by one."""
+        self._frame_samples()
+        _, numbers = self._packers.get(block.channels) or self._packer(block.channels)
+        head = struct.pack(f"<cHH{len(numbers)}H", b"R", block.source, len(numbers), *numbers)
+        self._append(head + _little(block.numbers).tobytes())
+
     def tick(self, now: float) -> None:
         """A tick that the core took."""
         self._frame(_TICK.pack(b"T", now))
@@ -119,6 +132,13 @@ class WriteAhead:
             os.close(self._file)
 
 
+def _little(numbers: array[float]) -> array[float]:
+    if sys.byteorder == "big":
+        numbers = numbers[:]
+        numbers.byteswap()
+    return numbers
+
+
 class Reading:
     """Entries of a write-ahead file up to its first torn or damaged frame; ``good`` is where that begins, ``size`` the file's."""
 
@@ -137,15 +157,24 @@ class Reading:
                 return
             place += _HEAD.size + length
             self.good = place
-            entry = self._decoded(content)
-            if entry is not None:
-                yield entry
+            yield from self._decoded(content)
 
-    def _decoded(self, content: bytes) -> Entry | None:
+    def _decoded(self, content: bytes) -> Iterator[Entry]:
         kind = content[:1]
         if kind == b"C":
             self.names.append(content[1:].decode())
-            return None
+        elif kind == b"R":
+            yield from self._rows(content)
+        else:
+            yield self._entry(kind, content)
+
+    def _rows(self, content: bytes) -> Iterator[Entry]:
+        source, count = struct.unpack_from("<HH", content, 1)
+        names = [self.names[k] for k in struct.unpack_from(f"<{count}H", content, 5)]
+        for arrival, stamp, *values in struct.iter_unpack(f"<{2 + count}d", content[5 + 2 * count :]):
+            yield "S", (arrival, source, stamp, dict(zip(names, values, strict=True)))
+
+    def _entry(self, kind: bytes, content: bytes) -> Entry:
         if kind == b"S":
             arrival, source, stamp, count = struct.unpack_from("<dHdH", content, 1)
             numbers = struct.unpack_from(f"<{count}H", content, 21)
