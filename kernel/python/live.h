@@ -30,7 +30,7 @@ typedef struct { /* The way of samples that are as expected, from message to est
 } tg_express;
 enum { TG_EXPRESS_TIME = -1, TG_EXPRESS_OTHER = -2 };
 /* Take a message, a JSON object of exactly these members in this order, zero-terminated, that arrived at `arrival` [s]. Returns 1 and
- * the estimate; or 0, with nothing changed, where anything is not as expected, or there is no room. */
+ * the estimate; or 0, with no row taken and the estimator as it was, where anything is not as expected, or there is no room. */
 int32_t tg_express_take(tg_express *x, tg_estimator *e, const char *message, size_t size, double arrival);
 /* cdef end */
 

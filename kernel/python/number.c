@@ -90,7 +90,8 @@ static int nearest(uint64_t digits, int exponent, double *value)
     }
     if (exponent < 0)
         x = over(x, POWERS[-exponent]);
-    const double slack = 9.094947017729282e-13 * x.low; /* 2^-40 of it; it is right to 2^-47 at least */
+    /* 2^-40 of what is left: its error is 2^-47 of half a unit at most, and only near half a unit does it count. */
+    const double slack = 9.094947017729282e-13 * x.low;
     *value = x.high + (x.low + slack);
     return *value == x.high + (x.low - slack);
 }

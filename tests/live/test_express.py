@@ -15,8 +15,9 @@ from hypothesis import strategies as st
 from drives import drive
 from machine import running
 from terragrip._kernel import ffi, lib
+from terragrip.errors import InputError
 from terragrip.estimation import TractionEstimator
-from terragrip.live import read_record
+from terragrip.live import Recorder, read_record
 from terragrip.live.message import ESTIMATE, EVENT
 from terragrip.live.record_folder import last_snapshot, wal_path
 from terragrip.live.service import Service
@@ -235,3 +236,96 @@ async def test_a_source_that_doubles_its_pace_is_not_taken_for_late(tmp_path, ve
     runs = [await lived(vehicle, port, tmp_path / str(express), sent, express) for express in (True, False)]
     assert runs[0][0] == runs[1][0]
     assert runs[0][2] == runs[1][2]
+
+
+def stuck_at_6_s(vehicle):
+    """A recording of a vehicle that comes to stand with spinning wheels."""
+    recording = drive(9.0, imu=True).recording
+    recording.channels["ground_speed"][605:] = 0.0
+    for wheel in vehicle.wheels:
+        recording.channels[f"wheel_speed_{wheel}"][605:] = 4.0
+    return recording
+
+
+async def fed(service, sent, last=lambda: None) -> None:
+    """Run a service on these messages by a clock of their own, then do ``last``, and end it."""
+    now = [1.7e9]
+    service.inbox.clock = lambda: now[0]
+    async with running(service):
+        for arrival, data in sent:
+            now[0] = 1.7e9 + arrival
+            service.feeds[0].burst([data])
+            if service._done.done():  # it failed: a loop would end it now
+                break
+        last()
+
+
+def texts(recording, count: int) -> list[tuple[float, bytes]]:
+    names = ["time", *recording.channels]
+    rows = np.column_stack([recording.time, *recording.channels.values()])[:count].tolist()
+    return [(row[0], json.dumps(dict(zip(names, row, strict=True))).encode()) for row in rows]
+
+
+@pytest.mark.asyncio
+@pytest.mark.parametrize(
+    "name",
+    [r"wheel_speed_\ud800", r"wheel_speed_a\"b", r"wheel_speed_a\b", r"wheel_speed_\u0000", "wheel_speed_ö"],
+)
+async def test_fields_of_strange_names_are_no_channels_and_harm_nobody(tmp_path, vehicle, port, short, name):
+    sent = [(at, data[:-1] + f', "{name}": 1.0}}'.encode()) for at, data in texts(short.recording, 120)]
+    told, counts, _, messages, (kept, _), _ = await lived(
+        vehicle, port, tmp_path / "record", sent, express=True
+    )
+    assert messages == 120
+    assert np.array_equal(kept.time, short.recording.time[:120])
+    assert set(counts) == set(short.recording.channels)
+    assert sum(kind == ESTIMATE for kind, _ in told) == 120
+
+
+@pytest.mark.asyncio
+async def test_a_listener_that_asks_for_the_core_changes_no_order(vehicle, port):
+    service, seen = Service(vehicle, [f"udp://127.0.0.1:{port}"]), []
+    service.listeners += [lambda message: service.core.rows, seen.append]
+    await fed(service, texts(stuck_at_6_s(vehicle), 900))
+    stuck = next(k for k, m in enumerate(seen) if m.kind == EVENT and m.data["kind"] == "stuck")
+    assert seen[stuck - 1].kind == ESTIMATE
+    assert seen[stuck - 1].time == seen[stuck].time
+
+
+@pytest.mark.asyncio
+async def test_the_record_is_closed_whole_though_a_listener_raises(tmp_path, vehicle, port):
+    service = Service(vehicle, [f"udp://127.0.0.1:{port}"], record=tmp_path / "record")
+
+    def broken(message):
+        if b"stuck" in message.json():
+            raise RuntimeError("a listener's own")
+
+    service.listeners.append(broken)
+    with pytest.raises(RuntimeError, match="a listener's own"):
+        await fed(service, texts(stuck_at_6_s(vehicle), 900))
+    kept, estimates = read_record(tmp_path / "record")
+    assert kept.time[-1] > 6.0
+    assert estimates["event"][-1] == "stuck"
+    assert list((tmp_path / "record").glob("recording-*.parquet"))
+
+
+@pytest.mark.asyncio
+async def test_a_disk_that_is_full_as_the_last_rows_are_written_is_said(
+    tmp_path, vehicle, port, short, monkeypatch
+):
+    service = Service(vehicle, [f"udp://127.0.0.1:{port}"], record=tmp_path / "record")
+
+    said = []
+
+    def full(self, block):
+        raise OSError(28, "No space left on device")
+
+    def closed():
+        assert service.engine._express._estimates  # rows that wait
+        monkeypatch.setattr(Recorder, "passed", full)
+        service.engine.close()
+        said.append(service.engine.failure)
+
+    with pytest.raises(InputError, match="No space left"):
+        await fed(service, texts(short.recording, 217), closed)
+    assert "No space left" in said[0]

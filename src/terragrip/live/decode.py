@@ -150,7 +150,7 @@ class Decoder:
         for name, raw in fields.items():
             ours = known.get(name)
             if ours is None:
-                ours = is_channel(name) and not name.startswith(REFERENCE) and len(known) < _NAMES
+                ours = _is_ours(name) and len(known) < _NAMES
                 if len(known) < _NAMES:
                     known[name] = ours
             if ours:
@@ -241,6 +241,11 @@ class Decoder:
             return None if value != value else gain * value + offset
 
         return read
+
+
+def _is_ours(name: str) -> bool:
+    """Whether a field is a channel. A sender may call it anything: wheels' names are letters, digits and underscores."""
+    return is_channel(name) and not name.startswith(REFERENCE) and name.isascii() and name.isidentifier()
 
 
 def _refuse_looking_ahead(name: str, source: Source) -> None:

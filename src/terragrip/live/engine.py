@@ -93,9 +93,14 @@ class LiveEngine:
 
     def close(self) -> None:
         """Close the record whole."""
+        try:
+            self.settle()
+        finally:
+            self._close_record()
+
+    def _close_record(self) -> None:
         if self._recorder is None:
             return
-        self.settle()
         try:
             self._recorder.close()
         except OSError as error:

@@ -36,7 +36,7 @@ class Express:
         self._refused = 0
 
     def take(self, message: bytes) -> bool:
-        """Estimate and publish a message's sample; False, and nothing done, where it must go the ordinary way."""
+        """Estimate and publish a message's sample; False, and none estimated, where it must go the ordinary way."""
         if self._open or self._opened():
             clock = self._feed.inbox.clock
             arrival = clock()
@@ -74,6 +74,7 @@ class Express:
         if not names or not isinstance(estimator, TractionEstimator):
             return
         slots = estimator.engine.slots_in
+        # Channels' names stand in JSON as they are (Decoder.is_sound).
         self._keys = ffi.new("char[]", b"".join(f'"{name}"\0'.encode() for name in names))
         self._slots = ffi.new(
             "int32_t[]",
@@ -87,7 +88,7 @@ class Express:
         self._estimator, self._kernel = estimator, engine.handle
         way.members, way.keys, way.slots, way.rows = len(names), self._keys, self._slots, self._rows
         way.sample, way.estimate = self._sample, engine.estimate
-        self._names = names
+        self._names, self._open = names, False
         self._channels = tuple(name for name in names if name != TIME)
         self._layout = frozenset(names)
 

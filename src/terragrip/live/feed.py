@@ -168,7 +168,8 @@ class Feed:
             if now - self._said.get(key, float("-inf")) < _EVERY:
                 return
             self._said[key] = now
-        self._note({"event": {"time": None, "kind": kind, "source": self.name, "text": text}})
+        sound = text.encode("utf-8", "backslashreplace").decode()  # half a surrogate pair is no text to most
+        self._note({"event": {"time": None, "kind": kind, "source": self.name, "text": sound}})
 
 
 def _number(data: bytes) -> float | None:

@@ -66,7 +66,7 @@ class Recorder:
         )  # now, or it would hold up the estimates when the first segment closes
         self._syncing: Future[None] | None = None
         self.opening: list[Output] = []  # what opening brought: that a run goes on
-        self._opened: float | None = None  # arrival of the segment's first output
+        self._opened: float | None = None  # arrival of the segment's first row, nearly
         try:
             self._resume(core)
         except OSError as error:
@@ -125,6 +125,8 @@ class Recorder:
         self._ahead.block(block)
         outputs = self.core.passed(block)
         self.segment.add_block(block)
+        if self._opened is None:
+            self._opened = block.arrivals[0]
         return self._kept(outputs, block.arrivals[-1])
 
     def tick(self, now: float) -> list[Output]:

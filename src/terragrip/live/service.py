@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import gc
 import logging
+from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -123,6 +124,7 @@ class Service:
         self.statistics = Statistics(self)
         self.prediction = Prediction(core)
         self.listeners: list[Callable[[Message], None]] = [outbox.put for outbox in self.outboxes]
+        self._publishing: deque[Message] = deque()
         self.is_real_time = all(source.real_time for source in self.sources)
         self._stopped = False
         self._done: Any = None  # a future, once `run` runs
@@ -344,5 +346,14 @@ class Service:
         self._publish(Message(STATUS, self.core.time, data=self.statistics.to_dict()))
 
     def _publish(self, message: Message) -> None:
-        for listen in self.listeners:
-            listen(message)
+        """Give it to every listener; one that comes of a listener's doing waits until all have this one."""
+        self._publishing.append(message)
+        if len(self._publishing) > 1:
+            return
+        try:
+            while self._publishing:
+                for listen in self.listeners:
+                    listen(self._publishing[0])
+                self._publishing.popleft()
+        finally:
+            self._publishing.clear()
