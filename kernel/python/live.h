@@ -34,4 +34,6 @@ enum { TG_EXPRESS_TIME = -1, TG_EXPRESS_OTHER = -2 };
 int32_t tg_express_take(tg_express *x, tg_estimator *e, const char *message, size_t size, double arrival);
 /* cdef end */
 
+extern const double TG_POWERS[23]; /* of ten: all that are doubles */
+
 #endif

@@ -6,8 +6,8 @@
 
 enum { DIGITS = 18, STEP = 22 }; /* 10^18 < 2^63; 10^22 is the last power of ten that is a double */
 
-static const double POWERS[] = {1e0,  1e1,  1e2,  1e3,  1e4,  1e5,  1e6,  1e7,  1e8,  1e9,  1e10, 1e11,
-                                1e12, 1e13, 1e14, 1e15, 1e16, 1e17, 1e18, 1e19, 1e20, 1e21, 1e22};
+const double TG_POWERS[23] = {1e0,  1e1,  1e2,  1e3,  1e4,  1e5,  1e6,  1e7,  1e8,  1e9,  1e10, 1e11,
+                              1e12, 1e13, 1e14, 1e15, 1e16, 1e17, 1e18, 1e19, 1e20, 1e21, 1e22};
 
 typedef struct {
     double high, low; /* the number is their sum */
@@ -83,13 +83,13 @@ static int nearest(uint64_t digits, int exponent, double *value)
     const double high = (double)digits;
     sum x = {high, (double)((int64_t)digits - (int64_t)high)};
     if (exponent > 0)
-        x = times(x, POWERS[exponent]);
+        x = times(x, TG_POWERS[exponent]);
     if (exponent < -STEP) {
-        x = over(x, POWERS[STEP]);
+        x = over(x, TG_POWERS[STEP]);
         exponent += STEP;
     }
     if (exponent < 0)
-        x = over(x, POWERS[-exponent]);
+        x = over(x, TG_POWERS[-exponent]);
     /* 2^-40 of what is left: its error is 2^-47 of half a unit at most, and only near half a unit does it count. */
     const double slack = 9.094947017729282e-13 * x.low;
     *value = x.high + (x.low + slack);

@@ -6,9 +6,6 @@
 
 #include "live.h"
 
-static const double POWERS[] = {1e0,  1e1,  1e2,  1e3,  1e4,  1e5,  1e6,  1e7,  1e8,  1e9,  1e10, 1e11,
-                                1e12, 1e13, 1e14, 1e15, 1e16, 1e17, 1e18, 1e19, 1e20, 1e21, 1e22};
-
 static char *copied(char *out, const char *text, size_t length)
 {
     memcpy(out, text, length);
@@ -26,16 +23,16 @@ static char *number(char *out, double value)
     }
     if (value == 0.0)
         return copied(out, "0", 1);
-    int power = 0, binary; /* the value is `value` times ten to `power`; POWERS are exact */
+    int power = 0, binary; /* the value is `value` times ten to `power`; TG_POWERS are exact */
     for (; value < 1e-13; power -= 22)
         value *= 1e22;
     for (; value >= 1e22; power += 22)
         value /= 1e22;
     (void)frexp(value, &binary);
     int first = (int)floor(0.30102999566398120 * (binary - 1)); /* place of the first digit, or one too low */
-    if (value >= (first + 1 >= 0 ? POWERS[first + 1] : 1.0 / POWERS[-first - 1]))
+    if (value >= (first + 1 >= 0 ? TG_POWERS[first + 1] : 1.0 / TG_POWERS[-first - 1]))
         first++;
-    const double scaled = first <= 8 ? value * POWERS[8 - first] : value / POWERS[first - 8];
+    const double scaled = first <= 8 ? value * TG_POWERS[8 - first] : value / TG_POWERS[first - 8];
     uint32_t digits = (uint32_t)(scaled + 0.5);
     if (digits >= 1000000000u) {
         digits /= 10;

@@ -71,13 +71,33 @@ def test_numbers_near_the_middle_of_two_doubles_are_rounded_right_or_left_out(di
         assert found is None or same(found[0], float(text)), text
 
 
+def rows_in(recording) -> list[list[float]]:
+    return np.column_stack([recording.time, *recording.channels.values()]).tolist()
+
+
+def text_of(recording, row: list[float]) -> bytes:
+    return json.dumps(dict(zip(["time", *recording.channels], row, strict=True))).encode()
+
+
+def texts(recording) -> list[tuple[float, bytes]]:
+    """Arrival and message of each row."""
+    return [(row[0], text_of(recording, row)) for row in rows_in(recording)]
+
+
+def stuck_at_6_s(vehicle, seconds: float):
+    """A recording of a vehicle that comes to stand with spinning wheels."""
+    recording = drive(seconds, imu=True).recording
+    recording.channels["ground_speed"][605:] = 0.0
+    for wheel in vehicle.wheels:
+        recording.channels[f"wheel_speed_{wheel}"][605:] = 4.0
+    return recording
+
+
 def jittered(recording, seed: int) -> list[tuple[float, bytes]]:
     """Arrival and text of each message of a drive; with all that senders and networks do to some of them."""
     generator = random.Random(seed)
-    rows = np.column_stack([recording.time, *recording.channels.values()]).tolist()
-    names = ["time", *recording.channels]
-    found = []
-    for k, row in enumerate(rows):
+    names, found = ["time", *recording.channels], []
+    for k, row in enumerate(rows_in(recording)):
         message = dict(zip(names, row, strict=True))
         chance = generator.random() if k > 40 else 1.0
         if chance < 0.01:
@@ -114,6 +134,19 @@ def jittered(recording, seed: int) -> list[tuple[float, bytes]]:
         elif 0.105 < chance < 0.11:
             found.append((row[0] + 0.3, data.replace(b'"time": ', b'"time": 9')))
     return found
+
+
+async def fed(service, sent, last=lambda: None) -> None:
+    """Run a service on these messages by a clock of their own, then do ``last``, and end it."""
+    now = [1.7e9]
+    service.inbox.clock = lambda: now[0]
+    async with running(service):
+        for arrival, data in sent:
+            now[0] = 1.7e9 + arrival
+            service.feeds[0].burst([data])
+            if service._done.done():  # it failed: a loop would end it now
+                break
+        last()
 
 
 async def lived(vehicle, port, folder, sent, express: bool):
@@ -172,13 +205,7 @@ async def test_it_gives_what_the_ordinary_way_gives_whatever_comes(tmp_path, veh
 
 @pytest.mark.asyncio
 async def test_in_good_order_nearly_all_go_that_way_and_warnings_come_at_once(tmp_path, vehicle, port):
-    """A vehicle that comes to stand with spinning wheels."""
-    recording = drive(12.0, imu=True).recording
-    rows = np.column_stack([recording.time, *recording.channels.values()])
-    names = ["time", *recording.channels]
-    rows[605:, names.index("ground_speed")] = 0.0
-    rows[605:, [names.index(f"wheel_speed_{w}") for w in vehicle.wheels]] = 4.0
-    sent = [(row[0], json.dumps(dict(zip(names, row, strict=True))).encode()) for row in rows.tolist()]
+    sent = texts(stuck_at_6_s(vehicle, 12.0))
     told, *_, passed = await lived(vehicle, port, tmp_path / "express", sent, express=True)
     told_2, *_ = await lived(vehicle, port, tmp_path / "ordinary", sent, express=False)
     assert passed > 0.9 * len(sent)
@@ -190,31 +217,20 @@ async def test_in_good_order_nearly_all_go_that_way_and_warnings_come_at_once(tm
 @pytest.mark.parametrize("seed", range(20))
 async def test_killed_at_any_byte_it_goes_on_as_one_run(tmp_path, vehicle, port, short, seed):
     """The write-ahead file, cut anywhere, is resumed; what is behind the cut is sent again."""
-    recording = short.recording
-    names = ["time", *recording.channels]
-    rows = np.column_stack([recording.time, *recording.channels.values()]).tolist()
-    sent = [(row[0], json.dumps(dict(zip(names, row, strict=True))).encode()) for row in rows]
-    folder = tmp_path / "record"
+    recording, folder = short.recording, tmp_path / "record"
     service = Service(vehicle, [f"udp://127.0.0.1:{port}"], record=folder)
-    now = [1.7e9]
-    service.inbox.clock = lambda: now[0]
-    async with running(service):
-        for arrival, data in sent:
-            now[0] = 1.7e9 + arrival
-            service.feeds[0].burst([data])
+
+    def killed():
         service.engine.write()
         shutil.copytree(folder, tmp_path / "killed")
+
+    await fed(service, texts(recording), killed)
     torn = wal_path(tmp_path / "killed", last_snapshot(tmp_path / "killed") + 1)
     data = torn.read_bytes()
     torn.write_bytes(data[: random.Random(seed).randrange(len(data) // 3, len(data))])
     again = Service(vehicle, [f"udp://127.0.0.1:{port}"], record=tmp_path / "killed")
-    again.inbox.clock = lambda: now[0]
     newest = again.core.time
-    async with running(again):
-        for arrival, data in sent:
-            if arrival > newest:
-                now[0] = 1.7e9 + 2.0 + arrival
-                again.feeds[0].burst([data])
+    await fed(again, [(2.0 + at, data) for at, data in texts(recording) if at > newest])
     assert newest < recording.time[-1]
     kept, estimates = read_record(tmp_path / "killed")
     through = TractionEstimator(vehicle, channels=tuple(kept.channels)).update_block(kept)
@@ -228,42 +244,13 @@ async def test_killed_at_any_byte_it_goes_on_as_one_run(tmp_path, vehicle, port,
 async def test_a_source_that_doubles_its_pace_is_not_taken_for_late(tmp_path, vehicle, port, swapped):
     """The period by which rows are waited for changes while they go the express way: a late sample finds its place as ever."""
     recording = drive(3.0, imu=True, rate=200.0).recording
-    rows = np.column_stack([recording.time, *recording.channels.values()]).tolist()
-    names = ["time", *recording.channels]
+    rows = rows_in(recording)
     rows = [*rows[0:400:2], *rows[400:]]
     rows[swapped], rows[swapped + 1] = rows[swapped + 1], rows[swapped]
-    sent = [(k / 200, json.dumps(dict(zip(names, row, strict=True))).encode()) for k, row in enumerate(rows)]
+    sent = [(k / 200, text_of(recording, row)) for k, row in enumerate(rows)]
     runs = [await lived(vehicle, port, tmp_path / str(express), sent, express) for express in (True, False)]
     assert runs[0][0] == runs[1][0]
     assert runs[0][2] == runs[1][2]
-
-
-def stuck_at_6_s(vehicle):
-    """A recording of a vehicle that comes to stand with spinning wheels."""
-    recording = drive(9.0, imu=True).recording
-    recording.channels["ground_speed"][605:] = 0.0
-    for wheel in vehicle.wheels:
-        recording.channels[f"wheel_speed_{wheel}"][605:] = 4.0
-    return recording
-
-
-async def fed(service, sent, last=lambda: None) -> None:
-    """Run a service on these messages by a clock of their own, then do ``last``, and end it."""
-    now = [1.7e9]
-    service.inbox.clock = lambda: now[0]
-    async with running(service):
-        for arrival, data in sent:
-            now[0] = 1.7e9 + arrival
-            service.feeds[0].burst([data])
-            if service._done.done():  # it failed: a loop would end it now
-                break
-        last()
-
-
-def texts(recording, count: int) -> list[tuple[float, bytes]]:
-    names = ["time", *recording.channels]
-    rows = np.column_stack([recording.time, *recording.channels.values()])[:count].tolist()
-    return [(row[0], json.dumps(dict(zip(names, row, strict=True))).encode()) for row in rows]
 
 
 @pytest.mark.asyncio
@@ -272,7 +259,7 @@ def texts(recording, count: int) -> list[tuple[float, bytes]]:
     [r"wheel_speed_\ud800", r"wheel_speed_a\"b", r"wheel_speed_a\b", r"wheel_speed_\u0000", "wheel_speed_ö"],
 )
 async def test_fields_of_strange_names_are_no_channels_and_harm_nobody(tmp_path, vehicle, port, short, name):
-    sent = [(at, data[:-1] + f', "{name}": 1.0}}'.encode()) for at, data in texts(short.recording, 120)]
+    sent = [(at, data[:-1] + f', "{name}": 1.0}}'.encode()) for at, data in texts(short.recording)[:120]]
     told, counts, _, messages, (kept, _), _ = await lived(
         vehicle, port, tmp_path / "record", sent, express=True
     )
@@ -286,7 +273,7 @@ async def test_fields_of_strange_names_are_no_channels_and_harm_nobody(tmp_path,
 async def test_a_listener_that_asks_for_the_core_changes_no_order(vehicle, port):
     service, seen = Service(vehicle, [f"udp://127.0.0.1:{port}"]), []
     service.listeners += [lambda message: service.core.rows, seen.append]
-    await fed(service, texts(stuck_at_6_s(vehicle), 900))
+    await fed(service, texts(stuck_at_6_s(vehicle, 9.0)))
     stuck = next(k for k, m in enumerate(seen) if m.kind == EVENT and m.data["kind"] == "stuck")
     assert seen[stuck - 1].kind == ESTIMATE
     assert seen[stuck - 1].time == seen[stuck].time
@@ -302,7 +289,7 @@ async def test_the_record_is_closed_whole_though_a_listener_raises(tmp_path, veh
 
     service.listeners.append(broken)
     with pytest.raises(RuntimeError, match="a listener's own"):
-        await fed(service, texts(stuck_at_6_s(vehicle), 900))
+        await fed(service, texts(stuck_at_6_s(vehicle, 9.0)))
     kept, estimates = read_record(tmp_path / "record")
     assert kept.time[-1] > 6.0
     assert estimates["event"][-1] == "stuck"
@@ -327,5 +314,5 @@ async def test_a_disk_that_is_full_as_the_last_rows_are_written_is_said(
         said.append(service.engine.failure)
 
     with pytest.raises(InputError, match="No space left"):
-        await fed(service, texts(short.recording, 217), closed)
+        await fed(service, texts(short.recording)[:217], closed)
     assert "No space left" in said[0]

@@ -79,7 +79,7 @@ class Decoder:
 
     def is_sound(self, fields: Mapping[str, Any]) -> bool:
         """Whether the fields are the time and channels by their own names, as those of the message before."""
-        return self.profile is None and self._sound == fields.keys()
+        return self._sound == fields.keys()  # empty with a profile
 
     def samples(self, fields: Mapping[str, Any]) -> list[Sample]:
         """The samples of one message: one, or several where channels have delays of their own; none without a value."""

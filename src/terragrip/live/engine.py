@@ -40,13 +40,12 @@ class LiveEngine:
         self._express, self._passed = Express(self._core, feed, publish), passed
 
     def express(self, message: bytes) -> bool:
-        """Estimate and publish a message's sample; False, and nothing done, where it must go the ordinary way."""
-        return self._express is not None and self._express.take(message)
-
-    @property
-    def is_full(self) -> bool:
-        """Whether the rows of `express` should be settled now."""
-        return self._express is not None and self._express.is_full
+        """Estimate and publish a message's sample; False, and none estimated, where it must go the ordinary way."""
+        if self._express is None or not self._express.take(message):
+            return False
+        if self._express.is_full:
+            self.settle()
+        return True
 
     def settle(self) -> None:
         """Have core and record take the rows of `express`."""

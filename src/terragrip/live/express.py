@@ -24,7 +24,7 @@ _PATIENCE = 32  # messages refused one after another, after which their members 
 
 
 class Express:
-    """For the one source ``feed`` of a ``core``; ``publish`` is given each row at once."""
+    """For the one source ``feed`` of a ``core`` that does not follow the ground; ``publish`` is given each row at once."""
 
     def __init__(self, core: Core, feed: Feed, publish: Callable[[Row], None]) -> None:
         self._core, self._feed, self._publish = core, feed, publish
@@ -94,7 +94,7 @@ class Express:
 
     def _opened(self) -> bool:
         """Take the bounds of what is expected from the core; False where something waits, or is not yet known."""
-        if not self._names or not self._feed.is_settled_on(self._layout) or self._core.ground is not None:
+        if not self._names or not self._feed.is_settled_on(self._layout):
             return False
         clock = self._core.clocks[0]
         bounds = self._core.reorder.steady(0, self._channels)

@@ -7,7 +7,7 @@ from typing import Any
 
 from terragrip.live.decode import Decoder
 from terragrip.live.inbox import Inbox, Values
-from terragrip.live.payload import Unpack, Unreadable, from_json
+from terragrip.live.payload import Unpack, Unreadable
 
 Note = Callable[[dict[str, Any]], None]
 
@@ -94,8 +94,6 @@ class Feed:
 
     def members(self, message: bytes) -> tuple[str, ...]:
         """The names in a message, in their order, if it is one JSON object of `time` and channels alone; else none."""
-        if self.decoder.profile is not None or self._unpack is not from_json:
-            return ()
         try:
             found = self._unpack(message)
         except Unreadable:

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     import pyarrow as pa
 
     from terragrip.estimation.estimates import Estimates
-    from terragrip.estimation.estimator import TractionEstimator
+    from terragrip.estimation.estimator import Estimate, TractionEstimator
     from terragrip.estimation.slip_estimator import SlipEstimator
 
 _TOGETHER = 64  # rows
@@ -82,8 +82,7 @@ class Segment:
         alike.places.extend(range(first, first + size))
         for k, (arrival, estimate) in enumerate(zip(block.arrivals, block.estimates, strict=True)):
             alike.values += block.numbers[k * width + 2 : (k + 1) * width].tobytes()
-            self.stamps += _STAMP.pack(estimate.time, arrival, _CODES[estimate.event])
-            self.estimates += estimate.packed
+            self._lay(arrival, estimate)
         self.size += size
 
     def _alike(self, names: tuple[str, ...]) -> _Rows:
@@ -100,9 +99,12 @@ class Segment:
             alike = self._alike(names)
             alike.places.append(place)
             alike.values += alike.pack(*row.values.values())
-            self.stamps += _STAMP.pack(estimate.time, row.arrival, _CODES[estimate.event])
-            self.estimates += estimate.packed
+            self._lay(row.arrival, estimate)
         self._waiting.clear()
+
+    def _lay(self, arrival: float, estimate: Estimate) -> None:
+        self.stamps += _STAMP.pack(estimate.time, arrival, _CODES[estimate.event])
+        self.estimates += estimate.packed
 
     def _stamps(self) -> npt.NDArray[np.void]:
         import numpy as np

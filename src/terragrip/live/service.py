@@ -131,7 +131,7 @@ class Service:
         self._waking: asyncio.TimerHandle | None = None
         self._house: asyncio.TimerHandle | None = None
         self._house_due = float("inf")  # on the inbox's clock
-        if len(self.feeds) == 1 and self.is_real_time:
+        if len(self.feeds) == 1 and self.is_real_time and profile is None and not settings.ground:
             self.feeds[0].express = self._express
             self.engine.allow_express(self.feeds[0], self._publish_row, self._passed)
 
@@ -275,8 +275,6 @@ class Service:
             if not lone or not self.engine.express(messages[0]):
                 self.engine.settle()
                 return False
-            if self.engine.is_full:
-                self.engine.settle()
             if self.inbox.clock() >= self._house_due:
                 self._keep_house()
         except Exception as failure:  # noqa: BLE001 - raised by `run`
