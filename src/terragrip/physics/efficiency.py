@@ -1,4 +1,4 @@
-"""Traction ratios and tractive efficiency (paper eq. 4, 6, 7), with their names in ASABE S296."""
+"""Traction ratios and tractive efficiency (paper eq. 4, 5, 7), with their names in ASABE S296."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 
 def net_traction(adhesion: ArrayLike, soil_resistance: ArrayLike) -> NDArray[Any]:
-    """Net traction ratio κ = μ - ρ_s (paper eq. 6; "net traction ratio" in ASABE S296).
+    """Net traction ratio κ = μ - ρ_s (paper eq. 5; "net traction ratio" in ASABE S296).
 
     Dimensionless, broadcast shape.
     """

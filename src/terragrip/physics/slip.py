@@ -1,4 +1,4 @@
-"""Slip of a driven wheel (paper eq. 5)."""
+"""Slip of a driven wheel (paper eq. 6)."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ def slip(
     *,
     standstill_speed: float = STANDSTILL_SPEED,
 ) -> NDArray[Any]:
-    """Slip s between -1 (locked wheel) and 1 (spinning on the spot), paper eq. 5.
+    """Slip s between -1 (locked wheel) and 1 (spinning on the spot), paper eq. 6.
 
     s = 1 - |v|/(r|ω|) if |v| <= r|ω|, else -1 + r|ω|/|v|. ASABE S296 calls it slip or travel reduction ratio,
     there over a zero condition of the user's choice, here over the rolling radius.

@@ -160,7 +160,7 @@ class Run:
         return self.vehicle.wheel_data[self.vehicle.wheels.index(self.sensor_wheel)].mass
 
     def measured_slip(self) -> FloatArray | None:
-        """Slip of the shown wheel from the recorded speeds (paper eq. 5), (n,), NaN where no ground speed is.
+        """Slip of the shown wheel from the recorded speeds (paper eq. 6), (n,), NaN where no ground speed is.
 
         The hub of a wheel off the middle runs at v - y times the yaw rate. Wheel speed and yaw rate are
         interpolated to the rows of the ground speed. None without a recording or a vehicle.

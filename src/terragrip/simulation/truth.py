@@ -29,7 +29,7 @@ def truth_frame(trace: Trace, whole: Trace) -> pd.DataFrame:
 
     Signed quantities are in the direction of travel. ``true_adhesion_<w>`` = F_h/F_z; ``true_soil_resistance`` = rolling
     resistance over m g cosθ (paper eq. 3), ``true_soil_resistance_<axle>`` over the axle's load; ``true_slip_<w>`` from
-    the wheel's own hub speed and true radius (paper eq. 5, NaN at standstill); ``true_slope`` holds what the local
+    the wheel's own hub speed and true radius (paper eq. 6, NaN at standstill); ``true_slope`` holds what the local
     gradients under the wheels add. ``stuck``: wheels turn, the machine does not (hysteresis of ``STUCK_SPEED`` and
     ``FREE_SPEED``); ``transition``: a wheel or tool on a border, or on another soil than the rest.
     """
