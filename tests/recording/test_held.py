@@ -153,3 +153,9 @@ def test_noise_of_a_held_channel_comes_from_its_updates() -> None:
     time = np.arange(0, 300, 0.05)
     recording = Recording(time, {"wheel_speed_l": held(time, 0.25, 3)})
     assert sensor_noise(recording)["wheel_speed_l"] == pytest.approx(0.03, rel=0.15)
+
+
+@pytest.mark.parametrize(("strays", "expected"), [(1, 0.1), (9, 0.05)])
+def test_one_step_in_a_hundred_may_miss_the_resolution(strays: int, expected: float) -> None:
+    steps = np.concatenate([0.1 * np.arange(1, 201), 0.1 * np.arange(1, strays + 1) + 0.05])
+    assert quantum(np.cumsum(np.r_[0.0, steps])) == pytest.approx(expected, rel=1e-6)

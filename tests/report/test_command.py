@@ -9,6 +9,7 @@ import pytest
 
 import made_up
 from terragrip.cli import main
+from terragrip.report.page import number
 from terragrip.soil.library import Soil, SoilLibrary
 
 
@@ -133,3 +134,8 @@ def test_what_cannot_be_used_is_one_line_and_leaves_nothing(
     assert len(lines) == 1
     assert said in lines[0]
     assert list(tmp_path.iterdir()) == []
+
+
+def test_the_efficiency_is_that_of_the_vehicles_own_tyres(report: Path) -> None:
+    html = (report / "report.html").read_text(encoding="utf-8")
+    assert f"ρt = {number(made_up.VEHICLE['tire_rolling_resistance'])} the tyre" in html

@@ -17,6 +17,7 @@ from terragrip.ground.classification.forest import Forest
 from terragrip.ground.classification.kernel_machine import PENALTY, WIDTH, KernelMachine, votes
 from terragrip.ground.classification.training_set import deal
 from terragrip.ground.classification.vibration import band_edges, band_energies
+from terragrip.ground.classification.wheel_features import motion
 from terragrip.ground.classification.windows import samples_in, window_starts
 
 
@@ -153,3 +154,21 @@ def test_nodes_that_make_no_tree_are_refused(name: str, value: int) -> None:
     changed[2] = value
     with pytest.raises(ValueError, match="node"):
         replace(forest, **{name: changed}).check()
+
+
+def test_a_constant_carries_no_energy() -> None:
+    period = 0.01
+    wave = np.sin(2 * np.pi * 12.0 * period * np.arange(200))
+    edges = band_edges(200 * period, period)
+    alone, lifted = (band_energies(wave + level, period, edges) for level in (0.0, 50.0))
+    assert np.nansum(alone) == pytest.approx(0.5, rel=0.05)  # mean square of a sine
+    np.testing.assert_allclose(lifted, alone, atol=1e-9)
+
+
+def test_wheels_on_a_straight_line_are_straight() -> None:
+    features = motion(np.full((1, 2, 40), 3.0), size=2.0)
+    assert features["straightness"] == pytest.approx(3.0 / (3.0 + 0.02 * 2.0))  # FLOOR of the usual size
+    assert features["turn"] == 0
+    spinning = motion(np.stack([np.full(40, 3.0), np.full(40, -3.0)])[None], size=2.0)
+    assert spinning["straightness"] == 0
+    assert spinning["turn"] == pytest.approx(3.0 / (3.0 + 0.02 * 2.0))
