@@ -25,11 +25,11 @@ from typing import Any
 
 import numpy as np
 
+from adwin import adwin_changes
 from calibration_drive import calibrate_machine
 from marked import put
 from terragrip.estimation import Estimates, calibrate, estimate
 from terragrip.ground.analysis import Settings, analyse
-from terragrip.ground.baseline import adwin_changes
 from terragrip.ground.changes import Change
 from terragrip.ground.result import Timeline
 from terragrip.ground.scores import ReliabilityBin, calibration_error, confusion, merged, reliability

@@ -15,7 +15,6 @@ from scipy.stats import t as student
 
 from ground_drives import COARSE, FINE, GRASS, drive
 from terragrip.errors import InputError
-from terragrip.ground.baseline import adwin_changes
 from terragrip.ground.changes import LEAST, _Cost, _pelt, changes_of, weights
 from terragrip.ground.conjugate import Model
 from terragrip.ground.online_changes import OnlineChanges, OnlineSettings, online_changes
@@ -177,11 +176,6 @@ def test_the_curve_scale_is_the_one_that_made_the_pair():
     mu = CURVES["exponential"].value(slip, {"a": 0.4})
     np.testing.assert_allclose(curve_scale(slip, mu), 0.4, rtol=0.06)
     assert curve_scale(np.array([0.0]), np.array([0.0]))[0] == pytest.approx(0.85)
-
-
-def test_adwin_tells_of_a_large_step_too():
-    told = adwin_changes(estimates_blocks(drive(8, [("grass", GRASS, 60), ("coarse", COARSE, 60)])))
-    assert any(60 < one.told < 70 for one in told)
 
 
 def test_without_ruptures_or_with_an_unknown_signal_one_line(monkeypatch):

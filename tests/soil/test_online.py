@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from kernel_curve import OnlineCurve
 from terragrip.physics.adhesion import CURVES
-from terragrip.soil.online import OnlineCurve, rise_of
 
 EXPONENTIAL = CURVES["exponential"]
 
@@ -188,15 +188,6 @@ def test_distance_forgets_up_to_what_is_known_of_any_ground():
     assert curve.a_std > 1.5 * known
     curve.update(1.0, np.nan, np.nan, distance=1e6)
     assert curve.a_std == pytest.approx(0.5, abs=0.02)
-
-
-def test_the_whole_curve_is_known():
-    curve = OnlineCurve()
-    drive(curve, np.random.default_rng(3), 0.6, 5, slip=(0.1, 0.15))
-    assert np.abs(curve.predict([0.3, 0.5]) - 0.6 * g([0.3, 0.5])).max() < 0.05
-    assert curve.rise == (pytest.approx(0.48 * curve.a), pytest.approx(0.48 * curve.a_std))
-    assert rise_of([1.0, 2.0]) == pytest.approx([0.48, 0.96])
-    assert repr(curve).startswith("OnlineCurve(a=0.")
 
 
 @pytest.mark.parametrize(

@@ -267,6 +267,7 @@ def settings_of(
     settings.method = method.kind
     settings.tuning.engine = method.engine
     settings.tuning.policy = method.policy
+    settings.tuning.supervisor = method.supervisor
     settings.axles = len(vehicle.axle_names)
     settings.towing = "drawbar_force" in channels
     _set_wheels(settings, vehicle, channels)

@@ -14,13 +14,15 @@ FILTERED, ALGEBRAIC = 0, 1
 
 @dataclass(frozen=True)
 class Method:
-    """A way to estimate. ``kind`` is tg_method, ``engine`` tg_engine, ``policy`` tg_policy of the kernel."""
+    """A way to estimate. ``kind`` is tg_method, ``engine`` tg_engine, ``policy`` tg_policy of the kernel; ``supervisor`` says what
+    the fuzzy supervisor judges by: 0 the wheel and ground speeds (paper), 1 drive torque and slip."""
 
     name: str
     meaning: str
     kind: int = FILTERED
     engine: int = EXACT
     policy: int = FIXED
+    supervisor: int = 0
 
     @property
     def can_smooth(self) -> bool:
@@ -41,6 +43,13 @@ METHODS: dict[str, Method] = {
             "adaptive unscented, fuzzy supervisor: the paper's",
             engine=UNSCENTED,
             policy=SUPERVISED,
+        ),
+        Method(
+            "aukf-fs-drive",
+            "the same, supervised by drive torque and slip: for wheels under speed control",
+            engine=UNSCENTED,
+            policy=SUPERVISED,
+            supervisor=1,
         ),
         Method("kalman", "exact Kalman filter, fixed noise"),
         Method("bank", "four exact filters over the scale of the noise, mixed as an IMM", policy=BANK),

@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from river import drift
 
-from terragrip.errors import InputError
 from terragrip.ground.changes import Change
 from terragrip.ground.signals import GROUND, LAWS, signals_of
 from terragrip.soil.blocks import Blocks
@@ -19,14 +19,8 @@ half a minute. Span and `delta` are those that do best on the development seeds:
 def adwin_changes(blocks: Blocks, names: tuple[str, ...] = GROUND, delta: float = 0.05) -> tuple[Change, ...]:
     """Changes as ADWIN would have told them while driving, `delta` its confidence; at a change all signals start anew.
 
-    A change's time is when it is told; ADWIN gives no spread and no probability: std is NaN, probability 1. InputError without river.
+    A change's time is when it is told; ADWIN gives no spread and no probability: std is NaN, probability 1.
     """
-    try:
-        from river import drift
-    except ImportError:
-        raise InputError(
-            "the baseline ADWIN needs river", mend="install it with pip install 'terragrip[ground]'"
-        ) from None
     make: Any = drift.ADWIN  # river carries no types
     signals, told = signals_of(blocks, names), []
     unit = np.array([(LAWS[n].mean, _SPAN * LAWS[n].sd) for n in names])

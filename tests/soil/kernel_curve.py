@@ -1,18 +1,11 @@
-"""The adhesion curve while driving (paper, Fig. 2): its scale a from single pairs of slip and adhesion, recursively.
-
-The kernel does the same for each wheel and the vehicle of every estimated row (columns `curve_a`, `curve_a_<wheel>`); this is for pairs
-from elsewhere, such as a force sensor's.
-"""
+"""The kernel's adhesion curve while driving, `tg_curve_update`, pair by pair: what makes the columns `curve_a` and `curve_a_<wheel>`."""
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from terragrip._kernel import ffi, lib
-from terragrip.physics.adhesion import CURVES, PROTOTYPE
 
 _MOST = 8
 _REFUSED = {
@@ -24,16 +17,7 @@ _REFUSED = {
 
 
 class OnlineCurve:
-    """The current a of mu = a g(s), g the paper's prototype (eq. 8), with its standard deviation.
-
-    A scalar Kalman filter (R) on the means of mu and g(s) over about 0.5 s: a wanders with the distance driven
-    (0.06 SD a metre); a pair's variance is var(mu) + E[a^2] g'^2 var(s), with g' no less than the mean slope over two SDs of slip, and
-    the soil's own scatter (8 %); since the errors of neighbouring pairs are alike, a row counts as dt/0.5 s of an independent pair.
-    Constant errors (torque gain, rolling radius) enter as considered: they do not average out. Residuals four times as large, in the mean
-    square, as one ground makes them, start a anew; `new_ground` does so by hand.
-
-    Slips over 60 %, and means under g(5 %) (g near 0), teach nothing: `a_std` stays as wide as it is, 0.5 before the first pair.
-    """
+    """The current a of mu = a g(s), g the paper's prototype (eq. 8), with its standard deviation (docs/kernel.md)."""
 
     def __init__(self) -> None:
         self._curve = ffi.new("tg_curve *", lib.tg_curve_unknown())
@@ -102,20 +86,3 @@ class OnlineCurve:
     def a_std(self) -> float:
         """One standard deviation of `a`, random and constant errors."""
         return float(lib.tg_curve_std(self._curve))
-
-    @property
-    def rise(self) -> tuple[float, float]:
-        """A = a(1 - p), the height of the curve's rise (PHYSICS 5), and its standard deviation."""
-        return self.a * (1 - PROTOTYPE["p"]), self.a_std * (1 - PROTOTYPE["p"])
-
-    def predict(self, slip: ArrayLike) -> NDArray[np.float64]:
-        """mu at slips of any shape, by the current curve."""
-        return CURVES["exponential"].value(slip, {"a": self.a})
-
-    def __repr__(self) -> str:
-        return f"OnlineCurve(a={self.a:.3g} +- {self.a_std:.2g})"
-
-
-def rise_of(a: Any) -> Any:
-    """A = a(1 - p) from a column `curve_a`, or its spread from `curve_a_std`; any shape."""
-    return np.asarray(a, dtype=float) * (1 - PROTOTYPE["p"])
