@@ -70,11 +70,9 @@ def kernel_bindings() -> list[Binding]:
     if not sources:
         return []
     python = ROOT / "kernel/python"
-    live = tuple(python / name for name in ("express.c", "number.c", "text.c"))
-    headers = (header, python / "live.h")
     found = [
         Binding(
-            "terragrip._kernel_portable", headers, (*sources, *live, python / "cpu.c"), declarations=CPU_CHECK
+            "terragrip._kernel_portable", (header,), (*sources, python / "cpu.c"), declarations=CPU_CHECK
         ),
         Binding("terragrip._kernel_float", (header,), sources, real="float", flags=("-O2",)),
     ]
@@ -83,8 +81,8 @@ def kernel_bindings() -> list[Binding]:
         found.append(
             Binding(
                 "terragrip._kernel_avx2",
-                headers,
-                (*sources, *live),
+                (header,),
+                sources,
                 flags=("-mavx2", "-mfma", "-mtune=skylake"),
             )
         )

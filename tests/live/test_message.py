@@ -6,7 +6,6 @@ import json
 import math
 import struct
 
-import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -28,23 +27,9 @@ def test_numbers_are_what_printf_writes_to_nine_digits(numbers, time):
     assert (found["time"], found["arrival"], found["event"]) == (time, 1.7e9 + 0.123456, "outlier")
     for name, number in values.items():
         if math.isfinite(number):
-            # printf rounds the number itself, we its nine digits: they may differ in the ninth on a tie.
-            assert found[name] == pytest.approx(float(f"{number:.9g}"), rel=1.01e-8, abs=0)
-            assert found[name] == pytest.approx(number, rel=5.01e-9, abs=0)
+            assert found[name] == float(f"{number:.9g}")
         else:
             assert found[name] is None
-
-
-@pytest.mark.parametrize(
-    ("number", "text"),
-    [
-        (0.0, "0"), (1.0, "1"), (-0.25, "-0.25"), (123456789.4, "123456789"), (0.1, "0.1"), (12000.0, "12000"),
-        (999999999.7, "1e9"), (1.5e-5, "0.000015"), (1.5e-6, "1.5e-6"), (-2e300, "-2e300"), (0.99999999996, "1"),
-        (5e-324, "4.94065646e-324"), (3.14159265358979, "3.14159265"),
-    ],
-)  # fmt: skip
-def test_numbers_are_short(number, text):
-    assert Columns().json(row({"nis": number})).endswith(f',"nis":{text}}}'.encode())
 
 
 def test_only_the_wanted_columns_are_written():

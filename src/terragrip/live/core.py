@@ -16,7 +16,6 @@ from terragrip.estimation.engine import estimate_slots
 from terragrip.estimation.estimator import Estimate, TractionEstimator, default_channels
 from terragrip.estimation.methods import DEFAULT
 from terragrip.estimation.slip_estimator import SlipEstimator, restored, speeds_alone
-from terragrip.live.block import Block
 from terragrip.live.clock import SourceClock
 from terragrip.live.counts import Counts
 from terragrip.live.event import Event
@@ -158,7 +157,7 @@ class Core:
 
     def take(self, arrival: float, source: int, stamp: float, values: Values) -> list[Output]:
         """A sample of ``source`` (its place in the settings), stamped by its own clock [s]; SI values by column."""
-        self.counts.received(values)
+        self.counts.add("received", values)
         out: list[Output] = []
         time = self.clocks[source].steady(arrival, stamp)
         if time is None:
@@ -228,19 +227,6 @@ class Core:
                     out += _told(state)
         if self.reorder.changes:
             self._tell_changes(out)
-        return out
-
-    def passed(self, block: Block) -> list[Output]:
-        """Rows that the estimator has taken already, as `take` would have given them; returns what they bring beside."""
-        self.counts.received(block.channels, len(block))
-        clock = self.clocks[block.source]
-        for arrival, stamp in zip(block.arrivals, block.stamps, strict=True):
-            clock.steady(arrival, stamp)
-        self.reorder.passed(block.source, block.channels, [estimate.time for estimate in block.estimates])
-        self.rows += len(block)
-        out: list[Output] = []
-        for estimate in block.estimates:
-            self._watch(estimate, out)
         return out
 
     def _watch(self, estimate: Estimate, out: list[Output]) -> None:

@@ -13,28 +13,14 @@ class Counts:
     """Counters by channel and fate; plain integers, kept through a restart."""
 
     def __init__(self) -> None:
-        self._by_channel: dict[str, dict[str, int]] = {}
-        self._together: dict[tuple[str, ...], int] = {}  # received, not yet counted by channel
-
-    @property
-    def by_channel(self) -> dict[str, dict[str, int]]:
-        """The counters of each channel by fate."""
-        together, self._together = self._together, {}
-        for names, number in together.items():
-            self.add("received", names, number)
-        return self._by_channel
-
-    def received(self, channels: Iterable[str], number: int = 1) -> None:
-        """Count more received of each channel; quicker than `add`, since channels mostly come together."""
-        names = tuple(channels)
-        self._together[names] = self._together.get(names, 0) + number
+        self.by_channel: dict[str, dict[str, int]] = {}
 
     def add(self, fate: str, channels: Iterable[str], number: int = 1) -> None:
         """Count ``number`` more of ``fate`` (one of `FATES`) for each channel."""
         for name in channels:
-            mine = self._by_channel.get(name)
+            mine = self.by_channel.get(name)
             if mine is None:
-                mine = self._by_channel[name] = dict.fromkeys(FATES, 0)
+                mine = self.by_channel[name] = dict.fromkeys(FATES, 0)
             mine[fate] += number
 
     def total(self, fate: str) -> int:
@@ -49,5 +35,5 @@ class Counts:
     def from_state(cls, state: dict[str, dict[str, int]]) -> Counts:
         """The inverse of `state`."""
         found = cls()
-        found._by_channel = {name: {**dict.fromkeys(FATES, 0), **mine} for name, mine in state.items()}
+        found.by_channel = {name: {**dict.fromkeys(FATES, 0), **mine} for name, mine in state.items()}
         return found

@@ -21,7 +21,6 @@ Sample = tuple[float | None, Values]
 """Stamp [s] on the source's clock, None where the message bears none; and values."""
 
 _HUGE = 1e300
-_FLOAT = {float}
 _NAMES = 1000  # of fields, beyond which a sender makes them up
 
 
@@ -52,7 +51,6 @@ class Decoder:
         self.units: dict[str, str] = {}
         self.unreadable: dict[str, str] = {}
         self._known: dict[str, bool] = {}
-        self._sound: frozenset[str] = frozenset()  # the last fields of which all but the time were channels
         self._time, self._zero = TIME, False
         self._first: int | float | None = None
         self._factor = 1.0
@@ -77,18 +75,9 @@ class Decoder:
         """Whether the profile names a field."""
         return self.profile is not None and self.profile.wants(name)
 
-    def is_sound(self, fields: Mapping[str, Any]) -> bool:
-        """Whether the fields are the time and channels by their own names, as those of the message before."""
-        return self._sound == fields.keys()  # empty with a profile
-
     def samples(self, fields: Mapping[str, Any]) -> list[Sample]:
         """The samples of one message: one, or several where channels have delays of their own; none without a value."""
         if self.profile is None:
-            if self._sound == fields.keys() and set(map(type, fields.values())) == _FLOAT:
-                values = dict(fields)
-                stamp = values.pop(TIME)
-                if -_HUGE < stamp + sum(values.values()) < _HUGE:  # no infinity, no NaN: one would show
-                    return [(stamp, values)]
             return self._plain(fields)
         rows = self.profile.rows
         if rows is not None and fields.get(rows.column) != rows.equals:
@@ -157,8 +146,6 @@ class Decoder:
                 value = raw if type(raw) is float and -_HUGE < raw < _HUGE else self._number(name, raw)
                 if value is not None:
                     values[name] = value
-        if 0 < len(values) == len(fields) - 1 and TIME in fields and self._sound != fields.keys():
-            self._sound = frozenset(fields)
         return [(self._stamp(fields), values)] if values else []
 
     def _stamp(self, fields: Mapping[str, Any]) -> float | None:

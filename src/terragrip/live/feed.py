@@ -40,8 +40,6 @@ class Feed:
         self.messages = self.unreadable = 0
         self.is_lost = False
         self.one_layout = True  # messages are of few kinds, so that another one is worth an event
-        # A shorter way for messages, if it can take them:
-        self.express: Callable[[Sequence[bytes]], bool] = lambda messages: False
         self._unpack, self._note = unpack, note
         self._said: dict[str, float] = {}
         self._layouts: dict[frozenset[str], None] = {}
@@ -63,8 +61,6 @@ class Feed:
 
     def burst(self, messages: Sequence[bytes]) -> None:
         """Messages that came together: what they bring is estimated before this returns, not a turn of the loop later."""
-        if self.express(messages):
-            return
         self.inbox.begin()
         try:
             for data in messages:
@@ -91,23 +87,6 @@ class Feed:
                 self._since_layout += 1
             else:
                 self._watch_layout(frozenset(fields), bool(samples))
-
-    def members(self, message: bytes) -> tuple[str, ...]:
-        """The names in a message, in their order, if it is one JSON object of `time` and channels alone; else none."""
-        try:
-            found = self._unpack(message)
-        except Unreadable:
-            return ()
-        return tuple(found[0]) if len(found) == 1 and self.decoder.is_sound(found[0]) else ()
-
-    def is_settled_on(self, layout: frozenset[str]) -> bool:
-        """Whether messages of these fields are nothing new."""
-        return self.one_layout and self._last_layout == layout
-
-    def passed(self, number: int) -> None:
-        """So many messages of the last layout went the express way."""
-        self.messages += number
-        self._since_layout += number
 
     def sample(self, stamp: float | None, values: Values, arrival: float | None = None) -> None:
         """A sample that needs no decoding."""

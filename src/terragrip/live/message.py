@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 import json
+import re
 from fnmatch import fnmatchcase
 from typing import Any
 
-from terragrip._kernel import ffi, lib
 from terragrip.live.core import Row
 from terragrip.live.event import Event
 
-_DIGITS = 17  # characters of a number at most
-_HEAD = 200  # characters before the columns at most
 ESTIMATE, EVENT, STATUS, SOIL, GROUND = "estimate", "event", "status", "soil", "ground"
+
+
+_NOT_FINITE = re.compile(":(nan|-?inf)")
 
 
 class Message:
@@ -49,6 +50,7 @@ class Columns:
         self._patterns = [part.strip() for part in text.split(",") if part.strip()]
         self._of: object = None
         self._places: dict[str, int] = {}
+        self._template = ""
 
     def wants(self, name: str) -> bool:
         """Whether a column is wanted."""
@@ -60,28 +62,17 @@ class Columns:
         if self._of is not every:
             self._of = every
             self._places = {name: place for name, place in every.items() if self.wants(name)}
-            members = b"".join(f',"{name}":\0'.encode() for name in self._places)
-            self._members = ffi.new("char[]", members)
-            self._slots = ffi.new("int32_t[]", list(self._places.values()))
-            self._count = len(self._places)
-            self._out = ffi.new("char[]", _HEAD + len(members) + _DIGITS * self._count)
-            self._text = ffi.buffer(self._out)
+            self._template = "".join(f',"{name}":%.9g' for name in self._places) + "}"
         return self._places
 
     def json(self, row: Row) -> bytes:
         """The row as a JSON object, numbers to nine digits; a missing one is null."""
-        estimate = row.estimate
-        if self._of is not estimate.places:
-            self.places(row)
-        head = (
-            f'{{"time":{estimate.time!r},"arrival":{row.arrival!r},"event":"{estimate.event}",'
-            f'"predicted":{"true" if row.predicted else "false"}'
-        )
-        length = lib.tg_json_row(
-            head.encode(), self._count, self._members, self._slots, estimate.packed, self._out
-        )
-        text: bytes = self._text[:length]
-        return text
+        estimate, places = row.estimate, self.places(row)
+        numbers = self._template % tuple(map(estimate.values.__getitem__, places.values()))
+        if ":n" in numbers or "inf" in numbers:
+            numbers = _NOT_FINITE.sub(":null", numbers)
+        head = f'{{"time":{estimate.time!r},"arrival":{row.arrival!r},"event":"{estimate.event}"'
+        return f'{head},"predicted":{"true" if row.predicted else "false"}{numbers}'.encode()
 
 
 _EVERY = Columns()

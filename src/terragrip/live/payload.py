@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
-from json.scanner import make_scanner
-from typing import Any, cast
+from typing import Any
 
 from terragrip.formats.payload import Payload
 
@@ -15,8 +14,6 @@ Fields = dict[str, Any]
 class Unreadable(Exception):
     """A message that is not what it should be; the text says what it is, shortly."""
 
-
-_scan = make_scanner(cast(Any, json.JSONDecoder()))
 
 Unpack = Callable[[bytes], list[Fields]]
 
@@ -37,15 +34,6 @@ def unpacker(payload: Payload | None) -> Unpack:
 
 def from_json(data: bytes) -> list[Fields]:
     """JSON objects: one, several in a list, or one a line. Nested ones are flattened: ``wheel.fl``."""
-    # One flat object in UTF-8, as nearly all messages are: at half the work of `json.loads`, which tells what is wrong with all others.
-    if data[:1] == b"{" and data.rfind(b"{") == 0 and b"[" not in data:
-        try:
-            text = data.decode().rstrip()
-            fields, end = _scan(text, 0)
-            if end == len(text):
-                return [fields]
-        except (ValueError, StopIteration):
-            pass
     try:
         found = json.loads(data)
     except UnicodeDecodeError:

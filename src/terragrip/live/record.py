@@ -16,7 +16,6 @@ from typing import Any
 
 from terragrip.errors import InputError
 from terragrip.files import unwritable
-from terragrip.live.block import Block
 from terragrip.live.core import Core, Output, Values
 from terragrip.live.record_folder import (
     SOILS,
@@ -120,15 +119,6 @@ class Recorder:
         outputs = self.core.take(arrival, source, stamp, values)
         return self._kept(outputs, arrival) if outputs else outputs
 
-    def passed(self, block: Block) -> list[Output]:
-        """See `Core.passed`; raises OSError where a segment cannot be begun."""
-        self._ahead.block(block)
-        outputs = self.core.passed(block)
-        self.segment.add_block(block)
-        if self._opened is None:
-            self._opened = block.arrivals[0]
-        return self._kept(outputs, block.arrivals[-1])
-
     def tick(self, now: float) -> list[Output]:
         """See `Core.tick`."""
         self._ahead.tick(now)
@@ -175,7 +165,6 @@ class Recorder:
     def write(self) -> None:
         """Hand what came in to the system, after which a kill cannot lose it; raises OSError, also a thread's."""
         self._ahead.write()
-        self.segment.settle()
         while self._closing and self._closing[0].done():
             self._closing.pop(0).result()
 

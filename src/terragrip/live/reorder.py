@@ -9,7 +9,7 @@ instant that come in several messages become one row. A stream that stays away f
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Collection, Iterable
+from collections.abc import Collection
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -55,22 +55,6 @@ class Stream:
         self.last = self.due_from = time
         self.calm = time + 1.5 * self.period
         return missing
-
-    @property
-    def is_steady(self) -> bool:
-        """Whether no sample of it is overdue, and its steps are known."""
-        return not self.overdue and len(self.steps) == _STEPS
-
-    def is_given_up(self, time: float) -> bool:
-        """Whether no row later than this waits for it, until it comes again."""
-        if self.period == 0.0:
-            return time - self.first >= _LEARNING
-        return self.overdue >= LOST or self.period == float("inf")
-
-    @property
-    def reach(self) -> float:
-        """How much later [s] the next sample but one may be without being waited for, whatever period is learned from the next."""
-        return 1.5 * min(self.steps)
 
     def give_up(self) -> None:
         """The sample that is due will not come."""
@@ -234,27 +218,6 @@ class Reorder:
                 stream.give_up()
             if stream.overdue >= LOST:
                 self.changes += [("channel_lost", stream.source, name) for name in stream.channels]
-
-    def steady(self, source: int, channels: tuple[str, ...]) -> tuple[float, float] | None:
-        """Where a row of these channels waits for nothing: the latest it may come [s], and by how much the next may be later.
-
-        None where something waits, or may have to wait for another stream, or is not known yet.
-        """
-        present, absent, met = self._those.get(((source, channels),), ([], [], False))
-        if not met or self.pending or not all(stream.is_steady for stream in present):
-            return None
-        if not all(stream.is_given_up(self.released) for stream in absent):
-            return None
-        return min(stream.calm for stream in present), min(stream.reach for stream in present)
-
-    def passed(self, source: int, channels: tuple[str, ...], times: Iterable[float]) -> None:
-        """Rows that were found `steady`, and so did not wait."""
-        present = self._those[((source, channels),)][0]
-        for time in times:
-            for stream in present:
-                self._step(stream, time)
-            self._recent.append((time, channels))
-            self.released = time
 
     def flush(self) -> list[Pending]:
         """All that is left, in order: the source has ended."""

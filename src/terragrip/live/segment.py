@@ -14,7 +14,6 @@ from typing import TYPE_CHECKING
 
 from terragrip.estimation.arrow import floats
 from terragrip.estimation.engine import EVENTS
-from terragrip.live.block import Block
 from terragrip.live.core import Ground, Output, Refusal, Row
 from terragrip.live.event import Event
 
@@ -24,10 +23,9 @@ if TYPE_CHECKING:
     import pyarrow as pa
 
     from terragrip.estimation.estimates import Estimates
-    from terragrip.estimation.estimator import Estimate, TractionEstimator
+    from terragrip.estimation.estimator import TractionEstimator
     from terragrip.estimation.slip_estimator import SlipEstimator
 
-_TOGETHER = 64  # rows
 _STAMP = struct.Struct("=ddB")  # time, arrival, code of the event
 _CODES = {event: code for code, event in enumerate(EVENTS)}
 
@@ -55,18 +53,15 @@ class Segment:
     refusals: list[Refusal] = field(default_factory=list)
     events: list[Event] = field(default_factory=list)
     ground: list[Ground] = field(default_factory=list)
-    _waiting: list[Row] = field(default_factory=list)  # laid flat together: quicker than one by one
 
     def __len__(self) -> int:
-        return len(self.stamps) // _STAMP.size + len(self._waiting)
+        return len(self.stamps) // _STAMP.size
 
     def add(self, output: Output) -> None:
         """Take one output of the core."""
         self.size += 1
         if isinstance(output, Row):
-            self._waiting.append(output)
-            if len(self._waiting) >= _TOGETHER:
-                self.settle()
+            self._add_row(output)
         elif isinstance(output, Event):
             self.events.append(output)
         elif isinstance(output, Ground):
@@ -74,36 +69,17 @@ class Segment:
         else:
             self.refusals.append(output)
 
-    def add_block(self, block: Block) -> None:
-        """Take rows that have passed."""
-        self.settle()
-        first, width, size = len(self), block.width, len(block)
-        alike = self._alike(block.channels)
-        alike.places.extend(range(first, first + size))
-        for k, (arrival, estimate) in enumerate(zip(block.arrivals, block.estimates, strict=True)):
-            alike.values += block.numbers[k * width + 2 : (k + 1) * width].tobytes()
-            self._lay(arrival, estimate)
-        self.size += size
-
     def _alike(self, names: tuple[str, ...]) -> _Rows:
         found = self.measured.get(names)
         if found is None:
             found = self.measured[names] = _Rows(struct.Struct(f"={len(names)}d").pack)
         return found
 
-    def settle(self) -> None:
-        """Lay the rows flat that have come since the last call."""
-        laid = len(self) - len(self._waiting)
-        for place, row in enumerate(self._waiting, laid):
-            estimate, names = row.estimate, tuple(row.values)
-            alike = self._alike(names)
-            alike.places.append(place)
-            alike.values += alike.pack(*row.values.values())
-            self._lay(row.arrival, estimate)
-        self._waiting.clear()
-
-    def _lay(self, arrival: float, estimate: Estimate) -> None:
-        self.stamps += _STAMP.pack(estimate.time, arrival, _CODES[estimate.event])
+    def _add_row(self, row: Row) -> None:
+        alike, estimate = self._alike(tuple(row.values)), row.estimate
+        alike.places.append(len(self))
+        alike.values += alike.pack(*row.values.values())
+        self.stamps += _STAMP.pack(estimate.time, row.arrival, _CODES[estimate.event])
         self.estimates += estimate.packed
 
     def _stamps(self) -> npt.NDArray[np.void]:
@@ -124,7 +100,6 @@ class Segment:
 
     def write(self, folder: Path, estimator: TractionEstimator | SlipEstimator | None) -> None:
         """Write the segment's files; raises OSError."""
-        self.settle()
         if len(self) and estimator is not None:
             import pyarrow.parquet as pq
 
@@ -152,7 +127,6 @@ class Segment:
         """The rows as they were measured, with the arrival of each [s since 1970]."""
         import pyarrow as pa
 
-        self.settle()
         stamps = self._stamps()
         columns = {"time": stamps["time"], "arrival": stamps["arrival"], **self.channels()}
         return pa.table({name: floats(column) for name, column in columns.items()})
@@ -164,7 +138,6 @@ class Segment:
         from terragrip.estimation.batch import about_run
         from terragrip.estimation.estimates import Estimates
 
-        self.settle()
         table = np.frombuffer(self.estimates).reshape(len(self), -1)
         columns = {name: np.ascontiguousarray(table[:, place]) for name, place in estimator.places.items()}
         measured = self.channels()

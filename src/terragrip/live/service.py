@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING, Any
 from terragrip.errors import InputError
 from terragrip.estimation.methods import DEFAULT, method_named
 from terragrip.estimation.slip_estimator import SlipEstimator
-from terragrip.live.block import Block
 from terragrip.live.core import WINDOW, Core, Ground, Output, Row, Settings
 from terragrip.live.decode import Decoder, check_channels
 from terragrip.live.engine import LiveEngine
@@ -36,9 +35,9 @@ if TYPE_CHECKING:
     from terragrip.vehicle import Vehicle
 
 _AT_ONCE = 64  # samples between two turns of sources and sinks
-_HOUSEKEEPING = 0.25  # s
+_HOUSEKEEPING = 0.09  # s: what came in is handed to the system at least ten times a second
 _GRACE = (
-    0.05  # s: so long the next sample may take to come, whose turn of the loop then does the housekeeping
+    0.005  # s: so long the next sample may take to come, whose turn of the loop then does the housekeeping
 )
 _SILENCE = 0.1  # s: without samples it is done so often
 _SYNC = 0.7  # s: with writing, under a second
@@ -131,9 +130,6 @@ class Service:
         self._waking: asyncio.TimerHandle | None = None
         self._house: asyncio.TimerHandle | None = None
         self._house_due = float("inf")  # on the inbox's clock
-        if len(self.feeds) == 1 and self.is_real_time and profile is None and not settings.ground:
-            self.feeds[0].express = self._express
-            self.engine.allow_express(self.feeds[0], self._publish_row, self._passed)
 
     @property
     def core(self) -> Core:
@@ -268,35 +264,11 @@ class Service:
         if sample[0] >= self._house_due:  # here, since the processor is awake, and warm
             self._keep_house()
 
-    def _express(self, messages: Sequence[bytes]) -> bool:
-        """The express way of a message; False where it, or these, must go the ordinary one, with all before them settled."""
-        lone = len(messages) == 1 and not self.inbox.samples and not self._stopped
-        try:
-            if not lone or not self.engine.express(messages[0]):
-                self.engine.settle()
-                return False
-            if self.inbox.clock() >= self._house_due:
-                self._keep_house()
-        except Exception as failure:  # noqa: BLE001 - raised by `run`
-            self._fail(failure)
-        return True
-
-    def _publish_row(self, row: Row) -> None:
-        self._publish(Message(ESTIMATE, row.estimate.time, row))
-
-    def _passed(self, block: Block, outputs: list[Output]) -> None:
-        """Rows went the express way: they are published already."""
-        for arrival, estimate, told in zip(block.arrivals, block.estimates, block.told, strict=True):
-            self.statistics.row(Row(arrival, {}, estimate), told)
-        self.statistics.samples(len(block), block.arrivals[-1])
-        self.feeds[block.source].passed(len(block))
-        self._dispatch(outputs)
-
     def _dispatch(self, outputs: list[Output]) -> None:
         for output in outputs:
             if isinstance(output, Row):
                 self.statistics.row(output, self.inbox.clock())
-                self._publish_row(output)
+                self._publish(Message(ESTIMATE, output.estimate.time, output))
             elif isinstance(output, Ground):
                 self.statistics.ground = output
                 data = output.to_dict()
@@ -315,7 +287,7 @@ class Service:
         self._house = self._loop.call_later(seconds, self._guarded, self._keep_house)
 
     def _keep_house(self) -> None:
-        """What is done four times a second, and more often while nothing comes."""
+        """What is done ten times a second."""
         now = self.inbox.clock()
         if self.is_real_time:
             self._house_due = now + _HOUSEKEEPING

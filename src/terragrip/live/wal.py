@@ -3,7 +3,6 @@
 A frame is its length and the CRC-32 of its content (little-endian uint32 each), then the content: a kind byte and
     C  the name of the next channel number, UTF-8
     S  arrival (f64), source (u16), stamp (f64), n (u16), n channel numbers (u16), n values (f64)
-    R  source (u16), n (u16), n channel numbers (u16), then of each of some samples arrival, stamp and n values (f64)
     T  a tick at an instant (f64)
     N  a note, JSON
     F  a flush
@@ -15,17 +14,12 @@ from __future__ import annotations
 import json
 import os
 import struct
-import sys
 import zlib
-from array import array
 from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-if TYPE_CHECKING:
-    from terragrip.live.block import Block
-
-MAGIC = b"TGWAL1\r\n"
+MAGIC = b"TGWAL2\r\n"
 _HEAD = struct.Struct("<II")
 _TICK = struct.Struct("<cd")
 
@@ -42,9 +36,6 @@ class WriteAhead:
         self._numbers = {name: k for k, name in enumerate(names or [])}
         self._packers: dict[tuple[str, ...], tuple[struct.Struct, tuple[int, ...]]] = {}
         self._buffer: list[bytes] = []
-        self._samples: list[
-            tuple[float, int, float, dict[str, float]]
-        ] = []  # framed together: quicker than one by one
         if append_at is None:
             self._buffer.append(MAGIC)
         else:
@@ -52,42 +43,26 @@ class WriteAhead:
             os.lseek(self._file, append_at, os.SEEK_SET)
 
     def _frame(self, content: bytes) -> None:
-        self._frame_samples()
-        self._append(content)
-
-    def _append(self, content: bytes) -> None:
         self._buffer.append(_HEAD.pack(len(content), zlib.crc32(content)))
         self._buffer.append(content)
 
     def sample(self, arrival: float, source: int, stamp: float, values: dict[str, float]) -> None:
-        """A sample as the core takes it; ``values`` must stay as they are until the next `write`."""
-        self._samples.append((arrival, source, stamp, values))
-
-    def _frame_samples(self) -> None:
-        samples, self._samples = self._samples, []
-        for arrival, source, stamp, values in samples:
-            names = tuple(values)
-            packer, numbers = self._packers.get(names) or self._packer(names)
-            self._append(packer.pack(b"S", arrival, source, stamp, len(numbers), *numbers, *values.values()))
+        """A sample as the core takes it."""
+        names = tuple(values)
+        packer, numbers = self._packers.get(names) or self._packer(names)
+        self._frame(packer.pack(b"S", arrival, source, stamp, len(numbers), *numbers, *values.values()))
 
     def _packer(self, names: tuple[str, ...]) -> tuple[struct.Struct, tuple[int, ...]]:
         for name in names:
             if name not in self._numbers:
                 self._numbers[name] = len(self._numbers)
-                self._append(b"C" + name.encode())
+                self._frame(b"C" + name.encode())
         found = (
             struct.Struct(f"<cdHdH{len(names)}H{len(names)}d"),
             tuple(self._numbers[name] for name in names),
         )
         self._packers[names] = found
         return found
-
-    def block(self, block: Block) -> None:
-        """Samples as the core takes them one by one."""
-        self._frame_samples()
-        _, numbers = self._packers.get(block.channels) or self._packer(block.channels)
-        head = struct.pack(f"<cHH{len(numbers)}H", b"R", block.source, len(numbers), *numbers)
-        self._append(head + _little(block.numbers).tobytes())
 
     def tick(self, now: float) -> None:
         """A tick that the core took."""
@@ -108,11 +83,10 @@ class WriteAhead:
     @property
     def dirty(self) -> bool:
         """Whether frames wait to be written."""
-        return bool(self._buffer or self._samples)
+        return bool(self._buffer)
 
     def write(self) -> None:
         """Hand the frames to the system; raises OSError."""
-        self._frame_samples()
         if self._buffer:
             data = memoryview(b"".join(self._buffer))
             self._buffer.clear()
@@ -130,13 +104,6 @@ class WriteAhead:
             self.sync()
         finally:
             os.close(self._file)
-
-
-def _little(numbers: array[float]) -> array[float]:
-    if sys.byteorder == "big":
-        numbers = numbers[:]
-        numbers.byteswap()
-    return numbers
 
 
 class Reading:
@@ -163,16 +130,8 @@ class Reading:
         kind = content[:1]
         if kind == b"C":
             self.names.append(content[1:].decode())
-        elif kind == b"R":
-            yield from self._rows(content)
         else:
             yield self._entry(kind, content)
-
-    def _rows(self, content: bytes) -> Iterator[Entry]:
-        source, count = struct.unpack_from("<HH", content, 1)
-        names = [self.names[k] for k in struct.unpack_from(f"<{count}H", content, 5)]
-        for arrival, stamp, *values in struct.iter_unpack(f"<{2 + count}d", content[5 + 2 * count :]):
-            yield "S", (arrival, source, stamp, dict(zip(names, values, strict=True)))
 
     def _entry(self, kind: bytes, content: bytes) -> Entry:
         if kind == b"S":
