@@ -37,7 +37,7 @@ def test_only_methods_that_adapt_have_the_columns(method):
     log = drive(1.0).recording
     found = estimate(log, robot(), method)
     assert tuple(n for n in found.names if n.startswith("adaptation")) == (
-        COLUMNS if method in ("aukf", "aukf-fs") else ()
+        COLUMNS if method in ("aukf", "aukf-fs", "aukf-fs-drive") else ()
     )
     assert TractionEstimator.for_recording(log, robot(), method).columns == tuple(found.columns)
 
