@@ -41,9 +41,7 @@ def drive() -> Callable[..., Trace]:
 
     def run(scenario: Scenario, seed: int = 0, step: float = 1e-3, stride: int = 1) -> Trace:
         vehicle = scenario.nominal_vehicle()
-        ground = terrain_module.build(
-            scenario, float(vehicle.track or 0), float(vehicle.wheelbase or 0), seed
-        )
+        ground = terrain_module.build(scenario, vehicle, seed)
         plant = plant_module.make_plant(scenario, vehicle, vehicle.wheel_radius, ground)
         rows = plant_module.run(plant, scenario.duration, step, stride)
         radius = np.array(vehicle.wheel_radius)

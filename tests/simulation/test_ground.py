@@ -104,7 +104,7 @@ def two_soils(border, skew=0.0, **route):
 
 @pytest.mark.parametrize("border", [0.2, 0.6])
 def test_border_is_a_ramp_of_its_width(border):
-    ground = terrain_module.build(two_soils(border), 0.554, 0.638, 0)
+    ground = terrain_module.build(two_soils(border), two_soils(border).nominal_vehicle(), 0)
     x, rho = ground.path.x, ground.tracks[0].resistance
     np.testing.assert_allclose(
         rho, np.interp(x, [5 - border / 2, 5 + border / 2], [0.12, 0.07]), atol=0.05 * 0.02 / border
@@ -177,7 +177,7 @@ def test_soil_variation_has_the_asked_mean_and_spread():
     scenario = scenario.model_copy(update={"soils": scenario.soils | {"fine": soil}})
     scales = []
     for seed in range(80):
-        ground = terrain_module.build(scenario, 0.554, 0.638, seed)
+        ground = terrain_module.build(scenario, scenario.nominal_vehicle(), seed)
         scales.append(ground.tracks[0].adhesion_scale[ground.path.x < 4.5])
     assert np.mean(scales) == pytest.approx(1.0, abs=0.02)
     assert np.std(scales) == pytest.approx(0.15, rel=0.08)

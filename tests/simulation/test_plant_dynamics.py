@@ -44,7 +44,7 @@ def uphill(quiet):
 
 def built(scenario, seed=0):
     vehicle = scenario.nominal_vehicle()
-    ground = terrain_module.build(scenario, vehicle.track, vehicle.wheelbase, seed)
+    ground = terrain_module.build(scenario, vehicle, seed)
     return plant_module.make_plant(scenario, vehicle, vehicle.wheel_radius, ground)
 
 

@@ -100,7 +100,7 @@ def test_the_wheel_sensor_reads_little_or_less_while_torque_is_high(quiet, drive
 def test_a_spot_by_time_comes_just_before_the_wheels(quiet, drive):
     trace = drive(quiet(soft_spots=[{"at_time": 4.0, "ahead": 0.25, "length": 0.4, "rear": 0.1}]))
     k = np.searchsorted(trace["time"], 4.0 - 1e-9)
-    assert np.isnan(trace.rows[k - 1, 60])
-    assert trace.rows[-1, 60] == pytest.approx(trace["position"][k] + 0.25)
-    assert trace["resistance_rear"].max() > 0.12 + 0.08
-    assert trace["resistance_front"].max() < 0.1201
+    assert np.isnan(trace["spot1"][k - 1])
+    assert trace["spot1"][-1] == pytest.approx(trace["position"][k] + 0.25)
+    assert trace["resistance"][:, 1].max() > 0.12 + 0.08
+    assert trace["resistance"][:, 0].max() < 0.1201

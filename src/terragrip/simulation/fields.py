@@ -57,15 +57,17 @@ def on_grid(field: Field, east: Floats, north: Floats, mask: npt.NDArray[np.bool
     return np.where(mask, np.interp(np.arange(n), nodes, values), 0.0)
 
 
-def roughness(rng: np.random.Generator, count: int, spacing: float) -> Floats:
+def roughness(rng: np.random.Generator, count: int, spacing: float, scale: float = 1.0) -> Floats:
     """Elevation of a track of variance 1 (count,), one point every ``spacing`` m.
 
     Power spectrum over wave number k: 1/(k² + k0²) (ISO 8608's slope -2), flat beyond ``LONGEST``, cut by the tyre's
-    ``ENVELOPE``.
+    ``ENVELOPE``; both lengths times ``scale``, as the tyre is.
     """
     size = 2 * int(2 ** np.ceil(np.log2(max(count, 64))))
     wave = 2 * np.pi * np.fft.rfftfreq(size, spacing)
-    shape = np.exp(-0.5 * (wave * ENVELOPE) ** 2) / np.sqrt(wave**2 + (2 * np.pi / LONGEST) ** 2)
+    shape = np.exp(-0.5 * (wave * scale * ENVELOPE) ** 2) / np.sqrt(
+        wave**2 + (2 * np.pi / (scale * LONGEST)) ** 2
+    )
     shape[0] = 0.0
     profile = np.fft.irfft(np.fft.rfft(rng.standard_normal(size)) * shape, size)
     power = (shape[1:-1] ** 2).sum() * 2 + shape[-1] ** 2

@@ -1,7 +1,7 @@
-/* The simulated robot: two axles, four wheels, up to two tools on slack tow bars. C99, no allocation, no globals.
+/* The simulated machine: one to four axles, up to eight wheels, up to two tools on slack tow bars. C99, no allocation, no globals.
  *
  * One call integrates one drive and writes a trace. Fields along the path (soil, resistance, elevation, slope) are
- * plain arrays on a regular grid, made in Python. Wheel order: front left, front right, rear left, rear right.
+ * plain arrays on a regular grid, made in Python. Wheels stand in the order of the axles, front to rear.
  * Tracks: 0 left, 1 right. SI units. Equations: docs/simulation.md.
  */
 #ifndef TERRAGRIP_PLANT_H
@@ -9,8 +9,9 @@
 #include <stdint.h>
 
 /* cdef begin */
-#define PLANT_STATES 30
-#define PLANT_COLUMNS 63
+#define PLANT_WHEELS 8 /* at most */
+#define PLANT_AXLES 4
+#define PLANT_STATES 52 /* at most: 5 wheels + 2 + axles + 6 */
 
 typedef enum {
     PLANT_OK = 0,
@@ -18,45 +19,54 @@ typedef enum {
     PLANT_NOT_FINITE = 2 /* the state left the finite numbers */
 } plant_status;
 
-/* Columns of the trace; where a column is one of four, the wheels stand in order. */
+/* A row of the trace: PLANT_SCALARS single columns; then, for each plant_axle_column, one column an axle; then, for each
+ * plant_wheel_column, one column a wheel. */
 typedef enum {
     PLANT_TIME = 0,
-    PLANT_POSITION = 1,      /* rear axle along the path, m */
-    PLANT_SPEED = 2,         /* m/s */
-    PLANT_ACCELERATION = 3,  /* dv/dt, m/s^2 */
-    PLANT_DRAWBAR = 4,       /* N, backward pull positive */
-    PLANT_SLOPE = 5,         /* large-scale slope of the path at the centre of gravity, rad */
-    PLANT_GRADIENT_FORCE = 6, /* N, what roughness adds to m g sin(slope) */
-    PLANT_ASSIST = 7,        /* N, the operator's push */
-    PLANT_BODY_PITCH = 8,    /* rad, relative to the large-scale slope, nose up */
-    PLANT_BODY_PITCH_RATE = 9,
-    PLANT_HEAVE_ACCELERATION = 10, /* m/s^2 */
-    PLANT_CURVATURE = 11,    /* 1/m, left turn positive */
-    PLANT_DRIVER_MODE = 12,
-    PLANT_COMMAND = 13,      /* rad/s, wheel-speed command; NaN while the motors are off */
-    PLANT_LOAD_FRONT = 14,   /* N, axle load without roughness (PHYSICS 3) */
-    PLANT_RESISTANCE_FRONT = 15, /* rolling resistance force over that load */
-    PLANT_RESISTANCE_REAR = 16,
-    PLANT_TOOL1_POSITION = 17,
-    PLANT_TOOL1_SPEED = 18,
-    PLANT_TOOL1_DRAUGHT = 19, /* N */
-    PLANT_TOOL2_POSITION = 20,
-    PLANT_TOOL2_SPEED = 21,
-    PLANT_TOOL2_DRAUGHT = 22,
-    PLANT_BAR2 = 23,         /* N, force in the second bar */
-    PLANT_WHEEL_SPEED = 24,
-    PLANT_TORQUE = 28,
-    PLANT_SLIP = 32,
-    PLANT_ADHESION = 36,     /* F_h / F_z */
-    PLANT_LOAD = 40,         /* N, wheel load */
-    PLANT_HUB_SPEED = 44,
-    PLANT_GRADIENT = 48,     /* of the ground under the wheel */
-    PLANT_HEIGHT = 52,       /* m, corner displacement */
-    PLANT_WHEEL_ACCELERATION = 56,
-    PLANT_SPOT1 = 60,        /* m, where the first soft spots came to lie (NaN: not yet) */
-    PLANT_SPOT2 = 61,
-    PLANT_SPOT3 = 62
+    PLANT_POSITION,      /* rear axle along the path, m */
+    PLANT_SPEED,         /* m/s */
+    PLANT_ACCELERATION,  /* dv/dt, m/s^2 */
+    PLANT_DRAWBAR,       /* N, backward pull positive */
+    PLANT_SLOPE,         /* large-scale slope of the path at the centre of gravity, rad */
+    PLANT_GRADIENT_FORCE, /* N, what roughness adds to m g sin(slope) */
+    PLANT_ASSIST,        /* N, the operator's push */
+    PLANT_BODY_PITCH,    /* rad, relative to the large-scale slope, nose up */
+    PLANT_BODY_PITCH_RATE,
+    PLANT_HEAVE_ACCELERATION, /* m/s^2 */
+    PLANT_CURVATURE,     /* 1/m, left turn positive */
+    PLANT_DRIVER_MODE,
+    PLANT_COMMAND,       /* rad/s, speed command of the first wheel, straight ahead; NaN while the motors are off */
+    PLANT_TOOL1_POSITION,
+    PLANT_TOOL1_SPEED,
+    PLANT_TOOL1_DRAUGHT, /* N */
+    PLANT_TOOL2_POSITION,
+    PLANT_TOOL2_SPEED,
+    PLANT_TOOL2_DRAUGHT,
+    PLANT_BAR2,          /* N, force in the second bar */
+    PLANT_SPOT1,         /* m, where the first soft spots came to lie (NaN: not yet) */
+    PLANT_SPOT2,
+    PLANT_SPOT3,
+    PLANT_SCALARS
 } plant_column;
+
+typedef enum {
+    PLANT_AXLE_LOAD = 0, /* N, without roughness (PHYSICS 3) */
+    PLANT_RESISTANCE,    /* rolling resistance force over that load */
+    PLANT_AXLE_COLUMNS
+} plant_axle_column;
+
+typedef enum {
+    PLANT_WHEEL_SPEED = 0,
+    PLANT_TORQUE,
+    PLANT_SLIP,
+    PLANT_ADHESION,   /* F_h / F_z */
+    PLANT_LOAD,       /* N, wheel load */
+    PLANT_HUB_SPEED,
+    PLANT_GRADIENT,   /* of the ground under the wheel */
+    PLANT_HEIGHT,     /* m, corner displacement */
+    PLANT_WHEEL_ACCELERATION,
+    PLANT_WHEEL_COLUMNS
+} plant_wheel_column;
 
 typedef struct { /* the ground along the path, sampled every `spacing` m from `start` */
     int32_t count;
@@ -74,6 +84,7 @@ typedef struct { /* the ground along the path, sampled every `spacing` m from `s
     const double *gradient[2];      /* d elevation / d x */
     const double *slope;            /* rad */
     const double *curvature;        /* 1/m */
+    const double *load_variation[8]; /* per wheel: relative, on top of what roughness does to its load; NULL: none */
 } plant_ground;
 
 typedef struct {
@@ -94,7 +105,7 @@ typedef struct { /* a place where the wheels sink; triggered by time or lying at
     double ahead;
     double length;
     double edge;            /* share of the length over which it begins, and ends: 0..0.5 */
-    double resistance[2];   /* added rho_s, front and rear */
+    double resistance[4];   /* added rho_s, by axle */
     double sinkage;         /* what full slip-sinkage adds to that, relative */
     double sinkage_length;  /* m of the rim's travel over which sinkage follows |slip| */
     double loosening;       /* the slip that an adhesion takes grows to 1 + this of itself */
@@ -114,12 +125,18 @@ typedef struct {
 } plant_driver;
 
 typedef struct {
-    double mass, gravity, wheelbase, rear_to_cg, cg_height, hitch_height, hitch_overhang, track;
-    double radius[4], inertia[4], bearing[4];
-    int32_t driven[4];
+    double mass, gravity, rear_to_cg, cg_height, hitch_height, hitch_overhang;
+    int32_t axles, wheels;
+    double axle_position[4];  /* m ahead of the rear axle, falling to 0 */
+    double axle_share[4];     /* of the weight, at rest on level ground */
+    int32_t wheel_axle[8], wheel_track[8], driven[8];
+    double side[8];           /* m left of the middle */
+    double radius[8], inertia[8], bearing[8];
+    double command_ratio[8];  /* this wheel's speed command over the first wheel's */
+    int32_t steers;           /* 1: in a curve each side is commanded the speed of its own track */
     double tire_resistance;
     double tire_stiffness, tire_damping;  /* a wheel, N/m and N s/m */
-    double chassis_torsion;               /* N at each wheel per m of warp (fl - fr - rl + rr) */
+    double warp[64];                      /* N/m, [wheel][wheel]: what the chassis' stiffness makes of corner heights */
     double resistance_length;             /* m, travel over which rolling resistance builds up */
     double slip_speed;                    /* m/s: below it slip is taken over this speed */
     double wheel_rest_speed;              /* rad/s: tyre and bearing resistance reach full size here */
@@ -135,12 +152,13 @@ typedef struct {
 } plant_machine;
 
 /* Integrate from rest at `position` (rear axle) for `steps` steps of `step` s; every `stride` steps, first at time 0, a row
- * of PLANT_COLUMNS values goes to `trace` (steps / stride + 1 rows). Stops where the path ends: `rows` tells how many. */
+ * of plant_columns() values goes to `trace` (steps / stride + 1 rows). Stops where the path ends: `rows` tells how many. */
+int32_t plant_columns(const plant_machine *machine);
 plant_status plant_run(const plant_machine *machine, const plant_ground *ground, double position, double step, int32_t steps,
                        int32_t stride, double *trace, int32_t *rows);
-/* d state / dt with the driver passive and the command at `time`: for tests against another integrator. State: wheel
- * speeds 0-3, v 4, torques 5-8, controller sums 9-12, corner displacements 13-16 and their rates 17-20, position 21,
- * rolling resistance ratios 22-23, tools: position, speed, draught 24-26 and 27-29. */
+/* d state / dt with the driver passive and the command at `time`: for tests against another integrator. State, packed (n
+ * wheels): n wheel speeds, v, n torques, n controller sums, n corner displacements and their n rates, position, the rolling
+ * resistance ratio of each axle, and of each of two tools position, speed and draught. */
 plant_status plant_derivative(const plant_machine *machine, const plant_ground *ground, double time, const double *state,
                               double *derivative);
 plant_status plant_start(const plant_machine *machine, const plant_ground *ground, double position, double *state);

@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from terragrip.errors import InputError
 from terragrip.simulation.scenario import Scenario
-from terragrip.simulation.terrain import CURVE_INTERVALS, SPACING, Terrain
+from terragrip.simulation.terrain import CURVE_INTERVALS, Terrain
 from terragrip.units import STANDARD_GRAVITY
 from terragrip.vehicle import Vehicle
 
@@ -26,19 +26,48 @@ class Plant:
     kept: tuple[Any, ...]
 
 
+MAX_AXLES = 4
+
+
 def check_layout(vehicle: Vehicle) -> None:
-    """Raise InputError unless the vehicle has two axles of two wheels, left before right: what the plant knows."""
-    if [len(axle.wheels) for axle in vehicle.axles.values()] != [2, 2] or not vehicle.track:
+    """Raise InputError unless the plant knows the vehicle: up to four axles of one wheel, or of a left and a right one."""
+    counts = {len(axle.wheels) for axle in vehicle.axles.values()}
+    if len(vehicle.axles) > MAX_AXLES or not counts <= {1, 2} or (2 in counts and not vehicle.track):
         raise InputError(
-            "only a vehicle with two axles of two wheels and a track can be simulated",
+            "only a vehicle of one to four axles, each with one wheel or with a left and a right one, can be simulated",
             place="vehicle",
-            mend="give axles front and rear with two wheels each, and 'track:'",
+            mend="give axles with one or two wheels each, and 'track:' where there are two",
         )
+
+
+def wheel_sides(vehicle: Vehicle) -> Floats:
+    """How far each wheel stands left of the middle (n,) [m]."""
+    half = 0.5 * (vehicle.track or 0.0)
+    return np.array(
+        [
+            side
+            for axle in vehicle.axles.values()
+            for side in ((0.0,) if len(axle.wheels) == 1 else (half, -half))
+        ]
+    )
+
+
+def warp_stiffness(vehicle: Vehicle, torsion: float) -> Floats:
+    """Forces that corner heights cause through a chassis that resists what is no heave, pitch or roll (n, n) [N/m].
+
+    ``torsion`` is the force at each wheel of a two-axle, four-wheel chassis per metre of one diagonal over the other.
+    """
+    ahead = vehicle.axle_to_rear[vehicle.wheel_axle]
+    rigid = np.stack([np.ones(len(ahead)), ahead - ahead.mean(), wheel_sides(vehicle)], axis=1)
+    return 4.0 * torsion * (np.eye(len(ahead)) - rigid @ np.linalg.pinv(rigid))
 
 
 def _check_step(scenario: Scenario, vehicle: Vehicle) -> None:
     """Raise InputError where a spring or damper is too stiff for the explicit part of a step."""
-    robot, corner = scenario.robot, 0.5 * float(vehicle.axle_mass.min())
+    robot = scenario.robot
+    corner = float(
+        (vehicle.axle_mass[vehicle.wheel_axle] / np.bincount(vehicle.wheel_axle)[vehicle.wheel_axle]).min()
+    )
     parts = [
         ("robot.tire_stiffness", robot.tire_stiffness + 4 * robot.chassis_torsion, robot.tire_damping, corner)
     ]
@@ -55,8 +84,8 @@ def _check_step(scenario: Scenario, vehicle: Vehicle) -> None:
 
 
 def make_plant(scenario: Scenario, vehicle: Vehicle, radius: Floats, terrain: Terrain) -> Plant:
-    """The C structures of a scenario; ``radius`` (4,) [m] is the true one. Raises InputError on an unfit vehicle."""
-    from terragrip.simulation._plant import ffi
+    """The C structures of a scenario; ``radius`` (n,) [m] is the true one. Raises InputError on an unfit vehicle."""
+    from terragrip.simulation._plant import ffi, lib
 
     check_layout(vehicle)
     _check_step(scenario, vehicle)
@@ -69,9 +98,9 @@ def make_plant(scenario: Scenario, vehicle: Vehicle, radius: Floats, terrain: Te
         return ffi.cast(f"{kind} *", handle)
 
     ground = _ground(ffi, terrain, pointer)
-    machine = _machine(ffi, scenario, vehicle, radius)
+    machine = _machine(ffi, lib, scenario, vehicle, radius)
     _tools(machine, scenario, terrain, pointer)
-    _spots_and_driver(machine, scenario)
+    _spots_and_driver(machine, scenario, len(vehicle.axles))
     speeds = np.array([np.nan if speed == "off" else float(speed) for _, speed in scenario.speed])
     machine.commands = len(speeds)
     machine.command_time = pointer([time for time, _ in scenario.speed])
@@ -80,14 +109,14 @@ def make_plant(scenario: Scenario, vehicle: Vehicle, radius: Floats, terrain: Te
 
 
 def run(plant: Plant, duration: float, step: float, stride: int) -> Floats:
-    """Integrate from rest at position 0; the trace (rows, PLANT_COLUMNS), a row every ``stride`` steps.
+    """Integrate from rest at position 0; the trace (rows, columns of plant.h), a row every ``stride`` steps.
 
     Ends early where the path ends. Raises InputError where the motion diverges (springs too stiff for the step).
     """
     from terragrip.simulation._plant import ffi, lib
 
     steps = round(duration / step)
-    trace = np.empty((steps // stride + 1, lib.PLANT_COLUMNS))
+    trace = np.empty((steps // stride + 1, lib.plant_columns(plant.machine)))
     rows = ffi.new("int32_t *")
     status = lib.plant_run(
         plant.machine,
@@ -114,7 +143,7 @@ def _ground(ffi: Any, terrain: Terrain, pointer: Any) -> Any:
     ground = ffi.new("plant_ground *")
     ground.count = len(terrain.path.x)
     ground.start = float(terrain.path.x[0])
-    ground.spacing = SPACING
+    ground.spacing = terrain.spacing
     ground.soils = len(terrain.names)
     ground.curve_intervals = CURVE_INTERVALS
     ground.curve = pointer(terrain.curve)
@@ -124,29 +153,40 @@ def _ground(ffi: Any, terrain: Terrain, pointer: Any) -> Any:
         ground.blend[k] = pointer(track.soils.blend)
         for name in ("adhesion_scale", "resistance", "slip_resistance", "elevation", "gradient"):
             getattr(ground, name)[k] = pointer(getattr(track, name))
+    for i, variation in enumerate(terrain.load_variation):
+        ground.load_variation[i] = pointer(variation)
     ground.slope = pointer(terrain.slope)
     ground.curvature = pointer(terrain.path.curvature)
     return ground
 
 
-def _machine(ffi: Any, scenario: Scenario, vehicle: Vehicle, radius: Floats) -> Any:
+def _machine(ffi: Any, lib: Any, scenario: Scenario, vehicle: Vehicle, radius: Floats) -> Any:
     machine = ffi.new("plant_machine *")
     machine.mass = vehicle.mass
     machine.gravity = STANDARD_GRAVITY
-    machine.wheelbase = vehicle.wheelbase
     machine.rear_to_cg = vehicle.center_of_gravity_to_rear
     machine.cg_height = vehicle.center_of_gravity_height
     machine.hitch_height = vehicle.hitch_height
     machine.hitch_overhang = vehicle.hitch_overhang
-    machine.track = vehicle.track
     machine.tire_resistance = vehicle.tire_rolling_resistance
-    for i in range(4):
+    machine.axles, machine.wheels = len(vehicle.axles), len(vehicle.wheels)
+    for a, share in enumerate(vehicle.axle_mass / vehicle.axle_mass.sum()):
+        machine.axle_position[a], machine.axle_share[a] = float(vehicle.axle_to_rear[a]), float(share)
+    sides = wheel_sides(vehicle)
+    machine.steers = int(scenario.robot.steers)
+    for i, row in enumerate(warp_stiffness(vehicle, scenario.robot.chassis_torsion)):
+        for j, value in enumerate(row):
+            machine.warp[lib.PLANT_WHEELS * i + j] = float(value)
+    for i in range(len(vehicle.wheels)):
+        machine.wheel_axle[i], machine.side[i] = int(vehicle.wheel_axle[i]), float(sides[i])
+        machine.wheel_track[i] = int(sides[i] < 0)
+        machine.command_ratio[i] = float(vehicle.wheel_radius[0] / vehicle.wheel_radius[i])
         machine.radius[i] = float(radius[i])
         machine.inertia[i] = float(vehicle.wheel_inertia[i])
         machine.bearing[i] = vehicle.bearing_resistance
         machine.driven[i] = int(vehicle.driven[i])
     for name in (
-        "tire_stiffness", "tire_damping", "chassis_torsion", "resistance_length", "slip_speed", "wheel_rest_speed", "speed_gain",
+        "tire_stiffness", "tire_damping", "resistance_length", "slip_speed", "wheel_rest_speed", "speed_gain",
         "speed_integral", "motor_lag", "antiwindup_time", "torque_limit", "power_limit",
     ):  # fmt: skip
         setattr(machine, name, getattr(scenario.robot, name))
@@ -163,7 +203,7 @@ def _tools(machine: Any, scenario: Scenario, terrain: Terrain, pointer: Any) -> 
         out.friction, out.dig_in = pointer(terrain.friction[k]), pointer(terrain.dig_in[k])
 
 
-def _spots_and_driver(machine: Any, scenario: Scenario) -> None:
+def _spots_and_driver(machine: Any, scenario: Scenario, axles: int) -> None:
     machine.spots = len(scenario.soft_spots)
     for k, spot in enumerate(scenario.soft_spots):
         out = machine.spot[k]
@@ -174,7 +214,8 @@ def _spots_and_driver(machine: Any, scenario: Scenario) -> None:
         out.edge = 0.5 if spot.edge is None else spot.edge / spot.length
         for name in ("sinkage", "sinkage_length", "loosening", "adhesion_fall"):
             setattr(out, name, getattr(spot, name))
-        out.resistance[0], out.resistance[1] = spot.front, spot.rear
+        for a in range(axles):
+            out.resistance[a] = spot.front if a == 0 else spot.rear
     driver, out = scenario.driver, machine.driver
     out.enabled = int(driver.acts)
     for name in (

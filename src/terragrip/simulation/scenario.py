@@ -110,7 +110,7 @@ class Tool(Part):
     draught_speed: Ratio = 0.0
     shear_length: PositiveLength = 0.01
     slack: Length = 0.04
-    stiffness: Annotated[float, _number("N/m", above=True)] = 4e4
+    stiffness: Annotated[float, _number("N/m", high=1e8, above=True)] = 4e4
     damping: Annotated[float, _number("N s/m")] = 800.0
 
 
@@ -238,13 +238,16 @@ class Robot(Part):
 
     ``power_limit`` [W] holds for all motors together, ``torque_limit`` [N m] for each wheel. ``chassis_torsion``: force at
     each wheel per metre of warp (one diagonal up). ``slip_speed`` [m/s]: slower than this, slip is taken over this
-    speed. ``wheel_radius_sd`` is relative, common to all wheels.
+    speed. ``wheel_radius_sd`` is relative, common to all wheels. ``load_variation``: relative standard deviation by which each
+    wheel's load differs from what springs and roughness make it, over ``load_variation_length`` [m] of travel, in no
+    relation to the other wheels. ``steers``: in a curve each side is commanded the speed of its own track (else all wheels
+    turn alike).
     """
 
     wheel_mass: Mass = 5.4
-    tire_stiffness: Annotated[float, _number("N/m", above=True)] = 8e4
+    tire_stiffness: Annotated[float, _number("N/m", high=1e8, above=True)] = 8e4
     tire_damping: Annotated[float, _number("N s/m")] = 600.0
-    chassis_torsion: Annotated[float, _number("N/m")] = 1500.0
+    chassis_torsion: Annotated[float, _number("N/m", high=1e8)] = 1500.0
     resistance_length: PositiveLength = 0.02
     slip_speed: Annotated[float, _number("m/s", 1e-3, 1)] = 0.05
     wheel_rest_speed: Annotated[float, _number("rad/s", 1e-4, 1)] = 0.02
@@ -255,6 +258,9 @@ class Robot(Part):
     torque_limit: Annotated[float, _number("N m", above=True)] = 130.0
     power_limit: Annotated[float, _number("W", above=True)] = 1600.0
     wheel_radius_sd: Share = 0.0
+    load_variation: Annotated[float, _number("1", 0, 0.3)] = 0.0
+    load_variation_length: PositiveLength = 0.25
+    steers: bool = False
 
 
 class Sensor(Part):

@@ -10,6 +10,7 @@ import numpy.typing as npt
 
 from terragrip.errors import InputError
 from terragrip.simulation.fields import stream
+from terragrip.simulation.plant import wheel_sides
 from terragrip.simulation.route import geographic
 from terragrip.simulation.scenario import Scenario, Sensor, Sensors
 from terragrip.simulation.trace import Trace
@@ -55,7 +56,9 @@ def signals(sensor: str, trace: Trace) -> dict[str, Floats]:
         }
     if sensor == "angular_velocity":
         time, height = trace["time"], trace["height"]
-        roll = (height[:, [0, 2]] - height[:, [1, 3]]).mean(axis=1) / (trace.vehicle.track or 1.0)
+        sides = wheel_sides(trace.vehicle)
+        width = float(sides @ sides)
+        roll = height @ sides / width if width > 0 else np.zeros(len(time))
         nodding = trace["body_pitch_rate"] + np.gradient(trace["slope"], time)
         return {
             "angular_velocity_x": np.gradient(roll, time),
@@ -65,10 +68,7 @@ def signals(sensor: str, trace: Trace) -> dict[str, Floats]:
     if sensor == "pitch":
         return {sensor: trace["slope"] + pitch}
     if sensor == "vertical_load":
-        return {
-            f"{sensor}_{axle}": trace["load"][:, 2 * k : 2 * k + 2].sum(axis=1)
-            for k, axle in enumerate(axles)
-        }
+        return {f"{sensor}_{axle}": trace.of_axles("load")[:, k] for k, axle in enumerate(axles)}
     if sensor == "wheel_force":
         forces = (("x", trace.wheel_force_x), ("z", trace.wheel_force_z))
         return {

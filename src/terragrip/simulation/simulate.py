@@ -105,7 +105,7 @@ def _true_radius(scenario: Scenario, vehicle: Vehicle, seed: int) -> Floats:
 
 
 def _drive(scenario: Scenario, vehicle: Vehicle, radius: Floats, seed: int) -> Trace:
-    ground = terrain.build(scenario, float(vehicle.track or 0.0), float(vehicle.wheelbase or 0.0), seed)
+    ground = terrain.build(scenario, vehicle, seed)
     machine = plant.make_plant(scenario, vehicle, radius, ground)
     stride = round(1.0 / (scenario.log_rate * scenario.step))
     rows = plant.run(machine, scenario.duration, scenario.step, stride)

@@ -11,10 +11,12 @@ from terragrip.physics.adhesion import CURVES
 from terragrip.simulation.fields import Field, clods, on_grid, roughness, stream
 from terragrip.simulation.route import Path, Soils, lay, soils_along
 from terragrip.simulation.scenario import Scenario, Soil, Tool
+from terragrip.vehicle import Vehicle
 
 Floats = npt.NDArray[np.float64]
 
-SPACING = 0.02  # m
+SPACING = 0.02  # m, on wheels of WHEEL_RADIUS
+WHEEL_RADIUS = 0.2  # m: lengths of what a tyre feels grow with its radius
 CURVE_INTERVALS = 1024
 _STRIDE = 5  # fields vary over decimetres: every fifth point will do
 
@@ -48,17 +50,21 @@ class Terrain:
     curve: Floats
     friction: tuple[Floats, ...]
     dig_in: tuple[Floats, ...]
+    spacing: float = SPACING
+    load_variation: tuple[Floats, ...] = ()
 
 
-def build(scenario: Scenario, track_width: float, wheelbase: float, seed: int) -> Terrain:
-    """The ground of a scenario for one seed."""
+def build(scenario: Scenario, vehicle: Vehicle, seed: int) -> Terrain:
+    """The ground of a scenario for one seed, and what it does to the loads of each of the vehicle's wheels."""
+    track_width, wheelbase = vehicle.track or 0.0, vehicle.wheelbase or 0.0
+    scale = float(vehicle.wheel_radius.mean()) / WHEEL_RADIUS
     route = scenario.route
     names = route.soils()
     trail = sum(tool.length + tool.slack for tool in scenario.tools)
-    path = lay(route, before=trail + 2.0, after=wheelbase + 1.0, spacing=SPACING)
+    path = lay(route, before=trail + 2.0 * scale, after=wheelbase + scale, spacing=SPACING * scale)
     sides = (0.5 * track_width, -0.5 * track_width)
     tracks = tuple(
-        _track(scenario, names, path, offset, track_width, seed, ("left", "right")[k])
+        _track(scenario, names, path, offset, track_width, scale, seed, ("left", "right")[k])
         for k, offset in enumerate(sides)
     )
     middle = soils_along(route, names, path, 0.0, track_width)
@@ -77,7 +83,31 @@ def build(scenario: Scenario, track_width: float, wheelbase: float, seed: int) -
         curve=np.array([_curve(scenario.soils[name]) for name in names]),
         friction=tuple(friction for friction, _ in draught),
         dig_in=tuple(dig_in for _, dig_in in draught),
+        spacing=SPACING * scale,
+        load_variation=_load_variation(scenario, vehicle, path, seed),
     )
+
+
+def _load_variation(scenario: Scenario, vehicle: Vehicle, path: Path, seed: int) -> tuple[Floats, ...]:
+    """What each wheel's load varies by, relative and unknown to any load formula (n,) a wheel; none where the robot has none.
+
+    Gaussian with a Matérn 3/2 covariance in the wheel's own travel (two first-order filters in a row), at most three
+    standard deviations.
+    """
+    from scipy.signal import lfilter
+
+    robot = scenario.robot
+    if robot.load_variation <= 0:
+        return ()
+    keep = float(np.exp(-np.sqrt(3.0) * path.spacing / robot.load_variation_length))
+    gain = np.sqrt((1 - keep**2) ** 3 / (1 + keep**2))  # makes the variance 1
+    out = []
+    for wheel in vehicle.wheels:
+        lead = int(10 / (1 - keep))  # by then the filters have settled
+        noise = stream(seed, f"load variation {wheel}").standard_normal(lead + len(path.x))
+        unit = gain * lfilter([1.0], [1.0, -2 * keep, keep**2], noise)[lead:]
+        out.append(robot.load_variation * np.clip(unit, -3.0, 3.0))
+    return tuple(out)
 
 
 def _curve(soil: Soil) -> Floats:
@@ -123,13 +153,20 @@ def _shared(soils: Soils, figures: list[float]) -> Floats:
 
 
 def _track(
-    scenario: Scenario, names: tuple[str, ...], path: Path, offset: float, width: float, seed: int, side: str
+    scenario: Scenario,
+    names: tuple[str, ...],
+    path: Path,
+    offset: float,
+    width: float,
+    scale: float,
+    seed: int,
+    side: str,
 ) -> Track:
     soils = soils_along(scenario.route, names, path, offset, width)
     place = path.beside(offset)
     resistance = _varied(scenario, names, soils, place, seed, "resistance")
     elevation = _mixed(scenario, names, soils, "roughness") * roughness(
-        stream(seed, f"roughness {side}"), len(path.x), path.spacing
+        stream(seed, f"roughness {side}"), len(path.x), path.spacing, scale
     )
     elevation = elevation + _clods(scenario, names, soils, path, seed, side)
     return Track(

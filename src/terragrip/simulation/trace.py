@@ -17,19 +17,19 @@ Array = npt.NDArray[np.float64]
 
 SCALARS = (
     "time", "position", "speed", "acceleration", "drawbar", "slope", "gradient_force", "assist", "body_pitch",
-    "body_pitch_rate", "heave_acceleration", "curvature", "driver_mode", "command", "load_front", "resistance_front",
-    "resistance_rear", "tool1_position", "tool1_speed", "tool1_draught", "tool2_position", "tool2_speed",
-    "tool2_draught", "bar2",
+    "body_pitch_rate", "heave_acceleration", "curvature", "driver_mode", "command", "tool1_position", "tool1_speed",
+    "tool1_draught", "tool2_position", "tool2_speed", "tool2_draught", "bar2", "spot1", "spot2", "spot3",
 )  # fmt: skip
+PER_AXLE = ("axle_load", "resistance")
 PER_WHEEL = (
     "wheel_speed", "torque", "slip", "adhesion", "load", "hub_speed", "gradient", "height", "wheel_acceleration",
 )  # fmt: skip
-"""Columns of the trace in the order of ``plant_column`` in plant.h; per wheel there are four."""
+"""Columns of the trace in the order of plant.h: single ones, then one an axle, then one a wheel."""
 
 
 @dataclass(frozen=True)
 class Trace:
-    """A run: ``rows`` (n, PLANT_COLUMNS) at equal time steps, on a vehicle (true radius ``radius`` (4,)) and a ground."""
+    """A run: ``rows`` (n, columns) at equal time steps, on a vehicle (true radius ``radius`` (wheels,)) and a ground."""
 
     rows: Floats
     vehicle: Vehicle
@@ -39,11 +39,20 @@ class Trace:
     tool_count: int
 
     def __getitem__(self, name: str) -> Floats:
-        """A scalar column (n,) or a wheel column (n, 4)."""
+        """A single column (n,), an axle column (n, axles) or a wheel column (n, wheels)."""
+        axles, wheels = len(self.vehicle.axles), len(self.vehicle.wheels)
         if name in SCALARS:
             return self.rows[:, SCALARS.index(name)]
-        first = len(SCALARS) + 4 * PER_WHEEL.index(name)
-        return self.rows[:, first : first + 4]
+        if name in PER_AXLE:
+            first = len(SCALARS) + axles * PER_AXLE.index(name)
+            return self.rows[:, first : first + axles]
+        first = len(SCALARS) + axles * len(PER_AXLE) + wheels * PER_WHEEL.index(name)
+        return self.rows[:, first : first + wheels]
+
+    def of_axles(self, name: str) -> Floats:
+        """The sum of a wheel column over each axle's wheels (n, axles)."""
+        members = np.eye(len(self.vehicle.axles))[self.vehicle.wheel_axle]
+        return np.asarray(self[name] @ members)
 
     def at(self, times: Floats) -> Trace:
         """The trace at other instants (k,), linear between its rows, held beyond its ends."""
@@ -65,11 +74,8 @@ class Trace:
 
     @cached_property
     def rolling_force(self) -> Floats:
-        """Rolling resistance force of each axle [N], signed against forward (n, 2)."""
-        front = self["load_front"]
-        return np.stack(
-            [self["resistance_front"] * front, self["resistance_rear"] * (self.normal_force - front)], axis=1
-        )
+        """Rolling resistance force of each axle [N], signed against forward (n, axles)."""
+        return self["resistance"] * self["axle_load"]
 
     @cached_property
     def specific_force(self) -> tuple[Floats, Floats]:
@@ -79,27 +85,26 @@ class Trace:
 
     @cached_property
     def wheel_force_x(self) -> Floats:
-        """What a force sensor in each wheel's axle reads forward (n, 4) [N]: F_h - F_s - m_w (dv/dt + g sinθ) (paper
+        """What a force sensor in each wheel's axle reads forward (n, wheels) [N]: F_h - F_s - m_w (dv/dt + g sinθ) (paper
         eq. 1), the ground's local gradient counted with the load."""
         inertial = self.wheel_mass * self.specific_force[0]
-        rolling = np.repeat(0.5 * self.rolling_force, 2, axis=1)
+        axle = self.vehicle.wheel_axle
+        rolling = (self.rolling_force / np.bincount(axle))[:, axle]
         climbing = self["gradient"] * self["load"]
         return self["adhesion"] * self["load"] - rolling - climbing - inertial[:, None]
 
     @cached_property
     def wheel_force_z(self) -> Floats:
-        """What that sensor reads upward (n, 4) [N]: the load without the wheel's own weight."""
+        """What that sensor reads upward (n, wheels) [N]: the load without the wheel's own weight."""
         return self["load"] - (self.wheel_mass * self.specific_force[1])[:, None]
 
     @cached_property
     def points(self) -> dict[str, Floats]:
         """Positions along the path [m] of the axles, the centre of gravity and the tools (n,)."""
         x, vehicle = self["position"], self.vehicle
-        places = {
-            "front": x + (vehicle.wheelbase or 0.0),
-            "rear": x,
-            "center": x + vehicle.center_of_gravity_to_rear,
-        }
+        ahead = zip(vehicle.axle_names, vehicle.axle_to_rear, strict=True)
+        places = {axle: x + distance for axle, distance in ahead}
+        places["center"] = x + vehicle.center_of_gravity_to_rear
         return places | {f"tool{k + 1}": self[f"tool{k + 1}_position"] for k in range(self.tool_count)}
 
     def cell(self, position: Floats) -> npt.NDArray[np.intp]:

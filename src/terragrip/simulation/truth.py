@@ -50,10 +50,8 @@ def truth_frame(trace: Trace, whole: Trace) -> pd.DataFrame:
     columns["true_soil_resistance"] = resistance
     axles = vehicle.axle_names
     for k, axle in enumerate(axles):
-        columns[f"true_soil_resistance_{axle}"] = (
-            direction * trace["resistance_front" if k == 0 else "resistance_rear"]
-        )
-        columns[f"true_vertical_load_{axle}"] = trace["load"][:, 2 * k : 2 * k + 2].sum(axis=1)
+        columns[f"true_soil_resistance_{axle}"] = direction * trace["resistance"][:, k]
+        columns[f"true_vertical_load_{axle}"] = trace.of_axles("load")[:, k]
     for i, wheel in enumerate(vehicle.wheels):
         adhesion = direction * trace["adhesion"][:, i]
         wheel_slip = slip(

@@ -1,0 +1,321 @@
+"""Families of machines, grounds and sensors, and their split into development and held-out (docs/decisions/0095) (R).
+
+A kind says which decade of mass, which family of adhesion curves and which set of sensors; a seed draws the rest: layout,
+dimensions, ground, work and drive. Everything follows the 139 kg robot of PHYSICS §8 by geometric similarity: with the length
+scale L = (mass/139 kg)^(1/3), forces grow as L³, torques as L⁴, inertia as L⁵, speeds (Froude) and times as L^(1/2), each with spread.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import pairwise, product
+from typing import Any, Literal
+
+import numpy as np
+
+from terragrip.errors import InputError
+from terragrip.simulation.family_machines import Machine, draw_machine
+from terragrip.simulation.family_soils import SOILS_OF, capacity, draw_soils
+from terragrip.simulation.fields import stream
+from terragrip.simulation.scenario import Scenario
+from terragrip.simulation.simulate import SimulationResult, simulate
+from terragrip.units import STANDARD_GRAVITY
+
+Tree = dict[str, Any]
+Part = Literal["development", "held-out"]
+
+MASSES: dict[str, tuple[float, float]] = {
+    "light": (5.0, 50.0),
+    "robot": (50.0, 500.0),
+    "compact": (500.0, 5000.0),
+    "tractor": (5000.0, 12000.0),
+}
+"""Mass [kg] from and to, by name."""
+CURVES = tuple(SOILS_OF)
+"""Families of adhesion curves: see :mod:`terragrip.simulation.family_soils`."""
+SENSORS = ("even", "plain", "uncoupled", "multirate", "coarse")
+"""Sets of sensors. even: every channel at one rate. plain: no inertial sensors, so it drives straight. uncoupled: no drawbar cell
+and no tool. multirate: ground speed and drawbar slower than the wheels, inertial channels faster. coarse: a slow receiver, rounded
+channels, more noise, no accelerometer."""
+
+HELD_OUT: dict[str, str] = {"mass": "compact", "curve": "peaking", "sensors": "coarse"}
+"""The split, by kind (decision 0095): a machine with any of these is held out, and so is the whole second plant
+(benchmarks/second_plant). Nothing is tuned on held-out machines."""
+
+LOAD_VARIATION = (0.02, 0.08)
+"""Relative standard deviation of a wheel's load, from and to, over about 1.25 wheel radii."""
+WORK = (0.45, 0.8)
+"""Share of what the ground bears at 20 % of slip that tools and hills together ask for at most, from and to."""
+
+
+@dataclass(frozen=True, order=True)
+class Kind:
+    """What kind of machine, ground and sensors: a name of ``MASSES``, of ``CURVES`` and of ``SENSORS``."""
+
+    mass: str
+    curve: str
+    sensors: str
+
+    @property
+    def part(self) -> Part:
+        """The part of the split that the kind belongs to."""
+        return (
+            "held-out"
+            if any(getattr(self, key) == value for key, value in HELD_OUT.items())
+            else "development"
+        )
+
+    def __str__(self) -> str:
+        return f"{self.mass}-{self.curve}-{self.sensors}"
+
+
+def kinds(part: Part | None = None) -> tuple[Kind, ...]:
+    """All kinds, or those of one part of the split."""
+    every = (Kind(*names) for names in product(MASSES, CURVES, SENSORS))
+    return tuple(kind for kind in every if part in (None, kind.part))
+
+
+def machines(part: Part, count: int, first_seed: int = 0) -> Iterator[tuple[Kind, int]]:
+    """``count`` pairs (kind, seed) for :func:`draw`: the kinds of a part in an order that mixes them, a seed each.
+
+    The order is the same whatever ``first_seed`` is; masses, curves and sensors are each spread evenly over any first few.
+    """
+    listed = kinds(part)
+    order = stream(0, f"order {part}").permutation(len(listed))
+    spread = sorted(range(len(listed)), key=lambda k: (_seen_before(listed, order, k), k))
+    for k in range(count):
+        yield listed[order[spread[k % len(listed)]]], first_seed + k
+
+
+def _seen_before(listed: tuple[Kind, ...], order: Any, k: int) -> int:
+    """How often the mass and the curve of the k-th of the shuffled kinds came before it, the larger of the two."""
+    kind = listed[order[k]]
+    before = [listed[j] for j in order[:k]]
+    return max(sum(b.mass == kind.mass for b in before), sum(b.curve == kind.curve for b in before))
+
+
+def draw(kind: Kind, seed: int, *, rate: float | None = None, faults: bool = False) -> SimulationResult:
+    """One machine of a kind on its drive: the recording, the truth, and the vehicle as its user wrote it.
+
+    ``rate`` [1/s] (of the wheel speeds; default: drawn) and ``faults`` (gaps, spikes, jitter, held values and an outage of the
+    ground speed, all in one log) change what is recorded, not the machine, its ground and its drive. Raises InputError on a
+    kind that there is not.
+    """
+    return simulate(scenario(kind, seed, rate=rate, faults=faults), seed)
+
+
+def scenario(kind: Kind, seed: int, *, rate: float | None = None, faults: bool = False) -> Scenario:
+    """The scenario that :func:`draw` simulates. Raises as it does."""
+    if kind not in kinds():
+        raise InputError(f"no such kind {kind}", mend="take one of families.kinds()")
+    rng = stream(seed, f"family {kind}")
+    machine = draw_machine(rng, MASSES[kind.mass])
+    soils, spots = draw_soils(rng, kind.curve, machine)
+    towing, turning = kind.sensors != "uncoupled", kind.sensors != "plain" and rng.uniform() < 0.5
+    beat = np.sqrt(machine.scale)  # what a second is to the robot
+    duration = float(np.clip(90.0 * beat, 50.0, 150.0))
+    speed = _speeds(rng, machine, duration)
+    length = 1.1 * sum(0.5 * (b[1] + a[1]) * (b[0] - a[0]) for a, b in pairwise(speed[1:]))
+    length += 5 * machine.wheelbase + machine.scale
+    work = rng.uniform(*WORK)
+    bears = {name: work * capacity(soil, spots) for name, soil in soils.items()}
+    hills = min(bears.values()) * (rng.uniform(0.0, 0.35) if towing else rng.uniform(0.5, 1.0))
+    name = f"{kind}-{seed}"
+    tree: Tree = {
+        "name": name,
+        "seed": seed,
+        "vehicle": machine.vehicle(),
+        "robot": {
+            **machine.robot(),
+            "load_variation": rng.uniform(*LOAD_VARIATION),
+            "load_variation_length": 1.25 * machine.radius,
+            "steers": True,
+        },
+        "soils": soils,
+        "soft_spots": spots(length),
+        "route": {
+            **_route(rng, machine, list(soils), length, turning),
+            "slope": {"sd": hills / 2.5, "length": rng.uniform(8.0, 20.0) * machine.scale},
+        },
+        "tools": [_tool(rng, machine, bears, length, hills)] if towing else [],
+        "speed": speed,
+        "duration": duration,
+        "driver": {"acts": False},
+        "step": machine.step,
+    }
+    noise = stream(seed, f"family sensors {kind}")
+    tree["sensors"], tree["vehicle"]["sensors"] = draw_sensors(noise, kind.sensors, machine, rate)
+    tree["vehicle"]["uncertainty"] = {
+        "drive_torque_gain": tree["sensors"]["drive_torque"]["gain_sd"],
+        "drive_torque_offset": max(tree["sensors"]["drive_torque"]["offset_sd"], 1e-6),
+        "drawbar_offset": machine.drawbar_offset,
+        "slope": 0.0087,
+        "vertical_load": 0.02,
+        "wheel_radius": machine.radius_error,
+        "acceleration_bias": 0.03,
+    }
+    tree["faults"] = _faults(duration, machine, kind.sensors) if faults else []
+    return Scenario.from_dict(tree, file=name)
+
+
+def _speeds(rng: np.random.Generator, machine: Machine, duration: float) -> list[list[Any]]:
+    """Commanded rim speeds: motors off, levels held with ramps between, at times a stop, a rest and a start."""
+    beat = np.sqrt(machine.scale)
+    points: list[list[Any]] = [[0.0, "off"], [2.0 * beat, 0.0]]
+    time = 2.0 * beat
+    while time < duration:
+        ramp, hold = rng.uniform(0.4, 2.0) * beat, rng.uniform(5, 14) * beat
+        level = machine.speed * rng.uniform(0.5, 1.3)
+        points += [[time + ramp, level], [time + ramp + hold, level]]
+        time += ramp + hold
+        if rng.uniform() < 0.25:
+            stop, rest = rng.uniform(0.4, 1.5) * beat, rng.uniform(1, 3) * beat
+            points += [[time + stop, 0.0], [time + stop + rest, 0.0]]
+            time += stop + rest
+    return points
+
+
+def _route(
+    rng: np.random.Generator, machine: Machine, names: list[str], length: float, turning: bool
+) -> Tree:
+    """The way over the soils: straight, or in legs whose headings swing about east, over strips of soil across it."""
+    border = 2.0 * machine.radius
+    stretch = max(rng.uniform(8, 16) * machine.scale, 3 * border)
+    count = max(int(np.ceil(length / stretch)), len(names))
+    order = [names[k % len(names)] for k in range(count)]
+    if not turning:
+        segments = [{"soil": soil, "length": stretch} for soil in order]
+        return {"segments": segments, "border": border, "skew": 0.5 * machine.radius}
+    points, heading = [[0.0, 0.0]], 0.0
+    travelled = 0.0
+    while travelled < length:
+        leg = rng.uniform(8, 20) * machine.scale
+        heading = float(np.clip(heading + rng.uniform(-1.4, 1.4), -1.1, 1.1))
+        points.append([points[-1][0] + leg * np.cos(heading), points[-1][1] + leg * np.sin(heading)])
+        travelled += leg
+    wide = travelled + 10.0 * machine.scale
+    strips = [
+        {
+            "soil": soil,
+            "corners": [
+                [k * stretch, -wide], [(k + 1) * stretch, -wide], [(k + 1) * stretch, wide], [k * stretch, wide],
+            ],
+        }
+        for k, soil in enumerate(order)
+    ]  # fmt: skip
+    turn_radius = rng.uniform(1.5, 4.0) * max(machine.track, machine.wheelbase, 2 * machine.radius)
+    return {
+        "path": points,
+        "around": names[0],
+        "plots": strips,
+        "border": border,
+        "turn_radius": float(turn_radius),
+    }
+
+
+def _tool(
+    rng: np.random.Generator, machine: Machine, bears: dict[str, float], length: float, hills: float
+) -> Tree:
+    """A towed tool: friction that leaves each soil room for hills, and draught that comes and goes along the way.
+
+    ``bears``: pull over weight that may be asked of each soil.
+    """
+    spare = {name: max(pull - hills, 0.02) for name, pull in bears.items()}
+    usual, mass = rng.uniform(0.15, 0.5), machine.mass * rng.uniform(0.25, 0.6)
+    weight, scale = machine.mass * STANDARD_GRAVITY, machine.scale
+    most = (1 - usual) * min(spare.values()) * weight
+    points, x = [[0.0, 0.0]], rng.uniform(2, 5) * scale
+    while x < length:
+        ramp, stay, size = (
+            rng.uniform(0.3, 2) * scale,
+            rng.uniform(2, 6) * scale,
+            most * rng.uniform(0.2, 1.0),
+        )
+        points += [[x, 0.0], [x + ramp, size], [x + ramp + stay, size], [x + 2 * ramp + stay, 0.0]]
+        x += 2 * ramp + stay + rng.uniform(1, 5) * scale
+    return {
+        "mass": mass,
+        "length": machine.tool_length,
+        "friction": {name: usual * share * machine.mass / mass for name, share in spare.items()},
+        "added": points,
+        "draught_speed": 0.2 / np.sqrt(scale),
+        "shear_length": 0.01 * scale,
+        "slack": rng.uniform(0.0, 0.04) * scale,
+        "stiffness": 600.0 * mass / scale,
+        "damping": 13.0 * mass / np.sqrt(scale),
+    }
+
+
+def draw_sensors(
+    rng: np.random.Generator, name: str, machine: Machine, rate: float | None = None
+) -> tuple[Tree, Tree]:
+    """A set of sensors for a scenario, and the standard deviations that its user writes into the vehicle file.
+
+    ``name`` is one of ``SENSORS``; ``rate`` [1/s] of the wheel speeds, drawn where not given.
+    """
+    corner, scale, beat = machine.corner_mass, machine.scale, np.sqrt(machine.scale)
+    drawn = float(rng.choice([20.0, 50.0, 100.0, 200.0]))
+    base = drawn if rate is None else rate
+    rough = 2.5 if name == "coarse" else 1.0
+    sd = {
+        "wheel_speed": rough * 0.03 / beat * _spread(rng, 0.3, 1.5),
+        "ground_speed": rough * 0.02 * beat * _spread(rng, 0.5, 2.0),
+        "drive_torque": rough * 0.029 * corner * scale * _spread(rng, 0.3, 3.0),
+        "drawbar_force": rough * 0.029 * machine.mass * _spread(rng, 0.3, 2.0),
+        "acceleration": 0.1 * _spread(rng, 0.3, 2.0),
+        "pitch": 0.0017 * _spread(rng, 0.5, 3.0),
+    }
+    gain, offset = rng.uniform(0.005, 0.03), 0.009 * corner * scale * rng.uniform(0.2, 1.0)
+    slow, fast = float(rng.choice([2.0, 4.0, 5.0])), 2.0
+    several, coarse = name == "multirate", name == "coarse"
+    rates = dict.fromkeys(sd, base)
+    if several or coarse:
+        rates["ground_speed"] = max(base / slow, 1.0)
+    if several:
+        rates["drawbar_force"] = base / 2
+        rates["acceleration"] = rates["pitch"] = min(base * fast, 200.0)
+    fitted: Tree = {channel: {"rate": rates[channel], "noise": noise} for channel, noise in sd.items()}
+    fitted["drive_torque"] |= {"gain_sd": gain, "offset_sd": offset}
+    fitted["drawbar_force"] |= {"offset_sd": machine.drawbar_offset}
+    fitted["acceleration"] |= {"offset_sd": 0.03}
+    fitted["pitch"] |= {"offset_sd": 0.0035}
+    fitted["angular_velocity"] = {"rate": rates["acceleration"], "noise": 0.005, "offset_sd": 0.002}
+    if coarse:
+        fitted["wheel_speed"]["resolution"] = 2 * sd["wheel_speed"]
+        fitted["drive_torque"]["resolution"] = 2 * sd["drive_torque"]
+        fitted["ground_speed"] |= {"resolution": sd["ground_speed"], "drift": 0.5 * sd["ground_speed"]}
+    dropped = {
+        "plain": ("acceleration", "angular_velocity", "pitch"),
+        "uncoupled": ("drawbar_force",),
+        "coarse": ("acceleration",),
+    }.get(name, ())
+    return {k: v for k, v in fitted.items() if k not in dropped}, {
+        k: v for k, v in sd.items() if k not in dropped
+    }
+
+
+def _spread(rng: np.random.Generator, low: float, high: float) -> float:
+    """A factor, uniform in its logarithm."""
+    return float(np.exp(rng.uniform(np.log(low), np.log(high))))
+
+
+def _faults(duration: float, machine: Machine, sensors: str) -> list[Tree]:
+    """All defects in one log: gaps, spikes on every channel, jitter, held values, and one outage of the ground speed."""
+    minutes, beat, wheel = duration / 60, np.sqrt(machine.scale), machine.wheels[-1]
+    weight = machine.corner_mass * STANDARD_GRAVITY
+    found: list[Tree] = [
+        {"kind": "gap", "duration": 0.6, "count": max(1, round(minutes))},
+        {"kind": "loss", "channel": "ground_speed", "at": 0.6 * duration, "duration": 6.0},
+        {"kind": "spike", "channel": "ground_speed", "size": 0.8 * beat, "count": max(1, round(6 * minutes))},
+        {"kind": "spike", "channel": f"wheel_speed_{wheel}", "size": 3 / beat, "count": max(1, round(4 * minutes))},
+        {"kind": "spike", "channel": "drive_torque", "size": weight * machine.radius, "count": max(1, round(3 * minutes))},
+        {"kind": "held", "channel": "ground_speed", "duration": 0.5, "count": max(1, round(minutes))},
+        {"kind": "jitter", "size": 0.002},
+    ]  # fmt: skip
+    if sensors != "uncoupled":
+        size = 0.3 * machine.mass * STANDARD_GRAVITY
+        found.append(
+            {"kind": "spike", "channel": "drawbar_force", "size": size, "count": max(1, round(3 * minutes))}
+        )
+    return found
