@@ -53,13 +53,19 @@ async def running(service: Service):
     """The service at work; what it published is in `service.seen`."""
     service.seen = []
     service.listeners.append(service.seen.append)
-    task = asyncio.create_task(service.run())
+    service.task = task = asyncio.create_task(service.run())
     await asyncio.sleep(0.05)
     try:
         yield service
     finally:
         service.stop()
         await asyncio.wait_for(task, 20)
+
+
+async def estimated(service: Service) -> None:
+    """Wait until the service has estimated what came in, or has ended."""
+    while (service.inbox.samples or service.inbox._counts) and not service.task.done():
+        await asyncio.sleep(0)
 
 
 def events(service: Service, kind: str) -> list[str]:

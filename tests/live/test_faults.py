@@ -10,12 +10,13 @@ import numpy as np
 import pytest
 
 from drives import drive
-from machine import running
+from machine import estimated, running
 from terragrip.errors import InputError
 from terragrip.estimation import TractionEstimator
-from terragrip.live import Recorder, read_record
+from terragrip.live import read_record
 from terragrip.live.core import Core
 from terragrip.live.message import ESTIMATE, EVENT
+from terragrip.live.pipeline import Pipeline
 from terragrip.live.record_folder import last_snapshot, wal_path
 from terragrip.live.service import Service
 
@@ -95,8 +96,8 @@ async def fed(service, sent, last=lambda: None) -> None:
         for arrival, data in sent:
             now[0] = 1.7e9 + arrival
             service.feeds[0].message(data)
-            service._drain()
-            if service._done.done():  # it failed: a loop would end it now
+            await estimated(service)
+            if service.task.done():  # it failed: a loop would end it now
                 break
         last()
 
@@ -108,15 +109,15 @@ async def test_what_is_in_the_record_is_the_run_to_the_last_bit(tmp_path, vehicl
     state, rows = {}, []
 
     def killed():
-        service.engine.write()
+        service.pipeline.write()
         shutil.copytree(tmp_path / "record", tmp_path / "killed")
         state.update(service.core.state())
         rows.extend(m.row for m in service.seen if m.kind == ESTIMATE and not m.row.predicted)
 
     await fed(service, jittered(drive(8.0, imu=True, seed=seed).recording, seed), killed)
-    again = Recorder(tmp_path / "killed", Core(vehicle, service.core.settings))
+    again = Pipeline(Core(vehicle, service.core.settings), tmp_path / "killed")
     assert json.loads(json.dumps(again.core.state())) == json.loads(json.dumps(state))
-    again.abandon()
+    again.recorder.abandon()
     kept, estimates = read_record(tmp_path / "killed")
     assert [row.estimate.time for row in rows] == kept.time.tolist()
     for name in estimates.columns:
@@ -133,7 +134,7 @@ async def test_killed_at_any_byte_it_goes_on_as_one_run(tmp_path, vehicle, port,
     service = Service(vehicle, [f"udp://127.0.0.1:{port}"], record=folder)
 
     def killed():
-        service.engine.write()
+        service.pipeline.write()
         shutil.copytree(folder, tmp_path / "killed")
 
     await fed(service, texts(recording), killed)

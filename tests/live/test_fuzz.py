@@ -9,7 +9,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from terragrip.formats import Profile
-from terragrip.live.counts import Counts
 from terragrip.live.decode import Decoder
 from terragrip.live.feed import Feed
 from terragrip.live.frames import FrameDecoder
@@ -43,16 +42,8 @@ PROFILE = Profile.from_dict(
 
 
 def feed(profile: Profile | None) -> Feed:
-    """A feed whose notes go into counts, as the service's do."""
-    counts = Counts()
-
-    def note(note):
-        json.dumps(note)
-        if "fate" in note:
-            counts.add(note["fate"], note["channels"], note.get("number", 1))
-
     payload = None if profile is None else profile.payload
-    return Feed(0, "test", Decoder(profile), unpacker(payload), Inbox(), note, after=0.0)
+    return Feed(0, "test", Decoder(profile), unpacker(payload), Inbox(), after=0.0)
 
 
 @given(st.binary(max_size=60) | anything.map(lambda value: json.dumps(value).encode()), st.booleans())
@@ -60,6 +51,7 @@ def test_any_message(data, with_profile):
     found = feed(PROFILE if with_profile else None)
     found.message(data)
     found.message(data, topic="a/b")
+    json.dumps(found.inbox.notes())
     assert all(isinstance(value, float) for sample in found.inbox.samples for value in sample[3].values())
 
 

@@ -11,8 +11,9 @@ from drives import drive
 from machine import events, rows_of
 from terragrip.estimation import TractionEstimator
 from terragrip.ground.live import LiveGround
-from terragrip.live import Recorder, read_record
+from terragrip.live import read_record
 from terragrip.live.core import Core, Ground, Settings
+from terragrip.live.pipeline import Pipeline
 from terragrip.live.service import Service
 from terragrip.soil.library import Soil, SoilLibrary
 
@@ -49,11 +50,11 @@ def test_a_restart_goes_on_with_the_same_ground(tmp_path, recording, library, ve
     settings = Settings(("replay:test",), channels=tuple(recording.channels), ground=True)
     got, rows = [], list(rows_of(recording))
     for first, last in ((0, 1234), (1234, 2222), (2222, len(rows))):
-        recorder = Recorder(tmp_path, Core(vehicle, settings, library), rows=700)
+        pipeline = Pipeline(Core(vehicle, settings, library), tmp_path, rows=700)
         for time, values in rows[first:last]:
-            got += [out for out in recorder.take(time, 0, time, values) if isinstance(out, Ground)]
-        recorder.write()
-        recorder.abandon() if last < len(rows) else recorder.close()
+            got += [out for out in pipeline.process(time, 0, time, values) if isinstance(out, Ground)]
+        pipeline.write()
+        pipeline.recorder.abandon() if last < len(rows) else pipeline.close()
     estimates, states = by_hand
     assert [(g.time, g.soil, g.probabilities) for g in got] == [
         (s.time, s.soil, s.probabilities) for s in states

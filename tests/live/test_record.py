@@ -17,8 +17,9 @@ from machine import rows_of
 from terragrip import read
 from terragrip.errors import InputError
 from terragrip.estimation import Estimates, TractionEstimator
-from terragrip.live import Recorder, read_record
+from terragrip.live import read_record
 from terragrip.live.core import Core, Settings
+from terragrip.live.pipeline import Pipeline
 from terragrip.live.record_folder import last_snapshot, write_snapshot
 from terragrip.live.wal import Reading
 
@@ -29,17 +30,17 @@ def settings_for(recording) -> Settings:
     return Settings(("replay:test",), channels=tuple(recording.channels))
 
 
-def play(recorder: Recorder, rows, pause: float = 0.0) -> None:
+def play(pipeline: Pipeline, rows, pause: float = 0.0) -> None:
     """Feed the rows behind the newest that the record holds, ten at a time."""
-    after = recorder.core.clocks[0].newest
+    after = pipeline.core.clocks[0].newest
     for k, (stamp, values) in enumerate(row for row in rows if row[0] > after):
-        recorder.take(stamp, 0, stamp, values)
+        pipeline.process(stamp, 0, stamp, values)
         if k % 10 == 9:
-            recorder.write()
-            recorder.sync()
+            pipeline.write()
+            pipeline.sync()
             time.sleep(pause)
-    recorder.flush()
-    recorder.close()
+    pipeline.flush()
+    pipeline.close()
 
 
 def assert_as_never_interrupted(folder, recording, vehicle) -> None:
@@ -82,7 +83,7 @@ def test_killed_a_hundred_times_it_ends_as_if_never_interrupted(tmp_path, vehicl
 
     # Segments of 150 rows: kills hit every step of closing one. On a quick machine a drive ends before the kills do: then another begins.
     def act():
-        play(Recorder(tmp_path / f"r{drives}", Core(vehicle, settings), rows=150), rows, pause=0.004)
+        play(Pipeline(Core(vehicle, settings), tmp_path / f"r{drives}", rows=150), rows, pause=0.004)
 
     while kills < KILLS:
         if killed_child(act, random.uniform(0.0, 0.15)):
@@ -90,7 +91,7 @@ def test_killed_a_hundred_times_it_ends_as_if_never_interrupted(tmp_path, vehicl
             drives += 1
         else:
             kills += 1
-    play(Recorder(tmp_path / f"r{drives}", Core(vehicle, settings), rows=150), rows)
+    play(Pipeline(Core(vehicle, settings), tmp_path / f"r{drives}", rows=150), rows)
     assert_as_never_interrupted(tmp_path / f"r{drives}", recording, vehicle)
 
 
@@ -98,12 +99,12 @@ def test_at_most_the_frames_behind_the_last_write_are_lost(tmp_path, vehicle, sh
     rows, settings = list(rows_of(short.recording)), settings_for(short.recording)
 
     def act():
-        recorder = Recorder(tmp_path, Core(vehicle, settings))
+        pipeline = Pipeline(Core(vehicle, settings), tmp_path)
         for stamp, values in rows[:437]:
-            recorder.take(stamp, 0, stamp, values)
-            recorder.write()
+            pipeline.process(stamp, 0, stamp, values)
+            pipeline.write()
         for stamp, values in rows[437:450]:
-            recorder.take(stamp, 0, stamp, values)
+            pipeline.process(stamp, 0, stamp, values)
         os.kill(os.getpid(), signal.SIGKILL)
 
     killed_child(act)
@@ -114,29 +115,29 @@ def test_at_most_the_frames_behind_the_last_write_are_lost(tmp_path, vehicle, sh
 @pytest.mark.parametrize("cut", [1, 7, 30, 100])
 def test_a_torn_end_is_cut_off_and_said(tmp_path, vehicle, short, cut):
     rows, settings = list(rows_of(short.recording)), settings_for(short.recording)
-    recorder = Recorder(tmp_path, Core(vehicle, settings))
+    pipeline = Pipeline(Core(vehicle, settings), tmp_path)
     for stamp, values in rows[:100]:
-        recorder.take(stamp, 0, stamp, values)
-    recorder.write()
-    recorder.abandon()
+        pipeline.process(stamp, 0, stamp, values)
+    pipeline.write()
+    pipeline.recorder.abandon()
     wal = tmp_path / "wal-000001.log"
     wal.write_bytes(wal.read_bytes()[:-cut])
-    again = Recorder(tmp_path, Core(vehicle, settings))
+    again = Pipeline(Core(vehicle, settings), tmp_path)
     assert again.core.rows in (98, 99)
-    assert "torn" in again.segment.events[-1].text
+    assert "torn" in again.recorder.segment.events[-1].text
     play(again, rows)
     assert_as_never_interrupted(tmp_path, short.recording, vehicle)
 
 
 def test_a_flipped_byte_ends_the_reading_there(tmp_path, vehicle, short):
-    recorder = Recorder(tmp_path, Core(vehicle, settings_for(short.recording)))
+    pipeline = Pipeline(Core(vehicle, settings_for(short.recording)), tmp_path)
     for stamp, values in list(rows_of(short.recording))[:50]:
-        recorder.take(stamp, 0, stamp, values)
-    recorder.close()
-    recorder = Recorder(tmp_path, Core(vehicle, settings_for(short.recording)))
+        pipeline.process(stamp, 0, stamp, values)
+    pipeline.close()
+    pipeline = Pipeline(Core(vehicle, settings_for(short.recording)), tmp_path)
     for stamp, values in list(rows_of(short.recording))[50:100]:
-        recorder.take(stamp, 0, stamp, values)
-    recorder.write()
+        pipeline.process(stamp, 0, stamp, values)
+    pipeline.write()
     path = tmp_path / "wal-000002.log"
     whole = len(list(Reading(path)))
     data = bytearray(path.read_bytes())
@@ -145,11 +146,11 @@ def test_a_flipped_byte_ends_the_reading_there(tmp_path, vehicle, short):
     reading = Reading(path)
     assert 0 < len(list(reading)) < whole
     assert reading.good < reading.size
-    recorder.abandon()
+    pipeline.recorder.abandon()
 
 
 def test_segments_are_files_that_every_command_reads(tmp_path, vehicle, short):
-    play(Recorder(tmp_path, Core(vehicle, settings_for(short.recording)), rows=250), rows_of(short.recording))
+    play(Pipeline(Core(vehicle, settings_for(short.recording)), tmp_path, rows=250), rows_of(short.recording))
     names = sorted(path.name for path in tmp_path.glob("*.parquet"))
     assert names == [f"{kind}-00000{k}.parquet" for kind in ("estimates", "recording") for k in (1, 2, 3)]
     assert len(read(tmp_path / "recording-000002.parquet")) == 250
@@ -159,11 +160,11 @@ def test_segments_are_files_that_every_command_reads(tmp_path, vehicle, short):
 
 
 def test_what_was_refused_is_kept_too(tmp_path, vehicle, short):
-    recorder = Recorder(tmp_path, Core(vehicle, settings_for(short.recording)))
+    pipeline = Pipeline(Core(vehicle, settings_for(short.recording)), tmp_path)
     rows = list(rows_of(short.recording))
     for stamp, values in [*rows[:100], rows[20]]:
-        recorder.take(stamp, 0, stamp, values)
-    recorder.close()
+        pipeline.process(stamp, 0, stamp, values)
+    pipeline.close()
     (line,) = (tmp_path / "refused-000001.jsonl").read_text().splitlines()
     assert json.loads(line)["time"] == rows[20][0]
     assert json.loads(line)["values"] == rows[20][1]
@@ -171,10 +172,10 @@ def test_what_was_refused_is_kept_too(tmp_path, vehicle, short):
 
 def test_another_vehicle_or_a_second_writer_is_refused(tmp_path, vehicle, short):
     settings = settings_for(short.recording)
-    recorder = Recorder(tmp_path, Core(vehicle, settings))
+    pipeline = Pipeline(Core(vehicle, settings), tmp_path)
     with pytest.raises(InputError, match="in use"):
-        Recorder(tmp_path, Core(vehicle, settings))
-    recorder.close()
+        Pipeline(Core(vehicle, settings), tmp_path)
+    pipeline.close()
     other = robot(
         mass=150.0,
         axles={
@@ -183,24 +184,24 @@ def test_another_vehicle_or_a_second_writer_is_refused(tmp_path, vehicle, short)
         },
     )
     with pytest.raises(InputError, match="another vehicle"):
-        Recorder(tmp_path, Core(other, settings))
+        Pipeline(Core(other, settings), tmp_path)
     with pytest.raises(InputError, match="made with window"):
-        Recorder(tmp_path, Core(vehicle, Settings(settings.sources, window=1.0, channels=settings.channels)))
+        Pipeline(Core(vehicle, Settings(settings.sources, window=1.0, channels=settings.channels)), tmp_path)
     (tmp_path / "snapshot-000000.json").unlink(missing_ok=True)
     for path in tmp_path.glob("snapshot-*"):
         path.write_text(path.read_text().replace('"rows"', '"rowz"'))
         with pytest.raises(InputError, match="is damaged"):
-            Recorder(tmp_path, Core(vehicle, settings))
+            Pipeline(Core(vehicle, settings), tmp_path)
 
 
 def test_a_snapshot_of_another_version_is_refused_in_one_line(tmp_path, vehicle, short):
     core = Core(vehicle, settings_for(short.recording))
-    Recorder(tmp_path, core).close()
+    Pipeline(core, tmp_path).close()
     state = core.state()
     del state["reorder"]["released"]  # whole by its check sum, but with other entries
     write_snapshot(tmp_path, last_snapshot(tmp_path), state)
     with pytest.raises(InputError, match="another version"):
-        Recorder(tmp_path, Core(vehicle, settings_for(short.recording)))
+        Pipeline(Core(vehicle, settings_for(short.recording)), tmp_path)
 
 
 def test_no_record_is_said(tmp_path):

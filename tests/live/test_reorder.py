@@ -148,7 +148,7 @@ class TestClock:
         clock = SourceClock(align)
         times, jumps, refused = [], [], 0
         for arrival, stamp in stamps_and_arrivals:
-            going, lost, jump = clock.take(arrival, stamp, {})
+            going, lost, jump = clock.place(arrival, stamp, {})
             times += [time for _, time, _ in going]
             refused += len(lost)
             jumps += [jump] if jump else []

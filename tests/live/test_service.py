@@ -17,9 +17,9 @@ from terragrip.errors import InputError
 from terragrip.estimation import TractionEstimator
 from terragrip.formats import Profile
 from terragrip.live import read_record
-from terragrip.live.door import Door
 from terragrip.live.message import STATUS, Message
 from terragrip.live.service import Service
+from terragrip.live.thread_bridge import ThreadBridge
 
 pytestmark = pytest.mark.asyncio
 
@@ -364,17 +364,17 @@ async def test_datagrams_that_are_too_many_are_dropped_by_the_service_which_coun
 async def test_a_thread_that_is_too_fast_is_held_back_and_counted(vehicle, port):
     service = Service(vehicle, [f"udp://127.0.0.1:{port}"])
     async with running(service):
-        door, taken = Door(service.feeds[0], most=10), []
+        bridge, taken = ThreadBridge(service.feeds[0], most=10), []
 
         def flood():
             for k in range(500):
-                door.hand(taken.append, k)
+                bridge.call(taken.append, k)
 
         thread = threading.Thread(target=flood)
         thread.start()
         thread.join()  # the loop stands still meanwhile
         await until(lambda: len(taken) == 10)
-        door.hand(taken.append, 500)
+        bridge.call(taken.append, 500)
         await until(lambda: events(service, "behind"))
     assert taken == [*range(10), 500]
     assert service.core.counts.by_channel[f"(udp://127.0.0.1:{port})"]["dropped"] == 490

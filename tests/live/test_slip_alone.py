@@ -131,7 +131,7 @@ def test_the_core_takes_up_where_it_was() -> None:
         if k == 300:
             core = Core.from_state(json.loads(json.dumps(core.state())))
         time = row.pop("time")
-        outputs += core.take(time, 0, time, {n: v for n, v in row.items() if v == v})
+        outputs += core.process(time, 0, time, {n: v for n, v in row.items() if v == v})
     outputs += core.flush()
     slips = [one.estimate.slip_drive for one in outputs if isinstance(one, Row)]
     assert len(slips) == 600

@@ -145,5 +145,5 @@ async def _run(service: Service, duration: float | None, quiet: bool) -> None:
         loop.add_signal_handler(number, service.stop)
     if duration is not None:
         loop.call_later(duration, service.stop)
-    with shown(service, quiet):
+    async with shown(service, quiet):
         await service.run()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from terragrip.live.core import Core, Row
 from terragrip.live.event import Event
-from terragrip.live.record import Recorder
+from terragrip.live.pipeline import Pipeline
 from terragrip.live.record_folder import read_record
 
-__all__ = ["Core", "Event", "Recorder", "Row", "read_record"]
+__all__ = ["Core", "Event", "Pipeline", "Row", "read_record"]

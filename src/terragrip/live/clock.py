@@ -1,8 +1,10 @@
 """A source's clock against the machine's: one time base for all sources, and jumps noticed.
 
-``lead`` is stamp less arrival. It wanders with the transport's delay, by far less than JUMP; a clock that was set changes
-it by more, and keeps the new lead. A backlog that arrives in a burst changes it too, but does not keep it: so a jump
-counts only when samples agree on the new lead for AGREEMENT seconds. Until then they wait; what disagrees is refused.
+``lead`` is stamp less arrival. It wanders with the transport's delay: down while samples are held up, and back step by
+step when they arrive in a burst. A stamp that is more than AHEAD of what is expected waits for a second one that agrees, and
+is refused without: all behind it would count as late until time has caught up. Beyond JUMP, or back by as much, the clock
+has jumped where samples agree on the new lead, and advance, for AGREEMENT seconds: then time goes on without the jump.
+Where samples are known to be lost, stamps are taken as they are: what looks like a jump is the hole.
 """
 
 from __future__ import annotations
@@ -10,8 +12,10 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Any
 
+AHEAD = 1.0  # s
 JUMP = 10.0  # s
 AGREEMENT = 1.0  # s, and how closely in s leads must agree
+LOSS = 10.0  # s after samples were dropped, in which stamps may lead on by any step
 SYNCHRONISED = 1.0  # s: stamps this close to the machine's clock are on it already
 _WAITING = 5000
 
@@ -25,62 +29,59 @@ class SourceClock:
 
     align: bool = False
     offset: float | None = None  # s, added to a stamp
-    lead: float = 0.0
+    lead: float = 0.0  # of the newest stamp
     newest: float = float("-inf")  # stamp
-    time: float = float("-inf")
-    arrival: float = 0.0
+    arrival: float = 0.0  # of the newest stamp
+    loss_until: float = float("-inf")  # arrival
     waiting: list[Stamped] = field(default_factory=list)
 
-    def steady(self, arrival: float, stamp: float) -> float | None:
-        """The time of a sample where its stamp is as expected and none waits, as nearly always; None where `take` must look."""
-        lead = stamp - arrival
-        if self.offset is None or self.waiting or not -JUMP <= lead - self.lead <= JUMP:
-            return None
-        self.lead = lead
-        if stamp > self.newest:
-            self.newest = stamp
-        time = stamp + self.offset
-        if time > self.time:
-            self.time, self.arrival = time, arrival
-        return time
-
-    def take(self, arrival: float, stamp: float, values: Values) -> tuple[list[Stamped], list[Values], float]:
-        """One sample: what may go on (arrival, time, values), values refused, and by how much the clock jumped (0: not)."""
+    def place(
+        self, arrival: float, stamp: float, values: Values
+    ) -> tuple[list[Stamped], list[Stamped], float]:
+        """One sample: what may go on (arrival, time, values), what is refused, and by how much the clock jumped (0: not)."""
         lead = stamp - arrival
         if self.offset is None:
             self.offset = -lead if self.align and abs(lead) > SYNCHRONISED else 0.0
             self.lead = lead
-        if abs(lead - self.lead) <= JUMP:
-            refused = [waiting[2] for waiting in self.waiting]
-            self.waiting.clear()
+        step, waiting, refused = lead - self.lead, self.waiting, []
+        lossy = arrival <= self.loss_until
+        expected = step <= AHEAD and (step >= -JUMP or stamp > self.newest or lossy)
+        if waiting and (expected or abs(lead - (waiting[0][1] - waiting[0][0])) > AGREEMENT):
+            refused, waiting = waiting, []
+            self.waiting = waiting
+        if expected:
             return [self._accept(arrival, stamp, values)], refused, 0.0
-        refused = []
-        if self.waiting and abs(lead - (self.waiting[0][1] - self.waiting[0][0])) > AGREEMENT:
-            refused = [waiting[2] for waiting in self.waiting]
-            self.waiting.clear()
-        if len(self.waiting) >= _WAITING:
-            refused.append(self.waiting.pop(1)[2])
-        self.waiting.append((arrival, stamp, values))
-        if arrival - self.waiting[0][0] < AGREEMENT:
+        if len(waiting) >= _WAITING:
+            refused.append(waiting.pop(1))
+        waiting.append((arrival, stamp, values))
+        first_arrival, first_stamp, _ = waiting[0]
+        if step > 0.0 and (step <= JUMP or lossy):
+            return self._accept_waiting() if len(waiting) > 1 else [], refused, 0.0
+        if arrival - first_arrival < AGREEMENT or stamp - first_stamp < AGREEMENT / 2:
             return [], refused, 0.0
-        jump = lead - self.lead
-        return self._jump(), refused, jump
+        # Time goes on as the arrivals say, on the new stamps.
+        self.offset += self.newest + (first_arrival - self.arrival) - first_stamp
+        self.newest = float("-inf")
+        return self._accept_waiting(), refused, step
+
+    def _accept_waiting(self) -> list[Stamped]:
+        held, self.waiting = self.waiting, []
+        return [self._accept(*one) for one in held]
 
     def _accept(self, arrival: float, stamp: float, values: Values) -> Stamped:
         assert self.offset is not None
-        time = stamp + self.offset
-        self.lead, self.newest = stamp - arrival, max(self.newest, stamp)
-        if time > self.time:
-            self.time, self.arrival = time, arrival
-        return arrival, time, values
+        if stamp > self.newest:
+            self.newest, self.arrival, self.lead = stamp, arrival, stamp - arrival
+        return arrival, stamp + self.offset, values
 
-    def _jump(self) -> list[Stamped]:
-        """Let time go on as the arrivals say, on the new stamps."""
-        arrival, stamp, _ = self.waiting[0]
-        self.offset = self.time + (arrival - self.arrival) - stamp
-        self.newest = float("-inf")
+    def dropped(self, arrival: float) -> None:
+        """Samples were lost on their way up to this arrival."""
+        self.loss_until = max(self.loss_until, arrival + LOSS)
+
+    def give_up(self) -> list[Stamped]:
+        """The samples that wait, now refused: no more will come to agree with them."""
         held, self.waiting = self.waiting, []
-        return [self._accept(*one) for one in held]
+        return held
 
     def state(self) -> dict[str, Any]:
         """As JSON holds it."""

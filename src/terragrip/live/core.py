@@ -1,6 +1,6 @@
 """The heart of the live service: what came in and when, to rows, estimates and events. No clock, no I/O.
 
-Everything it does follows from the sequence of `take`, `tick`, `note` and `flush` with their arguments; so the record
+Everything it does follows from the sequence of `process`, `tick`, `note` and `flush` with their arguments; so the record
 (terragrip.live.record) needs to hold only those to bring it back bit for bit after a kill.
 """
 
@@ -16,7 +16,7 @@ from terragrip.estimation.engine import estimate_slots
 from terragrip.estimation.estimator import Estimate, TractionEstimator, default_channels
 from terragrip.estimation.methods import DEFAULT
 from terragrip.estimation.slip_estimator import SlipEstimator, restored, speeds_alone
-from terragrip.live.clock import SourceClock
+from terragrip.live.clock import SourceClock, Stamped
 from terragrip.live.counts import Counts
 from terragrip.live.event import Event
 from terragrip.live.reorder import Pending, Reorder
@@ -27,12 +27,13 @@ if TYPE_CHECKING:
     from terragrip.vehicle import Vehicle
 
 WINDOW = 0.02  # s
+FORMAT = 2  # of `Core.state`
 _WARNINGS = {
     "immobilization": "about to dig in",
     "stuck": "stuck",
     "push": "the tool pushes",
 }
-"""Events of the estimator that a driver wants to hear of, in words."""
+"""Events of the estimator that concern a driver, in words."""
 
 Values = dict[str, float]
 
@@ -93,7 +94,7 @@ class Refusal:
 
 @dataclass(frozen=True, slots=True)
 class Ground:
-    """The ground at the end of half a second: the most probable soil, the probability of each, and a change told now."""
+    """The ground at the end of half a second: the most probable soil, the probability of each, and a change reported now."""
 
     time: float
     soil: str
@@ -155,54 +156,47 @@ class Core:
         """Instant [s] of the last row; -inf before the first."""
         return self.reorder.released
 
-    def take(self, arrival: float, source: int, stamp: float, values: Values) -> list[Output]:
+    def process(self, arrival: float, source: int, stamp: float, values: Values) -> list[Output]:
         """A sample of ``source`` (its place in the settings), stamped by its own clock [s]; SI values by column."""
         self.counts.add("received", values)
         out: list[Output] = []
-        time = self.clocks[source].steady(arrival, stamp)
-        if time is None:
-            self._unsteady(arrival, source, stamp, values, out)
-        else:
-            lost = self.reorder.add(arrival, source, time, values)
-            if lost:
-                out.append(Refusal(arrival, time, source, "late or doubled", lost))
+        accepted, refused, jump = self.clocks[source].place(arrival, stamp, values)
+        if refused:
+            self._refuse_stamps(source, refused, out)
+        if jump:
+            text = f"the clock jumped by {jump:+.5g} s; time goes on without the jump"
+            out.append(Event(self.time, "clock_jump", self.settings.sources[source], text))
+        for when, time, one in accepted:
+            unused = self.reorder.add(when, source, time, one)
+            if unused:
+                out.append(Refusal(when, time, source, "late or doubled", unused))
         return self._release(self.reorder.ready(arrival), out)
 
-    def _unsteady(self, arrival: float, source: int, stamp: float, values: Values, out: list[Output]) -> None:
-        """A sample whose clock has only begun, or may have jumped."""
-        going, refused, jump = self.clocks[source].take(arrival, stamp, values)
-        for lost in refused:
-            self.counts.add("clock", lost)
-            out.append(Refusal(arrival, stamp, source, "clock", lost))
-        if jump:
-            out.append(
-                Event(
-                    self.time, "clock_jump", self.settings.sources[source],
-                    f"the clock jumped by {jump:+.5g} s; time goes on without the jump",
-                )
-            )  # fmt: skip
-        for when, time, one in going:
-            lost = self.reorder.add(when, source, time, one)
-            if lost:
-                out.append(Refusal(when, time, source, "late or doubled", lost))
+    def _refuse_stamps(self, source: int, refused: list[Stamped], out: list[Output]) -> None:
+        for arrival, stamp, values in refused:
+            self.counts.add("clock", values)
+            out.append(Refusal(arrival, stamp, source, "clock", values))
 
     def tick(self, now: float) -> list[Output]:
         """Nothing came up to ``now``: rows that have waited for a window go on."""
         return self._release(self.reorder.ready(now), [])
 
-    def due(self, now: float) -> bool:
-        """Whether `tick` would do anything."""
-        pending = self.reorder.pending
-        return bool(pending) and now - pending[0].arrival >= self.reorder.window
-
     def flush(self) -> list[Output]:
-        """The sources have ended: all rows go on."""
-        return self._release(self.reorder.flush(), [])
+        """The sources have ended: all rows go on, and no sample waits for another that confirms its stamp."""
+        out: list[Output] = []
+        for source, clock in enumerate(self.clocks):
+            self._refuse_stamps(source, clock.give_up(), out)
+        return self._release(self.reorder.flush(), out)
 
     def note(self, note: Mapping[str, Any]) -> list[Output]:
-        """What the service saw beside samples: counts (``fate``, ``channels``, ``number``) and an ``event``."""
+        """What the service saw beside samples: counts (``fate``, ``channels``, ``number``) and an ``event``.
+
+        Dropped samples of a ``source`` explain a hole in its stamps behind ``arrival``.
+        """
         if "fate" in note:
-            self.counts.add(note["fate"], note["channels"], note.get("number", 1))
+            self.counts.add(note["fate"], note["channels"], note["number"])
+            if note["fate"] == "dropped" and note["source"] is not None:
+                self.clocks[note["source"]].dropped(note["arrival"])
         return [Event.from_dict({**note["event"], "time": self.time})] if "event" in note else []
 
     def _release(self, rows: list[Pending], out: list[Output]) -> list[Output]:
@@ -224,9 +218,9 @@ class Core:
             if self.ground is not None:
                 state = self.ground.update(estimate)
                 if state is not None:
-                    out += _told(state)
+                    out += _ground_outputs(state)
         if self.reorder.changes:
-            self._tell_changes(out)
+            self._report_changes(out)
         return out
 
     def _watch(self, estimate: Estimate, out: list[Output]) -> None:
@@ -236,7 +230,7 @@ class Core:
             if estimate.event in _WARNINGS:
                 out.append(self._warning(estimate))
 
-    def _tell_changes(self, out: list[Output]) -> None:
+    def _report_changes(self, out: list[Output]) -> None:
         """Events of channels that went and came."""
         for kind, source, channel in self.reorder.changes:
             text = f"{channel} no longer comes" if kind == "channel_lost" else f"{channel} comes again"
@@ -279,6 +273,7 @@ class Core:
         """Everything, as JSON holds it, to the last bit."""
         snapshot = self.estimator.snapshot() if self.estimator else b""
         return {
+            "format": FORMAT,
             "settings": self.settings.to_dict(),
             "vehicle": self.vehicle.to_dict(),
             "estimator": base64.b64encode(snapshot).decode(),
@@ -292,9 +287,14 @@ class Core:
 
     @classmethod
     def from_state(cls, state: Mapping[str, Any], library: SoilLibrary | None = None) -> Core:
-        """The inverse of `state`, with the same library; raises InputError where a snapshot in it is damaged."""
+        """The inverse of `state`, with the same library; raises InputError where a snapshot in it is damaged.
+
+        Raises ValueError or LookupError where it is another version's.
+        """
         from terragrip.vehicle import Vehicle
 
+        if state["format"] != FORMAT:
+            raise ValueError(f"a state of format {state['format']}, not {FORMAT}")
         found = cls(Vehicle.from_dict(state["vehicle"]), Settings.from_dict(state["settings"]), library)
         snapshot = base64.b64decode(state["estimator"])
         found.estimator = restored(snapshot) if snapshot else None
@@ -310,8 +310,8 @@ class Core:
         return found
 
 
-def _told(state: GroundState) -> list[Output]:
-    """A block's state as outputs of ours; with an event where a change is told."""
+def _ground_outputs(state: GroundState) -> list[Output]:
+    """A block's state as outputs of ours; with an event where the ground changes."""
     change = state.change
     as_numbers = (
         None

@@ -1,15 +1,13 @@
-"""What a source is given: where its messages go, and whom it tells that it is connected or lost."""
+"""From the messages of one source to samples in the inbox; and what is to be said of the source."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any
 
 from terragrip.live.decode import Decoder
 from terragrip.live.inbox import Inbox, Values
 from terragrip.live.payload import Unpack, Unreadable
-
-Note = Callable[[dict[str, Any]], None]
 
 _EVERY = 5.0  # s between two events of the same kind about the same thing
 _SETTLED = 50  # messages after which another set of fields is a change, not one more kind of message
@@ -24,15 +22,7 @@ class Feed:
     """The way of source number ``index`` into the inbox."""
 
     def __init__(
-        self,
-        index: int,
-        name: str,
-        decoder: Decoder,
-        unpack: Unpack,
-        inbox: Inbox,
-        note: Note,
-        *,
-        after: float,
+        self, index: int, name: str, decoder: Decoder, unpack: Unpack, inbox: Inbox, *, after: float
     ) -> None:
         self.index, self.name = index, name
         self.decoder, self.inbox = decoder, inbox
@@ -40,8 +30,8 @@ class Feed:
         self.messages = self.unreadable = 0
         self.is_lost = False
         self.one_layout = True  # messages are of few kinds, so that another one is worth an event
-        self._unpack, self._note = unpack, note
-        self._said: dict[str, float] = {}
+        self._unpack = unpack
+        self._last_events: dict[str, float] = {}
         self._layouts: dict[frozenset[str], None] = {}
         self._last_layout: frozenset[str] = frozenset()
         self._since_layout = 0
@@ -49,24 +39,15 @@ class Feed:
     def message(self, data: bytes, arrival: float | None = None, *, topic: str | None = None) -> None:
         """A message as bytes, by the profile's payload; of a ``topic`` where the source has such."""
         try:
-            found = self._unpack(data)
+            samples = self._unpack(data)
         except Unreadable as error:
             number = None if topic is None else _number(data)
             if number is None:
-                self.spoiled(str(error) if topic is None else f"{error} on {topic}")
+                self.reject(str(error) if topic is None else f"{error} on {topic}")
                 return
-            found = [{str(topic): number}]
-        for fields in found:
+            samples = [{str(topic): number}]
+        for fields in samples:
             self.fields(fields if topic is None else self._of_topic(topic, fields), arrival)
-
-    def burst(self, messages: Sequence[bytes]) -> None:
-        """Messages that came together: what they bring is estimated before this returns, not a turn of the loop later."""
-        self.inbox.begin()
-        try:
-            for data in messages:
-                self.message(data)
-        finally:
-            self.inbox.end()
 
     def _of_topic(self, topic: str, fields: Mapping[str, Any]) -> Mapping[str, Any]:
         """Fields by their own names, and by ``topic/name`` where the profile asks for that."""
@@ -81,7 +62,7 @@ class Feed:
         for stamp, values in samples:
             self.inbox.put(self.index, stamp, values, arrival)
         if self.decoder.unreadable:
-            self._say_unreadable()
+            self._report_unreadable()
         if self.one_layout:
             if fields.keys() == self._last_layout:
                 self._since_layout += 1
@@ -93,20 +74,20 @@ class Feed:
         self.messages += 1
         self.inbox.put(self.index, stamp, values, arrival)
 
-    def spoiled(self, why: str) -> None:
+    def reject(self, why: str) -> None:
         """A message that nobody can read."""
         self.unreadable += 1
-        self._note({"fate": "unreadable", "channels": [f"({self.name})"]})
+        self.inbox.count("unreadable", [f"({self.name})"])
         self._event("unreadable", f"a message was {why}", key="message")
 
     def dropped(self, number: int) -> None:
         """Messages were given up before anyone looked into them."""
-        self._note({"fate": "dropped", "channels": [f"({self.name})"], "number": number})
+        self.inbox.count("dropped", [f"({self.name})"], number, self.index)
         self._event("behind", f"{number} messages dropped unread", key="dropped")
 
-    def _say_unreadable(self) -> None:
+    def _report_unreadable(self) -> None:
         wrong, self.decoder.unreadable = self.decoder.unreadable, {}
-        self._note({"fate": "unreadable", "channels": list(wrong)})
+        self.inbox.count("unreadable", wrong)
         for channel, what in wrong.items():
             self._event("unreadable", f"{channel} was {what}, not a number", key=channel)
 
@@ -142,11 +123,10 @@ class Feed:
         """An event; those with the same ``key`` at most every few seconds."""
         now = self.inbox.clock()
         if key is not None:
-            if now - self._said.get(key, float("-inf")) < _EVERY:
+            if now - self._last_events.get(key, float("-inf")) < _EVERY:
                 return
-            self._said[key] = now
-        sound = text.encode("utf-8", "backslashreplace").decode()  # half a surrogate pair is no text to most
-        self._note({"event": {"time": None, "kind": kind, "source": self.name, "text": sound}})
+            self._last_events[key] = now
+        self.inbox.event(kind, self.name, text)
 
 
 def _number(data: bytes) -> float | None:

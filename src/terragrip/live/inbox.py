@@ -1,70 +1,93 @@
-"""Where sources put samples and the service takes them: bounded, so that a backlog is dropped and counted, not hidden."""
+"""What sources bring, until the service takes it: samples, counts and events.
+
+Room for samples is bounded, so that a backlog is dropped and counted, not hidden.
+"""
 
 from __future__ import annotations
 
 import asyncio
 import time
 from collections import deque
-from collections.abc import Callable
-
-from terragrip.live.counts import Counts
+from collections.abc import Callable, Iterable
+from typing import Any
 
 CAPACITY = 8192  # samples
-_BREATH = 0.002  # s
 Values = dict[str, float]
 Arrived = tuple[float, int, float, Values]
+"""Arrival [s], source, stamp [s], values."""
 
 
 class Inbox:
-    """``clock`` gives s since 1970; it never steps within one run.
-
-    ``filled`` is called when a sample comes into an empty box, ``work`` where a burst of them did.
-    """
+    """A queue with one reader. ``clock`` gives s since 1970; it never steps within one run."""
 
     def __init__(self, capacity: int = CAPACITY, clock: Callable[[], float] | None = None) -> None:
         self.capacity = capacity
         ahead, now = time.time() - time.monotonic(), time.monotonic
         self.clock = clock or (lambda: now() + ahead)
         self.samples: deque[Arrived] = deque()
-        self.dropped = Counts()
-        self.filled: Callable[[], None] = lambda: None
-        self.work: Callable[[], None] = lambda: None
-        self.busy: Callable[[], bool] = lambda: False  # whether sinks have enough to do
-        self._room, self._wanted = asyncio.Event(), False
-        self._together = False
+        self.values_dropped = 0
+        self._counts: dict[tuple[str, int | None, tuple[str, ...]], int] = {}
+        self._events: list[dict[str, Any]] = []
+        self._filled, self._room = asyncio.Event(), asyncio.Event()
 
     def put(self, source: int, stamp: float | None, values: Values, arrival: float | None = None) -> None:
         """Add a sample, stamped by its arrival where it bears no stamp; drop it, counted, where there is no room."""
-        waiting = len(self.samples)
-        if waiting >= self.capacity:
-            self.dropped.add("dropped", values)
+        if len(self.samples) >= self.capacity:
+            self.values_dropped += len(values)
+            self.count("dropped", values, source=source)
             return
         now = self.clock() if arrival is None else arrival
         self.samples.append((now, source, now if stamp is None else stamp, values))
-        if not waiting and not self._together:
-            self.filled()
+        self._filled.set()
 
-    def begin(self) -> None:
-        """A burst of samples begins, which whoever puts it ends by `end`."""
-        self._together = not self.samples
+    def count(self, fate: str, channels: Iterable[str], number: int = 1, source: int | None = None) -> None:
+        """Count what happened beside the samples (`terragrip.live.counts.FATES`)."""
+        key = (fate, source, tuple(channels))
+        self._counts[key] = self._counts.get(key, 0) + number
+        self._filled.set()
 
-    def end(self) -> None:
-        """Have a burst worked on now, not a turn of the loop later."""
-        if self._together:
-            self._together = False
-            if self.samples:
-                self.work()
+    def event(self, kind: str, source: str, text: str) -> None:
+        """Add an event (`terragrip.live.event.KINDS`) of a source or sink."""
+        sound = text.encode("utf-8", "backslashreplace").decode()  # half a surrogate pair is no text to most
+        self._events.append({"event": {"time": None, "kind": kind, "source": source, "text": sound}})
+        self._filled.set()
+
+    def notes(self) -> list[dict[str, Any]]:
+        """The counts and events since the last call, for `Core.note`."""
+        if not self._counts and not self._events:
+            return []
+        counts, self._counts = self._counts, {}
+        events, self._events = self._events, []
+        now = self.clock()
+        return [
+            {"fate": fate, "channels": list(channels), "number": number, "source": source, "arrival": now}
+            for (fate, source, channels), number in counts.items()
+        ] + events
+
+    def pop(self, most: int) -> list[Arrived]:
+        """The oldest samples, at most so many."""
+        samples = [self.samples.popleft() for _ in range(min(most, len(self.samples)))]
+        self._room.set()
+        return samples
+
+    async def filled(self, until: float | None = None) -> None:
+        """Wait until something is there, at most up to ``until`` on the clock [s]; lets others have their turn in any case."""
+        if self.samples or self._counts or self._events:
+            await asyncio.sleep(0)
+            return
+        self._filled.clear()
+        if until is None:
+            await self._filled.wait()
+            return
+        try:
+            async with asyncio.timeout(max(until - self.clock(), 0.0) + 1e-4):
+                await self._filled.wait()
+        except TimeoutError:
+            pass
 
     async def room(self) -> None:
-        """Wait until at least half of the place is free, and sinks keep up: for sources that can wait."""
-        await asyncio.sleep(_BREATH if self.busy() else 0.0)
+        """Wait until at least half of the place is free: for sources that can wait."""
+        await asyncio.sleep(0)
         while len(self.samples) > self.capacity // 2:
-            self._wanted = True
             self._room.clear()
             await self._room.wait()
-
-    def taken(self) -> None:
-        """Tell waiting sources that there is room."""
-        if self._wanted:
-            self._wanted = False
-            self._room.set()

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import asyncio
 from collections import deque
-from collections.abc import Callable
 
+from terragrip.live.inbox import Inbox
 from terragrip.live.message import ESTIMATE, Columns, Message
 from terragrip.live.uri import Uri
 
@@ -13,16 +13,18 @@ CAPACITY = 1000  # messages
 
 
 class Outbox:
-    """``rate`` [Hz] and ``columns`` of the sink's URI thin out estimates; events and predictions always pass."""
+    """``rate`` [Hz] and ``columns`` of the sink's URI thin out estimates; events and predictions always pass.
 
-    def __init__(self, uri: Uri, capacity: int = CAPACITY) -> None:
+    ``inbox``: where it is reported that the sink is lost, or back.
+    """
+
+    def __init__(self, uri: Uri, inbox: Inbox | None = None, capacity: int = CAPACITY) -> None:
         self.uri, self.capacity = uri, capacity
         self.step = 0.0 if "rate" not in uri.options else 1.0 / uri.number("rate", 1.0)
         self.columns = Columns(uri.options["columns"]) if "columns" in uri.options else None
         self.dropped = self.sent = 0
         self.is_lost = False
-        self.direct: Callable[[Message], None] | None = None  # a sink that never waits takes messages at once
-        self.connected: Callable[[], None] = lambda: None  # a sink calls it once it has its other side
+        self._inbox = inbox
         self._queue: deque[Message] = deque()
         self._filled = asyncio.Event()
         self._next = float("-inf")
@@ -37,36 +39,11 @@ class Outbox:
             self._next = (
                 message.time + self.step * (1 - 1e-6) if late or self._next < 0 else self._next + self.step
             )
-        if self.direct is not None:
-            self.sent += 1
-            self.direct(message)
-            return
         if len(self._queue) >= self.capacity:
             self._queue.popleft()
             self.dropped += 1
         self._queue.append(message)
         self._filled.set()
-
-    async def deliver(self, take: Callable[[Message], None]) -> None:
-        """Give every message to ``take`` as it comes, until cancelled or ``take`` raises; what has waited comes first."""
-        loop = asyncio.get_running_loop()
-        failed: asyncio.Future[None] = loop.create_future()
-
-        def safely(message: Message) -> None:
-            try:
-                take(message)
-            except Exception as error:  # noqa: BLE001 - handed to who awaits this
-                self.direct = None
-                if not failed.done():
-                    failed.set_exception(error)
-
-        while self._queue and not failed.done():
-            safely(self._queue.popleft())
-        self.direct = safely
-        try:
-            await failed
-        finally:
-            self.direct = None
 
     async def get(self) -> Message:
         """The next message."""
@@ -75,6 +52,18 @@ class Outbox:
             await self._filled.wait()
         self.sent += 1
         return self._queue.popleft()
+
+    def connected(self) -> None:
+        """The sink has its other side (again)."""
+        if self.is_lost and self._inbox is not None:
+            self._inbox.event("sink_back", self.uri.name, "connected again")
+        self.is_lost = False
+
+    def lost(self, why: str) -> None:
+        """The sink lost its other side."""
+        if not self.is_lost and self._inbox is not None:
+            self._inbox.event("sink_lost", self.uri.name, why)
+        self.is_lost = True
 
     @property
     def is_busy(self) -> bool:

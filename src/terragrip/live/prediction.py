@@ -16,18 +16,20 @@ _PERIODS = 5.0  # rows' periods
 class Prediction:
     """Predicted rows, at most one a call."""
 
-    def __init__(self, core: Core) -> None:
-        self._core = core
+    def __init__(self) -> None:
         self._copy: TractionEstimator | SlipEstimator | None = None
-        self._rows = -1
+        self._rows, self._time = -1, float("-inf")
 
-    def at(self, now: float, last_arrival: float, period: float) -> Row | None:
-        """The row at the arrival clock's ``now``, or None: nothing came yet, or it came just now."""
-        core = self._core
+    def at(self, core: Core, now: float, last_arrival: float, period: float) -> Row | None:
+        """The row at the arrival clock's ``now``, or None: nothing came yet, or something came just now."""
         silence = now - last_arrival
         if core.estimator is None or not core.rows or silence < max(_PATIENCE, _PERIODS * period):
             return None
         if self._copy is None or self._rows != core.rows:
             self._copy, self._rows = restored(core.estimator.snapshot()), core.rows
-        estimate = self._copy.update({"time": core.time + silence})
-        return Row(now, {}, estimate, predicted=True)
+            self._time = core.time
+        time = core.time + silence
+        if time <= self._time:  # what came meanwhile was no row: the silence counts anew
+            return None
+        self._time = time
+        return Row(now, {}, self._copy.update({"time": time}), predicted=True)

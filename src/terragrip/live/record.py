@@ -36,12 +36,12 @@ SECONDS = 60.0  # or so long after its first arrival
 
 
 class Recorder:
-    """A `Core` whose inputs are written ahead and whose outputs are kept; it has the core's methods.
+    """Keeps the inputs of a `Core`, each with the outputs that followed from it.
 
     Parameters
     ----------
     folder: made if absent. If it holds a record, the run goes on from its end.
-    core: one that has taken nothing yet. The record's takes its place; vehicle, settings and library must be the same.
+    core: one that has processed nothing yet. The record's takes its place; vehicle, settings and library must be the same.
     rows, seconds: when a segment is closed.
 
     Raises InputError if the folder cannot be used, is in use, or holds the record of another vehicle or other settings.
@@ -104,37 +104,38 @@ class Recorder:
             text = f"resumed after {self.core.rows} rows, the last at {self.core.time:.6g} s"
             if torn:
                 text += f"; the last {torn} bytes were torn and are left out"
-            self.opening = self.note(
-                {"event": {"time": None, "kind": "resumed", "source": "record", "text": text}}
-            )
+            note = {"event": {"time": None, "kind": "resumed", "source": "record", "text": text}}
+            self.opening = self.core.note(note)
+            self.note(self.opening, note)
 
     def _open_wal(self) -> WriteAhead:
         wal = WriteAhead(wal_path(self.folder, self.segment.number))
         wal.beginning({"segment": self.segment.number})
         return wal
 
-    def take(self, arrival: float, source: int, stamp: float, values: Values) -> list[Output]:
-        """See `Core.take`; raises OSError where a segment cannot be begun."""
+    def sample(
+        self, outputs: list[Output], arrival: float, source: int, stamp: float, values: Values
+    ) -> None:
+        """An input of `Core.process`; raises OSError where a segment cannot be begun."""
         self._ahead.sample(arrival, source, stamp, values)
-        outputs = self.core.take(arrival, source, stamp, values)
-        return self._kept(outputs, arrival) if outputs else outputs
+        self._keep(outputs, arrival)
 
-    def tick(self, now: float) -> list[Output]:
-        """See `Core.tick`."""
+    def tick(self, outputs: list[Output], now: float) -> None:
+        """An input of `Core.tick`; raises OSError as `sample` does."""
         self._ahead.tick(now)
-        return self._kept(self.core.tick(now), now)
+        self._keep(outputs, now)
 
-    def flush(self) -> list[Output]:
-        """See `Core.flush`."""
+    def flush(self, outputs: list[Output]) -> None:
+        """`Core.flush`."""
         self._ahead.flush_core()
-        return self._kept(self.core.flush(), None)
+        self._keep(outputs, None)
 
-    def note(self, note: dict[str, Any]) -> list[Output]:
-        """See `Core.note`."""
+    def note(self, outputs: list[Output], note: dict[str, Any]) -> None:
+        """An input of `Core.note`."""
         self._ahead.note(note)
-        return self._kept(self.core.note(note), None)
+        self._keep(outputs, None)
 
-    def _kept(self, outputs: list[Output], now: float | None) -> list[Output]:
+    def _keep(self, outputs: list[Output], now: float | None) -> None:
         segment = self.segment
         for output in outputs:
             segment.add(output)
@@ -143,7 +144,6 @@ class Recorder:
                 self._opened = now
             if segment.size >= self._rows or now - self._opened >= self._seconds:
                 self._rotate()
-        return outputs
 
     def _rotate(self) -> None:
         old, wal = self.segment, self._ahead

@@ -74,7 +74,7 @@ def replay(folder: Path, number: int, core: Core) -> Iterator[tuple[Segment, Rea
 
 def _apply(core: Core, kind: str, content: Any) -> list[Output]:
     if kind == "S":
-        return core.take(*content)
+        return core.process(*content)
     if kind == "T":
         return core.tick(content)
     if kind == "N":

@@ -20,7 +20,7 @@ _STEPS = 15  # of which the median is the period
 _FEWEST = 4  # steps before a period is known
 _LEARNING = 2.0  # s after which a stream without a period counts as irregular
 _RECENT = 512  # rows remembered to tell a doubled sample from a late one
-_LAYOUTS = 256  # sets of channels of which is kept which streams they are
+_LAYOUTS = 256  # sets of channels whose streams are kept
 _BEGINNING = float("-inf")
 
 Values = dict[str, float]
@@ -108,7 +108,7 @@ class Pending:
         return {name: value for name, value in values.items() if name not in new}
 
 
-_Those = tuple[list[Stream], list[Stream], bool]
+_Layout = tuple[list[Stream], list[Stream], bool]
 
 
 class Reorder:
@@ -118,7 +118,7 @@ class Reorder:
         self.window = window
         self.counts = counts
         self.streams: list[Stream] = []
-        self._those: dict[Parts, _Those] = {}
+        self._layouts: dict[Parts, _Layout] = {}
         self.pending: list[Pending] = []
         self.released = _BEGINNING
         self._recent: deque[tuple[float, tuple[str, ...]]] = deque(maxlen=_RECENT)
@@ -150,15 +150,15 @@ class Reorder:
         out = []
         while self.pending:
             row = self.pending[0]
-            those = self._those.get(row.parts) or self._streams_of(row)
+            layout = self._layouts.get(row.parts) or self._streams_of(row)
             expired = now - row.arrival >= self.window
-            if not expired and not _complete(row.time, those):
+            if not expired and not _complete(row.time, layout):
                 break
-            out.append(self._release(row, those, expired))
+            out.append(self._release(row, layout, expired))
         return out
 
-    def _streams_of(self, row: Pending) -> _Those:
-        """The streams that the row holds and those it lacks, and whether these are all its channels.
+    def _streams_of(self, row: Pending) -> _Layout:
+        """The streams that the row holds and layout it lacks, and whether these are all its channels.
 
         A stream of which the row holds a part only becomes two.
         """
@@ -171,16 +171,16 @@ class Reorder:
                 rest = stream.without(mine)
                 stream.channels = tuple(mine)
                 self.streams.append(rest)
-                self._those.clear()
+                self._layouts.clear()
                 absent.append(rest)
             (present if mine else absent).append(stream)
-        met = sum(len(stream.channels) for stream in present) == len(origin)
-        if len(self._those) < _LAYOUTS:
-            self._those[row.parts] = present, absent, met
-        return present, absent, met
+        known = sum(len(stream.channels) for stream in present) == len(origin)
+        if len(self._layouts) < _LAYOUTS:
+            self._layouts[row.parts] = present, absent, known
+        return present, absent, known
 
-    def _release(self, row: Pending, those: _Those, expired: bool) -> Pending:
-        present, absent, met = those
+    def _release(self, row: Pending, layout: _Layout, expired: bool) -> Pending:
+        present, absent, known = layout
         del self.pending[0]
         self.released = row.time
         self._recent.append((row.time, row.parts[0][1] if len(row.parts) == 1 else tuple(row.values)))
@@ -192,8 +192,8 @@ class Reorder:
             self._step(stream, row.time)
         if expired:
             self._give_up(row.time, absent)
-        if not met:
-            self._meet(row, {(stream.source, name) for stream in present for name in stream.channels})
+        if not known:
+            self._begin(row, {(stream.source, name) for stream in present for name in stream.channels})
         return row
 
     def _step(self, stream: Stream, time: float) -> None:
@@ -201,13 +201,13 @@ class Reorder:
         if missing:
             self.counts.add("missing", stream.channels, missing)
 
-    def _meet(self, row: Pending, known: Collection[tuple[int, str]]) -> None:
+    def _begin(self, row: Pending, old: Collection[tuple[int, str]]) -> None:
         """Begin a stream for each source's channels that no stream holds yet."""
         for source in dict.fromkeys(source for source, _ in row.parts):
-            new = tuple(n for s, names in row.parts for n in names if s == source and (s, n) not in known)
+            new = tuple(n for s, names in row.parts for n in names if s == source and (s, n) not in old)
             if new:
                 self.streams.append(Stream(source, new, row.time, row.time, row.time))
-        self._those.clear()
+        self._layouts.clear()
 
     def _give_up(self, time: float, absent: list[Stream]) -> None:
         """Streams that were due and did not come in time are not waited for at this instant again."""
@@ -245,7 +245,7 @@ class Reorder:
             Stream(**{**one, "channels": tuple(one["channels"]), "steps": deque(one["steps"], _STEPS)})
             for one in state["streams"]
         ]
-        self._those.clear()
+        self._layouts.clear()
         self.pending = [
             Pending(**{**one, "parts": tuple((source, tuple(names)) for source, names in one["parts"])})
             for one in state["pending"]
@@ -253,13 +253,13 @@ class Reorder:
         self._recent = deque(((when, tuple(names)) for when, names in state["recent"]), maxlen=_RECENT)
 
 
-def _complete(time: float, those: _Those) -> bool:
-    """Whether nothing is due that the row lacks, and each of its channels was met before (a new one may bring brothers)."""
-    present, absent, met = those
+def _complete(time: float, layout: _Layout) -> bool:
+    """Whether nothing is due that the row lacks, and each of its channels was known (a new one may belong to others that come)."""
+    present, absent, known = layout
     for stream in present:
         if time > stream.calm and stream.awaited(time, True):
             return False
     for stream in absent:
         if stream.awaited(time, False):
             return False
-    return met
+    return known

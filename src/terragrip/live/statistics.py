@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 from collections import deque
-from typing import TYPE_CHECKING, Any
+from collections.abc import Sequence
+from typing import Any
 
-from terragrip.live.core import Ground, Row
+from terragrip.live.core import Core, Ground, Row
 from terragrip.live.event import Event
 from terragrip.live.feed import Feed
+from terragrip.live.inbox import Inbox
+from terragrip.live.outbox import Outbox
 
-if TYPE_CHECKING:
-    from terragrip.live.service import Service
-
+_BEHIND = 1.0  # s
 _SILENT = 1.0  # s, or ten periods
 _EVERY = 5.0  # s between two events that estimates are behind
 
@@ -19,9 +20,12 @@ _EVERY = 5.0  # s between two events that estimates are behind
 class Statistics:
     """Numbers of the last whole second, and of the run."""
 
-    def __init__(self, service: Service) -> None:
-        self._service = service
-        now = service.inbox.clock()
+    def __init__(
+        self, core: Core, inbox: Inbox, feeds: Sequence[Feed], outboxes: Sequence[Outbox], is_real_time: bool
+    ) -> None:
+        self._core, self._inbox, self._feeds, self._outboxes = core, inbox, feeds, outboxes
+        self._is_real_time = is_real_time
+        now = inbox.clock()
         self.last_arrival = now
         self.period = 0.0  # s between rows, lately
         self.row_rate = self.sample_rate = self.delay = 0.0
@@ -29,11 +33,12 @@ class Statistics:
         self.ground: Ground | None = None
         self.events: deque[Event] = deque(maxlen=50)
         self.event_counts: dict[str, int] = {}
-        self._arrivals = [now] * len(service.feeds)
-        self._messages = [0] * len(service.feeds)
-        self._silent = [False] * len(service.feeds)
+        self._arrivals = [now] * len(feeds)
+        self._messages = [0] * len(feeds)
+        self._silent = [False] * len(feeds)
         self._began, self._rows, self._samples, self._delays = now, 0, 0, 0.0
         self._synced = self._behind = now - _EVERY
+        self._dropped = 0
 
     def samples(self, count: int, arrival: float) -> None:
         """Samples went into the core, the last one of this arrival."""
@@ -52,15 +57,26 @@ class Statistics:
         self._delays += now - row.arrival
 
     def event(self, event: Event) -> None:
-        """An event was told."""
+        """An event was published."""
         self.events.append(event)
         self.event_counts[event.kind] = self.event_counts.get(event.kind, 0) + 1
 
-    def watch_silence(self, feed: Feed, now: float) -> None:
-        """Say where a source that is connected sends nothing, and where it sends again."""
-        heard = feed.messages + feed.unreadable
-        if heard != self._messages[feed.index]:
-            self._messages[feed.index] = heard
+    def watch(self, now: float) -> None:
+        """Report sources that fall silent or send again, and estimates that are behind."""
+        for feed in self._feeds:
+            self._watch_silence(feed, now)
+        samples = self._inbox.samples
+        lag = now - samples[0][0] if samples else 0.0
+        dropped, self._dropped = self._inbox.values_dropped - self._dropped, self._inbox.values_dropped
+        if (lag > _BEHIND or dropped) and now - self._behind >= _EVERY:
+            self._behind = now
+            text = f"estimates are {lag:.2g} s behind; {dropped} values dropped just now"
+            self._inbox.event("behind", "service", text)
+
+    def _watch_silence(self, feed: Feed, now: float) -> None:
+        messages = feed.messages + feed.unreadable
+        if messages != self._messages[feed.index]:
+            self._messages[feed.index] = messages
             if self._silent[feed.index]:
                 self._silent[feed.index] = False
                 feed.connected("it sends again")
@@ -70,13 +86,6 @@ class Statistics:
             if silence > max(_SILENT, 10.0 * self.period):
                 self._silent[feed.index] = True
                 feed.lost(f"nothing came for {silence:.1f} s")
-
-    def say_behind(self, lag: float, dropped: int, now: float) -> None:
-        """Say that estimates are behind the sensors."""
-        if now - self._behind >= _EVERY:
-            self._behind = now
-            text = f"estimates are {lag:.2g} s behind; {dropped} values dropped just now"
-            self._service.note({"event": {"time": None, "kind": "behind", "source": "service", "text": text}})
 
     def second(self, now: float) -> bool:
         """Whether a second is over; then its rates are worked out."""
@@ -97,24 +106,23 @@ class Statistics:
 
     def to_dict(self) -> dict[str, Any]:
         """The status, as sinks get it."""
-        service = self._service
+        core = self._core
         found = {
-            "time": service.core.time if service.core.rows else None,
-            "rows": service.core.rows,
+            "time": core.time if core.rows else None,
+            "rows": core.rows,
             "row_rate": round(self.row_rate, 2),
             "sample_rate": round(self.sample_rate, 2),
-            "waiting": len(service.inbox.samples),
-            "counts": service.core.counts.state(),
+            "waiting": len(self._inbox.samples),
+            "counts": core.counts.state(),
             "events": dict(self.event_counts),
-            "sinks": {box.uri.name: {"sent": box.sent, "dropped": box.dropped} for box in service.outboxes},
+            "sinks": {box.uri.name: {"sent": box.sent, "dropped": box.dropped} for box in self._outboxes},
         }
         # A replay's rows arrive at their own stamps: what they take is no delay.
-        return {**found, "delay": self.delay} if service.is_real_time else found
+        return {**found, "delay": self.delay} if self._is_real_time else found
 
     def summary(self) -> str:
         """The run in a few lines of text."""
-        service = self._service
-        core = service.core
+        core = self._core
         lines = [f"{core.rows} rows estimated" + (f", up to {core.time:.6g} s" if core.rows else "")]
         for fate in ("missing", "late", "doubled", "dropped", "unreadable", "clock"):
             by = {name: mine[fate] for name, mine in core.counts.by_channel.items() if mine[fate]}
@@ -123,7 +131,7 @@ class Statistics:
         late, received = core.counts.total("late"), core.counts.total("received")
         if late > 0.01 * received:
             lines.append(f"{late} of {received} values came too late: a longer --window takes them in")
-        lossy = {box.uri.name: box.dropped for box in service.outboxes if box.dropped}
+        lossy = {box.uri.name: box.dropped for box in self._outboxes if box.dropped}
         if lossy:
             lines.append("messages that sinks were too slow for: " + _by_number(lossy))
         if self.event_counts:

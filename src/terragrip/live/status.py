@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
+import asyncio
 import logging
 import sys
-import time
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
 from typing import TYPE_CHECKING, Any
 
 from terragrip.estimation.estimates import wheels_with
 from terragrip.live.core import Row
-from terragrip.live.message import Message
+from terragrip.live.message import EVENT, Message
 
 if TYPE_CHECKING:
     from terragrip.live.service import Service
@@ -20,35 +20,34 @@ _STEP = 0.25  # s
 _TROUBLE = ("late", "doubled", "missing", "dropped", "unreadable", "clock")
 
 
-@contextmanager
-def shown(service: Service, quiet: bool) -> Iterator[None]:
+@asynccontextmanager
+async def shown(service: Service, quiet: bool) -> AsyncIterator[None]:
     """Show the status on standard error while the block runs: on a terminal a live table, elsewhere one line an event."""
-    if quiet:
-        yield
+    if not quiet and sys.stderr.isatty():
+        task = asyncio.create_task(_refresh(service))
+        try:
+            yield
+        finally:
+            task.cancel()
+            await asyncio.gather(task, return_exceptions=True)
         return
-    if not sys.stderr.isatty():
-        if not logging.getLogger("terragrip").isEnabledFor(logging.INFO):  # else the log says it
-            service.listeners.append(_print_event)
-        yield
-        return
+    if not quiet and not logging.getLogger("terragrip").isEnabledFor(logging.INFO):  # else the log says it
+        service.listeners.append(_print_event)
+    yield
+
+
+async def _refresh(service: Service) -> None:
     from rich.console import Console
     from rich.live import Live
 
-    state = {"next": 0.0}
     with Live(console=Console(stderr=True), auto_refresh=False, transient=True) as live:
-
-        def refresh(message: Message) -> None:
-            now = time.monotonic()
-            if now >= state["next"]:
-                state["next"] = now + _STEP
-                live.update(table(service), refresh=True)
-
-        service.listeners.append(refresh)
-        yield
+        while True:
+            live.update(table(service), refresh=True)
+            await asyncio.sleep(_STEP)
 
 
 def _print_event(message: Message) -> None:
-    if message.kind == "event" and message.data is not None:
+    if message.kind == EVENT and message.data is not None:
         event = message.data
         print(f"{event['kind']}: {event['source']}: {event['text']}", file=sys.stderr)
 

@@ -7,7 +7,7 @@ import logging
 from collections.abc import Awaitable, Callable
 from typing import Any
 
-from terragrip.live.feed import Feed, Lost, Note
+from terragrip.live.feed import Feed, Lost
 from terragrip.live.outbox import Outbox
 from terragrip.live.sinks import Sink
 from terragrip.live.sources import Source
@@ -23,27 +23,9 @@ async def supervise_source(source: Source, feed: Feed) -> None:
     await _again_and_again(lambda: source.run(feed), feed.lost)
 
 
-async def supervise_sink(sink: Sink, outbox: Outbox, note: Note) -> None:
+async def supervise_sink(sink: Sink, outbox: Outbox) -> None:
     """Run a sink until cancelled; raises InputError where it cannot be used at all."""
-    state = {"lost": False}
-
-    def tell(kind: str, text: str) -> None:
-        note({"event": {"time": None, "kind": kind, "source": outbox.uri.name, "text": text}})
-
-    def lost(why: str) -> None:
-        outbox.is_lost = True
-        if not state["lost"]:
-            tell("sink_lost", why)
-        state["lost"] = True
-
-    def back() -> None:
-        outbox.is_lost = False
-        if state["lost"]:
-            tell("sink_back", "connected again")
-        state["lost"] = False
-
-    outbox.connected = back
-    await _again_and_again(lambda: sink.run(outbox), lost)
+    await _again_and_again(lambda: sink.run(outbox), outbox.lost)
 
 
 async def _again_and_again(run: Callable[[], Awaitable[None]], lost: Callable[[str], None]) -> None:
@@ -62,8 +44,8 @@ async def _again_and_again(run: Callable[[], Awaitable[None]], lost: Callable[[s
         pause = min(2 * pause, _BACKOFF[1])
 
 
-def unheard(loop: asyncio.AbstractEventLoop, context: dict[str, Any]) -> None:
-    """A future that failed with nobody listening: aiomqtt leaves some when a broker goes, of which the service knows."""
+def report_unhandled(loop: asyncio.AbstractEventLoop, context: dict[str, Any]) -> None:
+    """A future whose failure nobody awaits: aiomqtt leaves some when a broker goes, of which the service knows."""
     if type(context.get("exception")).__module__.startswith("aiomqtt"):
         logger.info("%s: %s", context["message"], context["exception"])
     else:

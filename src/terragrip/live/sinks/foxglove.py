@@ -66,7 +66,8 @@ class FoxgloveSink:
             raise Lost(f"the server: {error}") from error
         try:
             outbox.connected()
-            await outbox.deliver(lambda message: self._log(message, outbox))
+            while True:
+                self._log(await outbox.get(), outbox)
         finally:
             server.stop()
             if self._writer is not None:

@@ -78,7 +78,8 @@ class Ros2Sink:
 
         try:
             outbox.connected()
-            await outbox.deliver(publish)
+            while True:
+                publish(await outbox.get())
         except RuntimeError as error:
             raise Lost(f"ROS 2: {error}") from error
         finally:

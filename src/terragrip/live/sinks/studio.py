@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import http
+from contextlib import aclosing
 from typing import TYPE_CHECKING, Any
 from urllib.parse import parse_qs, urlsplit
 
@@ -46,7 +47,8 @@ class StudioSink:
             raise Lost(f"the server: {error.strerror or error}") from error
         async with server:
             outbox.connected()
-            await outbox.deliver(self.broadcast.put)
+            while True:
+                self.broadcast.put(await outbox.get())
 
     def _admit(self, connection: Any, request: Any) -> Any:
         """Refuse who does not know the token, where one is set, and pages of other sites."""
@@ -62,25 +64,29 @@ class StudioSink:
         return connection.respond(http.HTTPStatus.UNAUTHORIZED, "The token is wrong or missing.\n")
 
     async def _serve(self, connection: Any) -> None:
+        """Send one client its frames until it leaves, of which nothing but the connection tells while there are none."""
+        sending = asyncio.create_task(self._send(connection))
+        closed = asyncio.create_task(connection.wait_closed())
+        try:
+            await asyncio.wait((sending, closed), return_when=asyncio.FIRST_COMPLETED)
+            if sending.done():
+                sending.result()
+        finally:
+            sending.cancel()
+            closed.cancel()
+            await asyncio.gather(sending, closed, return_exceptions=True)
+
+    async def _send(self, connection: Any) -> None:
         from websockets.exceptions import ConnectionClosed
 
-        listening = asyncio.create_task(connection.wait_closed())
-        frames = self.broadcast.subscribe(connection.request.path)
         try:
-            while not listening.done():
-                waiting = asyncio.ensure_future(anext(frames))
-                await asyncio.wait((waiting, listening), return_when=asyncio.FIRST_COMPLETED)
-                if not waiting.done():
-                    waiting.cancel()
-                    return
-                await connection.send(waiting.result())
+            async with aclosing(self.broadcast.subscribe(connection.request.path)) as frames:
+                async for frame in frames:
+                    await connection.send(frame)
         except InputError as error:
             await connection.close(1008, str(error)[:120])
         except ConnectionClosed:
             return
-        finally:
-            listening.cancel()
-            await frames.aclose()
 
 
 def open_sink(uri: Uri, vehicle: Vehicle, columns: Sequence[str]) -> StudioSink:

@@ -45,21 +45,19 @@ class UdpSink:
         except OSError as error:
             raise Lost(f"cannot send to {self.uri.host} ({error.strerror or error})") from error
         outbox.connected()
-
-        def send(message: Message) -> None:
-            data = self._packed(message, outbox) if self.packed else message.json(outbox.columns)
-            try:
-                if data:
-                    link.send(data)
-            except ConnectionRefusedError:
-                pass  # nobody listens yet; the next may be heard
-            except OSError as error:
-                if error.errno not in _PASSING:
-                    raise Lost(f"cannot send to {self.uri.host} ({error.strerror or error})") from error
-                outbox.dropped += 1
-
         with link:
-            await outbox.deliver(send)
+            while True:
+                message = await outbox.get()
+                data = self._packed(message, outbox) if self.packed else message.json(outbox.columns)
+                try:
+                    if data:
+                        link.send(data)
+                except ConnectionRefusedError:
+                    pass  # nobody listens yet; the next may find someone
+                except OSError as error:
+                    if error.errno not in _PASSING:
+                        raise Lost(f"cannot send to {self.uri.host} ({error.strerror or error})") from error
+                    outbox.dropped += 1
 
     async def _socket(self) -> socket.socket:
         loop = asyncio.get_running_loop()

@@ -8,9 +8,9 @@ from typing import Any
 
 from terragrip.live.can import check, errors, open_bus
 from terragrip.live.decode import Decoder
-from terragrip.live.door import Door
 from terragrip.live.feed import Feed, Lost
 from terragrip.live.frames import FrameDecoder
+from terragrip.live.thread_bridge import ThreadBridge
 from terragrip.live.uri import Uri
 
 _PATIENCE = 0.2  # s
@@ -36,7 +36,7 @@ class CanSource:
 
     async def run(self, feed: Feed) -> None:
         """Feed frames; raises Lost where the bus is not there or goes away."""
-        door, done = Door(feed, _BATCHES), threading.Event()
+        bridge, done = ThreadBridge(feed, _BATCHES), threading.Event()
         bus = await asyncio.to_thread(open_bus, self.uri)
         feed.one_layout = False
         feed.connected()
@@ -51,7 +51,7 @@ class CanSource:
                 if frame is not None:
                     batch.append(frame)
                 if batch:
-                    door.hand(self._take, feed, batch)
+                    bridge.call(self._feed, feed, batch)
 
         reader = asyncio.ensure_future(asyncio.to_thread(read))
         try:
@@ -63,7 +63,7 @@ class CanSource:
             await asyncio.wait([reader])
             bus.shutdown()
 
-    def _take(self, feed: Feed, batch: list[Any]) -> None:
+    def _feed(self, feed: Feed, batch: list[Any]) -> None:
         for frame in batch:
             if frame.is_error_frame or frame.is_remote_frame:
                 continue

@@ -9,15 +9,15 @@ from typing import Any
 
 from terragrip.errors import InputError
 from terragrip.live.decode import Decoder
-from terragrip.live.door import Door
 from terragrip.live.feed import Feed, Lost
 from terragrip.live.payload import Unreadable
 from terragrip.live.ros2 import Reader, domain_of, has_rclpy, ros_name
+from terragrip.live.thread_bridge import ThreadBridge
 from terragrip.live.uri import Uri
 
-_LOOK = 1.0  # s between looks for topics that nobody publishes yet
+_SEARCH = 1.0  # s between searches for topics that nobody publishes yet
 
-Take = Callable[[str, str, bytes], None]
+Receive = Callable[[str, str, bytes], None]
 
 
 class Ros2Source:
@@ -40,49 +40,49 @@ class Ros2Source:
 
     async def run(self, feed: Feed) -> None:
         """Feed messages; raises Lost where the other side is not there."""
-        door, reader = Door(feed), Reader(self._decoder)
+        bridge, reader = ThreadBridge(feed), Reader(self._decoder)
         feed.one_layout = False
 
-        def take(topic: str, kind: str, data: bytes) -> None:
+        def feed_message(topic: str, kind: str, data: bytes) -> None:
             try:
                 fields = reader.fields(topic, kind, data)
             except Unreadable as error:
-                feed.spoiled(f"{error} on {topic}")
+                feed.reject(f"{error} on {topic}")
                 return
             if fields:
                 feed.fields(fields)
 
-        def heard(topic: str, kind: str, data: bytes) -> None:  # in another thread
-            door.hand(take, topic, kind, data)
+        def received(topic: str, kind: str, data: bytes) -> None:  # in another thread
+            bridge.call(feed_message, topic, kind, data)
 
-        await (self._by_rclpy if self.by_rclpy else self._by_zenoh)(feed, heard)
+        await (self._by_rclpy if self.by_rclpy else self._by_zenoh)(feed, received)
 
-    async def _by_zenoh(self, feed: Feed, heard: Take) -> None:
+    async def _by_zenoh(self, feed: Feed, received: Receive) -> None:
         from terragrip.live.zenoh import open_session
 
         session = await asyncio.to_thread(open_session, self.uri)
         try:
             for topic, kind in self.topics.items():
-                session.declare_subscriber(f"{self.domain}{topic}/*/*", self._typed(topic, heard))
+                session.declare_subscriber(f"{self.domain}{topic}/*/*", self._typed(topic, received))
                 if kind:
-                    session.declare_subscriber(topic.strip("/"), self._bridged(topic, kind, heard))
+                    session.declare_subscriber(topic.strip("/"), self._bridged(topic, kind, received))
             feed.connected()
             await asyncio.Event().wait()
         finally:
             await asyncio.to_thread(session.close)
 
-    def _typed(self, topic: str, heard: Take) -> Callable[[Any], None]:
+    def _typed(self, topic: str, received: Receive) -> Callable[[Any], None]:
         def listen(sample: Any) -> None:
             kind = ros_name(str(sample.key_expr).split("/")[-2])
             if kind is not None:
-                heard(topic, kind, bytes(sample.payload))
+                received(topic, kind, bytes(sample.payload))
 
         return listen
 
-    def _bridged(self, topic: str, kind: str, heard: Take) -> Callable[[Any], None]:
-        return lambda sample: heard(topic, kind, bytes(sample.payload))
+    def _bridged(self, topic: str, kind: str, received: Receive) -> Callable[[Any], None]:
+        return lambda sample: received(topic, kind, bytes(sample.payload))
 
-    async def _by_rclpy(self, feed: Feed, heard: Take) -> None:
+    async def _by_rclpy(self, feed: Feed, received: Receive) -> None:
         """Raw subscriptions, so that messages are read the same way on both paths."""
         done = threading.Event()
 
@@ -105,10 +105,10 @@ class Ros2Source:
                     for topic in [name for name in missing if name in types]:
                         kind = missing.pop(topic) or types[topic][0]
                         node.create_subscription(
-                            get_message(kind), topic, lambda data, t=topic, k=kind: heard(t, k, bytes(data)),
+                            get_message(kind), topic, lambda data, t=topic, k=kind: received(t, k, bytes(data)),
                             qos_profile_sensor_data, raw=True,
                         )  # fmt: skip
-                    executor.spin_once(timeout_sec=_LOOK if missing else 0.2)
+                    executor.spin_once(timeout_sec=_SEARCH if missing else 0.2)
             finally:
                 node.destroy_node()
                 rclpy.shutdown(context=context)

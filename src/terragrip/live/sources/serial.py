@@ -8,10 +8,10 @@ from pathlib import Path
 
 from terragrip.errors import InputError
 from terragrip.live.decode import Decoder
-from terragrip.live.door import Door
 from terragrip.live.feed import Feed, Lost
 from terragrip.live.nmea import fields_of
 from terragrip.live.payload import Unreadable
+from terragrip.live.thread_bridge import ThreadBridge
 from terragrip.live.uri import Uri
 
 _LONGEST = 512  # bytes of a line
@@ -35,7 +35,7 @@ class SerialSource:
         """Feed sentences; raises Lost where the device is not there or goes away."""
         import serial
 
-        door, done = Door(feed), threading.Event()
+        bridge, done = ThreadBridge(feed), threading.Event()
         try:
             line = serial.Serial(str(Path(self.uri.path)), self.baud, timeout=0.2)
         except (serial.SerialException, ValueError) as error:
@@ -50,7 +50,7 @@ class SerialSource:
                 *whole, rest = rest.split(b"\n")
                 rest = rest[-_LONGEST:]
                 for sentence in whole:
-                    door.hand(self._take, feed, sentence)
+                    bridge.call(self._feed, feed, sentence)
 
         try:
             await asyncio.to_thread(read)
@@ -60,11 +60,11 @@ class SerialSource:
             done.set()
             line.close()
 
-    def _take(self, feed: Feed, sentence: bytes) -> None:
+    def _feed(self, feed: Feed, sentence: bytes) -> None:
         try:
             fields = fields_of(sentence)
         except Unreadable as error:
-            feed.spoiled(str(error))
+            feed.reject(str(error))
             return
         if "latitude" not in fields and "ground_speed" in fields and self._has_rmc:
             return  # VTG repeats the speed of RMC

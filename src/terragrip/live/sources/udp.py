@@ -4,17 +4,18 @@ from __future__ import annotations
 
 import asyncio
 import socket
-from time import monotonic
+import struct
+import sys
 
 from terragrip.errors import InputError
 from terragrip.live.decode import Decoder
 from terragrip.live.feed import Feed, Lost
 from terragrip.live.uri import Uri
 
-_BUFFER = 4 << 20  # bytes: a burst must not be lost in the system, where nobody counts
+_BUFFER = 4 << 20  # bytes asked for, so that a burst finds room
 _LONGEST = 1 << 16  # bytes of a datagram
-_PRESSED = 5e-4  # s since the last were done, within which the next mean that there are more
-_TOGETHER = 256  # datagrams
+_AT_ONCE = 256  # datagrams
+_SO_MEMINFO, _DROPS = 55, 8  # of Linux (asm-generic/socket.h, linux/sock_diag.h); Python does not name them
 
 
 class UdpSource:
@@ -63,41 +64,46 @@ class UdpSource:
 
 
 class _Receiver:
-    """Takes datagrams as they come: one a turn of the loop; where the next are there already, many, so that what is too
-    much is dropped, and counted, by the inbox, not by the system.
+    """Reads datagrams, many where many are there, so that what is too much is dropped, and counted, by the inbox rather
+    than by the system; what the system drops is counted too.
     """
 
     def __init__(
         self, link: socket.socket, feed: Feed, allowed: frozenset[str], failed: asyncio.Future[str]
     ) -> None:
         self._link, self._feed, self._allowed, self._failed = link, feed, allowed, failed
-        self._done = 0.0
+        self._dropped = _dropped_by_system(link)
 
     def read(self) -> None:
         """The socket has datagrams."""
-        pressed = monotonic() - self._done < _PRESSED
-        found: list[bytes] = []
         try:
-            self._take(found)
-            while pressed and len(found) < _TOGETHER:
-                self._take(found)
+            for _ in range(_AT_ONCE):
+                data, address = self._link.recvfrom(_LONGEST)
+                if self._allowed and address[0] not in self._allowed:
+                    self._feed.reject(f"from {address[0]}, which is not allowed")
+                else:
+                    self._feed.message(data)
         except (BlockingIOError, InterruptedError):
             pass
         except OSError as error:
             if not self._failed.done():
                 self._failed.set_result(str(error.strerror or error))
-        self._feed.burst(found)
-        self._done = monotonic()
+        # A full buffer is read afterwards: so nothing is dropped that is not counted here.
+        dropped = _dropped_by_system(self._link)
+        if dropped != self._dropped:
+            self._feed.dropped((dropped - self._dropped) % (1 << 32))
+            self._dropped = dropped
 
-    def _take(self, found: list[bytes]) -> None:
-        if not self._allowed:
-            found.append(self._link.recv(_LONGEST))
-            return
-        data, address = self._link.recvfrom(_LONGEST)
-        if address[0] in self._allowed:
-            found.append(data)
-        else:
-            self._feed.spoiled(f"from {address[0]}, which is not allowed")
+
+def _dropped_by_system(link: socket.socket) -> int:
+    """Datagrams that found the socket's buffer full, modulo 2^32; 0 where the system does not tell (it does on Linux)."""
+    if not sys.platform.startswith("linux"):
+        return 0
+    try:
+        numbers = link.getsockopt(socket.SOL_SOCKET, _SO_MEMINFO, 4 * (_DROPS + 1))
+    except OSError:
+        return 0
+    return struct.unpack(f"={len(numbers) // 4}I", numbers)[_DROPS]
 
 
 def open_source(uri: Uri, decoder: Decoder) -> UdpSource:

@@ -6,8 +6,8 @@ import asyncio
 from typing import Any
 
 from terragrip.live.decode import Decoder
-from terragrip.live.door import Door
 from terragrip.live.feed import Feed
+from terragrip.live.thread_bridge import ThreadBridge
 from terragrip.live.uri import Uri
 from terragrip.live.zenoh import config, key_of, open_session
 
@@ -24,20 +24,20 @@ class ZenohSource:
 
     async def run(self, feed: Feed) -> None:
         """Feed samples; raises Lost where the other side is not there. Zenoh itself connects again later."""
-        door = Door(feed)
+        bridge = ThreadBridge(feed)
         session = await asyncio.to_thread(open_session, self.uri)
 
-        def heard(sample: Any) -> None:  # in a thread of Zenoh's
-            door.hand(self._take, feed, bytes(sample.payload), str(sample.key_expr))
+        def received(sample: Any) -> None:  # in a thread of Zenoh's
+            bridge.call(self._feed, feed, bytes(sample.payload), str(sample.key_expr))
 
         try:
-            session.declare_subscriber(self.key, heard)
+            session.declare_subscriber(self.key, received)
             feed.connected()
             await asyncio.Event().wait()
         finally:
             await asyncio.to_thread(session.close)
 
-    def _take(self, feed: Feed, data: bytes, key: str) -> None:
+    def _feed(self, feed: Feed, data: bytes, key: str) -> None:
         feed.message(data, topic=key)
 
 

@@ -1,0 +1,94 @@
+"""From samples to what goes out: order and estimator (`Core`), then the record, where there is one."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from terragrip.live.core import Core, Output, Values
+from terragrip.live.event import Event
+from terragrip.live.record import ROWS, SECONDS, Recorder
+
+
+class Pipeline:
+    """`process`, `tick`, `note` and `flush` as `Core` has them, their inputs and outputs kept in a record.
+
+    A record that cannot be written ends with an event, not the run; ``failure`` then tells why.
+
+    Parameters
+    ----------
+    core: one that has processed nothing yet; a record's own takes its place, which must be of the same vehicle, settings
+        and library.
+    folder: of the record, which goes on from its end where it holds one; None: none is kept.
+    rows, seconds: when a segment of it is closed.
+
+    Raises InputError if the folder cannot be used, is in use, or holds the record of another vehicle or other settings.
+    """
+
+    def __init__(
+        self, core: Core, folder: Path | None = None, *, rows: int = ROWS, seconds: float = SECONDS
+    ) -> None:
+        self.recorder = None if folder is None else Recorder(folder, core, rows=rows, seconds=seconds)
+        self.core = core if self.recorder is None else self.recorder.core
+        self.opening: list[Output] = [] if self.recorder is None else self.recorder.opening
+        self.failure: str | None = None
+
+    def process(self, arrival: float, source: int, stamp: float, values: Values) -> list[Output]:
+        """See `Core.process`."""
+        outputs = self.core.process(arrival, source, stamp, values)
+        return self._keep(outputs, lambda recorder: recorder.sample(outputs, arrival, source, stamp, values))
+
+    def tick(self, now: float) -> list[Output]:
+        """See `Core.tick`; nothing, and nothing recorded, where it would do nothing."""
+        until = self.waiting_until
+        if until is None or now < until:
+            return []
+        outputs = self.core.tick(now)
+        return self._keep(outputs, lambda recorder: recorder.tick(outputs, now))
+
+    @property
+    def waiting_until(self) -> float | None:
+        """When a row that waits goes on at the latest, as an arrival [s]; None where none waits."""
+        pending = self.core.reorder.pending
+        return pending[0].arrival + self.core.settings.window if pending else None
+
+    def note(self, note: dict[str, Any]) -> list[Output]:
+        """See `Core.note`."""
+        outputs = self.core.note(note)
+        return self._keep(outputs, lambda recorder: recorder.note(outputs, note))
+
+    def flush(self) -> list[Output]:
+        """See `Core.flush`."""
+        outputs = self.core.flush()
+        return self._keep(outputs, lambda recorder: recorder.flush(outputs))
+
+    def write(self) -> list[Output]:
+        """Hand what came in to the system, after which a kill cannot lose it."""
+        return self._keep([], Recorder.write)
+
+    def sync(self) -> list[Output]:
+        """Have it put on the disk."""
+        return self._keep([], Recorder.sync)
+
+    def close(self) -> None:
+        """Close the record whole."""
+        if self.recorder is None:
+            return
+        try:
+            self.recorder.close()
+        except OSError as error:
+            self.failure = f"the record's last segment could not be closed ({error.strerror or error})"
+
+    def _keep(self, outputs: list[Output], keep: Callable[[Recorder], None]) -> list[Output]:
+        """Record it; where that is not possible, say so and go on without."""
+        if self.recorder is None:
+            return outputs
+        try:
+            keep(self.recorder)
+        except OSError as error:
+            self.failure = f"the record stopped at {self.core.time:.6g} s ({error.strerror or error})"
+            self.recorder.abandon()
+            self.recorder = None
+            return [*outputs, Event(self.core.time, "record_failed", "record", self.failure)]
+        return outputs
