@@ -210,6 +210,25 @@ async def test_the_studios_websocket_in_json_and_in_doubles(tmp_path, vehicle, s
     assert steps == pytest.approx([0.05] * len(steps))
 
 
+async def test_clients_that_leave_or_speak_no_websocket_leave_no_traceback(vehicle, port, caplog):
+    service = Service(vehicle, ["udp://127.0.0.1:0"], [f"studio://127.0.0.1:{port}"])
+    async with running(service):
+        async with connect(f"ws://127.0.0.1:{port}/") as client:
+            await client.recv()
+        async with connect(f"ws://127.0.0.1:{port}/") as client:
+            await client.recv()
+            client.transport.abort()
+        _, writer = await asyncio.open_connection("127.0.0.1", port)
+        writer.write(b"hello\r\n\r\n")
+        await writer.drain()
+        writer.close()
+        broadcast = service.sinks[0][1].broadcast
+        await until(lambda: not len(broadcast))
+        async with connect(f"ws://127.0.0.1:{port}/") as client:  # the next one is served
+            assert json.loads(await client.recv())["kind"] == "hello"
+    assert [record.getMessage() for record in caplog.records if record.levelname == "ERROR"] == []
+
+
 async def test_the_studios_websocket_beyond_this_machine_wants_the_token(vehicle, port, monkeypatch):
     with pytest.raises(InputError, match="TERRAGRIP_TOKEN"):
         Service(vehicle, ["udp://127.0.0.1:9870"], [f"studio://0.0.0.0:{port}"])

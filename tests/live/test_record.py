@@ -197,11 +197,14 @@ def test_another_vehicle_or_a_second_writer_is_refused(tmp_path, vehicle, short)
 def test_a_snapshot_of_another_version_is_refused_in_one_line(tmp_path, vehicle, short):
     core = Core(vehicle, settings_for(short.recording))
     Pipeline(core, tmp_path).close()
-    state = core.state()
-    del state["reorder"]["released"]  # whole by its check sum, but with other entries
-    write_snapshot(tmp_path, last_snapshot(tmp_path), state)
-    with pytest.raises(InputError, match="another version"):
-        Pipeline(Core(vehicle, settings_for(short.recording)), tmp_path)
+    newer, without, other = (core.state() for _ in range(3))
+    newer["format"] += 1
+    del without["format"]  # as it was once
+    del other["reorder"]["released"]  # whole by its check sum, but with other entries
+    for state in (newer, without, other):
+        write_snapshot(tmp_path, last_snapshot(tmp_path), state)
+        with pytest.raises(InputError, match="another version"):
+            Pipeline(Core(vehicle, settings_for(short.recording)), tmp_path)
 
 
 def test_no_record_is_said(tmp_path):

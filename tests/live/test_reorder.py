@@ -163,10 +163,36 @@ class TestClock:
         assert refused == 0
         assert times == pytest.approx([5 + k * 0.1 for k in range(100)])
 
-    def test_one_wild_stamp_is_refused(self):
+    @pytest.mark.parametrize("wild", [4.0, 11.0, 1e6, -1e6])
+    def test_one_wild_stamp_is_refused(self, wild):
         good = [(k * 0.1, k * 0.1) for k in range(60)]
-        times, jumps, refused = self.run([*good[:20], (2.0, 1e6), *good[20:]])
-        assert (jumps, refused, len(times)) == ([], 1, 60)
+        times, jumps, refused = self.run([*good[:20], (2.0, wild), *good[20:]])
+        assert (jumps, refused, times) == ([], 1, [stamp for _, stamp in good])
+
+    def test_a_second_stamp_that_agrees_shows_a_hole(self):
+        """A burst out of which 5 s are missing, and no sample behind it."""
+        stamps = [*range(30), *range(80, 120)]
+        times, jumps, refused = self.run([(0.001 * k, 0.1 * stamp) for k, stamp in enumerate(stamps)])
+        assert (jumps, refused, times) == ([], 0, [0.1 * stamp for stamp in stamps])
+
+    def test_what_was_dropped_explains_a_hole_of_any_length(self):
+        clock, times = SourceClock(), []
+        for k in range(100):
+            if k == 50:
+                clock.dropped(0.05)
+            accepted, refused, jump = clock.place(0.001 * k, k * 0.1 + (1000.0 if k >= 50 else 0.0), {})
+            assert (refused, jump) == ([], 0.0)
+            times += [time for _, time, _ in accepted]
+        assert times == [k * 0.1 + (1000.0 if k >= 50 else 0.0) for k in range(100)]
+
+    def test_old_stamps_in_a_flood_are_no_jump(self):
+        """A second and a half of messages from long ago, delivered once more between those of now."""
+        now = [(k * 0.1, 100.0 + k * 0.1) for k in range(60)]
+        flood = [(3.05 + 1e-4 * k, 50.0 + 1e-5 * k) for k in range(15_000)]
+        times, jumps, refused = self.run(sorted([*now, *flood]))
+        assert jumps == []
+        assert refused == len(flood)
+        assert times == [stamp for _, stamp in now]
 
     def test_a_backlog_keeps_its_stamps(self):
         live = [(k * 0.1, k * 0.1) for k in range(50)]

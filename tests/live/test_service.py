@@ -361,6 +361,49 @@ async def test_datagrams_that_are_too_many_are_dropped_by_the_service_which_coun
         assert dropped() > 0
 
 
+async def test_what_the_system_drops_is_counted_and_its_hole_is_no_jump_of_the_clock(
+    vehicle, short, port, sender, monkeypatch
+):
+    """Ten seconds' datagrams and forty more while the loop stands still, then on at their own pace."""
+    monkeypatch.setattr("terragrip.live.sources.udp._BUFFER", 1 << 16)
+    service = Service(vehicle, [f"udp://127.0.0.1:{port}"])
+    speeds = dict.fromkeys([f"wheel_speed_{w}" for w in vehicle.wheels], 3.0) | {"ground_speed": 0.55}
+    async with running(service):
+        sender.send({"time": 0.0, **speeds})
+        await until(lambda: service.feeds[0].messages == 1)
+        sender.send(*({"time": k * 0.01, **speeds} for k in range(1, 5000)))
+        for k in range(5000, 5130):
+            sender.send({"time": k * 0.01, **speeds})
+            await asyncio.sleep(0.01)
+        await until(lambda: service.core.time == 5129 * 0.01)
+    counts = service.core.counts.by_channel
+    unread = counts[f"(udp://127.0.0.1:{port})"]["dropped"]
+    assert unread > 1000
+    assert counts["ground_speed"]["received"] + unread == 5130
+    assert counts["ground_speed"]["clock"] == 0
+    assert events(service, "clock_jump") == []
+    assert "messages dropped unread" in events(service, "behind")[0]
+
+
+async def test_a_sample_that_comes_late_in_a_silence_ends_nothing(vehicle, short, port, sender):
+    service = Service(vehicle, [f"udp://127.0.0.1:{port}"])
+    good = messages(short.recording, 200)
+
+    def predicted() -> int:
+        return sum(m.kind == "estimate" and m.row.predicted for m in service.seen)
+
+    async with running(service):
+        sender.send(*good[:100])
+        await until(lambda: predicted() > 3)
+        sender.send(good[50])
+        before = predicted()
+        await until(lambda: predicted() > before + 3 or service.task.done())
+        sender.send(*good[100:])
+        await until(lambda: service.core.rows == 200 or service.task.done())
+    assert service.core.rows == 200
+    assert service.core.counts.by_channel["ground_speed"]["doubled"] == 1
+
+
 async def test_a_thread_that_is_too_fast_is_held_back_and_counted(vehicle, port):
     service = Service(vehicle, [f"udp://127.0.0.1:{port}"])
     async with running(service):

@@ -3,18 +3,19 @@
 from __future__ import annotations
 
 import asyncio
+import re
 import threading
 from pathlib import Path
 
 from terragrip.errors import InputError
+from terragrip.formats.nmea_sentences import sentences
 from terragrip.live.decode import Decoder
 from terragrip.live.feed import Feed, Lost
-from terragrip.live.nmea import fields_of
-from terragrip.live.payload import Unreadable
 from terragrip.live.thread_bridge import ThreadBridge
 from terragrip.live.uri import Uri
 
 _LONGEST = 512  # bytes of a line
+_FRAME = re.compile(r"[$!][A-Z][A-Z0-9]+,[^$!*]*\*[0-9A-Fa-f]{2}")  # a sentence of any kind
 
 
 class SerialSource:
@@ -23,7 +24,8 @@ class SerialSource:
     real_time = True
 
     def __init__(self, uri: Uri) -> None:
-        import serial  # noqa: F401  # so that a missing package is said at once
+        import pynmea2  # noqa: F401  # so that a missing package is reported at once
+        import serial  # noqa: F401
 
         self.uri = uri
         self._has_rmc = False
@@ -60,17 +62,17 @@ class SerialSource:
             done.set()
             line.close()
 
-    def _feed(self, feed: Feed, sentence: bytes) -> None:
-        try:
-            fields = fields_of(sentence)
-        except Unreadable as error:
-            feed.reject(str(error))
-            return
-        if "latitude" not in fields and "ground_speed" in fields and self._has_rmc:
-            return  # VTG repeats the speed of RMC
-        self._has_rmc |= "latitude" in fields and "ground_speed" in fields
-        if fields:
-            feed.fields(fields)
+    def _feed(self, feed: Feed, line: bytes) -> None:
+        text = line.decode("ascii", "replace").strip()
+        good, damaged = sentences(text)
+        if damaged or (text and not _FRAME.search(text)):
+            feed.reject(f"no whole NMEA sentence: {text[:30]!r}")
+        for sentence in good:
+            if sentence.kind == "VTG" and self._has_rmc:
+                continue  # it repeats the speed of RMC
+            self._has_rmc |= sentence.kind == "RMC" and "ground_speed" in sentence.fields
+            if sentence.fields:
+                feed.fields(sentence.fields)
 
 
 def open_source(uri: Uri, decoder: Decoder) -> SerialSource:
