@@ -44,6 +44,10 @@ _BASE: dict[str, tuple[float, Dimension]] = {
 _SUPERSCRIPTS = str.maketrans(
     {"²": "^2", "³": "^3", "¹": "^1", "⁻": "^-", "·": "*", "⋅": "*", "×": "*", "μ": "µ"}
 )
+_TURNS_A_MINUTE = re.compile(
+    r"(?:1|rev|r|U)?\s*/\s*min|min\s*\^?\s*-\s*1|r\.?p\.?m\.?|U\.?p\.?m\.?", re.IGNORECASE
+)
+"""What speeds of rotation are written in beside rad/s: 1/min is a turn a minute (DIN 1301-2), not a radian."""
 _TOKEN = re.compile(r"\s*(?:(\*\*|\^)\s*\(?([+-]?\d+)\)?|([*/])|([A-Za-z%°µ][A-Za-z0-9_%°µ]*|1))")
 _NUMBER = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(.*?)\s*$", re.DOTALL)
 _HARMLESS = re.compile(r"[A-Za-z0-9_%°µ^*/(). +-]{1,60}$")
@@ -136,9 +140,16 @@ def _short(value: object) -> str:
     return text if len(text) <= 40 else text[:37] + "..."
 
 
+def _plain(text: str) -> str:
+    """A unit without superscripts."""
+    return text.translate(_SUPERSCRIPTS).replace("^-^", "^-").strip()
+
+
 def _from_table(text: str) -> Unit | None:
     """Read ``text`` with the table; None if a symbol or the grammar is beyond it."""
-    text = text.translate(_SUPERSCRIPTS).strip()
+    text = _plain(text)
+    if _TURNS_A_MINUTE.fullmatch(text):
+        text = "rpm"
     factor, powers, sign, last, position = 1.0, [0, 0, 0, 0], 1, None, 0
     while position < len(text):
         match = _TOKEN.match(text, position)
@@ -174,7 +185,7 @@ def _from_pint(text: str) -> Unit:
     unknown = UnitError(
         f"{_short(text.strip())} is not a unit", "write units as in 'N m', 'km/h' or 'kg m^2'"
     )
-    plain = text.translate(_SUPERSCRIPTS).strip()
+    plain = _plain(text)
     # A number among the symbols is a slip ("139 2 kg"), and its powers would keep pint busy for ever.
     number = r"(?<![A-Za-z_0-9^*(+-])[0-9.]|[0-9)]\s*(\*\*|\^)|(\*\*|\^)\s*\(?\s*[+-]?\d{2}"
     if not _HARMLESS.match(plain) or re.search(number, plain):

@@ -202,10 +202,11 @@ def test_refusals(tmp_path: Path, dbc: Path) -> None:
     frames = [(START + k, 0x7F0, bytes(8)) for k in range(5)]
     log = write_log(tmp_path / "other.blf", frames, extended=False)
     with pytest.raises(
-        InputError, match=r"identifiers is in the built-in table of J1939 \(7F0\); give the bus's DBC"
+        InputError,
+        match="its only identifier, 7F0, is not in the built-in table of J1939; give the bus's DBC",
     ):
         read_table(log)
-    with pytest.raises(InputError, match="is in the DBC"):
+    with pytest.raises(InputError, match="is not in the DBC"):
         read_table(log, databases=(dbc,))
     tractor = write_log(tmp_path / "log.blf", drive(1000, 10.0).frames)
     with pytest.raises(InputError, match="is missing"):
@@ -238,9 +239,7 @@ def test_a_log_cut_off_is_read_as_far_as_it_goes(tmp_path: Path) -> None:
     assert 0 < len(cut.columns["time"]) < whole
     lines = write_log(tmp_path / "log.log", drive(1000, 10.0).frames).read_text().splitlines(keepends=True)
     (tmp_path / "log.log").write_text("".join(["@@@\n", *lines]))
-    assert any(
-        "1 lines hold no frame, the first is line 1" in n for n in read_table(tmp_path / "log.log").notes
-    )
+    assert any("1 line holds no frame: line 1 ('@@@')" in n for n in read_table(tmp_path / "log.log").notes)
 
 
 def test_measured_john_deere(shared: Callable[[str], Path]) -> None:
@@ -340,7 +339,10 @@ def test_frames_of_no_use_are_counted_all_the_same(tmp_path: Path, suffix: str) 
     ]
     log = write_log(tmp_path / f"log.{suffix}", frames)
     every, one = read_table(log), read_table(log, lambda name: name == "GroundBasedMachineSpeed")
-    assert any("300 of 600 frames (5 identifiers)" in note for note in every.notes)
+    assert any(
+        "300 of 600 frames are in no DBC or table, those of the identifiers 18FF0017 (PGN 65280)" in note
+        for note in every.notes
+    )
     assert [n for n in one.notes if "frames" in n] == [n for n in every.notes if "frames" in n]
     speed = every.columns["GroundBasedMachineSpeed"]
     assert np.array_equal(one.columns["GroundBasedMachineSpeed"], speed[np.isfinite(speed)])
@@ -412,3 +414,35 @@ def test_printed_frames_without_stamps_say_what_to_do(tmp_path: Path) -> None:
     path.write_text("".join(f"  can0  {i:08X}   [8]  {blanks(d)}\n" for _, i, d in drive(1000, 5.0).frames))
     with pytest.raises(InputError, match=r"line 1 .*: its frames have no stamps; record it by candump -l"):
         read(path, "tractor-isobus")
+
+
+FOREIGN = {
+    "asc": [
+        "   1.5 1  18FEF1ZZx  Rx  d 8 00 11",
+        "�%&",
+        "   2.5 1  CFE48F0x  Rx  d 8 00 XX 22 33 44 55 66 77",
+    ],
+    "TRC 1.1": ["     7)      1500.0  Rx 0CFE48F0  8  00 XX 22 33 44 55 66 77", "garbage", "     8)  "],
+    "TRC 2.1": ["      7   1500.000 DT 1 0CFE48F0 Rx - 8 00 XX 22 33", "garbage", "      8 x"],
+}
+
+
+@pytest.mark.parametrize("form", FOREIGN)
+def test_bad_lines_are_left_out_and_the_first_is_named(tmp_path: Path, form: str) -> None:
+    if form == "asc":
+        lines = write_log(tmp_path / "log.asc", drive(1000, 40.0).frames).read_text().splitlines()
+    else:
+        lines = [TEXTS[form](t - START, i, d) for t, i, d in drive(1000, 40.0).frames]
+        lines = [*HEADS[form].splitlines(), *lines]
+    whole, damaged = tmp_path / "whole.txt", tmp_path / "damaged.txt"
+    whole.write_text("\n".join(lines) + "\n")
+    for place, bad in zip((60, 20, 40), FOREIGN[form], strict=True):
+        lines.insert(place, bad)
+    damaged.write_text("\n".join(lines) + "\n")
+    table, expected = read_table(damaged), read_table(whole)
+    assert len(table.columns["time"]) == len(expected.columns["time"]) > 400
+    for name, column in expected.columns.items():
+        np.testing.assert_array_equal(table.columns[name], column)
+    assert any(note.startswith("3 lines hold no frame, the first is line 21 (") for note in table.notes)
+    unwanted = read_table(damaged, lambda name: name == "GroundBasedMachineSpeed")
+    assert any("the first is line 21 (" in note for note in unwanted.notes)

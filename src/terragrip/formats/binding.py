@@ -5,9 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from terragrip.errors import InputError, nearest
-from terragrip.formats.profile import Profile, Source, matching
+from terragrip.formats.profile import Profile, Source, TimeSource, matching
 from terragrip.formats.table import LogTable
 from terragrip.recording.schema import TIME
+from terragrip.units import UnitError, factor_to
 
 
 def bound(profile: Profile, log: LogTable, *, partial: bool = False) -> tuple[Profile, list[str]]:
@@ -46,11 +47,26 @@ def bound(profile: Profile, log: LogTable, *, partial: bool = False) -> tuple[Pr
         if not log.clocked:
             raise _missing(time.column, log)
         time = time.model_copy(update={"column": TIME, "unit": "s"})
+    elif (stated := log.units.get(time.column)) is not None and stated != time.unit:
+        time, said = _in_its_unit(time, stated)
+        notes += said
     if rows is not None and rows.column not in log.columns:
         if not partial:
             raise _missing(rows.column, log)
         rows = None
     return profile.model_copy(update={"channels": channels, "time": time, "rows": rows}), notes
+
+
+def _in_its_unit(time: TimeSource, stated: str) -> tuple[TimeSource, list[str]]:
+    """The time column with the unit that the log itself states, unless the profile gives another, which a note then says."""
+    try:
+        same = factor_to(stated, "s") == factor_to(time.unit, "s")
+    except UnitError:  # no unit of time: a remark of the logger
+        return time, []
+    if "unit" not in time.model_fields_set:
+        return time.model_copy(update={"unit": stated}), []
+    said = f"The log states {stated} for {time.column}; the profile's {time.unit} counts."
+    return time, [] if same else [said]
 
 
 def _bound(origin: Source, log: LogTable) -> Source | None:

@@ -1,11 +1,20 @@
-"""How far one clock is ahead of another, told by two records of the same machine's speed."""
+"""How far one record of a machine's speed lags behind another: the clocks of two files, or two channels of one.
+
+A vehicle follows its wheels with a lag of its own: it accelerates by pull, which takes slip. With the pull coefficient rising by K per
+slip, a = g K s for small slip, hence v = w (1 - v'/(g K)): the ground speed lags by v / (g K). What that explains is no clock's fault.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+
+from terragrip.recording.held import fresh_samples, held_period
+from terragrip.units import STANDARD_GRAVITY
 
 Floats = npt.NDArray[np.float64]
 
@@ -19,6 +28,116 @@ _WIDTH = 20  # points that rates are smoothed over: a second
 _ROUNDS = 5
 _LEAST_STD = 0.005  # s
 _LONGEST = 20_000_000  # points; a record over ten days
+
+
+_CERTAIN = 2.0  # standard deviations by which an offset must exceed what is explained
+_STIFFNESS = (
+    2.0  # K on soft soil: the slope of ASABE D497's gross traction ratio at 15 % slip, Bn = 20, is 1.85
+)
+_WITHIN = 5.0  # s, the largest lag looked for between channels of one file
+_MOST_ROWS = 1_000_000  # of a file, whose lag is found from its first rows
+
+
+@dataclass(frozen=True)
+class Speed:
+    """A record of a speed (n,) of any scale; ``pace`` [m/s] is its usual size where it is measured over ground, else None."""
+
+    time: Floats
+    values: Floats
+    pace: float | None
+
+
+@dataclass(frozen=True)
+class Lag:
+    """``seconds`` by which the second record is behind, its standard deviation, the correlation there, and what is ``explained``."""
+
+    seconds: float
+    std: float
+    correlation: float
+    explained: tuple[float, float]
+
+    @property
+    def is_of_the_clock(self) -> bool:
+        """Whether it is certain, and more than a vehicle's dynamics explain."""
+        least, most = self.explained
+        return max(least - self.seconds, self.seconds - most) > _CERTAIN * self.std
+
+    @property
+    def why_not(self) -> str:
+        """The cause for which no clock is to be corrected."""
+        if abs(self.seconds) <= _CERTAIN * self.std:
+            return "that is no more than twice its standard deviation"
+        return f"a vehicle follows its wheels by up to {max(map(abs, self.explained)):.2f} s"
+
+
+def speed_of(time: Floats, columns: Mapping[str, npt.NDArray[Any]]) -> Speed | None:
+    """The speed that some channels (n,) tell at ``time`` (n,): over ground, of the drive train, or of the wheels on average."""
+    ground = _measured(time, columns.get("ground_speed"))
+    if ground is not None:
+        speed = np.abs(ground[1])
+        moving = speed[speed > 0.5 * float(np.quantile(speed, 0.9))]
+        return Speed(ground[0], speed, float(np.median(moving)) if len(moving) else 0.0)
+    return wheels_of(time, columns)
+
+
+def wheels_of(time: Floats, columns: Mapping[str, npt.NDArray[Any]]) -> Speed | None:
+    """As `speed_of`, from the drive train or the wheels alone."""
+    based = _measured(time, columns.get("wheel_based_speed"))
+    if based is not None:
+        return Speed(based[0], np.abs(based[1]), None)
+    wheels = [_measured(time, v) for name, v in columns.items() if name.startswith("wheel_speed_")]
+    known = [np.interp(time, when, np.abs(values)) for when, values in filter(None, wheels)]
+    return Speed(time, np.mean(known, axis=0), None) if known else None
+
+
+def _measured(time: Floats, values: npt.NDArray[Any] | None) -> tuple[Floats, Floats] | None:
+    """The true updates (m,) of a channel, since a held value is late by half its period; None if there are hardly any."""
+    if values is None or values.dtype.kind not in "fiu":
+        return None
+    known = np.isfinite(values)
+    when, kept = time[known], np.asarray(values[known], np.float64)
+    period = held_period(when, kept) if len(kept) > 2 else None
+    if period is not None:
+        fresh = fresh_samples(when, kept, period)
+        when, kept = when[fresh], kept[fresh]
+    return (when, kept) if len(kept) > 2 else None
+
+
+def lag_between(first: Speed, second: Speed, *, reach: float | None = None) -> Lag | None:
+    """How far ``second`` is behind ``first``, with what a vehicle's dynamics explain of it; None as `offset_between`."""
+    found = offset_between((first.time, first.values), (second.time, second.values), reach=reach)
+    if found is None:
+        return None
+    low = high = 0.0
+    if first.pace is None and second.pace is not None:
+        high = second.pace / (STANDARD_GRAVITY * _STIFFNESS)
+    elif second.pace is None and first.pace is not None:
+        low = -first.pace / (STANDARD_GRAVITY * _STIFFNESS)
+    return Lag(found.seconds, found.std, found.correlation, (low, high))
+
+
+def lag_within(time: Floats, columns: Mapping[str, npt.NDArray[Any]]) -> list[str]:
+    """A sentence where one file's ground speed and wheel speeds (n,) are further apart in time than a vehicle's dynamics explain.
+
+    Said and not corrected: which of the two sensors is late, the file cannot tell, and the user can.
+    """
+    rows = slice(None, _MOST_ROWS)
+    part = {name: values[rows] for name, values in columns.items()}
+    wheels = wheels_of(time[rows], part)
+    ground = speed_of(time[rows], {"ground_speed": part["ground_speed"]}) if "ground_speed" in part else None
+    lag = None if wheels is None or ground is None else lag_between(wheels, ground, reach=_WITHIN)
+    if lag is None or not lag.is_of_the_clock:
+        return []
+    late, other = (
+        ("ground_speed", "the wheel speeds") if lag.seconds > 0 else ("The wheel speeds", "ground_speed")
+    )
+    verb = "is" if lag.seconds > 0 else "are"
+    what = "it" if lag.seconds > 0 else "each"
+    return [
+        f"{late} {verb} {abs(lag.seconds):.3f} ± {lag.std:.3f} s behind {other}, by the correlation of the speeds "
+        f"({lag.correlation:.3f}); a vehicle's own lag is {lag.explained[1]:.2f} s at most. If a sensor is late, write "
+        f"'delay: {abs(lag.seconds):.2f} s' for {what} in a profile."
+    ]
 
 
 @dataclass(frozen=True)

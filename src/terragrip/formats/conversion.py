@@ -19,8 +19,7 @@ from terragrip.formats.derivation import (
     yaw_of,
 )
 from terragrip.formats.profile import Profile, Rows, Source, TimeSource, matching, rate_unit
-from terragrip.formats.signals import SINCE_1970
-from terragrip.formats.table import LogTable
+from terragrip.formats.table import SINCE_1970, LogTable, since_clock_was_set
 from terragrip.formats.timebase import spread, union
 from terragrip.physics.geodesy import metres_of
 from terragrip.recording import Recording
@@ -58,6 +57,8 @@ def convert(profile: Profile, log: Any, source: str | None = None) -> Recording:
 def converted(profile: Profile, log: LogTable, *, partial: bool = False) -> Part:
     """The channels that ``profile`` makes of a log; where it is ``partial``, those that it can make of this one."""
     profile, notes = bound(profile, log, partial=partial)
+    log, unset = since_clock_was_set(log, profile.time.column, profile.time.unit)
+    notes += unset
     time, start, said = _time(profile.time, log)
     notes += said
     channels: dict[str, Column] = {}
@@ -126,8 +127,7 @@ def _time(origin: TimeSource, log: LogTable) -> tuple[Floats, float | None, list
     start = log.start
     if stamps.dtype.kind in "Mm":
         time, notes = seconds(stamps, log.source)
-        if stamps.dtype.kind == "M" and len(stamps):
-            start = float((stamps[0] - np.datetime64(0, "s")) / np.timedelta64(1, "s"))
+        start = start_of(stamps, time)
     else:
         if origin.zero == "first" and stamps.dtype.kind in "iu" and len(stamps):
             stamps = stamps.astype(np.int64) - np.int64(stamps[0])  # nanoseconds since 1970 need all 64 bits
@@ -137,6 +137,13 @@ def _time(origin: TimeSource, log: LogTable) -> tuple[Floats, float | None, list
     if origin.zero == "first" and len(time):
         time = time - time[0]
     return time, start, notes
+
+
+def start_of(stamps: Column, time: Floats) -> float | None:
+    """When time 0 was [s since 1970] of stamps as they were written and as ``time`` [s]; None where they do not say."""
+    if stamps.dtype.kind == "M" and len(stamps):
+        return float((stamps[0] - np.datetime64(0, "s")) / np.timedelta64(1, "s"))
+    return 0.0 if len(time) and time[0] > SINCE_1970 else None
 
 
 def _since_1970(stamps: Column, origin: TimeSource) -> float | None:

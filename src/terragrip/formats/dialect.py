@@ -158,7 +158,11 @@ def _best(lines: list[str]) -> tuple[str, str]:
         table = [split(line, separator) for line in lines]
         width = len(table[0])
         body = table[1:]
-        fitting = sum(abs(len(row) - width) <= 1 for row in body) / len(body) if body else 1.0
+        widths = [len(row) for row in body]
+        # Rows agree among themselves; a header of another width is refused later, by name, and hides no separator.
+        usual = max(set(widths), key=widths.count) if body else width
+        fitting = sum(abs(own - usual) <= 1 for own in widths) / len(body) if body else 1.0
+        fitting *= usual > 1 or abs(usual - width) <= 1
         for decimal in (".",) if separator == "," else (".", ","):
             cells = [cell for row in body[:20] for cell in row]
             numbers = sum(_is_number(cell, decimal) for cell in cells)

@@ -15,8 +15,8 @@ from terragrip.formats.profile import SHIPPED, Profile
 from terragrip.formats.proposal import is_ready, missing_channels, profile_text
 from terragrip.formats.reading import read, read_log, recording_of
 from terragrip.formats.recognition import find_time, propose, silent
-from terragrip.formats.signals import SINCE_1970, SignalLog
-from terragrip.formats.table import LogTable, Sparse
+from terragrip.formats.signals import SignalLog
+from terragrip.formats.table import SINCE_1970, LogTable, Sparse
 from terragrip.recording import Recording, unit_warnings
 from terragrip.recording.held import fresh_samples, held_period, measured_part
 from terragrip.recording.noise import white_noise
@@ -194,7 +194,7 @@ class _Seen:
             )
         numbers = {n: c.astype(np.float64) for n, c in log.columns.items() if c.dtype.kind in "fiub"}
         dates = tuple(n for n, c in log.columns.items() if c.dtype.kind == "M")
-        stamp = find_time(numbers, dates)
+        stamp = find_time(numbers, dates, log.units)
         instants = None if stamp is None else _seconds(log.columns[stamp[0]], stamp[1])
         large = (
             stamp is not None

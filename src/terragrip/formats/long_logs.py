@@ -9,7 +9,7 @@ from dataclasses import dataclass, field, replace
 from terragrip.formats.blocks import Columns, recordings
 from terragrip.formats.conversion import converted_block, settled
 from terragrip.formats.profile import Profile
-from terragrip.formats.table import LogTable, in_si
+from terragrip.formats.table import LogTable, in_si, since_clock_was_set
 from terragrip.recording import Recording
 from terragrip.recording.columns import seconds
 from terragrip.recording.schema import TIME, has_torque, is_own
@@ -47,7 +47,10 @@ def recordings_of(
         chosen = [name for name in log.names if is_own(name)]
         if with_torque and not has_torque(chosen):
             return None
-        own = (in_si(replace(table, columns=block)) for block in log.blocks(chosen))
+        own = (
+            in_si(block)
+            for block in _since_set(log, log.blocks(chosen), table, TIME, log.units.get(TIME, "s"))
+        )
         return recordings(own, log.names, chosen, log.source, log.notes)
     found = settled(profile, table)
     if found is None or (with_torque and not has_torque(found[0].channels)):
@@ -62,14 +65,27 @@ def _converted(log: LongLog, profile: Profile, table: LogTable) -> Iterator[Colu
     """The blocks of a log as a `settled` profile makes channels of them."""
     asked = {profile.time.column, *(c for origin in profile.channels.values() for c in origin.columns)}
     first = None
-    for block in log.blocks([name for name in log.names if name in asked]):
-        stamps = block[profile.time.column]
+    blocks = log.blocks([name for name in log.names if name in asked])
+    for block in _since_set(log, blocks, table, profile.time.column, profile.time.unit):
+        stamps = block.columns[profile.time.column]
         if not len(stamps):
             continue
         if first is None:
             first = stamps[0]
             log.notes.extend(seconds(stamps[:1], log.source)[1])
-        yield converted_block(profile, replace(table, columns=block), first)
+        yield converted_block(profile, block, first)
+
+
+def _since_set(
+    log: LongLog, blocks: Iterator[Columns], table: LogTable, column: str, unit: str
+) -> Iterator[LogTable]:
+    """The blocks as tables, without first rows from before the logger's clock was set."""
+    for number, block in enumerate(blocks):
+        part = replace(table, columns=block)
+        if number == 0:
+            part, said = since_clock_was_set(part, column, unit)
+            log.notes.extend(said)
+        yield part
 
 
 def long_log(path: str | os.PathLike[str]) -> LongLog | None:

@@ -1,7 +1,7 @@
-"""MATLAB files: version 5, and version 7.3 (HDF5) by h5py; other HDF5 files of plain datasets too.
+"""MATLAB files: version 5 by mat-io, version 7.3 (HDF5) by h5py; other HDF5 files of plain datasets too.
 
-Objects of MATLAB classes (timetable, timeseries, Simulink's Dataset, datetime) are read by mat-io and `matlab_objects`; what
-cannot be read is named in the notes.
+mat-io runs in a process of its own, since a damaged file can crash it, and reads version 5 and objects of MATLAB classes (timetable,
+timeseries, Simulink's Dataset, datetime) of both; what cannot be read is named in the notes.
 """
 
 from __future__ import annotations
@@ -18,10 +18,10 @@ from terragrip.errors import InputError
 from terragrip.files import sha256
 from terragrip.formats.boundary import needed, reading
 from terragrip.formats.kind import Databases
-from terragrip.formats.mat5 import Array, Opaque, read_mat5
 from terragrip.formats.matlab_hdf5 import is_hdf5, tree_of
 from terragrip.formats.matlab_records import IN_RECORDS
 from terragrip.formats.matlab_signals import Found, seconds_of, walk
+from terragrip.formats.matlab_values import Array, Opaque
 from terragrip.formats.signals import Signal, SignalLog
 from terragrip.formats.table import LogTable, Wanted, kept_rows
 from terragrip.formats.worker import Worker
@@ -34,8 +34,10 @@ _NO_OBJECTS = ("", "function", "sparse", "function_handle")
 def read_matlab(path: str, wanted: Wanted | None, databases: Databases) -> SignalLog | LogTable:
     """Read a MATLAB file; raises InputError if it is damaged, or holds no numeric column."""
     if not is_hdf5(path):
-        with reading(path, "MATLAB file"):
-            return _with_objects(read_mat5(path), path, wanted)
+        with _worker(path) as worker:
+            worker.say(None)
+            read = worker.hear()["tree"]
+            return _finished({name: _of_worker(part, worker) for name, part in read.items()}, path, wanted)
     h5py = needed("h5py", "a MATLAB 7.3 file")
     with reading(path, "MATLAB file", RuntimeError), h5py.File(path, "r") as file:
         return _with_objects(tree_of(file, h5py), path, wanted)
@@ -48,15 +50,17 @@ def _with_objects(tree: dict[str, Any], path: str, wanted: Wanted | None) -> Sig
         return _finished(tree, path, wanted)
     with ExitStack() as kept:  # the process lives until its arrays were read
         try:
-            worker = kept.enter_context(
-                Worker("terragrip.formats.matlab_worker", "matio", path, "MATLAB file")
-            )
+            worker = kept.enter_context(_worker(path))
             worker.say(names)
             read = worker.hear()["tree"]
         except InputError:
             return _finished(tree, path, wanted)  # the notes name what is left
         known = {name: _merged(tree[name], _of_worker(part, worker)) for name, part in read.items()}
-        return _finished({**tree, **known}, path, wanted, tuple(names))
+        return _finished({**tree, **known}, path, wanted)
+
+
+def _worker(path: str) -> Worker:
+    return Worker("terragrip.formats.matlab_worker", "matio", path, "MATLAB file")
 
 
 def _holds_object(value: Any) -> bool:
@@ -95,19 +99,11 @@ def _merged(own: Any, objects: Any) -> Any:
     return own
 
 
-def _finished(
-    tree: Mapping[str, Any], path: str, wanted: Wanted | None, objects: tuple[str, ...] = ()
-) -> SignalLog | LogTable:
-    """The wanted signals of what a file holds; ``objects`` are variables with objects, named where nothing is found in them."""
+def _finished(tree: Mapping[str, Any], path: str, wanted: Wanted | None) -> SignalLog | LogTable:
+    """The wanted signals of what a file holds."""
     found = Found()
     walk(tree, "", found, 0)
-    for name in objects:
-        here = [
-            n for n in (*found.signals, *found.opaque) if n == name or n.startswith((f"{name}.", f"{name}["))
-        ]
-        if not here and not isinstance(tree[name], Array | str):
-            found.opaque[name] = "without a series"
-    notes = _notes(found)
+    notes = [*_notes(found), *found.notes]
     if not found.signals and not found.loose:
         problem = "holds no numeric column"
         if notes:
@@ -142,19 +138,24 @@ def _notes(found: Found) -> list[str]:
     notes = []
     records = [name for name, kind in found.opaque.items() if kind == IN_RECORDS]
     if records:
-        more = f" and {len(records) - 6} more" if len(records) > 6 else ""
         notes.append(
-            f"The samples of {', '.join(records[:6])}{more} are in records that cannot be read here (a Dataset saved with -v7.3): save "
+            f"The samples of {_some(records)} are in records that cannot be read here (a Dataset saved with -v7.3): save "
             f"it in MATLAB by save('log.mat', '{records[0].partition('.')[0]}', '-v7')."
         )
+    if found.signals and found.loose:
+        notes.append(f"No time vector stands beside {_some(list(found.loose))}, which were left out.")
     shown = [f"{n} ({kind})" if kind else n for n, kind in found.opaque.items() if kind != IN_RECORDS]
     if shown:
-        more = f" and {len(shown) - 6} more" if len(shown) > 6 else ""
         notes.append(
-            f"Objects that MATLAB alone can read were left out: {', '.join(shown[:6])}{more}; export them there as arrays or "
-            "structs, a table by writetable(x, 'x.csv')."
+            f"What is no series of plain numbers was left out: {_some(shown)}; save it from MATLAB as arrays or structs, a table by "
+            "writetable(x, 'x.csv')."
         )
     return notes
+
+
+def _some(names: list[str]) -> str:
+    """The first of some names, and how many more there are."""
+    return ", ".join(names[:6]) + (f" and {len(names) - 6} more" if len(names) > 6 else "")
 
 
 def _table_of(loose: Mapping[str, Any], path: str, wanted: Wanted | None, notes: list[str]) -> LogTable:

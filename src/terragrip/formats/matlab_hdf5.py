@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from terragrip.formats.mat5 import Array, Opaque
+from terragrip.formats.matlab_values import Array, Opaque
 
 _DEEPEST = 12
 _USER_BLOCK, _HDF5 = 512, b"\x89HDF\r\n\x1a\n"

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from terragrip.formats.mat5 import Opaque
+from terragrip.formats.matlab_values import Opaque
 
 _DEEPEST = 24
 _MOST = 1 << 16  # parts of all cells, structs and objects
@@ -56,9 +56,15 @@ def plain(value: Any, room: _Room | None = None) -> Any:
         return _of_table(value)
     if isinstance(value, Mapping):
         return {str(key): plain(part, room.inner()) for key, part in value.items()}
-    if isinstance(value, str):
+    if value is None or isinstance(value, str):
         return value
-    return _of_array(np.asarray(value), room) if isinstance(value, np.ndarray | np.generic) else None
+    if isinstance(value, np.ndarray | np.generic):
+        return _of_array(np.asarray(value), room)
+    return (
+        Opaque("sparse")
+        if hasattr(value, "nnz")
+        else Opaque(type(value).__name__.removeprefix("Matlab").lower())
+    )
 
 
 def _of_array(value: npt.NDArray[Any], room: _Room) -> Any:
@@ -75,7 +81,7 @@ def _of_array(value: npt.NDArray[Any], room: _Room) -> Any:
         return texts[0] if len(texts) == 1 else texts or ""
     if value.dtype.kind in "mM":
         return _seconds(value)
-    return np.asarray(value) if value.dtype.kind in "fiub" else None
+    return np.asarray(value) if value.dtype.kind in "fiub" else Opaque("complex")
 
 
 def _of_object(value: Any, room: _Room) -> Any:
@@ -99,7 +105,8 @@ def _of_object(value: Any, room: _Room) -> Any:
         return content.get("Data")
     if "Values" in content:
         return {"Name": _name_of(content), "Values": content["Values"]}
-    return content
+    held_more = (isinstance(v, Mapping | list | str | Opaque) or np.size(v) > 1 for v in content.values())
+    return content if any(held_more) else Opaque(kind)
 
 
 def _storage(elements: list[Any]) -> Any:
@@ -183,18 +190,24 @@ def _scalar(value: Any) -> float | None:
 
 
 def _of_table(frame: Any) -> dict[str, Any]:
-    columns: dict[str, Any] = {
-        str(name): frame[name].to_numpy() for name in frame.columns if frame[name].dtype.kind in "fiub"
-    }
     index = frame.index
-    if getattr(index, "tz", None) is not None:
-        index = index.tz_convert("UTC").tz_localize(None)
+    columns = {str(name): _of_column(frame[name]) for name in frame.columns}
     if index.dtype.kind in "mM":
-        columns["time"] = _seconds(index.to_numpy())
-    return columns
+        columns["time"] = _of_column(index.to_series())
+    return {name: column for name, column in columns.items() if column is not None}
 
 
-def _seconds(value: npt.NDArray[Any]) -> npt.NDArray[np.float64]:
-    """Spans in seconds, dates since 1970; a missing one is NaN."""
+def _of_column(column: Any) -> Any:
+    if getattr(column.dtype, "tz", None) is not None:
+        column = column.dt.tz_convert("UTC").dt.tz_localize(None)
+    if column.dtype.kind in "mM":
+        return _seconds(column.to_numpy())
+    return column.to_numpy() if column.dtype.kind in "fiub" else None
+
+
+def _seconds(value: npt.NDArray[Any]) -> npt.NDArray[np.float64] | Opaque:
+    """Spans in seconds, dates since 1970; a missing one is NaN. A span of the calendar has no length in seconds."""
+    if value.dtype.kind == "m" and np.datetime_data(value.dtype)[0] in "YM":
+        return Opaque("calendarDuration")
     since = value - np.datetime64(0, "s") if value.dtype.kind == "M" else value
     return np.where(np.isnat(value), np.nan, since / np.timedelta64(1, "s")).astype(np.float64)

@@ -16,7 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from terragrip.formats.boundary import DAMAGE, needed
-from terragrip.formats.mat5 import Array, Opaque
+from terragrip.formats.matlab_values import Array, Opaque
 
 _STREAM = "#sigstream#"
 _CLASSES = {"double": "f8", "single": "f4", "half": "f2", "logical": "u1", "boolean": "u1", "int8": "i1", "uint8": "u1",

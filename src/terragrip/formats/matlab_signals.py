@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from terragrip.formats.mat5 import Array, Opaque
+from terragrip.formats.matlab_values import Array, Opaque
 from terragrip.units import is_common
 
 _TIMES = ("time", "t", "tout", "timestamp", "time_s", "t_s", "time_ms", "t_ms", "time_us", "time_ns")
@@ -29,36 +29,41 @@ _DATENUM_1970 = 719_529.0
 
 @dataclass
 class Found:
-    """Signals by name, with what their clock and column are read from; ``opaque`` objects with their class; vectors without a clock."""
+    """Signals by name, with what their clock and column are read from; ``opaque`` objects with their class; vectors without a clock.
+
+    ``notes`` say which of several vectors was taken for time.
+    """
 
     signals: dict[str, tuple[Any, Any, int | None]] = field(default_factory=dict)
     scales: dict[int, float] = field(default_factory=dict)
     units: dict[str, str] = field(default_factory=dict)
     opaque: dict[str, str] = field(default_factory=dict)
     loose: dict[str, Any] = field(default_factory=dict)
+    notes: list[str] = field(default_factory=list)
 
 
-def walk(value: Any, name: str, found: Found, depth: int) -> None:
-    """Find the signals under a value."""
+def walk(value: Any, name: str, found: Found, depth: int, above: Any = None) -> None:
+    """Find the signals under a value; ``above``: the time vector of the structs around it, for those that have none."""
     if depth > _DEEPEST:
         return
     if isinstance(value, Opaque):
         found.opaque[name] = value.kind
     elif isinstance(value, Mapping):
-        _walk_struct(value, name, found, depth)
+        _walk_struct(value, name, found, depth, above)
     elif isinstance(value, list) or (isinstance(value, np.ndarray) and value.dtype == object):
         for k, part in enumerate(list(np.ravel(value)) if isinstance(value, np.ndarray) else value):
             own = _own_name(part)
-            walk(part, _joined(name, own) if own else f"{name}[{k}]", found, depth + 1)
+            walk(part, _joined(name, own) if own else f"{name}[{k}]", found, depth + 1, above)
 
 
-def _walk_struct(struct: Mapping[str, Any], name: str, found: Found, depth: int) -> None:
-    lower = {key.lower(): key for key in struct}
-    clock_name = next((lower[key] for key in _TIMES if key in lower and _is_vector(struct[lower[key]])), None)
-    clock = None if clock_name is None else struct[clock_name]
-    if clock is not None and clock_name is not None:
+def _walk_struct(struct: Mapping[str, Any], name: str, found: Found, depth: int, above: Any) -> None:
+    lower = {key.lower(): key for key in reversed(list(struct))}  # of names that differ in case, the first
+    clock_name = _clock_name(struct, name, found)
+    clock = above if clock_name is None else struct[clock_name]
+    if clock is not None:
         length = int(np.prod(clock.shape))
-        found.scales[id(clock)] = _SCALES.get(clock_name.rpartition("_")[2].lower(), 1.0)
+        if clock_name is not None:
+            found.scales[id(clock)] = _SCALES.get(clock_name.rpartition("_")[2].lower(), 1.0)
         if "signals" in lower and _structure_with_time(struct[lower["signals"]], clock, length, name, found):
             return
         for key, part in struct.items():
@@ -71,12 +76,30 @@ def _walk_struct(struct: Mapping[str, Any], name: str, found: Found, depth: int)
             if clock is None and _is_vector(part):
                 found.loose[_joined(name, key)] = part
         elif key.lower() == "values" and isinstance(part, Mapping | Opaque):
-            walk(part, name, found, depth + 1)  # a Dataset's element: its name is the signal's
+            walk(part, name, found, depth + 1, clock)  # a Dataset's element: its name is the signal's
         elif key.lower() in ("elements", "signals") and not isinstance(part, str):
             own = _own_name(part)  # one element alone is no list
-            walk(part, _joined(name, own) if own else name, found, depth + 1)
+            walk(part, _joined(name, own) if own else name, found, depth + 1, clock)
         elif not isinstance(part, str):
-            walk(part, _joined(name, key), found, depth + 1)
+            walk(part, _joined(name, key), found, depth + 1, clock)
+
+
+def _clock_name(struct: Mapping[str, Any], name: str, found: Found) -> str | None:
+    """Which vector of a struct is time, None if none: of names that differ in case only (``t``, ``T``), the one that runs forward."""
+    for word in _TIMES:
+        alike = [key for key in struct if key.lower() == word and _is_vector(struct[key])]
+        if len(alike) > 1:
+            alike.sort(key=lambda key: (not _runs_forward(struct[key]), key != word))
+            others = ", ".join(_joined(name, key) for key in alike[1:])
+            found.notes.append(f"{_joined(name, alike[0])} is taken for time; {others} is a signal.")
+        if alike:
+            return alike[0]
+    return None
+
+
+def _runs_forward(value: Any) -> bool:
+    stamps = np.asarray(value.read() if isinstance(value, Array) else value).ravel()
+    return bool((stamps[1:] > stamps[:-1]).all())
 
 
 def _structure_with_time(signals: Any, clock: Any, length: int, name: str, found: Found) -> bool:
@@ -154,4 +177,5 @@ def seconds_of(clock: npt.NDArray[Any], scale: float) -> npt.NDArray[np.float64]
     time = np.asarray(clock, dtype=np.float64)
     if len(time) and _DATENUM[0] < time[0] < _DATENUM[1] and np.median(np.abs(np.diff(time[:1000]))) < 0.01:
         return (time - _DATENUM_1970) * 86400.0
-    return time * scale
+    with np.errstate(invalid="ignore"):  # a damaged file may hold signalling NaNs
+        return np.asarray(time * scale)

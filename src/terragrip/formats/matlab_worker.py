@@ -1,7 +1,7 @@
-"""Objects in MATLAB files: ``python -m terragrip.formats.matlab_worker FILE``.
+"""What mat-io reads of MATLAB files: ``python -m terragrip.formats.matlab_worker``.
 
-mat-io reads MATLAB's objects with code that a damaged file can crash: so it gets a process that may end
-(`terragrip.formats.worker`). It hears the names of variables, says what is in them, and sends the arrays that it is asked for.
+A damaged file can crash mat-io, so it gets a process that may end (`terragrip.formats.worker`). It is sent the names of variables
+(null: all), answers with what is in them, and sends the arrays that it is asked for.
 """
 
 from __future__ import annotations
@@ -13,9 +13,9 @@ import numpy as np
 import numpy.typing as npt
 
 from terragrip.formats.boundary import needed
-from terragrip.formats.mat5 import Array, Opaque
 from terragrip.formats.matlab_objects import TICKS, plain
 from terragrip.formats.matlab_records import records_of, resolved
+from terragrip.formats.matlab_values import Array, Opaque
 from terragrip.formats.worker import Outlet, serve
 
 
@@ -26,7 +26,8 @@ def work(path: str, out: Outlet) -> None:
     loaded = matio.load_from_mat(path, variable_names=names)
     arrays: list[Array] = []
     with records_of(path) as records:
-        tree = {name: resolved(plain(loaded.pop(name)), records, TICKS) for name in names if name in loaded}
+        chosen = names or [name for name in loaded if not name.startswith("__")]
+        tree = {name: resolved(plain(loaded.pop(name)), records, TICKS) for name in chosen if name in loaded}
         out.say({"tree": {name: _skeleton(value, arrays) for name, value in tree.items()}})
         while (number := out.hear()) is not None:
             out.send(np.asarray(arrays[number].read(), dtype=np.float64))
@@ -40,7 +41,7 @@ def _skeleton(value: Any, arrays: list[Array]) -> Any:
         return {"list": [_skeleton(part, arrays) for part in value]}
     if isinstance(value, np.ndarray):
         held: npt.NDArray[Any] = value
-        value = Array(held.shape, lambda: held)
+        value = Array(held.shape, lambda: held) if held.size else None
     if isinstance(value, Array):
         arrays.append(value)
         return {"array": len(arrays) - 1, "shape": list(value.shape)}

@@ -11,7 +11,7 @@ from terragrip.formats.boundary import DAMAGE, as_far_as_it_goes, needed
 from terragrip.formats.kind import Databases
 from terragrip.formats.mcap_records import records
 from terragrip.formats.messages import Parts, Topic
-from terragrip.formats.ros import Types, bag_topic, log_of
+from terragrip.formats.ros import Types, bag_topic, log_of, unpacked
 from terragrip.formats.signals import SignalLog
 from terragrip.formats.table import Wanted
 
@@ -83,7 +83,7 @@ def _channel(
         language = "idl" if schema.encoding.endswith("idl") else "msg"
         name = types.learn(schema.name, schema.data.decode("utf-8", "replace"), language)
         form = types.form(name, one=encoding == "ros1")
-        return ros, lambda receipt, content: ros.push(receipt, content, form)
+        return ros, lambda receipt, content: ros.push(receipt, unpacked(content), form)
     if encoding == "protobuf" and schema is not None:
         topic = _topic(channel.topic, _parts_of_protobuf, _stamp_of_protobuf, getattr, wanted, topics)
         factory = needed("mcap_protobuf.decoder", "protobuf messages").DecoderFactory()

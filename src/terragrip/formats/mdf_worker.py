@@ -1,4 +1,4 @@
-"""The part of reading MDF files that runs in a process of its own: ``python -m terragrip.formats.mdf_worker FILE``.
+"""The part of reading MDF files that runs in a process of its own: ``python -m terragrip.formats.mdf_worker``.
 
 A damaged file can end asammdf's process (a segmentation fault in its C extension) or fill memory, so it gets one that may
 end. Standard output carries JSON lines and NumPy arrays, as `terragrip.formats.mdf` reads them: what the file holds; then,

@@ -4,15 +4,17 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from terragrip.errors import InputError
-from terragrip.formats.conversion import Part
+from terragrip.formats.clocks import lag_within
+from terragrip.formats.conversion import Part, start_of
 from terragrip.formats.kind import Databases, kind_of
 from terragrip.formats.profile import SHIPPED, Profile
 from terragrip.formats.signals import SignalLog
-from terragrip.formats.table import LogTable, Wanted, in_si
+from terragrip.formats.table import LogTable, Wanted, in_si, since_clock_was_set
 from terragrip.recording import Recording, checks
 from terragrip.recording.columns import seconds
 from terragrip.recording.schema import TIME, is_own
@@ -55,10 +57,16 @@ def read(
 
 def recording_of(table: LogTable, profile: Profile | None) -> Recording:
     """The recording that a table is by a profile, or without one by its own names; raises InputError as `read` does."""
-    if profile is not None:
-        return profile.apply(table)
+    recording = profile.apply(table) if profile is not None else _as_it_stands(table)
+    late = lag_within(recording.time, recording.channels)
+    return replace(recording, notes=(*recording.notes, *late)) if late else recording
+
+
+def _as_it_stands(table: LogTable) -> Recording:
     _require(table)
     notes = [*table.notes, *checks.remarks(table.names)]
+    table, unset = since_clock_was_set(table, TIME, _time_unit(table))
+    notes += unset
     return Recording.from_frame(in_si(table), table.source, sha256=table.sha256, notes=notes)
 
 
@@ -140,9 +148,16 @@ def _part(path: PathLike, profile: Profile | None, databases: Databases, also: t
             place=f"column {TIME}",
             mend="name it in a profile for this source",
         )
+    table, unset = since_clock_was_set(table, TIME, _time_unit(table))
     columns = in_si(table)
-    time, _ = seconds(columns.pop(TIME), table.source)
-    return Part(time, columns, table.source, table.sha256, table.notes, {}, table.start)
+    stamps = columns.pop(TIME)
+    time, _ = seconds(stamps, table.source)
+    start = table.start if table.start is not None else start_of(stamps, time)
+    return Part(time, columns, table.source, table.sha256, (*table.notes, *unset), {}, start)
+
+
+def _time_unit(table: LogTable) -> str:
+    return table.units.get(TIME, "s")
 
 
 def _require(table: LogTable) -> None:

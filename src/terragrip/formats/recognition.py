@@ -27,7 +27,7 @@ _NOT_MEASURED = {
     *("temp", "temperature", "voltage", "volt", "status", "state", "id", "count", "index", "idx", "raw", "engine"),
 }  # fmt: skip
 _TURNING = {"omega", "w", "rpm", "vel", "velocity", "speed", "rps", "wheelspeed", "rotation"}
-_TORQUE = {"torque", "m", "moment", "tq", "trq", "tau"}
+_TORQUE = {"torque", "effort", "m", "moment", "tq", "trq", "tau"}
 _CURRENT = {"current", "curr", "amp", "amps", "i"}
 _SPEED = {"speed", "velocity", "vel", "v", "vx", "groundspeed", "sog"}
 _OVER_GROUND = {
@@ -88,8 +88,10 @@ class Proposal:
         return (found,) if isinstance(found, str) else tuple(found) if isinstance(found, list) else ()
 
 
-def find_time(numbers: Mapping[str, Floats], dates: tuple[str, ...] = ()) -> tuple[str, str] | None:
-    """The time column and its unit, or None: by name, then by running forward."""
+def find_time(
+    numbers: Mapping[str, Floats], dates: tuple[str, ...], units: Mapping[str, str]
+) -> tuple[str, str] | None:
+    """The time column and its unit, or None: by name, then by running forward; a unit of ``units``, the log's own, counts first."""
     best: tuple[int, str] | None = None
     for name, values in numbers.items():
         words = _words(name)
@@ -101,6 +103,9 @@ def find_time(numbers: Mapping[str, Floats], dates: tuple[str, ...] = ()) -> tup
             best = score, name
     if best is None:
         return (dates[0], "s") if dates else None
+    stated = units.get(best[1])
+    if stated is not None and _fits(stated, "s"):
+        return best[1], stated
     return best[1], _time_unit(best[1], numbers[best[1]])
 
 

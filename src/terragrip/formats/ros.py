@@ -18,6 +18,9 @@ from terragrip.formats.rosbag1 import Connection, records
 from terragrip.formats.signals import Signal, SignalLog
 from terragrip.formats.table import Wanted
 
+_ZSTD = b"\x28\xb5\x2f\xfd"
+_LARGEST_MESSAGE = 1 << 28  # bytes that one may unpack to
+
 
 def read_ros1(path: str, wanted: Wanted | None, databases: Databases) -> SignalLog:
     """Read a ROS 1 bag by topic and field, with or without an index; raises InputError if it is damaged from the start.
@@ -214,12 +217,26 @@ def _collect(
             for place, number, receipt, raw in rows:
                 seen.messages += 1
                 topic, form = known[number]
-                topic.push(receipt * 1e-9, raw, form)
+                topic.push(receipt * 1e-9, unpacked(raw), form)
                 if not topic.is_wanted:
                     last = place
                     break
             else:
                 break
+
+
+def unpacked(raw: bytes) -> bytes:
+    """A message of ROS 2 that may be packed by zstd on its own (rosbag2's compression mode MESSAGE); unpackable ones as they are.
+
+    CDR never begins as zstd does, so that no metadata are needed to tell.
+    """
+    if not raw.startswith(_ZSTD):
+        return raw
+    zstandard = needed("zstandard", "a ROS 2 bag with packed messages")
+    try:
+        return bytes(zstandard.ZstdDecompressor().decompress(raw, max_output_size=_LARGEST_MESSAGE))
+    except zstandard.ZstdError:
+        return raw  # which no message is: its topic counts it
 
 
 def _topics_of(

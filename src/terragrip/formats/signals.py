@@ -9,14 +9,12 @@ import numpy as np
 import numpy.typing as npt
 
 from terragrip.errors import InputError
-from terragrip.formats.table import LogTable
+from terragrip.formats.table import SINCE_1970, LogTable
 from terragrip.recording.schema import TIME
 
 Floats = npt.NDArray[np.float64]
 
 _SAME = 1e-3  # share of the shortest typical spacing within which two stamps are one instant
-SINCE_1970 = 1e8
-"""Larger stamps [s] count from 1970, smaller ones from some start of their own."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,6 +57,9 @@ class SignalLog:
         lost = sum(int(np.sum(~np.isfinite(t))) for t in clocks.values())
         if lost:
             notes.append(f"{lost} stamps are not finite, and their samples were left out.")
+        unset = sum(int(np.sum(t < _clock_set_at(t))) for t in clocks.values())
+        if unset:
+            notes.append(f"{unset} samples were stamped before the logger's clock was set, and left out.")
         orders = {key: _order(t) for key, t in clocks.items()}
         base, rows = _union([clocks[key][order] for key, order in orders.items()])
         if not len(base):
@@ -98,11 +99,18 @@ def _other_time(name: str) -> str:
     return f"signal.{TIME}" if name == TIME else name
 
 
+def _clock_set_at(time: Floats) -> float:
+    """The least stamp that counts: of a clock (n,) most of which counts from 1970, earlier ones are from before it was set."""
+    return SINCE_1970 if 2 * np.count_nonzero(time > SINCE_1970) > len(time) else -np.inf
+
+
 def _order(time: Floats) -> npt.NDArray[np.intp] | slice:
-    """Places (m,) of the finite stamps in the order of time; all of them where they are in order."""
-    if bool(np.isfinite(time).all()) and bool((time[1:] >= time[:-1]).all()):
+    """Places (m,) of the stamps that count, in the order of time; all of them where they are in order."""
+    floor = _clock_set_at(time)
+    in_order = bool(np.isfinite(time).all()) and bool((time[1:] >= time[:-1]).all())
+    if in_order and not (len(time) and time[0] < floor):
         return slice(None)
-    known = np.flatnonzero(np.isfinite(time))
+    known = np.flatnonzero(np.isfinite(time) & (time >= floor))
     return known[np.argsort(time[known], kind="stable")]
 
 

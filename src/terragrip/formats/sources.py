@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -10,11 +11,11 @@ import numpy as np
 import numpy.typing as npt
 
 from terragrip.errors import InputError
-from terragrip.formats.clocks import offset_between
+from terragrip.formats.clocks import lag_between, speed_of
 from terragrip.formats.conversion import Part
 from terragrip.formats.signals import Signal, SignalLog
 from terragrip.recording import Recording
-from terragrip.recording.schema import LABELS, TIME, unit_of
+from terragrip.recording.schema import TIME, unit_of
 
 Floats = npt.NDArray[np.float64]
 
@@ -73,34 +74,22 @@ def _shift(reference: Part, part: Part) -> tuple[float, str]:
     stated, reach = 0.0, None
     if reference.start is not None and part.start is not None:
         stated, reach = reference.start - part.start, _REACH
+    elif (reference.start is None) != (part.start is None) and len(reference.time) and len(part.time):
+        stated = float(part.time[0] - reference.time[0])  # only one counts from 1970: they start together
     name = Path(str(part.source)).name
-    mine, theirs = _speed(reference), _speed(part)
+    mine, theirs = speed_of(reference.time, reference.columns), speed_of(part.time, part.columns)
     found = None
     if mine is not None and theirs is not None:
-        found = offset_between(mine, (theirs[0] - stated, theirs[1]), reach=reach)
+        found = lag_between(mine, replace(theirs, time=theirs.time - stated), reach=reach)
     if found is None:
         how = "counts from 1970 as the first does" if reach is not None else "starts with the first one"
         return stated, f"The clock of {name} is taken as it is (it {how}): the speeds do not tell an offset."
     side = "ahead of" if found.seconds >= 0 else "behind"
     beyond = "its stamps" if reach is not None else "its start"
-    return stated + found.seconds, (
+    said = (
         f"The clock of {name} is {abs(found.seconds):.3f} ± {found.std:.3f} s {side} the first one beyond {beyond}, by the "
-        f"correlation of the speeds ({found.correlation:.3f}), and was set right."
+        f"correlation of the speeds ({found.correlation:.3f})"
     )
-
-
-def _speed(part: Part) -> tuple[Floats, Floats] | None:
-    """Time and a speed of any scale: over ground, of the drive train, or of the wheels on average."""
-    for name in ("ground_speed", "wheel_based_speed"):
-        if name in part.columns and np.isfinite(part.columns[name]).sum() > 2:
-            return part.time, np.abs(part.columns[name])
-    wheels = [v for n, v in part.columns.items() if n.startswith("wheel_speed_") and n not in LABELS]
-    if not wheels:
-        return None
-    known = [np.isfinite(v) for v in wheels]
-    filled = [
-        np.interp(part.time, part.time[k], np.abs(v[k]))
-        for v, k in zip(wheels, known, strict=True)
-        if k.any()
-    ]
-    return (part.time, np.mean(filled, axis=0)) if filled else None
+    if not found.is_of_the_clock:
+        return stated, f"{said}; {found.why_not}, so it is taken as it is."
+    return stated + found.seconds, f"{said}, and was set right."

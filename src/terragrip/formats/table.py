@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -14,6 +14,9 @@ from terragrip.recording.schema import unit_of
 from terragrip.units import UnitError, factor_to
 
 Wanted = Callable[[str], bool]
+SINCE_1970 = 1e8
+"""Larger stamps [s] count from 1970, smaller ones from some start of their own."""
+_FIRST = 1000  # rows in which a logger's clock is set, if it was not
 _SAMPLES = 10_000  # of a signal that are kept or left out together, where a log is looked at in parts
 
 
@@ -82,6 +85,28 @@ def in_si(table: LogTable) -> dict[str, npt.NDArray[Any]]:
         if factor != 1.0:
             columns[name] = columns[name] * np.float64(factor)
     return columns
+
+
+def since_clock_was_set(table: LogTable, column: str, unit: str) -> tuple[LogTable, list[str]]:
+    """The table without first rows that were stamped before the logger's clock was set, and a note on them.
+
+    ``column`` holds the stamps in ``unit``. A jump ahead by years within the first rows tells: 0 s, then seconds since 1970.
+    """
+    stamps = table.columns[column][: _FIRST + 1]
+    if stamps.dtype.kind not in "fiuM" or len(stamps) < 2:
+        return table, []
+    tick = factor_to(unit, "s") if stamps.dtype.kind != "M" else 1.0
+    steps = np.diff(stamps.astype(np.float64) if stamps.dtype.kind != "M" else stamps)
+    seconds = steps / np.timedelta64(1, "s") if stamps.dtype.kind == "M" else steps * tick
+    with np.errstate(invalid="ignore"):
+        jumps = np.flatnonzero(seconds > SINCE_1970)
+    if not len(jumps):
+        return table, []
+    count = int(jumps[-1]) + 1
+    kept = {name: values[count:] for name, values in table.columns.items()}
+    rows = "row was" if count == 1 else "rows were"
+    said = f"The first {count} {rows} stamped before the logger's clock was set ({stamps[0]}, then {stamps[count]}), and left out."
+    return replace(table, columns=kept), [said]
 
 
 def from_arrow(name: str, column: Any, source: str | None) -> npt.NDArray[Any]:

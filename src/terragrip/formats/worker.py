@@ -1,11 +1,13 @@
 """A process of its own for a library whose C code a damaged file can crash, or send out of bounds.
 
-The worker is a module that calls `serve`; who wants the file's content runs it by `Worker`. Standard output carries JSON
-lines and NumPy arrays, standard input JSON lines. Memory and processor time of the worker are bounded.
+The worker is a module that calls `serve`; who wants a file's content runs it by `Worker`. Standard output carries JSON lines and NumPy
+arrays, standard input JSON lines: a path, then what the two sides agree on. Memory and processor time are bounded for each file.
+A process that has ended a file waits for the next one, since importing the library takes longer than a small file.
 """
 
 from __future__ import annotations
 
+import atexit
 import contextlib
 import json
 import os
@@ -27,6 +29,10 @@ _SECONDS, _BYTES_A_SECOND = 60, 1 << 20  # of the processor: so many, and one mo
 _ENDED = "it ends the reader"
 
 
+_idle: dict[tuple[str, int], list[subprocess.Popen[bytes]]] = {}
+"""Processes that wait for a file, by module and by the process that started them: a forked child must not share its parent's."""
+
+
 class Worker:
     """The process that reads a file, and what it says. Raises InputError where the reader fails or ends.
 
@@ -35,24 +41,37 @@ class Worker:
 
     def __init__(self, module: str, package: str, path: str, kind: str) -> None:
         self._module, self._path, self._kind = module, path, kind
+        self._has_ended = self._is_lost = False
         if find_spec(package) is None:
             needed(package, f"a {kind}")  # says what to install
 
     def __enter__(self) -> Self:
-        self._process = subprocess.Popen(
-            [sys.executable, "-W", "ignore", "-m", self._module, self._path],
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.DEVNULL,
-        )
+        waiting = [p for p in _idle.pop((self._module, os.getpid()), []) if p.poll() is None]
+        self._process = waiting.pop() if waiting else _started(self._module)
+        _idle[self._module, os.getpid()] = waiting
+        self.say(self._path)
         return self
 
-    def __exit__(self, *failure: object) -> None:
+    def __exit__(self, kind: type[BaseException] | None, *failure: object) -> None:
+        if self._is_lost or (kind is not None and not issubclass(kind, Exception)):
+            self._kill()
+            return
+        try:
+            if not self._has_ended:
+                self.say(None)  # nothing more is asked for
+            while not self._has_ended:
+                self.hear()
+        except (InputError, ValueError):  # it was still sending, or is gone
+            self._kill()
+            return
+        _idle.setdefault((self._module, os.getpid()), []).append(self._process)
+
+    def _kill(self) -> None:
         self._process.kill()
         self._process.communicate()
 
     def say(self, message: Any) -> None:
-        """Tell the worker something."""
+        """Send the worker something."""
         assert self._process.stdin is not None
         try:
             self._process.stdin.write(json.dumps(message).encode() + b"\n")
@@ -67,6 +86,7 @@ class Worker:
         if not line.endswith(b"\n"):
             raise self._damaged(_ENDED)
         message: dict[str, Any] = json.loads(line)
+        self._has_ended = "end" in message or "error" in message
         if "error" in message:
             raise self._damaged(str(message["error"]))
         return message
@@ -84,9 +104,27 @@ class Worker:
         return self._process.stdout.read(size)
 
     def _damaged(self, why: str) -> InputError:
+        self._is_lost = self._is_lost or why == _ENDED
         said = " ".join(why.split())[:100]
         mend = "copy or record it again"
         return InputError(f"is a damaged {self._kind}, or none ({said})", file=self._path, mend=mend)
+
+
+def _started(module: str) -> subprocess.Popen[bytes]:
+    return subprocess.Popen(
+        [sys.executable, "-W", "ignore", "-m", module],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.DEVNULL,
+    )
+
+
+@atexit.register
+def _end_all() -> None:
+    for (_, owner), waiting in _idle.items():
+        for process in waiting if owner == os.getpid() else ():
+            process.kill()
+            process.communicate()
 
 
 class Outlet:
@@ -112,30 +150,29 @@ class Outlet:
 
 
 def serve(package: str, work: Callable[[str, Outlet], None]) -> int:
-    """Do ``work`` on the file that the command line names; anything that goes wrong becomes a message with the reason."""
+    """Do ``work`` on the files that standard input names; anything that goes wrong becomes a message with the reason."""
     out = Outlet(os.fdopen(os.dup(sys.stdout.fileno()), "wb"))
     os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # what libraries print is none of it
-    try:
-        __import__(package)
-        _limit(sys.argv[1])
-        work(sys.argv[1], out)
-        out.say({"end": True})
-    except Exception as error:  # noqa: BLE001 - whatever a damaged file brings is told to the one who asked
-        with contextlib.suppress(OSError):
-            out.say({"error": f"{type(error).__name__}: {error}"[:200]})
-        return 1
+    while line := sys.stdin.readline():
+        try:
+            __import__(package)
+            path = json.loads(line)
+            _limit(path)
+            work(path, out)
+            out.say({"end": True})
+        except Exception as error:  # noqa: BLE001 - whatever a damaged file brings is told to the one who asked
+            with contextlib.suppress(OSError):
+                out.say({"error": f"{type(error).__name__}: {error}"[:200]})
     return 0
 
 
 def _limit(path: str) -> None:
-    """Bound what a damaged file may cost."""
+    """Bound what a damaged file may cost, beyond what the process has taken so far."""
     with open("/proc/self/statm") as stream:
         taken = int(stream.read().split()[0]) * resource.getpagesize()
     size = os.path.getsize(path)  # which may be mapped
-    for what, most in (
-        (resource.RLIMIT_AS, taken + size + _MEMORY),
-        (resource.RLIMIT_CPU, _SECONDS + size // _BYTES_A_SECOND),
-    ):
-        hard = resource.getrlimit(what)[1]
-        limit = most if hard == resource.RLIM_INFINITY else min(most, hard)
-        resource.setrlimit(what, (limit, hard))
+    used = resource.getrusage(resource.RUSAGE_SELF)
+    seconds = int(used.ru_utime + used.ru_stime) + _SECONDS + size // _BYTES_A_SECOND
+    for what, most in ((resource.RLIMIT_AS, taken + size + _MEMORY), (resource.RLIMIT_CPU, seconds)):
+        hard = resource.getrlimit(what)[1]  # stays, so that the next file may have more
+        resource.setrlimit(what, (most if hard == resource.RLIM_INFINITY else min(most, hard), hard))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
+from importlib.util import find_spec
 from typing import Any
 
 from terragrip.errors import InputError
@@ -24,6 +25,12 @@ def check(uri: Uri) -> str:
     if interface not in INTERFACES:
         raise InputError(
             f"there is no interface {interface!r}", place=uri.text, mend=f"one of {', '.join(INTERFACES)}"
+        )
+    if interface == "udp_multicast" and find_spec("msgpack") is None:
+        raise InputError(
+            "udp_multicast needs the Python package 'msgpack'",
+            place=uri.text,
+            mend="pip install 'terragrip[live]'",
         )
     return interface
 

@@ -11,6 +11,13 @@ from terragrip.formats.can.frames import NO_SENDER, Frames, Payloads, of_sender
 from terragrip.formats.signals import Signal
 
 
+def identifier_text(identifier: int) -> str:
+    """An identifier as it is written, with its parameter group where it has 29 bits: ``18FEF117 (PGN 65265)``."""
+    if not identifier & EXTENDED:
+        return f"{identifier:03X}"
+    return f"{identifier & ~EXTENDED:08X} (PGN {group_of(identifier)})"
+
+
 def names_of(frames: Frames) -> tuple[str, ...]:
     """All signals of the messages that occur; those of one of several senders also by ``Name@F0``."""
     found: dict[str, None] = {}
@@ -87,11 +94,10 @@ def _on_frames(frames: Frames) -> list[str]:
         said.append(f"None of the DBC's messages occurs in the log ({', '.join(sorted(given)[:6])}).")
     if frames.unknown:
         count, total = len(frames.unknown), sum(frames.unknown.values())
-        groups = {group_of(i) for i in frames.unknown if i & EXTENDED}
-        what = (
-            f", among them the parameter groups {', '.join(map(str, sorted(groups)[:6]))}" if groups else ""
-        )
-        said.append(f"{total} of {frames.count} frames ({count} identifiers) are in no DBC or table{what}.")
+        often = sorted(frames.unknown, key=lambda i: (-frames.unknown[i], i))
+        shown = ", ".join(map(identifier_text, often[:6])) + (f" and {count - 6} more" if count > 6 else "")
+        what = "identifier" if count == 1 else "identifiers"
+        said.append(f"{total} of {frames.count} frames are in no DBC or table, those of the {what} {shown}.")
     if frames.transport.broken:
         said.append(f"{frames.transport.broken} messages of several frames lack a part and were left out.")
     return said

@@ -4,18 +4,26 @@ from __future__ import annotations
 
 import io
 import os
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
-from typing import Any
 
 from terragrip.errors import InputError
 from terragrip.files import sha256, unreadable
 from terragrip.formats.boundary import DAMAGE, needed
 from terragrip.formats.can.blf import frames_of
-from terragrip.formats.can.catalog import EXTENDED, catalog
-from terragrip.formats.can.decoding import names_of, signals_of
+from terragrip.formats.can.catalog import catalog
+from terragrip.formats.can.decoding import identifier_text, names_of, signals_of
 from terragrip.formats.can.frames import Frames
-from terragrip.formats.can.text_logs import Count, Frame, asc_lines, candump, layout_of, table
+from terragrip.formats.can.text_logs import (
+    Count,
+    Frame,
+    Numbered,
+    asc_lines,
+    by_python_can,
+    candump,
+    layout_of,
+    table,
+)
 from terragrip.formats.signals import SignalLog
 from terragrip.formats.table import Wanted
 
@@ -38,12 +46,12 @@ def read_blf(path: str, wanted: Wanted | None, databases: Databases) -> SignalLo
 
 def read_asc(path: str, wanted: Wanted | None, databases: Databases) -> SignalLog:
     """Vector ASC, by python-can; time counts from the start of the measurement."""
-    return _by_python_can(path, "ASCReader", "ASC log", wanted, databases)
+    return _text_by_python_can(path, "ASCReader", "ASC log", wanted, databases)
 
 
 def read_trc(path: str, wanted: Wanted | None, databases: Databases) -> SignalLog:
     """PEAK TRC, by python-can."""
-    return _by_python_can(path, "TRCReader", "TRC log", wanted, databases)
+    return _text_by_python_can(path, "TRCReader", "TRC log", wanted, databases)
 
 
 def read_candump(path: str, wanted: Wanted | None, databases: Databases) -> SignalLog:
@@ -79,10 +87,16 @@ def finished(
     if not frames.count:
         raise InputError("holds no CAN frame", file=path, mend="check that the bus was recorded")
     if not frames.seen and refuse_unknown:
-        shown = ", ".join(_shown(i) for i in sorted(frames.unknown)[:6])
+        count = len(frames.unknown)
+        shown = ", ".join(map(identifier_text, sorted(frames.unknown)[:6])) + (", ..." if count > 6 else "")
         what = "the DBC" if databases else "the built-in table of J1939"
+        which = (
+            f"its only identifier, {shown}, is not"
+            if count == 1
+            else f"none of its {count} identifiers ({shown}) is"
+        )
         raise InputError(
-            f"none of its {len(frames.unknown)} identifiers is in {what} ({shown})",
+            f"{which} in {what}",
             file=path,
             mend="give the bus's DBC: --dbc FILE, or 'dbc:' in the profile",
         )
@@ -93,24 +107,17 @@ def finished(
     return SignalLog(names_of(frames), signals, path, sha256(path), (*notes, *said))
 
 
-def _shown(identifier: int) -> str:
-    return f"{identifier & ~EXTENDED:08X}" if identifier & EXTENDED else f"{identifier:03X}"
-
-
-def _by_python_can(
+def _text_by_python_can(
     path: str, reader: str, kind: str, wanted: Wanted | None, databases: Databases
 ) -> SignalLog:
     can = needed("can", f"a {kind}")
 
-    def take(frames: Frames) -> None:
-        # Opened here, since a reader that refuses the file leaves it open.
-        with open(path, encoding="utf-8", errors="replace") as stream:
-            messages = getattr(can, reader)(stream)
-            if reader == "ASCReader":
-                messages.file = asc_lines(_bounded(stream), frames)
-            _take_messages(frames, messages)
+    def parse(lines: Iterator[str], count: Count, frames: Frames) -> Iterator[Frame]:
+        raw = Numbered(lines)
+        own = asc_lines(raw, frames) if reader == "ASCReader" else raw
+        return by_python_can(getattr(can, reader)(io.StringIO()), own, raw, count, (*DAMAGE, can.CanError))
 
-    return _as_far_as_it_goes(path, kind, wanted, databases, take, can.CanError)
+    return _from_lines(path, kind, wanted, databases, parse)
 
 
 def _as_far_as_it_goes(
@@ -135,18 +142,6 @@ def _as_far_as_it_goes(
             f"The log is damaged after frame {frames.count} ({said}); the frames before it were read."
         )
     return finished(frames, path, notes, databases)
-
-
-def _take_messages(frames: Frames, messages: Iterable[Any]) -> None:
-    for message in messages:
-        if message.is_error_frame or message.is_remote_frame:
-            continue
-        identifier = message.arbitration_id
-        frames.take(
-            message.timestamp,
-            identifier | EXTENDED if message.is_extended_id else identifier,
-            bytes(message.data),
-        )
 
 
 def _from_lines(
@@ -177,7 +172,10 @@ def _from_lines(
         raise InputError(problem, file=path, place=place, mend=mend)
     notes = []
     if count.bad:
-        notes.append(f"{count.bad} lines hold no frame, the first is line {count.first}; they were left out.")
+        what = (
+            "1 line holds no frame:" if count.bad == 1 else f"{count.bad} lines hold no frame, the first is"
+        )
+        notes.append(f"{what} line {count.first} ({count.shown!r}); left out.")
     scale = 1.0
     span = last - (frames.first or 0.0)
     if (
@@ -194,8 +192,7 @@ def _from_lines(
     return finished(frames, path, notes, databases, scale)
 
 
-def _bounded(lines: Iterable[str], most: int = 4096) -> Iterator[str]:
+def _bounded(lines: io.TextIOBase, most: int = 4096) -> Iterator[str]:
     """Lines of no more than ``most`` characters, since a damaged file may have no line ends at all."""
-    reader = lines.readline  # type: ignore[attr-defined]
-    while line := reader(most):
+    while line := lines.readline(most):
         yield line

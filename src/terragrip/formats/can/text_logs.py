@@ -9,6 +9,7 @@ import re
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from datetime import UTC, datetime
+from typing import Any
 
 from terragrip.formats.can.catalog import EXTENDED
 from terragrip.formats.can.frames import Frames
@@ -26,6 +27,12 @@ _SPACED = re.compile(
     + r"(?:[RT]X\s+\S+\s+\S+\s+)?([0-9A-Fa-f]{3}|[0-9A-Fa-f]{8})\s+\[\s*\d+\]\s*((?:[0-9A-Fa-f]{2}\s?)*)"
 )
 _UNSTAMPED = re.compile(r"\s*\w+\s+(?:[0-9A-Fa-f]{3}|[0-9A-Fa-f]{8})(?:#|\s+\[)")
+_ASC_REMARK = re.compile(
+    r"\s*(?:$|//|\d+\.\d+\s|date\b|base\b|(?:no\s+)?internal\b|(?:begin|end)\s+trigger)", re.IGNORECASE
+)
+_TRC_REMARK = re.compile(
+    r"\s*(?:$|;|\d+\)?\s+[\d.]+\s+(?:\d+\s+)?(?:Warng|Error|Event|ER|ST|EC|EV|RR|FFFFFFFF)\b)", re.IGNORECASE
+)
 _STAMP = re.compile(r"\d+\.\d+")
 _NO_DATA = re.compile(r"#R\d?\b|remote request|ERRORFRAME|\b2[0-9A-Fa-f]{7}[# ]")
 _HEAD, _BACK, _LONGEST_STEP = (
@@ -118,6 +125,62 @@ def _seconds(stamp: str) -> float:
     whole, _, part = stamp.partition(".")
     date = datetime.strptime(whole, "%Y-%m-%d %H:%M:%S").replace(tzinfo=UTC)
     return date.timestamp() + float(f"0.{part}")
+
+
+class Numbered:
+    """Lines, with the number of the last one."""
+
+    def __init__(self, lines: Iterable[str]) -> None:
+        self._lines, self.number = iter(lines), 0
+
+    def __iter__(self) -> Numbered:
+        return self
+
+    def __next__(self) -> str:
+        line = next(self._lines)
+        self.number += 1
+        return line
+
+
+def by_python_can(
+    reader: Any, lines: Iterable[str], raw: Numbered, count: Count, errors: tuple[type[Exception], ...]
+) -> Iterator[Frame]:
+    """Frames of an ASC or TRC log by a ``reader`` of python-can, which goes on behind lines that it cannot read; those are counted.
+
+    ``lines`` are those of ``raw`` that are of use; ``errors``: what the reader raises. Its ``file`` is whatever gives lines.
+    """
+    is_asc = type(reader).__name__ == "ASCReader"
+    remark = _ASC_REMARK if is_asc else _TRC_REMARK
+    number, shown, in_doubt = 0, "", False
+
+    def fed() -> Iterator[str]:
+        nonlocal number, shown, in_doubt
+        for line in lines:
+            if in_doubt:  # the reader made no frame of the one before, and said nothing
+                count.add(number, shown)
+            number, shown, in_doubt = raw.number, line, not remark.match(line)
+            yield line
+
+    reader.file = source = fed()
+    failed_at = -1
+    while True:
+        try:
+            for message in reader:
+                in_doubt = False
+                if not (message.is_error_frame or message.is_remote_frame):
+                    wide = EXTENDED if message.is_extended_id else 0
+                    yield message.timestamp, message.arbitration_id | wide, bytes(message.data)
+            break
+        except errors:
+            if number == failed_at:  # it did not get any further
+                break
+            failed_at = number
+            count.add(number, shown)
+            in_doubt = False
+            # A reader that begins anew looks for its header, and for ASC drops the line that ends it.
+            reader.file = (line for part in (["\n"] if is_asc else [], source) for line in part)
+    if in_doubt:
+        count.add(number, shown)
 
 
 def asc_lines(lines: Iterable[str], frames: Frames) -> Iterator[str]:

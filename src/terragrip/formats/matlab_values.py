@@ -1,0 +1,34 @@
+"""What stands in a MATLAB file beside structs, lists and texts: numbers that are read when they are asked for, and objects."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy.typing as npt
+
+
+@dataclass(frozen=True)
+class Opaque:
+    """A value that holds no signal that can be read; ``kind`` names its MATLAB class where it is known."""
+
+    kind: str = ""
+
+
+@dataclass(frozen=True, eq=False)
+class Array:
+    """A numeric array, read when it is asked for; ``shape`` as in MATLAB.
+
+    ``part`` reads some rows of one column of a vector or matrix; without it the whole array is read for that.
+    """
+
+    shape: tuple[int, ...]
+    read: Callable[[], npt.NDArray[Any]]
+    part: Callable[[slice, int], npt.NDArray[Any]] | None = None
+
+    def column(self, number: int, length: int, rows: slice = slice(None)) -> npt.NDArray[Any]:
+        """Some rows of a column, where the array has ``length`` rows (or is a vector of as many numbers)."""
+        if self.part is not None:
+            return self.part(rows, number)
+        return self.read().reshape(length, -1)[rows, number]

@@ -1,0 +1,185 @@
+"""Stamps and clocks: the header's unit of time, loggers whose clock was not set, lags between files and within one."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+import terragrip as tg
+from terragrip.errors import InputError
+from terragrip.formats import Profile, inspect, iter_csv
+from terragrip.formats.clocks import Speed, lag_between
+from test_sources import nmea
+
+TIME = np.round(np.arange(0, 200, 0.05), 2)
+EPOCH = 1.7e9
+
+
+def speed_at(time: np.ndarray) -> np.ndarray:
+    """A drive with stops that take seconds, as a vehicle's do, and turns of pace."""
+    pace = 1.5 + 0.6 * np.sin(time / 9) + 0.3 * np.sin(time / 2.3) + 0.2 * np.sin(time / 31)
+    phase = time % 83.0
+    return pace * (
+        1 - 0.45 * (1 + np.tanh((phase - 30.0) / 0.7)) + 0.45 * (1 + np.tanh((phase - 40.0) / 0.7))
+    )
+
+
+def table(time: np.ndarray, ground: np.ndarray, wheels: np.ndarray) -> pd.DataFrame:
+    return pd.DataFrame(
+        {"time": time, "ground_speed": ground, "wheel_speed_l": wheels, "wheel_speed_r": wheels}
+    )
+
+
+def noisy(values: np.ndarray, seed: int, size: float) -> np.ndarray:
+    return np.round(values + size * np.random.default_rng(seed).standard_normal(len(values)), 5)
+
+
+def put(path: Path, frame: pd.DataFrame, **names: str) -> Path:
+    frame.rename(columns=names).to_csv(path, index=False)
+    return path
+
+
+@pytest.mark.parametrize(("unit", "scale"), [("ms", 1e3), ("s", 1.0), ("min", 1 / 60)])
+def test_the_unit_of_time_in_the_header_counts(tmp_path: Path, unit: str, scale: float) -> None:
+    frame = table(TIME * scale, speed_at(TIME), 5 * speed_at(TIME))
+    own = tg.read(put(tmp_path / "own.csv", frame, time=f"time [{unit}]"))
+    assert own.time[-1] == pytest.approx(TIME[-1])
+    log = put(tmp_path / "log.csv", frame, time=f"t [{unit}]")
+    profile = {
+        "time": {"from": "t"},
+        "channels": {n: n for n in ("ground_speed", "wheel_speed_l", "wheel_speed_r")},
+    }
+    assert tg.read(log, Profile.from_dict(profile)).time[-1] == pytest.approx(TIME[-1])
+    blocks = iter_csv(log, Profile.from_dict(profile))
+    assert blocks is not None
+    assert [block.time[-1] for block in blocks][-1] == pytest.approx(TIME[-1])
+    seen = inspect(log)
+    assert seen.time is not None
+    assert seen.time.duration == pytest.approx(TIME[-1])
+    proposed = tmp_path / "proposed.yaml"
+    proposed.write_text(seen.profile)
+    assert tg.read(log, proposed).time[-1] == pytest.approx(TIME[-1])
+
+
+def test_a_profile_that_gives_another_unit_of_time_counts_and_is_noted(tmp_path: Path) -> None:
+    frame = table(TIME, speed_at(TIME), 5 * speed_at(TIME))
+    log = put(tmp_path / "log.csv", frame, time="t [ms]")
+    channels = {n: n for n in ("ground_speed", "wheel_speed_l", "wheel_speed_r")}
+    recording = tg.read(log, Profile.from_dict({"time": {"from": "t", "unit": "s"}, "channels": channels}))
+    assert recording.time[-1] == pytest.approx(TIME[-1])
+    assert "The log states ms for t; the profile's s counts." in recording.notes
+
+
+@pytest.mark.parametrize("unit", ["1/min", "min-1", "min^-1", "min⁻¹", "U/min", "RPM", "rpm", "r/min"])
+def test_turns_a_minute_however_they_are_written(tmp_path: Path, unit: str) -> None:
+    frame = table(TIME, speed_at(TIME), 60 / (2 * np.pi) * 5 * speed_at(TIME))
+    log = put(
+        tmp_path / "log.csv",
+        frame,
+        wheel_speed_l=f"wheel_speed_l [{unit}]",
+        wheel_speed_r=f"wheel_speed_r ({unit})",
+    )
+    recording = tg.read(log)
+    assert np.allclose(recording["wheel_speed_l"], 5 * speed_at(TIME))
+    assert np.allclose(recording["wheel_speed_r"], 5 * speed_at(TIME))
+
+
+def test_a_header_with_more_names_than_cells_is_refused_by_its_row(tmp_path: Path) -> None:
+    log = tmp_path / "log.csv"
+    rows = "".join(f"{t},1.{k % 7},2.{k % 5}\n" for k, t in enumerate(TIME[:50]))
+    log.write_text("time,ground_speed,wheel_speed_l,wheel_speed_r,drawbar_force,soil\n" + rows)
+    with pytest.raises(InputError, match=r"row 1: has 3 cells, the header 6"):
+        tg.read(log)
+
+
+@pytest.mark.parametrize(
+    "profile", [None, {"channels": {"ground_speed": "ground_speed", "wheel_speed_l": "wheel_speed_l"}}]
+)
+def test_rows_from_before_the_clock_was_set_are_left_out(
+    tmp_path: Path, profile: dict[str, object] | None
+) -> None:
+    frame = table(np.r_[0.0, 0.05, EPOCH + TIME[2:]], speed_at(TIME), 5 * speed_at(TIME))
+    log = put(tmp_path / "log.csv", frame)
+    chosen = None if profile is None else Profile.from_dict(profile)
+    recording = tg.read(log, chosen)
+    assert recording.time[-1] - recording.time[0] == pytest.approx(TIME[-1] - TIME[2])
+    assert any("first 2 rows were stamped before the logger's clock was set" in n for n in recording.notes)
+    blocks = iter_csv(log, chosen)
+    assert blocks is not None
+    assert np.array_equal(np.concatenate([block.time for block in blocks]), recording.time)
+
+
+def test_a_table_since_1970_beside_a_receiver(tmp_path: Path) -> None:
+    from can_frames import START
+
+    wheels = pd.DataFrame(
+        {"time": START + TIME, "wheel_speed_l": 5 * speed_at(TIME), "wheel_speed_r": 5 * speed_at(TIME)}
+    )
+    log = put(tmp_path / "wheels.csv", wheels)
+    fixes = np.arange(5, 195, 0.2)
+    gnss = nmea(tmp_path / "gnss.nmea", fixes, speed_at(fixes), late=0.0)
+    for paths in ([log, gnss], [gnss, log]):
+        recording = tg.read(paths)
+        assert recording.time[-1] - recording.time[0] == pytest.approx(TIME[-1], abs=0.1)
+    late = put(tmp_path / "late.csv", wheels.assign(time=TIME))  # a clock that does not say since when
+    recording = tg.read([gnss, late])
+    assert recording.time[-1] - recording.time[0] < 210
+
+
+@pytest.mark.parametrize("seed", range(1000, 1006))
+def test_a_vehicle_that_follows_its_wheels_is_no_wrong_clock(seed: int) -> None:
+    rim = speed_at(TIME)
+    slip = np.gradient(np.convolve(rim, np.ones(21) / 21, "same"), TIME) / (
+        9.81 * 2.5
+    )  # of a pull that rises by 2.5 per slip
+    wheels = Speed(TIME, noisy(5 * rim, seed, 0.02), None)
+    ground = Speed(TIME, noisy(rim * (1 - slip), seed + 100, 0.02), float(np.median(rim)))
+    for lag in (lag_between(wheels, ground), lag_between(ground, wheels)):
+        assert lag is not None
+        assert not lag.is_of_the_clock, lag
+
+
+@pytest.mark.parametrize("seed", range(1000, 1006))
+def test_an_offset_within_twice_its_deviation_is_not_corrected(seed: int) -> None:
+    first = Speed(TIME, noisy(speed_at(TIME), seed, 0.1), 1.5)
+    second = Speed(TIME, noisy(speed_at(TIME), seed + 100, 0.1), 1.5)
+    lag = lag_between(first, second)
+    assert lag is not None
+    assert abs(lag.seconds) > 2 * lag.std or not lag.is_of_the_clock
+
+
+@pytest.mark.parametrize("seed", range(1000, 1004))
+@pytest.mark.parametrize("held", [False, True])
+def test_a_lag_within_one_file_is_found_and_said(tmp_path: Path, seed: int, held: bool) -> None:
+    """GNSS .2 s behind the wheels, at each row or held at 5 Hz; the profile's ``delay`` then takes it away."""
+
+    def ground(late: float) -> np.ndarray:
+        values = noisy(speed_at(TIME - late), seed, 0.01)
+        return values[np.arange(len(TIME)) // 4 * 4] if held else values
+
+    wheels = noisy(5 * speed_at(TIME), seed + 100, 0.05)
+    late = tg.read(put(tmp_path / "late.csv", table(TIME, ground(0.2), wheels)))
+    (said,) = [note for note in late.notes if "behind" in note]
+    found, spread = (float(said.split()[k]) for k in (2, 4))
+    assert found == pytest.approx(0.2, abs=0.03)
+    assert abs(found - 0.2) < 3 * spread
+    right = tg.read(put(tmp_path / "right.csv", table(TIME, ground(0.0), wheels)))
+    assert not [note for note in right.notes if "behind" in note]
+    channels = {
+        "ground_speed": {"from": "ground_speed", "delay": "0.2 s"},
+        **{n: n for n in ("wheel_speed_l", "wheel_speed_r")},
+    }
+    mended = tg.read(tmp_path / "late.csv", Profile.from_dict({"channels": channels}))
+    assert not [note for note in mended.notes if "behind" in note]
+
+
+def test_effort_is_a_torque(tmp_path: Path) -> None:
+    frame = table(TIME, speed_at(TIME), 5 * speed_at(TIME)).assign(
+        effort_l=15 + np.sin(TIME), effort_r=15 + np.cos(TIME)
+    )
+    seen = inspect(put(tmp_path / "log.csv", frame))
+    assert seen.recognised["drive_torque_l"] == ("effort_l",)
+    assert not any("No drive torque" in said for said in seen.missing)

@@ -1,0 +1,94 @@
+"""MATLAB files as people save them: names that differ in case, structs below their time vector, and files by MATLAB itself."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+import scipy.io
+
+from terragrip.errors import InputError
+from terragrip.formats import read_table
+from test_logs import write_hdf5
+
+TIME = np.arange(200) / 20
+SPEED = 1 + 0.2 * np.sin(TIME)
+HOT = 40 - 0.01 * TIME
+
+
+def saved(path: Path, version: str, content: dict[str, object]) -> Path:
+    if version == "5":
+        scipy.io.savemat(path, content)
+        return path
+    return write_hdf5(path, content)
+
+
+@pytest.mark.parametrize("version", ["5", "7.3"])
+@pytest.mark.parametrize(("first", "second"), [("t", "T"), ("T", "t"), ("Time", "TIME")])
+def test_of_names_that_differ_in_case_the_one_that_runs_forward_is_time(
+    tmp_path: Path, version: str, first: str, second: str
+) -> None:
+    table = read_table(saved(tmp_path / "log.mat", version, {first: TIME, second: HOT, "v": SPEED}))
+    assert np.allclose(table.columns["time"], TIME)
+    assert np.allclose(table.columns["v"], SPEED)
+    assert np.allclose(table.columns[second], HOT)
+    assert any(f"{first} is taken for time; {second} is a signal" in note for note in table.notes)
+
+
+@pytest.mark.parametrize("version", ["5", "7.3"])
+def test_a_time_vector_serves_the_structs_below_it(tmp_path: Path, version: str) -> None:
+    log = {
+        "t": TIME,
+        "front": {"v": SPEED, "deep": {"w": 2 * SPEED}},
+        "other": {"t": TIME[::2], "u": SPEED[::2]},
+    }
+    table = read_table(saved(tmp_path / "log.mat", version, {"log": log}))
+    assert np.allclose(table.columns["log.front.v"], SPEED)
+    assert np.allclose(table.columns["log.front.deep.w"], 2 * SPEED)
+    assert np.allclose(table.columns["log.other.u"][::2], SPEED[::2])  # its own time comes first
+
+
+@pytest.mark.parametrize("packed", [False, True])
+def test_numbers_of_any_class_agree_with_scipy(tmp_path: Path, packed: bool) -> None:
+    kinds = ("int8", "uint16", "int32", "uint64", "float32", "float64")
+    content = {"t": TIME, "text": "hällo", "empty": np.empty((0, 3)), "flag": np.array([[True]])}
+    content |= {kind: np.arange(len(TIME)).astype(kind) for kind in kinds}
+    content["matrix"] = np.arange(600.0).reshape(-1, 3)
+    scipy.io.savemat(tmp_path / "log.mat", content, do_compression=packed)
+    oracle, columns = scipy.io.loadmat(tmp_path / "log.mat"), read_table(tmp_path / "log.mat").columns
+    for kind in kinds:
+        assert np.array_equal(columns[kind], oracle[kind].ravel().astype(np.float64))
+    assert np.array_equal(columns["matrix[2]"], oracle["matrix"][:, 2])
+    assert set(columns) == {"time", *kinds, *(f"matrix[{k}]" for k in range(3))}
+
+
+@pytest.mark.parametrize("version", ["v7", "v73"])
+def test_tables_and_timetables_that_matlab_wrote(shared: Callable[[str], Path], version: str) -> None:
+    table = read_table(shared("data/ingest_samples/matlab") / f"test_tables_{version}.mat")
+    expected = {"timetable_duration.data1": [1, 2, 3], "timetable_datetime.data1": [1, 2, 3]}
+    for name, values in expected.items():
+        column = table.columns[name]
+        assert column[np.isfinite(column)].tolist() == values
+    left_out = next(note for note in table.notes if "No time vector" in note)
+    assert "table_numeric.Var1" in left_out
+    assert not any("MATLAB alone" in note for note in table.notes)
+
+
+@pytest.mark.parametrize("version", ["v7", "v73"])
+def test_one_span_of_the_calendar_does_not_hide_the_other_variables(
+    shared: Callable[[str], Path], version: str
+) -> None:
+    table = read_table(shared("data/ingest_samples/matlab") / f"test_time_{version}.mat")
+    assert "dt_vector" in table.columns
+    assert any("calendarDuration" in note for note in table.notes)
+
+
+def test_plain_arrays_that_matlab_wrote(shared: Callable[[str], Path]) -> None:
+    table = read_table(shared("data/ingest_samples/matlab") / "test_basic_v7.mat")
+    (said,) = table.notes
+    assert "complex_array (complex)" in said  # its real part alone would be silently wrong
+    assert "struct" not in said.partition(":")[2].partition(";")[0]
+    with pytest.raises(InputError, match="holds no numeric column"):
+        read_table(shared("data/ingest_samples/matlab") / "test_string_v7.mat")
