@@ -16,7 +16,7 @@ from machine import events, rows_of, running, until
 from terragrip.errors import InputError
 from terragrip.estimation.engine import EVENTS
 from terragrip.formats import Profile
-from terragrip.live.frames import FrameDecoder
+from terragrip.live.frame_decoder import FrameDecoder
 from terragrip.live.service import Service
 from terragrip.live.sinks.can import DBC
 

@@ -11,7 +11,7 @@ from terragrip.formats import Profile
 from terragrip.formats.nmea_sentences import sentences
 from terragrip.live.decode import Decoder
 from terragrip.live.feed import Feed
-from terragrip.live.frames import FrameDecoder
+from terragrip.live.frame_decoder import FrameDecoder
 from terragrip.live.inbox import Inbox
 from terragrip.live.payload import unpacker
 from terragrip.live.wal import MAGIC, Reading, WriteAhead

@@ -24,7 +24,7 @@ OPTIONS = ("rate", "columns", "format", "token")
 
 
 class Broadcast:
-    """``vehicle``: its name; ``columns``: those of the estimates to come. ``put`` takes a message for all; ``subscribe`` gives one
+    """``vehicle``: its name; ``columns``: those of the estimates to come. ``put`` queues a message for all; ``subscribe`` gives one
     client's frames.
     """
 

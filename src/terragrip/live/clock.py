@@ -90,6 +90,6 @@ class SourceClock:
     @classmethod
     def from_state(cls, state: dict[str, Any]) -> SourceClock:
         """The inverse of `state`."""
-        found = cls(**state)
-        found.waiting = [(a, s, v) for a, s, v in state["waiting"]]
-        return found
+        result = cls(**state)
+        result.waiting = [(a, s, v) for a, s, v in state["waiting"]]
+        return result

@@ -1,4 +1,4 @@
-"""The heart of the live service: what came in and when, to rows, estimates and events. No clock, no I/O.
+"""Order and estimator: from what came in and when to rows, estimates and events. No clock, no I/O.
 
 Everything it does follows from the sequence of `process`, `tick`, `note` and `flush` with their arguments; so the record
 (terragrip.live.record) needs to hold only those to bring it back bit for bit after a kill.
@@ -83,7 +83,7 @@ class Row:
 
 @dataclass(frozen=True, slots=True)
 class Refusal:
-    """A sample, or part of one, that found no way into the estimator."""
+    """A sample, or part of one, that did not get to the estimator."""
 
     arrival: float
     time: float
@@ -295,19 +295,19 @@ class Core:
 
         if state["format"] != FORMAT:
             raise ValueError(f"a state of format {state['format']}, not {FORMAT}")
-        found = cls(Vehicle.from_dict(state["vehicle"]), Settings.from_dict(state["settings"]), library)
+        result = cls(Vehicle.from_dict(state["vehicle"]), Settings.from_dict(state["settings"]), library)
         snapshot = base64.b64decode(state["estimator"])
-        found.estimator = restored(snapshot) if snapshot else None
-        found.clocks = [SourceClock.from_state(one) for one in state["clocks"]]
-        found.counts = Counts.from_state(state["counts"])
-        found.reorder.counts = found.counts
-        found.reorder.restore(state["reorder"])
-        found.rows, found.event = state["rows"], state["event"]
-        if state["ground"] and isinstance(found.estimator, TractionEstimator):
+        result.estimator = restored(snapshot) if snapshot else None
+        result.clocks = [SourceClock.from_state(one) for one in state["clocks"]]
+        result.counts = Counts.from_state(state["counts"])
+        result.reorder.counts = result.counts
+        result.reorder.restore(state["reorder"])
+        result.rows, result.event = state["rows"], state["event"]
+        if state["ground"] and isinstance(result.estimator, TractionEstimator):
             from terragrip.ground.live import LiveGround
 
-            found.ground = LiveGround.restore(base64.b64decode(state["ground"]), found.estimator, library)
-        return found
+            result.ground = LiveGround.restore(base64.b64decode(state["ground"]), result.estimator, library)
+        return result
 
 
 def _ground_outputs(state: GroundState) -> list[Output]:

@@ -34,6 +34,6 @@ class Counts:
     @classmethod
     def from_state(cls, state: dict[str, dict[str, int]]) -> Counts:
         """The inverse of `state`."""
-        found = cls()
-        found.by_channel = {name: {**dict.fromkeys(FATES, 0), **mine} for name, mine in state.items()}
-        return found
+        result = cls()
+        result.by_channel = {name: {**dict.fromkeys(FATES, 0), **mine} for name, mine in state.items()}
+        return result

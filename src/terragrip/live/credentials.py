@@ -29,12 +29,12 @@ class Credentials:
         The file has lines ``username: …``. Raises InputError where it is missing, or others may read it.
         """
         path = os.environ.get(FILE)
-        found = _from_file(Path(path)) if path else {}
+        result = _from_file(Path(path)) if path else {}
         for key in _KEYS:
             value = os.environ.get(f"TERRAGRIP_{key.upper()}")
             if value:
-                found[key] = value
-        return cls(**found)
+                result[key] = value
+        return cls(**result)
 
     def grants(self, given: str | None) -> bool:
         """Whether what a client gave is the token."""
@@ -52,7 +52,7 @@ def _from_file(path: Path) -> dict[str, str]:
         raise InputError(
             f"others may read it (mode {stat.S_IMODE(mode):04o})", file=path, place=FILE, mend="chmod 600"
         )
-    found: dict[str, str] = {}
+    result: dict[str, str] = {}
     for number, line in enumerate(text.splitlines(), 1):
         key, colon, value = line.partition(":")
         if not line.strip() or line.lstrip().startswith("#"):
@@ -62,5 +62,5 @@ def _from_file(path: Path) -> dict[str, str]:
                 "is neither username, password nor token", file=path, place=f"line {number}",
                 mend="write 'username: …'",
             )  # fmt: skip
-        found[key.strip()] = value.strip()
-    return found
+        result[key.strip()] = value.strip()
+    return result

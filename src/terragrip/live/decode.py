@@ -105,12 +105,12 @@ class Decoder:
         """What messages of these fields give: of each channel's ways the first whose fields are all there."""
         plan = []
         for name, source in self._sources.items():
-            found = next(
+            result = next(
                 (step for k, one in enumerate(source.chain) if (step := self._step(name, k, one, layout))),
                 None,
             )
-            if found is not None:
-                plan.append(found)
+            if result is not None:
+                plan.append(result)
         if len(self._plans) < _LAYOUTS:
             self._plans[layout] = plan
         return plan

@@ -81,7 +81,7 @@ class Feed:
         self._event("unreadable", f"a message was {why}", key="message")
 
     def dropped(self, number: int) -> None:
-        """Messages were given up before anyone looked into them."""
+        """Messages were dropped before they were read."""
         self.inbox.count("dropped", [f"({self.name})"], number, self.index)
         self._event("behind", f"{number} messages dropped unread", key="dropped")
 

@@ -34,13 +34,13 @@ class Message:
 
     def json(self, columns: Columns | None = None) -> bytes:
         """The message as a JSON object; of an estimate, ``columns`` or all of them. Missing numbers are null."""
-        found = self._json.get(columns)
-        if found is None:
+        result = self._json.get(columns)
+        if result is None:
             row = self.row
-            found = self._json[columns] = (
+            result = self._json[columns] = (
                 json.dumps(self.data).encode() if row is None else (columns or _EVERY).json(row)
             )
-        return found
+        return result
 
 
 class Columns:

@@ -74,7 +74,7 @@ class Outbox:
         return len(self._queue)
 
     async def emptied(self, timeout: float) -> None:
-        """Wait until the sink has taken all, at most ``timeout`` s."""
+        """Wait until the sink has sent all, at most ``timeout`` s."""
         try:
             async with asyncio.timeout(timeout):
                 while self._queue:

@@ -35,7 +35,7 @@ def unpacker(payload: Payload | None) -> Unpack:
 def from_json(data: bytes) -> list[Fields]:
     """JSON objects: one, several in a list, or one a line. Nested ones are flattened: ``wheel.fl``."""
     try:
-        found = json.loads(data)
+        result = json.loads(data)
     except UnicodeDecodeError:
         raise Unreadable(f"no JSON: {len(data)} bytes that are no text") from None
     except (ValueError, RecursionError):
@@ -43,10 +43,10 @@ def from_json(data: bytes) -> list[Fields]:
         if len(lines) > 1:
             return [fields for line in lines if line.strip() for fields in from_json(line)]
         raise Unreadable(f"no JSON: {_short(data)}") from None
-    objects = found if isinstance(found, list) else [found]
+    objects = result if isinstance(result, list) else [result]
     if not all(isinstance(one, dict) for one in objects):
         raise Unreadable(f"JSON, but no object: {_short(data)}")
-    if data.count(b"{") == len(objects) and data.count(b"[") == (found is objects):
+    if data.count(b"{") == len(objects) and data.count(b"[") == (result is objects):
         return objects  # nothing is nested; braces within texts only cost a second look
     return [_flat(one) for one in objects]
 

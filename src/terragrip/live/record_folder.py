@@ -43,9 +43,9 @@ def read_record(folder: str | os.PathLike[str]) -> tuple[Recording, Estimates]:
         )
     core = load_snapshot(place, number)
     tables: dict[str, list[Any]] = {RECORDING: [], ESTIMATES: []}
-    for kind, found in tables.items():
+    for kind, parts in tables.items():
         names = sorted(place.glob(f"{kind}-*.parquet"))
-        found += [pq.read_table(path) for path in names if _number_of(path) <= number]
+        parts += [pq.read_table(path) for path in names if _number_of(path) <= number]
     for segment, _, _ in replay(place, number, core):
         if len(segment) and core.estimator is not None:
             tables[RECORDING].append(segment.to_recording())

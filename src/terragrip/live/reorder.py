@@ -112,7 +112,7 @@ _Layout = tuple[list[Stream], list[Stream], bool]
 
 
 class Reorder:
-    """The buffer; ``counts`` is told what is late, doubled and missing."""
+    """The buffer; ``counts`` counts what is late, doubled and missing."""
 
     def __init__(self, window: float, counts: Counts) -> None:
         self.window = window
@@ -125,7 +125,7 @@ class Reorder:
         self.changes: list[tuple[str, int, str]] = []  # ("channel_lost" | "channel_back", source, channel)
 
     def add(self, arrival: float, source: int, time: float, values: Values) -> Values:
-        """Take a sample; returns the values that found no place (late or doubled)."""
+        """Add a sample; returns the values that found no place (late or doubled)."""
         if time <= self.released:
             return self._refuse(time, values)
         pending = self.pending
@@ -158,7 +158,7 @@ class Reorder:
         return out
 
     def _streams_of(self, row: Pending) -> _Layout:
-        """The streams that the row holds and layout it lacks, and whether these are all its channels.
+        """The streams that the row holds and those it lacks, and whether these are all its channels.
 
         A stream of which the row holds a part only becomes two.
         """

@@ -70,10 +70,10 @@ class Segment:
             self.refusals.append(output)
 
     def _alike(self, names: tuple[str, ...]) -> _Rows:
-        found = self.measured.get(names)
-        if found is None:
-            found = self.measured[names] = _Rows(struct.Struct(f"={len(names)}d").pack)
-        return found
+        result = self.measured.get(names)
+        if result is None:
+            result = self.measured[names] = _Rows(struct.Struct(f"={len(names)}d").pack)
+        return result
 
     def _add_row(self, row: Row) -> None:
         alike, estimate = self._alike(tuple(row.values)), row.estimate
@@ -91,12 +91,12 @@ class Segment:
         """What was measured, a column (n,) each; NaN where a row has none."""
         import numpy as np
 
-        found = {name: np.full(len(self), np.nan) for names in self.measured for name in names}
+        result = {name: np.full(len(self), np.nan) for names in self.measured for name in names}
         for names, rows in self.measured.items():
             table = np.frombuffer(rows.values).reshape(-1, len(names))
             for name, column in zip(names, table.T, strict=True):
-                found[name][np.frombuffer(rows.places, dtype=np.int64)] = column
-        return found
+                result[name][np.frombuffer(rows.places, dtype=np.int64)] = column
+        return result
 
     def write(self, folder: Path, estimator: TractionEstimator | SlipEstimator | None) -> None:
         """Write the segment's files; raises OSError."""

@@ -1,4 +1,4 @@
-"""The live service: sources to core or record to sinks, in one thread, with what is lost said and counted."""
+"""The live service: sources to core or record to sinks, in one thread, with what is lost reported and counted."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ _AT_ONCE = 64  # samples between two turns of sources and sinks
 _HOUSEKEEPING = 0.09  # s: what came in is handed to the system at least ten times a second
 _SYNC = 0.7  # s: with writing, under a second
 _PAUSE = 0.002  # s for sinks that have enough to do
-_LINGER = 2.0  # s for sinks to take the last messages
+_LINGER = 2.0  # s for sinks to send the last messages
 
 logger = logging.getLogger("terragrip.live")
 
@@ -94,7 +94,7 @@ class Service:
         core = Core(vehicle, settings, library)
         if settings.ground and isinstance(core.estimator, SlipEstimator):
             raise InputError(
-                "the ground is told by adhesion and soil resistance, which need drive torques",
+                "ground changes show in adhesion and soil resistance, which need drive torques",
                 place="--ground", mend="leave it out: the sources give speeds alone",
             )  # fmt: skip
         self.sinks = [open_sink(text, vehicle, core.columns) for text in sinks]

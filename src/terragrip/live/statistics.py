@@ -107,7 +107,7 @@ class Statistics:
     def to_dict(self) -> dict[str, Any]:
         """The status, as sinks get it."""
         core = self._core
-        found = {
+        result = {
             "time": core.time if core.rows else None,
             "rows": core.rows,
             "row_rate": round(self.row_rate, 2),
@@ -118,7 +118,7 @@ class Statistics:
             "sinks": {box.uri.name: {"sent": box.sent, "dropped": box.dropped} for box in self._outboxes},
         }
         # A replay's rows arrive at their own stamps: what they take is no delay.
-        return {**found, "delay": self.delay} if self._is_real_time else found
+        return {**result, "delay": self.delay} if self._is_real_time else result
 
     def summary(self) -> str:
         """The run in a few lines of text."""

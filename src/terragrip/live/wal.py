@@ -47,7 +47,7 @@ class WriteAhead:
         self._buffer.append(content)
 
     def sample(self, arrival: float, source: int, stamp: float, values: dict[str, float]) -> None:
-        """A sample as the core takes it."""
+        """An input of `Core.process`."""
         names = tuple(values)
         packer, numbers = self._packers.get(names) or self._packer(names)
         self._frame(packer.pack(b"S", arrival, source, stamp, len(numbers), *numbers, *values.values()))
@@ -57,23 +57,23 @@ class WriteAhead:
             if name not in self._numbers:
                 self._numbers[name] = len(self._numbers)
                 self._frame(b"C" + name.encode())
-        found = (
+        result = (
             struct.Struct(f"<cdHdH{len(names)}H{len(names)}d"),
             tuple(self._numbers[name] for name in names),
         )
-        self._packers[names] = found
-        return found
+        self._packers[names] = result
+        return result
 
     def tick(self, now: float) -> None:
-        """A tick that the core took."""
+        """An input of `Core.tick`."""
         self._frame(_TICK.pack(b"T", now))
 
     def note(self, note: dict[str, Any]) -> None:
-        """A note that the core took."""
+        """An input of `Core.note`."""
         self._frame(b"N" + json.dumps(note).encode())
 
     def flush_core(self) -> None:
-        """A flush that the core took."""
+        """`Core.flush`."""
         self._frame(b"F")
 
     def beginning(self, about: dict[str, Any]) -> None:

@@ -12,7 +12,7 @@ from terragrip.estimation.engine import EVENTS
 from terragrip.estimation.estimator import Estimate
 from terragrip.estimation.rim_speeds import DRIVE
 from terragrip.ground.classification.labels import UNKNOWN
-from terragrip.live.can import check, errors, open_bus
+from terragrip.live.can_bus import check, errors, open_bus
 from terragrip.live.core import Row
 from terragrip.live.feed import Lost
 from terragrip.live.message import GROUND, SOIL, Message
@@ -102,7 +102,7 @@ class CanSink:
             "MessageCounter": self._counter,
         }
         self._counter = (self._counter + 1) % 251
-        found = [self._frame("TG_Vehicle", values)]
+        result = [self._frame("TG_Vehicle", values)]
         for message, quantities in _WHEEL.items():
             for number, wheel in enumerate(self._wheels, 1):
                 values = {}
@@ -112,8 +112,8 @@ class CanSink:
                         own = f"{quantity}_{DRIVE}"  # the drive train's speed stands for all driven wheels
                     values[f"{ours}{number}"] = _of(estimate, own)
                     values[f"{ours}Std{number}"] = _of(estimate, f"{own}_std")
-                found.append(self._frame(f"{message}{number}", values))
-        return found
+                result.append(self._frame(f"{message}{number}", values))
+        return result
 
     def _frame(self, name: str, values: dict[str, float]) -> tuple[int, bytes]:
         message = self._database.get_message_by_name(name)

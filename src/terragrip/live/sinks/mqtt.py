@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from terragrip.live.feed import Lost
-from terragrip.live.mqtt import check, client, quality
+from terragrip.live.mqtt_client import check, client, quality
 from terragrip.live.outbox import Outbox
 from terragrip.live.uri import Uri
 

@@ -12,7 +12,7 @@ from terragrip.errors import InputError
 from terragrip.live.feed import Lost
 from terragrip.live.message import Message
 from terragrip.live.outbox import Outbox
-from terragrip.live.ros2 import STRING, STRING_HASH, dds_name, domain_of, has_rclpy
+from terragrip.live.ros2_messages import STRING, STRING_HASH, dds_name, domain_of, has_rclpy
 from terragrip.live.uri import Uri
 
 if TYPE_CHECKING:
@@ -32,7 +32,7 @@ class Ros2Sink:
             raise InputError("names no topic", place=uri.text, mend="write ros2:/terragrip")
         self.by_rclpy = has_rclpy()
         if not self.by_rclpy:
-            from terragrip.live.zenoh import config
+            from terragrip.live.zenoh_session import config
 
             config(uri)
 
@@ -43,7 +43,7 @@ class Ros2Sink:
     async def _by_zenoh(self, outbox: Outbox) -> None:
         import zenoh
 
-        from terragrip.live.zenoh import open_session
+        from terragrip.live.zenoh_session import open_session
 
         session = await asyncio.to_thread(open_session, self.uri)
         sender, number = secrets.token_bytes(16), 0

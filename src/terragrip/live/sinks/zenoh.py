@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from terragrip.live.feed import Lost
 from terragrip.live.outbox import Outbox
 from terragrip.live.uri import Uri
-from terragrip.live.zenoh import config, key_of, open_session
+from terragrip.live.zenoh_session import config, key_of, open_session
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

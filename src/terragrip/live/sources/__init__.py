@@ -31,7 +31,7 @@ OPTIONS: dict[str, Collection[str]] = {
 class Source(Protocol):
     """A source of messages.
 
-    ``real_time``: samples come when they come, and silence means something; a replay waits for whoever takes them.
+    ``real_time``: samples come when they come, and silence means something; a replay waits for the estimator.
     """
 
     real_time: bool

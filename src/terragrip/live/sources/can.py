@@ -6,10 +6,10 @@ import asyncio
 import threading
 from typing import Any
 
-from terragrip.live.can import check, errors, open_bus
+from terragrip.live.can_bus import check, errors, open_bus
 from terragrip.live.decode import Decoder
 from terragrip.live.feed import Feed, Lost
-from terragrip.live.frames import FrameDecoder
+from terragrip.live.frame_decoder import FrameDecoder
 from terragrip.live.thread_bridge import ThreadBridge
 from terragrip.live.uri import Uri
 

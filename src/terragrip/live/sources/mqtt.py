@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from terragrip.live.decode import Decoder
 from terragrip.live.feed import Feed, Lost
-from terragrip.live.mqtt import check, client, quality
+from terragrip.live.mqtt_client import check, client, quality
 from terragrip.live.uri import Uri
 
 

@@ -11,7 +11,7 @@ from terragrip.errors import InputError
 from terragrip.live.decode import Decoder
 from terragrip.live.feed import Feed, Lost
 from terragrip.live.payload import Unreadable
-from terragrip.live.ros2 import Reader, domain_of, has_rclpy, ros_name
+from terragrip.live.ros2_messages import Reader, domain_of, has_rclpy, ros_name
 from terragrip.live.thread_bridge import ThreadBridge
 from terragrip.live.uri import Uri
 
@@ -34,7 +34,7 @@ class Ros2Source:
             raise InputError("names no topic", place=uri.text, mend="write ros2:/joint_states,/odom")
         self.by_rclpy = has_rclpy()
         if not self.by_rclpy:
-            from terragrip.live.zenoh import config
+            from terragrip.live.zenoh_session import config
 
             config(uri)
 
@@ -58,7 +58,7 @@ class Ros2Source:
         await (self._by_rclpy if self.by_rclpy else self._by_zenoh)(feed, received)
 
     async def _by_zenoh(self, feed: Feed, received: Receive) -> None:
-        from terragrip.live.zenoh import open_session
+        from terragrip.live.zenoh_session import open_session
 
         session = await asyncio.to_thread(open_session, self.uri)
         try:

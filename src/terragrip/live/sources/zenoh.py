@@ -9,7 +9,7 @@ from terragrip.live.decode import Decoder
 from terragrip.live.feed import Feed
 from terragrip.live.thread_bridge import ThreadBridge
 from terragrip.live.uri import Uri
-from terragrip.live.zenoh import config, key_of, open_session
+from terragrip.live.zenoh_session import config, key_of, open_session
 
 
 class ZenohSource:

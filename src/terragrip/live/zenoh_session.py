@@ -27,7 +27,7 @@ def config(uri: Uri) -> Any:
     """The session's configuration; raises InputError on an endpoint that is none."""
     import zenoh
 
-    found = zenoh.Config()
+    result = zenoh.Config()
     ends = {name: [e for e in uri.options.get(name, "").split(",") if e] for name in ("connect", "listen")}
     for end in ends["listen"]:
         host = end.partition("/")[2].rpartition(":")[0].strip("[]")
@@ -41,18 +41,18 @@ def config(uri: Uri) -> Any:
     if scout not in ("0", "1"):
         raise InputError(f"scout is {scout!r}", place=uri.text, mend="give 0 or 1")
     try:
-        found.insert_json5("mode", '"peer"')
-        found.insert_json5("scouting/multicast/enabled", "true" if scout == "1" else "false")
-        found.insert_json5("connect/endpoints", json.dumps(ends["connect"]))
-        found.insert_json5("listen/endpoints", json.dumps(ends["listen"]))
+        result.insert_json5("mode", '"peer"')
+        result.insert_json5("scouting/multicast/enabled", "true" if scout == "1" else "false")
+        result.insert_json5("connect/endpoints", json.dumps(ends["connect"]))
+        result.insert_json5("listen/endpoints", json.dumps(ends["listen"]))
         if ends["connect"]:
-            found.insert_json5("connect/timeout_ms", "2000")
-            found.insert_json5("connect/exit_on_failure", "true")
+            result.insert_json5("connect/timeout_ms", "2000")
+            result.insert_json5("connect/exit_on_failure", "true")
     except zenoh.ZError as error:
         raise InputError(
             "names no endpoint", place=uri.text, mend="write connect=tcp/127.0.0.1:7447"
         ) from error
-    return found
+    return result
 
 
 def key_of(uri: Uri, where: str) -> str:

@@ -64,6 +64,6 @@ class Reader:
         except (*DAMAGE, *self._types.errors) as error:
             raise Unreadable(f"no {kind} ({type(error).__name__})") from error
         reader = self._topics.setdefault(topic, ros_topic(topic, self._wanted))
-        found: Fields = reader.fields(message)
+        result: Fields = reader.fields(message)
         stamp = reader.stamp(message)
-        return {**found, "time": stamp} if stamp and found else found
+        return {**result, "time": stamp} if stamp and result else result

@@ -42,7 +42,7 @@ class FrameDecoder:
             self.unknown[key] = self.unknown.get(key, 0) + 1
             return {}
         raws = {field.name: _raw(field, data) for field, _ in plan}
-        found: Fields = {}
+        result: Fields = {}
         by_name = {field.name: field for field, _ in plan}
         for field, names in plan:
             raw = raws[field.name]
@@ -52,8 +52,8 @@ class FrameDecoder:
             if field.reverse is not None and field.reverse in by_name and raws[field.reverse] == 0:
                 value = -value
             for name in names:
-                found[name] = value
-        return found
+                result[name] = value
+        return result
 
     def _plan(self, key: int) -> list[tuple[Field, tuple[str, ...]]] | None:
         """The message's fields and the names of each."""
