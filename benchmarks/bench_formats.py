@@ -2,17 +2,20 @@
 
     python benchmarks/bench_formats.py [megabytes, default 100] [kinds, default all]
     python benchmarks/bench_formats.py --large [megabytes, default 5000] [words of the logs' names, default all]
+    python benchmarks/bench_formats.py --libraries [megabytes, default 500] [words of the logs' names, default all]
 
 Writes a candump log, an MF4 file (signals, and bus logging) and an MCAP file of that size, most of which nobody asks for,
 and reads what a profile asks for in a process of its own. The peer, where there is one, is the plain loop of the library
 that reads the same file without keeping anything. What is wanted: memory stays far below the file's size, so that 5 GB fit
 into 2 GB. ``--large`` tries that with the logs of `large_logs` (as much room again on the disk): they go through `tg.read`,
 ``terragrip inspect`` and ``terragrip estimate``, with the peak of all memory, mapped files and all; the peer reads a log of a tenth
-of the size.
+of the size. ``--libraries`` holds the library's own loop, which keeps nothing, against the whole of ``terragrip estimate`` on the
+same log, by seconds of the processor (others at work on the machine change these little).
 """
 
 from __future__ import annotations
 
+import os
 import struct
 import subprocess
 import sys
@@ -218,10 +221,48 @@ def write(name: str, path: Path, size: int) -> None:
     subprocess.run([sys.executable, __file__, "--write-large", name, str(path), str(size)], check=True)
 
 
+def libraries(size: int, words: list[str]) -> None:
+    """Print what the loop of a library costs beside a whole estimate."""
+    print("| log | MB | the library's own loop, CPU s | `estimate`, CPU s | ratio |")
+    print("|---|---:|---:|---:|---:|")
+    for name, log in LARGE.items():
+        if log.loop and all(word.lower() in name.lower() for word in words):
+            with tempfile.TemporaryDirectory() as folder:
+                path, vehicle = Path(folder) / log.file, Path(folder) / "vehicle.yaml"
+                vehicle.write_text(VEHICLE)
+                (Path(folder) / "struct.yaml").write_text(profile_of_struct())
+                write(name, path, size)
+                alone = processor_seconds(
+                    sys.executable, "-W", "ignore", "-c", log.loop.format(path=str(path))
+                )
+                profile = [word.format(folder=folder) for word in log.profile]
+                whole = processor_seconds(
+                    sys.executable, "-m", "terragrip", "estimate", str(path), "--vehicle", str(vehicle), *profile,
+                    "-o", str(Path(folder) / "estimates.parquet"), "--quiet",
+                )  # fmt: skip
+                megabytes = path.stat().st_size / 1e6
+                print(
+                    f"| {name} | {megabytes:.0f} | {alone:.1f} | {whole:.1f} | {alone / whole:.2f} |",
+                    flush=True,
+                )
+
+
+def processor_seconds(*command: str) -> float:
+    """Seconds of the processor that a command takes, with its children; ends the program where it fails."""
+    process = subprocess.Popen(command, stdout=subprocess.DEVNULL)
+    _, status, used = os.wait4(process.pid, 0)
+    if status:
+        sys.exit(f"it failed: {command}")
+    return used.ru_utime + used.ru_stime
+
+
 def main() -> None:
     """Print the table."""
     if sys.argv[1:2] == ["--large"]:
         large(int(sys.argv[2] if len(sys.argv) > 2 else 5000) * 1_000_000, sys.argv[3:])
+        return
+    if sys.argv[1:2] == ["--libraries"]:
+        libraries(int(sys.argv[2] if len(sys.argv) > 2 else 500) * 1_000_000, sys.argv[3:])
         return
     size = int(sys.argv[1] if len(sys.argv) > 1 else 100) * 1_000_000
     chosen = sys.argv[2:] or list(CASES)

@@ -246,6 +246,17 @@ def matlab73(extras: int) -> Callable[[Path, int], None]:
     return write
 
 
+def matlab5(path: Path, size: int) -> None:
+    """The same struct in version 5, packed as MATLAB saves it; it repeats itself less than once a minute."""
+    import scipy.io
+
+    columns = table(29, size // (8 * 41))
+    columns = {"time": np.arange(len(next(iter(columns.values())))) / 100, **columns}
+    scipy.io.savemat(
+        path, {"log": {name: column[:, None] for name, column in columns.items()}}, do_compression=True
+    )
+
+
 # --- CAN -----------------------------------------------------------------------------------------------------------
 
 SPEEDS = {0: 0x0CFE48F0, 1: 0x0CFE4980}  # of the frames in a turn, those that are wanted
@@ -366,6 +377,7 @@ class Large:
 ROS = ("--profile", "ros2-4wd")
 STRUCT = ("--profile", "{folder}/struct.yaml")
 TRACTOR = ("--profile", "tractor-isobus")
+MAT5_LOOP = "import matio\nmatio.load_from_mat({path!r})"
 MCAP_LOOP = "from mcap.stream_reader import StreamReader\nfor record in StreamReader(open({path!r}, 'rb')).records: pass"
 ROS1_LOOP = (
     "from rosbags.rosbag1 import Reader\nwith Reader({path!r}) as bag:\n for message in bag.messages(): pass"
@@ -379,6 +391,7 @@ LARGE = {
     "Parquet, all columns wanted": Large(parquet(0), "log.parquet", recording_fits=False),
     "MATLAB 7.3, 11 of 40 columns wanted": Large(matlab73(29), "log.mat", STRUCT),
     "MATLAB 7.3, all columns wanted": Large(matlab73(0), "log.mat", STRUCT, recording_fits=False),
+    "MATLAB 5, 11 of 40 columns wanted": Large(matlab5, "log.mat", STRUCT, MAT5_LOOP),
     "MCAP, ROS 2 beside images": Large(partial(mcap, images=True), "log.mcap", ROS, MCAP_LOOP),
     "MCAP, ROS 2, all wanted": Large(partial(mcap, images=False), "log.mcap", ROS, MCAP_LOOP),
     "ROS 2 bag (SQLite) beside images": Large(partial(ros2_sqlite, images=True), "log.db3", ROS, SQL_LOOP),

@@ -8,7 +8,6 @@ from collections.abc import Callable
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
-import can
 import cantools
 import numpy as np
 import pytest
@@ -18,7 +17,6 @@ from hypothesis import strategies as st
 from can_frames import START, WHEEL_BASED, drive, payload, write_log
 from terragrip.errors import InputError
 from terragrip.formats.can.bits import Field, missing_codes
-from terragrip.formats.can.blf import frames_of
 from terragrip.formats.can.catalog import EXTENDED, Catalog, catalog, group_of, message_of
 from terragrip.formats.can.decoding import signals_of
 from terragrip.formats.can.frames import Frames
@@ -254,80 +252,6 @@ def test_measured_john_deere(shared: Callable[[str], Path]) -> None:
         InputError, match='signal GroundBasedMachineSpeed: holds no value: it was sent as "not available"'
     ):
         read(folder / "idle10sec.csv", "tractor-isobus")
-
-
-def odd_messages(seed: int) -> list[can.Message]:
-    """Frames of all kinds, some of which hold no data."""
-    draws = np.random.default_rng(seed)
-    found = []
-    for k in range(600):
-        fd = bool(draws.integers(3) == 0)
-        length = int(draws.choice([0, 1, 8, 12, 64] if fd else [0, 3, 8]))
-        wide = bool(draws.integers(2))
-        found.append(
-            can.Message(
-                timestamp=START + 0.01 * k,
-                arbitration_id=int(draws.integers(1 << (29 if wide else 11))),
-                is_extended_id=wide,
-                is_fd=fd,
-                is_remote_frame=not fd and k % 50 == 0,
-                is_error_frame=not fd and k % 70 == 1,
-                data=b"" if not fd and k % 50 == 0 else draws.bytes(length),
-                channel=0,
-            )
-        )
-    return found
-
-
-@pytest.mark.parametrize("packed", [0, 6])
-@pytest.mark.parametrize("container", [200, 128 * 1024])
-def test_blf_frames_are_those_that_python_can_reads(tmp_path: Path, packed: int, container: int) -> None:
-    path = tmp_path / "log.blf"
-    with can.BLFWriter(path, compression_level=packed, max_container_size=container) as writer:
-        for message in odd_messages(1000):
-            writer.on_message_received(message)
-    expected = [
-        (m.arbitration_id | (EXTENDED if m.is_extended_id else 0), bytes(m.data), m.timestamp)
-        for m in can.BLFReader(path)
-        if not (m.is_remote_frame or m.is_error_frame)
-    ]
-    with path.open("rb") as stream:
-        blocks = list(frames_of(stream))
-    found = [
-        (int(i), row[:n].tobytes(), t)
-        for time, identifiers, lengths, data in blocks
-        for t, i, n, row in zip(time.tolist(), identifiers, lengths, data, strict=True)
-    ]
-    assert [f[:2] for f in found] == [e[:2] for e in expected]
-    assert np.allclose([f[2] for f in found], [e[2] for e in expected], rtol=0, atol=1e-6)
-
-
-def test_blf_of_the_64_form_by_hand(tmp_path: Path) -> None:
-    """Loggers write CAN FD as objects of type 101, which python-can reads but does not write."""
-    path = tmp_path / "log.blf"
-    with can.BLFWriter(path, compression_level=0) as writer:
-        writer.on_message_received(can.Message(timestamp=START, arbitration_id=1, data=b"1"))
-    objects = b""
-    for k, (valid, held) in enumerate(
-        [(8, 8), (48, 48), (12, 8), (0, 0)]
-    ):  # of the third one, four bytes are not there
-        body = struct.pack(
-            "<BBBBLLLLLLLHBBL", 1, 15, valid, 0, 0x80000100 + k, 0, 0x1000, 0, 0, 0, 0, 0, 0, 0, 0
-        )
-        body += bytes(range(1, held + 1))
-        objects += struct.pack("<4sHHLLLHHQ", b"LOBJ", 32, 1, 32 + len(body), 101, 2, 0, 0, 10**9 * k) + body
-        objects += bytes(len(body) % 4)
-    content = struct.pack("<H6xL4x", 0, len(objects)) + objects
-    head = path.read_bytes()[:144]
-    path.write_bytes(head + struct.pack("<4sHHLL", b"LOBJ", 16, 1, 16 + len(content), 10) + content)
-    expected = [(m.arbitration_id, bytes(m.data)) for m in can.BLFReader(path)]
-    with path.open("rb") as stream:
-        ((_, identifiers, lengths, data),) = frames_of(stream)
-    found = [
-        (int(i) & ~EXTENDED, r[:n].tobytes()) for i, n, r in zip(identifiers, lengths, data, strict=True)
-    ]
-    assert found == expected
-    assert found[2][1] == bytes([1, 2, 3, 4, 5, 6, 7, 8, 0, 0, 0, 0])
 
 
 @pytest.mark.parametrize("suffix", ["asc", "log"])

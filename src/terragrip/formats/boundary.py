@@ -15,6 +15,8 @@ from typing import Any
 
 from terragrip.errors import InputError
 
+LARGEST = 1 << 30
+"""Bytes of a record, or of what it unpacks to: a damaged length must not fill the memory."""
 DAMAGE: tuple[type[Exception], ...] = (
     # What byte-wise parsers run into when bytes are not what they should be.
     ValueError,  # with UnicodeDecodeError

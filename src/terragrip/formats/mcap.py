@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
-from terragrip.formats.boundary import DAMAGE, as_far_as_it_goes, needed
+from terragrip.formats.boundary import DAMAGE, LARGEST, as_far_as_it_goes, needed
 from terragrip.formats.kind import Databases
-from terragrip.formats.mcap_records import records
 from terragrip.formats.messages import Parts, Topic
 from terragrip.formats.ros import Types, bag_topic, log_of, unpacked
 from terragrip.formats.signals import SignalLog
@@ -34,7 +33,7 @@ def read_mcap(path: str, wanted: Wanted | None, databases: Databases) -> SignalL
 
 def collect(file: Path, wanted: Wanted | None, topics: dict[str, Topic], types: Types) -> list[str]:
     """Read the messages of one file into their topics; returns sentences on what could not be read."""
-    exceptions = needed("mcap.exceptions", "an MCAP file")
+    exceptions, kinds = needed("mcap.exceptions", "an MCAP file"), needed("mcap.records", "an MCAP file")
     notes: list[str] = []
     schemas: dict[int, Any] = {}
     channels: dict[int, tuple[Topic, Take | None]] = {}
@@ -44,21 +43,46 @@ def collect(file: Path, wanted: Wanted | None, topics: dict[str, Topic], types: 
         file.open("rb") as stream,
     ):
         for record in records(stream, notes):
-            if isinstance(record, tuple):
+            if isinstance(record, kinds.Message):
                 seen.messages += 1
-                number, time, content = record
-                topic, take = channels[number]
+                topic, take = channels[record.channel_id]
                 if take is not None and topic.is_wanted:
-                    _take(topic, take, time * 1e-9, content)
-            elif type(record).__name__ == "Schema":
+                    _take(topic, take, record.log_time * 1e-9, record.data)
+            elif isinstance(record, kinds.Schema):
                 schemas[record.id] = record
-            elif record.id not in channels:
+            elif isinstance(record, kinds.Channel) and record.id not in channels:
                 channels[record.id] = _channel(record, schemas.get(record.schema_id), wanted, topics, types)
                 if channels[record.id][1] is None:
                     unreadable[f"{record.topic} ({record.message_encoding})"] = None
     if unreadable:
         notes.append(f"Topics in an encoding that is not known were left out: {', '.join(unreadable)}.")
     return notes
+
+
+def records(stream: BinaryIO, notes: list[str]) -> Iterator[Any]:
+    """mcap's records, with those in chunks in their place; damaged chunks are left out, which ``notes`` tell.
+
+    Raises what mcap raises where the file is damaged or ends early.
+    """
+    reader, kinds = needed("mcap.stream_reader", "an MCAP file"), needed("mcap.records", "an MCAP file")
+    packed = (needed("zstandard", "an MCAP file").ZstdError, RuntimeError)  # RuntimeError is lz4's
+    damaged = 0
+    for record in reader.StreamReader(stream, emit_chunks=True, record_size_limit=LARGEST).records:
+        if isinstance(record, kinds.DataEnd):
+            break
+        if not isinstance(record, kinds.Chunk):
+            yield record
+            continue
+        try:
+            if record.uncompressed_size > LARGEST:
+                raise ValueError("a chunk of over 1 GiB")
+            inner = reader.breakup_chunk(record, validate_crc=True)
+        except (*DAMAGE, needed("mcap.exceptions", "an MCAP file").McapError, *packed):
+            damaged += 1
+            continue
+        yield from inner
+    if damaged:
+        notes.append(f"{damaged} chunks are damaged and were left out.")
 
 
 def _take(topic: Topic, take: Take, receipt: float, content: bytes) -> None:

@@ -11,8 +11,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import BinaryIO
 
-from terragrip.formats.boundary import DAMAGE, needed
-from terragrip.formats.record_bytes import LARGEST, exactly
+from terragrip.formats.boundary import DAMAGE, LARGEST, needed
 
 _MAGIC = b"#ROSBAG V2.0\n"
 _MESSAGE, _BAG, _CHUNK, _CONNECTION = 2, 3, 5, 7
@@ -155,3 +154,11 @@ def _connection(fields: dict[bytes, bytes], content: bytes) -> Connection:
     about = _fields(content)
     texts = (fields[b"topic"], about[b"type"], about[b"message_definition"])
     return Connection(number, *(text.decode("utf-8", "replace") for text in texts))
+
+
+def exactly(stream: BinaryIO, size: int) -> bytes:
+    """The next ``size`` bytes; raises ValueError where there are fewer."""
+    found = stream.read(size)
+    if len(found) < size:
+        raise ValueError("it ends within a record")
+    return found

@@ -9,8 +9,7 @@ from pathlib import Path
 
 from terragrip.errors import InputError
 from terragrip.files import sha256, unreadable
-from terragrip.formats.boundary import DAMAGE, needed
-from terragrip.formats.can.blf import frames_of
+from terragrip.formats.boundary import DAMAGE, as_far_as_it_goes, needed
 from terragrip.formats.can.catalog import catalog
 from terragrip.formats.can.decoding import identifier_text, names_of, signals_of
 from terragrip.formats.can.frames import Frames
@@ -21,6 +20,7 @@ from terragrip.formats.can.text_logs import (
     asc_lines,
     by_python_can,
     candump,
+    frames_of,
     layout_of,
     table,
 )
@@ -34,14 +34,17 @@ _BUSY = 20.0  # frames a second: a bus that speaks less is one whose stamps are 
 
 
 def read_blf(path: str, wanted: Wanted | None, databases: Databases) -> SignalLog:
-    """Vector BLF."""
-
-    def take(frames: Frames) -> None:
-        with open(path, "rb") as stream:
-            for block in frames_of(stream):
-                frames.take_many(*block)
-
-    return _as_far_as_it_goes(path, "BLF log", wanted, databases, take)
+    """Vector BLF, by python-can; one that is damaged behind some frames is read as far as it goes."""
+    can = needed("can", "a BLF log")
+    frames, notes = Frames(catalog(databases), wanted), list[str]()
+    with (
+        open(path, "rb") as stream,
+        as_far_as_it_goes(path, "BLF log", notes, needed("can.io.blf", "a BLF log").BLFParseError) as seen,
+    ):
+        for frame in frames_of(can.BLFReader(stream)):
+            frames.take(*frame)
+            seen.messages += 1
+    return finished(frames, path, notes, databases)
 
 
 def read_asc(path: str, wanted: Wanted | None, databases: Databases) -> SignalLog:
@@ -118,30 +121,6 @@ def _text_by_python_can(
         return by_python_can(getattr(can, reader)(io.StringIO()), own, raw, count, (*DAMAGE, can.CanError))
 
     return _from_lines(path, kind, wanted, databases, parse)
-
-
-def _as_far_as_it_goes(
-    path: str,
-    kind: str,
-    wanted: Wanted | None,
-    databases: Databases,
-    take: Callable[[Frames], None],
-    *errors: type[Exception],
-) -> SignalLog:
-    """The signals of the frames that ``take`` hands over until it raises, which a note tells; ``errors``: the library's own."""
-    frames, notes = Frames(catalog(databases), wanted), []
-    try:
-        take(frames)
-    except (*DAMAGE, *errors) as error:
-        said = " ".join(str(error).split())[:80] or type(error).__name__
-        if not frames.count:
-            raise InputError(
-                f"is a damaged {kind}, or none ({said})", file=path, mend="copy or record it again"
-            ) from error
-        notes.append(
-            f"The log is damaged after frame {frames.count} ({said}); the frames before it were read."
-        )
-    return finished(frames, path, notes, databases)
 
 
 def _from_lines(

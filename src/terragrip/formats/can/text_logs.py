@@ -142,6 +142,14 @@ class Numbered:
         return line
 
 
+def frames_of(messages: Iterable[Any]) -> Iterator[Frame]:
+    """The data frames among python-can's messages."""
+    for message in messages:
+        if not (message.is_error_frame or message.is_remote_frame):
+            wide = EXTENDED if message.is_extended_id else 0
+            yield message.timestamp, message.arbitration_id | wide, bytes(message.data)
+
+
 def by_python_can(
     reader: Any, lines: Iterable[str], raw: Numbered, count: Count, errors: tuple[type[Exception], ...]
 ) -> Iterator[Frame]:
@@ -167,9 +175,7 @@ def by_python_can(
         try:
             for message in reader:
                 in_doubt = False
-                if not (message.is_error_frame or message.is_remote_frame):
-                    wide = EXTENDED if message.is_extended_id else 0
-                    yield message.timestamp, message.arbitration_id | wide, bytes(message.data)
+                yield from frames_of((message,))
             break
         except errors:
             if number == failed_at:  # it did not get any further
