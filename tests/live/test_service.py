@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import asyncio
+import inspect
 import json
 import socket
 import struct
 import threading
+from collections import deque
 
 import numpy as np
 import pytest
@@ -59,6 +61,41 @@ async def test_a_replay_gives_what_the_estimator_gives(tmp_path, vehicle, short)
     assert np.array_equal(estimates.time, through.time)
     for name, values in through.columns.items():
         assert np.array_equal(estimates.columns[name], values, equal_nan=True), name
+
+
+async def test_no_object_holds_its_caller(tmp_path, vehicle, short, port, sender):
+    """References lead one way, from source to sink: no walk along the live service's objects comes back to where it was."""
+    sinks = ["udp://127.0.0.1:9", f"studio://127.0.0.1:{port}"]
+    service = Service(vehicle, [f"udp://127.0.0.1:{port}"], sinks, record=tmp_path)
+    async with running(service):
+        sender.send(*messages(short.recording, 20))
+        await until(lambda: service.core.rows == 20)
+        assert len(walked(service, [], set())) > 15
+
+
+def walked(thing, path: list, done: set) -> set:
+    """The ids of all objects of `terragrip.live` that can be reached from one; fails where one of them is on the path to it."""
+    if isinstance(thing, dict):
+        parts = list(thing.values())
+    elif isinstance(thing, list | tuple | set | deque):
+        parts = list(thing)
+    elif inspect.ismethod(thing):
+        parts = [thing.__self__]
+    elif inspect.isfunction(thing):
+        parts = [cell.cell_contents for cell in thing.__closure__ or ()]
+    elif type(thing).__module__.startswith("terragrip.live"):
+        assert not any(thing is above for above in path), [type(one).__name__ for one in [*path, thing]]
+        if id(thing) in done:
+            return done
+        done.add(id(thing))
+        path = [*path, thing]
+        names = [*getattr(thing, "__dict__", ()), *getattr(type(thing), "__slots__", ())]
+        parts = [getattr(thing, name) for name in names]
+    else:
+        return done
+    for part in parts:
+        walked(part, path, done)
+    return done
 
 
 async def test_datagrams_in_estimates_out(vehicle, short, port, sender):
