@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import logging
+import math
 import sys
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
@@ -66,9 +67,15 @@ def table(service: Service) -> Any:
     if trouble is not None:
         parts.append(trouble)
     parts += [
-        Text(f"{e.time:9.1f} s  {e.kind}: {e.source}: {e.text}") for e in list(service.statistics.events)[-4:]
+        Text(f"{_seconds(e.time)}  {e.kind}: {e.source}: {e.text}")
+        for e in list(service.statistics.events)[-4:]
     ]
     return Group(*parts)
+
+
+def _seconds(time: float) -> str:
+    """An event's time; before the first sample there is none."""
+    return f"{time:9.1f} s" if math.isfinite(time) else f"{'—':>9}  "
 
 
 def head(service: Service) -> list[str]:
