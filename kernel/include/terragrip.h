@@ -205,7 +205,9 @@ enum {
     TG_OUT_WHEEL_CURVE = 98, /* + wheel */
     TG_OUT_WHEEL_CURVE_STD = 106,
     TG_OUT_ADAPTATION = 114, /* + state: a_j of A_k as this row used it; written by the adaptive and the supervised policy only */
-    TG_OUT_SLOTS = 132
+    TG_OUT_ZERO_SLIP_RADIUS = 132, /* + wheel, m: what slip counts from; written by TG_SPEEDS only */
+    TG_OUT_ZERO_SLIP_RADIUS_STD = 140,
+    TG_OUT_SLOTS = 148
 };
 
 typedef enum {
@@ -218,7 +220,11 @@ typedef enum {
     TG_EVENT_PUSH = 6        /* something pushes from behind while the wheels pull: a tool that runs up */
 } tg_event;
 
-typedef enum { TG_FILTERED = 0, TG_ALGEBRAIC = 1 } tg_method;
+typedef enum {
+    TG_FILTERED = 0,
+    TG_ALGEBRAIC = 1,
+    TG_SPEEDS = 2 /* without torque: speeds, slip, distance; all other values NaN. A wheel may stand for a drive train */
+} tg_method;
 
 typedef struct {
     double time;            /* s, rising */
@@ -229,7 +235,7 @@ typedef struct {
     double time;
     double distance;
     int32_t event;          /* tg_event */
-    tg_real value[132];
+    tg_real value[148];
 } tg_estimate;
 
 typedef struct { /* spreads (1 SD) of constants that the data cannot tell; 0 = known */
@@ -299,6 +305,7 @@ typedef struct {
     tg_real prior_resistance, prior_resistance_std;
     tg_real slope_spread;           /* rad: by how much the slope may differ from the measured pitch (from 0 without one) */
     tg_real standstill_speed;       /* m/s */
+    tg_real dead_band;              /* m/s: TG_SPEEDS takes rims of at most this for unknown while the vehicle moves */
     tg_real gap;                    /* s without any wheel or ground speed after which the motion starts anew */
     tg_real max_step;               /* s; a longer step is predicted in pieces */
     tg_real outlier_weight;         /* a channel weighted below this flags the row */

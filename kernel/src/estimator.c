@@ -276,6 +276,10 @@ tg_status tg_estimator_update(tg_estimator *e, const tg_sample *sample, tg_estim
     tg_drive drive;
     tg_status status = tgi_clean(e, sample, &row);
     if (status != TG_OK) return status;
+    if (e->settings.method == TG_SPEEDS) {
+        tgi_speeds_update(e, &row, out);
+        return TG_OK;
+    }
 
     int32_t was_standing = e->standing, gap, n = e->settings.machine.wheels;
     tg_real dt = e->started ? (tg_real)(row.time - e->time) : 0, travelled = tgi_fabs(e->belief.x[n + 1]);

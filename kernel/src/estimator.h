@@ -113,6 +113,24 @@ typedef struct { /* the eye on immobilization */
     int32_t turning, sinking, stuck, pushing; /* turning: rim holds a value */
 } tgi_watch;
 
+#define TG_SPEED_STATES (TG_MAX_WHEELS + 2)
+#define TG_SPEED_MODES 9
+
+typedef struct { /* see speeds.c; all reals, since a smoother's record is this */
+    tg_real x[TG_SPEED_STATES], P[TG_SPEED_STATES][TG_SPEED_STATES]; /* of all modes together: ground speed, its rate, slip speeds */
+    tg_real probability[TG_SPEED_MODES];
+    tg_real seen[TG_MAX_WHEELS + 1];  /* 1: measured since the motion began anew; ground speed, wheels */
+    tg_real begun;                    /* 1: any of them was, so that the state is one */
+    tg_real dt, manoeuvre, slipping;  /* how this row was reached: s, mean densities */
+    tg_real anew;                     /* 1: nothing links this row to the one before */
+    tg_real yaw, standing;
+    tg_real open;                     /* 1: the rims read nothing that slip could be told from */
+} tgi_speeds;
+
+typedef struct {
+    tg_real x[TG_SPEED_STATES], P[TG_SPEED_STATES][TG_SPEED_STATES];
+} tgi_speed_mode;
+
 typedef struct { /* what follows from the settings alone */
     tg_real limit[TG_SLOTS];        /* beyond it a value is a defect; negative: this machine has no such channel */
     tg_real inverse_gain[TG_SLOTS];
@@ -159,6 +177,8 @@ struct tg_estimator {
     tg_curve curve, wheel_curve[8];
     tg_real curve_std, wheel_curve_std[8];
     tg_real curve_wait, curve_distance; /* s and m since the curves were last brought up to date */
+    tgi_speeds speeds;         /* of the method TG_SPEEDS, */
+    tgi_speed_mode speed_mode[TG_SPEED_MODES];
     tg_track *track;           /* while a smoother's records are written, else null */
     tg_filter filter;
     tg_consider consider;
@@ -225,6 +245,26 @@ void tgi_signs_features(const tgi_signs *s, tg_real *x);
 void tgi_watch_over(tg_estimator *e, const tg_row *row, const tg_drive *drive, int32_t moving, int32_t anew, tg_real dt, const tg_real *o);
 int32_t tgi_watched(const tg_estimator *e); /* tg_event */
 
+/* speeds.c */
+void tgi_speeds_update(tg_estimator *e, tg_row *row, tg_estimate *out);
+size_t tgi_speeds_length(void);
+void tgi_speeds_smooth(const tg_settings *set, const tg_real *record, const tg_real *next, tg_real *carry, tg_real *o);
+
 /* traction.c */
+typedef struct { /* slip, and its change with omega, v and the relative radius */
+    tg_real slip, wheel, ground, radius;
+} tgi_slip;
+
+/* Slip by paper eq. 5: (rim - travel)/larger. Where wheel and vehicle both creep, the divisor is floored. */
+TG_INLINE tgi_slip tgi_slip_of(tg_real omega, tg_real v, tg_real radius, tg_real least)
+{
+    const tg_real rim = radius * tgi_fabs(omega), travel = tgi_fabs(v), larger = rim > travel ? rim : travel;
+    const tg_real inverse = 1 / (larger > least ? larger : least), s = (rim - travel) * inverse;
+    const tg_real moving = larger > least ? s : 0; /* the divisor moves too, unless floored */
+    const tg_real by_rim = inverse * (1 - (rim >= travel ? moving : 0)), by_travel = -inverse * (1 + (rim >= travel ? 0 : moving));
+    const tgi_slip found = {s, omega < 0 ? -radius * by_rim : radius * by_rim, v < 0 ? -by_travel : by_travel, rim * by_rim};
+    return found;
+}
+
 void tgi_traction(const tg_settings *s, const tg_belief *b, const tg_real (*S)[TG_ROWS], const tgi_scene *scene, tg_real *o);
 #endif

@@ -98,7 +98,7 @@ static tg_status check_numbers(const tg_settings *s)
     const tg_uncertainty *u = &s->uncertainty;
     const tg_real spreads[] = {u->drive_torque_gain, u->drive_torque_gain_common, u->drive_torque_offset, u->drawbar_gain, u->drawbar_offset, u->slope,
                                u->tire_rolling_resistance, u->vertical_load, u->wheel_radius, u->acceleration_bias,
-                               s->slope_spread, s->standstill_speed, s->outlier_weight, s->load_filter, s->center_of_gravity_height,
+                               s->slope_spread, s->standstill_speed, s->dead_band, s->outlier_weight, s->load_filter, s->center_of_gravity_height,
                                s->hitch_height, s->watch.release, s->watch.high_slip, s->watch.confidence,
                                s->watch.stuck_duration, s->watch.stuck_travel, s->watch.free_travel, s->watch.push, s->watch.thrust,
                                s->watch.push_duration};
@@ -120,7 +120,7 @@ static tg_status check(const tg_settings *s)
 {
     if (s->machine.wheels < 1 || s->machine.wheels > TG_MAX_WHEELS || s->axles < 1 || s->axles > TG_MAX_WHEELS)
         return TG_BAD_ARGUMENT;
-    if (s->method != TG_FILTERED && s->method != TG_ALGEBRAIC) return TG_BAD_ARGUMENT;
+    if (s->method != TG_FILTERED && s->method != TG_ALGEBRAIC && s->method != TG_SPEEDS) return TG_BAD_ARGUMENT;
     tg_status status = check_wheels(s);
     return status == TG_OK ? check_numbers(s) : status;
 }

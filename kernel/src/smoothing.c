@@ -10,12 +10,14 @@ static size_t filter_length(const tg_estimator *e)
 
 size_t tg_smooth_length(const tg_estimator *e)
 {
+    if (e && e->settings.method == TG_SPEEDS) return tgi_speeds_length();
     return e ? filter_length(e) + TG_SCENE_LENGTH : 0;
 }
 
 size_t tg_smooth_carry(const tg_estimator *e)
 {
     if (!e) return 0;
+    if (e->settings.method == TG_SPEEDS) return tgi_speeds_length();
     size_t states = (size_t)e->filter.states;
     return states + states * states + (size_t)e->consider.columns * states;
 }
@@ -33,6 +35,10 @@ tg_status tg_estimator_record(tg_estimator *e, size_t rows, const double *time, 
         sample.time = time[row];
         for (int32_t k = 0; k < TG_SLOTS; k++) sample.value[k] = in[k] ? (tg_real)in[k][row] : (tg_real)NAN;
         status = tg_estimator_update(e, &sample, &estimate);
+        if (e->settings.method == TG_SPEEDS) {
+            memcpy(record, &e->speeds, sizeof e->speeds);
+            continue;
+        }
         if (status == TG_OK) status = tg_record_take(record, &track, &e->filter, &e->consider);
         if (status == TG_OK) memcpy(record + filter_length(e), &e->scene, sizeof e->scene);
     }
@@ -74,10 +80,28 @@ static void to_rows(const tg_estimator *e, const tgi_smoothed *m, tg_belief *b, 
     b->columns = e->consider.columns;
 }
 
+static void put(const tg_real *value, double *const *out, size_t row, int32_t last)
+{
+    for (int32_t k = 0; k < last; k++)
+        if (out[k] && (k < TG_OUT_NIS || k > TG_OUT_DISTANCE)) out[k][row] = (double)value[k];
+}
+
 tg_status tg_estimator_smooth(const tg_estimator *e, size_t rows, const tg_real *records, const tg_real *next, tg_real *carry,
                               double *const *out)
 {
     if (!e || !records || !carry || !out || e->settings.method == TG_ALGEBRAIC) return TG_BAD_ARGUMENT;
+    if (e->settings.method == TG_SPEEDS) {
+        tg_real value[TG_OUT_SLOTS];
+        for (size_t row = rows; row-- > 0;) {
+            const tg_real *here = records + row * tg_smooth_length(e);
+            tgi_speeds_smooth(&e->settings, here, next, carry, value);
+            put(value, out, row, TG_OUT_ADHESION);
+            for (int32_t k = TG_OUT_SLIP; k < TG_OUT_NET_TRACTION; k++)
+                if (out[k]) out[k][row] = (double)value[k];
+            next = here;
+        }
+        return TG_OK;
+    }
     tgi_smoothed m = inside(e, carry);
     tg_belief belief;
     tg_real S[TG_MAX_CONSIDERED][TG_ROWS], value[TG_OUT_SLOTS];
@@ -88,8 +112,7 @@ tg_status tg_estimator_smooth(const tg_estimator *e, size_t rows, const tg_real 
         step_back(e, here, next, &m);
         to_rows(e, &m, &belief, S);
         tgi_traction(&e->settings, &belief, (const tg_real(*)[TG_ROWS])S, &scene, value);
-        for (int32_t k = 0; k < TG_OUT_VERTICAL_LOAD; k++)
-            if (out[k] && (k < TG_OUT_NIS || k > TG_OUT_DISTANCE)) out[k][row] = (double)value[k];
+        put(value, out, row, TG_OUT_VERTICAL_LOAD);
         next = here;
     }
     return TG_OK;

@@ -1,7 +1,7 @@
 /* An estimator as bytes: a header that tells what the bytes are, the object itself, a checksum. */
 #include "estimator.h"
 
-#define TG_SNAPSHOT_VERSION 7u
+#define TG_SNAPSHOT_VERSION 8u
 
 typedef struct {
     char magic[8];

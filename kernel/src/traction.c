@@ -52,21 +52,6 @@ TG_INLINE tg_real root(tg_real variance) { return tgi_sqrt(variance > 0 ? varian
 /* Slip lies in [-1, 1], so no spread above 1 says more than 1 does; the same is said of the efficiency. */
 TG_INLINE tg_real bounded_root(tg_real variance) { return root(variance < 1 ? variance : 1); }
 
-typedef struct { /* slip, and its change with omega, v and the relative radius */
-    tg_real slip, wheel, ground, radius;
-} tgi_slip;
-
-/* Slip by paper eq. 5: (rim - travel)/larger. Where wheel and vehicle both creep, the divisor is floored. */
-TG_INLINE tgi_slip slip_of(tg_real omega, tg_real v, tg_real radius, tg_real least)
-{
-    const tg_real rim = radius * tgi_fabs(omega), travel = tgi_fabs(v), larger = rim > travel ? rim : travel;
-    const tg_real inverse = 1 / (larger > least ? larger : least), s = (rim - travel) * inverse;
-    const tg_real moving = larger > least ? s : 0; /* the divisor moves too, unless floored */
-    const tg_real by_rim = inverse * (1 - (rim >= travel ? moving : 0)), by_travel = -inverse * (1 + (rim >= travel ? 0 : moving));
-    const tgi_slip found = {s, omega < 0 ? -radius * by_rim : radius * by_rim, v < 0 ? -by_travel : by_travel, rim * by_rim};
-    return found;
-}
-
 /* All wheels, delta method. `mean` is the mean adhesion over the load: what a common radius error does to rho_s. */
 TG_INLINE void traction(const tg_settings *restrict s, const tg_real *restrict x, const tgi_moments *restrict c, const tg_real *restrict hub,
                         tg_real mean, tg_real *restrict o, const int n)
@@ -83,7 +68,7 @@ TG_INLINE void traction(const tg_settings *restrict s, const tg_real *restrict x
         o[TG_OUT_NET_TRACTION_STD + i] = root(c->mm[i] - 2 * c->mr[i] + c->rr + tgi_square((mu - mean) * error));
     }
     for (int i = 0; i < n; i++) {
-        const tgi_slip g = slip_of(x[n + 2 + i], v + hub[i], s->rolling_radius[i], s->standstill_speed);
+        const tgi_slip g = tgi_slip_of(x[n + 2 + i], v + hub[i], s->rolling_radius[i], s->standstill_speed);
         const tg_real slip_variance = g.wheel * (g.wheel * c->ww[i] + 2 * g.ground * c->wv[i]) + g.ground * g.ground * c->vv;
         o[TG_OUT_SLIP + i] = g.slip;
         o[TG_OUT_SLIP_STD + i] = bounded_root(slip_variance + tgi_square(g.radius * error));

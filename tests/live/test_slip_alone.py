@@ -10,10 +10,9 @@ import pyarrow.parquet as pq
 import pytest
 
 import terragrip as tg
+from terragrip import TractionEstimator
 from terragrip.cli import main
 from terragrip.errors import InputError
-from terragrip.estimation.slip_estimator import SlipEstimator, restored
-from terragrip.estimation.slip_filter import Walks
 from terragrip.live.core import Core, Row, Settings
 from terragrip.live.service import Service
 from terragrip.live.sinks.can import CanSink
@@ -60,8 +59,7 @@ def samples(frame: dict[str, np.ndarray]) -> list[dict[str, float]]:
 def test_sample_by_sample_is_what_the_whole_log_gives() -> None:
     frame, vehicle = drive(), calibrated()
     whole = tg.estimate(tg.Recording.from_frame(frame), vehicle, sensors={"wheel_based_speed": 0.01}, held={})
-    walks = Walks(**whole.about["settings"]["walks"])
-    one = SlipEstimator(vehicle, CHANNELS, sensors={"wheel_based_speed": 0.01}, walks=walks)
+    one = TractionEstimator(vehicle, channels=CHANNELS, sensors={"wheel_based_speed": 0.01})
     found = [one.update(sample) for sample in samples(frame)]
     for name in ("slip_drive", "slip_drive_std", "ground_speed", "wheel_speed_drive", "distance", "nis"):
         assert np.allclose([e[name] for e in found], whole[name], rtol=1e-9, atol=1e-12, equal_nan=True), name
@@ -76,19 +74,19 @@ def test_sample_by_sample_is_what_the_whole_log_gives() -> None:
 
 def test_a_snapshot_goes_on_bit_for_bit() -> None:
     rows = samples(drive())
-    one = SlipEstimator(calibrated(), CHANNELS, held={"ground_speed": 0.2})
+    one = TractionEstimator(calibrated(), channels=CHANNELS, held={"ground_speed": 0.2})
     for row in rows[:700]:
         one.update(row)
-    other = restored(one.snapshot())
-    assert isinstance(other, SlipEstimator)
+    other = TractionEstimator.restore(one.snapshot())
+    assert other.method == "slip-only"
     for row in rows[700:]:
-        assert repr(one.update(row).values) == repr(other.update(row).values)
+        assert one.update(row).packed == other.update(row).packed
     with pytest.raises(InputError):
-        restored(one.snapshot()[:-3])
+        TractionEstimator.restore(one.snapshot()[:-3])
 
 
 def test_what_cannot_be_taken_is_named_and_leaves_the_filter_alone() -> None:
-    one = SlipEstimator(calibrated(), CHANNELS)
+    one = TractionEstimator(calibrated(), channels=CHANNELS)
     one.update({"time": 1.0, "ground_speed": 2.0, "wheel_based_speed": 2.1})
     state = one.snapshot()
     for sample in (
@@ -103,7 +101,7 @@ def test_what_cannot_be_taken_is_named_and_leaves_the_filter_alone() -> None:
 
 
 def test_without_samples_the_intervals_grow() -> None:
-    one = SlipEstimator(calibrated(), CHANNELS)
+    one = TractionEstimator(calibrated(), channels=CHANNELS)
     for row in samples(drive())[:100]:
         one.update(row)
     spread = [one.update({"time": 10 + 0.2 * k}).slip_drive_std for k in range(1, 6)]
@@ -113,8 +111,8 @@ def test_without_samples_the_intervals_grow() -> None:
 def test_a_held_channel_counts_once() -> None:
     vehicle = calibrated()
     held, bare = (
-        SlipEstimator(vehicle, CHANNELS, held={"ground_speed": 0.5}),
-        SlipEstimator(vehicle, CHANNELS),
+        TractionEstimator(vehicle, channels=CHANNELS, held={"ground_speed": 0.5}),
+        TractionEstimator(vehicle, channels=CHANNELS),
     )
     for k in range(50):
         values = {"time": k / 10, "ground_speed": 2.0 + 0.01 * (k // 5), "wheel_based_speed": 2.0 + 0.002 * k}
@@ -135,7 +133,7 @@ def test_the_core_takes_up_where_it_was() -> None:
     outputs += core.flush()
     slips = [one.estimate.slip_drive for one in outputs if isinstance(one, Row)]
     assert len(slips) == 600
-    straight = SlipEstimator(calibrated(), CHANNELS)
+    straight = TractionEstimator(calibrated(), channels=CHANNELS)
     assert slips[-1] == [straight.update(row) for row in samples(drive(600))][-1].slip_drive
 
 
@@ -174,7 +172,7 @@ def test_can_frames_give_the_drives_slip_for_each_driven_wheel() -> None:
 
     from terragrip.live.sinks.can import DBC
 
-    one = SlipEstimator(calibrated(), CHANNELS)
+    one = TractionEstimator(calibrated(), channels=CHANNELS)
     for row in samples(drive())[:200]:
         estimate = one.update(row)
     sink = CanSink(Uri.parse("can:x?interface=virtual", {"can": ("interface", "rate")}, "sink"), calibrated())

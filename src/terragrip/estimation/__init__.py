@@ -20,7 +20,6 @@ if TYPE_CHECKING:
     from terragrip.estimation.methods import DEFAULT as DEFAULT
     from terragrip.estimation.methods import METHODS as METHODS
     from terragrip.estimation.methods import Method as Method
-    from terragrip.estimation.slip_estimator import SlipEstimator as SlipEstimator
 
 _HOME = {
     "estimate": "batch",
@@ -32,7 +31,6 @@ _HOME = {
     "DEFAULT": "methods",
     "METHODS": "methods",
     "Method": "methods",
-    "SlipEstimator": "slip_estimator",
     "Calibration": "calibration",
     "calibrate": "calibration",
     "identify_torque_scale": "calibration",

@@ -10,14 +10,15 @@ import numpy as np
 import numpy.typing as npt
 
 from terragrip.errors import InputError
-from terragrip.estimation.engine import EVENTS, sample_slots
+from terragrip.estimation.engine import EVENTS
 from terragrip.estimation.estimates import Estimates
 from terragrip.estimation.estimator import TractionEstimator
-from terragrip.estimation.methods import DEFAULT, method_named
+from terragrip.estimation.methods import DEFAULT, SLIP_ONLY, method_named
+from terragrip.estimation.rims import speeds_alone
+from terragrip.estimation.slip_only import against_travel
 from terragrip.recording import Recording, unit_warnings
 
 if TYPE_CHECKING:
-    from terragrip.estimation.slip_estimator import SlipEstimator
     from terragrip.vehicle import Vehicle
 
 Floats = npt.NDArray[np.float64]
@@ -39,7 +40,7 @@ def estimate(
     standstill_speed: float | None = None,
     progress: Progress | None = None,
 ) -> Estimates:
-    """Estimate a whole recording; of one without any drive torque, slip alone (`terragrip.estimation.slip_only`).
+    """Estimate a whole recording; of one without any drive torque, slip alone (docs/methods.md).
 
     Parameters
     ----------
@@ -56,20 +57,7 @@ def estimate(
     InputError: the recording or the vehicle is unusable, there is no such method, or `algebraic` is to smooth.
     """
     log = recording if isinstance(recording, Recording) else Recording.from_frame(recording)
-    from terragrip.estimation.slip_only import estimate_slip, is_slip_only
-
-    if is_slip_only(log, vehicle):
-        return estimate_slip(
-            log,
-            vehicle,
-            smooth=smooth,
-            sensors=sensors,
-            held=held,
-            gap=gap,
-            standstill_speed=standstill_speed,
-            progress=progress,
-        )
-    log.check_against(vehicle)
+    check(log, vehicle)
     if smooth and not method_named(method).can_smooth:
         raise InputError(
             f"the method {method} cannot smooth", mend="take another method, or leave out smooth"
@@ -82,6 +70,12 @@ def estimate(
 
         return run_smoothed(estimator, log, progress)
     return run(estimator, log, progress)
+
+
+def check(log: Recording, vehicle: Vehicle) -> None:
+    """Raise InputError unless the log fits the vehicle; one without torque is looked at rim by rim instead."""
+    if not speeds_alone(log.channels, vehicle):
+        log.check_against(vehicle)
 
 
 def run(
@@ -99,7 +93,7 @@ def run(
 
 def prepared(estimator: TractionEstimator, recording: Recording) -> tuple[Floats, dict[str, Floats]]:
     """Time and those channels that the estimator looks at, each contiguous."""
-    wanted = sample_slots(estimator.vehicle)
+    wanted = estimator.engine.slots_in
     columns = {
         name: np.ascontiguousarray(values) for name, values in recording.channels.items() if name in wanted
     }
@@ -125,12 +119,17 @@ def finished(
     smooth: bool,
 ) -> Estimates:
     """Estimates from the kernel's columns, with what is passed on and notes."""
-    for name in (*_PASSED_ON, *recording.references):
+    own = () if estimator.method != SLIP_ONLY.name else ("drawbar_force",)
+    for name in (*own, *_PASSED_ON, *recording.references):
         if name in recording.channels:
             out[name] = recording.channels[name]
     labels = dict(recording.labels)
     about = about_run(estimator, recording.source, recording.sha256, smooth=smooth)
-    notes = (*recording.notes, *unit_warnings(recording, estimator.vehicle), *notes_of(estimator, recording))
+    notes = [*recording.notes, *unit_warnings(recording, estimator.vehicle), *notes_of(estimator, recording)]
+    if estimator.found is not None:
+        notes = [note for note in notes if not note.startswith("There is no drawbar_force")]
+        wheels = {rim.wheel: out[f"wheel_speed_{rim.wheel}"] for rim in estimator.rims}
+        notes += [*estimator.found.notes, *against_travel(out["ground_speed"], wheels)]
     return Estimates(recording.time, out, event, labels, about, tuple(dict.fromkeys(notes)))
 
 
@@ -141,7 +140,7 @@ def flag_before_gaps(event: npt.NDArray[np.uint8]) -> None:
 
 
 def about_run(
-    estimator: TractionEstimator | SlipEstimator, source: str | None, sha256: str | None, *, smooth: bool
+    estimator: TractionEstimator, source: str | None, sha256: str | None, *, smooth: bool
 ) -> dict[str, Any]:
     """What the table was made from, ready for JSON."""
     from terragrip import __version__
@@ -159,6 +158,11 @@ def about_run(
             "standstill_speed": estimator.thresholds.standstill_speed,
         },
     }
+    if estimator.found is not None:
+        about["zero_slip"] = {
+            wheel: {"ratio": zero.ratio, "std": zero.std, "windows": zero.windows, "doubt": zero.doubt}
+            for wheel, zero in estimator.found.zero.items()
+        }
     plain: dict[str, Any] = json.loads(json.dumps(about))
     return plain
 

@@ -8,10 +8,9 @@ from concurrent.futures import Future, ThreadPoolExecutor
 from typing import TYPE_CHECKING
 
 from terragrip.errors import InputError
-from terragrip.estimation.batch import GAP, flag_before_gaps, run
+from terragrip.estimation.batch import GAP, check, flag_before_gaps, run
 from terragrip.estimation.estimator import TractionEstimator
 from terragrip.estimation.methods import DEFAULT
-from terragrip.estimation.slip_only import is_slip_only, slip_in_parts
 from terragrip.estimation.summary import Tally
 from terragrip.files import replacing
 
@@ -62,9 +61,7 @@ def estimate_in_parts(
     Noise and held channels are found in the whole recording, so that the rows are those of :func:`estimate`. Raises
     InputError as `estimate_blocks` does.
     """
-    if is_slip_only(recording, vehicle):
-        return _written(slip_in_parts(recording, vehicle, rows), output, progress)
-    recording.check_against(vehicle)
+    check(recording, vehicle)
     estimator = TractionEstimator.for_recording(recording, vehicle, method)
     parts = (recording.select(slice(k, k + rows)) for k in range(0, len(recording), rows))
     return _written(_flagged(run(estimator, part, flag=False) for part in parts), output, progress)
@@ -99,7 +96,7 @@ def _estimated(
     estimator = None
     for block in blocks:
         if estimator is None:
-            block.check_against(vehicle)
+            check(block, vehicle)
             estimator = TractionEstimator.for_recording(
                 block, vehicle, method, sensors=sensors, held=held, gap=gap, standstill_speed=standstill_speed
             )

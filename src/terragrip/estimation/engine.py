@@ -14,7 +14,7 @@ import numpy.typing as npt
 
 from terragrip._kernel import ffi, lib
 from terragrip.errors import InputError
-from terragrip.estimation.methods import ADAPTIVE, FILTERED, SUPERVISED, Method
+from terragrip.estimation.methods import Method
 from terragrip.physics.loads import GRAVITY, lateral_shares
 from terragrip.physics.radius import biderman_deflection, hadekel_deflection, loaded_radius, rolling_radius
 from terragrip.vehicle import BidermanRadius, HadekelRadius, Vehicle, Wheel
@@ -35,6 +35,13 @@ class Thresholds:
     gap: float | None = None
     standstill_speed: float | None = None
     max_step: float | None = None
+
+    def put(self, settings: Any) -> None:
+        """Write what the user set into a tg_settings."""
+        for name in ("gap", "standstill_speed", "max_step"):
+            value = getattr(self, name)
+            if value is not None:
+                setattr(settings, name, value)
 
 
 def watch_limits() -> dict[str, float]:
@@ -105,12 +112,13 @@ def estimate_slots(vehicle: Vehicle, *, adaptive: bool = False) -> dict[str, int
 
 
 class Engine:
-    """One tg_estimator. ``settings`` is a tg_settings structure; raises InputError if the kernel refuses it."""
+    """One tg_estimator. ``settings`` is a tg_settings structure; raises InputError if the kernel refuses it.
 
-    def __init__(self, vehicle: Vehicle, settings: Any) -> None:
-        self.slots_in = sample_slots(vehicle)
-        adaptive = settings.method == FILTERED and settings.tuning.policy in (ADAPTIVE, SUPERVISED)
-        self._slots_out = estimate_slots(vehicle, adaptive=adaptive)
+    ``slots_in`` and ``slots_out``: the places in tg_sample.value and tg_estimate.value of the columns it works with.
+    """
+
+    def __init__(self, settings: Any, slots_in: Mapping[str, int], slots_out: Mapping[str, int]) -> None:
+        self.slots_in, self._slots_out = dict(slots_in), dict(slots_out)
         self._used = 1 + max(self._slots_out.values())
         self.inputs = tuple(self.slots_in)
         self.outputs = tuple(self._slots_out)
@@ -278,10 +286,7 @@ def settings_of(
     for name, slot in sample_slots(vehicle).items():
         settings.noise[slot] = noise.get(name, 0.0)
         settings.held_period[slot] = held.get(name, 0.0)
-    for name in ("gap", "standstill_speed", "max_step"):
-        value = getattr(thresholds, name)
-        if value is not None:
-            setattr(settings, name, value)
+    thresholds.put(settings)
     return settings
 
 
@@ -358,13 +363,19 @@ def _set_loads(settings: Any, vehicle: Vehicle) -> None:
                 center_of_gravity_height=vehicle.center_of_gravity_height,
                 track=vehicle.track,
             )
-        half = (vehicle.track or 0.0) / 2 if count > 1 else 0.0
-        sides = np.linspace(half, -half, count)
-        for level, leaning, side in zip(shares[0], shares[1], sides, strict=True):
+        for level, leaning in zip(shares[0], shares[1], strict=True):
             settings.wheel_share[place] = level
             settings.lateral_share[place] = level - leaning
-            settings.wheel_side[place] = side
             place += 1
+    for i, side in enumerate(wheel_sides(vehicle)):
+        settings.wheel_side[i] = side
+
+
+def wheel_sides(vehicle: Vehicle) -> Floats:
+    """Distance of each wheel (n,) [m] from the vehicle's middle, left positive; 0 without a track."""
+    half = (vehicle.track or 0.0) / 2
+    counts = [len(axle.wheels) for axle in vehicle.axles.values()]
+    return np.concatenate([np.linspace(half, -half, n) if n > 1 else np.zeros(1) for n in counts])
 
 
 def _set_calibration(settings: Any, vehicle: Vehicle) -> None:

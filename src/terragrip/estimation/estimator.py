@@ -6,20 +6,32 @@ import json
 import math
 import struct
 from collections.abc import Collection, Iterator, Mapping
+from dataclasses import asdict
 from typing import TYPE_CHECKING, Any, Self
 
 from terragrip.errors import InputError
-from terragrip.estimation.engine import EVENTS, Engine, Thresholds, refusal, settings_of
-from terragrip.estimation.methods import DEFAULT, method_named
+from terragrip.estimation import rims as speeds
+from terragrip.estimation.engine import (
+    EVENTS,
+    Engine,
+    Thresholds,
+    estimate_slots,
+    refusal,
+    sample_slots,
+    settings_of,
+)
+from terragrip.estimation.methods import DEFAULT, SLIP_ONLY, method_named
 from terragrip.estimation.noise import channel_noise
+from terragrip.estimation.rims import Rim, rims_of, speeds_alone
 from terragrip.estimation.sealed import seal, unseal
 from terragrip.vehicle import Vehicle
 
 if TYPE_CHECKING:
     from terragrip.estimation.estimates import Estimates
+    from terragrip.estimation.slip_only import Found
     from terragrip.recording import Recording
 
-_SNAPSHOT_MAGIC = b"TGRIPSN1"
+_SNAPSHOT_MAGIC = b"TGRIPSN2"
 
 
 class Estimate:
@@ -87,7 +99,8 @@ class TractionEstimator:
     held: update period [s] of channels whose values are repeated between updates.
     channels: the columns that samples carry. It decides whether a drawbar force is unknown before its first
         value (in ``channels``) or taken as 0, and whether an undriven wheel has a torque. Default: wheel
-        speeds, ground speed and torques of driven wheels.
+        speeds, ground speed and torques of driven wheels. Columns with speeds and no torque (``wheel_speed_<wheel>`` or
+        ``wheel_based_speed``) make it estimate slip alone, whatever the ``method``: docs/methods.md.
     gap: s without any wheel or ground speed after which the motion starts anew.
     standstill_speed: m/s under which vehicle and wheels count as standing.
 
@@ -112,22 +125,25 @@ class TractionEstimator:
         self.held = dict(held or {})
         self.channels = default_channels(vehicle) if channels is None else tuple(channels)
         self.thresholds = Thresholds(gap=gap, standstill_speed=standstill_speed)
+        self.found: Found | None = None
+        self.rims: tuple[Rim, ...] = ()
+        if speeds_alone(self.channels, vehicle):
+            self.method = SLIP_ONLY.name
+            self.rims = rims_of(vehicle, self.channels)
         self._start(sensors)
 
-    def _start(self, sensors: Mapping[str, float] | None) -> None:
-        from terragrip.estimation.engine import sample_slots
-
-        names = tuple(sample_slots(self.vehicle))
-        self.noise, self.guessed = channel_noise(self.vehicle, names, sensors)
-        settings = settings_of(
-            self.vehicle,
-            method_named(self.method),
-            noise=self.noise,
-            held=self.held,
-            channels=self.channels,
-            thresholds=self.thresholds,
-        )
-        self._engine = Engine(self.vehicle, settings)
+    def _start(self, sensors: Mapping[str, float] | None, dead_band: float = 0.0) -> None:
+        self.dead_band = dead_band
+        slots = speeds.slots_in(self.rims) if self.rims else sample_slots(self.vehicle)
+        self.noise, self.guessed = channel_noise(self.vehicle, tuple(slots), sensors)
+        common: dict[str, Any] = {"noise": self.noise, "held": self.held, "thresholds": self.thresholds}
+        if self.rims:
+            settings = speeds.speed_settings(self.vehicle, self.rims, dead_band=dead_band, **common)
+            self._engine = Engine(settings, slots, speeds.slots_out(self.rims))
+            return
+        method = method_named(self.method)
+        settings = settings_of(self.vehicle, method, channels=self.channels, **common)
+        self._engine = Engine(settings, slots, estimate_slots(self.vehicle, adaptive=method.adapts))
 
     @classmethod
     def for_recording(
@@ -141,15 +157,22 @@ class TractionEstimator:
         gap: float | None = None,
         standstill_speed: float | None = None,
     ) -> Self:
-        """An estimator set up as :func:`estimate` does it: noise and held channels found in the log where not given."""
+        """An estimator set up as :func:`estimate` does it: noise and held channels found in the log where not given; where it holds
+        no torque, also what slip counts from."""
         from terragrip.estimation.noise import logged_noise, sensor_of
+        from terragrip.estimation.slip_only import found_in
         from terragrip.recording import held_periods
 
         periods = dict(held_periods(recording) if held is None else held)
         logged = logged_noise(recording, vehicle, periods)
         mine = dict(sensors or {})
         logged = {name: sd for name, sd in logged.items() if sensor_of(name) not in mine}
-        return cls(
+        alone = speeds_alone(recording.channels, vehicle)
+        found = found_in(recording, vehicle) if alone else None
+        if found is not None:
+            used = speeds.slots_in(found.rims)
+            logged = {name: sd for name, sd in logged.items() if name in used}
+        made = cls(
             vehicle,
             method,
             sensors={**logged, **mine},
@@ -158,6 +181,10 @@ class TractionEstimator:
             gap=gap,
             standstill_speed=standstill_speed,
         )
+        if found is not None:
+            made.found, made.rims = found, found.rims
+            made._start({**logged, **mine}, found.dead_band)
+        return made
 
     @property
     def columns(self) -> tuple[str, ...]:
@@ -236,6 +263,8 @@ class TractionEstimator:
             "channels": self.channels,
             "gap": self.thresholds.gap,
             "standstill_speed": self.thresholds.standstill_speed,
+            "rims": [asdict(rim) for rim in self.rims],
+            "dead_band": self.dead_band,
         }
         text = json.dumps(about).encode()
         body = struct.pack("<I", len(text)) + text + self._engine.snapshot()
@@ -251,13 +280,16 @@ class TractionEstimator:
         about = json.loads(body[4 : 4 + length])
         found = cls(
             Vehicle.from_dict(about["vehicle"]),
-            about["method"],
+            DEFAULT if about["rims"] else about["method"],
             sensors=about["noise"],
             held=about["held"],
             channels=about["channels"],
             gap=about["gap"],
             standstill_speed=about["standstill_speed"],
         )
+        if about["rims"]:
+            found.rims = tuple(Rim(**rim) for rim in about["rims"])
+            found._start(about["noise"], about["dead_band"])
         found.guessed = tuple(about["guessed"])
         found._engine.restore(body[4 + length :])
         return found

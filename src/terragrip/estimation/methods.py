@@ -9,7 +9,7 @@ from terragrip.errors import InputError, nearest
 # Values of tg_engine, tg_policy and tg_method in kernel/include/terragrip.h.
 EXACT, UNSCENTED = 0, 1
 FIXED, ADAPTIVE, SUPERVISED, BANK = 0, 1, 2, 3
-FILTERED, ALGEBRAIC = 0, 1
+FILTERED, ALGEBRAIC, SPEEDS = 0, 1, 2
 
 
 @dataclass(frozen=True)
@@ -27,7 +27,12 @@ class Method:
     @property
     def can_smooth(self) -> bool:
         """Whether a backward pass exists: it needs a filter."""
-        return self.kind == FILTERED
+        return self.kind in (FILTERED, SPEEDS)
+
+    @property
+    def adapts(self) -> bool:
+        """Whether it has factors A_k on its process noise."""
+        return self.kind == FILTERED and self.policy in (ADAPTIVE, SUPERVISED)
 
 
 METHODS: dict[str, Method] = {
@@ -56,6 +61,9 @@ METHODS: dict[str, Method] = {
     )
 }
 DEFAULT = "bank"
+
+SLIP_ONLY = Method("slip-only", "slip from speeds, where no torque is measured; taken by itself", kind=SPEEDS)
+"""No choice among `METHODS`: what the channels hold decides."""
 
 
 def method_named(name: str) -> Method:

@@ -1,12 +1,17 @@
-"""The radius at which wheels would not slip, from speeds alone: ground speed over wheel speed where the load is least.
+"""The zero of slip: the ratio of ground speed to wheel speed in light work, found in a log in one way for all who ask.
 
-Speeds tell slip only against a condition that is called zero (ASABE S296: "zero condition"). A pass without load on firm
-ground is one; in a log of work, the stretches where the wheels run least ahead of the ground come nearest. (R), our own.
+Speeds tell slip only against a condition that is called zero (ASABE S296: "zero condition"): driving without load on firm ground.
+A log of work holds such stretches too, on the headland and on the road. Over windows of some seconds the ratio then has more than
+one mode; the mode of the highest ratio is light work. Where there is one mode only, field work cannot be told from light work, and
+that is said. The modes are Gaussians beside a uniform floor, fitted by expectation and maximisation, their number by the Bayesian
+information criterion (Schwarz 1978). (R), our own construction.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 import numpy.typing as npt
@@ -15,106 +20,161 @@ from terragrip.recording import Recording
 from terragrip.recording.held import held_periods, without_held
 
 Floats = npt.NDArray[np.float64]
+Span = tuple[float, float]
 
-WINDOW = 2.0
-"""Length [s] of the windows that speeds are averaged over."""
+WINDOW = 5.0
+"""Length [s] of the windows that speeds are averaged over: a lag of .2 s between the two speeds then hardly counts."""
+FEWEST = 8
+"""Windows that are needed: 40 s."""
+UNTOLD = 0.03
+"""Relative SD of a radius that nothing tells but the machine itself: worn or other tires, other pressure."""
 
 _SLOWEST = 0.3  # m/s
-_STEADY = 0.3  # m/s², of the change between the halves of a window
+_GOING = 0.5  # of the window's mean speed: slower samples are stops
 _TURNING = 0.05  # rad/s
-_LIGHTEST = 0.9  # quantile of ground over wheel speed
-_AT_QUANTILE = 1.2815515655446004  # of a standard normal distribution
-_FEWEST = 15  # windows
-_BLOCK = 5  # neighbouring windows that count as one
-_DRAWS = 200
+_STRAIGHT = 0.05  # relative difference of the wheels' speeds
+_ROAD = 5.0  # m/s: faster than any work in the soil
+_PLAUSIBLE = 0.15  # a radius is not further off than this; units are
+_NEAR = 0.05  # a radius is seldom further off than this
+_LIGHT = 0.002  # SD of the slip in light work from place to place
+_FLOOR = 0.003  # least SD of a mode
+_ROUNDS = 200
 
 
 @dataclass(frozen=True)
-class Ratio:
-    """``value``: ground speed over supposed rim speed at zero slip; its SD; how many ``windows`` it rests on."""
+class Zero:
+    """``ratio``: ground speed over supposed rim speed at zero slip, with its SD; ``windows`` it rests on (0: none); ``doubt``: why light
+    work cannot be told from field work, empty where it can."""
 
-    value: float
+    ratio: float
     std: float
     windows: int
+    doubt: str = ""
 
 
-def ratios(recording: Recording, channel: str, radius: float) -> tuple[Floats, float]:
-    """Ground speed over rim speed in windows of steady straight motion (n,), and the SD that noise gives one of them.
+def zero_of(
+    logs: Sequence[Recording], channel: str, radius: float, light: Sequence[Span | None] | None = None
+) -> Zero | None:
+    """The zero of a channel over logs of one machine; None where there are too few windows of driving.
 
-    ``channel`` times ``radius`` is the rim speed. The windows' noise is told by the halves of each.
+    ``channel`` times ``radius`` is the rim speed [m/s]. ``light``: of each log the span [s] that was driven without load, if the
+    user knows one; then only that counts.
     """
-    log = without_held(recording, held_periods(recording))
-    time = log.time
-    edges = np.arange(time[0], time[-1], WINDOW / 2)
-    if len(edges) < 4:
-        return np.empty(0), 0.0
-    ground, rim = _halves(log, "ground_speed", edges), radius * _halves(log, channel, edges)
-    turn = _halves(log, "angular_velocity_z", edges)
-    with np.errstate(invalid="ignore", divide="ignore"):
-        straight = ~(np.abs(turn) > _TURNING)
-        moving = (np.abs(ground) > _SLOWEST) & (np.abs(rim) > _SLOWEST) & (ground * rim > 0) & straight
-        ratio = ground / rim
-    count = len(ratio) // 2
-    first, second = slice(0, 2 * count, 2), slice(1, 2 * count, 2)
-    used = moving[first] & moving[second]
-    for speed in (ground, rim):
-        used &= np.abs(speed[second] - speed[first]) < _STEADY * WINDOW / 2
-    pairs = np.stack([ratio[first][used], ratio[second][used]])
-    if not pairs.size:
-        return np.empty(0), 0.0
-    apart = 1.4826 * float(
-        np.median(np.abs(pairs[1] - pairs[0]))
-    )  # of two halves: √2 their own, twice the window's
-    return pairs.mean(axis=0), apart / 2
-
-
-def lightest(found: Floats, noise: float) -> Ratio | None:
-    """The ratio of the tenth of windows (n,) where it is largest, without what noise adds there; None if there are few.
-
-    The quantile of noisy ratios lies above that of true ones by up to noise times the normal quantile, which is taken
-    off. The SD is that over draws of blocks of windows, with half of what was taken off.
-    """
-    if len(found) < _FEWEST:
-        return None
-    excess = noise * _AT_QUANTILE
-
-    def value(ratios: Floats) -> float:
-        spread = float(np.std(ratios))
-        # Noise adds to the spread in squares, so to the quantile less than by itself.
-        share = noise / spread if spread > noise else 1.0
-        return float(np.quantile(ratios, _LIGHTEST)) - excess * share
-
-    return Ratio(value(found), float(np.hypot(_over_blocks(found, value), 0.5 * excess)), len(found))
-
-
-def average(found: Floats) -> Ratio | None:
-    """The median ratio of windows (n,) of which none was under load; None if there are few."""
-    if len(found) < _FEWEST:
-        return None
-    return Ratio(float(np.median(found)), _over_blocks(found, lambda x: float(np.median(x))), len(found))
-
-
-def _over_blocks(found: Floats, value: object) -> float:
-    """SD of a statistic over draws of blocks of neighbouring windows."""
-    assert callable(value)
-    draws = np.random.default_rng(0)
-    starts = np.arange(0, len(found), _BLOCK)
-    blocks = [found[s : s + _BLOCK] for s in starts]
-    values = [
-        value(np.concatenate([blocks[k] for k in draws.integers(0, len(blocks), len(blocks))]))
-        for _ in range(_DRAWS)
+    spans = [None] * len(logs) if light is None else list(light)
+    declared = any(span is not None for span in spans)
+    parts = [
+        _windows(log, channel, radius, span)
+        for log, span in zip(logs, spans, strict=True)
+        if channel in log.channels and (span is not None or not declared)
     ]
-    return float(np.std(values))
+    ratio = np.concatenate([np.empty(0), *(found for found, _ in parts)])
+    if len(ratio) < FEWEST:
+        return None
+    if declared:
+        return Zero(float(np.median(ratio)), _error(ratio), len(ratio))
+    return _judged(ratio, np.concatenate([fast for _, fast in parts]))
 
 
-def _halves(log: Recording, name: str, edges: Floats) -> Floats:
-    """Means of a channel between edges (n,); NaN where nothing was measured."""
-    if name not in log.channels:
-        return np.full(len(edges) - 1, np.nan)
-    values = log.channels[name]
+def _judged(ratio: Floats, fast: npt.NDArray[np.bool_]) -> Zero:
+    modes = _modes(ratio)
+    value, spread, share = modes[-1]
+    count = max(1, round(share * len(ratio)))
+    std = float(np.hypot(spread / np.sqrt(max(1.0, count / 2)), _LIGHT))
+    if abs(value - 1) > _PLAUSIBLE:
+        why = f"ground speed is {value:.3g} times wheel speed even in the lightest work: check the units and the radius"
+        return Zero(1.0, UNTOLD, count, why)
+    if len(modes) > 1 or np.mean(fast) > 0.8:
+        return Zero(value, std, count)
+    if abs(value - 1) <= _NEAR:
+        why = "all windows slip alike, so light work cannot be told from field work"
+        return Zero(value, float(np.hypot(std, UNTOLD)), count, why)
+    why = (
+        f"all windows slip alike and run {abs(1 - value):.0%} {'behind' if value < 1 else 'ahead of'} the supposed radius, so that it is "
+        "field work as likely as another radius"
+    )
+    return Zero(1.0, UNTOLD, count, why)
+
+
+def _error(ratio: Floats) -> float:
+    """SD of a median of windows (n,) of which neighbours hang together."""
+    spread = 1.4826 * float(np.median(np.abs(ratio - np.median(ratio))))
+    return float(np.hypot(1.2533 * max(spread, _FLOOR) / np.sqrt(len(ratio) / 2), _LIGHT))
+
+
+def _modes(ratio: Floats) -> list[tuple[float, float, float]]:
+    """Mean, SD and share of each mode, from the lowest to the highest; modes that run into each other are one."""
+    best: tuple[float, list[tuple[float, float, float]]] | None = None
+    for number in (1, 2, 3):
+        score, modes = _fit(ratio, number)
+        kept = [mode for mode in modes if mode[2] * len(ratio) >= FEWEST / 2]
+        apart = all(b[0] - a[0] > a[1] + b[1] for a, b in pairwise(kept))
+        if kept and apart and (best is None or score < best[0]):
+            best = score, kept
+    if best is None:
+        return [(float(np.median(ratio)), float(np.std(ratio)), 1.0)]
+    return best[1]
+
+
+def _fit(ratio: Floats, number: int) -> tuple[float, list[tuple[float, float, float]]]:
+    """Bayesian information criterion and modes of a mixture, by expectation and maximisation (Dempster, Laird, Rubin 1977)."""
+    n = len(ratio)
+    floor = 1 / max(float(np.ptp(ratio)), 0.2)
+    mean = np.quantile(ratio, (np.arange(number) + 0.5) / number)
+    spread = np.full(number, max(float(np.std(ratio)) / number, _FLOOR))
+    share = np.r_[np.full(number, 0.95 / number), 0.05]
+    likelihood = 0.0
+    for _ in range(_ROUNDS):
+        scaled = (ratio[:, None] - mean) / spread
+        density = np.column_stack(
+            [np.exp(-0.5 * scaled**2) / (spread * np.sqrt(2 * np.pi)), np.full(n, floor)]
+        )
+        density *= share
+        total = density.sum(axis=1)
+        likelihood = float(np.sum(np.log(total)))
+        weight = density / total[:, None]
+        held = np.maximum(weight.sum(axis=0), 1e-9)
+        share = held / held.sum()
+        mean = (weight[:, :-1] * ratio[:, None]).sum(axis=0) / held[:-1]
+        square = (weight[:, :-1] * (ratio[:, None] - mean) ** 2).sum(axis=0) / held[:-1]
+        spread = np.maximum(np.sqrt(square), _FLOOR)
+    found = sorted(zip(mean.tolist(), spread.tolist(), share.tolist(), strict=False))
+    return 3 * number * float(np.log(n)) - 2 * likelihood, found
+
+
+def _windows(
+    recording: Recording, channel: str, radius: float, span: Span | None
+) -> tuple[Floats, npt.NDArray[np.bool_]]:
+    """Ground speed over rim speed in windows without a stop (n,), of one wheel in straight ones; and whether each is of a road."""
+    log = without_held(recording, held_periods(recording))
+    if span is not None:
+        log = log.select((log.time >= span[0]) & (log.time <= span[1]))
+        if len(log) == 0:
+            return np.empty(0), np.zeros(0, dtype=bool)
+    place = ((log.time - log.time[0]) / WINDOW).astype(np.intp)
+    count = int(place[-1]) + 1
+    ground, slowest = _means(log.channels["ground_speed"], place, count)
+    rim, least = _means(radius * log.channels[channel], place, count)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        used = (np.abs(ground) > _SLOWEST) & (np.abs(rim) > _SLOWEST) & (ground * rim > 0)
+        used &= (slowest > _GOING * np.abs(ground)) & (least > _GOING * np.abs(rim))
+        if channel != "wheel_based_speed":
+            used &= _straight(log, place, count)
+        return (ground / rim)[used], (np.abs(ground) > _ROAD)[used]
+
+
+def _straight(log: Recording, place: npt.NDArray[np.intp], count: int) -> npt.NDArray[np.bool_]:
+    """Windows (count,) in which no turn shows: in the yaw rate, else in the wheels' speeds."""
+    if "angular_velocity_z" in log.channels:
+        return ~(np.abs(_means(log.channels["angular_velocity_z"], place, count)[0]) > _TURNING)
+    wheels = np.stack([_means(log.channels[f"wheel_speed_{w}"], place, count)[0] for w in log.wheels])
+    return np.asarray(np.ptp(wheels, axis=0) <= _STRAIGHT * np.abs(wheels.mean(axis=0)))
+
+
+def _means(values: Floats, place: npt.NDArray[np.intp], count: int) -> tuple[Floats, Floats]:
+    """Mean of a channel in windows (count,), NaN where nothing was measured, and its least magnitude there."""
     known = np.isfinite(values)
-    place = np.searchsorted(edges, log.time[known], side="right") - 1
-    inside = (place >= 0) & (place < len(edges) - 1)
-    count = np.bincount(place[inside], minlength=len(edges) - 1)
-    total = np.bincount(place[inside], values[known][inside], minlength=len(edges) - 1)
-    return np.where(count > 0, total / np.maximum(count, 1), np.nan)
+    number = np.bincount(place[known], minlength=count)
+    total = np.bincount(place[known], values[known], count)
+    least = np.full(count, np.inf)
+    np.minimum.at(least, place[known], np.abs(values[known]))
+    return np.where(number > 0, total / np.maximum(number, 1), np.nan), least

@@ -15,7 +15,7 @@ from terragrip.errors import InputError
 from terragrip.estimation.engine import estimate_slots
 from terragrip.estimation.estimator import Estimate, TractionEstimator, default_channels
 from terragrip.estimation.methods import DEFAULT
-from terragrip.estimation.slip_estimator import SlipEstimator, restored, speeds_alone
+from terragrip.estimation.rims import DRIVE, speeds_alone
 from terragrip.live.clock import SourceClock, Stamped
 from terragrip.live.counts import Counts
 from terragrip.live.event import Event
@@ -127,20 +127,17 @@ class Core:
         self.reorder = Reorder(settings.window, self.counts)
         align = len(settings.sources) > 1
         self.clocks = [SourceClock(align) for _ in settings.sources]
-        self.estimator: TractionEstimator | SlipEstimator | None = None
+        self.estimator: TractionEstimator | None = None
         self.rows = 0
         self.event = ""  # the last row's
         if settings.channels:
             self._begin(settings.channels)
 
-    def _begin(self, channels: Collection[str]) -> TractionEstimator | SlipEstimator:
-        held = self.settings.held
-        if speeds_alone(channels, self.vehicle):
-            self.estimator = SlipEstimator(self.vehicle, channels, held=held)
-            return self.estimator
-        estimator = TractionEstimator(self.vehicle, self.settings.method, channels=channels, held=held)
+    def _begin(self, channels: Collection[str]) -> TractionEstimator:
+        method, held = self.settings.method, self.settings.held
+        estimator = TractionEstimator(self.vehicle, method, channels=channels, held=held)
         self.estimator = estimator
-        if self.settings.ground:
+        if self.settings.ground and not estimator.rims:
             from terragrip.ground.live import LiveGround
 
             self.ground = LiveGround(estimator, self.library)
@@ -252,7 +249,7 @@ class Core:
         seen = {name for row in (first, *self.reorder.pending) for name in row.values}
         wheels = [name.removeprefix("wheel_speed_") for name in seen if name.startswith("wheel_speed_")]
         absent = [wheel for wheel in self.vehicle.wheels if wheel not in wheels]
-        if isinstance(self.estimator, SlipEstimator) and not wheels:
+        if self.estimator is not None and [rim.wheel for rim in self.estimator.rims] == [DRIVE]:
             return []
         strange = sorted(wheel for wheel in wheels if wheel not in self.vehicle.wheels)
         if not absent:
@@ -297,13 +294,13 @@ class Core:
             raise ValueError(f"a state of format {state['format']}, not {FORMAT}")
         result = cls(Vehicle.from_dict(state["vehicle"]), Settings.from_dict(state["settings"]), library)
         snapshot = base64.b64decode(state["estimator"])
-        result.estimator = restored(snapshot) if snapshot else None
+        result.estimator = TractionEstimator.restore(snapshot) if snapshot else None
         result.clocks = [SourceClock.from_state(one) for one in state["clocks"]]
         result.counts = Counts.from_state(state["counts"])
         result.reorder.counts = result.counts
         result.reorder.restore(state["reorder"])
         result.rows, result.event = state["rows"], state["event"]
-        if state["ground"] and isinstance(result.estimator, TractionEstimator):
+        if state["ground"] and result.estimator is not None:
             from terragrip.ground.live import LiveGround
 
             result.ground = LiveGround.restore(base64.b64decode(state["ground"]), result.estimator, library)

@@ -6,7 +6,6 @@ The filter itself does not move: samples that were only delayed find it as if no
 from __future__ import annotations
 
 from terragrip.estimation.estimator import TractionEstimator
-from terragrip.estimation.slip_estimator import SlipEstimator, restored
 from terragrip.live.core import Core, Row
 
 _PATIENCE = 0.3  # s of silence, or
@@ -17,7 +16,7 @@ class Prediction:
     """Predicted rows, at most one a call."""
 
     def __init__(self) -> None:
-        self._copy: TractionEstimator | SlipEstimator | None = None
+        self._copy: TractionEstimator | None = None
         self._rows, self._time = -1, float("-inf")
 
     def at(self, core: Core, now: float, last_arrival: float, period: float) -> Row | None:
@@ -26,7 +25,7 @@ class Prediction:
         if core.estimator is None or not core.rows or silence < max(_PATIENCE, _PERIODS * period):
             return None
         if self._copy is None or self._rows != core.rows:
-            self._copy, self._rows = restored(core.estimator.snapshot()), core.rows
+            self._copy, self._rows = TractionEstimator.restore(core.estimator.snapshot()), core.rows
             self._time = core.time
         time = core.time + silence
         if time <= self._time:  # what came meanwhile was no row: the silence counts anew

@@ -24,7 +24,6 @@ if TYPE_CHECKING:
 
     from terragrip.estimation.estimates import Estimates
     from terragrip.estimation.estimator import TractionEstimator
-    from terragrip.estimation.slip_estimator import SlipEstimator
 
 _STAMP = struct.Struct("=ddB")  # time, arrival, code of the event
 _CODES = {event: code for code, event in enumerate(EVENTS)}
@@ -98,7 +97,7 @@ class Segment:
                 result[name][np.frombuffer(rows.places, dtype=np.int64)] = column
         return result
 
-    def write(self, folder: Path, estimator: TractionEstimator | SlipEstimator | None) -> None:
+    def write(self, folder: Path, estimator: TractionEstimator | None) -> None:
         """Write the segment's files; raises OSError."""
         if len(self) and estimator is not None:
             import pyarrow.parquet as pq
@@ -131,7 +130,7 @@ class Segment:
         columns = {"time": stamps["time"], "arrival": stamps["arrival"], **self.channels()}
         return pa.table({name: floats(column) for name, column in columns.items()})
 
-    def to_estimates(self, estimator: TractionEstimator | SlipEstimator) -> Estimates:
+    def to_estimates(self, estimator: TractionEstimator) -> Estimates:
         """The rows' estimates as a table."""
         import numpy as np
 

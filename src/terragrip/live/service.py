@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, Any
 
 from terragrip.errors import InputError
 from terragrip.estimation.methods import DEFAULT, method_named
-from terragrip.estimation.slip_estimator import SlipEstimator
 from terragrip.live.core import WINDOW, Core, Ground, Output, Row, Settings
 from terragrip.live.decode import Decoder, check_channels
 from terragrip.live.event import Event
@@ -92,7 +91,7 @@ class Service:
             names, method, window, tuple(channels), dict(held or {}), ground or library is not None
         )
         core = Core(vehicle, settings, library)
-        if settings.ground and isinstance(core.estimator, SlipEstimator):
+        if settings.ground and core.estimator is not None and core.estimator.rims:
             raise InputError(
                 "ground changes show in adhesion and soil resistance, which need drive torques",
                 place="--ground", mend="leave it out: the sources give speeds alone",

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from terragrip.estimation.rim_speeds import DRIVE
+from terragrip.estimation.rims import DRIVE
 from terragrip.physics.geodesy import metres_of
 from terragrip.report.page import Picture, Section, Table, names, number
 from terragrip.report.runs import FloatArray, Run

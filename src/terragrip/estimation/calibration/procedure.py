@@ -17,7 +17,8 @@ from terragrip.estimation.calibration.result import Calibration, Quantity, Unkno
 from terragrip.estimation.calibration.speeds import calibrate_radii
 from terragrip.estimation.calibration.torque_scale import identify_torque_scale
 from terragrip.estimation.calibration.windows import track_blocks, windows
-from terragrip.estimation.slip_only import is_slip_only
+from terragrip.estimation.rims import speeds_alone
+from terragrip.estimation.zero_slip import Span
 from terragrip.physics.loads import GRAVITY
 from terragrip.recording import Recording, sensor_noise, without_held
 from terragrip.vehicle import Vehicle
@@ -27,19 +28,25 @@ _UNSTATED_RADIUS = 0.02  # relative, likewise
 _SENSOR_BIAS = 0.03  # m/s^2, likewise, of an accelerometer
 
 
-def calibrate(recordings: Recording | Sequence[Recording], vehicle: Vehicle) -> Calibration:
+def calibrate(
+    recordings: Recording | Sequence[Recording],
+    vehicle: Vehicle,
+    *,
+    light: Sequence[Span | None] | None = None,
+) -> Calibration:
     """Find what logs can tell of a vehicle's sensors and wheels.
 
     Zeros of torque, drawbar and accelerometer come from standstill; rolling radii from straight passes at zero pull;
     relative torque gains of the wheels from the adhesion curve that they share. Each has a 95 % interval and says what
-    it rests on; what the logs cannot give is listed with the reason. Logs without any torque give radii alone, and must be
-    of driving without load. A ``calibration`` block that the vehicle already
+    it rests on; what the logs cannot give is listed with the reason. Logs without any torque give radii alone, by the
+    zero of slip that `estimate` finds too. A ``calibration`` block that the vehicle already
     has is used for whatever the logs cannot give.
 
     Parameters
     ----------
     recordings: logs of one vehicle in one state, read by :func:`terragrip.read`. A ``soil`` label sharpens the gains.
     vehicle: as its file says.
+    light: of each log without torque the span [s] that was driven without load, where one is known (None: not).
 
     Raises
     ------
@@ -49,8 +56,8 @@ def calibrate(recordings: Recording | Sequence[Recording], vehicle: Vehicle) -> 
     if not logs:
         raise InputError("there is no recording to calibrate from", mend="give at least one log")
     sources = [log.source or f"recording {k + 1}" for k, log in enumerate(logs)]
-    if all(is_slip_only(log, vehicle) for log in logs):
-        return calibrate_radii(logs, vehicle, sources)
+    if all(speeds_alone(log.channels, vehicle) for log in logs):
+        return calibrate_radii(logs, vehicle, sources, light)
     for log in logs:
         log.check_against(vehicle)
     logs = [without_held(log) for log in logs]

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from terragrip.errors import InputError
 from terragrip.estimation.engine import EVENTS
 from terragrip.estimation.estimator import Estimate
-from terragrip.estimation.rim_speeds import DRIVE
+from terragrip.estimation.rims import DRIVE
 from terragrip.ground.classification.labels import UNKNOWN
 from terragrip.live.can_bus import check, errors, open_bus
 from terragrip.live.core import Row

@@ -1,0 +1,382 @@
+/* Slip from speeds alone, where no torque is measured (docs/decisions/0110). The state is the ground speed v, its rate a, and of each wheel
+ * the slip speed d = r omega - (v - side yaw_rate), in the vehicle's own directions: so both speeds are linear in it, and a wheel that spins
+ * at rest is no special case. a is an Ornstein-Uhlenbeck process (Singer 1970), d a random walk in proportion to speed. How hard both are
+ * driven is not known: TG_SPEED_MODES filters, one a pair of densities, are mixed as an interacting multiple model (Blom and Bar-Shalom
+ * 1988). The same in NumPy: estimation/reference/speeds.py. */
+#include "estimator.h"
+
+#define TG_LEVELS 3
+#define TG_LASTING ((tg_real)3)        /* s, time constant of the acceleration */
+#define TG_DWELL ((tg_real)2)          /* s, mean time in a pair of densities */
+#define TG_FIRST_RATE ((tg_real)1)     /* m/s^2, SD of the acceleration before it was seen */
+#define TG_SLOWEST ((tg_real)0.1)      /* m/s: slower wheels change their slip speed no less */
+
+/* (m/s^2)^2/s: a steady drive, driving by hand, sharp starts and stops. */
+static const tg_real manoeuvres[TG_LEVELS] = {(tg_real)1e-3, (tg_real)3e-2, 1};
+/* Square of the change of slip per root second: one ground and load, a rough one, a wheel that lets go. */
+static const tg_real slippings[TG_LEVELS] = {(tg_real)2.5e-5, (tg_real)2.5e-3, (tg_real)0.25};
+
+#define SIZE TG_SPEED_STATES
+
+typedef struct { /* what a row measures [m/s]: ground speed, rims; and which channels there are */
+    tg_real y[TG_MAX_WHEELS + 1], variance[TG_MAX_WHEELS + 1];
+    int32_t given[TG_MAX_WHEELS + 1], count; /* channels that are measured */
+} tgi_speed_samples;
+
+typedef struct { /* how the samples fitted one mode */
+    tg_real weight[TG_MAX_WHEELS + 1], score, nis;
+} tgi_speed_fit;
+
+/* Variance that the densities add over dt; the noise of slip speeds is in proportion to the speeds in `x`. */
+static void disturb(const tg_real *x, tg_real (*P)[SIZE], tg_real dt, tg_real manoeuvre, tg_real slipping, int32_t n)
+{
+    P[0][0] += manoeuvre * dt * dt * dt / 3;
+    P[0][1] += manoeuvre * dt * dt / 2;
+    P[1][0] += manoeuvre * dt * dt / 2;
+    P[1][1] += manoeuvre * dt;
+    for (int32_t i = 0; i < n; i++) {
+        tg_real speed = tgi_fabs(x[0]), rim = tgi_fabs(x[0] + x[2 + i]);
+        if (rim > speed) speed = rim;
+        if (speed < TG_SLOWEST) speed = TG_SLOWEST;
+        P[2 + i][2 + i] += slipping * dt * speed * speed;
+    }
+}
+
+/* P becomes F P F' of a step: F differs from 1 in v' = v + reach a, a' = keep a. */
+static void carry_on(tg_real (*P)[SIZE], tg_real reach, tg_real keep, int32_t size)
+{
+    for (int32_t j = 0; j < size; j++) {
+        P[0][j] += reach * P[1][j];
+        P[1][j] *= keep;
+    }
+    for (int32_t j = 0; j < size; j++) {
+        P[j][0] += reach * P[j][1];
+        P[j][1] *= keep;
+    }
+}
+
+static void passage_of(tg_real dt, tg_real *reach, tg_real *keep)
+{
+    *reach = -TG_LASTING * tgi_expm1(-dt / TG_LASTING);
+    *keep = tgi_exp(-dt / TG_LASTING);
+}
+
+/* Channel c sees v, a wheel v + d. */
+TG_INLINE tg_real read_of(const tg_real *x, int32_t c) { return x[0] + (c ? x[1 + c] : 0); }
+
+static tg_real spread(const tg_real (*P)[SIZE], int32_t c)
+{
+    return c ? P[0][0] + 2 * P[0][1 + c] + P[1 + c][1 + c] : P[0][0];
+}
+
+/* Take the samples one after another. A sample beyond `huber` SDs of what is expected before any was taken counts less. */
+static void update(tgi_speed_mode *m, tgi_speed_fit *fit, const tgi_speed_samples *in, tg_real huber, int32_t size)
+{
+    fit->nis = 0;
+    for (int32_t k = 0; k < in->count; k++) {
+        const int32_t c = in->given[k];
+        const tg_real expected = tgi_sqrt(spread((const tg_real(*)[SIZE])m->P, c) + in->variance[c]);
+        const tg_real off = tgi_fabs(in->y[c] - read_of(m->x, c));
+        fit->weight[c] = huber > 0 && off > huber * expected ? huber * expected / off : 1;
+    }
+    for (int32_t k = 0; k < in->count; k++) {
+        const int32_t c = in->given[k];
+        tg_real column[SIZE];
+        for (int32_t j = 0; j < size; j++) column[j] = m->P[j][0] + (c ? m->P[j][1 + c] : 0);
+        const tg_real variance = read_of(column, c) + in->variance[c] / fit->weight[c], innovation = in->y[c] - read_of(m->x, c);
+        for (int32_t i = 0; i < size; i++) {
+            const tg_real gain = column[i] / variance;
+            m->x[i] += gain * innovation;
+            for (int32_t j = 0; j < size; j++) m->P[i][j] -= gain * column[j];
+        }
+        fit->nis += innovation * innovation / variance;
+        fit->score -= (innovation * innovation / variance + tgi_log(variance)) / 2;
+    }
+}
+
+/* The moments of all modes together. */
+static void merge(tgi_speeds *s, const tgi_speed_mode *mode, int32_t size)
+{
+    memset(s->x, 0, sizeof s->x);
+    memset(s->P, 0, sizeof s->P);
+    for (int32_t m = 0; m < TG_SPEED_MODES; m++)
+        for (int32_t i = 0; i < size; i++) s->x[i] += s->probability[m] * mode[m].x[i];
+    for (int32_t m = 0; m < TG_SPEED_MODES; m++)
+        for (int32_t i = 0; i < size; i++)
+            for (int32_t j = 0; j < size; j++)
+                s->P[i][j] += s->probability[m] * (mode[m].P[i][j] + (mode[m].x[i] - s->x[i]) * (mode[m].x[j] - s->x[j]));
+}
+
+/* Where a mode starts from: itself by `own`, all modes together by the rest. */
+static void mix(tgi_speed_mode *m, const tgi_speeds *all, tg_real own, int32_t size)
+{
+    tg_real apart[SIZE], other[SIZE];
+    for (int32_t i = 0; i < size; i++) {
+        const tg_real x = own * m->x[i] + (1 - own) * all->x[i];
+        apart[i] = m->x[i] - x;
+        other[i] = all->x[i] - x;
+        m->x[i] = x;
+    }
+    for (int32_t i = 0; i < size; i++)
+        for (int32_t j = 0; j < size; j++)
+            m->P[i][j] = own * (m->P[i][j] + apart[i] * apart[j]) + (1 - own) * (all->P[i][j] + other[i] * other[j]);
+}
+
+TG_INLINE void move(tg_real *x, tg_real reach, tg_real keep)
+{
+    x[0] += reach * x[1];
+    x[1] *= keep;
+}
+
+static void step(tg_estimator *e, tg_real dt, const tgi_speed_samples *in, tg_row *row)
+{
+    tgi_speeds *const s = &e->speeds;
+    const int32_t n = e->settings.machine.wheels, size = n + 2;
+    tgi_speed_fit fit[TG_SPEED_MODES];
+    tg_real reach, keep, best = 0, sum = 0, weight[TG_MAX_WHEELS + 1] = {0}, scale[SIZE];
+    const tg_real stay = tgi_exp(-dt / TG_DWELL), leave = -tgi_expm1(-dt / TG_DWELL) / TG_SPEED_MODES;
+    passage_of(dt, &reach, &keep);
+    memcpy(scale, s->x, sizeof scale);
+    move(scale, reach, keep);
+    for (int32_t m = 0; m < TG_SPEED_MODES; m++) {
+        tgi_speed_mode *const mode = &e->speed_mode[m];
+        const tg_real prior = stay * s->probability[m] + leave;
+        mix(mode, s, stay * s->probability[m] / prior, size);
+        move(mode->x, reach, keep);
+        carry_on(mode->P, reach, keep, size);
+        disturb(scale, mode->P, dt, manoeuvres[m / TG_LEVELS], slippings[m % TG_LEVELS], n);
+        fit[m].score = tgi_log(prior);
+        update(mode, &fit[m], in, e->settings.tuning.huber, size);
+        if (m == 0 || fit[m].score > best) best = fit[m].score;
+    }
+    for (int32_t m = 0; m < TG_SPEED_MODES; m++) sum += s->probability[m] = tgi_exp(fit[m].score - best);
+    s->manoeuvre = s->slipping = 0;
+    for (int32_t m = 0; m < TG_SPEED_MODES; m++) {
+        const tg_real p = s->probability[m] /= sum;
+        s->manoeuvre += p * manoeuvres[m / TG_LEVELS];
+        s->slipping += p * slippings[m % TG_LEVELS];
+        e->belief.nis += p * fit[m].nis;
+        for (int32_t k = 0; k < in->count; k++) weight[k] += p * fit[m].weight[in->given[k]];
+    }
+    for (int32_t k = 0; k < in->count; k++) row->outlier |= weight[k] < e->settings.outlier_weight;
+    merge(s, e->speed_mode, size);
+}
+
+/* The first row since nothing was known that measures any speed. What it does not measure follows from the rest, broadly. */
+static void begin(tg_estimator *e, const tgi_speed_samples *in, int32_t n)
+{
+    tgi_speeds *const s = &e->speeds;
+    const int32_t size = n + 2;
+    tg_real v = 0;
+    int32_t rims = 0;
+    for (int32_t c = 1; c <= n; c++) {
+        if (isnan(in->y[c])) continue;
+        v += in->y[c];
+        rims++;
+    }
+    if (rims > 0) v /= (tg_real)rims;
+    if (!isnan(in->y[0])) v = in->y[0];
+    else if (rims == 0) return;
+    const tg_real broad = tgi_square((tg_real)0.3 * tgi_fabs(v) + (tg_real)0.1);
+    memset(s->P, 0, sizeof s->P);
+    s->x[0] = v;
+    s->x[1] = 0;
+    s->P[0][0] = isnan(in->y[0]) ? broad : in->variance[0];
+    s->P[1][1] = tgi_square(TG_FIRST_RATE);
+    for (int32_t c = 1; c <= n; c++) {
+        const int32_t k = 1 + c;
+        s->x[k] = isnan(in->y[c]) ? 0 : in->y[c] - v;
+        if (!isnan(in->y[c]))
+            for (int32_t j = 0; j < size; j++) s->P[k][j] = s->P[j][k] = -s->P[0][j];
+        s->P[k][k] = isnan(in->y[c]) ? broad : s->P[0][0] + in->variance[c];
+    }
+    for (int32_t m = 0; m < TG_SPEED_MODES; m++) {
+        memcpy(e->speed_mode[m].x, s->x, sizeof s->x);
+        memcpy(e->speed_mode[m].P, s->P, sizeof s->P);
+    }
+    s->begun = 1;
+}
+
+/* Nothing is known of the motion. */
+static void forget(tg_estimator *e)
+{
+    memset(&e->speeds, 0, sizeof e->speeds);
+    memset(e->speed_mode, 0, sizeof e->speed_mode);
+    e->speeds.anew = 1;
+    for (int32_t m = 0; m < TG_SPEED_MODES; m++) e->speeds.probability[m] = (tg_real)1 / TG_SPEED_MODES;
+}
+
+/* Rims that stand while the vehicle goes: no wheels do that, but a speed that reads 0 below what its sensor can see does. */
+static int32_t rims_are_blind(const tg_estimator *e, const tg_row *row, int32_t *any)
+{
+    const tg_settings *s = &e->settings;
+    *any = 0;
+    for (int32_t i = 0; i < s->machine.wheels; i++) {
+        const tg_real omega = row->value[TG_WHEEL_SPEED + i];
+        if (isnan(omega)) continue;
+        *any = 1;
+        if (s->rolling_radius[i] * tgi_fabs(omega) > s->dead_band) return 0;
+    }
+    return *any && !e->standing;
+}
+
+static void samples_of(const tg_estimator *e, const tg_row *row, const tgi_speeds *s, tgi_speed_samples *in)
+{
+    const tg_settings *set = &e->settings;
+    const tg_real lean = tgi_square(set->noise[TG_YAW_RATE]);
+    const int32_t n = set->machine.wheels;
+    in->count = 0;
+    in->y[0] = row->value[TG_GROUND_SPEED];
+    in->variance[0] = e->constants.variance[TG_GROUND_SPEED];
+    for (int32_t i = 0; i < n; i++) {
+        const tg_real r = set->rolling_radius[i], side = set->wheel_side[i];
+        in->y[1 + i] = s->open != 0 ? (tg_real)NAN : r * row->value[TG_WHEEL_SPEED + i] + side * s->yaw;
+        in->variance[1 + i] = r * r * e->constants.variance[TG_WHEEL_SPEED + i] + (s->yaw != 0 ? side * side * lean : 0);
+    }
+    for (int32_t c = 0; c <= n; c++)
+        if (!isnan(in->y[c])) in->given[in->count++] = c;
+}
+
+static tg_real root(tg_real variance) { return tgi_sqrt(variance > 0 ? variance : 0); }
+
+/* The row's values from the state; the radius is considered: it shifts slip, and no sample shows it. */
+static void report(const tg_settings *set, const tgi_speeds *s, tg_real *o)
+{
+    const tg_real error = set->uncertainty.wheel_radius, nan = (tg_real)NAN;
+    const int32_t known = s->begun != 0;
+    o[TG_OUT_GROUND_SPEED] = known ? s->x[0] : nan;
+    o[TG_OUT_GROUND_SPEED_STD] = known ? root(s->P[0][0]) : nan;
+    for (int32_t i = 0; i < set->machine.wheels; i++) {
+        const int32_t k = 2 + i;
+        const tg_real r = set->rolling_radius[i], hub = s->x[0] - set->wheel_side[i] * s->yaw, omega = (hub + s->x[k]) / r;
+        const tg_real vv = s->P[0][0], wv = (vv + s->P[0][k]) / r, ww = (vv + 2 * s->P[0][k] + s->P[k][k]) / (r * r);
+        const tgi_slip g = tgi_slip_of(omega, hub, r, set->standstill_speed);
+        const tg_real variance = g.wheel * (g.wheel * ww + 2 * g.ground * wv) + g.ground * g.ground * vv + tgi_square(g.radius * error);
+        const int32_t slips = known && s->open == 0 && s->standing == 0;
+        o[TG_OUT_WHEEL_SPEED + i] = known ? omega : nan;
+        o[TG_OUT_WHEEL_SPEED_STD + i] = known ? root(ww) : nan;
+        o[TG_OUT_SLIP + i] = slips ? g.slip : nan;
+        o[TG_OUT_SLIP_STD + i] = slips ? root(variance < 1 ? variance : 1) : nan;
+        o[TG_OUT_ZERO_SLIP_RADIUS + i] = r;
+        o[TG_OUT_ZERO_SLIP_RADIUS_STD + i] = r * error;
+    }
+}
+
+/* Whether there is nothing to tell slip from, now or since the motion began. */
+static int32_t is_blind(const tgi_speeds *s, int32_t n)
+{
+    int32_t wheel = 0;
+    for (int32_t i = 0; i < n; i++) wheel |= s->seen[1 + i] != 0;
+    return s->seen[0] == 0 || !wheel || s->open != 0;
+}
+
+/* A checked row of the method TG_SPEEDS. */
+void tgi_speeds_update(tg_estimator *e, tg_row *row, tg_estimate *out)
+{
+    tgi_speeds *const s = &e->speeds;
+    const int32_t n = e->settings.machine.wheels;
+    const tg_real dt = e->started ? (tg_real)(row->time - e->time) : 0, travelled = tgi_fabs(s->x[0]);
+    const int32_t gap = !e->started || row->time - e->measured_time > (double)e->settings.gap;
+    int32_t any;
+    tgi_speed_samples in;
+    tgi_track_motion(e, row);
+    tgi_track_turn(e, row);
+    if (gap) forget(e);
+    else s->anew = 0;
+    s->dt = dt;
+    s->yaw = e->yaw_rate;
+    s->standing = (tg_real)e->standing;
+    const int32_t blind = rims_are_blind(e, row, &any);
+    if (any || e->standing) s->open = (tg_real)blind;
+    samples_of(e, row, s, &in);
+    e->belief.nis = 0;
+    if (s->begun != 0) step(e, dt, &in, row);
+    else begin(e, &in, n);
+    e->belief.channels = in.count;
+    for (int32_t k = 0; k < in.count; k++) s->seen[in.given[k]] = 1;
+    if (!gap && !e->standing) e->distance += (double)((travelled + tgi_fabs(s->x[0])) / 2 * dt);
+    if (row->measured) e->measured_time = row->time;
+    const int32_t first = !e->started;
+    e->started = 1;
+    e->time = row->time;
+
+    for (int32_t k = 0; k < TG_OUT_SLOTS; k++) out->value[k] = (tg_real)NAN;
+    report(&e->settings, s, out->value);
+    out->time = row->time;
+    out->distance = e->distance;
+    out->value[TG_OUT_DISTANCE] = (tg_real)e->distance;
+    out->value[TG_OUT_NIS] = e->belief.nis;
+    out->value[TG_OUT_CHANNELS] = (tg_real)e->belief.channels;
+    out->event = (gap && !first) || is_blind(s, n) ? TG_EVENT_GAP
+               : e->standing                       ? TG_EVENT_STANDSTILL
+               : row->outlier                      ? TG_EVENT_OUTLIER
+                                                   : TG_EVENT_NONE;
+}
+
+/* ---- smoothing: a row's record is its tgi_speeds ---- */
+
+size_t tgi_speeds_length(void) { return sizeof(tgi_speeds) / sizeof(tg_real); }
+
+/* Solve A Z = B in place of B, A symmetric and positive definite: by Cholesky. Returns 0 where A is not. */
+static int solve(tg_real (*A)[SIZE], tg_real (*B)[SIZE], int32_t size)
+{
+    for (int32_t j = 0; j < size; j++) {
+        for (int32_t k = 0; k < j; k++)
+            for (int32_t i = j; i < size; i++) A[i][j] -= A[i][k] * A[j][k];
+        if (!(A[j][j] > 0)) return 0;
+        const tg_real pivot = tgi_sqrt(A[j][j]);
+        for (int32_t i = j; i < size; i++) A[i][j] /= pivot;
+    }
+    for (int32_t c = 0; c < size; c++) {
+        for (int32_t i = 0; i < size; i++) {
+            for (int32_t k = 0; k < i; k++) B[i][c] -= A[i][k] * B[k][c];
+            B[i][c] /= A[i][i];
+        }
+        for (int32_t i = size - 1; i >= 0; i--) {
+            for (int32_t k = i + 1; k < size; k++) B[i][c] -= A[k][i] * B[k][c];
+            B[i][c] /= A[i][i];
+        }
+    }
+    return 1;
+}
+
+/* Rauch, Tung and Striebel (1965), with the densities that the row behind was reached by. */
+static void step_back(tgi_speeds *here, const tgi_speeds *filtered_next, const tgi_speeds *next, int32_t n)
+{
+    const int32_t size = n + 2;
+    tg_real ahead[SIZE][SIZE], factor[SIZE][SIZE], gain[SIZE][SIZE], change[SIZE], x[SIZE], reach, keep;
+    passage_of(filtered_next->dt, &reach, &keep);
+    memcpy(ahead, here->P, sizeof ahead);
+    memcpy(gain, here->P, sizeof gain);
+    carry_on(ahead, reach, keep, size);
+    for (int32_t j = 0; j < size; j++) { /* F P: its transpose times inverse(ahead) is the gain */
+        gain[0][j] += reach * gain[1][j];
+        gain[1][j] *= keep;
+    }
+    memcpy(x, here->x, sizeof x);
+    move(x, reach, keep);
+    disturb(x, ahead, filtered_next->dt, filtered_next->manoeuvre, filtered_next->slipping, n);
+    for (int32_t j = 0; j < size; j++) change[j] = next->x[j] - x[j];
+    memcpy(factor, ahead, sizeof factor);
+    if (!solve(factor, gain, size)) return;
+    for (int32_t i = 0; i < size; i++)
+        for (int32_t k = 0; k < size; k++) here->x[i] += gain[k][i] * change[k];
+    for (int32_t i = 0; i < size; i++)
+        for (int32_t j = 0; j < size; j++)
+            for (int32_t k = 0; k < size; k++)
+                for (int32_t l = 0; l < size; l++) here->P[i][j] += gain[k][i] * (next->P[k][l] - ahead[k][l]) * gain[l][j];
+}
+
+/* One row back: `carry` holds the smoothed row behind and is overwritten by this one's; `next` is the filtered one behind, or null. */
+void tgi_speeds_smooth(const tg_settings *set, const tg_real *record, const tg_real *next, tg_real *carry, tg_real *o)
+{
+    tgi_speeds here, behind, smoothed;
+    memcpy(&here, record, sizeof here);
+    if (next) {
+        memcpy(&behind, next, sizeof behind);
+        memcpy(&smoothed, carry, sizeof smoothed);
+        if (behind.anew == 0) step_back(&here, &behind, &smoothed, set->machine.wheels);
+    }
+    memcpy(carry, &here, sizeof here);
+    report(set, &here, o);
+}

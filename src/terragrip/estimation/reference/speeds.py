@@ -1,0 +1,162 @@
+"""Slip from speeds alone as the kernel's `speeds.c` has it, in plain NumPy: what tests hold the kernel against.
+
+State: ground speed v, its rate a, and of each wheel the slip speed d = r ω - (v - side yaw_rate), all in the vehicle's own
+directions. a is an Ornstein-Uhlenbeck process (Singer 1970), d a random walk in proportion to speed. How hard both are driven is
+not known: nine filters, one a pair of densities, are mixed as an interacting multiple model (Blom and Bar-Shalom 1988).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+import numpy.typing as npt
+
+Floats = npt.NDArray[np.float64]
+
+MANOEUVRES = (1e-3, 3e-2, 1.0)
+"""Densities of what drives the acceleration, (m/s²)²/s: a steady drive, driving by hand, sharp starts and stops."""
+SLIPPING = (5e-3, 5e-2, 5e-1)
+"""Change of slip per root second: one ground and load, a rough one, a wheel that lets go."""
+PAIRS = tuple((manoeuvre, slipping) for manoeuvre in MANOEUVRES for slipping in SLIPPING)
+LASTING = 3.0
+"""Time constant of the acceleration [s]."""
+DWELL = 2.0
+"""Mean time [s] in a pair of densities."""
+HUBER = 4.0
+_FIRST_RATE = 1.0  # SD of a [m/s²] before it was seen
+_SLOWEST = 0.1  # m/s: slower wheels change their slip speed no less
+
+
+@dataclass
+class SpeedsFilter:
+    """``noise`` (1 + wheels,): SDs [m/s] of ground speed and rim speeds. ``state`` (2 + wheels,) and ``covariance``."""
+
+    noise: Floats
+    state: Floats = field(init=False)
+    covariance: Floats = field(init=False)
+    means: Floats = field(init=False)
+    spreads: Floats = field(init=False)
+    probability: Floats = field(init=False)
+    begun: bool = field(init=False, default=False)
+    nis: float = field(init=False, default=0.0)
+    channels: int = field(init=False, default=0)
+    weight: Floats = field(init=False)
+    densities: tuple[float, float] = field(init=False, default=(0.0, 0.0))
+
+    def __post_init__(self) -> None:
+        size = len(self.noise) + 1
+        self.state, self.covariance = np.zeros(size), np.zeros((size, size))
+        self.means, self.spreads = np.zeros((len(PAIRS), size)), np.zeros((len(PAIRS), size, size))
+        self.probability = np.full(len(PAIRS), 1 / len(PAIRS))
+        self.begun = False
+        self.weight = np.ones(len(self.noise))
+
+    def step(self, dt: float, speeds: Floats) -> None:
+        """Go ``dt`` [s] on and take samples (1 + wheels,) [m/s] of ground speed and rims, NaN where not measured."""
+        self.nis, self.channels, self.weight = 0.0, 0, np.ones(len(self.noise))
+        if not self.begun:
+            self._begin(speeds)
+            return
+        usable = np.isfinite(speeds)
+        move = transition(dt, len(self.state))
+        scale = move @ self.state  # the noise of slip speeds is in proportion to speed
+        stay, leave = np.exp(-dt / DWELL), -np.expm1(-dt / DWELL) / len(PAIRS)
+        prior = stay * self.probability + leave
+        found = []
+        for m, (manoeuvre, slipping) in enumerate(PAIRS):
+            x, P = self._mixed(m, stay * self.probability[m] / prior[m])
+            Q = process_noise(scale, dt, manoeuvre, slipping**2)
+            found.append(self._update(move @ x, move @ P @ move.T + Q, speeds, usable))
+        score = np.log(prior) + [one[2] for one in found]
+        p = np.exp(score - score.max())
+        p /= p.sum()
+        self.probability = p
+        self.means, self.spreads = np.stack([one[0] for one in found]), np.stack([one[1] for one in found])
+        self.nis = float(p @ [one[3] for one in found])
+        self.weight = p @ np.stack([one[4] for one in found])
+        self.channels = int(usable.sum())
+        self.densities = float(p @ [q for q, _ in PAIRS]), float(p @ [c * c for _, c in PAIRS])
+        self._merge()
+
+    def _mixed(self, mode: int, own: float) -> tuple[Floats, Floats]:
+        """Where a mode starts from: itself by ``own``, all modes together by the rest."""
+        x = own * self.means[mode] + (1 - own) * self.state
+        apart, other = self.means[mode] - x, self.state - x
+        P = own * (self.spreads[mode] + np.outer(apart, apart))
+        return x, P + (1 - own) * (self.covariance + np.outer(other, other))
+
+    def _merge(self) -> None:
+        """The moments of all modes together."""
+        self.state = self.probability @ self.means
+        apart = self.means - self.state
+        self.covariance = np.einsum("m,mij->ij", self.probability, self.spreads)
+        self.covariance += np.einsum("m,mi,mj->ij", self.probability, apart, apart)
+
+    def _update(
+        self, x: Floats, P: Floats, speeds: Floats, usable: npt.NDArray[np.bool_]
+    ) -> tuple[Floats, Floats, float, float, Floats]:
+        likelihood, nis = 0.0, 0.0
+        rows = _rows(len(self.noise))
+        weight = np.ones(len(self.noise))
+        for c in np.flatnonzero(usable):
+            size = np.sqrt(rows[c] @ P @ rows[c] + self.noise[c] ** 2)
+            off = abs(speeds[c] - rows[c] @ x)
+            weight[c] = HUBER * size / off if off > HUBER * size else 1.0
+        for c in np.flatnonzero(usable):
+            column = P @ rows[c]
+            variance = rows[c] @ column + self.noise[c] ** 2 / weight[c]
+            innovation = speeds[c] - rows[c] @ x
+            x = x + column * innovation / variance
+            P = P - np.outer(column, column) / variance
+            nis += innovation**2 / variance
+            likelihood -= 0.5 * (innovation**2 / variance + np.log(variance))
+        return x, P, likelihood, nis, weight
+
+    def _begin(self, speeds: Floats) -> None:
+        """Start from the first row that measures any speed; what it does not measure follows from the rest, broadly."""
+        given = np.isfinite(speeds)
+        if not given.any():
+            return
+        v = float(speeds[0] if given[0] else np.mean(speeds[1:][given[1:]]))
+        broad = (0.3 * abs(v) + 0.1) ** 2
+        x, P = np.zeros_like(self.state), np.zeros_like(self.covariance)
+        x[0], P[0, 0], P[1, 1] = v, self.noise[0] ** 2 if given[0] else broad, _FIRST_RATE**2
+        for c in range(1, len(speeds)):
+            if given[c]:
+                x[c + 1] = speeds[c] - v
+                P[c + 1], P[:, c + 1] = -P[0], -P[0]
+            P[c + 1, c + 1] = P[0, 0] + self.noise[c] ** 2 if given[c] else broad
+        self.means[:], self.spreads[:] = x, P
+        self.state, self.covariance = x, P
+        self.begun = True
+
+    def anew(self) -> None:
+        """Nothing is known of the motion from here on."""
+        self.__post_init__()
+
+
+def transition(dt: float, size: int) -> Floats:
+    """The state's map (size, size) over ``dt`` [s]."""
+    move = np.eye(size)
+    move[0, 1] = -LASTING * np.expm1(-dt / LASTING)
+    move[1, 1] = np.exp(-dt / LASTING)
+    return move
+
+
+def process_noise(x: Floats, dt: float, manoeuvre: float, slipping: float) -> Floats:
+    """Variance (n, n) that ``dt`` [s] add; ``slipping``: density of relative slip, 1/s."""
+    Q = np.zeros((len(x), len(x)))
+    Q[:2, :2] = manoeuvre * np.array([[dt**3 / 3, dt**2 / 2], [dt**2 / 2, dt]])
+    for i in range(2, len(x)):
+        speed = max(abs(x[0]), abs(x[0] + x[i]), _SLOWEST)
+        Q[i, i] = slipping * dt * speed**2
+    return Q
+
+
+def _rows(channels: int) -> Floats:
+    rows = np.zeros((channels, channels + 1))
+    rows[:, 0] = 1
+    for c in range(1, channels):
+        rows[c, c + 1] = 1
+    return rows

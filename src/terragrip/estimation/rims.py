@@ -1,0 +1,152 @@
+"""Rims whose slip is told without torque: a wheel each, or a drive train as one wheel, and the radii that slip counts from."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from terragrip._kernel import ffi, lib
+from terragrip.errors import InputError
+from terragrip.estimation.engine import Thresholds, wheel_radii, wheel_sides
+from terragrip.estimation.methods import SLIP_ONLY
+from terragrip.estimation.zero_slip import UNTOLD, Zero
+from terragrip.physics.loads import GRAVITY
+from terragrip.recording.schema import has_torque
+from terragrip.vehicle import Vehicle
+
+DRIVE = "drive"
+"""Name of the wheel that stands for all driven ones, where only the drive train's speed is measured."""
+
+_RADIUS = 0.02  # relative SD of a radius that the vehicle file gives without one
+
+
+@dataclass(frozen=True)
+class Rim:
+    """A wheel whose slip is told, and the ``channel`` that tells its speed.
+
+    ``scale``: reading of the channel at 1 rad/s (1, or for the drive train the radius that it supposes [m]); ``radius`` [m] at zero slip
+    and its relative SD ``spread``; ``side``: m left of the vehicle's middle.
+    """
+
+    wheel: str
+    channel: str
+    scale: float
+    radius: float
+    spread: float
+    side: float
+
+
+def speeds_alone(channels: Collection[str], vehicle: Vehicle) -> bool:
+    """Whether samples of these columns hold speeds, and no torque though the vehicle drives wheels."""
+    wheels = any(name == "wheel_based_speed" or name.startswith("wheel_speed_") for name in channels)
+    return bool(vehicle.driven.any()) and wheels and "ground_speed" in channels and not has_torque(channels)
+
+
+def rims_of(vehicle: Vehicle, channels: Collection[str], source: str | None = None) -> tuple[Rim, ...]:
+    """The rims that samples of these columns tell of, by the vehicle file's radii; raises InputError on a wheel it does not have."""
+    stated = vehicle.uncertainty.wheel_radius
+    spread = _RADIUS if stated is None else stated
+    named = [name.removeprefix("wheel_speed_") for name in channels if name.startswith("wheel_speed_")]
+    for wheel in named:
+        if wheel not in vehicle.wheels:
+            mend = f"its wheels are {', '.join(vehicle.wheels)}"
+            place = f"column wheel_speed_{wheel}"
+            raise InputError(f"the vehicle has no wheel {wheel}", file=source, place=place, mend=mend)
+    if named:
+        radii, sides = wheel_radii(vehicle)[1], wheel_sides(vehicle)
+        return tuple(
+            Rim(wheel, f"wheel_speed_{wheel}", 1.0, float(radius), spread, float(side))
+            for wheel, radius, side in zip(vehicle.wheels, radii, sides, strict=True)
+            if wheel in named
+        )
+    supposed = supposed_radius(vehicle)
+    calibrated = calibrated_scale(vehicle)
+    if calibrated is None:
+        return (
+            Rim(DRIVE, "wheel_based_speed", supposed, supposed, UNTOLD if stated is None else stated, 0.0),
+        )
+    return (Rim(DRIVE, "wheel_based_speed", supposed, calibrated * supposed, spread, 0.0),)
+
+
+def supposed_radius(vehicle: Vehicle) -> float:
+    """The driven wheels' mean radius [m] as the vehicle file says it, before calibration: a drive train's speed in m/s stands for any."""
+    radii = [data.radius for data, driven in zip(vehicle.wheel_data, vehicle.driven, strict=True) if driven]
+    return float(np.mean(radii))
+
+
+def calibrated_scale(vehicle: Vehicle) -> float | None:
+    """What the drive train's speed is to be multiplied by, where all driven wheels are calibrated."""
+    found = vehicle.calibration.wheel_radius
+    driven = [
+        (wheel, data.radius)
+        for wheel, data, on in zip(vehicle.wheels, vehicle.wheel_data, vehicle.driven, strict=True)
+        if on
+    ]
+    if not all(wheel in found for wheel, _ in driven):
+        return None
+    return float(np.mean([found[wheel] / radius for wheel, radius in driven]))
+
+
+def at_zero(rim: Rim, zero: Zero) -> Rim:
+    """The rim with the radius that a log tells."""
+    return Rim(rim.wheel, rim.channel, rim.scale, zero.ratio * rim.radius, zero.std, rim.side)
+
+
+def slots_in(rims: Collection[Rim]) -> dict[str, int]:
+    """The place in tg_sample.value of each column that slip is told from."""
+    wheels = {rim.channel: lib.TG_WHEEL_SPEED + i for i, rim in enumerate(rims)}
+    return {**wheels, "ground_speed": lib.TG_GROUND_SPEED, "angular_velocity_z": lib.TG_YAW_RATE}
+
+
+def slots_out(rims: Collection[Rim]) -> dict[str, int]:
+    """The place in tg_estimate.value of each column of estimates from speeds alone, in the table's order."""
+    slots = {
+        "distance": lib.TG_OUT_DISTANCE,
+        "ground_speed": lib.TG_OUT_GROUND_SPEED,
+        "ground_speed_std": lib.TG_OUT_GROUND_SPEED_STD,
+    }
+    for quantity, value, std in (
+        ("wheel_speed", lib.TG_OUT_WHEEL_SPEED, lib.TG_OUT_WHEEL_SPEED_STD),
+        ("slip", lib.TG_OUT_SLIP, lib.TG_OUT_SLIP_STD),
+        ("zero_slip_radius", lib.TG_OUT_ZERO_SLIP_RADIUS, lib.TG_OUT_ZERO_SLIP_RADIUS_STD),
+    ):
+        for i, rim in enumerate(rims):
+            slots[f"{quantity}_{rim.wheel}"] = value + i
+            slots[f"{quantity}_{rim.wheel}_std"] = std + i
+    return slots | {"nis": lib.TG_OUT_NIS, "channels": lib.TG_OUT_CHANNELS}
+
+
+def speed_settings(
+    vehicle: Vehicle,
+    rims: Collection[Rim],
+    *,
+    noise: Mapping[str, float],
+    held: Mapping[str, float],
+    thresholds: Thresholds,
+    dead_band: float,
+) -> Any:
+    """A tg_settings for slip from speeds alone; arguments as for `engine.settings_of`, ``dead_band`` [m/s] of the rims."""
+    settings = ffi.new("tg_settings *", lib.tg_default_settings())
+    settings.method = SLIP_ONLY.kind
+    machine = settings.machine
+    machine.wheels, machine.mass, machine.gravity = len(rims), vehicle.mass, GRAVITY
+    for i, rim in enumerate(rims):
+        machine.radius[i] = settings.rolling_radius[i] = rim.radius
+        machine.inertia[i] = 1.0  # of no effect without torque
+        settings.wheel_share[i] = 1 / len(rims)
+        settings.wheel_side[i] = rim.side
+        settings.gain[lib.TG_WHEEL_SPEED + i] = rim.scale
+        settings.noise[lib.TG_WHEEL_SPEED + i] = noise[rim.channel] / rim.scale
+    lib.tg_tune_walks(settings)
+    settings.noise[lib.TG_GROUND_SPEED] = noise["ground_speed"]
+    settings.noise[lib.TG_YAW_RATE] = noise["angular_velocity_z"]
+    settings.noise[lib.TG_ACCELERATION_X] = 1.0  # of no effect either, but the kernel asks for one
+    for name, slot in slots_in(rims).items():
+        settings.held_period[slot] = held.get(name, 0.0)
+    settings.uncertainty.wheel_radius = max((rim.spread for rim in rims), default=0.0)
+    settings.dead_band = dead_band
+    thresholds.put(settings)
+    return settings

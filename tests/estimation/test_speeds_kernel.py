@@ -1,0 +1,105 @@
+"""The kernel's method of speeds alone against its twin in NumPy, sample by sample and smoothed."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import terragrip as tg
+from terragrip.estimation.reference.speeds import SpeedsFilter, process_noise, transition
+
+RADIUS = 0.25
+
+
+def machine(wheels: tuple[str, ...]) -> tg.Vehicle:
+    return tg.Vehicle.from_dict(
+        {"mass": 80, "axles": {"only": {"mass": 80, "wheels": list(wheels)}}, "wheel": {"radius": RADIUS, "inertia": 1}}
+    )  # fmt: skip
+
+
+def drive(wheels: int, seed: int) -> tuple[np.ndarray, np.ndarray]:
+    """Instants (n,) and speeds (n, 1 + wheels) [m/s] at uneven steps, with missing samples, spikes and a leap."""
+    draws = np.random.default_rng(seed)
+    time = np.cumsum(draws.uniform(0.01, 0.6, 250))
+    speed = 1.5 + np.sin(time / 4)
+    slip = 0.1 + 0.1 * np.sin(time[:, None] / (3 + np.arange(wheels)))
+    speeds = np.c_[speed, speed[:, None] / (1 - slip)] + 0.02 * draws.standard_normal((250, 1 + wheels))
+    speeds[150:] += 1.0
+    speeds[draws.random(speeds.shape) < 0.3] = np.nan
+    speeds[[50, 90, 130], 0] = 15.0
+    return time, speeds
+
+
+@pytest.mark.parametrize(("wheels", "seed"), [(1, 1000), (2, 1001), (4, 1002), (8, 1003)])
+def test_kernel_and_twin_agree(wheels: int, seed: int) -> None:
+    names = tuple(f"w{k}" for k in range(wheels))
+    time, speeds = drive(wheels, seed)
+    columns = {"time": time, "ground_speed": speeds[:, 0]}
+    columns |= {f"wheel_speed_{w}": speeds[:, 1 + k] / RADIUS for k, w in enumerate(names)}
+    log, sensors = tg.Recording.from_frame(columns), {"ground_speed": 0.03, "wheel_speed": 0.02 / RADIUS}
+    options = {"sensors": sensors, "held": {}, "gap": 1e3}
+    found = tg.estimate(log, machine(names), **options)
+    smooth = tg.estimate(log, machine(names), smooth=True, **options)
+
+    twin = SpeedsFilter(np.r_[0.03, np.full(wheels, 0.02)])
+    states, covariances, densities, scores = [], [], [], []
+    for k in range(len(time)):
+        twin.step(time[k] - time[k - 1] if k else 0.0, speeds[k])
+        states.append(twin.state.copy())
+        covariances.append(twin.covariance.copy())
+        densities.append(twin.densities)
+        scores.append((twin.nis, twin.weight.min()))
+    score = np.array(scores)
+    assert np.allclose(found["nis"], score[:, 0], rtol=1e-9, atol=1e-9)
+    assert np.array_equal(found["event"] == "outlier", score[:, 1] < 0.5)
+    assert np.sum(score[:, 1] < 0.5) >= 3
+    _same(found, states, covariances, names)
+    for k in range(len(time) - 2, -1, -1):  # Rauch, Tung and Striebel
+        dt = time[k + 1] - time[k]
+        move = transition(dt, wheels + 2)
+        x = move @ states[k]
+        ahead = move @ covariances[k] @ move.T + process_noise(x, dt, *densities[k + 1])
+        gain = covariances[k] @ move.T @ np.linalg.inv(ahead)
+        states[k] = states[k] + gain @ (states[k + 1] - x)
+        covariances[k] = covariances[k] + gain @ (covariances[k + 1] - ahead) @ gain.T
+    _same(smooth, states, covariances, names, rtol=1e-7)
+
+
+def _same(
+    found: tg.Estimates,
+    states: list[np.ndarray],
+    covariances: list[np.ndarray],
+    names: tuple[str, ...],
+    rtol: float = 1e-9,
+) -> None:
+    x, P = np.stack(states), np.stack(covariances)
+    assert np.allclose(found["ground_speed"], x[:, 0], rtol=rtol)
+    assert np.allclose(found["ground_speed_std"], np.sqrt(P[:, 0, 0]), rtol=rtol)
+    for k, name in enumerate(names):
+        rim = x[:, 0] + x[:, 2 + k]
+        spread = P[:, 0, 0] + 2 * P[:, 0, 2 + k] + P[:, 2 + k, 2 + k]
+        assert np.allclose(found[f"wheel_speed_{name}"], rim / RADIUS, rtol=rtol)
+        assert np.allclose(found[f"wheel_speed_{name}_std"], np.sqrt(spread) / RADIUS, rtol=rtol)
+
+
+def test_intervals_on_simulated_slip() -> None:
+    """Slip that wanders as a random walk does, seen by noise that is told: 95 % of the rows are in their intervals."""
+    draws = np.random.default_rng(1004)
+    time = np.arange(0, 200, 0.1)
+    speed = 1.5 + 0.3 * np.sin(time / 8)
+    slip = 0.12 + 0.08 * np.tanh(np.cumsum(0.02 * draws.standard_normal(len(time))))
+    columns = {
+        "time": time,
+        "ground_speed": speed + 0.03 * draws.standard_normal(len(time)),
+        "wheel_speed_a": (speed / (1 - slip) + 0.02 * draws.standard_normal(len(time))) / RADIUS,
+    }
+    vehicle = tg.Vehicle.from_dict({**machine(("a",)).to_dict(), "uncertainty": {"wheel_radius": 0.0}})
+    found = tg.estimate(
+        tg.Recording.from_frame(columns),
+        vehicle,
+        sensors={"ground_speed": 0.03, "wheel_speed": 0.02 / RADIUS},
+        held={},
+    )
+    inside = np.abs(found["slip_a"] - slip) < 1.96 * found["slip_a_std"]
+    assert 0.9 < inside.mean() < 0.99
+    assert 0.7 < found["nis"].sum() / found["channels"].sum() < 1.2
