@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import Annotated
 
@@ -21,6 +22,14 @@ def command(
     ],
     profile: ProfileFile = None,
     dbc: DbcFiles = None,
+    light: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--light",
+            metavar="FROM:TO",
+            help="Seconds of a log without torque that were driven without load, or 'all'; once a log, in their order.",
+        ),
+    ] = None,
     quiet: Quiet = False,
 ) -> None:
     """Calibrate a vehicle from its logs.
@@ -36,13 +45,16 @@ def command(
     check_file(
         output, [*logs, vehicle, *([profile] if profile else []), *(dbc or [])], suffixes=(".yaml", ".yml")
     )
+    spans = _spans(light or [], len(logs))
     recordings = []
     with progress("reading", quiet) as step:
         for number, log in enumerate(logs, 1):
             recordings.append(read(log, profile, dbc=tuple(dbc or ())))
             step(number, len(logs), log.name)
-    found = calibrate(recordings, machine)
+    found = calibrate(recordings, machine, light=spans)
     if not any(quantity.applies for quantity in found.quantities):
+        for note in found.notes:
+            print(f"Note: {note}")
         reasons = "; ".join(f"{unknown.name}: {unknown.why}" for unknown in found.unknown)
         raise InputError(
             f"nothing can be calibrated ({reasons})",
@@ -53,3 +65,26 @@ def command(
     if not quiet:
         print(found.table())
         print(f"\nWritten to {output}")
+
+
+def _spans(light: list[str], logs: int) -> list[tuple[float, float] | None] | None:
+    """Spans [s] of the logs that were driven without load, from the options."""
+    if not light:
+        return None
+    if len(light) > logs:
+        raise InputError(
+            f"{len(light)} spans for {logs} logs", place="--light", mend="give at most one a log"
+        )
+    spans: list[tuple[float, float] | None] = []
+    for text in light:
+        first, _, last = text.partition(":")
+        try:
+            span = (-math.inf, math.inf) if text == "all" else (float(first), float(last))
+        except ValueError:
+            span = (math.nan, math.nan)
+        if not span[0] < span[1]:
+            raise InputError(
+                f"{text!r} is no span", place="--light", mend="write e.g. '120:300' [s], or 'all'"
+            )
+        spans.append(span)
+    return spans + [None] * (logs - len(light))

@@ -39,6 +39,8 @@ _NEAR = 0.05  # a radius is seldom further off than this
 _LIGHT = 0.002  # SD of the slip in light work from place to place
 _FLOOR = 0.003  # least SD of a mode
 _ROUNDS = 200
+_NUMBERS = (1, 2, 3, 4)
+_STRAY = 0.1  # share of windows that are of no mode, at most
 
 
 @dataclass(frozen=True)
@@ -104,8 +106,8 @@ def _error(ratio: Floats) -> float:
 def _modes(ratio: Floats) -> list[tuple[float, float, float]]:
     """Mean, SD and share of each mode, from the lowest to the highest; modes that run into each other are one."""
     best: tuple[float, list[tuple[float, float, float]]] | None = None
-    for number in (1, 2, 3):
-        score, modes = _fit(ratio, number)
+    for number, first in ((n, first) for n in _NUMBERS for first in _starts(ratio, n)):
+        score, modes = _fit(ratio, number, first)
         kept = [mode for mode in modes if mode[2] * len(ratio) >= FEWEST / 2]
         apart = all(b[0] - a[0] > a[1] + b[1] for a, b in pairwise(kept))
         if kept and apart and (best is None or score < best[0]):
@@ -115,11 +117,17 @@ def _modes(ratio: Floats) -> list[tuple[float, float, float]]:
     return best[1]
 
 
-def _fit(ratio: Floats, number: int) -> tuple[float, list[tuple[float, float, float]]]:
+def _starts(ratio: Floats, number: int) -> list[Floats]:
+    """Means (number,) to begin with: spread over the windows, and with one of them at the few that slip least."""
+    even = (np.arange(number) + 0.5) / number
+    light = np.r_[(np.arange(number - 1) + 0.5) / max(1, number - 1) * 0.9, 0.97]
+    return [np.quantile(ratio, places) for places in ((even,) if number == 1 else (even, light))]
+
+
+def _fit(ratio: Floats, number: int, mean: Floats) -> tuple[float, list[tuple[float, float, float]]]:
     """Bayesian information criterion and modes of a mixture, by expectation and maximisation (Dempster, Laird, Rubin 1977)."""
     n = len(ratio)
     floor = 1 / max(float(np.ptp(ratio)), 0.2)
-    mean = np.quantile(ratio, (np.arange(number) + 0.5) / number)
     spread = np.full(number, max(float(np.std(ratio)) / number, _FLOOR))
     share = np.r_[np.full(number, 0.95 / number), 0.05]
     likelihood = 0.0
@@ -134,6 +142,8 @@ def _fit(ratio: Floats, number: int) -> tuple[float, list[tuple[float, float, fl
         weight = density / total[:, None]
         held = np.maximum(weight.sum(axis=0), 1e-9)
         share = held / held.sum()
+        share[-1] = min(share[-1], _STRAY)  # a floor that takes whole modes would be none
+        share /= share.sum()
         mean = (weight[:, :-1] * ratio[:, None]).sum(axis=0) / held[:-1]
         square = (weight[:, :-1] * (ratio[:, None] - mean) ** 2).sum(axis=0) / held[:-1]
         spread = np.maximum(np.sqrt(square), _FLOOR)

@@ -129,8 +129,9 @@ def inspect(
             raise
         fitting = _fitting(log)
         warnings += [] if fitting else [_cause(error)]
-    if recording is not None and machine is not None:
+    if recording is not None:
         warnings += unit_warnings(recording, machine)
+    if recording is not None and machine is not None:
         try:
             if not _without_torque(recording):
                 recording.check_against(machine)

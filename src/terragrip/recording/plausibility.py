@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
+from terragrip.recording.track import Track, track_of
+
 if TYPE_CHECKING:
     from terragrip.recording.table import Recording
     from terragrip.vehicle import Vehicle
@@ -28,15 +30,23 @@ _RATIOS = (
 )
 _ENOUGH = 4000  # rows: a median that is to be told from another by a third needs no more
 _PLAUSIBLE = (0.6, 2.2)  # a median ratio within is left to slip
+_AGREED = (0.7, 1.4)  # likewise of two ground speeds, to noise
+_SURE = 0.5  # correlation of two rates of turn
+_LEAST_TURN = 1.5  # rad: with less there is nothing to compare
 
 
-def unit_warnings(recording: Recording, vehicle: Vehicle) -> list[str]:
-    """Sentences on channels that are likely not in SI: speeds against each other, angles, acceleration, time.
+def unit_warnings(recording: Recording, vehicle: Vehicle | None) -> list[str]:
+    """Sentences on channels that are likely not in SI, or of the wrong sign: speeds against each other and against the positions, the
+    rate of turn against wheels and positions, angles, acceleration, time. Without a vehicle what needs its radii is left out.
 
     The speeds are judged where both are well above standstill, by the median of their ratio.
     """
+    track = track_of(recording)
     return [
-        *_speed_warnings(recording, vehicle),
+        *(_speed_warnings(recording, vehicle) if vehicle is not None else ()),
+        *_drive_warnings(recording),
+        *_position_warnings(recording, track),
+        *_turn_warnings(recording, vehicle, track),
         *_angle_warnings(recording),
         *_acceleration_warnings(recording),
         *_time_warnings(recording),
@@ -63,15 +73,113 @@ def _speed_warnings(recording: Recording, vehicle: Vehicle) -> list[str]:
     ]
 
 
+def _drive_warnings(recording: Recording) -> list[str]:
+    """The drive train's speed against the ground speed: both are in m/s, so that no radius makes a factor of 3.6."""
+    ratio = _ratio_of(recording, recording.channels.get("wheel_based_speed"), 1.0)
+    if ratio is None or _PLAUSIBLE[0] <= ratio <= _PLAUSIBLE[1]:
+        return []
+    high, low = "wheel_based_speed", "ground_speed"
+    if ratio < 1:
+        high, low = low, high
+    apart = max(ratio, 1 / ratio)
+    why = (
+        f"{high} may be in km/h, or {low} was taken for km/h and is in m/s"
+        if 2.5 < apart < 5.5
+        else "check units"
+    )
+    return [f"wheel_based_speed is {ratio:.3g} times the ground speed: {why}."]
+
+
+def _position_warnings(recording: Recording, track: Track | None) -> list[str]:
+    """Ground speed against the speed of the positions, which are in degrees and nothing else."""
+    if track is None or "ground_speed" not in recording.channels:
+        return []
+    found = _ratio(recording.time, recording.channels["ground_speed"], track.at("speed", recording.time))
+    if found is None or _AGREED[0] <= 1 / found <= _AGREED[1]:
+        return []
+    ratio = 1 / found
+    why = "check its unit"
+    if 2.9 < ratio < 4.4:
+        why = "it may be in km/h: 1 km/h is 0.2778 m/s"
+    elif 2.9 < found < 4.4:
+        why = "it was taken for km/h, and may be in m/s"
+    return [f"ground_speed is {ratio:.3g} times the speed of the positions: {why}."]
+
+
+def _turn_warnings(recording: Recording, vehicle: Vehicle | None, track: Track | None) -> list[str]:
+    """The gyroscope's rate of turn against that of the positions and that of the wheels' speeds from side to side."""
+    yaw = recording.channels.get("angular_velocity_z")
+    if yaw is None:
+        return []
+    said: dict[str, float] = {}
+    if track is not None:
+        said["the positions"] = _agreement(recording.time, yaw, track.at("turn", recording.time))
+    if vehicle is not None:
+        said["the wheels' speeds"] = _agreement(recording.time, yaw, _wheel_turn(recording, vehicle))
+    against = [who for who, value in said.items() if value < -_SURE]
+    agreed = [who for who, value in said.items() if value > _SURE]
+    if not against:
+        return []
+    if agreed:
+        doubt = (
+            "left and right wheels may be exchanged"
+            if "the wheels' speeds" in against
+            else "check the positions"
+        )
+        return [f"angular_velocity_z turns with {agreed[0]} and against {against[0]}: {doubt}."]
+    return [
+        f"angular_velocity_z is of the wrong sign: {' and '.join(against)} turn the other way. Left is positive: write 'sign: -1' for "
+        "it in the profile."
+    ]
+
+
+def _wheel_turn(recording: Recording, vehicle: Vehicle) -> Floats:
+    """Rate of turn (n,) by right less left rim speeds, up to a factor: it is the sign that counts."""
+    parts = []
+    for axle in vehicle.axles.values():
+        left, right = (recording.channels.get(f"wheel_speed_{axle.wheels[k]}") for k in (0, -1))
+        if len(axle.wheels) > 1 and left is not None and right is not None:
+            parts.append(_filled(recording.time, right) - _filled(recording.time, left))
+    return np.mean(parts, axis=0) if parts else np.full(len(recording), np.nan)
+
+
+def _agreement(time: Floats, yaw: Floats, other: Floats) -> float:
+    """Correlation about 0 of two rates of turn (n,) over windows of 2 s; 0 where there is little turning."""
+    place = ((time - time[0]) / 2.0).astype(np.intp)
+    known = np.isfinite(yaw) & np.isfinite(other)
+    count = np.bincount(place[known])
+    if not known.any():
+        return 0.0
+    with np.errstate(invalid="ignore"):
+        a, b = (np.bincount(place[known], x[known])[count > 0] / count[count > 0] for x in (yaw, other))
+    if np.sum(np.abs(a)) * 2.0 < _LEAST_TURN or not np.any(b):
+        return 0.0
+    return float(np.sum(a * b) / np.sqrt(np.sum(a**2) * np.sum(b**2)))
+
+
+def _filled(time: Floats, values: Floats) -> Floats:
+    known = np.isfinite(values)
+    return np.interp(time, time[known], values[known]) if known.any() else values
+
+
 def _speed_ratio(recording: Recording, wheel: str, radius: float) -> float | None:
     """Median of |wheel speed| radius / |ground speed| while both move; None without enough motion."""
-    speed, turning = recording.channels.get("ground_speed"), recording.channels.get(f"wheel_speed_{wheel}")
+    return _ratio_of(recording, recording.channels.get(f"wheel_speed_{wheel}"), radius)
+
+
+def _ratio_of(recording: Recording, turning: Floats | None, radius: float) -> float | None:
+    speed = recording.channels.get("ground_speed")
     if speed is None or turning is None:
         return None
-    pairs = _pairs(recording.time, speed, turning)
+    return _ratio(recording.time, speed, radius * turning)
+
+
+def _ratio(time: Floats, speed: Floats, other: Floats) -> float | None:
+    """Median of |other| / |speed| (n,) while both move; None without enough motion."""
+    pairs = _pairs(time, speed, other)
     if pairs is None:
         return None
-    ground, rim = np.abs(pairs[0]), radius * np.abs(pairs[1])
+    ground, rim = np.abs(pairs[0]), np.abs(pairs[1])
     moving = (ground > 0.3 * _high(ground)) & (rim > 0.3 * _high(rim)) & (ground > 0) & (rim > 0)
     return float(np.median(rim[moving] / ground[moving])) if moving.sum() >= 10 else None
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -20,7 +21,7 @@ from terragrip.estimation.calibration.windows import track_blocks, windows
 from terragrip.estimation.rims import speeds_alone
 from terragrip.estimation.zero_slip import Span
 from terragrip.physics.loads import GRAVITY
-from terragrip.recording import Recording, sensor_noise, without_held
+from terragrip.recording import Recording, sensor_noise, unit_warnings, without_held
 from terragrip.vehicle import Vehicle
 
 _SLOPE, _PITCH_ZERO = float(np.radians(0.5)), float(np.radians(0.2))  # priors where the vehicle states none
@@ -56,8 +57,9 @@ def calibrate(
     if not logs:
         raise InputError("there is no recording to calibrate from", mend="give at least one log")
     sources = [log.source or f"recording {k + 1}" for k, log in enumerate(logs)]
+    doubts = tuple(dict.fromkeys(said for log in logs for said in unit_warnings(log, vehicle)))
     if all(speeds_alone(log.channels, vehicle) for log in logs):
-        return calibrate_radii(logs, vehicle, sources, light)
+        return replace(calibrate_radii(logs, vehicle, sources, light), notes=doubts)
     for log in logs:
         log.check_against(vehicle)
     logs = [without_held(log) for log in logs]
@@ -91,7 +93,7 @@ def calibrate(
         found.append(identify_torque_scale(_with_gains(corrected, shared), rolled))
     except InputError as error:
         unknown.append(Unknown("drive_torque_scale", error.problem))
-    return Calibration(tuple(found), tuple(unknown), _left(found, vehicle))
+    return Calibration(tuple(found), tuple(unknown), _left(found, vehicle), doubts)
 
 
 def _zeros(

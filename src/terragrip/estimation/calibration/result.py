@@ -90,12 +90,13 @@ class Calibration:
     """The result of :func:`terragrip.calibrate`.
 
     ``quantities`` were found, ``unknown`` could not be. ``uncertainty`` holds what is left of the constants that
-    the vehicle file's ``uncertainty`` block considers.
+    the vehicle file's ``uncertainty`` block considers. ``notes``: sentences on what is doubtful about the logs.
     """
 
     quantities: tuple[Quantity, ...]
     unknown: tuple[Unknown, ...]
     uncertainty: Mapping[str, float] = field(default_factory=dict)
+    notes: tuple[str, ...] = ()
 
     def __getitem__(self, name: str) -> Quantity:
         """The quantity of a name such as ``"drive_torque_gain fl"``; raises KeyError if it was not found."""
@@ -142,6 +143,7 @@ class Calibration:
         lines += ["", *(f"{key}: {sentence}" for key, sentence in said)] if said else []
         lines += ["", "Not told by the data:"] if self.unknown else []
         lines += [f"  {unknown.name}: {unknown.why}" for unknown in self.unknown]
+        lines += ["", *(f"Note: {note}" for note in self.notes)] if self.notes else []
         return "\n".join(line.rstrip() for line in lines)
 
 

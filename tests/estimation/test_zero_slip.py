@@ -1,0 +1,123 @@
+"""The zero of slip: one procedure for estimate and calibrate, honest where field work and light work look alike."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import terragrip as tg
+from terragrip.estimation import calibrate
+from terragrip.estimation.zero_slip import zero_of
+from terragrip.formats.reading import read_table
+
+
+def tractor(**more: object) -> tg.Vehicle:
+    axles = {
+        "front": {"mass": 2500, "wheels": ["fl", "fr"], "driven": False},
+        "rear": {"mass": 3500, "wheels": ["rl", "rr"]},
+    }
+    base = {"mass": 6000, "wheelbase": 2.8, "center_of_gravity_height": 1.0, "axles": axles}
+    return tg.Vehicle.from_dict({**base, "wheel": {"radius": 0.8, "inertia": 50}, **more})
+
+
+def log_of(slip: np.ndarray, scale: float, seed: int, speed: float = 2.0) -> tg.Recording:
+    """A drive at 5 Hz whose machine supposes a radius ``scale`` times the true one (simulated)."""
+    draws, time = np.random.default_rng(seed), np.arange(len(slip)) / 5
+    v = speed * (1 + 0.1 * np.sin(time / 9))
+    return tg.Recording.from_frame(
+        {
+            "time": time,
+            "ground_speed": v + 0.03 * draws.standard_normal(len(time)),
+            "wheel_based_speed": scale * v / (1 - slip) + 0.01 * draws.standard_normal(len(time)),
+        }
+    )
+
+
+def field_day(seed: int, light: float = 0.25) -> np.ndarray:
+    """Slip of beds and headlands, at 5 Hz; ``light``: share of the time on the headland."""
+    draws = np.random.default_rng(seed)
+    beds = np.repeat(draws.uniform(0.05, 0.16, 12), 400)
+    inside = np.arange(len(beds)) % 400
+    return np.where(inside < 400 * (1 - light), beds + 0.01 * np.sin(inside / 30), 0.004)
+
+
+@pytest.mark.parametrize("seed", range(1000, 1006))
+@pytest.mark.parametrize("light", [0.15, 0.4])
+def test_light_work_is_found_in_a_field_day(seed: int, light: float) -> None:
+    scale = 0.97 + 0.01 * (seed - 1000)
+    zero = zero_of([log_of(field_day(seed, light), scale, seed)], "wheel_based_speed", 1.0)
+    assert zero is not None
+    assert not zero.doubt
+    assert zero.ratio == pytest.approx((1 - 0.004) / scale, abs=3 * zero.std)
+    assert zero.std < 0.006
+
+
+def test_estimate_and_calibrate_give_one_answer() -> None:
+    log = log_of(field_day(1000), 1.02, 1000)
+    estimates = tg.estimate(log, tractor())
+    found = calibrate(log, tractor())
+    zero = estimates.about["zero_slip"]["drive"]
+    assert found["wheel_radius rl"].value == zero["ratio"] * 0.8
+    assert found["wheel_radius rl"].std == zero["std"] * 0.8
+
+
+def test_field_work_alone_is_not_called_light() -> None:
+    """Work at 10 % slip and nothing else: neither a radius of .72 m nor a slip of 0 is claimed."""
+    log = log_of(np.full(3000, 0.1), 1.0, 1001)
+    estimates = tg.estimate(log, tractor())
+    assert "field work as likely as another radius" in " ".join(estimates.notes)
+    moving = estimates["event"] == ""
+    error = estimates["slip_drive"][moving] - 0.1
+    assert np.mean(np.abs(error) < 1.96 * estimates["slip_drive_std"][moving]) > 0.95
+    found = calibrate(log, tractor())
+    assert not found.quantities
+    assert "record 40 s without load" in found.unknown[0].why
+
+
+def test_rows_that_the_user_calls_light_are_taken() -> None:
+    slip = np.r_[np.full(1500, 0.1), np.full(1500, 0.0)]
+    log = log_of(slip, 0.93, 1002)  # a radius that nobody would guess
+    found = calibrate(log, tractor(), light=[(305.0, 600.0)])
+    radius = found["wheel_radius rl"]
+    assert radius.value == pytest.approx(0.8 / 0.93, abs=3 * radius.std)
+    assert radius.std < 0.003
+
+
+def test_one_level_of_slip_is_said_to_be_one() -> None:
+    log = log_of(np.full(3000, 0.0), 1.02, 1003)
+    zero = zero_of([log], "wheel_based_speed", 1.0)
+    assert zero is not None
+    assert "light work cannot be told from field work" in zero.doubt
+    assert abs(zero.ratio - 1 / 1.02) < 1.96 * zero.std
+    assert zero.std > 0.02
+
+
+def test_a_road_is_light_work() -> None:
+    zero = zero_of([log_of(np.full(3000, 0.0), 1.02, 1004, speed=12.0)], "wheel_based_speed", 1.0)
+    assert zero is not None
+    assert not zero.doubt
+    assert zero.ratio == pytest.approx(1 / 1.02, abs=3 * zero.std)
+
+
+def test_measured_field_hour(shared: Callable[[str], Path]) -> None:
+    """New Holland T7 (PROVENANCE): by hand .079 working and .001 turning, without any flag within .012."""
+    table = read_table(shared("data/tractor_t7/session2_hour.csv.gz")).columns
+    rim, ground = table["CAN1.CCVS1.WheelBasedVehicleSpeed"] / 3.6, table["CAN2.gnss_speed.Speed"]
+    columns = {"time": np.arange(len(rim), dtype=float), "wheel_based_speed": rim, "ground_speed": ground}
+    columns |= {"latitude": table["CAN2.gnss_pos.Latitude"], "longitude": table["CAN2.gnss_pos.Longitude"]}
+    log = tg.Recording.from_frame(columns)
+    estimates = tg.estimate(log, tractor())
+    state = np.array(table["STATE"]).astype(str)
+    for name, slip in (("W", 0.079), ("T", 0.001)):
+        rows = (state == name) & (rim > 0.5)
+        assert np.nanmedian(estimates["slip_drive"][rows]) == pytest.approx(slip, abs=0.012)
+    found = calibrate(log, tractor())["wheel_radius rl"]
+    assert found.value == estimates.about["zero_slip"]["drive"]["ratio"] * 0.8
+    assert found.interval[0] < 1.005 * 0.8 < found.interval[1]
+    moving = rim > 0.5
+    assert np.mean(estimates["event"][moving] == "outlier") < 0.01
+    assert np.nanmax(np.abs(estimates["ground_speed"] - ground)[moving]) < 0.15
+    assert not [note for note in estimates.notes if "km/h" in note or "wrong sign" in note]

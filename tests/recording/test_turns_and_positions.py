@@ -1,0 +1,150 @@
+"""Speeds and rates of turn that positions or wheels contradict are told, by whoever reads the log."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import terragrip as tg
+from terragrip.cli import main
+from terragrip.estimation import calibrate
+from terragrip.formats import inspect
+from terragrip.recording import Recording, unit_warnings
+from terragrip.recording.track import track_of
+
+Columns = dict[str, np.ndarray]
+TRACK = 1.5  # m
+
+
+def field(seed: int = 1000) -> Columns:
+    """Beds with headland turns to either side at 5 Hz, 2 m/s, slip of 5 %, GNSS to 2 cm (simulated)."""
+    draws, time = np.random.default_rng(seed), np.arange(0, 400, 0.2)
+    turn = np.where(time % 50 > 40, np.pi / 10, 0.0) * np.where(time % 100 > 50, 1, -1)
+    speed = 2.0 + 0.2 * np.sin(time / 9)
+    course = np.cumsum(turn) * 0.2
+    east, north = (np.cumsum(speed * f(course)) * 0.2 for f in (np.cos, np.sin))
+    radius = 6_378_137.0
+    columns = {
+        "time": time,
+        "ground_speed": speed + 0.02 * draws.standard_normal(len(time)),
+        "angular_velocity_z": turn + 0.01 * draws.standard_normal(len(time)),
+        "latitude": np.degrees((north + 0.02 * draws.standard_normal(len(time))) / radius),
+        "longitude": 11 + np.degrees((east + 0.02 * draws.standard_normal(len(time))) / radius),
+    }
+    for wheel, side in (("fl", 1), ("fr", -1), ("rl", 1), ("rr", -1)):
+        rim = (speed - side * TRACK / 2 * turn) / 0.95
+        columns[f"wheel_speed_{wheel}"] = (rim + 0.01 * draws.standard_normal(len(time))) / 0.6
+    return columns
+
+
+def machine() -> tg.Vehicle:
+    axles = {"front": {"mass": 1500, "wheels": ["fl", "fr"]}, "rear": {"mass": 1500, "wheels": ["rl", "rr"]}}
+    return tg.Vehicle.from_dict(
+        {"mass": 3000, "wheelbase": 2.0, "track": TRACK, "center_of_gravity_height": 0.8, "axles": axles,
+         "wheel": {"radius": 0.6, "inertia": 20}}
+    )  # fmt: skip
+
+
+def of_drive(columns: Columns, factor: float = 1.0) -> Columns:
+    """The same with the drive train's speed [m/s, times ``factor`` ] in place of the wheels."""
+    kept = {n: v for n, v in columns.items() if not n.startswith("wheel_speed")}
+    rim = 0.6 * np.mean([v for n, v in columns.items() if n.startswith("wheel_speed")], axis=0)
+    return kept | {"wheel_based_speed": factor * rim}
+
+
+def test_a_track_gives_speed_and_turn() -> None:
+    columns = field()
+    track = track_of(Recording.from_frame(columns))
+    assert track is not None
+    straight = np.abs(track.turn) < 0.1
+    assert np.median(track.speed) == pytest.approx(np.median(columns["ground_speed"]), abs=0.02)
+    assert np.nanmedian(np.abs(track.turn[~straight])) == pytest.approx(np.pi / 10, abs=0.03)
+    time = columns["time"]
+    agree = np.corrcoef(track.at("turn", time)[20:-20], columns["angular_velocity_z"][20:-20])[0, 1]
+    assert agree > 0.95
+
+
+def test_right_channels_say_nothing() -> None:
+    assert unit_warnings(Recording.from_frame(field()), machine()) == []
+    assert unit_warnings(Recording.from_frame(of_drive(field())), machine()) == []
+
+
+@pytest.mark.parametrize(
+    ("channel", "factor", "told"),
+    [
+        (
+            "wheel_based_speed",
+            3.6,
+            "wheel_based_speed is 3.79 times the ground speed: wheel_based_speed may be in km/h",
+        ),
+        (
+            "wheel_based_speed",
+            1 / 3.6,
+            "ground_speed may be in km/h, or wheel_based_speed was taken for km/h",
+        ),
+        ("ground_speed", 3.6, "times the speed of the positions: it may be in km/h"),
+        (
+            "ground_speed",
+            1 / 3.6,
+            "times the speed of the positions: it was taken for km/h",
+        ),
+    ],
+)
+def test_kmh_is_told_in_both_directions(channel: str, factor: float, told: str) -> None:
+    columns = of_drive(field())
+    columns[channel] = columns[channel] * factor
+    log = Recording.from_frame(columns)
+    assert any(told in said for said in unit_warnings(log, None))
+    assert any(told in note for note in tg.estimate(log, machine()).notes)
+    assert any(told in note for note in calibrate(log, machine()).notes)
+
+
+def test_a_scale_of_units_is_no_radius() -> None:
+    """A drive in km/h must not be taken for a wheel of .17 m."""
+    estimates = tg.estimate(Recording.from_frame(of_drive(field(), 3.6)), machine())
+    assert estimates.about["zero_slip"]["drive"]["ratio"] == 1
+    assert "check the units" in " ".join(estimates.notes)
+    found = calibrate(Recording.from_frame(of_drive(field(), 3.6)), machine())
+    assert not found.quantities
+    assert "check the units" in found.unknown[0].why
+
+
+def test_an_inverted_yaw_rate_is_noticed_everywhere(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    import pandas as pd
+
+    columns = field()
+    columns["angular_velocity_z"] = -columns["angular_velocity_z"]
+    log = Recording.from_frame(columns)
+    told = "angular_velocity_z is of the wrong sign: the positions and the wheels' speeds turn the other way"
+    assert any(told in note for note in tg.estimate(log, machine()).notes)
+    assert any(told in note for note in calibrate(log, machine()).notes)
+    pd.DataFrame(columns).to_csv(tmp_path / "log.csv", index=False)
+    assert any(told in note for note in inspect(tmp_path / "log.csv", vehicle=machine()).warnings)
+    # Without a vehicle the positions alone speak.
+    assert any("wrong sign: the positions turn" in note for note in inspect(tmp_path / "log.csv").warnings)
+    machine().save(tmp_path / "v.yaml")
+    words = [
+        "calibrate",
+        str(tmp_path / "log.csv"),
+        "--vehicle",
+        str(tmp_path / "v.yaml"),
+        "-o",
+        str(tmp_path / "c.yaml"),
+    ]
+    assert main(words) == 0
+    assert told in capsys.readouterr().out
+
+
+def test_wheels_exchanged_from_side_to_side_are_told_apart_from_a_yaw_rate() -> None:
+    columns = field()
+    for left, right in (("fl", "fr"), ("rl", "rr")):
+        a, b = f"wheel_speed_{left}", f"wheel_speed_{right}"
+        columns[a], columns[b] = columns[b], columns[a]
+    said = unit_warnings(Recording.from_frame(columns), machine())
+    assert said == [
+        "angular_velocity_z turns with the positions and against the wheels' speeds: left and right wheels may be exchanged."
+    ]
