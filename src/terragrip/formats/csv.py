@@ -13,6 +13,7 @@ import numpy.typing as npt
 from terragrip.errors import InputError
 from terragrip.files import refuse_missing, sha256
 from terragrip.formats.dialect import Dialect, detect, split, to_text
+from terragrip.formats.registry import Format
 from terragrip.formats.table import LogTable, Wanted, from_arrow
 from terragrip.formats.text_file import is_packed, length_of, opened, read
 from terragrip.formats.written_times import times_of
@@ -20,6 +21,8 @@ from terragrip.recording.schema import LABELS, TIME, is_channel
 
 if TYPE_CHECKING:
     import pyarrow as pa
+
+    from terragrip.formats.long_logs import LongLog
 
 SUFFIXES = (".csv", ".txt", ".tsv", ".dat", ".csv.gz", ".txt.gz", ".tsv.gz")
 _LONG = 256 << 20  # bytes
@@ -41,7 +44,7 @@ def read_csv(path: str | os.PathLike[str], wanted: Wanted | None = None) -> LogT
     refuse_missing(source, suffixes=SUFFIXES)
     raw = None if is_long(source) else _whole(source)
     if raw is None or len(raw) > _LONG:  # packed, it may unpack to more than its size lets expect
-        found = _in_blocks(source, wanted)
+        found = _long_table(source, wanted)
         if found is not None:
             return found
         raw = _whole(source)
@@ -81,7 +84,7 @@ def chosen_of(dialect: Dialect, wanted: Wanted | None, source: str) -> list[int]
     return chosen
 
 
-def _in_blocks(source: str, wanted: Wanted | None) -> LogTable | None:
+def _long_table(source: str, wanted: Wanted | None) -> LogTable | None:
     from terragrip.formats.csv_blocks import read_long_csv
 
     return read_long_csv(source, wanted)
@@ -213,6 +216,18 @@ def _numbers_of_texts(name: str, column: pa.ChunkedArray, source: str, first: in
     return found
 
 
-def read_csv_log(path: str, wanted: Wanted | None, databases: object) -> LogTable:
-    """`read_csv` with the arguments of every kind of log."""
-    return read_csv(path, wanted)
+def _in_blocks(path: str) -> LongLog | None:
+    from terragrip.formats.csv_blocks import long_csv
+
+    return long_csv(path)
+
+
+FORMATS = (
+    Format(
+        "csv",
+        "text table",
+        lambda path, wanted, databases: read_csv(path, wanted),
+        SUFFIXES,
+        in_blocks=_in_blocks,
+    ),
+)

@@ -9,6 +9,7 @@ from dataclasses import dataclass, field, replace
 from terragrip.formats.blocks import Columns, recordings
 from terragrip.formats.conversion import converted_block, settled
 from terragrip.formats.profile import Profile
+from terragrip.formats.registry import format_of
 from terragrip.formats.table import LogTable, in_si, since_clock_was_set
 from terragrip.recording import Recording
 from terragrip.recording.columns import seconds
@@ -90,19 +91,5 @@ def _since_set(
 
 def long_log(path: str | os.PathLike[str]) -> LongLog | None:
     """A log that is a long table; None of any other, or where its rows cannot be told beforehand."""
-    from terragrip.formats.kind import CSV, MATLAB, PARQUET, kind_of
-
-    kind = kind_of(path)
-    if kind is CSV:
-        from terragrip.formats.csv_blocks import long_csv
-
-        return long_csv(path)
-    if kind is PARQUET:
-        from terragrip.formats.parquet import long_parquet
-
-        return long_parquet(path)
-    if kind is MATLAB:
-        from terragrip.formats.matlab_long import long_matlab
-
-        return long_matlab(os.fspath(path))
-    return None
+    found = format_of(path)
+    return None if found.in_blocks is None else found.in_blocks(os.fspath(path))

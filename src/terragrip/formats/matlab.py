@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from contextlib import ExitStack
 from functools import partial
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
@@ -17,14 +17,17 @@ import numpy.typing as npt
 from terragrip.errors import InputError
 from terragrip.files import sha256
 from terragrip.formats.boundary import needed, reading
-from terragrip.formats.kind import Databases
 from terragrip.formats.matlab_hdf5 import is_hdf5, tree_of
 from terragrip.formats.matlab_records import IN_RECORDS
 from terragrip.formats.matlab_signals import Found, seconds_of, walk
 from terragrip.formats.matlab_values import Array, Opaque
+from terragrip.formats.registry import Databases, Format
 from terragrip.formats.signals import Signal, SignalLog
 from terragrip.formats.table import LogTable, Wanted, kept_rows
 from terragrip.formats.worker import Worker
+
+if TYPE_CHECKING:
+    from terragrip.formats.long_logs import LongLog
 
 Floats = npt.NDArray[np.float64]
 
@@ -173,3 +176,21 @@ def _table_of(loose: Mapping[str, Any], path: str, wanted: Wanted | None, notes:
 
 def _read(value: Any) -> npt.NDArray[Any]:
     return value.read() if isinstance(value, Array) else value
+
+
+def _in_blocks(path: str) -> LongLog | None:
+    from terragrip.formats.matlab_long import long_matlab
+
+    return long_matlab(path)
+
+
+FORMATS = (
+    Format(
+        "matlab",
+        "MATLAB file",
+        read_matlab,
+        (".mat",),
+        (b"MATLAB 5.0 MAT-file", b"MATLAB 7.3 MAT-file", b"\x89HDF\r\n\x1a\n"),
+        in_blocks=_in_blocks,
+    ),
+)

@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import Any, BinaryIO
 
 from terragrip.formats.boundary import DAMAGE, LARGEST, as_far_as_it_goes, needed
-from terragrip.formats.kind import Databases
 from terragrip.formats.messages import Parts, Topic
+from terragrip.formats.registry import Databases, Format
 from terragrip.formats.ros import Types, bag_topic, log_of, unpacked
 from terragrip.formats.signals import SignalLog
 from terragrip.formats.table import Wanted
@@ -177,3 +177,6 @@ def _stamp_of_protobuf(message: Any) -> float | None:
         if getattr(getattr(stamp, "DESCRIPTOR", None), "full_name", "") == "google.protobuf.Timestamp":
             return float(stamp.seconds + 1e-9 * stamp.nanos)  # type: ignore[union-attr]
     return None
+
+
+FORMATS = (Format("mcap", "MCAP file", read_mcap, (".mcap",), (b"\x89MCAP0\r\n",)),)

@@ -12,7 +12,7 @@ from terragrip.files import sha256
 from terragrip.formats.can.catalog import catalog
 from terragrip.formats.can.frames import Frames
 from terragrip.formats.can.log import finished
-from terragrip.formats.kind import Databases
+from terragrip.formats.registry import Databases, Format
 from terragrip.formats.signals import Signal, SignalLog
 from terragrip.formats.table import Wanted, kept_rows
 from terragrip.formats.worker import Worker
@@ -48,3 +48,8 @@ def read_mdf(path: str, wanted: Wanted | None, databases: Databases) -> SignalLo
         return SignalLog(tuple(units), signals, path, sha256(path))
     log = finished(frames, path, (), databases, refuse_unknown=not signals)
     return SignalLog((*units, *log.names), signals | log.signals, path, log.sha256, log.notes)
+
+
+FORMATS = (
+    Format("mdf", "MDF file", read_mdf, (".mf4", ".mdf"), (b"MDF     ", b"UnFinMF "), takes_databases=True),
+)

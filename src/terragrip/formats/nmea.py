@@ -6,6 +6,7 @@ Time is the receiver's UTC, not the logger's: a stamp that a logger wrote before
 from __future__ import annotations
 
 import datetime as dt
+import re
 from array import array
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -14,8 +15,9 @@ import numpy as np
 
 from terragrip.errors import InputError
 from terragrip.files import sha256, unreadable
-from terragrip.formats.kind import Databases
+from terragrip.formats.can.text_logs import lines_are_like
 from terragrip.formats.nmea_sentences import UNITS, Sentence, sentences
+from terragrip.formats.registry import Databases, Format
 from terragrip.formats.signals import Signal, SignalLog
 from terragrip.formats.table import Wanted, skips
 
@@ -99,3 +101,11 @@ def _add(sentence: Sentence, track: _Track) -> None:
         return  # RMC has given speed and course of this instant
     for name, value in sentence.fields.items():
         track.add(name, value)
+
+
+_LINE = re.compile(r"[^$!\r\n]{0,60}[$!](?:[A-Z]{2}[A-Z]{3}|P[A-Z]{3,}),[\x20-\x7e]*\*?[0-9A-Fa-f]{0,2}\r?$")
+FORMATS = (
+    Format(
+        "nmea", "NMEA 0183 log", read_nmea, (".nmea",), recognises=lambda head: lines_are_like(head, _LINE)
+    ),
+)

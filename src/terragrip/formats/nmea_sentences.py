@@ -14,7 +14,7 @@ from terragrip.units import factor_to
 
 _OURS = re.compile(r"\$[A-Z]{2}(RMC|VTG|GGA),[^$!*\r\n]{0,120}\*[0-9A-Fa-f]{2}")
 _BEGUN = re.compile(r"\$[A-Z]{2}(RMC|VTG|GGA)")
-_KNOT, _KMH = factor_to("kn", "m/s"), factor_to("km/h", "m/s")
+_KNOT, _KMH = factor_to("knot", "m/s"), factor_to("km/h", "m/s")
 
 UNITS = {
     "ground_speed": "m/s",

@@ -12,6 +12,7 @@ from terragrip.errors import InputError
 from terragrip.files import refuse_missing, sha256
 from terragrip.formats.long_logs import ROWS, LongLog, recordings_of
 from terragrip.formats.profile import Profile
+from terragrip.formats.registry import Format
 from terragrip.formats.table import LogTable, Wanted, every_of, from_arrow
 from terragrip.recording import Recording
 
@@ -124,3 +125,10 @@ def _refuse_twice(names: tuple[str, ...], chosen: list[str], source: str) -> Non
 def read_parquet_log(path: str, wanted: Wanted | None, databases: object) -> LogTable:
     """`read_parquet` with the arguments of every kind of log."""
     return read_parquet(path, wanted)
+
+
+FORMATS = (
+    Format(
+        "parquet", "Parquet file", read_parquet_log, (".parquet", ".pq"), (b"PAR1",), in_blocks=long_parquet
+    ),
+)

@@ -11,8 +11,8 @@ import numpy as np
 from terragrip.errors import InputError
 from terragrip.formats.clocks import lag_within
 from terragrip.formats.conversion import Part, start_of
-from terragrip.formats.kind import Databases, kind_of
 from terragrip.formats.profile import SHIPPED, Profile
+from terragrip.formats.registry import Databases, format_of
 from terragrip.formats.signals import SignalLog
 from terragrip.formats.table import LogTable, Wanted, in_si, since_clock_was_set
 from terragrip.recording import Recording, checks
@@ -99,11 +99,11 @@ def read_table(path: PathLike, wanted: Wanted | None = None, databases: Database
 
 def read_log(path: PathLike, wanted: Wanted | None = None, databases: Databases = ()) -> LogTable | SignalLog:
     """Read a log as `read_table` does; signals with clocks of their own are left on them."""
-    kind = kind_of(path)
-    if databases and not kind.takes_databases:
+    own = format_of(path)
+    if databases and not own.takes_databases:
         mend = "leave out --dbc, or 'dbc:' in the profile"
-        raise InputError(f"is a {kind.title}, which needs no DBC", file=path, mend=mend)
-    return kind.reader()(os.fspath(path), wanted, databases)
+        raise InputError(f"is a {own.title}, which needs no DBC", file=path, mend=mend)
+    return own.read(os.fspath(path), wanted, databases)
 
 
 def _loaded(profile: Profile | PathLike | None) -> Profile | None:
@@ -132,14 +132,14 @@ def _part(path: PathLike, profile: Profile | None, databases: Databases, also: t
     from terragrip.formats.conversion import converted
 
     if profile is not None:
-        can = kind_of(path).takes_databases
+        can = format_of(path).takes_databases
         return converted(
             profile, read_table(path, profile.wants, (*databases, *profile.dbc) if can else ()), partial=True
         )
     table = read_table(
         path,
         lambda name: is_own(name) or name.startswith(also),
-        databases if kind_of(path).takes_databases else (),
+        databases if format_of(path).takes_databases else (),
     )
     if TIME not in table.columns:
         raise InputError(

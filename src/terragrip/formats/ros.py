@@ -11,8 +11,8 @@ from typing import Any
 from terragrip.errors import InputError
 from terragrip.files import sha256
 from terragrip.formats.boundary import DAMAGE, as_far_as_it_goes, needed
-from terragrip.formats.kind import Databases
 from terragrip.formats.messages import Topic
+from terragrip.formats.registry import Databases, Format
 from terragrip.formats.ros_topic import RosTopic, Serialised
 from terragrip.formats.rosbag1 import Connection, records
 from terragrip.formats.signals import Signal, SignalLog
@@ -278,3 +278,9 @@ def log_of(topics: Iterable[Topic], path: str, notes: list[str], files: Iterable
         )
     digest = "+".join(sha256(file) for file in files) or sha256(path)
     return SignalLog(tuple(names), found, path, digest, tuple(said))
+
+
+FORMATS = (
+    Format("ros1", "ROS 1 bag", read_ros1, (".bag",), (b"#ROSBAG V",)),
+    Format("ros2", "ROS 2 bag", read_ros2, (".db3",), (b"SQLite format 3\0",)),
+)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import io
-import os
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
@@ -21,13 +20,16 @@ from terragrip.formats.can.text_logs import (
     by_python_can,
     candump,
     frames_of,
+    is_asc,
+    is_candump,
+    is_frame_table,
+    is_trc,
     layout_of,
     table,
 )
+from terragrip.formats.registry import Databases, Format
 from terragrip.formats.signals import SignalLog
 from terragrip.formats.table import Wanted
-
-Databases = Sequence[str | os.PathLike[str]]
 
 _MOST_BAD = 0.5  # share of lines without a frame from which a file is none of its kind
 _BUSY = 20.0  # frames a second: a bus that speaks less is one whose stamps are taken for seconds by mistake
@@ -175,3 +177,14 @@ def _bounded(lines: io.TextIOBase, most: int = 4096) -> Iterator[str]:
     """Lines of no more than ``most`` characters, since a damaged file may have no line ends at all."""
     while line := lines.readline(most):
         yield line
+
+
+FORMATS = (
+    Format("blf", "BLF log", read_blf, (".blf",), (b"LOGG",), takes_databases=True),
+    Format("asc", "ASC log", read_asc, (".asc",), recognises=is_asc, takes_databases=True),
+    Format("trc", "TRC log", read_trc, (".trc",), recognises=is_trc, takes_databases=True),
+    Format("candump", "candump log", read_candump, (".log",), recognises=is_candump, takes_databases=True),
+    Format(
+        "frames", "table of CAN frames", read_frame_table, recognises=is_frame_table, takes_databases=True
+    ),
+)

@@ -55,6 +55,42 @@ _IDENTIFIERS = ("arbitration_id", "id", "can_id", "canid", "identifier")
 _DATA = ("data", "databytes", "payload", "data_hex")
 
 
+# What the first lines of each form look like.
+_CANDUMP = re.compile(
+    r"\s*(?:\((?:\d{4}-\d\d-\d\d )?[\d:]+\.\d+\)\s+)?\S+\s+(?:[RT]X\s+\S+\s+\S+\s+)?[0-9A-Fa-f]{3,8}(?:#[0-9A-Fa-fR#]|\s+\[\s*\d+\])"
+)
+_TRC = re.compile(r"\s*\d+\)\s+\d+(?:\.\d+)?\s+(?:\d+\s+)?(?:[RT]x\s+)?[0-9A-Fa-f]{4,8}\s", re.IGNORECASE)
+_ASC = re.compile(rb"\A(?:\s*//[^\n]*\n)*\s*(?:date\s|base\s+(?:hex|dec))", re.IGNORECASE)
+_LIKE = 1 / 3  # share of the first lines that must have a form
+
+
+def is_asc(head: bytes) -> bool:
+    """Whether a file that begins so is an ASC log."""
+    return _ASC.match(head) is not None
+
+
+def is_trc(head: bytes) -> bool:
+    """Whether a file that begins so is a TRC log; version 1.0 has no head."""
+    return b";$FILEVERSION=" in head or (not is_candump(head) and lines_are_like(head, _TRC))
+
+
+def is_candump(head: bytes) -> bool:
+    """Whether a file that begins so is a log of candump, or its printed lines."""
+    return lines_are_like(head, _CANDUMP)
+
+
+def is_frame_table(head: bytes) -> bool:
+    """Whether a file that begins so is a table with columns of stamps, identifiers and payloads."""
+    header = next((line for line in head.splitlines() if line.strip()), b"").decode("utf-8", "replace")
+    return layout_of(header) is not None
+
+
+def lines_are_like(head: bytes, form: re.Pattern[str]) -> bool:
+    """Whether more than a third of the first lines have a form."""
+    lines = [line.decode("latin-1") for line in head.splitlines()[:40] if line.strip()]
+    return sum(form.match(line) is not None for line in lines) > _LIKE * len(lines)
+
+
 @dataclass
 class Count:
     """How many lines of a text log held no frame and were no known remark, and the first of them."""
