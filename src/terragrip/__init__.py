@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from terragrip.estimation import estimate as estimate
     from terragrip.formats import Profile as Profile
     from terragrip.formats import read as read
+    from terragrip.from_log import estimate_file as estimate_file
     from terragrip.ground.classification.classifier import GroundClassifier as GroundClassifier
     from terragrip.recording import Recording as Recording
     from terragrip.simulation import simulate as simulate
@@ -31,6 +32,7 @@ _HOME = {
     "Estimates": "terragrip.estimation",
     "TractionEstimator": "terragrip.estimation",
     "estimate": "terragrip.estimation",
+    "estimate_file": "terragrip.from_log",
     "calibrate": "terragrip.estimation",
     "simulate": "terragrip.simulation",
     "AdhesionCurve": "terragrip.soil.fit",

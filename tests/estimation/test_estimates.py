@@ -10,8 +10,9 @@ import pytest
 
 from drives import WHEELS, drive, robot
 from terragrip.errors import InputError
-from terragrip.estimation import Estimates, TractionEstimator, estimate, estimate_blocks
-from terragrip.recording import Recording
+from terragrip.estimation import Estimates, estimate, estimated
+from terragrip.estimation.writing import write_parts
+from terragrip.recording import LogBlocks, Recording
 
 
 def labelled(seconds: float = 8.0) -> Recording:
@@ -83,6 +84,25 @@ def test_a_folder_that_is_not_there_is_refused(estimates, tmp_path):
         estimates.write(tmp_path / "no" / "e.parquet")
 
 
+def test_the_suffix_says_how_a_table_is_written(estimates, tmp_path):
+    path = tmp_path / "x.csv"
+    estimates.write(path)
+    found = pd.read_csv(path, keep_default_na=False, na_values=["nan"])
+    assert list(found) == list(estimates)
+    for name in estimates:
+        if name in ("event", "soil"):
+            assert found[name].tolist() == estimates[name].tolist()
+        else:
+            assert np.array_equal(found[name], estimates[name], equal_nan=True), name
+
+
+@pytest.mark.parametrize("name", ["x.xlsx", "x"])
+def test_what_cannot_be_written_is_refused_by_its_suffix(estimates, tmp_path, name):
+    with pytest.raises(InputError, match=r"x\.parquet"):
+        estimates.write(tmp_path / name)
+    assert not list(tmp_path.iterdir())
+
+
 def test_what_is_no_table_of_estimates_is_refused(tmp_path):
     path = tmp_path / "x.parquet"
     path.write_bytes(b"PAR1 not really")
@@ -124,21 +144,25 @@ def test_distance_is_the_way_travelled(estimates):
 def test_a_file_from_blocks_is_the_whole_file(estimates, tmp_path, cuts):
     """The gap lies between rows 499 and 500, so one cut falls on it."""
     recording, path, seen = labelled(), tmp_path / "e.parquet", []
-    known = TractionEstimator.for_recording(recording, robot())
-    blocks = (recording.select(slice(a, b)) for a, b in pairwise(cuts))
-    text = estimate_blocks(blocks, robot(), path, sensors=known.noise, held=known.held, progress=seen.append)
-    pd.testing.assert_frame_equal(Estimates.read(path).to_pandas(), estimates.to_pandas())
-    assert text == estimates.summary()
-    assert seen[-1] == 800
+    log = in_blocks([recording.select(slice(a, b)) for a, b in pairwise(cuts)])
+    write_parts(estimated(log, robot(), progress=lambda done, of: seen.append((done, of))), path)
+    found = Estimates.read(path)
+    pd.testing.assert_frame_equal(found.to_pandas(), estimates.to_pandas(), check_exact=True)
+    assert (found.about, found.notes) == (estimates.about, estimates.notes)
+    assert seen[-1] == (800, 800)
+
+
+def in_blocks(blocks):
+    return LogBlocks(sum(map(len, blocks)), lambda: iter(blocks), lambda: blocks[0])
 
 
 def test_a_failing_block_leaves_no_file(tmp_path):
     recording = labelled()
-    backwards = [recording.select(slice(400, 800)), recording.select(slice(0, 400))]
+    backwards = in_blocks([recording.select(slice(400, 800)), recording.select(slice(0, 400))])
     with pytest.raises(InputError, match="does not run forward"):
-        estimate_blocks(backwards, robot(), tmp_path / "e.parquet")
+        write_parts(estimated(backwards, robot()), tmp_path / "e.parquet")
     with pytest.raises(InputError, match="no row"):
-        estimate_blocks([], robot(), tmp_path / "e.parquet")
+        write_parts(estimated(in_blocks([]), robot()), tmp_path / "e.parquet")
     assert not list(tmp_path.iterdir())
 
 

@@ -10,7 +10,6 @@ import pytest
 
 import terragrip as tg
 from terragrip.errors import InputError
-from terragrip.estimation.blocks import estimate_in_parts
 from terragrip.formats.reading import read_table
 from terragrip.formats.signals import Signal, SignalLog
 
@@ -51,14 +50,19 @@ def test_wheels_standstill_gap_and_intervals() -> None:
         assert 0.85 < np.mean(np.abs(error) < 1.96 * spread) <= 1.0
 
 
-def test_parts_of_a_log_are_what_the_whole_gives(tmp_path: Path) -> None:
+@pytest.mark.parametrize("smooth", [False, True])
+def test_parts_of_a_log_are_what_the_whole_gives(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, smooth: bool
+) -> None:
     log = speeds_of(0.1, gap=True)
-    whole = tg.estimate(log, robot())
+    whole = tg.estimate(log, robot(), smooth=smooth)
     for rows in (40, 641):  # the gap begins in row 601 and ends in row 680
-        estimate_in_parts(log, robot(), tmp_path / "parts.parquet", rows=rows)
+        monkeypatch.setattr("terragrip.from_log.ROWS", rows)
+        tg.estimate_file(log, robot(), tmp_path / "parts.parquet", smooth=smooth)
         parts = tg.Estimates.read(tmp_path / "parts.parquet")
         assert parts["event"].tolist() == whole["event"].tolist()
-        assert np.array_equal(parts["slip_fl"], whole["slip_fl"], equal_nan=True)
+        for name in whole.columns:
+            assert np.array_equal(parts[name], whole[name], equal_nan=True), name
 
 
 def test_an_outlier_is_flagged_and_a_leap_is_followed() -> None:

@@ -53,6 +53,14 @@ def command(
             help="A channel repeated between updates S seconds apart: ground_speed=0.2.",
         ),
     ] = None,
+    settings: Annotated[
+        Path | None,
+        typer.Option(
+            "--settings",
+            metavar="FILE",
+            help="Estimates of an earlier log of this machine: take their noise and held channels.",
+        ),
+    ] = None,
     ground: Annotated[bool, typer.Option("--ground", help="Tell where the ground changes.")] = False,
     library: Annotated[
         Path | None,
@@ -78,6 +86,7 @@ def command(
 
     if quiet and not sink and record is None:
         raise InputError("estimates would go nowhere", place="--quiet", mend="add --sink or --record")
+    known = _settings(settings)
     service = Service(
         Vehicle.load(vehicle),
         source,
@@ -86,7 +95,8 @@ def command(
         record=record,
         method=method,
         window=window / 1000.0,
-        held=_held(held or []),
+        held={**known["held"], **_held(held or [])},
+        noise=known["noise"],
         ground=ground,
         library=_library(library),
     )
@@ -96,6 +106,20 @@ def command(
         print(service.statistics.summary())
         if record is not None:
             print(f"Recorded in {record}")
+
+
+def _settings(path: Path | None) -> dict[str, dict[str, float]]:
+    """Noise and update periods that estimates were made with; raises InputError where the file does not hold them."""
+    if path is None:
+        return {"noise": {}, "held": {}}
+    from terragrip.estimation import Estimates
+
+    known = Estimates.read_about(path).get("settings", {})
+    if not {"noise", "held"} <= set(known):
+        raise InputError(
+            "holds no settings", file=path, place="--settings", mend="estimate the log anew with this version"
+        )
+    return {"noise": known["noise"], "held": known["held"]}
 
 
 def _held(pairs: list[str]) -> dict[str, float]:

@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from terragrip.estimation.batch import estimate as estimate
-    from terragrip.estimation.blocks import estimate_blocks as estimate_blocks
-    from terragrip.estimation.blocks import estimate_in_parts as estimate_in_parts
+    from terragrip.estimation.batch import estimated as estimated
     from terragrip.estimation.calibration import Calibration as Calibration
     from terragrip.estimation.calibration import calibrate as calibrate
     from terragrip.estimation.calibration import identify_torque_scale as identify_torque_scale
@@ -23,8 +22,7 @@ if TYPE_CHECKING:
 
 _HOME = {
     "estimate": "batch",
-    "estimate_blocks": "blocks",
-    "estimate_in_parts": "blocks",
+    "estimated": "batch",
     "Estimates": "estimates",
     "Estimate": "estimator",
     "TractionEstimator": "estimator",

@@ -1,9 +1,9 @@
-"""A whole recording at once."""
+"""A whole recording: one loop over its blocks, of which a recording in memory is one."""
 
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -15,13 +15,16 @@ from terragrip.estimation.estimates import Estimates
 from terragrip.estimation.estimator import TractionEstimator
 from terragrip.estimation.methods import DEFAULT, SLIP_ONLY, method_named
 from terragrip.estimation.rims import speeds_alone
-from terragrip.estimation.slip_only import against_travel
-from terragrip.recording import Recording, unit_warnings
+from terragrip.estimation.slip_only import found_in
+from terragrip.recording import LogBlocks, Recording, survey_of, unit_warnings
 
 if TYPE_CHECKING:
+    import os
+
     from terragrip.vehicle import Vehicle
 
 Floats = npt.NDArray[np.float64]
+Codes = npt.NDArray[np.uint8]
 Progress = Callable[[int, int], None]
 
 _PASSED_ON = ("latitude", "longitude", "altitude")
@@ -57,38 +60,137 @@ def estimate(
     InputError: the recording or the vehicle is unusable, there is no such method, or `algebraic` is to smooth.
     """
     log = recording if isinstance(recording, Recording) else Recording.from_frame(recording)
-    check(log, vehicle)
+    (found,) = estimated(
+        LogBlocks.of(log),
+        vehicle,
+        method,
+        smooth=smooth,
+        sensors=sensors,
+        held=held,
+        gap=gap,
+        standstill_speed=standstill_speed,
+        progress=progress,
+    )
+    return found
+
+
+def estimated(
+    log: LogBlocks,
+    vehicle: Vehicle,
+    method: str = DEFAULT,
+    *,
+    smooth: bool = False,
+    sensors: Mapping[str, float] | None = None,
+    held: Mapping[str, float] | None = None,
+    gap: float | None = None,
+    standstill_speed: float | None = None,
+    beside: str | os.PathLike[str] | None = None,
+    progress: Progress | None = None,
+) -> Iterator[Estimates]:
+    """The estimates of a log in blocks, a table a block, in the order of time; arguments as for :func:`estimate`.
+
+    A first pass over the log finds the noise and the held channels (`terragrip.recording.survey`), so that the blocks' size
+    changes no digit. ``beside``: the folder in whose neighbourhood blocks wait for the backward pass of ``smooth``, where the log
+    has more than one; None: the system's. Raises InputError as :func:`estimate` does, each when its block is reached.
+    """
     if smooth and not method_named(method).can_smooth:
         raise InputError(
             f"the method {method} cannot smooth", mend="take another method, or leave out smooth"
         )
+    passes = _Passes(progress, log.rows, log.from_disk + 1 + smooth)
+    known = survey_of(log, passes.first if log.from_disk else None)
+    passes.rows = known.rows
+    alone = speeds_alone(known.sample.channels, vehicle)
+    if not alone:
+        known.sample.check_against(vehicle)
+    # Where slip counts from may be told by one stretch of light work, which a sample of the rows can miss.
+    found = found_in(log.whole(), vehicle) if alone else None
     estimator = TractionEstimator.for_recording(
-        log, vehicle, method, sensors=sensors, held=held, gap=gap, standstill_speed=standstill_speed
+        known.sample,
+        vehicle,
+        method,
+        sensors=sensors,
+        held=held,
+        gap=gap,
+        standstill_speed=standstill_speed,
+        found=found,
     )
+    notes = notes_of(estimator, known.sample)
+    blocks = (known.without_empty(block) for block in log.blocks())
+    forward = passes.of(log.from_disk)
     if smooth:
-        from terragrip.estimation.smoothing import run_smoothed
+        from terragrip.estimation.smoothing import smoothed
 
-        return run_smoothed(estimator, log, progress)
-    return run(estimator, log, progress)
+        yield from smoothed(estimator, blocks, notes, beside, forward, passes.of(log.from_disk + 1))
+    else:
+        yield from _flagged(_filtered(estimator, blocks, notes, forward))
 
 
-def check(log: Recording, vehicle: Vehicle) -> None:
-    """Raise InputError unless the log fits the vehicle; one without torque is looked at rim by rim instead."""
-    if not speeds_alone(log.channels, vehicle):
-        log.check_against(vehicle)
+class _Passes:
+    """Progress over several passes of all rows, each as a function of the rows that it has done."""
+
+    def __init__(self, progress: Progress | None, rows: int, count: int) -> None:
+        self._progress, self.rows, self.count = progress, rows, count
+
+    def of(self, number: int) -> Callable[[int], None]:
+        """Progress of one pass, counted from 0."""
+        return lambda done: self._tell(number * self.rows + min(done, self.rows))
+
+    @property
+    def first(self) -> Callable[[int], None]:
+        """Progress of the first pass."""
+        return self.of(0)
+
+    def done(self, count: int) -> None:
+        """So many passes are done."""
+        self._tell(count * self.rows)
+
+    def _tell(self, done: int) -> None:
+        if self._progress is not None:
+            self._progress(done, self.count * self.rows)
+
+
+def _filtered(
+    estimator: TractionEstimator,
+    blocks: Iterator[Recording],
+    notes: Sequence[str],
+    progress: Callable[[int], None],
+) -> Iterator[Estimates]:
+    """Each block through the estimator."""
+    rows = 0
+    for block in blocks:
+        yield run(estimator, block, notes, lambda done, before=rows: progress(before + done))  # type: ignore[misc]
+        rows += len(block)
+
+
+def _flagged(parts: Iterator[Estimates]) -> Iterator[Estimates]:
+    """Hold each part back until the next shows whether a gap follows its last row."""
+    last: Estimates | None = None
+    for part in parts:
+        flag_before_gaps(part.event_codes, None if last is None else last.event_codes)
+        if last is not None:
+            yield last
+        last = part
+    if last is not None:
+        yield last
 
 
 def run(
-    estimator: TractionEstimator, recording: Recording, progress: Progress | None = None, *, flag: bool = True
+    estimator: TractionEstimator,
+    recording: Recording,
+    notes: Sequence[str] | None = None,
+    progress: Callable[[int], None] | None = None,
 ) -> Estimates:
-    """All rows of the recording through the estimator as it stands; ``flag`` also flags rows before gaps."""
+    """All rows of the recording through the estimator as it stands; ``notes``: None: those that it gives itself.
+
+    A row before a gap is not flagged (`flag_before_gaps`), as none is where samples come one by one.
+    """
     time, columns = prepared(estimator, recording)
     out = table_of(estimator.columns, len(time))
     event = np.empty(len(time), dtype=np.uint8)
     estimator.engine.run(time, columns, out, event, progress)
-    if flag:
-        flag_before_gaps(event)
-    return finished(estimator, recording, out, event, smooth=False)
+    notes = notes_of(estimator, recording) if notes is None else notes
+    return finished(estimator, recording, out, event, notes, smooth=False)
 
 
 def prepared(estimator: TractionEstimator, recording: Recording) -> tuple[Floats, dict[str, Floats]]:
@@ -100,7 +202,7 @@ def prepared(estimator: TractionEstimator, recording: Recording) -> tuple[Floats
     return np.ascontiguousarray(recording.time), columns
 
 
-def table_of(names: tuple[str, ...], rows: int) -> dict[str, Floats]:
+def table_of(names: Sequence[str], rows: int) -> dict[str, Floats]:
     """Empty columns (rows,) in one block.
 
     An odd number of cache lines a column keeps columns that are written side by side out of the same cache set.
@@ -114,29 +216,28 @@ def finished(
     estimator: TractionEstimator,
     recording: Recording,
     out: dict[str, Floats],
-    event: npt.NDArray[np.uint8],
+    event: Codes,
+    notes: Sequence[str],
     *,
     smooth: bool,
 ) -> Estimates:
     """Estimates from the kernel's columns, with what is passed on and notes."""
-    own = () if estimator.method != SLIP_ONLY.name else ("drawbar_force",)
-    for name in (*own, *_PASSED_ON, *recording.references):
-        if name in recording.channels:
-            out[name] = recording.channels[name]
-    labels = dict(recording.labels)
+    out |= {name: recording.channels[name] for name in passed_on(recording, estimator)}
     about = about_run(estimator, recording.source, recording.sha256, smooth=smooth)
-    notes = [*recording.notes, *unit_warnings(recording, estimator.vehicle), *notes_of(estimator, recording)]
-    if estimator.found is not None:
-        notes = [note for note in notes if not note.startswith("There is no drawbar_force")]
-        wheels = {rim.wheel: out[f"wheel_speed_{rim.wheel}"] for rim in estimator.rims}
-        notes += [*estimator.found.notes, *against_travel(out["ground_speed"], wheels)]
-    return Estimates(recording.time, out, event, labels, about, tuple(dict.fromkeys(notes)))
+    return Estimates(recording.time, out, event, dict(recording.labels), about, tuple(notes))
 
 
-def flag_before_gaps(event: npt.NDArray[np.uint8]) -> None:
-    """Flag the row before each gap too: it is the last one before the unknown."""
-    before = np.flatnonzero((event[1:] == GAP) & (event[:-1] != GAP))
-    event[before] = GAP
+def passed_on(recording: Recording, estimator: TractionEstimator) -> tuple[str, ...]:
+    """The channels that stand beside the estimates as they were measured."""
+    own = ("drawbar_force",) if estimator.method == SLIP_ONLY.name else ()
+    return tuple(n for n in (*own, *_PASSED_ON, *recording.references) if n in recording.channels)
+
+
+def flag_before_gaps(event: Codes, before: Codes | None = None) -> None:
+    """Flag the row before each gap too: it is the last one before the unknown. ``before``: the codes of the rows before these."""
+    if before is not None and event[0] == GAP:
+        before[-1] = GAP
+    event[np.flatnonzero((event[1:] == GAP) & (event[:-1] != GAP))] = GAP
 
 
 def about_run(
@@ -167,10 +268,14 @@ def about_run(
     return plain
 
 
-def notes_of(estimator: TractionEstimator, recording: Recording) -> list[str]:
-    """Sentences on what the estimator had to assume."""
+def notes_of(estimator: TractionEstimator, recording: Recording) -> tuple[str, ...]:
+    """Sentences of the reader, on units that are likely wrong, and on what the estimator had to assume."""
+    said = [*recording.notes, *unit_warnings(recording, estimator.vehicle)]
     guessed = [name for name in estimator.guessed if name in recording.channels]
-    if not guessed:
-        return []
-    shown = ", ".join(f"{name} ({estimator.noise[name]:.3g})" for name in guessed)
-    return [f"The noise of {shown} is a guess from the vehicle's size: give it under 'sensors'."]
+    if guessed:
+        shown = ", ".join(f"{name} ({estimator.noise[name]:.3g})" for name in guessed)
+        said.append(f"The noise of {shown} is a guess from the vehicle's size: give it under 'sensors'.")
+    if estimator.found is not None:
+        said = [note for note in said if not note.startswith("There is no drawbar_force")]
+        said += estimator.found.notes
+    return tuple(dict.fromkeys(said))

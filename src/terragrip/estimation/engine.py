@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import struct
 from array import array
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -111,6 +111,11 @@ def estimate_slots(vehicle: Vehicle, *, adaptive: bool = False) -> dict[str, int
     return slots
 
 
+def _is_smoothed(slot: int) -> bool:
+    """Whether tg_estimator_smooth writes a place of tg_estimate.value; the others keep what the forward pass found."""
+    return bool(slot < lib.TG_OUT_VERTICAL_LOAD and not lib.TG_OUT_NIS <= slot <= lib.TG_OUT_DISTANCE)
+
+
 class Engine:
     """One tg_estimator. ``settings`` is a tg_settings structure; raises InputError if the kernel refuses it.
 
@@ -122,6 +127,7 @@ class Engine:
         self._used = 1 + max(self._slots_out.values())
         self.inputs = tuple(self.slots_in)
         self.outputs = tuple(self._slots_out)
+        self.filtered_only = tuple(name for name, slot in self._slots_out.items() if not _is_smoothed(slot))
         self._memory = ffi.new("char[]", lib.tg_estimator_size() + 64)
         address = int(ffi.cast("uintptr_t", self._memory))
         self.handle = ffi.cast("tg_estimator *", address + -address % 64)  # lives as long as this object
@@ -163,11 +169,12 @@ class Engine:
         columns: Mapping[str, Floats],
         out: Mapping[str, Floats],
         event: npt.NDArray[np.uint8],
-        progress: Any = None,
+        progress: Callable[[int], None] | None = None,
     ) -> None:
         """Take rows of contiguous columns (n,) and write those of ``out`` (n,) and the event codes.
 
-        Raises InputError with the row where the kernel refuses one; the rows before it have been taken.
+        ``progress`` is called with the rows done. Raises InputError with the row where the kernel refuses one; the rows before it
+        have been taken.
         """
         rows = len(time)
         sources = {self.slots_in[name]: values for name, values in columns.items()}
@@ -189,7 +196,7 @@ class Engine:
             if status != lib.TG_OK:
                 raise refusal(status, f"row {first + done[0] + 1}")
             if progress is not None:
-                progress(last, rows)
+                progress(last)
 
     def smooth_carry(self) -> Floats:
         """Room for what smoothing carries from block to block."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Self
 
@@ -142,33 +142,31 @@ class Estimates:
         return json.dumps({**self.about, "notes": list(self.notes)}).encode()
 
     def write(self, path: str | os.PathLike[str]) -> None:
-        """Write a Parquet file, whole or not at all; raises InputError if it cannot be written."""
-        import pyarrow.parquet as pq
+        """Write a file, whole or not at all: Parquet, or CSV (which `read` does not take) where the name ends so.
 
-        from terragrip.files import replacing
+        Raises InputError where the name ends otherwise, or the file cannot be written.
+        """
+        from terragrip.estimation.writing import write_parts
 
-        table = self.to_arrow()
-        with replacing(path) as temporary:
-            pq.write_table(table, temporary, **parquet_options(table.schema))
+        write_parts([self], path)
 
     @classmethod
     def read(cls, path: str | os.PathLike[str]) -> Self:
         """Read a Parquet file of estimates; raises InputError if it is missing, damaged or no such table."""
-        import pyarrow as pa
         import pyarrow.parquet as pq
 
-        from terragrip.files import refuse_missing, unreadable
+        return cls.from_arrow(_opened(path, pq.read_table), source=os.fspath(path))
 
-        refuse_missing(path, suffixes=(".parquet",))
-        try:
-            table = pq.read_table(path)
-        except pa.ArrowInvalid as error:
-            raise InputError(
-                "is no Parquet file, or is damaged", file=path, mend="write it anew with terragrip estimate"
-            ) from error
-        except OSError as error:
-            raise unreadable(path, error) from error
-        return cls.from_arrow(table, source=os.fspath(path))
+    @classmethod
+    def read_about(cls, path: str | os.PathLike[str]) -> dict[str, Any]:
+        """What a Parquet file of estimates was made from (``about``), without its rows; raises InputError as `read`."""
+        import pyarrow.parquet as pq
+
+        about: dict[str, Any] = json.loads(
+            (_opened(path, pq.read_schema).metadata or {}).get(METADATA_KEY, b"{}")
+        )
+        about.pop("notes", None)
+        return about
 
     @classmethod
     def from_arrow(cls, table: pa.Table, source: str | None = None) -> Self:
@@ -201,18 +199,21 @@ class Estimates:
         return tally.text(self.notes)
 
 
-def parquet_options(schema: pa.Schema) -> dict[str, Any]:
-    """How estimates are stored: noisy floats do not repeat, so no dictionary; split by bytes they compress."""
+def _opened(path: str | os.PathLike[str], reading: Callable[[str], Any]) -> Any:
+    """What ``reading`` makes of a Parquet file; raises InputError where it is missing, damaged or none."""
     import pyarrow as pa
 
-    floats = [f.name for f in schema if pa.types.is_floating(f.type)]
-    texts = [f.name for f in schema if not pa.types.is_floating(f.type)]
-    return {
-        "compression": "zstd",
-        "compression_level": 1,
-        "use_dictionary": texts or False,
-        "use_byte_stream_split": floats,
-    }
+    from terragrip.files import refuse_missing, unreadable
+
+    refuse_missing(path, suffixes=(".parquet",))
+    try:
+        return reading(os.fspath(path))
+    except pa.ArrowInvalid as error:
+        raise InputError(
+            "is no Parquet file, or is damaged", file=path, mend="write it anew with terragrip estimate"
+        ) from error
+    except OSError as error:
+        raise unreadable(path, error) from error
 
 
 def _event_codes(table: pa.Table, source: str | None) -> npt.NDArray[np.uint8]:

@@ -156,9 +156,10 @@ class TractionEstimator:
         held: Mapping[str, float] | None = None,
         gap: float | None = None,
         standstill_speed: float | None = None,
+        found: Found | None = None,
     ) -> Self:
         """An estimator set up as :func:`estimate` does it: noise and held channels found in the log where not given; where it holds
-        no torque, also what slip counts from."""
+        no torque, also what slip counts from (``found``; None finds it)."""
         from terragrip.estimation.noise import logged_noise, sensor_of
         from terragrip.estimation.slip_only import found_in
         from terragrip.recording import held_periods
@@ -167,8 +168,8 @@ class TractionEstimator:
         logged = logged_noise(recording, vehicle, periods)
         mine = dict(sensors or {})
         logged = {name: sd for name, sd in logged.items() if sensor_of(name) not in mine}
-        alone = speeds_alone(recording.channels, vehicle)
-        found = found_in(recording, vehicle) if alone else None
+        if found is None and speeds_alone(recording.channels, vehicle):
+            found = found_in(recording, vehicle)
         if found is not None:
             used = speeds.slots_in(found.rims)
             logged = {name: sd for name, sd in logged.items() if name in used}

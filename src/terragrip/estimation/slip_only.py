@@ -9,14 +9,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
 from terragrip.estimation.rims import DRIVE, Rim, at_zero, calibrated_scale, rims_of
 from terragrip.estimation.zero_slip import Zero, zero_of
 from terragrip.recording import Recording
 from terragrip.vehicle import Vehicle
-
-Floats = npt.NDArray[np.float64]
 
 _MOVING = 0.1  # m/s
 _BLIND = 5  # rows of rims that stand while the vehicle moves
@@ -59,7 +56,7 @@ def found_in(log: Recording, vehicle: Vehicle) -> Found:
             f"The rims read 0 in {rows} rows while the vehicle moves, at up to {band:.2g} m/s: what is slower they do not see, so slip "
             "is left open there (event gap)."
         )
-    return Found(tuple(rims), zero, band, tuple(notes))
+    return Found(tuple(rims), zero, band, (*notes, *_against_travel(log, rims)))
 
 
 def _said(rim: Rim, zero: Zero | None, learns: bool) -> list[str]:
@@ -100,13 +97,16 @@ def _dead_band(log: Recording, rims: Sequence[Rim]) -> tuple[float, int]:
     return min(float(np.quantile(moving, 0.9)), _WIDEST), len(moving)
 
 
-def against_travel(ground: Floats, wheels: dict[str, Floats]) -> list[str]:
-    """A sentence on wheels whose speeds (n,) are against the ground speed (n,) most of the time."""
-    odd = []
-    for wheel, speed in wheels.items():
-        moving = (np.abs(ground) > _MOVING) & np.isfinite(speed) & (speed != 0)
-        if moving.any() and np.mean((speed * ground)[moving] < 0) > 0.5:
-            odd.append(wheel)
+def _against_travel(log: Recording, rims: Sequence[Rim]) -> list[str]:
+    """A sentence on wheels that turn backward while the machine goes forward, most of the time."""
+    ground, odd = log.channels["ground_speed"], []
+    known = np.isfinite(ground)
+    for rim in rims if known.any() else ():
+        speed = log.channels[rim.channel]
+        over = np.interp(log.time, log.time[known], ground[known])
+        moving = (np.abs(over) > _MOVING) & np.isfinite(speed) & (speed != 0)
+        if moving.any() and np.mean((speed * over)[moving] < 0) > 0.5:
+            odd.append(rim.wheel)
     if not odd:
         return []
     return [

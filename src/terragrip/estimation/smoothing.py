@@ -1,72 +1,158 @@
 """A backward pass over a whole recording: every row then knows the rows after it (Rauch, Tung and Striebel 1965).
 
-Memory stays bounded: the forward pass keeps a snapshot a block; then, from the last block to the first, a
-restored estimator writes records of one block and they are smoothed.
+Memory stays bounded. The forward pass keeps a snapshot every few thousand rows and puts each block aside; then, from the last block
+to the first, a restored estimator writes the records of some rows and they are smoothed. All blocks but the newest wait on disk.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import os
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
 
-from terragrip.estimation.batch import finished, flag_before_gaps, prepared, table_of
+from terragrip.estimation.arrow import floats, texts
+from terragrip.estimation.batch import (
+    finished,
+    flag_before_gaps,
+    passed_on,
+    prepared,
+    table_of,
+)
 from terragrip.estimation.estimates import Estimates
+from terragrip.estimation.put_aside import TablesAside
 
 if TYPE_CHECKING:
+    import pyarrow as pa
+
     from terragrip.estimation.estimator import TractionEstimator
     from terragrip.recording import Recording
 
 Floats = npt.NDArray[np.float64]
+Done = Callable[[int], None]
 
-_BLOCK = 8192  # rows: some 25 MB of records for four wheels
+STEP = 8192
+"""Rows between snapshots: some 25 MB of records for four wheels."""
 
 
-def run_smoothed(
+@dataclass(frozen=True)
+class _Forward:
+    """A block after the forward pass: what smoothing leaves as it is (``out``, ``event``), and snapshots every ``STEP`` rows."""
+
+    block: Recording
+    out: dict[str, Floats]
+    event: npt.NDArray[np.uint8]
+    snapshots: list[bytes]
+
+
+def smoothed(
     estimator: TractionEstimator,
-    recording: Recording,
-    progress: Callable[[int, int], None] | None = None,
-    block: int = _BLOCK,
-) -> Estimates:
-    """Filter all rows of the recording forwards, then smooth them backwards.
+    blocks: Iterator[Recording],
+    notes: Sequence[str],
+    beside: str | os.PathLike[str] | None = None,
+    forward: Done = lambda rows: None,
+    backward: Done = lambda rows: None,
+    step: int = STEP,
+) -> Iterator[Estimates]:
+    """Filter all blocks of a recording forwards, then smooth them backwards; gives the blocks in the order of time.
 
-    ``estimator`` must not be `algebraic`; it stands after the last row when this returns. ``nis``,
-    ``supervisor``, ``adaptation_<state>``, ``distance``, loads and events are those of the forward pass.
-    ``block`` rows are held in memory at a time; it does not change the result. ``progress`` counts every row
-    twice: there and back.
+    ``estimator`` must not be `algebraic`; it stands after the last row when this ends. ``nis``, ``supervisor``,
+    ``adaptation_<state>``, ``distance``, loads and events are those of the forward pass. Neither the blocks nor ``step`` change the
+    result. ``beside``: see `terragrip.estimation.put_aside`. ``forward`` and ``backward`` are called with the rows done.
     """
     engine = estimator.engine
-    time, columns = prepared(estimator, recording)
-    rows = len(time)
-    out = table_of(estimator.columns, rows)
-    event = np.empty(rows, dtype=np.uint8)
-    starts = range(0, rows, block)
+    with TablesAside(beside) as filtered, TablesAside(beside) as finals:
+        behind: list[list[bytes]] = []
+        last, rows = None, 0
+        for block in blocks:
+            done = _filter(estimator, block, step, lambda k, before=rows: forward(before + k))  # type: ignore[misc]
+            flag_before_gaps(done.event, None if last is None else last.event)
+            if last is not None:
+                filtered.put(_as_table(estimator, last))
+                behind.append(last.snapshots)
+            last, rows = done, rows + len(block)
+        if last is None:
+            return
+        end = engine.snapshot()
+        carry, following, count = engine.smooth_carry(), None, rows
+        while True:
+            found, following = _smooth(estimator, last, carry, following, notes, step)
+            count -= len(found)
+            backward(rows - count)
+            if not behind:
+                break
+            finals.put(found.to_arrow())
+            last = _of_table(filtered.take(), last.block, behind.pop())
+        engine.restore(end)
+        yield found
+        while len(finals):
+            yield Estimates.from_arrow(finals.take())
+
+
+def _filter(estimator: TractionEstimator, block: Recording, step: int, forward: Done) -> _Forward:
+    engine = estimator.engine
+    time, columns = prepared(estimator, block)
+    out = table_of(engine.filtered_only, len(time))
+    event = np.empty(len(time), dtype=np.uint8)
     snapshots = []
-    for first in starts:
-        part = slice(first, first + block)
+    for first in range(0, len(time), step):
+        part = slice(first, first + step)
         snapshots.append(engine.snapshot())
         engine.run(time[part], _cut(columns, part), _cut(out, part), event[part])
-        _tell(progress, min(first + block, rows), 2 * rows)
-    end = engine.snapshot()
-    carry, following = engine.smooth_carry(), None
-    for first in reversed(starts):
-        part = slice(first, first + block)
-        engine.restore(snapshots.pop())
+        forward(min(first + step, len(time)))
+    return _Forward(block, out, event, snapshots)
+
+
+def _smooth(
+    estimator: TractionEstimator,
+    one: _Forward,
+    carry: Floats,
+    following: Floats | None,
+    notes: Sequence[str],
+    step: int,
+) -> tuple[Estimates, Floats | None]:
+    """The estimates of a block, and the record of its first row; ``following`` is the record behind its last."""
+    engine = estimator.engine
+    time, columns = prepared(estimator, one.block)
+    out = table_of(estimator.columns, len(time))
+    for name, values in one.out.items():
+        out[name][:] = values
+    for number in reversed(range(len(one.snapshots))):
+        part = slice(number * step, (number + 1) * step)
+        engine.restore(one.snapshots[number])
         records = engine.record(time[part], _cut(columns, part))
         engine.smooth(records, following, carry, _cut(out, part))
         following = records[0].copy()
-        _tell(progress, 2 * rows - first, 2 * rows)
-    engine.restore(end)
-    flag_before_gaps(event)
-    return finished(estimator, recording, out, event, smooth=True)
+    return finished(estimator, one.block, out, one.event, notes, smooth=True), following
 
 
 def _cut(columns: dict[str, Floats], part: slice) -> dict[str, Floats]:
     return {name: values[part] for name, values in columns.items()}
 
 
-def _tell(progress: Callable[[int, int], None] | None, done: int, of: int) -> None:
-    if progress is not None:
-        progress(done, of)
+_TIME, _EVENT, _INPUT, _LABEL = "time:", "event:", "input:", "label:"
+"""Columns of a block that stands aside, beside those of ``out``; what the names of its channels and labels begin with."""
+
+
+def _as_table(estimator: TractionEstimator, one: _Forward) -> pa.Table:
+    """A filtered block, to be put aside: what the estimator looks at and what is passed on, beside ``out``."""
+    import pyarrow as pa
+
+    inputs = prepared(estimator, one.block)[1]
+    inputs |= {name: one.block.channels[name] for name in passed_on(one.block, estimator)}
+    columns = {_TIME: one.block.time, **{_INPUT + name: values for name, values in inputs.items()}, **one.out}
+    arrays = {name: floats(values) for name, values in columns.items()}
+    arrays |= {_LABEL + name: texts(values) for name, values in one.block.labels.items()}
+    return pa.table({**arrays, _EVENT: floats(one.event.astype(np.float64))})
+
+
+def _of_table(table: pa.Table, like: Recording, snapshots: list[bytes]) -> _Forward:
+    """The inverse of `_as_table`; ``like``: another block of the recording."""
+    columns = {name: table.column(name).to_numpy() for name in table.column_names}
+    time, event = columns.pop(_TIME), columns.pop(_EVENT).astype(np.uint8)
+    channels = {n.removeprefix(_INPUT): columns.pop(n) for n in [*columns] if n.startswith(_INPUT)}
+    labels = {n.removeprefix(_LABEL): columns.pop(n) for n in [*columns] if n.startswith(_LABEL)}
+    return _Forward(replace(like, time=time, channels=channels, labels=labels), columns, event, snapshots)

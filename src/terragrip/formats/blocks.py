@@ -9,7 +9,6 @@ import numpy as np
 import numpy.typing as npt
 
 from terragrip.errors import InputError
-from terragrip.files import sha256
 from terragrip.recording import Recording, checks
 from terragrip.recording.columns import numbers, seconds, texts
 from terragrip.recording.schema import LABELS, TIME
@@ -22,16 +21,17 @@ def recordings(
     names: tuple[str, ...],
     chosen: list[str],
     source: str,
+    digest: str,
     said: Sequence[str] = (),
 ) -> Iterator[Recording]:
     """Consecutive blocks of columns as checked recordings; they together are what `Recording.from_frame` makes of all.
 
-    ``names``: all columns of the log, ``chosen``: those in the blocks; ``said``: notes, to which the blocks may add as they
-    come. Raises InputError as that does, each when its block is
-    reached; that a channel is empty over the whole file shows at the end only.
+    ``names``: all columns of the log, ``chosen``: those in the blocks; ``digest``: SHA-256 of the file; ``said``: notes, to which
+    the blocks may add as they come. Raises InputError as that does, each when its block is reached; that a channel is empty over the
+    whole file shows at the end only.
     """
     checks.require_columns(names, source)
-    notes, digest = list(checks.remarks(names)), sha256(source)
+    notes = list(checks.remarks(names))
     silent, first, after = set(chosen), 0, None
     origin: np.datetime64 | None = None
     for columns in blocks:
@@ -47,7 +47,7 @@ def recordings(
             raise InputError(
                 "holds dates and numbers", file=source, place=f"column {TIME}", mend="give one of them"
             )
-        block = _block(columns, source, first, after, silent, (*notes, *said), digest)
+        block = _block(columns, source, first, after, silent, tuple(dict.fromkeys((*notes, *said))), digest)
         first, after = first + len(block), float(block.time[-1])
         yield block
     if first == 0:

@@ -14,11 +14,12 @@ from terragrip.errors import InputError
 from terragrip.files import sha256
 from terragrip.formats.csv import body_of, chosen_of, is_long, parse
 from terragrip.formats.dialect import HEAD, Dialect, detect, in_utf8, to_text
-from terragrip.formats.long_logs import ROWS, LongLog, recordings_of
+from terragrip.formats.long_logs import LongLog, recordings_of
 from terragrip.formats.profile import Profile
 from terragrip.formats.table import LogTable, Wanted, every_of
 from terragrip.formats.text_file import length_of, opened, read
 from terragrip.recording import Recording
+from terragrip.recording.survey import ROWS
 
 Column = npt.NDArray[Any]
 

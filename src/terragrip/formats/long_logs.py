@@ -3,19 +3,22 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
+from terragrip.files import sha256
 from terragrip.formats.blocks import Columns, recordings
 from terragrip.formats.conversion import converted_block, settled
 from terragrip.formats.profile import Profile
 from terragrip.formats.registry import format_of
 from terragrip.formats.table import LogTable, in_si, since_clock_was_set
-from terragrip.recording import Recording
+from terragrip.recording import LogBlocks, Recording
 from terragrip.recording.columns import seconds
-from terragrip.recording.schema import TIME, has_torque, is_own
+from terragrip.recording.schema import TIME, is_own
+from terragrip.recording.survey import ROWS
 
-ROWS = 200_000  # of a block
+PathLike = str | os.PathLike[str]
 
 
 @dataclass(frozen=True)
@@ -34,32 +37,57 @@ class LongLog:
     notes: list[str] = field(default_factory=list)
     clocked: bool = False
 
+    @cached_property
+    def digest(self) -> str:
+        """SHA-256 of the file, computed once however often it is gone through."""
+        return sha256(self.source)
 
-def recordings_of(
-    log: LongLog, profile: Profile | None = None, *, with_torque: bool = False
-) -> Iterator[Recording] | None:
+
+def log_in_blocks(
+    path: PathLike | Sequence[PathLike],
+    profile: Profile | PathLike | None = None,
+    *,
+    dbc: Sequence[PathLike] = (),
+) -> LogBlocks:
+    """The recording that `terragrip.formats.read` gives of a log, or of several sources of one drive, in blocks.
+
+    A long table is read a block at a time where each of its rows can be told by itself; any other log is read whole and cut. Raises
+    InputError as `read` does, of a long table each where its block is reached.
+    """
+    from terragrip.formats.reading import read
+
+    chosen = profile if profile is None or isinstance(profile, Profile) else Profile.load(profile)
+    log = long_log(path) if isinstance(path, str | os.PathLike) and not dbc else None
+    if log is None or recordings_of(log, chosen) is None:
+        return LogBlocks.of(read(path, chosen, dbc=dbc), ROWS)
+
+    def blocks() -> Iterator[Recording]:
+        return recordings_of(log, chosen) or iter(())
+
+    return LogBlocks(log.rows, blocks, lambda: read(path, chosen), from_disk=True)
+
+
+def recordings_of(log: LongLog, profile: Profile | None = None) -> Iterator[Recording] | None:
     """The recording that `terragrip.formats.read` gives, in blocks; None where a profile needs the whole log at once.
 
-    ``with_torque``: None, too, of a log without any, since slip alone takes the whole of it. Raises InputError as `read` does,
-    each where its block is reached; that a channel is empty over the whole file shows at the end only.
+    Raises InputError as `read` does, each where its block is reached; that a channel is empty over the whole file shows at the end
+    only.
     """
     table = LogTable(log.names, {}, log.units, log.source, clocked=log.clocked)
     if profile is None:
         chosen = [name for name in log.names if is_own(name)]
-        if with_torque and not has_torque(chosen):
-            return None
         own = (
             in_si(block)
             for block in _since_set(log, log.blocks(chosen), table, TIME, log.units.get(TIME, "s"))
         )
-        return recordings(own, log.names, chosen, log.source, log.notes)
+        return recordings(own, log.names, chosen, log.source, log.digest, log.notes)
     found = settled(profile, table)
-    if found is None or (with_torque and not has_torque(found[0].channels)):
+    if found is None:
         return None
     ready, notes = found
     log.notes.extend(notes)
     names = [TIME, *ready.channels]
-    return recordings(_converted(log, ready, table), tuple(names), names, log.source, log.notes)
+    return recordings(_converted(log, ready, table), tuple(names), names, log.source, log.digest, log.notes)
 
 
 def _converted(log: LongLog, profile: Profile, table: LogTable) -> Iterator[Columns]:

@@ -11,11 +11,12 @@ import numpy as np
 import numpy.typing as npt
 
 from terragrip.formats.boundary import needed, reading
-from terragrip.formats.long_logs import ROWS, LongLog
+from terragrip.formats.long_logs import LongLog
 from terragrip.formats.matlab_hdf5 import is_hdf5, tree_of
 from terragrip.formats.matlab_signals import Found, seconds_of, walk
 from terragrip.formats.matlab_values import Array
 from terragrip.recording.schema import TIME
+from terragrip.recording.survey import ROWS
 
 _LONG = 100_000_000  # bytes
 

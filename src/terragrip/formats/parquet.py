@@ -10,11 +10,12 @@ import numpy.typing as npt
 
 from terragrip.errors import InputError
 from terragrip.files import refuse_missing, sha256
-from terragrip.formats.long_logs import ROWS, LongLog, recordings_of
+from terragrip.formats.long_logs import LongLog, recordings_of
 from terragrip.formats.profile import Profile
 from terragrip.formats.registry import Format
 from terragrip.formats.table import LogTable, Wanted, every_of, from_arrow
 from terragrip.recording import Recording
+from terragrip.recording.survey import ROWS
 
 if TYPE_CHECKING:
     import pyarrow as pa

@@ -44,7 +44,7 @@ class Settings:
 
     ``window`` [s]: how long a row waits for what is due. ``channels``: columns the samples carry; empty: those seen by the
     first row. ``sources``: their URIs without options. ``held`` [s]: update periods of channels that are repeated between
-    updates. ``ground``: whether ground changes and soils are followed.
+    updates. ``noise``: SDs [SI] by channel, over the vehicle file's. ``ground``: whether ground changes and soils are followed.
     """
 
     sources: tuple[str, ...]
@@ -53,6 +53,7 @@ class Settings:
     channels: tuple[str, ...] = ()
     held: Mapping[str, float] = field(default_factory=dict)
     ground: bool = False
+    noise: Mapping[str, float] = field(default_factory=dict)
 
     def to_dict(self) -> dict[str, Any]:
         """As JSON holds it."""
@@ -63,6 +64,7 @@ class Settings:
             "channels": list(self.channels),
             "held": dict(self.held),
             "ground": self.ground,
+            "noise": dict(self.noise),
         }
 
     @classmethod
@@ -134,8 +136,8 @@ class Core:
             self._begin(settings.channels)
 
     def _begin(self, channels: Collection[str]) -> TractionEstimator:
-        method, held = self.settings.method, self.settings.held
-        estimator = TractionEstimator(self.vehicle, method, channels=channels, held=held)
+        method, held, noise = self.settings.method, self.settings.held, self.settings.noise
+        estimator = TractionEstimator(self.vehicle, method, channels=channels, held=held, sensors=noise)
         self.estimator = estimator
         if self.settings.ground and not estimator.rims:
             from terragrip.ground.live import LiveGround

@@ -102,7 +102,7 @@ class Segment:
         if len(self) and estimator is not None:
             import pyarrow.parquet as pq
 
-            from terragrip.estimation.estimates import parquet_options
+            from terragrip.estimation.writing import parquet_options
 
             for name, table in (
                 (RECORDING, self.to_recording()),

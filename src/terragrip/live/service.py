@@ -50,6 +50,7 @@ class Service:
     record: folder of the record, which is resumed where it holds one; None: none is kept.
     window: s that a row waits for what is due (`terragrip.live.reorder`).
     held: update periods [s] of channels that a source repeats between updates.
+    noise: SDs [SI] by channel, as estimates of a log hold them; they win over the vehicle file's.
     ground: report ground changes while driving; library: and which of these soils it is.
     capacity: samples that may wait for the estimator before they are dropped.
 
@@ -67,6 +68,7 @@ class Service:
         method: str = DEFAULT,
         window: float = WINDOW,
         held: Mapping[str, float] | None = None,
+        noise: Mapping[str, float] | None = None,
         ground: bool = False,
         library: SoilLibrary | None = None,
         capacity: int = CAPACITY,
@@ -88,7 +90,13 @@ class Service:
         )
         names = tuple(uri.name for uri, _ in opened)
         settings = Settings(
-            names, method, window, tuple(channels), dict(held or {}), ground or library is not None
+            names,
+            method,
+            window,
+            tuple(channels),
+            dict(held or {}),
+            ground or library is not None,
+            dict(noise or {}),
         )
         core = Core(vehicle, settings, library)
         if settings.ground and core.estimator is not None and core.estimator.rims:

@@ -4,14 +4,17 @@ from terragrip.recording.held import fresh_samples, held_periods, without_held
 from terragrip.recording.noise import sensor_noise
 from terragrip.recording.plausibility import unit_warnings
 from terragrip.recording.schema import is_channel, unit_of, wheel_names_in
+from terragrip.recording.survey import LogBlocks, survey_of
 from terragrip.recording.table import Recording
 
 __all__ = [
+    "LogBlocks",
     "Recording",
     "fresh_samples",
     "held_periods",
     "is_channel",
     "sensor_noise",
+    "survey_of",
     "unit_of",
     "unit_warnings",
     "wheel_names_in",

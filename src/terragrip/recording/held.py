@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
+from terragrip.recording.chunks import sampled_rows
 from terragrip.recording.schema import REFERENCE
 
 if TYPE_CHECKING:
@@ -28,7 +29,6 @@ _FEWEST_RUNS = 8
 _REGULAR_SHARE = 0.6
 _LARGE_STEP = 1.5  # quanta: one and a half parts a single step from a double one
 _WORTH_A_LOOK = 0.01  # share of exact repeats under which a channel is taken to be fresh
-_BLOCK, _BLOCKS = 25_000, 8  # a long log is judged on this many samples, spread over it
 
 
 def held_periods(recording: Recording) -> dict[str, float]:
@@ -125,11 +125,9 @@ def quantum(values: Floats) -> float:
 
 
 def measured_part(time: Floats, values: Floats) -> tuple[Floats, Floats]:
-    """The measured samples of a channel: all of a short one, blocks spread over a long one."""
-    if len(values) > _BLOCK * _BLOCKS:
-        first = np.linspace(0, len(values) - _BLOCK, _BLOCKS).astype(int)
-        rows = (first[:, None] + np.arange(_BLOCK)).ravel()
-        time, values = time[rows], values[rows]
+    """The measured samples of a channel; of a long one those in the log's sample (`sampled_rows`)."""
+    rows = sampled_rows(len(values))
+    time, values = time[rows], values[rows]
     known = np.isfinite(values)
     return (time, values) if known.all() else (time[known], values[known])
 

@@ -197,15 +197,16 @@ def _record(name: str, seed: int) -> tuple[str, Recording]:
 
 def _estimate(name: str, seed: int, vehicle: Vehicle, folder: Path) -> EstimatedRun:
     """One run from scenario to saved estimates and scores."""
-    from terragrip.estimation import DEFAULT, METHODS, estimate
+    from terragrip.estimation import DEFAULT, METHODS, Estimates, estimate
+    from terragrip.from_log import estimate_file
     from terragrip.ground.analysis import analyse
     from terragrip.report.campaign_soils import true_pairs
     from terragrip.soil.estimates import GatheredRuns
 
     result = _simulated(name, seed)
     path = folder / f"{name}.parquet"
-    estimates = estimate(result.recording, vehicle, method=DEFAULT)
-    estimates.write(path)
+    estimate_file(result.recording, vehicle, path)
+    estimates = Estimates.read(path)
     gathered = GatheredRuns()
     gathered.add(estimates, name)
     events = analyse(estimates, None, name)[0].events if name in BENCHMARKS else ()
@@ -215,8 +216,10 @@ def _estimate(name: str, seed: int, vehicle: Vehicle, folder: Path) -> Estimated
     if name in BENCHMARKS:
         comparisons += compare_truth(shown)
         for method in METHODS:
-            others = estimate(result.recording, vehicle, method=method)
-            run = shown if method == DEFAULT else _run(name, others, result, vehicle, events)
+            run = shown
+            if method != DEFAULT:
+                others = estimate(result.recording, vehicle, method=method)
+                run = _run(name, others, result, vehicle, events)
             comparisons += compare(run)
             scores.append(truth_score(run))
     return EstimatedRun(

@@ -45,21 +45,18 @@ def run(request: dict[str, Any]) -> str:
 
 
 def _estimate(request: dict[str, Any]) -> str:
-    from terragrip.estimation import estimate
-    from terragrip.formats import read
+    from terragrip.from_log import estimate_file
     from terragrip.vehicle import Vehicle
 
-    vehicle = Vehicle.load(request["vehicle"])
-    recording = read(request["recording"], request.get("profile"))
-    found = estimate(
-        recording,
-        vehicle,
+    return estimate_file(
+        request["recording"],
+        Vehicle.load(request["vehicle"]),
+        request["output"],
         request["method"],
+        profile=request.get("profile"),
         smooth=bool(request.get("smooth")),
         progress=_Reporter(),
     )
-    found.write(request["output"])
-    return found.summary()
 
 
 def _soils(request: dict[str, Any]) -> str:

@@ -1,0 +1,83 @@
+"""From a log to a file of estimates: the one way of command line, studio, campaign and fleet."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from terragrip.estimation import DEFAULT, Estimates, estimated
+from terragrip.estimation.summary import Tally
+from terragrip.estimation.writing import require_suffix, write_parts
+from terragrip.recording import LogBlocks, Recording
+from terragrip.recording.survey import ROWS
+
+if TYPE_CHECKING:
+    from terragrip.formats import Profile
+    from terragrip.vehicle import Vehicle
+
+PathLike = str | os.PathLike[str]
+
+
+def estimate_file(
+    log: PathLike | Sequence[PathLike] | Recording,
+    vehicle: Vehicle,
+    output: PathLike,
+    method: str = DEFAULT,
+    *,
+    profile: Profile | PathLike | None = None,
+    dbc: Sequence[PathLike] = (),
+    smooth: bool = False,
+    sensors: Mapping[str, float] | None = None,
+    held: Mapping[str, float] | None = None,
+    gap: float | None = None,
+    standstill_speed: float | None = None,
+    progress: Callable[[int, int], None] | None = None,
+) -> str:
+    """Estimate a log into a Parquet file (or CSV, by its suffix); returns the summary as text.
+
+    The rows are those of :func:`terragrip.estimate`, to the last digit, whatever the log's length: it is gone through once for the
+    noise and the held channels, which stand in the file's metadata with all other settings, and then in blocks, so that memory stays
+    small. The file appears whole or not at all.
+
+    Parameters
+    ----------
+    log: the path of a log, those of several sources of one drive, or a Recording.
+    vehicle, method, smooth, sensors, held, gap, standstill_speed: as for :func:`terragrip.estimate`.
+    profile, dbc: as for :func:`terragrip.read`.
+    progress: called with the rows done and those to do; a pass over the log counts all its rows.
+
+    Raises
+    ------
+    InputError: the log, the vehicle or the call is unusable, or the file cannot be written.
+    """
+    require_suffix(output)
+    if isinstance(log, Recording):
+        blocks = LogBlocks.of(log, ROWS)
+    else:
+        from terragrip.formats.long_logs import log_in_blocks
+
+        blocks = log_in_blocks(log, profile, dbc=dbc)
+    parts = estimated(
+        blocks,
+        vehicle,
+        method,
+        smooth=smooth,
+        sensors=sensors,
+        held=held,
+        gap=gap,
+        standstill_speed=standstill_speed,
+        beside=Path(output).parent,
+        progress=progress,
+    )
+    tally, notes = Tally(), dict[str, None]()
+    write_parts(_counted(parts, tally, notes), output)
+    return tally.text(notes)
+
+
+def _counted(parts: Iterator[Estimates], tally: Tally, notes: dict[str, None]) -> Iterator[Estimates]:
+    for part in parts:
+        tally.add(part)
+        notes.update(dict.fromkeys(part.notes))
+        yield part

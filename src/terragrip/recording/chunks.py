@@ -1,0 +1,27 @@
+"""The rows that a long log's noise and held channels are told from: chunks of neighbouring rows, spread over the whole of it.
+
+Chunks, since every k-th row would destroy rates, held values and noise. Every second, fourth, eighth ... chunk counts, so that
+they can be chosen while the log goes by and its length is not known yet.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+CHUNK = 12_500
+"""Rows of a chunk."""
+CHUNKS = 16
+"""Chunks that are kept at most, and more than half as many of a log that has more."""
+
+
+def sampled_rows(rows: int) -> slice | npt.NDArray[np.intp]:
+    """Which of a log's ``rows`` are its sample: all where they are `CHUNKS` chunks at most, else every 2^k-th chunk."""
+    chunks, every = -(-rows // CHUNK), 1
+    if chunks <= CHUNKS:
+        return slice(None)
+    while -(-chunks // every) > CHUNKS:
+        every *= 2
+    first = CHUNK * np.arange(0, chunks, every)
+    found = (first[:, None] + np.arange(CHUNK)).ravel()
+    return found[found < rows]

@@ -1,0 +1,110 @@
+"""A log in blocks, and what is known of it once it has been gone through: its length, its channels, a sample of its rows."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from typing import Self
+
+import numpy as np
+
+from terragrip.errors import InputError
+from terragrip.recording.chunks import CHUNK, CHUNKS, sampled_rows
+from terragrip.recording.table import Recording
+
+ROWS = 200_000
+"""Rows of a block, where a recording is cut into blocks."""
+
+Progress = Callable[[int], None]
+
+
+@dataclass(frozen=True)
+class LogBlocks:
+    """A recording as consecutive blocks that can be gone through more than once.
+
+    ``rows``: how many there are, about; ``blocks``: gives the blocks anew, from the first; ``whole``: gives all rows as one
+    recording, for what cannot be told block by block; ``from_disk``: each pass reads a file, so that it takes time.
+    """
+
+    rows: int
+    blocks: Callable[[], Iterator[Recording]]
+    whole: Callable[[], Recording]
+    from_disk: bool = False
+
+    @classmethod
+    def of(cls, recording: Recording, rows: int | None = None) -> Self:
+        """A recording in memory, in blocks of so many ``rows`` (None: one block); nothing is copied."""
+        length = rows or max(len(recording), 1)
+
+        def blocks() -> Iterator[Recording]:
+            return (recording.select(slice(k, k + length)) for k in range(0, len(recording), length))
+
+        return cls(len(recording), blocks, lambda: recording)
+
+
+@dataclass(frozen=True)
+class Survey:
+    """What one pass over a log tells: the number of its ``rows``, and a ``sample`` of them that is spread over the whole of it.
+
+    ``sample`` has the channels that hold a value anywhere in the log, and all that its reader says of it (notes, noise).
+    ``empty``: the channels that hold none.
+    """
+
+    rows: int
+    sample: Recording
+    empty: tuple[str, ...]
+
+    def without_empty(self, block: Recording) -> Recording:
+        """A block of the log without the channels that hold no value anywhere."""
+        if not self.empty:
+            return block
+        return replace(block, channels={n: v for n, v in block.channels.items() if n not in self.empty})
+
+
+def survey_of(log: LogBlocks, progress: Progress | None = None) -> Survey:
+    """Go through a log once; its sample is that of `sampled_rows`, whatever the blocks.
+
+    ``progress`` is called with the rows done. Raises InputError as reading the blocks does, and where there is no row.
+    """
+    kept: dict[int, list[Recording]] = {}
+    holding: set[str] = set()
+    rows, every, last = 0, 1, None
+    for last in log.blocks():
+        holding |= {n for n, v in last.channels.items() if n not in holding and not np.isnan(v).all()}
+        end = rows + len(last)
+        for number in range(rows // CHUNK, -(-end // CHUNK)):
+            if number % every:
+                continue
+            part = slice(max(number * CHUNK - rows, 0), min((number + 1) * CHUNK, end) - rows)
+            kept.setdefault(number, []).append(_copied(last, part))
+            if len(kept) > CHUNKS:
+                every *= 2
+                kept = {k: parts for k, parts in kept.items() if k % every == 0}
+        rows = end
+        if progress is not None:
+            progress(rows)
+    if last is None:
+        raise InputError("there is no row to estimate", mend="give a log with at least one row")
+    if len(last) == rows:  # one block: its rows need not be put together
+        sample = last.select(sampled_rows(rows))
+    else:
+        sample = _joined([part for number in sorted(kept) for part in kept[number]], last)
+    empty = tuple(name for name in sample.channels if name not in holding)
+    notes = [f"{name} holds no value and is left out." for name in empty]
+    found = Survey(rows, sample, empty)
+    return replace(found, sample=found.without_empty(sample).with_notes(*notes))
+
+
+def _copied(block: Recording, rows: slice) -> Recording:
+    """Rows of a block as their own memory, so that the block need not stay."""
+    return block.select(np.arange(rows.start, rows.stop))
+
+
+def _joined(parts: list[Recording], last: Recording) -> Recording:
+    """Parts of a log as one recording; what its reader said of it is complete with its ``last`` block."""
+    return replace(
+        last,
+        time=np.concatenate([part.time for part in parts]),
+        channels={name: np.concatenate([part.channels[name] for part in parts]) for name in last.channels},
+        labels={name: np.concatenate([part.labels[name] for part in parts]) for name in last.labels},
+    )
