@@ -169,6 +169,14 @@ class TestClock:
         times, jumps, refused = self.run([*good[:20], (2.0, wild), *good[20:]])
         assert (jumps, refused, times) == ([], 1, [stamp for _, stamp in good])
 
+    @pytest.mark.parametrize("lag", [0.5, 1.5, 9.0])
+    def test_channels_of_one_source_that_lag_are_both_taken(self, lag):
+        """As of a profile with a delay: each message gives a sample of then and one of now."""
+        both = [(k * 0.1, k * 0.1 - then) for k in range(60) for then in (lag, 0.0)]
+        times, jumps, refused = self.run(both)
+        assert (jumps, refused) == ([], 0)
+        assert sorted(times) == sorted(stamp for _, stamp in both)
+
     def test_a_second_stamp_that_agrees_shows_a_hole(self):
         """A burst out of which 5 s are missing, and no sample behind it."""
         stamps = [*range(30), *range(80, 120)]
@@ -200,6 +208,15 @@ class TestClock:
         times, jumps, _ = self.run([*live, *backlog])
         assert jumps == []
         assert times[-1] == pytest.approx(39.9)
+
+    @pytest.mark.parametrize("period", [0.01, 1.0, 3.0])
+    def test_batches_keep_their_stamps(self, period):
+        """Ten samples at once, as a tracker sends them by radio."""
+        batches = [((k // 10 + 1) * 10 * period + 1e-4 * k, k * period) for k in range(60)]
+        times, jumps, refused = self.run(batches)
+        assert (jumps, refused) == ([], 0)
+        # The last of a batch of slow samples waits for the next batch.
+        assert times == [stamp for _, stamp in batches[: 59 if period > 1.0 else 60]]
 
     def test_several_clocks_are_set_against_the_machines_own(self):
         times, _, _ = self.run([(1000.0 + k, 3.0 + k) for k in range(3)], align=True)

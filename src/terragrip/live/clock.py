@@ -1,10 +1,11 @@
 """A source's clock against the machine's: one time base for all sources, and jumps noticed.
 
 ``lead`` is stamp less arrival. It wanders with the transport's delay: down while samples are held up, and back step by
-step when they arrive in a burst. A stamp that is more than AHEAD of what is expected waits for a second one that agrees, and
-is refused without: all behind it would count as late until time has caught up. Beyond JUMP, or back by as much, the clock
-has jumped where samples agree on the new lead, and advance, for AGREEMENT seconds: then time goes on without the jump.
-Where samples are known to be lost, stamps are taken as they are: what looks like a jump is the hole.
+step when they arrive in a burst. A stamp that is more than AHEAD of what is expected waits for a second one that agrees,
+or for time to reach it, and is refused without: all behind it would count as late until time has caught up. Beyond JUMP,
+or back by as much, the clock has jumped where samples agree on the new lead, and advance, for AGREEMENT seconds: then time
+goes on without the jump. Where samples are known to be lost, stamps are taken as they are: what looks like a jump is the
+hole they left.
 """
 
 from __future__ import annotations
@@ -43,26 +44,40 @@ class SourceClock:
         if self.offset is None:
             self.offset = -lead if self.align and abs(lead) > SYNCHRONISED else 0.0
             self.lead = lead
-        step, waiting, refused = lead - self.lead, self.waiting, []
-        lossy = arrival <= self.loss_until
-        expected = step <= AHEAD and (step >= -JUMP or stamp > self.newest or lossy)
-        if waiting and (expected or abs(lead - (waiting[0][1] - waiting[0][0])) > AGREEMENT):
-            refused, waiting = waiting, []
-            self.waiting = waiting
-        if expected:
-            return [self._accept(arrival, stamp, values)], refused, 0.0
-        if len(waiting) >= _WAITING:
-            refused.append(waiting.pop(1))
-        waiting.append((arrival, stamp, values))
-        first_arrival, first_stamp, _ = waiting[0]
-        if step > 0.0 and (step <= JUMP or lossy):
-            return self._accept_waiting() if len(waiting) > 1 else [], refused, 0.0
+        step, lossy = lead - self.lead, arrival <= self.loss_until
+        if step <= AHEAD and (step >= -JUMP or stamp > self.newest or lossy):
+            held, refused = self._judged_by(arrival, stamp) if self.waiting else ([], [])
+            return [*held, self._accept(arrival, stamp, values)], refused, 0.0
+        refused = self.give_up() if self.waiting and not self._agrees(lead) else []
+        if len(self.waiting) >= _WAITING:
+            refused.append(self.waiting.pop(1))
+        self.waiting.append((arrival, stamp, values))
+        first_arrival, first_stamp, _ = self.waiting[0]
+        first_step = first_stamp - first_arrival - self.lead
+        if first_step > 0.0 and (first_step <= JUMP or lossy):
+            return self._accept_waiting() if len(self.waiting) > 1 else [], refused, 0.0
         if arrival - first_arrival < AGREEMENT or stamp - first_stamp < AGREEMENT / 2:
             return [], refused, 0.0
         # Time goes on as the arrivals say, on the new stamps.
         self.offset += self.newest + (first_arrival - self.arrival) - first_stamp
         self.newest = float("-inf")
         return self._accept_waiting(), refused, step
+
+    def _judged_by(self, now: float, reached: float) -> tuple[list[Stamped], list[Stamped]]:
+        """What waits, accepted or refused in view of a stamp as expected; neither while channels may lag by so much."""
+        arrival, stamp, _ = self.waiting[0]
+        if 0.0 < stamp - arrival - self.lead <= JUMP:
+            if stamp <= reached:
+                return self._accept_waiting(), []
+            if now - arrival <= AGREEMENT:
+                return [], []
+        return [], self.give_up()
+
+    def _agrees(self, lead: float) -> bool:
+        """Whether a lead goes with that of the samples that wait: in a burst of slow samples it is greater by their period."""
+        arrival, stamp, _ = self.waiting[0]
+        greater = JUMP if 0.0 < stamp - arrival - self.lead <= JUMP else AGREEMENT
+        return -AGREEMENT <= lead - (stamp - arrival) <= greater
 
     def _accept_waiting(self) -> list[Stamped]:
         held, self.waiting = self.waiting, []
