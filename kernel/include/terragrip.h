@@ -20,14 +20,17 @@
 #define TG_MODES 4
 #define TG_MAX_CONSIDERED 14
 
-#ifndef TG_NAME
-#define TG_NAME(name) name /* a binding may compile the kernel twice under other names */
-#endif
-
+/* A program and its kernel must agree on the precision: whoever includes this header asks the linker for the symbol of its own. */
 #ifdef TG_FLOAT
 #define TG_REAL float
+#define TG_PRECISION tg_kernel_in_single_precision
 #else
 #define TG_REAL double
+#define TG_PRECISION tg_kernel_in_double_precision
+#endif
+extern const int TG_PRECISION;
+#ifdef __GNUC__
+static const int *const tg_precision_check __attribute__((used)) = &TG_PRECISION;
 #endif
 
 /* cdef begin */

@@ -197,12 +197,8 @@ TG_INLINE int adapt(tg_adaptation_state *s, const tg_filter *f, const tgi_plan *
 tg_status tgi_adapt(tg_filter *f, const tgi_plan *plan, const tgi_result *result)
 {
     tg_adaptation_state next;
-    int finite = 0;
     copy(&next, &f->policy.adaptation, f->states, f->stride);
-#define ADAPT(n, stride) finite = adapt(&next, f, plan, result, n, stride)
-    TG_BY_WHEELS(f->wheels, ADAPT)
-#undef ADAPT
-    if (!finite) return TG_DIVERGED;
+    if (!adapt(&next, f, plan, result, f->wheels, f->stride)) return TG_DIVERGED;
     copy(&f->policy.adaptation, &next, f->states, f->stride);
     return TG_OK;
 }

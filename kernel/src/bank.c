@@ -364,8 +364,9 @@ TG_INLINE void commit(tg_filter *f, const tgi_plan *plan, const tgi_update *out,
         bank->updates++;
 }
 
-TG_INLINE tg_status bank_step(tg_filter *f, tgi_plan *plan, tg_step *step, const int n)
+tg_status tgi_bank_step(tg_filter *f, tgi_plan *plan, tg_step *step)
 {
+    const int n = f->wheels;
     const tg_lanes scales = lanes_load(f->tuning.scales);
     const int mixes = plan->count && f->policy.bank.updates + 1 >= f->tuning.mix_stride;
     int formed = 0;
@@ -397,15 +398,6 @@ TG_INLINE tg_status bank_step(tg_filter *f, tgi_plan *plan, tg_step *step, const
     commit(f, plan, &out, probability, mixes, formed, n);
     if (step) report(f, plan, &out, nis, log_likelihood, step);
     return TG_OK;
-}
-
-tg_status tgi_bank_step(tg_filter *f, tgi_plan *plan, tg_step *step)
-{
-    tg_status status = TG_OK;
-#define STEP(n, stride) status = bank_step(f, plan, step, n)
-    TG_BY_WHEELS(f->wheels, STEP)
-#undef STEP
-    return status;
 }
 
 void tgi_bank_moments(const tg_filter *f, tg_real *x, tg_real *P)

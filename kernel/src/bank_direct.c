@@ -124,8 +124,9 @@ TG_INLINE void take_channels(const tg_filter *f, const tgi_plan *plan, tgi_updat
     take(plan, out, n + 1, h, along_jolt(plan, h, n), bank_jolt(plan, out->state.x, n), n);
 }
 
-TG_INLINE int direct(const tg_filter *f, const tgi_plan *plan, int mixes, const tg_lanes *noise, tgi_modes *before, tgi_update *out, const int n)
+int tgi_bank_direct(const tg_filter *f, const tgi_plan *plan, int mixes, const tg_lanes *noise, tgi_modes *before, tgi_update *out)
 {
+    const int n = f->wheels;
     const triangle P = out->state.u;
     tg_real least[TG_MODES], left[TG_MODES]; /* the two halves of the bound; the first: a state's noise as a share of its variance */
     int holds = 1;
@@ -138,19 +139,6 @@ TG_INLINE int direct(const tg_filter *f, const tgi_plan *plan, int mixes, const 
     for (int j = 0; j < TG_TWICE(n); j++) out->x_prior[j] = bank_mean(out->probability, out->state.x[j]);
     if (plan->count) take_channels(f, plan, out, left, n);
     for (int m = 0; m < TG_MODES; m++) holds &= least[m] * left[m] >= TGI_SHARES;
-    return holds;
-}
-
-int tgi_bank_direct(const tg_filter *f, const tgi_plan *plan, int mixes, const tg_lanes *noise, tgi_modes *before, tgi_update *out)
-{
-    int holds = 0;
-    switch (f->wheels) {
-    case 1: holds = direct(f, plan, mixes, noise, before, out, 1); break;
-    case 2: holds = direct(f, plan, mixes, noise, before, out, 2); break;
-    case 3: holds = direct(f, plan, mixes, noise, before, out, 3); break;
-    case 4: holds = direct(f, plan, mixes, noise, before, out, 4); break;
-    default: break;
-    }
     return holds;
 }
 #endif

@@ -244,19 +244,11 @@ int tgi_direct_step(const tg_filter *f, const tgi_plan *plan, tgi_direct *out)
 {
     tg_real formed[TG_MAX_STATES * TG_ROWS];
     const tg_real *P = f->P;
-    int holds = 0;
     if (!f->formed) {
         tgi_covariance(f->states, f->stride, f->u, f->d, formed);
         P = formed;
     }
-    switch (f->wheels) {
-    case 1: holds = direct_step(f, P, plan, out, 1, 4); break;
-    case 2: holds = direct_step(f, P, plan, out, 2, 8); break;
-    case 3: holds = direct_step(f, P, plan, out, 3, TG_ROWS); break;
-    case 4: holds = direct_step(f, P, plan, out, 4, 12); break;
-    default: break;
-    }
-    return holds;
+    return direct_step(f, P, plan, out, f->wheels, f->stride);
 }
 
 /* A row of three parts, in row order. */
@@ -274,15 +266,14 @@ TG_INLINE void store_row(tg_real *to, tg_lanes mu, tg_lanes rest, tg_lanes omega
     to[n + 1] = lanes_at(rest, 1);
 }
 
-TG_INLINE void store_gains(const tgi_direct *out, tg_real (*gain)[TG_ROWS], const int n)
+void tgi_direct_gains(const tgi_direct *out, tg_real (*gain)[TG_ROWS], int n)
 {
     for (int c = 0; c < out->taken; c++) store_row(gain[c], out->gain[c].mu, out->gain[c].rest, out->gain[c].omega, n);
 }
 
-void tgi_direct_gains(const tgi_direct *out, tg_real (*gain)[TG_ROWS], int n) { store_gains(out, gain, n); }
-
-TG_INLINE void commit(tg_filter *f, const tgi_direct *out, const int n, const int stride)
+void tgi_direct_commit(tg_filter *f, const tgi_direct *out)
 {
+    const int n = f->wheels, stride = f->stride;
     const tgi_block *const P = &out->P;
     tg_real *const rho = f->P + n * stride, *const v = rho + stride;
     for (int i = 0; i < n; i++) {
@@ -293,17 +284,7 @@ TG_INLINE void commit(tg_filter *f, const tgi_direct *out, const int n, const in
     store_row(v, P->v_mu, P->v_rest, P->v_omega, n);
     store_row(f->x, out->x.mu, out->x.rest, out->x.omega, n);
     store_row(f->x_prior, out->x_prior.mu, out->x_prior.rest, out->x_prior.omega, n);
-    store_gains(out, f->gain, n);
+    tgi_direct_gains(out, f->gain, n);
     f->formed = 1;
-}
-
-void tgi_direct_commit(tg_filter *f, const tgi_direct *out)
-{
-    switch (f->wheels) {
-    case 1: commit(f, out, 1, 4); break;
-    case 2: commit(f, out, 2, 8); break;
-    case 3: commit(f, out, 3, TG_ROWS); break;
-    default: commit(f, out, 4, 12); break;
-    }
 }
 #endif

@@ -87,10 +87,10 @@ TG_INLINE void exact_take_accelerometer(const tg_filter *f, const tgi_plan *plan
     exact_take(f, plan, out, n + 1, along, coupling, 0, residual, n, stride);
 }
 
-TG_INLINE void exact_step(const tg_filter *f, const tgi_factors *from, const tgi_plan *plan, tgi_result *out, const int n, const int stride)
+void tgi_exact_step(const tg_filter *f, const tgi_factors *from, const tgi_plan *plan, tgi_result *out)
 {
     tg_real W[2 * TG_MAX_STATES * TG_ROWS], weight[2 * TG_MAX_STATES];
-    const int rows = TG_TWICE(n);
+    const int n = f->wheels, stride = f->stride, rows = TG_TWICE(n);
     exact_predict(f, from, plan, W, weight, out->x, n, stride);
     for (int i = 0; i < stride; i += TG_LANES) lanes_store(out->x_prior + i, lanes_load(out->x + i));
     for (int j = rows; j < stride; j++) out->d[j] = 0;
@@ -98,23 +98,10 @@ TG_INLINE void exact_step(const tg_filter *f, const tgi_factors *from, const tgi
     out->nis = 0;
     out->volume = 1;
     tgi_gram gram = factor_begin(W, weight, rows, stride);
-#define TAKE(j, lanes, first)                                                                             \
-    {                                                                                                     \
-        factor_row(&gram, j, lanes, first, 1, plan->passage.q[j], out->u + (j) * stride, out->d + (j));   \
-        if ((j) > n && plan->count) exact_take_output(f, plan, out, j, n, stride);                        \
+    for (int j = rows - 1; j > 0; j--) {
+        factor_row(&gram, j, j / TG_LANES + 1, j == rows - 1, 1, plan->passage.q[j], out->u + j * stride, out->d + j);
+        if (j > n && plan->count) exact_take_output(f, plan, out, j, n, stride);
     }
-#define NEXT(j, lanes) TAKE(j, lanes, 0)
-    TAKE(rows - 1, (rows - 1) / TG_LANES + 1, 1)
-    TG_ROWS_DOWN(rows - 2, 1, stride, NEXT)
     factor_last(&gram, plan->passage.q[0], out->u, out->d);
-#undef NEXT
-#undef TAKE
     if (plan->count && plan->present[n + 1]) exact_take_accelerometer(f, plan, out, n, stride);
-}
-
-void tgi_exact_step(const tg_filter *f, const tgi_factors *from, const tgi_plan *plan, tgi_result *out)
-{
-#define STEP(n, stride) exact_step(f, from, plan, out, n, stride)
-    TG_BY_WHEELS(f->wheels, STEP)
-#undef STEP
 }

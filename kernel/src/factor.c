@@ -20,7 +20,8 @@ tg_status tgi_factorise(int rows, int stride, const tg_real *P, tg_real *u, tg_r
     return TG_OK;
 }
 
-TG_INLINE void covariance(int rows, int stride, const tg_real *u, const tg_real *d, tg_real *P)
+/* P by rows of `stride`; only columns 0..i of row i hold, the others repeat them in part. */
+void tgi_covariance(int rows, int stride, const tg_real *u, const tg_real *d, tg_real *P)
 {
     const int lanes = stride / TG_LANES;
     for (int i = 0; i < rows; i++) { /* row i of P: sum over the columns that reach it */
@@ -31,17 +32,6 @@ TG_INLINE void covariance(int rows, int stride, const tg_real *u, const tg_real 
             for (int l = 0; l < lanes; l++) sum[l] = lanes_mul_add(v, lanes_load(u + k * stride + TG_LANES * l), sum[l]);
         }
         for (int l = 0; l < lanes; l++) lanes_store(P + i * stride + TG_LANES * l, sum[l]);
-    }
-}
-
-/* P by rows of `stride`; only columns 0..i of row i hold, the others repeat them in part. */
-void tgi_covariance(int rows, int stride, const tg_real *u, const tg_real *d, tg_real *P)
-{
-    switch (rows) {
-    case 4: covariance(4, 4, u, d, P); break;
-    case 6: covariance(6, 8, u, d, P); break;
-    case 10: covariance(10, 12, u, d, P); break;
-    default: covariance(rows, stride, u, d, P); break;
     }
 }
 

@@ -115,19 +115,6 @@ TG_INLINE tgi_gram factor_begin(tg_real *W, tg_real *weight, int columns, int st
     return g;
 }
 
-/* Do `take(j, lanes)` from row `last` down to `first`; where `stride` is not the largest, lane counts are constants (up to 4). */
-#define TG_LANES_DOWN(last, first, count, take) \
-    for (int j = (last) < TG_LANES * (count) ? (last) : TG_LANES * (count) - 1; j >= (first) && j >= TG_LANES * ((count) - 1); j--) take(j, count)
-#define TG_ROWS_DOWN(last, first, stride, take)                                   \
-    if ((stride) >= TG_ROWS) {                                                    \
-        for (int j = last; j >= (first); j--) take(j, j / TG_LANES + 1)           \
-    } else {                                                                      \
-        TG_LANES_DOWN(last, first, 4, take)                                       \
-        TG_LANES_DOWN(last, first, 3, take)                                       \
-        TG_LANES_DOWN(last, first, 2, take)                                       \
-        TG_LANES_DOWN(last, first, 1, take)                                       \
-    }
-
 /* Measurement update by one channel (Bierman 1977, V.3; Thornton's gain). `f`: U'h, zero before column `first`; `spread`: sums of d f^2 up
  * to each column. Columns of U, d and the gain (K over the residual's variance) are those after the channel; returns one over that variance. */
 TG_INLINE tg_real factor_measure(tg_real *u, tg_real *d, const tg_real *f, const tg_real *spread, int first, int rows, int stride, tg_real r,

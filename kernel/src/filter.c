@@ -3,6 +3,8 @@
 #include "factor.h"
 #include "plan.h"
 
+const int TG_PRECISION = (int)sizeof(tg_real);
+
 size_t tg_filter_size(void) { return sizeof(tg_filter); }
 
 /* Settings of PHYSICS 6; `walk` stays 0 and is the caller's. */
@@ -244,22 +246,14 @@ TG_INLINE tg_status advance_one(tg_filter *f, const tgi_call *call, tgi_plan *pl
     return TG_OK;
 }
 
-TG_INLINE tg_status advance(tg_filter *f, const tgi_call *call, tg_step *out, const int n, const int stride)
+static tg_status advance(tg_filter *f, const tgi_call *call, tg_step *out)
 {
     tgi_plan plan;
+    const int n = f->wheels;
     tg_status status = plan_step(f, call, &plan, n);
     if (status != TG_OK) return status;
-    status = f->tuning.policy == TG_BANK ? tgi_bank_step(f, &plan, out) : advance_one(f, call, &plan, out, n, stride);
+    status = f->tuning.policy == TG_BANK ? tgi_bank_step(f, &plan, out) : advance_one(f, call, &plan, out, n, f->stride);
     if (status == TG_OK) remember(f, call, &plan, n);
-    return status;
-}
-
-static tg_status advance_any(tg_filter *f, const tgi_call *call, tg_step *out)
-{
-    tg_status status = TG_OK;
-#define ADVANCE(n, stride) status = advance(f, call, out, n, stride)
-    TG_BY_WHEELS(f->wheels, ADVANCE)
-#undef ADVANCE
     return status;
 }
 
@@ -268,14 +262,14 @@ tg_status tg_filter_step(tg_filter *f, tg_real dt, const tg_input *before, const
 {
     if (!f || !before || !now || !y || !r) return TG_BAD_ARGUMENT;
     const tgi_call call = {dt, before, now, q_input, y, r};
-    return advance_any(f, &call, out);
+    return advance(f, &call, out);
 }
 
 tg_status tg_filter_predict(tg_filter *f, tg_real dt, const tg_input *before, const tg_real *q_input)
 {
     if (!f || !before) return TG_BAD_ARGUMENT;
     const tgi_call call = {dt, before, before, q_input, NULL, NULL};
-    return advance_any(f, &call, NULL);
+    return advance(f, &call, NULL);
 }
 
 /* Row order to state order. */

@@ -43,17 +43,8 @@ typedef struct { /* what a step comes to, before it is known to be sound */
 TG_INLINE int tgi_row(int n, int e) { return e < n ? n + 2 + e : e == n ? n + 1 : e - n - 1; }
 /* Channels inside run like their rows: v, omega_1..omega_n, a_x; the first n + 1 measure row n + 1 + o. Place in the public order: */
 TG_INLINE int tgi_channel(int n, int o) { return o == 0 ? n : o <= n ? o - 1 : o; }
-/* Distance between columns for n wheels; must agree with the cases of TG_BY_WHEELS. */
-TG_INLINE int tgi_stride(int n) { return n == 1 ? 4 : n == 2 ? 8 : n == 4 ? 12 : TG_ROWS; }
-
-/* Call the inlined function with the wheel count as a constant where that is worth the code. */
-#define TG_BY_WHEELS(n, call)                  \
-    switch (n) {                               \
-    case 1: call(1, 4); break;                 \
-    case 2: call(2, 8); break;                 \
-    case 4: call(4, 12); break;                \
-    default: call((n), TG_ROWS); break;        \
-    }
+/* Distance between columns for n wheels: the states in whole lanes. */
+TG_INLINE int tgi_stride(int n) { return (TG_TWICE(n) + TG_LANES - 1) / TG_LANES * TG_LANES; }
 
 TG_INLINE int tgi_finite(tg_real x) { return x - x == 0; }
 

@@ -116,12 +116,9 @@ void tgi_traction(const tg_settings *restrict s, const tg_belief *restrict b, co
     tgi_moments c;
     for (int32_t i = 0; i < n; i++) thrust += b->x[i] * scene->load[i];
     thrust /= s->machine.mass * s->machine.gravity;
-#define TRACTION(n, stride)         \
-    gather(b, S, n, stride, &c);    \
-    roughen(&c, b->x, scene, n);    \
-    traction(s, b->x, &c, scene->hub, thrust, o, n)
-    TG_BY_WHEELS(n, TRACTION)
-#undef TRACTION
+    gather(b, S, n, tgi_stride(n), &c);
+    roughen(&c, b->x, scene, n);
+    traction(s, b->x, &c, scene->hub, thrust, o, n);
     if (scene->direction < 0) {
         o[TG_OUT_GROUND_SPEED] = -o[TG_OUT_GROUND_SPEED];
         for (int32_t i = 0; i < n; i++) o[TG_OUT_WHEEL_SPEED + i] = -o[TG_OUT_WHEEL_SPEED + i];

@@ -64,13 +64,9 @@ TG_INLINE void unscented_predict(const tg_filter *f, const tgi_plan *plan, const
     }
     centre(w, W, out->x_prior, stride, n);
     tgi_gram gram = factor_begin(W, weight, count, stride);
-#define TAKE(j, lanes, first) factor_row(&gram, j, lanes, first, 1, plan->passage.q[j], out->u + (j) * stride, out->d + (j));
-#define NEXT(j, lanes) TAKE(j, lanes, 0)
-    TAKE(rows - 1, (rows - 1) / TG_LANES + 1, 1)
-    TG_ROWS_DOWN(rows - 2, 1, stride, NEXT)
+    for (int j = rows - 1; j > 0; j--)
+        factor_row(&gram, j, j / TG_LANES + 1, j == rows - 1, 1, plan->passage.q[j], out->u + j * stride, out->d + j);
     factor_last(&gram, plan->passage.q[0], out->u, out->d);
-#undef NEXT
-#undef TAKE
 }
 
 /* Rows of the joint factor: the state, then a_x, v, omega_1..omega_n: the last is taken first, as in the exact engine. */
@@ -107,21 +103,13 @@ TG_INLINE void unscented_update(const tg_filter *f, const tgi_plan *plan, const 
         r[j - rows] = plan->present[o] ? plan->r[o] / out->weight[o] : 1;
     }
     tgi_gram gram = factor_begin(W, weight, count, joint);
-#define TAKE_CHANNEL(j, lanes, first) factor_row(&gram, j, lanes, first, 1, r[(j) - rows], u[(j) - rows], d + ((j) - rows));
-#define NEXT_CHANNEL(j, lanes) TAKE_CHANNEL(j, lanes, 0)
-#define TAKE_STATE(j, lanes)                                                                                        \
-    {                                                                                                               \
-        factor_row(&gram, j, lanes, 0, 0, 0, column, out->d + (j));                                                        \
-        for (int i = 0; i < stride; i += TG_LANES) lanes_store(out->u + (j) * stride + i, lanes_load(column + i));   \
+    for (int j = all - 1; j >= rows; j--)
+        factor_row(&gram, j, j / TG_LANES + 1, j == all - 1, 1, r[j - rows], u[j - rows], d + (j - rows));
+    for (int j = rows - 1; j >= 0; j--) {
+        if (j > 0) factor_row(&gram, j, j / TG_LANES + 1, 0, 0, 0, column, out->d + j);
+        else factor_last(&gram, 0, column, out->d);
+        for (int i = 0; i < stride; i += TG_LANES) lanes_store(out->u + j * stride + i, lanes_load(column + i));
     }
-    TAKE_CHANNEL(all - 1, (all - 1) / TG_LANES + 1, 1)
-    TG_ROWS_DOWN(all - 2, rows, joint, NEXT_CHANNEL)
-    TG_ROWS_DOWN(rows - 1, 1, joint, TAKE_STATE)
-    factor_last(&gram, 0, column, out->d);
-    for (int i = 0; i < stride; i += TG_LANES) lanes_store(out->u + i, lanes_load(column + i));
-#undef TAKE_CHANNEL
-#undef NEXT_CHANNEL
-#undef TAKE_STATE
     tg_real residual[TG_MAX_CHANNELS];
     for (int i = 0; i < stride; i++) out->x[i] = out->x_prior[i];
     for (int o = n; o >= -1; o--) { /* omega_n .. omega_1, v, a_x */
@@ -145,8 +133,9 @@ TG_INLINE void unscented_update(const tg_filter *f, const tgi_plan *plan, const 
     }
 }
 
-TG_INLINE void unscented_step(const tg_filter *f, const tgi_plan *plan, tgi_result *out, const int n, const int stride, const int joint)
+void tgi_unscented_step(const tg_filter *f, const tgi_plan *plan, tgi_result *out)
 {
+    const int n = f->wheels, stride = f->stride, joint = (TG_TWICE(n) + n + 2 + TG_LANES - 1) / TG_LANES * TG_LANES;
     const weights w = unscented_weights(&f->tuning, n);
     out->taken = 0;
     out->nis = 0;
@@ -157,14 +146,4 @@ TG_INLINE void unscented_step(const tg_filter *f, const tgi_plan *plan, tgi_resu
         unscented_update(f, plan, &w, out, n, stride, joint);
     else
         for (int i = 0; i < stride; i++) out->x[i] = out->x_prior[i];
-}
-
-void tgi_unscented_step(const tg_filter *f, const tgi_plan *plan, tgi_result *out)
-{
-    switch (f->wheels) {
-    case 1: unscented_step(f, plan, out, 1, 4, 8); break;
-    case 2: unscented_step(f, plan, out, 2, 8, 12); break;
-    case 4: unscented_step(f, plan, out, 4, 12, 16); break;
-    default: unscented_step(f, plan, out, f->wheels, TG_ROWS, TG_MOST_LANES * TG_LANES); break;
-    }
 }

@@ -4,13 +4,13 @@ same estimates to a thousandth of their spread. Snapshots of single precision co
 from __future__ import annotations
 
 from dataclasses import replace
-from importlib import import_module
 from typing import Any
 
 import numpy as np
 import pytest
 
 from drives import WHEELS, drive, robot
+from single_precision import kernel
 from terragrip.errors import InputError
 from terragrip.estimation import METHODS, Estimates, TractionEstimator, engine, estimate
 from terragrip.recording import Recording
@@ -19,7 +19,7 @@ from terragrip.recording import Recording
 @pytest.fixture
 def single(monkeypatch: pytest.MonkeyPatch) -> Any:
     """From a call on, estimators are of single precision."""
-    module = import_module("terragrip._kernel_float")
+    module = kernel()
 
     def switch() -> None:
         monkeypatch.setattr(engine, "ffi", module.ffi)
