@@ -115,7 +115,7 @@ def scenario(kind: Kind, seed: int, *, rate: float | None = None, faults: bool =
     towing, turning = kind.sensors != "uncoupled", kind.sensors != "plain" and rng.uniform() < 0.5
     beat = np.sqrt(machine.scale)  # what a second is to the robot
     duration = float(np.clip(90.0 * beat, 50.0, 150.0))
-    speed = _speeds(rng, machine, duration)
+    speed = draw_speeds(rng, machine, duration)
     length = 1.1 * sum(0.5 * (b[1] + a[1]) * (b[0] - a[0]) for a, b in pairwise(speed[1:]))
     length += 5 * machine.wheelbase + machine.scale
     work = rng.uniform(*WORK)
@@ -150,16 +150,18 @@ def scenario(kind: Kind, seed: int, *, rate: float | None = None, faults: bool =
         "drive_torque_gain": tree["sensors"]["drive_torque"]["gain_sd"],
         "drive_torque_offset": max(tree["sensors"]["drive_torque"]["offset_sd"], 1e-6),
         "drawbar_offset": machine.drawbar_offset,
-        "slope": 0.0087,
+        "slope": 0.0087
+        if "pitch" in tree["sensors"]
+        else max(0.0087, hills / 2.5),  # how hilly it is, a user knows
         "vertical_load": 0.02,
         "wheel_radius": machine.radius_error,
         "acceleration_bias": 0.03,
     }
-    tree["faults"] = _faults(duration, machine, kind.sensors) if faults else []
+    tree["faults"] = draw_faults(duration, machine, kind.sensors) if faults else []
     return Scenario.from_dict(tree, file=name)
 
 
-def _speeds(rng: np.random.Generator, machine: Machine, duration: float) -> list[list[Any]]:
+def draw_speeds(rng: np.random.Generator, machine: Machine, duration: float) -> list[list[Any]]:
     """Commanded rim speeds: motors off, levels held with ramps between, at times a stop, a rest and a start."""
     beat = np.sqrt(machine.scale)
     points: list[list[Any]] = [[0.0, "off"], [2.0 * beat, 0.0]]
@@ -300,7 +302,7 @@ def _spread(rng: np.random.Generator, low: float, high: float) -> float:
     return float(np.exp(rng.uniform(np.log(low), np.log(high))))
 
 
-def _faults(duration: float, machine: Machine, sensors: str) -> list[Tree]:
+def draw_faults(duration: float, machine: Machine, sensors: str) -> list[Tree]:
     """All defects in one log: gaps, spikes on every channel, jitter, held values, and one outage of the ground speed."""
     minutes, beat, wheel = duration / 60, np.sqrt(machine.scale), machine.wheels[-1]
     weight = machine.corner_mass * STANDARD_GRAVITY

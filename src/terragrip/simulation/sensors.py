@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -79,22 +80,33 @@ def signals(sensor: str, trace: Trace) -> dict[str, Floats]:
     return dict(zip(("east", "north", "altitude"), trace.location, strict=True))
 
 
-def draw_errors(sensors: Sensors, trace: Trace, seed: int) -> Errors:
+Sources = Callable[[str], dict[str, Floats]]
+"""True values of a sensor's channels, by the sensor's name."""
+
+
+def draw_errors(sensors: Sensors, sources: Sources, wheels: tuple[str, ...], seed: int) -> Errors:
     """Gains and offsets of every channel on board, drawn from the machine's ``seed``."""
     gain: dict[str, float] = {}
     offset: dict[str, float] = {}
     for name, sensor in _fitted(sensors):
-        for channel in _channels(name, sensor, trace):
+        for channel in _channels(name, sensor, sources(name), wheels):
             g, o = stream(seed, f"errors {channel}").standard_normal(2)
             gain[channel] = sensor.gain + sensor.gain_sd * float(g)
             offset[channel] = sensor.offset + sensor.offset_sd * float(o)
     return Errors(gain, offset)
 
 
-def measure(scenario: Scenario, trace: Trace, errors: Errors, seed: int) -> list[Series]:
-    """What every sensor reads of a run."""
-    series = [_read(name, sensor, trace, errors, seed) for name, sensor in _fitted(scenario.sensors)]
-    return [_located(scenario, one) if one.sensor == "position" else one for one in series]
+def measure(
+    sensors: Sensors, time: Floats, sources: Sources, wheels: tuple[str, ...], errors: Errors, seed: int
+) -> list[Series]:
+    """What every sensor reads of a run whose true values (n,) at even ``time`` (n,) ``sources`` gives.
+
+    ``wheels``: those of the vehicle. Position comes in metres: see `located`. Raises InputError where a sensor names a wheel
+    that there is not.
+    """
+    return [
+        _read(name, sensor, time, sources(name), wheels, errors, seed) for name, sensor in _fitted(sensors)
+    ]
 
 
 def _fitted(sensors: Sensors) -> list[tuple[str, Sensor]]:
@@ -102,26 +114,32 @@ def _fitted(sensors: Sensors) -> list[tuple[str, Sensor]]:
     return [(name, sensor) for name, sensor in pairs if sensor is not None]
 
 
-def _channels(name: str, sensor: Sensor, trace: Trace) -> list[str]:
+def _channels(name: str, sensor: Sensor, source: dict[str, Floats], wheels: tuple[str, ...]) -> list[str]:
     keep = sensor.wheels
-    odd = next((wheel for wheel in keep or () if wheel not in trace.vehicle.wheels), None)
+    odd = next((wheel for wheel in keep or () if wheel not in wheels), None)
     if odd is not None:
         raise InputError(
             f"no wheel {odd!r}",
             place=f"sensors.{name}.wheels",
-            mend=f"wheels are {', '.join(trace.vehicle.wheels)}",
+            mend=f"wheels are {', '.join(wheels)}",
         )
-    short = replace(trace, rows=trace.rows[:2])
-    return [c for c in signals(name, short) if keep is None or c.rsplit("_", 1)[1] in keep]
+    return [c for c in source if keep is None or c.rsplit("_", 1)[1] in keep]
 
 
-def _read(name: str, sensor: Sensor, trace: Trace, errors: Errors, seed: int) -> Series:
-    end = float(trace["time"][-1])
+def _read(
+    name: str,
+    sensor: Sensor,
+    seen: Floats,
+    true: dict[str, Floats],
+    wheels: tuple[str, ...],
+    errors: Errors,
+    seed: int,
+) -> Series:
+    end = float(seen[-1])
     stamp = np.round(np.arange(int(np.floor(end * sensor.rate + 1e-6)) + 1) / sensor.rate, 6)
-    source = _smoothed(signals(name, trace), sensor, trace)
-    seen = trace["time"]
+    source = _smoothed(true, sensor, float(seen[1] - seen[0]))
     values = {}
-    for channel in _channels(name, sensor, trace):
+    for channel in _channels(name, sensor, true, wheels):
         rng = stream(seed, f"sensor {channel}")
         reading = errors.gain[channel] * np.interp(stamp - sensor.delay, seen, source[channel])
         reading += errors.offset[channel] + sensor.noise * rng.standard_normal(len(stamp))
@@ -136,12 +154,11 @@ def _read(name: str, sensor: Sensor, trace: Trace, errors: Errors, seed: int) ->
     return Series(name, sensor.rate, stamp[keep], {channel: v[keep] for channel, v in values.items()})
 
 
-def _smoothed(source: dict[str, Floats], sensor: Sensor, trace: Trace) -> dict[str, Floats]:
+def _smoothed(source: dict[str, Floats], sensor: Sensor, step: float) -> dict[str, Floats]:
     if not sensor.bandwidth:
         return source
     from scipy.signal import lfilter
 
-    step = float(trace["time"][1] - trace["time"][0])
     keep = float(np.exp(-2 * np.pi * sensor.bandwidth * step))
     return {c: lfilter([1 - keep], [1.0, -keep], v, zi=[keep * v[0]])[0] for c, v in source.items()}
 
@@ -172,8 +189,10 @@ def _lost(rng: np.random.Generator, sensor: Sensor, count: int) -> npt.NDArray[n
     return lost
 
 
-def _located(scenario: Scenario, series: Series) -> Series:
-    """Local position as latitude and longitude."""
+def located(scenario: Scenario, series: Series) -> Series:
+    """Local position as latitude and longitude; any other sensor's samples as they are."""
+    if series.sensor != "position":
+        return series
     local: dict[str, Any] = series.values
     latitude, longitude = geographic(scenario.route, local["east"], local["north"])
     return replace(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -15,7 +16,7 @@ from terragrip.recording import Recording
 from terragrip.simulation import faults, plant, terrain
 from terragrip.simulation.fields import stream
 from terragrip.simulation.scenario import Scenario
-from terragrip.simulation.sensors import Errors, Series, draw_errors, measure
+from terragrip.simulation.sensors import Errors, Series, draw_errors, located, measure, signals
 from terragrip.simulation.trace import Trace
 from terragrip.simulation.truth import soil_labels, truth_frame
 from terragrip.vehicle import Vehicle
@@ -84,10 +85,13 @@ def simulate(
     plant.check_layout(vehicle)
     radius = _true_radius(scenario, vehicle, machine_seed)
     trace = _drive(scenario, vehicle, radius, seed)
-    errors = draw_errors(scenario.sensors, trace, machine_seed)
-    series = measure(scenario, trace, errors, seed)
-    series = faults.apply(scenario.faults, series, float(trace["time"][-1]), seed)
-    time, channels = _one_table(series)
+    known = cache(lambda name: signals(name, trace))
+    errors = draw_errors(scenario.sensors, known, vehicle.wheels, machine_seed)
+    series = measure(scenario.sensors, trace["time"], known, vehicle.wheels, errors, seed)
+    series = faults.apply(
+        scenario.faults, [located(scenario, one) for one in series], float(trace["time"][-1]), seed
+    )
+    time, channels = one_table(series)
     seen = trace.at(time)
     recording = Recording(
         time=time,
@@ -95,7 +99,7 @@ def simulate(
         labels={"soil": soil_labels(seen)["soil"].astype(object)},
         source=f"simulation {scenario.name}, seed {seed}",
     )
-    parameters = _true_parameters(vehicle, errors, radius)
+    parameters = true_parameters(vehicle, errors, radius)
     return SimulationResult(recording, truth_frame(seen, trace), vehicle, parameters, scenario, seed)
 
 
@@ -112,7 +116,7 @@ def _drive(scenario: Scenario, vehicle: Vehicle, radius: Floats, seed: int) -> T
     return Trace(rows, vehicle, radius, ground, scenario.robot.wheel_mass, len(scenario.tools))
 
 
-def _one_table(series: list[Series]) -> tuple[Floats, dict[str, Floats]]:
+def one_table(series: list[Series]) -> tuple[Floats, dict[str, Floats]]:
     """The union of all instants (n,) and every channel on it, NaN where it was not measured."""
     measured = []
     for one in series:
@@ -134,7 +138,8 @@ def _one_table(series: list[Series]) -> tuple[Floats, dict[str, Floats]]:
     return time, channels
 
 
-def _true_parameters(vehicle: Vehicle, errors: Errors, radius: Floats) -> dict[str, Any]:
+def true_parameters(vehicle: Vehicle, errors: Errors, radius: Floats) -> dict[str, Any]:
+    """What a result holds of its machine: gains, offsets, radii (wheels,) and the calibration that would undo them."""
     wheels = vehicle.wheels
     torque = [f"drive_torque_{wheel}" for wheel in wheels]
     calibration: dict[str, Any] = {
