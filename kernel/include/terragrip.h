@@ -284,6 +284,32 @@ typedef struct { /* when the estimator warns of immobilization, and calls the ve
     tg_real push_duration;          /* s */
 } tg_watch_settings;
 
+/* The tuned numbers of this floor, all that there are beside thresholds in the settings; what halving and doubling each does:
+ * docs/methods.md. Scaled by the machine where that says how: T = sqrt(r/g), r its mean wheel radius, and V = sqrt(g r). */
+typedef struct {
+    tg_real adhesion_walk;          /* variance of a wheel's adhesion, gained in T */
+    tg_real resistance_walk;        /* variance of the soil resistance, gained in T */
+    tg_real force_walk;             /* variance of the ground speed, and of a rim's, in V^2, gained in T: forces that nothing measures */
+    tg_real spike;                  /* an increment of a signal beyond this many of its usual SDs is a spike until the next confirms it */
+    tg_real agility;                /* of gravity: a change of speed that a vehicle can do, hence no spike */
+    tg_real increment_memory;       /* s: of the usual increments */
+    tg_real input_lag;              /* s, at most: low-pass of measured loads, pitch, and the pull as the loads feel it */
+    tg_real unknown_slope;          /* rad: SD of a pitch never seen or long silent */
+    tg_real slow_wheel;             /* T between samples, from which on a wheel is quasi-steady */
+    tg_real wheel_late;             /* intervals after which a slow wheel's last sample stands for nothing */
+    tg_real mounting_walk;          /* rad^2, gained in T: of what a pitch sensor does not tell of the slope */
+    tg_real terrain_walk;           /* rad^2, gained in T: of the whole slope, where there is none */
+    tg_real silence;                /* s without a ground speed after which it is reckoned from the wheels */
+    tg_real slip_memory;            /* s over which slip and adhesion are remembered for that */
+    tg_real most_slope;             /* of slip over adhesion */
+    tg_real slip_spread;            /* SD of a remembered slip; its variance grows by a fifth a second */
+    tg_real alike, carried_alike;   /* s over which the error of a reckoned speed stays alike; of one that the accelerometer carries on */
+    tg_real reckoned_force, carried_force; /* force_walk times this beside it, meanwhile */
+    tg_real jolt_memory;            /* s: of what the accelerometer reads beyond the model */
+    tg_real swing;                  /* samples that a jolt lasts */
+    tg_real longest_walk;           /* s of random walk that a gap adds at most: beyond it the ground is simply unknown */
+} tg_tuned;
+
 typedef struct {
     int32_t method;                 /* tg_method */
     int32_t axles;                  /* 1..8 */
@@ -315,6 +341,7 @@ typedef struct {
     tg_real load_filter;            /* s, low-pass of the acceleration that moves the loads */
     tg_real algebraic_filter;       /* s, low-pass of every signal of the algebraic method */
     tg_watch_settings watch;
+    tg_tuned tuned;
 } tg_settings;
 
 typedef struct tg_estimator tg_estimator;
@@ -323,7 +350,7 @@ tg_real tg_digging_score(const tg_real *signs);
 size_t tg_estimator_size(void);
 /* Tuned thresholds, tuning and priors; the machine is left empty, and with it the random walks. */
 tg_settings tg_default_settings(void);
-/* The tuned random walks (tuning.walk) of the machine that the settings hold. */
+/* The random walks (tuning.walk) of the machine that the settings hold, by their tuned numbers. */
 tg_status tg_tune_walks(tg_settings *settings);
 tg_status tg_estimator_init(tg_estimator *e, const tg_settings *settings);
 tg_status tg_estimator_update(tg_estimator *e, const tg_sample *sample, tg_estimate *out);

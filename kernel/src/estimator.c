@@ -1,10 +1,7 @@
 /* One raw sample in, one row of estimates out. */
 #include "estimator.h"
 
-#define TG_JOLT_MEMORY 5 /* s */
-#define TG_SWING ((tg_real)2) /* samples that a jolt lasts */
 #define TG_BATCH 32
-#define TG_LONGEST_WALK 30 /* s of random walk that a gap adds at most: beyond it the ground is simply unknown */
 
 /* ---- the filter ---- */
 
@@ -26,7 +23,7 @@ static void forget(tg_estimator *e)
 /* Start the outputs anew at `outputs`, the parameters having walked for `walk` seconds. */
 static void restart(tg_estimator *e, tg_real walk, const tg_real *outputs, const tg_real *variances)
 {
-    if (walk > TG_LONGEST_WALK) walk = TG_LONGEST_WALK;
+    if (walk > e->settings.tuned.longest_walk) walk = e->settings.tuned.longest_walk;
     if (tg_filter_restart(&e->filter, walk, outputs, variances) != TG_OK) {
         forget(e);
         tg_filter_restart(&e->filter, 0, outputs, variances);
@@ -51,13 +48,13 @@ static void restart_from(tg_estimator *e, const tg_row *row, tg_real walk)
     int32_t late = isnan(v) && e->ground_speed.seen && row->time - e->ground_speed.time <= 1;
     if (late) v = e->ground_speed.value;
     else if (isnan(v)) v = seen ? rim / (tg_real)seen : 0;
-    tg_real broad = tgi_square((tg_real)0.3 * tgi_fabs(v) + (tg_real)0.1), noise = tgi_square(s->noise[TG_GROUND_SPEED]);
+    tg_real broad = tgi_square((tg_real)0.3 * tgi_fabs(v) + (tg_real)0.1), noise = tgi_square(s->noise[TG_GROUND_SPEED]) + row->doubt[n];
     x[n] = d * v;
     P[n] = isnan(y[TG_GROUND_SPEED]) ? (late ? noise + (tg_real)0.01 : broad) : noise;
     for (int32_t i = 0; i < n; i++) {
         tg_real omega = y[TG_WHEEL_SPEED + i], r = s->rolling_radius[i];
         x[i] = d * (isnan(omega) ? v / r : omega);
-        P[i] = isnan(omega) ? broad / (r * r) : tgi_square(s->noise[TG_WHEEL_SPEED + i]);
+        P[i] = isnan(omega) ? broad / (r * r) : tgi_square(s->noise[TG_WHEEL_SPEED + i]) + row->doubt[i];
     }
     restart(e, walk, x, P);
 }
@@ -81,7 +78,7 @@ static void rest(tg_estimator *e)
 static void drift(tg_estimator *e, tg_real dt)
 {
     const int32_t n = e->settings.machine.wheels, stride = tgi_stride(n);
-    tg_real x[9], P[9], step = dt > TG_LONGEST_WALK ? TG_LONGEST_WALK : dt;
+    tg_real x[9], P[9], longest = e->settings.tuned.longest_walk, step = dt > longest ? longest : dt;
     for (int32_t j = 0; j <= n; j++) {
         tg_real r = j < n ? e->settings.rolling_radius[j] : 1;
         int32_t row = tgi_row(n, j);
@@ -99,15 +96,15 @@ static void measured(const tg_estimator *e, const tg_row *row, tg_real *y, tg_re
     const tg_real d = (tg_real)e->direction;
     for (int32_t i = 0; i < n; i++) {
         y[i] = d * row->value[TG_WHEEL_SPEED + i];
-        r[i] = row->held_wheels >> i & 1 ? row->wheel_variance[i] : e->constants.variance[TG_WHEEL_SPEED + i];
+        r[i] = row->held_wheels >> i & 1 ? row->wheel_variance[i] : e->constants.variance[TG_WHEEL_SPEED + i] + row->doubt[i];
     }
     y[n] = d * row->value[TG_GROUND_SPEED];
     r[n] = row->ground_variance;
     y[n + 1] = d * row->value[TG_ACCELERATION_X];
-    r[n + 1] = e->constants.least_jolt + TG_SWING * (e->jolt - e->constants.least_jolt);
+    r[n + 1] = e->constants.least_jolt + e->settings.tuned.swing * (e->jolt - e->constants.least_jolt);
 }
 
-/* What the accelerometer reads beyond the model, its mean square over about TG_JOLT_MEMORY: on rough ground the body's jolts are
+/* What the accelerometer reads beyond the model, its mean square over about jolt_memory: on rough ground the body's jolts are
  * larger than the sensor's noise. */
 static void watch_jolts(tg_estimator *e, const tg_step *step, tg_real r, tg_real dt)
 {
@@ -115,7 +112,7 @@ static void watch_jolts(tg_estimator *e, const tg_step *step, tg_real r, tg_real
     if (isnan(step->innovation[c])) return;
     tg_real square = tgi_square(step->innovation[c]), bound = 16 * step->innovation_variance[c];
     if (square > bound) square = bound;
-    e->jolt += dt / (TG_JOLT_MEMORY + dt) * (square - (step->innovation_variance[c] - r) - e->jolt);
+    e->jolt += dt / (e->settings.tuned.jolt_memory + dt) * (square - (step->innovation_variance[c] - r) - e->jolt);
     if (e->jolt < e->constants.least_jolt) e->jolt = e->constants.least_jolt;
 }
 
@@ -152,12 +149,24 @@ static void watch_consistency(tg_estimator *e, const tg_row *row, const tg_step 
     }
 }
 
+/* The inputs as they were over the step that ends now: means of torque and drawbar force, of loads and slope between its ends. */
+static void inputs_over(const tg_estimator *e, const tg_drive *drive, const tg_input *now, tg_input *over)
+{
+    const tg_real d = (tg_real)e->direction;
+    for (int32_t i = 0; i < e->settings.machine.wheels; i++) {
+        over->torque[i] = d * drive->mean_torque[i];
+        over->load[i] = (e->held.load[i] + now->load[i]) / 2;
+    }
+    over->drawbar = d * drive->mean_drawbar;
+    over->slope = (e->held.slope + now->slope) / 2;
+}
+
 /* Predict over dt, in pieces where it is long, and update. Returns 0 where the filter had to start anew. */
 static int32_t advance(tg_estimator *e, tg_row *row, const tg_drive *drive, tg_real dt, tg_real *q)
 {
     const tg_settings *s = &e->settings;
     tg_real y[TG_MAX_CHANNELS], r[TG_MAX_CHANNELS];
-    tg_input now;
+    tg_input now, over;
     tg_step step;
     int32_t pieces = 1;
     if (dt > s->max_step) {
@@ -166,14 +175,15 @@ static int32_t advance(tg_estimator *e, tg_row *row, const tg_drive *drive, tg_r
         for (int32_t j = 0; j < TG_MAX_STATES; j++) q[j] /= (tg_real)pieces;
     }
     tgi_along(e, drive, &now);
+    inputs_over(e, drive, &now, &over);
     measured(e, row, y, r);
-    tgi_deviations(e, &e->held, e->belief.x);
+    tgi_deviations(e, &over, e->belief.x);
     tg_status status = TG_OK;
     for (int32_t k = 1; k < pieces && status == TG_OK; k++) {
-        status = tg_filter_predict(&e->filter, dt, &e->held, q);
+        status = tg_filter_predict(&e->filter, dt, &over, q);
         if (status == TG_OK) follow(e, e->deviation);
     }
-    if (status == TG_OK) status = tg_filter_step(&e->filter, dt, &e->held, &now, q, y, r, &step);
+    if (status == TG_OK) status = tg_filter_step(&e->filter, dt, &over, &now, q, y, r, &step);
     if (status != TG_OK) {
         forget(e);
         restart_from(e, row, 0);
@@ -283,11 +293,12 @@ tg_status tg_estimator_update(tg_estimator *e, const tg_sample *sample, tg_estim
 
     int32_t was_standing = e->standing, gap, n = e->settings.machine.wheels;
     tg_real dt = e->started ? (tg_real)(row.time - e->time) : 0, travelled = tgi_fabs(e->belief.x[n + 1]);
+    tgi_doubt_speeds(e, &row);
     int32_t turned = tgi_track_motion(e, &row);
     tgi_track_turn(e, &row);
     tg_real q[TG_MAX_STATES];
-    tgi_input_noise(e, row.time, dt, q); /* of the inputs held so far: before this row's are taken */
     tgi_take_inputs(e, &row, dt, &drive);
+    tgi_input_noise(e, row.time, dt, q);
     tgi_loads(e, &row, &drive);
     tg_course course = course_of(e, &row, was_standing, turned, &gap);
     if (!e->started) e->ground_time = row.time;

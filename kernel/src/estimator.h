@@ -6,20 +6,20 @@
 #include <math.h>
 #include <string.h>
 
-#define TG_SPIKE 4 /* an increment beyond this many of its usual SDs is a spike */
-#define TG_INPUT_LAG ((tg_real)0.07) /* s */
 #define TG_ROUGH_LOAD 8 /* variance of a wheel's load, over the mean load, over that of rho_s, on rough ground (R) */
 
 typedef struct { /* an input between its samples */
     tg_real value;    /* filtered */
     tg_real variance; /* of the filtered value's noise */
     tg_real raw;      /* last sample */
-    tg_real calm;     /* value at the last sample that was no spike */
+    tg_real calm;     /* last sample that was no spike */
+    tg_real mean;     /* over the step that ends with this row */
     tg_real level;    /* mean square of its increments, spikes clipped */
     tg_real interval; /* s between its last two samples */
     tg_real spike;    /* square of the last increment where that was a spike, else 0 */
     double time;      /* of the last sample */
     int32_t count;    /* samples seen, saturating */
+    int32_t fresh;    /* this row holds a sample that is no spike */
 } tg_hold;
 
 typedef struct { /* a low-passed signal */
@@ -37,6 +37,7 @@ typedef struct { /* one row, calibrated and checked, in the vehicle's own direct
     int32_t held_wheels; /* bits: the wheel's speed is not measured but held, with this variance */
     tg_real wheel_variance[8];
     tg_real ground_variance;
+    tg_real doubt[9]; /* of the wheel speeds and the ground speed: variance beside the sensor's, of a spike */
 } tg_row;
 
 typedef struct { /* what a row's values need beside the belief; all reals, so that it goes into a record */
@@ -51,9 +52,9 @@ typedef struct { /* what a row's values need beside the belief; all reals, so th
 typedef struct { /* what drives the model between two rows, in the vehicle's own directions */
     tg_real load[8];      /* wheel, N */
     tg_real axle_load[8]; /* N */
-    tg_real torque[8];
-    tg_real drawbar;
-    tg_real calm_drawbar; /* for the loads, which know no uncertainty: the value before a spike */
+    tg_real torque[8], mean_torque[8]; /* now, and over the step that ends now */
+    tg_real drawbar, mean_drawbar;
+    tg_real calm_drawbar; /* filtered, for the loads, which know no uncertainty */
     tg_real slope, cosine, sine;
 } tg_drive;
 
@@ -143,6 +144,9 @@ typedef struct { /* what follows from the settings alone */
     tg_real least_load[8];          /* N; the model divides by the load */
     tg_real least_jolt;             /* (m/s^2)^2, variance of the accelerometer at rest */
     tg_real scale_score[TG_MODES];  /* of the bank: log scale, 0 the smallest, 1 the largest */
+    tg_real force_walk;             /* m^2/s^3 */
+    tg_real mounting_walk, terrain_walk; /* rad^2/s */
+    tg_real slow_wheel;             /* s */
     int32_t holds;                  /* some channel is held */
 } tgi_constants;
 
@@ -158,7 +162,7 @@ struct tg_estimator {
     tg_real last_raw[TG_SLOTS];
     double last_raw_time[TG_SLOTS];
     tg_hold torque[8], drawbar, pitch, axle_load[8];
-    tg_hold wheel[8];          /* speeds, once a row was seen that lacks one */
+    tg_hold wheel[8], ground;  /* speeds */
     int32_t sparse_wheels;
     tg_real yaw_rate;
     double yaw_time;           /* of its last sample */
@@ -188,6 +192,7 @@ TG_INLINE tg_real tgi_square(tg_real x) { return x * x; }
 
 /* quality.c */
 tg_status tgi_clean(tg_estimator *e, const tg_sample *sample, tg_row *row);
+void tgi_doubt_speeds(tg_estimator *e, tg_row *row);
 tg_real tgi_lowpass(tg_lowpass *f, tg_real x, double time, tg_real tau);
 void tgi_track_turn(tg_estimator *e, const tg_row *row);
 int32_t tgi_track_motion(tg_estimator *e, const tg_row *row);
@@ -196,7 +201,7 @@ int32_t tgi_track_motion(tg_estimator *e, const tg_row *row);
 void tgi_loads(tg_estimator *e, const tg_row *row, tg_drive *drive);
 
 /* inputs.c */
-void tgi_hold_update(tg_hold *h, tg_real x, double time, tg_real noise);
+void tgi_hold_update(tg_hold *h, const tg_tuned *k, tg_real x, double time, tg_real dt, tg_real noise, tg_real rate);
 void tgi_take_inputs(tg_estimator *e, tg_row *row, tg_real dt, tg_drive *drive);
 void tgi_input_noise(const tg_estimator *e, double time, tg_real dt, tg_real *q);
 void tgi_along(const tg_estimator *e, const tg_drive *drive, tg_input *u);

@@ -51,6 +51,22 @@ tg_status tgi_clean(tg_estimator *e, const tg_sample *sample, tg_row *row)
     return TG_OK;
 }
 
+/* A speed that leaps is a spike until the next sample tells: until then the leap itself is its uncertainty. A leap that a vehicle can do
+ * is none. */
+void tgi_doubt_speeds(tg_estimator *e, tg_row *row)
+{
+    const tg_settings *s = &e->settings;
+    const int32_t n = s->machine.wheels;
+    const tg_real agile = s->tuned.agility * s->machine.gravity;
+    for (int32_t i = 0; i <= n; i++) {
+        const int32_t slot = i < n ? TG_WHEEL_SPEED + i : TG_GROUND_SPEED;
+        tg_hold *const h = i < n ? &e->wheel[i] : &e->ground;
+        tgi_hold_update(h, &s->tuned, row->value[slot], row->time, 0, s->noise[slot], i < n ? agile / s->rolling_radius[i] : agile);
+        row->doubt[i] = h->time == row->time ? h->spike : 0;
+        row->outlier |= row->doubt[i] > 0;
+    }
+}
+
 /* First-order low-pass by the backward Euler rule over the time since the last sample; the first sample is taken whole. */
 tg_real tgi_lowpass(tg_lowpass *f, tg_real x, double time, tg_real tau)
 {
@@ -92,9 +108,9 @@ int32_t tgi_track_motion(tg_estimator *e, const tg_row *row)
     const tg_settings *s = &e->settings;
     const tg_real tau = (tg_real)0.2, age = 1;
     int32_t n = s->machine.wheels, seen = 0;
-    tg_real fastest = 0, rim = 0, ground = tgi_lowpass(&e->ground_speed, row->value[TG_GROUND_SPEED], row->time, tau);
+    tg_real fastest = 0, rim = 0, ground = tgi_lowpass(&e->ground_speed, row->doubt[n] > 0 ? (tg_real)NAN : row->value[TG_GROUND_SPEED], row->time, tau);
     for (int32_t i = 0; i < n; i++) {
-        tg_real w = s->rolling_radius[i] * tgi_lowpass(&e->wheel_speed[i], row->value[TG_WHEEL_SPEED + i], row->time, tau);
+        tg_real w = s->rolling_radius[i] * tgi_lowpass(&e->wheel_speed[i], row->doubt[i] > 0 ? (tg_real)NAN : row->value[TG_WHEEL_SPEED + i], row->time, tau);
         if (!recent(&e->wheel_speed[i], row->time, s->gap)) continue;
         seen++;
         rim += w;

@@ -2,15 +2,7 @@
  * and soil resistance apart, and the estimate of v runs off with every error of the forces. */
 #include "estimator.h"
 
-#define TG_SILENCE ((tg_real)0.5)    /* s without a ground speed after which it is reckoned */
-#define TG_SLIP_MEMORY ((tg_real)0.3) /* s over which slip and adhesion are remembered */
 #define TG_STEEPNESS ((tg_real)11.36) /* k of mu = A (1 - exp(-k s)), the paper's prototype curve (PHYSICS 5) */
-#define TG_MOST_SLOPE ((tg_real)0.4) /* of slip over adhesion */
-#define TG_SLIP_SPREAD ((tg_real)0.04) /* SD of a remembered slip; its variance grows by a fifth a second */
-#define TG_ALIKE ((tg_real)0.3)      /* s over which the error of a reckoned speed stays alike */
-#define TG_CARRIED_ALIKE ((tg_real)0.5) /* s, of one that the accelerometer carries on */
-#define TG_UNKNOWN_FORCE ((tg_real)0.03) /* m^2/s^3 of noise on the speed while it is only reckoned, */
-#define TG_CARRIED_FORCE ((tg_real)0.003) /* or carried on */
 
 /* Mean rim speed and mean adhesion over the load, along the travel. */
 static void means(const tg_estimator *e, const tg_drive *drive, tg_real *rim, tg_real *adhesion)
@@ -33,18 +25,18 @@ void tgi_remember_slip(tg_estimator *e, const tg_drive *drive, tg_real dt)
     tg_real rim, adhesion, v = e->belief.x[e->settings.machine.wheels + 1];
     means(e, drive, &rim, &adhesion);
     if (rim < 3 * e->settings.standstill_speed) return;
-    tg_real slip = 1 - v / rim, gain = dt / (TG_SLIP_MEMORY + dt);
+    tg_real slip = 1 - v / rim, gain = dt / (e->settings.tuned.slip_memory + dt);
     if (slip < (tg_real)-0.2) slip = (tg_real)-0.2;
     m->slip += gain * (slip - m->slip);
     m->adhesion += gain * (adhesion - m->adhesion);
 }
 
 /* Slip at another adhesion than the remembered one, on the same soil: along the tangent of the prototype curve. */
-static tg_real slip_at(const tgi_slip_memory *m, tg_real adhesion)
+static tg_real slip_at(const tgi_slip_memory *m, tg_real most, tg_real adhesion)
 {
     tg_real level = m->adhesion > (tg_real)0.1 ? m->adhesion : (tg_real)0.1, slip = m->slip > 0 ? m->slip : 0;
     tg_real slope = slip > 0 ? tgi_expm1(TG_STEEPNESS * slip) / (TG_STEEPNESS * level) : 1 / (TG_STEEPNESS * level);
-    if (slope > TG_MOST_SLOPE) slope = TG_MOST_SLOPE;
+    if (slope > most) slope = most;
     tg_real found = m->slip + slope * (adhesion - m->adhesion);
     return found < (tg_real)-0.2 ? (tg_real)-0.2 : found > (tg_real)0.8 ? (tg_real)0.8 : found;
 }
@@ -53,24 +45,25 @@ static tg_real slip_at(const tgi_slip_memory *m, tg_real adhesion)
  * for: a white one would be averaged away. With an accelerometer it only corrects the speed that the accelerometer carries on. */
 void tgi_reckon(tg_estimator *e, const tg_drive *drive, tg_real dt, tg_row *row, tg_real *q)
 {
-    row->ground_variance = e->constants.variance[TG_GROUND_SPEED];
+    const tg_tuned *const k = &e->settings.tuned;
+    row->ground_variance = e->constants.variance[TG_GROUND_SPEED] + row->doubt[e->settings.machine.wheels];
     if (!isnan(row->value[TG_GROUND_SPEED])) {
         e->ground_time = row->time;
         return;
     }
     tg_real silence = (tg_real)(row->time - e->ground_time), rim, adhesion;
-    if (silence < TG_SILENCE || !row->measured || !(dt > 0)) return;
+    if (silence < k->silence || !row->measured || !(dt > 0)) return;
     means(e, drive, &rim, &adhesion);
-    tg_real spread = tgi_square(TG_SLIP_SPREAD) * (1 + silence / 5), alike = TG_ALIKE, force = TG_UNKNOWN_FORCE;
+    tg_real spread = tgi_square(k->slip_spread) * (1 + silence / 5), alike = k->alike, force = k->reckoned_force * e->constants.force_walk;
     if (spread > tgi_square((tg_real)0.15)) spread = tgi_square((tg_real)0.15);
-    tg_real speed = (tg_real)e->direction * rim * (1 - slip_at(&e->slip_memory, adhesion));
+    tg_real speed = (tg_real)e->direction * rim * (1 - slip_at(&e->slip_memory, k->most_slope, adhesion));
     tg_real variance = tgi_square(rim) * spread + tgi_square((tg_real)0.01);
     if (e->slope.running) {
         tgi_slope_correct(&e->slope, speed, variance * (1 + 2 * alike / dt));
         speed = e->slope.speed;
         variance = e->slope.speed_variance;
-        alike = TG_CARRIED_ALIKE;
-        force = TG_CARRIED_FORCE;
+        alike = k->carried_alike;
+        force = k->carried_force * e->constants.force_walk;
     }
     row->value[TG_GROUND_SPEED] = speed;
     row->ground_variance = variance * (1 + 2 * alike / dt);

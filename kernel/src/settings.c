@@ -34,6 +34,35 @@ static tg_watch_settings default_watch(void)
     return w;
 }
 
+static tg_tuned default_tuned(void)
+{
+    tg_tuned k;
+    k.adhesion_walk = (tg_real)3e-4;
+    k.resistance_walk = (tg_real)4e-5;
+    k.force_walk = (tg_real)7e-5;
+    k.spike = 4;
+    k.agility = (tg_real)0.5;
+    k.increment_memory = 1;
+    k.input_lag = (tg_real)0.07;
+    k.unknown_slope = (tg_real)0.1;
+    k.slow_wheel = (tg_real)0.7;
+    k.wheel_late = (tg_real)1.5;
+    k.mounting_walk = (tg_real)7e-8;
+    k.terrain_walk = (tg_real)4e-6;
+    k.silence = (tg_real)0.5;
+    k.slip_memory = (tg_real)0.3;
+    k.most_slope = (tg_real)0.4;
+    k.slip_spread = (tg_real)0.04;
+    k.alike = (tg_real)0.3;
+    k.carried_alike = (tg_real)0.5;
+    k.reckoned_force = 30;
+    k.carried_force = 3;
+    k.jolt_memory = 5;
+    k.swing = 2;
+    k.longest_walk = 30;
+    return k;
+}
+
 /* Tuned on the simulation's scenarios accuracy-clean and accuracy-faults, seeds 1000 to 1019, and on nothing else: walks, scales of the
  * bank, and the constants at the head of this floor's files (docs/decisions/0027, 0028). */
 tg_settings tg_default_settings(void)
@@ -41,7 +70,7 @@ tg_settings tg_default_settings(void)
     tg_settings s;
     memset(&s, 0, sizeof s);
     s.tuning = tg_default_tuning();
-    const tg_real scales[TG_MODES] = {(tg_real)0.1, (tg_real)0.5, (tg_real)2.5, 12};
+    const tg_real scales[TG_MODES] = {(tg_real)0.1, 1, 10, 100};
     memcpy(s.tuning.scales, scales, sizeof scales);
     s.tuning.huber = 4;
     s.axles = 1;
@@ -59,7 +88,22 @@ tg_settings tg_default_settings(void)
     s.load_filter = (tg_real)0.2;
     s.algebraic_filter = (tg_real)0.25;
     s.watch = default_watch();
+    s.tuned = default_tuned();
     return s;
+}
+
+/* T of the machine (see tg_tuned), and the variance that forces which nothing measures give a speed, per second. */
+static tg_real natural_time(const tg_machine *m)
+{
+    tg_real radius = 0;
+    for (int32_t i = 0; i < m->wheels; i++) radius += m->radius[i] / (tg_real)m->wheels;
+    return tgi_sqrt(radius / m->gravity);
+}
+
+static tg_real force_walk(const tg_settings *s)
+{
+    const tg_real T = natural_time(&s->machine), g = s->machine.gravity; /* V^2/T = g^2 T */
+    return s->tuned.force_walk * g * g * T;
 }
 
 /* Densities, variance per second. A rim and the ground speed wander alike, in m/s. */
@@ -67,14 +111,16 @@ tg_status tg_tune_walks(tg_settings *s)
 {
     if (!s || s->machine.wheels < 1 || s->machine.wheels > TG_MAX_WHEELS) return TG_BAD_ARGUMENT;
     const int32_t n = s->machine.wheels;
-    const tg_real rim = (tg_real)1e-3, ground = (tg_real)1e-4, adhesion = (tg_real)2e-3, resistance = (tg_real)3e-4;
-    for (int32_t i = 0; i < n; i++) {
+    if (!is_positive(s->machine.gravity)) return TG_NOT_POSITIVE;
+    for (int32_t i = 0; i < n; i++)
         if (!is_positive(s->machine.radius[i])) return TG_NOT_POSITIVE;
-        s->tuning.walk[i] = rim / tgi_square(s->machine.radius[i]);
-        s->tuning.walk[n + 1 + i] = adhesion;
+    const tg_real T = natural_time(&s->machine), force = force_walk(s);
+    for (int32_t i = 0; i < n; i++) {
+        s->tuning.walk[i] = force / tgi_square(s->machine.radius[i]);
+        s->tuning.walk[n + 1 + i] = s->tuned.adhesion_walk / T;
     }
-    s->tuning.walk[n] = ground;
-    s->tuning.walk[2 * n + 1] = resistance;
+    s->tuning.walk[n] = force;
+    s->tuning.walk[2 * n + 1] = s->tuned.resistance_walk / T;
     return TG_OK;
 }
 
@@ -104,6 +150,9 @@ static tg_status check_numbers(const tg_settings *s)
                                s->watch.push_duration};
     const tg_real positive[] = {s->watch.memory, s->prior_adhesion_std, s->prior_resistance_std, s->gap, s->max_step, s->algebraic_filter,
                                 s->noise[TG_GROUND_SPEED], s->noise[TG_ACCELERATION_X]};
+    const tg_real *const tuned = (const tg_real *)&s->tuned; /* all of them reals */
+    for (size_t k = 0; k < sizeof s->tuned / sizeof *tuned; k++)
+        if (!is_positive(tuned[k])) return TG_NOT_POSITIVE;
     for (size_t k = 0; k < sizeof spreads / sizeof *spreads; k++)
         if (!is_spread(spreads[k])) return TG_NOT_POSITIVE;
     for (size_t k = 0; k < sizeof positive / sizeof *positive; k++)
@@ -162,6 +211,11 @@ static void work_out_constants(const tg_settings *s, tgi_constants *c)
         c->unknown_torque[i] = tgi_square((tg_real)0.5 * m->radius[i] * load);
         c->least_load[i] = (tg_real)0.02 * load;
     }
+    const tg_real T = natural_time(m);
+    c->force_walk = force_walk(s);
+    c->mounting_walk = s->tuned.mounting_walk / T;
+    c->terrain_walk = s->tuned.terrain_walk / T;
+    c->slow_wheel = s->tuned.slow_wheel * T;
     c->inverse_mass = 1 / m->mass;
     c->inverse_weight = 1 / weight;
     c->unknown_pull = tgi_square((tg_real)0.3 * weight);

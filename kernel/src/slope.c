@@ -4,10 +4,7 @@
  * as it should: the two then agree on dv/dt. */
 #include "estimator.h"
 
-#define TG_MOUNTING_WALK ((tg_real)5e-7) /* rad^2/s: of what a pitch sensor does not tell */
-#define TG_TERRAIN_WALK ((tg_real)3e-5)  /* rad^2/s: of the whole slope, where there is none */
-#define TG_SLOPE_LIMIT ((tg_real)0.5) /* rad */
-#define TG_SPEED_WALK ((tg_real)2e-3) /* m^2/s^3: jolts that the accelerometer's noise does not hold */
+#define TG_SLOPE_LIMIT ((tg_real)0.5) /* rad: no vehicle of ours drives steeper */
 
 static void start(tgi_slope *s, const tg_settings *settings, tg_real speed)
 {
@@ -17,10 +14,10 @@ static void start(tgi_slope *s, const tg_settings *settings, tg_real speed)
     s->running = 1;
 }
 
-static void predict(tgi_slope *s, const tg_settings *settings, tg_real pitch, tg_real walk, tg_real dt)
+static void predict(tgi_slope *s, const tg_settings *settings, tg_real pitch, tg_real walk, tg_real force, tg_real dt)
 {
     const tg_real g = settings->machine.gravity, k = g * dt;
-    const tg_real noise = tgi_square(settings->noise[TG_ACCELERATION_X]) * dt + TG_SPEED_WALK;
+    const tg_real noise = tgi_square(settings->noise[TG_ACCELERATION_X]) * dt + force; /* of jolts that its noise does not hold */
     s->speed += dt * (s->acceleration - g * (tgi_sin(pitch) + s->error));
     s->speed_variance += k * (k * s->error_variance - 2 * s->covariance) + noise * dt;
     s->covariance -= k * s->error_variance;
@@ -48,12 +45,12 @@ tg_real tgi_slope_update(tg_estimator *e, const tg_row *row, tg_real pitch, tg_r
 {
     tgi_slope *s = &e->slope;
     const tg_settings *settings = &e->settings;
-    tg_real speed = row->value[TG_GROUND_SPEED], walk = e->pitch.count > 0 ? TG_MOUNTING_WALK : TG_TERRAIN_WALK;
+    tg_real speed = row->value[TG_GROUND_SPEED], walk = e->pitch.count > 0 ? e->constants.mounting_walk : e->constants.terrain_walk;
     if (s->running && (dt > settings->gap || row->time - e->acceleration.time > 1)) s->running = 0;
-    if (s->running && dt > 0) predict(s, settings, pitch, walk, dt);
+    if (s->running && dt > 0) predict(s, settings, pitch, walk, e->constants.force_walk, dt);
     if (!isnan(row->value[TG_ACCELERATION_X])) s->acceleration = row->value[TG_ACCELERATION_X];
     if (!isnan(speed)) {
-        if (s->running) tgi_slope_correct(s, speed, e->constants.variance[TG_GROUND_SPEED]);
+        if (s->running) tgi_slope_correct(s, speed, e->constants.variance[TG_GROUND_SPEED] + row->doubt[settings->machine.wheels]);
         else if (e->acceleration.seen) start(s, settings, speed);
     }
     return pitch + s->error;

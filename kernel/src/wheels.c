@@ -3,9 +3,6 @@
  * last sample stands for the speed, and the adhesion takes what the torque says. */
 #include "estimator.h"
 
-#define TG_SLOW_WHEEL ((tg_real)0.1) /* s between samples, from which on a wheel is quasi-steady */
-#define TG_WHEEL_LATE ((tg_real)1.5) /* intervals after which the last sample stands for nothing */
-
 /* Give the row the speeds of slow wheels that it does not measure; `dt` 0: none. All rows until the next sample share one error, and so
  * count as one measurement together. */
 void tgi_hold_wheels(tg_estimator *e, tg_real dt, tg_row *row)
@@ -14,11 +11,10 @@ void tgi_hold_wheels(tg_estimator *e, tg_real dt, tg_row *row)
     for (int32_t i = 0; i < n; i++) e->sparse_wheels |= isnan(row->value[TG_WHEEL_SPEED + i]);
     if (!e->sparse_wheels) return;
     for (int32_t i = 0; i < n; i++) {
-        tg_hold *const h = &e->wheel[i];
+        const tg_hold *const h = &e->wheel[i];
         const tg_real noise = e->settings.noise[TG_WHEEL_SPEED + i], x = row->value[TG_WHEEL_SPEED + i];
         const tg_real age = (tg_real)(row->time - h->time), motion = h->level - 2 * noise * noise;
-        tgi_hold_update(h, x, row->time, noise);
-        if (!isnan(x) || h->count < 2 || h->interval < TG_SLOW_WHEEL || age > TG_WHEEL_LATE * h->interval || !(dt > 0)) continue;
+        if (!isnan(x) || h->count < 2 || h->interval < e->constants.slow_wheel || age > e->settings.tuned.wheel_late * h->interval || !(dt > 0)) continue;
         row->value[TG_WHEEL_SPEED + i] = h->raw;
         row->wheel_variance[i] = (noise * noise + (motion > 0 ? motion * age / h->interval : 0)) * (1 + h->interval / dt);
         row->held_wheels |= 1 << i;
