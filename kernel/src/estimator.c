@@ -2,6 +2,7 @@
 #include "estimator.h"
 
 #define TG_BATCH 32
+#define TG_NO_TIME ((tg_real)1e-6) /* s */
 
 /* ---- the filter ---- */
 
@@ -32,8 +33,8 @@ static void restart(tg_estimator *e, tg_real walk, const tg_real *outputs, const
 }
 
 /* Outputs as this row measures them, along the travel. What it does not measure follows from the rest, broadly: a wheel from the
- * ground speed, the ground speed from the wheels. */
-static void restart_from(tg_estimator *e, const tg_row *row, tg_real walk)
+ * ground speed, the ground speed from the wheels or, but for a `start` from rest or a turn of direction, from what it just was. */
+static void restart_from(tg_estimator *e, const tg_row *row, int32_t start, tg_real walk)
 {
     const tg_settings *s = &e->settings;
     const int32_t n = s->machine.wheels;
@@ -45,7 +46,7 @@ static void restart_from(tg_estimator *e, const tg_row *row, tg_real walk)
         rim += s->rolling_radius[i] * y[TG_WHEEL_SPEED + i];
         seen++;
     }
-    int32_t late = isnan(v) && e->ground_speed.seen && row->time - e->ground_speed.time <= 1;
+    int32_t late = !start && isnan(v) && e->ground_speed.seen && row->time - e->ground_speed.time <= 1;
     if (late) v = e->ground_speed.value;
     else if (isnan(v)) v = seen ? rim / (tg_real)seen : 0;
     tg_real broad = tgi_square((tg_real)0.3 * tgi_fabs(v) + (tg_real)0.1), noise = tgi_square(s->noise[TG_GROUND_SPEED]) + row->doubt[n];
@@ -57,6 +58,16 @@ static void restart_from(tg_estimator *e, const tg_row *row, tg_real walk)
         P[i] = isnan(omega) ? broad / (r * r) : tgi_square(s->noise[TG_WHEEL_SPEED + i]) + row->doubt[i];
     }
     restart(e, walk, x, P);
+}
+
+/* What adhesion was before a standstill or a turn of direction says little of the start: it is as unknown as at first. No time passes, but
+ * the filter takes a time above 0. */
+static void unknown_adhesion(tg_estimator *e)
+{
+    const int32_t n = e->settings.machine.wheels;
+    tg_real q[TG_MAX_STATES] = {0};
+    for (int32_t i = 0; i < n; i++) q[n + 1 + i] = tgi_square(e->settings.prior_adhesion_std);
+    if (tg_filter_predict(&e->filter, TG_NO_TIME, &e->held, q) == TG_OK) follow(e, NULL);
 }
 
 /* At standstill the low-passed speeds stand for the outputs. */
@@ -186,7 +197,7 @@ static int32_t advance(tg_estimator *e, tg_row *row, const tg_drive *drive, tg_r
     if (status == TG_OK) status = tg_filter_step(&e->filter, dt, &over, &now, q, y, r, &step);
     if (status != TG_OK) {
         forget(e);
-        restart_from(e, row, 0);
+        restart_from(e, row, 0, 0);
         return 0;
     }
     follow(e, e->deviation);
@@ -221,7 +232,7 @@ static void balance_forces(tg_estimator *e, const tg_drive *drive, double time)
     tgi_lowpass(&e->balance, e->standing ? 0 : d * force * e->constants.inverse_mass, time, e->settings.load_filter);
 }
 
-static int32_t go_on(tg_estimator *e, tg_row *row, const tg_drive *drive, tg_course course, tg_real dt, tg_real *q)
+static int32_t go_on(tg_estimator *e, tg_row *row, const tg_drive *drive, tg_course course, int32_t start, tg_real dt, tg_real *q)
 {
     int32_t sound = 1;
     tg_belief *b = &e->belief;
@@ -232,8 +243,9 @@ static int32_t go_on(tg_estimator *e, tg_row *row, const tg_drive *drive, tg_cou
         if (course == TG_ANEW || course == TG_GO) tgi_algebraic(e, row, drive, course == TG_ANEW);
         return 1;
     }
-    if (course == TG_ANEW) restart_from(e, row, dt);
-    else if (course == TG_DRIFT) drift(e, dt);
+    if (course == TG_ANEW) restart_from(e, row, start, dt);
+    if (course == TG_ANEW && start && e->started) unknown_adhesion(e);
+    if (course == TG_DRIFT) drift(e, dt);
     else if (course == TG_REST) rest(e);
     else if (course == TG_GO) sound = advance(e, row, drive, dt, q);
     tgi_believe(e);
@@ -305,7 +317,7 @@ tg_status tg_estimator_update(tg_estimator *e, const tg_sample *sample, tg_estim
     tgi_reckon(e, &drive, course == TG_GO ? dt : 0, &row, q);
     if (e->settings.method == TG_FILTERED) tgi_hold_wheels(e, course == TG_GO ? dt : 0, &row);
     tell_adaptation(e, out->value);
-    if (!go_on(e, &row, &drive, course, dt, q)) gap = 1;
+    if (!go_on(e, &row, &drive, course, was_standing || turned, dt, q)) gap = 1;
     balance_forces(e, &drive, row.time);
     tgi_watch_roughness(e, course == TG_GO && !gap, dt);
     if (course == TG_GO && !row.reckoned && !isnan(row.value[TG_GROUND_SPEED])) tgi_remember_slip(e, &drive, dt);

@@ -167,6 +167,7 @@ struct tg_estimator {
     tg_real yaw_rate;
     double yaw_time;           /* of its last sample */
     double slow_time;          /* when the ground speed was last near 0 */
+    tg_lowpass soon[8];        /* wheel speeds, low-passed as little as can be */
     tg_lowpass wheel_speed[8], ground_speed, acceleration, lateral, balance;
     tgi_slip_memory slip_memory;
     tgi_slope slope;

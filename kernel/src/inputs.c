@@ -57,7 +57,7 @@ void tgi_hold_update(tg_hold *h, const tg_tuned *k, tg_real x, double time, tg_r
 }
 
 /* Error of one input as extra variance of its state over the step that ends at `time`. Where the step ends with a sample, the mean over
- * it is known but for the sensor's noise and what the input does beside the straight line: a random walk of this motion, the twelfth of
+ * it is known but for the noise of two samples and what the input does beside the straight line: a random walk of this motion, the twelfth of
  * it (Brownian bridge). Where it does not, the last value stands: its error stays the same, so that `age` after it it has moved the state
  * by (age error), and this step adds error^2 (age^2 - (age - dt)^2); and the input wanders on as a random walk w, of whose integral the
  * variance is w age^3/3. `unknown` is the variance before the first sample and once the last one is older than a gap. */
@@ -65,7 +65,7 @@ static tg_real held_noise(const tg_estimator *e, const tg_hold *h, double time, 
 {
     if (h->count == 0) return dt * unknown;
     const tg_real motion = h->level - 2 * noise * noise, walk = motion > 0 && h->interval > 0 ? motion / h->interval : 0;
-    if (h->fresh) return dt * dt * (noise * noise + walk * dt / 12);
+    if (h->fresh) return dt * dt * (noise * noise / 2 + walk * dt / 12);
     const tg_real age = h->spike > 0 && time == h->time ? dt : (tg_real)(time - h->time), since = age - dt;
     const tg_real constant = noise * noise + h->spike + (age > e->settings.gap ? unknown : 0);
     return dt * (2 * age - dt) * constant + walk * (age * age * age - since * since * since) / 3;

@@ -101,6 +101,20 @@ static int32_t moves(tg_estimator *e, tg_real ground, double time)
     return !e->standing || time - e->slow_time > TG_LEAP;
 }
 
+/* A speed as soon as its noise allows to tell it from standstill: low-passed until that is a quarter of the threshold, and not longer than
+ * tau. */
+static tg_real soon(tg_lowpass *f, tg_real x, double time, tg_real tau, tg_real noise, tg_real threshold)
+{
+    if (isnan(x)) return f->value;
+    const tg_real ratio = tgi_square(threshold / (4 * noise)), dt = (tg_real)(time - f->time), slow = dt / (tau + dt);
+    tg_real gain = f->seen && ratio < 1 ? 2 * ratio / (1 + ratio) : 1;
+    if (gain < slow) gain = slow;
+    f->value += gain * (x - f->value);
+    f->time = time;
+    f->seen = 1;
+    return f->value;
+}
+
 /* Low-passed speeds tell standstill and the direction of travel, both with hysteresis so that noise does not flicker. A ground speed
  * that is a second old no longer counts. Returns 1 where the direction has turned. */
 int32_t tgi_track_motion(tg_estimator *e, const tg_row *row)
@@ -108,10 +122,14 @@ int32_t tgi_track_motion(tg_estimator *e, const tg_row *row)
     const tg_settings *s = &e->settings;
     const tg_real tau = (tg_real)0.2, age = 1;
     int32_t n = s->machine.wheels, seen = 0;
-    tg_real fastest = 0, rim = 0, ground = tgi_lowpass(&e->ground_speed, row->doubt[n] > 0 ? (tg_real)NAN : row->value[TG_GROUND_SPEED], row->time, tau);
+    tg_real fastest = 0, soonest = 0, over = 0, rim = 0, ground = tgi_lowpass(&e->ground_speed, row->doubt[n] > 0 ? (tg_real)NAN : row->value[TG_GROUND_SPEED], row->time, tau);
     for (int32_t i = 0; i < n; i++) {
-        tg_real w = s->rolling_radius[i] * tgi_lowpass(&e->wheel_speed[i], row->doubt[i] > 0 ? (tg_real)NAN : row->value[TG_WHEEL_SPEED + i], row->time, tau);
+        const tg_real measured = row->doubt[i] > 0 ? (tg_real)NAN : row->value[TG_WHEEL_SPEED + i];
+        const tg_real w = s->rolling_radius[i] * tgi_lowpass(&e->wheel_speed[i], measured, row->time, tau);
+        const tg_real r = s->rolling_radius[i], noise = s->noise[TG_WHEEL_SPEED + i];
+        const tg_real now = r * soon(&e->soon[i], measured, row->time, tau, noise, s->standstill_speed / r);
         if (!recent(&e->wheel_speed[i], row->time, s->gap)) continue;
+        if (tgi_fabs(now) > soonest) soonest = tgi_fabs(now);
         seen++;
         rim += w;
         if (tgi_fabs(w) > fastest) fastest = tgi_fabs(w);
@@ -119,12 +137,13 @@ int32_t tgi_track_motion(tg_estimator *e, const tg_row *row)
     if (seen > 0) rim /= (tg_real)seen;
     if (recent(&e->ground_speed, row->time, age)) {
         seen++;
-        if (moves(e, ground, row->time) && tgi_fabs(ground) > fastest) fastest = tgi_fabs(ground);
+        if (moves(e, ground, row->time)) over = tgi_fabs(ground);
     } else {
         ground = rim;
     }
     if (seen == 0) return 0;
-    e->standing = fastest < (e->standing ? 2 : 1) * s->standstill_speed;
+    const tg_real threshold = s->standstill_speed, leave = e->standing ? (tg_real)1.25 : 1; /* a ground speed at rest wanders more */
+    e->standing = fastest < leave * threshold && soonest < leave * threshold && over < (e->standing ? 2 : 1) * threshold;
 
     tg_real motion = (ground + rim) / 2;
     if (e->standing || tgi_fabs(motion) < s->standstill_speed) return 0;

@@ -39,7 +39,7 @@ static tg_tuned default_tuned(void)
     tg_tuned k;
     k.adhesion_walk = (tg_real)3e-4;
     k.resistance_walk = (tg_real)4e-5;
-    k.force_walk = (tg_real)7e-5;
+    k.force_walk = (tg_real)4e-5;
     k.spike = 4;
     k.agility = (tg_real)0.5;
     k.increment_memory = 1;
