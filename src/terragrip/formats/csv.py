@@ -42,14 +42,14 @@ def read_csv(path: str | os.PathLike[str], wanted: Wanted | None = None) -> LogT
     """
     source = os.fspath(path)
     refuse_missing(source, suffixes=SUFFIXES)
-    raw = None if is_long(source) else _whole(source)
-    if raw is None or len(raw) > _LONG:  # packed, it may unpack to more than its size lets expect
-        found = _long_table(source, wanted)
-        if found is not None:
-            return found
-        raw = _whole(source)
-        if len(raw) > _LONG and is_packed(source):  # there is no telling how much more
-            raise InputError("is not a table of text", file=source, mend="give a CSV or Parquet file")
+    from terragrip.formats.csv_blocks import read_in_blocks
+
+    found = read_in_blocks(source, wanted)
+    if found is not None:
+        return found
+    raw = _whole(source)  # UTF-16, or lines that only to_text tells: one block
+    if len(raw) > _LONG and is_packed(source):  # there is no telling how much more
+        raise InputError("is not a table of text", file=source, mend="give a CSV or Parquet file")
     if not raw.strip():
         raise InputError("is empty", file=source, mend="give a table with a header and rows")
     data = to_text(raw, source)
@@ -82,12 +82,6 @@ def chosen_of(dialect: Dialect, wanted: Wanted | None, source: str) -> list[int]
     if twice is not None:
         raise InputError("stands twice", file=source, place=f"column {twice}", mend="keep one of them")
     return chosen
-
-
-def _long_table(source: str, wanted: Wanted | None) -> LogTable | None:
-    from terragrip.formats.csv_blocks import read_long_csv
-
-    return read_long_csv(source, wanted)
 
 
 def body_of(

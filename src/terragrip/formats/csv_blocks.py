@@ -1,4 +1,4 @@
-"""Text tables too long to be read whole: block by block, cut at the ends of lines."""
+"""Text tables block by block, cut at the ends of lines; a short one is one block."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ _BLOCK = 16 << 20  # bytes
 _LOOK = 2 << 20  # bytes, where only some blocks are looked at
 
 
-def read_long_csv(source: str, wanted: Wanted | None) -> LogTable | None:
+def read_in_blocks(source: str, wanted: Wanted | None) -> LogTable | None:
     """Read the wanted columns of a table, as `terragrip.formats.csv.read_csv` does; None where its lines cannot be told."""
     looked_at = _looked_at(source)
     if looked_at is None:
