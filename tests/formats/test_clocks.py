@@ -10,8 +10,10 @@ import pytest
 
 import terragrip as tg
 from terragrip.errors import InputError
-from terragrip.formats import Profile, inspect, iter_csv
+from terragrip.formats import Profile, inspect
 from terragrip.formats.clocks import Speed, lag_between
+from terragrip.formats.csv import csv_on_disk
+from terragrip.formats.long_logs import recordings_of
 from test_sources import nmea
 
 TIME = np.round(np.arange(0, 200, 0.05), 2)
@@ -53,7 +55,7 @@ def test_the_unit_of_time_in_the_header_counts(tmp_path: Path, unit: str, scale:
         "channels": {n: n for n in ("ground_speed", "wheel_speed_l", "wheel_speed_r")},
     }
     assert tg.read(log, Profile.from_dict(profile)).time[-1] == pytest.approx(TIME[-1])
-    blocks = iter_csv(log, Profile.from_dict(profile))
+    blocks = recordings_of(csv_on_disk(str(log)), Profile.from_dict(profile))
     assert blocks is not None
     assert [block.time[-1] for block in blocks][-1] == pytest.approx(TIME[-1])
     seen = inspect(log)
@@ -107,7 +109,7 @@ def test_rows_from_before_the_clock_was_set_are_left_out(
     recording = tg.read(log, chosen)
     assert recording.time[-1] - recording.time[0] == pytest.approx(TIME[-1] - TIME[2])
     assert any("first 2 rows were stamped before the logger's clock was set" in n for n in recording.notes)
-    blocks = iter_csv(log, chosen)
+    blocks = recordings_of(csv_on_disk(str(log)), chosen)
     assert blocks is not None
     assert np.array_equal(np.concatenate([block.time for block in blocks]), recording.time)
 

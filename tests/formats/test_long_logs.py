@@ -16,7 +16,7 @@ import pytest
 import terragrip as tg
 from can_frames import drive, write_log
 from terragrip.errors import InputError
-from terragrip.formats import Profile, csv, csv_blocks, inspect, iter_csv
+from terragrip.formats import Profile, csv, inspect
 from terragrip.formats.long_logs import long_log, recordings_of
 from terragrip.formats.reading import read_table
 from terragrip.vehicle import Vehicle
@@ -48,7 +48,7 @@ def text_of(kind: str, rows: int = 400) -> str:
 def in_blocks(monkeypatch: pytest.MonkeyPatch) -> None:
     """Read any text table in blocks of a kilobyte."""
     monkeypatch.setattr(csv, "_LONG", 0)
-    monkeypatch.setattr(csv_blocks, "_BLOCK", 1000)
+    monkeypatch.setattr(csv, "_BLOCK", 1000)
 
 
 @pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig", "latin-1", "gzip"])
@@ -63,7 +63,7 @@ def test_a_table_in_blocks_is_the_table(
         path.write_text(text_of(kind), encoding=encoding)
     whole = read_table(path)
     monkeypatch.setattr(csv, "_LONG", 0)
-    monkeypatch.setattr(csv_blocks, "_BLOCK", 1000)
+    monkeypatch.setattr(csv, "_BLOCK", 1000)
     found = read_table(path)
     assert (found.names, found.units, found.sha256) == (whole.names, whole.units, whole.sha256)
     for name, column in whole.columns.items():
@@ -106,8 +106,7 @@ def test_a_small_file_that_unpacks_to_a_large_one_is_read_in_blocks(
     path.write_bytes(gzip.compress(text_of("plain").encode()))
     whole = tg.read(path)
     monkeypatch.setattr(csv, "_LONG", 1000)
-    monkeypatch.setattr(csv, "is_long", lambda source: False)
-    monkeypatch.setattr(csv_blocks, "_BLOCK", 1000)
+    monkeypatch.setattr(csv, "_BLOCK", 1000)
     assert np.array_equal(tg.read(path)["ground_speed"], whole["ground_speed"])
     path.write_bytes(gzip.compress(bytes(100_000)))
     with pytest.raises(InputError, match="is not a table of text"):
@@ -133,11 +132,11 @@ def test_blocks_of_a_long_table_are_its_recording(tmp_path: Path, monkeypatch: p
     path = tmp_path / "log.csv"
     frame = drive_of_a_robot()
     dates = frame.assign(time=pd.Timestamp("2026-05-01") + pd.to_timedelta(frame["time"], unit="s"))
-    monkeypatch.setattr(csv_blocks, "ROWS", 500)
+    monkeypatch.setattr(csv, "ROWS", 500)
     for table in (frame, dates):
         table.to_csv(path, index=False)
-        whole, blocks = tg.read(path), list(iter_csv(path) or ())
-        monkeypatch.setattr(csv_blocks, "_BLOCK", 10_000)
+        whole, blocks = tg.read(path), list(recordings_of(csv.csv_on_disk(str(path))) or ())
+        monkeypatch.setattr(csv, "_BLOCK", 10_000)
         assert np.allclose(np.concatenate([b.time for b in blocks]), whole.time, atol=1e-12)
         for name, values in whole.channels.items():
             assert np.array_equal(np.concatenate([b[name] for b in blocks]), values)
@@ -198,9 +197,9 @@ def test_blocks_through_a_profile_are_its_recording(
     monkeypatch.setattr(csv, "_LONG", 0)
     for module in ("parquet", "matlab_long"):
         monkeypatch.setattr(f"terragrip.formats.{module}._LONG", 0)
-    for module in ("csv_blocks", "parquet", "matlab_long"):
+    for module in ("csv", "parquet", "matlab_long"):
         monkeypatch.setattr(f"terragrip.formats.{module}.ROWS", 500)
-    monkeypatch.setattr(csv_blocks, "_BLOCK", 10_000)
+    monkeypatch.setattr(csv, "_BLOCK", 10_000)
     log = long_log(path)
     assert log is not None
     blocks = list(recordings_of(log, profile) or ())
@@ -270,7 +269,7 @@ def test_a_long_log_is_looked_at_in_parts(tmp_path: Path, monkeypatch: pytest.Mo
     monkeypatch.setattr(module, "_LONG", size // 2)
     monkeypatch.setattr(module, "_ENOUGH", size / 4)
     monkeypatch.setattr(csv, "_LONG", 0)
-    monkeypatch.setattr(csv_blocks, "_LOOK", size // 40)
+    monkeypatch.setattr(csv, "_LOOK", size // 40)
     monkeypatch.setattr("terragrip.formats.parquet._BLOCK", 500)
     monkeypatch.setattr("terragrip.formats.can.frames._BLOCK", 100)
     some = inspect(path)

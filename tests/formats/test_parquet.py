@@ -13,7 +13,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from terragrip.errors import InputError
-from terragrip.formats import iter_parquet, read
+from terragrip.formats import parquet, read
+from terragrip.formats.long_logs import recordings_of
+from terragrip.recording import Recording
 
 
 def put(folder: Path, log: pd.DataFrame) -> Path:
@@ -40,11 +42,17 @@ def test_types_become_numbers_and_labels(tmp_path: Path, log: pd.DataFrame) -> N
     assert recording["drawbar_force"].dtype == np.float64
 
 
+def in_blocks(path: Path, rows: int) -> list[Recording]:
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(parquet, "ROWS", rows)
+        return list(recordings_of(parquet.parquet_on_disk(str(path))) or ())
+
+
 @pytest.mark.parametrize("rows", [1, 64, 299, 300, 1000])
 def test_blocks_make_up_the_whole(tmp_path: Path, log: pd.DataFrame, rows: int) -> None:
     log.loc[:150, "drawbar_force"] = np.nan  # a block may lack a channel
     path = put(tmp_path, log)
-    whole, blocks = read(path), list(iter_parquet(path, rows))
+    whole, blocks = read(path), in_blocks(path, rows)
     assert max(len(block) for block in blocks) <= rows
     for name in log.columns:
         np.testing.assert_array_equal(np.concatenate([block[name] for block in blocks]), whole[name])
@@ -71,7 +79,7 @@ def test_blocks_name_the_row_of_the_whole(
     with pytest.raises(InputError, match=message):
         read(path)
     with pytest.raises(InputError, match=message):
-        list(iter_parquet(path, rows))
+        in_blocks(path, rows)
 
 
 def test_blocks_refuse_what_the_whole_refuses(tmp_path: Path, log: pd.DataFrame) -> None:
@@ -82,7 +90,7 @@ def test_blocks_refuse_what_the_whole_refuses(tmp_path: Path, log: pd.DataFrame)
         (log.iloc[:0], "the table is empty"),
     ):
         path = put(tmp_path, spoilt)
-        for reading in (read, lambda p: list(iter_parquet(p, 100))):
+        for reading in (read, lambda p: in_blocks(p, 100)):
             with pytest.raises(InputError, match=message):
                 reading(path)
 

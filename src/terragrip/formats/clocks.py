@@ -191,9 +191,9 @@ def _regular(time: Floats, speed: Floats) -> tuple[float, Floats] | None:
 
 def _correlation(a: Floats, b: Floats) -> tuple[Floats, npt.NDArray[np.intp]]:
     """Correlation of a (n,) with b (m,) over their common part, at each lag of b by whole points."""
-    from scipy.fft import irfft, next_fast_len, rfft
+    from numpy.fft import irfft, rfft
 
-    size = next_fast_len(len(a) + len(b) - 1, real=True)
+    size = 1 << (len(a) + len(b) - 2).bit_length()
     masks = [np.isfinite(x).astype(np.float64) for x in (a, b)]
     values = [
         np.where(m > 0, x - np.nansum(x) / max(m.sum(), 1.0), 0.0) for x, m in zip((a, b), masks, strict=True)

@@ -1,227 +1,95 @@
-"""Text tables: CSV and its cousins, plain or gzipped."""
+"""Text tables: CSV and its cousins, plain or gzipped, in blocks that are cut at the ends of lines; a short one is one block."""
 
 from __future__ import annotations
 
-import os
-import re
+from collections.abc import Iterator
 from contextlib import closing
-from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import numpy.typing as npt
 
 from terragrip.errors import InputError
-from terragrip.files import refuse_missing, sha256
-from terragrip.formats.dialect import Dialect, detect, split, to_text
+from terragrip.files import refuse_missing
+from terragrip.formats.csv_cells import body_of, chosen_of, parse
+from terragrip.formats.dialect import HEAD, detect, in_utf8, to_text
 from terragrip.formats.registry import Format
-from terragrip.formats.table import LogTable, Wanted, from_arrow
+from terragrip.formats.table_on_disk import Columns, TableOnDisk
 from terragrip.formats.text_file import is_packed, length_of, opened, read
-from terragrip.formats.written_times import times_of
-from terragrip.recording.schema import LABELS, TIME, is_channel
-
-if TYPE_CHECKING:
-    import pyarrow as pa
-
-    from terragrip.formats.long_logs import LongLog
+from terragrip.recording.survey import ROWS
 
 SUFFIXES = (".csv", ".txt", ".tsv", ".dat", ".csv.gz", ".txt.gz", ".tsv.gz")
 _LONG = 256 << 20  # bytes
-_BLANKS = re.compile(rb"[ \t]+")
-_MISSING = [
-    *("", "NaN", "nan", "NAN", "-nan", "-NaN", "NA", "N/A", "n/a", "#N/A", "<NA>", "null", "NULL", "None"),
-    *("-", "--", "1.#QNAN", "-1.#IND", "nan(ind)", "-nan(ind)"),
-]
+_BLOCK = 16 << 20  # bytes
+_LOOK = 2 << 20  # bytes, where only some blocks are looked at
 
 
-def read_csv(path: str | os.PathLike[str], wanted: Wanted | None = None) -> LogTable:
-    """Read a text table, gzipped or not; separator, decimal sign, encoding and a units row are detected.
+def csv_on_disk(path: str) -> TableOnDisk:
+    """A text table, gzipped or not; separator, decimal sign, encoding and a units row are detected.
 
-    ``wanted`` says which columns to read (None: all, numbers where every cell is one). A column of the
-    recording's schema must hold numbers. Raises InputError with row and content: no such file, empty, not a
-    text table, no header, a row of another width, text in a number column.
+    Columns that are asked for are numbers where every cell is one; a column of the recording's schema must hold numbers. Raises
+    InputError with row and content, some of it where a block is reached: no such file, empty, not a text table, no header, a row of
+    another width, text in a number column, a name that stands twice.
     """
-    source = os.fspath(path)
-    refuse_missing(source, suffixes=SUFFIXES)
-    from terragrip.formats.csv_blocks import read_in_blocks
+    refuse_missing(path, suffixes=SUFFIXES)
+    with closing(opened(path)) as stream:
+        head = read(stream, HEAD, path)
+    whole = None
+    if b"\n" not in head or head.startswith((b"\xff\xfe", b"\xfe\xff")) or head.count(0) > 0.2 * len(head):
+        whole = _text_of(path)  # its lines cannot be told in its bytes: one block
+        dialect = detect(whole, path)
+    else:
+        dialect = detect(to_text(head[: head.rindex(b"\n") + 1], path), path)
+    length = length_of(path)
+    rows = max(1, round(length / max(len(head), 1) * head.count(b"\n")))
+    size = int(np.clip(ROWS * length / rows, 1 << 20, 4 * _BLOCK))
+    notes: list[str] = []
 
-    found = read_in_blocks(source, wanted)
-    if found is not None:
-        return found
-    raw = _whole(source)  # UTF-16, or lines that only to_text tells: one block
-    if len(raw) > _LONG and is_packed(source):  # there is no telling how much more
-        raise InputError("is not a table of text", file=source, mend="give a CSV or Parquet file")
+    def blocks(names: list[str], every: int) -> Iterator[Columns]:
+        chosen = chosen_of(dialect, set(names), path)
+        row = 0
+        parts = _lines(path, size if every == 1 else _LOOK) if whole is None else iter([(whole, True)])
+        for number, (data, is_first) in enumerate(parts):
+            if number % every:
+                continue
+            text = in_utf8(data.removeprefix(b"\xef\xbb\xbf"))
+            # A byte order mark, comments and the header stand in the first block only.
+            body, said = body_of(text, dialect, dialect.start if is_first else 0, more=not is_first)
+            notes.extend(said)
+            columns = parse(body, dialect, chosen, path, row)
+            row += max((len(column) for column in columns.values()), default=0)
+            yield columns
+
+    names = tuple(name for name in dialect.names if name)
+    return TableOnDisk(
+        names, dialect.units, path, rows, blocks, notes, is_long=whole is None and length > _LONG
+    )
+
+
+def _text_of(path: str) -> bytes:
+    """The content as UTF-8; of a packed file no more than is read at once, since there is no telling how much more there is."""
+    with closing(opened(path)) as stream:
+        raw = read(stream, _LONG + 1 if is_packed(path) else -1, path)
+    if len(raw) > _LONG and is_packed(path):
+        raise InputError("is not a table of text", file=path, mend="give a CSV or Parquet file")
     if not raw.strip():
-        raise InputError("is empty", file=source, mend="give a table with a header and rows")
-    data = to_text(raw, source)
-    dialect = detect(data, source)
-    body, notes = body_of(data, dialect, dialect.start)
-    names = dialect.names
-    chosen = chosen_of(dialect, wanted, source)
-    columns = parse(body, dialect, chosen, source)
-    return LogTable(
-        tuple(n for n in names if n), columns, dialect.units, source, sha256(source), tuple(notes)
-    )
+        raise InputError("is empty", file=path, mend="give a table with a header and rows")
+    return to_text(raw, path)
 
 
-def is_long(source: str) -> bool:
-    """Whether a file is so long that it is read in blocks; raises InputError where it cannot be opened."""
-    return length_of(source) > _LONG
-
-
-def _whole(source: str) -> bytes:
-    """The content; of a packed file a byte more than is read at once at most."""
+def _lines(source: str, size: int) -> Iterator[tuple[bytes, bool]]:
+    """Blocks of whole lines, and whether each is the first."""
+    rest, is_first = b"", True
     with closing(opened(source)) as stream:
-        return read(stream, _LONG + 1 if is_packed(source) else -1, source)
+        while data := read(stream, size, source):
+            data = rest + data
+            end = data.rfind(b"\n") + 1
+            rest = data[end:]
+            if len(rest) > 4 * size:
+                raise InputError("has no line ends", file=source, mend="give a table of text, a row a line")
+            if end:
+                yield data[:end], is_first
+                is_first = False
+    if rest.strip():
+        yield rest, is_first
 
 
-def chosen_of(dialect: Dialect, wanted: Wanted | None, source: str) -> list[int]:
-    """The places of the wanted columns; raises InputError where one stands twice."""
-    names = dialect.names
-    chosen = [k for k, name in enumerate(names) if name and (wanted is None or wanted(name))]
-    twice = next((names[k] for k in chosen if names.count(names[k]) > 1), None)
-    if twice is not None:
-        raise InputError("stands twice", file=source, place=f"column {twice}", mend="keep one of them")
-    return chosen
-
-
-def body_of(
-    data: bytes, dialect: Dialect, start: int, *, more: bool = False
-) -> tuple[bytes | memoryview, list[str]]:
-    """The rows from ``start`` on; a last line that was cut off while writing is left out, with a note.
-
-    ``more``: there are rows before these.
-    """
-    body: bytes | memoryview = memoryview(data)[start:]
-    notes = []
-    if not data.endswith(b"\n"):
-        last = data.rfind(b"\n") + 1
-        cells = split(data[last:].decode("utf-8", "replace"), dialect.separator)
-        if (last > start or more) and data[last:].strip() and len(cells) < len(dialect.names):
-            body = memoryview(data)[start:last]
-            notes.append("The last row is cut off and was left out.")
-    if dialect.separator == " ":
-        body = b"\n".join(_BLANKS.sub(b"\t", line.strip()) for line in bytes(body).splitlines())
-    return body, notes
-
-
-def parse(
-    body: bytes | memoryview, dialect: Dialect, chosen: list[int], source: str, first: int = 0
-) -> dict[str, npt.NDArray[Any]]:
-    """The chosen columns by name; ``first``: rows before these."""
-    import pyarrow as pa
-
-    names = dialect.names
-    if not bytes(body[:1024]).strip() and not bytes(body).strip():
-        return {names[k]: np.empty(0) for k in chosen}
-    types = {_field(k): pa.float64() for k in chosen if _is_number_column(names[k], body, dialect, k)}
-    types |= {_field(k): pa.string() for k in chosen if names[k] in LABELS}
-    try:
-        table = _arrow(body, dialect, chosen, types)
-    except (pa.ArrowInvalid, pa.ArrowKeyError) as error:
-        texts = _arrow_of_texts(body, dialect, chosen, error, source, first)
-        return {names[k]: _numbers_of_texts(names[k], texts.column(_field(k)), source, first) for k in chosen}
-    found = {names[k]: from_arrow(names[k], table.column(_field(k)), source) for k in chosen}
-    return {name: _as_times(name, column) for name, column in found.items()}
-
-
-def _as_times(name: str, column: npt.NDArray[Any]) -> npt.NDArray[Any]:
-    """A column, with times and dates that Arrow took for text."""
-    if column.dtype != object or name in LABELS:
-        return column
-    times = times_of(column.tolist())
-    return column if times is None else times
-
-
-def _is_number_column(name: str, body: bytes | memoryview, dialect: Dialect, index: int) -> bool:
-    if name == TIME:  # may be dates: leave those to Arrow
-        line = bytes(body[:4096]).lstrip().partition(b"\n")[0].decode("utf-8", "replace")
-        cells = split(line, "\t" if dialect.separator == " " else dialect.separator)
-        return not (index < len(cells) and re.match(r"\d{4}-\d\d-\d\d", cells[index]))
-    return is_channel(name)
-
-
-def _field(index: int) -> str:
-    return f"c{index}"  # by position, since names may repeat or be empty
-
-
-def _arrow(body: bytes | memoryview, dialect: Dialect, chosen: list[int], types: dict[str, Any]) -> pa.Table:
-    import pyarrow as pa
-    from pyarrow import csv
-
-    separator = "\t" if dialect.separator == " " else dialect.separator
-    return csv.read_csv(
-        pa.BufferReader(pa.py_buffer(body)),
-        read_options=csv.ReadOptions(column_names=[_field(k) for k in range(len(dialect.names))]),
-        parse_options=csv.ParseOptions(delimiter=separator),
-        convert_options=csv.ConvertOptions(
-            column_types=types,
-            include_columns=[_field(k) for k in chosen],
-            null_values=_MISSING,
-            strings_can_be_null=True,
-            decimal_point=dialect.decimal,
-        ),
-    )
-
-
-def _arrow_of_texts(
-    body: bytes | memoryview, dialect: Dialect, chosen: list[int], error: Exception, source: str, first: int
-) -> pa.Table:
-    """The columns as texts, where they cannot be read as numbers; raises InputError where rows do not fit."""
-    import pyarrow as pa
-
-    try:
-        return _arrow(body, dialect, chosen, {_field(k): pa.string() for k in chosen})
-    except (pa.ArrowInvalid, pa.ArrowKeyError):
-        raise _ragged(bytes(body), dialect, error, source, first) from error
-
-
-def _ragged(body: bytes, dialect: Dialect, error: Exception, source: str, first: int) -> InputError:
-    """The InputError that names the first row of another width than the header."""
-    separator, width = "\t" if dialect.separator == " " else dialect.separator, len(dialect.names)
-    lines = (line for line in body.decode("utf-8", "replace").splitlines() if line.strip())
-    for row, line in enumerate(lines, start=first + 1):
-        cells = len(split(line, separator))
-        if cells != width:
-            problem = f"has {cells} cells, the header {width}"
-            return InputError(problem, file=source, place=f"row {row}", mend="give every row as many cells")
-    problem = f"is not a regular table ({str(error)[:80]})"
-    return InputError(problem, file=source, mend="look for unbalanced quotes")
-
-
-def _numbers_of_texts(name: str, column: pa.ChunkedArray, source: str, first: int) -> npt.NDArray[Any]:
-    """Texts as numbers; a schema column raises InputError at the first that is none, another stays text."""
-    cells = column.to_pylist()
-    times = times_of(cells) if name == TIME or not (is_channel(name) or name in LABELS) else None
-    if times is not None:
-        return times
-    found = np.full(len(cells), np.nan)
-    for row, cell in enumerate(cells):
-        if cell is None:
-            continue
-        try:
-            found[row] = float(cell.replace(",", "."))
-        except ValueError:
-            if name in LABELS or not (is_channel(name) or name == TIME):
-                return np.array(cells, dtype=object)
-            shown = repr(cell) if len(cell) <= 30 else repr(cell[:27] + "...")
-            place = f"column {name}, row {first + row + 1}"
-            mend = "leave the cell empty or give a number"
-            raise InputError(f"{shown} is not a number", file=source, place=place, mend=mend) from None
-    return found
-
-
-def _in_blocks(path: str) -> LongLog | None:
-    from terragrip.formats.csv_blocks import long_csv
-
-    return long_csv(path)
-
-
-FORMATS = (
-    Format(
-        "csv",
-        "text table",
-        lambda path, wanted, databases: read_csv(path, wanted),
-        SUFFIXES,
-        in_blocks=_in_blocks,
-    ),
-)
+FORMATS = (Format("csv", "text table", None, SUFFIXES, in_blocks=csv_on_disk),)

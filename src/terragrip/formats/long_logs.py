@@ -3,44 +3,21 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, field, replace
-from functools import cached_property
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
 
-from terragrip.files import sha256
 from terragrip.formats.blocks import Columns, recordings
 from terragrip.formats.conversion import converted_block, settled
 from terragrip.formats.profile import Profile
 from terragrip.formats.registry import format_of
 from terragrip.formats.table import LogTable, in_si, since_clock_was_set
+from terragrip.formats.table_on_disk import TableOnDisk
 from terragrip.recording import LogBlocks, Recording
 from terragrip.recording.columns import seconds
 from terragrip.recording.schema import TIME, is_own
 from terragrip.recording.survey import ROWS
 
 PathLike = str | os.PathLike[str]
-
-
-@dataclass(frozen=True)
-class LongLog:
-    """A table on disk: its columns' ``names`` and ``units``, about how many ``rows`` it has, and what gives its blocks.
-
-    ``blocks`` takes the names that are wanted; it may add to ``notes`` as the blocks come. ``clocked``: as in `LogTable`, time is
-    none of the names, and the blocks have it all the same.
-    """
-
-    names: tuple[str, ...]
-    units: dict[str, str]
-    source: str
-    rows: int
-    blocks: Callable[[list[str]], Iterator[Columns]]
-    notes: list[str] = field(default_factory=list)
-    clocked: bool = False
-
-    @cached_property
-    def digest(self) -> str:
-        """SHA-256 of the file, computed once however often it is gone through."""
-        return sha256(self.source)
 
 
 def log_in_blocks(
@@ -67,7 +44,7 @@ def log_in_blocks(
     return LogBlocks(log.rows, blocks, lambda: read(path, chosen), from_disk=True)
 
 
-def recordings_of(log: LongLog, profile: Profile | None = None) -> Iterator[Recording] | None:
+def recordings_of(log: TableOnDisk, profile: Profile | None = None) -> Iterator[Recording] | None:
     """The recording that `terragrip.formats.read` gives, in blocks; None where a profile needs the whole log at once.
 
     Raises InputError as `read` does, each where its block is reached; that a channel is empty over the whole file shows at the end
@@ -78,7 +55,7 @@ def recordings_of(log: LongLog, profile: Profile | None = None) -> Iterator[Reco
         chosen = [name for name in log.names if is_own(name)]
         own = (
             in_si(block)
-            for block in _since_set(log, log.blocks(chosen), table, TIME, log.units.get(TIME, "s"))
+            for block in _since_set(log, log.blocks(chosen, 1), table, TIME, log.units.get(TIME, "s"))
         )
         return recordings(own, log.names, chosen, log.source, log.digest, log.notes)
     found = settled(profile, table)
@@ -90,11 +67,11 @@ def recordings_of(log: LongLog, profile: Profile | None = None) -> Iterator[Reco
     return recordings(_converted(log, ready, table), tuple(names), names, log.source, log.digest, log.notes)
 
 
-def _converted(log: LongLog, profile: Profile, table: LogTable) -> Iterator[Columns]:
+def _converted(log: TableOnDisk, profile: Profile, table: LogTable) -> Iterator[Columns]:
     """The blocks of a log as a `settled` profile makes channels of them."""
     asked = {profile.time.column, *(c for origin in profile.channels.values() for c in origin.columns)}
     first = None
-    blocks = log.blocks([name for name in log.names if name in asked])
+    blocks = log.blocks([name for name in log.names if name in asked], 1)
     for block in _since_set(log, blocks, table, profile.time.column, profile.time.unit):
         stamps = block.columns[profile.time.column]
         if not len(stamps):
@@ -106,7 +83,7 @@ def _converted(log: LongLog, profile: Profile, table: LogTable) -> Iterator[Colu
 
 
 def _since_set(
-    log: LongLog, blocks: Iterator[Columns], table: LogTable, column: str, unit: str
+    log: TableOnDisk, blocks: Iterator[Columns], table: LogTable, column: str, unit: str
 ) -> Iterator[LogTable]:
     """The blocks as tables, without first rows from before the logger's clock was set."""
     for number, block in enumerate(blocks):
@@ -117,7 +94,8 @@ def _since_set(
         yield part
 
 
-def long_log(path: str | os.PathLike[str]) -> LongLog | None:
+def long_log(path: str | os.PathLike[str]) -> TableOnDisk | None:
     """A log that is a long table; None of any other, or where its rows cannot be told beforehand."""
-    found = format_of(path)
-    return None if found.in_blocks is None else found.in_blocks(os.fspath(path))
+    own = format_of(path)
+    found = None if own.in_blocks is None else own.in_blocks(os.fspath(path))
+    return found if found is not None and found.is_long else None

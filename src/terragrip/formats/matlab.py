@@ -27,7 +27,7 @@ from terragrip.formats.table import LogTable, Wanted, kept_rows
 from terragrip.formats.worker import Worker
 
 if TYPE_CHECKING:
-    from terragrip.formats.long_logs import LongLog
+    from terragrip.formats.table_on_disk import TableOnDisk
 
 Floats = npt.NDArray[np.float64]
 
@@ -178,7 +178,7 @@ def _read(value: Any) -> npt.NDArray[Any]:
     return value.read() if isinstance(value, Array) else value
 
 
-def _in_blocks(path: str) -> LongLog | None:
+def _in_blocks(path: str) -> TableOnDisk | None:
     from terragrip.formats.matlab_long import long_matlab
 
     return long_matlab(path)

@@ -11,18 +11,18 @@ import numpy as np
 import numpy.typing as npt
 
 from terragrip.formats.boundary import needed, reading
-from terragrip.formats.long_logs import LongLog
 from terragrip.formats.matlab_hdf5 import is_hdf5, tree_of
 from terragrip.formats.matlab_signals import Found, seconds_of, walk
 from terragrip.formats.matlab_values import Array
+from terragrip.formats.table_on_disk import TableOnDisk
 from terragrip.recording.schema import TIME
 from terragrip.recording.survey import ROWS
 
 _LONG = 100_000_000  # bytes
 
 
-def long_matlab(path: str) -> LongLog | None:
-    """A large file of version 7.3 all of whose signals share one clock, as a `LongLog`; None of any other."""
+def long_matlab(path: str) -> TableOnDisk | None:
+    """A large file of version 7.3 all of whose signals share one clock, as a `TableOnDisk`; None of any other."""
     if os.path.getsize(path) < _LONG or not is_hdf5(path):
         return None
     h5py = needed("h5py", "a MATLAB 7.3 file")
@@ -32,7 +32,7 @@ def long_matlab(path: str) -> LongLog | None:
             return None
         rows, names, units = found.clock[1], tuple(found.signals), found.units
 
-    def blocks(chosen: list[str]) -> Iterator[dict[str, npt.NDArray[Any]]]:
+    def blocks(chosen: list[str], every: int) -> Iterator[dict[str, npt.NDArray[Any]]]:
         origin = None
         with h5py.File(path, "r") as file:
             with reading(path, "MATLAB file", RuntimeError):
@@ -43,7 +43,7 @@ def long_matlab(path: str) -> LongLog | None:
                 origin = float(block[TIME][0]) if origin is None else origin
                 yield {**block, TIME: block[TIME] - origin}
 
-    return LongLog(names, units, path, rows, blocks, clocked=True)
+    return TableOnDisk(names, units, path, rows, blocks, clocked=True, is_long=True)
 
 
 @dataclass(frozen=True)

@@ -103,7 +103,16 @@ def read_log(path: PathLike, wanted: Wanted | None = None, databases: Databases 
     if databases and not own.takes_databases:
         mend = "leave out --dbc, or 'dbc:' in the profile"
         raise InputError(f"is a {own.title}, which needs no DBC", file=path, mend=mend)
-    return own.read(os.fspath(path), wanted, databases)
+    if own.read is not None:
+        return own.read(os.fspath(path), wanted, databases)
+    table = None if own.in_blocks is None else own.in_blocks(os.fspath(path))
+    if table is None:
+        raise InputError(
+            f"is a {own.title}, which its format does not read",
+            file=path,
+            mend="update the package that brings it",
+        )
+    return table.whole(wanted)
 
 
 def _loaded(profile: Profile | PathLike | None) -> Profile | None:

@@ -20,8 +20,8 @@ from terragrip.files import refuse_missing, unreadable
 from terragrip.formats.table import LogTable, Wanted
 
 if TYPE_CHECKING:
-    from terragrip.formats.long_logs import LongLog
     from terragrip.formats.signals import SignalLog
+    from terragrip.formats.table_on_disk import TableOnDisk
 
 GROUP = "terragrip.formats"
 _OWN = (
@@ -47,17 +47,23 @@ class Format:
     ``name`` registers it, ``title`` is for messages. ``read`` gives of a path the ``wanted`` signals (None: all) as a `SignalLog`,
     or the columns of a table as a `LogTable`; it raises InputError where the file is damaged. A file is of this format where it begins
     with one of ``magic``, or ``recognises`` says so of its first 8 KiB; of a file that no format knows, one of ``suffixes`` tells.
-    ``takes_databases``: it holds CAN frames, which DBC files decode. ``in_blocks`` gives a long file as a `LongLog`, None of a short one.
+    ``takes_databases``: it holds CAN frames, which DBC files decode. ``in_blocks`` gives a file that is one table as a `TableOnDisk`;
+    without ``read`` it always does, with it None may come back.
     """
 
     name: str
     title: str
-    read: Reader
+    read: Reader | None = None
     suffixes: tuple[str, ...] = ()
     magic: tuple[bytes, ...] = ()
     recognises: Callable[[bytes], bool] | None = None
     takes_databases: bool = False
-    in_blocks: Callable[[str], LongLog | None] | None = None
+    in_blocks: Callable[[str], TableOnDisk | None] | None = None
+
+
+@cache
+def _own() -> dict[str, Format]:
+    return {one.name: one for module in _OWN for one in import_module(f"terragrip.formats.{module}").FORMATS}
 
 
 @cache
@@ -104,7 +110,7 @@ def format_of(path: str | os.PathLike[str]) -> Format:
     # package knows its name.
     binary = b"\0" in head and not head.startswith((b"\xff\xfe", b"\xfe\xff"))
     named = (one for one in known.values() if str(path).lower().endswith(one.suffixes))
-    return next((one for one in named if binary or not one.read.__module__.startswith(GROUP)), known["csv"])
+    return next((one for one in named if binary or one.name not in _own()), known["csv"])
 
 
 def _is_bag(folder: Path) -> bool:

@@ -1,0 +1,160 @@
+"""The rows of a text table as columns: numbers, texts, times; what is wrong with a row is said by its number."""
+
+from __future__ import annotations
+
+import re
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+
+from terragrip.errors import InputError
+from terragrip.formats.dialect import Dialect, split
+from terragrip.formats.table import from_arrow
+from terragrip.formats.written_times import times_of
+from terragrip.recording.schema import LABELS, TIME, is_channel
+
+if TYPE_CHECKING:
+    import pyarrow as pa
+
+_BLANKS = re.compile(rb"[ \t]+")
+_MISSING = [
+    *("", "NaN", "nan", "NAN", "-nan", "-NaN", "NA", "N/A", "n/a", "#N/A", "<NA>", "null", "NULL", "None"),
+    *("-", "--", "1.#QNAN", "-1.#IND", "nan(ind)", "-nan(ind)"),
+]
+
+
+def chosen_of(dialect: Dialect, chosen: set[str], source: str) -> list[int]:
+    """The places of the columns ``chosen`` by name; raises InputError where one stands twice."""
+    names = dialect.names
+    places = [k for k, name in enumerate(names) if name in chosen]
+    twice = next((names[k] for k in places if names.count(names[k]) > 1), None)
+    if twice is not None:
+        raise InputError("stands twice", file=source, place=f"column {twice}", mend="keep one of them")
+    return places
+
+
+def body_of(
+    data: bytes, dialect: Dialect, start: int, *, more: bool = False
+) -> tuple[bytes | memoryview, list[str]]:
+    """The rows from ``start`` on; a last line that was cut off while writing is left out, with a note.
+
+    ``more``: there are rows before these.
+    """
+    body: bytes | memoryview = memoryview(data)[start:]
+    notes = []
+    if not data.endswith(b"\n"):
+        last = data.rfind(b"\n") + 1
+        cells = split(data[last:].decode("utf-8", "replace"), dialect.separator)
+        if (last > start or more) and data[last:].strip() and len(cells) < len(dialect.names):
+            body = memoryview(data)[start:last]
+            notes.append("The last row is cut off and was left out.")
+    if dialect.separator == " ":
+        body = b"\n".join(_BLANKS.sub(b"\t", line.strip()) for line in bytes(body).splitlines())
+    return body, notes
+
+
+def parse(
+    body: bytes | memoryview, dialect: Dialect, chosen: list[int], source: str, first: int = 0
+) -> dict[str, npt.NDArray[Any]]:
+    """The chosen columns by name; ``first``: rows before these."""
+    import pyarrow as pa
+
+    names = dialect.names
+    if not bytes(body[:1024]).strip() and not bytes(body).strip():
+        return {names[k]: np.empty(0) for k in chosen}
+    types = {_field(k): pa.float64() for k in chosen if _is_number_column(names[k], body, dialect, k)}
+    types |= {_field(k): pa.string() for k in chosen if names[k] in LABELS}
+    try:
+        table = _arrow(body, dialect, chosen, types)
+    except (pa.ArrowInvalid, pa.ArrowKeyError) as error:
+        texts = _arrow_of_texts(body, dialect, chosen, error, source, first)
+        return {names[k]: _numbers_of_texts(names[k], texts.column(_field(k)), source, first) for k in chosen}
+    found = {names[k]: from_arrow(names[k], table.column(_field(k)), source) for k in chosen}
+    return {name: _as_times(name, column) for name, column in found.items()}
+
+
+def _as_times(name: str, column: npt.NDArray[Any]) -> npt.NDArray[Any]:
+    """A column, with times and dates that Arrow took for text."""
+    if column.dtype != object or name in LABELS:
+        return column
+    times = times_of(column.tolist())
+    return column if times is None else times
+
+
+def _is_number_column(name: str, body: bytes | memoryview, dialect: Dialect, index: int) -> bool:
+    if name == TIME:  # may be dates: leave those to Arrow
+        line = bytes(body[:4096]).lstrip().partition(b"\n")[0].decode("utf-8", "replace")
+        cells = split(line, "\t" if dialect.separator == " " else dialect.separator)
+        return not (index < len(cells) and re.match(r"\d{4}-\d\d-\d\d", cells[index]))
+    return is_channel(name)
+
+
+def _field(index: int) -> str:
+    return f"c{index}"  # by position, since names may repeat or be empty
+
+
+def _arrow(body: bytes | memoryview, dialect: Dialect, chosen: list[int], types: dict[str, Any]) -> pa.Table:
+    import pyarrow as pa
+    from pyarrow import csv
+
+    separator = "\t" if dialect.separator == " " else dialect.separator
+    return csv.read_csv(
+        pa.BufferReader(pa.py_buffer(body)),
+        read_options=csv.ReadOptions(column_names=[_field(k) for k in range(len(dialect.names))]),
+        parse_options=csv.ParseOptions(delimiter=separator),
+        convert_options=csv.ConvertOptions(
+            column_types=types,
+            include_columns=[_field(k) for k in chosen],
+            null_values=_MISSING,
+            strings_can_be_null=True,
+            decimal_point=dialect.decimal,
+        ),
+    )
+
+
+def _arrow_of_texts(
+    body: bytes | memoryview, dialect: Dialect, chosen: list[int], error: Exception, source: str, first: int
+) -> pa.Table:
+    """The columns as texts, where they cannot be read as numbers; raises InputError where rows do not fit."""
+    import pyarrow as pa
+
+    try:
+        return _arrow(body, dialect, chosen, {_field(k): pa.string() for k in chosen})
+    except (pa.ArrowInvalid, pa.ArrowKeyError):
+        raise _ragged(bytes(body), dialect, error, source, first) from error
+
+
+def _ragged(body: bytes, dialect: Dialect, error: Exception, source: str, first: int) -> InputError:
+    """The InputError that names the first row of another width than the header."""
+    separator, width = "\t" if dialect.separator == " " else dialect.separator, len(dialect.names)
+    lines = (line for line in body.decode("utf-8", "replace").splitlines() if line.strip())
+    for row, line in enumerate(lines, start=first + 1):
+        cells = len(split(line, separator))
+        if cells != width:
+            problem = f"has {cells} cells, the header {width}"
+            return InputError(problem, file=source, place=f"row {row}", mend="give every row as many cells")
+    problem = f"is not a regular table ({str(error)[:80]})"
+    return InputError(problem, file=source, mend="look for unbalanced quotes")
+
+
+def _numbers_of_texts(name: str, column: pa.ChunkedArray, source: str, first: int) -> npt.NDArray[Any]:
+    """Texts as numbers; a schema column raises InputError at the first that is none, another stays text."""
+    cells = column.to_pylist()
+    times = times_of(cells) if name == TIME or not (is_channel(name) or name in LABELS) else None
+    if times is not None:
+        return times
+    found = np.full(len(cells), np.nan)
+    for row, cell in enumerate(cells):
+        if cell is None:
+            continue
+        try:
+            found[row] = float(cell.replace(",", "."))
+        except ValueError:
+            if name in LABELS or not (is_channel(name) or name == TIME):
+                return np.array(cells, dtype=object)
+            shown = repr(cell) if len(cell) <= 30 else repr(cell[:27] + "...")
+            place = f"column {name}, row {first + row + 1}"
+            mend = "leave the cell empty or give a number"
+            raise InputError(f"{shown} is not a number", file=source, place=place, mend=mend) from None
+    return found
