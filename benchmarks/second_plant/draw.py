@@ -22,6 +22,7 @@ from terragrip.simulation.families import (
     draw_faults,
     draw_sensors,
     draw_speeds,
+    uncertainty,
 )  # fmt: skip
 from terragrip.simulation.family_machines import Machine, draw_machine
 from terragrip.simulation.fields import stream
@@ -109,11 +110,7 @@ def draw(
     )
     turning = kind.sensors != "plain" and task != "digging" and rng.uniform() < 0.6
     work = _work(rng, machine, vehicle, points, asked if towing else 0.0, duration, turning, task)
-    if kind.sensors not in (
-        "even",
-        "multirate",
-        "uncoupled",
-    ):  # no pitch: its user knows how hilly the ground is
+    if "pitch" not in tree["sensors"]:  # how hilly the ground is, its user knows
         tree["vehicle"]["uncertainty"]["slope"] = max(0.0087, hills / 2.5)
     tree |= {
         "speed": points,
@@ -172,16 +169,7 @@ def _machine_tree(
     tree["sensors"], tree["vehicle"]["sensors"] = draw_sensors(
         stream(seed, f"sensors {kind}"), kind.sensors, machine, rate
     )
-    torque = tree["sensors"]["drive_torque"]
-    tree["vehicle"]["uncertainty"] = {
-        "drive_torque_gain": torque["gain_sd"],
-        "drive_torque_offset": max(torque["offset_sd"], 1e-6),
-        "drawbar_offset": machine.drawbar_offset,
-        "slope": 0.0087,
-        "vertical_load": 0.02,
-        "wheel_radius": machine.radius_error,
-        "acceleration_bias": 0.03,
-    }
+    tree["vehicle"]["uncertainty"] = uncertainty(tree["sensors"], machine, 0.0087)
     return tree, Vehicle.from_dict(tree["vehicle"])
 
 

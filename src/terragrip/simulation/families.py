@@ -16,7 +16,7 @@ import numpy as np
 
 from terragrip.errors import InputError
 from terragrip.simulation.family_machines import Machine, draw_machine
-from terragrip.simulation.family_soils import SOILS_OF, capacity, draw_soils
+from terragrip.simulation.family_soils import SOILS_OF, NoSinkage, capacity, draw_soils
 from terragrip.simulation.fields import stream
 from terragrip.simulation.scenario import Scenario
 from terragrip.simulation.simulate import SimulationResult, simulate
@@ -24,6 +24,7 @@ from terragrip.units import STANDARD_GRAVITY
 
 Tree = dict[str, Any]
 Part = Literal["development", "held-out"]
+Task = Literal["work", "healthy", "digging"]
 
 MASSES: dict[str, tuple[float, float]] = {
     "light": (5.0, 50.0),
@@ -47,6 +48,8 @@ LOAD_VARIATION = (0.02, 0.08)
 """Relative standard deviation of a wheel's load, from and to, over about 1.25 wheel radii."""
 WORK = (0.45, 0.8)
 """Share of what the ground bears at 20 % of slip that tools and hills together ask for at most, from and to."""
+SOFTNESS = (0.9, 1.4)
+"""What a soft spot asks for over what it bears, before wheels sink in by slip."""
 
 
 @dataclass(frozen=True, order=True)
@@ -95,33 +98,71 @@ def _seen_before(listed: tuple[Kind, ...], order: Any, k: int) -> int:
     return max(sum(b.mass == kind.mass for b in before), sum(b.curve == kind.curve for b in before))
 
 
-def draw(kind: Kind, seed: int, *, rate: float | None = None, faults: bool = False) -> SimulationResult:
+def draw(
+    kind: Kind,
+    seed: int,
+    *,
+    rate: float | None = None,
+    faults: bool = False,
+    task: Task = "work",
+    duration: float | None = None,
+) -> SimulationResult:
     """One machine of a kind on its drive: the recording, the truth, and the vehicle as its user wrote it.
 
     ``rate`` [1/s] (of the wheel speeds; default: drawn) and ``faults`` (gaps, spikes, jitter, held values and an outage of the
-    ground speed, all in one log) change what is recorded, not the machine, its ground and its drive. Raises InputError on a
-    kind that there is not.
+    ground speed, all in one log) change what is recorded, not the machine, its ground and its drive. ``task``: work (speeds,
+    pulls, curves, stops and starts), healthy (the same, rougher and with hits, for warnings) or digging (a steady command
+    into a soft spot that bears less than is asked, in which slip digs the wheels in). ``duration`` [s] of work and healthy drives,
+    where not drawn. Raises InputError on a kind that there is not.
     """
-    return simulate(scenario(kind, seed, rate=rate, faults=faults), seed)
+    return simulate(scenario(kind, seed, rate=rate, faults=faults, task=task, duration=duration), seed)
 
 
-def scenario(kind: Kind, seed: int, *, rate: float | None = None, faults: bool = False) -> Scenario:
+def scenario(
+    kind: Kind,
+    seed: int,
+    *,
+    rate: float | None = None,
+    faults: bool = False,
+    task: Task = "work",
+    duration: float | None = None,
+) -> Scenario:
     """The scenario that :func:`draw` simulates. Raises as it does."""
     if kind not in kinds():
         raise InputError(f"no such kind {kind}", mend="take one of families.kinds()")
     rng = stream(seed, f"family {kind}")
     machine = draw_machine(rng, MASSES[kind.mass])
     soils, spots = draw_soils(rng, kind.curve, machine)
-    towing, turning = kind.sensors != "uncoupled", kind.sensors != "plain" and rng.uniform() < 0.5
-    beat = np.sqrt(machine.scale)  # what a second is to the robot
-    duration = float(np.clip(90.0 * beat, 50.0, 150.0))
-    speed = draw_speeds(rng, machine, duration)
-    length = 1.1 * sum(0.5 * (b[1] + a[1]) * (b[0] - a[0]) for a, b in pairwise(speed[1:]))
-    length += 5 * machine.wheelbase + machine.scale
+    towing = kind.sensors != "uncoupled" or task != "work"
+    turning = kind.sensors != "plain" and rng.uniform() < 0.5 and task != "digging"
+    beat = float(np.sqrt(machine.scale))  # what a second is to the robot
     work = rng.uniform(*WORK)
     bears = {name: work * capacity(soil, spots) for name, soil in soils.items()}
     hills = min(bears.values()) * (rng.uniform(0.0, 0.35) if towing else rng.uniform(0.5, 1.0))
-    name = f"{kind}-{seed}"
+    soft: list[Tree] = []
+    if task == "digging":
+        soils = {"soil1": soils["soil1"]}
+        hills *= 0.3
+        asked = rng.uniform(0.1, 0.6) * capacity(soils["soil1"], spots)
+        soft = [draw_soft_spot(rng, machine, soils["soil1"], spots, asked)]
+        level = machine.speed * rng.uniform(0.6, 1.3)
+        duration = 13.0 * beat + 15.0 * machine.scale / level
+        speed: list[list[Any]] = [[0.0, "off"], [2 * beat, 0.0], [3 * beat, level], [duration, level]]
+    else:
+        duration = duration or float(np.clip(90.0 * beat, 50.0, 150.0))
+        speed = draw_speeds(rng, machine, duration)
+    length = 1.1 * sum(0.5 * (b[1] + a[1]) * (b[0] - a[0]) for a, b in pairwise(speed[1:]))
+    length += 5 * machine.wheelbase + machine.scale
+    if task == "healthy":
+        for soil in soils.values():
+            soil["roughness"] *= 2.0
+    tools: list[Tree] = []
+    if task == "digging":
+        pull = asked * machine.mass / (0.4 * machine.mass)
+        tools = [_tool_body(machine, 0.4 * machine.mass) | {"friction": {"soil1": pull}}]
+    elif towing:
+        tools = [_tool(rng, machine, bears, length, hills, hits=task == "healthy")]
+    name = f"{kind}-{seed}" if task == "work" else f"{kind}-{task}-{seed}"
     tree: Tree = {
         "name": name,
         "seed": seed,
@@ -133,12 +174,12 @@ def scenario(kind: Kind, seed: int, *, rate: float | None = None, faults: bool =
             "steers": True,
         },
         "soils": soils,
-        "soft_spots": spots(length),
+        "soft_spots": spots(length) + soft,
         "route": {
             **_route(rng, machine, list(soils), length, turning),
             "slope": {"sd": hills / 2.5, "length": rng.uniform(8.0, 20.0) * machine.scale},
         },
-        "tools": [_tool(rng, machine, bears, length, hills)] if towing else [],
+        "tools": tools,
         "speed": speed,
         "duration": duration,
         "driver": {"acts": False},
@@ -146,19 +187,50 @@ def scenario(kind: Kind, seed: int, *, rate: float | None = None, faults: bool =
     }
     noise = stream(seed, f"family sensors {kind}")
     tree["sensors"], tree["vehicle"]["sensors"] = draw_sensors(noise, kind.sensors, machine, rate)
-    tree["vehicle"]["uncertainty"] = {
-        "drive_torque_gain": tree["sensors"]["drive_torque"]["gain_sd"],
-        "drive_torque_offset": max(tree["sensors"]["drive_torque"]["offset_sd"], 1e-6),
+    slope = (
+        0.0087 if "pitch" in tree["sensors"] else max(0.0087, hills / 2.5)
+    )  # how hilly it is, a user knows
+    tree["vehicle"]["uncertainty"] = uncertainty(tree["sensors"], machine, slope)
+    tree["faults"] = draw_faults(duration, machine, kind.sensors) if faults else []
+    return Scenario.from_dict(tree, file=name)
+
+
+def uncertainty(sensors: Tree, machine: Machine, slope: float) -> Tree:
+    """What an honest user writes down of what is not known: the spreads that gains, offsets and radius were drawn with."""
+    torque = sensors["drive_torque"]
+    return {
+        "drive_torque_gain": torque["gain_sd"],
+        "drive_torque_offset": torque["offset_sd"],
         "drawbar_offset": machine.drawbar_offset,
-        "slope": 0.0087
-        if "pitch" in tree["sensors"]
-        else max(0.0087, hills / 2.5),  # how hilly it is, a user knows
+        "slope": slope,
         "vertical_load": 0.02,
         "wheel_radius": machine.radius_error,
         "acceleration_bias": 0.03,
     }
-    tree["faults"] = draw_faults(duration, machine, kind.sensors) if faults else []
-    return Scenario.from_dict(tree, file=name)
+
+
+def draw_soft_spot(
+    rng: np.random.Generator, machine: Machine, soil: Tree, spots: NoSinkage, asked: float
+) -> Tree:
+    """A soft spot 7 m ahead (for the robot, as all lengths here) that bears less than ``asked`` (pull over weight) of a soil."""
+    bears, scale = capacity(soil, spots), machine.scale
+    resistance = float(soil["resistance"])
+    loss, softness, share = rng.uniform(0.05, 0.35), rng.uniform(*SOFTNESS), rng.uniform(0.3, 0.7)
+    added = max(softness * (bears + resistance) * (1 - loss) - resistance - asked, 0.0)
+    length = rng.uniform(3.0, 8.0) * scale
+    alone = len(machine.counts) == 1
+    return {
+        "at": 7.0 * scale + 0.5 * length,
+        "length": length,
+        "edge": rng.uniform(0.2, 0.5) * length,
+        "front": added if alone else 2 * share * added,
+        "rear": added if alone else 2 * (1 - share) * added,
+        "sinkage": rng.uniform(0.2, 1.0),
+        "sinkage_length": rng.uniform(0.4, 1.5) * scale,
+        "loosening": rng.uniform(1.0, 3.0),
+        "adhesion_loss": loss,
+        "adhesion_fall": rng.uniform(0.1, 0.5),
+    }
 
 
 def draw_speeds(rng: np.random.Generator, machine: Machine, duration: float) -> list[list[Any]]:
@@ -217,11 +289,16 @@ def _route(
 
 
 def _tool(
-    rng: np.random.Generator, machine: Machine, bears: dict[str, float], length: float, hills: float
+    rng: np.random.Generator,
+    machine: Machine,
+    bears: dict[str, float],
+    length: float,
+    hills: float,
+    hits: bool,
 ) -> Tree:
     """A towed tool: friction that leaves each soil room for hills, and draught that comes and goes along the way.
 
-    ``bears``: pull over weight that may be asked of each soil.
+    ``bears``: pull over weight that may be asked of each soil. ``hits``: short ones on roots and stones besides.
     """
     spare = {name: max(pull - hills, 0.02) for name, pull in bears.items()}
     usual, mass = rng.uniform(0.15, 0.5), machine.mass * rng.uniform(0.25, 0.6)
@@ -234,16 +311,30 @@ def _tool(
             rng.uniform(2, 6) * scale,
             most * rng.uniform(0.2, 1.0),
         )
+        if hits and rng.uniform() < 0.4:
+            ramp, stay, size = (
+                rng.uniform(0.02, 0.08) * scale,
+                rng.uniform(0.01, 0.04) * scale,
+                weight * rng.uniform(0.06, 0.2),
+            )
         points += [[x, 0.0], [x + ramp, size], [x + ramp + stay, size], [x + 2 * ramp + stay, 0.0]]
         x += 2 * ramp + stay + rng.uniform(1, 5) * scale
-    return {
-        "mass": mass,
-        "length": machine.tool_length,
+    slack = rng.uniform(0.0, 0.04) * scale
+    return _tool_body(machine, mass) | {
         "friction": {name: usual * share * machine.mass / mass for name, share in spare.items()},
         "added": points,
         "draught_speed": 0.2 / np.sqrt(scale),
+        "slack": slack,
+    }
+
+
+def _tool_body(machine: Machine, mass: float) -> Tree:
+    scale = machine.scale
+    return {
+        "mass": mass,
+        "length": machine.tool_length,
         "shear_length": 0.01 * scale,
-        "slack": rng.uniform(0.0, 0.04) * scale,
+        "slack": 0.0,
         "stiffness": 600.0 * mass / scale,
         "damping": 13.0 * mass / np.sqrt(scale),
     }
