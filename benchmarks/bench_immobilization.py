@@ -1,54 +1,56 @@
-"""Is a vehicle's getting stuck foretold, and how often for nothing? On simulated drives that nothing was tuned on.
+"""Is a vehicle's getting stuck foretold, how early, and how often for nothing? On random machines, and on made-up snow runs.
 
-    python benchmarks/bench_immobilization.py [--seeds 3000 3019] [--write]
+    python benchmarks/bench_immobilization.py [--part development held-out] [--machines 150] [--seed 0] [--rates 100 10]
+                                              [--snow] [--workers 1] [--write]
 
-Drives into soft spots and rough but healthy ones (terragrip.simulation.soft_spots), for each seed on the paper's prototype
-curve and on one that peaks and falls, as seen by four sets of sensors. A full stop: ground speed first under 0.03 m/s with
-turning wheels, by the truth. A warning counts from its start; missed: none before the full stop, once the spot has begun;
-a vehicle that never gets that far says nothing about spots.
-False: a warning on a healthy drive, where the machine did not stop within LATER seconds; of a drive on which it got stuck
-by itself, only what is earlier than that counts, as time too. --write puts the table into docs/events.md.
+Machines: terragrip.simulation.families, without a drawbar cell. Each drives into a soft spot (family_stops), and its own rough but healthy
+drive with loads, hills, stops and starts; at every rate. --snow: the runs of snow_runs.py instead, which are development too.
+A stop, by the truth: ground speed first under 5 % of the commanded speed with turning rims. Missed: no warning between the spot's begin
+and the stop. Lead: from the warning's begin to the stop, in seconds and in lengths of the vehicle travelled meanwhile. Late: `stuck` is
+flagged later than half a second after the stop. False: every warning that begins on a healthy drive (one that stops by itself counts up
+to LATER before that), or before the spot. Bounds are of 95 %: Wilson's of a share, the exact ones of a Poisson rate and of a median.
+--write puts the table into docs/events.md.
 """
 
 from __future__ import annotations
 
 import argparse
+from collections.abc import Iterable
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pandas as pd
+from numpy.typing import NDArray
+from scipy.stats import binom, chi2
 
+import snow_runs
 from marked import put
-from terragrip.estimation import estimate
-from terragrip.ground.events import events
-from terragrip.simulation import SimulationResult, simulate
-from terragrip.simulation.soft_spots import CURVES, healthy_drive, soft_spot_drive
+from terragrip.estimation import Estimates, estimate
+from terragrip.estimation.engine import EVENTS
+from terragrip.simulation import SimulationResult
+from terragrip.simulation.families import Kind, machines
+from terragrip.simulation.family_stops import healthy_drive, stop_drive
+from terragrip.vehicle import Vehicle
 
-KINDS = ("spot", "healthy")
-SENSORS: dict[str, dict[str, Any]] = {
-    "100 Hz, drawbar cell": {},
-    "100 Hz": {"drawbar": False},
-    "10 Hz": {"rate": 10.0, "drawbar": False},
-    "50 Hz, ground speed 2 Hz": {"rate": 50.0, "drawbar": False, "ground_rate": 2.0},
-}
-STOPPED, TURNING = 0.03, 0.15  # m/s of ground and rim
-SPOT = 6.0  # m: here the spot may begin
+WARNED, STUCK = EVENTS.index("immobilization"), EVENTS.index("stuck")
+CREEP, TURNING = 0.05, 0.2  # of the commanded speed: slower is a stop, where the rims are faster
 LATER = 8.0  # s
+IN_TIME = 0.5  # s
 DOCUMENT = Path(__file__).resolve().parents[1] / "docs/events.md"
-BEGIN = "<!-- made by benchmarks/bench_immobilization.py --write -->"
+BEGIN = "<!-- made by benchmarks/bench_immobilization.py --write: {part} -->"
 
 
 @dataclass
 class Tally:
-    """What the warnings of one set of sensors on one curve were worth."""
+    """What the warnings of one kind of drive were worth: leads [s] and in vehicle lengths, speeds [m/s] before those stops."""
 
     leads: list[float] = field(default_factory=list)
+    lengths: list[float] = field(default_factory=list)
+    speeds: list[float] = field(default_factory=list)
     missed: int = 0
-    passed: int = 0
-    passed_warned: int = 0
+    late: int = 0
     false: int = 0
     seconds: float = 0.0
 
@@ -57,116 +59,208 @@ class Tally:
             setattr(self, name, getattr(self, name) + value)
 
     def row(self) -> list[str]:
-        leads = np.array(self.leads)
+        stops = len(self.leads) + self.missed
+        slow = [lead for lead, speed in zip(self.leads, self.speeds, strict=True) if speed <= 1.0]
+        rate = [x / max(self.seconds, 1.0) * 1800 for x in poisson_bounds(self.false)]
         return [
-            str(len(leads) + self.missed),
-            str(self.missed),
-            f"{np.median(leads):.1f}" if len(leads) else "–",
-            f"{np.quantile(leads, 0.1):.1f}" if len(leads) else "–",
-            f"{self.passed_warned} of {self.passed}",
-            f"{self.seconds / 60:.0f}",
-            str(self.false),
-            f"{self.false / max(self.seconds, 1.0) * 1800:.1f}",
+            str(stops),
+            f"{self.missed} ({_percent(wilson(self.missed, stops))})",
+            _median(self.leads),
+            _median(slow),
+            f"{np.quantile(self.leads, 0.1):.1f}" if self.leads else "–",
+            f"{np.median(self.lengths):.1f}" if self.lengths else "–",
+            str(self.late),
+            f"{self.seconds / 3600:.1f}",
+            f"{self.false}",
+            f"{self.false / max(self.seconds, 1.0) * 1800:.2f} ({rate[0]:.2f} to {rate[1]:.2f})",
         ]
+
+
+HEAD = (
+    "stops",
+    "missed (%)",
+    "lead (s)",
+    "lead up to 1 m/s (s)",
+    "lead, 10 % (s)",
+    "lead (lengths)",
+    "`stuck` late",
+)
+HEAD += ("healthy (h)", "false", "false in 30 min")
+
+
+def wilson(hits: int, of: int, z: float = 1.96) -> tuple[float, float]:
+    """Wilson's bounds of a share."""
+    if of == 0:
+        return 0.0, 1.0
+    p, scale = hits / of, 1 + z**2 / of
+    half = z * np.sqrt(p * (1 - p) / of + z**2 / (4 * of**2)) / scale
+    middle = (p + z**2 / (2 * of)) / scale
+    return max(float(middle - half), 0.0), float(middle + half)
+
+
+def poisson_bounds(count: int) -> tuple[float, float]:
+    """Exact 95 % bounds of a Poisson mean (Garwood)."""
+    low = float(chi2.ppf(0.025, 2 * count)) / 2 if count else 0.0
+    return low, float(chi2.ppf(0.975, 2 * count + 2)) / 2
+
+
+def _percent(share: tuple[float, float]) -> str:
+    return f"{100 * share[0]:.1f} to {100 * share[1]:.1f}"
+
+
+def _median(values: list[float]) -> str:
+    """Median and its distribution-free 95 % bounds."""
+    if len(values) < 6:
+        return "–"
+    ranked = np.sort(values)
+    low = int(binom.ppf(0.025, len(values), 0.5))
+    return f"{np.median(values):.2f} ({ranked[max(low - 1, 0)]:.2f} to {ranked[min(len(values) - low, len(values) - 1)]:.2f})"
 
 
 @dataclass(frozen=True)
 class Course:
-    """What befell a vehicle, by the truth [s]: its first full stop (NaN: none), where the spot may begin (infinite: never
-    reached) and the end."""
+    """What befell a vehicle, by the truth: time [s] and travel [m] of its rows, its first stop (NaN: none), where the soft ground
+    begins (infinite: never reached), its speed before, its length [m]."""
 
+    time: NDArray[np.float64]
+    distance: NDArray[np.float64]
     stop: float
     begun: float
-    end: float
+    speed: float
+    length: float
 
 
-def course_of(truth: pd.DataFrame) -> Course:
-    """A full stop: it first stands with turning wheels."""
-    wheels = [c for c in truth if c.startswith("true_wheel_speed_")]
+def length_of(vehicle: Vehicle) -> float:
+    """Wheelbase, of one axle three wheel radii [m]."""
+    return float(np.ptp(vehicle.axle_to_rear)) or 3 * float(np.mean(vehicle.wheel_radius))
+
+
+def course_of(truth: pd.DataFrame, vehicle: Vehicle, spot: float) -> Course:
+    """``spot`` [m]: where the ground becomes soft; infinite on a healthy drive."""
+    rims = [
+        radius * truth[f"true_wheel_speed_{wheel}"].abs()
+        for wheel, radius, driven in zip(vehicle.wheels, vehicle.wheel_radius, vehicle.driven, strict=True)
+        if driven
+    ]
+    rim, speed = np.mean(rims, axis=0), truth["true_ground_speed"].abs().to_numpy()
     time, distance = truth["time"].to_numpy(), truth["true_distance"].to_numpy()
-    rim = 0.2 * truth[wheels].abs().mean(axis=1).to_numpy()
-    held = (truth["true_ground_speed"].to_numpy() < STOPPED) & (rim > TURNING) & (distance > 2.0)
-    reached = distance > SPOT
+    level, length = float(np.quantile(rim, 0.9)), length_of(vehicle)
+    held = (speed < CREEP * level) & (rim > TURNING * level) & (distance > length)
+    reached = distance > spot - length
     return Course(
+        time=time,
+        distance=distance,
         stop=float(time[np.argmax(held)]) if held.any() else np.nan,
         begun=float(time[np.argmax(reached)]) if reached.any() else np.inf,
-        end=float(time[-1]),
+        speed=level,
+        length=length,
     )
 
 
-def judge(kind: str, course: Course, starts: list[float]) -> Tally:
-    """Warnings that start at ``starts`` [s], on a drive into a spot or a healthy one."""
-    if kind == "healthy":
-        end = course.end if np.isnan(course.stop) else course.stop - LATER
-        return Tally(false=sum(t < end for t in starts), seconds=max(end, 0.0))
-    starts = [t for t in starts if t > course.begun]
-    if np.isinf(course.begun) or course.stop < course.begun:
-        return Tally()  # it never got there
-    if np.isnan(course.stop):
-        return Tally(passed=1, passed_warned=int(bool(starts)))
-    before = [t for t in starts if t < course.stop]
-    return Tally(leads=[course.stop - before[0]]) if before else Tally(missed=1)
+def begins(estimates: Estimates, code: int) -> list[float]:
+    """When each spell of an event begins [s]."""
+    there = estimates.event_codes == code
+    return [float(t) for t in estimates.time[there & ~np.concatenate([[False], there[:-1]])]]
 
 
-def simulated(kind: str, seed: int, curve: str, sensors: dict[str, Any]) -> SimulationResult:
-    """A drive into a soft spot, or a healthy one; healthy ones of even seeds with faults."""
-    scenario = (
-        soft_spot_drive(seed, curve, **sensors)
-        if kind == "spot"
-        else healthy_drive(seed, curve, faults=seed % 2 == 0, **sensors)
-    )
-    return simulate(scenario, seed)
-
-
-def score(job: tuple[int, str, str]) -> Tally:
-    """One seed, curve and set of sensors."""
-    seed, curve, name = job
-    tally = Tally()
-    for kind in KINDS:
-        result = simulated(kind, seed, curve, SENSORS[name])
-        found = events(estimate(result.recording, result.vehicle))
-        starts = [event.start for event in found if event.kind == "immobilization"]
-        tally.add(judge(kind, course_of(result.truth), starts))
+def judge(course: Course, estimates: Estimates) -> Tally:
+    """A drive into soft ground, or (``begun`` infinite) a healthy one."""
+    warned = begins(estimates, WARNED)
+    end = min(course.begun, float(course.time[-1]) if np.isnan(course.stop) else course.stop - LATER)
+    tally = Tally(false=sum(t < end for t in warned), seconds=max(end, 0.0))
+    if np.isinf(course.begun) or not course.stop > course.begun:
+        return tally
+    on = bool(estimates.event_codes[np.searchsorted(estimates.time, course.begun) - 1] == WARNED)
+    before = [course.begun] * on + [t for t in warned if course.begun <= t < course.stop]
+    tally.false = sum(t < course.begun for t in warned)
+    tally.seconds = course.begun
+    tally.late = int(not any(course.begun < t <= course.stop + IN_TIME for t in begins(estimates, STUCK)))
+    if not before:
+        tally.missed = 1
+        return tally
+    way = np.interp([before[0], course.stop], course.time, course.distance)
+    tally.leads, tally.lengths = [course.stop - before[0]], [float(way[1] - way[0]) / course.length]
+    tally.speeds = [course.speed]
     return tally
 
 
-def table(tallies: dict[tuple[str, str], Tally]) -> str:
-    head = [
-        "sensors",
-        "curve",
-        "stops",
-        "missed",
-        "lead, median (s)",
-        "lead, 10 % (s)",
-        "warned of the passed",
-    ]
-    head += ["healthy (min)", "false", "false in 30 min"]
-    lines = ["| " + " | ".join(head) + " |", "|" + "---|" * len(head)]
+def score(job: tuple[Kind, int, float, bool]) -> Tally:
+    """One machine at one rate, into soft ground or on its healthy drive."""
+    kind, seed, rate, soft = job
+    result: SimulationResult = (stop_drive if soft else healthy_drive)(kind, seed, rate)
+    spot = result.scenario.soft_spots[-1] if soft else None
+    at = np.inf if spot is None or spot.at is None else spot.at - 0.5 * spot.length
+    return judge(course_of(result.truth, result.vehicle, at), estimate(result.recording, result.vehicle))
+
+
+def score_snow(job: tuple[int, bool]) -> Tally:
+    """One made-up snow run, or 5 minutes of healthy snow; the truth is the run's own."""
+    seed, soft = job
+    run = snow_runs.snow_run(seed) if soft else snow_runs.healthy_snow(seed)
+    course = Course(
+        run.time,
+        run.distance,
+        run.stop,
+        run.begun if soft else np.inf,
+        run.command,
+        length_of(snow_runs.rover()),
+    )
+    return judge(course, estimate(run.recording, snow_runs.rover()))
+
+
+def table(tallies: dict[str, Tally]) -> str:
+    lines = ["| drives | " + " | ".join(HEAD) + " |", "|" + "---|" * (len(HEAD) + 1)]
     total = Tally()
-    for (name, curve), tally in tallies.items():
+    for name, tally in tallies.items():
         total.add(tally)
-        lines.append("| " + " | ".join([name, curve, *tally.row()]) + " |")
-    lines.append("| " + " | ".join(["**all**", "", *total.row()]) + " |")
+        lines.append(f"| {name} | " + " | ".join(tally.row()) + " |")
+    lines.append("| **all** | " + " | ".join(total.row()) + " |")
     return "\n".join(lines)
+
+
+def run(names: Iterable[str], jobs: list[tuple[Kind, int, float, bool]], workers: int) -> dict[str, Tally]:
+    tallies: dict[str, Tally] = {}
+    with ProcessPoolExecutor(workers) as pool:
+        for name, tally in zip(names, pool.map(score, jobs, chunksize=4), strict=True):
+            tallies.setdefault(name, Tally()).add(tally)
+    return dict(sorted(tallies.items()))
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
-    parser.add_argument("--seeds", type=int, nargs=2, default=(3000, 3019), metavar=("FIRST", "LAST"))
-    parser.add_argument("--sensors", nargs="*", default=list(SENSORS), choices=list(SENSORS))
+    parser.add_argument("--part", default="development", choices=["development", "held-out"])
+    parser.add_argument("--machines", type=int, default=150)
+    parser.add_argument("--seed", type=int, default=0, help="of the first machine")
+    parser.add_argument("--rates", type=float, nargs="+", default=[100.0, 10.0])
+    parser.add_argument("--by", default="rate", choices=["rate", "mass", "curve", "sensors"])
+    parser.add_argument("--snow", action="store_true")
     parser.add_argument("--workers", type=int, default=1)
     parser.add_argument("--write", action="store_true", help="put the table into docs/events.md")
     arguments = parser.parse_args()
-    seeds = range(arguments.seeds[0], arguments.seeds[1] + 1)
-    jobs = [(seed, curve, name) for name in arguments.sensors for curve in CURVES for seed in seeds]
-    tallies: dict[tuple[str, str], Tally] = {}
-    with ProcessPoolExecutor(arguments.workers) as pool:
-        for (_, curve, name), tally in zip(jobs, pool.map(score, jobs), strict=True):
-            tallies.setdefault((name, curve), Tally()).add(tally)
-    text = table(tallies)
+    if arguments.snow:
+        snow = Tally()
+        for soft, count in ((True, snow_runs.RUNS), (False, 24)):
+            for seed in range(count):
+                snow.add(score_snow((seed, soft)))
+        part, text = "snow", table({"snow, 10 Hz": snow})
+    else:
+        drawn = list(machines(arguments.part, arguments.machines, arguments.seed))
+        jobs = [
+            (kind, seed, rate, soft)
+            for kind, seed in drawn
+            for rate in arguments.rates
+            for soft in (True, False)
+        ]
+        names = [
+            f"{rate:g} Hz" if arguments.by == "rate" else str(getattr(kind, arguments.by))
+            for kind, _, rate, _ in jobs
+        ]
+        last = arguments.seed + arguments.machines - 1
+        part = arguments.part
+        text = f"Machines {arguments.seed} to {last}.\n\n{table(run(names, jobs, arguments.workers))}"
     print(text)
     if arguments.write:
-        put(DOCUMENT, BEGIN, f"Seeds {arguments.seeds[0]} to {arguments.seeds[1]}.\n\n{text}")
+        put(DOCUMENT, BEGIN.format(part=part), text)
 
 
 if __name__ == "__main__":

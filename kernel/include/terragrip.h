@@ -207,10 +207,13 @@ enum {
     TG_OUT_CURVE_STD = 97,
     TG_OUT_WHEEL_CURVE = 98, /* + wheel */
     TG_OUT_WHEEL_CURVE_STD = 106,
-    TG_OUT_ADAPTATION = 114, /* + state: a_j of A_k as this row used it; written by the adaptive and the supervised policy only */
-    TG_OUT_ZERO_SLIP_RADIUS = 132, /* + wheel, m: what slip counts from; written by TG_SPEEDS only */
-    TG_OUT_ZERO_SLIP_RADIUS_STD = 140,
-    TG_OUT_SLOTS = 148
+    TG_OUT_WARNING = 114,    /* score of the warning of immobilization, points */
+    TG_OUT_USUAL_SLIP = 115, /* what the watch holds for usual */
+    TG_OUT_SIGN = 116,       /* + tg_sign, points; 0 where nothing is judged */
+    TG_OUT_ADAPTATION = 121, /* + state: a_j of A_k as this row used it; written by the adaptive and the supervised policy only */
+    TG_OUT_ZERO_SLIP_RADIUS = 139, /* + wheel, m: what slip counts from; written by TG_SPEEDS only */
+    TG_OUT_ZERO_SLIP_RADIUS_STD = 147,
+    TG_OUT_SLOTS = 155
 };
 
 typedef enum {
@@ -222,6 +225,15 @@ typedef enum {
     TG_EVENT_STUCK = 5,      /* the wheels turn, the vehicle hardly moves */
     TG_EVENT_PUSH = 6        /* something pushes from behind while the wheels pull: a tool that runs up */
 } tg_event;
+
+typedef enum { /* signs that the wheels dig, in points; the score is their sum, low-passed */
+    TG_SIGN_RISE = 0,       /* slip of the worst wheels rises */
+    TG_SIGN_HIGH = 1,       /* and is high */
+    TG_SIGN_LEADING = 2,    /* the leading wheels' adhesion falls against the trailing ones' */
+    TG_SIGN_RESISTANCE = 3, /* the soil resistance rises */
+    TG_SIGN_COMMAND = 4,    /* not above 0: the rims or the vehicle gain speed */
+    TG_SIGNS = 5
+} tg_sign;
 
 typedef enum {
     TG_FILTERED = 0,
@@ -238,7 +250,7 @@ typedef struct {
     double time;
     double distance;
     int32_t event;          /* tg_event */
-    tg_real value[148];
+    tg_real value[155];
 } tg_estimate;
 
 typedef struct { /* spreads (1 SD) of constants that the data cannot tell; 0 = known */
@@ -254,30 +266,18 @@ typedef struct { /* spreads (1 SD) of constants that the data cannot tell; 0 = k
     tg_real acceleration_bias;      /* m/s^2 */
 } tg_uncertainty;
 
-enum { /* signs that the wheels dig, of the driven wheels' means; a change is a mean over a shorter time less one over a longer */
-    TG_SIGN_SLIP,               /* over 0.1 s, */
-    TG_SIGN_SLIP_CALM,          /* over 0.3 s */
-    TG_SIGN_SLIP_RISE,          /* 0.1 s less 1 s */
-    TG_SIGN_SLIP_UNUSUAL,       /* 0.3 s less 20 s, in usual spreads */
-    TG_SIGN_ASYMMETRY_CHANGE,   /* log of the leading axle's adhesion over the trailing one's: 0.1 s less 1 s, */
-    TG_SIGN_ASYMMETRY_LEVEL,    /* 1 s less 20 s, */
-    TG_SIGN_ASYMMETRY_UNUSUAL,  /* 0.3 s less 20 s, in usual spreads */
-    TG_SIGN_GRIP_UNUSUAL,       /* log of adhesion over what the prototype curve makes of the slip: 0.3 s less 20 s, in usual spreads */
-    TG_SIGN_ADHESION_CHANGE,    /* log of adhesion: 0.1 s less 1 s, */
-    TG_SIGN_ADHESION_LEVEL,     /* 0.3 s less 20 s */
-    TG_SIGN_RESISTANCE_CHANGE,  /* soil resistance: 0.1 s less 1 s, */
-    TG_SIGN_RESISTANCE_LEVEL,   /* 0.3 s less 3 s */
-    TG_SIGN_RIM_CHANGE,         /* log of the rim speed: 0.1 s less 1 s, */
-    TG_SIGN_RIM_LEVEL,          /* 0.3 s less 3 s */
-    TG_SIGNS
-};
-
-typedef struct { /* when the estimator warns of immobilization, and calls the vehicle stuck or pushed */
-    tg_real warn;                   /* low-passed score above which it warns, of a vehicle that does not stand */
-    tg_real release;                /* it warns on until the score is so much below that */
-    tg_real memory;                 /* s, low-pass of the score */
-    tg_real high_slip;              /* slip above this, less `confidence` of its SDs, adds to the score by itself */
-    tg_real confidence;
+typedef struct { /* when the estimator warns of immobilization (see src/digging.c), and calls the vehicle stuck or pushed */
+    tg_real pace;                   /* the unit of time, over sqrt(length/gravity) */
+    tg_real memory;                 /* units of time, low-pass of the points' sum, the score */
+    tg_real usual;                  /* units of time over which what is usual is learned */
+    tg_real level;                  /* it warns only of slip that is, less its SD, so much above its usual, */
+    tg_real warn;                   /* and of a score above this; on until it is half of this */
+    tg_real most;                   /* points of a sign at most; of high slip and of the command twice as many */
+    tg_real rise;                   /* a point: rise of slip above its mean over a unit of time */
+    tg_real high_slip;              /* slip, less its SD, beyond which points are given, `most` at twice that */
+    tg_real leading;                /* a point: fall of the leading wheels' share of adhesion (-1 to 1) below its usual */
+    tg_real resistance;             /* a point: rise of the soil resistance above its mean over a unit of time */
+    tg_real command;                /* a point off: gain of rim speed or of ground speed over that mean; log */
     tg_real stuck_duration;         /* s that the ground speed must stay below `stuck_travel` */
     tg_real stuck_travel, free_travel; /* ground over rim speed: below the first stuck, free again above the second */
     tg_real push, thrust;           /* push from behind, and thrust meanwhile, over the weight */
@@ -345,8 +345,6 @@ typedef struct {
 } tg_settings;
 
 typedef struct tg_estimator tg_estimator;
-/* Score of TG_SIGNS signs: how much they look like the 3 s before a full stop, as log odds in the weighted drives it was fitted to. */
-tg_real tg_digging_score(const tg_real *signs);
 size_t tg_estimator_size(void);
 /* Tuned thresholds, tuning and priors; the machine is left empty, and with it the random walks. */
 tg_settings tg_default_settings(void);

@@ -1,103 +1,124 @@
-/* The signs that the wheels dig themselves in, and their score: a sum of small monotone decision trees, fitted to simulated drives by
- * benchmarks/fit_immobilization.py (R), which wrote digging_table.h. Signs compare a signal with its own means over shorter and longer
- * times, or are in its own usual spread, so that neither the machine's size nor its usual slip matters. */
-#include "digging_table.h"
+/* The signs that the wheels dig themselves in (R): what changed within the vehicle's own unit of time, `pace` square roots of its length
+ * over gravity, and against what is usual for it. Each sign is in points: its change over the change that counts as one point
+ * (tg_watch_settings); the points of a row are added, and their sum, low-passed, is the score that warns. */
+#include "estimator.h"
 
-#define TG_STEEPNESS ((tg_real)11.36) /* k of the prototype curve mu = A (1 - exp(-k s)) (PHYSICS 5) */
-#define TG_FORCES ((tg_real)0.2)      /* s, low-pass of adhesion before its logarithm is taken */
+#define TG_SHORT ((tg_real)0.1) /* of the unit of time: rows within it are averaged, and the signals low-passed */
+#define TG_LEAST ((tg_real)-2)  /* points that count at least, so that a hit or a change of speed is soon forgotten */
+#define TG_SHARP ((tg_real)0.02) /* SD of slip from which on a row of a look counts less: between measured speeds it is large */
+#define TG_FLOOR ((tg_real)0.1) /* adhesion that is added where two small ones are compared */
 
-enum { SLIP, ASYMMETRY, GRIP, ADHESION, RESISTANCE, RIM };      /* rows of tgi_signs.mean */
-enum { SPREAD_SLIP, SPREAD_ASYMMETRY, SPREAD_GRIP };            /* of tgi_signs.square */
-
-static const tg_real MEMORY[TG_MEMORIES] = {(tg_real)0.1, (tg_real)0.3, 1, 3, 20}; /* s */
-#define TG_RESTARTED 3 /* the shorter memories start anew after a rest, the longer ones go on */
-
-static tg_real low_pass(tg_real *mean, tg_real dt, tg_real tau, tg_real x)
+static tg_real low_pass(tg_real mean, tg_real dt, tg_real tau, tg_real x)
 {
-    if (dt > 0) *mean += dt / (tau + dt) * (x - *mean);
-    return *mean;
+    return dt > 0 ? mean + dt / (tau + dt) * (x - mean) : mean;
 }
 
-static tg_real logarithm(tg_real x, tg_real floor)
+static tg_real bounded(tg_real x, tg_real least, tg_real most)
 {
-    return tgi_log((x > 0 ? x : 0) + floor);
+    return x < least ? least : x > most ? most : x;
 }
 
-/* Take a look; `dt` s after the one before it, of the first since a rest 0. */
-void tgi_signs_take(tgi_signs *s, const tgi_view *l, tg_real dt)
+/* The unit of time, s. The length is the wheelbase; of several axles sqrt(2) times the root of their summed squared distances from the
+ * middle, which is that of two; of one axle three wheel radii. */
+tg_real tgi_pace(const tg_settings *s)
 {
-    const tg_real force = s->seen ? dt / (TG_FORCES + dt) : 1;
-    const tg_real curve = l->slip > 0 ? 1 - tgi_exp(-TG_STEEPNESS * l->slip) : 0;
-    s->leading += force * (l->leading - s->leading);
-    s->trailing += force * (l->trailing - s->trailing);
-    s->adhesion += force * (l->adhesion - s->adhesion);
-    s->curve += force * (curve - s->curve);
-    const tg_real level = logarithm(s->adhesion, (tg_real)0.03);
-    const tg_real now[TG_SIGNALS] = {l->slip, logarithm(s->leading, (tg_real)0.05) - logarithm(s->trailing, (tg_real)0.05),
-                                     level - logarithm(s->curve, (tg_real)0.05), level, l->resistance, tgi_log(l->rim + (tg_real)0.02)};
-    for (int32_t k = 0; k < TG_SIGNALS; k++)
-        for (int32_t j = 0; j < TG_MEMORIES; j++) {
-            if (!s->seen && (j < TG_RESTARTED || s->age == 0)) s->mean[k][j] = now[k];
-            else low_pass(&s->mean[k][j], dt, j >= TG_RESTARTED && s->age < MEMORY[j] ? s->age : MEMORY[j], now[k]);
-        }
-    const tg_real span = s->age < 8 ? s->age : 8;
-    for (int32_t k = 0; k < 3 && s->moved > 1; k++) low_pass(&s->square[k], dt, span, tgi_square(s->mean[k][1] - s->mean[k][3]));
-    s->seen = 1;
-    s->age += dt;
-    s->moved += dt;
+    tg_real square = 0, length = 3 * s->machine.radius[0];
+    for (int32_t k = 0; k < s->axles; k++) square += tgi_square(s->load_transfer[k]);
+    if (s->axles > 1 && square > 0) length = tgi_sqrt(2 / square);
+    return s->watch.pace * tgi_sqrt(length / s->machine.gravity);
+}
+
+/* Balance: of the leading wheels' adhesion against the trailing ones', within -1 and 1. A resistance that is not known says nothing. */
+static void signals_of(const tg_estimator *e, const tgi_view *l, tg_real *now)
+{
+    const tg_real still = e->settings.standstill_speed, ahead = l->leading > 0 ? l->leading : 0, behind = l->trailing > 0 ? l->trailing : 0;
+    now[TGI_SLIP] = l->slip;
+    now[TGI_DEVIATION] = l->deviation;
+    now[TGI_BALANCE] = (ahead - behind) / (ahead + behind + TG_FLOOR);
+    now[TGI_RESISTANCE] = isnan(l->resistance) ? 0 : l->resistance;
+    now[TGI_RIM] = tgi_log(l->rim + still);
+    now[TGI_TRAVEL] = tgi_log((l->travel > 0 ? l->travel : 0) + still);
+}
+
+static void add(tgi_view *sum, const tgi_view *l, tg_real weight)
+{
+    sum->slip += weight * l->slip;
+    sum->deviation += weight * l->deviation;
+    sum->leading += weight * l->leading;
+    sum->trailing += weight * l->trailing;
+    sum->resistance += weight * l->resistance;
+    sum->rim += weight * l->rim;
+    sum->travel += weight * l->travel;
+}
+
+/* Add a row to the look, weighted by how well its slip is known; returns whether that ended one, whose signals then are in the means. `since` becomes the time between two looks. */
+static int32_t look(tg_estimator *e, double time, const tgi_view *row, tg_real *since)
+{
+    tgi_digging *d = &e->watch.digging;
+    const tg_real pace = e->constants.pace;
+    const tg_real weight = 1 / tgi_square(row->deviation + TG_SHARP);
+    add(&d->sum, row, weight);
+    d->weight += weight;
+    *since = d->moving ? (tg_real)(time - d->time) : 0;
+    if (d->moving && *since < (tg_real)0.95 * TG_SHORT * pace) return 0;
+    tg_real now[TGI_SIGNALS];
+    tgi_view mean;
+    memset(&mean, 0, sizeof mean);
+    add(&mean, &d->sum, 1 / d->weight);
+    signals_of(e, &mean, now);
+    for (int32_t k = 0; k < TGI_SIGNALS; k++) {
+        d->now[k] = d->moving ? low_pass(d->now[k], *since, TG_SHORT * pace, now[k]) : now[k];
+        d->mean[k] = d->moving ? low_pass(d->mean[k], *since, pace, now[k]) : now[k];
+    }
+    const tg_real longest = e->settings.watch.usual * pace, tau = d->age < longest ? d->age : longest;
+    const tg_real usual[2] = {d->now[TGI_SLIP], d->now[TGI_BALANCE]};
+    for (int32_t k = 0; k < 2; k++) {
+        const tg_real x = k == 0 && usual[k] > e->settings.watch.high_slip ? e->settings.watch.high_slip : usual[k];
+        d->usual[k] = d->age > 0 ? low_pass(d->usual[k], *since, tau, x) : x;
+    }
+    memset(&d->sum, 0, sizeof d->sum);
+    d->weight = 0;
+    d->age += *since;
+    d->moving = 1;
+    d->time = time;
+    return 1;
 }
 
 /* A rest or a gap: what the motion was is forgotten, what is usual is kept. */
-void tgi_signs_rest(tgi_signs *s)
+void tgi_digging_rest(tgi_digging *d)
 {
-    s->seen = 0;
-    s->moved = 0;
+    memset(&d->sum, 0, sizeof d->sum);
+    memset(d->points, 0, sizeof d->points);
+    d->moving = d->slips = 0;
+    d->weight = d->score = 0;
 }
 
-static tg_real change(const tgi_signs *s, int32_t signal, int32_t shorter, int32_t longer)
+/* After a row; returns whether it ended a look. */
+int32_t tgi_digging_update(tg_estimator *e, double time, const tgi_view *row)
 {
-    return s->mean[signal][shorter] - s->mean[signal][longer];
+    const tg_watch_settings *s = &e->settings.watch;
+    tgi_digging *d = &e->watch.digging;
+    tg_real since;
+    if (!look(e, time, row, &since)) return 0;
+    const tg_real slip = d->now[TGI_SLIP], sure = slip - d->now[TGI_DEVIATION];
+    const tg_real rim = d->now[TGI_RIM] - d->mean[TGI_RIM], gain = d->now[TGI_TRAVEL] - d->mean[TGI_TRAVEL];
+    const tg_real high = s->high_slip > 0 ? sure / s->high_slip - 1 : 0;
+    d->points[TG_SIGN_RISE] = bounded((slip - d->mean[TGI_SLIP]) / s->rise, -s->most, s->most);
+    d->points[TG_SIGN_HIGH] = bounded(s->most * high, 0, 2 * s->most);
+    d->points[TG_SIGN_LEADING] = bounded((d->usual[1] - d->now[TGI_BALANCE]) / s->leading, -s->most, s->most);
+    d->points[TG_SIGN_RESISTANCE] = bounded((d->now[TGI_RESISTANCE] - d->mean[TGI_RESISTANCE]) / s->resistance, -s->most, s->most);
+    d->points[TG_SIGN_COMMAND] = -bounded((rim > gain ? rim : gain) / s->command, 0, 2 * s->most);
+    tg_real sum = 0;
+    for (int32_t k = 0; k < TG_SIGNS; k++) sum += d->points[k];
+    d->score = low_pass(d->score, since < e->constants.pace ? since : e->constants.pace, s->memory * e->constants.pace, sum < TG_LEAST ? TG_LEAST : sum);
+    d->slips = sure > d->usual[0] + s->level;
+    return 1;
 }
 
-/* A signal's mean over 0.3 s against its usual one, in its usual spreads. */
-static tg_real unusual(const tgi_signs *s, int32_t signal, tg_real least)
+/* The signs as a row of outputs has them. */
+void tgi_digging_report(const tgi_digging *d, tg_real *o)
 {
-    return change(s, signal, 1, 4) / tgi_sqrt(s->square[signal] + least * least);
-}
-
-void tgi_signs_features(const tgi_signs *s, tg_real *x)
-{
-    x[TG_SIGN_SLIP] = s->mean[SLIP][0];
-    x[TG_SIGN_SLIP_CALM] = s->mean[SLIP][1];
-    x[TG_SIGN_SLIP_RISE] = change(s, SLIP, 0, 2);
-    x[TG_SIGN_SLIP_UNUSUAL] = unusual(s, SLIP, (tg_real)0.01);
-    x[TG_SIGN_ASYMMETRY_CHANGE] = change(s, ASYMMETRY, 0, 2);
-    x[TG_SIGN_ASYMMETRY_LEVEL] = change(s, ASYMMETRY, 2, 4);
-    x[TG_SIGN_ASYMMETRY_UNUSUAL] = unusual(s, ASYMMETRY, (tg_real)0.05);
-    x[TG_SIGN_GRIP_UNUSUAL] = unusual(s, GRIP, (tg_real)0.1);
-    x[TG_SIGN_ADHESION_CHANGE] = change(s, ADHESION, 0, 2);
-    x[TG_SIGN_ADHESION_LEVEL] = change(s, ADHESION, 1, 4);
-    x[TG_SIGN_RESISTANCE_CHANGE] = change(s, RESISTANCE, 0, 2);
-    x[TG_SIGN_RESISTANCE_LEVEL] = change(s, RESISTANCE, 1, 3);
-    x[TG_SIGN_RIM_CHANGE] = change(s, RIM, 0, 2);
-    x[TG_SIGN_RIM_LEVEL] = change(s, RIM, 1, 3);
-}
-
-/* Place of the lowest of eight bits, at least one set (Leiserson, Prokop and Randall 1998). */
-static int32_t lowest(uint32_t bits)
-{
-    static const uint8_t place[8] = {0, 1, 2, 4, 7, 3, 6, 5};
-    return place[((bits & (0u - bits)) * 0x17u >> 5) & 7u];
-}
-
-/* All trees at once, sign by sign, without a branch a split (Lucchese et al. 2015, QuickScorer). */
-tg_real tg_digging_score(const tg_real *x)
-{
-    tg_real score = TG_DIGGING_BASE;
-    uint8_t left[TG_DIGGING_TREES]; /* leaves that may yet be reached */
-    memset(left, 0xff, sizeof left);
-    for (int32_t s = 0; s < TG_SIGNS; s++)
-        for (int32_t k = digging_first[s]; k < digging_first[s + 1] && !(x[s] <= digging_at[k]); k++) left[digging_tree[k]] &= digging_mask[k];
-    for (int32_t t = 0; t < TG_DIGGING_TREES; t++) score += digging_leaf[TG_DIGGING_LEAVES * t + lowest(left[t])];
-    return score;
+    o[TG_OUT_WARNING] = d->score;
+    o[TG_OUT_USUAL_SLIP] = d->usual[0];
+    for (int32_t k = 0; k < TG_SIGNS; k++) o[TG_OUT_SIGN + k] = d->points[k];
 }

@@ -86,29 +86,29 @@ typedef struct { /* of the estimated soil resistance: low-passed, and the mean s
     tg_real slow, square;
 } tgi_roughness;
 
-typedef struct { /* means over the driven wheels, and over the rows of a look; along the travel */
-    tg_real slip, deviation, leading, trailing, adhesion; /* adhesion of the leading and the trailing axles, alike where there is but one */
-    tg_real resistance, rim, travel;
+typedef struct { /* of the driven wheels, along the travel; see immobilization.c */
+    tg_real slip, deviation, fastest; /* of the worst wheel of each side, their mean: slip, its SD, rim speed */
+    tg_real leading, trailing; /* adhesion of these axles, alike where there is but one */
+    tg_real resistance, rim, travel; /* rim: mean of all */
 } tgi_view;
 
-#define TG_SIGNALS 6
-#define TG_MEMORIES 5
+enum { TGI_SLIP, TGI_DEVIATION, TGI_BALANCE, TGI_RESISTANCE, TGI_RIM, TGI_TRAVEL, TGI_SIGNALS };
 
 typedef struct { /* see digging.c */
-    tg_real leading, trailing, adhesion, curve; /* low-passed; curve: 1 - exp(-k slip) */
-    tg_real mean[TG_SIGNALS][TG_MEMORIES];
-    tg_real square[3];        /* mean square of slip's, asymmetry's and grip's wandering */
-    tg_real age, moved;       /* s of looking, in all and since the last rest */
-    int32_t seen;
-} tgi_signs;
+    tgi_view sum;              /* of the rows since the last look, weighted, */
+    tg_real weight;            /* and of their weights */
+    tg_real now[TGI_SIGNALS], mean[TGI_SIGNALS]; /* low-passed over a tenth of the unit of time, and over it */
+    tg_real usual[2];          /* slip, balance */
+    tg_real age;               /* s of looking in all */
+    tg_real points[TG_SIGNS];
+    tg_real score;             /* their sum, low-passed */
+    double time;               /* of the last look, or where the motion began */
+    int32_t moving;            /* there was a look since the motion began */
+    int32_t slips;             /* slip is surely above its usual */
+} tgi_digging;
 
-typedef struct { /* the eye on immobilization */
-    tgi_signs signs;
-    tgi_view sum;              /* of the rows since the last look, */
-    int32_t rows;              /* so many */
-    int32_t watching;          /* there was a look, or a row, since the motion began */
-    double look_time, seen_time; /* of the last look, or where the motion began; of the last measured ground speed */
-    tg_real score;             /* low-passed */
+typedef struct { /* is the vehicle about to be stuck, stuck, pushed? */
+    tgi_digging digging;
     tg_real rim, spinning, pushed; /* m/s low-passed; s that each has held */
     double stuck_time;         /* of the last row that was judged for being stuck */
     int32_t turning, sinking, stuck, pushing; /* turning: rim holds a value */
@@ -147,6 +147,8 @@ typedef struct { /* what follows from the settings alone */
     tg_real force_walk;             /* m^2/s^3 */
     tg_real mounting_walk, terrain_walk; /* rad^2/s */
     tg_real slow_wheel;             /* s */
+    tg_real pace;                   /* s, the unit of time of the watch, see digging.c */
+    int32_t watched[8], side[8];    /* wheel: driven, or no wheel is; by its place on its axle -1 left, 1 right, 0 middle */
     int32_t holds;                  /* some channel is held */
 } tgi_constants;
 
@@ -190,6 +192,7 @@ struct tg_estimator {
 };
 
 TG_INLINE tg_real tgi_square(tg_real x) { return x * x; }
+TG_INLINE tg_real tgi_max(tg_real x, tg_real y) { return x > y ? x : y; }
 
 /* quality.c */
 tg_status tgi_clean(tg_estimator *e, const tg_sample *sample, tg_row *row);
@@ -243,12 +246,13 @@ void tgi_no_curves(tg_estimator *e);
 void tgi_curves(tg_estimator *e, int32_t learn, tg_real dt, tg_real distance, const tg_real *load, tg_real *o);
 
 /* digging.c */
-void tgi_signs_take(tgi_signs *s, const tgi_view *l, tg_real dt);
-void tgi_signs_rest(tgi_signs *s);
-void tgi_signs_features(const tgi_signs *s, tg_real *x);
+tg_real tgi_pace(const tg_settings *s);
+void tgi_digging_rest(tgi_digging *d);
+int32_t tgi_digging_update(tg_estimator *e, double time, const tgi_view *row);
+void tgi_digging_report(const tgi_digging *d, tg_real *o);
 
 /* immobilization.c */
-void tgi_watch_over(tg_estimator *e, const tg_row *row, const tg_drive *drive, int32_t moving, int32_t anew, tg_real dt, const tg_real *o);
+void tgi_watch_over(tg_estimator *e, const tg_row *row, const tg_drive *drive, int32_t moving, int32_t anew, tg_real dt, tg_real *o);
 int32_t tgi_watched(const tg_estimator *e); /* tg_event */
 
 /* speeds.c */

@@ -2,25 +2,8 @@
  * looks like. */
 #include "estimator.h"
 
-#define TG_LOOK ((tg_real)0.095)      /* s between two looks for the signs of digging; rows in between are averaged */
-#define TG_LONGEST_STEP ((tg_real)0.6) /* s that a look counts at most */
-#define TG_NO_SCORE ((tg_real)-6)     /* the score is cut to this, and to as much above 0 */
-#define TG_HIGH_SLIP 10               /* score per unit of slip above `high_slip` */
-#define TG_SILENT ((tg_real)0.55)     /* s without a ground speed after which its slip is no sign by itself */
-#define TG_FAST ((tg_real)0.1)        /* s, low-pass of the rim speed */
+#define TG_CALM ((tg_real)0.1)         /* s, low-pass of the rim speed by which a vehicle is called stuck */
 #define TG_LONGEST_LOOK ((tg_real)1.5) /* s between two measured ground speeds: after more, being stuck is judged anew */
-
-static void add(tgi_view *sum, const tgi_view *l, tg_real weight)
-{
-    sum->slip += weight * l->slip;
-    sum->deviation += weight * l->deviation;
-    sum->leading += weight * l->leading;
-    sum->trailing += weight * l->trailing;
-    sum->adhesion += weight * l->adhesion;
-    sum->resistance += weight * l->resistance;
-    sum->rim += weight * l->rim;
-    sum->travel += weight * l->travel;
-}
 
 /* Which end of the machine wheel i is at, along the travel: 1 leading, -1 trailing, 0 neither. */
 static int32_t end_of(const tg_estimator *e, int32_t i)
@@ -29,38 +12,53 @@ static int32_t end_of(const tg_estimator *e, int32_t i)
     return lever > 0 ? 1 : lever < 0 ? -1 : 0;
 }
 
-/* Means over the driven wheels (of none: all). */
-static tgi_view look_at(const tg_estimator *e, const tg_real *o)
+typedef struct { /* the worst slip (by what is sure of it), its SD and the fastest rim of a side's driven wheels */
+    tg_real slip, deviation, rim;
+    int32_t count;
+} side_view;
+
+static void add_wheel(side_view *side, tg_real slip, tg_real deviation, tg_real rim)
 {
-    const int32_t n = e->settings.machine.wheels;
-    tgi_view l;
-    memset(&l, 0, sizeof l);
-    tg_real count = 0, ahead = 0, behind = 0;
-    int32_t any = 0;
-    for (int32_t i = 0; i < n; i++) any |= e->settings.driven[i];
-    for (int32_t i = 0; i < n; i++) {
-        if (any && !e->settings.driven[i]) continue;
-        const tg_real deviation = o[TG_OUT_SLIP_STD + i], adhesion = o[TG_OUT_ADHESION + i];
-        const int32_t end = end_of(e, i);
-        l.slip += o[TG_OUT_SLIP + i];
-        if (deviation == deviation) l.deviation += deviation;
-        l.adhesion += adhesion;
-        l.rim += e->settings.rolling_radius[i] * o[TG_OUT_WHEEL_SPEED + i];
-        count += 1;
-        if (end > 0) {
-            l.leading += adhesion;
-            ahead += 1;
-        } else if (end < 0) {
-            l.trailing += adhesion;
-            behind += 1;
-        }
+    if (isnan(deviation)) deviation = 0;
+    if (!side->count || slip - deviation > side->slip - side->deviation) {
+        side->slip = slip;
+        side->deviation = deviation;
     }
-    l.slip /= count;
-    l.deviation /= count;
-    l.adhesion /= count;
-    l.rim = tgi_fabs(l.rim) / count; /* on the spot, wheels turn against each other: that goes nowhere, and is not stuck */
-    l.leading = ahead > 0 && behind > 0 ? l.leading / ahead : l.adhesion;
-    l.trailing = ahead > 0 && behind > 0 ? l.trailing / behind : l.adhesion;
+    if (!side->count || tgi_fabs(rim) > tgi_fabs(side->rim)) side->rim = rim;
+    side->count++;
+}
+
+/* What the driven wheels do (of none: all). Slip and fastest rim are the worst wheel's of each side, their mean: of a diagonal that spins
+ * while the other holds they are the spinning one's, in a turn and on the spot the sides cancel. */
+static tgi_view view_of(const tg_estimator *e, const tg_real *o)
+{
+    const tg_settings *s = &e->settings;
+    tgi_view l;
+    side_view side[2];
+    memset(&l, 0, sizeof l);
+    memset(side, 0, sizeof side);
+    tg_real count = 0, ahead = 0, behind = 0, adhesion = 0;
+    for (int32_t i = 0; i < s->machine.wheels; i++) {
+        if (!e->constants.watched[i]) continue;
+        const int32_t end = end_of(e, i), where = e->constants.side[i];
+        const tg_real rim = s->rolling_radius[i] * o[TG_OUT_WHEEL_SPEED + i], mu = o[TG_OUT_ADHESION + i];
+        if (where <= 0) add_wheel(&side[0], o[TG_OUT_SLIP + i], o[TG_OUT_SLIP_STD + i], rim);
+        if (where >= 0) add_wheel(&side[1], o[TG_OUT_SLIP + i], o[TG_OUT_SLIP_STD + i], rim);
+        l.rim += rim;
+        adhesion += mu;
+        l.leading += end > 0 ? mu : 0;
+        l.trailing += end < 0 ? mu : 0;
+        ahead += end > 0;
+        behind += end < 0;
+        count++;
+    }
+    const tg_real sides = (tg_real)((side[0].count > 0) + (side[1].count > 0));
+    l.slip = (side[0].slip + side[1].slip) / sides;
+    l.deviation = (side[0].deviation + side[1].deviation) / sides;
+    l.fastest = tgi_fabs(side[0].rim + side[1].rim) / sides;
+    l.rim = tgi_fabs(l.rim) / count;
+    l.leading = ahead > 0 && behind > 0 ? l.leading / ahead : adhesion / count;
+    l.trailing = ahead > 0 && behind > 0 ? l.trailing / behind : adhesion / count;
     l.resistance = o[TG_OUT_SOIL_RESISTANCE];
     l.travel = (tg_real)e->direction * o[TG_OUT_GROUND_SPEED];
     if (l.slip < (tg_real)-0.2) l.slip = (tg_real)-0.2;
@@ -69,11 +67,8 @@ static tgi_view look_at(const tg_estimator *e, const tg_real *o)
 
 static void forget_motion(tgi_watch *w)
 {
-    tgi_signs_rest(&w->signs);
-    memset(&w->sum, 0, sizeof w->sum);
-    w->rows = w->watching = w->turning = 0;
-    w->score = TG_NO_SCORE;
-    w->seen_time = -1e9;
+    tgi_digging_rest(&w->digging);
+    w->turning = 0;
     w->spinning = 0;
     w->sinking = w->stuck = 0;
 }
@@ -85,66 +80,35 @@ static tg_real count_seconds(tg_real seconds, tg_real dt, int32_t holds, tg_real
     return seconds < 0 ? 0 : seconds > most ? most : seconds;
 }
 
-static tg_real score_of(const tg_real *signs)
-{
-    const tg_real score = tg_digging_score(signs);
-    return score < TG_NO_SCORE ? TG_NO_SCORE : score > -TG_NO_SCORE ? -TG_NO_SCORE : score;
-}
-
-/* What slip beyond `high_slip`, less some of its SDs, adds at once, unless the ground speed is only reckoned. */
-static tg_real score_of_high_slip(const tg_watch_settings *s, tg_real slip, tg_real deviation, tg_real silence)
-{
-    const tg_real high = slip - s->confidence * deviation - s->high_slip;
-    return high > 0 && silence < TG_SILENT ? TG_HIGH_SLIP * high : 0;
-}
-
-static void watch_digging(tg_estimator *e, const tg_row *row, const tgi_view *now)
+/* Warn where the score is high and slip surely above its usual; go on until the score is half of that. */
+static void watch_digging(tg_estimator *e, const tg_row *row, const tgi_view *l)
 {
     const tg_watch_settings *s = &e->settings.watch;
     tgi_watch *w = &e->watch;
-    add(&w->sum, now, 1);
-    w->rows++;
-    const tg_real since = w->watching ? (tg_real)(row->time - w->look_time) : 0;
-    if (w->watching && since < TG_LOOK) return;
-    tgi_view l;
-    memset(&l, 0, sizeof l);
-    add(&l, &w->sum, 1 / (tg_real)w->rows);
-    memset(&w->sum, 0, sizeof w->sum);
-    w->rows = 0;
-    w->watching = 1;
-    w->look_time = row->time;
-    tgi_signs_take(&w->signs, &l, since);
-    if (w->stuck || l.rim < 3 * e->settings.standstill_speed) { /* too late for a warning, or nowhere to go */
-        w->score = TG_NO_SCORE;
-        w->sinking = 0;
-        return;
-    }
-    const tg_real step = since < TG_LONGEST_STEP ? since : TG_LONGEST_STEP;
-    tg_real signs[TG_SIGNS];
-    tgi_signs_features(&w->signs, signs);
-    w->score += step / (s->memory + step) * (score_of(signs) - w->score);
-    const tg_real score = w->score + score_of_high_slip(s, signs[TG_SIGN_SLIP], l.deviation, (tg_real)(row->time - w->seen_time));
-    const int32_t begins = score > s->warn && w->spinning <= 0; /* of a vehicle that stands already nothing is foretold */
-    w->sinking = begins || (w->sinking && score > s->warn - s->release);
+    if (!tgi_digging_update(e, row->time, l)) return;
+    const int32_t begins = w->digging.score > s->warn && w->digging.slips && w->spinning <= 0; /* what stands is stuck, no warning */
+    w->sinking = !w->stuck && (begins || (w->sinking && 2 * w->digging.score > s->warn));
 }
 
-/* Where the ground speed was measured, for a reckoned one follows from the slip last seen. */
+/* Where the ground speed was measured, for a reckoned one follows from the slip last seen. Slower than the standstill speed is standing. */
 static void watch_stuck(tg_estimator *e, const tg_row *row, const tgi_view *l)
 {
     const tg_watch_settings *s = &e->settings.watch;
     tgi_watch *w = &e->watch;
+    const tg_real still = e->settings.standstill_speed;
     tg_real dt = w->turning ? (tg_real)(row->time - w->stuck_time) : 0;
     if (dt > TG_LONGEST_LOOK) {
         dt = 0;
         w->turning = w->stuck = 0;
         w->spinning = 0;
     }
-    w->rim = w->turning ? w->rim + dt / (TG_FAST + dt) * (l->rim - w->rim) : l->rim;
+    w->rim = w->turning ? w->rim + dt / (TG_CALM + dt) * (l->fastest - w->rim) : l->fastest;
     w->turning = 1;
     w->stuck_time = row->time;
-    const int32_t turning = w->rim > 3 * e->settings.standstill_speed, held_up = turning && l->travel < s->stuck_travel * l->rim;
-    w->spinning = held_up ? w->spinning + dt : 0;
-    w->stuck = turning && (w->spinning >= s->stuck_duration || (w->stuck && l->travel < s->free_travel * l->rim));
+    const int32_t turning = w->rim > 3 * still;
+    const int32_t held_up = turning && l->travel < tgi_max(s->stuck_travel * l->fastest, still);
+    w->spinning = turning ? count_seconds(w->spinning, dt, held_up, 1, s->stuck_duration) : 0;
+    w->stuck = turning && ((held_up && w->spinning >= s->stuck_duration) || (w->stuck && l->travel < s->free_travel * l->fastest));
     if (w->stuck) w->sinking = 0;
 }
 
@@ -164,24 +128,22 @@ static void judge_push(tg_estimator *e, const tg_drive *drive, const tg_real *o,
 }
 
 /* After a row's values were worked out; `moving`: the filter went on with it, `anew`: from a new start. */
-void tgi_watch_over(tg_estimator *e, const tg_row *row, const tg_drive *drive, int32_t moving, int32_t anew, tg_real dt, const tg_real *o)
+void tgi_watch_over(tg_estimator *e, const tg_row *row, const tg_drive *drive, int32_t moving, int32_t anew, tg_real dt, tg_real *o)
 {
     tgi_watch *w = &e->watch;
-    const int32_t rests = e->standing || !e->seen_motion;
-    if (rests || !moving || anew || isnan(o[TG_OUT_SLIP])) forget_motion(w);
+    const int32_t rests = e->standing || !e->seen_motion, slips = !isnan(o[TG_OUT_SLIP]);
+    if (rests || !moving || anew || !slips) forget_motion(w);
     if (rests) {
         w->pushed = 0;
         w->pushing = 0;
     }
-    if (rests || !moving) return;
-    judge_push(e, drive, o, dt);
-    if (isnan(o[TG_OUT_SLIP])) return;
-    const tgi_view l = look_at(e, o);
-    if (!row->reckoned && !isnan(row->value[TG_GROUND_SPEED])) {
-        w->seen_time = row->time;
-        watch_stuck(e, row, &l);
+    if (!rests && moving) judge_push(e, drive, o, dt);
+    if (!rests && moving && slips) {
+        const tgi_view l = view_of(e, o);
+        if (!row->reckoned && !isnan(row->value[TG_GROUND_SPEED])) watch_stuck(e, row, &l);
+        watch_digging(e, row, &l);
     }
-    watch_digging(e, row, &l);
+    tgi_digging_report(&w->digging, o);
 }
 
 int32_t tgi_watched(const tg_estimator *e)

@@ -16,15 +16,21 @@ static int is_spread(tg_real x)
     return is_number(x) && x >= 0;
 }
 
-/* Tuned on the drives of simulation/soft_spots.py, seeds 1000 to 1199, 4000 to 4079 and 5000 to 5699, and on nothing else. */
+/* The warning's on simulated drives and made-up snow runs, see docs/decisions/0100. */
 static tg_watch_settings default_watch(void)
 {
     tg_watch_settings w;
-    w.warn = 3;
-    w.release = 2;
+    w.pace = 4;
     w.memory = (tg_real)0.4;
+    w.usual = 12;
+    w.level = (tg_real)0.06;
+    w.warn = (tg_real)4.2;
+    w.most = 3;
+    w.rise = (tg_real)0.035;
     w.high_slip = (tg_real)0.3;
-    w.confidence = 2;
+    w.leading = (tg_real)0.04;
+    w.resistance = (tg_real)0.04;
+    w.command = (tg_real)0.022;
     w.stuck_duration = (tg_real)0.5;
     w.stuck_travel = (tg_real)0.1;
     w.free_travel = (tg_real)0.4;
@@ -145,10 +151,11 @@ static tg_status check_numbers(const tg_settings *s)
     const tg_real spreads[] = {u->drive_torque_gain, u->drive_torque_gain_common, u->drive_torque_offset, u->drawbar_gain, u->drawbar_offset, u->slope,
                                u->tire_rolling_resistance, u->vertical_load, u->wheel_radius, u->acceleration_bias,
                                s->slope_spread, s->standstill_speed, s->dead_band, s->outlier_weight, s->load_filter, s->center_of_gravity_height,
-                               s->hitch_height, s->watch.release, s->watch.high_slip, s->watch.confidence,
+                               s->hitch_height, s->watch.level, s->watch.most, s->watch.high_slip,
                                s->watch.stuck_duration, s->watch.stuck_travel, s->watch.free_travel, s->watch.push, s->watch.thrust,
                                s->watch.push_duration};
-    const tg_real positive[] = {s->watch.memory, s->prior_adhesion_std, s->prior_resistance_std, s->gap, s->max_step, s->algebraic_filter,
+    const tg_real positive[] = {s->watch.pace, s->watch.memory, s->watch.usual, s->watch.rise, s->watch.leading, s->watch.resistance,
+                                s->watch.command, s->prior_adhesion_std, s->prior_resistance_std, s->gap, s->max_step, s->algebraic_filter,
                                 s->noise[TG_GROUND_SPEED], s->noise[TG_ACCELERATION_X]};
     const tg_real *const tuned = (const tg_real *)&s->tuned; /* all of them reals */
     for (size_t k = 0; k < sizeof s->tuned / sizeof *tuned; k++)
@@ -194,6 +201,20 @@ static int has_channel(const tg_settings *s, int32_t slot)
     return slot < TG_YAW_RATE ? slot - TG_VERTICAL_LOAD < s->axles : slot == TG_YAW_RATE;
 }
 
+/* Which wheels the watch looks at, and on which side of the machine they are. */
+static void place_wheels(const tg_settings *s, tgi_constants *c)
+{
+    int32_t any = 0;
+    for (int32_t i = 0; i < s->machine.wheels; i++) any |= s->driven[i];
+    for (int32_t i = 0; i < s->machine.wheels; i++) {
+        int32_t place = 0;
+        for (int32_t j = 0; j < s->machine.wheels; j++)
+            if (s->wheel_axle[j] == s->wheel_axle[i]) place += (j < i) - (j > i);
+        c->side[i] = place < 0 ? -1 : place > 0;
+        c->watched[i] = !any || s->driven[i];
+    }
+}
+
 static void work_out_constants(const tg_settings *s, tgi_constants *c)
 {
     const tg_machine *m = &s->machine;
@@ -218,6 +239,8 @@ static void work_out_constants(const tg_settings *s, tgi_constants *c)
     c->slow_wheel = s->tuned.slow_wheel * T;
     c->inverse_mass = 1 / m->mass;
     c->inverse_weight = 1 / weight;
+    c->pace = tgi_pace(s);
+    place_wheels(s, c);
     c->unknown_pull = tgi_square((tg_real)0.3 * weight);
     c->least_jolt = c->variance[TG_ACCELERATION_X] + c->variance[TG_DRAWBAR_FORCE] * tgi_square(c->inverse_mass);
     tg_real low = s->tuning.scales[0], high = low;

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import struct
 from array import array
-from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -23,6 +23,9 @@ Floats = npt.NDArray[np.float64]
 
 EVENTS = ("", "outlier", "standstill", "gap", "immobilization", "stuck", "push")
 """Texts of the ``event`` column, in the order of tg_event."""
+
+SIGNS = ("rise", "high_slip", "leading", "resistance", "command")
+"""The signs of the warning, columns ``warning_<sign>``, in the order of tg_sign."""
 
 _MISSING = (math.nan,) * lib.TG_SLOTS
 _BLOCK = 1 << 18  # rows a call: Ctrl-C and progress get a turn between calls
@@ -50,11 +53,6 @@ def watch_limits() -> dict[str, float]:
     names = [name for name, _ in ffi.typeof("tg_watch_settings").fields]
     found = {name: float(getattr(settings.watch, name)) for name in names}
     return found | {"gap": float(settings.gap), "standstill_speed": float(settings.standstill_speed)}
-
-
-def digging_score(signs: Iterable[float]) -> float:
-    """Log odds that the vehicle stops within 3 s, of the signs TG_SIGN_* (R; in the simulated drives it was fitted to)."""
-    return float(lib.tg_digging_score(ffi.new("tg_real[]", list(signs))))
 
 
 def sample_slots(vehicle: Vehicle) -> dict[str, int]:
@@ -100,6 +98,10 @@ def estimate_slots(vehicle: Vehicle, *, adaptive: bool = False) -> dict[str, int
     take("curve_a", lib.TG_OUT_CURVE, lib.TG_OUT_CURVE_STD)
     for i, wheel in enumerate(vehicle.wheels):
         take(f"curve_a_{wheel}", lib.TG_OUT_WHEEL_CURVE, lib.TG_OUT_WHEEL_CURVE_STD, i)
+    slots["warning"] = lib.TG_OUT_WARNING
+    slots["warning_usual_slip"] = lib.TG_OUT_USUAL_SLIP
+    for k, sign in enumerate(SIGNS):
+        slots[f"warning_{sign}"] = lib.TG_OUT_SIGN + k
     slots["nis"] = lib.TG_OUT_NIS
     slots["channels"] = lib.TG_OUT_CHANNELS
     slots["supervisor"] = lib.TG_OUT_SUPERVISOR

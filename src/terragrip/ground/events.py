@@ -9,18 +9,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from terragrip.estimation import Estimates
-from terragrip.estimation.engine import EVENTS, digging_score, watch_limits
-from terragrip.estimation.reference.immobilization import ASYMMETRY, GRIP, SIGNS, SLIP, Watch, rows_of
+from terragrip.estimation.engine import EVENTS, SIGNS, watch_limits
 
 Array = NDArray[np.float64]
 
 CLOSE = 0.3
 """s: spells of one kind that lie closer are one event."""
 
-RECALL = 60.0
-"""s before a warning from which its signs are worked out again: what is usual goes back 20 s."""
-LEAST_GAIN = 0.5
-"""Of the score: what adds less is no reason."""
+LEAST_POINTS = 0.3
+"""Of a sign: fewer are no reason."""
 
 
 @dataclass(frozen=True)
@@ -67,66 +64,31 @@ def _mean(estimates: Estimates, quantity: str, rows: NDArray[np.intp]) -> Array:
 
 
 def _immobilization(estimates: Estimates, rows: NDArray[np.intp]) -> str:
-    limits, first = watch_limits(), rows[:1]
-    before = _second_before(estimates, rows[0])
-    slip, was = _mean(estimates, "slip", first)[0], np.nanmean(_mean(estimates, "slip", before))
-    speed, went = estimates["ground_speed"][rows[0]], np.nanmean(estimates["ground_speed"][before])
-    rim = _rim_change(estimates, before, rows[0])
-    told = _leading_signs(estimates, int(rows[0]))
-    return (
-        f"The wheels begin to dig: within a second slip went from {was:.0%} to {slip:.0%} and ground speed from "
-        f"{abs(went):.2f} to {abs(speed):.2f} m/s while the wheels {rim}{told}; the warning comes when the signs' "
-        f"score, of how much they look like the 3 s before a full stop in simulated drives, is above {limits['warn']:g} over "
-        f"{limits['memory']:g} s, and slip beyond {limits['high_slip']:.0%} adds to it by itself."
-    )
-
-
-def _leading_signs(estimates: Estimates, row: int) -> str:
-    """What adds most to the score of a warning that starts at ``row``: each group of signs against what is usual."""
-    if "vehicle" not in estimates.about:
-        return ""
-    first = int(np.searchsorted(estimates.time, estimates.time[row] - RECALL))
-    watch, part = Watch(watch_limits()), slice(first, row + 1)
-    measured = np.ones(len(estimates), bool)
-    for seen in rows_of(estimates, measured, part):
-        watch.take(seen)
-    if not watch.signs.seen:
-        return ""
-    signs, means = dict(zip(SIGNS, watch.signs.features(), strict=True)), watch.signs.mean
-    usual = float(means[SLIP, -1])
-    ratio, grip = (float(np.exp(means[k, 1] - means[k, -1])) for k in (ASYMMETRY, GRIP))
-    groups = {
-        f"slip is {100 * (signs['slip_calm'] - usual):.0f} points above its usual {usual:.0%}, {signs['slip_unusual']:.1f} times its "
-        "usual wandering": {"slip": usual, "slip_calm": usual, "slip_rise": 0.0, "slip_unusual": 0.0},
-        f"the leading wheels' adhesion over the trailing ones' is {ratio:.0%} of the usual": {
-            name: 0.0 for name in SIGNS if name.startswith("asymmetry")
-        },
-        f"adhesion is {grip:.0%} of what the ground before would give at such slip": {
-            name: 0.0 for name in SIGNS if name.startswith(("grip", "adhesion", "resistance"))
-        },
+    """From the kernel's own signs and thresholds: columns ``warning``, ``warning_<sign>`` and tg_watch_settings."""
+    limits, row = watch_limits(), rows[0]
+    slip, speed = _mean(estimates, "slip", rows[:1])[0], abs(estimates["ground_speed"][row])
+    text = f"The wheels begin to dig: slip is {slip:.0%} in the mean of the wheels, at {speed:.2f} m/s"
+    if "warning" not in estimates:
+        return text + "."
+    points = {sign: float(estimates[f"warning_{sign}"][row]) for sign in SIGNS}
+    change = {sign: points[sign] * limits[sign] for sign in ("rise", "leading", "resistance")}
+    most = max(points.values())
+    said = {
+        "rise": f"slip of the worst wheels rose by {change['rise']:.0%}",
+        "high_slip": f"it is surely above {limits['high_slip']:.0%}",
+        "leading": f"the leading wheels' adhesion against the trailing ones' fell by {change['leading']:.2f} below its usual",
+        "resistance": f"soil resistance rose by {change['resistance']:.2f}",
     }
-    score = digging_score(list(signs.values()))
-    gains = {text: score - digging_score(list((signs | calm).values())) for text, calm in groups.items()}
-    leading = [text for text in sorted(gains, key=lambda text: -gains[text]) if gains[text] > LEAST_GAIN]
-    return ", because " + ", and ".join(leading[:2]) if leading else ""
-
-
-def _second_before(estimates: Estimates, row: np.intp) -> NDArray[np.intp]:
-    """Rows about a second before a row, where there is nothing that early the first."""
-    time = estimates.time
-    last = int(np.searchsorted(time, time[row] - 0.8))
-    first = int(np.searchsorted(time, time[row] - 1.2))
-    moving = np.arange(first, max(last, first + 1))
-    known = moving[np.isfinite(_mean(estimates, "slip", moving))]
-    return known if len(known) else np.array([row])
-
-
-def _rim_change(estimates: Estimates, before: NDArray[np.intp], row: np.intp) -> str:
-    was = float(np.nanmean(np.abs(_mean(estimates, "wheel_speed", before))))
-    now = float(np.abs(_mean(estimates, "wheel_speed", np.array([row]))[0]))
-    if abs(now - was) < 0.1 * was:
-        return f"kept turning at {now:.2f} rad/s"
-    return f"{'slowed' if now < was else 'sped up'} from {was:.2f} to {now:.2f} rad/s"
+    reasons = [
+        f"{said[sign]} ({points[sign]:.1f} points{', the most that count' if points[sign] >= limits['most'] == most else ''})"
+        for sign in sorted(said, key=lambda sign: -points[sign])
+        if points[sign] > LEAST_POINTS
+    ]
+    off = f", less {-points['command']:.1f} for speed gained" if points["command"] < -LEAST_POINTS else ""
+    return (
+        f"{text}, its usual {estimates['warning_usual_slip'][row]:.0%}; {', '.join(reasons) or 'the signs of just before'}{off}; "
+        f"their sum, low-passed, is {estimates['warning'][row]:.1f} and warns above {limits['warn']:g}."
+    )
 
 
 def _stuck(estimates: Estimates, rows: NDArray[np.intp]) -> str:

@@ -1,231 +1,225 @@
-"""The warning of immobilization in plain Python: the twin of the kernel's immobilization.c and digging.c.
-
-The signs are worked out here a second time; the score is the kernel's, a table made by benchmarks/fit_immobilization.py.
-"""
+"""The warning of immobilization in plain Python: the twin of the kernel's immobilization.c and digging.c, settings included."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from math import exp, isnan, log, sqrt
+from math import isnan, log, sqrt
 
 import numpy as np
 from numpy.typing import NDArray
 
-from terragrip.estimation.engine import EVENTS, digging_score
+from terragrip.estimation.engine import EVENTS
 from terragrip.estimation.estimates import Estimates
+from terragrip.physics.loads import GRAVITY
+from terragrip.vehicle import Vehicle
 
 Array = NDArray[np.float64]
 
-SIGNS = (
-    "slip", "slip_calm", "slip_rise", "slip_unusual",
-    "asymmetry_change", "asymmetry_level", "asymmetry_unusual", "grip_unusual",
-    "adhesion_change", "adhesion_level", "resistance_change", "resistance_level", "rim_change", "rim_level",
-)  # fmt: skip
-"""The kernel's TG_SIGN_*, in their order; terragrip.h tells what each is."""
-
-STEEPNESS, FORCES, LOOK, LONGEST_STEP, LONGEST_LOOK, FAST = 11.36, 0.2, 0.095, 0.6, 1.5, 0.1
-NO_SCORE, HIGH_SLIP, SILENT = -6.0, 10.0, 0.55
-MEMORY = np.array([0.1, 0.3, 1.0, 3.0, 20.0])
-RESTARTED = MEMORY < 3
-SPREAD_MEMORY = 8.0
-SLIP, ASYMMETRY, GRIP, ADHESION, RESISTANCE, RIM = range(6)
+SHORT, LEAST, FLOOR, SHARP = 0.1, -2.0, 0.1, 0.02
+CALM, LONGEST_LOOK = 0.1, 1.5
+SLIP, DEVIATION, BALANCE, RESISTANCE, RIM, TRAVEL = range(6)
 
 
 @dataclass(frozen=True)
 class Row:
-    """Means over the driven wheels, along the travel. NaN ``slip``: standstill, or a gap.
+    """What the driven wheels do in a row, along the travel. NaN ``slip``: standstill, or a gap.
 
-    ``time`` [s], ``deviation``: SD of slip, ``leading`` and ``trailing``: adhesion of these axles (of one axle: ``adhesion``),
-    ``rim`` and ``travel`` [m/s], ``measured``: the ground speed was.
+    ``time`` [s]; ``slip``, ``deviation`` (its SD) and ``fastest`` (rim speed [m/s]): of the worst wheel of each side, their mean;
+    ``leading`` and ``trailing``: adhesion of these axles, alike where there is but one; ``resistance``; ``rim`` (mean) and
+    ``travel`` [m/s]; ``measured``: the ground speed was.
     """
 
     time: float
     slip: float
     deviation: float
+    fastest: float
     leading: float
     trailing: float
-    adhesion: float
     resistance: float
     rim: float
     travel: float
     measured: bool = True
 
 
-def rows_of(estimates: Estimates, measured: NDArray[np.bool_], rows: slice = slice(None)) -> list[Row]:
+def rows_of(estimates: Estimates, measured: NDArray[np.bool_]) -> list[Row]:
     """Rows of a table of estimates as the kernel sees them; ``measured``: whether each row's ground speed was.
 
     Raises InputError where the estimates hold no vehicle.
     """
-    vehicle, event = estimates.vehicle, estimates.event_codes[rows]
-    driven = np.array([axle.driven for axle in vehicle.axles.values()])[vehicle.wheel_axle]
+    vehicle = estimates.vehicle
+    driven = np.array(vehicle.driven, bool)
     if not driven.any():
         driven[:] = True
-    time, speed = estimates.time[rows], estimates["ground_speed"][rows]
 
-    def mean(name: str, chosen: NDArray[np.bool_] = driven) -> Array:
-        return np.mean(
-            [estimates[name.format(w)][rows] for w, of in zip(vehicle.wheels, chosen, strict=True) if of],
-            axis=0,
-        )
+    def columns(name: str) -> Array:
+        return np.stack([estimates[name.format(w)] for w in vehicle.wheels], axis=1)
 
-    adhesion, direction = mean("adhesion_{}"), np.where(mean("wheel_speed_{}") < 0, -1.0, 1.0)
-    place = vehicle.axle_to_rear - np.mean(vehicle.axle_to_rear)
-    front, rear = (driven & (sign * place[vehicle.wheel_axle] > 0) for sign in (1, -1))
-    ends = (
-        (mean("adhesion_{}", front), mean("adhesion_{}", rear))
-        if front.any() and rear.any()
-        else (adhesion,) * 2
-    )
-    slip = np.where(
-        np.isin(event, [EVENTS.index("gap"), EVENTS.index("standstill")]), np.nan, mean("slip_{}")
-    )
-    radius = np.mean(np.asarray(vehicle.wheel_radius)[driven])
+    slip, deviation = columns("slip_{}"), np.nan_to_num(columns("slip_{}_std"))
+    rims, adhesion = columns("wheel_speed_{}") * np.asarray(vehicle.wheel_radius), columns("adhesion_{}")
+    direction = np.where(rims[:, driven].mean(axis=1) < 0, -1.0, 1.0)
+    sides = [driven & (sign * side_of_wheels(vehicle) >= 0) for sign in (-1, 1)]
+    worst = [_worst(slip[:, on], deviation[:, on], rims[:, on]) for on in sides if on.any()]
+    ends = [adhesion[:, on].mean(axis=1) for on in _ends(vehicle, driven)]
+    blind = np.isin(estimates.event_codes, [EVENTS.index("gap"), EVENTS.index("standstill")])
     table = np.stack(
         [
-            time, slip, np.nan_to_num(mean("slip_{}_std")),
-            np.where(direction > 0, *ends), np.where(direction > 0, *ends[::-1]), adhesion,
-            estimates["soil_resistance"][rows], radius * np.abs(mean("wheel_speed_{}")), direction * speed,
-        ]
-    )  # fmt: skip
-    names = ("time", "slip", "deviation", "leading", "trailing", "adhesion", "resistance", "rim", "travel")
+            estimates.time,
+            np.where(blind, np.nan, np.maximum(np.mean([w[0] for w in worst], axis=0), -0.2)),
+            np.mean([w[1] for w in worst], axis=0),
+            np.abs(np.mean([w[2] for w in worst], axis=0)),
+            np.where(direction > 0, *ends),
+            np.where(direction > 0, *ends[::-1]),
+            estimates["soil_resistance"],
+            np.abs(rims[:, driven].mean(axis=1)),
+            direction * estimates["ground_speed"],
+        ],
+        axis=1,
+    )
+    names = ("time", "slip", "deviation", "fastest", "leading", "trailing", "resistance", "rim", "travel")
     return [
-        Row(**dict(zip(names, column, strict=True)), measured=bool(seen))
-        for column, seen in zip(table.T.tolist(), measured[rows], strict=True)
+        Row(**dict(zip(names, row, strict=True)), measured=bool(seen))
+        for row, seen in zip(table.tolist(), measured, strict=True)
     ]
 
 
-@dataclass
-class Signs:
-    """Means of six signals over five memories, and what follows from them."""
+def side_of_wheels(vehicle: Vehicle) -> Array:
+    """-1 left, 1 right, 0 the middle, by a wheel's place on its axle (n,)."""
+    axle = np.asarray(vehicle.wheel_axle)
+    place = np.arange(len(axle))
+    return np.array(
+        [np.sign(np.sum(axle[:i] == axle[i]) - np.sum(axle[i + 1 :] == axle[i])) for i in place], float
+    )
 
-    mean: Array = field(default_factory=lambda: np.zeros((6, 5)))
-    square: Array = field(default_factory=lambda: np.zeros(3))
-    force: Array = field(default_factory=lambda: np.zeros(4))
-    age: float = 0.0
-    moved: float = 0.0
-    seen: bool = False
 
-    def rest(self) -> None:
-        """A rest or a gap."""
-        self.seen, self.moved = False, 0.0
+def _worst(slip: Array, deviation: Array, rim: Array) -> tuple[Array, Array, Array]:
+    """Slip and SD of the wheel whose slip is surely largest, and the fastest rim; each (n,) of (n, wheels)."""
+    rows = np.arange(len(slip))
+    most = np.argmax(np.nan_to_num(slip - deviation, nan=-9.0), axis=1)
+    return slip[rows, most], deviation[rows, most], rim[rows, np.argmax(np.abs(rim), axis=1)]
 
-    def take(self, look: Array, dt: float) -> None:
-        """A look: slip, its SD, adhesion leading, trailing and of all, resistance, rim speed; ``dt`` s after the last one."""
-        slip, _, leading, trailing, adhesion, resistance, rim = look.tolist()
-        curve = 1 - exp(-STEEPNESS * slip) if slip > 0 else 0.0
-        gain = dt / (FORCES + dt) if self.seen else 1.0
-        self.force += gain * (np.array([leading, trailing, adhesion, curve]) - self.force)
-        ahead, behind, level, shape = (
-            log(max(x, 0.0) + floor)
-            for x, floor in zip(self.force.tolist(), (0.05, 0.05, 0.03, 0.05), strict=True)
-        )
-        now = np.array([slip, ahead - behind, level - shape, level, resistance, log(rim + 0.02)])[:, None]
-        tau = np.where(RESTARTED, MEMORY, np.minimum(MEMORY, self.age))
-        if dt > 0:
-            self.mean += dt / (tau + dt) * (now - self.mean)
-        if not self.seen:
-            anew = RESTARTED if self.age > 0 else np.ones(5, bool)
-            self.mean[:, anew] = now
-        if self.moved > 1 and dt > 0:
-            wander = (self.mean[:3, 1] - self.mean[:3, 3]) ** 2
-            self.square += dt / (min(SPREAD_MEMORY, self.age) + dt) * (wander - self.square)
-        self.seen = True
-        self.age += dt
-        self.moved += dt
 
-    def features(self) -> list[float]:
-        """The signs, in the order of SIGNS."""
-        m, q = self.mean.tolist(), self.square.tolist()
-        return [
-            m[SLIP][0],
-            m[SLIP][1],
-            m[SLIP][0] - m[SLIP][2],
-            (m[SLIP][1] - m[SLIP][4]) / sqrt(q[0] + 0.01**2),
-            m[ASYMMETRY][0] - m[ASYMMETRY][2],
-            m[ASYMMETRY][2] - m[ASYMMETRY][4],
-            (m[ASYMMETRY][1] - m[ASYMMETRY][4]) / sqrt(q[1] + 0.05**2),
-            (m[GRIP][1] - m[GRIP][4]) / sqrt(q[2] + 0.1**2),
-            m[ADHESION][0] - m[ADHESION][2],
-            m[ADHESION][1] - m[ADHESION][4],
-            m[RESISTANCE][0] - m[RESISTANCE][2],
-            m[RESISTANCE][1] - m[RESISTANCE][3],
-            m[RIM][0] - m[RIM][2],
-            m[RIM][1] - m[RIM][3],
-        ]
+def _ends(vehicle: Vehicle, driven: NDArray[np.bool_]) -> list[NDArray[np.bool_]]:
+    """The driven wheels in front of the middle and behind it; twice all of them where one of these is empty."""
+    place = (vehicle.axle_to_rear - np.mean(vehicle.axle_to_rear))[np.asarray(vehicle.wheel_axle)]
+    ends = [driven & (sign * place > 0) for sign in (1, -1)]
+    return ends if all(end.any() for end in ends) else [driven, driven]
+
+
+def pace(vehicle: Vehicle, limits: Mapping[str, float]) -> float:
+    """The watch's unit of time [s]; ``limits`` as :func:`~terragrip.estimation.engine.watch_limits` gives them."""
+    place = vehicle.axle_to_rear - np.mean(vehicle.axle_to_rear)
+    length = sqrt(2 * float(np.sum(place**2))) if len(place) > 1 else 3 * float(vehicle.wheel_radius[0])
+    return limits["pace"] * sqrt(length / GRAVITY)
+
+
+def _low_pass(mean: float, dt: float, tau: float, x: float) -> float:
+    return mean + dt / (tau + dt) * (x - mean) if dt > 0 else mean
 
 
 @dataclass
 class Watch:
-    """Told each row, says whether the wheels dig or the vehicle is stuck.
+    """Given each row, says whether the wheels dig or the vehicle is stuck.
 
-    ``limits``: as :func:`~terragrip.estimation.engine.watch_limits` gives them.
+    ``limits``: as :func:`~terragrip.estimation.engine.watch_limits` gives them; ``pace``: the unit of time [s].
     """
 
     limits: Mapping[str, float]
-    signs: Signs = field(default_factory=Signs)
-    looked: bool = False
-    """The last row ended a look."""
+    pace: float
+    usual: list[float] = field(default_factory=lambda: [0.0, 0.0])
+    age: float = 0.0
 
     def __post_init__(self) -> None:
         self.forget()
 
     def forget(self) -> None:
         """What was seen of the motion; what is usual is kept."""
-        self.signs.rest()
-        self.sum, self.rows = np.zeros(7), 0
-        self.look_time: float | None = None
+        self.sum, self.weight, self.moving, self.slips = np.zeros(7), 0.0, False, False
+        self.points, self.score, self.time = [0.0] * 5, 0.0, 0.0
         self.stuck_time: float | None = None
-        self.score, self.spinning, self.rim, self.seen_time = NO_SCORE, 0.0, 0.0, -1e9
+        self.spinning, self.rim = 0.0, 0.0
         self.sinking = self.stuck = False
 
-    def take(self, row: Row) -> str:
+    def update(self, row: Row) -> str:
         """The event after a row."""
-        self.looked = False
         if isnan(row.slip):
             self.forget()
             return ""
         if row.measured:
-            self.seen_time = row.time
             self._judge_stuck(row)
-        self._judge_digging(row)
+        if self._look(row):
+            begins = self.score > self.limits["warn"] and self.slips and self.spinning <= 0
+            holds = self.sinking and 2 * self.score > self.limits["warn"]
+            self.sinking = not self.stuck and (begins or holds)
         return "stuck" if self.stuck else "immobilization" if self.sinking else ""
 
-    def _judge_digging(self, row: Row) -> None:
-        slip = max(row.slip, -0.2)
-        self.sum += (slip, row.deviation, row.leading, row.trailing, row.adhesion, row.resistance, row.rim)
-        self.rows += 1
-        since = 0.0 if self.look_time is None else row.time - self.look_time
-        if self.look_time is not None and since < LOOK:
-            return
-        look = self.sum / self.rows
-        self.sum, self.rows, self.look_time, self.looked = np.zeros(7), 0, row.time, True
-        self.signs.take(look, since)
-        if self.stuck or float(look[6]) < 3 * self.limits["standstill_speed"]:
-            self.score, self.sinking = NO_SCORE, False
-            return
-        signs = self.signs.features()
-        step = min(since, LONGEST_STEP)
-        score = min(max(digging_score(signs), NO_SCORE), -NO_SCORE)
-        self.score += step / (self.limits["memory"] + step) * (score - self.score)
-        high = signs[0] - self.limits["confidence"] * float(look[1]) - self.limits["high_slip"]
-        score = self.score + (HIGH_SLIP * max(high, 0.0) if row.time - self.seen_time < SILENT else 0.0)
-        warn = self.limits["warn"]
-        begins = score > warn and self.spinning <= 0
-        self.sinking = begins or (self.sinking and score > warn - self.limits["release"])
+    def _look(self, row: Row) -> bool:
+        weight = 1 / (row.deviation + SHARP) ** 2
+        seen = (
+            row.slip, row.deviation, row.leading, row.trailing, row.resistance, row.rim, row.travel
+        )  # fmt: skip
+        self.sum += weight * np.array(seen)
+        self.weight += weight
+        since = row.time - self.time if self.moving else 0.0
+        if self.moving and since < 0.95 * SHORT * self.pace:
+            return False
+        now = self._signals(self.sum / self.weight)
+        if not self.moving:
+            self.now, self.mean = list(now), list(now)
+        for k, x in enumerate(now):
+            self.now[k] = _low_pass(self.now[k], since, SHORT * self.pace, x)
+            self.mean[k] = _low_pass(self.mean[k], since, self.pace, x)
+        tau = min(self.age, self.limits["usual"] * self.pace)
+        for k, x in enumerate((min(self.now[SLIP], self.limits["high_slip"]), self.now[BALANCE])):
+            self.usual[k] = _low_pass(self.usual[k], since, tau, x) if self.age > 0 else x
+        self.sum, self.weight, self.moving, self.time = np.zeros(7), 0.0, True, row.time
+        self.age += since
+        self._judge(since)
+        return True
+
+    def _signals(self, mean: Array) -> tuple[float, ...]:
+        slip, deviation, leading, trailing, resistance, rim, travel = mean.tolist()
+        ahead, behind, still = max(leading, 0.0), max(trailing, 0.0), self.limits["standstill_speed"]
+        return (
+            slip, deviation, (ahead - behind) / (ahead + behind + FLOOR), 0.0 if isnan(resistance) else resistance,
+            log(rim + still), log(max(travel, 0.0) + still),
+        )  # fmt: skip
+
+    def _judge(self, since: float) -> None:
+        limits, most = self.limits, self.limits["most"]
+
+        def change(signal: int) -> float:
+            return self.now[signal] - self.mean[signal]
+
+        def bounded(points: float, least: float, most: float) -> float:
+            return min(max(points, least), most)
+
+        sure = self.now[SLIP] - self.now[DEVIATION]
+        self.points = [
+            bounded(change(SLIP) / limits["rise"], -most, most),
+            bounded(most * (sure / limits["high_slip"] - 1), 0.0, 2 * most),
+            bounded((self.usual[1] - self.now[BALANCE]) / limits["leading"], -most, most),
+            bounded(change(RESISTANCE) / limits["resistance"], -most, most),
+            -bounded(max(change(RIM), change(TRAVEL)) / limits["command"], 0.0, 2 * most),
+        ]
+        tau = limits["memory"] * self.pace
+        self.score = _low_pass(self.score, min(since, self.pace), tau, max(sum(self.points), LEAST))
+        self.slips = sure > self.usual[0] + limits["level"]
 
     def _judge_stuck(self, row: Row) -> None:
-        limits = self.limits
+        limits, still = self.limits, self.limits["standstill_speed"]
         dt = 0.0 if self.stuck_time is None else row.time - self.stuck_time
         if dt > LONGEST_LOOK:
             dt, self.stuck_time, self.stuck, self.spinning = 0.0, None, False, 0.0
-        self.rim = row.rim if self.stuck_time is None else self.rim + dt / (FAST + dt) * (row.rim - self.rim)
+        before = row.fastest if self.stuck_time is None else self.rim
+        self.rim = _low_pass(before, dt, CALM, row.fastest)
         self.stuck_time = row.time
-        turning = self.rim > 3 * limits["standstill_speed"]
-        self.spinning = (
-            self.spinning + dt if turning and row.travel < limits["stuck_travel"] * row.rim else 0.0
-        )
-        held = self.stuck and row.travel < limits["free_travel"] * row.rim
-        self.stuck = turning and (self.spinning >= limits["stuck_duration"] or held)
+        turning = self.rim > 3 * still
+        held_up = turning and row.travel < max(limits["stuck_travel"] * row.fastest, still)
+        spinning = min(max(self.spinning + (dt if held_up else -dt), 0.0), limits["stuck_duration"])
+        self.spinning = spinning if turning else 0.0
+        sure = held_up and self.spinning >= limits["stuck_duration"]
+        holds = self.stuck and row.travel < limits["free_travel"] * row.fastest
+        self.stuck = turning and (sure or holds)
         if self.stuck:
             self.sinking = False
