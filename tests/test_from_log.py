@@ -70,8 +70,8 @@ def by_command_in_blocks(folder: Path, drive: Any, patch: pytest.MonkeyPatch) ->
 
 def by_command_in_text_blocks(folder: Path, drive: Any, patch: pytest.MonkeyPatch) -> Estimates:
     patch.setattr("terragrip.formats.csv._LONG", 0)
-    patch.setattr("terragrip.formats.csv_blocks.ROWS", 1)
-    patch.setattr("terragrip.formats.csv_blocks._BLOCK", 100_000)
+    patch.setattr("terragrip.formats.csv.ROWS", 1)
+    patch.setattr("terragrip.formats.csv._BLOCK", 100_000)
     return command(folder, "log.csv")
 
 

@@ -56,7 +56,7 @@ def estimate_file(
     if isinstance(log, Recording):
         blocks = LogBlocks.of(log, ROWS)
     else:
-        from terragrip.formats.long_logs import log_in_blocks
+        from terragrip.formats.log_blocks import log_in_blocks
 
         blocks = log_in_blocks(log, profile, dbc=dbc)
     parts = estimated(

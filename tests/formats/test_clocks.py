@@ -13,7 +13,7 @@ from terragrip.errors import InputError
 from terragrip.formats import Profile, inspect
 from terragrip.formats.clocks import Speed, lag_between
 from terragrip.formats.csv import csv_on_disk
-from terragrip.formats.long_logs import recordings_of
+from terragrip.formats.log_blocks import recordings_of
 from test_sources import nmea
 
 TIME = np.round(np.arange(0, 200, 0.05), 2)
@@ -185,3 +185,25 @@ def test_effort_is_a_torque(tmp_path: Path) -> None:
     seen = inspect(put(tmp_path / "log.csv", frame))
     assert seen.recognised["drive_torque_l"] == ("effort_l",)
     assert not any("No drive torque" in said for said in seen.missing)
+
+
+@pytest.mark.parametrize("seed", range(1000, 1003))
+def test_right_clocks_stay_and_wrong_ones_are_set_right(tmp_path: Path, seed: int) -> None:
+    """Two loggers: of right clocks the vehicle's own lag moves nothing; a clock 0.4 s late is set right."""
+    rim = speed_at(TIME)
+    slip = np.gradient(rim, TIME) / (9.81 * 2.0)
+    wheels = pd.DataFrame(
+        {"time": TIME, "wheel_speed_l": noisy(5 * rim, seed, 0.02), "wheel_speed_r": 5 * rim}
+    )
+    ground = pd.DataFrame({"time": TIME, "ground_speed": noisy(rim * (1 - slip), seed + 100, 0.02)})
+    first, second = put(tmp_path / "wheels.csv", wheels), put(tmp_path / "gnss.csv", ground)
+    right = tg.read([first, second])
+    assert len(right) == len(TIME)  # not moved, so that stamps still coincide
+    (note,) = [note for note in right.notes if "clock of gnss.csv" in note]
+    assert note.endswith("so it is taken as it is.")
+    put(second, ground.assign(time=TIME + 0.4))
+    late = tg.read([first, second])
+    (note,) = [note for note in late.notes if "clock of gnss.csv" in note]
+    assert note.endswith("and was set right.")
+    fresh = np.isfinite(late["ground_speed"])
+    assert np.abs(late.time[fresh][0]) < 0.1

@@ -17,7 +17,7 @@ import terragrip as tg
 from can_frames import drive, write_log
 from terragrip.errors import InputError
 from terragrip.formats import Profile, csv, inspect
-from terragrip.formats.long_logs import long_log, recordings_of
+from terragrip.formats.log_blocks import long_log, recordings_of
 from terragrip.formats.reading import read_table
 from terragrip.vehicle import Vehicle
 

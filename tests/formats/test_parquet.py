@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 
 from terragrip.errors import InputError
 from terragrip.formats import parquet, read
-from terragrip.formats.long_logs import recordings_of
+from terragrip.formats.log_blocks import recordings_of
 from terragrip.recording import Recording
 
 

@@ -99,13 +99,13 @@ def format_of(path: str | os.PathLike[str]) -> Format:
             head = stream.read(_HEAD)
     except OSError as error:
         raise unreadable(path, error) from error
-    told = next((one for one in known.values() if head.startswith(one.magic)), None)
-    if told is None:
-        told = next(
+    found = next((one for one in known.values() if head.startswith(one.magic)), None)
+    if found is None:
+        found = next(
             (one for one in known.values() if one.recognises is not None and one.recognises(head)), None
         )
-    if told is not None:
-        return told
+    if found is not None:
+        return found
     # Nothing tells. Of a file that is no text, the name says which reader shall say what is wrong; a text is a table, unless another
     # package knows its name.
     binary = b"\0" in head and not head.startswith((b"\xff\xfe", b"\xfe\xff"))

@@ -1,20 +1,22 @@
-"""Tables too long to be held in memory, in blocks of rows, with or without a profile: text, Parquet and MATLAB 7.3."""
+"""A log as a recording in blocks: tables too long to be held in memory (text, Parquet, MATLAB 7.3), with or without a profile."""
 
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 
-from terragrip.formats.blocks import Columns, recordings
+import numpy as np
+
+from terragrip.errors import InputError
 from terragrip.formats.conversion import converted_block, settled
 from terragrip.formats.profile import Profile
 from terragrip.formats.registry import format_of
 from terragrip.formats.table import LogTable, in_si, since_clock_was_set
-from terragrip.formats.table_on_disk import TableOnDisk
-from terragrip.recording import LogBlocks, Recording
-from terragrip.recording.columns import seconds
-from terragrip.recording.schema import TIME, is_own
+from terragrip.formats.table_on_disk import Columns, TableOnDisk
+from terragrip.recording import LogBlocks, Recording, checks
+from terragrip.recording.columns import numbers, seconds, texts
+from terragrip.recording.schema import LABELS, TIME, is_own
 from terragrip.recording.survey import ROWS
 
 PathLike = str | os.PathLike[str]
@@ -57,14 +59,14 @@ def recordings_of(log: TableOnDisk, profile: Profile | None = None) -> Iterator[
             in_si(block)
             for block in _since_set(log, log.blocks(chosen, 1), table, TIME, log.units.get(TIME, "s"))
         )
-        return recordings(own, log.names, chosen, log.source, log.digest, log.notes)
+        return _checked(own, log.names, chosen, log.source, log.digest, log.notes)
     found = settled(profile, table)
     if found is None:
         return None
     ready, notes = found
     log.notes.extend(notes)
     names = [TIME, *ready.channels]
-    return recordings(_converted(log, ready, table), tuple(names), names, log.source, log.digest, log.notes)
+    return _checked(_converted(log, ready, table), tuple(names), names, log.source, log.digest, log.notes)
 
 
 def _converted(log: TableOnDisk, profile: Profile, table: LogTable) -> Iterator[Columns]:
@@ -99,3 +101,68 @@ def long_log(path: str | os.PathLike[str]) -> TableOnDisk | None:
     own = format_of(path)
     found = None if own.in_blocks is None else own.in_blocks(os.fspath(path))
     return found if found is not None and found.is_long else None
+
+
+def _checked(
+    blocks: Iterable[Columns],
+    names: tuple[str, ...],
+    chosen: list[str],
+    source: str,
+    digest: str,
+    said: Sequence[str] = (),
+) -> Iterator[Recording]:
+    """Consecutive blocks of columns as checked recordings; they together are what `Recording.from_frame` makes of all.
+
+    ``names``: all columns of the log, ``chosen``: those in the blocks; ``digest``: SHA-256 of the file; ``said``: notes, to which
+    the blocks may add as they come. Raises InputError as that does, each when its block is reached; that a channel is empty over the
+    whole file shows at the end only.
+    """
+    checks.require_columns(names, source)
+    notes = list(checks.remarks(names))
+    silent, first, after = set(chosen), 0, None
+    origin: np.datetime64 | None = None
+    for columns in blocks:
+        time = columns[TIME]
+        if not len(time):
+            continue
+        if time.dtype.kind == "M":
+            if origin is None:
+                origin = time[0]
+                notes += seconds(time[:1], source)[1]
+            columns = {**columns, TIME: time - origin}
+        elif origin is not None:
+            raise InputError(
+                "holds dates and numbers", file=source, place=f"column {TIME}", mend="give one of them"
+            )
+        block = _block(columns, source, first, after, silent, tuple(dict.fromkeys((*notes, *said))), digest)
+        first, after = first + len(block), float(block.time[-1])
+        yield block
+    if first == 0:
+        checks.check_time(np.empty(0), source)
+    for name in silent:
+        checks.refuse_empty(name, source)
+
+
+def _block(
+    columns: Columns,
+    source: str,
+    first_row: int,
+    after: float | None,
+    silent: set[str],
+    notes: tuple[str, ...],
+    digest: str,
+) -> Recording:
+    """One checked block; takes the channels that hold a value out of ``silent``."""
+    time, _ = seconds(columns[TIME], source)
+    checks.check_time(time, source, first_row=first_row, after=after)
+    channels, labels = {}, {}
+    for name, column in columns.items():
+        if name in LABELS:
+            labels[name] = texts(name, column, len(time), source)
+        elif name != TIME:
+            values = numbers(name, column, time, source)
+            checks.refuse_infinite(name, values, time, source, first_row=first_row)
+            channels[name] = values
+            if name in silent and not np.isnan(values).all():
+                silent.discard(name)
+    return Recording(time, channels, labels, source, digest, notes)
