@@ -168,6 +168,8 @@ def test_a_lag_within_one_file_is_found_and_said(tmp_path: Path, seed: int, held
     found, spread = (float(said.split()[k]) for k in (2, 4))
     assert found == pytest.approx(0.2, abs=0.03)
     assert abs(found - 0.2) < 3 * spread
+    (block,) = recordings_of(csv_on_disk(str(tmp_path / "late.csv"))) or ()
+    assert block.notes == late.notes
     right = tg.read(put(tmp_path / "right.csv", table(TIME, ground(0.0), wheels)))
     assert not [note for note in right.notes if "behind" in note]
     channels = {

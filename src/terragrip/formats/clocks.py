@@ -14,6 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from terragrip.recording.held import fresh_samples, held_period
+from terragrip.recording.survey import ROWS
 from terragrip.units import STANDARD_GRAVITY
 
 Floats = npt.NDArray[np.float64]
@@ -35,7 +36,7 @@ _STIFFNESS = (
     2.0  # K on soft soil: the slope of ASABE D497's gross traction ratio at 15 % slip, Bn = 20, is 1.85
 )
 _WITHIN = 5.0  # s, the largest lag looked for between channels of one file
-_MOST_ROWS = 1_000_000  # of a file, whose lag is found from its first rows
+_MOST_ROWS = ROWS  # of a file, whose lag is found from its first rows: a block's
 
 
 @dataclass(frozen=True)

@@ -9,6 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from terragrip.errors import InputError
+from terragrip.formats.clocks import lag_within
 from terragrip.formats.conversion import converted_block, settled
 from terragrip.formats.profile import Profile
 from terragrip.formats.registry import format_of
@@ -135,6 +136,9 @@ def _checked(
                 "holds dates and numbers", file=source, place=f"column {TIME}", mend="give one of them"
             )
         block = _block(columns, source, first, after, silent, tuple(dict.fromkeys((*notes, *said))), digest)
+        if first == 0 and (late := lag_within(block.time, block.channels)):
+            notes += late
+            block = replace(block, notes=(*block.notes, *late))
         first, after = first + len(block), float(block.time[-1])
         yield block
     if first == 0:
