@@ -1,8 +1,8 @@
 """Intervals on the families: what share holds, how good they are (mean interval score), beside an oracle's.
 
 The oracle is the plain filter with the true gains, offsets and radii, its own covariance, and in closed form what the machine's
-true load variation adds (and it knows the slope): an adhesion goes by force over load, so a relative load error e shifts mu + rho_t by e of itself. It
-takes whichever of its five Q has the best score. No user can have it.
+true load variation adds (and it knows the slope): an adhesion goes by force over load, so a relative load error e shifts
+mu + rho_t by e of itself. It takes whichever of its five Q has the best score. No user can have it.
 """
 
 from __future__ import annotations

@@ -13,18 +13,9 @@ from second_plant.plant import Ground, Waves, Work, pull_over_weight, run, stati
 from second_plant.result import result_of
 from second_plant.terramechanics import Soil, sinkage_under, soil_for, stresses
 from terragrip.simulation import SimulationResult
-from terragrip.simulation.families import (
-    LOAD_VARIATION,
-    MASSES,
-    SENSORS,
-    WORK,
-    Kind,
-    draw_faults,
-    draw_sensors,
-    draw_speeds,
-    uncertainty,
-)  # fmt: skip
+from terragrip.simulation.families import LOAD_VARIATION, MASSES, WORK, Kind, draw_speeds
 from terragrip.simulation.family_machines import Machine, draw_machine
+from terragrip.simulation.family_sensors import SENSORS, draw_faults, draw_sensors, uncertainty
 from terragrip.simulation.fields import stream
 from terragrip.simulation.scenario import Scenario
 from terragrip.units import STANDARD_GRAVITY
