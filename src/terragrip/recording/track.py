@@ -16,10 +16,10 @@ if TYPE_CHECKING:
 Floats = npt.NDArray[np.float64]
 
 WINDOW = 2.0
-"""Length [s] of the stretch that a parabola is laid through; five fixes at least."""
+"""Length [s] of the stretch that a parabola is laid through; five fixes at least. Longer: less noise, and turns rounded off."""
 
 _SLOWEST = 0.3  # m/s: slower, a course is noise
-_GRADE_WAY = 10.0  # m
+_GRADE_WAY = 16.0  # m
 
 
 @dataclass(frozen=True)
@@ -47,7 +47,7 @@ class Track:
         return np.where(far, np.nan, found)
 
 
-def track_of(recording: Recording) -> Track | None:
+def track_of(recording: Recording, window: float = WINDOW) -> Track | None:
     """Motion by the positions, None without any to speak of.
 
     Positions that repeat are no fixes. Over each five fixes or more a parabola is fitted by least squares (Savitzky and Golay 1964, for
@@ -65,40 +65,49 @@ def track_of(recording: Recording) -> Track | None:
     if len(rows) < 10:
         return None
     time, north, east = recording.time[rows], north[rows], east[rows]
-    span = max(5, int(WINDOW / max(float(np.median(np.diff(time))), 1e-6)) | 1)
+    span = max(5, int(window / max(float(np.median(np.diff(time))), 1e-6)) | 1)
     if len(rows) < span:
         return None
     shown, half = np.lib.stride_tricks.sliding_window_view, span // 2
     middle = slice(half, len(rows) - half)
     ago = shown(time, span) - time[middle, None]
-    (vn, an), (ve, ae) = (_parabola(ago, shown(x, span) - x[middle, None]) for x in (north, east))
+    (_, vn, an), (_, ve, ae) = (_fitted(ago, shown(x, span) - x[middle, None], 2).T for x in (north, east))
+    an, ae = 2 * an, 2 * ae
     speed = np.hypot(vn, ve)
     with np.errstate(invalid="ignore", divide="ignore"):
         turn = (ve * an - vn * ae) / speed**2  # x east, y north: to the left is positive
-    slow = (speed < _SLOWEST) | (np.ptp(ago, axis=1) > 3 * max(WINDOW, float(np.median(np.ptp(ago, axis=1)))))
+    slow = (speed < _SLOWEST) | (np.ptp(ago, axis=1) > 3 * max(window, float(np.median(np.ptp(ago, axis=1)))))
     turn[slow] = np.nan
     grade = _grade(recording, time[middle], speed)
     return Track(time[middle], speed, turn, np.where(slow, np.nan, grade))
 
 
-def _parabola(ago: Floats, values: Floats) -> tuple[Floats, Floats]:
-    """First and second derivative (n,) at 0 of parabolas through rows of (n, k)."""
-    basis = np.stack([np.ones_like(ago), ago, ago**2 / 2], axis=2)
+def _fitted(ago: Floats, values: Floats, degree: int) -> Floats:
+    """Coefficients (n, 1 + degree) of polynomials through rows of (n, k), about 0."""
+    size = np.maximum(np.abs(ago).max(axis=1, keepdims=True), 1e-9)
+    basis = (ago / size)[:, :, None] ** np.arange(degree + 1)
     normal = np.einsum("nki,nkj->nij", basis, basis)
     right = np.einsum("nki,nk->ni", basis, values)
-    found = np.linalg.solve(normal, right[..., None])[..., 0]
-    return found[:, 1], found[:, 2]
+    return np.asarray(np.linalg.solve(normal, right[..., None])[..., 0] / size ** np.arange(degree + 1))
 
 
 def _grade(recording: Recording, time: Floats, speed: Floats) -> Floats:
-    """Grade (n,) [rad] from altitude over the way, as a straight line over `_GRADE_WAY` metres on either side."""
-    altitude = recording.channels.get("altitude")
-    if altitude is None or np.isfinite(altitude).sum() < 2:
-        return np.full(len(time), np.nan)
+    """Grade (n,) [rad]: cubics through the altitude over `_GRADE_WAY` metres, which do not flatten hills as straight lines do."""
+    altitude, unknown = recording.channels.get("altitude"), np.full(len(time), np.nan)
+    if altitude is None or np.isfinite(altitude).sum() < 2 or not (speed > _SLOWEST).any():
+        return unknown
     known = np.isfinite(altitude)
     height = np.interp(time, recording.time[known], altitude[known])
     way = np.r_[0.0, np.cumsum(np.diff(time) * (speed[1:] + speed[:-1]) / 2)]
-    low, high = (np.interp(way + d, way, height) for d in (-_GRADE_WAY / 2, _GRADE_WAY / 2))
-    run = np.clip(way + _GRADE_WAY / 2, 0, way[-1]) - np.clip(way - _GRADE_WAY / 2, 0, way[-1])
-    with np.errstate(invalid="ignore", divide="ignore"):
-        return np.where(run > _GRADE_WAY / 4, np.arctan((high - low) / run), np.nan)
+    step = float(np.median(np.diff(way)[speed[1:] > _SLOWEST])) if len(way) > 1 else 0.0
+    span = max(7, int(_GRADE_WAY / max(step, 1e-6)) | 1)
+    if len(way) < span:
+        return unknown
+    shown, middle = np.lib.stride_tricks.sliding_window_view, slice(span // 2, len(way) - span // 2)
+    ago = shown(way, span) - way[middle, None]
+    long = np.minimum(-ago[:, 0], ago[:, -1]) > _GRADE_WAY / 4  # else the vehicle stood, and altitude drifted
+    found = unknown.copy()
+    found[middle][long] = np.arctan(
+        _fitted(ago[long], (shown(height, span) - height[middle, None])[long], 3)[:, 1]
+    )
+    return found

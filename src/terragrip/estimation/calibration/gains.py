@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from terragrip.estimation.calibration.plausible import turns_unseen
 from terragrip.estimation.calibration.result import Evidence, Quantity, Unknown
 from terragrip.estimation.calibration.sharing import SharedGains, Sharing, fit_shared_gains
 from terragrip.estimation.calibration.windows import Windows, track_blocks, wheel_loads, windows
@@ -24,6 +25,7 @@ WINDOW = 0.5
 
 _SLOWEST = 0.15  # m/s
 _SLIP = (-0.1, 0.6)  # beyond, a wheel digs itself in and leaves the curve that it shares
+_TIGHT = 0.05  # difference of the hubs' speeds over the ground speed
 _MIN_BLOCKS = 8
 _BLOCKS_A_SOIL = 15  # for a soil's gains to be held against another's
 _SURPRISE = 0.01
@@ -169,7 +171,9 @@ def _driving(table: Windows, vehicle: Vehicle) -> Windows:
     whole = table.count > 0.5 * np.median(table.count[table.count > 0])
     slips = slip(table.wheel_speed, table.hub_speed, vehicle.wheel_radius)
     on_curve = np.all((slips > _SLIP[0]) & (slips < _SLIP[1]), axis=1)
-    return table.select(known & moving & whole & on_curve & ~_near_border(table))
+    # Where a turn is not known, the hubs' speeds are not; where it is tight, the wheels scrub and are far apart on their curve.
+    seen = ~turns_unseen(table, vehicle) & (np.ptp(table.hub_speed, axis=1) < _TIGHT * table.ground_speed)
+    return table.select(known & moving & whole & on_curve & seen & ~_near_border(table))
 
 
 def _rows(table: Windows, vehicle: Vehicle, offset_std: Floats, blocks: Ints, driven: Ints) -> Sharing:

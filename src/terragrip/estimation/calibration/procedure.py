@@ -12,6 +12,12 @@ import numpy.typing as npt
 from terragrip.errors import InputError
 from terragrip.estimation.calibration import zeros
 from terragrip.estimation.calibration.gains import ChannelErrors, RelativeGains, relative_gains
+from terragrip.estimation.calibration.plausible import (
+    UNSTATED_GAIN,
+    completed_by_positions,
+    plausible,
+    turned_unseen,
+)
 from terragrip.estimation.calibration.radii import WINDOW as RADIUS_WINDOW
 from terragrip.estimation.calibration.radii import Rolling, rolling_radii
 from terragrip.estimation.calibration.result import Calibration, Quantity, Unknown
@@ -65,13 +71,15 @@ def calibrate(
     logs = [without_held(log) for log in logs]
     found, unknown, yaw_zero = _zeros(logs, vehicle, sources)
     zeroed = Calibration(tuple(found), ()).apply(vehicle)
-    corrected = [_corrected(log, zeroed, yaw_zero) for log in logs]
+    completed = [completed_by_positions(_corrected(log, zeroed, yaw_zero)) for log in logs]
+    corrected = [log for log, _ in completed]
+    doubts += tuple(dict.fromkeys(said for _, notes in completed for said in notes))
 
     passes = windows(corrected, zeroed, RADIUS_WINDOW)
     rolling = rolling_radii(passes, zeroed, track_blocks(passes), sources)
     rolled = zeroed
     if isinstance(rolling, Rolling):
-        together = _possible(_radii(rolling, None, vehicle), vehicle, unknown)
+        together = plausible(_possible(_radii(rolling, None, vehicle), vehicle, unknown), vehicle, unknown)
         rolled = Calibration(tuple(together), ()).apply(zeroed)
     else:
         unknown.append(rolling)
@@ -82,17 +90,19 @@ def calibrate(
     shared: list[Quantity] = []
     if isinstance(gains, RelativeGains):
         unknown += gains.unknown
-        shared = _useful(_possible(gains.quantities, vehicle, unknown), vehicle, unknown)
+        likely = plausible(_possible(gains.quantities, vehicle, unknown), vehicle, unknown)
+        shared = _useful(likely, vehicle, unknown)
     else:
         unknown += gains
     if isinstance(rolling, Rolling) and rolled is not zeroed:
-        apart = gains if isinstance(gains, RelativeGains) else None
-        found += _useful(_radii(rolling, apart, vehicle), vehicle, unknown)
+        apart = gains if isinstance(gains, RelativeGains) and shared else None
+        found += _useful(plausible(_radii(rolling, apart, vehicle), vehicle, unknown), vehicle, unknown)
     found += shared
     try:
         found.append(identify_torque_scale(_with_gains(corrected, shared), rolled))
     except InputError as error:
         unknown.append(Unknown("drive_torque_scale", error.problem))
+    unknown += turned_unseen(corrected, vehicle, [q.name for q in found])
     return Calibration(tuple(found), tuple(unknown), _left(found, vehicle), doubts)
 
 
@@ -203,7 +213,7 @@ def _useful(quantities: list[Quantity], vehicle: Vehicle, unknown: list[Unknown]
     key, stated = quantities[0].key, vehicle.uncertainty
     relative = key in ("drive_torque_gain", "wheel_radius")
     prior = {
-        "drive_torque_gain": stated.drive_torque_gain,
+        "drive_torque_gain": UNSTATED_GAIN if stated.drive_torque_gain is None else stated.drive_torque_gain,
         "drive_torque_offset": stated.drive_torque_offset,
         "drawbar_offset": stated.drawbar_offset,
         "wheel_radius": _UNSTATED_RADIUS if stated.wheel_radius is None else stated.wheel_radius,

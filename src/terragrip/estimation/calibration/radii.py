@@ -42,6 +42,7 @@ _ZERO_PULL = 0.03  # drawbar force over weight
 _STEADY = 0.05  # dv/dt over g
 _SLOWEST = 0.2  # m/s
 _STRAIGHT = 0.02  # relative difference of the wheels' speeds from side to side
+_GENTLE = 0.3  # likewise of the hubs, where the yaw rate is known
 _LEAST_DISTANCE = 5.0  # m of zero-pull passes
 _LOW = 0.7  # of the largest pull: windows above say nothing of the radius
 _STEEPNESS = (
@@ -139,7 +140,11 @@ def _passes(windows: Windows, vehicle: Vehicle) -> Bools:
     straight = np.ones(len(windows), dtype=bool)
     if len(left) and len(right):
         speed = rim.mean(axis=1)
-        straight = np.abs(rim[:, left].mean(axis=1) - rim[:, right].mean(axis=1)) < _STRAIGHT * np.abs(speed)
+        apart = np.abs(rim[:, left].mean(axis=1) - rim[:, right].mean(axis=1))
+        turning = np.ptp(windows.hub_speed, axis=1)
+        known = np.isfinite(windows.yaw_rate) & (vehicle.track is not None)
+        # With a known turn each hub's speed is known, as long as it does not scrub.
+        straight = np.where(known, turning < _GENTLE * np.abs(speed), apart < _STRAIGHT * np.abs(speed))
     whole = windows.count > 0.5 * np.median(windows.count[windows.count > 0])
     moving = (windows.ground_speed > _SLOWEST) & np.all(rim > _SLOWEST, axis=1)
     return whole & moving & straight & (change < _STEADY * GRAVITY)

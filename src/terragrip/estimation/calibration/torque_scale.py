@@ -7,8 +7,10 @@ other. By PHYSICS §1, summed over the wheels and averaged over a window::
     R = Σ (J dω_i/dt)/r_i + Σ (ρ_t F_i + ρ_w ω_i) + ρ_s m g
 
 K is raw torque over true torque. ρ_s, constant for a log, soil and direction of travel, is an intercept; a skid-steered
-vehicle's resistance in turns is a term of its own. Resistance that grows with slip would pass for a larger K: its
-prior is in the interval.
+vehicle's resistance in turns is a term of its own. Resistance that grows with slip would pass for a larger K: windows of high
+slip, where it grows fastest, do not count, and its prior is in the interval. (As a term of the regression it would take up thrust
+itself, since slip follows thrust more closely than Y does.) A slope that nothing measures is in the interval as far as a driver takes it
+with another speed or pull.
 
 Errors in Y would pull K towards 0. Where there are two measures of dv/dt + g sinθ, the accelerometer and ground speed with
 pitch, each is the other's instrument: K = cov(X, (Y1 + Y2)/2)/cov(Y1, Y2), so errors of either, if unlike, do no harm.
@@ -23,6 +25,7 @@ import numpy as np
 import numpy.typing as npt
 
 from terragrip.errors import InputError
+from terragrip.estimation.calibration.plausible import turns_unseen
 from terragrip.estimation.calibration.result import Evidence, Quantity
 from terragrip.estimation.calibration.windows import Windows, windows
 from terragrip.physics.loads import GRAVITY
@@ -37,7 +40,10 @@ _HOLDS = 2.0  # a window spans so many updates of the slowest torque channel
 _SLOWEST = 0.1  # m/s
 _LEAST = 20  # windows
 _BLOCKS = 20  # of windows that hang together, to judge the error by
-_SLIP_RESISTANCE = 0.05  # prior of dρ_s/ds: Brixius gives 0.06 to 0.1, hard ground 0
+_SLIP_RESISTANCE = 0.1  # prior SD of dρ_s/ds: hard ground 0, Brixius 0.06 to 0.1
+_MOST_SLIP = 0.15  # beyond, resistance grows faster
+_SLOPE = float(np.radians(0.5))  # prior of a slope that nothing measures, where the vehicle states none,
+_WITH_PUSH = 0.3  # and of its correlation with pull and acceleration
 _DRAWBAR_GAIN = 0.01  # prior where the vehicle states none
 _HUBER = 2.5
 _STRONG = 3.0  # the instruments' covariance over its error
@@ -53,6 +59,7 @@ class _Balance:
     other: Floats
     nuisance: Floats
     slip: Floats
+    slope_known: bool
 
 
 def identify_torque_scale(recordings: Recording | Sequence[Recording], vehicle: Vehicle) -> Quantity:
@@ -90,7 +97,7 @@ def identify_torque_scale(recordings: Recording | Sequence[Recording], vehicle: 
         )
     considered = np.hypot(
         _SLIP_RESISTANCE * vehicle.mass * GRAVITY * _partial_slope(rows.slip, rows, weight),
-        _drawbar_gain(table, vehicle),
+        np.hypot(_drawbar_gain(table, vehicle), _unseen_slope(vehicle, rows, weight)),
     )
     std = float(np.hypot(error, scale * considered))
     said = "torques over radius against drawbar force and mass times acceleration and slope; it goes with the mass"
@@ -116,7 +123,13 @@ def _usable(table: Windows, vehicle: Vehicle) -> Bools:
         np.isfinite(table.torque + table.load + table.wheel_acceleration + table.hub_speed), axis=1
     )
     whole = table.count > 0.5 * np.median(table.count[table.count > 0])
-    return moving & together & known & whole
+    slip = np.mean(
+        1 - table.hub_speed / np.where(together[:, None], table.wheel_speed * vehicle.wheel_radius, np.nan),
+        axis=1,
+    )
+    with np.errstate(invalid="ignore"):
+        usual = np.abs(slip) < _MOST_SLIP
+    return moving & together & known & whole & usual & ~turns_unseen(table, vehicle)
 
 
 def _balance(table: Windows, vehicle: Vehicle) -> _Balance:
@@ -138,7 +151,8 @@ def _balance(table: Windows, vehicle: Vehicle) -> _Balance:
     if np.ptp(turn) > 0:
         nuisance = np.column_stack([nuisance, turn * way])
     slip = np.mean(1 - table.hub_speed / (table.wheel_speed * radius), axis=1) * way
-    return _Balance(thrust, losses, first, other, nuisance, slip)
+    known = bool(np.isfinite(table.pitch).mean() > 0.5 or np.isfinite(table.acceleration).mean() > 0.5)
+    return _Balance(thrust, losses, first, other, nuisance, slip, known)
 
 
 def _centered(values: Floats, nuisance: Floats, weight: Floats) -> Floats:
@@ -179,6 +193,16 @@ def _partial_slope(values: Floats, rows: _Balance, weight: Floats) -> float:
     """Slope of values (n,) over Y, nuisance taken out."""
     value, y1, y2 = _centered(np.column_stack([values, rows.force, rows.other]), rows.nuisance, weight).T
     return float(np.sum(weight * value * (y1 + y2) / 2) / np.sum(weight * y1 * y2))
+
+
+def _unseen_slope(vehicle: Vehicle, rows: _Balance, weight: Floats) -> float:
+    """Relative SD of K by a slope that neither pitch nor accelerometer tells."""
+    if rows.slope_known:
+        return 0.0
+    stated = vehicle.uncertainty.slope
+    slope = vehicle.mass * GRAVITY * (_SLOPE if stated is None else stated)
+    force = _centered(rows.force[:, None], rows.nuisance, weight)[:, 0]
+    return _WITH_PUSH * slope / max(float(np.sqrt(np.mean(weight * force**2))), 1e-12)
 
 
 def _drawbar_gain(table: Windows, vehicle: Vehicle) -> float:

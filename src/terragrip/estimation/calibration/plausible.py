@@ -1,0 +1,98 @@
+"""What a calibration may claim: what positions add to a log, what a value may be, and what is missing."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+
+import numpy as np
+import numpy.typing as npt
+
+from terragrip.estimation.calibration.result import Quantity, Unknown
+from terragrip.estimation.calibration.windows import Windows, windows
+from terragrip.recording import Recording
+from terragrip.recording.track import track_of
+from terragrip.vehicle import Vehicle
+
+Floats = npt.NDArray[np.float64]
+
+UNSTATED_GAIN = 0.1
+"""Relative SD of a torque channel's gain where the vehicle states none: that of motor currents and of strain gauges on a shaft."""
+
+_CALM = 4.0  # s: slips are compared to some tenths of a per cent
+_MOST_GAIN = 1.35  # times, either way: what is further off is no gain but wheels that did not share a curve
+_MOST_RADIUS = 0.1  # relative, from the vehicle file: tread, pressure and load together
+_TURNING = 0.04  # relative difference of the rims from side to side: a turn of 25 track widths
+_MUCH = 0.2  # share of the driving
+
+
+def completed_by_positions(log: Recording) -> tuple[Recording, list[str]]:
+    """The log with a yaw rate and a pitch by its positions where no sensor gives them, and sentences on it."""
+    lacks = [name for name in ("angular_velocity_z", "pitch") if name not in log.channels]
+    if not lacks or "latitude" not in log.channels:
+        return log, []
+    track = track_of(log, _CALM)
+    if track is None:
+        return log, []
+    added: dict[str, Floats] = {}
+    for name, column in (("angular_velocity_z", "turn"), ("pitch", "grade")):
+        values = track.at(column, log.time) if name in lacks else np.empty(0)
+        if np.isfinite(values).any():
+            added[name] = values
+    words = {
+        "angular_velocity_z": "The rate of turn is that of the positions",
+        "pitch": "the slope is that of the altitude",
+    }
+    said = "; ".join(words[name] for name in added)
+    return log.with_channels(**added), [f"{said[0].upper()}{said[1:]}."] if said else []
+
+
+def plausible(quantities: Sequence[Quantity], vehicle: Vehicle, unknown: list[Unknown]) -> list[Quantity]:
+    """The quantities of one kind, or none where one of them is beyond what a machine can have; ``unknown`` then says which."""
+    for quantity in quantities:
+        why = _beyond(quantity, vehicle)
+        if why:
+            unknown.append(Unknown(quantity.key, why))
+            return []
+    return list(quantities)
+
+
+def _beyond(quantity: Quantity, vehicle: Vehicle) -> str:
+    if quantity.key == "drive_torque_gain" and abs(np.log(max(quantity.value, 1e-9))) > np.log(_MOST_GAIN):
+        return (
+            f"that of {quantity.wheel} would be {quantity.value:.2f}, and no sensor is off by more than {1 / _MOST_GAIN:.2f} to "
+            f"{_MOST_GAIN:.2f}: the wheels did not share slip and soil (turns? other radii? a scale of its own?)"
+        )
+    if quantity.key == "wheel_radius":
+        stated = vehicle.wheel_data[vehicle.wheels.index(str(quantity.wheel))].radius
+        if abs(quantity.value / stated - 1) > _MOST_RADIUS:
+            return (
+                f"that of {quantity.wheel} would be {quantity.value:.3g} m, and the vehicle file says {stated:.3g} m: check the units of "
+                "the speeds, the gear ratio and the file"
+            )
+    return ""
+
+
+def turned_unseen(logs: Sequence[Recording], vehicle: Vehicle, told: Collection[str]) -> list[Unknown]:
+    """A line that says to give a yaw rate, where the machine turned, nothing tells how fast, and radii or gains are lacking."""
+    if any(name.startswith(("wheel_radius", "drive_torque_gain")) for name in told):
+        return []
+    table = windows(logs, vehicle, 2.0)
+    moving = np.abs(table.ground_speed) > 0.2
+    if not moving.any():
+        return []
+    share = float(np.mean(turns_unseen(table, vehicle)[moving]))
+    if share < _MUCH:
+        return []
+    why = f"this machine turned in {share:.0%} of its driving and nothing says how fast: give a yaw rate (or positions)"
+    return [Unknown("angular_velocity_z", why)]
+
+
+def turns_unseen(table: Windows, vehicle: Vehicle) -> npt.NDArray[np.bool_]:
+    """Windows (n,) in which the wheels' speeds show a turn, and no yaw rate is known."""
+    rim = table.wheel_speed * vehicle.wheel_radius
+    apart = np.zeros(len(table))
+    for axle in range(len(vehicle.axles)):
+        own = np.flatnonzero(vehicle.wheel_axle == axle)
+        if len(own) > 1:
+            apart = np.fmax(apart, np.abs(rim[:, own[0]] - rim[:, own[-1]]))
+    return np.asarray((apart > _TURNING * np.abs(np.nanmean(rim, axis=1))) & ~np.isfinite(table.yaw_rate))
