@@ -25,7 +25,8 @@ from pathlib import Path
 
 import numpy as np
 
-from large_logs import FRAME, LARGE, Large, profile_of_struct
+from large_can_logs import FRAME
+from large_logs import LARGE, Large, profile_of_struct
 
 READ = """
 import terragrip as tg
