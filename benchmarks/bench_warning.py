@@ -1,6 +1,6 @@
 """Is getting stuck foretold, and how often for nothing? On random machines of both plants, without a drawbar cell.
 
-    python benchmarks/bench_warning.py [--families development held-out second-plant] [--stops 40] [--hours 2] [--rates 100 10]
+    python benchmarks/bench_warning.py [--families development held-out second-plant snow] [--stops 40] [--hours 2] [--rates 100 10]
                                        [--workers 2] [--write]
 
 Closing figures: --families held-out second-plant --stops 300 --hours 20. development and held-out: terragrip.simulation.families;
@@ -9,7 +9,8 @@ asked. Its stop is when, by the truth, the ground speed first stays under STOPPE
 from its start, missed: none between the edge of the soft ground and the stop. Lead is also given in vehicle lengths: of way
 still made. stuck late: it came later than the stop and half a second. False: a warning on a healthy drive (rough ground, hits,
 hills, stops and starts), or on a digging one before its soft ground, where no stop follows within LATER seconds; time after a
-machine stopped by itself does not count. Bounds of 95 %: Wilson's for shares, Poisson's exact for rates.
+machine stopped by itself does not count. snow: the made-up runs of snow_runs.py, for development. Bounds of 95 %: Wilson's for
+shares, Poisson's exact for rates, order statistics for medians.
 """
 
 from __future__ import annotations
@@ -23,28 +24,39 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.stats import binom, chi2
 
+import snow_runs
 from marked import put
 from second_plant import draw as second
 from terragrip.estimation import estimate
 from terragrip.ground.events import events
+from terragrip.recording import Recording
 from terragrip.simulation import SimulationResult, families
 from terragrip.simulation.families import Kind
+from terragrip.vehicle import Vehicle
 
 STOPPED, FREE = 0.05, 0.3  # of the rim's speed
 LATER = 8.0  # s
+SLOW = 1.0  # m/s
 HEALTHY = 600.0  # s a drive
 DOCUMENT = Path(__file__).resolve().parents[1] / "docs/families.md"
 BEGIN = "<!-- made by benchmarks/bench_warning.py --write -->"
+SNOW_DOCUMENT, SNOW_BEGIN = (
+    DOCUMENT.with_name("events.md"),
+    "<!-- made by benchmarks/bench_warning.py --write: snow -->",
+)
 
 Flags = NDArray[np.bool_]
 
 
 @dataclass
 class Tally:
-    """What the warnings were worth. Leads in seconds and in vehicle lengths; `late`: stuck that came late or never [s]."""
+    """What the warnings were worth. Leads in seconds (all, and at no more than SLOW) and in vehicle lengths; `late`: stuck that
+    came late or never."""
 
     leads: list[float] = field(default_factory=list)
+    slow: list[float] = field(default_factory=list)
     lengths: list[float] = field(default_factory=list)
     stops: int = 0
     late: int = 0
@@ -58,11 +70,13 @@ class Tally:
 
 @dataclass(frozen=True)
 class Course:
-    """By the truth [s]: the edge of the soft ground (inf: none), the first stop (NaN: none), the end; and the way at any time."""
+    """By the truth [s]: the edge of the soft ground (inf: none), the first stop (NaN: none), the end; the usual rim speed [m/s];
+    and the way at any time."""
 
     edge: float
     stop: float
     end: float
+    speed: float
     time: NDArray[np.float64]
     travel: NDArray[np.float64]
     length: float
@@ -98,7 +112,7 @@ def course_of(result: SimulationResult, digging: bool) -> Course:
         reached = np.flatnonzero(travel >= soft_from(result))
         edge = float(time[reached[0]]) if len(reached) else np.inf
     length = vehicle.wheelbase or 4 * float(vehicle.wheel_radius.mean())
-    return Course(edge, stop, float(time[-1]), time, travel, length)
+    return Course(edge, stop, float(time[-1]), usual, time, travel, length)
 
 
 def soft_from(result: SimulationResult) -> float:
@@ -123,6 +137,7 @@ def judge(course: Course, warnings: list[float], stuck: list[float]) -> Tally:
         before = [w for w in warnings if edge <= w < course.stop]
         if before:
             tally.leads, tally.lengths = [course.stop - before[0]], [course.lengths(before[0], course.stop)]
+            tally.slow = tally.leads * (course.speed <= SLOW)
         tally.late = int(not any(s <= course.stop + 0.5 for s in stuck if s > edge))
     return tally
 
@@ -137,9 +152,25 @@ def score(job: tuple[str, Kind, int, str, float]) -> Tally:
     channels = {name: values for name, values in recording.channels.items() if name != "drawbar_force"}
     rows = np.logical_or.reduce([np.isfinite(values) for values in channels.values()])
     seen = type(recording)(recording.time, channels, source=recording.source).select(rows)
-    found = events(estimate(seen, result.vehicle))
-    starts = {what: [e.start for e in found if e.kind == what] for what in ("immobilization", "stuck")}
-    return judge(course_of(result, task == "digging"), starts["immobilization"], starts["stuck"])
+    return judge(course_of(result, task == "digging"), *starts(seen, result.vehicle))
+
+
+def starts(recording: Recording, vehicle: Vehicle) -> tuple[list[float], list[float]]:
+    """When warnings, and `stuck`, begin [s]."""
+    found = events(estimate(recording, vehicle))
+    warnings, stuck = ([e.start for e in found if e.kind == kind] for kind in ("immobilization", "stuck"))
+    return warnings, stuck
+
+
+def score_snow() -> Tally:
+    """As many made-up runs as were measured, and two hours of healthy snow."""
+    tally, vehicle = Tally(), snow_runs.rover()
+    made = [snow_runs.snow_run(seed) for seed in range(snow_runs.RUNS)]
+    for run in made + [snow_runs.healthy_snow(seed) for seed in range(24)]:
+        end, length = float(run.time[-1]), float(vehicle.wheelbase or 0.0)
+        course = Course(run.begun, run.stop, end, run.command, run.time, run.distance, length)
+        tally.add(judge(course, *starts(run.recording, vehicle)))
+    return tally
 
 
 def jobs(
@@ -166,15 +197,22 @@ def wilson(hits: int, count: int) -> tuple[float, float]:
 
 def poisson(count: int) -> tuple[float, float]:
     """The exact interval of 95 % of a Poisson mean of which ``count`` were seen."""
-    from scipy.stats import chi2
-
     return float(chi2.ppf(0.025, 2 * count) / 2) if count else 0.0, float(chi2.ppf(0.975, 2 * count + 2) / 2)
+
+
+def _median(values: list[float]) -> str:
+    """Median and its distribution-free 95 % bounds."""
+    if len(values) < 6:
+        return "–"
+    ranked, n = np.sort(values), len(values)
+    low = max(int(binom.ppf(0.025, n, 0.5)) - 1, 0)
+    return f"{np.median(values):.1f} ({ranked[low]:.1f}–{ranked[n - 1 - low]:.1f})"
 
 
 def table(tallies: dict[tuple[str, float], Tally]) -> str:
     head = [
-        "machines", "Hz", "stops", "missed", "missed, 95 % (%)", "lead, median (s)", "lead, 10 % (s)", "lead (lengths)", "stuck late",
-        "healthy (h)", "false", "false in 30 min, 95 %",
+        "machines", "Hz", "stops", "missed", "missed, 95 % (%)", "lead, median (s)", "up to 1 m/s (s)", "lead, 10 % (s)",
+        "lead (lengths)", "stuck late", "healthy (h)", "false", "false in 30 min, 95 %",
     ]  # fmt: skip
     lines = ["| " + " | ".join(head) + " |", "|---|" + "---:|" * (len(head) - 1)]
     for (part, rate), t in tallies.items():
@@ -183,9 +221,14 @@ def table(tallies: dict[tuple[str, float], Tally]) -> str:
         scale = 1800 / max(t.seconds, 1.0)
         few, many = poisson(t.false)
         leads = (
-            [f"{np.median(t.leads):.1f}", f"{np.quantile(t.leads, 0.1):.1f}", f"{np.median(t.lengths):.1f}"]
+            [
+                _median(t.leads),
+                _median(t.slow),
+                f"{np.quantile(t.leads, 0.1):.1f}",
+                f"{np.median(t.lengths):.1f}",
+            ]
             if t.leads
-            else ["–"] * 3
+            else ["–"] * 4
         )
         cells = [
             part,
@@ -207,24 +250,33 @@ def table(tallies: dict[tuple[str, float], Tally]) -> str:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
-    known = ["development", "held-out", "second-plant"]
+    known = ["development", "held-out", "second-plant", "snow"]
     parser.add_argument("--families", nargs="+", default=["development"], choices=known)
     parser.add_argument("--stops", type=int, default=40)
     parser.add_argument("--hours", type=float, default=2.0)
     parser.add_argument("--rates", type=float, nargs="+", default=[100.0, 10.0])
     parser.add_argument("--seed", type=int, default=0, help="of the first machine")
     parser.add_argument("--workers", type=int, default=1)
-    parser.add_argument("--write", action="store_true", help="put the table into docs/families.md")
+    parser.add_argument(
+        "--write",
+        action="store_true",
+        help="put the table into docs/families.md; of snow alone into events.md",
+    )
     arguments = parser.parse_args()
     tallies: dict[tuple[str, float], Tally] = {}
     with ProcessPoolExecutor(arguments.workers) as pool:
         for part in arguments.families:
+            if part == "snow":
+                tallies[part, snow_runs.RATE] = score_snow()
+                continue
             listed = list(jobs(part, arguments.stops, arguments.hours, arguments.rates, arguments.seed))
             for job, tally in zip(listed, pool.map(score, listed), strict=True):
                 tallies.setdefault((part, job[-1]), Tally()).add(tally)
     text = table(tallies)
     print(text)
-    if arguments.write:
+    if arguments.write and arguments.families == ["snow"]:
+        put(SNOW_DOCUMENT, SNOW_BEGIN, text)
+    elif arguments.write:
         put(DOCUMENT, BEGIN, f"Machines from seed {arguments.seed}.\n\n{text}")
 
 

@@ -29,7 +29,7 @@ static void add_wheel(side_view *side, tg_real slip, tg_real deviation, tg_real 
 }
 
 /* What the driven wheels do (of none: all). Slip and fastest rim are the worst wheel's of each side, their mean: of a diagonal that spins
- * while the other holds they are the spinning one's, in a turn and on the spot the sides cancel. */
+ * while the other holds they are the spinning one's, in a turn the sides cancel. */
 static tgi_view view_of(const tg_estimator *e, const tg_real *o)
 {
     const tg_settings *s = &e->settings;
@@ -37,7 +37,7 @@ static tgi_view view_of(const tg_estimator *e, const tg_real *o)
     side_view side[2];
     memset(&l, 0, sizeof l);
     memset(side, 0, sizeof side);
-    tg_real count = 0, ahead = 0, behind = 0, adhesion = 0;
+    tg_real count = 0, ahead = 0, behind = 0, adhesion = 0, turning = 0;
     for (int32_t i = 0; i < s->machine.wheels; i++) {
         if (!e->constants.watched[i]) continue;
         const int32_t end = end_of(e, i), where = e->constants.side[i];
@@ -45,6 +45,7 @@ static tgi_view view_of(const tg_estimator *e, const tg_real *o)
         if (where <= 0) add_wheel(&side[0], o[TG_OUT_SLIP + i], o[TG_OUT_SLIP_STD + i], rim);
         if (where >= 0) add_wheel(&side[1], o[TG_OUT_SLIP + i], o[TG_OUT_SLIP_STD + i], rim);
         l.rim += rim;
+        turning += tgi_fabs(rim);
         adhesion += mu;
         l.leading += end > 0 ? mu : 0;
         l.trailing += end < 0 ? mu : 0;
@@ -55,8 +56,9 @@ static tgi_view view_of(const tg_estimator *e, const tg_real *o)
     const tg_real sides = (tg_real)((side[0].count > 0) + (side[1].count > 0));
     l.slip = (side[0].slip + side[1].slip) / sides;
     l.deviation = (side[0].deviation + side[1].deviation) / sides;
-    l.fastest = tgi_fabs(side[0].rim + side[1].rim) / sides;
-    l.rim = tgi_fabs(l.rim) / count;
+    const int32_t onward = 2 * tgi_fabs(l.rim) > turning; /* wheels that turn against each other turn the vehicle on the spot */
+    l.fastest = onward ? tgi_fabs(side[0].rim + side[1].rim) / sides : 0;
+    l.rim = onward ? tgi_fabs(l.rim) / count : 0;
     l.leading = ahead > 0 && behind > 0 ? l.leading / ahead : adhesion / count;
     l.trailing = ahead > 0 && behind > 0 ? l.trailing / behind : adhesion / count;
     l.resistance = o[TG_OUT_SOIL_RESISTANCE];
@@ -80,11 +82,17 @@ static tg_real count_seconds(tg_real seconds, tg_real dt, int32_t holds, tg_real
     return seconds < 0 ? 0 : seconds > most ? most : seconds;
 }
 
-/* Warn where the score is high and slip surely above its usual; go on until the score is half of that. */
+/* Warn where the score is high and slip surely above its usual; go on until the score is half of that. Of rims that hardly turn, or
+ * against each other, nothing is foretold. */
 static void watch_digging(tg_estimator *e, const tg_row *row, const tgi_view *l)
 {
     const tg_watch_settings *s = &e->settings.watch;
     tgi_watch *w = &e->watch;
+    if (l->rim < 3 * e->settings.standstill_speed) {
+        tgi_digging_rest(&w->digging);
+        w->sinking = 0;
+        return;
+    }
     if (!tgi_digging_update(e, row->time, l)) return;
     const int32_t begins = w->digging.score > s->warn && w->digging.slips && w->spinning <= 0; /* what stands is stuck, no warning */
     w->sinking = !w->stuck && (begins || (w->sinking && 2 * w->digging.score > s->warn));

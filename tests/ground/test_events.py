@@ -49,7 +49,7 @@ def test_a_soft_spot_is_warned_of_before_the_vehicle_stands(curve, rate):
 
 
 def test_hills_hits_and_stops_are_not_called_stuck_and_rarely_warned_of():
-    """The rate of false warnings is benchmarks/bench_immobilization.py's; in 12 minutes more than two would be out of order."""
+    """The rate of false warnings is benchmarks/bench_warning.py's; in 12 minutes more than two would be out of order."""
     warned = 0
     for seed in range(1004, 1016):
         result = simulate(healthy_drive(seed, duration=60.0, drawbar=False))
@@ -136,6 +136,18 @@ def test_every_snow_run_is_warned_of_in_time_and_called_stuck_within_half_a_seco
         assert [e for e in found if e.kind == "stuck" and run.begun < e.start <= run.stop + 0.5]
     assert len(leads) == RUNS
     assert np.median(leads) >= 1.5
+
+
+def test_turning_on_the_spot_is_neither_a_warning_nor_stuck():
+    time, rng = np.arange(0.0, 30.0, 0.1), np.random.default_rng(3)
+    rim = 0.6 * np.clip(np.minimum(time - 5, 25 - time), 0, 1)
+    sides = {"fl": -1, "fr": 1, "rl": -1, "rr": 1}
+    channels = {"ground_speed": rng.normal(0, 0.01, len(time))}
+    for wheel, side in sides.items():
+        channels[f"wheel_speed_{wheel}"] = (side * rim + rng.normal(0, 0.05, len(time)) * (rim > 0)) / RADIUS
+        channels[f"drive_torque_{wheel}"] = side * 10.0 * (rim > 0) + rng.normal(0, 1, len(time))
+    found = events(estimate(Recording(time=time, channels=channels), rover()))
+    assert not [e for e in found if e.kind in ("immobilization", "stuck")]
 
 
 def test_the_made_up_snow_runs_look_as_described():

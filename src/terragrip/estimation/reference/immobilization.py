@@ -27,7 +27,7 @@ class Row:
 
     ``time`` [s]; ``slip``, ``deviation`` (its SD) and ``fastest`` (rim speed [m/s]): of the worst wheel of each side, their mean;
     ``leading`` and ``trailing``: adhesion of these axles, alike where there is but one; ``resistance``; ``rim`` (mean) and
-    ``travel`` [m/s]; ``measured``: the ground speed was.
+    ``travel`` [m/s]; ``measured``: the ground speed was. Rim speeds are 0 where wheels turn against each other.
     """
 
     time: float
@@ -62,16 +62,17 @@ def rows_of(estimates: Estimates, measured: NDArray[np.bool_]) -> list[Row]:
     worst = [_worst(slip[:, on], deviation[:, on], rims[:, on]) for on in sides if on.any()]
     ends = [adhesion[:, on].mean(axis=1) for on in _ends(vehicle, driven)]
     blind = np.isin(estimates.event_codes, [EVENTS.index("gap"), EVENTS.index("standstill")])
+    onward = 2 * np.abs(rims[:, driven].sum(axis=1)) > np.abs(rims[:, driven]).sum(axis=1)
     table = np.stack(
         [
             estimates.time,
             np.where(blind, np.nan, np.maximum(np.mean([w[0] for w in worst], axis=0), -0.2)),
             np.mean([w[1] for w in worst], axis=0),
-            np.abs(np.mean([w[2] for w in worst], axis=0)),
+            np.abs(np.mean([w[2] for w in worst], axis=0)) * onward,
             np.where(direction > 0, *ends),
             np.where(direction > 0, *ends[::-1]),
             estimates["soil_resistance"],
-            np.abs(rims[:, driven].mean(axis=1)),
+            np.abs(rims[:, driven].mean(axis=1)) * onward,
             direction * estimates["ground_speed"],
         ],
         axis=1,
@@ -134,11 +135,14 @@ class Watch:
 
     def forget(self) -> None:
         """What was seen of the motion; what is usual is kept."""
-        self.sum, self.weight, self.moving, self.slips = np.zeros(7), 0.0, False, False
-        self.points, self.score, self.time = [0.0] * 5, 0.0, 0.0
+        self._rest()
         self.stuck_time: float | None = None
         self.spinning, self.rim = 0.0, 0.0
         self.sinking = self.stuck = False
+
+    def _rest(self) -> None:
+        self.sum, self.weight, self.moving, self.slips = np.zeros(7), 0.0, False, False
+        self.points, self.score, self.time = [0.0] * 5, 0.0, 0.0
 
     def update(self, row: Row) -> str:
         """The event after a row."""
@@ -147,7 +151,10 @@ class Watch:
             return ""
         if row.measured:
             self._judge_stuck(row)
-        if self._look(row):
+        if row.rim < 3 * self.limits["standstill_speed"]:
+            self._rest()
+            self.sinking = False
+        elif self._look(row):
             begins = self.score > self.limits["warn"] and self.slips and self.spinning <= 0
             holds = self.sinking and 2 * self.score > self.limits["warn"]
             self.sinking = not self.stuck and (begins or holds)
