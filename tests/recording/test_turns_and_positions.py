@@ -148,3 +148,21 @@ def test_wheels_exchanged_from_side_to_side_are_told_apart_from_a_yaw_rate() -> 
     assert said == [
         "angular_velocity_z turns with the positions and against the wheels' speeds: left and right wheels may be exchanged."
     ]
+
+
+@pytest.mark.parametrize("position", [True, False])
+def test_slip_alone_turns_by_the_positions(position: bool) -> None:
+    """5 % slip everywhere, headland turns of .3 rad/s and no gyroscope."""
+    columns = {n: v for n, v in field().items() if n != "angular_velocity_z"}
+    turning = np.abs(field()["angular_velocity_z"]) > 0.2
+    if not position:
+        columns = {n: v for n, v in columns.items() if n not in ("latitude", "longitude")}
+    estimates = tg.estimate(Recording.from_frame(columns), machine())
+    said = " ".join(estimates.notes)
+    error = np.abs(estimates["slip_fl"][turning] - 0.05)
+    if position:
+        assert "The rate of turn is that of the positions" in said
+        assert np.median(error) < 0.02
+    else:
+        assert "nothing says how fast the machine turned" in said
+        assert np.median(error) > 0.1

@@ -195,10 +195,10 @@ def run(
 
 def prepared(estimator: TractionEstimator, recording: Recording) -> tuple[Floats, dict[str, Floats]]:
     """Time and those channels that the estimator looks at, each contiguous."""
-    wanted = estimator.engine.slots_in
-    columns = {
-        name: np.ascontiguousarray(values) for name, values in recording.channels.items() if name in wanted
-    }
+    wanted, channels = estimator.engine.slots_in, recording.channels
+    if estimator.found is not None:
+        channels = estimator.found.completed(recording.time, channels)
+    columns = {name: np.ascontiguousarray(values) for name, values in channels.items() if name in wanted}
     return np.ascontiguousarray(recording.time), columns
 
 
