@@ -94,6 +94,12 @@ def test_an_unknown_interface_is_refused(vehicle):
         Service(vehicle, ["udp://127.0.0.1:9870"], ["can:can0?interface=socketcam"])
 
 
+def test_an_interface_whose_package_is_missing_is_refused_with_the_extra(vehicle, monkeypatch):
+    monkeypatch.setattr("terragrip.live.can_bus.find_spec", lambda name: None)
+    with pytest.raises(InputError, match=r"udp_multicast needs .*'msgpack'; pip install 'terragrip\[live\]'"):
+        Service(vehicle, ["udp://127.0.0.1:9870"], ["can:239.0.0.1?interface=udp_multicast"])
+
+
 @pytest.mark.asyncio
 async def test_a_bus_that_is_not_there_is_named(vehicle):
     service = Service(vehicle, ["udp://127.0.0.1:0"], ["can:can99"])
