@@ -308,6 +308,10 @@ typedef struct {
     tg_real jolt_memory;            /* s: of what the accelerometer reads beyond the model */
     tg_real swing;                  /* samples that a jolt lasts */
     tg_real longest_walk;           /* s of random walk that a gap adds at most: beyond it the ground is simply unknown */
+    tg_real uneven_length;          /* wheel radii: shorter changes of adhesion and resistance are the ground's unevenness */
+    tg_real uneven_memory;          /* wheel radii over which their mean squares are taken */
+    tg_real uneven_most;            /* usual squares that one counts at most: a border between soils is no bump */
+    tg_real least_load_spread;      /* relative SD of the load that no log can show, since all wheels share it */
 } tg_tuned;
 
 typedef struct {

@@ -261,8 +261,8 @@ static void report(tg_estimator *e, const tg_drive *drive, tg_estimate *out)
     e->scene.direction = (tg_real)e->direction;
     e->scene.standing = (tg_real)e->standing;
     e->scene.seen_motion = (tg_real)e->seen_motion;
-    e->scene.mean_load = e->settings.machine.mass * e->settings.machine.gravity / (tg_real)e->settings.machine.wheels;
-    e->scene.roughness = e->roughness.square;
+    e->scene.roughness = e->roughness.wander;
+    e->scene.unseen_load = tgi_unseen_load(e);
     tgi_traction(&e->settings, &e->belief, (const tg_real(*)[TG_ROWS])e->consider.s, &e->scene, o);
     o[TG_OUT_NIS] = e->belief.nis;
     o[TG_OUT_CHANNELS] = (tg_real)e->belief.channels;
@@ -319,7 +319,7 @@ tg_status tg_estimator_update(tg_estimator *e, const tg_sample *sample, tg_estim
     tell_adaptation(e, out->value);
     if (!go_on(e, &row, &drive, course, was_standing || turned, dt, q)) gap = 1;
     balance_forces(e, &drive, row.time);
-    tgi_watch_roughness(e, course == TG_GO && !gap, dt);
+    tgi_watch_roughness(e, course == TG_GO && !gap, e->standing ? 0 : travelled * dt);
     if (course == TG_GO && !row.reckoned && !isnan(row.value[TG_GROUND_SPEED])) tgi_remember_slip(e, &drive, dt);
 
     if (course == TG_GO && !gap) e->distance += (double)((travelled + tgi_fabs(e->belief.x[n + 1])) / 2 * dt);

@@ -6,8 +6,6 @@
 #include <math.h>
 #include <string.h>
 
-#define TG_ROUGH_LOAD 8 /* variance of a wheel's load, over the mean load, over that of rho_s, on rough ground (R) */
-
 typedef struct { /* an input between its samples */
     tg_real value;    /* filtered */
     tg_real variance; /* of the filtered value's noise */
@@ -44,8 +42,8 @@ typedef struct { /* what a row's values need beside the belief; all reals, so th
     tg_real load[8]; /* wheel, N */
     tg_real hub[8];  /* wheel, m/s: what its hub is faster than the vehicle, along the travel */
     tg_real direction, standing, seen_motion;
-    tg_real mean_load; /* at rest on level ground, N */
-    tg_real roughness; /* mean square of what rho_s wanders over rough ground, see roughness.c */
+    tg_real roughness; /* mean square of what rho_s wanders over uneven ground, see roughness.c */
+    tg_real unseen_load; /* relative variance of a wheel's load */
     tg_real anew; /* the filter was started anew: nothing links this row to the one before */
 } tgi_scene;
 
@@ -82,8 +80,10 @@ typedef struct { /* low-passed while the ground speed is measured; the whole veh
     tg_real slip, adhesion;
 } tgi_slip_memory;
 
-typedef struct { /* of the estimated soil resistance: low-passed, and the mean square of what is faster */
-    tg_real slow, square;
+typedef struct { /* uneven ground, see roughness.c */
+    tg_real adhesion[8], resistance; /* low-passed over the distance */
+    tg_real scatter, square;         /* mean squares: of a wheel's adhesion beyond the others', of the adhesion */
+    tg_real wander;                  /* mean square of rho_s about its low-pass */
 } tgi_roughness;
 
 typedef struct { /* of the driven wheels, along the travel; see immobilization.c */
@@ -138,6 +138,7 @@ typedef struct { /* what follows from the settings alone */
     tg_real variance[TG_SLOTS];     /* noise squared */
     tg_real inverse_inertia[8];
     tg_real inverse_mass, inverse_weight;
+    tg_real mean_radius;            /* m */
     tg_real spin_inertia;           /* sum J/r */
     tg_real unknown_torque[8];      /* variance of a torque never seen */
     tg_real unknown_pull;
@@ -229,14 +230,10 @@ void tgi_hold_wheels(tg_estimator *e, tg_real dt, tg_row *row);
 void tgi_remember_slip(tg_estimator *e, const tg_drive *drive, tg_real dt);
 void tgi_reckon(tg_estimator *e, const tg_drive *drive, tg_real dt, tg_row *row, tg_real *q);
 
-/* roughness.c; variance that it adds to wheel i's adhesion: the ground moves a force, the lighter wheel feels it more */
-TG_INLINE tg_real tgi_rough_adhesion(const tgi_scene *scene, int32_t i, tg_real mu)
-{
-    const tg_real part = mu * scene->mean_load / scene->load[i];
-    return TG_ROUGH_LOAD * scene->roughness * part * part;
-}
-
-void tgi_watch_roughness(tg_estimator *e, int32_t flowing, tg_real dt);
+/* roughness.c; variance that unseen load adds to an adhesion */
+TG_INLINE tg_real tgi_rough_adhesion(const tgi_scene *scene, tg_real mu) { return scene->unseen_load * tgi_square(mu); }
+tg_real tgi_unseen_load(const tg_estimator *e);
+void tgi_watch_roughness(tg_estimator *e, int32_t flowing, tg_real distance);
 
 /* algebraic.c */
 void tgi_algebraic(tg_estimator *e, const tg_row *row, const tg_drive *drive, int32_t anew);

@@ -1,17 +1,65 @@
-/* Rough ground, as the estimated soil resistance shows it. The body pitches over it, which the accelerometer and the pitch sensor take for
- * a slope, and load moves between the wheels: the forces see soil resistance come and go faster than soil does (R). What it wanders
- * within TG_ROUGH_LAG counts as uncertainty. */
+/* Uneven ground, as the estimates themselves show it (R). Nothing on board measures how a wheel's load comes and goes over the ground's
+ * bumps: the force follows the load, and the estimate takes it for adhesion. Wheels at one slip share a curve, so what one wheel's adhesion does
+ * beyond the others' within a few wheel radii is taken for unseen load, a variance relative to the adhesion; where only one wheel is
+ * driven, what it does beyond its own mean. rho_s wanders likewise: the body pitches over the bumps, which accelerometer and pitch sensor take
+ * for a slope, and soil itself takes longer to change. Lengths are in wheel radii, so a machine of another size sees its own ground. */
 #include "estimator.h"
 
-#define TG_ROUGH_LAG ((tg_real)0.4) /* s: soil itself takes longer to change under a vehicle's length */
-#define TG_ROUGH_MEMORY 1 /* s */
+#define TG_LOAD_LENGTH ((tg_real)1.25)       /* wheel radii over which an unseen load is taken to be alike */
+#define TG_SMALL_ADHESION ((tg_real)1e-4)    /* .01 squared: below it scatter is not relative */
+#define TG_SMALL_RESISTANCE ((tg_real)4e-6)  /* .002 squared */
 
-/* After a row's estimate. `flowing`: the row goes on from the one before it. */
-void tgi_watch_roughness(tg_estimator *e, int32_t flowing, tg_real dt)
+/* Mean square of what each of `count` wheels does beyond all of them. */
+static tg_real apart(const tg_real *change, int32_t count)
+{
+    tg_real sum = 0, square = 0;
+    for (int32_t k = 0; k < count; k++) {
+        sum += change[k];
+        square += tgi_square(change[k]);
+    }
+    if (count < 2) return square;
+    square -= sum * sum / (tg_real)count;
+    return (square > 0 ? square : 0) / (tg_real)(count - 1);
+}
+
+/* A mean square goes on by `square`, of which at most `most` times the usual counts: a border between soils is no bump. */
+static void count_square(tg_real *mean, tg_real square, tg_real least, tg_real most, tg_real gain)
+{
+    most *= *mean + least;
+    *mean += gain * ((square < most ? square : most) - *mean);
+}
+
+/* After a row's estimate, `distance` m behind the one before. `flowing`: the row goes on from that one. */
+void tgi_watch_roughness(tg_estimator *e, int32_t flowing, tg_real distance)
 {
     tgi_roughness *r = &e->roughness;
-    const tg_real rho = e->belief.x[e->settings.machine.wheels];
-    if (!flowing) r->slow = rho;
-    r->slow += dt / (TG_ROUGH_LAG + dt) * (rho - r->slow);
-    r->square += dt / (TG_ROUGH_MEMORY + dt) * (tgi_square(rho - r->slow) - r->square);
+    const tg_tuned *k = &e->settings.tuned;
+    const int32_t n = e->settings.machine.wheels;
+    const tg_real *const mu = e->belief.x, rho = mu[n], travelled = distance / e->constants.mean_radius;
+    const tg_real fresh = travelled / (k->uneven_length + travelled), gain = travelled / (k->uneven_memory + travelled);
+    tg_real change[TG_MAX_WHEELS], square = 0;
+    int32_t driven = 0;
+    for (int32_t i = 0; i < n; i++) {
+        if (!flowing) r->adhesion[i] = mu[i];
+        r->adhesion[i] += fresh * (mu[i] - r->adhesion[i]);
+        if (!e->settings.driven[i]) continue;
+        change[driven++] = mu[i] - r->adhesion[i];
+        square += tgi_square(mu[i]);
+    }
+    if (driven) square /= (tg_real)driven;
+    count_square(&r->scatter, apart(change, driven), tgi_square(k->least_load_spread) * square + TG_SMALL_ADHESION, k->uneven_most, gain);
+    r->square += gain * (square - r->square);
+    if (!flowing) r->resistance = rho;
+    r->resistance += fresh * (rho - r->resistance);
+    count_square(&r->wander, tgi_square(rho - r->resistance), TG_SMALL_RESISTANCE, k->uneven_most, gain);
+}
+
+/* Relative variance of a wheel's load that the loads of the model do not hold. Of a load that is alike over TG_LOAD_LENGTH the low-pass
+ * leaves length/(length + TG_LOAD_LENGTH) of the variance. */
+tg_real tgi_unseen_load(const tg_estimator *e)
+{
+    const tgi_roughness *r = &e->roughness;
+    const tg_tuned *k = &e->settings.tuned;
+    const tg_real whole = 1 + TG_LOAD_LENGTH / k->uneven_length;
+    return whole * r->scatter / (r->square + TG_SMALL_ADHESION) + tgi_square(k->least_load_spread);
 }

@@ -66,6 +66,10 @@ static tg_tuned default_tuned(void)
     k.jolt_memory = 5;
     k.swing = 2;
     k.longest_walk = 30;
+    k.uneven_length = 4;
+    k.uneven_memory = 40;
+    k.uneven_most = 4;
+    k.least_load_spread = (tg_real)0.02;
     return k;
 }
 
@@ -229,6 +233,7 @@ static void work_out_constants(const tg_settings *s, tgi_constants *c)
         const tg_real load = s->load_share[s->wheel_axle[i]] * s->wheel_share[i] * weight;
         c->inverse_inertia[i] = 1 / m->inertia[i];
         c->spin_inertia += m->inertia[i] / s->rolling_radius[i];
+        c->mean_radius += s->rolling_radius[i] / (tg_real)m->wheels;
         c->unknown_torque[i] = tgi_square((tg_real)0.5 * m->radius[i] * load);
         c->least_load[i] = (tg_real)0.02 * load;
     }

@@ -40,11 +40,11 @@ TG_INLINE void gather(const tg_belief *b, const tg_real (*S)[TG_ROWS], const int
     }
 }
 
-/* Rough ground (roughness.c): rho_s may hold all of what it wanders, and the wheels' loads move with it. */
+/* Uneven ground (roughness.c): rho_s may hold all of what it wanders, and the wheels' loads come and go unseen. */
 TG_INLINE void roughen(tgi_moments *c, const tg_real *x, const tgi_scene *scene, const int n)
 {
     c->rr += scene->roughness;
-    for (int i = 0; i < n; i++) c->mm[i] += tgi_rough_adhesion(scene, i, x[i]);
+    for (int i = 0; i < n; i++) c->mm[i] += tgi_rough_adhesion(scene, x[i]);
 }
 
 TG_INLINE tg_real root(tg_real variance) { return tgi_sqrt(variance > 0 ? variance : 0); }

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from terragrip.estimation import estimate
 from terragrip.recording import Recording
 from terragrip.simulation import SimulationResult, simulate
+from terragrip.simulation.families import draw, machines
 from terragrip.vehicle import Vehicle
 
 SEEDS = (1002, 1010)
@@ -56,9 +57,10 @@ def test_intervals_hold_the_truth(scenario: str, missing: tuple[str, ...]) -> No
     for kind in ("adhesion", "slip", "soil_resistance"):
         own = [by for name, by in held(scenario, missing).items() if name.startswith(kind)]
         share = float(np.mean(np.concatenate([part for by in own for part in by.values()])))
-        # Without an accelerometer the slope's prior is most of soil resistance's interval, whatever the filter does.
-        most = 0.995 if missing == SENSED[:3] and kind == "soil_resistance" else 0.99
-        assert 0.90 <= share <= most, kind
+        # Adhesion is held in more rows than need be: here the soil differs from wheel to wheel within the length that
+        # counts as unseen load (decision 0115). Without an accelerometer the slope's prior is most of soil resistance's.
+        wide = kind == "adhesion" or (missing == SENSED[:3] and kind == "soil_resistance")
+        assert 0.90 <= share <= (0.9995 if wide else 0.99), kind
 
 
 @pytest.mark.parametrize("scenario", ["accuracy-clean", "accuracy-faults"])
@@ -67,6 +69,28 @@ def test_intervals_hold_the_truth_on_rough_ground_and_on_smooth(scenario: str) -
     for name, by_soil in held(scenario).items():
         for soil, inside in by_soil.items():
             assert np.mean(inside) > 0.85, (name, soil)
+
+
+def test_intervals_hold_over_machines() -> None:
+    """Random development machines of 5 kg to 12 t whose wheels' loads vary by 2 to 8 %, unknown to anyone. How wide the intervals
+    are beside an oracle's: benchmarks/bench_families.py."""
+    inside: dict[str, list[NDArray[np.bool_]]] = {}
+    for kind, seed in machines("development", 6):
+        result = draw(kind, seed, rate=50.0)
+        truth, found = result.truth, estimate(result.recording, result.vehicle)
+        speed = np.abs(truth["true_ground_speed"].to_numpy())
+        moving = speed > min(0.05, 0.1 * float(np.median(speed[speed > 0.01])))
+        driven = [w for w, driven in zip(result.vehicle.wheels, result.vehicle.driven, strict=True) if driven]
+        for name in [f"{q}_{w}" for q in ("adhesion", "slip", "net_traction") for w in driven] + [
+            "soil_resistance"
+        ]:
+            error = found[name] - truth[f"true_{name}"].to_numpy()
+            rows = moving & np.isfinite(error)
+            half = 1.96 * found[f"{name}_std"][rows]
+            quantity = name if name == "soil_resistance" else name.rpartition("_")[0]
+            inside.setdefault(quantity, []).append(np.abs(error[rows]) <= half)
+    for quantity, parts in inside.items():
+        assert 0.90 <= np.mean(np.concatenate(parts)) <= 0.99, quantity
 
 
 def test_what_the_accelerometer_reads_too_much_moves_resistance_but_not_speed() -> None:

@@ -1,5 +1,5 @@
 """Standard deviations of slip, net traction and efficiency against sampling: draws from the filter's own joint distribution, with
-the considered constants and the wheel radius, go through the definitions of PHYSICS §2."""
+the considered constants and the wheel radius, go through the definitions of physics.md 2."""
 
 from __future__ import annotations
 
@@ -19,8 +19,9 @@ WHEEL_RADIUS = 0.02
 COLUMNS = 7  # torque gain of each wheel, drawbar, slope, the tyres' rolling resistance
 
 
-def joint(estimator: TractionEstimator, recording: Any) -> tuple[Any, Any, Any]:
-    """Mean (10,), covariance (10, 10) and considered columns (k, 10) after the recording's last row, state order."""
+def joint(estimator: TractionEstimator, recording: Any) -> tuple[Any, Any, Any, float]:
+    """Mean (10,), covariance (10, 10) and considered columns (k, 10) after the recording's last row, state order, and the SD of
+    a wheel's unseen load, the last but one number of the row's scene."""
     engine, ffi, lib = estimator.engine, _kernel.ffi, _kernel.lib
     time, columns = prepared(estimator, recording)
     last = engine.record(time, columns)[-1].copy()
@@ -28,7 +29,7 @@ def joint(estimator: TractionEstimator, recording: Any) -> tuple[Any, Any, Any]:
     x, P, s = np.empty(10), np.empty((10, 10)), np.empty((COLUMNS, 10))
     pointers = (ffi.cast("double *", a.ctypes.data) for a in (last, x, P, s))
     assert lib.tg_record_moments(4, COLUMNS, *pointers) == lib.TG_OK
-    return x, P, s
+    return x, P, s, float(np.sqrt(last[-2]))
 
 
 @pytest.mark.parametrize("slip", [0.03, 0.12, 0.35])
@@ -40,7 +41,9 @@ def test_spreads_agree_with_sampling(slip):
             "wheel_radius": WHEEL_RADIUS,
         }
     )  # fmt: skip
-    x, P, s = joint(TractionEstimator.for_recording(made.recording, vehicle, "kalman"), made.recording)
+    x, P, s, unseen = joint(
+        TractionEstimator.for_recording(made.recording, vehicle, "kalman"), made.recording
+    )
     whole = TractionEstimator.for_recording(made.recording, vehicle, "kalman").update_block(made.recording)
     last = {name: whole[name][-1] for name in whole.columns}
     np.testing.assert_allclose(x[5:9], [last[f"adhesion_{w}"] for w in WHEELS], rtol=1e-12)
@@ -53,7 +56,8 @@ def test_spreads_agree_with_sampling(slip):
     loads = np.repeat([last["vertical_load_front"] / 2, last["vertical_load_rear"] / 2], 2)
     mu, rho = drawn[:, 5:9], drawn[:, 9:]
     rho = rho - error * (x[5:9] @ loads) / (MASS * GRAVITY)
-    mu = mu * (1 - error)
+    assert unseen >= _kernel.lib.tg_default_settings().tuned.least_load_spread
+    mu = mu * (1 - error) + x[5:9] * unseen * rng.standard_normal((DRAWS, 4))
     found = slip_of(drawn[:, :4], drawn[:, 4:5], RADIUS * (1 + error))
     net = mu - rho
     efficiency = np.where(net > 0, net / (mu + TIRE) * (1 - found), 0.0)
