@@ -105,7 +105,7 @@ $(VENV)/package: $(VENV)/runtime $(BUILD_INPUTS)
 	@touch $@
 
 # --- the kernel's own tests, in double and in single precision ---------------------------------------------------------
-KERNEL_FLAGS := -std=c99 -O2 -Wall -Wextra -pedantic -Werror -Ikernel/include -Ikernel/src -Ikernel/tests
+KERNEL_FLAGS := -std=c99 -O2 -Wno-psabi -Wall -Wextra -pedantic -Werror -Ikernel/include -Ikernel/src -Ikernel/tests
 
 define kernel_rules
 build/kernel/$(1)/%.o: kernel/src/%.c $$(KERNEL_HEADERS) Makefile
@@ -116,9 +116,13 @@ build/kernel/$(1)/%: kernel/tests/%.c $$(patsubst kernel/src/%.c,build/kernel/$(
 	@mkdir -p $$(@D)
 	$$(CC) $$(KERNEL_FLAGS) $(2) -o $$@ $$(filter %.c %.o,$$^) -lm
 endef
+# Restoring from damaged snapshots is tried under the sanitizers too, where the compiler has them.
+SANITIZERS := -g -fsanitize=address,undefined -fno-sanitize-recover=all
+SANITIZED := $(shell echo 'int main(void) { return 0; }' | $(CC) $(SANITIZERS) -x c - -o /dev/null 2>/dev/null && echo build/kernel/sanitized/restore)
 .SECONDARY:
+$(eval $(call kernel_rules,sanitized,-O1 $(SANITIZERS)))
 $(eval $(call kernel_rules,double,))
 $(eval $(call kernel_rules,float,-DTG_FLOAT))
 
-kernel-test: $(foreach real,double float,$(KERNEL_TESTS:%=build/kernel/$(real)/%)) ## compile the kernel with every warning an error, run its C tests
+kernel-test: $(foreach real,double float,$(KERNEL_TESTS:%=build/kernel/$(real)/%)) $(SANITIZED) ## compile the kernel with every warning an error, run its C tests
 	@for program in $^; do echo "$$program"; ./$$program || exit 1; done

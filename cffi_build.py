@@ -22,7 +22,7 @@ CPU_CHECK = "int tg_cpu_has_avx2(void);"
 # Without -ffast-math: NaN means "missing" here. errno and floating-point traps are read by nobody. -O3 gains 10 % and
 # doubles the compile time (docs/decisions/0090). Contraction to fused multiply-add stays off, so that the portable and
 # the AVX2 build give the same bits.
-FLAGS = ("-std=c99", "-O2", "-g0", "-fno-math-errno", "-fno-trapping-math", "-ffp-contract=off")
+FLAGS = ("-std=c99", "-O2", "-g0", "-fno-math-errno", "-fno-trapping-math", "-ffp-contract=off", "-Wno-psabi")
 HIDDEN = "-fvisibility=hidden"
 
 

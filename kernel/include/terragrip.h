@@ -223,7 +223,8 @@ typedef enum {
     TG_EVENT_GAP = 3,        /* nothing measured for longer than `gap`, or nothing yet: values before the first are NaN */
     TG_EVENT_IMMOBILIZATION = 4, /* a warning: the wheels dig, the vehicle is about to get stuck */
     TG_EVENT_STUCK = 5,      /* the wheels turn, the vehicle hardly moves */
-    TG_EVENT_PUSH = 6        /* something pushes from behind while the wheels pull: a tool that runs up */
+    TG_EVENT_PUSH = 6,       /* something pushes from behind while the wheels pull: a tool that runs up */
+    TG_EVENT_RESTART = 7     /* a step of the filter left the finite numbers: it starts anew from the priors at this row */
 } tg_event;
 
 typedef enum { /* signs that the wheels dig, in points; the score is their sum, low-passed */

@@ -281,8 +281,9 @@ static void tell_adaptation(const tg_estimator *e, tg_real *o)
 }
 
 /* What blinds comes first, then what stops the vehicle. */
-static int32_t event_of(const tg_estimator *e, const tg_row *row, int32_t gap)
+static int32_t event_of(const tg_estimator *e, const tg_row *row, int32_t gap, int32_t lost)
 {
+    if (lost) return TG_EVENT_RESTART;
     if (gap) return TG_EVENT_GAP;
     if (e->standing) return TG_EVENT_STANDSTILL;
     const int32_t watched = tgi_watched(e);
@@ -317,12 +318,12 @@ tg_status tg_estimator_update(tg_estimator *e, const tg_sample *sample, tg_estim
     tgi_reckon(e, &drive, course == TG_GO ? dt : 0, &row, q);
     if (e->settings.method == TG_FILTERED) tgi_hold_wheels(e, course == TG_GO ? dt : 0, &row);
     tell_adaptation(e, out->value);
-    if (!go_on(e, &row, &drive, course, was_standing || turned, dt, q)) gap = 1;
+    const int32_t lost = !go_on(e, &row, &drive, course, was_standing || turned, dt, q), breaks = gap || lost;
     balance_forces(e, &drive, row.time);
-    tgi_watch_roughness(e, course == TG_GO && !gap, e->standing ? 0 : travelled * dt);
+    tgi_watch_roughness(e, course == TG_GO && !breaks, e->standing ? 0 : travelled * dt);
     if (course == TG_GO && !row.reckoned && !isnan(row.value[TG_GROUND_SPEED])) tgi_remember_slip(e, &drive, dt);
 
-    if (course == TG_GO && !gap) e->distance += (double)((travelled + tgi_fabs(e->belief.x[n + 1])) / 2 * dt);
+    if (course == TG_GO && !breaks) e->distance += (double)((travelled + tgi_fabs(e->belief.x[n + 1])) / 2 * dt);
     if (row.measured) {
         e->seen_motion = 1;
         e->measured_time = row.time;
@@ -333,8 +334,8 @@ tg_status tg_estimator_update(tg_estimator *e, const tg_sample *sample, tg_estim
     out->time = row.time;
     out->distance = e->distance;
     report(e, &drive, out);
-    tgi_watch_over(e, &row, &drive, course == TG_GO || course == TG_ANEW, course == TG_ANEW || gap, dt, out->value);
-    out->event = event_of(e, &row, gap || course == TG_WAIT);
+    tgi_watch_over(e, &row, &drive, course == TG_GO || course == TG_ANEW, course == TG_ANEW || breaks, dt, out->value);
+    out->event = event_of(e, &row, gap || course == TG_WAIT, lost);
     const int32_t learn = out->event == TG_EVENT_NONE || out->event == TG_EVENT_IMMOBILIZATION;
     tgi_curves(e, course == TG_GO && learn && !row.outlier, dt, e->standing ? 0 : travelled * dt, drive.load, out->value);
     return TG_OK;

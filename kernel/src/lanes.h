@@ -37,7 +37,6 @@
 #if defined(__FAST_MATH__) || __FINITE_MATH_ONLY__
 #error "compile without -ffast-math, -Ofast and -ffinite-math-only: NaN means missing here, and what is not finite is refused"
 #endif
-#pragma GCC diagnostic ignored "-Wpsabi" /* lanes are handed over within inlined functions only */
 #define TG_INLINE static inline __attribute__((always_inline, unused))
 
 #define TG_LANES 4

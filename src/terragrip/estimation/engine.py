@@ -21,7 +21,7 @@ from terragrip.vehicle import BidermanRadius, HadekelRadius, Vehicle, Wheel
 
 Floats = npt.NDArray[np.float64]
 
-EVENTS = ("", "outlier", "standstill", "gap", "immobilization", "stuck", "push")
+EVENTS = ("", "outlier", "standstill", "gap", "immobilization", "stuck", "push", "restart")
 """Texts of the ``event`` column, in the order of tg_event."""
 
 SIGNS = ("rise", "high_slip", "leading", "resistance", "command")

@@ -139,6 +139,13 @@ def _outlier(estimates: Estimates, rows: NDArray[np.intp]) -> str:
     )
 
 
+def _restart(estimates: Estimates, rows: NDArray[np.intp]) -> str:
+    return (
+        f"A step of the filter left the finite numbers (at {estimates.time[rows[0]]:.2f} s): it began anew from the priors; what it had "
+        "learned of adhesion and soil resistance is lost."
+    )
+
+
 _WHY: dict[str, Callable[[Estimates, NDArray[np.intp]], str]] = {
     "immobilization": _immobilization,
     "stuck": _stuck,
@@ -146,4 +153,5 @@ _WHY: dict[str, Callable[[Estimates, NDArray[np.intp]], str]] = {
     "standstill": _standstill,
     "gap": _gap,
     "outlier": _outlier,
+    "restart": _restart,
 }

@@ -61,7 +61,7 @@ def rows_of(estimates: Estimates, measured: NDArray[np.bool_]) -> list[Row]:
     sides = [driven & (sign * side_of_wheels(vehicle) >= 0) for sign in (-1, 1)]
     worst = [_worst(slip[:, on], deviation[:, on], rims[:, on]) for on in sides if on.any()]
     ends = [adhesion[:, on].mean(axis=1) for on in _ends(vehicle, driven)]
-    blind = np.isin(estimates.event_codes, [EVENTS.index("gap"), EVENTS.index("standstill")])
+    blind = np.isin(estimates.event_codes, [EVENTS.index(e) for e in ("gap", "standstill", "restart")])
     onward = 2 * np.abs(rims[:, driven].sum(axis=1)) > np.abs(rims[:, driven]).sum(axis=1)
     table = np.stack(
         [

@@ -1,0 +1,105 @@
+/* Restoring from bytes that are not a snapshot, though their checksum fits: refused, or an estimator that runs. Meant for the build under the
+ * address and the undefined-behaviour sanitizers (`make kernel-test`). */
+#include "check.h"
+
+enum { TRIALS = 3000, ROWS = 200, AFTER = 30, METHODS = 4 };
+
+static const int32_t methods[METHODS][2] = {
+    {TG_EXACT, TG_FIXED}, {TG_EXACT, TG_BANK}, {TG_UNSCENTED, TG_ADAPTIVE}, {TG_UNSCENTED, TG_SUPERVISED}};
+
+static tg_settings settings_of(int method)
+{
+    tg_settings s = tg_default_settings();
+    s.machine = random_machine(4);
+    s.axles = 2;
+    s.tuning.engine = methods[method][0];
+    s.tuning.policy = methods[method][1];
+    for (int i = 0; i < 4; i++) {
+        s.wheel_axle[i] = i / 2;
+        s.driven[i] = 1;
+        s.wheel_share[i] = (tg_real)0.5;
+        s.rolling_radius[i] = s.machine.radius[i];
+    }
+    s.load_share[0] = s.load_share[1] = (tg_real)0.5;
+    for (int k = 0; k < TG_SLOTS; k++) s.noise[k] = (tg_real)0.05;
+    s.uncertainty.drive_torque_gain = s.uncertainty.slope = (tg_real)0.02;
+    CHECK(tg_tune_walks(&s) == TG_OK, "walks");
+    return s;
+}
+
+static int restarts; /* rows at which a filter that lost its way began anew, and said so */
+
+static void drive(tg_estimator *e, double from, int rows, int must)
+{
+    tg_sample sample;
+    tg_estimate out;
+    for (int row = 0; row < rows; row++) {
+        for (int k = 0; k < TG_SLOTS; k++) sample.value[k] = (tg_real)NAN;
+        for (int i = 0; i < 4; i++) {
+            sample.value[TG_WHEEL_SPEED + i] = (tg_real)(4 + 0.05 * normal());
+            sample.value[TG_DRIVE_TORQUE + i] = (tg_real)(20 + normal());
+        }
+        sample.value[TG_GROUND_SPEED] = (tg_real)(0.7 + 0.02 * normal());
+        sample.time = from + 0.01 * row;
+        const tg_status status = tg_estimator_update(e, &sample, &out);
+        restarts += status == TG_OK && out.event == TG_EVENT_RESTART;
+        CHECK(!must || status == TG_OK, "row %d: %d", row, (int)status);
+    }
+}
+
+static uint64_t checksum(const uint8_t *bytes, size_t size)
+{
+    uint64_t hash = 14695981039346656037u;
+    for (size_t k = 0; k < size; k++) hash = (hash ^ bytes[k]) * 1099511628211u;
+    return hash;
+}
+
+static uint32_t word(void)
+{
+    const double kind = uniform(0, 1);
+    if (kind < 0.3) return (uint32_t)uniform(0, 300);
+    if (kind < 0.5) return 0u - (uint32_t)uniform(1, 300);
+    return (uint32_t)uniform(0, 4294967295.0);
+}
+
+static int attack(tg_estimator *e, const uint8_t *good, uint8_t *bytes, size_t size, size_t header, size_t reach, int words)
+{
+    memcpy(bytes, good, size);
+    for (int k = 0; k < words; k++) {
+        const uint32_t w = word();
+        memcpy(bytes + header + 4 * (size_t)uniform(0, (double)(reach / 4 - 1)), &w, sizeof w);
+    }
+    const uint64_t hash = checksum(bytes, size - sizeof hash);
+    memcpy(bytes + size - sizeof hash, &hash, sizeof hash);
+    if (tg_estimator_restore(e, bytes, size) != TG_OK) return 0;
+    drive(e, 2.01, AFTER, 0);
+    drive(e, 1e6, AFTER, 0);
+    CHECK(tg_estimator_snapshot(e, bytes) == TG_OK, "snapshot");
+    return 1;
+}
+
+int main(void)
+{
+    const size_t size = tg_snapshot_size(), header = 24;
+    tg_estimator *const e = malloc(tg_estimator_size());
+    uint8_t *const good = malloc(size), *const bytes = malloc(size);
+    CHECK(e && good && bytes, "memory");
+    for (int method = 0; method < METHODS; method++) {
+        const tg_settings s = settings_of(method);
+        int passed = 0;
+        CHECK(tg_estimator_init(e, &s) == TG_OK, "init");
+        drive(e, 0, ROWS, 1);
+        CHECK(tg_estimator_snapshot(e, good) == TG_OK, "snapshot");
+        CHECK(tg_estimator_restore(e, good, size) == TG_OK, "a good one");
+        for (int trial = 0; trial < TRIALS; trial++)
+            passed += attack(e, good, bytes, size, header, trial % 3 ? size - header - 8 : 6000, trial % 2 ? 1 : 40);
+        printf("engine %d, policy %d: %d of %d changed snapshots refused, the others ran on\n", (int)s.tuning.engine, (int)s.tuning.policy,
+               TRIALS - passed, TRIALS);
+        CHECK(passed > 0 && passed < TRIALS, "the trials tell nothing");
+    }
+    CHECK(restarts > 0, "a broken filter went on unflagged");
+    free(e);
+    free(good);
+    free(bytes);
+    return 0;
+}
