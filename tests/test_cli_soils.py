@@ -282,3 +282,33 @@ def test_libraries_are_joined_twins_refused_and_others_compared(
     assert "intervals of a" in line
     learn(tmp_path / "x.json", fine, "--compare", hard)
     assert "No soil of these" in capsys.readouterr().out
+
+
+def test_a_soil_is_named_for_points_and_a_name_that_names_nothing_is_refused(
+    tmp_path: Path, fails: Fails
+) -> None:
+    points = tmp_path / "points.csv"
+    rows = [(s, 0.7 * (1 - np.exp(-9 * s))) for s in np.linspace(0.06, 0.5, 12)]
+    points.write_text("slip,mu\n" + "\n".join(f"{s:.4f},{m:.4f}" for s, m in rows))
+    found = learn(tmp_path / "soils.json", points, "--soil", "clay")["soils"]
+    assert list(found) == ["clay"]
+    assert "libraries only" in fails(tmp_path / "soils.json", "--soil", "clay")
+    points.write_text("clay,,stubble,\nX,Y,X,Y\n" + "\n".join(f"{s},{m},{s},{m}" for s, m in rows))
+    assert "holds 2 curves" in fails(points, "--soil", "clay")
+
+
+def test_data_do_not_fix_a_curve_that_explains_little_of_them(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    points, draws = tmp_path / "points.csv", np.random.default_rng(1000)
+    mu = CURVES["exponential"].value(np.linspace(0.06, 0.55, 25), {"a": 0.85})
+    rows = [
+        (s, m + 0.08 * draws.standard_normal()) for s, m in zip(np.linspace(0.06, 0.55, 25), mu, strict=True)
+    ]
+    points.write_text("slip,mu\n" + "\n".join(f"{s:.4f},{m:.4f}" for s, m in rows))
+    found = learn(tmp_path / "soils.json", points, "--soil", "clay")["soils"]["clay"]
+    assert 0 < found["r2"] < 0.5
+    assert found["identifiability"]["identifiable"] is False
+    assert any("explains little of the bins" in note for note in found["notes"])
+    said = capsys.readouterr().out
+    assert f"no (R2 {found['r2']:.2f})" in said

@@ -3,11 +3,6 @@
  * the way a new ground shows are ours. */
 #include "curve.h"
 
-/* The prototype (paper eq. 8, PHYSICS 5): g(s) = 1 - p e^(alpha_1 s) - (1 - p) e^(alpha_2 s). */
-#define TG_SHARE ((tg_real)0.52)
-#define TG_SLOW ((tg_real)0.01)
-#define TG_RISE ((tg_real)-11.36)
-
 /* The slips that the curve is fitted to (paper: 5 % to 60 %). Below, g is near 0 and a pair says nothing of a. The lower bound is put to
  * the mean of g: on single slips it would pick those whose error is upward. */
 #define TG_LEAST_HEIGHT ((tg_real)0.2075) /* g(0.05) */
@@ -37,14 +32,14 @@ tg_real tg_curve_std(const tg_curve *c)
 /* e^(alpha_1 s) by its series, to 1e-12: alpha_1 s is at most 0.006. */
 static tg_real slow(tg_real s)
 {
-    const tg_real x = TG_SLOW * s;
+    const tg_real x = TG_CURVE_SLOW * s;
     return 1 + x * (1 + x * ((tg_real)0.5 + x * ((tg_real)(1.0 / 6) + x * (tg_real)(1.0 / 24))));
 }
 
 /* g(s), odd in slip, on -1 to 1. */
 static tg_real height_at(tg_real slip)
 {
-    const tg_real s = tgi_fabs(slip), g = 1 - TG_SHARE * slow(s) - (1 - TG_SHARE) * tgi_exp(TG_RISE * s);
+    const tg_real s = tgi_fabs(slip), g = 1 - TG_CURVE_SHARE * slow(s) - (1 - TG_CURVE_SHARE) * tgi_exp(TG_CURVE_RISE * s);
     return slip < 0 ? -g : g;
 }
 
@@ -66,11 +61,11 @@ tgi_sight tgi_look(const tg_pair *p)
     const tg_real s = tgi_fabs(p->slip), sum = p->adhesion + p->adhesion_variance + p->slip_variance + p->adhesion_constant;
     memset(&found, 0, sizeof found);
     if (!(s <= TG_LARGEST_SLIP) || isnan(sum) || isinf(sum)) return found;
-    const tg_real first = TG_SHARE * slow(s), second = (1 - TG_SHARE) * tgi_exp(TG_RISE * s), g = 1 - first - second;
+    const tg_real first = TG_CURVE_SHARE * slow(s), second = (1 - TG_CURVE_SHARE) * tgi_exp(TG_CURVE_RISE * s), g = 1 - first - second;
     found.told = 1;
     found.adhesion = p->adhesion;
     found.height = p->slip < 0 ? -g : g;
-    found.slope = answer(s, g, -TG_SLOW * first - TG_RISE * second, p->slip_variance);
+    found.slope = answer(s, g, -TG_CURVE_SLOW * first - TG_CURVE_RISE * second, p->slip_variance);
     found.variance = p->adhesion_variance;
     found.slip_variance = p->slip_variance;
     found.constant = p->adhesion_constant * p->adhesion_constant;

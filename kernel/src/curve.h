@@ -5,6 +5,12 @@
 #include <math.h>
 #include <string.h>
 
+/* The prototype (paper eq. 8): g(s) = 1 - p e^(alpha_1 s) - (1 - p) e^(alpha_2 s), and k = -alpha_2 of its rise A (1 - exp(-k s)). */
+#define TG_CURVE_SHARE ((tg_real)0.52)
+#define TG_CURVE_SLOW ((tg_real)0.01)
+#define TG_CURVE_RISE ((tg_real)-11.36)
+#define TG_STEEPNESS (-TG_CURVE_RISE)
+
 typedef struct {
     tg_real adhesion, height, slope; /* mu, g(s), |dg/ds| */
     tg_real variance, slip_variance, constant;

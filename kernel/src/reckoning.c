@@ -2,8 +2,6 @@
  * and soil resistance apart, and the estimate of v runs off with every error of the forces. */
 #include "estimator.h"
 
-#define TG_STEEPNESS ((tg_real)11.36) /* k of mu = A (1 - exp(-k s)), the paper's prototype curve (PHYSICS 5) */
-
 /* Mean rim speed and mean adhesion over the load, along the travel. */
 static void means(const tg_estimator *e, const tg_drive *drive, tg_real *rim, tg_real *adhesion)
 {

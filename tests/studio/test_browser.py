@@ -130,9 +130,11 @@ def test_the_browsers_curves_are_the_servers(page: Any, served: Served) -> None:
     for name, model in CURVES.items():
         page.select_option("#curve-model", name)
         drawn = page.evaluate(
-            """slips => {
-              const { value, state } = window.terragripFit;
-              return slips.map((s) => value(state.active.model, state.active.parameters, s));
+            """async slips => {
+              const { at, state } = window.terragripFit, { samples } = state;
+              const drawn = () => samples.of(state.active.id, state.active);
+              while (!drawn() || !samples.isCurrent(state.active.id, state.active)) await new Promise(requestAnimationFrame);
+              return slips.map((s) => at(drawn(), s));
             }""",
             slips.tolist(),
         )
@@ -150,6 +152,20 @@ def test_fit_shows_the_servers_numbers_and_undo_takes_them_back(page: Any, serve
     assert float(page.input_value("#field-a")) == pytest.approx(1.0)
     page.keyboard.press("Control+Shift+z")
     assert float(page.input_value("#field-a")) == pytest.approx(fitted)
+
+
+def test_a_curve_set_by_hand_says_how_far_it_is_from_the_fit(page: Any, served: Served) -> None:
+    open_fit(page, served, "estimates.parquet")
+    page.wait_for_selector("#soil-list li")
+    page.click("#fit-button")
+    page.wait_for_selector(".badge")
+    assert page.inner_text(".apart") == ""
+    fitted = float(page.input_value("#field-a"))
+    page.fill("#field-a", str(fitted + 0.1))
+    page.keyboard.press("Enter")
+    page.wait_for_selector(".apart:has-text('By hand')")
+    off = 0.1 * float(CURVES["exponential"].value(0.6, {"a": 1.0}))
+    assert f"+{off:.2g} off this fit at 60 % slip" in page.inner_text(".apart")
 
 
 def test_the_fit_page_by_keyboard_alone(page: Any, served: Served) -> None:

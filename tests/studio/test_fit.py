@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 from pathlib import Path
 from typing import Any
@@ -10,6 +11,7 @@ import numpy as np
 import pytest
 from fastapi.testclient import TestClient
 
+from terragrip.estimation import Estimates
 from terragrip.physics.adhesion import CURVES
 from terragrip.soil.estimates import soils_of
 from terragrip.soil.library import SoilLibrary
@@ -34,12 +36,44 @@ def test_a_soil_of_estimates_is_fitted_as_terragrip_soils_does(client: TestClien
     shown = {
         soil["name"]: soil for soil in client.get("/api/soils", params={"path": "estimates.parquet"}).json()
     }
-    reference = soils_of([folder / "estimates.parquet"]).soils["grass"].curve
-    bins = {"upper": 0.40}
-    found = fit(client, path="estimates.parquet", soil="grass", bins=bins).json()
-    assert shown["grass"]["bins"]
-    assert math.isclose(found["parameters"]["a"], reference.parameters_["a"], rel_tol=1e-6)
-    assert found["bins"] == reference.bins_.to_list()
+    reference = soils_of([folder / "estimates.parquet"]).soils["grass"].curve.to_dict()
+    found = fit(client, path="estimates.parquet", soil="grass", bootstrap=1000).json()
+    assert {name: found[name] for name in reference} == json.loads(json.dumps(reference))
+    assert shown["grass"]["bins"] == found["bins"]
+
+
+def test_bins_of_estimates_are_sorted_by_pull_as_terragrip_soils_sorts_them(
+    client: TestClient, folder: Path
+) -> None:
+    """Weak spots make slip vary about the pull's own, which bins by slip take for a lower curve."""
+    known, time = Estimates.read(folder / "estimates.parquet"), np.arange(8000) / 20
+    pulled = 0.25 + 0.2 * np.sin(time / 16)
+    spot = np.random.default_rng(1000).standard_normal(200).repeat(40)
+    mu = CURVES["exponential"].value(pulled, {"a": 0.85})
+    columns = {"distance": time, "ground_speed": np.ones(8000), "soil_resistance": np.full(8000, 0.1)}
+    for wheel in known.wheels:
+        columns |= {f"adhesion_{wheel}": mu, f"slip_{wheel}": pulled * np.exp(0.2 * spot)}
+        columns |= {f"slip_{wheel}_std": np.full(8000, 0.01)}
+    labels = {"soil": np.full(8000, "fine", dtype=object)}
+    Estimates(time, columns, np.zeros(8000, np.uint8), labels, known.about).write(folder / "made_up.parquet")
+    reference = soils_of([folder / "made_up.parquet"]).soils["fine"].curve.to_dict()
+    found = fit(client, path="made_up.parquet", soil="fine", bootstrap=1000).json()
+    assert found["settings"]["by"] == "pull"
+    assert {name: found[name] for name in reference} == json.loads(json.dumps(reference))
+    (shown,) = client.get("/api/soils", params={"path": "made_up.parquet"}).json()
+    assert shown["bins"] == found["bins"]
+
+
+def test_curves_are_served_as_samples(client: TestClient) -> None:
+    for name, model in CURVES.items():
+        given = {model.names[0]: 1.5}
+        served = client.post(
+            "/api/curve", json={"model": name, "parameters": {**given, "intercept": -0.05}}
+        ).json()
+        assert np.array_equal(served["value"], model.value(served["slip"], given, -0.05))
+        assert served["peak"] == list(model.peak(given))
+    assert client.post("/api/curve", json={"model": "magic"}).status_code == 422
+    assert client.post("/api/curve", json={"model": "pacejka", "parameters": {"a": 1}}).status_code == 422
 
 
 def test_enough_points_carry_intervals_and_a_band(client: TestClient) -> None:

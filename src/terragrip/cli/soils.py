@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -50,7 +50,10 @@ def command(
     runs: Annotated[int, typer.Option(help="By pull: fewest runs of a bin.")] = 2,
     minimum: Annotated[int, typer.Option(help="By slip: fewest samples of a bin.")] = 10,
     soil: Annotated[
-        str | None, typer.Option(metavar="NAME", help="The soil of all rows, for logs without labels.")
+        str | None,
+        typer.Option(
+            metavar="NAME", help="The soil of all rows, for logs without labels; of digitised points."
+        ),
     ] = None,
     merge: Annotated[
         Path | None, typer.Option(metavar="FILE", help="Add to this library; its twins are replaced.")
@@ -93,6 +96,12 @@ def command(
         None if (width, lower, upper) == (usual.width, usual.lower, usual.upper) else {}
     )
     estimates = [path for path in inputs if path.suffix.lower() not in (".json", ".csv")]
+    if soil is not None and all(path.suffix.lower() == ".json" for path in inputs):
+        raise InputError(
+            "names the soil of rows or points, and there are libraries only",
+            place="--soil",
+            mend="leave it out",
+        )
     library = SoilLibrary({})
     words: list[str] = []
     if estimates:
@@ -104,8 +113,9 @@ def command(
         if path.suffix.lower() == ".json":
             library = _joined(library, SoilLibrary.load(path), path)
         elif path.suffix.lower() == ".csv":
-            points = soils_of_points(path, curve)
+            points = soils_of_points(path, curve, soil)
             words += [f"{name}: not fitted, {why}." for name, why in points.not_fitted.items()]
+            words += [f"{name}: {note}" for name, one in points.items() for note in one.fit.get("notes", ())]
             library = _joined(library, points, path)
     if base is not None:
         library = base.merge(library, "replace")
@@ -176,13 +186,24 @@ def table(library: Mapping[str, Soil]) -> str:
             )
         score = ["" if value is None else f"{value:.3f}" for value in (one.r2, one.nrmse)]
         badge, settings = one.fit.get("identifiability"), one.fit.get("settings") or {}
-        fixed = "" if not badge else "yes" if badge["identifiable"] else f"no ({badge['condition']:.1g})"
+        fixed = "" if not badge else _fixed(one, badge)
         bins = f"{len(one.bins)} by {settings.get('by', 'slip')}" if one.bins else ""
         rows.append((name, one.model, ", ".join(words), *score, bins, _by_slip(one), fixed))
     widths = [max(len(row[i]) for row in rows) for i in range(len(head))]
     return "\n".join(
         "  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip() for row in rows
     )
+
+
+def _fixed(soil: Soil, badge: Mapping[str, Any]) -> str:
+    """Whether the data fix what was fitted; why not: the condition number, or a curve that explains too little of its bins."""
+    from terragrip.soil.identifiability import LIMIT, POOR
+
+    if badge["condition"] >= LIMIT:
+        return f"no ({badge['condition']:.1g})"
+    if soil.r2 is not None and soil.r2 < POOR:
+        return f"no (R2 {soil.r2:.2f})"
+    return "yes"
 
 
 def _by_slip(soil: Soil) -> str:

@@ -9,6 +9,7 @@ from terragrip.report.curves import SoilCurves, draw_all_maxima, draw_both_maxim
 from terragrip.report.page import Picture, Section, Table, names, number, percent
 from terragrip.soil.bins import BY_PULL
 from terragrip.soil.fit import FREE, AdhesionCurve
+from terragrip.soil.identifiability import Identifiability
 from terragrip.soil.learn import APART, Campaign, scales_apart
 from terragrip.soil.library import Soil, SoilLibrary
 from terragrip.soil.literature import paper_soils
@@ -320,11 +321,18 @@ def _trust_row(one: SoilCurves) -> tuple[str, ...]:
         ) + (" (matters)" if noise.matters else "")
     return (
         one.name,
-        f"{'yes' if badge.identifiable else 'no'} ({badge.condition:.3g})",
+        _badge(badge, one.learned.soil.r2),
         "–" if verdict is None else "yes" if verdict.follows else f"no: take {verdict.proposal}",
         number(noise.slip_std if noise else None),
         corrected,
     )
+
+
+def _badge(badge: Identifiability, r2: float | None) -> str:
+    """Whether the data fix the fit, with what says so: the condition number, or R2 where the curve explains too little."""
+    if badge.told_apart and not badge.identifiable:
+        return f"no (R² {number(r2, 2)})"
+    return f"{'yes' if badge.identifiable else 'no'} ({badge.condition:.3g})"
 
 
 def _ranking(curves: Sequence[SoilCurves]) -> list[Table]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import os
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -16,6 +16,7 @@ from terragrip.files import refuse_missing, unreadable
 from terragrip.formats.dialect import to_text
 from terragrip.soil.bins import BinSettings
 from terragrip.soil.fit import AdhesionCurve
+from terragrip.soil.learn import explaining
 from terragrip.soil.library import Soil, SoilLibrary
 
 Array = NDArray[np.float64]
@@ -118,16 +119,28 @@ def _curve(slip: Array, value: Array, name: str, file: str) -> DigitisedCurve:
     return DigitisedCurve(name, slip[order], value[order], notes)
 
 
-def soils_of_points(path: str | os.PathLike[str], curve: AdhesionCurve | None = None) -> SoilLibrary:
+def soils_of_points(
+    path: str | os.PathLike[str], curve: AdhesionCurve | None = None, soil: str | None = None
+) -> SoilLibrary:
     """A soil for each digitised curve of a file (see `read_points`), each point a bin of its own; what cannot be fitted is in `not_fitted`.
 
     curve: an unfitted AdhesionCurve whose model and range of slips to use (default: the paper's, 5-60 %). Points of one curve are no
-    repetitions, so there are no intervals. Raises InputError as `read_points`, and on two curves of one name.
+    repetitions, so there are no intervals. soil: the name of the file's one curve. Raises InputError as `read_points`, on two curves of
+    one name, and where `soil` is to name several.
     """
     template = curve or AdhesionCurve()
     soils: dict[str, Soil] = {}
     missed: dict[str, str] = {}
-    for one in read_points(path):
+    found = read_points(path)
+    if soil is not None:
+        if len(found) > 1:
+            raise InputError(
+                f"holds {len(found)} curves, and --soil names one",
+                file=os.fspath(path),
+                mend="leave --soil out: the header names them",
+            )
+        found = [replace(one, name=soil) for one in found]
+    for one in found:
         if one.name in soils or one.name in missed:
             raise InputError(
                 f"two curves are named {one.name!r}", file=os.fspath(path), mend="rename one in its header"
@@ -144,7 +157,9 @@ def soils_of_points(path: str | os.PathLike[str], curve: AdhesionCurve | None = 
         )
         try:
             soils[one.name] = Soil.from_curve(
-                one.name, fitted.fit(one.slip, one.value), f"digitised, {os.path.basename(os.fspath(path))}"
+                one.name,
+                explaining(fitted.fit(one.slip, one.value)),
+                f"digitised, {os.path.basename(os.fspath(path))}",
             )
         except InputError as error:
             missed[one.name] = str(error)

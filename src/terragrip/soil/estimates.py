@@ -103,6 +103,11 @@ class GatheredRuns:
         self.common_sd = max(self.common_sd, other.common_sd)
         self.wheels = max(self.wheels, other.wheels)
 
+    def only(self, soil: str) -> GatheredRuns:
+        """The same runs with the rows of one soil."""
+        blocks = {name: found for name, found in self.blocks.items() if name == soil}
+        return replace(self, pairs=[part for part in self.pairs if part.soil == soil], blocks=blocks)
+
     def learn(
         self, curve: AdhesionCurve | None = None, bins: Mapping[str, BinSettings] | None = None
     ) -> Campaign:

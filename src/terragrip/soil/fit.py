@@ -93,7 +93,7 @@ class AdhesionCurve:
         spread = mean - mean.mean()
         self.r2_ = float(1 - residual @ residual / max(float(spread @ spread), 1e-300))
         self.nrmse_ = float(np.sqrt(np.mean(residual**2)) / max(float(np.ptp(mean)), 1e-300))
-        self.identifiability_: Identifiability = judge(curve, self._of_model(), free, slip)
+        self.identifiability_: Identifiability = judge(curve, self._of_model(), free, slip, self.r2_)
         self.notes_: list[str] = (
             [] if self.identifiability_.identifiable else [self.identifiability_.sentence]
         )
@@ -200,7 +200,7 @@ class AdhesionCurve:
         self.samples_ = best + (x - best) * widen
         samples = self.samples_
         columns = {name: samples[:, i] for i, name in enumerate(free)}
-        if not self.identifiability_.identifiable and self.model == "exponential":
+        if not self.identifiability_.told_apart and self.model == "exponential":
             columns = effective_parameters({**held, **columns})
         self.interval_ = {
             name: (float(low), float(high))

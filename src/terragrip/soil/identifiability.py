@@ -14,6 +14,8 @@ Array = NDArray[np.float64]
 
 LIMIT = 1e4
 """Condition number (columns scaled to unit change of each parameter's own size) beyond which parameters are not told apart."""
+POOR = 0.5
+"""R2 below which a curve explains too little of its bins for them to fix its parameters."""
 
 
 @dataclass(frozen=True)
@@ -21,7 +23,8 @@ class Identifiability:
     """The badge of a fit.
 
     `condition`: ratio of the largest to the smallest singular value of the scaled sensitivities d curve/d ln parameter.
-    `identifiable`: condition below LIMIT. `effective`: parameters that the data do fix (A, k, d), for the paper's form.
+    `identifiable`: condition below LIMIT, and R2 at least POOR.
+    `effective`: parameters that the data do fix (A, k, d), for the paper's form.
     `twin`: another parameter set, `twin_difference` away at most over the data's slips; None where there is none.
     """
 
@@ -32,11 +35,16 @@ class Identifiability:
     twin_difference: float | None
     sentence: str
 
+    @property
+    def told_apart(self) -> bool:
+        """Whether the bins' slips tell the parameters apart, however well the curve explains the bins."""
+        return self.condition < LIMIT
+
 
 def judge(
-    model: CurveModel, parameters: Mapping[str, float], free: Sequence[str], slip: Array
+    model: CurveModel, parameters: Mapping[str, float], free: Sequence[str], slip: Array, r2: float
 ) -> Identifiability:
-    """Badge of a fit of `free` parameters on bins at `slip` (bins,), all other parameters held."""
+    """Badge of a fit of `free` parameters on bins at `slip` (bins,), all other parameters held; `r2` of the fit on them."""
     names = [name for name in free if name != "intercept"]
     columns = [_sensitivity(model, parameters, name, slip) for name in names]
     if "intercept" in free:
@@ -46,6 +54,9 @@ def judge(
     _, values, rows = np.linalg.svd(matrix, full_matrices=False)
     condition = float(values[0] / max(values[-1], values[0] * 1e-16))
     effective = effective_parameters(parameters) if model.name == "exponential" else None
+    if condition < LIMIT and r2 < POOR:
+        sentence = f"The curve explains little of the bins (R2 {r2:.2f}), so they do not fix {', '.join(names)}: take it as a hint."
+        return Identifiability(condition, False, effective, None, None, sentence)
     if condition < LIMIT:
         sentence = f"The data fix {', '.join(names)} (condition number {condition:.3g})."
         return Identifiability(condition, True, effective, None, None, sentence)

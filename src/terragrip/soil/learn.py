@@ -24,8 +24,6 @@ Array = NDArray[np.float64]
 STRETCH = 10.0
 """Metres of one run that count as one draw of the bootstrap where there are too few runs."""
 FEW_RUNS = 5
-POOR = 0.5
-"""R2 below which a fit carries a warning."""
 APART = 0.03
 """Relative difference of the scale by pull from that by slip beyond which it is said."""
 FALL = 0.05
@@ -227,8 +225,6 @@ def _learn(
     curve, by_slip = _fits(parts, template, sorted_by_slip, verdict)
     if curve is not by_slip:
         verdict = _compared(curve.bins_)
-    if curve.r2_ < POOR:
-        curve.notes_.append(f"The curve explains little of the bins (R2 {curve.r2_:.2f}): take it as a hint.")
     if curve.interval_ and len(parts) < FEW_RUNS:
         curve.notes_.append(
             f"The intervals come from stretches of {STRETCH:g} m of {len(parts)} run{'s' * (len(parts) > 1)}: "
@@ -267,13 +263,13 @@ def _fits(
             why = "the curve falls within the bins, so that one pull has two slips"
         else:
             try:
-                return _explaining(
+                return explaining(
                     template.unfitted().fit_bins(_enough(bin_parts(parts, template.bins)))
                 ), paper
             except InputError as error:
                 why = error.problem
         paper.notes_.append(f"Sorted by slip, not by pull: {why}.")
-    return _explaining(paper), paper
+    return explaining(paper), paper
 
 
 def _of_noise(parts: Sequence[RunPairs], curve: AdhesionCurve) -> SlipNoise:
@@ -317,8 +313,8 @@ def _enough(bins: Bins) -> Bins:
     return bins
 
 
-def _explaining(curve: AdhesionCurve) -> AdhesionCurve:
-    """The fitted curve itself. Raises InputError where it explains nothing of its bins."""
+def explaining(curve: AdhesionCurve) -> AdhesionCurve:
+    """The fitted curve itself. Raises InputError where it explains nothing of its bins (R2 of 0 or less)."""
     if curve.r2_ <= 0:
         raise InputError(
             f"the {curve.model} curve explains nothing of its {np.count_nonzero(curve.bins_.used)} bins (R2 {curve.r2_:.2f}): "

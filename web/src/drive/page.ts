@@ -1,5 +1,6 @@
 /** A run over time: measured against estimated, with intervals, soils, events and what the filter thinks of itself. */
 
+import { sampled } from "../fit/samples";
 import { get, type Item } from "../ui/api";
 import { brushed } from "../ui/brush";
 import { digits, fill, h } from "../ui/dom";
@@ -27,6 +28,7 @@ interface Sample {
 export const page: Page = (main, { notices, query }) => {
   const charts = new Charts();
   const plane = new Plane();
+  void tried(() => sampled({ model: "exponential", parameters: { a: 1 } })).then((shape) => shape && plane.shaped(shape));
   const choice = h("select", { id: "run", "aria-label": "Run" });
   const wheels = h("div", { class: "chips", role: "group", "aria-label": "Wheels" });
   const panels = h("details", { class: "chooser" }, h("summary", {}, "Panels"));

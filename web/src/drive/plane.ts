@@ -1,7 +1,7 @@
 /** The mu-s plane of one wheel: the shown time's pairs, the pair under the cursor, the online curve known by then. */
 
 import { CanvasInk } from "../fit/ink";
-import { value } from "../fit/models";
+import type { Samples } from "../fit/samples";
 import { View, ticks } from "../fit/view";
 import { digits, h } from "../ui/dom";
 import { color, onTheme } from "../ui/theme";
@@ -24,6 +24,7 @@ export class Plane {
   private view = new View({ low: -0.05, high: 0.7 }, { low: -0.1, high: 0.8 }, 300, 260);
   private points = { slip: [] as number[], adhesion: [] as number[] };
   private now: Now | null = null;
+  private shape: Samples | null = null;
   private asked = false;
   private forget: () => void;
   private watcher: ResizeObserver;
@@ -50,6 +51,12 @@ export class Plane {
     };
     this.view.x = { low: Math.min(-0.02, most(points.slip, 0.01)), high: Math.max(0.3, most(points.slip, 0.99) * 1.1) };
     this.view.y = { low: Math.min(-0.02, most(points.adhesion, 0.01)), high: Math.max(0.3, most(points.adhesion, 0.99) * 1.2) };
+    this.later();
+  }
+
+  /** The online curve's shape: the curve of scale 1. */
+  shaped(shape: Samples): void {
+    this.shape = shape;
     this.later();
   }
 
@@ -105,15 +112,9 @@ export class Plane {
 
   private drawNow(ink: CanvasInk, now: Now): void {
     const { view } = this;
-    const curve = (a: number): number[] => {
-      const out: number[] = [];
-      for (let i = 0; i <= 80; i++) {
-        const s = view.x.low + (i / 80) * (view.x.high - view.x.low);
-        out.push(view.px(s), view.py(value("exponential", { a, p: 0.52, alpha_1: 0.01, alpha_2: -11.36 }, s)));
-      }
-      return out;
-    };
-    if (now.a_std < USELESS) {
+    const { shape } = this;
+    if (shape && now.a_std < USELESS) {
+      const curve = (a: number): number[] => shape.slip.flatMap((s, i) => [view.px(s), view.py(a * (shape.value[i] ?? NaN))]);
       const high = curve(now.a + 1.96 * now.a_std);
       const low = curve(now.a - 1.96 * now.a_std);
       const back: number[] = [];

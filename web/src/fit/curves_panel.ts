@@ -1,8 +1,9 @@
 /** The panel on the right: the active curve's model, a slider and a number field for each parameter, its fit. */
 
 import { digits, fill, h } from "../ui/dom";
+import { farthest } from "./samples";
 import { sameCurve } from "./scene";
-import type { Curve, Parameter, State } from "./state";
+import type { Curve, FitResult, Parameter, State } from "./state";
 
 const SYMBOLS: Record<string, string> = { alpha_1: "α₁", alpha_2: "α₂", c1: "c₁", c2: "c₂", c3: "c₃", mobility: "Bn", wheel_numeric: "Cn" };
 const STEPS = 1000;
@@ -37,6 +38,7 @@ export class CurvesPanel {
   ) {
     state.on((change) => {
       if (change === "all") this.draw();
+      if (change === "curve") this.tellApart();
     });
   }
 
@@ -170,6 +172,20 @@ export class CurvesPanel {
     if (result && curve) result.replaceWith(this.result(curve));
   }
 
+  /** How far a curve set by hand lies from its fit. */
+  private apart(curve: Curve, fit: FitResult): string {
+    const { samples } = this.state;
+    const [mine, fitted] = [samples.of(curve.id, curve), samples.of(`fit ${curve.id}`, fit)];
+    if (!mine || !fitted || !samples.isCurrent(curve.id, curve)) return "The sliders have left this fit.";
+    const [slip, off] = farthest(mine, fitted);
+    return Number.isFinite(slip) ? `By hand: µ is ${off > 0 ? "+" : "−"}${digits(Math.abs(off), 2)} off this fit at ${digits(100 * slip, 3)} % slip, the most from 5 to 60 %.` : "";
+  }
+
+  private tellApart(): void {
+    const [said, curve] = [this.element.querySelector(".apart"), this.state.active];
+    if (said && curve?.fit) said.textContent = sameCurve(curve) ? "" : this.apart(curve, curve.fit);
+  }
+
   private interceptChoice(curve: Curve): HTMLElement {
     const box = h("input", { type: "checkbox", checked: "intercept" in curve.parameters });
     box.addEventListener("change", () => {
@@ -199,7 +215,7 @@ export class CurvesPanel {
     return h(
       "div",
       { class: `result${sameCurve(curve) ? "" : " stale"}`, "aria-live": "polite" },
-      h("p", {}, sameCurve(curve) ? "" : "The sliders have left this fit."),
+      h("p", { class: "apart" }, sameCurve(curve) ? "" : this.apart(curve, fit)),
       h("table", {}, h("thead", {}, h("tr", {}, h("th", {}, ""), h("th", {}, "fit"), h("th", {}, "95 % interval"))), h("tbody", {}, rows, effective)),
       h("p", {}, `R² ${digits(fit.r2)}, NRMSE ${digits(fit.nrmse)}, ${fit.bins.length} bins`),
       h("p", { class: `badge ${badge.identifiable ? "good" : "poor"}` }, badge.identifiable ? "identifiable" : "not identifiable", ` (condition ${digits(badge.condition, 2)})`),

@@ -6,10 +6,10 @@ import { note, tried } from "../ui/notes";
 import type { Page } from "../ui/page";
 import { CurvesPanel } from "./curves_panel";
 import { ListPanel } from "./list_panel";
-import { value } from "./models";
 import { mapOf } from "./picture";
 import { PicturesPanel } from "./pictures_panel";
 import { Plot } from "./plot";
+import { at, sampled } from "./samples";
 import { sameCurve } from "./scene";
 import { State, type FitResult, type Model } from "./state";
 
@@ -30,7 +30,7 @@ export const page: Page = (main, { notices, query }) => {
     h("span", { class: "spring" }),
     h("button", { type: "button", click: () => void png(plot) }, "PNG"),
     h("button", { type: "button", click: () => save("adhesion-slip.svg", new Blob([plot.svg()], { type: "image/svg+xml" })) }, "SVG"),
-    h("button", { type: "button", click: () => save("adhesion-slip.csv", new Blob([csv(state)], { type: "text/csv" })) }, "CSV"),
+    h("button", { type: "button", click: () => void table(state) }, "CSV"),
   );
   main.append(list.element, h("section", { class: "middle", "aria-label": "Plot" }, tools, plot.element), curves.element);
   plot.onClick = (at, shift) => pictures.click(at, shift);
@@ -91,7 +91,7 @@ export const page: Page = (main, { notices, query }) => {
   main.addEventListener("dragover", hover);
   void start();
   // For the browser tests: how often the plot was drawn, and what is on it.
-  Object.assign(window, { terragripFit: { plot, state, value, mapOf } });
+  Object.assign(window, { terragripFit: { plot, state, at, mapOf } });
   return () => {
     forget();
     plot.close();
@@ -172,13 +172,15 @@ async function png(plot: Plot): Promise<void> {
 }
 
 /** The shown curves on a grid of 1 % of slip, a column a curve. */
-function csv(state: State): string {
+async function table(state: State): Promise<void> {
   const shown = state.kept.curves.filter((curve) => curve.shown);
   const quoted = (text: string): string => (/[",\n]/.test(text) ? `"${text.replace(/"/g, '""')}"` : text);
+  const samples = await tried(() => Promise.all(shown.map(sampled)));
+  if (!samples) return;
   const rows = [["slip", ...shown.map((curve) => quoted(curve.name))].join(",")];
   for (let i = 0; i <= 100; i++) {
     const s = i / 100;
-    rows.push([s, ...shown.map((curve) => Number(value(curve.model, curve.parameters, s).toPrecision(8)))].join(","));
+    rows.push([s, ...samples.map((one) => Number(at(one, s).toPrecision(8)))].join(","));
   }
-  return `${rows.join("\n")}\n`;
+  save("adhesion-slip.csv", new Blob([`${rows.join("\n")}\n`], { type: "text/csv" }));
 }

@@ -132,7 +132,7 @@ export class Plot {
 
   private inkCurves(ink: Ink): void {
     const { curves, active } = this.state.kept;
-    for (const curve of curves) if (curve.shown) drawCurve(ink, this.view, curve, curve.id === active);
+    for (const curve of curves) if (curve.shown) drawCurve(ink, this.view, curve, curve.id === active, this.state.samples.of(curve.id, curve));
   }
 
   private inkLegend(ink: Ink): void {

@@ -3,7 +3,7 @@
 import { color } from "../ui/theme";
 import { digits } from "../ui/dom";
 import type { Ink } from "./ink";
-import { value } from "./models";
+import type { Samples } from "./samples";
 import type { Curve, Soil } from "./state";
 import { ticks, type View } from "./view";
 
@@ -45,7 +45,7 @@ export function drawSoil(ink: Ink, view: View, soil: Soil): void {
   ink.dots(soil.bins.flatMap((bin) => [view.px(bin.slip), view.py(bin.mean)]), 4, shade, 1);
 }
 
-export function drawCurve(ink: Ink, view: View, curve: Curve, active: boolean): void {
+export function drawCurve(ink: Ink, view: View, curve: Curve, active: boolean, samples: Samples | null): void {
   const shade = color(curve.color);
   const band = curve.fit?.band;
   if (band && sameCurve(curve)) {
@@ -54,13 +54,12 @@ export function drawCurve(ink: Ink, view: View, curve: Curve, active: boolean): 
     for (let i = band.slip.length - 1; i >= 0; i--) outline.push(view.px(band.slip[i] as number), view.py(band.low[i] as number));
     ink.area(outline, shade, 0.18);
   }
-  const count = Math.max(Math.round((view.width - view.left - view.right) / 2), 2);
-  const points = new Float64Array(2 * count + 2);
-  for (let i = 0; i <= count; i++) {
-    const s = view.x.low + (i / count) * (view.x.high - view.x.low);
+  if (!samples) return;
+  const points = new Float64Array(2 * samples.slip.length);
+  samples.slip.forEach((s, i) => {
     points[2 * i] = view.px(s);
-    points[2 * i + 1] = Math.abs(s) > 1 ? NaN : view.py(value(curve.model, curve.parameters, s));
-  }
+    points[2 * i + 1] = view.py(samples.value[i] ?? NaN);
+  });
   ink.line(points, { color: shade, width: active ? 2.6 : 1.6 });
 }
 

@@ -1,7 +1,7 @@
 /** What the fit page shows, and its undo. Data of soils and pictures are held apart: undo never loses them. */
 
 import { CURVE_COLORS } from "../ui/theme";
-import type { Parameters } from "./models";
+import { Sampler, type Parameters } from "./samples";
 import type { Calibration } from "./picture";
 
 export interface Parameter {
@@ -80,6 +80,8 @@ export class State {
   images = new Map<string, HTMLImageElement>();
   /** The soil, or "picture:path#line", that a fit takes. */
   target = "";
+  /** Samples of curves by their id, and of what their fits found by `fit <id>`. */
+  samples = new Sampler(() => this.changed("curve"));
   kept: Kept = { curves: [], active: 0, pictures: {} };
   private past: string[] = [];
   private future: string[] = [];

@@ -1,6 +1,7 @@
 /** The live page: big numbers for the cab, six traces, warnings. Fed by the live service, or by a run played again. */
 
 import { soilColor, WHEEL_COLORS } from "../drive/run";
+import { sampled } from "../fit/samples";
 import { get, type Item } from "../ui/api";
 import { digits, fill, h } from "../ui/dom";
 import { tried } from "../ui/notes";
@@ -8,8 +9,6 @@ import type { Page } from "../ui/page";
 import { Feed, type Said } from "./feed";
 import { Traces, type Trace } from "./traces";
 
-/** mu_max of the prototype curve over its scale a (PHYSICS 5). */
-const PEAK = 0.476;
 const WARNING: Record<string, string> = {
   immobilization: "About to dig in",
   stuck: "Stuck",
@@ -30,6 +29,8 @@ export const page: Page = (main, { notices, query }) => {
   const speedTile = tile("Speed", "m/s");
   const said = h("ul", { class: "said", "aria-label": "Events" });
   let warnedAt = -Infinity;
+  let peak = NaN; // largest adhesion of the online curve over its scale
+  void tried(() => sampled({ model: "exponential", parameters: { a: 1 } })).then((shape) => shape && (peak = shape.peak[1]));
   let updates = 0;
   let rate = 0;
 
@@ -99,9 +100,9 @@ export const page: Page = (main, { notices, query }) => {
     const wheel = wheels.find((name) => ring.last(`slip_${name}`) === most) ?? "";
     const spread = 196 * ring.last(`slip_${wheel}_std`);
     slip.set(slips.length ? (100 * most).toFixed(0) : "–", slips.length ? `${wheel}, ± ${spread.toFixed(0)}` : "standing");
-    const offered = PEAK * ring.last("curve_a");
+    const offered = peak * ring.last("curve_a");
     const used = Math.max(...wheels.map((name) => ring.last(`adhesion_${name}`)));
-    const known = ring.last("curve_a_std") < 0.35 * ring.last("curve_a");
+    const known = peak > 0 && ring.last("curve_a_std") < 0.35 * ring.last("curve_a");
     grip.set(known ? Math.min((100 * used) / offered, 100).toFixed(0) : "–", known ? `µ ${digits(used, 2)} of ${digits(offered, 2)}` : `µ ${digits(used, 2)}; what the soil offers is not known yet`);
     speedTile.set(ring.last("ground_speed").toFixed(2), `± ${(1.96 * ring.last("ground_speed_std")).toFixed(2)}`);
   }

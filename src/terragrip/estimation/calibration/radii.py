@@ -30,6 +30,7 @@ from terragrip.estimation.calibration.windows import Windows
 from terragrip.estimation.calibration.zeros import Spell, evidence
 from terragrip.physics.loads import GRAVITY
 from terragrip.physics.motion import algebraic_adhesion
+from terragrip.physics.slip import slip
 from terragrip.vehicle import Vehicle
 
 Floats = npt.NDArray[np.float64]
@@ -100,10 +101,10 @@ def rolling_radii(
     radius = vehicle.wheel_radius * scale
     typical = float(np.average(steepness[code[free]]))
     variance = own + _considered(vehicle, typical)
-    slip = float(np.mean(1 - windows.hub_speed[free] / (windows.wheel_speed[free] * radius)))
+    rolled = slip(windows.wheel_speed[free], windows.hub_speed[free], radius, standstill_speed=0.0)
     told = evidence(windows, [Spell(int(k), int(k)) for k in np.flatnonzero(free)], sources)
     factor = float(stdtrit(max(1.0, stretches - 1), 0.975))
-    return Rolling(radius, np.sqrt(variance), factor, slip, told)
+    return Rolling(radius, np.sqrt(variance), factor, float(np.mean(rolled)), told)
 
 
 def _adhesion(windows: Windows, vehicle: Vehicle) -> Floats:

@@ -22,6 +22,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
+from terragrip.physics.adhesion import PROTOTYPE
+
 Floats = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.intp]
 Bools = npt.NDArray[np.bool_]
@@ -33,7 +35,6 @@ _LOCAL = 0.1  # relative difference of local adhesion between wheels, for the we
 _LEAST_LOCAL = 0.01  # and at least
 _LEAST_WINDOWS = 30
 _STEEPNESS = np.geomspace(2.0, 60.0, 60)  # of the curves 1 - exp(-k s)
-_PROTOTYPE = 11.36  # the paper's
 
 
 @dataclass(frozen=True)
@@ -156,7 +157,7 @@ class _Problem:
         slip, soil = self.data.slip.mean(axis=1), self.data.soil
         size = np.abs(slip)
         best, found = np.inf, np.zeros(len(slip))
-        for k in _STEEPNESS if np.ptp(size) > 0.02 else [_PROTOTYPE]:
+        for k in _STEEPNESS if np.ptp(size) > 0.02 else [-PROTOTYPE["alpha_2"]]:
             form = np.sign(slip) * -np.expm1(-k * size)
             amplitude = np.bincount(soil, form * level) / np.maximum(np.bincount(soil, form**2), 1e-12)
             loss = float(np.sum(np.abs(level - amplitude[soil] * form)))

@@ -29,6 +29,7 @@ from terragrip.estimation.calibration.plausible import turns_unseen
 from terragrip.estimation.calibration.result import Evidence, Quantity
 from terragrip.estimation.calibration.windows import Windows, windows
 from terragrip.physics.loads import GRAVITY
+from terragrip.physics.slip import slip
 from terragrip.recording import Recording, without_held
 from terragrip.vehicle import Vehicle
 
@@ -123,12 +124,10 @@ def _usable(table: Windows, vehicle: Vehicle) -> Bools:
         np.isfinite(table.torque + table.load + table.wheel_acceleration + table.hub_speed), axis=1
     )
     whole = table.count > 0.5 * np.median(table.count[table.count > 0])
-    slip = np.mean(
-        1 - table.hub_speed / np.where(together[:, None], table.wheel_speed * vehicle.wheel_radius, np.nan),
-        axis=1,
-    )
+    turning = np.where(together[:, None], table.wheel_speed, np.nan)
+    slips = slip(turning, table.hub_speed, vehicle.wheel_radius, standstill_speed=0.0)
     with np.errstate(invalid="ignore"):
-        usual = np.abs(slip) < _MOST_SLIP
+        usual = np.abs(slips.mean(axis=1)) < _MOST_SLIP
     return moving & together & known & whole & usual & ~turns_unseen(table, vehicle)
 
 
@@ -150,9 +149,9 @@ def _balance(table: Windows, vehicle: Vehicle) -> _Balance:
     turn = np.abs(np.ptp(table.hub_speed, axis=1)) / np.abs(table.ground_speed)
     if np.ptp(turn) > 0:
         nuisance = np.column_stack([nuisance, turn * way])
-    slip = np.mean(1 - table.hub_speed / (table.wheel_speed * radius), axis=1) * way
+    slips = slip(table.wheel_speed, table.hub_speed, radius, standstill_speed=0.0)
     known = bool(np.isfinite(table.pitch).mean() > 0.5 or np.isfinite(table.acceleration).mean() > 0.5)
-    return _Balance(thrust, losses, first, other, nuisance, slip, known)
+    return _Balance(thrust, losses, first, other, nuisance, np.mean(slips, axis=1) * way, known)
 
 
 def _centered(values: Floats, nuisance: Floats, weight: Floats) -> Floats:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, Literal
 
@@ -11,8 +12,10 @@ from pydantic import BaseModel, Field, FiniteFloat
 
 from terragrip.errors import InputError
 from terragrip.physics.adhesion import CURVES
-from terragrip.soil.bins import BinSettings, bin_pairs
+from terragrip.soil.bins import BY_SLIP, BinSettings
+from terragrip.soil.estimates import GatheredRuns
 from terragrip.soil.fit import AdhesionCurve
+from terragrip.soil.learn import DEFAULT, LearnedSoil, bin_parts
 from terragrip.soil.library import Soil, SoilLibrary
 from terragrip.studio.api.files import Named, finite
 from terragrip.studio.state import Here, Studio
@@ -23,18 +26,23 @@ SHOWN = 4000
 """Points of one soil that a page gets; the fit takes them all."""
 
 
+SLIPS = np.linspace(-1.0, 1.0, 401)
+"""Slips that curves are sampled at for the pages."""
+
+
 class BinChoice(BaseModel):
-    """Slip bins, as fractions."""
+    """Slip bins, as fractions; by the vehicle's pull unless told otherwise, as `terragrip soils` has them."""
 
     width: float = Field(0.01, gt=0, le=0.5)
     lower: float = Field(0.05, ge=-1, le=1)
     upper: float = Field(0.60, ge=-1, le=1)
     minimum: int = Field(10, ge=1)
+    by: Literal["pull", "slip"] = "pull"
 
     def settings(self) -> BinSettings:
         """As the fit takes them; InputError if they hold no bin."""
         try:
-            return BinSettings(self.width, self.lower, self.upper, self.minimum)
+            return BinSettings(self.width, self.lower, self.upper, self.minimum, self.by)
         except ValueError as error:
             raise InputError(str(error), mend="widen the range") from None
 
@@ -50,8 +58,15 @@ class FitRequest(BaseModel):
     adhesion: list[FiniteFloat] = Field(default=[], max_length=200_000)
     path: str | None = Field(None, description="Estimates of the folder, instead of points.")
     soil: str | None = None
-    bins: BinChoice = BinChoice()
+    bins: BinChoice | None = Field(None, description="None: those of `terragrip soils`.")
     bootstrap: int = Field(1000, ge=0, le=5000)
+
+
+class CurveRequest(BaseModel):
+    """A curve as a page draws it; parameters that are left out have their start values."""
+
+    model: str
+    parameters: dict[str, FiniteFloat] = {}
 
 
 class SaveRequest(BaseModel):
@@ -86,6 +101,23 @@ def models() -> list[dict[str, Any]]:
     ]  # fmt: skip
 
 
+@router.post("/curve")
+def curve(wanted: CurveRequest) -> dict[str, Any]:
+    """Samples of a curve over slip, and where its largest value lies: the pages draw these and compute no model."""
+    if wanted.model not in CURVES:
+        raise InputError(f"there is no curve model {wanted.model!r}", mend=f"take one of {', '.join(CURVES)}")
+    model = CURVES[wanted.model]
+    own = {name: value for name, value in wanted.parameters.items() if name != "intercept"}
+    try:
+        values = model.value(SLIPS, own, wanted.parameters.get("intercept", 0.0))
+    except ValueError as error:
+        raise InputError(str(error)) from None
+    plain: dict[str, Any] = finite(
+        {"slip": SLIPS.tolist(), "value": values.tolist(), "peak": model.peak(own)}
+    )
+    return plain
+
+
 @router.get("/literature")
 def literature() -> list[dict[str, Any]]:
     """Curves of the literature that are built in."""
@@ -114,23 +146,18 @@ def soils(studio: Here, path: Named) -> list[dict[str, Any]]:
 def fit(studio: Here, wanted: FitRequest) -> dict[str, Any]:
     """Fit a curve; returns what soils.json would hold, and a band of the curve over slip.
 
-    A mean of squares fits bins, as the paper does. Points that are sent (digitised, or bins of a library) count as a bin each.
+    A soil of estimates is fitted as `terragrip soils` does it, by the same bins.
+    Points that are sent (digitised, or bins of a library) count as a bin each.
     """
-    run: Any
     if wanted.path is not None:
-        pairs = _pairs(studio, studio.folder.file(wanted.path), wanted.soil or "")
-        slip, adhesion, run, settings = *pairs, wanted.bins.settings()
+        curve = _learned(studio, studio.folder.file(wanted.path), wanted).curve
     else:
         slip, adhesion = np.array(wanted.slip), np.array(wanted.adhesion)
         if slip.size != adhesion.size:
             raise InputError(f"{slip.size} slips but {adhesion.size} adhesions")
         if slip.size < 2:
             raise InputError("there are fewer than two points", mend="choose a soil, or click points")
-        run = np.arange(slip.size)
-        settings = _bins_of_points(slip)
-    curve = AdhesionCurve(
-        wanted.model, wanted.fixed, wanted.intercept, wanted.weights, settings, wanted.bootstrap
-    ).fit(slip, adhesion, run)
+        curve = _unfitted(wanted, _bins_of_points(slip)).fit(slip, adhesion, np.arange(slip.size))
     found: dict[str, Any] = curve.to_dict()
     grid = np.linspace(0.0, 1.0, 101)
     if curve.samples_ is not None:
@@ -173,6 +200,21 @@ def _bins_of_points(slip: np.ndarray[Any, Any]) -> BinSettings:
     return BinSettings(width, lower, max(float(slip.max()) + width, lower + width), 1)
 
 
+def _unfitted(wanted: FitRequest, bins: BinSettings) -> AdhesionCurve:
+    return AdhesionCurve(wanted.model, wanted.fixed, wanted.intercept, wanted.weights, bins, wanted.bootstrap)
+
+
+def _learned(studio: Studio, target: Path, wanted: FitRequest) -> LearnedSoil:
+    """One soil of a file of estimates as `terragrip soils` learns it; raises InputError where it cannot be fitted."""
+    bins = DEFAULT if wanted.bins is None else wanted.bins.settings()
+    gathered = _gathered(studio, target, wanted.soil or "")
+    name = gathered.pairs[0].soil
+    campaign = gathered.learn(_unfitted(wanted, bins), None if wanted.bins is None else {})
+    if name not in campaign.soils:
+        raise InputError(f"{name}: {campaign.not_fitted[name]}", file=studio.folder.name(target))
+    return campaign.soils[name]
+
+
 def _soils_of(studio: Studio, target: Path) -> list[str]:
     table = studio.estimates.get(target)
     if "soil" not in table:
@@ -180,37 +222,38 @@ def _soils_of(studio: Studio, target: Path) -> list[str]:
     return sorted(set(table["soil"].tolist()))
 
 
-def _pairs(studio: Studio, target: Path, soil: str) -> tuple[Any, Any, Any]:
-    """Slip, adhesion and stretch of one soil's usable rows; an unlabelled log is one soil without a name."""
-    from terragrip.soil.estimates import pairs_of
-
+def _gathered(studio: Studio, target: Path, soil: str) -> GatheredRuns:
+    """One soil's usable rows; an unlabelled log is one soil without a name. Raises InputError where there are none."""
     table = studio.estimates.get(target)
     labelled = "soil" in table and any(table["soil"] != "")
-    parts = [
-        p
-        for p in pairs_of(table, target.stem, None if labelled else "unlabelled")
-        if not labelled or p.soil == soil
-    ]
-    if not parts:
+    every = GatheredRuns()
+    every.add(table, target.stem, None if labelled else "unlabelled", studio.folder.name(target))
+    found = every.only(soil if labelled else "unlabelled")
+    if not found.pairs:
         raise InputError(
             f"no usable samples on {soil or 'unlabelled ground'}",
             file=studio.folder.name(target),
             mend="choose another soil",
         )
-    return tuple(
-        np.concatenate([getattr(p, name) for p in parts]) for name in ("slip", "adhesion", "stretch")
-    )  # type: ignore[return-value]
+    return found
 
 
 def _shown(name: str, studio: Studio, target: Path) -> dict[str, Any]:
-    """One soil of estimates: its bins, and points thinned evenly."""
+    """One soil of estimates: the bins that `terragrip soils` fits (by slip where it cannot fit any), and points thinned evenly."""
     entry: dict[str, Any] = {"name": name or "unlabelled", "soil": name, "path": studio.folder.name(target)}
     try:
-        slip, adhesion, stretch = _pairs(studio, target, name)
+        parts = _gathered(studio, target, name).pairs
     except InputError as error:
         return {**entry, "note": error.problem, "points": {"slip": [], "adhesion": []}, "bins": []}
+    wanted = FitRequest(model="exponential", path=str(target), soil=name, bootstrap=0)
+    try:
+        bins, note = _learned(studio, target, wanted).curve.bins_, ""
+    except InputError as error:
+        bins, note = bin_parts(parts, replace(DEFAULT, by=BY_SLIP)), error.problem
+    slip, adhesion = (np.concatenate([getattr(part, key) for part in parts]) for key in ("slip", "adhesion"))
     step = max(len(slip) // SHOWN, 1)
-    bins = bin_pairs(slip, adhesion, stretch)
     points = {"slip": slip[::step].round(5).tolist(), "adhesion": adhesion[::step].round(5).tolist()}
-    plain: dict[str, Any] = finite({**entry, "points": points, "count": len(slip), "bins": bins.to_list()})
+    plain: dict[str, Any] = finite(
+        {**entry, "points": points, "count": len(slip), "bins": bins.to_list(), "note": note}
+    )
     return plain
