@@ -28,12 +28,11 @@ def files_fixture(tmp_path_factory: pytest.TempPathFactory) -> list[str]:
 
 @pytest.fixture(scope="module", name="report")
 def report_fixture(files: list[str], tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The report of all, beside a library and the ground of the last."""
+    """The report of all, beside the ground of the last."""
     folder = tmp_path_factory.mktemp("report")
-    SoilLibrary({"fine": Soil("fine", "exponential", {"a": 0.777})}).write(folder / "soils.json")
-    ground, library = str(folder / "ground.json"), str(folder / "soils.json")
+    ground = str(folder / "ground.json")
     assert main(["ground", files[-1], "-o", ground, "--quiet"]) == 0
-    words = ["report", *files, "--library", library, "--ground", ground, "-o", str(folder / "report.html")]
+    words = ["report", *files, "--ground", ground, "-o", str(folder / "report.html")]
     assert main([*words, "--title", "Field <3>", "--quiet"]) == 0
     return folder
 
@@ -60,10 +59,22 @@ def test_the_page_holds_every_section_and_loads_nothing(report: Path) -> None:
         "runs",
     ):
         assert f'id="{anchor}"' in html, anchor
-    assert "0.777" in html  # the library's
     assert "0.046" in html  # the paper's NRMSE on hard
     assert "6 runs" not in html
     assert "7 runs" in html
+
+
+def test_a_library_given_is_what_is_shown(
+    files: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Nothing is learned beside it; a soil that it does not hold is said."""
+    SoilLibrary({"fine": Soil("fine", "exponential", {"a": 0.777})}).write(tmp_path / "soils.json")
+    monkeypatch.setattr("terragrip.soil.estimates.learn_soils", None)
+    words = ["report", *files, "--library", str(tmp_path / "soils.json"), "-o", str(tmp_path / "report.html")]
+    assert main([*words, "--no-pdf", "--quiet"]) == 0
+    html = (tmp_path / "report.html").read_text(encoding="utf-8")
+    assert "0.777" in html
+    assert "hard: not fitted, the library does not hold it" in html
 
 
 def test_the_pdf_is_drawn_with_text_and_brings_its_fonts(report: Path) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -14,12 +15,14 @@ from terragrip.report.curves import SoilCurves, maxima
 from terragrip.report.page import Picture, Section, Table
 from terragrip.soil.estimates import GatheredRuns
 from terragrip.soil.fit import AdhesionCurve
+from terragrip.soil.known import known_soils
+from terragrip.soil.learn import Campaign
 from terragrip.soil.library import Soil, SoilLibrary
 
 
 @pytest.fixture(scope="module", name="curves")
 def curves_fixture() -> list[SoilCurves]:
-    """hard and fine, six runs each, with a truth, the same fit on "true" pairs, and a library that knows fine."""
+    """hard and fine, six runs each, with a truth, the same fit on "true" pairs."""
     gathered = GatheredRuns()
     for i, soil in enumerate(["hard", "fine"] * 6):
         gathered.add(made_up.estimates(1000 + i, (soil,)), f"{soil}-{i}")
@@ -30,8 +33,7 @@ def curves_fixture() -> list[SoilCurves]:
         n: AdhesionCurve(bootstrap=0).fit(slip, CURVES["exponential"].value(slip, {"a": a}))
         for n, a in made_up.A.items()
     }
-    library = SoilLibrary({"fine": Soil("fine", "exponential", {"a": 0.777})})
-    return soil_sections.told_by_all(campaign, library, truth, true)
+    return soil_sections.told_by_all(campaign, truth, true)
 
 
 def tables(section: Section) -> list[Table]:
@@ -43,8 +45,6 @@ def test_the_table_holds_the_papers_numbers_ours_and_the_truth(curves: list[Soil
     cells = {row[0]: dict(zip(scale.header, row, strict=True)) for row in scale.rows}
     assert cells["hard"]["paper"] == "1.420"
     assert cells["fine"]["truth"] == "0.850"
-    assert cells["fine"]["library"] == "0.777"
-    assert cells["hard"]["library"] == "–"
     for name, a in (("hard", 1.42), ("fine", 0.85)):
         assert float(cells[name]["ours, by pull"]) == pytest.approx(a, rel=0.03)
         assert float(cells[name]["ours, by slip"]) == pytest.approx(a, rel=0.03)
@@ -123,3 +123,23 @@ def test_without_soils_each_section_says_why() -> None:
         assert section.omitted == "Left out: no soil could be fitted."
     missed = soil_sections.fits([], missed)
     assert missed.prose == ("clay: not fitted, 1 slip bins.",)
+
+
+def test_a_library_is_shown_as_it_was_learned(curves: list[SoilCurves], tmp_path: Path) -> None:
+    """soils.json holds all that the tables and the drawn curves say: one curve, whoever shows it."""
+    Campaign({one.name: one.learned for one in curves}, {}, ()).library().write(tmp_path / "soils.json")
+    campaign = known_soils(SoilLibrary.load(tmp_path / "soils.json"), ["hard", "fine", "clay"])
+    assert campaign.not_fitted == {"clay": "the library does not hold it"}
+    shown = soil_sections.told_by_all(campaign)
+    fresh = soil_sections.told_by_all(Campaign({one.name: one.learned for one in curves}, {}, ()))
+    for mine, theirs in zip(
+        tables(soil_sections.fits(shown, {})), tables(soil_sections.fits(fresh, {})), strict=True
+    ):
+        assert mine.header == theirs.header
+        assert [row[:-1] for row in mine.rows] == [row[:-1] for row in theirs.rows]
+    for mine, theirs in zip(shown, fresh, strict=True):
+        grid = np.linspace(0.05, 0.6, 12)
+        assert np.array_equal(mine.learned.curve.predict(grid), theirs.learned.curve.predict(grid))
+        assert np.allclose(mine.learned.curve.band(grid), theirs.learned.curve.band(grid), rtol=1e-9)
+        assert mine.learned.curve.bins_.to_list() == theirs.learned.curve.bins_.to_list()
+    assert "terragrip soils" in (soil_sections.what_is_missing(shown).omitted or "")

@@ -23,7 +23,10 @@ def command(
         ),
     ],
     library: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="A soils.json to draw beside what is learned here.")
+        Path | None,
+        typer.Option(
+            metavar="FILE", help="The soils.json whose curves are shown; without it they are learned here."
+        ),
     ] = None,
     ground: Annotated[
         Path | None,

@@ -16,7 +16,6 @@ from terragrip.report.style import (
     INK,
     MUTED,
     ORANGE,
-    PURPLE,
     new_figure,
     soil_color,
     styled,
@@ -40,7 +39,7 @@ SLIPS = np.linspace(0.0, 0.65, 131)
 class SoilCurves:
     """One soil's curve as everyone tells it.
 
-    `learned`: from these estimates. `paper`: the paper's soil of that name. `library`: of the library that was given. `truth`: what a
+    `learned`: from these estimates, or as the library holds it. `paper`: the paper's soil of that name. `truth`: what a
     simulation made the soil with; `true_pairs`: the fit of `learned` on the simulation's true slip and adhesion; `true_by_slip`: the
     paper's fit on them. None where there is none.
     """
@@ -48,7 +47,6 @@ class SoilCurves:
     name: str
     learned: LearnedSoil
     paper: Soil | None = None
-    library: Soil | None = None
     truth: Soil | None = None
     true_pairs: AdhesionCurve | None = None
     true_by_slip: AdhesionCurve | None = None
@@ -166,7 +164,7 @@ def _draw_fit(plot: Axes, told: SoilCurves) -> dict[str, Any]:
     named["bins by slip, mean ± SD"] = _draw_bins(plot, paper, "x", MUTED, 4)
     if counts is not paper:
         named["bins by pull, mean ± SD"] = _draw_bins(plot, counts, "o", BLUE, 3.5)
-    if told.learned.curve.samples_ is not None:
+    if told.learned.curve.has_band:
         low, high = told.learned.curve.band(SLIPS)
         named["95 % of the fit"] = plot.fill_between(SLIPS, low, high, color=BLUE, alpha=0.22, linewidth=0)
     lines: list[tuple[str, Array | None, dict[str, Any]]] = [
@@ -181,11 +179,6 @@ def _draw_fit(plot: Axes, told: SoilCurves) -> dict[str, Any]:
             {"color": MUTED, "linewidth": 1.4, "linestyle": "--"},
         ),
         ("paper", _value(told.paper), {"color": ORANGE, "linewidth": 1.4, "linestyle": "-."}),
-        (
-            "library",
-            _value(told.library),
-            {"color": PURPLE, "linewidth": 1.4, "linestyle": (0, (5, 1, 1, 1))},
-        ),
         ("simulated truth", _value(told.truth), {"color": INK, "linewidth": 0.9}),
     ]
     for label, values, look in lines:

@@ -18,6 +18,7 @@ from terragrip.report.page import Page, Section, Table, names, number
 from terragrip.report.runs import Run, label_stretches
 from terragrip.report.scores import Comparison, compare
 from terragrip.soil.estimates import GatheredRuns, distinct
+from terragrip.soil.known import known_soils
 from terragrip.soil.learn import Campaign
 from terragrip.soil.library import SoilLibrary
 
@@ -49,7 +50,8 @@ def report_of(
 ) -> Page:
     """The report of estimates files (Parquet, written by `terragrip estimate`).
 
-    library: soils to draw beside those learned here. grounds: of ground.json (`terragrip ground`).
+    library: soils as `terragrip soils` learned them, which are shown; without it they are learned here, by the same
+    settings. grounds: of ground.json (`terragrip ground`).
     progress: called with steps done and steps in all.
     Raises InputError on a file that is no table of estimates or is given twice; whatever else is absent leaves its section out.
     """
@@ -61,7 +63,11 @@ def report_of(
             progress(done, total)
 
     summaries, shown, gathered = _read(paths, grounds, step)
-    campaign = gathered.learn() if gathered.pairs else Campaign({}, {}, ())
+    campaign = Campaign({}, {}, ())
+    if library is not None:
+        campaign = known_soils(library, (part.soil for part in gathered.pairs))
+    elif gathered.pairs:
+        campaign = gathered.learn()
     step(total - 1)
     if not shown:
         raise InputError(
@@ -77,7 +83,7 @@ def report_of(
         f"{sum(one.distance for one in summaries):.0f} m, estimated by {names(sorted({one.method for one in summaries}))}. "
         f"Drawn over time: {names([run.name for run in together])}.",
         (
-            *(_sections(main, together, campaign, library) if main.has_adhesion else _of_slip(together)),
+            *(_sections(main, together, campaign) if main.has_adhesion else _of_slip(together)),
             ground_sections.recognised(grounds),
             ground_sections.section_points(grounds),
             ground_sections.events(grounds),
@@ -131,11 +137,9 @@ def _read(
     return summaries, [run for _, run in kept], gathered
 
 
-def _sections(
-    main: Run, together: Sequence[Run], campaign: Campaign, library: SoilLibrary | None
-) -> Iterator[Section]:
+def _sections(main: Run, together: Sequence[Run], campaign: Campaign) -> Iterator[Section]:
     """Traction over time, slip and resistance, curves and operating points; of drawn runs without torques slip alone."""
-    curves = soil_sections.told_by_all(campaign, library)
+    curves = soil_sections.told_by_all(campaign)
     tire = main.vehicle.tire_rolling_resistance if main.vehicle is not None else 0.0
     yield from (sections.tracking(run) for run in together if run.has_adhesion)
     yield sections.slip_and_resistance(main)

@@ -5,13 +5,14 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from types import MappingProxyType
 
+from terragrip.physics.adhesion import CURVES
 from terragrip.report.curves import SoilCurves, draw_all_maxima, draw_both_maxima, draw_fits, maxima
 from terragrip.report.page import Picture, Section, Table, names, number, percent
 from terragrip.soil.bins import BY_PULL
 from terragrip.soil.fit import FREE, AdhesionCurve
 from terragrip.soil.identifiability import Identifiability
 from terragrip.soil.learn import APART, Campaign, scales_apart
-from terragrip.soil.library import Soil, SoilLibrary
+from terragrip.soil.library import Soil
 from terragrip.soil.literature import paper_soils
 from terragrip.soil.missing import in_words
 
@@ -24,19 +25,17 @@ NONE_FITTED = "Left out: no soil could be fitted."
 
 def told_by_all(
     campaign: Campaign,
-    library: SoilLibrary | None = None,
     truth: Mapping[str, Soil] | None = None,
     true_pairs: Mapping[str, AdhesionCurve] | None = None,
     true_by_slip: Mapping[str, AdhesionCurve] | None = None,
 ) -> list[SoilCurves]:
-    """The campaign's soils, the one to show first in front, each with what paper, library and simulation tell of it."""
+    """The campaign's soils, the one to show first in front, each with what paper and simulation tell of it."""
     paper = paper_soils()
     found = [
         SoilCurves(
             name,
             learned,
             paper.get(name),
-            library.get(name) if library is not None else None,
             truth.get(name) if truth is not None else None,
             true_pairs.get(name) if true_pairs is not None else None,
             true_by_slip.get(name) if true_by_slip is not None else None,
@@ -161,6 +160,12 @@ def what_is_missing(curves: Sequence[SoilCurves], not_fitted: Mapping[str, str] 
     title = "What to drive next"
     if not curves:
         return Section("missing", title, omitted=NONE_FITTED if not_fitted else NO_SOILS)
+    if not any(one.learned.pairs for one in curves):
+        return Section(
+            "missing",
+            title,
+            omitted="Left out: the curves are the library's; 'terragrip soils' says what to drive next.",
+        )
     rows = tuple(
         (
             one.name,
@@ -214,7 +219,7 @@ def _quality_table(curves: Sequence[SoilCurves]) -> Table:
             row += [number(getattr(one.by_slip, f"{key}_", None))] * both
             row += [number(getattr(one.true_pairs, f"{key}_", None))] * true
         runs = len({part.run for part in one.learned.pairs})
-        rows.append((*row, str(len(one.learned.soil.bins)), str(runs)))
+        rows.append((*row, str(len(one.learned.soil.bins)), str(runs) if runs else "–"))
     ours = ("ours, by pull", "ours, by slip") if both else ("ours",)
     head = [
         f"{what}: {who}" for what in ("NRMSE", "R²") for who in ("paper", *ours, *(["true pairs"] * true))
@@ -229,9 +234,8 @@ def _quality_table(curves: Sequence[SoilCurves]) -> Table:
 
 
 def _scale_table(curves: Sequence[SoilCurves]) -> Table:
-    """The scale a: paper, ours with interval, ours the paper's way, both of true pairs, of the truth, of the library."""
+    """The scale a: paper, ours with interval, ours the paper's way, both of true pairs, of the truth."""
     true, both = _true(curves), _both(curves)
-    given = any(one.library is not None for one in curves)
     rows = []
     for one in curves:
         row = [
@@ -251,7 +255,7 @@ def _scale_table(curves: Sequence[SoilCurves]) -> Table:
                 *([_fitted_scale(one.true_by_slip)] * both),
                 _scale(one.truth),
             ]
-        rows.append((*row, *([_scale(one.library)] * given)))
+        rows.append(tuple(row))
     head = [
         "soil",
         "paper",
@@ -259,7 +263,8 @@ def _scale_table(curves: Sequence[SoilCurves]) -> Table:
     ]
     if true:
         head += ["true pairs, by pull", "true pairs, by slip", "truth"] if both else ["true pairs", "truth"]
-    said = "The scale a of the prototype curve (µ at full slip is 0.476 a)."
+    full = float(CURVES["exponential"].value(1.0, {"a": 1.0}))
+    said = f"The scale a of the prototype curve (µ at full slip is {full:.3f} a)."
     if both:
         said += (
             " By pull: bins of the vehicle's pull, each a fair sample of the ground. By slip: the paper's bins; "
@@ -267,7 +272,7 @@ def _scale_table(curves: Sequence[SoilCurves]) -> Table:
         )
     if true:
         said += " The truth is what the soil was made with, the mean over its ground; true pairs show what the sorting alone does."
-    return Table(said, (*head, *(("library",) if given else ())), tuple(rows))
+    return Table(said, tuple(head), tuple(rows))
 
 
 def _true(curves: Sequence[SoilCurves]) -> bool:
@@ -330,6 +335,8 @@ def _trust_row(one: SoilCurves) -> tuple[str, ...]:
 
 def _badge(badge: Identifiability, r2: float | None) -> str:
     """Whether the data fix the fit, with what says so: the condition number, or R2 where the curve explains too little."""
+    if badge.condition != badge.condition:  # a curve that was not fitted
+        return "–"
     if badge.told_apart and not badge.identifiable:
         return f"no (R² {number(r2, 2)})"
     return f"{'yes' if badge.identifiable else 'no'} ({badge.condition:.3g})"
@@ -374,7 +381,6 @@ def _voices(curves: Sequence[SoilCurves]) -> str:
     ] * both
     for field, what in (
         ("paper", "the paper's curve"),
-        ("library", "the library's curve"),
         ("truth", "the simulated truth"),
     ):
         said += [what] * any(getattr(one, field) is not None for one in curves)

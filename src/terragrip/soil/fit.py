@@ -107,11 +107,22 @@ class AdhesionCurve:
         """mu (or kappa, with an intercept) at the slips, same shape."""
         return CURVES[self.model].value(slip, self._of_model(), self.parameters_.get(INTERCEPT, 0.0))
 
+    @property
+    def has_band(self) -> bool:
+        """Whether `band` can be told: by the bootstrap, or by the interval of the one free parameter of a fit that was read."""
+        return self.samples_ is not None or (len(self.free_) == 1 and self.free_[0] in self.interval_)
+
     def band(self, slip: ArrayLike, level: float = 0.95) -> tuple[Array, Array]:
-        """Pointwise interval of the curve at slips (n,) from the bootstrap. Raises ValueError where there was none."""
-        if self.samples_ is None:
+        """Pointwise interval of the curve at slips (n,): from the bootstrap, or of 95 % between the curves at the ends of the one free
+        parameter's interval. Raises ValueError where neither is known."""
+        if not self.has_band:
             raise ValueError("this curve was fitted without a bootstrap")
         s = np.asarray(slip, dtype=float)
+        if self.samples_ is None:
+            ends = np.array(self.interval_[self.free_[0]])[:, None]
+            given = {**self.parameters_, self.free_[0]: ends}
+            edges = CURVES[self.model].value(s[None, :], given, given.pop(INTERCEPT, 0.0))
+            return edges.min(axis=0), edges.max(axis=0)
         given = {name: self.samples_[:, i, None] for i, name in enumerate(self.free_)}
         intercept = given.pop(INTERCEPT, self.parameters_.get(INTERCEPT, 0.0))
         held = {n: v for n, v in self.parameters_.items() if n not in self.free_ and n != INTERCEPT}
