@@ -232,7 +232,7 @@ typedef enum { /* signs that the wheels dig, in points; the score is their sum, 
     TG_SIGN_HIGH = 1,       /* and is high */
     TG_SIGN_LEADING = 2,    /* the leading wheels' adhesion falls against the trailing ones' */
     TG_SIGN_RESISTANCE = 3, /* the soil resistance rises */
-    TG_SIGN_COMMAND = 4,    /* not above 0: the rims or the vehicle gain speed */
+    TG_SIGN_COMMAND = 4,    /* not above 0: the speed of the rims changes, or the vehicle gains some */
     TG_SIGNS = 5
 } tg_sign;
 
@@ -272,13 +272,14 @@ typedef struct { /* when the estimator warns of immobilization (see src/digging.
     tg_real memory;                 /* units of time, low-pass of the points' sum, the score */
     tg_real usual;                  /* units of time over which what is usual is learned */
     tg_real level;                  /* it warns only of slip that is, less its SD, so much above its usual, */
+    tg_real ahead;                  /* that passes this if it rises as much again in the next unit of time, */
     tg_real warn;                   /* and of a score above this; on until it is half of this */
     tg_real most;                   /* points of a sign at most; of high slip and of the command twice as many */
     tg_real rise;                   /* a point: rise of slip above its mean over a unit of time */
     tg_real high_slip;              /* slip, less its SD, beyond which points are given, `most` at twice that */
     tg_real leading;                /* a point: fall of the leading wheels' share of adhesion (-1 to 1) below its usual */
     tg_real resistance;             /* a point: rise of the soil resistance above its mean over a unit of time */
-    tg_real command;                /* a point off: gain of rim speed or of ground speed over that mean; log */
+    tg_real command;                /* a point off: gain of rim or ground speed over that mean, or twice as much loss of rim speed; log */
     tg_real stuck_duration;         /* s that the ground speed must stay below `stuck_travel` */
     tg_real stuck_travel, free_travel; /* ground over rim speed: below the first stuck, free again above the second */
     tg_real push, thrust;           /* push from behind, and thrust meanwhile, over the weight */

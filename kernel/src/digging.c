@@ -4,7 +4,6 @@
 #include "estimator.h"
 
 #define TG_SHORT ((tg_real)0.1) /* of the unit of time: rows within it are averaged, and the signals low-passed */
-#define TG_LEAST ((tg_real)-2)  /* points that count at least, so that a hit or a change of speed is soon forgotten */
 #define TG_SHARP ((tg_real)0.02) /* SD of slip from which on a row of a look counts less: between measured speeds it is large */
 #define TG_FLOOR ((tg_real)0.1) /* adhesion that is added where two small ones are compared */
 
@@ -102,16 +101,17 @@ int32_t tgi_digging_update(tg_estimator *e, double time, const tgi_view *row)
     if (!look(e, time, row, &since)) return 0;
     const tg_real slip = d->now[TGI_SLIP], sure = slip - d->now[TGI_DEVIATION];
     const tg_real rim = d->now[TGI_RIM] - d->mean[TGI_RIM], gain = d->now[TGI_TRAVEL] - d->mean[TGI_TRAVEL];
+    const tg_real command = tgi_max(tgi_max(rim, gain), -rim / 2); /* rims slow by command and in hits, yet also of a weak drive that digs in */
     const tg_real high = s->high_slip > 0 ? sure / s->high_slip - 1 : 0;
     d->points[TG_SIGN_RISE] = bounded((slip - d->mean[TGI_SLIP]) / s->rise, -s->most, s->most);
     d->points[TG_SIGN_HIGH] = bounded(s->most * high, 0, 2 * s->most);
     d->points[TG_SIGN_LEADING] = bounded((d->usual[1] - d->now[TGI_BALANCE]) / s->leading, -s->most, s->most);
     d->points[TG_SIGN_RESISTANCE] = bounded((d->now[TGI_RESISTANCE] - d->mean[TGI_RESISTANCE]) / s->resistance, -s->most, s->most);
-    d->points[TG_SIGN_COMMAND] = -bounded((rim > gain ? rim : gain) / s->command, 0, 2 * s->most);
+    d->points[TG_SIGN_COMMAND] = -bounded(command / s->command, 0, 2 * s->most);
     tg_real sum = 0;
     for (int32_t k = 0; k < TG_SIGNS; k++) sum += d->points[k];
-    d->score = low_pass(d->score, since < e->constants.pace ? since : e->constants.pace, s->memory * e->constants.pace, sum < TG_LEAST ? TG_LEAST : sum);
-    d->slips = sure > d->usual[0] + s->level;
+    d->score = low_pass(d->score, since < e->constants.pace ? since : e->constants.pace, s->memory * e->constants.pace, sum);
+    d->slips = sure > d->usual[0] + s->level && sure + slip - d->mean[TGI_SLIP] > s->ahead;
     return 1;
 }
 

@@ -104,7 +104,7 @@ typedef struct { /* see digging.c */
     tg_real score;             /* their sum, low-passed */
     double time;               /* of the last look, or where the motion began */
     int32_t moving;            /* there was a look since the motion began */
-    int32_t slips;             /* slip is surely above its usual */
+    int32_t slips;             /* slip is surely above its usual, and rises to much */
 } tgi_digging;
 
 typedef struct { /* is the vehicle about to be stuck, stuck, pushed? */

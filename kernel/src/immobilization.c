@@ -116,7 +116,8 @@ static void watch_stuck(tg_estimator *e, const tg_row *row, const tgi_view *l)
     const int32_t turning = w->rim > 3 * still;
     const int32_t held_up = turning && l->travel < tgi_max(s->stuck_travel * l->fastest, still);
     w->spinning = turning ? count_seconds(w->spinning, dt, held_up, 1, s->stuck_duration) : 0;
-    w->stuck = turning && ((held_up && w->spinning >= s->stuck_duration) || (w->stuck && l->travel < s->free_travel * l->fastest));
+    const int32_t long_enough = w->spinning + dt / 2 >= s->stuck_duration; /* to the nearest sample */
+    w->stuck = turning && ((held_up && long_enough) || (w->stuck && l->travel < s->free_travel * l->fastest));
     if (w->stuck) w->sinking = 0;
 }
 

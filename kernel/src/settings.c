@@ -23,11 +23,12 @@ static tg_watch_settings default_watch(void)
     w.pace = 4;
     w.memory = (tg_real)0.4;
     w.usual = 12;
-    w.level = (tg_real)0.06;
-    w.warn = (tg_real)4.2;
+    w.level = (tg_real)0.05;
+    w.ahead = (tg_real)0.22;
+    w.warn = (tg_real)3.6;
     w.most = 3;
     w.rise = (tg_real)0.035;
-    w.high_slip = (tg_real)0.3;
+    w.high_slip = (tg_real)0.25;
     w.leading = (tg_real)0.04;
     w.resistance = (tg_real)0.04;
     w.command = (tg_real)0.022;
@@ -155,7 +156,7 @@ static tg_status check_numbers(const tg_settings *s)
     const tg_real spreads[] = {u->drive_torque_gain, u->drive_torque_gain_common, u->drive_torque_offset, u->drawbar_gain, u->drawbar_offset, u->slope,
                                u->tire_rolling_resistance, u->vertical_load, u->wheel_radius, u->acceleration_bias,
                                s->slope_spread, s->standstill_speed, s->dead_band, s->outlier_weight, s->load_filter, s->center_of_gravity_height,
-                               s->hitch_height, s->watch.level, s->watch.most, s->watch.high_slip,
+                               s->hitch_height, s->watch.level, s->watch.ahead, s->watch.most, s->watch.high_slip,
                                s->watch.stuck_duration, s->watch.stuck_travel, s->watch.free_travel, s->watch.push, s->watch.thrust,
                                s->watch.push_duration};
     const tg_real positive[] = {s->watch.pace, s->watch.memory, s->watch.usual, s->watch.rise, s->watch.leading, s->watch.resistance,

@@ -16,7 +16,7 @@ from terragrip.vehicle import Vehicle
 
 Array = NDArray[np.float64]
 
-SHORT, LEAST, FLOOR, SHARP = 0.1, -2.0, 0.1, 0.02
+SHORT, FLOOR, SHARP = 0.1, 0.1, 0.02
 CALM, LONGEST_LOOK = 0.1, 1.5
 SLIP, DEVIATION, BALANCE, RESISTANCE, RIM, TRAVEL = range(6)
 
@@ -207,11 +207,12 @@ class Watch:
             bounded(most * (sure / limits["high_slip"] - 1), 0.0, 2 * most),
             bounded((self.usual[1] - self.now[BALANCE]) / limits["leading"], -most, most),
             bounded(change(RESISTANCE) / limits["resistance"], -most, most),
-            -bounded(max(change(RIM), change(TRAVEL)) / limits["command"], 0.0, 2 * most),
+            -bounded(max(change(RIM), change(TRAVEL), -change(RIM) / 2) / limits["command"], 0.0, 2 * most),
         ]
         tau = limits["memory"] * self.pace
-        self.score = _low_pass(self.score, min(since, self.pace), tau, max(sum(self.points), LEAST))
-        self.slips = sure > self.usual[0] + limits["level"]
+        self.score = _low_pass(self.score, min(since, self.pace), tau, sum(self.points))
+        unusual = sure > self.usual[0] + limits["level"]
+        self.slips = unusual and sure + change(SLIP) > limits["ahead"]
 
     def _judge_stuck(self, row: Row) -> None:
         limits, still = self.limits, self.limits["standstill_speed"]
@@ -225,7 +226,7 @@ class Watch:
         held_up = turning and row.travel < max(limits["stuck_travel"] * row.fastest, still)
         spinning = min(max(self.spinning + (dt if held_up else -dt), 0.0), limits["stuck_duration"])
         self.spinning = spinning if turning else 0.0
-        sure = held_up and self.spinning >= limits["stuck_duration"]
+        sure = held_up and self.spinning + dt / 2 >= limits["stuck_duration"]
         holds = self.stuck and row.travel < limits["free_travel"] * row.fastest
         self.stuck = turning and (sure or holds)
         if self.stuck:
