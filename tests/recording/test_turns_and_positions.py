@@ -166,3 +166,21 @@ def test_slip_alone_turns_by_the_positions(position: bool) -> None:
     else:
         assert "nothing says how fast the machine turned" in said
         assert np.median(error) > 0.1
+
+
+def test_poor_positions_of_a_slow_robot_are_no_wrong_unit() -> None:
+    """.2 m/s and positions that jump by a metre: their speed is mostly noise."""
+    draws, time = np.random.default_rng(1000), np.arange(0, 600, 1.0)
+    columns = {
+        "time": time,
+        "ground_speed": 0.2 + 0.01 * draws.standard_normal(600),
+        "wheel_based_speed": 0.21 + 0.01 * draws.standard_normal(600),
+        "latitude": np.degrees((0.2 * time + draws.standard_normal(600)) / 6_378_137.0),
+        "longitude": 11 + np.degrees(draws.standard_normal(600) / 6_378_137.0),
+    }
+    log = Recording.from_frame(columns)
+    track = track_of(log)
+    assert track is not None
+    assert np.median(track.speed) > 0.4
+    assert np.isnan(track.turn).all()
+    assert unit_warnings(log, None) == []

@@ -76,6 +76,8 @@ def found_in(log: Recording, vehicle: Vehicle) -> Found:
     track = None
     if any(rim.side for rim in rims) and "angular_velocity_z" not in log.channels:
         track = track_of(log, _CALM)
+        if track is not None and not np.isfinite(track.turn).any():
+            track = None
         notes += _turns(log, rims, track)
     return Found(tuple(rims), zero, band, tuple(notes), track)
 

@@ -30,7 +30,8 @@ _RATIOS = (
 )
 _ENOUGH = 4000  # rows: a median that is to be told from another by a third needs no more
 _PLAUSIBLE = (0.6, 2.2)  # a median ratio within is left to slip
-_AGREED = (0.7, 1.4)  # likewise of two ground speeds, to noise
+_OUTRUN = 1.5  # straight line over way: above, the way is too short
+_WAY_WINDOW = 10.0  # s
 _SURE = 0.5  # correlation of two rates of turn
 _LEAST_TURN = 1.5  # rad: with less there is nothing to compare
 
@@ -91,19 +92,35 @@ def _drive_warnings(recording: Recording) -> list[str]:
 
 
 def _position_warnings(recording: Recording, track: Track | None) -> list[str]:
-    """Ground speed against the speed of the positions, which are in degrees and nothing else."""
+    """Ground speed against the positions, which are in degrees and nothing else.
+
+    Noise of positions only adds to their speed, so a ground speed far above it is wrong whatever they are worth. One far below is
+    wrong only if the positions also come further in a straight line than it reaches.
+    """
     if track is None or "ground_speed" not in recording.channels:
         return []
     found = _ratio(recording.time, recording.channels["ground_speed"], track.at("speed", recording.time))
-    if found is None or _AGREED[0] <= 1 / found <= _AGREED[1]:
+    if found is None:
         return []
-    ratio = 1 / found
-    why = "check its unit"
-    if 2.9 < ratio < 4.4:
-        why = "it may be in km/h: 1 km/h is 0.2778 m/s"
-    elif 2.9 < found < 4.4:
-        why = "it was taken for km/h, and may be in m/s"
-    return [f"ground_speed is {ratio:.3g} times the speed of the positions: {why}."]
+    said = f"ground_speed is {1 / found:.3g} times the speed of the positions"
+    if 2.9 < 1 / found < 4.4:
+        return [f"{said}: it may be in km/h: 1 km/h is 0.2778 m/s."]
+    if 2.9 < found < 4.4 and _straight_ahead(recording, track) > _OUTRUN:
+        return [f"{said}: it was taken for km/h, and may be in m/s."]
+    return []
+
+
+def _straight_ahead(recording: Recording, track: Track) -> float:
+    """What the positions come in a straight line over what the ground speed makes in the same time: median over windows in motion."""
+    speed = np.abs(_filled(recording.time, recording.channels["ground_speed"]))
+    way = np.r_[0.0, np.cumsum(np.diff(recording.time) * (speed[1:] + speed[:-1]) / 2)]
+    edges = np.arange(track.time[0], track.time[-1], _WAY_WINDOW)
+    if len(edges) < 2:
+        return 0.0
+    north, east = (np.interp(edges, track.time, x) for x in (track.north, track.east))
+    chord, made = np.hypot(np.diff(north), np.diff(east)), np.diff(np.interp(edges, recording.time, way))
+    moving = made > 0.3 * _high(made)
+    return float(np.median(chord[moving] / np.maximum(made[moving], 1e-9))) if moving.any() else 0.0
 
 
 def _turn_warnings(recording: Recording, vehicle: Vehicle | None, track: Track | None) -> list[str]:

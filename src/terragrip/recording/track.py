@@ -19,17 +19,22 @@ WINDOW = 2.0
 """Length [s] of the stretch that a parabola is laid through; five fixes at least. Longer: less noise, and turns rounded off."""
 
 _SLOWEST = 0.3  # m/s: slower, a course is noise
+_VAGUE_TURN = 0.03  # rad/s, and
+_VAGUE_GRADE = 0.02  # rad: SDs beyond which nothing is claimed
 _GRADE_WAY = 16.0  # m
 
 
 @dataclass(frozen=True)
 class Track:
-    """At each fix: ``time`` (n,) [s], ``speed`` (n,) [m/s], ``turn`` (n,) [rad/s, to the left], ``grade`` (n,) [rad, uphill].
+    """At each fix: ``time`` (n,) [s], ``north`` and ``east`` (n,) [m], ``speed`` (n,) [m/s], ``turn`` (n,) [rad/s, to the left] and
+    ``grade`` (n,) [rad, uphill].
 
-    ``turn`` and ``grade`` are NaN where the vehicle hardly moves; ``grade`` too where there is no altitude.
+    ``turn`` and ``grade`` are NaN where the vehicle hardly moves, or the positions are too noisy to tell; ``grade`` too without altitude.
     """
 
     time: Floats
+    north: Floats
+    east: Floats
     speed: Floats
     turn: Floats
     grade: Floats
@@ -71,24 +76,32 @@ def track_of(recording: Recording, window: float = WINDOW) -> Track | None:
     shown, half = np.lib.stride_tricks.sliding_window_view, span // 2
     middle = slice(half, len(rows) - half)
     ago = shown(time, span) - time[middle, None]
-    (_, vn, an), (_, ve, ae) = (_fitted(ago, shown(x, span) - x[middle, None], 2).T for x in (north, east))
-    an, ae = 2 * an, 2 * ae
+    fits = [_fitted(ago, shown(x, span) - x[middle, None], 2) for x in (north, east)]
+    (_, vn, an), (_, ve, ae) = (found.T for found, _ in fits)
+    an, ae, bent = 2 * an, 2 * ae, 2 * np.hypot(fits[0][1][:, 2], fits[1][1][:, 2]) / np.sqrt(2)
     speed = np.hypot(vn, ve)
     with np.errstate(invalid="ignore", divide="ignore"):
         turn = (ve * an - vn * ae) / speed**2  # x east, y north: to the left is positive
-    slow = (speed < _SLOWEST) | (np.ptp(ago, axis=1) > 3 * max(window, float(np.median(np.ptp(ago, axis=1)))))
-    turn[slow] = np.nan
+    reach = np.ptp(ago, axis=1)
+    gap = reach > 3 * max(window, float(np.median(reach)))
+    turn[(speed < _SLOWEST) | gap | ~(bent < _VAGUE_TURN * speed)] = np.nan
     grade = _grade(recording, time[middle], speed)
-    return Track(time[middle], speed, turn, np.where(slow, np.nan, grade))
+    grade[(speed < _SLOWEST) | gap] = np.nan
+    return Track(time[middle], north[middle], east[middle], speed, turn, grade)
 
 
-def _fitted(ago: Floats, values: Floats, degree: int) -> Floats:
-    """Coefficients (n, 1 + degree) of polynomials through rows of (n, k), about 0."""
+def _fitted(ago: Floats, values: Floats, degree: int) -> tuple[Floats, Floats]:
+    """Coefficients (n, 1 + degree) of polynomials through rows of (n, k), about 0, and their SDs by what the rows scatter about them."""
     size = np.maximum(np.abs(ago).max(axis=1, keepdims=True), 1e-9)
     basis = (ago / size)[:, :, None] ** np.arange(degree + 1)
     normal = np.einsum("nki,nkj->nij", basis, basis)
     right = np.einsum("nki,nk->ni", basis, values)
-    return np.asarray(np.linalg.solve(normal, right[..., None])[..., 0] / size ** np.arange(degree + 1))
+    found = np.linalg.solve(normal, right[..., None])[..., 0]
+    freedom = ago.shape[1] - degree - 1
+    square = np.sum((values - np.einsum("nki,ni->nk", basis, found)) ** 2, axis=1) / freedom
+    spread = np.sqrt(np.median(square) * np.diagonal(np.linalg.inv(normal), axis1=1, axis2=2))
+    powers = size ** np.arange(degree + 1)
+    return np.asarray(found / powers), np.asarray(spread / powers)
 
 
 def _grade(recording: Recording, time: Floats, speed: Floats) -> Floats:
@@ -106,8 +119,8 @@ def _grade(recording: Recording, time: Floats, speed: Floats) -> Floats:
     shown, middle = np.lib.stride_tricks.sliding_window_view, slice(span // 2, len(way) - span // 2)
     ago = shown(way, span) - way[middle, None]
     long = np.minimum(-ago[:, 0], ago[:, -1]) > _GRADE_WAY / 4  # else the vehicle stood, and altitude drifted
-    found = unknown.copy()
-    found[middle][long] = np.arctan(
-        _fitted(ago[long], (shown(height, span) - height[middle, None])[long], 3)[:, 1]
-    )
-    return found
+    if not long.any():
+        return unknown
+    rise, spread = _fitted(ago[long], (shown(height, span) - height[middle, None])[long], 3)
+    unknown[middle][long] = np.where(spread[:, 1] < _VAGUE_GRADE, np.arctan(rise[:, 1]), np.nan)
+    return unknown
