@@ -39,6 +39,8 @@ _NEAR = 0.05  # a radius is seldom further off than this
 _LIGHT = 0.002  # SD of the slip in light work from place to place
 _FLOOR = 0.003  # least SD of a mode
 _ROUNDS = 200
+_SETTLED = 1e-4  # of the log likelihood, from round to round
+_ENOUGH = 1500  # windows: two hours, or every so many of a longer log
 _NUMBERS = (1, 2, 3, 4)
 _STRAY = 0.1  # share of windows that are of no mode, at most
 
@@ -105,6 +107,7 @@ def _error(ratio: Floats) -> float:
 
 def _modes(ratio: Floats) -> list[tuple[float, float, float]]:
     """Mean, SD and share of each mode, from the lowest to the highest; modes that run into each other are one."""
+    ratio = ratio[:: 1 + len(ratio) // _ENOUGH]
     best: tuple[float, list[tuple[float, float, float]]] | None = None
     for number, first in ((n, first) for n in _NUMBERS for first in _starts(ratio, n)):
         score, modes = _fit(ratio, number, first)
@@ -130,8 +133,9 @@ def _fit(ratio: Floats, number: int, mean: Floats) -> tuple[float, list[tuple[fl
     floor = 1 / max(float(np.ptp(ratio)), 0.2)
     spread = np.full(number, max(float(np.std(ratio)) / number, _FLOOR))
     share = np.r_[np.full(number, 0.95 / number), 0.05]
-    likelihood = 0.0
+    likelihood = -np.inf
     for _ in range(_ROUNDS):
+        before = likelihood
         scaled = (ratio[:, None] - mean) / spread
         density = np.column_stack(
             [np.exp(-0.5 * scaled**2) / (spread * np.sqrt(2 * np.pi)), np.full(n, floor)]
@@ -139,6 +143,8 @@ def _fit(ratio: Floats, number: int, mean: Floats) -> tuple[float, list[tuple[fl
         density *= share
         total = density.sum(axis=1)
         likelihood = float(np.sum(np.log(total)))
+        if abs(likelihood - before) < _SETTLED:
+            break
         weight = density / total[:, None]
         held = np.maximum(weight.sum(axis=0), 1e-9)
         share = held / held.sum()
