@@ -90,9 +90,9 @@ def turned_unseen(logs: Sequence[Recording], vehicle: Vehicle, told: Collection[
 def turns_unseen(table: Windows, vehicle: Vehicle) -> npt.NDArray[np.bool_]:
     """Windows (n,) in which the wheels' speeds show a turn, and no yaw rate is known."""
     rim = table.wheel_speed * vehicle.wheel_radius
-    apart = np.zeros(len(table))
+    shown = np.zeros(len(table), dtype=bool)
     for axle in range(len(vehicle.axles)):
         own = np.flatnonzero(vehicle.wheel_axle == axle)
-        if len(own) > 1:
-            apart = np.fmax(apart, np.abs(rim[:, own[0]] - rim[:, own[-1]]))
-    return np.asarray((apart > _TURNING * np.abs(np.nanmean(rim, axis=1))) & ~np.isfinite(table.yaw_rate))
+        left, right = rim[:, own[0]], rim[:, own[-1]]
+        shown |= np.abs(left - right) > _TURNING * np.abs(left + right) / 2  # not where one is unknown
+    return np.asarray(shown & ~np.isfinite(table.yaw_rate))
