@@ -121,3 +121,29 @@ def test_measured_field_hour(shared: Callable[[str], Path]) -> None:
     assert np.mean(estimates["event"][moving] == "outlier") < 0.01
     assert np.nanmax(np.abs(estimates["ground_speed"] - ground)[moving]) < 0.15
     assert not [note for note in estimates.notes if "km/h" in note or "wrong sign" in note]
+
+
+def test_light_rows_on_the_command_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    import pandas as pd
+
+    from terragrip.cli import main
+
+    log = log_of(np.r_[np.full(1500, 0.1), np.full(1500, 0.0)], 0.93, 1002)
+    pd.DataFrame({"time": log.time, **log.channels}).to_csv(tmp_path / "log.csv", index=False)
+    tractor().save(tmp_path / "v.yaml")
+    words = [
+        "calibrate",
+        str(tmp_path / "log.csv"),
+        "--vehicle",
+        str(tmp_path / "v.yaml"),
+        "-o",
+        str(tmp_path / "c.yaml"),
+    ]
+    assert main([*words, "--light", "305:600"]) == 0
+    assert tg.Vehicle.load(tmp_path / "c.yaml").wheel_radius[2] == pytest.approx(0.8 / 0.93, abs=0.006)
+    capsys.readouterr()
+    for wrong in ("305", "600:305", "a:b"):
+        assert main([*words, "--light", wrong]) == 2
+        assert "--light: " in capsys.readouterr().err
+    assert main([*words, "--light", "1:2", "--light", "3:4"]) == 2
+    assert "give at most one a log" in capsys.readouterr().err

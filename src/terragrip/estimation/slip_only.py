@@ -129,8 +129,7 @@ def _said(rim: Rim, zero: Zero | None, learns: bool) -> list[str]:
         f"lightest work ({beside} {base:.4f} m)"
     )
     if zero.doubt:
-        record = "record 40 s without load too (headland, road), or calibrate on such rows"
-        return [f"{said}; {zero.doubt}: {record}."]
+        return [f"{said}; {zero.doubt}."]
     return [said + (". Slip counts from there." if learns else ".")]
 
 

@@ -9,8 +9,6 @@ from terragrip.estimation.zero_slip import UNTOLD, WINDOW, Span, zero_of
 from terragrip.recording import Recording
 from terragrip.vehicle import Vehicle
 
-_MEND = "record 40 s without load too (headland, road), or say which rows are without load (--light FROM:TO)"
-
 
 def calibrate_radii(
     logs: Sequence[Recording],
@@ -37,11 +35,11 @@ def calibrate_radii(
             why = "too few windows of steady motion; 40 s without load are needed"
             unknown.append(Unknown(name, why))
         elif zero.std >= UNTOLD and zero.ratio == 1:
-            unknown.append(Unknown(name, f"{zero.doubt}: {_MEND}"))
+            unknown.append(Unknown(name, zero.doubt))
         else:
             sentence = f"ground speed over wheel speed in {zero.windows} windows of the lightest work, which are called zero slip"
             if zero.doubt:
-                sentence += f"; {zero.doubt}, which the interval holds: {_MEND}"
+                sentence += f" (the interval holds the doubt: {zero.doubt})"
             value, std = zero.ratio * data.radius, zero.std * data.radius
             told = tuple(
                 Evidence(
