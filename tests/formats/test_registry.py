@@ -88,6 +88,6 @@ def test_a_format_that_cannot_be_registered_is_named(
 
 def test_every_format_of_ours_has_a_name_and_a_title() -> None:
     assert set(formats()) == {
-        "csv", "parquet", "blf", "asc", "trc", "candump", "frames", "mdf", "ros1", "ros2", "mcap", "matlab", "nmea"
+        "csv", "parquet", "blf", "asc", "trc", "candump", "frames", "mdf", "ros1", "ros2", "mcap", "matlab", "nmea", "vbo",
     }  # fmt: skip
     assert len({one.title for one in formats().values()}) == len(formats())

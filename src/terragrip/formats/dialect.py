@@ -88,7 +88,7 @@ def detect(data: bytes, source: str) -> Dialect:
     The separator and decimal sign that make the most cells of the first rows numbers win; before the header, lines that begin
     with ``#``, ``%`` or ``//`` are passed over, and so are lines that are no rows of the table, as loggers write them.
     """
-    start = _skip_comments(data)
+    start = _start_of(data)
     head = data[start : start + HEAD]
     if len(head) == HEAD and b"\n" in head:
         head = head[: head.rindex(b"\n")]
@@ -101,7 +101,7 @@ def detect(data: bytes, source: str) -> Dialect:
     before = _preamble(lines)
     start, lines = _after_lines(data, start, before), lines[before:]
     separator, decimal = _best(lines)
-    header = split(lines[0], separator)
+    header = split(_without_mark(lines[0]), separator)
     second = split(lines[1], separator) if len(lines) > 1 else []
     if sum(_is_number(cell, decimal) for cell in header) > len(header) / 2:
         raise InputError(
@@ -111,8 +111,15 @@ def detect(data: bytes, source: str) -> Dialect:
         )
     rows = 1
     units: dict[str, str] = {}
-    if len(lines) > 2 and _is_units_row(second, split(lines[2], separator), decimal):
+    third = split(lines[2], separator) if len(lines) > 2 else []
+    if len(lines) > 2 and _is_units_row(second, third, decimal):
         rows, units = 2, dict(zip(header, (_bare(cell) for cell in second), strict=False))
+    elif (
+        len(lines) > 3  # three rows of header: names, units, short names
+        and not any(_is_number(cell, decimal) for cell in third)
+        and _is_units_row(second, split(lines[3], separator), decimal)
+    ):
+        rows, units = 3, dict(zip(header, (_bare(cell) for cell in second), strict=False))
     if len(second) == len(header) + 1 and not second[-1]:
         header.append("")
     names, said = _names_and_units(header)
@@ -220,6 +227,32 @@ def _skip_comments(data: bytes) -> int:
             return start
         start = end
     return start
+
+
+def _start_of(data: bytes) -> int:
+    """Where the table starts: after comments, or with the last comment line where that is the header of the rows below it."""
+    start = _skip_comments(data)
+    above = data[:start].rstrip()
+    begin = above.rfind(b"\n") + 1
+    last = _without_mark(above[begin:].decode("utf-8", "replace"))
+    below = data[start : start + HEAD].split(b"\n", 1)[0].decode("utf-8", "replace")
+    if not last or not below.strip():
+        return start
+    for separator in (*_SEPARATORS, " "):
+        names, cells = split(last, separator), split(below, separator)
+        numbers = sum(bool(_NUMBER.match(cell)) for cell in cells)
+        if (
+            len(names) == len(cells) > 1
+            and 2 * numbers > len(cells)
+            and all(_NAME.search(n) or not n for n in names)
+        ):
+            return begin
+    return start
+
+
+def _without_mark(line: str) -> str:
+    """A header line without the comment mark before it; ``%time`` is a name."""
+    return re.sub(r"^\s*(#+|//|%(?=\s))\s*", "", line)
 
 
 def _after_lines(data: bytes, start: int, count: int) -> int:

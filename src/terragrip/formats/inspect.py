@@ -14,9 +14,11 @@ from terragrip.errors import InputError
 from terragrip.formats.profile import SHIPPED, Profile
 from terragrip.formats.proposal import is_ready, missing_channels, profile_text
 from terragrip.formats.reading import read, read_log, recording_of
-from terragrip.formats.recognition import find_time, propose, silent
+from terragrip.formats.recognition import Proposal, propose, silent
 from terragrip.formats.signals import SignalLog
 from terragrip.formats.table import SINCE_1970, LogTable, Sparse
+from terragrip.formats.time_column import find_time
+from terragrip.formats.vocabulary import GENERAL, Vocabulary
 from terragrip.recording import Recording, unit_warnings
 from terragrip.recording.held import fresh_samples, held_period, measured_part
 from terragrip.recording.noise import white_noise
@@ -139,10 +141,10 @@ def inspect(
             warnings.append(_cause(error))
     if recording is not None and profile is not None:
         log = _as_table(recording, log)
-    seen = _Seen.of(log, whole=every == 1)
+    seen = Seen.of(log, whole=every == 1)
     numbers = seen.numbers()
-    proposals = propose(numbers, seen.texts(), seen.units)
-    warnings += silent(numbers, proposals)
+    proposals = seen.proposals(GENERAL)
+    warnings += silent(numbers, proposals, seen.units)
     stamp, base = seen.stamp, seen.base
     return Inspection(
         file=str(log.source),
@@ -165,7 +167,7 @@ def inspect(
 
 
 @dataclass(frozen=True)
-class _Seen:
+class Seen:
     """What is told of a log: columns and units by name, the time's column and unit, its instants [s].
 
     ``clocks``: the instants of signals that have their own.
@@ -180,7 +182,8 @@ class _Seen:
     whole: bool  # no block of the log was left out
 
     @classmethod
-    def of(cls, log: LogTable | SignalLog, *, whole: bool) -> _Seen:
+    def of(cls, log: LogTable | SignalLog, *, whole: bool = True, vocabulary: Vocabulary = GENERAL) -> Seen:
+        """What is seen of a log; ``whole``: no block of it was left out."""
         if isinstance(log, SignalLog):
             base = log.instants()
             first = float(base[0]) if len(base) else 0.0
@@ -195,7 +198,7 @@ class _Seen:
             )
         numbers = {n: c.astype(np.float64) for n, c in log.columns.items() if c.dtype.kind in "fiub"}
         dates = tuple(n for n, c in log.columns.items() if c.dtype.kind == "M")
-        stamp = find_time(numbers, dates, log.units)
+        stamp = find_time(numbers, dates, log.units, vocabulary)
         instants = None if stamp is None else _seconds(log.columns[stamp[0]], stamp[1])
         large = (
             stamp is not None
@@ -219,9 +222,15 @@ class _Seen:
             if c.dtype.kind in "fiub" and n != own
         }
 
-    def texts(self) -> tuple[str, ...]:
-        """The names of the text columns."""
-        return tuple(n for n, c in self.columns.items() if c.dtype.kind == "O")
+    def proposals(self, vocabulary: Vocabulary) -> dict[str, Proposal]:
+        """What each channel may be made of, by a vocabulary."""
+        numbers = self.numbers()
+        clocks = {name: clock for name in numbers if (clock := self.clock_of(name)) is not None}
+        return propose(numbers, self.texts(), self.units, clocks, vocabulary)
+
+    def texts(self) -> dict[str, npt.NDArray[Any]]:
+        """The text columns."""
+        return {n: c for n, c in self.columns.items() if c.dtype.kind == "O"}
 
 
 def _size(path: str | os.PathLike[str]) -> int:

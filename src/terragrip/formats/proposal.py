@@ -74,8 +74,10 @@ def profile_text(
     lines.append("channels:" if proposals else "channels: {}")
     for channel in sorted(proposals, key=_order):
         proposal = proposals[channel]
-        doubt = f"   # ? {proposal.doubt}" if proposal.doubt else ""
-        lines.append(f"  {channel}: {_flow(proposal.entry)}{doubt}")
+        remarks = [f"? {proposal.doubt}"] * bool(proposal.doubt) + [proposal.give] * bool(proposal.give)
+        lines.append(
+            f"  {channel}: {_flow(proposal.entry)}" + (f"   # {'; '.join(remarks)}" if remarks else "")
+        )
     if not wheel_names_in(proposals) and "wheel_based_speed" not in proposals:
         lines.append("  # wheel_speed_fl: {from: ???, unit: rad/s}   # needed: one for each wheel")
     if "ground_speed" not in proposals:

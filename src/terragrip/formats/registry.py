@@ -33,6 +33,7 @@ _OWN = (
     "mcap",
     "matlab",
     "nmea",
+    "vbo",
 )  # modules, in the order in which they are asked
 _HEAD = 8192  # bytes that tell
 

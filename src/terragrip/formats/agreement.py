@@ -1,0 +1,381 @@
+"""Hold the guesses of one log against each other: speeds against positions, rims against the ground, gyros against headings."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+import numpy.typing as npt
+
+from terragrip.formats.candidates import Column, candidates_of, kind_of
+from terragrip.formats.evidence import (
+    RADII,
+    RATE_UNITS,
+    SPEED_UNITS,
+    Evidence,
+    Finding,
+    Path,
+    Series,
+    nearest_unit,
+)
+from terragrip.formats.judgement import Guess
+from terragrip.units import factor_to
+
+Floats = npt.NDArray[np.float64]
+Ranked = dict[str, list[Guess]]
+Way = tuple[str, Path | float]
+"""What was driven: by which columns, and the path, or metres for a count of distance."""
+
+_KNOWN = ("Terragrip", "a signal")
+_SIDEWAYS = 15.0  # m/s^2, the 90 % quantile
+
+
+class Agreement:
+    """The columns of one log, their evidence, and the guesses that these leave standing."""
+
+    def __init__(self, columns: Mapping[str, Column], evidence: Evidence) -> None:
+        self._columns, self._evidence = columns, evidence
+
+    def refine(self, ranked: Ranked) -> None:
+        """Hold the guesses against each other, in the order in which one helps the next."""
+        self._positions(ranked)
+        path = self._paths(ranked)
+        for channel in ("ground_speed", "wheel_based_speed"):
+            ranked[channel] = [self._speed(g, path) for g in ranked.get(channel, [])]
+        self._prefer_ground(ranked)
+        self._rims(ranked, path)
+        self._accelerations(ranked)
+        self._turning(ranked)
+        for channel in [c for c, guesses in ranked.items() if not guesses]:
+            del ranked[channel]
+
+    def _positions(self, ranked: Ranked) -> None:
+        """Latitudes and longitudes in radians or degrees: both have one unit."""
+        both = [g for c in ("latitude", "longitude") for g in ranked.get(c, ()) if g.column.unit is None]
+        if both and all(self._evidence.size(g.column.column) < 3.2 for g in both):
+            for channel in ("latitude", "longitude"):
+                ranked[channel] = [
+                    replace(g, unit="rad", doubt="its size tells radians") if g.column.unit is None else g
+                    for g in ranked.get(channel, [])
+                ]
+        for channel in ("latitude", "longitude"):
+            limit = 90.001 if channel == "latitude" else 180.001
+            ranked[channel] = [
+                g
+                for g in ranked.get(channel, [])
+                if kind_of(g.unit) != "angle"
+                or g.unit not in ("deg", "°")
+                or self._evidence.size(g.column.column) <= limit
+            ]
+
+    def _paths(self, ranked: Mapping[str, list[Guess]]) -> list[Way]:
+        """What was driven, in metres: by latitude and longitude, by positions, by a distance."""
+        found: list[Way] = []
+        best = [
+            max(ranked.get(c, []), key=lambda g: g.confidence, default=None)
+            for c in ("latitude", "longitude")
+        ]
+        if (
+            best[0] is not None
+            and best[1] is not None
+            and best[0].unit == best[1].unit
+            and best[0].unit in ("deg", "rad")
+        ):
+            pair = (best[0].column.column, best[1].column.column)
+            factor = 1.0 if best[0].unit == "deg" else 180 / np.pi
+            if (path := self._evidence.displacements(pair, degrees=True, unit=factor)) is not None:
+                found.append((f"{pair[0]}, {pair[1]}", path))
+        for name, column in self._columns.items():
+            if (
+                column.kind == "length"
+                and column.name.axis == "x"
+                and not column.name.has("odometry", "statistic", "other")
+            ):
+                other = next(
+                    (
+                        n
+                        for n, c in self._columns.items()
+                        if c.kind == "length"
+                        and c.name.axis == "y"
+                        and c.name.concepts == column.name.concepts
+                    ),
+                    None,
+                )
+                if other is not None and column.unit is not None:
+                    path = self._evidence.displacements(
+                        (name, other), degrees=False, unit=factor_to(column.unit, "m")
+                    )
+                    if path is not None:
+                        found.append((f"{name}, {other}", path))
+        for name, column in self._columns.items():
+            if (
+                column.name.has("distance")
+                and not column.name.has("statistic", "command")
+                and column.kind in (None, "length")
+            ):
+                found.append((name, factor_to(column.unit or "m", "m")))
+        return found
+
+    def _speed(self, guess: Guess, paths: list[Way]) -> Guess:
+        name = guess.column.column
+        for source, path in paths:
+            if isinstance(path, float):
+                finding = self._evidence.against_distance(name, source, path)
+            else:
+                finding = self._evidence.against_path(name, path, source)
+            if finding is not None:
+                if not finding.agrees and guess.channel == "wheel_based_speed":
+                    continue
+                judged = guess.with_finding(finding)
+                return judged if finding.agrees else replace(judged, confidence=0.3 * guess.confidence)
+        return guess
+
+    def _prefer_ground(self, ranked: Ranked) -> None:
+        """Of two speeds of which one is named as over ground, the other is more likely the vehicle's own."""
+        named = [g for g in ranked["ground_speed"] if g.column.name.has("ground") or g.why.startswith(_KNOWN)]
+        if not named:
+            beside = {g.column.column for g in ranked["latitude"]} if ranked.get("latitude") else set()
+            prefixes = {
+                self._columns[c].name.words[:1] for c in beside if len(self._columns[c].name.words) > 1
+            }
+            ranked["ground_speed"] = [
+                replace(
+                    g, confidence=max(g.confidence, 0.75), evidence=(*g.evidence, "named as the latitude is")
+                )
+                if g.column.name.words[:1] in prefixes and len(g.column.name.words) > 1
+                else g
+                for g in ranked["ground_speed"]
+            ]
+            ranked["wheel_based_speed"] = [
+                g
+                for g in ranked["wheel_based_speed"]
+                if g.column.name.has("wheel", "odometry") or g.why.startswith(_KNOWN)
+            ]
+            return
+        own = {g.column.column for g in named}
+        ranked["ground_speed"] = [
+            g if g.column.column in own else replace(g, confidence=0.4 * g.confidence)
+            for g in ranked["ground_speed"]
+        ]
+        kept = []
+        for guess in ranked["wheel_based_speed"]:
+            if guess.column.column in own:
+                continue
+            best = max(named, key=lambda g: g.confidence)
+            if guess.column.name.has("wheel", "odometry") or guess.confidence >= 0.9:
+                kept.append(guess)
+                continue
+            found = self._evidence.ratio(best.column.column, guess.column.column)
+            if found is not None and found[1] > 0.5 and 0.6 < found[0] < 1.4:
+                said = f"goes with {best.column.column}, of which it is {1 / found[0]:.3g} times"
+                kept.append(
+                    replace(
+                        guess,
+                        confidence=0.6,
+                        evidence=(*guess.evidence, said),
+                        doubt="the wheels' own speed, beside one over ground?",
+                    )
+                )
+        ranked["wheel_based_speed"] = kept
+
+    def _ground(self, ranked: Mapping[str, list[Guess]]) -> tuple[str, float] | None:
+        """The best ground speed and its factor to m/s, where its unit is beyond doubt."""
+        best = max(ranked.get("ground_speed", []), key=lambda g: g.confidence, default=None)
+        if best is None or best.unit is None or (best.doubt and best.column.unit is None):
+            return None
+        return best.column.column, factor_to(best.unit, "m/s")
+
+    def _rims(self, ranked: Ranked, paths: list[Way]) -> None:
+        """Wheel speeds against the ground speed or the positions: the radius that they imply must be a wheel's."""
+        ground = self._ground(ranked)
+        for channel in [c for c in ranked if c.startswith("wheel_speed_")]:
+            judged = []
+            for guess in ranked[channel]:
+                found = None
+                if (
+                    ground is not None
+                    and (ratio := self._evidence.ratio(ground[0], guess.column.column)) is not None
+                ):
+                    found = ratio[0] * ground[1], ground[0]
+                elif ground is None:
+                    found = self._by_path(guess, paths)
+                judged.append(guess if found is None else guess.with_finding(self._rim(guess, *found)))
+            ranked[channel] = judged
+        if ground is not None:
+            ranked["wheel_based_speed"] = [
+                g.with_finding(self._as_fast(g, *ground)) if g.column.column != ground[0] else g
+                for g in ranked.get("wheel_based_speed", [])
+            ]
+
+    def _by_path(self, guess: Guess, paths: list[Way]) -> tuple[float, str] | None:
+        """Metres driven for one count of wheel speed over a second, by positions."""
+        for source, path in paths:
+            if (
+                not isinstance(path, float)
+                and (run := self._evidence.run_over(guess.column.column, path)) is not None
+            ):
+                return 1 / run[0], source
+        return None
+
+    def _rim(self, guess: Guess, metres: float, ground: str) -> Finding | None:
+        """``metres``: of ground speed for one count of wheel speed, by what is called ``ground``."""
+        if guess.column.name.has("motor"):
+            return None
+        if guess.column.unit is not None:
+            if guess.column.kind == "speed":
+                share = metres / factor_to(guess.column.unit, "m/s")
+                return Finding(0.5 < share < 1.6, f"{ground} is {share:.3g} times the rim speed")
+            radius = metres / factor_to(guess.column.unit, "rad/s")
+            return Finding(
+                RADII[0] <= radius <= RADII[1], f"a radius of {radius:.3g} m follows from {ground}"
+            )
+        likely = {}
+        for unit in ("rad/s", "rpm", "deg/s"):
+            radius = metres / factor_to(unit, "rad/s")
+            if RADII[0] <= radius <= RADII[1]:
+                likely[unit] = f"a radius of {radius:.3g} m follows from {ground}"
+        likely |= {
+            u: f"as {ground} in {u}" for u in ("m/s", "km/h") if abs(np.log(metres * SPEED_UNITS[u])) < 0.12
+        }
+        if len(likely) == 1:
+            unit, said = next(iter(likely.items()))
+            return Finding(True, said, unit)
+        if not likely:
+            return Finding(False, f"with {ground} no radius of a wheel fits")
+        return Finding(False, f"with {ground} {' or '.join(likely)}?")
+
+    def _as_fast(self, guess: Guess, ground: str, factor: float) -> Finding | None:
+        found = self._evidence.ratio(ground, guess.column.column)
+        if found is None:
+            return None
+        if guess.unit is not None and guess.column.unit is not None:
+            share = found[0] * factor / factor_to(guess.unit, "m/s")
+            return Finding(0.5 < share < 1.6, f"{ground} is {share:.3g} times as fast")
+        unit = nearest_unit(
+            1 / (found[0] * factor), {k: SPEED_UNITS[k] for k in ("m/s", "km/h", "mm/s")}, 0.4
+        )
+        return Finding(
+            unit is not None,
+            f"as fast as {ground}" if unit else f"is not as fast as {ground} in any unit",
+            unit,
+        )
+
+    def _accelerations(self, ranked: Ranked) -> None:
+        """Accelerations by gravity in the sum of three, and along the vehicle by the derivative of its speed."""
+        axes = ("acceleration_x", "acceleration_y", "acceleration_z")
+        if all(ranked.get(a) for a in axes):
+            best = [max(ranked[a], key=lambda g: g.confidence) for a in axes]
+            unit = self._evidence.gravity(
+                (best[0].column.column, best[1].column.column, best[2].column.column)
+            )
+            if unit is not None:
+                finding = Finding(True, "the three sum up to gravity", unit)
+                for axis, guess in zip(axes, best, strict=True):
+                    ranked[axis] = [g.with_finding(finding) if g is guess else g for g in ranked[axis]]
+        ground = self._ground(ranked)
+        if ground is None or not ranked.get("acceleration_x"):
+            return
+        rate = self._evidence.derivative(*ground)
+        if rate is None:
+            return
+        judged = []
+        for guess in ranked["acceleration_x"]:
+            found = self._evidence.fit(guess.column.column, *rate)
+            if found is not None and found[1] > 0.6:
+                unit = nearest_unit(found[0], {"m/s^2": 1.0, "g": 1 / 9.80665}, 0.35)
+                plain = guess.column.unit is not None or guess.unit == unit
+                said = f"goes with the derivative of {ground[0]} (correlation {found[1]:.2f})"
+                guess = guess.with_finding(
+                    Finding(True, said, unit if not plain or guess.column.unit is None else None)
+                )
+            judged.append(guess)
+        ranked["acceleration_x"] = judged
+
+    def _turning(self, ranked: Ranked) -> None:
+        """The rate of turn against headings, the path, and lateral acceleration over speed; its unit serves the other two gyros."""
+        guesses = ranked.get("angular_velocity_z", [])
+        if not guesses:
+            return
+        references = self._turns(ranked)
+        judged = []
+        for guess in guesses:
+            for source, rate in references:
+                found = self._evidence.fit(guess.column.column, *rate)
+                if found is None or abs(found[1]) < 0.8:
+                    continue
+                unit = nearest_unit(abs(found[0]), RATE_UNITS, 0.3)
+                if unit is None:
+                    continue
+                said = f"goes with the rate of turn by {source} (correlation {found[1]:.2f})"
+                judged_once = guess.with_finding(Finding(True, said, unit))
+                guess = replace(
+                    judged_once,
+                    confidence=max(judged_once.confidence, 0.75)
+                    if guess.confidence < 0.5
+                    else judged_once.confidence,
+                )
+                break
+            else:
+                guess = guess.with_finding(self._at_speed(guess, self._ground(ranked)))
+            judged.append(guess)
+        ranked["angular_velocity_z"] = [g for g in judged if g.confidence > 0.35]
+        best = max(ranked["angular_velocity_z"], key=lambda g: g.confidence, default=None)
+        if best is None or best.doubt or best.unit is None:
+            return
+        for channel in ("angular_velocity_x", "angular_velocity_y"):
+            ranked[channel] = [
+                replace(
+                    g,
+                    unit=best.unit,
+                    doubt="",
+                    evidence=(*g.evidence, f"in the unit of {best.column.column}"),
+                )
+                if g.column.unit is None and g.doubt.startswith("no unit")
+                else g
+                for g in ranked.get(channel, [])
+            ]
+
+    def _at_speed(self, guess: Guess, ground: tuple[str, float] | None) -> Finding | None:
+        """A rate of turn without a unit beside a speed: in rad/s it must not ask for more sideways than a vehicle can."""
+        if (
+            guess.column.unit is not None
+            or ground is None
+            or (series := self._evidence.series(guess.column.column)) is None
+        ):
+            return None
+        speed = self._evidence.at(ground[0], series[0])
+        if speed is None or not np.isfinite(speed).any():
+            return None
+        sideways = float(np.nanquantile(np.abs(series[1] * speed * ground[1]), 0.9))
+        if sideways < _SIDEWAYS:
+            return None
+        return Finding(True, f"in rad/s it would be {sideways:.0f} m/s^2 sideways at {ground[0]}", "deg/s")
+
+    def _turns(self, ranked: Mapping[str, list[Guess]]) -> list[tuple[str, Series]]:
+        found: list[tuple[str, Series]] = []
+        for name, column in self._columns.items():
+            read = column.name
+            if read.has(
+                "rate", "gyro", "speed", "acceleration", "statistic", "command", "other"
+            ) or column.kind not in (None, "angle"):
+                continue
+            if read.has("yaw", "heading") or (
+                column.kind == "angle" and len(read.words) == 1 and not candidates_of(column)
+            ):
+                degrees = column.unit in ("deg", "°") if column.unit else self._evidence.size(name) > 7
+                if (rate := self._evidence.rate_of_angle(name, degrees=degrees)) is not None:
+                    found.append((name, rate))
+        lateral = max(ranked.get("acceleration_y", []), key=lambda g: g.confidence, default=None)
+        ground = self._ground(ranked)
+        if lateral is not None and lateral.unit is not None and ground is not None:
+            series = self._evidence.series(lateral.column.column)
+            speed = None if series is None else self._evidence.at(ground[0], series[0])
+            if series is not None and speed is not None:
+                speed = speed * ground[1]
+                with np.errstate(divide="ignore", invalid="ignore"):
+                    sideways = np.where(
+                        np.abs(speed) > 1.0, series[1] * factor_to(lateral.unit, "m/s^2") / speed, np.nan
+                    )
+                found.append((f"{lateral.column.column} over {ground[0]}", (series[0], sideways)))
+        return found

@@ -1,0 +1,269 @@
+"""Which channels a column may be by its name and unit alone: candidates, to be judged by the data."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cache
+
+from terragrip.formats.profile import Profile
+from terragrip.formats.vocabulary import Name, Vocabulary
+from terragrip.recording.schema import CHANNELS, is_channel, split_channel, unit_of
+from terragrip.units import UnitError, parse_unit
+
+_KINDS = {
+    (0, 1, -1, 0): "speed", (0, 0, -1, 0): "rotation", (1, 2, -2, 0): "torque", (0, 0, 0, 1): "current", (1, 1, -2, 0): "force",
+    (0, 1, -2, 0): "acceleration", (0, 1, 0, 0): "length", (0, 0, 0, 0): "angle", (0, 0, 1, 0): "time",
+}  # fmt: skip
+_MISSPELT = re.compile(r"ms(\^?-?2|²)")  # m/s^2, which reads as a square of milliseconds
+_ROS = re.compile(r"\.(twist|linear|angular|angular_velocity|linear_acceleration|velocity|effort)(\.|\d|$)")
+
+
+@dataclass(frozen=True)
+class Column:
+    """A column: its name as read, the unit that is stated or named (None: neither), what that unit measures, and how it is stated."""
+
+    column: str
+    name: Name
+    unit: str | None
+    kind: str | None
+    stated: str | None = None
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """A column that may be a channel: ``score`` (0 to 1) and ``why`` by the name."""
+
+    channel: str
+    column: str
+    score: float
+    why: str
+
+
+def columns_of(
+    numbers: Sequence[str], constants: Mapping[str, str], units: Mapping[str, str], vocabulary: Vocabulary
+) -> dict[str, Column]:
+    """Every numeric column's name as read; ``constants`` are the texts that never change, by column."""
+    odometry = {_root(c) for c, text in constants.items() if "odometry" in vocabulary.read(text).concepts}
+    alike = _numbered(numbers)
+    found = {}
+    for column in numbers:
+        name = vocabulary.read(column)
+        index = re.search(r"(\d+)$", column)
+        if index is not None:  # name0 = wheel_left_joint says of velocity0 which it is
+            told = next(
+                (
+                    t
+                    for c, t in constants.items()
+                    if c.endswith(f"name{index[1]}") and _root(c) == _root(column)
+                ),
+                None,
+            )
+            if told is not None:
+                other = vocabulary.read(told)
+                name = replace(name, concepts=name.concepts | other.concepts, wheel=other.wheel)
+        if {"twist", "pose"} & set(name.words) and _root(column) in odometry:
+            name = replace(name, concepts=name.concepts | {"odometry"})
+        if (
+            name.wheel.isdigit()
+            and column not in alike
+            and (name.has("current") or not name.has("wheel", "motor", "torque"))
+        ):
+            name = replace(name, wheel="")
+        stated = units.get(column)
+        readable = None if stated is not None and _MISSPELT.fullmatch(stated) else stated
+        unit = readable or name.unit or _unit_of_ros(column)
+        found[column] = Column(column, name, unit, kind_of(unit), stated)
+    return found
+
+
+def kind_of(unit: str | None) -> str | None:
+    """What a unit measures: speed, rotation, torque, ...; None without a unit, "other" of one that no channel has."""
+    if unit is None:
+        return None
+    if unit.strip() in ("g", "mg"):
+        return "acceleration"
+    if unit.strip() in ("%", "percent"):
+        return "share"
+    try:
+        return _KINDS.get(parse_unit(unit).dimension, "other")
+    except UnitError:
+        return "other"
+
+
+def candidates_of(column: Column) -> list[Candidate]:
+    """The channels that a column may be, by its name and unit."""
+    own = column.column
+    # A wheel may have any name, but none that ends in a unit or says what is no measurement.
+    any_name = split_channel(own) is not None and own not in CHANNELS
+    if is_channel(own) and not (any_name and (column.name.unit or column.name.has("command", "statistic"))):
+        return [Candidate(own, own, 1.0, "Terragrip's own name")]
+    standard = _on_the_bus().get(re.split(r"[./]", own)[-1])
+    if standard is not None:
+        return [Candidate(standard, own, 0.95, "a signal of J1939, ISO 11783 or NMEA 2000")]
+    if column.name.has("command", "statistic", "change", "other"):
+        return []
+    for ways in (_of_wheels, _of_motion, _of_place, _of_speed):
+        found = ways(column)
+        if found:
+            return [c for c in found if column.kind is None or _fits(column.kind, c.channel)]
+    return []
+
+
+def _of_wheels(column: Column) -> list[Candidate]:
+    name, own = column.name, column.column
+    if (
+        not name.wheel
+        or name.axis
+        or name.has("ground", "odometry", "gyro", "acceleration", "position", "rate")
+    ):
+        return []
+    if name.has("torque"):
+        return [
+            Candidate(
+                f"drive_torque_{name.wheel}", own, 0.9 if name.has("wheel") else 0.8, "a torque and a wheel"
+            )
+        ]
+    if name.has("current") or column.kind == "current":
+        return [Candidate(f"drive_torque_{name.wheel}", own, 0.75, "a current and a wheel")]
+    turning = name.has("speed", "rotation") or (
+        name.has("wheel", "motor") and column.kind in ("speed", "rotation")
+    )
+    if not turning or (name.has("body") and name.wheel.isdigit()):
+        return []
+    score = 0.9 if name.has("wheel") else 0.65 if name.has("motor") else 0.8
+    what = "a motor" if name.has("motor") else "a wheel"
+    return [Candidate(f"wheel_speed_{name.wheel}", own, score, f"a speed and {what}")]
+
+
+def _of_motion(column: Column) -> list[Candidate]:
+    name, own = column.name, column.column
+    axis = name.axis or next(
+        (a for a, c in (("x", "longitudinal"), ("y", "lateral"), ("z", "vertical")) if name.has(c)), ""
+    )
+    about = next((a for a, c in (("x", "roll"), ("y", "pitch"), ("z", "yaw")) if name.has(c)), "")
+    if name.has("acceleration"):
+        if name.has("gyro", "rate", "rotation") or about or name.has("position", "east", "north"):
+            return []
+        if axis:
+            return [
+                Candidate(
+                    f"acceleration_{axis}", own, 0.8 if name.axis else 0.6, "an acceleration and an axis"
+                )
+            ]
+        return [Candidate("acceleration_x", own, 0.4, "an acceleration, along which axis is not said")]
+    if name.has("rate") and about and not axis:
+        return [Candidate(f"angular_velocity_{about}", own, 0.85, "the rate of an angle")]
+    angular = name.has("gyro") or (name.has("rate") and (name.has("speed") or "twist" in name.words))
+    if angular and axis:
+        return [Candidate(f"angular_velocity_{axis}", own, 0.85, "a gyro and an axis")]
+    if axis and name.has("rate") and not name.has("position"):
+        return [Candidate(f"angular_velocity_{axis}", own, 0.7, "a rate and an axis")]
+    if name.has("rate") and "turn" in name.words:
+        return [Candidate("angular_velocity_z", own, 0.55, "a rate of turn")]
+    if axis and column.kind == "rotation" and not name.has("wheel", "motor") and not name.wheel:
+        return [Candidate(f"angular_velocity_{axis}", own, 0.6, "turns about an axis")]
+    if axis and column.kind == "acceleration":
+        return [Candidate(f"acceleration_{axis}", own, 0.6, "an acceleration by its unit, and an axis")]
+    if (
+        column.kind == "rotation"
+        and not name.has("wheel", "motor")
+        and not name.wheel
+        and column.unit != "rpm"
+    ):
+        return [Candidate("angular_velocity_z", own, 0.3, "turns, of what is not said")]
+    if name.has("pitch", "roll") and not name.has("rate", "speed", "rotation", "yaw", "position"):
+        return [Candidate("pitch" if name.has("pitch") else "roll", own, 0.85, "its name")]
+    return []
+
+
+def _of_place(column: Column) -> list[Candidate]:
+    name, own = column.name, column.column
+    if name.has("speed", "acceleration", "rate"):
+        return []
+    for channel in ("latitude", "longitude"):
+        if name.has(channel):
+            whole = channel in name.words or channel[:3] in name.words
+            return [Candidate(channel, own, 0.85 if whole else 0.75, "its name")]
+    if name.has("altitude"):
+        return [Candidate("altitude", own, 0.85, "its name")]
+    if name.has("pull") or (name.has("force") and (name.has("coupling") or "tow" in name.words)):
+        return [Candidate("drawbar_force", own, 0.85, "a pull")]
+    return []
+
+
+def _of_speed(column: Column) -> list[Candidate]:
+    name, own = column.name, column.column
+    along = "twist" in name.words and "linear" in name.words
+    if not (name.has("speed") or along) or name.wheel:
+        return []
+    if name.axis in ("y", "z") or name.has(
+        "lateral", "vertical", "east", "north", "rate", "rotation", "gyro", "yaw", "heading"
+    ):
+        return []
+    if name.has("pitch", "roll", "acceleration", "position", "motor"):
+        return []
+    if name.has("odometry"):
+        return [Candidate("wheel_based_speed", own, 0.8, "odometry, which is made of the wheels")]
+    if name.has("ground"):
+        return [Candidate("ground_speed", own, 0.85, "a speed over ground")]
+    if name.has("wheel"):
+        return [Candidate("wheel_based_speed", own, 0.85, "a speed of the wheels as one")]
+    if along and not name.has("body"):
+        return [Candidate("ground_speed", own, 0.4, "a velocity; wheel odometry is none over ground")]
+    ground = Candidate("ground_speed", own, 0.55, "a speed, of what is not said")
+    if name.axis == "x" or name.has("longitudinal"):
+        return [replace(ground, score=0.65, why="a speed along the vehicle")]
+    return [ground, Candidate("wheel_based_speed", own, 0.35, "a speed, of what is not said")]
+
+
+def _fits(kind: str, channel: str) -> bool:
+    target = kind_of(unit_of(channel))
+    if channel.startswith("wheel_speed_"):
+        return kind in ("rotation", "speed")
+    if channel.startswith("drive_torque_"):
+        return kind in ("torque", "current")
+    return kind == target
+
+
+@cache
+def _on_the_bus() -> dict[str, str]:
+    """Channels by the names of standard signals, as the shipped profile of tractors knows them."""
+    profile = Profile.load("tractor-isobus")
+    return {name: channel for channel, source in profile.channels.items() for name in source.candidates}
+
+
+def _root(column: str) -> str:
+    """A column's name before its first point that is not a generic prefix: what a message's columns share."""
+    parts = column.split(".")
+    return parts[0] if len(parts) > 1 else ""
+
+
+def _numbered(columns: Sequence[str]) -> frozenset[str]:
+    """Columns that differ from another by a number alone, counted from 1: of those from 0 nobody knows which wheel is which."""
+    stems: dict[str, list[str]] = {}
+    for column in columns:
+        stems.setdefault(re.sub(r"\d+(st|nd|rd|th)?", "#", column), []).append(column)
+    counted = (
+        group
+        for group in stems.values()
+        if len(group) > 1 and not any(re.search(r"(?<!\d)0(?!\d)", c) for c in group)
+    )
+    return frozenset(c for group in counted for c in group)
+
+
+def _unit_of_ros(column: str) -> str | None:
+    """The unit of a field of ROS's own message types (REP 103: SI), by the path of the field."""
+    match = _ROS.search(column)
+    if match is None or "covariance" in column:
+        return None
+    if re.search(r"linear_acceleration\.[xyz]$", column):
+        return "m/s^2"
+    if re.search(r"(angular_velocity|angular)\.[xyz]$", column):
+        return "rad/s"
+    if re.search(r"twist\.linear\.[xyz]$", column):
+        return "m/s"
+    if re.search(r"(^|\.)velocity(\d|\.)", column):
+        return "rad/s"
+    return "N m" if re.search(r"(^|\.)effort(\d|\.)", column) else None

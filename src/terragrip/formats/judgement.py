@@ -1,0 +1,185 @@
+"""Judge a candidate by the data: its range, its unit, and what the other columns say of it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+import numpy.typing as npt
+
+from terragrip.formats.candidates import Candidate, Column, kind_of
+from terragrip.formats.evidence import Evidence, Finding
+from terragrip.recording.schema import unit_of
+from terragrip.units import UnitError, factor_to
+
+Floats = npt.NDArray[np.float64]
+
+_LARGEST = {
+    "m/s": 150.0,
+    "rad/s": 2000.0,
+    "m/s^2": 200.0,
+    "N m": 1e6,
+    "N": 1e6,
+    "m": 12_000.0,
+    "deg": 180.001,
+}
+_STEEP = 0.8  # rad: no vehicle leans or climbs so for long
+_STANDING = 0.5  # m/s, under which wheels may stand still throughout
+
+
+@dataclass(frozen=True)
+class Guess:
+    """A candidate as judged: ``confidence`` (0 to 1), the column's ``unit`` (None: unknown), what speaks for it and against it."""
+
+    column: Column
+    channel: str
+    confidence: float
+    why: str
+    unit: str | None = None
+    evidence: tuple[str, ...] = ()
+    doubt: str = ""
+    sign: int = 1
+
+    def with_finding(self, finding: Finding | None) -> Guess:
+        """The guess after a check: surer, or in doubt; the unit that the sizes tell counts where none is stated."""
+        if finding is None:
+            return self
+        if not finding.agrees:
+            return replace(self, confidence=0.5 * self.confidence, doubt=finding.said)
+        stated = self.column.unit
+        if stated is not None and finding.unit is not None and not _same(stated, finding.unit):
+            said = f"stated in {stated}, but {finding.said}"
+            return replace(self, confidence=0.6 * self.confidence, doubt=said)
+        surer = 1 - 0.45 * (1 - self.confidence)
+        unit = stated or finding.unit or self.unit
+        clear = self.doubt if finding.unit is None and stated is None else ""
+        return replace(
+            self, confidence=surer, unit=unit, evidence=(*self.evidence, finding.said), doubt=clear
+        )
+
+
+class Judge:
+    """Judges candidates one by one, by the values of the columns of one log."""
+
+    def __init__(
+        self, columns: Mapping[str, Column], numbers: Mapping[str, Floats], evidence: Evidence
+    ) -> None:
+        self._columns, self._numbers, self._evidence = columns, numbers, evidence
+        self._in_degrees = any(
+            c.name.has("pitch", "roll", "yaw", "heading")
+            and not c.name.has("rate", "gyro", "speed", "acceleration", "statistic")
+            and 7 < evidence.size(n) <= 360
+            for n, c in columns.items()
+        )
+
+    def of(self, candidate: Candidate) -> Guess | None:
+        """The candidate with its unit, judged by its own values; None where they rule it out."""
+        column = self._columns[candidate.column]
+        values = self._numbers[candidate.column]
+        known = values[np.isfinite(values)]
+        own = candidate.score == 1.0
+        if not len(known) or (
+            not own
+            and len(known) > 2
+            and not known.max() > known.min()
+            and not self._may_stand(candidate, known)
+        ):
+            return None
+        target = unit_of(candidate.channel)
+        guess = Guess(
+            column, candidate.channel, candidate.score, candidate.why, column.unit, (candidate.why,)
+        )
+        if column.unit is not None:
+            surer = candidate.score if own else 1 - 0.7 * (1 - candidate.score)  # it measures the same
+            guess = replace(guess, confidence=surer, evidence=(candidate.why, f"in {column.unit}"))
+        elif target is not None and (
+            not own or (target == "rad" and (self._in_degrees or self._evidence.size(candidate.column) > 1.6))
+        ):
+            guess = self._sized(guess, target)
+        elif own:
+            guess = replace(guess, unit=target)
+        if guess.channel.startswith("drive_torque_") and column.name.has("current"):
+            guess = replace(guess, doubt="", unit=column.unit)
+        if (
+            target is not None and column.unit is not None
+            and not own
+            and _too_large(guess, self._evidence.size(candidate.column), target)
+        ):
+            return None
+        if candidate.channel in ("pitch", "roll") and guess.unit is not None:
+            size = self._evidence.size(candidate.column) * factor_to(guess.unit, "rad")
+            if size > _STEEP:
+                guess = replace(
+                    guess,
+                    confidence=0.6 * guess.confidence,
+                    doubt=f"reaches {np.degrees(size):.0f} deg: a vehicle's?",
+                )
+        if len(known) < 3 and not own:
+            guess = replace(guess, doubt=f"{len(known)} value{'s' * (len(known) > 1)} only")
+        elif not own and not known.max() > known.min():
+            guess = replace(guess, confidence=0.6 * guess.confidence, doubt=f"is {known[0]:.4g} throughout")
+        return guess
+
+    def _may_stand(self, candidate: Candidate, known: Floats) -> bool:
+        """Whether a column of zeros may be a wheel's speed: the ground speed says that the vehicle stands."""
+        if not candidate.channel.startswith(("wheel_speed_", "wheel_based_speed")) or known[0] != 0:
+            return False
+        for name, column in self._columns.items():
+            over_ground = column.name.has("speed") and not column.name.has(
+                "wheel", "vertical", "statistic", "command"
+            )
+            if (
+                over_ground
+                and column.kind == "speed"
+                and column.unit
+                and np.ptp(_known(self._numbers[name])) > 0
+            ):
+                return self._evidence.size(name) * factor_to(column.unit, "m/s") < _STANDING
+        return False
+
+    def _sized(self, guess: Guess, target: str) -> Guess:
+        """The unit of a column that states none, by the size of its values: with a doubt, unless nothing else is likely."""
+        size = self._evidence.size(guess.column.column)
+        if guess.channel in ("latitude", "longitude"):
+            return replace(guess, unit="deg")
+        if guess.channel == "altitude":
+            return replace(guess, unit="m")
+        if target == "rad":
+            if size > 1.6 or self._in_degrees:
+                sure = size > 7 or self._in_degrees
+                return replace(
+                    guess,
+                    unit="deg",
+                    doubt="" if sure else "the sizes tell degrees",
+                    evidence=(guess.why, "its size tells degrees"),
+                )
+            return replace(guess, unit="rad", doubt="no unit is stated: rad?")
+        if guess.channel.startswith("wheel_speed_") and size > 40:
+            return replace(guess, unit="rad/s", doubt=f"reaches {size:.3g}: rpm or deg/s?")
+        if target == "rad/s" and guess.channel.startswith("angular") and size > 12:
+            return replace(guess, unit="deg/s", evidence=(guess.why, "its size tells deg/s"))
+        return replace(guess, unit=target, doubt=f"no unit is stated: {target}?")
+
+
+def _known(values: Floats) -> Floats:
+    known = values[np.isfinite(values)]
+    return known if len(known) else np.zeros(1)
+
+
+def _same(unit: str, other: str) -> bool:
+    """Whether two units are of one size (as far as sizes tell: within a tenth)."""
+    try:
+        return 0.88 < factor_to(unit, other) < 1.14
+    except UnitError:
+        return kind_of(unit) == kind_of(other) == "acceleration" and unit == other
+
+
+def _too_large(guess: Guess, size: float, target: str) -> bool:
+    limit = _LARGEST.get(target)
+    if limit is None or guess.unit is None:
+        return False
+    try:
+        return size * factor_to(guess.unit, target) > limit
+    except UnitError:
+        return False  # a rim speed, a current

@@ -1,0 +1,306 @@
+"""What the words in a column's name mean: the general words of the trade, their abbreviations, and the units behind them.
+
+Not a list of loggers: a word stands here for what it means everywhere. `Vocabulary.without` takes words away, by which
+``benchmarks/bench_inspect.py`` judges each logger without the words that it alone has shown.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from functools import cached_property
+
+from terragrip.units import is_common
+
+MEANINGS: dict[str, str] = {
+    # what is measured
+    "speed": "speed velocity vel spd v sog geschwindigkeit vitesse velocidad",
+    "rotation": "rpm rps omega w rotation drehzahl",
+    "torque": "torque effort moment drehmoment tau tq trq couple",
+    "current": "current curr amps amp ampere strom",
+    "acceleration": "acceleration accelerometer acc accel beschleunigung",
+    "gyro": "gyroscope gyro gyr",
+    "rate": "rate angular turn",
+    "pitch": "pitch",
+    "roll": "roll bank",
+    "yaw": "yaw psi",
+    "heading": "heading course bearing azimuth cog compass",
+    "latitude": "latitude",
+    "longitude": "longitude",
+    "altitude": "altitude alt height elevation hoehe",
+    "position": "position pose pos easting northing utm",
+    "pull": "drawbar draft pull traction",
+    "coupling": "hitch towing trailer",
+    "force": "force",
+    "distance": "distance odometer",
+    "time": "time timestamp stamp unix epoch clock utc zeit tow",
+    # what it is of
+    "wheel": "wheel whl rim tire tyre joint roue",
+    "motor": "motor",
+    "ground": "ground gps gnss radar navigation visual vio lidar icp true location rtk ublox slam",
+    "body": "vehicle machine car robot body base ego",
+    "odometry": "odom odometry",
+    "soil": "soil terrain surface",
+    "other": "engine pto shaft driveshaft fan pump gearbox transmission battery brake steering steer throttle pedal ignition fuel "
+    "oil coolant boost wind magnetometer magnetic mag camshaft injector injection turbo clutch compressor alternator carrier "
+    "doppler pseudorange satellite cylinder gear intake exhaust propeller idle encoder limiter bumper cliff charger gravity "
+    "air diff lock limiting ecef hydraulic valve grinder blade reel auger spool lever joystick crank",
+    # what is no measurement of it
+    "command": "cmd command commanded set setpoint target desired reference ref demand demanded requested request limit max "
+    "maximum min minimum nominal available expected predicted ideal selected soll sollwert planned",
+    "statistic": "std stddev var cov covariance variance accuracy error sigma uncertainty quality dop hdop vdop pdop status state "
+    "flag id identifier count counter index idx raw mode valid fix number checksum seq ticks pwm voltage volt temperature "
+    "temp pressure power load derivative correction offset trim level duty percent pct jerk energy frequency slip confidence "
+    "bias deviation scale ratio gain residual label",
+    # along which axis
+    "longitudinal": "longitudinal forward fwd",
+    "lateral": "lateral side sideways transverse",
+    "vertical": "vertical vert down up climb sink",
+    "east": "east easting",
+    "north": "north northing",
+    "left": "left l links gauche",
+    "right": "right r rechts droite",
+    "front": "front vorn avant",
+    "rear": "rear back hinten arriere",
+    "change": "delta d",
+}  # fmt: skip
+_CORNERS = {
+    **dict.fromkeys(("fl", "lf", "vl"), "fl"), **dict.fromkeys(("fr", "rf", "vr"), "fr"),
+    **dict.fromkeys(("rl", "lr", "bl", "hl"), "rl"), **dict.fromkeys(("rr", "br", "hr"), "rr"),
+}  # fmt: skip
+UNIT_WORDS = {
+    "kmh": "km/h", "kph": "km/h", "mph": "mph", "knots": "knots", "knot": "knots", "kn": "kN", "rpm": "rpm", "rps": "rev/s",
+    "dps": "deg/s", "degs": "deg/s", "rads": "rad/s", "deg": "deg", "degree": "deg", "degrees": "deg", "rad": "rad",
+    "radians": "rad", "nm": "N m", "knm": "kNm", "n": "N", "m": "m", "meter": "m", "meters": "m", "metres": "m", "mm": "mm",
+    "cm": "cm", "g": "g", "ms2": "m/s^2", "mss": "m/s^2", "s": "s", "sec": "s", "secs": "s", "seconds": "s", "second": "s",
+    "millis": "ms", "ms": "ms", "milliseconds": "ms", "micros": "us", "us": "us", "microseconds": "us", "nanos": "ns",
+    "ns": "ns", "nanoseconds": "ns", "nsec": "ns", "usec": "us", "msec": "ms", "a": "A", "amps": "A", "ma": "mA",
+    "percent": "%", "pct": "%",
+}  # fmt: skip
+_ALWAYS = ("rpm", "rps", "kmh", "kph", "kmph", "mph", "mps")  # mean a unit wherever they stand
+_PER = re.compile(r"(km|m|mm|cm|mi|rad|deg|rev|ft)p(s|h|hr|min)(2?)$")
+_WORD = re.compile(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+|\d+")
+_SYMBOL_OF_AXIS = re.compile(r"(acc|accel|accl|gyro|gyr|vel|omega|a|g|w|v|f)([xyz])$")
+_SYMBOLS = {
+    "t": "torque",
+    "m": "torque",
+    "v": "speed",
+    "w": "rotation",
+    "n": "rotation",
+    "i": "current",
+    "a": "acceleration",
+}
+_AXIS_SYMBOLS = {"a": "acceleration", "g": "gyro", "w": "gyro", "v": "speed", "f": "force"}
+_ORDINAL = re.compile(r"(\d)(st|nd|rd|th)$", re.IGNORECASE)
+_VOWELS = re.compile(r"(?<!^)[aeiou]")
+_BRACKET = re.compile(r"[\[(]\s*([^\])]*?)\s*[\])]?\s*$")
+
+
+@dataclass(frozen=True)
+class Name:
+    """What a column's name says: concepts of `MEANINGS`, the wheel ("" if none), the axis, and the unit at its end."""
+
+    concepts: frozenset[str]
+    wheel: str = ""
+    axis: str = ""
+    unit: str | None = None
+    words: tuple[str, ...] = ()
+
+    def has(self, *concepts: str) -> bool:
+        """Whether one of the concepts is in the name."""
+        return bool(self.concepts.intersection(concepts))
+
+
+@dataclass(frozen=True)
+class Vocabulary:
+    """Words and what they mean; ``left_out`` are not known."""
+
+    left_out: frozenset[str] = field(default_factory=frozenset)
+
+    def without(self, words: Iterable[str]) -> Vocabulary:
+        """The same vocabulary that does not know ``words``."""
+        return Vocabulary(self.left_out | frozenset(words))
+
+    @cached_property
+    def _known(self) -> dict[str, str]:
+        return {
+            word: concept
+            for concept, words in MEANINGS.items()
+            for word in words.split()
+            if word not in self.left_out
+        }
+
+    def concepts_of(self, word: str) -> frozenset[str]:
+        """What a lower-case word means: as it stands, put together of two words, or cut short."""
+        added = {"rate"} if self._is_derivative(word) else set()
+        symbol = {_SYMBOLS[word[0]]} if self._has_symbol(word) else set()
+        return frozenset({self._known[known] for known in self.known_in(word)} | added | symbol)
+
+    def known_in(self, word: str) -> frozenset[str]:
+        """The vocabulary's words that a lower-case word is read by."""
+        known = self._known
+        if word in known:
+            return frozenset([word])
+        if len(word) < 3 or not word.isalpha():
+            return frozenset()
+        for cut in range(3, len(word) - 2):
+            if word[:cut] in known and word[cut:] in known:
+                return frozenset([word[:cut], word[cut:]])
+        if self._has_symbol(word) or self._is_derivative(word):
+            return frozenset([word[1:]])
+        tail = next((w for w in known if len(w) >= 5 and word.endswith(w)), None)
+        if tail is not None:  # of a word that is not known and one that is
+            return frozenset([tail])
+        # Cut short: its first letters (veloc), or its consonants (whl, lngtd); of two meanings the name's other words tell.
+        bare = word == _VOWELS.sub("", word)
+        return frozenset(
+            full
+            for full in known
+            if len(full) > max(len(word), 4)
+            and (full.startswith(word) or (bare and _VOWELS.sub("", full).startswith(word)))
+        )
+
+    def _has_symbol(self, word: str) -> bool:
+        """vWheel, TMotor: a physicist's letter before what it is of."""
+        return (
+            word not in self._known
+            and word[:1] in _SYMBOLS
+            and self._known.get(word[1:]) in ("wheel", "motor")
+        )
+
+    def _is_derivative(self, word: str) -> bool:
+        """dpsi: the time derivative of an angle."""
+        return (
+            word not in self._known
+            and word[:1] == "d"
+            and self._known.get(word[1:]) in ("yaw", "pitch", "roll")
+        )
+
+    def unit_word(self, word: str) -> str | None:
+        """The unit that a word at a name's end stands for (``kmh``, ``mps2``, ``radps``), None if it is none."""
+        if (match := _PER.match(word)) is not None:
+            time = {"hr": "h"}.get(match[2], match[2])
+            return f"{match[1]}/{time}" + ("^2" if match[3] else "")
+        return None if word in self.left_out else UNIT_WORDS.get(word)
+
+    def read(self, name: str) -> Name:
+        """Read a column's name."""
+        bracket = _BRACKET.search(name)
+        body = name[: bracket.start()] if bracket and bracket.start() > 0 else name
+        if bracket and body.strip() and not _is_unit(bracket[1]):
+            body = name  # words, not a unit
+        words = words_of(body)
+        concepts: set[str] = set()
+        axis = ""
+        unit, used = self._unit_at_end(words)
+        if unit is None and bracket and body != name:
+            unit = self._unit_in_bracket(bracket[1])
+        unit = unit or next((u for w in words if w in _ALWAYS and (u := self.unit_word(w))), None)
+        said = words[: len(words) - used] or words
+        if said == ["t"]:
+            concepts.add("time")
+        if len(said) == 2 and said[0] in _SYMBOLS and (said[1] in _CORNERS or said[1] in "lr12345678"):
+            concepts.add(_SYMBOLS[said[0]])  # M1, w_rl
+            said = said[1:]
+        for word in said:
+            short = _SYMBOL_OF_AXIS.match(word)
+            if short is not None and word not in self._known:
+                concepts |= {_AXIS_SYMBOLS[short[1][0]]}
+                axis = short[2]
+            elif word in ("x", "y", "z"):
+                axis = word
+            else:
+                concepts |= self.concepts_of(word)
+        last = words_of(re.split(r"[./]", body)[-1])  # numbers before it are those of buses and topics
+        return Name(_settled(concepts), _wheel_of(words, last, concepts), axis, unit, tuple(words))
+
+    def _unit_at_end(self, words: list[str]) -> tuple[str | None, int]:
+        """The unit that a name ends in, and how many of its words say so; a name is not all unit."""
+        for count in (3, 2):
+            tail = words[-count:]
+            if len(words) > count and tail[-1] in ("s", "h", "s2", "min", "2"):
+                top, bottom = tail[0], "".join(tail[1:])
+                if top in ("m", "km", "mm", "cm", "rad", "deg", "rev") and bottom in ("s", "h", "s2", "min"):
+                    return f"{top}/{bottom.replace('s2', 's^2')}", count
+        if (
+            words
+            and (unit := self.unit_word(words[-1])) is not None
+            and (len(words) > 1 or len(words[-1]) > 2)
+        ):
+            return unit, 1 if len(words) > 1 else 0
+        return None, 0
+
+    def _unit_in_bracket(self, text: str) -> str | None:
+        plain = text.strip()
+        if plain.lower() == "ms^2":
+            return None  # m/s^2 misspelt, or not
+        return plain if is_common(plain) or plain == "g" else self.unit_word(plain.lower())
+
+
+GENERAL = Vocabulary()
+
+
+def words_of(name: str) -> list[str]:
+    """The words of a name in their order, in lower case: parts of camel case and between other characters, numbers apart."""
+    found: list[str] = []
+    for part in re.split(r"[^A-Za-z0-9]+", _ordinals(name)):
+        if part.lower() in (
+            "nm",
+            "kn",
+            "knm",
+            "knots",
+            "kmph",
+            "kmh",
+            "kph",
+            "mph",
+            "mps",
+            "rpm",
+            "ms2",
+            "mps2",
+        ):
+            found.append(part.lower())
+            continue
+        # A plural abbreviation in capitals beside a word (WheelSpFL) comes apart by case alone.
+        found += [word.lower() for word in _WORD.findall(part)]
+    return _rejoined(found)
+
+
+def _rejoined(words: list[str]) -> list[str]:
+    """Words with a power put back behind its unit (``mps``, ``2``)."""
+    joined: list[str] = []
+    for word in words:
+        if joined and word == "2" and re.fullmatch(r"(m|rad|deg)ps|ms|s", joined[-1]):
+            joined[-1] += word
+        else:
+            joined.append(word)
+    return joined
+
+
+def _ordinals(name: str) -> str:
+    return " ".join(_ORDINAL.sub(r"\1", word) for word in name.split(" "))
+
+
+def _is_unit(text: str) -> bool:
+    return bool(text) and len(text) <= 10 and not re.search(r"\s\w{3,}", text)
+
+
+def _settled(concepts: set[str]) -> frozenset[str]:
+    """Of two meanings of one abbreviation the one that the name's other words ask for."""
+    along = {"acceleration", "force", "speed"} & concepts
+    if {"latitude", "lateral"} <= concepts:
+        concepts = concepts - ({"latitude"} if along else {"lateral"})
+    if {"longitude", "longitudinal"} <= concepts:
+        concepts = concepts - ({"longitude"} if along else {"longitudinal"})
+    return frozenset(concepts)
+
+
+def _wheel_of(words: list[str], last: list[str], concepts: set[str]) -> str:
+    """The wheel that a name speaks of: a corner, a side with or without its end, or a number; empty if none."""
+    for word in words:
+        if word in _CORNERS:
+            return _CORNERS[word]
+    side = "l" if "left" in concepts else "r" if "right" in concepts else ""
+    end = "f" if "front" in concepts else "r" if "rear" in concepts else ""
+    number = next((word for word in last if word.isdigit() and 1 <= int(word) <= 8), "")
+    return end + side if side else number

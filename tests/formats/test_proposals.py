@@ -1,0 +1,249 @@
+"""What inspect proposes of a stranger's columns: by name, unit and data; wrong ones are worse than none."""
+
+from __future__ import annotations
+
+import importlib.util
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from terragrip.errors import InputError
+from terragrip.formats import inspect, read
+from terragrip.formats.recognition import propose
+from terragrip.formats.vocabulary import GENERAL
+
+TIME = np.arange(0.0, 60.0, 0.1)
+SPEED = 3.0 + np.sin(TIME / 5)  # m/s
+HEADING = np.cumsum(0.05 * np.sin(TIME / 4)) * 0.1 * 3
+WAY = np.cumsum(SPEED) * 0.1
+
+
+def _propose(columns: dict[str, np.ndarray], units: dict[str, str] | None = None):  # type: ignore[no-untyped-def]
+    return propose(columns, (), units or {}, dict.fromkeys(columns, TIME))
+
+
+def _place() -> dict[str, np.ndarray]:
+    """Latitude and longitude of a drive due north at SPEED."""
+    return {"lat": 45.0 + WAY / 111_132.0, "lon": 11.0 + 1e-9 * np.arange(len(TIME))}
+
+
+@pytest.mark.parametrize(
+    ("name", "unit"),
+    [
+        ("CAN1.TSC1.EngnRqstdTrqTrqLmt", "%"),  # an engine's torque limit, on bus 1
+        ("CAN1.EEC1.ActualEnginePercentTorque", "%"),
+        ("wheel_torque_fl", "%"),  # no dimension of a torque
+        ("velocity_down", "m/s"),
+        ("vert-vel", "m/s"),
+        ("angular_acceleration_x", "rad/s^2"),
+        ("rotational_acceleration_z", "deg/s^2"),
+        ("cmd_wheel_speed_fl", "rad/s"),
+        ("GPS TOW", "s"),
+        ("wheel_speed_fl_variance", "rad/s"),
+        ("brake_torque_fl", "N m"),
+        ("East Velocity", "m/s"),
+    ],
+)
+def test_what_is_not_a_channel_is_not_proposed(name: str, unit: str) -> None:
+    assert _propose({name: SPEED}, {name: unit}) == {}
+
+
+def test_a_gnss_speed_is_no_wheel_and_prefixes_are_seen_through() -> None:
+    columns = {
+        "CAN1.CCVS1.WheelBasedVehicleSpeed": 3.6 * SPEED * 1.05,
+        "CAN2.gnss_speed.Speed": SPEED,
+        **{f"CAN2.gnss_pos.{name}": values for name, values in _place().items()},
+    }
+    found = _propose(columns)
+    assert set(found) == {"wheel_based_speed", "ground_speed", "latitude", "longitude"}
+    assert found["ground_speed"].columns == ("CAN2.gnss_speed.Speed",)
+    assert (found["ground_speed"].unit, found["ground_speed"].doubt) == ("m/s", "")
+    assert found["wheel_based_speed"].entry["unit"] == "km/h"
+
+
+def test_motors_are_left_out_where_wheels_are_and_need_a_gear_ratio_where_not() -> None:
+    motors = {f"motor_{side}_rpm": 300 * SPEED for side in ("left", "right")}
+    wheels = {f"wheel_speed_{side}_rads": 8 * SPEED for side in ("left", "right")}
+    assert {p.columns[0] for p in _propose({**motors, **wheels}).values()} == set(wheels)
+    alone = _propose(motors)
+    assert set(alone) == {"wheel_speed_l", "wheel_speed_r"}
+    assert all("turns per motor turn" in p.give and p.unit == "rpm" for p in alone.values())
+
+
+@pytest.mark.parametrize(
+    ("unit", "factor"), [("m/s", 1.0), ("km/h", 3.6), ("mm/s", 1000.0), ("mph", 1 / 0.44704)]
+)
+def test_positions_tell_the_unit_of_a_speed(unit: str, factor: float) -> None:
+    found = _propose({"speed": factor * SPEED, **_place()})["ground_speed"]
+    assert (found.unit, found.doubt) == (unit, "")
+    assert any("path of lat, lon" in sentence for sentence in found.evidence)
+
+
+@pytest.mark.parametrize("factor", [1.0, 1000.0])
+def test_a_speed_without_unit_or_check_has_a_question_mark(factor: float) -> None:
+    found = _propose({"speed": factor * SPEED}).get("ground_speed")
+    assert found is None or "no unit" in found.doubt  # 3000 m/s is none
+
+
+def test_a_speed_that_positions_contradict_is_not_proposed() -> None:
+    found = _propose({"speed": 17 * SPEED, **_place()}, {"speed": "m/s"})
+    assert found.get("ground_speed") is None or found["ground_speed"].columns != ("speed",)
+
+
+def test_a_stated_unit_that_positions_contradict_is_in_doubt() -> None:
+    found = _propose({"gps_speed": 3.6 * SPEED, **_place()}, {"gps_speed": "m/s"})["ground_speed"]
+    assert "km/h" in found.doubt
+
+
+@pytest.mark.parametrize(("unit", "gravity"), [("g", 1.0), ("m/s^2", 9.80665), ("mg", 1000.0)])
+def test_gravity_tells_the_unit_of_accelerations(unit: str, gravity: float) -> None:
+    noise = np.random.default_rng(1).normal(0, 0.02, (2, len(TIME))) * gravity
+    found = _propose(
+        {"acc_x": noise[0], "acc_y": noise[1], "acc_z": gravity + 0 * TIME + 0.01 * gravity * np.sin(TIME)}
+    )
+    assert {(p.unit, p.doubt) for p in found.values()} == {(unit, "")}
+
+
+@pytest.mark.parametrize(("unit", "factor"), [("rad/s", 1.0), ("deg/s", 57.29578)])
+def test_a_heading_tells_the_unit_of_a_gyro(unit: str, factor: float) -> None:
+    rate = np.gradient(HEADING, TIME)
+    found = _propose({"heading": np.degrees(HEADING) % 360, "gyro_z": factor * rate})["angular_velocity_z"]
+    assert (found.unit, found.doubt) == (unit, "")
+
+
+def test_a_wheel_speed_whose_radius_is_no_wheels_is_in_doubt() -> None:
+    columns = {
+        "gps_speed_mps": SPEED,
+        "wheel_speed_fl_rads": SPEED / 0.002,
+        "wheel_speed_fr_rads": SPEED / 0.3,
+    }
+    found = _propose(columns)
+    assert "radius of 0.002 m" in found["wheel_speed_fl"].doubt
+    assert found["wheel_speed_fr"].doubt == ""
+
+
+def test_odometry_is_no_ground_speed() -> None:
+    found = _propose({"odom_vx": SPEED, "gps_speed_mps": SPEED})
+    assert found["ground_speed"].columns == ("gps_speed_mps",)
+    assert found["wheel_based_speed"].columns == ("odom_vx",)
+    assert "ground_speed" not in _propose({"odom_vx": SPEED})
+
+
+def test_units_and_several_header_rows_reach_the_profile(tmp_path: Path) -> None:
+    path, profile = tmp_path / "log.csv", tmp_path / "profile.yaml"
+    rows = "".join(
+        f"{1000 * t:.0f};{n:.3f};{n:.3f};{3.6 * v:.4f}\n"
+        for t, n, v in zip(TIME, 95 * SPEED, SPEED, strict=True)
+    )
+    path.write_text(
+        f"Time;Wheel speed left;Wheel speed right;GPS speed\nms;1/min;1/min;km/h\nt;nl;nr;v\n{rows}"
+    )
+    found = inspect(path)
+    profile.write_text(found.profile)
+    assert "?" not in found.profile.split("\n", 1)[1].replace("???", "")
+    recording = read(path, profile)
+    np.testing.assert_allclose(recording["ground_speed"], SPEED, atol=1e-4)
+    np.testing.assert_allclose(recording["wheel_speed_l"], 95 * SPEED * 2 * np.pi / 60, rtol=1e-4)
+    np.testing.assert_allclose(recording.time, TIME, atol=1e-9)
+
+
+@pytest.mark.parametrize("mark", ["#", "# ", "// ", "% "])
+def test_a_header_behind_a_comment_mark_is_one(tmp_path: Path, mark: str) -> None:
+    path = tmp_path / "log.csv"
+    path.write_text(f"# logger 3\n{mark}vx_mps,wheel_fl(rad/s)\n1.0,2.0\n1.5,3.0\n2.0,4.0\n")
+    names = [column.name for column in inspect(path).columns]
+    assert names == ["vx_mps", "wheel_fl"]
+
+
+def test_a_comment_of_another_width_is_no_header(tmp_path: Path) -> None:
+    path = tmp_path / "log.csv"
+    path.write_text("# made by hand, twice, today\n1.0,2.0\n1.5,3.0\n")
+    with pytest.raises(InputError, match="not column names"):
+        inspect(path)
+
+
+def test_a_vbo_file_is_read_in_seconds_and_degrees(tmp_path: Path) -> None:
+    path = tmp_path / "log.vbo"
+    path.write_bytes(
+        "File created on 01/03/2016 @ 14:26\r\n\r\n[header]\r\nsatellites\r\n\r\n[channel units]\r\n\r\n°/s\r\nkm/h\r\n\r\n"
+        "[column names]\r\nsats time lat long velocity YawRate WheelSpFL\r\n\r\n[data]\r\n"
+        "014 235959.50 +3141.60 +0099.60 036.0 +1.0E+00 35.0\r\n014 000000.50 +3141.66 +0099.60 036.0 -1.0E+00 36.0\r\n".encode("latin-1")
+    )  # fmt: skip
+    found = inspect(path)
+    by_name = {column.name: column for column in found.columns}
+    assert found.time is not None and found.time.duration == pytest.approx(1.0)
+    assert (by_name["lat"].minimum, by_name["long"].minimum) == pytest.approx((52.36, -1.66))
+    assert [by_name[n].unit for n in ("velocity", "YawRate", "WheelSpFL")] == ["km/h", "deg/s", "km/h"]
+
+
+@pytest.mark.parametrize(
+    ("name", "concepts", "wheel", "unit"),
+    [
+        ("TwheelRL_Nm", {"torque", "wheel"}, "rl", "N m"),
+        ("AvgWhl_V", {"speed", "wheel"}, "", None),
+        ("EngnRqstdTrqLmt", {"other", "command", "torque"}, "", None),
+        ("heightAboveWgs84EllipsoidM", {"altitude"}, "", "m"),
+        ("ay_mps2", {"acceleration"}, "", "m/s^2"),
+        ("Wheel speed RR [1/min]", {"speed", "wheel"}, "rr", "1/min"),
+        ("lngDeg", {"longitude"}, "", "deg"),
+    ],
+)
+def test_names_are_read(name: str, concepts: set[str], wheel: str, unit: str | None) -> None:
+    read_name = GENERAL.read(name)
+    assert (set(read_name.concepts), read_name.wheel, read_name.unit) == (concepts, wheel, unit)
+
+
+names = st.one_of(
+    st.text(max_size=12),
+    st.builds(
+        "_".join,
+        st.lists(
+            st.sampled_from(
+                "wheel speed fl gps vx lat lon 1 0 acc x z gyro torque motor time ms kmh pitch [m/s] (g)".split()
+            ),
+            max_size=4,
+        ),
+    ),
+)
+values = st.one_of(st.floats(width=32), st.just(np.nan), st.just(0.0), st.floats(-10, 10))
+
+
+@given(
+    st.dictionaries(names, st.integers(0, 2**31), max_size=6),
+    st.lists(values, max_size=12),
+    st.booleans(),
+    st.sampled_from([None, "m/s", "g", "ms^2", "?", ""]),
+)
+def test_any_table_gives_proposals(
+    seeds: dict[str, int], cells: list[float], timed: bool, unit: str | None
+) -> None:
+    rows = np.array(cells, dtype=np.float64)
+    columns = {name: np.random.default_rng(seed).permutation(rows) for name, seed in seeds.items()}
+    clocks = dict.fromkeys(columns, np.arange(len(rows)) / 10) if timed else {}
+    found = propose(columns, (), {} if unit is None else dict.fromkeys(columns, unit), clocks)
+    used = [column for proposal in found.values() for column in proposal.columns]
+    assert set(used) <= set(columns)
+    assert all(0 <= proposal.confidence <= 1 for proposal in found.values())
+
+
+def test_measured_headers_leaving_one_logger_out(shared: Callable[[str], Path]) -> None:
+    shared("data/headers/truth.json")
+    path = Path(__file__).parents[2] / "benchmarks" / "bench_inspect.py"
+    sys.path.insert(0, str(path.parent))
+    try:
+        spec = importlib.util.spec_from_file_location("bench_inspect", path)
+        assert spec is not None and spec.loader is not None
+        bench = importlib.util.module_from_spec(spec)
+        sys.modules[spec.name] = bench
+        spec.loader.exec_module(bench)
+    finally:
+        sys.path.remove(str(path.parent))
+    total = bench.judged(headers_only=True)
+    right = total["right"] + total["right, with a ?"]
+    assert right >= 0.85 * (right + total["left open"] + total["wrong, with a ?"] + total["wrong and sure"])
+    assert total["wrong and sure"] <= 2
