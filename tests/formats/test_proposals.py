@@ -176,7 +176,8 @@ def test_a_vbo_file_is_read_in_seconds_and_degrees(tmp_path: Path) -> None:
     )  # fmt: skip
     found = inspect(path)
     by_name = {column.name: column for column in found.columns}
-    assert found.time is not None and found.time.duration == pytest.approx(1.0)
+    assert found.time is not None
+    assert found.time.duration == pytest.approx(1.0)
     assert (by_name["lat"].minimum, by_name["long"].minimum) == pytest.approx((52.36, -1.66))
     assert [by_name[n].unit for n in ("velocity", "YawRate", "WheelSpFL")] == ["km/h", "deg/s", "km/h"]
 
@@ -204,7 +205,7 @@ names = st.one_of(
         "_".join,
         st.lists(
             st.sampled_from(
-                "wheel speed fl gps vx lat lon 1 0 acc x z gyro torque motor time ms kmh pitch [m/s] (g)".split()
+                ["wheel", "speed", "fl", "gps", "vx", "lat", "lon", "1", "0", "acc", "x", "z", "gyro", "torque", "motor", "time", "ms", "kmh", "pitch", "[m/s]", "(g)"]
             ),
             max_size=4,
         ),
@@ -237,7 +238,8 @@ def test_measured_headers_leaving_one_logger_out(shared: Callable[[str], Path]) 
     sys.path.insert(0, str(path.parent))
     try:
         spec = importlib.util.spec_from_file_location("bench_inspect", path)
-        assert spec is not None and spec.loader is not None
+        assert spec is not None
+        assert spec.loader is not None
         bench = importlib.util.module_from_spec(spec)
         sys.modules[spec.name] = bench
         spec.loader.exec_module(bench)
