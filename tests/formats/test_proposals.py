@@ -199,17 +199,10 @@ def test_names_are_read(name: str, concepts: set[str], wheel: str, unit: str | N
     assert (set(read_name.concepts), read_name.wheel, read_name.unit) == (concepts, wheel, unit)
 
 
+WORDS = ("wheel", "speed", "fl", "gps", "vx", "lat", "lon", "1", "0", "acc", "x", "z", "gyro", "torque")
+UNITS = ("motor", "time", "ms", "kmh", "pitch", "[m/s]", "(g)")
 names = st.one_of(
-    st.text(max_size=12),
-    st.builds(
-        "_".join,
-        st.lists(
-            st.sampled_from(
-                ["wheel", "speed", "fl", "gps", "vx", "lat", "lon", "1", "0", "acc", "x", "z", "gyro", "torque", "motor", "time", "ms", "kmh", "pitch", "[m/s]", "(g)"]
-            ),
-            max_size=4,
-        ),
-    ),
+    st.text(max_size=12), st.builds("_".join, st.lists(st.sampled_from((*WORDS, *UNITS)), max_size=4))
 )
 values = st.one_of(st.floats(width=32), st.just(np.nan), st.just(0.0), st.floats(-10, 10))
 
