@@ -102,7 +102,8 @@ class Judge:
         if guess.channel.startswith("drive_torque_") and column.name.has("current"):
             guess = replace(guess, doubt="", unit=column.unit)
         if (
-            target is not None and column.unit is not None
+            target is not None
+            and column.unit is not None
             and not own
             and _too_large(guess, self._evidence.size(candidate.column), target)
         ):
