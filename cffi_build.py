@@ -72,7 +72,7 @@ def kernel_bindings() -> list[Binding]:
         ),
     ]
     if platform.machine() in ("x86_64", "AMD64"):
-        # The generic schedule, made for older processors too, costs 5 % here (docs/decisions/0080).
+        # The generic schedule, made for older processors too, costs 5 % here (docs/decisions/0090).
         found.append(
             Binding(
                 "terragrip._kernel_avx2",

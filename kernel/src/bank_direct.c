@@ -1,4 +1,4 @@
-/* The bank's step on the modes' covariances themselves, under the bound of direct.h in each of them (docs/decisions/0081): half the work of
+/* The bank's step on the modes' covariances themselves, under the bound of direct.h in each of them (docs/decisions/0001): half the work of
  * factors, and mixing is a sum. Lower triangles, P[i][j] with j <= i, in the place of factors. */
 #include "bank.h"
 #include "direct.h"

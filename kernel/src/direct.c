@@ -1,5 +1,5 @@
 /* The exact step on the covariance itself: a third of the work of factors, and it subtracts. Sound where a bound on what is left says so
- * (docs/decisions/0023-covariance-under-a-bound.md); elsewhere the caller takes factors. Up to four wheels, double precision. */
+ * (docs/decisions/0001-ud-factors.md); elsewhere the caller takes factors. Up to four wheels, double precision. */
 #include "direct.h"
 
 #if TGI_DIRECT

@@ -1,7 +1,7 @@
 """Slip bins of pairs sorted by the vehicle's pull: each bin is then a fair sample of the ground.
 
 Slip answers to the ground: under one pull a weak spot slips more than a strong one. Sorted by their own slip, bins of high slip gather
-weak spots, and bins at 5 % leave the strongest ground out (decision 0042); noise of slip sorts too. The pull does not answer to the spot.
+weak spots, and bins at 5 % leave the strongest ground out (decision 0075); noise of slip sorts too. The pull does not answer to the spot.
 So a pair goes into the bin of the slip that the soil's mean curve gives for the vehicle's pull, its driven wheels' mean adhesion.
 The bin's adhesion is the mean over its metres. Its slip is the mean too, on the scale of the prototype curve g (PHYSICS 5): a spot of
 scale a_i has mu_i = a_i g(s_i), so that mean(mu) = a mean(g(s)), which the plain mean of s would miss where the curve bends. Random errors
