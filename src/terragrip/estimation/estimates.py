@@ -50,8 +50,9 @@ class Estimates:
     logarithmic scale. ``adaptation_<state>`` (of `aukf` and `aukf-fs` alone) are the factors a_j on the diagonal of
     A_k, one a state of the filter, by which the process noise of the row was Q_k = [I + γ_k (A_k - I)] Q_0
     (PHYSICS §6). ``curve_a`` (vehicle, and of each wheel) is the scale of the adhesion curve known so far
-    (docs/kernel.md). NaN stands only where ``event`` says why: slip and efficiency at ``standstill``, and
-    speeds in a ``gap`` before anything was measured.
+    (docs/kernel.md). ``warning`` is the score of the warning of immobilization, ``warning_<sign>`` its signs in points,
+    ``warning_usual_slip`` the slip it holds for usual (docs/events.md). NaN stands only where ``event`` says why: slip and
+    efficiency at ``standstill``, and speeds in a ``gap`` before anything was measured.
     """
 
     time: Floats
