@@ -322,6 +322,7 @@ typedef struct {
     int32_t towing;                 /* 1: a drawbar force is measured, so it is unknown until its first value; 0: none until then */
     int32_t wheel_axle[8];          /* which axle a wheel is on */
     int32_t driven[8];              /* 0: its torque is 0 */
+    int32_t powered[8];             /* 1: a motor drives it, so the watch looks at it; of no wheel: at all. A driven wheel may be merely measured */
     tg_machine machine;
     tg_tuning tuning;
     tg_real load_share[8];          /* axle: part of the weight it carries at rest on level ground */

@@ -50,7 +50,8 @@ static void add(tgi_view *sum, const tgi_view *l, tg_real weight)
     sum->travel += weight * l->travel;
 }
 
-/* Add a row to the look, weighted by how well its slip is known; returns whether that ended one, whose signals then are in the means. `since` becomes the time between two looks. */
+/* Add a row to the look, weighted by how well its slip is known; returns whether that ended one, whose signals then are in the means.
+ * `since` becomes the time between two looks. */
 static int32_t look(tg_estimator *e, double time, const tgi_view *row, tg_real *since)
 {
     tgi_digging *d = &e->watch.digging;

@@ -104,7 +104,7 @@ typedef struct { /* see digging.c */
     tg_real score;             /* their sum, low-passed */
     double time;               /* of the last look, or where the motion began */
     int32_t moving;            /* there was a look since the motion began */
-    int32_t slips;             /* slip is surely above its usual, and rises to much */
+    int32_t slips;             /* slip is surely above its usual, and rises far */
 } tgi_digging;
 
 typedef struct { /* is the vehicle about to be stuck, stuck, pushed? */
@@ -149,7 +149,7 @@ typedef struct { /* what follows from the settings alone */
     tg_real mounting_walk, terrain_walk; /* rad^2/s */
     tg_real slow_wheel;             /* s */
     tg_real pace;                   /* s, the unit of time of the watch, see digging.c */
-    int32_t watched[8], side[8];    /* wheel: driven, or no wheel is; by its place on its axle -1 left, 1 right, 0 middle */
+    int32_t watched[8], side[8];    /* wheel: powered, or no wheel is; by its place on its axle -1 left, 1 right, 0 middle */
     int32_t holds;                  /* some channel is held */
 } tgi_constants;
 

@@ -28,7 +28,7 @@ static void add_wheel(side_view *side, tg_real slip, tg_real deviation, tg_real 
     side->count++;
 }
 
-/* What the driven wheels do (of none: all). Slip and fastest rim are the worst wheel's of each side, their mean: of a diagonal that spins
+/* What the powered wheels do (of none: all). Slip and fastest rim are the worst wheel's of each side, their mean: of a diagonal that spins
  * while the other holds they are the spinning one's, in a turn the sides cancel. */
 static tgi_view view_of(const tg_estimator *e, const tg_real *o)
 {

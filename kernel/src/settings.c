@@ -210,13 +210,13 @@ static int has_channel(const tg_settings *s, int32_t slot)
 static void place_wheels(const tg_settings *s, tgi_constants *c)
 {
     int32_t any = 0;
-    for (int32_t i = 0; i < s->machine.wheels; i++) any |= s->driven[i];
+    for (int32_t i = 0; i < s->machine.wheels; i++) any |= s->powered[i];
     for (int32_t i = 0; i < s->machine.wheels; i++) {
         int32_t place = 0;
         for (int32_t j = 0; j < s->machine.wheels; j++)
             if (s->wheel_axle[j] == s->wheel_axle[i]) place += (j < i) - (j > i);
         c->side[i] = place < 0 ? -1 : place > 0;
-        c->watched[i] = !any || s->driven[i];
+        c->watched[i] = !any || s->powered[i];
     }
 }
 

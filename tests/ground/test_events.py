@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from copy import deepcopy
 from functools import cache
 from pathlib import Path
 
@@ -16,6 +17,7 @@ from terragrip.ground.events import events
 from terragrip.recording import Recording
 from terragrip.simulation import simulate
 from terragrip.simulation.soft_spots import healthy_drive, soft_spot_drive
+from terragrip.vehicle import Vehicle
 
 sys.path.insert(0, str(Path(__file__).parents[2] / "benchmarks"))  # for snow_runs.py
 from snow_runs import RADIUS, RUNS, healthy_snow, rover, snow_run
@@ -231,6 +233,17 @@ def test_the_twins_agree_of_a_spinning_diagonal_at_10_hz():
     assert {"immobilization", "stuck"} <= assert_twins_agree(
         snow_run_of(1).recording, estimates_of(snow_run_of(1))
     )
+
+
+def test_an_undriven_wheel_with_a_torque_in_the_log_is_not_watched(soft):
+    """The twin looks at the wheels that the vehicle file calls driven: so must the kernel, though it measures more."""
+    result, before = soft
+    file = deepcopy(before.about["vehicle"])
+    file["axles"]["front"]["driven"] = False
+    vehicle = Vehicle.from_dict(file)
+    assert list(vehicle.driven) == [False, False, True, True]
+    table = estimate(result.recording, vehicle)
+    assert assert_twins_agree(result.recording, table) >= {"stuck"}
 
 
 def test_sample_by_sample_and_across_a_snapshot_the_events_are_the_same(soft):

@@ -312,6 +312,7 @@ def _set_wheels(settings: Any, vehicle: Vehicle, channels: Collection[str]) -> N
         machine.inertia[i] = vehicle.wheel_inertia[i]
         machine.bearing_resistance[i] = vehicle.bearing_resistance
         settings.wheel_axle[i] = vehicle.wheel_axle[i]
+        settings.powered[i] = bool(vehicle.driven[i])
         settings.driven[i] = bool(vehicle.driven[i]) or f"drive_torque_{wheel}" in channels
 
 
