@@ -46,7 +46,7 @@ MACHINES = (
 
 @dataclass(frozen=True)
 class Verdict:
-    """Figures of one log, medians over rows of straight driving; ``nis`` is per channel over the whole log,
+    """Figures of one log, medians over rows of straight driving; ``nis`` is per channel over all moving rows,
     ``nis_straight`` over all rows whose sides turn alike; ``straight`` counts rows and wheels.
 
     ``on_the_spot`` is the median slip, by the estimator, where the sides turn against each other.
@@ -106,13 +106,13 @@ def judge(machine: Machine, recording: Recording, vehicle: Vehicle, estimates: E
 
     # Torques of the wheels come at different instants, so what one gets too much another gets too little.
     together: Floats = np.mean([estimates[f"adhesion_{w}"] for w in vehicle.wheels], axis=0)
-    with np.errstate(divide="ignore", invalid="ignore"):  # rows at rest are not looked at
+    with np.errstate(divide="ignore", over="ignore", invalid="ignore"):  # rows at rest are not looked at
         hub_slip = {w: 1 - hub[w] / (vehicle.wheel_radius[0] * of("wheel_speed_{}")[w]) for w in hub}
     return Verdict(
         log=Path(recording.source or "").name.split(".")[0],
         seconds=float(recording.time[-1] - recording.time[0]),
         held={name: 1 / period for name, period in held_periods(recording).items()},
-        nis=ratio(estimates["channels"] > 0),
+        nis=ratio(~np.isin(estimates.event_codes, [EVENTS.index("standstill"), EVENTS.index("gap")])),
         nis_straight=ratio(turning < 0.1),
         standing=float(np.mean(estimates.event_codes == EVENTS.index("standstill"))),
         straight=sum(int((straight & measured[w]).sum()) for w in vehicle.wheels),
@@ -145,7 +145,10 @@ def verdicts(machine: Machine, data: Path, method: str, smooth: bool = False) ->
 
 def table(found: list[Verdict]) -> str:
     """The figures as a Markdown table."""
-    head = "| log | s | at rest | NIS | NIS straight | straight rows | slip | hub slip | ± | adhesion | resistance | slip on the spot |"
+    head = (
+        "| log | s | at rest | NIS moving | NIS straight | straight rows "
+        "| slip | hub slip | ± | adhesion | resistance | slip on the spot |"
+    )
     rows = [
         f"| {v.log} | {v.seconds:.0f} | {100 * v.standing:.0f} % | {v.nis:.2f} | {v.nis_straight:.2f} | {v.straight} | {v.slip:.3f} | "
         f"{v.hub_slip:.3f} | {v.slip_std:.3f} | {v.adhesion:.3f} ± {v.adhesion_std:.3f} | "

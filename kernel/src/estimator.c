@@ -2,102 +2,8 @@
 #include "estimator.h"
 
 #define TG_BATCH 32
-#define TG_NO_TIME ((tg_real)1e-6) /* s */
 
 /* ---- the filter ---- */
-
-/* Considered columns, and a smoother's track, go along with whatever the filter just did. */
-static void follow(tg_estimator *e, const tg_deviation *deviation)
-{
-    tg_consider_step(&e->consider, &e->filter, deviation);
-    if (e->track) tg_track_step(e->track, &e->filter);
-}
-
-/* A filter that has lost its way knows the priors again. */
-static void forget(tg_estimator *e)
-{
-    tgi_filter_anew(&e->filter, &e->consider, &e->settings);
-    if (e->track) tg_track_init(e->track, &e->filter);
-    e->scene.anew = 1;
-}
-
-/* Start the outputs anew at `outputs`, the parameters having walked for `walk` seconds. */
-static void restart(tg_estimator *e, tg_real walk, const tg_real *outputs, const tg_real *variances)
-{
-    if (walk > e->settings.tuned.longest_walk) walk = e->settings.tuned.longest_walk;
-    if (tg_filter_restart(&e->filter, walk, outputs, variances) != TG_OK) {
-        forget(e);
-        tg_filter_restart(&e->filter, 0, outputs, variances);
-    }
-    follow(e, NULL);
-}
-
-/* Outputs as this row measures them, along the travel. What it does not measure follows from the rest, broadly: a wheel from the
- * ground speed, the ground speed from the wheels or, but for a `start` from rest or a turn of direction, from what it just was. */
-static void restart_from(tg_estimator *e, const tg_row *row, int32_t start, tg_real walk)
-{
-    const tg_settings *s = &e->settings;
-    const int32_t n = s->machine.wheels;
-    const tg_real d = (tg_real)e->direction, *y = row->value;
-    tg_real x[9], P[9], rim = 0, v = y[TG_GROUND_SPEED];
-    int32_t seen = 0;
-    for (int32_t i = 0; i < n; i++) {
-        if (isnan(y[TG_WHEEL_SPEED + i])) continue;
-        rim += s->rolling_radius[i] * y[TG_WHEEL_SPEED + i];
-        seen++;
-    }
-    int32_t late = !start && isnan(v) && e->ground_speed.seen && row->time - e->ground_speed.time <= 1;
-    if (late) v = e->ground_speed.value;
-    else if (isnan(v)) v = seen ? rim / (tg_real)seen : 0;
-    tg_real broad = tgi_square((tg_real)0.3 * tgi_fabs(v) + (tg_real)0.1), noise = tgi_square(s->noise[TG_GROUND_SPEED]) + row->doubt[n];
-    x[n] = d * v;
-    P[n] = isnan(y[TG_GROUND_SPEED]) ? (late ? noise + (tg_real)0.01 : broad) : noise;
-    for (int32_t i = 0; i < n; i++) {
-        tg_real omega = y[TG_WHEEL_SPEED + i], r = s->rolling_radius[i];
-        x[i] = d * (isnan(omega) ? v / r : omega);
-        P[i] = isnan(omega) ? broad / (r * r) : tgi_square(s->noise[TG_WHEEL_SPEED + i]) + row->doubt[i];
-    }
-    restart(e, walk, x, P);
-}
-
-/* What adhesion was before a standstill or a turn of direction says little of the start: it is as unknown as at first. No time passes, but
- * the filter takes a time above 0. */
-static void unknown_adhesion(tg_estimator *e)
-{
-    const int32_t n = e->settings.machine.wheels;
-    tg_real q[TG_MAX_STATES] = {0};
-    for (int32_t i = 0; i < n; i++) q[n + 1 + i] = tgi_square(e->settings.prior_adhesion_std);
-    if (tg_filter_predict(&e->filter, TG_NO_TIME, &e->held, q) == TG_OK) follow(e, NULL);
-}
-
-/* At standstill the low-passed speeds stand for the outputs. */
-static void rest(tg_estimator *e)
-{
-    const tg_settings *s = &e->settings;
-    const int32_t n = s->machine.wheels;
-    tg_real d = (tg_real)e->direction, x[9], P[9];
-    for (int32_t i = 0; i < n; i++) {
-        x[i] = d * e->wheel_speed[i].value;
-        P[i] = tgi_square(s->noise[TG_WHEEL_SPEED + i]);
-    }
-    x[n] = d * e->ground_speed.value;
-    P[n] = tgi_square(s->noise[TG_GROUND_SPEED]);
-    restart(e, 0, x, P);
-}
-
-/* Nothing measured for too long: the estimate stays and its spread grows, since old torques must not be integrated. */
-static void drift(tg_estimator *e, tg_real dt)
-{
-    const int32_t n = e->settings.machine.wheels, stride = tgi_stride(n);
-    tg_real x[9], P[9], longest = e->settings.tuned.longest_walk, step = dt > longest ? longest : dt;
-    for (int32_t j = 0; j <= n; j++) {
-        tg_real r = j < n ? e->settings.rolling_radius[j] : 1;
-        int32_t row = tgi_row(n, j);
-        x[j] = e->belief.x[row];
-        P[j] = e->belief.P[row * stride + row] + step / (r * r); /* 1 m/s after 1 s */
-    }
-    restart(e, dt, x, P);
-}
 
 /* The row's channels along the travel, and their variances. The accelerometer's jolts come in swings, not as white noise, and so count
  * TG_SWING times. */
@@ -192,15 +98,15 @@ static int32_t advance(tg_estimator *e, tg_row *row, const tg_drive *drive, tg_r
     tg_status status = TG_OK;
     for (int32_t k = 1; k < pieces && status == TG_OK; k++) {
         status = tg_filter_predict(&e->filter, dt, &over, q);
-        if (status == TG_OK) follow(e, e->deviation);
+        if (status == TG_OK) tgi_follow(e, e->deviation);
     }
     if (status == TG_OK) status = tg_filter_step(&e->filter, dt, &over, &now, q, y, r, &step);
     if (status != TG_OK) {
-        forget(e);
-        restart_from(e, row, 0, 0);
+        tgi_forget(e);
+        tgi_restart_from(e, row, 0, 0);
         return 0;
     }
-    follow(e, e->deviation);
+    tgi_follow(e, e->deviation);
     watch_jolts(e, &step, r[s->machine.wheels + 1], dt);
     watch_consistency(e, row, &step, r);
     e->belief.supervisor = supervisor_of(e, &step);
@@ -210,7 +116,7 @@ static int32_t advance(tg_estimator *e, tg_row *row, const tg_drive *drive, tg_r
 
 /* ---- a row ---- */
 
-typedef enum { TG_WAIT, TG_ANEW, TG_DRIFT, TG_REST, TG_GO } tg_course;
+typedef enum { TG_WAIT, TG_ANEW, TG_DRIFT, TG_REST, TG_START, TG_GO } tg_course; /* TG_START: goes on from rest */
 
 static tg_course course_of(const tg_estimator *e, const tg_row *row, int32_t was_standing, int32_t turned, int32_t *gap)
 {
@@ -219,7 +125,7 @@ static tg_course course_of(const tg_estimator *e, const tg_row *row, int32_t was
     if (!e->seen_motion) return row->measured ? (e->standing ? TG_REST : TG_ANEW) : TG_WAIT;
     if (*gap && !row->measured) return TG_DRIFT;
     if (e->standing) return TG_REST;
-    return *gap || turned || was_standing ? TG_ANEW : TG_GO;
+    return *gap || turned ? TG_ANEW : was_standing ? TG_START : TG_GO;
 }
 
 static void balance_forces(tg_estimator *e, const tg_drive *drive, double time)
@@ -232,24 +138,33 @@ static void balance_forces(tg_estimator *e, const tg_drive *drive, double time)
     tgi_lowpass(&e->balance, e->standing ? 0 : d * force * e->constants.inverse_mass, time, e->settings.load_filter);
 }
 
-static int32_t go_on(tg_estimator *e, tg_row *row, const tg_drive *drive, tg_course course, int32_t start, tg_real dt, tg_real *q)
+static int32_t go_on(tg_estimator *e, tg_row *row, const tg_drive *drive, tg_course course, int32_t turned, tg_real dt, tg_real *q)
 {
     int32_t sound = 1;
+    const int32_t start = course == TG_START || (course == TG_ANEW && turned);
     tg_belief *b = &e->belief;
     b->nis = b->supervisor = 0;
     e->scene.anew = 0;
     b->channels = 0;
     if (e->settings.method == TG_ALGEBRAIC) {
-        if (course == TG_ANEW || course == TG_GO) tgi_algebraic(e, row, drive, course == TG_ANEW);
+        if (course != TG_WAIT && course != TG_DRIFT && course != TG_REST) tgi_algebraic(e, row, drive, course != TG_GO);
         return 1;
     }
-    if (course == TG_ANEW) restart_from(e, row, start, dt);
-    if (course == TG_ANEW && start && e->started) unknown_adhesion(e);
-    if (course == TG_DRIFT) drift(e, dt);
-    else if (course == TG_REST) rest(e);
-    else if (course == TG_GO) sound = advance(e, row, drive, dt, q);
+    if (course == TG_ANEW) tgi_restart_from(e, row, start, dt);
+    if (start && e->started) tgi_unknown_adhesion(e);
+    if (course == TG_DRIFT) tgi_drift(e, dt);
+    else if (course == TG_REST) tgi_rest(e);
+    else if (course == TG_GO || course == TG_START) sound = advance(e, row, drive, dt, q);
     tgi_believe(e);
     return sound;
+}
+
+/* No wheel speed was measured for longer than a gap: what the model makes of the wheels since then is no slip. */
+static int32_t wheels_are_silent(const tg_estimator *e, double time)
+{
+    for (int32_t i = 0; i < e->settings.machine.wheels; i++)
+        if (e->wheel[i].count > 0 && time - e->wheel[i].time <= (double)e->settings.gap) return 0;
+    return 1;
 }
 
 static void report(tg_estimator *e, const tg_drive *drive, tg_estimate *out)
@@ -259,7 +174,7 @@ static void report(tg_estimator *e, const tg_drive *drive, tg_estimate *out)
     for (int32_t i = 0; i < e->settings.machine.wheels; i++)
         e->scene.hub[i] = -(tg_real)e->direction * e->settings.wheel_side[i] * e->yaw_rate;
     e->scene.direction = (tg_real)e->direction;
-    e->scene.standing = (tg_real)e->standing;
+    e->scene.standing = (tg_real)(e->standing || wheels_are_silent(e, out->time));
     e->scene.seen_motion = (tg_real)e->seen_motion;
     e->scene.roughness = e->roughness.wander;
     e->scene.unseen_load = tgi_unseen_load(e);
@@ -278,6 +193,16 @@ static void tell_adaptation(const tg_estimator *e, tg_real *o)
     if (policy != TG_ADAPTIVE && policy != TG_SUPERVISED) return;
     for (int32_t j = 0; j < e->filter.states; j++)
         o[TG_OUT_ADAPTATION + j] = e->filter.policy.adaptation.scale[tgi_row(e->filter.wheels, j)];
+}
+
+/* Whether nothing tells slip: after a gap, before both a wheel speed and the ground speed are back, and while wheels are silent. */
+static int32_t is_blind(tg_estimator *e, const tg_row *row, int32_t gap)
+{
+    if (gap) e->unseen = 3;
+    for (int32_t i = 0; i < e->settings.machine.wheels; i++)
+        if (e->wheel[i].count > 0 && e->wheel[i].time == row->time) e->unseen &= ~1;
+    if (e->ground.count > 0 && e->ground.time == row->time) e->unseen &= ~2;
+    return e->unseen != 0 || wheels_are_silent(e, row->time);
 }
 
 /* What blinds comes first, then what stops the vehicle. */
@@ -318,7 +243,7 @@ tg_status tg_estimator_update(tg_estimator *e, const tg_sample *sample, tg_estim
     tgi_reckon(e, &drive, course == TG_GO ? dt : 0, &row, q);
     if (e->settings.method == TG_FILTERED) tgi_hold_wheels(e, course == TG_GO ? dt : 0, &row);
     tell_adaptation(e, out->value);
-    const int32_t lost = !go_on(e, &row, &drive, course, was_standing || turned, dt, q), breaks = gap || lost;
+    const int32_t lost = !go_on(e, &row, &drive, course, turned, dt, q), breaks = gap || lost;
     balance_forces(e, &drive, row.time);
     tgi_watch_roughness(e, course == TG_GO && !breaks, e->standing ? 0 : travelled * dt);
     if (course == TG_GO && !row.reckoned && !isnan(row.value[TG_GROUND_SPEED])) tgi_remember_slip(e, &drive, dt);
@@ -334,8 +259,9 @@ tg_status tg_estimator_update(tg_estimator *e, const tg_sample *sample, tg_estim
     out->time = row.time;
     out->distance = e->distance;
     report(e, &drive, out);
-    tgi_watch_over(e, &row, &drive, course == TG_GO || course == TG_ANEW, course == TG_ANEW || breaks, dt, out->value);
-    out->event = event_of(e, &row, gap || course == TG_WAIT, lost);
+    const int32_t blind = is_blind(e, &row, breaks) && course != TG_WAIT, moves = course == TG_GO || course == TG_START || course == TG_ANEW;
+    tgi_watch_over(e, &row, &drive, !blind && moves, blind || course == TG_START || course == TG_ANEW || breaks, dt, out->value);
+    out->event = event_of(e, &row, gap || blind || course == TG_WAIT, lost);
     const int32_t learn = out->event == TG_EVENT_NONE || out->event == TG_EVENT_IMMOBILIZATION;
     tgi_curves(e, course == TG_GO && learn && !row.outlier, dt, e->standing ? 0 : travelled * dt, drive.load, out->value);
     return TG_OK;

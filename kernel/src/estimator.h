@@ -13,7 +13,8 @@ typedef struct { /* an input between its samples */
     tg_real calm;     /* last sample that was no spike */
     tg_real mean;     /* over the step that ends with this row */
     tg_real level;    /* mean square of its increments, spikes clipped */
-    tg_real interval; /* s between its last two samples */
+    tg_real interval; /* s between its last two samples, */
+    tg_real step;     /* square of the change between them */
     tg_real spike;    /* square of the last increment where that was a spike, else 0 */
     double time;      /* of the last sample */
     int32_t count;    /* samples seen, saturating */
@@ -41,7 +42,7 @@ typedef struct { /* one row, calibrated and checked, in the vehicle's own direct
 typedef struct { /* what a row's values need beside the belief; all reals, so that it goes into a record */
     tg_real load[8]; /* wheel, N */
     tg_real hub[8];  /* wheel, m/s: what its hub is faster than the vehicle, along the travel */
-    tg_real direction, standing, seen_motion;
+    tg_real direction, standing, seen_motion; /* standing: or else without a slip */
     tg_real roughness; /* mean square of what rho_s wanders over uneven ground, see roughness.c */
     tg_real unseen_load; /* relative variance of a wheel's load */
     tg_real anew; /* the filter was started anew: nothing links this row to the one before */
@@ -161,12 +162,13 @@ struct tg_estimator {
     int32_t seen_motion;       /* a wheel or ground speed was seen: the outputs are numbers */
     int32_t standing;          /* at standstill */
     int32_t direction;         /* of travel: 1 forward, -1 in reverse */
-    double first_time, time, measured_time, distance;
+    double time, measured_time, distance;
     tg_real last_raw[TG_SLOTS];
     double last_raw_time[TG_SLOTS];
     tg_hold torque[8], drawbar, pitch, axle_load[8];
     tg_hold wheel[8], ground;  /* speeds */
     int32_t sparse_wheels;
+    int32_t unseen;            /* since a gap: bit 0 no wheel speed, bit 1 no ground speed was measured */
     tg_real yaw_rate;
     double yaw_time;           /* of its last sample */
     double slow_time;          /* when the ground speed was last near 0 */
@@ -234,6 +236,14 @@ void tgi_reckon(tg_estimator *e, const tg_drive *drive, tg_real dt, tg_row *row,
 TG_INLINE tg_real tgi_rough_adhesion(const tgi_scene *scene, tg_real mu) { return scene->unseen_load * tgi_square(mu); }
 tg_real tgi_unseen_load(const tg_estimator *e);
 void tgi_watch_roughness(tg_estimator *e, int32_t flowing, tg_real distance);
+
+/* restarts.c */
+void tgi_follow(tg_estimator *e, const tg_deviation *deviation);
+void tgi_forget(tg_estimator *e);
+void tgi_restart_from(tg_estimator *e, const tg_row *row, int32_t start, tg_real walk);
+void tgi_unknown_adhesion(tg_estimator *e);
+void tgi_rest(tg_estimator *e);
+void tgi_drift(tg_estimator *e, tg_real dt);
 
 /* algebraic.c */
 void tgi_algebraic(tg_estimator *e, const tg_row *row, const tg_drive *drive, int32_t anew);

@@ -43,6 +43,7 @@ void tgi_hold_update(tg_hold *h, const tg_tuned *k, tg_real x, double time, tg_r
         } else {
             track(h, x, h->level - 2 * noise * noise, noise, interval, k->input_lag);
             h->calm = x;
+            h->step = tgi_square(x - before);
             h->mean = x - (x - before) * (dt < interval ? dt / interval : 1) / 2; /* of a straight line since the last sample */
             h->fresh = 1;
         }
@@ -56,19 +57,68 @@ void tgi_hold_update(tg_hold *h, const tg_tuned *k, tg_real x, double time, tg_r
     if (h->count < 100) h->count++;
 }
 
+/* The leap was the vehicle's own. */
+static void believe_leap(tg_hold *h, tg_real dt)
+{
+    h->mean = h->raw - (h->raw - h->calm) * (dt < h->interval ? dt / h->interval : 1) / 2;
+    h->step = h->spike;
+    h->value = h->calm = h->raw;
+    h->spike = 0;
+    h->fresh = 1;
+}
+
+/* Torques that leap at the same instant on most of the driven wheels are a manoeuvre, no spikes. */
+static void judge_leaps(tg_estimator *e, double time, tg_real dt)
+{
+    int32_t leaps = 0, driven = 0;
+    for (int32_t i = 0; i < e->settings.machine.wheels; i++) {
+        driven += e->settings.driven[i] != 0;
+        leaps += e->torque[i].spike > 0 && e->torque[i].time == time;
+    }
+    if (leaps < 2 || 2 * leaps <= driven) return;
+    for (int32_t i = 0; i < e->settings.machine.wheels; i++)
+        if (e->torque[i].spike > 0 && e->torque[i].time == time) believe_leap(&e->torque[i], dt);
+}
+
 /* Error of one input as extra variance of its state over the step that ends at `time`. Where the step ends with a sample, the mean over
- * it is known but for the noise of two samples and what the input does beside the straight line: a random walk of this motion, the twelfth of
- * it (Brownian bridge). Where it does not, the last value stands: its error stays the same, so that `age` after it it has moved the state
+ * it is known but for the noise of two samples and what the input does beside the straight line: the twelfth of its squared increment, whether it
+ * walks at random (Brownian bridge) or leaps at some instant in between. Where it does not, the last value stands: its error stays the same, so that `age` after it it has moved the state
  * by (age error), and this step adds error^2 (age^2 - (age - dt)^2); and the input wanders on as a random walk w, of whose integral the
  * variance is w age^3/3. `unknown` is the variance before the first sample and once the last one is older than a gap. */
 static tg_real held_noise(const tg_estimator *e, const tg_hold *h, double time, tg_real dt, tg_real noise, tg_real unknown)
 {
     if (h->count == 0) return dt * unknown;
-    const tg_real motion = h->level - 2 * noise * noise, walk = motion > 0 && h->interval > 0 ? motion / h->interval : 0;
-    if (h->fresh) return dt * dt * (noise * noise / 2 + walk * dt / 12);
+    const tg_real white = 2 * noise * noise, usual = h->level > white ? h->level - white : 0, now = h->step > white ? h->step - white : 0;
+    const tg_real walk = h->interval > 0 ? usual / h->interval : 0, most = h->interval > 0 && now > usual ? now / h->interval : walk;
+    if (h->fresh) return dt * dt * (noise * noise / 2 + most * dt / 12);
     const tg_real age = h->spike > 0 && time == h->time ? dt : (tg_real)(time - h->time), since = age - dt;
     const tg_real constant = noise * noise + h->spike + (age > e->settings.gap ? unknown : 0);
     return dt * (2 * age - dt) * constant + walk * (age * age * age - since * since * since) / 3;
+}
+
+/* Factor on the walks that the filter goes by: of the bank the mean over its modes, as they may have changed in dt. */
+static tg_real scale_of_walks(const tg_estimator *e, tg_real dt)
+{
+    const tg_tuning *t = &e->settings.tuning;
+    if (t->policy != TG_BANK) return 1;
+    const tg_real leave = -tgi_expm1(-dt / t->dwell);
+    tg_real mean = 0;
+    for (int32_t b = 0; b < TG_MODES; b++) {
+        const tg_real p = e->filter.policy.bank.probability[b];
+        mean += t->scales[b] * (p * (1 - leave) + (1 - p) * leave / (TG_MODES - 1));
+    }
+    return mean;
+}
+
+/* What adhesion and resistance, walking at random within the step, do to the ground speed in it: a third of the walk times dt^2. The filter
+ * itself lets them walk after the step, which at 1 Hz would make an outlier of every start. */
+static tg_real walking_forces(const tg_estimator *e, tg_real dt)
+{
+    const tg_settings *s = &e->settings;
+    const int32_t n = s->machine.wheels;
+    tg_real walk = s->tuning.walk[2 * n + 1] * tgi_square(s->machine.gravity);
+    for (int32_t i = 0; i < n; i++) walk += s->tuning.walk[n + 1 + i] * tgi_square(e->held.load[i] * e->constants.inverse_mass);
+    return scale_of_walks(e, dt) * walk * dt * dt * dt / 3;
 }
 
 /* Input noise of the step that ends at `time`, from the inputs as they stood over it (PHYSICS 1: torque moves omega, drawbar
@@ -79,6 +129,7 @@ void tgi_input_noise(const tg_estimator *e, double time, tg_real dt, tg_real *q)
     const tgi_constants *c = &e->constants;
     const int32_t n = s->machine.wheels;
     for (int32_t j = 0; j < TG_MAX_STATES; j++) q[j] = 0;
+    q[n] = walking_forces(e, dt);
     for (int32_t i = 0; i < n; i++)
         if (s->driven[i])
             q[i] = held_noise(e, &e->torque[i], time, dt, s->noise[TG_DRIVE_TORQUE + i], c->unknown_torque[i])
@@ -94,9 +145,13 @@ void tgi_take_inputs(tg_estimator *e, tg_row *row, tg_real dt, tg_drive *drive)
     const tg_settings *s = &e->settings;
     memset(drive, 0, sizeof *drive);
     for (int32_t i = 0; i < s->machine.wheels; i++) {
+        const int32_t slot = TG_DRIVE_TORQUE + i;
+        if (s->driven[i]) tgi_hold_update(&e->torque[i], &s->tuned, row->value[slot], row->time, dt, s->noise[slot], 0);
+    }
+    judge_leaps(e, row->time, dt);
+    for (int32_t i = 0; i < s->machine.wheels; i++) {
         if (!s->driven[i]) continue;
-        tg_hold *h = &e->torque[i];
-        tgi_hold_update(h, &s->tuned, row->value[TG_DRIVE_TORQUE + i], row->time, dt, s->noise[TG_DRIVE_TORQUE + i], 0);
+        const tg_hold *const h = &e->torque[i];
         drive->torque[i] = h->calm;
         drive->mean_torque[i] = h->mean;
         row->outlier |= h->spike > 0;

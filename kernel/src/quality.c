@@ -102,6 +102,16 @@ static int32_t moves(tg_estimator *e, tg_real ground, double time)
     return !e->standing || time - e->slow_time > TG_LEAP;
 }
 
+/* First-order low-pass, exact also where samples are further apart than tau. */
+static tg_real settle(tg_lowpass *f, tg_real x, double time, tg_real tau)
+{
+    if (isnan(x)) return f->value;
+    f->value = f->seen ? f->value - tgi_expm1(-(tg_real)(time - f->time) / tau) * (x - f->value) : x;
+    f->time = time;
+    f->seen = 1;
+    return f->value;
+}
+
 /* A speed as soon as its noise allows to tell it from standstill: low-passed until that is a quarter of the threshold, and not longer than
  * tau. */
 static tg_real soon(tg_lowpass *f, tg_real x, double time, tg_real tau, tg_real noise, tg_real threshold)
@@ -123,10 +133,10 @@ int32_t tgi_track_motion(tg_estimator *e, const tg_row *row)
     const tg_settings *s = &e->settings;
     const tg_real tau = (tg_real)0.2, age = 1;
     int32_t n = s->machine.wheels, seen = 0;
-    tg_real fastest = 0, soonest = 0, over = 0, rim = 0, ground = tgi_lowpass(&e->ground_speed, row->doubt[n] > 0 ? (tg_real)NAN : row->value[TG_GROUND_SPEED], row->time, tau);
+    tg_real fastest = 0, soonest = 0, over = 0, rim = 0, ground = settle(&e->ground_speed, row->doubt[n] > 0 ? (tg_real)NAN : row->value[TG_GROUND_SPEED], row->time, tau);
     for (int32_t i = 0; i < n; i++) {
         const tg_real measured = row->doubt[i] > 0 ? (tg_real)NAN : row->value[TG_WHEEL_SPEED + i];
-        const tg_real w = s->rolling_radius[i] * tgi_lowpass(&e->wheel_speed[i], measured, row->time, tau);
+        const tg_real w = s->rolling_radius[i] * settle(&e->wheel_speed[i], measured, row->time, tau);
         const tg_real r = s->rolling_radius[i], noise = s->noise[TG_WHEEL_SPEED + i];
         const tg_real now = r * soon(&e->soon[i], measured, row->time, tau, noise, s->standstill_speed / r);
         if (!recent(&e->wheel_speed[i], row->time, s->gap)) continue;
@@ -143,10 +153,11 @@ int32_t tgi_track_motion(tg_estimator *e, const tg_row *row)
         ground = rim;
     }
     if (seen == 0) return 0;
-    const tg_real threshold = s->standstill_speed, leave = e->standing ? (tg_real)1.25 : 1; /* a ground speed at rest wanders more */
-    e->standing = fastest < leave * threshold && soonest < leave * threshold && over < (e->standing ? 2 : 1) * threshold;
+    const tg_real threshold = s->standstill_speed, leave = e->standing ? (tg_real)1.25 : 1; /* a ground speed at rest wanders by its noise */
+    e->standing = fastest < leave * threshold && soonest < leave * threshold && over < (e->standing ? 2 : 1) * threshold + 2 * s->noise[TG_GROUND_SPEED];
 
-    tg_real motion = (ground + rim) / 2;
+    const tg_real trust = 1 / (1 + tgi_square(s->noise[TG_GROUND_SPEED] / s->standstill_speed)); /* a noisy ground speed says less than the wheels */
+    tg_real motion = (rim + trust * ground) / (1 + trust);
     if (e->standing || tgi_fabs(motion) < s->standstill_speed) return 0;
     int32_t direction = motion > 0 ? 1 : -1, turned = direction != e->direction;
     e->direction = direction;

@@ -2,15 +2,17 @@
  * and soil resistance apart, and the estimate of v runs off with every error of the forces. */
 #include "estimator.h"
 
-/* Mean rim speed and mean adhesion over the load, along the travel. */
-static void means(const tg_estimator *e, const tg_drive *drive, tg_real *rim, tg_real *adhesion)
+/* Mean rim speed, of this row where it measures it (row null: as believed), and mean adhesion over the load, along the travel. */
+static void means(const tg_estimator *e, const tg_row *row, const tg_drive *drive, tg_real *rim, tg_real *adhesion)
 {
     const int32_t n = e->settings.machine.wheels;
     tg_real load = 0, pull = 0, speed = 0;
     for (int32_t i = 0; i < n; i++) {
         load += drive->load[i];
         pull += drive->load[i] * e->belief.x[i];
-        speed += e->settings.rolling_radius[i] * e->belief.x[n + 2 + i];
+        const int32_t known = row && !isnan(row->value[TG_WHEEL_SPEED + i]) && !(row->doubt[i] > 0);
+        const tg_real omega = known ? (tg_real)e->direction * row->value[TG_WHEEL_SPEED + i] : e->belief.x[n + 2 + i];
+        speed += e->settings.rolling_radius[i] * omega;
     }
     *rim = speed / (tg_real)n;
     *adhesion = pull / load;
@@ -21,7 +23,7 @@ void tgi_remember_slip(tg_estimator *e, const tg_drive *drive, tg_real dt)
 {
     tgi_slip_memory *m = &e->slip_memory;
     tg_real rim, adhesion, v = e->belief.x[e->settings.machine.wheels + 1];
-    means(e, drive, &rim, &adhesion);
+    means(e, NULL, drive, &rim, &adhesion);
     if (rim < 3 * e->settings.standstill_speed) return;
     tg_real slip = 1 - v / rim, gain = dt / (e->settings.tuned.slip_memory + dt);
     if (slip < (tg_real)-0.2) slip = (tg_real)-0.2;
@@ -51,7 +53,7 @@ void tgi_reckon(tg_estimator *e, const tg_drive *drive, tg_real dt, tg_row *row,
     }
     tg_real silence = (tg_real)(row->time - e->ground_time), rim, adhesion;
     if (silence < k->silence || !row->measured || !(dt > 0)) return;
-    means(e, drive, &rim, &adhesion);
+    means(e, row, drive, &rim, &adhesion);
     tg_real spread = tgi_square(k->slip_spread) * (1 + silence / 5), alike = k->alike, force = k->reckoned_force * e->constants.force_walk;
     if (spread > tgi_square((tg_real)0.15)) spread = tgi_square((tg_real)0.15);
     tg_real speed = (tg_real)e->direction * rim * (1 - slip_at(&e->slip_memory, k->most_slope, adhesion));
@@ -66,5 +68,6 @@ void tgi_reckon(tg_estimator *e, const tg_drive *drive, tg_real dt, tg_row *row,
     row->value[TG_GROUND_SPEED] = speed;
     row->ground_variance = variance * (1 + 2 * alike / dt);
     row->reckoned = 1;
-    q[e->settings.machine.wheels] += force * dt;
+    const tg_real change = e->slope.running ? 0 : k->agility * e->settings.machine.gravity * dt; /* any acceleration up to half of that */
+    q[e->settings.machine.wheels] += force * dt + tgi_square(change) / 12;
 }

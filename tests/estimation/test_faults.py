@@ -61,7 +61,8 @@ def test_rows_without_any_speed_are_a_gap_too():
     event, rows = found["event"], np.flatnonzero(dead)
     assert (event[rows[210] : rows[-1] + 2] == "gap").all()
     assert (event[rows[0] : rows[180]] == "").all()
-    assert np.isfinite(found["slip_rr"]).all()
+    assert np.isfinite(found["slip_rr"][event != "gap"]).all()
+    assert np.isnan(found["slip_rr"][rows[210] : rows[-1]]).all()  # nothing tells it
     assert found["adhesion_rr_std"][rows[-1]] > 2 * found["adhesion_rr_std"][rows[0]]
 
 

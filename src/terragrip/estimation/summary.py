@@ -17,6 +17,8 @@ if TYPE_CHECKING:
 
 Floats = npt.NDArray[np.float64]
 
+STANDSTILL = EVENTS.index("standstill")
+
 _SAMPLE = 20_000  # rows a block that medians are taken from,
 _MOST = 200_000  # and rows in all
 _EXPECTED = (0.7, 1.4)  # of the normalised innovation squared a channel
@@ -51,8 +53,9 @@ class Tally:
             self.distance = float(np.nanmax(block["distance"]))
         self._count_events(block.event_codes)
         if "nis" in block and "channels" in block:
-            self.nis += float(np.nansum(block["nis"]))
-            self.channels += float(np.nansum(block["channels"]))
+            moves = block.event_codes != STANDSTILL  # a machine at rest is quieter than its sensors' noise
+            self.nis += float(np.nansum(block["nis"][moves]))
+            self.channels += float(np.nansum(block["channels"][moves]))
         moving = np.flatnonzero(block.event_codes == 0)
         chosen = moving[:: max(1, len(moving) // _SAMPLE)]
         for name in (n for _, n, _ in _quantities(self.wheels) if n in block):

@@ -1,0 +1,140 @@
+"""What each tuned number of the estimator does: halved and doubled, on the development families.
+
+    python benchmarks/bench_constants.py [--machines 12] [--rates 100 20] [--only NAME ...] [--write]
+
+The numbers are tg_tuned (kernel/include/terragrip.h), the bank's scales, all together, and `huber`. A line a number: R² of
+adhesion less that with the number as it is, median and worst machine over all rates, and NIS a channel of moving rows. Every log
+loses its ground speed for 8 s and everything for 3 s, and half of them their pitch and accelerometer, so that each number has
+something to do. --write puts the table into docs/families.md.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from bench_families import DOCUMENT, Floats, moving_rows, pooled_r2
+from marked import put
+from terragrip._kernel import ffi, lib
+from terragrip.estimation import estimator as estimator_module
+from terragrip.estimation.batch import estimate
+from terragrip.estimation.engine import EVENTS
+from terragrip.simulation import SimulationResult
+from terragrip.simulation.families import draw, machines
+
+BEGIN = "<!-- made by benchmarks/bench_constants.py --write -->"
+AT_REST = [EVENTS.index("standstill"), EVENTS.index("gap")]
+as_set = estimator_module.settings_of
+
+
+@dataclass(frozen=True)
+class Figures:
+    """R² of adhesion and NIS a channel, a number a machine and rate."""
+
+    r2: Floats
+    nis: Floats
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
+    parser.add_argument("--machines", type=int, default=12)
+    parser.add_argument("--rates", type=float, nargs="+", default=[100.0, 20.0])
+    parser.add_argument("--only", nargs="+", help="these numbers")
+    parser.add_argument("--write", action="store_true", help="put the table into docs/families.md")
+    arguments = parser.parse_args()
+    drawn = [
+        draw(kind, seed, rate=rate)
+        for kind, seed in machines("development", arguments.machines, 0)
+        for rate in arguments.rates
+    ]
+    drawn = [damaged(result, bare=k % 2 == 1) for k, result in enumerate(drawn)]
+    usual = figures(drawn, lambda settings: None)
+    lines = [
+        "| number | value | halved: R² median | worst | NIS | doubled: R² median | worst | NIS |",
+        "|---|---:|---:|---:|---:|---:|---:|---:|",
+        f"| as they are | | | | {np.median(usual.nis):.2f} | | | {np.median(usual.nis):.2f} |",
+    ]
+    for name, value in numbers().items():
+        if arguments.only and name not in arguments.only:
+            continue
+        cells = [name, value]
+        for factor in (0.5, 2.0):
+            found = figures(drawn, scaled(name, factor))
+            change = found.r2 - usual.r2
+            cells += [f"{np.median(change):+.4f}", f"{change.min():+.4f}", f"{np.median(found.nis):.2f}"]
+        lines.append("| " + " | ".join(cells) + " |")
+        print(lines[-1], flush=True)
+    text = "\n".join(lines)
+    print("\n" + text)
+    if arguments.write:
+        put(DOCUMENT, BEGIN, text)
+        print(f"written to {DOCUMENT}")
+
+
+def damaged(result: SimulationResult, bare: bool) -> SimulationResult:
+    """The result whose log lacks the ground speed for 8 s, everything for 3 s and, if ``bare``, the inertial unit."""
+    log = result.recording
+    time, middle = log.time - log.time[0], float(log.time[-1] - log.time[0]) / 2
+    silent, dead = (time > middle) & (time < middle + 8), (time > middle + 15) & (time < middle + 18)
+    channels = {
+        name: np.where(dead | (silent & (name == "ground_speed")), np.nan, values)
+        for name, values in log.channels.items()
+        if not (bare and name.startswith(("acceleration", "pitch", "angular")))
+    }
+    return replace(result, recording=replace(log, channels=channels))
+
+
+def numbers() -> dict[str, str]:
+    """Every tuned number by name, and its value."""
+    settings = lib.tg_default_settings()
+    found = {name: f"{getattr(settings.tuned, name):.3g}" for name, _ in ffi.typeof("tg_tuned").fields}
+    found["scales"] = " ".join(f"{scale:g}" for scale in settings.tuning.scales)
+    for name in ("huber", "dwell"):
+        found[name] = f"{getattr(settings.tuning, name):g}"
+    return found
+
+
+def scaled(name: str, factor: float) -> Callable[[Any], None]:
+    """A change of settings: this number times `factor`."""
+
+    def change(settings: Any) -> None:
+        if name == "scales":
+            for k in range(len(settings.tuning.scales)):
+                settings.tuning.scales[k] *= factor
+        else:
+            holder = settings.tuning if name in ("huber", "dwell") else settings.tuned
+            setattr(holder, name, getattr(holder, name) * factor)
+        lib.tg_tune_walks(settings)
+
+    return change
+
+
+def figures(drawn: list[SimulationResult], change: Callable[[Any], None]) -> Figures:
+    """All recordings with the settings changed."""
+
+    def changed(*arguments: Any, **named: Any) -> Any:
+        settings = as_set(*arguments, **named)
+        change(settings)
+        return settings
+
+    estimator_module.settings_of = changed
+    r2, nis = [], []
+    for result in drawn:
+        found = estimate(result.recording, result.vehicle)
+        wheels = [w for w, driven in zip(result.vehicle.wheels, result.vehicle.driven, strict=True) if driven]
+        measured = np.isfinite(result.recording[f"wheel_speed_{wheels[0]}"])
+        rows = moving_rows(result) & measured
+        truth = np.stack([result.truth[f"true_adhesion_{w}"] for w in wheels], axis=1)
+        r2.append(pooled_r2(truth, np.stack([found[f"adhesion_{w}"] for w in wheels], axis=1), rows))
+        taken = (found["channels"] > 0) & ~np.isin(found.event_codes, AT_REST)
+        nis.append(float(found["nis"][taken].sum() / found["channels"][taken].sum()))
+    estimator_module.settings_of = as_set
+    return Figures(np.array(r2), np.array(nis))
+
+
+if __name__ == "__main__":
+    main()

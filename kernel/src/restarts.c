@@ -1,0 +1,97 @@
+/* How the filter goes on where the motion does not: at rest, at the start from it, after a gap, where it has lost its way. */
+#include "estimator.h"
+
+#define TG_NO_TIME ((tg_real)1e-6) /* s */
+
+/* Considered columns, and a smoother's track, go along with whatever the filter just did. */
+void tgi_follow(tg_estimator *e, const tg_deviation *deviation)
+{
+    tg_consider_step(&e->consider, &e->filter, deviation);
+    if (e->track) tg_track_step(e->track, &e->filter);
+}
+
+/* A filter that has lost its way knows the priors again. */
+void tgi_forget(tg_estimator *e)
+{
+    tgi_filter_anew(&e->filter, &e->consider, &e->settings);
+    if (e->track) tg_track_init(e->track, &e->filter);
+    e->scene.anew = 1;
+}
+
+/* Start the outputs anew at `outputs`, the parameters having walked for `walk` seconds. */
+static void restart(tg_estimator *e, tg_real walk, const tg_real *outputs, const tg_real *variances)
+{
+    if (walk > e->settings.tuned.longest_walk) walk = e->settings.tuned.longest_walk;
+    if (tg_filter_restart(&e->filter, walk, outputs, variances) != TG_OK) {
+        tgi_forget(e);
+        tg_filter_restart(&e->filter, 0, outputs, variances);
+    }
+    tgi_follow(e, NULL);
+}
+
+/* Outputs as this row measures them, along the travel. What it does not measure follows from the rest, broadly: a wheel from the
+ * ground speed, the ground speed from the wheels or, but for a `start` from rest or a turn of direction, from what it just was. */
+void tgi_restart_from(tg_estimator *e, const tg_row *row, int32_t start, tg_real walk)
+{
+    const tg_settings *s = &e->settings;
+    const int32_t n = s->machine.wheels;
+    const tg_real d = (tg_real)e->direction, *y = row->value;
+    tg_real x[9], P[9], rim = 0, v = y[TG_GROUND_SPEED];
+    int32_t seen = 0;
+    for (int32_t i = 0; i < n; i++) {
+        if (isnan(y[TG_WHEEL_SPEED + i])) continue;
+        rim += s->rolling_radius[i] * y[TG_WHEEL_SPEED + i];
+        seen++;
+    }
+    int32_t late = !start && isnan(v) && e->ground_speed.seen && row->time - e->ground_speed.time <= 1;
+    if (late) v = e->ground_speed.value;
+    else if (isnan(v)) v = seen ? rim / (tg_real)seen : 0;
+    tg_real broad = tgi_square((tg_real)0.3 * tgi_fabs(v) + (tg_real)0.1), noise = tgi_square(s->noise[TG_GROUND_SPEED]) + row->doubt[n];
+    x[n] = d * v;
+    P[n] = isnan(y[TG_GROUND_SPEED]) ? (late ? noise + (tg_real)0.01 : broad) : noise;
+    for (int32_t i = 0; i < n; i++) {
+        tg_real omega = y[TG_WHEEL_SPEED + i], r = s->rolling_radius[i];
+        x[i] = d * (isnan(omega) ? v / r : omega);
+        P[i] = isnan(omega) ? broad / (r * r) : tgi_square(s->noise[TG_WHEEL_SPEED + i]) + row->doubt[i];
+    }
+    restart(e, walk, x, P);
+}
+
+/* What adhesion was before a standstill or a turn of direction says little of the start: it is as unknown as at first. No time passes, but
+ * the filter takes a time above 0. */
+void tgi_unknown_adhesion(tg_estimator *e)
+{
+    const int32_t n = e->settings.machine.wheels;
+    tg_real q[TG_MAX_STATES] = {0};
+    for (int32_t i = 0; i < n; i++) q[n + 1 + i] = tgi_square(e->settings.prior_adhesion_std);
+    if (tg_filter_predict(&e->filter, TG_NO_TIME, &e->held, q) == TG_OK) tgi_follow(e, NULL);
+}
+
+/* At standstill the low-passed speeds stand for the outputs. */
+void tgi_rest(tg_estimator *e)
+{
+    const tg_settings *s = &e->settings;
+    const int32_t n = s->machine.wheels;
+    tg_real d = (tg_real)e->direction, x[9], P[9];
+    for (int32_t i = 0; i < n; i++) {
+        x[i] = d * e->wheel_speed[i].value;
+        P[i] = tgi_square(s->noise[TG_WHEEL_SPEED + i]);
+    }
+    x[n] = d * e->ground_speed.value;
+    P[n] = tgi_square(s->noise[TG_GROUND_SPEED]);
+    restart(e, 0, x, P);
+}
+
+/* Nothing measured for too long: the estimate stays and its spread grows, since old torques must not be integrated. */
+void tgi_drift(tg_estimator *e, tg_real dt)
+{
+    const int32_t n = e->settings.machine.wheels, stride = tgi_stride(n);
+    tg_real x[9], P[9], longest = e->settings.tuned.longest_walk, step = dt > longest ? longest : dt;
+    for (int32_t j = 0; j <= n; j++) {
+        tg_real r = j < n ? e->settings.rolling_radius[j] : 1;
+        int32_t row = tgi_row(n, j);
+        x[j] = e->belief.x[row];
+        P[j] = e->belief.P[row * stride + row] + step / (r * r); /* 1 m/s after 1 s */
+    }
+    restart(e, dt, x, P);
+}
