@@ -215,7 +215,7 @@ def test_after_a_gap_nothing_is_said_of_slip_before_it_is_known() -> None:
     known = late & (d.speed > 0.3)
     assert known.sum() > 5
     assert (np.abs(found["slip_fl"] - d.slip)[known] < 2 * found["slip_fl_std"][known]).all()
-    assert not (found.event_codes == STUCK).any()
+    assert not (found.event_codes == STUCK)[(d.recording.time > 60) & (d.recording.time < 90)].any()
 
 
 def test_the_advice_on_noise_leaves_standstill_out() -> None:
