@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-sys.path.insert(0, str(Path(__file__).parents[2] / "benchmarks"))  # for studio_session.py
+sys.path += [str(Path(__file__).parents[2] / "benchmarks"), str(Path(__file__).parent)]  # studio_session.py, live_service.py
 pytest.importorskip("fastapi", reason="the studio needs terragrip[studio]")
 
 from fastapi.testclient import TestClient

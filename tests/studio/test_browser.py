@@ -16,6 +16,7 @@ import uvicorn
 
 from studio_session import browser as started_browser
 from studio_session import chromium
+from live_service import LiveService
 from terragrip.physics.adhesion import CURVES
 from terragrip.studio.app import STATIC, create_app
 
@@ -37,8 +38,8 @@ pytestmark = [
 class Served:
     """A studio on a folder, served by a thread; it can be stopped and started again on its port."""
 
-    def __init__(self, folder: Path) -> None:
-        self.folder = folder
+    def __init__(self, folder: Path, live: str | None = None) -> None:
+        self.folder, self.live = folder, live
         with socket.socket() as probe:
             probe.bind(("127.0.0.1", 0))
             self.port = probe.getsockname()[1]
@@ -49,7 +50,7 @@ class Served:
         return f"http://127.0.0.1:{self.port}"
 
     def start(self) -> None:
-        app = create_app(self.folder, upload_limit=20_000_000)
+        app = create_app(self.folder, upload_limit=20_000_000, live=self.live)
         config = uvicorn.Config(app, port=self.port, log_level="critical", timeout_graceful_shutdown=1)
         self.server = uvicorn.Server(config)
         self.thread = threading.Thread(target=self.server.run, daemon=True)
@@ -370,6 +371,43 @@ def test_a_live_replay_follows_pauses_and_recovers(page: Any, served: Served) ->
     page.wait_for_selector("#live-state:has-text('connection lost')")
     served.start()
     page.wait_for_selector("#live-state:text-is('connected')")
+
+
+def test_a_dead_source_shows_on_the_live_page(page: Any, served: Served) -> None:
+    service = LiveService()
+    served.stop()
+    served.live = service.address
+    served.start()
+    try:
+        page.goto(f"{served.url}/#/live")
+        page.wait_for_selector("#live-state:text-is('connected')")
+        page.wait_for_function("() => window.terragripLive.feed.ring.taken > 30")
+        faded = "() => Number(getComputedStyle(document.querySelector('.tile .big').parentElement).opacity)"
+        assert page.is_hidden("#live-age")
+        assert page.evaluate(faded) == 1
+        page.wait_for_selector("#health:has-text('ms behind')")
+        for mode in ("silent", "frozen"):
+            service.mode = mode
+            page.wait_for_selector("#live-age:has-text('s old: no rows come')")
+            assert page.evaluate(faded) < 0.5
+            assert page.inner_text("#live-state") == "no measurements"
+            page.wait_for_function("() => !document.getElementById('health').textContent.includes('behind')")
+            # the age is the page's own: it grows while nothing comes
+            old = page.evaluate("() => window.terragripLive.feed.age('measured')")
+            page.wait_for_function(f"() => parseFloat(document.getElementById('live-age').textContent.match(/[0-9.]+/)[0]) > {old + 0.3}")
+            service.mode = "measured"
+            page.wait_for_selector("#live-age", state="hidden")
+            assert page.evaluate(faded) == 1
+        service.mode = "predicted"
+        page.wait_for_selector("#live-age:has-text('Predicted: nothing was measured for')")
+        assert page.evaluate(faded) < 0.5
+        assert page.evaluate("() => getComputedStyle(document.querySelector('.tile .big')).fontStyle") == "italic"
+        service.stop()
+        page.wait_for_selector("#live-state:has-text('connection lost')")
+        page.wait_for_selector("#live-age:has-text('s old')")
+        assert page.evaluate(faded) < 0.5
+    finally:
+        service.stop()
 
 
 def test_the_map_draws_the_track_and_changes_its_colours(page: Any, served: Served) -> None:

@@ -81,6 +81,33 @@ export class Ring {
   get now(): number {
     return this.taken ? (this.time[(this.taken - 1) % RING] as number) : NaN;
   }
+
+  /** Whether nothing was measured for the last row: the filter went on alone. */
+  get isPredicted(): boolean {
+    return this.taken > 0 && this.predicted[(this.taken - 1) % RING] === 1;
+  }
+
+  /** Seconds from one measured row to the next, the median of the newest; NaN before there are two. */
+  get period(): number {
+    const steps: number[] = [];
+    let later = NaN;
+    for (let i = this.count - 1; i >= 0 && steps.length < 50; i--) {
+      const at = this.place(i);
+      if (this.predicted[at]) continue;
+      const time = this.time[at] as number;
+      if (later > time) steps.push(later - time);
+      later = time;
+    }
+    return steps.sort((a, b) => a - b)[steps.length >> 1] ?? NaN;
+  }
+}
+
+/** Seconds of silence that are never called old: rows come in bundles, and a reader sees nothing faster. */
+const LEAST_AGE = 0.5;
+
+/** Seconds after which what is shown is old: twice the time from row to row. */
+export function oldAfter(period: number): number {
+  return Math.max(Number.isFinite(period) ? 2 * period : 0, LEAST_AGE);
 }
 
 export class Feed {
@@ -88,6 +115,8 @@ export class Feed {
   hello: Hello | null = null;
   state: State = "connecting";
   messages = 0;
+  /** When the last row, the last measured one and the last status came [ms of performance.now()]; NaN: none yet. */
+  arrived = { row: NaN, measured: NaN, status: NaN };
   onRows: (() => void) | null = null;
   onSaid: ((said: Said) => void) | null = null;
   onState: ((state: State, why: string) => void) | null = null;
@@ -117,6 +146,11 @@ export class Feed {
     this.open();
   }
 
+  /** Seconds since the last row and since the last measured one came; NaN before the first. */
+  age(what: "row" | "measured" | "status"): number {
+    return (performance.now() - this.arrived[what]) / 1000;
+  }
+
   private set(state: State, why = ""): void {
     this.state = state;
     this.onState?.(state, why);
@@ -133,7 +167,11 @@ export class Feed {
       if (socket !== this.socket) return;
       if (typeof event.data !== "string") {
         this.messages++;
-        this.ring.take(event.data as ArrayBuffer);
+        const before = this.ring.taken;
+        const rows = this.ring.take(event.data as ArrayBuffer);
+        const now = performance.now();
+        if (rows) this.arrived.row = now;
+        for (let i = 0; i < rows; i++) if (!this.ring.predicted[(before + i) % RING]) this.arrived.measured = now;
         this.onRows?.();
         return;
       }
@@ -141,11 +179,15 @@ export class Feed {
       if (said.kind === "hello") {
         this.hello = said;
         this.ring.start(said.columns);
+        this.arrived = { row: NaN, measured: NaN, status: NaN };
         this.pause = 500;
         this.set("connected");
       } else if (said.kind === "end") this.ended = true;
       else if (said.kind === "problem") why = said.text ?? "";
-      else this.onSaid?.(said);
+      else {
+        if (said.kind === "status") this.arrived.status = performance.now();
+        this.onSaid?.(said);
+      }
     };
     socket.onclose = () => {
       if (this.closed || socket !== this.socket) return;

@@ -6,7 +6,7 @@ import { get, type Item } from "../ui/api";
 import { digits, fill, h } from "../ui/dom";
 import { tried } from "../ui/notes";
 import type { Page } from "../ui/page";
-import { Feed, type Said } from "./feed";
+import { Feed, oldAfter, type Said } from "./feed";
 import { Traces, type Trace } from "./traces";
 
 const WARNING: Record<string, string> = {
@@ -15,6 +15,10 @@ const WARNING: Record<string, string> = {
   push: "The tool pushes",
 };
 const LINGER = 2;
+const STANDING = 0.05; // m/s
+/** Seconds between looks at how old the last row is, and after which a status says nothing of now (one comes every second). */
+const LOOK = 0.1;
+const STATUS_AGE = 2.5;
 
 export const page: Page = (main, { notices, query }) => {
   const source = h("select", { id: "live-source", "aria-label": "Source" });
@@ -27,12 +31,15 @@ export const page: Page = (main, { notices, query }) => {
   const grip = tile("Grip in use", "%");
   const soil = tile("Soil", "");
   const speedTile = tile("Speed", "m/s");
+  const old = h("p", { class: "old", id: "live-age", hidden: true });
   const said = h("ul", { class: "said", "aria-label": "Events" });
   let warnedAt = -Infinity;
   let peak = NaN; // largest adhesion of the online curve over its scale
   void tried(() => sampled({ model: "exponential", parameters: { a: 1 } })).then((shape) => shape && (peak = shape.peak[1]));
   let updates = 0;
   let rate = 0;
+  let delay = 0; // of the estimates against their samples, by the last status [s]
+  let heldAt = NaN; // when what is shown was held [ms]
 
   const feed = new Feed(() => {
     const replay = source.value;
@@ -42,26 +49,62 @@ export const page: Page = (main, { notices, query }) => {
   main.append(
     h("div", { class: "tools" }, source, speed, pause, state, h("span", { class: "spring" }), health),
     warning,
+    old,
     h("div", { class: "tiles" }, slip.element, grip.element, soil.element, speedTile.element),
     traces.element,
     said,
   );
 
-  feed.onState = (now, why) => {
-    state.className = `state ${now === "connected" ? "done" : now === "connecting" || now === "ended" ? "" : "failed"}`;
-    state.textContent = { connecting: "connecting …", connected: "connected", lost: `connection lost: ${why}`, ended: "the run has ended" }[now];
+  let why = "";
+  feed.onState = (now, reason) => {
+    why = reason;
     if (now === "connected" && feed.hello) {
       traces.show(tracesOf(feed.hello.wheels, feed.hello.columns));
       warnedAt = -Infinity;
+      warning.hidden = true;
+      for (const one of [slip, grip, soil, speedTile]) one.set("–", "");
+      delay = 0;
+      delete health.dataset["drops"];
       fill(said);
     }
+    freshness();
   };
+
+  /** Whether what is shown is what is: else the numbers fade, and how old they are is said in their place. */
+  function freshness(): void {
+    const played = feed.hello?.replay ? Number(speed.value) : 1;
+    const limit = oldAfter(feed.ring.period / played);
+    const silent = feed.age("row");
+    const unmeasured = feed.age("measured") + (feed.age("status") < STATUS_AGE ? delay : 0);
+    const connected = feed.state === "connected";
+    const waiting = connected && !feed.ring.taken;
+    const isOld = feed.ring.taken > 0 && (!connected || traces.held !== null || !(unmeasured <= limit));
+    const heard = connected && !isOld && !waiting;
+    state.className = `state ${heard ? "done" : feed.state === "lost" || (connected && isOld && traces.held === null) ? "failed" : ""}`;
+    state.textContent = { connecting: "connecting …", connected: heard ? "connected" : waiting ? "connected, no rows yet" : traces.held !== null ? "paused" : "no measurements", lost: `connection lost: ${why}`, ended: "the run has ended" }[feed.state];
+    main.classList.toggle("stale", isOld);
+    const predicted = connected && traces.held === null && feed.ring.isPredicted;
+    main.classList.toggle("predicted", predicted);
+    traces.late = connected && traces.held === null && silent > limit ? silent * played : 0;
+    old.hidden = !isOld;
+    if (!isOld) return;
+    const seconds = traces.held === null ? unmeasured : (performance.now() - heldAt) / 1000;
+    const age = Number.isFinite(seconds) ? `${seconds.toFixed(1)} s` : "ages";
+    old.textContent =
+      traces.held !== null
+        ? `Paused: these numbers are ${age} old.`
+        : predicted
+          ? `Predicted: nothing was measured for ${age}; the filter goes on alone, with growing intervals.`
+          : `These numbers are ${age} old${feed.state === "ended" ? ": the run has ended" : ": no rows come"}.`;
+    if (traces.late) traces.redraw();
+  }
   feed.onRows = () => {
     updates++;
     if (traces.held === null) {
       traces.redraw();
       numbers();
     }
+    if (main.classList.contains("stale") || main.classList.contains("predicted") || feed.ring.isPredicted || feed.messages === 1) freshness();
   };
   feed.onSaid = tell;
 
@@ -76,7 +119,8 @@ export const page: Page = (main, { notices, query }) => {
       soil.element.dataset["soil"] = soilColor(message.soil ?? "");
     } else if (message.kind === "status") {
       const lost = Object.values(message.counts ?? {}).reduce((sum, one) => sum + (one["dropped"] ?? 0), 0);
-      health.dataset["drops"] = `${lost} dropped, ${digits(1000 * (message.delay ?? 0), 2)} ms behind`;
+      delay = message.delay ?? 0;
+      health.dataset["drops"] = `${lost} dropped${message.delay === undefined ? "" : `, ${digits(1000 * message.delay, 2)} ms behind`}`;
     }
   }
 
@@ -99,18 +143,22 @@ export const page: Page = (main, { notices, query }) => {
     const most = Math.max(...slips);
     const wheel = wheels.find((name) => ring.last(`slip_${name}`) === most) ?? "";
     const spread = 196 * ring.last(`slip_${wheel}_std`);
-    slip.set(slips.length ? (100 * most).toFixed(0) : "–", slips.length ? `${wheel}, ± ${spread.toFixed(0)}` : "standing");
+    slip.set(slips.length ? (100 * most).toFixed(0) : "–", slips.length ? `${wheel}, ± ${spread.toFixed(0)}` : Math.abs(ring.last("ground_speed")) < STANDING ? "standing" : "not known");
     const offered = peak * ring.last("curve_a");
     const used = Math.max(...wheels.map((name) => ring.last(`adhesion_${name}`)));
     const known = peak > 0 && ring.last("curve_a_std") < 0.35 * ring.last("curve_a");
     grip.set(known ? Math.min((100 * used) / offered, 100).toFixed(0) : "–", known ? `µ ${digits(used, 2)} of ${digits(offered, 2)}` : `µ ${digits(used, 2)}; what the soil offers is not known yet`);
-    speedTile.set(ring.last("ground_speed").toFixed(2), `± ${(1.96 * ring.last("ground_speed_std")).toFixed(2)}`);
+    const v = ring.last("ground_speed");
+    speedTile.set(Number.isFinite(v) ? v.toFixed(2) : "–", Number.isFinite(v) ? `± ${(1.96 * ring.last("ground_speed_std")).toFixed(2)}` : "not known");
   }
 
   pause.addEventListener("click", () => {
     traces.held = traces.held === null ? feed.ring.now : null;
+    heldAt = feed.arrived.row;
     pause.setAttribute("aria-pressed", String(traces.held !== null));
     pause.textContent = traces.held === null ? "Pause" : "Follow";
+    if (traces.held === null && feed.ring.taken) numbers();
+    freshness();
     traces.redraw();
   });
   source.addEventListener("change", () => {
@@ -139,14 +187,17 @@ export const page: Page = (main, { notices, query }) => {
   const clock = window.setInterval(() => {
     rate = updates;
     updates = 0;
-    const drops = health.dataset["drops"] ?? "";
-    health.textContent = feed.state === "connected" ? [`${rate} updates/s`, drops].filter(Boolean).join(", ") : "";
+    const drops = feed.age("status") < STATUS_AGE ? (health.dataset["drops"] ?? "") : "";
+    health.textContent = feed.state === "connected" && rate && !main.classList.contains("stale") ? [`${rate} updates/s`, drops].filter(Boolean).join(", ") : "";
   }, 1000);
+  const watch = window.setInterval(freshness, 1000 * LOOK);
   const forget = notices.on((notice) => notice.kind === "folder" && void reload(false));
   void reload(true);
   Object.assign(window, { terragripLive: { feed, traces } });
   return () => {
     clearInterval(clock);
+    clearInterval(watch);
+    main.classList.remove("stale", "predicted");
     forget();
     feed.close();
     traces.close();

@@ -24,6 +24,8 @@ export class Traces {
   span = 30;
   /** The time at the right edge while paused; null follows. */
   held: number | null = null;
+  /** Seconds by which the last row lies back, where none comes: the lines then move away from the right edge. */
+  late = 0;
   redraws = 0;
   private canvas = h("canvas", { "aria-hidden": "true" });
   private traces: Trace[] = [];
@@ -73,7 +75,7 @@ export class Traces {
     this.redraws++;
     pen.setTransform(devicePixelRatio, 0, 0, devicePixelRatio, 0, 0);
     pen.clearRect(0, 0, width, height);
-    const end = this.held ?? this.ring.now;
+    const end = this.held ?? this.ring.now + this.late;
     if (Number.isNaN(end)) return;
     const first = this.firstSince(end - this.span);
     const rows = 3;
@@ -147,26 +149,35 @@ export class Traces {
     for (const line of trace.lines) {
       const values = ring.columns[ring.names.indexOf(line.column)];
       if (!values) continue;
-      pen.strokeStyle = color(line.color);
-      pen.lineWidth = 1.6;
-      pen.beginPath();
-      let on = false;
-      for (let i = first; i < count; i++) {
-        const at = ring.place(i);
-        const time = ring.time[at] as number;
-        if (time > end) break;
-        const v = (values[at] as number) * trace.scale;
-        if (Number.isNaN(v)) {
-          on = false;
-          continue;
-        }
-        if (on) pen.lineTo(px(time), py(v));
-        else pen.moveTo(px(time), py(v));
-        on = true;
+      for (const predicted of [0, 1]) {
+        pen.strokeStyle = color(predicted ? "muted" : line.color);
+        pen.lineWidth = predicted ? 1.2 : 1.6;
+        pen.setLineDash(predicted ? [2, 4] : []);
+        this.path(pen, values, predicted, first, end, px, (v) => py(v * trace.scale));
       }
-      pen.stroke();
     }
     pen.restore();
+  }
+
+  /** One line's rows, those measured or those predicted, from `first` to the time `end`. */
+  private path(pen: CanvasRenderingContext2D, values: Float64Array, predicted: number, first: number, end: number, px: (time: number) => number, py: (v: number) => number): void {
+    const { ring } = this;
+    pen.beginPath();
+    let on = false;
+    for (let i = first; i < ring.count; i++) {
+      const at = ring.place(i);
+      const time = ring.time[at] as number;
+      if (time > end) break;
+      const v = values[at] as number;
+      if (Number.isNaN(v) || ring.predicted[at] !== predicted) {
+        on = false;
+        continue;
+      }
+      if (on) pen.lineTo(px(time), py(v));
+      else pen.moveTo(px(time), py(v));
+      on = true;
+    }
+    pen.stroke();
   }
 
   /** A range that grows at once and shrinks slowly, so that the lines do not dance. */

@@ -1,0 +1,52 @@
+"""A stand-in for a live service whose source can fall silent, go on predicted, freeze, or go."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import threading
+from typing import Any
+
+import numpy as np
+
+COLUMNS = ["slip_a", "slip_a_std", "adhesion_a", "ground_speed", "ground_speed_std", "curve_a", "curve_a_std"]
+VALUES = [0.2, 0.01, 0.4, 1.5, 0.02, 1.0, 0.05]
+
+
+class LiveService:
+    """Rows at 20 Hz while `mode` is "measured"; "predicted": predicted ones; "silent": none, but a status a second; "frozen": nothing."""
+
+    def __init__(self) -> None:
+        self.mode, self.address = "measured", ""
+        self._ready, self._stop = threading.Event(), threading.Event()
+        self._thread = threading.Thread(target=lambda: asyncio.run(self._run()), daemon=True)
+        self._thread.start()
+        assert self._ready.wait(10)
+
+    def stop(self) -> None:
+        """The service goes."""
+        self._stop.set()
+        self._thread.join(10)
+
+    async def _answer(self, socket: Any) -> None:
+        hello = {"kind": "hello", "vehicle": "v", "columns": COLUMNS, "wheels": ["a"], "events": [""]}
+        await socket.send(json.dumps(hello))
+        row = 0
+        while not self._stop.is_set():
+            row += 1
+            if self.mode in ("measured", "predicted"):
+                await socket.send(
+                    np.array([row / 20, float(self.mode == "predicted"), 0.0, *VALUES]).tobytes()
+                )
+            if row % 20 == 0 and self.mode != "frozen":
+                await socket.send(json.dumps({"kind": "status", "time": row / 20, "delay": 0.0, "counts": {}}))
+            await asyncio.sleep(0.05)
+
+    async def _run(self) -> None:
+        from websockets.asyncio.server import serve
+
+        async with serve(self._answer, "127.0.0.1", 0) as server:
+            self.address = f"ws://127.0.0.1:{next(iter(server.sockets)).getsockname()[1]}"
+            self._ready.set()
+            while not self._stop.is_set():
+                await asyncio.sleep(0.02)
