@@ -6,13 +6,20 @@ import shutil
 import sys
 from collections.abc import Iterator
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import pytest
 
-sys.path += [str(Path(__file__).parents[2] / "benchmarks"), str(Path(__file__).parent)]  # studio_session.py, live_service.py
+sys.path += [
+    str(Path(__file__).parents[2] / "benchmarks"),
+    str(Path(__file__).parent),
+]  # studio_session.py, live_service.py
 pytest.importorskip("fastapi", reason="the studio needs terragrip[studio]")
 
 from fastapi.testclient import TestClient
+
+if TYPE_CHECKING:
+    from served import Served
 
 
 @pytest.fixture(scope="session")
@@ -45,3 +52,40 @@ def client(folder: Path) -> Iterator[TestClient]:
 
     with TestClient(create_app(folder, upload_limit=2_000_000), base_url="http://127.0.0.1:8750") as client:
         yield client
+
+
+@pytest.fixture(scope="session")
+def browser() -> Iterator[Any]:
+    from studio_session import browser as started
+
+    with started() as running:
+        yield running
+
+
+@pytest.fixture
+def served(folder: Path) -> Iterator[Served]:
+    from served import Served
+
+    studio = Served(folder)
+    yield studio
+    studio.stop()
+
+
+@pytest.fixture
+def page(browser: Any, served: Served) -> Iterator[Any]:
+    """A tab of 1280 x 720 whose console stays free of errors and whose requests stay on this machine."""
+    context = browser.new_context(viewport={"width": 1280, "height": 720}, bypass_csp=False)
+    tab = context.new_page()
+    faults: list[str] = []
+    tab.on("console", lambda m: faults.append(m.text) if m.type == "error" else None)
+    tab.on("pageerror", lambda error: faults.append(str(error)))
+    tab.on(
+        "request",
+        lambda r: (
+            faults.append(r.url) if served.url not in r.url and r.url[:5] not in ("data:", "blob:") else None
+        ),
+    )
+    tab.set_default_timeout(15_000)
+    yield tab
+    context.close()
+    assert [f for f in faults if "422" not in f and "WebSocket" not in f and "ERR_CONNECTION" not in f] == []

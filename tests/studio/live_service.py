@@ -39,7 +39,9 @@ class LiveService:
                     np.array([row / 20, float(self.mode == "predicted"), 0.0, *VALUES]).tobytes()
                 )
             if row % 20 == 0 and self.mode != "frozen":
-                await socket.send(json.dumps({"kind": "status", "time": row / 20, "delay": 0.0, "counts": {}}))
+                await socket.send(
+                    json.dumps({"kind": "status", "time": row / 20, "delay": 0.0, "counts": {}})
+                )
             await asyncio.sleep(0.05)
 
     async def _run(self) -> None:

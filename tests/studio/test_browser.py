@@ -3,97 +3,18 @@
 from __future__ import annotations
 
 import json
-import socket
-import threading
-import time
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-import uvicorn
 
-from studio_session import browser as started_browser
-from studio_session import chromium
-from live_service import LiveService
+from served import AXE, NEEDS, Served
 from terragrip.physics.adhesion import CURVES
-from terragrip.studio.app import STATIC, create_app
 
 pytest.importorskip("playwright.sync_api", reason="SKIPPED LOUDLY: the browser tests need playwright")
 
-AXE = Path(__file__).parents[2] / "web" / "node_modules" / "axe-core" / "axe.min.js"
-BUILT = (STATIC / "index.html").is_file() and AXE.is_file()
-
-pytestmark = [
-    pytest.mark.skipif(
-        chromium() is None, reason="no chromium: apt-get install chromium, or run `make test` as root"
-    ),
-    pytest.mark.skipif(not BUILT, reason="the pages are not built: `make studio` needs Node.js 20 or newer"),
-    # playwright's loop and sockets are still open when pytest looks for what was left behind
-    pytest.mark.filterwarnings("ignore::ResourceWarning", "ignore::pytest.PytestUnraisableExceptionWarning"),
-]
-
-
-class Served:
-    """A studio on a folder, served by a thread; it can be stopped and started again on its port."""
-
-    def __init__(self, folder: Path, live: str | None = None) -> None:
-        self.folder, self.live = folder, live
-        with socket.socket() as probe:
-            probe.bind(("127.0.0.1", 0))
-            self.port = probe.getsockname()[1]
-        self.start()
-
-    @property
-    def url(self) -> str:
-        return f"http://127.0.0.1:{self.port}"
-
-    def start(self) -> None:
-        app = create_app(self.folder, upload_limit=20_000_000, live=self.live)
-        config = uvicorn.Config(app, port=self.port, log_level="critical", timeout_graceful_shutdown=1)
-        self.server = uvicorn.Server(config)
-        self.thread = threading.Thread(target=self.server.run, daemon=True)
-        self.thread.start()
-        while not self.server.started:
-            time.sleep(0.01)
-
-    def stop(self) -> None:
-        self.server.should_exit = True
-        self.thread.join(10)
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Any]:
-    with started_browser() as running:
-        yield running
-
-
-@pytest.fixture
-def served(folder: Path) -> Iterator[Served]:
-    studio = Served(folder)
-    yield studio
-    studio.stop()
-
-
-@pytest.fixture
-def page(browser: Any, served: Served) -> Iterator[Any]:
-    """A tab of 1280 x 720 whose console stays free of errors and whose requests stay on this machine."""
-    context = browser.new_context(viewport={"width": 1280, "height": 720}, bypass_csp=False)
-    tab = context.new_page()
-    faults: list[str] = []
-    tab.on("console", lambda m: faults.append(m.text) if m.type == "error" else None)
-    tab.on("pageerror", lambda error: faults.append(str(error)))
-    tab.on(
-        "request",
-        lambda r: (
-            faults.append(r.url) if served.url not in r.url and r.url[:5] not in ("data:", "blob:") else None
-        ),
-    )
-    tab.set_default_timeout(15_000)
-    yield tab
-    context.close()
-    assert [f for f in faults if "422" not in f and "WebSocket" not in f and "ERR_CONNECTION" not in f] == []
+pytestmark = NEEDS
 
 
 def open_fit(page: Any, served: Served, path: str = "") -> None:
@@ -371,43 +292,6 @@ def test_a_live_replay_follows_pauses_and_recovers(page: Any, served: Served) ->
     page.wait_for_selector("#live-state:has-text('connection lost')")
     served.start()
     page.wait_for_selector("#live-state:text-is('connected')")
-
-
-def test_a_dead_source_shows_on_the_live_page(page: Any, served: Served) -> None:
-    service = LiveService()
-    served.stop()
-    served.live = service.address
-    served.start()
-    try:
-        page.goto(f"{served.url}/#/live")
-        page.wait_for_selector("#live-state:text-is('connected')")
-        page.wait_for_function("() => window.terragripLive.feed.ring.taken > 30")
-        faded = "() => Number(getComputedStyle(document.querySelector('.tile .big').parentElement).opacity)"
-        assert page.is_hidden("#live-age")
-        assert page.evaluate(faded) == 1
-        page.wait_for_selector("#health:has-text('ms behind')")
-        for mode in ("silent", "frozen"):
-            service.mode = mode
-            page.wait_for_selector("#live-age:has-text('s old: no rows come')")
-            assert page.evaluate(faded) < 0.5
-            assert page.inner_text("#live-state") == "no measurements"
-            page.wait_for_function("() => !document.getElementById('health').textContent.includes('behind')")
-            # the age is the page's own: it grows while nothing comes
-            old = page.evaluate("() => window.terragripLive.feed.age('measured')")
-            page.wait_for_function(f"() => parseFloat(document.getElementById('live-age').textContent.match(/[0-9.]+/)[0]) > {old + 0.3}")
-            service.mode = "measured"
-            page.wait_for_selector("#live-age", state="hidden")
-            assert page.evaluate(faded) == 1
-        service.mode = "predicted"
-        page.wait_for_selector("#live-age:has-text('Predicted: nothing was measured for')")
-        assert page.evaluate(faded) < 0.5
-        assert page.evaluate("() => getComputedStyle(document.querySelector('.tile .big')).fontStyle") == "italic"
-        service.stop()
-        page.wait_for_selector("#live-state:has-text('connection lost')")
-        page.wait_for_selector("#live-age:has-text('s old')")
-        assert page.evaluate(faded) < 0.5
-    finally:
-        service.stop()
 
 
 def test_the_map_draws_the_track_and_changes_its_colours(page: Any, served: Served) -> None:

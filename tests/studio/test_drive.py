@@ -15,6 +15,7 @@ from hypothesis import strategies as st
 from scipy.stats import chi2
 
 from terragrip.estimation import Estimates
+from terragrip.studio import drive
 from terragrip.studio.shown import Shown, consistency
 from terragrip.studio.tables import Extremes, are_long, buckets, extremes
 
@@ -262,6 +263,84 @@ def test_ground_of_the_run_is_shown_where_it_lies_beside_it(client: TestClient, 
     }
     (folder / "estimates-ground.json").write_text(json.dumps(ground))
     assert client.get("/api/drive", params={"path": RUN}).json()["ground"]["sections"] == ground["sections"]
+
+
+def test_a_ground_file_of_several_runs_gives_this_runs_sections(client: TestClient, folder: Path) -> None:
+    def section(run: str, soil: str) -> dict[str, object]:
+        return {"run": run, "start": 0.0, "end": 9.0, "soil": soil, "probabilities": {soil: 0.58}}
+
+    several = {"changes": [], "sections": [section("multi1", "coarse"), section("estimates", "hard")]}
+    (folder / "ground.json").write_text(json.dumps(several))
+    found = client.get("/api/drive", params={"path": RUN}).json()["ground"]
+    assert [one["soil"] for one in found["sections"]] == ["hard"]
+    del several["sections"][1]
+    (folder / "ground.json").write_text(json.dumps(several))
+    assert client.get("/api/drive", params={"path": RUN}).json()["ground"] is None
+
+
+def test_ground_lies_in_the_folder_above_as_the_demo_has_it(client: TestClient, folder: Path) -> None:
+    (folder / "estimates").mkdir()
+    (folder / RUN).rename(folder / "estimates" / "multi2.parquet")
+    one = {"run": "multi2", "start": 0.0, "end": 9.0, "soil": "hard", "probabilities": {"hard": 1.0}}
+    (folder / "ground.json").write_text(json.dumps({"changes": [], "sections": [one]}))
+    about = client.get("/api/drive", params={"path": "estimates/multi2.parquet"}).json()
+    assert about["ground"]["sections"] == [one]
+    assert about["recording"] == "recording.parquet"
+
+
+def test_a_renamed_recording_is_found_by_its_content(client: TestClient, folder: Path) -> None:
+    (folder / "recording.parquet").rename(folder / "monday.parquet")
+    about = client.get("/api/drive", params={"path": RUN}).json()
+    assert about["recording"] == "monday.parquet"
+    assert "drawbar_force" in about["measured"]
+
+
+def test_a_log_that_needs_a_profile_shows_its_measurements(client: TestClient, folder: Path) -> None:
+    import polars as pl
+
+    import terragrip as tg
+
+    log = pl.read_parquet(folder / "recording.parquet")[:400]
+    log.rename({"ground_speed": "v_gps", "time": "stamp"}).write_csv(folder / "foreign.csv")
+    channels = "\n".join(f"  {n}: {n}" for n in log.columns if n not in ("time", "ground_speed", "soil"))
+    text = (
+        f"time: {{from: stamp, unit: s}}\nchannels:\n  ground_speed: {{from: v_gps, unit: m/s}}\n{channels}\n"
+    )
+    (folder / "foreign.yaml").write_text(text)
+    recording = tg.read(folder / "foreign.csv", profile=folder / "foreign.yaml")
+    tg.estimate(recording, tg.Vehicle.load(folder / "vehicle.yaml")).write(folder / "foreign.parquet")
+    about = client.get("/api/drive", params={"path": "foreign.parquet"}).json()
+    assert about["recording"] == "foreign.csv"
+    assert "ground_speed" in about["measured"]
+    shown = window(client, path="foreign.parquet", column=["measured:ground_speed"], start=0, end=2)
+    assert np.isfinite(shown["measured:ground_speed"]).any()
+
+
+def test_a_page_of_a_replaced_file_is_refused(client: TestClient, folder: Path) -> None:
+    version = client.get("/api/drive", params={"path": RUN}).json()["version"]
+    query = {"path": RUN, "time": 3.0, "version": version}
+    assert client.get("/api/drive/sample", params=query).status_code == 200
+    whole = Estimates.read(folder / RUN)
+    whole.columns["slip_rr"] = whole.columns["slip_rr"] + 1.0
+    whole.write(folder / RUN)
+    answer = client.get("/api/drive/sample", params=query)
+    assert answer.status_code == 422
+    assert "was replaced since it was opened" in answer.json()["detail"]
+
+
+def test_a_tractors_drive_train_has_a_radius(made: Path) -> None:
+    """Its speed in rad/s is drawn in m/s: the mean radius of the driven wheels, by the zero of slip that the log told."""
+    import terragrip as tg
+
+    vehicle = tg.Vehicle.load(made / "vehicle.yaml")
+    time = np.arange(0, 60, 0.1)
+    speed = 1.5 + 0.5 * np.sin(time / 7)
+    log = {"time": time, "ground_speed": speed, "wheel_based_speed": 1.05 * speed}
+    table = tg.estimate(tg.Recording.from_frame(log), vehicle)
+    radius = drive.radii(table)
+    assert set(radius) == set(table.wheels)
+    rim = radius[table.wheels[0]] * table[f"wheel_speed_{table.wheels[0]}"]
+    assert np.nanmedian(rim / table["ground_speed"]) == pytest.approx(1.0, abs=0.1)
 
 
 def test_estimates_of_slip_alone_open_as_any(client: TestClient, folder: Path) -> None:

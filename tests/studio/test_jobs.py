@@ -107,3 +107,56 @@ def test_soils_are_learnt(client: TestClient, folder: Path) -> None:
     )
     assert wait(client, answer.json()["id"])["state"] == "done"
     assert dict(SoilLibrary.load(folder / "learnt.json")) == dict(SoilLibrary.load(folder / "soils.json"))
+
+
+def slip_alone(folder: Path) -> None:
+    """slip.csv and slip.parquet: the recording without its torques, and its estimates."""
+    import terragrip as tg
+
+    recording = tg.read(folder / "recording.parquet")
+    bare = {
+        n: c for n, c in recording.channels.items() if n == "ground_speed" or n.startswith("wheel_speed_")
+    }
+    log = tg.Recording.from_frame({"time": recording.time, **bare})
+    tg.estimate(log, tg.Vehicle.load(folder / "vehicle.yaml")).write(folder / "slip.parquet")
+
+
+def test_soils_are_learned_beside_a_run_of_slip_alone(client: TestClient, folder: Path) -> None:
+    slip_alone(folder)
+    both = {"estimates": ["slip.parquet", "estimates.parquet"], "output": "all.json"}
+    job = wait(client, client.post("/api/jobs/soils", json=both).json()["id"])
+    assert job["state"] == "done", job["text"]
+    assert "slip.parquet: left out" in job["text"]
+    assert (folder / "all.json").exists()
+    job = wait(
+        client,
+        client.post("/api/jobs/soils", json={"estimates": ["slip.parquet"], "output": "none.json"}).json()[
+            "id"
+        ],
+    )
+    assert job["state"] == "failed"
+    assert "no adhesion" in job["text"]
+
+
+def test_fit_says_that_slip_alone_has_no_curve(client: TestClient, folder: Path) -> None:
+    slip_alone(folder)
+    soils = client.get("/api/soils", params={"path": "slip.parquet"})
+    assert soils.status_code == 200
+    assert all("no adhesion" in soil["note"] for soil in soils.json())
+    answer = client.post("/api/fit", json={"model": "exponential", "path": "slip.parquet", "soil": ""})
+    assert answer.status_code == 422
+    assert "no adhesion" in answer.json()["detail"]
+
+
+def test_ready_means_that_the_estimate_will_run(client: TestClient, folder: Path) -> None:
+    """A log that is whole but that no estimate takes: the machine has no such wheel, or does not go with the method."""
+    time_ = np.arange(0.0, 60.0, 0.1)
+    pd.DataFrame({"time": time_, "wheel_speed_xx": 1.0, "ground_speed": 1.0}).to_csv(
+        folder / "odd.csv", index=False
+    )
+    for log in ("odd.csv", "recording.parquet"):
+        found = client.get("/api/inspect", params={"path": log, "vehicle": "vehicle.yaml"}).json()
+        job = wait(client, ask(client, recording=log, output="try.parquet", replace=True).json()["id"])
+        assert found["ready"] == (job["state"] == "done")
+        if not found["ready"]:
+            assert found["problem"] == job["text"]

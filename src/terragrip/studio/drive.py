@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import contextlib
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -9,10 +11,12 @@ import numpy as np
 import numpy.typing as npt
 
 from terragrip.errors import InputError
+from terragrip.estimation.rims import DRIVE, supposed_radius
 
 if TYPE_CHECKING:
     from terragrip.estimation import Estimates
     from terragrip.recording import Recording
+    from terragrip.studio.folder import Item
     from terragrip.studio.state import Studio
 
 Floats = npt.NDArray[np.float64]
@@ -36,29 +40,70 @@ def spans(labels: npt.NDArray[Any], time: Floats) -> list[dict[str, Any]]:
     return found[:MOST_SPANS]
 
 
-def recording_of(studio: Studio, table: Estimates) -> tuple[Path, Recording] | None:
-    """The recording that the estimates were made from, where the folder holds it unchanged (same SHA-256, same rows)."""
+def radii(table: Estimates) -> dict[str, float]:
+    """Rolling radius [m] of each wheel of the table: the vehicle file's, by the zero of slip where the log told one. The drive train
+    of a tractor, which stands for all driven wheels, has their mean."""
+    vehicle = table.vehicle
+    known = dict(zip(vehicle.wheels, vehicle.wheel_radius.tolist(), strict=True))
+    if DRIVE in table.wheels:
+        known[DRIVE] = supposed_radius(vehicle)
+    zero = table.about.get("zero_slip", {})
+    return {
+        wheel: known[wheel] * float(zero.get(wheel, {}).get("ratio", 1.0))
+        for wheel in table.wheels
+        if wheel in known
+    }
+
+
+def recording_of(studio: Studio, table: Estimates, *, search: bool = False) -> tuple[Path, Recording] | None:
+    """The recording that the estimates were made from, where the folder holds it unchanged: same SHA-256, whatever its name now,
+    and rows at the same times. A log that needs a profile is read by those of the folder.
+
+    The folder is searched the first time, and again where `search` asks for it: a walk through all of it, so not for every request.
+    """
     about = table.about.get("recording", {})
     wanted, name = about.get("sha256"), Path(str(about.get("source") or "")).name
-    if not wanted or not name:
+    if not wanted:
         return None
-    path = studio.origins.get(wanted)
-    if path is None or not path.is_file() or studio.fingerprints.get(path) != wanted:
-        path = _find(studio, name, wanted)
-    if path is None:
+    origin = studio.origins.get(wanted)
+    if origin is not None:
+        path, profile = origin
+        if path.is_file() and studio.fingerprints.get(path) == wanted:
+            with contextlib.suppress(InputError):  # the profile is gone, or was changed
+                recording = studio.recordings.get(path, profile)
+                if _is_of(recording, table):
+                    return path, recording
+    elif wanted in studio.origins and not search:
         return None
-    studio.origins[wanted] = path
-    try:
-        recording = studio.recordings.get(path)
-    except InputError:  # it needs a profile
-        return None
-    return (path, recording) if len(recording) == len(table) else None
+    items = studio.folder.items()
+    path = _find(studio, items, name, wanted)
+    found = None if path is None else _read(studio, items, path, table)
+    studio.origins[wanted] = None if path is None or found is None else (path, found[0])
+    return None if path is None or found is None else (path, found[1])
 
 
-def _find(studio: Studio, name: str, wanted: str) -> Path | None:
-    """The recording of a name and a SHA-256 in the folder: a walk through all of it, so not for every request."""
-    paths = (studio.folder.file(item.path) for item in studio.folder.items() if item.kind == "recording")
-    return next((p for p in paths if p.name == name and studio.fingerprints.get(p) == wanted), None)
+def _find(studio: Studio, items: Sequence[Item], name: str, wanted: str) -> Path | None:
+    """The file with a SHA-256, those of the recording's own name first."""
+    paths = [studio.folder.file(item.path) for item in items if item.kind == "recording"]
+    paths.sort(key=lambda path: path.name != name)
+    return next((path for path in paths if studio.fingerprints.get(path) == wanted), None)
+
+
+def _read(
+    studio: Studio, items: Sequence[Item], path: Path, table: Estimates
+) -> tuple[str, Recording] | None:
+    """The log as it was estimated, and the profile it needs (empty: none): that which gives the most channels at the table's times."""
+    read = []
+    for profile in ["", *(str(studio.folder.file(item.path)) for item in items if item.kind == "profile")]:
+        with contextlib.suppress(InputError):  # not this profile
+            recording = studio.recordings.get(path, profile)
+            if _is_of(recording, table):
+                read.append((profile, recording))
+    return max(read, key=lambda one: len(one[1].channels), default=None)
+
+
+def _is_of(recording: Recording, table: Estimates) -> bool:
+    return len(recording) == len(table) and np.array_equal(recording.time, table.time)
 
 
 def sample(table: Estimates, recording: Recording | None, time: float) -> dict[str, Any]:

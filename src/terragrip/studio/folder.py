@@ -91,6 +91,11 @@ class Folder:
             raise InputError("cannot be written there", file=path, mend="name a file in a folder that exists")
         return target
 
+    def version(self, path: str) -> str:
+        """What tells a file from the one that replaces it: its size and time of change. Raises as `file`."""
+        status = self.file(path).stat()
+        return f"{status.st_size}-{status.st_mtime_ns}"
+
     def name(self, target: Path) -> str:
         """The path that names `target`."""
         return target.relative_to(self.root).as_posix()

@@ -10,7 +10,7 @@ from fastapi import Depends
 from fastapi.requests import HTTPConnection
 
 from terragrip.files import sha256
-from terragrip.studio.folder import Folder
+from terragrip.studio.folder import MOST, Folder
 from terragrip.studio.jobs import Jobs
 from terragrip.studio.notices import Notices
 from terragrip.studio.shown import Shown
@@ -55,8 +55,9 @@ class Studio:
         self.estimates: Tables[Estimates] = Tables(_estimates)
         self.shown: Tables[Shown] = Tables(lambda path: Shown(self.estimates.get(path)))
         self.recordings: Tables[Recording] = Tables(_recording)
-        self.fingerprints: Tables[str] = Tables(sha256, 500)
-        self.origins: dict[str, Path] = {}  # where the recording of a SHA-256 was found
+        self.fingerprints: Tables[str] = Tables(sha256, MOST)
+        # by SHA-256: the recording and the profile that reads it, None where the folder does not hold it
+        self.origins: dict[str, tuple[Path, str] | None] = {}
         self.upload_limit, self.live = upload_limit, live
 
 

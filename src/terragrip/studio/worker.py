@@ -62,9 +62,25 @@ def _estimate(request: dict[str, Any]) -> str:
 def _soils(request: dict[str, Any]) -> str:
     from terragrip.soil.estimates import soils_of
 
-    campaign = soils_of([Path(path) for path in request["estimates"]], progress=_Reporter())
-    campaign.library({"from": [Path(path).name for path in request["estimates"]]}).write(request["output"])
-    return "\n".join(campaign.words)
+    paths = [Path(path) for path in request["estimates"]]
+    learning = [path for path in paths if _has_adhesion(path)]
+    if not learning:
+        raise InputError(
+            "the estimates hold slip but no adhesion, so no soil can be learned",
+            mend="estimate a log with torques",
+        )
+    campaign = soils_of(learning, progress=_Reporter())
+    campaign.library({"from": [path.name for path in learning]}).write(request["output"])
+    left = [f"{path.name}: left out, slip without adhesion" for path in paths if path not in learning]
+    return "\n".join([*campaign.words, *left])
+
+
+def _has_adhesion(path: Path) -> bool:
+    import pyarrow.parquet as pq
+
+    from terragrip.estimation.estimates import wheels_with
+
+    return bool(wheels_with("adhesion", pq.read_schema(path).names))
 
 
 def _stop(number: int, frame: FrameType | None) -> None:

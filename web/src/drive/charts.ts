@@ -35,6 +35,8 @@ export class Charts {
   onCursor: ((time: number | null) => void) | null = null;
   onPick: ((time: number) => void) | null = null;
   onRange: ((range: Range) => void) | null = null;
+  /** The file was replaced while it was open. */
+  onReplaced: (() => void) | null = null;
   private plots: { panel: Panel; plot: uPlot; box: HTMLElement }[] = [];
   private count = 0;
   private run: Run | null = null;
@@ -63,6 +65,12 @@ export class Charts {
     return this.run ? [this.run.start, this.run.end] : [0, 1];
   }
 
+  /** The ends of a chart's upright axis. */
+  scale(number: number): Range | null {
+    const { min, max } = this.plots[number]?.plot.scales["y"] ?? {};
+    return typeof min === "number" && typeof max === "number" ? [min, max] : null;
+  }
+
   close(): void {
     this.forget();
     this.watcher.disconnect();
@@ -73,11 +81,20 @@ export class Charts {
   }
 
   show(path: string, run: Run, panels: Panel[]): void {
-    const same = path === this.path;
+    const same = path === this.path && run.version === this.run?.version;
     this.path = path;
     this.run = run;
     if (!same) this.range = this.whole;
     this.build(panels);
+  }
+
+  /** Show no run, but why. */
+  clear(why: string): void {
+    this.run = null;
+    this.path = "";
+    this.build([]);
+    delete this.element.dataset["rows"];
+    fill(this.element, h("p", { class: "hint empty" }, why));
   }
 
   /** Show the times brushed last, on another page or in another tab, where they are of this run. */
@@ -176,9 +193,13 @@ export class Charts {
     const pending = (this.pending = new AbortController());
     const found = await tried(async () => {
       try {
-        return await columns("drive/window", { path: this.path, start, end, width: buckets }, [...names], pending.signal);
+        return await columns("drive/window", { path: this.path, start, end, width: buckets, version: this.run?.version }, [...names], pending.signal);
       } catch (error) {
         if (error instanceof DOMException && error.name === "AbortError") return undefined;
+        if (this.onReplaced && error instanceof Error && error.message.includes("was replaced since")) {
+          this.onReplaced();
+          return undefined;
+        }
         throw error;
       }
     });
@@ -214,7 +235,7 @@ export class Charts {
         const unseen = { paths: () => null, points: { show: false } }; // they count for the scale
         series.push({ ...unseen }, { ...unseen });
       }
-      series.push({ label: t.label, stroke: shade, width: 1.4, paths: (...of) => (this.isDense(of[0]) ? null : line(...of)), points: { show: false }, ...(t.dash ? { dash: t.dash } : {}) });
+      series.push({ label: t.label, stroke: shade, width: 1.4, paths: (...of) => (this.isDense(of[0]) ? null : line(...of)), points: { show: false, size: 4, width: 0, fill: shade, filter: (...of) => (this.isDense(of[0]) ? [] : alone(of[0].data[of[1]] as Values)) }, ...(t.dash ? { dash: t.dash } : {}) });
     }
     const axis = { stroke: color("muted"), grid: { stroke: color("grid"), width: 1 }, ticks: { stroke: color("grid"), width: 1 }, font: "11px system-ui, sans-serif" };
     return {
@@ -223,7 +244,7 @@ export class Charts {
       padding: [6, 20, 0, 0],
       legend: { show: false },
       cursor: { sync: { key: SYNC }, drag: { x: true, y: false, setScale: false }, points: { show: false }, y: false },
-      scales: { x: { time: false, range: () => this.range }, y: log ? { distr: 3, range: () => panel.log as Range } : { range: (_, low, high) => limits(low, high, panel) } },
+      scales: { x: { time: false, range: () => this.range }, y: log ? { distr: 3, range: () => panel.log as Range } : { range: (plot, low, high) => limits(plot, low, high, panel) } },
       axes: [
         { ...axis, size: 24, ticks: { ...axis.ticks, size: 4 }, gap: 3, values: (_, ticks) => ticks.map((v) => `${digits(v, 6)}${last ? " s" : ""}`) },
         { ...axis, size: 52, space: 24, ...(log ? { splits: () => MARKS, filter: (_: uPlot, at: number[]) => at } : {}), values: (_, ticks) => ticks.map((v) => digits(v, 4)) },
@@ -232,7 +253,7 @@ export class Charts {
       hooks: {
         drawClear: [(plot) => this.spans(plot)],
         drawAxes: [(plot) => (this.isDense(plot) ? columnsOfBuckets(plot, panel.traces, this.fetched?.cut ? 2 : 1) : bands(plot, panel.traces))],
-        draw: [(plot) => levels(plot, panel)],
+        draw: [(plot) => levels(plot, panel), (plot) => beyond(plot, panel)],
         setCursor: [(plot) => plot.cursor.left !== undefined && this.onCursor?.(plot.cursor.left >= 0 ? plot.posToVal(plot.cursor.left, "x") : null)],
         setSelect: [
           (plot) => {
@@ -290,13 +311,65 @@ function shown(values: Float64Array | undefined, scale: number): Float64Array | 
   return scaled.some(Number.isNaN) ? Array.from(scaled, (v) => (Number.isNaN(v) ? null : v)) : scaled;
 }
 
-/** The range of the data, held inside what the panel can sensibly show. */
-function limits(low: number | null, high: number | null, panel: Panel): Range {
-  let from = Math.max(low ?? 0, panel.low ?? -Infinity);
-  let to = Math.min(high ?? 1, panel.high ?? Infinity);
+type Values = ArrayLike<number | null>;
+
+/** Samples with none on either side: no line reaches them, so each is a point. */
+export function alone(values: Values): number[] {
+  const found: number[] = [];
+  const known = (i: number): boolean => typeof values[i] === "number";
+  for (let i = 0; i < values.length; i++) if (known(i) && !known(i - 1) && !known(i + 1)) found.push(i);
+  return found;
+}
+
+/** Smallest and largest value of the shown traces, and of their intervals, by uPlot's own extremes of each series. */
+function extent(plot: uPlot, panel: Panel): { values: Range; bands: Range } {
+  const values: Range = [Infinity, -Infinity];
+  const bands: Range = [Infinity, -Infinity];
+  let at = 1;
+  const take = (into: Range): void => {
+    const one = plot.series[at++];
+    const [low, high] = [one?.min, one?.max];
+    if (typeof low === "number" && typeof high === "number" && low <= high) [into[0], into[1]] = [Math.min(into[0], low), Math.max(into[1], high)];
+  };
+  for (const t of panel.traces) {
+    if (t.band) {
+      take(bands);
+      take(bands);
+    }
+    take(values);
+  }
+  return { values, bands };
+}
+
+/** The range of the data: intervals inside what the panel shows by custom, values inside the most it can sensibly show. */
+function limits(plot: uPlot, low: number | null, high: number | null, panel: Panel): Range {
+  const { values, bands } = extent(plot, panel);
+  const [soft, hard]: Range[] = [
+    [panel.low ?? -Infinity, panel.high ?? Infinity],
+    [panel.least ?? panel.low ?? -Infinity, panel.most ?? panel.high ?? Infinity],
+  ];
+  const within = (v: number, [from, to]: Range): number => Math.min(Math.max(v, from), to);
+  const ends = [...values.map((v) => within(v, hard as Range)), ...bands.map((v) => within(v, soft as Range))].filter(Number.isFinite);
+  let [from, to] = ends.length && values[0] <= values[1] ? [Math.min(...ends), Math.max(...ends)] : [Math.max(low ?? 0, panel.low ?? -Infinity), Math.min(high ?? 1, panel.high ?? Infinity)];
   if (!(to > from)) [from, to] = [from - 0.5, from + 0.5];
   const room = 0.06 * (to - from);
   return [from - room, to + room];
+}
+
+/** Values that lie outside the axis are told in its corner: nothing is left out in silence. */
+function beyond(plot: uPlot, panel: Panel): void {
+  const { min, max } = plot.scales["y"] ?? {};
+  if (panel.log || typeof min !== "number" || typeof max !== "number") return;
+  const { values } = extent(plot, panel);
+  const { ctx, bbox } = plot;
+  ctx.save();
+  ctx.fillStyle = color("bad");
+  ctx.font = `${11 * devicePixelRatio}px system-ui, sans-serif`;
+  ctx.textAlign = "right";
+  const x = bbox.left + bbox.width - 4 * devicePixelRatio;
+  if (values[1] > max) ctx.fillText(`▲ up to ${digits(values[1])} ${panel.unit}`, x, bbox.top + 12 * devicePixelRatio);
+  if (values[0] < min) ctx.fillText(`▼ down to ${digits(values[0])} ${panel.unit}`, x, bbox.top + bbox.height - 6 * devicePixelRatio);
+  ctx.restore();
 }
 
 function levels(plot: uPlot, panel: Panel): void {

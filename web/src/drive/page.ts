@@ -4,8 +4,9 @@ import { sampled } from "../fit/samples";
 import { get, type Item } from "../ui/api";
 import { brushed } from "../ui/brush";
 import { digits, fill, h } from "../ui/dom";
-import { tried } from "../ui/notes";
+import { note, tried } from "../ui/notes";
 import type { Page } from "../ui/page";
+import { notHere, options, runsOf } from "../ui/runs";
 import { Charts } from "./charts";
 import { Plane } from "./plane";
 import { zoomed } from "./gestures";
@@ -38,6 +39,7 @@ export const page: Page = (main, { notices, query }) => {
   const planeWheel = h("select", { "aria-label": "Wheel of the plane" });
   let run: Run | null = null;
   let path = "";
+  let seen = ""; // size and time of change of what is open
   let chosen: string[] = [];
   let shown: string[] = JSON.parse(localStorage.getItem(KEY) ?? "null") ?? FIRST;
   let picked = 0;
@@ -126,6 +128,7 @@ export const page: Page = (main, { notices, query }) => {
       soils.map((name) => h("span", {}, h("i", { class: `patch ${soilColor(name)}` }), name)),
       kinds.map((kind) => h("span", {}, h("i", { class: `strip ${EVENT_COLORS[kind] ?? "ink"}` }), kind)),
       run.recording ? null : h("span", { class: "hint" }, "The recording is not in this folder: measured channels are left out."),
+      run.notes.length ? h("details", { class: "chooser run-notes" }, h("summary", {}, `${run.notes.length} ${run.notes.length === 1 ? "note" : "notes"}`), h("ul", { class: "menu" }, run.notes.map((text) => h("li", {}, text)))) : null,
     );
   }
 
@@ -133,10 +136,14 @@ export const page: Page = (main, { notices, query }) => {
     const reading = window.setTimeout(() => fill(legend, h("span", { class: "hint" }, `Reading ${wanted} …`)), 200);
     const found = await tried(() => get<Run>("drive", { path: wanted }));
     clearTimeout(reading);
-    if (!found) return;
+    if (!found) {
+      if (wanted !== path) leave(wanted, notHere(wanted));
+      return;
+    }
+    const again = wanted === path && run?.wheels.join() === found.wheels.join();
     path = wanted;
     run = found;
-    chosen = found.wheels.slice(-2);
+    if (!again) chosen = found.wheels.slice(-2);
     choice.value = wanted;
     history.replaceState(null, "", `#/drive?path=${encodeURIComponent(wanted)}`);
     fill(planeWheel, found.wheels.map((wheel) => h("option", { value: wheel, selected: wheel === found.wheels.at(-1) }, wheel)));
@@ -148,17 +155,27 @@ export const page: Page = (main, { notices, query }) => {
     void drawPlane();
   }
 
+  /** No run is shown, and why. */
+  function leave(wanted: string, why: string): void {
+    path = wanted;
+    run = null;
+    charts.clear(why);
+    for (const one of [legend, wheels, details]) fill(one);
+    plane.show({ slip: [], adhesion: [] });
+    readout.value = "";
+  }
+
   async function drawPlane(): Promise<void> {
     if (!run || !planeWheel.value) return;
     const [start, end] = charts.range;
-    const points = await tried(() => get<{ slip: number[]; adhesion: number[] }>("drive/plane", { path, wheel: planeWheel.value, start, end }));
+    const points = await tried(() => get<{ slip: number[]; adhesion: number[] }>("drive/plane", { path, wheel: planeWheel.value, start, end, version: run?.version }));
     if (points) plane.show(points);
   }
 
   async function pick(time: number): Promise<void> {
     if (asking) return;
     asking = true;
-    const found = await tried(() => get<Sample>("drive/sample", { path, time }));
+    const found = await tried(() => get<Sample>("drive/sample", { path, time, version: run?.version }));
     asking = false;
     if (!found) return;
     picked = found.time;
@@ -227,7 +244,13 @@ export const page: Page = (main, { notices, query }) => {
     clearTimeout(soon);
     soon = window.setTimeout(() => void drawPlane(), 150);
   };
-  choice.addEventListener("change", () => void open(choice.value));
+  choice.addEventListener("change", () => {
+    seen = "";
+    path = choice.value;
+    run = null;
+    void reload();
+  });
+  charts.onReplaced = () => void reload();
   planeWheel.addEventListener("change", () => {
     void drawPlane();
     if (picked) void pick(picked);
@@ -235,11 +258,18 @@ export const page: Page = (main, { notices, query }) => {
 
   async function reload(): Promise<void> {
     const folder = await tried(() => get<{ items: Item[] }>("folder"));
-    const runs = (folder?.items ?? []).filter((item) => item.kind === "estimates").map((item) => item.path);
-    fill(choice, runs.length ? runs.map((name) => h("option", { value: name, selected: name === path }, name)) : h("option", { value: "" }, "No estimates in the folder"));
-    const wanted = query.get("path") ?? brushed()?.path;
-    if (!path && runs.length) await open(wanted && runs.includes(wanted) ? wanted : (runs[0] as string));
-    if (!runs.length) fill(charts.element, h("p", { class: "hint empty" }, "Nothing to show yet: open a recording on the folder page and estimate it."));
+    if (!folder) return;
+    const runs = runsOf(folder.items);
+    const wanted = path || query.get("path") || brushed()?.path || [...runs.keys()][0] || "";
+    const now = runs.get(wanted) ?? "";
+    fill(choice, options(runs, wanted));
+    if (!wanted) charts.clear("Nothing to show yet: open a recording on the folder page and estimate it.");
+    else if (!now) leave(wanted, path && run ? `${wanted} was removed from the folder. Choose another run.` : notHere(wanted));
+    else if (now !== seen || !run) {
+      if (run && seen) note(`${wanted} was replaced: shown anew`);
+      seen = now;
+      await open(wanted);
+    }
   }
 
   const forget = notices.on((notice) => notice.kind === "folder" && void reload());

@@ -32,6 +32,8 @@ export interface Run {
   vehicle: string;
   radius: Record<string, number>;
   notes: string[];
+  /** The file as it was described; a request that names it is refused once the file is replaced. */
+  version: string;
   events: Event[];
   soils: Span[];
   ground: { path: string; sections: Section[]; changes: { time: number; std: number; probability: number }[] } | null;
@@ -57,8 +59,11 @@ export interface Panel {
   traces: Trace[];
   /** Values at which lines cross the panel, such as the expected NIS. */
   levels?: number[];
+  /** What intervals may stretch the axis to; and values, where these differ from it. What lies beyond is told in a corner. */
   low?: number;
   high?: number;
+  least?: number;
+  most?: number;
   /** The ends of a logarithmic axis. */
   log?: [number, number];
   /** What it is, for who does not know. */
@@ -83,17 +88,17 @@ export function panelsOf(run: Run, wheels: string[]): Panel[] {
   const one = (column: string, label: string, shade = "blue", scale = 1): Trace[] =>
     has(column) ? [{ column, label, color: shade, band: has(`${column}_std`) ? column : "", scale }] : [];
   const speeds = wheels.flatMap((wheel): Trace[] => {
-    const scale = run.radius[wheel] ?? 1;
-    const own = has(`wheel_speed_${wheel}`)
+    const scale = run.radius[wheel] ?? NaN; // without a radius there is no speed in m/s
+    const own = has(`wheel_speed_${wheel}`) && scale > 0
       ? [{ column: `wheel_speed_${wheel}`, label: `r ω ${wheel}`, color: color(wheel), band: "", scale }]
       : [];
     return own;
   });
   const panels: Panel[] = [
     { key: "adhesion", title: "Adhesion µ", unit: "–", traces: each("adhesion") },
-    { key: "slip", title: "Slip s", unit: "%", traces: each("slip", 100), low: -20, high: 100 },
+    { key: "slip", title: "Slip s", unit: "%", traces: each("slip", 100), low: -20, high: 100, least: -150, most: 200 },
     { key: "resistance", title: "Soil resistance ρs", unit: "–", traces: one("soil_resistance", "ρs", "purple") },
-    { key: "efficiency", title: "Tractive efficiency η", unit: "%", traces: each("efficiency", 100), low: 0, high: 100 },
+    { key: "efficiency", title: "Tractive efficiency η", unit: "%", traces: each("efficiency", 100), low: 0, high: 100, least: -100, most: 120 },
     { key: "traction", title: "Net traction κ", unit: "–", traces: each("net_traction") },
     {
       key: "speed",

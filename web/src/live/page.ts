@@ -176,6 +176,7 @@ export const page: Page = (main, { notices, query }) => {
       live?.service || !runs.length ? h("option", { value: "" }, live?.service ? "live service" : "no live service, no runs") : null,
       runs.map((path) => h("option", { value: path }, `replay ${path}`)),
     );
+    if (before && !runs.includes(before)) source.prepend(h("option", { value: before }, `replay ${before} (not to be had)`));
     source.value = before;
     speed.hidden = source.value === "";
     if (first) {
@@ -229,7 +230,7 @@ function tracesOf(wheels: string[], columns: string[]): Trace[] {
       .filter((line) => columns.includes(line.column));
   const one = (column: string, color: string): Trace["lines"] => (columns.includes(column) ? [{ column, color, label: column }] : []);
   return [
-    { title: "Slip", unit: "%", scale: 100, lines: each("slip"), low: -20, high: 100 },
+    { title: "Slip", unit: "%", scale: 100, lines: each("slip"), low: -150, high: 200 },
     { title: "Adhesion µ", unit: "–", scale: 1, lines: each("adhesion"), low: -0.5, high: 1.5 },
     { title: "Ground speed", unit: "m/s", scale: 1, lines: one("ground_speed", "blue"), low: 0, high: 20 },
     { title: "Soil resistance ρs", unit: "–", scale: 1, lines: one("soil_resistance", "purple"), low: -0.3, high: 1 },

@@ -11,6 +11,7 @@ import { columns, type Columns } from "../ui/columns";
 import { digits, fill, h } from "../ui/dom";
 import { note, tried } from "../ui/notes";
 import type { Page } from "../ui/page";
+import { notHere, options, runsOf } from "../ui/runs";
 import { color, onTheme } from "../ui/theme";
 import { shade, SCALE } from "./shade";
 import { corners, type Placed } from "./basemap";
@@ -55,6 +56,7 @@ export const page: Page = (main, { notices, query }) => {
   const ready = new Promise<void>((resolve) => map.on("load", () => resolve()));
   let run: Run | null = null;
   let path = "";
+  let seen = ""; // size and time of change of what is open
   let track: Columns | null = null;
 
   const forgetTheme = onTheme(() => {
@@ -76,7 +78,7 @@ export const page: Page = (main, { notices, query }) => {
 
   async function open(wanted: string): Promise<void> {
     const found = await tried(() => get<Run>("drive", { path: wanted }));
-    if (!found) return;
+    if (!found) return leave(wanted, notHere(wanted));
     path = wanted;
     run = found;
     choice.value = wanted;
@@ -90,11 +92,22 @@ export const page: Page = (main, { notices, query }) => {
     charts.follow();
   }
 
+  /** No run is shown, and why. */
+  function leave(wanted: string, why: string): void {
+    path = wanted;
+    run = null;
+    track = null;
+    charts.clear(why);
+    fill(legend);
+    readout.value = "";
+    void ready.then(() => run ?? replace("track", [], "line"));
+  }
+
   async function draw(): Promise<void> {
     if (!run) return;
     const asked = names().find((n) => n.value === quantity.value);
     const named = quantity.value === "soil" || quantity.value === "event";
-    track = (await tried(() => columns("drive/track", { path }, named ? [] : [quantity.value]))) ?? null;
+    track = (await tried(() => columns("drive/track", { path, version: run?.version }, named ? [] : [quantity.value]))) ?? null;
     await ready;
     if (!track || !track.count) {
       if (track) note("This run has no positions: the map needs latitude and longitude.", "error");
@@ -215,7 +228,13 @@ export const page: Page = (main, { notices, query }) => {
     if (best >= 0) mark((track.data[0] as Float64Array)[best] as number);
   });
 
-  choice.addEventListener("change", () => void open(choice.value));
+  choice.addEventListener("change", () => {
+    seen = "";
+    path = choice.value;
+    run = null;
+    void reload();
+  });
+  charts.onReplaced = () => void reload();
   quantity.addEventListener("change", () => void draw());
   base.addEventListener("change", () => void lay(base.value));
 
@@ -234,14 +253,22 @@ export const page: Page = (main, { notices, query }) => {
 
   async function reload(): Promise<void> {
     const folder = await tried(() => get<{ items: Item[] }>("folder"));
-    const items = folder?.items ?? [];
-    const runs = items.filter((item) => item.kind === "estimates").map((item) => item.path);
+    if (!folder) return;
+    const { items } = folder;
+    const runs = runsOf(items);
+    const wanted = path || query.get("path") || brushed()?.path || [...runs.keys()][0] || "";
+    const now = runs.get(wanted) ?? "";
     const pictures = items.filter((item) => item.kind === "basemap" || (item.kind === "picture" && !item.path.endsWith(".svg"))).map((item) => item.path);
-    fill(choice, runs.length ? runs.map((name) => h("option", { value: name, selected: name === path }, name)) : h("option", { value: "" }, "No estimates in the folder"));
+    fill(choice, options(runs, wanted));
     const before = base.value;
     fill(base, h("option", { value: "" }, "No basemap"), pictures.map((name) => h("option", { value: name, selected: name === before }, name)));
-    const wanted = query.get("path") ?? brushed()?.path;
-    if (!path && runs.length) await open(wanted && runs.includes(wanted) ? wanted : (runs[0] as string));
+    if (!wanted) charts.clear("Nothing to show yet: open a recording on the folder page and estimate it.");
+    else if (!now) leave(wanted, path && run ? `${wanted} was removed from the folder. Choose another run.` : notHere(wanted));
+    else if (now !== seen || !run) {
+      if (run && seen) note(`${wanted} was replaced: shown anew`);
+      seen = now;
+      await open(wanted);
+    }
   }
 
   const forget = notices.on((notice) => notice.kind === "folder" && void reload());

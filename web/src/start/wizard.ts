@@ -7,6 +7,8 @@ import { tried } from "../ui/notes";
 interface Inspection {
   rows: number;
   ready: boolean;
+  /** Why an estimate cannot run, though the log is whole; null where nothing is known against it. */
+  problem: string | null;
   missing: string[];
   warnings: string[];
   profile: string;
@@ -28,6 +30,7 @@ export class Wizard {
   private output: HTMLInputElement;
   private go = h("button", { type: "submit", class: "primary" }, "Estimate");
   private methods: Methods | undefined;
+  private looks = 0;
 
   constructor(
     private recording: string,
@@ -41,7 +44,10 @@ export class Wizard {
     this.output = h("input", { type: "text", id: "wizard-output", value: `${stem}-estimates.parquet`, required: true });
     this.profile.addEventListener("change", () => void this.look());
     this.vehicle.addEventListener("change", () => void this.look());
-    this.method.addEventListener("change", () => this.limits());
+    this.method.addEventListener("change", () => {
+      this.limits();
+      void this.look();
+    });
     this.element.addEventListener("submit", (event) => {
       event.preventDefault();
       void this.start();
@@ -65,10 +71,14 @@ export class Wizard {
     if (this.methods && !this.method.options.length) {
       for (const name of Object.keys(this.methods.methods)) this.method.append(h("option", { value: name, selected: name === this.methods.default }, name));
     }
-    const query = { path: this.recording, profile: this.profile.value || undefined, vehicle: this.vehicle.value || undefined };
+    const query = { path: this.recording, profile: this.profile.value || undefined, vehicle: this.vehicle.value || undefined, method: this.method.value || undefined };
+    const turn = ++this.looks;
+    this.go.disabled = true;
     try {
-      this.show(await get<Inspection>("inspect", query));
+      const found = await get<Inspection>("inspect", query);
+      if (turn === this.looks) this.show(found);
     } catch (error) {
+      if (turn !== this.looks) return;
       fill(this.found, h("p", { class: "bad", role: "alert" }, error instanceof Error ? error.message : String(error)));
       this.go.disabled = true;
     }
@@ -77,12 +87,19 @@ export class Wizard {
   private show(found: Inspection): void {
     fill(
       this.found,
-      h("p", { class: found.ready ? "good" : "bad" }, found.ready ? `${found.rows.toLocaleString()} rows, ready to estimate.` : `Not ready: ${found.missing.join("; ") || "choose a profile"}.`),
+      h("p", { class: found.ready && this.vehicle.value ? "good" : "bad" }, this.verdict(found)),
       found.warnings.map((text) => h("p", { class: "hint" }, text)),
       h("details", {}, h("summary", {}, "What is in it"), h("pre", { tabindex: "0" }, found.text)),
-      found.ready ? null : h("button", { type: "button", click: () => void this.keepProfile(found.profile) }, "Save the proposed profile to the folder"),
+      found.ready || found.problem ? null : h("button", { type: "button", click: () => void this.keepProfile(found.profile) }, "Save the proposed profile to the folder"),
     );
     this.go.disabled = !found.ready || !this.vehicle.value;
+  }
+
+  /** "Ready" is said only where the estimate was begun, and ran. */
+  private verdict(found: Inspection): string {
+    const rows = `${found.rows.toLocaleString()} rows`;
+    if (found.ready) return this.vehicle.value ? `${rows}, ready to estimate.` : `${rows}; a vehicle file is missing.`;
+    return found.problem ? `Not ready: ${found.problem}` : `Not ready: ${found.missing.join("; ") || "choose a profile"}.`;
   }
 
   private async keepProfile(text: string): Promise<void> {

@@ -25,12 +25,17 @@ PLANE = 3000
 TRACK = 20_000
 """Points of a track."""
 
-Columns = Annotated[list[str], Query(max_length=64)]
+Columns = Annotated[list[str], Query(max_length=2000)]
+"""All panels of four wheels ask for 73; a guard against nonsense, not a share of what a page may draw."""
 Width = Annotated[int, Query(ge=10, le=5000)]
 Time = Annotated[float, Query(allow_inf_nan=False)]
 
 
-def _table(studio: Studio, path: str) -> Estimates:
+def _table(studio: Studio, path: str, version: str = "") -> Estimates:
+    """Estimates of the folder. Raises InputError where the file is no longer the `version` that the page was told of: what it draws
+    would be a mixture of two runs."""
+    if version and studio.folder.version(path) != version:
+        raise InputError("was replaced since it was opened", file=path, mend="open it again")
     return studio.estimates.get(studio.folder.file(path))
 
 
@@ -38,7 +43,7 @@ def _table(studio: Studio, path: str) -> Estimates:
 def about(studio: Here, path: Named) -> dict[str, Any]:
     """What a run holds: columns, wheels, time, events with their reasons, soils, the recording it came from, the ground where known."""
     table = _table(studio, path)
-    found = drive.recording_of(studio, table)
+    found = drive.recording_of(studio, table, search=True)
     plain: dict[str, Any] = finite(
         {
             "rows": len(table),
@@ -50,7 +55,8 @@ def about(studio: Here, path: Named) -> dict[str, Any]:
             "wheels": list(table.wheels),
             "method": table.method,
             "vehicle": table.vehicle.name,
-            "radius": dict(zip(table.vehicle.wheels, table.vehicle.wheel_radius.tolist(), strict=True)),
+            "radius": drive.radii(table),
+            "version": studio.folder.version(path),
             "notes": list(table.notes),
             "events": [event.to_dict() for event in events(table)],
             "soils": drive.spans(table["soil"], table.time) if "soil" in table else [],
@@ -62,10 +68,10 @@ def about(studio: Here, path: Named) -> dict[str, Any]:
 
 @router.get("/drive/window")
 def window(
-    studio: Here, path: Named, column: Columns, start: Time, end: Time, width: Width = 1000
+    studio: Here, path: Named, column: Columns, start: Time, end: Time, width: Width = 1000, version: str = ""
 ) -> Response:
     """Columns between two times as float64 arrays behind a JSON head (see `packed`): min and max of every bucket are kept."""
-    table = _table(studio, path)
+    table = _table(studio, path, version)
     if not len(table) or end <= start:
         raise InputError("holds nothing between these times", file=path)
     found = drive.recording_of(studio, table) if any(c.startswith(MEASURED) for c in column) else None
@@ -77,9 +83,9 @@ def window(
 
 
 @router.get("/drive/plane")
-def plane(studio: Here, path: Named, wheel: str, start: Time, end: Time) -> dict[str, Any]:
+def plane(studio: Here, path: Named, wheel: str, start: Time, end: Time, version: str = "") -> dict[str, Any]:
     """Adhesion over slip of one wheel between two times, thinned evenly; no point where slip alone is known."""
-    table = _table(studio, path)
+    table = _table(studio, path, version)
     _known(table, wheel)
     if f"adhesion_{wheel}" not in table.columns:
         return {"slip": [], "adhesion": [], "time": []}
@@ -93,9 +99,9 @@ def plane(studio: Here, path: Named, wheel: str, start: Time, end: Time) -> dict
 
 
 @router.get("/drive/sample")
-def sample(studio: Here, path: Named, time: Time) -> dict[str, Any]:
+def sample(studio: Here, path: Named, time: Time, version: str = "") -> dict[str, Any]:
     """Everything known of one sample, and what moved the adhesion there."""
-    table = _table(studio, path)
+    table = _table(studio, path, version)
     if not len(table):
         raise InputError("holds no rows", file=path)
     found = drive.recording_of(studio, table)
@@ -104,9 +110,14 @@ def sample(studio: Here, path: Named, time: Time) -> dict[str, Any]:
 
 
 @router.get("/drive/track")
-def track(studio: Here, path: Named, column: Columns = []) -> Response:  # noqa: B006  (FastAPI copies it)
+def track(
+    studio: Here,
+    path: Named,
+    column: Columns = [],  # noqa: B006  (FastAPI copies it)
+    version: str = "",
+) -> Response:
     """Time, longitude, latitude and columns along the way, thinned evenly, rows without a position left out."""
-    table = _table(studio, path)
+    table = _table(studio, path, version)
     if "latitude" not in table.columns or "longitude" not in table.columns:
         raise InputError("holds no positions", file=path, mend="estimate a log with latitude and longitude")
     for name in column:
@@ -125,14 +136,33 @@ def _known(table: Estimates, wheel: str) -> None:
 
 
 def _ground(studio: Studio, path: str) -> dict[str, Any] | None:
-    """ground.json of this run where it lies beside it: NAME.ground.json, NAME-ground.json or ground.json in the same folder."""
+    """The ground of this run: of NAME.ground.json or NAME-ground.json beside it, else of a ground.json there or in the folder above
+    (as `terragrip demo` lays it). A file of several runs gives the entries of this one, and nothing where it is not among them."""
     stem = path.removesuffix(".parquet")
     folder = path.rpartition("/")[0]
-    for name in (f"{stem}.ground.json", f"{stem}-ground.json", f"{folder}/ground.json".lstrip("/")):
+    above = folder.rpartition("/")[0]
+    own = [f"{stem}.ground.json", f"{stem}-ground.json"]
+    shared = list(dict.fromkeys(f"{place}/ground.json".lstrip("/") for place in (folder, above)))
+    for name in own + shared:
         try:
             data = json.loads(studio.folder.file(name).read_bytes())
         except (InputError, ValueError, OSError):
             continue
-        if isinstance(data, dict) and {"changes", "sections"} <= set(data):
-            return {"path": name, "changes": data["changes"], "sections": data["sections"]}
+        if not isinstance(data, dict) or not {"changes", "sections"} <= set(data):
+            continue
+        mine = _of_run(data, stem.rpartition("/")[2], alone=name in own)
+        if mine is not None:
+            return {"path": name, **mine}
     return None
+
+
+def _of_run(data: dict[str, Any], run: str, *, alone: bool) -> dict[str, Any] | None:
+    """Changes and sections of one run in a ground file, None where it holds other runs only. A file that is named after the run
+    (`alone`) and holds one run holds this one, whatever it was called when it was written."""
+    entries = [*data["changes"], *data["sections"], *data.get("runs", [])]
+    runs = {one.get("run", run) for one in entries}
+    if run not in runs:
+        if not (alone and len(runs) == 1):
+            return None
+        run = next(iter(runs))
+    return {key: [one for one in data[key] if one.get("run", run) == run] for key in ("changes", "sections")}

@@ -90,18 +90,42 @@ def remove_file(studio: Here, path: Named) -> None:
 
 
 @router.get("/inspect")
-def inspect_log(studio: Here, path: Named, profile: str = "", vehicle: str = "") -> dict[str, Any]:
-    """What a log holds, which channels were found, what is missing, and a profile to begin with."""
+def inspect_log(
+    studio: Here, path: Named, profile: str = "", vehicle: str = "", method: str = ""
+) -> dict[str, Any]:
+    """What a log holds, which channels were found, what is missing, and a profile to begin with.
+
+    With a vehicle, `ready` means that an estimate will run: it is begun, and `problem` is the reason where it cannot.
+    """
     from terragrip.formats import inspect
 
-    found = inspect(
-        studio.folder.file(path),
-        studio.folder.file(profile) if profile else None,
-        studio.folder.file(vehicle) if vehicle else None,
-    )
-    text = found.to_text().replace(f"{studio.folder.root}/", "")
-    plain: dict[str, Any] = {**finite(found.to_dict()), "file": path, "text": text}
+    log = studio.folder.file(path)
+    chosen = studio.folder.file(profile) if profile else None
+    machine = studio.folder.file(vehicle) if vehicle else None
+    found = inspect(log, chosen, machine)
+    problem = _begun(log, chosen, machine, method) if found.ready and machine is not None else None
+    root = f"{studio.folder.root}/"
+    plain: dict[str, Any] = {
+        **finite(found.to_dict()),
+        "file": path,
+        "text": found.to_text().replace(root, ""),
+        "ready": found.ready and problem is None,
+        "problem": None if problem is None else problem.replace(root, ""),
+    }
     return plain
+
+
+def _begun(log: Path, profile: Path | None, vehicle: Path, method: str) -> str | None:
+    """Begin to estimate a log: all checks, the pass over all rows, the first rows through the filter; why it fails, or None."""
+    from terragrip.estimation import DEFAULT, estimated
+    from terragrip.formats.log_blocks import log_in_blocks
+    from terragrip.vehicle import Vehicle
+
+    try:
+        next(estimated(log_in_blocks(log, profile), Vehicle.load(vehicle), method or DEFAULT), None)
+    except InputError as error:
+        return str(error)
+    return None
 
 
 def finite(value: Any) -> Any:

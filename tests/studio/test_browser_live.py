@@ -1,0 +1,55 @@
+"""The live page in a real browser: a dead source must show."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+from live_service import LiveService
+from served import NEEDS, Served
+
+pytest.importorskip("playwright.sync_api", reason="SKIPPED LOUDLY: the browser tests need playwright")
+pytestmark = NEEDS
+
+
+def test_a_dead_source_shows_on_the_live_page(page: Any, served: Served) -> None:
+    service = LiveService()
+    served.stop()
+    served.live = service.address
+    served.start()
+    try:
+        page.goto(f"{served.url}/#/live")
+        page.wait_for_selector("#live-state:text-is('connected')")
+        page.wait_for_function("() => window.terragripLive.feed.ring.taken > 30")
+        faded = "() => Number(getComputedStyle(document.querySelector('.tile .big').parentElement).opacity)"
+        assert page.is_hidden("#live-age")
+        assert page.evaluate(faded) == 1
+        page.wait_for_selector("#health:has-text('ms behind')")
+        for mode in ("silent", "frozen"):
+            service.mode = mode
+            page.wait_for_selector("#live-age:has-text('s old: no rows come')")
+            assert page.evaluate(faded) < 0.5
+            assert page.inner_text("#live-state") == "no measurements"
+            page.wait_for_function("() => !document.getElementById('health').textContent.includes('behind')")
+            # the age is the page's own: it grows while nothing comes
+            old = page.evaluate("() => window.terragripLive.feed.age('measured')")
+            page.wait_for_function(
+                f"() => parseFloat(document.getElementById('live-age').textContent.match(/[0-9.]+/)[0]) > {old + 0.3}"
+            )
+            service.mode = "measured"
+            page.wait_for_selector("#live-age", state="hidden")
+            assert page.evaluate(faded) == 1
+        service.mode = "predicted"
+        page.wait_for_selector("#live-age:has-text('Predicted: nothing was measured for')")
+        assert page.evaluate(faded) < 0.5
+        assert (
+            page.evaluate("() => getComputedStyle(document.querySelector('.tile .big')).fontStyle")
+            == "italic"
+        )
+        service.stop()
+        page.wait_for_selector("#live-state:has-text('connection lost')")
+        page.wait_for_selector("#live-age:has-text('s old')")
+        assert page.evaluate(faded) < 0.5
+    finally:
+        service.stop()
