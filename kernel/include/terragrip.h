@@ -213,7 +213,8 @@ enum {
     TG_OUT_ADAPTATION = 121, /* + state: a_j of A_k as this row used it; written by the adaptive and the supervised policy only */
     TG_OUT_ZERO_SLIP_RADIUS = 139, /* + wheel, m: what slip counts from; written by TG_SPEEDS only */
     TG_OUT_ZERO_SLIP_RADIUS_STD = 147,
-    TG_OUT_SLOTS = 155
+    TG_OUT_CHANNEL_NIS = 155, /* + channel (wheel speeds, ground speed, a_x): each one's own; NaN where it was not measured */
+    TG_OUT_SLOTS = 165
 };
 
 typedef enum {
@@ -251,7 +252,7 @@ typedef struct {
     double time;
     double distance;
     int32_t event;          /* tg_event */
-    tg_real value[155];
+    tg_real value[165];
 } tg_estimate;
 
 typedef struct { /* spreads (1 SD) of constants that the data cannot tell; 0 = known */

@@ -50,20 +50,19 @@ static int32_t is_outlier(const tg_estimator *e, const tg_row *row, const tg_ste
     return found;
 }
 
-/* NIS of the channels that were measured, each by itself where others were not. */
-static void watch_consistency(tg_estimator *e, const tg_row *row, const tg_step *step, const tg_real *r)
+/* NIS of the row and of each measured channel; with a held or reckoned one in it, the row's is the sum of the measured ones'. */
+static void watch_consistency(tg_estimator *e, tg_row *row, const tg_step *step, const tg_real *r)
 {
-    tg_belief *const b = &e->belief;
-    b->nis = step->nis;
-    b->channels = step->channels;
-    if (!row->held_wheels) return;
-    b->nis = 0;
-    b->channels = 0;
-    for (int32_t c = 0; c < e->settings.machine.wheels + 2; c++) {
-        if (isnan(step->innovation[c]) || row->held_wheels >> c & 1) continue;
-        b->nis += tgi_square(step->innovation[c]) / (step->innovation_variance[c] + r[c] * (1 / step->weight[c] - 1));
-        b->channels++;
+    int32_t count = 0, n = e->settings.machine.wheels, made_up = row->held_wheels | (row->reckoned ? 1 << n : 0);
+    tg_real sum = 0;
+    for (int32_t c = 0; c < n + 2; c++) {
+        if (isnan(step->innovation[c]) || made_up >> c & 1) continue;
+        const tg_real w = step->weight[c], variance = step->innovation_variance[c] + (w < 1 ? r[c] * (1 / w - 1) : 0);
+        sum += row->channel_nis[c] = tgi_square(step->innovation[c]) / variance;
+        count++;
     }
+    e->belief.nis = made_up ? sum : step->nis;
+    e->belief.channels = made_up ? count : step->channels;
 }
 
 /* The inputs as they were over the step that ends now: means of torque and drawbar force, of loads and slope between its ends. */
@@ -259,6 +258,7 @@ tg_status tg_estimator_update(tg_estimator *e, const tg_sample *sample, tg_estim
     out->time = row.time;
     out->distance = e->distance;
     report(e, &drive, out);
+    memcpy(out->value + TG_OUT_CHANNEL_NIS, row.channel_nis, sizeof row.channel_nis);
     const int32_t blind = is_blind(e, &row, breaks) && course != TG_WAIT, moves = course == TG_GO || course == TG_START || course == TG_ANEW;
     tgi_watch_over(e, &row, &drive, !blind && moves, blind || course == TG_START || course == TG_ANEW || breaks, dt, out->value);
     out->event = event_of(e, &row, gap || blind || course == TG_WAIT, lost);

@@ -37,6 +37,7 @@ typedef struct { /* one row, calibrated and checked, in the vehicle's own direct
     tg_real wheel_variance[8];
     tg_real ground_variance;
     tg_real doubt[9]; /* of the wheel speeds and the ground speed: variance beside the sensor's, of a spike */
+    tg_real channel_nis[TG_MAX_CHANNELS]; /* NaN: no update took the channel as measured */
 } tg_row;
 
 typedef struct { /* what a row's values need beside the belief; all reals, so that it goes into a record */

@@ -24,7 +24,7 @@ typedef struct { /* what a row measures [m/s]: ground speed, rims; and which cha
 } tgi_speed_samples;
 
 typedef struct { /* how the samples fitted one mode */
-    tg_real weight[TG_MAX_WHEELS + 1], score, nis;
+    tg_real weight[TG_MAX_WHEELS + 1], nis[TG_MAX_WHEELS + 1], score;
 } tgi_speed_fit;
 
 /* Variance that the densities add over dt; the noise of slip speeds is in proportion to the speeds in `x`. */
@@ -72,7 +72,6 @@ static tg_real spread(const tg_real (*P)[SIZE], int32_t c)
 /* Take the samples one after another. A sample beyond `huber` SDs of what is expected before any was taken counts less. */
 static void update(tgi_speed_mode *m, tgi_speed_fit *fit, const tgi_speed_samples *in, tg_real huber, int32_t size)
 {
-    fit->nis = 0;
     for (int32_t k = 0; k < in->count; k++) {
         const int32_t c = in->given[k];
         const tg_real expected = tgi_sqrt(spread((const tg_real(*)[SIZE])m->P, c) + in->variance[c]);
@@ -89,8 +88,8 @@ static void update(tgi_speed_mode *m, tgi_speed_fit *fit, const tgi_speed_sample
             m->x[i] += gain * innovation;
             for (int32_t j = 0; j < size; j++) m->P[i][j] -= gain * column[j];
         }
-        fit->nis += innovation * innovation / variance;
-        fit->score -= (innovation * innovation / variance + tgi_log(variance)) / 2;
+        fit->nis[c] = innovation * innovation / variance; /* with what the samples before it tell of it */
+        fit->score -= (fit->nis[c] + tgi_log(variance)) / 2;
     }
 }
 
@@ -155,8 +154,13 @@ static void step(tg_estimator *e, tg_real dt, const tgi_speed_samples *in, tg_ro
         const tg_real p = s->probability[m] /= sum;
         s->manoeuvre += p * manoeuvres[m / TG_LEVELS];
         s->slipping += p * slippings[m % TG_LEVELS];
-        e->belief.nis += p * fit[m].nis;
-        for (int32_t k = 0; k < in->count; k++) weight[k] += p * fit[m].weight[in->given[k]];
+        for (int32_t k = 0; k < in->count; k++) {
+            const int32_t c = in->given[k], place = c ? c - 1 : n; /* ground speed stands first here, after the wheels elsewhere */
+            if (m == 0) row->channel_nis[place] = 0;
+            row->channel_nis[place] += p * fit[m].nis[c];
+            e->belief.nis += p * fit[m].nis[c];
+            weight[k] += p * fit[m].weight[c];
+        }
     }
     for (int32_t k = 0; k < in->count; k++) row->outlier |= weight[k] < e->settings.outlier_weight;
     merge(s, e->speed_mode, size);
@@ -306,6 +310,7 @@ void tgi_speeds_update(tg_estimator *e, tg_row *row, tg_estimate *out)
     out->distance = e->distance;
     out->value[TG_OUT_DISTANCE] = (tg_real)e->distance;
     out->value[TG_OUT_NIS] = e->belief.nis;
+    memcpy(out->value + TG_OUT_CHANNEL_NIS, row->channel_nis, sizeof row->channel_nis);
     out->value[TG_OUT_CHANNELS] = (tg_real)e->belief.channels;
     out->event = (gap && !first) || is_blind(s, n) ? TG_EVENT_GAP
                : e->standing                       ? TG_EVENT_STANDSTILL

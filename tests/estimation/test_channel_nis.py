@@ -1,0 +1,80 @@
+"""The NIS of each channel: its chi-square law, which channel's noise is misstated, and what is no measurement."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import terragrip as tg
+from drives import WHEELS, drive, robot
+from terragrip.estimation import estimate
+from terragrip.estimation.channel_nis import estimate_with_channel_nis, moving_nis
+
+SPEEDS = (*(f"wheel_speed_{wheel}" for wheel in WHEELS), "ground_speed")
+
+
+@pytest.mark.parametrize("method", ["kalman", "bank", "aukf-fs"])
+def test_it_stands_beside_the_estimates_and_changes_none(method: str) -> None:
+    log = drive(10, seed=3).recording
+    found, plain = estimate_with_channel_nis(log, robot(), method), estimate(log, robot(), method)
+    for name in plain:
+        np.testing.assert_array_equal(found[name], plain[name], err_msg=name)
+    moving = (found.event_codes == 0) & (
+        found["channels"] > 0
+    )  # the first row starts the filter and updates nothing
+    assert moving.sum() > 900
+    for name in SPEEDS:
+        assert np.isfinite(found[f"nis_{name}"][moving]).all()
+    # The row's is of all channels together: a channel's own, which knows no other of the row, cannot be larger.
+    most = np.max([found[f"nis_{name}"] for name in SPEEDS], axis=0)
+    if method != "bank":
+        assert (most <= found["nis"] * (1 + 1e-9) + 1e-9)[moving].all()
+
+
+def test_stated_noise_gives_what_the_filter_expects() -> None:
+    """The wheels' expected innovation holds a walk of adhesion that this even drive does not make: below 1."""
+    log = drive(60, seed=4).recording
+    for name, (mean, rows) in moving_nis(estimate_with_channel_nis(log, robot(), "kalman")).items():
+        assert rows > 5000
+        assert 0.6 < mean < 1.1, name
+
+
+@pytest.mark.parametrize("wrong", ["ground_speed", "wheel_speed_rl"])
+def test_it_names_the_channel_whose_noise_is_stated_at_half(wrong: str) -> None:
+    log = drive(60, seed=5).recording
+    right = moving_nis(estimate_with_channel_nis(log, robot(), "kalman"))
+    half = {"ground_speed": 0.01, "wheel_speed_rl": 0.015}[wrong]
+    found = moving_nis(estimate_with_channel_nis(log, robot(), "kalman", sensors={wrong: half}))
+    for name in SPEEDS:
+        rise = found[name][0] / right[name][0]
+        assert rise > 1.25 if name == wrong else 0.9 < rise < 1.1
+
+
+def test_a_missing_channel_and_a_reckoned_ground_speed_have_none() -> None:
+    given = drive(30, seed=6).recording
+    columns = {name: given[name].copy() for name in given.channels}
+    silent = (given.time > 10) & (given.time < 20)
+    columns["ground_speed"][silent] = np.nan
+    columns["wheel_speed_fr"][50:60] = np.nan
+    found = estimate_with_channel_nis(
+        tg.Recording.from_frame({"time": given.time, **columns}), robot(), "kalman"
+    )
+    np.testing.assert_array_equal(np.isnan(found["nis_ground_speed"][silent]), True)
+    np.testing.assert_array_equal(np.isnan(found["nis_wheel_speed_fr"][50:60]), True)
+    assert np.isfinite(found["nis_wheel_speed_fl"][silent]).all()
+    # Nor does the row count them: four wheels are left.
+    assert set(found["channels"][silent][20:]) == {4.0}
+
+
+def test_of_speeds_alone_the_channels_add_up_to_the_row() -> None:
+    given = drive(30, seed=7).recording
+    columns = {"time": given.time, **{name: given[name] for name in SPEEDS}}
+    found = estimate_with_channel_nis(tg.Recording.from_frame(columns), robot())
+    assert "slip_fl" in found
+    assert "adhesion_fl" not in found
+    started = np.flatnonzero(found["nis"] > 0)
+    assert len(started) > 2000
+    total = np.sum([found[f"nis_{name}"] for name in SPEEDS], axis=0)
+    np.testing.assert_allclose(total[started], found["nis"][started], rtol=1e-9)
+    for name, (mean, _) in moving_nis(found).items():
+        assert 0.6 < mean < 1.3, name
