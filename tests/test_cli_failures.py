@@ -53,7 +53,7 @@ def failing(failure: BaseException) -> Callable[..., None]:
         (["estimate", "a.csv", "--vehicle", "v", "-o", "o", "--metod", "x"], "--metod"),
         (["simulate", "x", "-o", "y", "--seed", "many"], "--seed"),
         (["simulate", "x", "-o", "y", "--seed", "-1"], "--seed"),
-        (["inspect", "a", "b"], "b"),
+        (["inspect"], "LOG"),
     ],
 )
 def test_a_wrong_call_is_one_line_that_points_to_the_help(say: Say, words: list[str], expected: str) -> None:

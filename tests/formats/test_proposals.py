@@ -12,6 +12,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from terragrip.cli import main
 from terragrip.errors import InputError
 from terragrip.formats import inspect, read
 from terragrip.formats.recognition import propose
@@ -201,6 +202,113 @@ def test_names_are_read(name: str, concepts: set[str], wheel: str, unit: str | N
 
 WORDS = ("wheel", "speed", "fl", "gps", "vx", "lat", "lon", "1", "0", "acc", "x", "z", "gyro", "torque")
 UNITS = ("motor", "time", "ms", "kmh", "pitch", "[m/s]", "(g)")
+
+
+def _log(path: Path, columns: dict[str, np.ndarray]) -> Path:
+    rows = zip(TIME, *columns.values(), strict=True)
+    lines = [",".join(["time_s", *columns]), *(",".join(f"{cell:.6f}" for cell in row) for row in rows)]
+    path.write_text("\n".join(lines) + "\n")
+    return path
+
+
+def test_several_logs_and_a_folder_in_one_call(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    wheels = {"gps_speed_mps": SPEED, "wheel_left_rpm": 30 * SPEED, "wheel_right_rpm": 30 * SPEED}
+    folder = tmp_path / "day"
+    folder.mkdir()
+    for name in ("a.csv", "b.csv"):
+        _log(folder / name, wheels)
+    (folder / "notes.md").write_text("# not a log\n")
+    alone = _log(tmp_path / "imu.csv", {"gyro_z": SPEED})
+    assert main(["inspect", str(folder), str(alone)]) == 0
+    said = capsys.readouterr().out
+    assert all(name in said for name in ("a.csv", "b.csv", "imu.csv"))
+    assert said.count("# Proposed by") == 1  # a and b have the same columns, imu has no wheels
+    assert "imu.csv has no wheel speed" in said
+    (folder / "c.csv").write_bytes(b"\x00\x01")
+    profile = tmp_path / "p.yaml"
+    assert main(["inspect", str(folder), "--write-profile", str(profile)]) == 2
+    streams = capsys.readouterr()
+    assert "a.csv" in streams.out
+    assert streams.err.count("\n") == 1
+    assert "c.csv: is not a table of text" in streams.err
+    (folder / "c.csv").unlink()
+    assert main(["inspect", str(folder), "--write-profile", str(profile)]) == 0
+    recording = read(folder / "b.csv", profile)
+    np.testing.assert_allclose(recording["wheel_speed_r"], 30 * SPEED * 2 * np.pi / 60, atol=1e-5)
+
+
+def test_a_folder_without_logs_and_logs_of_two_kinds(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    folder = tmp_path / "day"
+    folder.mkdir()
+    assert main(["inspect", str(folder)]) == 2
+    assert "holds no log" in capsys.readouterr().err
+    _log(folder / "a.csv", {"gps_speed_mps": SPEED, "wheel_left_rpm": SPEED})
+    _log(folder / "b.csv", {"gps_speed_kmh": SPEED, "wheel_left_rpm": SPEED})
+    assert main(["inspect", str(folder), "--write-profile", str(tmp_path / "p.yaml")]) == 2
+    assert "2 layouts" in capsys.readouterr().err
+
+
+def test_a_log_without_wheels_is_refused_in_one_line(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = _log(tmp_path / "imu.csv", {"gyro_z": SPEED, "gps_speed_mps": SPEED})
+    assert main(["inspect", str(path)]) == 2
+    line = capsys.readouterr().err
+    assert line.count("\n") == 1
+    assert "no wheel speed" in line
+    assert "ground_speed" in line
+    profile = tmp_path / "p.yaml"  # for a log to be joined to another
+    assert main(["inspect", str(path), "--write-profile", str(profile)]) == 0
+    assert "gps_speed_mps" in profile.read_text()
+
+
+def test_the_efforts_of_a_joint_state_are_torques_and_a_profile_that_fits_says_what_is_missing(
+    tmp_path: Path,
+) -> None:
+    columns = {}
+    for wheel in ("front_left", "front_right", "rear_left", "rear_right"):
+        columns[f"/joint_states.velocity.{wheel}_wheel"] = 10 * SPEED
+        columns[f"/joint_states.effort.{wheel}_wheel"] = 5 + 0 * SPEED + np.sin(TIME)
+    found = inspect(_log(tmp_path / "robot.csv", columns))
+    assert {"drive_torque_fl", "wheel_speed_rr"} <= found.recognised.keys()
+    assert not any("drive torque" in sentence for sentence in found.missing)
+    (said,) = (sentence for sentence in found.nearly if "ros2-4wd" in sentence)
+    assert "wheel_speed_fl <- /joint_states.velocity.front_left_wheel" in said
+    assert "no ground_speed" in said
+    assert "twist.twist.linear.x" in said
+
+
+@pytest.mark.parametrize(
+    ("name", "channel"),
+    [  # as other people's loggers write them (public code; none of them was at hand for the rules)
+        ("WhlSpdFrntLft", "wheel_speed_fl"),
+        ("Drehzahl Rad vorne links", "wheel_speed_fl"),
+        ("nRadHR", "wheel_speed_rr"),
+        ("left_rpm", "wheel_speed_l"),
+        ("HRW.FrontAxleLeftWheelSpeed", "wheel_speed_fl"),
+        ("TheoreticalSpeed_kmh", "wheel_based_speed"),
+        ("RadarSpeed_kmh", "ground_speed"),
+        ("DraftForce_kN", "drawbar_force"),
+        ("a_z", "acceleration_z"),
+        ("EBC2.RlvSpeedFrontAxleLeftWheel", None),  # relative
+        ("steering_wheel_speed", None),
+        ("wheel_2_steering_velocity", None),
+        ("tyre_pressure_fl", None),
+        ("slip_ratio_fl", None),
+        ("VelD", None),
+        ("VelE", None),
+        ("erpm_3", None),
+        ("Accel_magnitude", None),
+        ("PTO_Speed_rpm", None),
+        ("FuelRate_Lph", None),
+    ],
+)
+def test_names_of_others(name: str, channel: str | None) -> None:
+    assert set(_propose({name: SPEED})) == ({channel} if channel else set())
+
+
 names = st.one_of(
     st.text(max_size=12), st.builds("_".join, st.lists(st.sampled_from((*WORDS, *UNITS)), max_size=4))
 )

@@ -1,9 +1,9 @@
-"""``terragrip inspect``: what is in a log."""
+"""``terragrip inspect``: what is in logs."""
 
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -11,9 +11,15 @@ from terragrip.cli.options import DbcFiles, ProfileFile
 from terragrip.cli.output import check_file
 from terragrip.errors import InputError
 
+if TYPE_CHECKING:
+    from terragrip.formats.inspect import Inspection
+
 
 def command(
-    log: Annotated[Path, typer.Argument(metavar="LOG", help="A log of any known format (docs/formats.md).")],
+    logs: Annotated[
+        list[Path],
+        typer.Argument(metavar="LOG", help="Logs of any known format (docs/formats.md), or folders of them."),
+    ],
     profile: ProfileFile = None,
     dbc: DbcFiles = None,
     vehicle: Annotated[
@@ -23,12 +29,14 @@ def command(
         Path | None, typer.Option("--write-profile", metavar="FILE", help="Write the proposed profile here.")
     ] = None,
 ) -> None:
-    """Tell what is in a log.
+    """Tell what is in logs.
 
-    Columns, rates, gaps, ranges and doubts, and a profile to begin with.
+    Columns, rates, gaps, ranges and doubts, what each channel may be made of, and a profile to begin with. Of several logs
+    a line for each, and the proposals for each layout of columns. Exit code 2 where a log cannot be read, or has no wheels.
     """
     from terragrip.files import replacing
     from terragrip.formats import inspect
+    from terragrip.formats.inspection_text import summary_of
 
     if write_profile is not None:
         if write_profile.is_file():
@@ -37,9 +45,64 @@ def command(
                 "exists already", file=write_profile, place="--write-profile", mend="name a new file"
             )
         check_file(write_profile, option="--write-profile")
-    found = inspect(log, profile, vehicle, dbc=dbc or ())
-    print(found.to_text())
+    paths = _logs_in(logs)
+    if len(paths) == 1:
+        found = [inspect(paths[0], profile, vehicle, dbc=dbc or ())]
+        print(found[0].to_text())
+    else:
+        found, faults = [], []
+        for path in paths:
+            try:
+                found.append(inspect(path, profile, vehicle, dbc=dbc or ()))
+            except InputError as error:
+                faults.append(str(error))
+        if found:
+            print(summary_of(found))
+        for fault in faults[:-1]:
+            typer.echo(fault, err=True)
+        if faults:
+            raise InputError(f"{faults[-1]} ({len(faults)} of {len(paths)} logs could not be read)")
     if write_profile is not None:
+        _refuse_several(found, write_profile)
         with replacing(write_profile) as temporary:
-            temporary.write_text(found.profile, encoding="utf-8")
+            temporary.write_text(found[0].profile, encoding="utf-8")
         print(f"Proposed profile written to {write_profile}")
+    elif found and all(one.refused for one in found):
+        raise InputError(
+            found[0].refused, file=found[0].file, mend="log the wheels too, or join it to a log that has them"
+        )
+
+
+def _logs_in(paths: list[Path]) -> list[Path]:
+    """The logs, with those of each folder that is not a bag itself; raises InputError where a folder holds none."""
+    from terragrip.formats.registry import is_bag, suffixes
+
+    found: list[Path] = []
+    for path in paths:
+        if not path.is_dir() or is_bag(path):
+            found.append(path)
+            continue
+        known = suffixes()
+        inside = sorted(
+            entry
+            for entry in path.iterdir()
+            if (entry.is_file() and entry.name.lower().endswith(known)) or (entry.is_dir() and is_bag(entry))
+        )
+        if not inside:
+            raise InputError(
+                "holds no log", file=path, mend=f"name a folder with files such as *{known[0]}, or a log"
+            )
+        found += inside
+    return found
+
+
+def _refuse_several(found: list[Inspection], target: Path) -> None:
+    """Raise InputError unless the logs have the same columns, so that one profile is theirs."""
+    layouts = {tuple(column.name for column in one.columns) for one in found}
+    if len(layouts) != 1:
+        problem = (
+            f"would be one profile for {len(layouts)} layouts of columns"
+            if found
+            else "there is no log to propose it for"
+        )
+        raise InputError(problem, file=target, place="--write-profile", mend="inspect logs of one kind")

@@ -128,6 +128,14 @@ class Agreement:
                 if not finding.agrees and guess.channel == "wheel_based_speed":
                     continue
                 judged = guess.with_finding(finding)
+                read = guess.column.name
+                if (
+                    guess.channel == "ground_speed"
+                    and read.has("body")
+                    and not read.has("ground")
+                    and not judged.doubt
+                ):
+                    judged = replace(judged, doubt="a vehicle's speed may be made of its wheels")
                 return judged if finding.agrees else replace(judged, confidence=0.3 * guess.confidence)
         return guess
 

@@ -209,7 +209,8 @@ def _of_speed(column: Column) -> list[Candidate]:
     if name.has("ground"):
         return [Candidate("ground_speed", own, 0.85, "a speed over ground")]
     if name.has("wheel"):
-        return [Candidate("wheel_based_speed", own, 0.85, "a speed of the wheels as one")]
+        score = 0.5 if name.has("front", "rear") else 0.85
+        return [Candidate("wheel_based_speed", own, score, "a speed of the wheels as one")]
     if along and not name.has("body"):
         return [Candidate("ground_speed", own, 0.4, "a velocity; wheel odometry is none over ground")]
     ground = Candidate("ground_speed", own, 0.55, "a speed, of what is not said")

@@ -11,8 +11,9 @@ import numpy as np
 import numpy.typing as npt
 
 from terragrip.errors import InputError
-from terragrip.formats.profile import SHIPPED, Profile
-from terragrip.formats.proposal import is_ready, missing_channels, profile_text
+from terragrip.formats.fitting import Fit, fit_of
+from terragrip.formats.profile import Profile
+from terragrip.formats.proposal import is_ready, missing_channels, profile_text, refusal
 from terragrip.formats.reading import read, read_log, recording_of
 from terragrip.formats.recognition import Proposal, propose, silent
 from terragrip.formats.signals import SignalLog
@@ -83,10 +84,13 @@ class Inspection:
     time: TimeSummary | None
     columns: tuple[ColumnSummary, ...]
     recognised: dict[str, tuple[str, ...]]  # channel: the columns it may come from
+    proposals: dict[str, Proposal]  # the same, each with its evidence, confidence, doubt and alternatives
     missing: tuple[str, ...]
     warnings: tuple[str, ...]
     ready: bool  # the log can be estimated as it is, or with the profile that was given
     fitting: tuple[str, ...]  # profiles that come with Terragrip and fit
+    nearly: tuple[str, ...]  # sentences on those that nearly do, and by which names
+    refused: str  # why nothing can be estimated from this log, whatever the profile; empty if something can
     profile: str  # a proposed profile, YAML
 
     def to_dict(self) -> dict[str, Any]:
@@ -121,7 +125,7 @@ def inspect(
     warnings, recording = list(log.notes), None
     if every > 1:
         warnings.insert(0, _SPARSE.format(size / 1e9, every))
-    fitting: tuple[str, ...] = ()
+    fits = Fit()
     try:
         # A long log is not read a second time.
         recording = read(path, chosen, dbc=databases) if every == 1 else _recording(log, chosen)
@@ -129,8 +133,8 @@ def inspect(
     except InputError as error:
         if profile is not None:
             raise
-        fitting = _fitting(log)
-        warnings += [] if fitting else [_cause(error)]
+        fits = fit_of(log)
+        warnings += [] if fits.names else [_cause(error)]
     if recording is not None:
         warnings += unit_warnings(recording, machine)
     if recording is not None and machine is not None:
@@ -146,6 +150,8 @@ def inspect(
     proposals = seen.proposals(GENERAL)
     warnings += silent(numbers, proposals, seen.units)
     stamp, base = seen.stamp, seen.base
+    present = proposals.keys() | fits.channels
+    ready = recording is not None and is_ready(recording)
     return Inspection(
         file=str(log.source),
         sha256=str(log.sha256),
@@ -156,10 +162,13 @@ def inspect(
             for n, c in seen.columns.items()
         ),
         recognised={channel: proposal.columns for channel, proposal in proposals.items()},
-        missing=tuple(missing_channels(proposals, stamp is not None)),
+        proposals=proposals,
+        missing=tuple(missing_channels(present, stamp is not None)),
         warnings=tuple(warnings),
-        ready=recording is not None and is_ready(recording),
-        fitting=fitting,
+        ready=ready,
+        fitting=fits.names,
+        nearly=fits.nearly,
+        refused="" if ready or fits.names else refusal(present),
         profile=profile_text(
             os.path.basename(str(log.source)), stamp, proposals, since_1970=seen.since_1970, dbc=databases
         ),
@@ -251,24 +260,6 @@ def _recording(log: LogTable | SignalLog, profile: Profile | None) -> Recording:
     return recording_of(
         replace(log, signals={n: s for n, s in log.signals.items() if wants(n)}).table(), profile
     )
-
-
-def _fitting(log: LogTable | SignalLog) -> tuple[str, ...]:
-    """The profiles that come with Terragrip and make a recording of the log."""
-    found = []
-    for name in SHIPPED:
-        profile = Profile.load(name)
-        if isinstance(log, SignalLog):
-            own = {n: s for n, s in log.signals.items() if profile.wants(n)}
-            table = replace(log, signals=own).table() if own else None
-        else:
-            table = log
-        try:
-            if table is not None and is_ready(profile.apply(table)):
-                found.append(name)
-        except InputError:
-            continue
-    return tuple(found)
 
 
 def _without_torque(recording: Recording) -> bool:

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
+
+from terragrip.recording.schema import wheel_names_in
 
 if TYPE_CHECKING:
     from terragrip.formats.inspect import ColumnSummary, Inspection, TimeSummary
+    from terragrip.formats.recognition import Proposal
 
 _HEAD = ("column", "unit", "count", "missing", "rate", "held", "noise", "min", "5 %", "median", "95 %", "max")
 
@@ -17,8 +21,8 @@ def text_of(inspection: Inspection) -> str:
         parts.append(_time_text(inspection.time))
     parts.append(_table([_HEAD, *(_row(column) for column in inspection.columns)]))
     if inspection.recognised:
-        found = [f"  {channel} <- {', '.join(columns)}" for channel, columns in inspection.recognised.items()]
-        parts.append("Recognised\n" + "\n".join(found))
+        found = [_proposal_text(channel, own) for channel, own in inspection.proposals.items()]
+        parts.append("Recognised, with confidence and evidence\n" + "\n".join(found))
     if inspection.missing:
         parts.append("Missing\n" + "\n".join(f"  {sentence}" for sentence in inspection.missing))
     if inspection.warnings:
@@ -26,11 +30,61 @@ def text_of(inspection: Inspection) -> str:
     if inspection.fitting:
         named = " or ".join(f"--profile {name}" for name in inspection.fitting)
         parts.append(f"A profile that comes with Terragrip fits: {named}")
+    if inspection.nearly:
+        parts.append("\n".join(inspection.nearly))
+    if inspection.refused:
+        parts.append(f"{inspection.file} {inspection.refused}.")
     if inspection.ready:
         parts.append("The log can be estimated as it is read here.")
     else:
         parts.append("Proposed profile (save it, check it, pass it with --profile)\n\n" + inspection.profile)
     return "\n\n".join(parts).rstrip() + "\n"
+
+
+def summary_of(inspections: Sequence[Inspection]) -> str:
+    """Several logs: a line for each, and for each layout of columns what is proposed for it."""
+    rows: list[tuple[str, ...]] = [("log", "rows", "s", "wheels", "ground speed", "torque", "")]
+    layouts: dict[tuple[str, ...], list[Inspection]] = {}
+    for one in inspections:
+        wheels = ", ".join(
+            wheel_names_in(c for c in one.recognised if c.startswith("wheel_speed_"))
+        ) or "as one" * ("wheel_based_speed" in one.recognised)
+        ground = ", ".join(one.recognised.get("ground_speed", ()))
+        state = (
+            "ready"
+            if one.ready
+            else " or ".join(one.fitting) or ("no wheels" if one.refused else "needs a profile")
+        )
+        torque = str(sum(channel.startswith("drive_torque_") for channel in one.recognised) or "")
+        length = "" if one.time is None else _number(one.time.duration)
+        rows.append((one.file, str(one.rows), length, wheels, ground, torque, state))
+        layouts.setdefault(tuple(column.name for column in one.columns), []).append(one)
+    parts = [_table(rows)]
+    for alike in layouts.values():
+        first = alike[0]
+        others = f" and {len(alike) - 1} more with the same columns" if len(alike) > 1 else ""
+        found = [_proposal_text(channel, own) for channel, own in first.proposals.items()]
+        parts.append("\n".join([f"{first.file}{others}", *found]))
+        parts += ["\n".join(first.nearly)] if first.nearly else []
+        if not first.ready and not first.fitting:
+            parts.append(first.profile.rstrip() if not first.refused else f"{first.file} {first.refused}.")
+    return "\n\n".join(parts).rstrip() + "\n"
+
+
+def _proposal_text(channel: str, proposal: Proposal) -> str:
+    """A proposal on one line: where from, how sure, why, what else it might be."""
+    mark = "? " * bool(proposal.doubt)
+    unit = f" [{proposal.unit}]" if proposal.unit else ""
+    why = "; ".join(
+        [
+            *proposal.evidence,
+            *[f"but {proposal.doubt}"] * bool(proposal.doubt and proposal.doubt not in proposal.evidence),
+        ]
+    )
+    others = f"; else {', '.join(proposal.alternatives)}" if proposal.alternatives else ""
+    return (
+        f"  {mark}{channel} <- {', '.join(proposal.columns)}{unit}  {proposal.confidence:.2f}  {why}{others}"
+    )
 
 
 def _time_text(time: TimeSummary) -> str:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import os
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 
 from terragrip.formats.recognition import Proposal
 from terragrip.recording import Recording
@@ -15,8 +15,8 @@ _PLAIN = re.compile(r"[A-Za-z_][A-Za-z0-9_./-]*$")
 _LIKE_YAML = {"yes", "no", "on", "off", "true", "false", "null", "y", "n"}
 
 
-def missing_channels(proposals: Mapping[str, Proposal], has_time: bool) -> list[str]:
-    """What no column was found for, and what follows, as sentences."""
+def missing_channels(proposals: Collection[str], has_time: bool) -> list[str]:
+    """What is not among the channels that were found, and what follows, as sentences."""
     said = [] if has_time else ["No time column was found: it is needed, in seconds that run forward."]
     wheels = [w for w in wheel_names_in(proposals) if f"wheel_speed_{w}" in proposals]
     if not wheels and "wheel_based_speed" not in proposals:
@@ -46,6 +46,16 @@ def missing_channels(proposals: Mapping[str, Proposal], has_time: bool) -> list[
     if "pitch" not in proposals:
         said.append("No pitch was found: the ground is taken as level, and a slope reads as soil resistance.")
     return said
+
+
+def refusal(channels: Collection[str]) -> str:
+    """Why nothing can be estimated from a log with these channels, whatever the profile; empty if something can."""
+    if "wheel_based_speed" in channels or any(c.startswith("wheel_speed_") for c in channels):
+        return ""
+    found = (
+        ", ".join(sorted(c for c in channels if not c.startswith("true_"))) or "nothing that Terragrip knows"
+    )
+    return f"has no wheel speed, nor one of the drive train: nothing can be estimated from it alone (found: {found})"
 
 
 def is_ready(recording: Recording) -> bool:

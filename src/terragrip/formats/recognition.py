@@ -123,6 +123,9 @@ def _proposal(channel: str, guess: Guess, ranked: list[Guess]) -> Proposal:
     doubt = guess.doubt
     if not doubt and guess.confidence < SURE:
         doubt = guess.why
+    rival = next((g for g in others if g.confidence > guess.confidence - 0.02 and g.unit == guess.unit), None)
+    if not doubt and rival is not None and channel.startswith(("wheel_speed_", "drive_torque_")):
+        doubt = f"or {rival.column.column}?"
     entry: dict[str, object] = {"from": guess.column.column}
     target = unit_of(channel)
     unit, give = guess.unit, ""

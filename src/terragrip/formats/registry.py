@@ -92,7 +92,7 @@ def suffixes() -> tuple[str, ...]:
 def format_of(path: str | os.PathLike[str]) -> Format:
     """The format of a log; raises InputError if there is no such file, or it cannot be read."""
     known = formats()
-    if (folder := Path(path)).is_dir() and _is_bag(folder):
+    if (folder := Path(path)).is_dir() and is_bag(folder):
         return known["ros2"]
     refuse_missing(path, suffixes=suffixes())
     try:
@@ -114,7 +114,7 @@ def format_of(path: str | os.PathLike[str]) -> Format:
     return next((one for one in named if binary or one.name not in _own()), known["csv"])
 
 
-def _is_bag(folder: Path) -> bool:
+def is_bag(folder: Path) -> bool:
     try:
         return any(
             entry.suffix in (".db3", ".mcap") or entry.name == "metadata.yaml" for entry in folder.iterdir()

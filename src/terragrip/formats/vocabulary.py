@@ -17,7 +17,7 @@ MEANINGS: dict[str, str] = {
     # what is measured
     "speed": "speed velocity vel spd v sog geschwindigkeit vitesse velocidad",
     "rotation": "rpm rps omega w rotation drehzahl",
-    "torque": "torque effort moment drehmoment tau tq trq couple",
+    "torque": "torque effort moment drehmoment tau tq trq md couple",
     "current": "current curr amps amp ampere strom",
     "acceleration": "acceleration accelerometer acc accel beschleunigung",
     "gyro": "gyroscope gyro gyr",
@@ -25,21 +25,21 @@ MEANINGS: dict[str, str] = {
     "pitch": "pitch",
     "roll": "roll bank",
     "yaw": "yaw psi",
-    "heading": "heading course bearing azimuth cog compass",
+    "heading": "heading hdg course bearing azimuth cog compass",
     "latitude": "latitude",
     "longitude": "longitude",
     "altitude": "altitude alt height elevation hoehe",
     "position": "position pose pos easting northing utm",
-    "pull": "drawbar draft pull traction",
+    "pull": "drawbar draft pull traction zugkraft",
     "coupling": "hitch towing trailer",
     "force": "force",
     "distance": "distance odometer",
     "time": "time timestamp stamp unix epoch clock utc zeit tow",
     # what it is of
-    "wheel": "wheel whl rim tire tyre joint roue",
+    "wheel": "wheel whl rim tire tyre joint roue axle rad theoretical",
     "motor": "motor",
     "ground": "ground gps gnss radar navigation visual vio lidar icp true location rtk ublox slam",
-    "body": "vehicle machine car robot body base ego",
+    "body": "vehicle machine car robot body base ego tractor fahrzeug fzg obd",
     "odometry": "odom odometry",
     "soil": "soil terrain surface",
     "other": "engine pto shaft driveshaft fan pump gearbox transmission battery brake steering steer throttle pedal ignition fuel "
@@ -52,7 +52,7 @@ MEANINGS: dict[str, str] = {
     "statistic": "std stddev var cov covariance variance accuracy error sigma uncertainty quality dop hdop vdop pdop status state "
     "flag id identifier count counter index idx raw mode valid fix number checksum seq ticks pwm voltage volt temperature "
     "temp pressure power load derivative correction offset trim level duty percent pct jerk energy frequency slip confidence "
-    "bias deviation scale ratio gain residual label",
+    "bias deviation scale ratio gain residual label relative rlv rel magnitude norm total wear",
     # along which axis
     "longitudinal": "longitudinal forward fwd",
     "lateral": "lateral side sideways transverse",
@@ -61,7 +61,7 @@ MEANINGS: dict[str, str] = {
     "north": "north northing",
     "left": "left l links gauche",
     "right": "right r rechts droite",
-    "front": "front vorn avant",
+    "front": "front vorn vorne avant",
     "rear": "rear back hinten arriere",
     "change": "delta d",
 }  # fmt: skip
@@ -73,7 +73,7 @@ UNIT_WORDS = {
     "kmh": "km/h", "kph": "km/h", "mph": "mph", "knots": "knots", "knot": "knots", "kn": "kN", "rpm": "rpm", "rps": "rev/s",
     "dps": "deg/s", "degs": "deg/s", "rads": "rad/s", "deg": "deg", "degree": "deg", "degrees": "deg", "rad": "rad",
     "radians": "rad", "nm": "N m", "knm": "kNm", "n": "N", "m": "m", "meter": "m", "meters": "m", "metres": "m", "mm": "mm",
-    "cm": "cm", "g": "g", "ms2": "m/s^2", "mss": "m/s^2", "s": "s", "sec": "s", "secs": "s", "seconds": "s", "second": "s",
+    "cm": "cm", "g": "g", "ms2": "m/s^2", "mss": "m/s^2", "s": "s", "sec": "s", "secs": "s", "seconds": "s", "second": "s", "millisecond": "ms", "microsecond": "us", "nanosecond": "ns",
     "millis": "ms", "ms": "ms", "milliseconds": "ms", "micros": "us", "us": "us", "microseconds": "us", "nanos": "ns",
     "ns": "ns", "nanoseconds": "ns", "nsec": "ns", "usec": "us", "msec": "ms", "a": "A", "amps": "A", "ma": "mA",
     "percent": "%", "pct": "%",
@@ -92,6 +92,7 @@ _SYMBOLS = {
     "a": "acceleration",
 }
 _AXIS_SYMBOLS = {"a": "acceleration", "g": "gyro", "w": "gyro", "v": "speed", "f": "force"}
+_COMPASS = {"n": "north", "e": "east", "d": "vertical", "u": "vertical"}
 _ORDINAL = re.compile(r"(\d)(st|nd|rd|th)$", re.IGNORECASE)
 _VOWELS = re.compile(r"(?<!^)[aeiou]")
 _BRACKET = re.compile(r"[\[(]\s*([^\])]*?)\s*[\])]?\s*$")
@@ -153,13 +154,10 @@ class Vocabulary:
         if tail is not None:  # of a word that is not known and one that is
             return frozenset([tail])
         # Cut short: its first letters (veloc), or its consonants (whl, lngtd); of two meanings the name's other words tell.
+        if word in UNIT_WORDS:
+            return frozenset()
         bare = word == _VOWELS.sub("", word)
-        return frozenset(
-            full
-            for full in known
-            if len(full) > max(len(word), 4)
-            and (full.startswith(word) or (bare and _VOWELS.sub("", full).startswith(word)))
-        )
+        return frozenset(full for full, concept in known.items() if _is_cut(word, bare, full, concept))
 
     def _has_symbol(self, word: str) -> bool:
         """vWheel, TMotor: a physicist's letter before what it is of."""
@@ -200,6 +198,10 @@ class Vocabulary:
         said = words[: len(words) - used] or words
         if said == ["t"]:
             concepts.add("time")
+        if len(said) == 2 and said[0] in _AXIS_SYMBOLS and said[1] in ("x", "y", "z"):
+            said = ["".join(said)]  # a_z
+        if len(words) > 1 and unit in ("rpm", "rev/s"):
+            concepts.add("rotation")
         if len(said) == 2 and said[0] in _SYMBOLS and (said[1] in _CORNERS or said[1] in "lr12345678"):
             concepts.add(_SYMBOLS[said[0]])  # M1, w_rl
             said = said[1:]
@@ -212,6 +214,11 @@ class Vocabulary:
                 axis = word
             else:
                 concepts |= self.concepts_of(word)
+        if said and said[0] in _SYMBOLS and concepts & {"wheel", "motor"}:
+            concepts.add(_SYMBOLS[said[0]])  # nRadVL
+        if "speed" in concepts and words and words[-1] in _COMPASS:
+            concepts.add(_COMPASS[words[-1]])  # VelN, vel_d
+            unit = None if unit == "N" else unit
         last = words_of(re.split(r"[./]", body)[-1])  # numbers before it are those of buses and topics
         return Name(_settled(concepts), _wheel_of(words, last, concepts), axis, unit, tuple(words))
 
@@ -236,6 +243,18 @@ class Vocabulary:
         if plain.lower() == "ms^2":
             return None  # m/s^2 misspelt, or not
         return plain if is_common(plain) or plain == "g" else self.unit_word(plain.lower())
+
+
+def _is_cut(word: str, bare: bool, full: str, concept: str) -> bool:
+    """Whether ``word`` is ``full`` cut short; sides only by all their consonants (lft), for their first letters mean much else."""
+    if len(full) <= len(word) or len(full) < 4:
+        return False
+    skeleton = _VOWELS.sub("", full)
+    if bare and skeleton == word:
+        return True
+    if len(full) < 5 or concept in ("left", "right", "front", "rear"):
+        return False
+    return full.startswith(word) or (bare and skeleton.startswith(word))
 
 
 GENERAL = Vocabulary()
