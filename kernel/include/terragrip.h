@@ -79,7 +79,7 @@ typedef struct {
     tg_real wheel_speed_min; /* supervisor: omega_min, rad/s */
     tg_real ground_speed_min; /* supervisor: v_min, m/s */
     int32_t supervisor;      /* 0: wheel-speed and ground-speed changes (paper); 1: drive-torque and slip changes */
-    tg_real scales[4];       /* bank: factors on Q0, .03 .3 3 30 */
+    tg_real scales[4];       /* bank: factors on Q0, .1 1 10 100 */
     tg_real dwell;           /* bank: mean time in a mode, s */
     int32_t mix_stride;      /* bank: IMM mixing every `mix_stride` updates, 5 */
 } tg_tuning;
@@ -394,7 +394,7 @@ typedef struct { /* an affine map of the state: omega' = phi omega + b mu, v' = 
     tg_real q[TG_ROWS];
 } tg_passage;
 
-typedef struct { /* one lane a mode of the bank; where the filter is formed, u[k][i], i <= k, holds P[k][i] itself */
+typedef struct { /* one lane a mode of the bank */
     tg_real x[TG_ROWS][TG_MODES], d[TG_ROWS][TG_MODES], u[TG_MAX_STATES][TG_ROWS][TG_MODES];
     tg_real gain[TG_MAX_CHANNELS][TG_ROWS][TG_MODES];
     tg_real probability[TG_MODES];
@@ -429,7 +429,7 @@ struct tg_filter {
     tg_real slope[2], cosine[2], sine[2]; /* of the last two slopes */
     tg_real walk[TG_ROWS];
     tg_real x[TG_ROWS], d[TG_ROWS], u[TG_MAX_STATES * TG_ROWS]; /* without a bank */
-    tg_real P[TG_MAX_STATES * TG_ROWS];  /* instead of d and u, where `formed`: rows `stride` apart, columns to the diagonal hold */
+    tg_real P[TG_MAX_STATES * TG_ROWS];  /* instead of d and u, where `formed`, without a bank: rows `stride` apart, columns to the diagonal hold */
     int32_t formed;                      /* covariances are held, not factors */
     int32_t factor_steps;                /* still to be taken with factors */
     tg_real x_prior[TG_ROWS];            /* of the last step, before its update */

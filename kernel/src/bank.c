@@ -1,8 +1,6 @@
 /* A bank of four exact filters over the scale of Q, mixed as interacting multiple models (Blom and Bar-Shalom 1988). One lane a mode:
- * every operation is done for all four at once. By factors here, algebra as in factor.h, but row by row, since lanes are taken by the modes; on the
- * covariances themselves in bank_direct.c, where that is sound. */
+ * every operation is done for all four at once. By factors, algebra as in factor.h, but row by row, since lanes are taken by the modes. */
 #include "bank.h"
-#include "direct.h"
 
 #define PROBABILITY_MIN ((tg_real)1e-12)
 #define COLUMNS_MAX (TG_MODES * (TG_MAX_STATES + 1)) /* of mixing: all modes' factors and means */
@@ -56,65 +54,23 @@ static void load(const tg_filter *f, tgi_modes *m)
     }
 }
 
-/* Factors of the covariances in their own place; see tgi_factorise. */
-static tg_status factorise(int rows, tgi_modes *m)
-{
-    for (int j = rows - 1; j >= 0; j--) {
-        const tg_lanes d = m->u[j][j], inverse = lanes_div(lanes_all(1), d);
-        for (int b = 0; b < TG_MODES; b++)
-            if (!(lanes_at(d, b) > 0)) return TG_NOT_POSITIVE;
-        m->d[j] = d;
-        m->u[j][j] = lanes_all(1);
-        for (int i = 0; i < j; i++) {
-            const tg_lanes own = m->u[j][i], part = lanes_mul(own, inverse);
-            for (int k = i; k < j; k++) m->u[k][i] = lanes_mul_sub(m->u[j][k], part, m->u[k][i]); /* those from i on are whole yet */
-            m->u[j][i] = part;
-        }
-    }
-    return TG_OK;
-}
-
-static tg_status load_factors(const tg_filter *f, tgi_modes *m)
-{
-    load(f, m);
-    return f->formed ? factorise(f->states, m) : TG_OK;
-}
-
-#if TGI_DIRECT
-static void load_covariances(const tg_filter *f, tgi_modes *m)
-{
-    load(f, m);
-    if (f->formed) return;
-    for (int j = 0; j < f->states; j++) /* column j of U is read last by row j */
-        for (int i = 0; i <= j; i++) {
-            tg_lanes sum = bank_zeros();
-            for (int k = j; k < f->states; k++) sum = lanes_mul_add(lanes_mul(m->d[k], m->u[k][i]), m->u[k][j], sum);
-            m->u[j][i] = sum;
-        }
-}
-#endif
-
-static void store(tg_filter *f, const tgi_modes *m, int formed)
+static void store(tg_filter *f, const tgi_modes *m)
 {
     tg_bank_state *const b = &f->policy.bank;
-    f->formed = formed;
     for (int k = 0; k < f->states; k++) {
         lanes_store(b->x[k], m->x[k]);
-        if (!formed) lanes_store(b->d[k], m->d[k]);
+        lanes_store(b->d[k], m->d[k]);
         for (int i = 0; i <= k; i++) lanes_store(b->u[k][i], m->u[k][i]);
     }
 }
 
-tg_status tgi_bank_factors_of(const tg_filter *f, int mode, tg_real *u, tg_real *d)
+void tgi_bank_factors_of(const tg_filter *f, int mode, tg_real *u, tg_real *d)
 {
-    tgi_modes m;
-    const tg_status status = load_factors(f, &m);
-    if (status != TG_OK) return status;
+    const tg_bank_state *const b = &f->policy.bank;
     for (int k = 0; k < f->states; k++) {
-        d[k] = lanes_at(m.d[k], mode);
-        for (int i = 0; i < f->stride; i++) u[k * f->stride + i] = i <= k ? lanes_at(m.u[k][i], mode) : 0;
+        d[k] = b->d[k][mode];
+        for (int i = 0; i < f->stride; i++) u[k * f->stride + i] = i <= k ? b->u[k][i][mode] : 0;
     }
-    return TG_OK;
 }
 
 void tgi_bank_init(tg_filter *f)
@@ -125,7 +81,7 @@ void tgi_bank_init(tg_filter *f)
         m.d[k] = lanes_all(f->d[k]);
         for (int i = 0; i <= k; i++) m.u[k][i] = lanes_all(f->u[k * f->stride + i]);
     }
-    store(f, &m, 0);
+    store(f, &m);
     for (int b = 0; b < TG_MODES; b++) f->policy.bank.probability[b] = (tg_real)1 / TG_MODES;
 }
 
@@ -288,12 +244,12 @@ static tg_real weigh(const tgi_update *out, tg_real *probability)
     return largest + tgi_log(sum);
 }
 
-static int is_finite(const tgi_update *out, int rows, int formed)
+static int is_finite(const tgi_update *out, int rows)
 {
     tg_lanes zero = lanes_mul(out->nis, bank_zeros());
     for (int k = 0; k < rows; k++) {
         zero = lanes_mul_add(out->state.x[k], bank_zeros(), zero);
-        zero = lanes_mul_add(formed ? out->state.u[k][k] : out->state.d[k], bank_zeros(), zero);
+        zero = lanes_mul_add(out->state.d[k], bank_zeros(), zero);
         for (int i = 0; i < k; i++) zero = lanes_mul_add(out->state.u[k][i], bank_zeros(), zero);
     }
     return lanes_sum(zero) == 0;
@@ -315,25 +271,19 @@ static void report(const tg_filter *f, const tgi_plan *plan, const tgi_update *o
     for (int b = 0; b < TG_MODES; b++) step->mode[b] = f->policy.bank.probability[b];
 }
 
-static void begin(const tg_filter *f, tgi_update *out)
+/* The step up to the last channel. */
+TG_INLINE void work_out(const tg_filter *f, const tgi_plan *plan, int mixes, const tg_lanes *noise, tgi_update *out, const int n)
 {
+    array a;
+    tgi_modes before;
+    tg_lanes S[TG_MAX_CHANNELS];
+    load(f, &before);
     out->probability = lanes_load(f->policy.bank.probability);
     out->taken = 0;
     out->nis = bank_zeros();
     out->volume = lanes_all(1);
-}
-
-/* The step up to the last channel by factors. */
-TG_INLINE tg_status with_factors(const tg_filter *f, const tgi_plan *plan, int mixes, const tg_lanes *noise, tgi_modes *before, tgi_update *out,
-                                 const int n)
-{
-    array a;
-    tg_lanes S[TG_MAX_CHANNELS];
-    const tg_status status = load_factors(f, before);
-    if (status != TG_OK) return TG_DIVERGED;
-    begin(f, out);
-    if (mixes) mix(f, before, &out->probability, &a);
-    bank_predict(plan, before, &a, out->state.x, n);
+    if (mixes) mix(f, &before, &out->probability, &a);
+    bank_predict(plan, &before, &a, out->state.x, n);
     for (int j = 0; j < TG_TWICE(n); j++) out->x_prior[j] = bank_mean(out->probability, out->state.x[j]);
     if (plan->count) {
         bank_variances(plan, &a, noise, S, n);
@@ -341,15 +291,13 @@ TG_INLINE tg_status with_factors(const tg_filter *f, const tgi_plan *plan, int m
     }
     bank_factor(&a, TG_TWICE(n), TG_TWICE(n), 0, noise, out->state.u, out->state.d);
     if (plan->count) bank_update(plan, out, n);
-    return TG_OK;
 }
 
 /* What a sound step leaves. */
-TG_INLINE void commit(tg_filter *f, const tgi_plan *plan, const tgi_update *out, const tg_real *probability, int mixes, int formed, const int n)
+TG_INLINE void commit(tg_filter *f, const tgi_plan *plan, const tgi_update *out, const tg_real *probability, int mixes, const int n)
 {
     tg_bank_state *const bank = &f->policy.bank;
-    store(f, &out->state, formed);
-    if (!formed) tgi_count_factors(f);
+    store(f, &out->state);
     for (int b = 0; b < TG_MODES; b++) bank->probability[b] = probability[b];
     for (int c = 0; c < out->taken; c++) {
         f->channel[c] = out->channel[c];
@@ -369,33 +317,21 @@ tg_status tgi_bank_step(tg_filter *f, tgi_plan *plan, tg_step *step)
     const int n = f->wheels;
     const tg_lanes scales = lanes_load(f->tuning.scales);
     const int mixes = plan->count && f->policy.bank.updates + 1 >= f->tuning.mix_stride;
-    int formed = 0;
-    tgi_modes before;
     tgi_update out;
     tg_lanes noise[TG_MAX_STATES];
     tg_real nis = 0, log_likelihood = 0, probability[TG_MODES];
     for (int j = 0; j < TG_TWICE(n); j++)
         noise[j] = lanes_mul_add(scales, lanes_all(f->walk[j] * plan->passage.dt), lanes_all(plan->passage.q[j]));
-#if TGI_DIRECT
-    if (n <= TG_LANES && f->factor_steps == 0) {
-        load_covariances(f, &before);
-        begin(f, &out);
-        formed = tgi_bank_direct(f, plan, mixes, noise, &before, &out) && is_finite(&out, f->states, 1);
-    }
-#endif
-    if (!formed) {
-        const tg_status status = with_factors(f, plan, mixes, noise, &before, &out, n);
-        if (status != TG_OK) return status;
-    }
+    work_out(f, plan, mixes, noise, &out, n);
     lanes_store(probability, out.probability);
     if (plan->count) {
         nis = mixture_nis(plan, &out, n);
         log_likelihood = weigh(&out, probability);
     }
-    if (!formed && !is_finite(&out, f->states, 0)) return TG_DIVERGED;
+    if (!is_finite(&out, f->states)) return TG_DIVERGED;
     if (!tgi_finite(nis) || !tgi_finite(log_likelihood)) return TG_DIVERGED;
     for (int j = 0; j < TG_TWICE(n); j++) plan->passage.q[j] = bank_mean(out.probability, noise[j]);
-    commit(f, plan, &out, probability, mixes, formed, n);
+    commit(f, plan, &out, probability, mixes, n);
     if (step) report(f, plan, &out, nis, log_likelihood, step);
     return TG_OK;
 }
@@ -413,23 +349,21 @@ void tgi_bank_moments(const tg_filter *f, tg_real *x, tg_real *P)
     for (int i = 0; P && i < f->states; i++)
         for (int j = 0; j <= i; j++) {
             tg_lanes sum = lanes_mul(away[i], away[j]);
-            if (f->formed) sum = lanes_add(sum, lanes_load(bank->u[i][j]));
-            for (int k = i; !f->formed && k < f->states; k++)
+            for (int k = i; k < f->states; k++)
                 sum = lanes_mul_add(lanes_mul(lanes_load(bank->d[k]), lanes_load(bank->u[k][i])), lanes_load(bank->u[k][j]), sum);
             P[i * f->stride + j] = bank_mean(probability, sum);
         }
 }
 
 /* Every mode's outputs anew; `passage` gets the mixture's noise. */
-tg_status tgi_bank_restart(tg_filter *f, const tg_real *outputs, tg_passage *passage)
+void tgi_bank_restart(tg_filter *f, const tg_real *outputs, tg_passage *passage)
 {
     const int n = f->wheels;
     const tg_lanes scales = lanes_load(f->tuning.scales), probability = lanes_load(f->policy.bank.probability);
     tgi_modes m;
     array a;
     tg_lanes noise[TG_MAX_WHEELS + 1];
-    const tg_status status = load_factors(f, &m);
-    if (status != TG_OK) return TG_DIVERGED;
+    load(f, &m);
     for (int k = 0; k < f->states; k++) {
         a.weight[k] = m.d[k];
         for (int i = 0; i <= n; i++) a.W[i][k] = i <= k ? m.u[k][i] : bank_zeros();
@@ -445,7 +379,6 @@ tg_status tgi_bank_restart(tg_filter *f, const tg_real *outputs, tg_passage *pas
         m.d[j] = lanes_all(passage->q[j]);
         for (int i = 0; i <= j; i++) m.u[j][i] = lanes_all(i == j);
     }
-    store(f, &m, 0);
+    store(f, &m);
     for (int i = 0; i < f->states; i++) f->x_prior[i] = bank_mean(probability, m.x[i]);
-    return TG_OK;
 }

@@ -1,9 +1,9 @@
-/* Inside the bank: what its two ways share, by factors (bank.c) and on the covariances themselves (bank_direct.c). One lane a mode. */
+/* Inside the bank, see bank.c: small parts of its step. One lane a mode. */
 #ifndef TG_BANK_H
 #define TG_BANK_H
 #include "filter.h"
 
-typedef struct { /* P = U diag(d) U' by u[k][i], i <= k; or, where formed, P[k][i] itself in its place */
+typedef struct { /* P = U diag(d) U' by u[k][i], i <= k */
     tg_lanes x[TG_ROWS], d[TG_ROWS], u[TG_MAX_STATES][TG_ROWS];
 } tgi_modes;
 
@@ -95,8 +95,4 @@ TG_INLINE void bank_note(tgi_update *out, int o, tg_lanes residual, tg_lanes var
     out->residual[out->taken] = residual;
     out->variance[out->taken++] = variance;
 }
-
-/* bank_direct.c: the step up to the last channel on the covariances `before`, which are mixed first where `mixes` tells. Whether the bound of
- * direct.h holds in every mode; else neither `before` nor `out` is of use. Up to four wheels. */
-int tgi_bank_direct(const tg_filter *f, const tgi_plan *plan, int mixes, const tg_lanes *noise, tgi_modes *before, tgi_update *out);
 #endif

@@ -12,7 +12,6 @@
 /* The two halves of the bound. P' = F P F' + Q is at least its noise, so at least this share of its diagonal; and a channel leaves at
  * least R/S of what was there. The product of both shares stands ten thousand times above the rounding. */
 #define TGI_NOISE_SHARE ((tg_real)1e-5)
-#define TGI_SHARES (TGI_NOISE_SHARE * TGI_NOISE_SHARE) /* both halves together, which proves as much */
 #define TGI_FACTOR_STEPS 16 /* with factors, after the bound did not hold */
 
 /* After a step with factors. */

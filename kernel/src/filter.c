@@ -22,10 +22,10 @@ tg_tuning tg_default_tuning(void)
     t.window = (tg_real)0.5;
     t.wheel_speed_min = (tg_real)0.5;
     t.ground_speed_min = (tg_real)0.1;
-    t.scales[0] = (tg_real)0.03;
-    t.scales[1] = (tg_real)0.3;
-    t.scales[2] = 3;
-    t.scales[3] = 30;
+    t.scales[0] = (tg_real)0.1;
+    t.scales[1] = 1;
+    t.scales[2] = 10;
+    t.scales[3] = 100;
     t.dwell = 5;
     t.mix_stride = 5;
     return t;
@@ -307,8 +307,8 @@ tg_status tg_filter_factors(const tg_filter *f, int32_t mode, tg_real *U, tg_rea
     const int bank = f->tuning.policy == TG_BANK;
     if (mode < 0 || mode >= (bank ? TG_MODES : 1)) return TG_BAD_ARGUMENT;
     tg_real u[TG_MAX_STATES * TG_ROWS], d[TG_ROWS];
-    const tg_status status = bank ? tgi_bank_factors_of(f, mode, u, d) : tgi_factors_of(f, u, d);
-    if (status != TG_OK) return TG_DIVERGED;
+    if (bank) tgi_bank_factors_of(f, mode, u, d);
+    else if (tgi_factors_of(f, u, d) != TG_OK) return TG_DIVERGED;
     for (int k = 0; k < f->states; k++) {
         D[k] = d[k];
         for (int e = 0; e < f->states; e++) {
@@ -376,10 +376,9 @@ tg_status tg_filter_restart(tg_filter *f, tg_real walk_time, const tg_real *outp
     memset(&passage, 0, sizeof passage);
     for (int j = 0; j <= n; j++) passage.q[j] = f->walk[j] * walk_time;
     for (int o = 0; o <= n; o++) passage.q[n + 1 + o] = variances[tgi_channel(n, o)];
-    if (f->tuning.policy == TG_BANK) {
-        const tg_status status = tgi_bank_restart(f, outputs, &passage);
-        if (status != TG_OK) return status;
-    } else {
+    if (f->tuning.policy == TG_BANK)
+        tgi_bank_restart(f, outputs, &passage);
+    else {
         tg_real u[TG_MAX_STATES * TG_ROWS], d[TG_ROWS];
         if (tgi_factors_of(f, u, d) != TG_OK) return TG_DIVERGED;
         tgi_restart(n, f->stride, passage.q, u, d);

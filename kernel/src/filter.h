@@ -75,8 +75,8 @@ void tgi_supervisor_remember(tg_filter *f, const tgi_plan *plan, const tg_input 
 void tgi_bank_init(tg_filter *f);
 tg_status tgi_bank_step(tg_filter *f, tgi_plan *plan, tg_step *out);
 void tgi_bank_moments(const tg_filter *f, tg_real *x, tg_real *P); /* row order, P by rows of `stride` */
-tg_status tgi_bank_restart(tg_filter *f, const tg_real *outputs, tg_passage *passage);
-tg_status tgi_bank_factors_of(const tg_filter *f, int mode, tg_real *u, tg_real *d); /* as tgi_factors_of */
+void tgi_bank_restart(tg_filter *f, const tg_real *outputs, tg_passage *passage);
+void tgi_bank_factors_of(const tg_filter *f, int mode, tg_real *u, tg_real *d); /* as tgi_factors_of */
 
 /* filter.c: the outputs anew with variances q, the parameters kept and widened by q. */
 void tgi_restart(int n, int stride, const tg_real *q, tg_real *u, tg_real *d);

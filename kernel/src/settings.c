@@ -81,8 +81,6 @@ tg_settings tg_default_settings(void)
     tg_settings s;
     memset(&s, 0, sizeof s);
     s.tuning = tg_default_tuning();
-    const tg_real scales[TG_MODES] = {(tg_real)0.1, 1, 10, 100};
-    memcpy(s.tuning.scales, scales, sizeof scales);
     s.tuning.huber = 4;
     s.axles = 1;
     s.load_share[0] = 1;

@@ -87,6 +87,10 @@ def long_problem(problem: Callable[..., Any]) -> Any:
     return problem(2021, wheels=3, steps=5000, condition=1e9, **LONG)
 
 
+def test_the_bank_has_one_default_of_its_scales():
+    assert list(lib.tg_default_settings().tuning.scales) == list(lib.tg_default_tuning().scales) == list(Tuning.scales)
+
+
 @pytest.mark.parametrize(("engine", "policy"), METHODS)
 def test_agrees_over_5000_steps(engine, policy, long_problem):
     assert_agree(long_problem, Tuning(long_problem.walk, engine=engine, policy=policy, huber=3.0))

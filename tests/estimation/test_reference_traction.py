@@ -135,7 +135,7 @@ def test_restart_keeps_the_parameters_and_forgets_the_motion(policy, problem):
     np.testing.assert_allclose(got_P[:3, :3], np.diag([0.1, 0.2, 0.3]), atol=1e-15)
     np.testing.assert_allclose(got_P[:3, 3:], 0, atol=1e-20)  # the mean of equal lanes may round
     growth = got_P[3:, 3:] - P[3:, 3:]
-    mode = filter._bank.probabilities @ [0.03, 0.3, 3, 30] if filter._bank else 1.0
+    mode = filter._bank.probabilities @ [0.1, 1, 10, 100] if filter._bank else 1.0
     np.testing.assert_allclose(growth, np.diag(4.0 * mode * case.walk[3:]), rtol=1e-9, atol=1e-14)
 
 

@@ -49,7 +49,7 @@ class Tuning:
     wheel_speed_min: float = 0.5
     ground_speed_min: float = 0.1
     supervisor: Literal["speeds", "drive"] = "speeds"
-    scales: Sequence[float] = (0.03, 0.3, 3.0, 30.0)
+    scales: Sequence[float] = (0.1, 1.0, 10.0, 100.0)
     dwell: float = 5.0
     mix_stride: int = 5
 
