@@ -88,7 +88,11 @@ def long_problem(problem: Callable[..., Any]) -> Any:
 
 
 def test_the_bank_has_one_default_of_its_scales():
-    assert list(lib.tg_default_settings().tuning.scales) == list(lib.tg_default_tuning().scales) == list(Tuning.scales)
+    assert (
+        list(lib.tg_default_settings().tuning.scales)
+        == list(lib.tg_default_tuning().scales)
+        == list(Tuning.scales)
+    )
 
 
 @pytest.mark.parametrize(("engine", "policy"), METHODS)
