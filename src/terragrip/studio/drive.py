@@ -76,10 +76,13 @@ def recording_of(studio: Studio, table: Estimates, *, search: bool = False) -> t
     elif wanted in studio.origins and not search:
         return None
     items = studio.folder.items()
-    path = _find(studio, items, name, wanted)
-    found = None if path is None else _read(studio, items, path, table)
-    studio.origins[wanted] = None if path is None or found is None else (path, found[0])
-    return None if path is None or found is None else (path, found[1])
+    place = _find(studio, items, name, wanted)
+    found = None if place is None else _read(studio, items, place, table)
+    if place is None or found is None:
+        studio.origins[wanted] = None
+        return None
+    studio.origins[wanted] = (place, found[0])
+    return place, found[1]
 
 
 def _find(studio: Studio, items: Sequence[Item], name: str, wanted: str) -> Path | None:
