@@ -211,6 +211,26 @@ def _log(path: Path, columns: dict[str, np.ndarray]) -> Path:
     return path
 
 
+def test_a_bus_speed_that_goes_with_positions_may_still_be_the_wheels() -> None:
+    found = _propose({"VehicleSpeed_kmh": 3.6 * SPEED, **_place()})["ground_speed"]
+    assert "wheels" in found.doubt
+
+
+def test_a_receiver_that_stands_contradicts_no_speed() -> None:
+    noise = np.cumsum(np.random.default_rng(3).normal(0, 2e-8, (2, len(TIME))), axis=1)
+    columns = {"gps_speed_mps": 0.02 + 0.01 * np.sin(TIME), "lat": 45 + noise[0], "lon": 11 + noise[1]}
+    found = _propose(columns)["ground_speed"]
+    assert (found.columns, found.doubt) == (("gps_speed_mps",), "")
+
+
+def test_wheels_that_never_turn_are_named_in_the_refusal(tmp_path: Path) -> None:
+    found = inspect(
+        _log(tmp_path / "idle.csv", {"WheelBasedVehicleSpeed": 0 * TIME, "EngineSpeed": 90 + SPEED})
+    )
+    assert "WheelBasedVehicleSpeed" in found.refused
+    assert "0 throughout" in found.refused
+
+
 def test_several_logs_and_a_folder_in_one_call(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     wheels = {"gps_speed_mps": SPEED, "wheel_left_rpm": 30 * SPEED, "wheel_right_rpm": 30 * SPEED}
     folder = tmp_path / "day"

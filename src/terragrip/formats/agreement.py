@@ -278,7 +278,7 @@ class Agreement:
                 (best[0].column.column, best[1].column.column, best[2].column.column)
             )
             if unit is not None:
-                finding = Finding(True, "the three sum up to gravity", unit)
+                finding = Finding(True, f"the three sum up to gravity, in {unit}", unit)
                 for axis, guess in zip(axes, best, strict=True):
                     ranked[axis] = [g.with_finding(finding) if g is guess else g for g in ranked[axis]]
         ground = self._ground(ranked)

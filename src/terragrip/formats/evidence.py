@@ -21,6 +21,7 @@ Path = tuple[Floats, Floats, Floats]
 """Begins [s], ends [s] and lengths [m] of straight pieces of what was driven."""
 
 _MOST = 300_000  # samples of a column that are looked at
+_SLOWEST = 0.3  # m/s
 _WINDOW = 2.0  # s over which a path is taken for straight
 SPEED_UNITS = {
     "m/s": 1.0,
@@ -144,7 +145,9 @@ class Evidence:
         inside = (begins >= time[0]) & (ends <= time[-1])
         run = np.interp(ends, time, total) - np.interp(begins, time, total)
         driven = float(lengths[inside].sum())
-        if driven < 2.0 or not float(run[inside].sum()) > 0:
+        duration = float((ends - begins)[inside].sum())
+        # Of a receiver that stands still, the path is its noise.
+        if driven < max(2.0, _SLOWEST * duration) or not float(run[inside].sum()) > 0:
             return None
         return float(run[inside].sum()) / driven, driven
 

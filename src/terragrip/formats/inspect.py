@@ -148,7 +148,8 @@ def inspect(
     seen = Seen.of(log, whole=every == 1)
     numbers = seen.numbers()
     proposals = seen.proposals(GENERAL)
-    warnings += silent(numbers, proposals, seen.units)
+    quiet = silent(numbers, proposals, seen.units)
+    warnings += quiet
     stamp, base = seen.stamp, seen.base
     present = proposals.keys() | fits.channels
     ready = recording is not None and is_ready(recording)
@@ -168,7 +169,7 @@ def inspect(
         ready=ready,
         fitting=fits.names,
         nearly=fits.nearly,
-        refused="" if ready or fits.names else refusal(present),
+        refused="" if ready or fits.names else refusal(present, quiet),
         profile=profile_text(
             os.path.basename(str(log.source)), stamp, proposals, since_1970=seen.since_1970, dbc=databases
         ),

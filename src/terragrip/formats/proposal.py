@@ -48,13 +48,19 @@ def missing_channels(proposals: Collection[str], has_time: bool) -> list[str]:
     return said
 
 
-def refusal(channels: Collection[str]) -> str:
-    """Why nothing can be estimated from a log with these channels, whatever the profile; empty if something can."""
+def refusal(channels: Collection[str], silent: Sequence[str]) -> str:
+    """Why nothing can be estimated from a log with these channels, whatever the profile; empty if something can.
+
+    ``silent``: sentences on columns that have the name of a speed, but say nothing.
+    """
     if "wheel_based_speed" in channels or any(c.startswith("wheel_speed_") for c in channels):
         return ""
     found = (
         ", ".join(sorted(c for c in channels if not c.startswith("true_"))) or "nothing that Terragrip knows"
     )
+    wheels = next((s for s in silent if "wheel_speed_" in s or "wheel_based_speed" in s), "").rstrip(".")
+    if wheels:
+        return f"has no wheel speed that ever changes: {wheels}"
     return f"has no wheel speed, nor one of the drive train: nothing can be estimated from it alone (found: {found})"
 
 
