@@ -6,8 +6,13 @@
  *
  * State order, n wheels:  x = (omega_1..omega_n, v, mu_1..mu_n, rho_s), nx = 2n+2.
  * Channel order:          y = (omega_1..omega_n, v, a_x), ny = n+2. A NaN channel is missing at that instant.
- * Matrices are row-major, nx by nx. SI units. Every function returns a tg_status; on any status but TG_OK the object is
- * unchanged, and outputs are not written.
+ * Matrices are row-major, nx by nx. SI units.
+ *
+ * A function that can fail returns a tg_status. On any status but TG_OK the object is unchanged and outputs are not written, bit for bit
+ * (kernel/tests/promises.c). Only tg_estimator_block and tg_estimator_record, which go through many rows, stop at the row that is refused:
+ * the object and the outputs are then as after the rows before it. Without a status: sizes and lengths (0 where an argument is out of
+ * range), defaults, and tg_curve_std (NaN of a null pointer). Places of an output that belong to no wheel, axle or state of the machine, or
+ * that the method does not give, are NaN in a tg_estimate and 0 in a tg_step.
  */
 #ifndef TERRAGRIP_H
 #define TERRAGRIP_H
@@ -19,6 +24,7 @@
 #define TG_MAX_CHANNELS 10
 #define TG_MODES 4
 #define TG_MAX_CONSIDERED 14
+#define TG_ESTIMATOR_ROOM 81920 /* bytes, aligned as a double, that hold any tg_estimator: storage without malloc */
 
 /* A program and its kernel must agree on the precision: whoever includes this header asks the linker for the symbol of its own. */
 #ifdef TG_FLOAT
@@ -210,8 +216,8 @@ enum {
     TG_OUT_WARNING = 114,    /* score of the warning of immobilization, points */
     TG_OUT_USUAL_SLIP = 115, /* what the watch holds for usual */
     TG_OUT_SIGN = 116,       /* + tg_sign, points; 0 where nothing is judged */
-    TG_OUT_ADAPTATION = 121, /* + state: a_j of A_k as this row used it; written by the adaptive and the supervised policy only */
-    TG_OUT_ZERO_SLIP_RADIUS = 139, /* + wheel, m: what slip counts from; written by TG_SPEEDS only */
+    TG_OUT_ADAPTATION = 121, /* + state: a_j of A_k as this row used it; NaN but for the adaptive and the supervised policy */
+    TG_OUT_ZERO_SLIP_RADIUS = 139, /* + wheel, m: what slip counts from; NaN but for TG_SPEEDS */
     TG_OUT_ZERO_SLIP_RADIUS_STD = 147,
     TG_OUT_CHANNEL_NIS = 155, /* + channel (wheel speeds, ground speed, a_x): each one's own; NaN where it was not measured */
     TG_OUT_SLOTS = 165

@@ -41,6 +41,12 @@ tg_status tg_consider_step(tg_consider *c, const tg_filter *f, const tg_deviatio
 {
     if (!c || !f || c->wheels != f->wheels) return TG_BAD_ARGUMENT;
     const int n = f->wheels;
+    tg_real zero = 0; /* NaN, from an infinite or NaN term */
+    for (int k = 0; deviations && k < c->columns; k++) {
+        zero += deviations[k].acceleration * 0 + deviations[k].accelerometer * 0;
+        for (int i = 0; i < n; i++) zero += deviations[k].wheel_acceleration[i] * 0;
+    }
+    if (zero != 0) return TG_NOT_FINITE;
     for (int k = 0; k < c->columns; k++) {
         consider_predict(&f->passage, deviations ? deviations + k : NULL, c->s[k], c->prior[k], n);
         memcpy(c->s[k], c->prior[k], sizeof c->s[k]);

@@ -179,6 +179,10 @@ tg_status tg_curve_update(tg_curve *c, tg_real dt, tg_real distance, int32_t pai
     if (isnan(dt) || isinf(dt) || isnan(distance) || isinf(distance)) return TG_NOT_FINITE;
     if (dt < 0) return TG_TIME_REVERSED;
     for (int32_t i = 0; i < pairs; i++) {
+        if (isinf(share[i]) || isinf(pair[i].adhesion) || isinf(pair[i].slip) || isinf(pair[i].adhesion_variance) || isinf(pair[i].slip_variance) ||
+            isinf(pair[i].adhesion_constant) || isinf(pair[i].radius_error))
+            return TG_NOT_FINITE;
+        if (!(share[i] > 0)) return TG_NOT_POSITIVE;
         if (pair[i].adhesion_variance < 0 || pair[i].slip_variance < 0 || pair[i].radius_error < 0) return TG_NOT_POSITIVE;
         sight[i] = tgi_look(&pair[i]);
     }

@@ -223,6 +223,7 @@ tg_status tg_estimator_update(tg_estimator *e, const tg_sample *sample, tg_estim
     tg_drive drive;
     tg_status status = tgi_clean(e, sample, &row);
     if (status != TG_OK) return status;
+    for (int32_t k = 0; k < TG_OUT_SLOTS; k++) out->value[k] = (tg_real)NAN; /* what nothing below writes */
     if (e->settings.method == TG_SPEEDS) {
         tgi_speeds_update(e, &row, out);
         return TG_OK;

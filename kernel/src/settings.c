@@ -284,6 +284,8 @@ void tgi_believe(tg_estimator *e)
     tgi_covariance_of(f, e->belief.P);
 }
 
+typedef char tgi_room_is_enough[sizeof(tg_estimator) <= TG_ESTIMATOR_ROOM ? 1 : -1];
+
 /* The machine and the tuning are checked by the filter. */
 tg_status tg_estimator_init(tg_estimator *e, const tg_settings *settings)
 {

@@ -35,11 +35,12 @@ tg_status tg_estimator_record(tg_estimator *e, size_t rows, const double *time, 
         sample.time = time[row];
         for (int32_t k = 0; k < TG_SLOTS; k++) sample.value[k] = in[k] ? (tg_real)in[k][row] : (tg_real)NAN;
         status = tg_estimator_update(e, &sample, &estimate);
+        if (status != TG_OK) break;
         if (e->settings.method == TG_SPEEDS) {
             memcpy(record, &e->speeds, sizeof e->speeds);
             continue;
         }
-        if (status == TG_OK) status = tg_record_take(record, &track, &e->filter, &e->consider);
+        status = tg_record_take(record, &track, &e->filter, &e->consider);
         if (status == TG_OK) memcpy(record + filter_length(e), &e->scene, sizeof e->scene);
     }
     e->track = NULL;
@@ -90,8 +91,9 @@ tg_status tg_estimator_smooth(const tg_estimator *e, size_t rows, const tg_real 
                               double *const *out)
 {
     if (!e || !records || !carry || !out || e->settings.method == TG_ALGEBRAIC) return TG_BAD_ARGUMENT;
+    tg_real value[TG_OUT_SLOTS];
+    for (int32_t k = 0; k < TG_OUT_SLOTS; k++) value[k] = (tg_real)NAN; /* those of absent wheels stay so */
     if (e->settings.method == TG_SPEEDS) {
-        tg_real value[TG_OUT_SLOTS];
         for (size_t row = rows; row-- > 0;) {
             const tg_real *here = records + row * tg_smooth_length(e);
             tgi_speeds_smooth(&e->settings, here, next, carry, value);
@@ -104,7 +106,7 @@ tg_status tg_estimator_smooth(const tg_estimator *e, size_t rows, const tg_real 
     }
     tgi_smoothed m = inside(e, carry);
     tg_belief belief;
-    tg_real S[TG_MAX_CONSIDERED][TG_ROWS], value[TG_OUT_SLOTS];
+    tg_real S[TG_MAX_CONSIDERED][TG_ROWS];
     for (size_t row = rows; row-- > 0;) {
         const tg_real *here = records + row * tg_smooth_length(e);
         tgi_scene scene;

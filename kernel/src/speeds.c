@@ -304,7 +304,6 @@ void tgi_speeds_update(tg_estimator *e, tg_row *row, tg_estimate *out)
     e->started = 1;
     e->time = row->time;
 
-    for (int32_t k = 0; k < TG_OUT_SLOTS; k++) out->value[k] = (tg_real)NAN;
     report(&e->settings, s, out->value);
     out->time = row->time;
     out->distance = e->distance;

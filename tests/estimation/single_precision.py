@@ -18,19 +18,28 @@ from cffi_build import FLAGS, declarations  # noqa: E402
 HEADER = ROOT / "kernel/include/terragrip.h"
 
 
-def kernel() -> SimpleNamespace:
-    """``ffi`` and ``lib`` as `terragrip._kernel` has them; the shared library lies in build/single."""
+def library() -> Path:
+    """The kernel in single precision as a shared library, in build/single."""
     sources = sorted((ROOT / "kernel/src").glob("*.c"))
     texts = (path.read_bytes() for path in (HEADER, *sorted((ROOT / "kernel/src").glob("*.[ch]"))))
     state = hashlib.sha256(b"".join(texts)).hexdigest()[:16]
-    library = ROOT / "build/single" / f"terragrip-{state}.so"
-    if not library.exists():
-        library.parent.mkdir(parents=True, exist_ok=True)
-        made = library.with_suffix(f".{os.getpid()}")
-        compiler = os.environ.get("CC", "cc").split()
-        command = [*compiler, *FLAGS, "-O1", "-DTG_FLOAT", "-shared", "-fPIC", f"-I{HEADER.parent}"]
+    path = ROOT / "build/single" / f"terragrip-{state}.so"
+    if not path.exists():
+        path.parent.mkdir(parents=True, exist_ok=True)
+        made = path.with_suffix(f".{os.getpid()}")
+        command = [*compiler(), *FLAGS, "-O1", "-DTG_FLOAT", "-shared", "-fPIC", f"-I{HEADER.parent}"]
         subprocess.run([*command, *map(str, sources), "-lm", "-o", str(made)], check=True)
-        made.replace(library)  # at once, for another test worker may be at the same
+        made.replace(path)  # at once, for another test worker may be at the same
+    return path
+
+
+def compiler() -> list[str]:
+    """The C compiler's command."""
+    return os.environ.get("CC", "cc").split()
+
+
+def kernel() -> SimpleNamespace:
+    """``ffi`` and ``lib`` as `terragrip._kernel` has them."""
     ffi = FFI()
     ffi.cdef(declarations(HEADER, "float"))
-    return SimpleNamespace(ffi=ffi, lib=ffi.dlopen(str(library)))
+    return SimpleNamespace(ffi=ffi, lib=ffi.dlopen(str(library())))
