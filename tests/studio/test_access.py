@@ -81,3 +81,35 @@ def test_the_printed_address_logs_in_by_a_cookie_that_scripts_cannot_read(folder
 def test_with_a_token_a_rebound_name_is_still_refused(folder: Path) -> None:
     with TestClient(create_app(folder, token=TOKEN), base_url="http://evil.example") as client:
         assert client.get("/api/folder", headers={"authorization": f"Bearer {TOKEN}"}).status_code == 403
+
+
+PUBLIC = "https://field.example.org/studio"
+
+
+@pytest.mark.parametrize("host", ["127.0.0.1:8750", "field.example.org"])
+def test_a_reverse_proxy_passes_whether_it_keeps_the_host_or_not(folder: Path, host: str) -> None:
+    """nginx sends its upstream's name by default, others the browser's; the browser's origin is the public address in both."""
+    app = create_app(folder, token=TOKEN, public=PUBLIC)
+    headers = {"host": host, "origin": "https://field.example.org", "sec-fetch-site": "same-origin"}
+    with TestClient(app, base_url=f"http://{host}") as client:
+        answer = client.get(f"/?token={TOKEN}", headers={"host": host}, follow_redirects=False)
+        assert answer.headers["location"] == "/studio/"
+        assert "Path=/studio/; Secure" in answer.headers["set-cookie"]
+        headers["cookie"] = f"{COOKIE}={TOKEN}"
+        assert client.get("/api/folder", headers=headers).status_code == 200
+        with client.websocket_connect(f"ws://{host}/api/notices", headers=headers):
+            pass
+        for wrong in ({"origin": "https://evil.example"}, {"host": "evil.example"}):
+            assert client.get("/api/folder", headers=headers | wrong).status_code == 403
+        del headers["cookie"]
+        assert client.get("/api/folder", headers=headers).status_code == 401
+
+
+def test_a_machine_is_named_by_its_local_name_where_there_is_a_token(
+    folder: Path, client: TestClient
+) -> None:
+    with TestClient(create_app(folder, token=TOKEN), base_url="http://tractor.local:8750") as named:
+        assert named.get("/api/folder").status_code == 401
+        headers = {"authorization": f"Bearer {TOKEN}", "origin": "http://tractor.local:8750"}
+        assert named.get("/api/folder", headers=headers).status_code == 200
+    assert client.get("/api/folder", headers={"host": "tractor.local:8750"}).status_code == 403

@@ -22,6 +22,14 @@ def command(
     live: Annotated[
         str | None, typer.Option("--live", metavar="URL", help="WebSocket of a running 'terragrip live'.")
     ] = None,
+    public_url: Annotated[
+        str | None,
+        typer.Option(
+            "--public-url",
+            metavar="URL",
+            help="The address by which browsers reach a reverse proxy in front; a token is then needed.",
+        ),
+    ] = None,
     upload_limit: Annotated[
         int, typer.Option("--upload-limit", metavar="MB", min=1, help="Largest file taken by drop.")
     ] = 2000,
@@ -41,6 +49,12 @@ def command(
         ) from None
     if live is not None and not live.startswith(("ws://", "wss://")):
         raise InputError(f"{live!r} is no WebSocket address", place="--live", mend="give ws://HOST:PORT")
+    if public_url is not None and not _is_web_address(public_url):
+        raise InputError(
+            f"{public_url!r} is no web address",
+            place="--public-url",
+            mend="give https://HOST, or https://HOST/PATH",
+        )
     try:
         from terragrip.studio.serve import serve
     except ModuleNotFoundError as error:
@@ -49,4 +63,17 @@ def command(
         raise InputError(
             f"the studio needs the Python package {error.name!r}", mend="pip install 'terragrip[studio]'"
         ) from error
-    serve(folder, address, port, loopback=home, live=live, upload_limit=upload_limit * 1_000_000)
+    limit = upload_limit * 1_000_000
+    serve(folder, address, port, loopback=home, live=live, upload_limit=limit, public=public_url)
+
+
+def _is_web_address(text: str) -> bool:
+    from urllib.parse import urlsplit
+
+    try:
+        place = urlsplit(text)
+        return (
+            place.scheme in ("http", "https") and bool(place.hostname) and not (place.query or place.fragment)
+        )
+    except ValueError:
+        return False

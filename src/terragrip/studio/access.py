@@ -37,11 +37,19 @@ class Access:
     app: the ASGI application behind.
     hosts: names that the Host header may carry besides the loopback names.
     token: what every request must bring (cookie, or ``Authorization: Bearer``); None on loopback.
+    public: the address that browsers see where a reverse proxy stands in front (https://example.org/studio); its host and origin are the
+        studio's too, its cookie is kept to its path, and to TLS where it has it. Needs a token.
     """
 
-    def __init__(self, app: Any, hosts: Iterable[str] = (), token: str | None = None) -> None:
+    def __init__(
+        self, app: Any, hosts: Iterable[str] = (), token: str | None = None, public: str | None = None
+    ) -> None:
         self._app, self._token = app, token
         self._hosts = LOOPBACK | {host.lower() for host in hosts}
+        place = urlsplit(public or "")
+        self._public = place.netloc.lower()
+        self._path = f"{place.path.rstrip('/')}/"
+        self._tls = "; Secure" if place.scheme == "https" else ""
 
     async def __call__(self, scope: Any, receive: Any, send: Any) -> None:
         if scope["type"] not in ("http", "websocket"):
@@ -72,7 +80,9 @@ class Access:
         if not self._host_is_ours(host):
             return 403, "this host name is not the studio's"
         origin = headers.get("origin")
-        if origin is not None and urlsplit(origin).netloc.lower() != host.lower():
+        # A proxy that hands on its own Host header leaves the browser's origin: the public address.
+        ours = {host.lower(), self._public} - {""}
+        if origin is not None and urlsplit(origin).netloc.lower() not in ours:
             return 403, "requests from other sites are refused"
         site = headers.get("sec-fetch-site", "none")
         navigation = headers.get("sec-fetch-mode") == "navigate" and scope.get("method") == "GET"
@@ -82,10 +92,11 @@ class Access:
 
     def _host_is_ours(self, header: str) -> bool:
         name = (urlsplit(f"//{header}").hostname or "").lower()
-        if name in self._hosts:
+        if name in self._hosts or header.lower() == self._public != "":
             return True
-        # With a token a rebound name gains nothing; addresses are let in so that a tablet can name the machine.
-        return self._token is not None and _is_address(name)
+        # With a token a rebound name gains nothing: it cannot bring the cookie of another name. So a tablet may name the machine
+        # by its address, and by a name that only its own network gives out (RFC 6762, mDNS).
+        return self._token is not None and (_is_address(name) or name.endswith(".local"))
 
     def _knows_token(self, headers: dict[str, str]) -> bool:
         assert self._token is not None
@@ -103,8 +114,8 @@ class Access:
         if not _same(given, self._token):
             await _answer(send, 401, "this token is not the studio's")
             return
-        cookie = f"{COOKIE}={quote(self._token)}; HttpOnly; SameSite=Strict; Path=/"
-        await _answer(send, 303, "", ((b"location", b"/"), (b"set-cookie", cookie.encode())))
+        cookie = f"{COOKIE}={quote(self._token)}; HttpOnly; SameSite=Strict; Path={self._path}{self._tls}"
+        await _answer(send, 303, "", ((b"location", self._path.encode()), (b"set-cookie", cookie.encode())))
 
 
 def _same(given: str, token: str) -> bool:

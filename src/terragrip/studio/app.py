@@ -34,6 +34,7 @@ def create_app(
     hosts: Iterable[str] = (),
     upload_limit: int = UPLOAD_LIMIT,
     live: str | None = None,
+    public: str | None = None,
 ) -> FastAPI:
     """The studio on one folder, as an ASGI application.
 
@@ -44,6 +45,7 @@ def create_app(
     hosts: names that the Host header may carry besides loopback's.
     upload_limit: bytes of one upload.
     live: WebSocket address of a running live service.
+    public: the address that browsers see where a reverse proxy stands in front.
 
     Raises InputError if there is no such folder.
     """
@@ -65,7 +67,7 @@ def create_app(
         app.mount("/", _Pages(directory=STATIC, html=True), name="pages")
     else:
         app.add_api_route("/", _not_built, include_in_schema=False)
-    app.add_middleware(Access, hosts=tuple(hosts), token=token)
+    app.add_middleware(Access, hosts=tuple(hosts), token=token, public=public)
     return app
 
 

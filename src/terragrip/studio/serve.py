@@ -18,13 +18,27 @@ SHORTEST = 16
 
 
 def serve(
-    folder: Path, address: str, port: int, *, loopback: bool, live: str | None, upload_limit: int
+    folder: Path,
+    address: str,
+    port: int,
+    *,
+    loopback: bool,
+    live: str | None,
+    upload_limit: int,
+    public: str | None = None,
 ) -> None:
-    """Bind, say where the pages are, serve. InputError where the folder or the port is not to be had, or the token is too short."""
-    token = None if loopback else _token()
-    app = create_app(folder, token=token, hosts=(address,), upload_limit=upload_limit, live=live)
+    """Bind, say where the pages are, serve. InputError where the folder or the port is not to be had, or the token is too short.
+
+    `public`: the address by which a reverse proxy is reached. What comes through it comes from other machines, so a token is needed,
+    though the studio itself stands on loopback.
+    """
+    token = None if loopback and public is None else _token()
+    app = create_app(
+        folder, token=token, hosts=(address,), upload_limit=upload_limit, live=live, public=public
+    )
     listener = _bind(address, port)
-    place = f"http://{_shown(address)}:{listener.getsockname()[1]}/"
+    own = f"http://{_shown(address)}:{listener.getsockname()[1]}/"
+    place = own if public is None else f"{public.rstrip('/')}/"
     if not (STATIC / "index.html").is_file():
         print(
             "The pages are not built (Node.js 20 or newer, then `make studio`); only the interface is served."
@@ -33,7 +47,9 @@ def serve(
         f"Terragrip studio: {place}{f'?token={token}' if token and TOKEN not in os.environ else ''}",
         flush=True,
     )
-    if not loopback:
+    if public is not None:
+        print(f"The proxy passes on to {own}.", flush=True)
+    elif not loopback:
         print(
             "Anyone who knows the token can read and write this folder; the way there is not encrypted.",
             flush=True,
