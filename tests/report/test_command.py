@@ -150,3 +150,24 @@ def test_what_cannot_be_used_is_one_line_and_leaves_nothing(
 def test_the_efficiency_is_that_of_the_vehicles_own_tyres(report: Path) -> None:
     html = (report / "report.html").read_text(encoding="utf-8")
     assert f"ρt = {number(made_up.VEHICLE['tire_rolling_resistance'])} the tyre" in html
+
+
+def test_events_of_the_estimates_are_listed_without_a_ground(tmp_path: Path) -> None:
+    from terragrip.estimation.engine import EVENTS
+
+    table = made_up.estimates(5, ("hard",))
+    table.event_codes[300:320] = EVENTS.index("gap")
+    table.write(tmp_path / "run.parquet")
+    words = [
+        "report",
+        str(tmp_path / "run.parquet"),
+        "-o",
+        str(tmp_path / "report.html"),
+        "--no-pdf",
+        "--quiet",
+    ]
+    assert main(words) == 0
+    html = (tmp_path / "report.html").read_text(encoding="utf-8")
+    assert "1 gap; listed are warnings" in html
+    assert "run, 30.0 s" in html
+    assert "tool slides up" not in html

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 import pytest
 
@@ -9,7 +11,8 @@ from terragrip.ground.changes import Change
 from terragrip.ground.result import Ground, Timeline
 from terragrip.ground.sections import Section as Stay
 from terragrip.report import ground_sections
-from terragrip.report.page import Picture, Section, Table
+from terragrip.report.page import Page, Picture, Section, Table, render
+from terragrip.report.style import soil_color
 
 NAMES = ("fine", "wet", "unknown")
 
@@ -87,3 +90,34 @@ def test_without_a_ground_each_section_says_so(section) -> None:
     found = section([])
     assert found.omitted
     assert "ground.json" in found.omitted
+
+
+def test_a_warning_is_listed_however_short_and_its_reason_is_read_from_the_left() -> None:
+    why = "The wheels begin to dig: slip is 41 % in the mean of the wheels, at 0.31 m/s"
+    happened = tuple(
+        [
+            {"kind": "outlier", "start": float(i), "end": i + 0.9, "why": "a row that fits nothing"}
+            for i in range(60)
+        ]
+        + [{"kind": "immobilization", "start": 70.0, "end": 70.2, "why": why}]
+    )
+    section = ground_sections.events([ground(["fine"] * 9, ["fine"] * 9, happened)])
+    (table,) = only(section, Table)
+    assert table.rows[-1] == ("run 1, 70.0 s", "immobilization", "0.2", why)
+    assert len(table.rows) == ground_sections.LISTED
+    assert table.prose == {3}
+    html = render(Page("t", "l", (section,)))
+    assert f'<td class="prose">{why}</td>' in html
+    assert re.search(r"td\.prose [^}]*text-align: left", html)
+
+
+def test_events_of_the_estimates_are_told_of_runs_without_a_ground() -> None:
+    mine = {"kind": "stuck", "start": 1.0, "end": 3.5, "why": "it stands"}
+    section = ground_sections.events([ground(["fine"] * 9, ["fine"] * 9)], {"run 1": [mine], "run 2": [mine]})
+    (table,) = only(section, Table)
+    assert [row[0] for row in table.rows] == ["run 2, 1.0 s"]  # of run 1 the ground tells
+
+
+def test_labels_have_colours_of_their_own() -> None:
+    names = ["hard", "fine", "wet", "coarse", "grass", *(f"field {i}" for i in range(20))]
+    assert len({soil_color(name, names) for name in names}) == len(names)

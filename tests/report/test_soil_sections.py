@@ -143,3 +143,19 @@ def test_a_library_is_shown_as_it_was_learned(curves: list[SoilCurves], tmp_path
         assert np.allclose(mine.learned.curve.band(grid), theirs.learned.curve.band(grid), rtol=1e-9)
         assert mine.learned.curve.bins_.to_list() == theirs.learned.curve.bins_.to_list()
     assert "terragrip soils" in (soil_sections.what_is_missing(shown).omitted or "")
+
+
+def test_full_bins_are_not_called_enough_where_the_data_fix_no_curve(curves: list[SoilCurves]) -> None:
+    from dataclasses import replace
+
+    full = [replace(one, learned=replace(one.learned, gaps=())) for one in curves]
+    (said,) = soil_sections.what_is_missing(full, {}).prose
+    assert "Yet" not in said or not all(one.learned.curve.identifiability_.identifiable for one in full)
+    curve = full[0].learned.curve
+    before = curve.identifiability_
+    try:
+        curve.identifiability_ = replace(before, identifiable=False)
+        (said,) = soil_sections.what_is_missing(full, {}).prose
+    finally:
+        curve.identifiability_ = before
+    assert f"the data do not fix the curve of {full[0].name} (R² " in said

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import json
 import threading
 from typing import Any
@@ -29,6 +30,12 @@ class LiveService:
         self._thread.join(10)
 
     async def _answer(self, socket: Any) -> None:
+        from websockets.exceptions import ConnectionClosed
+
+        with contextlib.suppress(ConnectionClosed):  # the page has left
+            await self._send(socket)
+
+    async def _send(self, socket: Any) -> None:
         hello = {"kind": "hello", "vehicle": "v", "columns": COLUMNS, "wheels": ["a"], "events": [""]}
         await socket.send(json.dumps(hello))
         row = 0

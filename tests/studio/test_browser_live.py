@@ -47,9 +47,20 @@ def test_a_dead_source_shows_on_the_live_page(page: Any, served: Served) -> None
             page.evaluate("() => getComputedStyle(document.querySelector('.tile .big')).fontStyle")
             == "italic"
         )
+        service.mode = "silent"
+        page.wait_for_selector("#live-age:has-text('s old: no rows come')")
         service.stop()
         page.wait_for_selector("#live-state:has-text('connection lost')")
         page.wait_for_selector("#live-age:has-text('s old')")
         assert page.evaluate(faded) < 0.5
     finally:
         service.stop()
+
+
+def test_the_numbers_are_whole_on_a_telephone(page: Any, served: Served) -> None:
+    page.set_viewport_size({"width": 390, "height": 800})
+    page.goto(f"{served.url}/#/live?replay=estimates.parquet&speed=10")
+    page.wait_for_function("() => window.terragripLive?.feed.ring.taken > 500")
+    cut = "() => [...document.querySelectorAll('.tile > div')].some((e) => e.scrollWidth > e.clientWidth)"
+    assert not page.evaluate(cut)
+    assert page.evaluate("() => document.documentElement.scrollWidth") <= 390

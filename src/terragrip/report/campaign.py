@@ -123,7 +123,7 @@ def _learn(runs: Sequence[EstimatedRun]) -> Campaign:
 def estimate_campaign(
     folder: Path, seed: int, workers: int, progress: Progress | None, names: Sequence[str] | None
 ) -> EstimatedCampaign:
-    """Calibrate, simulate, estimate and score; estimates go to `folder`/<run>.parquet.
+    """Calibrate, simulate, estimate and score; estimates go to `folder`/<run>.parquet, the benchmarks' recordings to recordings/<run>.parquet beside it.
 
     `names`: which of the campaign's runs; None takes all; the benchmarks are always among them.
     """
@@ -195,6 +195,16 @@ def _record(name: str, seed: int) -> tuple[str, Recording]:
     return name, _simulated(name, seed).recording
 
 
+def _kept(result: SimulationResult, folder: Path, name: str) -> Path:
+    """The recording as a file, so that `terragrip studio` can draw what was measured beside what was estimated of it."""
+    from terragrip.files import replacing
+
+    folder.mkdir(exist_ok=True)
+    with replacing(folder / f"{name}.parquet") as temporary:
+        result.recording.to_pandas().to_parquet(temporary, index=False)
+    return folder / f"{name}.parquet"
+
+
 def _estimate(name: str, seed: int, vehicle: Vehicle, folder: Path) -> EstimatedRun:
     """One run from scenario to saved estimates and scores."""
     from terragrip.estimation import DEFAULT, METHODS, Estimates, estimate
@@ -205,7 +215,8 @@ def _estimate(name: str, seed: int, vehicle: Vehicle, folder: Path) -> Estimated
 
     result = _simulated(name, seed)
     path = folder / f"{name}.parquet"
-    estimate_file(result.recording, vehicle, path)
+    log = _kept(result, folder.parent / "recordings", name) if name in BENCHMARKS else result.recording
+    estimate_file(log, vehicle, path)
     estimates = Estimates.read(path)
     gathered = GatheredRuns()
     gathered.add(estimates, name)

@@ -67,8 +67,8 @@ def run_demo(
     Parameters
     ----------
     output: folder, made if it is not there. It gets index.html, report.pdf (where plutoprint is installed),
-        figures/*.svg, scores.json, soils.json, ground.json, vehicle.yaml (calibrated) and estimates/<run>.parquet; a file is written whole
-        or not at all.
+        figures/*.svg, scores.json, soils.json, ground.json, vehicle.yaml (calibrated), estimates/<run>.parquet and, of the benchmarks,
+        recordings/<run>.parquet; a file is written whole or not at all.
     seed: of the whole campaign. workers: processes.
     progress: called after each run with steps done, steps in all, and what was just done.
     runs: names of the campaign's runs to take; all by default. The benchmarks multi1 and multi2 are always

@@ -6,13 +6,14 @@ import os
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from terragrip import __version__
 from terragrip.errors import InputError
 from terragrip.estimation import Estimates
+from terragrip.ground.events import events
 from terragrip.report import ground_sections, residuals, sections, slip_sections, soil_sections
 from terragrip.report.page import Page, Section, Table, names, number
 from terragrip.report.runs import Run, label_stretches
@@ -62,7 +63,7 @@ def report_of(
         if progress is not None:
             progress(done, total)
 
-    summaries, shown, gathered = _read(paths, grounds, step)
+    summaries, shown, gathered, happened = _read(paths, grounds, step)
     campaign = Campaign({}, {}, ())
     if library is not None:
         campaign = known_soils(library, (part.soil for part in gathered.pairs))
@@ -86,7 +87,7 @@ def report_of(
             *(_sections(main, together, campaign) if main.has_adhesion else _of_slip(together)),
             ground_sections.recognised(grounds),
             ground_sections.section_points(grounds),
-            ground_sections.events(grounds),
+            ground_sections.events(grounds, happened),
             *(
                 [residuals.section(main), sections.methods(comparisons, [], main.method)]
                 if main.has_adhesion
@@ -111,8 +112,10 @@ def report_of(
 
 def _read(
     paths: Sequence[Path], grounds: Sequence[Ground], step: Callable[[int], None]
-) -> tuple[list[_Summary], list[Run], GatheredRuns]:
-    """A summary of each run, the SHOWN most telling runs (most stretches of soil, then a sensor, then the longest), all pairs."""
+) -> tuple[list[_Summary], list[Run], GatheredRuns, dict[str, list[dict[str, Any]]]]:
+    """A summary of each run, the SHOWN most telling runs (most stretches of soil, then a sensor, then the longest), all pairs, and
+    the events of each run by its own estimates."""
+    own: dict[str, list[dict[str, Any]]] = {}
     summaries: list[_Summary] = []
     kept: list[tuple[tuple[int, bool, float], Run]] = []
     gathered = GatheredRuns()
@@ -122,7 +125,11 @@ def _read(
             raise InputError("holds fewer than two rows", file=path, mend="leave it out")
         if estimates.has_adhesion:
             gathered.add(estimates, path.stem, file=str(path))
+        own[path.stem] = [event.to_dict() for event in events(estimates)]
+        told = any(ground.run == path.stem for ground in grounds)
         happened = tuple(event for ground in grounds if ground.run == path.stem for event in ground.events)
+        if not told:
+            happened = tuple(own[path.stem])
         table = estimates.to_pandas()
         table.attrs["zero_slip"] = estimates.about.get("zero_slip")
         run = Run(path.stem, table, estimates.method, vehicle=estimates.vehicle, events=happened)
@@ -134,7 +141,7 @@ def _read(
         step(number_)
     if kept and len(kept) == SHOWN and kept[1][0][0] < 2 <= kept[0][0][0]:
         kept = kept[:1]  # a run on one soil says nothing beside one over several
-    return summaries, [run for _, run in kept], gathered
+    return summaries, [run for _, run in kept], gathered, own
 
 
 def _sections(main: Run, together: Sequence[Run], campaign: Campaign) -> Iterator[Section]:

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
-from typing import TYPE_CHECKING
+from collections.abc import Iterable, Mapping, Sequence
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -23,7 +23,9 @@ ALIKE = ("fine", "wet")
 SHOWN = 2
 """Drives drawn over time: those with most changes."""
 LEAST_EVENT = 0.5
-"""Seconds under which an event is counted but not listed."""
+"""Seconds under which an event is counted but not listed, unless it is one of `WARNINGS`."""
+WARNINGS = ("immobilization", "stuck", "push")
+"""Events that a driver acts on: each is listed, however short."""
 LISTED = 40
 
 
@@ -114,22 +116,41 @@ def section_points(grounds: Sequence[Ground], simulated: bool = False) -> Sectio
     return Section("sections", title, (), (picture, table))
 
 
-def events(grounds: Sequence[Ground]) -> Section:
-    """What happened, with start, end and the reason in the user's words."""
+def events(
+    grounds: Sequence[Ground], found: Mapping[str, Sequence[Mapping[str, Any]]] | None = None
+) -> Section:
+    """What happened, with start, end and the reason in the user's words.
+
+    found: events of the estimates themselves by run (kind, start, end, why), for the runs that no `grounds` tells of.
+    """
     title = "Events"
-    if not grounds:
-        return Section("events", title, omitted="Left out: no ground.json was given.")
+    told = {ground.run for ground in grounds}
     every = [(ground.run, one) for ground in grounds for one in ground.events]
-    listed = [(run, one) for run, one in every if one["end"] - one["start"] >= LEAST_EVENT]
-    if not listed:
-        return Section("events", title, ("No event of half a second or more.",))
+    every += [(run, one) for run, mine in (found or {}).items() if run not in told for one in mine]
+    if not grounds and not found:
+        return Section(
+            "events",
+            title,
+            omitted="Left out: no ground.json was given, and no estimates whose events could be told.",
+        )
+    if not every:
+        return Section("events", title, ("No event.",))
+    listed = [
+        (run, one)
+        for run, one in every
+        if one["end"] - one["start"] >= LEAST_EVENT or one["kind"] in WARNINGS
+    ]
     kinds = {
         kind: sum(one["kind"] == kind for _, one in every)
         for kind in sorted({one["kind"] for _, one in every})
     }
-    prose = (
-        f"{', '.join(f'{count} {kind}' for kind, count in kinds.items())}; those of half a second or more:"
-    )
+    counted = ", ".join(f"{count} {kind}" for kind, count in kinds.items())
+    if not listed:
+        return Section("events", title, (f"{counted}; none of half a second or more.",))
+    prose = f"{counted}; listed are warnings, and what lasts half a second or more:"
+    # Warnings are never crowded out by a row of outliers.
+    first = sorted(listed, key=lambda pair: pair[1]["kind"] not in WARNINGS)[:LISTED]
+    shown = [pair for pair in listed if pair in first]
     rows = tuple(
         (
             f"{run}, {number(one['start'], 1)} s",
@@ -137,10 +158,10 @@ def events(grounds: Sequence[Ground]) -> Section:
             number(one["end"] - one["start"], 1),
             str(one.get("why") or "–"),
         )
-        for run, one in listed[:LISTED]
+        for run, one in shown
     )
     caption = (
-        f"Events; the first {LISTED} of {len(listed)}."
+        f"Events; {LISTED} of {len(listed)}, warnings first."
         if len(listed) > LISTED
         else "Events and why each was raised."
     )

@@ -21,6 +21,10 @@ class Picture:
     alt: str
 
 
+SENTENCE = 40
+"""Characters from which on a cell holds words, not a figure with its interval."""
+
+
 @dataclass(frozen=True)
 class Table:
     """A table of finished text cells; `strong` are the indices of rows to set off."""
@@ -29,6 +33,12 @@ class Table:
     header: tuple[str, ...]
     rows: tuple[tuple[str, ...], ...]
     strong: frozenset[int] = frozenset()
+
+    @property
+    def prose(self) -> frozenset[int]:
+        """The columns, counted from 0, that hold sentences: they are read from the left, figures stand to the right."""
+        columns = range(1, len(self.header))
+        return frozenset(i for i in columns if any(len(row[i]) > SENTENCE for row in self.rows))
 
 
 @dataclass(frozen=True)

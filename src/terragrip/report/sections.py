@@ -257,7 +257,7 @@ def _zoom(run: Run) -> tuple[float, float, str]:
     spells = stretches(run.outlier)
     if spells:
         first, last = spells[0]
-        about = "the spell in which the vehicle is stuck and its tool slides up and pushes"
+        about = "the spell in which the vehicle is stuck"
         start, end = float(run.time[first]) - ZOOM_MARGIN, float(run.time[last]) + ZOOM_MARGIN
     else:
         middle = float(run.time[len(run.time) // 2])

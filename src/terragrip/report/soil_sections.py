@@ -179,7 +179,7 @@ def what_is_missing(curves: Sequence[SoilCurves], not_fitted: Mapping[str, str] 
         for gap in one.learned.gaps
     )
     if not rows:
-        return Section("missing", title, ("Every slip bin of every soil holds enough samples.",))
+        return Section("missing", title, (_nothing_missing(curves),))
     words = tuple(
         sentence for one in curves if one.learned.gaps for sentence in in_words(one.name, one.learned.gaps)
     )
@@ -189,6 +189,19 @@ def what_is_missing(curves: Sequence[SoilCurves], not_fitted: Mapping[str, str] 
         rows,
     )
     return Section("missing", title, words, (table,))
+
+
+def _nothing_missing(curves: Sequence[SoilCurves]) -> str:
+    """What full bins say, and what they do not: a count of samples, not how well a curve explains them."""
+    said = "Every slip bin of every soil holds enough samples."
+    poor = [
+        f"{one.name} (R² {number(one.learned.soil.r2, 2)})"
+        for one in curves
+        if not one.learned.curve.identifiability_.identifiable
+    ]
+    if poor:
+        said += f" Yet the data do not fix the curve of {names(poor)}: more of the same does not help there, see What to trust."
+    return said
 
 
 def _preparation(curves: Sequence[SoilCurves]) -> str:

@@ -27,7 +27,9 @@ MEASURED, ESTIMATED, TRUE = VERMILLION, BLUE, INK
 
 SOIL_COLORS = {"hard": MUTED, "fine": ORANGE, "wet": SKY, "coarse": PURPLE, "grass": GREEN}
 """None of them is a voice's."""
-_SPARE_COLORS = (YELLOW, VERMILLION, BLUE)
+_SPARE_COLORS = (YELLOW, VERMILLION, BLUE, "#8c510a", "#2f9e9e", "#7b52ab", "#a3b81f", "#e06c9f")
+"""Beyond these hues are made, a golden angle apart."""
+_GOLDEN = 0.618034
 
 CSS_VARIABLES = {
     INK: "ink", MUTED: "muted", GRID: "grid", PAPER: "paper", ORANGE: "orange", SKY: "sky", GREEN: "green",
@@ -136,8 +138,21 @@ def in_page(svg: str, label: str, prefix: str) -> str:
 
 
 def soil_color(soil: str, soils: Sequence[str] = ()) -> str:
-    """The colour of a soil: fixed for the paper's five, for others a spare one by its place in `soils`."""
+    """The colour of a soil: fixed for the paper's five, for others one of its own by its place in `soils`."""
     if soil in SOIL_COLORS:
         return SOIL_COLORS[soil]
-    others = [name for name in soils if name not in SOIL_COLORS]
-    return _SPARE_COLORS[others.index(soil) % len(_SPARE_COLORS)] if soil in others else MUTED
+    others = list(dict.fromkeys(name for name in soils if name not in SOIL_COLORS))
+    if soil not in others:
+        return MUTED
+    place = others.index(soil)
+    if place < len(_SPARE_COLORS):
+        return _SPARE_COLORS[place]
+    return _made(place - len(_SPARE_COLORS))
+
+
+def _made(number: int) -> str:
+    """One of any number of colours, as #rrggbb: hues a golden angle apart, by turns dark and light."""
+    import colorsys
+
+    red, green, blue = colorsys.hls_to_rgb((0.07 + _GOLDEN * number) % 1.0, 0.62 if number % 2 else 0.38, 0.6)
+    return f"#{round(255 * red):02x}{round(255 * green):02x}{round(255 * blue):02x}"

@@ -103,7 +103,7 @@ export class Ring {
 }
 
 /** Seconds of silence that are never called old: rows come in bundles, and a reader sees nothing faster. */
-const LEAST_AGE = 0.5;
+export const LEAST_AGE = 0.5;
 
 /** Seconds after which what is shown is old: twice the time from row to row. */
 export function oldAfter(period: number): number {

@@ -6,7 +6,7 @@ import { get, type Item } from "../ui/api";
 import { digits, fill, h } from "../ui/dom";
 import { tried } from "../ui/notes";
 import type { Page } from "../ui/page";
-import { Feed, oldAfter, type Said } from "./feed";
+import { Feed, LEAST_AGE, oldAfter, type Said } from "./feed";
 import { Traces, type Trace } from "./traces";
 
 const WARNING: Record<string, string> = {
@@ -83,7 +83,7 @@ export const page: Page = (main, { notices, query }) => {
     state.className = `state ${heard ? "done" : feed.state === "lost" || (connected && isOld && traces.held === null) ? "failed" : ""}`;
     state.textContent = { connecting: "connecting …", connected: heard ? "connected" : waiting ? "connected, no rows yet" : traces.held !== null ? "paused" : "no measurements", lost: `connection lost: ${why}`, ended: "the run has ended" }[feed.state];
     main.classList.toggle("stale", isOld);
-    const predicted = connected && traces.held === null && feed.ring.isPredicted;
+    const predicted = connected && traces.held === null && feed.ring.isPredicted && silent <= LEAST_AGE;
     main.classList.toggle("predicted", predicted);
     traces.late = connected && traces.held === null && silent > limit ? silent * played : 0;
     old.hidden = !isOld;

@@ -16,6 +16,8 @@ export interface Trace {
   high: number;
 }
 
+/** Pixels under which the charts stand below each other (as in the style sheet). */
+const NARROW = 560;
 const [LEFT, RIGHT, GAP, FOOT] = [50, 10, 24, 24];
 
 export class Traces {
@@ -78,13 +80,14 @@ export class Traces {
     const end = this.held ?? this.ring.now + this.late;
     if (Number.isNaN(end)) return;
     const first = this.firstSince(end - this.span);
-    const rows = 3;
-    const wide = (width - GAP) / 2;
+    const across = width < NARROW ? 1 : 2;
+    const rows = Math.ceil(this.traces.length / across);
+    const wide = (width - GAP * (across - 1)) / across;
     const tall = (height - FOOT) / rows;
     this.traces.forEach((trace, i) => {
-      const x0 = (i % 2) * (wide + GAP);
-      const y0 = Math.floor(i / 2) * tall;
-      this.drawOne(pen, trace, x0, y0, wide, tall, first, end, Math.floor(i / 2) === rows - 1);
+      const x0 = (i % across) * (wide + GAP);
+      const y0 = Math.floor(i / across) * tall;
+      this.drawOne(pen, trace, x0, y0, wide, tall, first, end, Math.floor(i / across) === rows - 1);
     });
   }
 
@@ -194,7 +197,8 @@ export class Traces {
     }
     low = Math.max(Math.min(low, trace.low === 0 ? 0 : low), trace.low);
     high = Math.min(high, trace.high);
-    if (!(high > low)) [low, high] = [trace.low, Math.min(trace.high, trace.low + 1)];
+    if (low > high) [low, high] = [Math.max(trace.low, 0), Math.min(trace.high, Math.max(trace.low, 0) + 1)]; // nothing is known
+    else if (low === high) [low, high] = trace.low === 0 ? [0, high + 1] : [low - 0.5, high + 0.5]; // it stands still
     const room = 0.08 * (high - low);
     const before = this.ranges.get(trace.title);
     const now: [number, number] = [low - (trace.low === 0 ? 0 : room), high + room];
