@@ -41,6 +41,7 @@ def test_every_file_is_there_and_nothing_else(
         "report.pdf",
         "figures",
         "estimates",
+        "recordings",
         "scores.json",
         "soils.json",
         "ground.json",
@@ -52,6 +53,22 @@ def test_every_file_is_there_and_nothing_else(
         assert len(table) > 1000
         assert table.method == DEFAULT
     assert Vehicle.load(folder / "vehicle.yaml").calibration.drive_torque_gain
+
+
+def test_the_studio_shows_recordings_and_ground_of_the_demo(
+    demo: tuple[DemoResult, Path, list[tuple[int, int, str]]],
+) -> None:
+    pytest.importorskip("fastapi", reason="the studio needs terragrip[studio]")
+    from fastapi.testclient import TestClient
+
+    from terragrip.studio.app import create_app
+
+    with TestClient(create_app(demo[1]), base_url="http://127.0.0.1:8750") as client:
+        about = client.get("/api/drive", params={"path": "estimates/multi2.parquet"}).json()
+    assert about["recording"] == "recordings/multi2.parquet"
+    assert "drawbar_force" in about["measured"]
+    ground = json.loads((demo[1] / "ground.json").read_text(encoding="utf-8"))
+    assert about["ground"]["sections"] == [one for one in ground["sections"] if one["run"] == "multi2"]
 
 
 def test_scores_hold_every_method_beside_the_papers_figures(

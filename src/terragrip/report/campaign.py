@@ -123,7 +123,8 @@ def _learn(runs: Sequence[EstimatedRun]) -> Campaign:
 def estimate_campaign(
     folder: Path, seed: int, workers: int, progress: Progress | None, names: Sequence[str] | None
 ) -> EstimatedCampaign:
-    """Calibrate, simulate, estimate and score; estimates go to `folder`/<run>.parquet, the benchmarks' recordings to recordings/<run>.parquet beside it.
+    """Calibrate, simulate, estimate and score; estimates go to `folder`/<run>.parquet, the benchmarks' recordings to
+    recordings/<run>.parquet beside `folder`.
 
     `names`: which of the campaign's runs; None takes all; the benchmarks are always among them.
     """
