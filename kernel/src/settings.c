@@ -75,7 +75,7 @@ static tg_tuned default_tuned(void)
 }
 
 /* Tuned on the simulation's scenarios accuracy-clean and accuracy-faults, seeds 1000 to 1019, and on nothing else: walks, scales of the
- * bank, and the constants at the head of this floor's files (docs/decisions/0115, 0028). */
+ * bank, and the constants at the head of this floor's files (docs/decisions/0098, 0115). */
 tg_settings tg_default_settings(void)
 {
     tg_settings s;
