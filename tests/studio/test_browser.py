@@ -90,6 +90,25 @@ def test_a_curve_set_by_hand_says_how_far_it_is_from_the_fit(page: Any, served: 
     assert f"+{off:.2g} off this fit at 60 % slip" in page.inner_text(".apart")
 
 
+def test_a_fit_leaves_a_held_parameter_and_leaving_the_page_loses_nothing(page: Any, served: Served) -> None:
+    open_fit(page, served, "estimates.parquet")
+    page.wait_for_selector("#soil-list li")
+    assert page.is_checked("#hold-p")  # as the paper holds it
+    page.fill("#field-p", "0.6")
+    page.press("#field-p", "Tab")
+    page.click("#fit-button")
+    page.wait_for_selector(".badge")
+    assert float(page.input_value("#field-p")) == pytest.approx(0.6)
+    fitted = page.input_value("#field-a")
+    page.click("nav >> text=Folder")
+    page.wait_for_selector("text=recording.parquet")
+    page.click("nav >> text=Fit")
+    page.wait_for_selector(".badge")
+    assert page.input_value("#field-a") == fitted
+    assert page.input_value("#field-p") == "0.6"
+    assert page.locator("#soil-list li").count() > 0
+
+
 def test_the_fit_page_by_keyboard_alone(page: Any, served: Served) -> None:
     open_fit(page, served, "estimates.parquet")
     page.wait_for_selector("#soil-list li")

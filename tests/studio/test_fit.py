@@ -142,3 +142,29 @@ def test_digitised_points_are_served(client: TestClient, folder: Path) -> None:
 def test_literature_and_models_are_served(client: TestClient) -> None:
     assert {model["name"] for model in client.get("/api/models").json()} == set(CURVES)
     assert "dry asphalt" in {soil["name"] for soil in client.get("/api/literature").json()}
+
+
+def test_a_parameter_on_its_bound_is_told(client: TestClient) -> None:
+    """A straight line through the points needs ever slower a rise than the range of k allows."""
+    slip = np.linspace(0.02, 0.5, 30)
+    sent = {"model": "effective", "fixed": "free", "slip": slip.tolist(), "bootstrap": 0}
+    found = client.post("/api/fit", json={**sent, "adhesion": (5.0 * np.sign(slip)).tolist()}).json()
+    limits = {
+        p["name"]: p
+        for m in client.get("/api/models").json()
+        if m["name"] == "effective"
+        for p in m["parameters"]
+    }
+    on = [
+        name
+        for name in found["free"]
+        if min(
+            found["parameters"][name] - limits[name]["lower"],
+            limits[name]["upper"] - found["parameters"][name],
+        )
+        < 1e-3 * (limits[name]["upper"] - limits[name]["lower"])
+    ]
+    assert on
+    assert found["at_bound"] == on
+    good = 0.6 * -np.expm1(-10 * slip)
+    assert client.post("/api/fit", json={**sent, "adhesion": good.tolist()}).json()["at_bound"] == []

@@ -109,6 +109,7 @@ export class CurvesPanel {
       if (!model) return;
       const intercept = curve.parameters["intercept"];
       curve.model = model.name;
+      curve.held = [...model.fixed];
       curve.parameters = Object.fromEntries(model.parameters.map((p) => [p.name, p.start]));
       if (intercept !== undefined) curve.parameters["intercept"] = intercept;
       curve.fit = null;
@@ -156,12 +157,18 @@ export class CurvesPanel {
       this.settle();
     });
     this.rows.set(name, { slider, field, parameter });
+    const hold = h("input", { type: "checkbox", id: `hold-${name}`, checked: curve.held.includes(name), "aria-label": `hold ${name}: a fit leaves it as it is`, title: "hold: a fit leaves it as it is" });
+    hold.addEventListener("change", () => {
+      curve.held = hold.checked ? [...curve.held, name] : curve.held.filter((other) => other !== name);
+      this.settle();
+    });
     return h(
       "div",
       { class: "slider", title: parameter.meaning },
       h("label", { for: `field-${name}` }, SYMBOLS[name] ?? name),
       slider,
       field,
+      name === "intercept" ? null : hold,
     );
   }
 
@@ -201,6 +208,7 @@ export class CurvesPanel {
     const fit = curve.fit;
     if (!fit) return h("div", { class: "result" });
     const badge = fit.identifiability;
+    const identified = badge.identifiable && !fit.at_bound.length;
     const rows = fit.free.map((name) => {
       const interval = fit.interval[name];
       const range = interval ? `${digits(interval[0])} … ${digits(interval[1])}` : "–";
@@ -218,7 +226,8 @@ export class CurvesPanel {
       h("p", { class: "apart" }, sameCurve(curve) ? "" : this.apart(curve, fit)),
       h("table", {}, h("thead", {}, h("tr", {}, h("th", {}, ""), h("th", {}, "fit"), h("th", {}, "95 % interval"))), h("tbody", {}, rows, effective)),
       h("p", {}, `R² ${digits(fit.r2)}, NRMSE ${digits(fit.nrmse)}, ${fit.bins.length} bins`),
-      h("p", { class: `badge ${badge.identifiable ? "good" : "poor"}` }, badge.identifiable ? "identifiable" : "not identifiable", ` (condition ${digits(badge.condition, 2)})`),
+      h("p", { class: `badge ${identified ? "good" : "poor"}` }, identified ? "identifiable" : "not identifiable", ` (condition ${digits(badge.condition, 2)})`),
+      fit.at_bound.length ? h("p", { class: "hint" }, `${fit.at_bound.map((name) => SYMBOLS[name] ?? name).join(", ")}: stopped at an end of its range, so the data do not fix it. Hold it, or fit with more slip.`) : null,
       fit.notes.map((text) => h("p", { class: "hint" }, text)),
     );
   }

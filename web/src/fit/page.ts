@@ -11,7 +11,7 @@ import { PicturesPanel } from "./pictures_panel";
 import { Plot } from "./plot";
 import { at, sampled } from "./samples";
 import { sameCurve } from "./scene";
-import { State, type FitResult, type Model } from "./state";
+import { State, type Curve, type FitResult, type Model } from "./state";
 
 export const page: Page = (main, { notices, query }) => {
   const state = new State();
@@ -72,8 +72,10 @@ export const page: Page = (main, { notices, query }) => {
 
   async function start(): Promise<void> {
     state.models = (await tried(() => get<Model[]>("models"))) ?? [];
-    state.addCurve("exponential", undefined, "prototype", "paper, eq. 8");
-    state.commit();
+    if (!state.takeUp()) {
+      state.addCurve("exponential", undefined, "prototype", "paper, eq. 8");
+      state.commit();
+    }
     state.changed("all");
     await reload();
     const path = query.get("path");
@@ -93,6 +95,7 @@ export const page: Page = (main, { notices, query }) => {
   // For the browser tests: how often the plot was drawn, and what is on it.
   Object.assign(window, { terragripFit: { plot, state, at, mapOf } });
   return () => {
+    state.leave();
     forget();
     plot.close();
     removeEventListener("keydown", key);
@@ -110,7 +113,7 @@ async function fit(state: State): Promise<void> {
     note("Choose a soil, or digitise a line of a picture, first.", "error");
     return;
   }
-  const wanted = { model: curve.model, intercept: "intercept" in curve.parameters, ...data };
+  const wanted = { model: curve.model, intercept: "intercept" in curve.parameters, fixed: held(curve), ...data };
   const found = await tried(() => send<FitResult>("POST", "fit", wanted));
   if (!found) return;
   curve.fit = found;
@@ -118,6 +121,12 @@ async function fit(state: State): Promise<void> {
   curve.source = `fitted to ${state.target.replace(/^picture:/, "")}`;
   state.commit();
   state.changed("all");
+}
+
+/** The parameters that the fit leaves alone, with their values; "free" where it may move all. */
+function held(curve: Curve): Record<string, number> | "free" {
+  const values = Object.fromEntries(curve.held.filter((name) => name in curve.parameters).map((name) => [name, curve.parameters[name] as number]));
+  return Object.keys(values).length ? values : "free";
 }
 
 /** What the fit takes: a soil of estimates by name, else points. */

@@ -31,6 +31,8 @@ export interface FitResult {
   clusters: number;
   identifiability: { condition: number; identifiable: boolean; effective: Parameters; twin: Parameters | null; sentence: string };
   notes: string[];
+  /** Free parameters that stopped at an end of their range: the data do not fix them. */
+  at_bound: string[];
   band?: { slip: number[]; low: number[]; high: number[] };
   peak: [number, number];
 }
@@ -49,6 +51,8 @@ export interface Curve {
   parameters: Parameters;
   color: string;
   shown: boolean;
+  /** Parameters that a fit leaves as they are. */
+  held: string[];
   fit: FitResult | null;
   source: string;
 }
@@ -73,6 +77,9 @@ interface Kept {
 }
 
 const DEEP = 200;
+
+/** What is kept while another page is open. */
+let left: Pick<State, "kept" | "soils" | "images" | "target"> | null = null;
 
 export class State {
   models: Model[] = [];
@@ -126,6 +133,19 @@ export class State {
     return true;
   }
 
+  /** Keep what is shown for the next time that the page opens. */
+  leave(): void {
+    left = { kept: this.kept, soils: this.soils, images: this.images, target: this.target };
+  }
+
+  /** Take up what was left; false where nothing was. */
+  takeUp(): boolean {
+    if (!left) return false;
+    Object.assign(this, left);
+    this.settled = JSON.stringify(this.kept);
+    return true;
+  }
+
   get canUndo(): boolean {
     return this.past.length > 0;
   }
@@ -157,6 +177,7 @@ export class State {
       parameters: { ...start, ...parameters },
       color: this.nextColor(),
       shown: true,
+      held: [...(chosen?.fixed ?? [])],
       fit: null,
       source,
     };

@@ -22,6 +22,8 @@ from terragrip.studio.state import Here, Studio
 
 router = APIRouter(tags=["fit"])
 
+AT_BOUND = 1e-3
+"""Share of a parameter's range that counts as its end."""
 SHOWN = 4000
 """Points of one soil that a page gets; the fit takes them all."""
 
@@ -164,6 +166,7 @@ def fit(studio: Here, wanted: FitRequest) -> dict[str, Any]:
         low, high = curve.band(grid)
         found["band"] = {"slip": grid.tolist(), "low": low.tolist(), "high": high.tolist()}
     found["peak"] = curve.peak()
+    found["at_bound"] = _at_bound(curve)
     plain: dict[str, Any] = finite(found)
     return plain
 
@@ -185,6 +188,17 @@ def save(studio: Here, wanted: SaveRequest) -> dict[str, Any]:
     merged = library.merge(SoilLibrary({soil.name: soil}), "replace" if wanted.replace else "refuse")
     merged.write(target)
     return {"path": wanted.library, "soils": list(merged)}
+
+
+def _at_bound(curve: AdhesionCurve) -> list[str]:
+    """Free parameters that a fit left at an end of their range, to a thousandth of it: the bound gave the value, not the data."""
+    return [
+        p.name
+        for p in CURVES[curve.model].parameters
+        if p.name in curve.free_
+        and min(curve.parameters_[p.name] - p.lower, p.upper - curve.parameters_[p.name])
+        <= AT_BOUND * (p.upper - p.lower)
+    ]
 
 
 def _plain(soil: Soil) -> dict[str, Any]:
