@@ -60,6 +60,7 @@ export class CurvesPanel {
       h("div", { class: "field" }, h("label", { for: "curve-name" }, "Name"), this.nameField(curve)),
       h("div", { class: "field" }, h("label", { for: "curve-model" }, "Model"), this.modelChoice(curve)),
       h("p", { class: "source" }, model?.source ?? ""),
+      h("p", { class: "hint" }, "Ticked: held. A fit leaves it as it is."),
       parameters.map((p) => this.row(curve, p)),
       this.interceptChoice(curve),
       h(
