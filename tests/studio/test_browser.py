@@ -196,6 +196,29 @@ def test_a_turned_picture_is_calibrated_to_half_a_per_cent_of_the_axis(
     np.testing.assert_allclose(kept["lines"][0]["points"], wanted, atol=0.005)
 
 
+def test_one_origin_is_clicked_for_both_axes(page: Any, served: Served, folder: Path) -> None:
+    diagram(folder)
+    open_fit(page, served)
+    page.select_option("select[aria-label='Open a picture of the folder']", "scan.png")
+    box = page.wait_for_selector("dialog .sheet").bounding_box()
+    scale = box["width"] / 800
+    for point in ((0.0, 0.0), (0.9, 0.0), (0.0, 0.0), (0.0, 0.9)):
+        x, y = pixel(*point)
+        page.mouse.click(box["x"] + x * scale, box["y"] + y * scale)
+    for name, value in (
+        ("Slip axis, point 1", 0),
+        ("Slip axis, point 2", 90),
+        ("Adhesion axis, point 1", 0),
+        ("Adhesion axis, point 2", 0.9),
+    ):
+        field = page.locator(f"input[aria-label='{name}, value']")
+        field.fill(str(value))
+        field.press("Tab")
+    page.click("text=Use these axes")
+    at = "p => window.terragripFit.mapOf(window.terragripFit.state.kept.pictures['scan.png']).toValue(p)"
+    np.testing.assert_allclose(page.evaluate(at, list(pixel(0.5, 0.5))), (0.5, 0.5), atol=0.005)
+
+
 def test_a_broken_file_is_refused_with_one_line_and_a_good_one_estimated(
     page: Any, served: Served, folder: Path
 ) -> None:

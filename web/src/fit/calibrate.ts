@@ -77,7 +77,9 @@ class Editor {
     };
     this.canvas.addEventListener("pointerdown", (event) => {
       const pixel = at(event);
-      const near = this.marks().find((mark) => Math.hypot(mark.pixel[0] - pixel[0], mark.pixel[1] - pixel[1]) * this.zoom < 9);
+      // A mark of the other axis is no obstacle: most printed figures have one origin for both.
+      const wanted = ORDER[this.next]?.[0];
+      const near = this.marks().find((mark) => Math.hypot(mark.pixel[0] - pixel[0], mark.pixel[1] - pixel[1]) * this.zoom < 9 && (!wanted || this.draft[wanted].marks.includes(mark)));
       if (near) held = near;
       else if (this.next >= 0) {
         const [axis, i] = ORDER[this.next] as [AxisName, number];
