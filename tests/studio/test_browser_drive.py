@@ -24,10 +24,10 @@ COUNT = """([shade, number]) => {
   const rgb = [1, 3, 5].map((k) => parseInt(ink.slice(k, k + 2), 16));
   const { data } = canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height);
   let count = 0;
-  for (let i = 0; i < data.length; i += 4) if (rgb.every((c, k) => Math.abs(data[i + k] - c) < 40)) count++;
+  for (let i = 0; i < data.length; i += 4) if (data[i + 3] > 200 && rgb.every((c, k) => Math.abs(data[i + k] - c) < 40)) count++;
   return count;
 }"""
-"""Pixels of a colour in a chart."""
+"""Pixels of a colour in a chart; not those of a tint, which have that colour at a low alpha."""
 
 
 def open_drive(page: Any, served: Served, path: str, panels: str = "") -> None:
@@ -63,7 +63,7 @@ def test_samples_between_gaps_are_drawn_as_points(page: Any, served: Served, fol
     page.evaluate("() => window.terragripDrive.charts.zoom([10, 14])")
     page.wait_for_function("() => Number(document.querySelector('.charts').dataset.rows) < 1000")
     page.wait_for_timeout(300)
-    assert page.evaluate(f"() => ({COUNT})(['green', 0])") > 60  # eight points of 4 px
+    assert page.evaluate(f"() => ({COUNT})(['green', 0])") > 40  # eight points of 4 px
 
 
 def test_all_panels_of_four_wheels_are_drawn_at_once(page: Any, served: Served, folder: Path) -> None:
