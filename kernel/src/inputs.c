@@ -87,7 +87,7 @@ static void judge_leaps(tg_estimator *e, double time, tg_real dt)
  * variance is w age^3/3. `unknown` is the variance before the first sample and once the last one is older than a gap. */
 static tg_real held_noise(const tg_estimator *e, const tg_hold *h, double time, tg_real dt, tg_real noise, tg_real unknown)
 {
-    if (h->count == 0) return dt * unknown;
+    if (h->count == 0 || (h->count == 1 && time == h->time)) return dt * unknown; /* over the step before its first sample, too */
     const tg_real white = 2 * noise * noise, usual = h->level > white ? h->level - white : 0, now = h->step > white ? h->step - white : 0;
     const tg_real walk = h->interval > 0 ? usual / h->interval : 0, most = h->interval > 0 && now > usual ? now / h->interval : walk;
     if (h->fresh) return dt * dt * (noise * noise / 2 + most * dt / 12);

@@ -294,3 +294,18 @@ def test_time_must_run_forward_between_blocks():
     estimator.update_block(recording)
     with pytest.raises(InputError, match="row 1: time does not run forward"):
         estimator.update_block(recording)
+
+
+@pytest.mark.parametrize("late", [1.0, 10.0])
+def test_an_input_that_comes_late_does_not_start_the_filter_anew(late: float) -> None:
+    """A torque whose first sample comes while the vehicle drives: its noise over that step was negative, and the filter gave up."""
+    made = drive(30, seed=11)
+    columns = {"drive_torque_rl": late, "drive_torque_fr": late + 0.5, "drawbar_force": late + 1.0}
+    recording = made.recording
+    for name, start in columns.items():
+        recording = with_values(recording, name, recording.time < start, np.nan)
+    for method in ("kalman", "bank", "aukf-fs"):
+        found = estimate(recording, robot(), method)
+        assert "restart" not in set(found["event"])
+        after = found.time > late + 8
+        assert np.sqrt(np.mean((found["adhesion_rl"] - made.truth["adhesion_rl"])[after] ** 2)) < 0.05
