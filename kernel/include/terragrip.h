@@ -382,7 +382,7 @@ tg_status tg_estimator_record(tg_estimator *e, size_t rows, const double *time, 
 tg_status tg_estimator_smooth(const tg_estimator *e, size_t rows, const tg_real *records, const tg_real *next, tg_real *carry,
                               double *const *out);
 /* Bytes that continue bit for bit, with this kernel's version and precision only. */
-size_t tg_snapshot_size(void);
+size_t tg_snapshot_size(const tg_estimator *e); /* by its policy */
 tg_status tg_estimator_snapshot(const tg_estimator *e, uint8_t *bytes);
 tg_status tg_estimator_restore(tg_estimator *e, const uint8_t *bytes, size_t size);
 tg_status tg_estimator_settings(const tg_estimator *e, tg_settings *settings);

@@ -192,7 +192,7 @@ struct tg_estimator {
     tgi_speed_mode speed_mode[TG_SPEED_MODES];
     tg_filter filter;
     tg_consider consider;
-    tg_track *track;           /* while a smoother's records are written, else null; last, for a snapshot holds what comes before it */
+    tg_track *track;           /* while a smoother's records are written, else null */
 };
 
 TG_INLINE tg_real tgi_square(tg_real x) { return x * x; }

@@ -298,7 +298,7 @@ tg_status tg_estimator_init(tg_estimator *e, const tg_settings *settings)
     memset(&consider, 0, sizeof consider);
     status = tgi_filter_anew(&filter, &consider, settings);
     if (status != TG_OK) return status;
-    memset(e, 0, sizeof *e); /* padding too: a snapshot is these bytes */
+    memset(e, 0, sizeof *e);
     e->settings = *settings;
     memcpy(&e->filter, &filter, sizeof filter);
     memcpy(&e->consider, &consider, sizeof consider);

@@ -1,24 +1,37 @@
-/* An estimator as bytes: a header that tells what the bytes are, the object but for its pointer, a checksum. A checksum is no signature: what
- * is restored may be anything, so its settings are checked as new ones are, and every count and index against its range. */
-#include "estimator.h"
+/* An estimator as bytes: a header that tells what the bytes are, the settings, the state field by field (fields.c), a checksum. A checksum is
+ * no signature: what is restored may be anything, so its settings are checked as new ones are, and every count and index against its range. */
+#include "fields.h"
 #include <limits.h>
 
-#define TG_OBJECT_SIZE offsetof(tg_estimator, track)
-
-#define TG_SNAPSHOT_VERSION 8u
+#define TG_SNAPSHOT_VERSION 9u
 
 typedef struct {
     char magic[8];
     uint32_t version;
     uint32_t byte_order; /* 1 as this machine writes it */
     uint32_t real_size;
-    uint32_t object_size;
+    uint32_t size;       /* of all fields of any policy: changes with them */
 } tg_snapshot_header;
 
 static tg_snapshot_header header_of_this_kernel(void)
 {
-    tg_snapshot_header h = {"TERRAGR", TG_SNAPSHOT_VERSION, 1u, (uint32_t)sizeof(tg_real), (uint32_t)TG_OBJECT_SIZE};
+    const size_t size = tgi_fields_size(tgi_settings_fields) + tgi_fields_size(tgi_estimator_fields) + tgi_fields_size(tgi_filter_fields) +
+                        tgi_fields_size(tgi_adaptation_fields) + tgi_fields_size(tgi_bank_fields) + tgi_fields_size(tgi_consider_fields);
+    const tg_snapshot_header h = {"TERRAGR", TG_SNAPSHOT_VERSION, 1u, (uint32_t)sizeof(tg_real), (uint32_t)size};
     return h;
+}
+
+/* Of the policy: a filter of fixed noise has neither. */
+static const tgi_field *policy_fields(const tg_settings *s)
+{
+    static const tgi_field none[] = {{0, 0, 0, NULL}};
+    return s->tuning.policy == TG_BANK ? tgi_bank_fields : s->tuning.policy == TG_FIXED ? none : tgi_adaptation_fields;
+}
+
+static size_t size_of(const tg_settings *s)
+{
+    return sizeof(tg_snapshot_header) + tgi_fields_size(tgi_settings_fields) + tgi_fields_size(tgi_estimator_fields) +
+           tgi_fields_size(tgi_filter_fields) + tgi_fields_size(policy_fields(s)) + tgi_fields_size(tgi_consider_fields) + sizeof(uint64_t);
 }
 
 /* FNV-1a, 64 bits. */
@@ -34,20 +47,24 @@ size_t tg_estimator_size(void)
     return sizeof(tg_estimator);
 }
 
-size_t tg_snapshot_size(void)
+size_t tg_snapshot_size(const tg_estimator *e)
 {
-    return sizeof(tg_snapshot_header) + TG_OBJECT_SIZE + sizeof(uint64_t);
+    return e ? size_of(&e->settings) : 0;
 }
 
 tg_status tg_estimator_snapshot(const tg_estimator *e, uint8_t *bytes)
 {
     if (!e || !bytes) return TG_BAD_ARGUMENT;
-    tg_snapshot_header header = header_of_this_kernel();
-    size_t size = sizeof header + TG_OBJECT_SIZE;
+    const tg_snapshot_header header = header_of_this_kernel();
+    uint8_t *to = bytes + sizeof header;
     memcpy(bytes, &header, sizeof header);
-    memcpy(bytes + sizeof header, e, TG_OBJECT_SIZE);
-    uint64_t hash = checksum(bytes, size);
-    memcpy(bytes + size, &hash, sizeof hash);
+    to = tgi_write_fields(tgi_settings_fields, &e->settings, to);
+    to = tgi_write_fields(tgi_estimator_fields, e, to);
+    to = tgi_write_fields(tgi_filter_fields, &e->filter, to);
+    to = tgi_write_fields(policy_fields(&e->settings), &e->filter.policy, to);
+    to = tgi_write_fields(tgi_consider_fields, &e->consider, to);
+    const uint64_t hash = checksum(bytes, (size_t)(to - bytes));
+    memcpy(to, &hash, sizeof hash);
     return TG_OK;
 }
 
@@ -56,16 +73,9 @@ static int is_within(int32_t x, int32_t low, int32_t high)
     return x >= low && x <= high;
 }
 
-/* What the filter counts and indexes by. Its machine and tuning are those of the settings. */
-static int filter_is_sound(const tg_filter *f, const tg_filter *fresh)
+/* What the filter counts and indexes by. */
+static int filter_is_sound(const tg_filter *f)
 {
-    if (f->wheels != fresh->wheels || f->states != fresh->states || f->channels != fresh->channels || f->stride != fresh->stride) return 0;
-    if (memcmp(&f->machine, &fresh->machine, sizeof f->machine) != 0 || memcmp(&f->tuning, &fresh->tuning, sizeof f->tuning) != 0) return 0;
-    /* what follows from them alone; `stiffness` decides how many substeps a step takes */
-    if (memcmp(f->drag, fresh->drag, sizeof f->drag) != 0 || memcmp(f->arm, fresh->arm, sizeof f->arm) != 0 ||
-        memcmp(f->inverse_inertia, fresh->inverse_inertia, sizeof f->inverse_inertia) != 0 || f->inverse_mass != fresh->inverse_mass ||
-        f->stiffness != fresh->stiffness || memcmp(f->walk, fresh->walk, sizeof f->walk) != 0)
-        return 0;
     if (!is_within(f->taken, 0, f->channels) || !is_within(f->formed, 0, 1) || !is_within(f->factor_steps, 0, 1000)) return 0;
     for (int32_t c = 0; c < f->taken; c++)
         if (!is_within(f->channel[c], 0, f->channels - 1)) return 0;
@@ -73,30 +83,30 @@ static int filter_is_sound(const tg_filter *f, const tg_filter *fresh)
     return is_within(f->tuning.policy == TG_BANK ? f->policy.bank.updates : f->policy.adaptation.updates, 0, INT_MAX / 2);
 }
 
-static int is_sound(const tg_estimator *e, const tg_estimator *fresh)
+static int is_sound(const tg_estimator *e)
 {
-    if (!filter_is_sound(&e->filter, &fresh->filter)) return 0;
-    if (e->consider.columns != fresh->consider.columns || e->consider.wheels != fresh->consider.wheels ||
-        e->consider.states != fresh->consider.states || e->belief.columns != fresh->belief.columns)
-        return 0;
-    if ((e->direction != 1 && e->direction != -1) || !is_within(e->started, 0, 1) || !is_within(e->seen_motion, 0, 1) ||
-        !is_within(e->standing, 0, 1))
-        return 0;
-    return memcmp(&e->constants, &fresh->constants, sizeof e->constants) == 0;
+    return filter_is_sound(&e->filter) && (e->direction == 1 || e->direction == -1) && is_within(e->started, 0, 1) &&
+           is_within(e->seen_motion, 0, 1) && is_within(e->standing, 0, 1);
 }
 
 tg_status tg_estimator_restore(tg_estimator *e, const uint8_t *bytes, size_t size)
 {
     if (!e || !bytes) return TG_BAD_ARGUMENT;
-    tg_snapshot_header header = header_of_this_kernel();
+    const tg_snapshot_header header = header_of_this_kernel();
+    tg_settings settings;
+    tg_estimator found;
     uint64_t hash;
-    if (size != tg_snapshot_size() || memcmp(bytes, &header, sizeof header) != 0) return TG_BAD_SNAPSHOT;
+    if (size < sizeof header + tgi_fields_size(tgi_settings_fields) || memcmp(bytes, &header, sizeof header) != 0) return TG_BAD_SNAPSHOT;
+    memset(&settings, 0, sizeof settings);
+    const uint8_t *from = tgi_read_fields(tgi_settings_fields, &settings, bytes + sizeof header);
+    if (size != size_of(&settings)) return TG_BAD_SNAPSHOT;
     memcpy(&hash, bytes + size - sizeof hash, sizeof hash);
-    if (hash != checksum(bytes, size - sizeof hash)) return TG_BAD_SNAPSHOT;
-    tg_estimator found, fresh;
-    memset(&found, 0, sizeof found);
-    memcpy(&found, bytes + sizeof header, TG_OBJECT_SIZE);
-    if (tg_estimator_init(&fresh, &found.settings) != TG_OK || !is_sound(&found, &fresh)) return TG_BAD_SNAPSHOT;
+    if (hash != checksum(bytes, size - sizeof hash) || tg_estimator_init(&found, &settings) != TG_OK) return TG_BAD_SNAPSHOT;
+    from = tgi_read_fields(tgi_estimator_fields, &found, from);
+    from = tgi_read_fields(tgi_filter_fields, &found.filter, from);
+    from = tgi_read_fields(policy_fields(&settings), &found.filter.policy, from);
+    tgi_read_fields(tgi_consider_fields, &found.consider, from);
+    if (!is_sound(&found)) return TG_BAD_SNAPSHOT;
     memcpy(e, &found, sizeof *e);
     return TG_OK;
 }

@@ -233,7 +233,7 @@ class Engine:
 
     def snapshot(self) -> bytes:
         """The estimator as bytes that continue bit for bit."""
-        size = lib.tg_snapshot_size()
+        size = lib.tg_snapshot_size(self.handle)
         data = ffi.new("uint8_t[]", size)
         lib.tg_estimator_snapshot(self.handle, data)
         return bytes(ffi.buffer(data, size))

@@ -1,0 +1,126 @@
+/* What of an estimator goes into a snapshot, field by field: its settings, and what a row leaves for the next. What follows from the settings
+ * alone is made anew, so that no padding, no pointer and no derived number is read from bytes. Whoever adds a field to the estimator adds it
+ * here: kernel/tests/restore.c compares the objects byte for byte. */
+#include "fields.h"
+
+#define ITEMS(T, m, E) (sizeof(((T *)0)->m) / (sizeof(E)))
+#define REALS(T, m) {offsetof(T, m), ITEMS(T, m, tg_real), sizeof(tg_real), NULL} /* also a structure of reals alone */
+#define DOUBLES(T, m) {offsetof(T, m), ITEMS(T, m, double), sizeof(double), NULL}
+#define INTEGERS(T, m) {offsetof(T, m), ITEMS(T, m, int32_t), sizeof(int32_t), NULL}
+#define INSIDE(T, m, E, fields) {offsetof(T, m), ITEMS(T, m, E), sizeof(E), fields}
+#define END {0, 0, 0, NULL}
+
+static const tgi_field machine[] = {INTEGERS(tg_machine, wheels), REALS(tg_machine, mass), REALS(tg_machine, gravity),
+                                    REALS(tg_machine, tire_rolling_resistance), REALS(tg_machine, radius), REALS(tg_machine, inertia),
+                                    REALS(tg_machine, bearing_resistance), END};
+
+#define T tg_tuning
+static const tgi_field tuning[] = {INTEGERS(T, engine), INTEGERS(T, policy), REALS(T, walk), REALS(T, huber), REALS(T, alpha), REALS(T, beta),
+                                   REALS(T, kappa), REALS(T, rate), REALS(T, memory), INTEGERS(T, stride), REALS(T, window),
+                                   REALS(T, wheel_speed_min), REALS(T, ground_speed_min), INTEGERS(T, supervisor), REALS(T, scales),
+                                   REALS(T, dwell), INTEGERS(T, mix_stride), END};
+#undef T
+#define T tg_settings
+const tgi_field tgi_settings_fields[] = {
+    INTEGERS(T, method), INTEGERS(T, axles), INTEGERS(T, towing), INTEGERS(T, wheel_axle), INTEGERS(T, driven),
+    INSIDE(T, machine, tg_machine, machine), INSIDE(T, tuning, tg_tuning, tuning), REALS(T, load_share), REALS(T, load_transfer),
+    REALS(T, wheel_share), REALS(T, wheel_side), REALS(T, lateral_share), REALS(T, center_of_gravity_height), REALS(T, hitch_height),
+    REALS(T, rolling_radius), REALS(T, offset), REALS(T, gain), REALS(T, noise), REALS(T, held_period), REALS(T, uncertainty),
+    REALS(T, prior_adhesion), REALS(T, prior_adhesion_std), REALS(T, prior_resistance), REALS(T, prior_resistance_std), REALS(T, slope_spread),
+    REALS(T, standstill_speed), REALS(T, dead_band), REALS(T, gap), REALS(T, max_step), REALS(T, outlier_weight), REALS(T, load_filter),
+    REALS(T, algebraic_filter), REALS(T, watch), REALS(T, tuned), END};
+#undef T
+#define T tg_hold
+static const tgi_field hold[] = {REALS(T, value), REALS(T, variance), REALS(T, raw), REALS(T, calm), REALS(T, mean), REALS(T, level),
+                                 REALS(T, interval), REALS(T, step), REALS(T, spike), DOUBLES(T, time), INTEGERS(T, count), INTEGERS(T, fresh), END};
+#undef T
+static const tgi_field lowpass[] = {REALS(tg_lowpass, value), DOUBLES(tg_lowpass, time), INTEGERS(tg_lowpass, seen), END};
+
+#define T tgi_slope
+static const tgi_field slope[] = {REALS(T, speed), REALS(T, error), REALS(T, speed_variance), REALS(T, covariance), REALS(T, error_variance),
+                                  REALS(T, acceleration), INTEGERS(T, running), END};
+#undef T
+#define T tg_belief
+static const tgi_field belief[] = {REALS(T, x), REALS(T, P), INTEGERS(T, channels), REALS(T, nis), REALS(T, supervisor), END};
+#undef T
+#define T tg_algebra
+static const tgi_field algebra[] = {INSIDE(T, wheel, tg_lowpass, lowpass), INSIDE(T, ground, tg_lowpass, lowpass),
+                                    INSIDE(T, torque, tg_lowpass, lowpass), INSIDE(T, drawbar, tg_lowpass, lowpass), REALS(T, wheel_rate),
+                                    REALS(T, ground_rate), REALS(T, gain), END};
+#undef T
+#define T tgi_digging
+static const tgi_field digging[] = {REALS(T, sum), REALS(T, weight), REALS(T, now), REALS(T, mean), REALS(T, usual), REALS(T, age),
+                                    REALS(T, points), REALS(T, score), DOUBLES(T, time), INTEGERS(T, moving), INTEGERS(T, slips), END};
+#undef T
+#define T tgi_watch
+static const tgi_field watch[] = {INSIDE(T, digging, tgi_digging, digging), REALS(T, rim), REALS(T, spinning), REALS(T, pushed),
+                                  DOUBLES(T, stuck_time), INTEGERS(T, turning), INTEGERS(T, sinking), INTEGERS(T, stuck), INTEGERS(T, pushing),
+                                  END};
+#undef T
+#define T tg_supervisor_state
+static const tgi_field supervisor[] = {REALS(T, value), DOUBLES(T, time), REALS(T, last), INTEGERS(T, first), INTEGERS(T, count),
+                                       REALS(T, gamma), END};
+#undef T
+#define T tg_filter
+const tgi_field tgi_filter_fields[] = {
+    DOUBLES(T, clock), REALS(T, slope), REALS(T, cosine), REALS(T, sine), REALS(T, x), REALS(T, d), REALS(T, u), REALS(T, P), INTEGERS(T, formed),
+    INTEGERS(T, factor_steps), REALS(T, x_prior), REALS(T, passage), INTEGERS(T, taken), INTEGERS(T, channel), REALS(T, gain),
+    REALS(T, accelerometer), INSIDE(T, supervisor, tg_supervisor_state, supervisor), END};
+#undef T
+#define T tg_adaptation_state
+const tgi_field tgi_adaptation_fields[] = {REALS(T, scale), REALS(T, dx), REALS(T, dP), REALS(T, C), INTEGERS(T, updates), END};
+#undef T
+#define T tg_bank_state
+const tgi_field tgi_bank_fields[] = {REALS(T, x), REALS(T, d), REALS(T, u), REALS(T, gain), REALS(T, probability), DOUBLES(T, mixed),
+                                     INTEGERS(T, updates), END};
+#undef T
+const tgi_field tgi_consider_fields[] = {REALS(tg_consider, s), REALS(tg_consider, prior), END};
+
+#define T tg_estimator
+#define HOLDS(m) INSIDE(T, m, tg_hold, hold)
+#define LOWPASS(m) INSIDE(T, m, tg_lowpass, lowpass)
+const tgi_field tgi_estimator_fields[] = {
+    REALS(T, deviation), INTEGERS(T, started), INTEGERS(T, seen_motion), INTEGERS(T, standing), INTEGERS(T, direction), DOUBLES(T, time),
+    DOUBLES(T, measured_time), DOUBLES(T, distance), REALS(T, last_raw), DOUBLES(T, last_raw_time), HOLDS(torque), HOLDS(drawbar), HOLDS(pitch),
+    HOLDS(axle_load), HOLDS(wheel), HOLDS(ground), INTEGERS(T, sparse_wheels), INTEGERS(T, unseen), REALS(T, yaw_rate), DOUBLES(T, yaw_time),
+    DOUBLES(T, slow_time), LOWPASS(soon), LOWPASS(wheel_speed), LOWPASS(ground_speed), LOWPASS(acceleration), LOWPASS(lateral),
+    LOWPASS(balance), REALS(T, slip_memory), INSIDE(T, slope, tgi_slope, slope), REALS(T, roughness), DOUBLES(T, ground_time), REALS(T, jolt),
+    REALS(T, held), INSIDE(T, belief, tg_belief, belief), INSIDE(T, algebra, tg_algebra, algebra), INSIDE(T, watch, tgi_watch, watch),
+    REALS(T, scene), REALS(T, curve), REALS(T, wheel_curve), REALS(T, curve_std), REALS(T, wheel_curve_std), REALS(T, curve_wait),
+    REALS(T, curve_distance), REALS(T, speeds), REALS(T, speed_mode), END};
+#undef T
+
+size_t tgi_fields_size(const tgi_field *fields)
+{
+    size_t size = 0;
+    for (; fields->count; fields++) size += fields->count * (fields->inside ? tgi_fields_size(fields->inside) : fields->size);
+    return size;
+}
+
+uint8_t *tgi_write_fields(const tgi_field *fields, const void *object, uint8_t *bytes)
+{
+    for (; fields->count; fields++) {
+        const char *from = (const char *)object + fields->offset;
+        if (fields->inside)
+            for (size_t k = 0; k < fields->count; k++) bytes = tgi_write_fields(fields->inside, from + k * fields->size, bytes);
+        else {
+            memcpy(bytes, from, fields->count * fields->size);
+            bytes += fields->count * fields->size;
+        }
+    }
+    return bytes;
+}
+
+const uint8_t *tgi_read_fields(const tgi_field *fields, void *object, const uint8_t *bytes)
+{
+    for (; fields->count; fields++) {
+        char *const to = (char *)object + fields->offset;
+        if (fields->inside)
+            for (size_t k = 0; k < fields->count; k++) bytes = tgi_read_fields(fields->inside, to + k * fields->size, bytes);
+        else {
+            memcpy(to, bytes, fields->count * fields->size);
+            bytes += fields->count * fields->size;
+        }
+    }
+    return bytes;
+}
