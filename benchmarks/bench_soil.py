@@ -4,7 +4,7 @@
 
 Accuracy: the paper's 68 runs a seed, calibrated from their own logs, estimated by the default method; then `terragrip soils`' fits from
 estimated slip and adhesion. Beside the truth (what each soil was made with: the mean over its ground) stands the same fit on the true
-slip and adhesion of the same rows: what no estimator can mend. Each fit twice: bins sorted by pull, and by slip as in the paper.
+slip and adhesion of the same rows: what no estimator can repair. Each fit twice: bins sorted by pull, and by slip as in the paper.
 --write puts the tables into docs/soils.md.
 
 Speed: one fit with 1 000 bootstrap repetitions over runs, against a loop of scipy.optimize.curve_fit over the same draws.

@@ -1,4 +1,4 @@
-"""The peer: filterpy's unscented Kalman filter on the very model that the kernel filters (PHYSICS §1).
+"""The peer: filterpy's unscented Kalman filter on the very model that the kernel filters (physics.md 1).
 
 It gets what costs `terragrip.estimate` work for nothing: vertical loads, checked tables, no missing values.
 """
@@ -51,7 +51,7 @@ class Problem:
 def run(problem: Problem, steps: int) -> tuple[FloatArray, float]:
     """Filter the first `steps` rows; the last state (2 n + 2,) and the seconds a step took.
 
-    filterpy 2 draws the sigma points anew from the predicted moments, as PHYSICS §6 asks and the kernel does.
+    filterpy 2 draws the sigma points anew from the predicted moments, as physics.md 6 asks and the kernel does.
     """
     machine, n = problem.machine, problem.load.shape[1]
 

@@ -1,4 +1,4 @@
-"""The plain Kalman filter that every other estimate is held against: PHYSICS §1, exactly discretised, one fixed Q.
+"""The plain Kalman filter that every other estimate is held against: physics.md 1, exactly discretised, one fixed Q.
 
 Written apart from the kernel, in NumPy, as a user would: nothing adapts, nothing is weighed, no row is an outlier. It runs five
 process noises at once; which of them is taken is decided afterwards, machine by machine, which no user can do.

@@ -1,4 +1,4 @@
-"""The issue's list of bad input, through the real command line: exit 2, one line with file and mend, nothing written."""
+"""The issue's list of bad input, through the real command line: exit 2, one line with file and hint, nothing written."""
 
 from __future__ import annotations
 
@@ -79,7 +79,7 @@ def refused(place: Path, capsys: pytest.CaptureFixture[str]) -> Refused:
         assert len(lines) == 1, lines
         assert streams.out == ""
         assert sorted(place.rglob("*")) == before
-        assert ";" in lines[0], "no mend"
+        assert ";" in lines[0], "no hint"
         return lines[0]
 
     return run

@@ -102,7 +102,7 @@ def test_debug_shows_the_traceback(
 @pytest.mark.parametrize(
     ("failure", "code", "expected"),
     [
-        (InputError("is text", file="a.csv", place="row 3", mend="write numbers"), 2, "a.csv: row 3: is text; write numbers"),
+        (InputError("is text", file="a.csv", place="row 3", hint="write numbers"), 2, "a.csv: row 3: is text; write numbers"),
         (OSError(errno.ENOSPC, "No space left on device", "a.parquet"), 2, "a.parquet: the disk is full"),
         (PermissionError(errno.EACCES, "Permission denied", "a.csv"), 2, "a.csv: permission denied"),
         (OSError("Error writing bytes. Detail: [errno 28] No space left"), 2, "the disk is full"),

@@ -37,7 +37,7 @@ def test_what_is_no_place_for_a_file(tmp_path: Path) -> None:
     ):
         with pytest.raises(InputError, match=reason) as caught:
             check_file(path, inputs)
-        assert caught.value.mend
+        assert caught.value.hint
     with pytest.raises(InputError, match=r"is not named \.parquet.*a\.parquet"):
         check_file(tmp_path / "a.csv", suffixes=(".parquet",))
     assert log.read_text() == "x"

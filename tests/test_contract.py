@@ -1,4 +1,4 @@
-"""The installed command keeps the contracts of DESIGN §3, tried by the project's own outside check."""
+"""The installed command keeps the contracts of architecture.md, contracts, tried by the project's own outside check."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Files: nothing is ever half-written, and what cannot be opened or written is refused with a mend."""
+"""Files: nothing is ever half-written, and what cannot be opened or written is refused with a hint."""
 
 from __future__ import annotations
 

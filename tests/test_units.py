@@ -1,4 +1,4 @@
-"""Units: the table agrees with pint, and nonsense is refused with a mend."""
+"""Units: the table agrees with pint, and nonsense is refused with a hint."""
 
 from __future__ import annotations
 
@@ -12,7 +12,16 @@ from hypothesis import strategies as st
 
 from terragrip.units import _BASE, UnitError, factor_to, parse_unit, quantity
 
-_PINT_NAMES = {"t": "tonne", "Nm": "N*m", "kNm": "kN*m", "kmh": "km/h", "rev": "turn", "1": "", "°": "degree"}
+_PINT_NAMES = {
+    "t": "tonne",
+    "Nm": "N*m",
+    "kNm": "kN*m",
+    "kmh": "km/h",
+    "kmph": "km/h",
+    "rev": "turn",
+    "1": "",
+    "°": "degree",
+}
 _DIMENSIONS = ("[mass]", "[length]", "[time]", "[current]")
 
 
@@ -70,7 +79,7 @@ def test_refusal(value: object, si_unit: str, problem: str) -> None:
     with pytest.raises(UnitError) as caught:
         quantity(value, si_unit)
     assert problem in caught.value.problem
-    assert caught.value.mend
+    assert caught.value.hint
 
 
 _pieces = (

@@ -1,4 +1,4 @@
-"""The vehicle file: what it gives, and what it refuses with file, key, line and mend."""
+"""The vehicle file: what it gives, and what it refuses with file, key, line and hint."""
 
 from __future__ import annotations
 
@@ -113,7 +113,7 @@ def test_save_and_load_round_trip(tmp_path: Path, model: str) -> None:
 
 
 @pytest.mark.parametrize(
-    ("old", "new", "place", "problem", "mend"),
+    ("old", "new", "place", "problem", "hint"),
     [
         ("mass: 139 kg", "mass: -139 kg", "mass (line 2)", "-139 kg is impossible", "exceed 0 kg"),
         ("mass: 139 kg", "mass: 139 N", "mass (line 2)", "measures a force, where a mass is needed", "kg"),
@@ -146,7 +146,7 @@ def test_save_and_load_round_trip(tmp_path: Path, model: str) -> None:
         ("sensors:", "sensors: 3\nx:", "x (line 14)", "unknown key", "known keys are"),
     ],
 )  # fmt: skip
-def test_refusal(tmp_path: Path, old: str, new: str, place: str, problem: str, mend: str) -> None:
+def test_refusal(tmp_path: Path, old: str, new: str, place: str, problem: str, hint: str) -> None:
     assert old in GOOD
     with pytest.raises(InputError) as caught:
         load(tmp_path, GOOD.replace(old, new, 1))
@@ -154,7 +154,7 @@ def test_refusal(tmp_path: Path, old: str, new: str, place: str, problem: str, m
     assert error.file == str(tmp_path / "vehicle.yaml")
     assert place in (error.place or "")
     assert problem in error.problem
-    assert mend in (error.mend or "")
+    assert hint in (error.hint or "")
     assert "\n" not in str(error)
 
 

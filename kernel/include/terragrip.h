@@ -1,6 +1,6 @@
 /* Terragrip kernel: traction estimation for wheeled machines. C99, no allocation, no globals, no I/O.
  *
- * Two floors. The filter floor (tg_filter_*) is the Kalman filter of PHYSICS 1 and 6 for one machine. The estimator floor
+ * Two floors. The filter floor (tg_filter_*) is the Kalman filter of physics.md 1 and 6 for one machine. The estimator floor
  * (tg_estimator_*) takes raw samples with missing channels and gives traction estimates: it adds vertical loads, input
  * noise, standstill, gaps, soft outlier weighting and the considered constants. Both are plain data: copy to clone.
  *
@@ -149,7 +149,7 @@ tg_status tg_record_take(tg_real *record, tg_track *t, const tg_filter *f, const
 tg_status tg_record_moments(int32_t wheels, int32_t columns, const tg_real *record, tg_real *x, tg_real *P, tg_real *s);
 tg_status tg_smooth_step(int32_t wheels, int32_t columns, const tg_real *here, const tg_real *next, tg_real *x, tg_real *P, tg_real *s);
 
-/* ---- The adhesion curve while driving (paper, Fig. 2): a of mu = a g(s), g the paper's prototype (PHYSICS 5), from single pairs. ---- */
+/* ---- The adhesion curve while driving (paper, Fig. 2): a of mu = a g(s), g the paper's prototype (physics.md 5), from single pairs. ---- */
 
 typedef struct {
     tg_real a;

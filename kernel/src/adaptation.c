@@ -1,4 +1,4 @@
-/* Adaptation of Q by the innovations (PHYSICS 6, the MIT rule): A = diag(a_j) descends V = tr(dS dS'), dS the difference from I of C, the
+/* Adaptation of Q by the innovations (physics.md 6, the MIT rule): A = diag(a_j) descends V = tr(dS dS'), dS the difference from I of C, the
  * mean product of whitened innovations (docs/decisions/0024-whitened-innovations.md). Sensitivities to ln a_j run through the whole
  * recursion, one lane a parameter.
  *

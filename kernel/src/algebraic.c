@@ -1,4 +1,4 @@
-/* The algebraic baseline (PHYSICS 1, last formula): no filter but a first-order low-pass on every signal alike. */
+/* The algebraic baseline (physics.md 1, last formula): no filter but a first-order low-pass on every signal alike. */
 #include "estimator.h"
 
 /* Variance of a low-passed white signal. */
@@ -17,7 +17,7 @@ static tg_real follow(tg_lowpass *f, tg_real x, double time, tg_real tau, tg_rea
     return f->value;
 }
 
-/* Considered constants in closed form (PHYSICS 6): a wheel acceleration a too much is an adhesion J a/(r F) too much, and rho_s takes
+/* Considered constants in closed form (physics.md 6): a wheel acceleration a too much is an adhesion J a/(r F) too much, and rho_s takes
  * what the forces then lack. */
 static void consider_statically(tg_estimator *e, const tg_drive *drive)
 {

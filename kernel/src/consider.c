@@ -1,4 +1,4 @@
-/* Considered constants (Schmidt-Kalman, PHYSICS 6): what a constant that the data cannot tell does to the estimate. Columns pass through
+/* Considered constants (Schmidt-Kalman, physics.md 6): what a constant that the data cannot tell does to the estimate. Columns pass through
  * the gains that the filter itself took; of a bank, through the gains' mean. */
 #include "filter.h"
 

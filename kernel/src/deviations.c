@@ -1,4 +1,4 @@
-/* Considered constants of the machine and its sensors: what one SD of each adds to the computed motion (PHYSICS 6). */
+/* Considered constants of the machine and its sensors: what one SD of each adds to the computed motion (physics.md 6). */
 #include "estimator.h"
 
 /* How many columns these spreads need: constants without a spread take none. */

@@ -185,7 +185,7 @@ static void report(tg_estimator *e, const tg_drive *drive, tg_estimate *out)
     for (int32_t k = 0; k < e->settings.axles; k++) o[TG_OUT_VERTICAL_LOAD + k] = drive->axle_load[k];
 }
 
-/* A_k before this row moves it: with gamma of the row it makes the row's Q (PHYSICS 6). */
+/* A_k before this row moves it: with gamma of the row it makes the row's Q (physics.md 6). */
 static void tell_adaptation(const tg_estimator *e, tg_real *o)
 {
     const int32_t policy = e->settings.tuning.policy;

@@ -1,4 +1,4 @@
-/* Inside the estimator floor. Signals here are calibrated; "along" means in the direction of travel (PHYSICS 2). */
+/* Inside the estimator floor. Signals here are calibrated; "along" means in the direction of travel (physics.md 2). */
 #ifndef TG_ESTIMATOR_H
 #define TG_ESTIMATOR_H
 #include "curve.h"
@@ -273,7 +273,7 @@ typedef struct { /* slip, and its change with omega, v and the relative radius *
     tg_real slip, wheel, ground, radius;
 } tgi_slip;
 
-/* Slip by paper eq. 5: (rim - travel)/larger. Where wheel and vehicle both creep, the divisor is floored. */
+/* Slip (paper eq. 6): (rim - travel)/larger. Where wheel and vehicle both creep, the divisor is floored. */
 TG_INLINE tgi_slip tgi_slip_of(tg_real omega, tg_real v, tg_real radius, tg_real least)
 {
     const tg_real rim = radius * tgi_fabs(omega), travel = tgi_fabs(v), larger = rim > travel ? rim : travel;

@@ -7,7 +7,7 @@ const int TG_PRECISION = (int)sizeof(tg_real);
 
 size_t tg_filter_size(void) { return sizeof(tg_filter); }
 
-/* Settings of PHYSICS 6; `walk` stays 0 and is the caller's. */
+/* Settings of physics.md 6; `walk` stays 0 and is the caller's. */
 tg_tuning tg_default_tuning(void)
 {
     tg_tuning t;
@@ -103,7 +103,7 @@ tg_status tg_filter_init(tg_filter *f, const tg_machine *machine, const tg_tunin
     return TG_OK;
 }
 
-/* Q of this step (PHYSICS 6): [I + gamma (A - I)] Q0 on top of the inputs' noise. */
+/* Q of this step (physics.md 6): [I + gamma (A - I)] Q0 on top of the inputs' noise. */
 TG_INLINE void scale_noise(const tg_filter *f, tg_real gamma, tgi_plan *plan, const int n)
 {
     const tg_real *const a = f->policy.adaptation.scale, dt = plan->passage.dt;

@@ -48,7 +48,7 @@ TG_INLINE int tgi_stride(int n) { return (TG_TWICE(n) + TG_LANES - 1) / TG_LANES
 
 TG_INLINE int tgi_finite(tg_real x) { return x - x == 0; }
 
-/* Innovation weight of PHYSICS 6 (Huber): 1 within `huber` SDs, then falling. */
+/* Innovation weight of physics.md 6 (Huber): 1 within `huber` SDs, then falling. */
 TG_INLINE tg_real tgi_weight(tg_real huber, tg_real innovation, tg_real variance)
 {
     if (!(huber > 0) || innovation * innovation <= huber * huber * variance) return 1;

@@ -1,4 +1,4 @@
-/* Is the vehicle about to dig itself in, stuck, or pushed by its tool? All of it is ours (R); PHYSICS 7 says what a stuck vehicle
+/* Is the vehicle about to dig itself in, stuck, or pushed by its tool? All of it is ours (R); physics.md 7 says what a stuck vehicle
  * looks like. */
 #include "estimator.h"
 

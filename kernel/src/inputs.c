@@ -121,7 +121,7 @@ static tg_real walking_forces(const tg_estimator *e, tg_real dt)
     return scale_of_walks(e, dt) * walk * dt * dt * dt / 3;
 }
 
-/* Input noise of the step that ends at `time`, from the inputs as they stood over it (PHYSICS 1: torque moves omega, drawbar
+/* Input noise of the step that ends at `time`, from the inputs as they stood over it (physics.md 1: torque moves omega, drawbar
  * force and slope move v). */
 void tgi_input_noise(const tg_estimator *e, double time, tg_real dt, tg_real *q)
 {

@@ -1,4 +1,4 @@
-/* Vertical loads of axles and wheels (PHYSICS 3), and the inputs of a row. */
+/* Vertical loads of axles and wheels (physics.md 3), and the inputs of a row. */
 #include "estimator.h"
 
 /* Specific force along the vehicle, dv/dt + g sin(slope): the accelerometer's where it is alive, else the balance of the estimated

@@ -1,4 +1,4 @@
-/* The motion and the channels of PHYSICS 1 for an engine that knows nothing of their structure. Inlined: the wheel count is a constant. */
+/* The motion and the channels of physics.md 1 for an engine that knows nothing of their structure. Inlined: the wheel count is a constant. */
 #ifndef TG_MODEL_H
 #define TG_MODEL_H
 #include "filter.h"
@@ -16,7 +16,7 @@ TG_INLINE void model_rates(const tg_filter *f, const tg_input *u, tg_real cosine
     rate[0] = (traction - u->drawbar) * f->inverse_mass - f->machine.gravity * (rho * cosine + sine);
 }
 
-/* One step of the state by Runge-Kutta 4 in equal substeps; mu and rho_s stay. */
+/* One step of the state (paper eq. 9) by Runge-Kutta 4 in equal substeps; mu and rho_s stay. */
 TG_INLINE void model_move(const tg_filter *f, const tgi_plan *plan, tg_real *x, const int n)
 {
     const tg_real h = plan->passage.dt / (tg_real)plan->substeps;
@@ -34,7 +34,7 @@ TG_INLINE void model_move(const tg_filter *f, const tgi_plan *plan, tg_real *x, 
     }
 }
 
-/* What the channels should read at x: v, omega_1..omega_n, a_x. */
+/* What the channels should read at x (paper eq. 9): v, omega_1..omega_n, a_x. */
 TG_INLINE void model_channels(const tgi_plan *plan, const tg_real *x, tg_real *y, const int n)
 {
     for (int o = 0; o <= n; o++) y[o] = x[n + 1 + o];

@@ -33,7 +33,7 @@ TG_INLINE tg_status plan_check_input(const tg_input *u, const int n)
     return TG_OK;
 }
 
-/* The one-step map: the closed form of Runge-Kutta 4 on PHYSICS 1, which is affine, in equal substeps of at most TG_SUBSTEP/stiffness. */
+/* The one-step map (paper eq. 2 and 3): the closed form of Runge-Kutta 4 on physics.md 1, which is affine, in equal substeps of at most TG_SUBSTEP/stiffness. */
 TG_INLINE tg_status plan_passage(const tg_filter *f, const tg_input *u, tg_real dt, tgi_plan *plan, const int n)
 {
     tg_passage *const p = &plan->passage;
@@ -82,7 +82,7 @@ TG_INLINE tg_status plan_passage(const tg_filter *f, const tg_input *u, tg_real 
     return TG_OK;
 }
 
-/* Which channels are there; the row of H of a_x with the inputs of its instant (PHYSICS 1). */
+/* Which channels are there; the row of H of a_x with the inputs of its instant (physics.md 1). */
 TG_INLINE tg_status plan_channels(const tg_filter *f, const tgi_call *call, tgi_plan *plan, const int n)
 {
     tg_real zero = 0;

@@ -1,4 +1,4 @@
-/* Fuzzy supervisor of PHYSICS 6 (a reconstruction): gamma from how much the signals changed over a window. Zero-order Sugeno, 3 by 3.
+/* Fuzzy supervisor of physics.md 6 (a reconstruction): gamma from how much the signals changed over a window. Zero-order Sugeno, 3 by 3.
  *
  * Snapshots, a fiftieth of the window apart, hold the last known values. The reference is the newest snapshot at least a window old, else
  * the oldest; means are over what is younger than it, the present included. A value not known yet has not changed. */

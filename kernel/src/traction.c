@@ -1,4 +1,4 @@
-/* From the belief over the state to what a user reads: slip, net traction, efficiency (PHYSICS 2), each with its spread. */
+/* From the belief over the state to what a user reads: slip, net traction, efficiency (physics.md 2), each with its spread. */
 #include "estimator.h"
 
 typedef struct { /* second moments of (omega_i, v, mu_i, rho_s): the filter's and the considered constants' */
@@ -52,7 +52,7 @@ TG_INLINE tg_real root(tg_real variance) { return tgi_sqrt(variance > 0 ? varian
 /* Slip lies in [-1, 1], so no spread above 1 says more than 1 does; the same is said of the efficiency. */
 TG_INLINE tg_real bounded_root(tg_real variance) { return root(variance < 1 ? variance : 1); }
 
-/* All wheels, delta method. `mean` is the mean adhesion over the load: what a common radius error does to rho_s. */
+/* Net traction (paper eq. 5), slip and efficiency (paper eq. 7) of all wheels, delta method. `mean` is the mean adhesion over the load: what a common radius error does to rho_s. */
 TG_INLINE void traction(const tg_settings *restrict s, const tg_real *restrict x, const tgi_moments *restrict c, const tg_real *restrict hub,
                         tg_real mean, tg_real *restrict o, const int n)
 {

@@ -53,6 +53,7 @@ TG_INLINE void centre(const weights *w, tg_real *points, tg_real *mean, int stri
     }
 }
 
+/* Predicted mean and factors of the predicted covariance (paper eq. 10 and 11). */
 TG_INLINE void unscented_predict(const tg_filter *f, const tgi_plan *plan, const weights *w, tgi_result *out, const int n, const int stride)
 {
     const int rows = TG_TWICE(n), count = 2 * rows + 1;
@@ -83,6 +84,7 @@ TG_INLINE void measure(const tgi_plan *plan, tg_real *points, int stride, const 
     }
 }
 
+/* The update (paper eq. 12 and 13) from points redrawn, channel by channel of their joint factor. */
 TG_INLINE void unscented_update(const tg_filter *f, const tgi_plan *plan, const weights *w, tgi_result *out, const int n, const int stride,
                                 const int joint)
 {

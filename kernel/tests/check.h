@@ -1,5 +1,5 @@
 /* What the kernel's tests share: a check, random numbers, a random machine, and a dense Kalman filter (joint update, Joseph form, double)
- * written from PHYSICS 1 without the kernel's algebra. */
+ * written from physics.md 1 without the kernel's algebra. */
 #ifndef CHECK_H
 #define CHECK_H
 #include "terragrip.h"

@@ -21,13 +21,13 @@ def _choose(wanted: str | None) -> tuple[str, Any]:
     """Return the name and the module of the build to use; ``wanted`` None takes the fastest."""
     if wanted is not None and wanted not in BUILDS:
         raise InputError(
-            f"TERRAGRIP_KERNEL is {wanted!r}", mend=f"set it to {' or '.join(BUILDS)}, or leave it unset"
+            f"TERRAGRIP_KERNEL is {wanted!r}", hint=f"set it to {' or '.join(BUILDS)}, or leave it unset"
         )
     portable = import_module("terragrip._kernel_portable")
     # The AVX2 module is not even imported before the check: its very loading may run AVX2 code.
     able = bool(portable.lib.tg_cpu_has_avx2()) and find_spec("terragrip._kernel_avx2") is not None
     if wanted == "avx2" and not able:
-        raise InputError("TERRAGRIP_KERNEL is 'avx2', which this machine cannot run", mend="unset it")
+        raise InputError("TERRAGRIP_KERNEL is 'avx2', which this machine cannot run", hint="unset it")
     if wanted == "portable" or not able:
         return "portable", portable
     return "avx2", import_module("terragrip._kernel_avx2")

@@ -1,4 +1,4 @@
-"""A file of the user's (YAML) or of ours (JSON), read so that every complaint names the key, the line and the mend."""
+"""A file of the user's (YAML) or of ours (JSON), read so that every complaint names the key, the line and the fix."""
 
 from __future__ import annotations
 
@@ -30,10 +30,10 @@ _PLAIN = {
 
 
 class Fault(ValueError):
-    """A fault that a validator finds: problem, mend, and the place within the part that was validated."""
+    """A fault that a validator finds: problem, hint, and the place within the part that was validated."""
 
-    def __init__(self, problem: str, mend: str, place: Place = ()) -> None:
-        self.problem, self.mend, self.place = problem, mend, place
+    def __init__(self, problem: str, hint: str, place: Place = ()) -> None:
+        self.problem, self.hint, self.place = problem, hint, place
         super().__init__(problem)
 
 
@@ -51,8 +51,8 @@ class Part(BaseModel):
         for key in data:
             if key not in known:
                 close = nearest(str(key), known)
-                mend = f"did you mean {close!r}?" if close else f"known keys are {', '.join(known)}"
-                raise PydanticCustomError("unknown_key", "unknown key", {"key": str(key), "mend": mend})
+                hint = f"did you mean {close!r}?" if close else f"known keys are {', '.join(known)}"
+                raise PydanticCustomError("unknown_key", "unknown key", {"key": str(key), "hint": hint})
         return data
 
 
@@ -83,19 +83,19 @@ def read_yaml(path: str | os.PathLike[str]) -> Document:
         problem = getattr(error, "problem", None) or "cannot be read"
         place = None if mark is None else f"line {mark.line + 1}"
         raise InputError(
-            f"not YAML: {problem}", file=file, place=place, mend="write it as 'key: value' lines"
+            f"not YAML: {problem}", file=file, place=place, hint="write it as 'key: value' lines"
         ) from error
     except InputError:
         raise
     except (RecursionError, ValueError, OverflowError) as error:  # too deep, or an impossible date
         raise InputError(
-            f"not YAML that can be read: {error}", file=file, mend="simplify the file"
+            f"not YAML that can be read: {error}", file=file, hint="simplify the file"
         ) from error
     finally:
         loader.dispose()
     if not isinstance(data, dict):
         problem = "the file is empty" if data is None else "the file is not a mapping"
-        raise InputError(problem, file=file, mend="write it as 'key: value' lines")
+        raise InputError(problem, file=file, hint="write it as 'key: value' lines")
     return Document(data, file, lines)
 
 
@@ -123,20 +123,20 @@ def read_json(
     """
     file = os.fspath(path)
     refuse_missing(file, suffixes=(".json",))
-    mend = f"give a file written by {writer}"
+    hint = f"give a file written by {writer}"
     try:
         with open(file, encoding="utf-8-sig") as stream:
             data = json.load(stream, object_pairs_hook=pairs)
     except (ValueError, RecursionError) as error:  # not text, not JSON, or a number of thousands of digits
-        raise InputError(f"not JSON ({error})", file=file, mend=mend) from None
+        raise InputError(f"not JSON ({error})", file=file, hint=hint) from None
     except OSError as error:
         raise unreadable(file, error) from None
     if not isinstance(data, dict) or key not in data:
-        raise InputError(f"holds no {key!r}", file=file, mend=mend)
+        raise InputError(f"holds no {key!r}", file=file, hint=hint)
     found = data.get("version", version)
     if not isinstance(found, int) or found > version:
         problem = f"is of version {found}, this terragrip reads up to {version}"
-        raise InputError(problem, file=file, mend="update terragrip")
+        raise InputError(problem, file=file, hint="update terragrip")
     return data
 
 
@@ -145,7 +145,7 @@ def _read_text(file: str) -> str:
     try:
         return Path(file).read_text(encoding="utf-8-sig")
     except UnicodeDecodeError as error:
-        raise InputError("is not text", file=file, mend="give a YAML file in UTF-8") from error
+        raise InputError("is not text", file=file, hint="give a YAML file in UTF-8") from error
     except OSError as error:
         raise unreadable(file, error) from error
 
@@ -159,7 +159,7 @@ def _collect_lines(node: Any, place: Place, lines: dict[Place, int], file: str) 
             if here in lines and lines[here] != line:
                 raise InputError(
                     "the key stands twice", file=file, place=f"{_dotted(here)} (line {line})",
-                    mend=f"keep one; the other is on line {lines[here]}",
+                    hint=f"keep one; the other is on line {lines[here]}",
                 )  # fmt: skip
             lines[here] = line
             _collect_lines(value, here, lines, file)
@@ -170,30 +170,30 @@ def _collect_lines(node: Any, place: Place, lines: dict[Place, int], file: str) 
 
 
 def _input_error(error: ValidationError, document: Document) -> InputError:
-    """The fault a user should mend first, as one InputError."""
+    """The fault a user should fix first, as one InputError."""
     faults = error.errors(include_url=False)
     order = {"unknown_key": 0, "missing": 2}
     fault = min(faults, key=lambda f: order.get(f["type"], 1))
     place = _place_in(document.data, fault["loc"], missing=fault["type"] == "missing")
     context = fault.get("ctx", {})
     cause = context.get("error")
-    problem, mend = fault["msg"].removeprefix("Value error, "), context.get("mend")
+    problem, hint = fault["msg"].removeprefix("Value error, "), context.get("hint")
     if isinstance(cause, UnitError):
-        problem, mend = cause.problem, cause.mend
+        problem, hint = cause.problem, cause.hint
     elif isinstance(cause, Fault):
-        problem, mend, place = cause.problem, cause.mend, (*place, *cause.place)
+        problem, hint, place = cause.problem, cause.hint, (*place, *cause.place)
     elif fault["type"] == "unknown_key":
         place = (*place, context["key"])
     elif fault["type"] == "missing":
-        problem, mend = "is missing", "add it"
+        problem, hint = "is missing", "add it"
     elif fault["type"] in ("union_tag_not_found", "union_tag_invalid"):
         problem = "has no known name"
-        mend = (
+        hint = (
             f"known names are {context['expected_tags']}" if "expected_tags" in context else "add its 'name:'"
         )
     elif fault["type"] in _PLAIN:
-        problem, mend = _PLAIN[fault["type"]]
-    return InputError(problem, file=document.file or None, place=_located(place, document), mend=mend)
+        problem, hint = _PLAIN[fault["type"]]
+    return InputError(problem, file=document.file or None, place=_located(place, document), hint=hint)
 
 
 def _place_in(data: Any, location: Place, *, missing: bool) -> Place:

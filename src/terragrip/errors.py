@@ -8,14 +8,14 @@ from typing import Any
 
 
 class InputError(ValueError):
-    """An input or a call is unusable. The text is one line: what, where, and how to mend it.
+    """An input or a call is unusable. The text is one line: what, where, and how to fix it.
 
     Parameters
     ----------
     problem: what is wrong, without the place.
     file: the file it is in, if it came from one.
     place: where in the file (``"column ground_speed, row 17"``, ``"axles.front.mass"``).
-    mend: what the user can do about it.
+    hint: what the user can do about it.
 
     The command line prints ``str(error)`` and exits with 2.
     """
@@ -26,24 +26,24 @@ class InputError(ValueError):
         *,
         file: str | os.PathLike[str] | None = None,
         place: str | None = None,
-        mend: str | None = None,
+        hint: str | None = None,
     ) -> None:
         self.problem = problem
         self.file = None if file is None else os.fspath(file)
         self.place = place
-        self.mend = mend
+        self.hint = hint
         text = ": ".join(part for part in (self.file, place, problem) if part)
-        if mend:
-            text = f"{text}; {mend}"
+        if hint:
+            text = f"{text}; {hint}"
         super().__init__(" ".join(text.split()))
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Pickle by the arguments, so that the error survives a worker process."""
-        return _rebuild, (self.problem, self.file, self.place, self.mend)
+        return _rebuild, (self.problem, self.file, self.place, self.hint)
 
 
-def _rebuild(problem: str, file: str | None, place: str | None, mend: str | None) -> InputError:
-    return InputError(problem, file=file, place=place, mend=mend)
+def _rebuild(problem: str, file: str | None, place: str | None, hint: str | None) -> InputError:
+    return InputError(problem, file=file, place=place, hint=hint)
 
 
 def nearest(name: str, known: Iterable[str]) -> str | None:

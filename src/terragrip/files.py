@@ -32,10 +32,10 @@ def replacing(path: str | os.PathLike[str]) -> Iterator[Path]:
         temporary.unlink(missing_ok=True)
 
 
-def unwritable(path: str | os.PathLike[str], error: Exception, mend: str) -> InputError:
+def unwritable(path: str | os.PathLike[str], error: Exception, hint: str) -> InputError:
     """The InputError for a file that cannot be written."""
     return InputError(
-        f"cannot be written ({getattr(error, 'strerror', None) or error})", file=path, mend=mend
+        f"cannot be written ({getattr(error, 'strerror', None) or error})", file=path, hint=hint
     )
 
 
@@ -47,20 +47,20 @@ def refuse_missing(path: str | os.PathLike[str], *, suffixes: tuple[str, ...] = 
             return
         if target.is_dir():
             inside = sorted(p.name for p in target.iterdir() if p.name.lower().endswith(suffixes or ""))
-            mend = f"name a file in it, such as {inside[0]}" if inside else "name a file"
-            raise InputError("is a folder", file=path, mend=mend)
+            hint = f"name a file in it, such as {inside[0]}" if inside else "name a file"
+            raise InputError("is a folder", file=path, hint=hint)
         if target.exists():
-            raise InputError("is not a regular file", file=path, mend="name a file on disk")
+            raise InputError("is not a regular file", file=path, hint="name a file on disk")
         if not target.parent.is_dir():
-            raise InputError("no such file", file=path, mend=f"there is no folder {target.parent}")
+            raise InputError("no such file", file=path, hint=f"there is no folder {target.parent}")
         close = nearest(target.name, (p.name for p in target.parent.iterdir() if p.is_file()))
     except InputError:
         raise
     except (OSError, ValueError) as error:  # no permission; a name too long or with a NUL
         raise InputError(
-            f"cannot be opened ({error})", file=path, mend="check the path and its permissions"
+            f"cannot be opened ({error})", file=path, hint="check the path and its permissions"
         ) from error
-    raise InputError("no such file", file=path, mend=f"did you mean {close}?" if close else "check the path")
+    raise InputError("no such file", file=path, hint=f"did you mean {close}?" if close else "check the path")
 
 
 def sha256(path: str | os.PathLike[str]) -> str:
@@ -78,5 +78,5 @@ def sha256(path: str | os.PathLike[str]) -> str:
 def unreadable(path: str | os.PathLike[str], error: OSError) -> InputError:
     """The InputError for a file that exists but cannot be read."""
     return InputError(
-        f"cannot be read ({error.strerror or error})", file=path, mend="check its permissions and the disk"
+        f"cannot be read ({error.strerror or error})", file=path, hint="check its permissions and the disk"
     )

@@ -37,7 +37,7 @@ _BASE: dict[str, tuple[float, Dimension]] = {
     "degrees": (math.pi / 180, _ONE), "°": (math.pi / 180, _ONE), "rev": (2 * math.pi, _ONE),
     "turn": (2 * math.pi, _ONE), "%": (1e-2, _ONE), "percent": (1e-2, _ONE), "1": (1.0, _ONE),
     "rpm": (2 * math.pi / 60, (0, 0, -1, 0)),
-    "kmh": (1 / 3.6, (0, 1, -1, 0)), "kph": (1 / 3.6, (0, 1, -1, 0)), "mph": (0.44704, (0, 1, -1, 0)),
+    "kmh": (1 / 3.6, (0, 1, -1, 0)), "kph": (1 / 3.6, (0, 1, -1, 0)), "kmph": (1 / 3.6, (0, 1, -1, 0)), "mph": (0.44704, (0, 1, -1, 0)),
     "knot": (1852 / 3600, (0, 1, -1, 0)), "knots": (1852 / 3600, (0, 1, -1, 0)),
     "g_0": (STANDARD_GRAVITY, (0, 1, -2, 0)), "g0": (STANDARD_GRAVITY, (0, 1, -2, 0)),
 }  # fmt: skip
@@ -61,10 +61,10 @@ _KINDS: dict[Dimension, str] = {
 
 
 class UnitError(ValueError):
-    """A quantity cannot be read: ``problem`` says why, ``mend`` what to write."""
+    """A quantity cannot be read: ``problem`` says why, ``hint`` what to write."""
 
-    def __init__(self, problem: str, mend: str | None = None) -> None:
-        self.problem, self.mend = problem, mend
+    def __init__(self, problem: str, hint: str | None = None) -> None:
+        self.problem, self.hint = problem, hint
         super().__init__(problem)
 
 

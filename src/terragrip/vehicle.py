@@ -34,12 +34,12 @@ def _read(unit: str, low: float, high: float, likely: tuple[str, ...], above: bo
             return number
         suffix = "" if unit == "1" else f" {unit}"
         bound = "exceed" if above else "be at least"
-        mend = f"it must {bound} {low:g}{suffix} and not exceed {high:g}{suffix}"
+        hint = f"it must {bound} {low:g}{suffix} and not exceed {high:g}{suffix}"
         for other in likely if isinstance(value, int | float) else ():
             if low < number * factor_to(other, unit) <= high:
-                mend = f"{number:g} {other}? write '{number:g} {other}'"
+                hint = f"{number:g} {other}? write '{number:g} {other}'"
                 break
-        raise UnitError(f"{number:g}{suffix} is impossible", mend)
+        raise UnitError(f"{number:g}{suffix} is impossible", hint)
 
     return check
 
@@ -88,14 +88,14 @@ class FixedRadius(Part):
 
 
 class HadekelRadius(Part):
-    """Hadekel: h = F_z/(2π p √(r0 r_c)), r_c half the width (PHYSICS §4); the wheel's radius is r0."""
+    """Hadekel: h = F_z/(2π p √(r0 r_c)), r_c half the width (physics.md 4); the wheel's radius is r0."""
 
     name: Literal["hadekel"]
     pressure: _Pressure
 
 
 class BidermanRadius(Part):
-    """Biderman: h = A + √(A² + C1 F_z), A = C2 F_z/(2 (p + p0)) (PHYSICS §4); the wheel's radius is r0."""
+    """Biderman: h = A + √(A² + C1 F_z), A = C2 F_z/(2 (p + p0)) (physics.md 4); the wheel's radius is r0."""
 
     name: Literal["biderman"]
     C1: Annotated[float, *_quantity("m^2/N", 0, 1)]
@@ -168,7 +168,7 @@ class Sensors(Part):
 
 
 class Uncertainty(Part):
-    """Prior standard deviations of constants that data cannot tell: they widen the intervals (PHYSICS §6)."""
+    """Prior standard deviations of constants that data cannot tell: they widen the intervals (physics.md 6)."""
 
     drive_torque_gain: _Ratio | None = None  # of each wheel by itself
     drive_torque_gain_common: _Ratio | None = None  # of all wheels together
@@ -199,7 +199,7 @@ class Calibration(Part):
 class Vehicle(Part):
     """A machine of 1 to 8 wheels on one or more axles.
 
-    Fields are those of the vehicle file (DESIGN §3) in SI; ``wheelbase`` [m] reaches from the first axle to
+    Fields are those of the vehicle file (architecture.md, contracts) in SI; ``wheelbase`` [m] reaches from the first axle to
     the last. The properties hold numbers per wheel or axle as read-only arrays, in the order of ``wheels``.
     """
 
@@ -221,7 +221,7 @@ class Vehicle(Part):
 
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> Self:
-        """Read a vehicle file; raises InputError with the file, the key, its line and the mend."""
+        """Read a vehicle file; raises InputError with the file, the key, its line and the fix."""
         return validate(cls, read_yaml(path))
 
     @classmethod

@@ -1,4 +1,4 @@
-"""A drive that obeys PHYSICS 1-3 exactly, worked out backwards in NumPy: speeds and slip are chosen, adhesion follows from
+"""A drive that obeys physics.md 1-3 exactly, worked out backwards in NumPy: speeds and slip are chosen, adhesion follows from
 slip, torque and drawbar force from the equations of motion. Nothing here comes from the kernel or the simulation.
 """
 
@@ -20,7 +20,7 @@ MASS, RADIUS, INERTIA, TIRE, BEARING = 139.0, 0.2, 0.15, 0.02, 2.0
 
 
 def robot(**changes: Any) -> Vehicle:
-    """The robot of PHYSICS 8, four driven wheels on two axles; ``changes`` replace top-level keys."""
+    """The robot of physics.md 8, four driven wheels on two axles; ``changes`` replace top-level keys."""
     data = {
         "mass": MASS,
         "wheelbase": 0.638,

@@ -211,7 +211,7 @@ def test_considered_constants_shift_the_estimate_as_physics_6_says():
     ).T
     adhesion, resistance = columns[:, 5:9], columns[:, 9]
     np.testing.assert_allclose(adhesion[:2], 0, atol=1e-5)
-    # an error of what the filter takes the pull or the slope for; PHYSICS §6 states the slope left out
+    # an error of what the filter takes the pull or the slope for; physics.md 6 states the slope left out
     np.testing.assert_allclose(resistance[:2], [-1 / (m * g), -1.0], rtol=1e-3, atol=3e-6)
     np.testing.assert_allclose(adhesion[2], np.array([0, 0, 1, 0]) / (r * LOAD[2]), rtol=1e-3, atol=1e-6)
     assert resistance[2] == pytest.approx(1 / (r * m * g), rel=1e-3)

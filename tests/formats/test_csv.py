@@ -1,4 +1,4 @@
-"""Text tables in all their dialects give the same recording; what is none is refused with row and mend."""
+"""Text tables in all their dialects give the same recording; what is none is refused with row and hint."""
 
 from __future__ import annotations
 
@@ -155,7 +155,7 @@ def test_refusal(tmp_path: Path, content: str | bytes, message: str) -> None:
     with pytest.raises(InputError) as caught:
         read(path)
     assert str(caught.value).startswith(f"{path}: {message}")
-    assert caught.value.mend
+    assert caught.value.hint
     assert "\n" not in str(caught.value)
 
 

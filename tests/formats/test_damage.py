@@ -73,7 +73,7 @@ def test_a_damaged_file_is_read_or_refused_in_one_line(tmp_path: Path, kind: str
             read_table(target)
         except InputError as error:
             refusals.append(error)
-    assert all("\n" not in str(error) and error.file is not None and error.mend for error in refusals)
+    assert all("\n" not in str(error) and error.file is not None and error.hint for error in refusals)
     assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before < 300_000  # kB
     assert refusals or kind in ("asc", "log", "nmea")  # of a text, single lines are left out
 

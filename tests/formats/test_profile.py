@@ -229,7 +229,7 @@ def test_pitch_and_roll_from_a_quaternion() -> None:
 
 
 @pytest.mark.parametrize(
-    ("old", "new", "place", "problem", "mend"),
+    ("old", "new", "place", "problem", "hint"),
     [
         ("from: kmh", "fron: kmh", "channels.ground_speed.fron (line 7)", "unknown key", "did you mean 'from'?"),
         ("ground_speed:", "groundspeed:", "channels.groundspeed (line 7)", "no such channel", "'ground_speed'"),
@@ -248,7 +248,7 @@ def test_pitch_and_roll_from_a_quaternion() -> None:
     ],
 )  # fmt: skip
 def test_a_faulty_profile_is_refused(
-    tmp_path: Path, old: str, new: str, place: str, problem: str, mend: str
+    tmp_path: Path, old: str, new: str, place: str, problem: str, hint: str
 ) -> None:
     path = tmp_path / "profile.yaml"
     assert old in PROFILE
@@ -257,7 +257,7 @@ def test_a_faulty_profile_is_refused(
         Profile.load(path)
     assert place in (caught.value.place or "")
     assert problem in caught.value.problem
-    assert mend in (caught.value.mend or "")
+    assert hint in (caught.value.hint or "")
 
 
 def _rename(name: str, other: str) -> Callable[[pd.DataFrame], pd.DataFrame]:

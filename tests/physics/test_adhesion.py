@@ -48,7 +48,7 @@ def test_prototype_peaks_at_0_476_a():
 def test_negative_slip_is_not_the_printed_form():
     parameters = {**PROTOTYPE, "a": 1.42}
     printed = 1.42 * (1 - 0.52 * np.exp(0.01 * -0.5) - 0.48 * np.exp(-11.36 * -0.5))
-    assert printed < -190  # PHYSICS 5: as printed mu(-0.5) = -199
+    assert printed < -190  # physics.md 5: as printed mu(-0.5) = -199
     assert CURVES["exponential"].value(-0.5, parameters) == pytest.approx(
         -CURVES["exponential"].value(0.5, parameters)
     )
@@ -58,7 +58,7 @@ def test_two_parameter_sets_draw_one_curve():
     slip = np.linspace(0, 0.6, 200)
     one = CURVES["exponential"].value(slip, {"a": 1.42, "p": 0.52, "alpha_1": 0.01, "alpha_2": -11.36})
     other = CURVES["exponential"].value(slip, {"a": 3.00, "p": 0.773, "alpha_1": 0.0032, "alpha_2": -11.36})
-    assert np.abs(one - other).max() < 1.5e-3  # the printed digits; PHYSICS says 9e-6 with all digits
+    assert np.abs(one - other).max() < 1.5e-3  # the printed digits; physics.md says 9e-6 with all digits
 
 
 def test_effective_form_follows_the_paper_form():

@@ -1,4 +1,4 @@
-"""Vertical loads against sums of forces and moments written out anew, and PHYSICS §3's own figure."""
+"""Vertical loads against sums of forces and moments written out anew, and physics.md 3's own figure."""
 
 import numpy as np
 import pytest

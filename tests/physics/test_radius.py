@@ -1,4 +1,4 @@
-"""Tire deflection and radii by hand (PHYSICS §4)."""
+"""Tire deflection and radii by hand (physics.md 4)."""
 
 import numpy as np
 import pytest

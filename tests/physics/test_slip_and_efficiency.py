@@ -47,7 +47,7 @@ def test_slip_lies_within_its_range(omega, v):
 
 def test_slip_grows_by_one_minus_s_times_a_radius_error():
     true, wrong = slip(5.0, 0.8, 0.2), slip(5.0, 0.8, 0.2 * 1.03)
-    assert wrong - true == pytest.approx((1 - true) * 0.03, rel=0.03)  # PHYSICS §4
+    assert wrong - true == pytest.approx((1 - true) * 0.03, rel=0.03)  # physics.md 4
 
 
 def test_ratios_by_hand():

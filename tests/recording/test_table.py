@@ -1,4 +1,4 @@
-"""Recording: what it takes, without copies, and what it refuses with column, row and mend."""
+"""Recording: what it takes, without copies, and what it refuses with column, row and hint."""
 
 from __future__ import annotations
 
@@ -144,7 +144,7 @@ def test_refusal(columns: Columns, change: Callable[[Columns], Any], message: st
     with pytest.raises(InputError) as caught:
         Recording.from_frame(change(columns), source="log.csv")
     assert str(caught.value).startswith(f"log.csv: {message}")
-    assert caught.value.mend
+    assert caught.value.hint
 
 
 @pytest.mark.parametrize(

@@ -67,7 +67,7 @@ def buildup(limit, held, speed, length):
 
 
 def reference(time, y):
-    """The same machine from PHYSICS 1-3 and docs/simulation.md, flat ground, one soil."""
+    """The same machine from physics.md 1-3 and docs/simulation.md, flat ground, one soil."""
     m, L, lr, h, hd, c, r, J = 139.0, 0.638, 54 / 139 * 0.638, 0.30, 0.25, 0.10, 0.2, 0.15
     dy = np.zeros(30)
     w, v, torque, sums, z, zdot, x, rho = y[:4], y[4], y[5:9], y[9:13], y[13:17], y[17:21], y[21], y[22:24]

@@ -146,7 +146,7 @@ def test_accelerometer_and_pitch_on_a_slope_at_rest_and_in_motion(quiet):
     assert result.recording["acceleration_z"][rest].mean() == pytest.approx(
         9.80665 * np.cos(slope + squat), rel=1e-3
     )
-    # PHYSICS 1: a_x = sum(mu F_z)/m - rho g cos, to within the body's squat
+    # physics.md 1: a_x = sum(mu F_z)/m - rho g cos, to within the body's squat
     truth, last = result.truth.iloc[-1], -1
     push = (
         sum(truth[f"true_adhesion_{w}"] * truth[f"true_vertical_load_{w}"] for w in ("fl", "fr", "rl", "rr"))

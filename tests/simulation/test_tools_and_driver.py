@@ -87,7 +87,7 @@ def test_driver_frees_the_machine_in_order(quiet, drive):
 
 
 def test_the_wheel_sensor_reads_little_or_less_while_torque_is_high(quiet, drive):
-    """The paper's outlier (its section on traction estimation; PHYSICS 7)."""
+    """The paper's outlier (its section on traction estimation; physics.md 7)."""
     trace = drive(
         quiet(tools=[ROLLER | {"slack": 0.015}], soft_spots=[HOLE], driver={"acts": False}, duration=10)
     )

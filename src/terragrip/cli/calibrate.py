@@ -59,7 +59,7 @@ def command(
         raise InputError(
             f"nothing can be calibrated ({reasons})",
             file=logs[0],
-            mend="record a standstill, a straight pass without load and some minutes of work",
+            hint="record a standstill, a straight pass without load and some minutes of work",
         )
     found.apply(machine).save(output)
     if not quiet:
@@ -73,7 +73,7 @@ def _spans(light: list[str], logs: int) -> list[tuple[float, float] | None] | No
         return None
     if len(light) > logs:
         raise InputError(
-            f"{len(light)} spans for {logs} logs", place="--light", mend="give at most one a log"
+            f"{len(light)} spans for {logs} logs", place="--light", hint="give at most one a log"
         )
     spans: list[tuple[float, float] | None] = []
     for text in light:
@@ -84,7 +84,7 @@ def _spans(light: list[str], logs: int) -> list[tuple[float, float] | None] | No
             span = (math.nan, math.nan)
         if not span[0] < span[1]:
             raise InputError(
-                f"{text!r} is no span", place="--light", mend="write e.g. '120:300' [s], or 'all'"
+                f"{text!r} is no span", place="--light", hint="write e.g. '120:300' [s], or 'all'"
             )
         spans.append(span)
     return spans + [None] * (logs - len(light))

@@ -40,10 +40,10 @@ def command(
     from terragrip.vehicle import Vehicle
 
     if not method_named(method).can_smooth and smooth:
-        raise InputError(f"the method {method} cannot smooth", place="--smooth", mend="choose another method")
+        raise InputError(f"the method {method} cannot smooth", place="--smooth", hint="choose another method")
     if others and len(logs) > 1:
         raise InputError(
-            "there are several logs", place="--with", mend="join the sources of one log at a time"
+            "there are several logs", place="--with", hint="join the sources of one log at a time"
         )
     machine = Vehicle.load(vehicle)
     targets = _targets(
@@ -75,7 +75,7 @@ def _targets(logs: list[Path], output: Path, beside: list[Path]) -> list[Path]:
         return [check_file(output, inputs, suffixes=(".parquet", ".csv"))]
     for log in logs:
         if not log.exists():
-            raise InputError("no such file", file=log, mend="check the path")
+            raise InputError("no such file", file=log, hint="check the path")
     targets = files_in(output, logs, ".parquet")
     check_folder(output)
     return [check_file(target, inputs) for target in targets]

@@ -60,7 +60,7 @@ def command(
     from terragrip.soil.signature import signature_in
 
     if not 0 < length < float("inf"):
-        raise InputError(f"{length:g} is no length", place="--length", mend="give metres, e.g. 30")
+        raise InputError(f"{length:g} is no length", place="--length", hint="give metres, e.g. 30")
     runs = _names(estimates)
     inputs = [*estimates, *([library] if library else [])]
     target = check_file(output, inputs, suffixes=(".json",))
@@ -77,7 +77,7 @@ def command(
                 raise (
                     error
                     if error.file not in (None, run)
-                    else InputError(error.problem, file=path, place=error.place, mend=error.mend)
+                    else InputError(error.problem, file=path, place=error.place, hint=error.hint)
                 ) from None
             grounds.append(ground)
             if tables:
@@ -95,8 +95,8 @@ def _signals(given: list[str] | None) -> tuple[str, ...]:
     for name in given or ():
         if name not in SIGNALS:
             near = nearest(name, SIGNALS)
-            mend = f"did you mean {near}?" if near else f"take of {', '.join(SIGNALS)}"
-            raise InputError(f"there is no signal {name!r}", place="--signal", mend=mend)
+            hint = f"did you mean {near}?" if near else f"take of {', '.join(SIGNALS)}"
+            raise InputError(f"there is no signal {name!r}", place="--signal", hint=hint)
     return tuple(dict.fromkeys(given)) if given else GROUND
 
 
@@ -107,9 +107,9 @@ def _names(files: list[Path]) -> list[str]:
         other = taken.get(path.stem)
         if other is not None:
             if other.resolve() == path.resolve():
-                raise InputError("is given twice", file=path, mend="name each run once")
+                raise InputError("is given twice", file=path, hint="name each run once")
             raise InputError(
-                f"has the same name as {other}", file=path, mend="rename one: runs are told apart by name"
+                f"has the same name as {other}", file=path, hint="rename one: runs are told apart by name"
             )
         taken[path.stem] = path
     return list(taken)
@@ -122,7 +122,7 @@ def _tables(table: Path | None, estimates: list[Path], inputs: list[Path]) -> li
         return [check_file(table, inputs, suffixes=(".parquet",), option="--table")]
     for path in estimates:
         if not path.exists():
-            raise InputError("no such file", file=path, mend="check the path")
+            raise InputError("no such file", file=path, hint="check the path")
     check_folder(table)
     return [check_file(path, inputs, option="--table") for path in files_in(table, estimates, ".parquet")]
 

@@ -117,7 +117,7 @@ def predict(
     from terragrip.ground.classification.classifier import GroundClassifier
 
     if others and len(logs) > 1:
-        raise InputError("there are several logs", place="--with", mend="tell one drive at a time")
+        raise InputError("there are several logs", place="--with", hint="tell one drive at a time")
     beside = [path for path in (classifier, profile, *(dbc or ()), *(others or ())) if path is not None]
     target = check_file(output, [*logs, *beside], suffixes=(".csv", ".parquet"))
     known = GroundClassifier.load(classifier)
@@ -156,7 +156,7 @@ def _labelled(
     from terragrip.ground.classification.labelled import LabelledDrive, read_labels, stretches
 
     if labels is None and not logs:
-        raise InputError("there is no log", mend="give labelled logs, or --labels with a table file,label")
+        raise InputError("there is no log", hint="give labelled logs, or --labels with a table file,label")
     drives = read_labels(labels, logs) if labels else [LabelledDrive("", (log,)) for log in logs]
     tables: list[Any] = []
     grounds: list[str] = []
@@ -169,8 +169,8 @@ def _labelled(
                 tables.append(columns)
                 grounds.append(drive.label)
             elif column not in columns:
-                mend = "name the column with --column, or give --labels with a table file,label"
-                raise InputError("is missing", file=log, place=f"column {column}", mend=mend)
+                hint = "name the column with --column, or give --labels with a table file,label"
+                raise InputError("is missing", file=log, place=f"column {column}", hint=hint)
             else:
                 for part, label in stretches(columns, columns[column], window):
                     tables.append(part)
@@ -178,8 +178,8 @@ def _labelled(
             sources += [log] * (len(tables) - len(sources))
             step(number, len(drives), log.name)
     if not tables:
-        mend = f"label longer stretches, or take a shorter --window than {window:g} s"
-        raise InputError(f"no log has a labelled stretch as long as a window ({window:g} s)", mend=mend)
+        hint = f"label longer stretches, or take a shorter --window than {window:g} s"
+        raise InputError(f"no log has a labelled stretch as long as a window ({window:g} s)", hint=hint)
     return tables, grounds, sources
 
 
@@ -188,7 +188,7 @@ def _of_log(error: InputError, sources: list[Path]) -> InputError:
     number = re.fullmatch(r"recordings\[(\d+)\]", error.file or "")
     file = sources[int(number.group(1))] if number else error.file
     place = None if error.place in ("recordings", "labels") else error.place
-    return InputError(error.problem, file=file, place=place, mend=error.mend)
+    return InputError(error.problem, file=file, place=place, hint=error.hint)
 
 
 def _judged(known: GroundClassifier, columns: Any, log: Path) -> pd.DataFrame:
@@ -201,9 +201,9 @@ def _judged(known: GroundClassifier, columns: Any, log: Path) -> pd.DataFrame:
         length, window = columns["time"][-1] - columns["time"][0], table["end"][0] - table["start"][0]
         if length < window:
             problem = f"lasts {length:.3g} s, too short for a window of {window:.3g} s"
-            raise InputError(problem, file=log, mend="give a longer log")
+            raise InputError(problem, file=log, hint="give a longer log")
         wanted = "; ".join(" + ".join(s) for s in known.sensors_[-3:])
-        raise InputError("holds none of the sensors learnt", file=log, mend=f"give e.g. {wanted}")
+        raise InputError("holds none of the sensors learnt", file=log, hint=f"give e.g. {wanted}")
     table = table.drop(columns="recording")
     table.insert(0, "file", log.name)
     return table

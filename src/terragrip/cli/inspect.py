@@ -42,7 +42,7 @@ def command(
         if write_profile.is_file():
             # It may be one that the user has worked on.
             raise InputError(
-                "exists already", file=write_profile, place="--write-profile", mend="name a new file"
+                "exists already", file=write_profile, place="--write-profile", hint="name a new file"
             )
         check_file(write_profile, option="--write-profile")
     paths = _logs_in(logs)
@@ -69,7 +69,7 @@ def command(
         print(f"Proposed profile written to {write_profile}")
     elif found and all(one.refused for one in found):
         raise InputError(
-            found[0].refused, file=found[0].file, mend="log the wheels too, or join it to a log that has them"
+            found[0].refused, file=found[0].file, hint="log the wheels too, or join it to a log that has them"
         )
 
 
@@ -90,7 +90,7 @@ def _logs_in(paths: list[Path]) -> list[Path]:
         )
         if not inside:
             raise InputError(
-                "holds no log", file=path, mend=f"name a folder with files such as *{known[0]}, or a log"
+                "holds no log", file=path, hint=f"name a folder with files such as *{known[0]}, or a log"
             )
         found += inside
     return found
@@ -105,4 +105,4 @@ def _refuse_several(found: list[Inspection], target: Path) -> None:
             if found
             else "there is no log to propose it for"
         )
-        raise InputError(problem, file=target, place="--write-profile", mend="inspect logs of one kind")
+        raise InputError(problem, file=target, place="--write-profile", hint="inspect logs of one kind")

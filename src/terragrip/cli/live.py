@@ -85,7 +85,7 @@ def command(
     from terragrip.vehicle import Vehicle
 
     if quiet and not sink and record is None:
-        raise InputError("estimates would go nowhere", place="--quiet", mend="add --sink or --record")
+        raise InputError("estimates would go nowhere", place="--quiet", hint="add --sink or --record")
     known = _settings(settings)
     service = Service(
         Vehicle.load(vehicle),
@@ -117,7 +117,7 @@ def _settings(path: Path | None) -> dict[str, dict[str, float]]:
     known = Estimates.read_about(path).get("settings", {})
     if not {"noise", "held"} <= set(known):
         raise InputError(
-            "holds no settings", file=path, place="--settings", mend="estimate the log anew with this version"
+            "holds no settings", file=path, place="--settings", hint="estimate the log anew with this version"
         )
     return {"noise": known["noise"], "held": known["held"]}
 
@@ -135,7 +135,7 @@ def _held(pairs: list[str]) -> dict[str, float]:
             period = 0.0
         if not is_channel(name) or not 0.0 < period < 1e4:
             raise InputError(
-                f"{pair!r} is no channel and period", place="--held", mend="write ground_speed=0.2"
+                f"{pair!r} is no channel and period", place="--held", hint="write ground_speed=0.2"
             )
         found[name] = period
     return found

@@ -21,22 +21,22 @@ def check_file(
         missing or cannot be written.
     """
     if path.is_dir():
-        raise InputError("is a folder", file=path, place=option, mend="name a file in it")
+        raise InputError("is a folder", file=path, place=option, hint="name a file in it")
     if path.exists() and not path.is_file():
-        raise InputError("is a device, not a file", file=path, place=option, mend="name a file")
+        raise InputError("is a device, not a file", file=path, place=option, hint="name a file")
     if suffixes and path.suffix.lower() not in suffixes:
         named = " or ".join(suffixes)
         raise InputError(
-            f"is not named {named}", file=path, place=option, mend=f"write e.g. {path.stem}{suffixes[0]}"
+            f"is not named {named}", file=path, place=option, hint=f"write e.g. {path.stem}{suffixes[0]}"
         )
     _refuse_inputs(path, inputs)
     if not path.parent.exists():
         raise InputError(
-            f"the folder {path.parent} does not exist", file=path, place=option, mend="make it first"
+            f"the folder {path.parent} does not exist", file=path, place=option, hint="make it first"
         )
     _try_writing(path.parent)
     if path.exists() and not os.access(path, os.W_OK):
-        raise InputError("is write-protected", file=path, place=option, mend="choose another name")
+        raise InputError("is write-protected", file=path, place=option, hint="choose another name")
     return path
 
 
@@ -49,12 +49,12 @@ def check_folder(path: Path) -> Path:
     """
     if path.exists() and not path.is_dir():
         raise InputError(
-            "is a file, and a folder is needed", file=path, place="--output", mend="name a folder"
+            "is a file, and a folder is needed", file=path, place="--output", hint="name a folder"
         )
     if not path.exists():
         if not path.parent.exists():
             raise InputError(
-                f"the folder {path.parent} does not exist", file=path, place="--output", mend="make it first"
+                f"the folder {path.parent} does not exist", file=path, place="--output", hint="make it first"
             )
         _try_writing(path.parent)
         path.mkdir()
@@ -77,7 +77,7 @@ def files_in(folder: Path, logs: Iterable[Path], suffix: str) -> list[Path]:
             raise InputError(
                 f"has the same name as {taken[target]}: both would be written to {target}",
                 file=log,
-                mend="rename one, or estimate them one at a time",
+                hint="rename one, or estimate them one at a time",
             )
         _refuse_inputs(target, logs)
         taken[target] = log
@@ -87,7 +87,7 @@ def files_in(folder: Path, logs: Iterable[Path], suffix: str) -> list[Path]:
 def _refuse_inputs(path: Path, inputs: Iterable[Path]) -> None:
     for source in inputs:
         if path.exists() and source.exists() and path.samefile(source):
-            raise InputError("is an input too", file=path, place="--output", mend="choose another name")
+            raise InputError("is an input too", file=path, place="--output", hint="choose another name")
 
 
 def _try_writing(folder: Path) -> None:
@@ -100,5 +100,5 @@ def _try_writing(folder: Path) -> None:
             f"cannot be written ({error.strerror})",
             file=folder,
             place="--output",
-            mend="choose another folder",
+            hint="choose another folder",
         ) from error

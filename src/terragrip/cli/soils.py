@@ -88,7 +88,7 @@ def command(
         bins = BinSettings(width, lower, upper, minimum, by, metres, runs)
     except ValueError as error:
         raise InputError(
-            str(error), place="--width, --lower, --upper, --by, --metres, --runs", mend="choose other bins"
+            str(error), place="--width, --lower, --upper, --by, --metres, --runs", hint="choose other bins"
         ) from None
     curve = AdhesionCurve(model, FREE if free else None, weights="count" if weights else None, bins=bins)
     usual = BinSettings()
@@ -100,7 +100,7 @@ def command(
         raise InputError(
             "names the soil of rows or points, and there are libraries only",
             place="--soil",
-            mend="leave it out",
+            hint="leave it out",
         )
     library = SoilLibrary({})
     words: list[str] = []
@@ -140,7 +140,7 @@ def _joined(library: SoilLibrary, other: SoilLibrary, path: Path) -> SoilLibrary
         raise InputError(
             f"the soil {twins[0]!r} is in another of these inputs too",
             file=path,
-            mend="rename one, or give one library with --merge, whose twins are replaced",
+            hint="rename one, or give one library with --merge, whose twins are replaced",
         )
     return library.merge(other)
 

@@ -45,15 +45,15 @@ def command(
         home = ipaddress.ip_address("127.0.0.1" if address == "localhost" else address).is_loopback
     except ValueError:
         raise InputError(
-            f"{address!r} is no IP address", place="--address", mend="give e.g. 0.0.0.0"
+            f"{address!r} is no IP address", place="--address", hint="give e.g. 0.0.0.0"
         ) from None
     if live is not None and not live.startswith(("ws://", "wss://")):
-        raise InputError(f"{live!r} is no WebSocket address", place="--live", mend="give ws://HOST:PORT")
+        raise InputError(f"{live!r} is no WebSocket address", place="--live", hint="give ws://HOST:PORT")
     if public_url is not None and not _is_web_address(public_url):
         raise InputError(
             f"{public_url!r} is no web address",
             place="--public-url",
-            mend="give https://HOST, or https://HOST/PATH",
+            hint="give https://HOST, or https://HOST/PATH",
         )
     try:
         from terragrip.studio.serve import serve
@@ -61,7 +61,7 @@ def command(
         if (error.name or "").split(".")[0] == "terragrip":
             raise
         raise InputError(
-            f"the studio needs the Python package {error.name!r}", mend="pip install 'terragrip[studio]'"
+            f"the studio needs the Python package {error.name!r}", hint="pip install 'terragrip[studio]'"
         ) from error
     limit = upload_limit * 1_000_000
     serve(folder, address, port, loopback=home, live=live, upload_limit=limit, public=public_url)

@@ -19,7 +19,7 @@ BoolArray = NDArray[np.bool_]
 
 @dataclass(frozen=True)
 class Agreement:
-    """Agreement of predictions with observations over `count` rows (PHYSICS §5)."""
+    """Agreement of predictions with observations over `count` rows (physics.md 5)."""
 
     count: int
     r2: float
@@ -64,7 +64,7 @@ def agreement(observed: ArrayLike, predicted: ArrayLike, mask: ArrayLike | None 
     """R², NRMSE, RMSE and bias of `predicted` against `observed`, both (n,), in the rows of `mask`.
 
     R² = 1 - SSE/SST; NRMSE = RMSE / (max - min of the observations); bias = mean(predicted - observed)
-    (PHYSICS §5; paper, section 3). Raises InputError when fewer than two rows are finite or the
+    (physics.md 5; paper, section 3). Raises InputError when fewer than two rows are finite or the
     observations do not vary, since then neither figure exists.
     """
     seen, said = _finite_rows((observed, predicted), mask, least=2)
@@ -78,12 +78,12 @@ def agreement(observed: ArrayLike, predicted: ArrayLike, mask: ArrayLike | None 
 
 
 def r_squared(observed: ArrayLike, predicted: ArrayLike, mask: ArrayLike | None = None) -> float:
-    """R² = 1 - SSE/SST, arrays (n,) (PHYSICS §5). Raises as :func:`agreement`."""
+    """R² = 1 - SSE/SST, arrays (n,) (physics.md 5). Raises as :func:`agreement`."""
     return agreement(observed, predicted, mask).r2
 
 
 def nrmse(observed: ArrayLike, predicted: ArrayLike, mask: ArrayLike | None = None) -> float:
-    """RMSE over (max - min) of the observations, arrays (n,) (PHYSICS §5). Raises as :func:`agreement`."""
+    """RMSE over (max - min) of the observations, arrays (n,) (physics.md 5). Raises as :func:`agreement`."""
     return agreement(observed, predicted, mask).nrmse
 
 

@@ -137,7 +137,7 @@ class Engine:
         if status != lib.TG_OK:
             raise InputError(
                 f"the estimator cannot work with this vehicle ({_STATUS.get(status, status)})",
-                mend="check masses, inertias, radii and sensors in the vehicle file",
+                hint="check masses, inertias, radii and sensors in the vehicle file",
             )
         self.sample = ffi.new("tg_sample *")
         self.estimate = ffi.new("tg_estimate *")
@@ -262,7 +262,7 @@ _MEND = {
 
 def refusal(status: int, place: str | None) -> InputError:
     """The error for a tg_status that a sample or a snapshot came back with."""
-    return InputError(_STATUS.get(status, f"status {status}"), place=place, mend=_MEND.get(status))
+    return InputError(_STATUS.get(status, f"status {status}"), place=place, hint=_MEND.get(status))
 
 
 def settings_of(
@@ -317,7 +317,7 @@ def _set_wheels(settings: Any, vehicle: Vehicle, channels: Collection[str]) -> N
 
 
 def wheel_radii(vehicle: Vehicle) -> tuple[Floats, Floats]:
-    """Torque arm and rolling radius of each wheel (n,) [m] under its static load (PHYSICS §4)."""
+    """Torque arm and rolling radius of each wheel (n,) [m] under its static load (physics.md 4)."""
     arms, rolling = np.array(vehicle.wheel_radius), np.array(vehicle.wheel_radius)
     counts = np.bincount(vehicle.wheel_axle)
     for i, wheel in enumerate(vehicle.wheel_data):
@@ -347,13 +347,13 @@ def _deflection(wheel: Wheel, radius: float, load: float) -> float:
         raise InputError(
             f"the radius model deflects a tire of {radius:g} m by {float(found):.3g} m",
             place="wheel.radius_model",
-            mend="check its pressure and constants",
+            hint="check its pressure and constants",
         )
     return float(found)
 
 
 def _set_loads(settings: Any, vehicle: Vehicle) -> None:
-    """Shares and levers of the load formulas (PHYSICS §3), as physics.loads.axle_loads has them."""
+    """Shares and levers of the load formulas (physics.md 3), as physics.loads.axle_loads has them."""
     position, mass = vehicle.axle_to_rear, vehicle.axle_mass
     offset = position - position.mean()
     lever = offset / np.sum(offset**2) if len(mass) > 1 else np.zeros(1)

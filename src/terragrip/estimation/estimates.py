@@ -1,4 +1,4 @@
-"""The table of estimates: one row a recording row, SI units (DESIGN §3)."""
+"""The table of estimates: one row a recording row, SI units (architecture.md, contracts)."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ class Estimates:
     it is where the expected scale of the noise stands between the smallest (0) and the largest (1), on a
     logarithmic scale. ``adaptation_<state>`` (of `aukf` and `aukf-fs` alone) are the factors a_j on the diagonal of
     A_k, one a state of the filter, by which the process noise of the row was Q_k = [I + γ_k (A_k - I)] Q_0
-    (PHYSICS §6). ``curve_a`` (vehicle, and of each wheel) is the scale of the adhesion curve known so far
+    (physics.md 6). ``curve_a`` (vehicle, and of each wheel) is the scale of the adhesion curve known so far
     (docs/kernel.md). ``warning`` is the score of the warning of immobilization, ``warning_<sign>`` its signs in points,
     ``warning_usual_slip`` the slip it holds for usual (docs/events.md). NaN stands only where ``event`` says why: slip and
     efficiency at ``standstill``, and speeds in a ``gap`` before anything was measured.
@@ -105,7 +105,7 @@ class Estimates:
         from terragrip.vehicle import Vehicle
 
         if "vehicle" not in self.about:
-            raise InputError("the estimates hold no vehicle", mend="estimate the log anew with this version")
+            raise InputError("the estimates hold no vehicle", hint="estimate the log anew with this version")
         return Vehicle.from_dict(self.about["vehicle"])
 
     def to_pandas(self) -> pd.DataFrame:
@@ -175,7 +175,7 @@ class Estimates:
         missing = [n for n in ("time", "event", "ground_speed") if n not in table.column_names]
         if missing:
             raise InputError(
-                "this is no table of estimates", file=source, place=f"column {missing[0]}", mend="is missing"
+                "this is no table of estimates", file=source, place=f"column {missing[0]}", hint="is missing"
             )
         about = json.loads((table.schema.metadata or {}).get(METADATA_KEY, b"{}"))
         notes = tuple(about.pop("notes", ()))
@@ -211,7 +211,7 @@ def _opened(path: str | os.PathLike[str], reading: Callable[[str], Any]) -> Any:
         return reading(os.fspath(path))
     except pa.ArrowInvalid as error:
         raise InputError(
-            "is no Parquet file, or is damaged", file=path, mend="write it anew with terragrip estimate"
+            "is no Parquet file, or is damaged", file=path, hint="write it anew with terragrip estimate"
         ) from error
     except OSError as error:
         raise unreadable(path, error) from error

@@ -35,7 +35,7 @@ _SNAPSHOT_MAGIC = b"TGRIPSN2"
 
 
 class Estimate:
-    """The estimate at one instant: a column of DESIGN §3 by ``e["slip_fl"]`` or ``e.slip_fl``.
+    """The estimate at one instant: a column of architecture.md, contracts by ``e["slip_fl"]`` or ``e.slip_fl``.
 
     ``time`` [s], ``event`` (a text of :data:`~terragrip.estimation.engine.EVENTS`), and the columns of
     :attr:`TractionEstimator.columns` as plain floats; NaN only where ``event`` says why.
@@ -316,12 +316,12 @@ def unusable(sample: Mapping[str, Any], names: Collection[str]) -> InputError:
         except (TypeError, OverflowError):
             sound = False
         if not sound or (name == "time" and value is None):
-            mend = (
+            hint = (
                 "every sample needs a time in s"
                 if name == "time"
                 else "give SI numbers, NaN where not measured"
             )
             return InputError(
-                f"{name} is {value!r}", place=f"sample at time {sample.get('time')!r}", mend=mend
+                f"{name} is {value!r}", place=f"sample at time {sample.get('time')!r}", hint=hint
             )
-    return InputError("the sample holds a value that is no finite number", mend="give SI numbers")
+    return InputError("the sample holds a value that is no finite number", hint="give SI numbers")

@@ -1,4 +1,4 @@
-"""The named methods: an engine and a noise policy each (DESIGN §4)."""
+"""The named methods: an engine and a noise policy each (methods.md)."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ METHODS: dict[str, Method] = {
     method.name: method
     for method in (
         Method("algebraic", "the equations of motion on low-passed signals, no filter", kind=ALGEBRAIC),
-        # The model is affine in the state, so the extended Kalman filter is the Kalman filter (PHYSICS §1).
+        # The model is affine in the state, so the extended Kalman filter is the Kalman filter (physics.md 1).
         Method("ekf", "extended Kalman filter; on this model the same as kalman"),
         Method("ukf", "unscented Kalman filter, fixed noise", engine=UNSCENTED),
         Method("aukf", "adaptive unscented Kalman filter", engine=UNSCENTED, policy=ADAPTIVE),
@@ -73,5 +73,5 @@ def method_named(name: str) -> Method:
     near = nearest(name, METHODS)
     raise InputError(
         f"there is no method {name!r}",
-        mend=f"did you mean {near}?" if near else f"choose one of {', '.join(METHODS)}",
+        hint=f"did you mean {near}?" if near else f"choose one of {', '.join(METHODS)}",
     )

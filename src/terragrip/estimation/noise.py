@@ -75,11 +75,11 @@ def _check(given: Mapping[str, float], channels: tuple[str, ...]) -> None:
         if name not in known:
             near = nearest(name, known)
             raise InputError(
-                f"there is no sensor {name!r}", mend=f"did you mean {near}?" if near else "name a channel"
+                f"there is no sensor {name!r}", hint=f"did you mean {near}?" if near else "name a channel"
             )
         if not (np.isfinite(value) and value > 0):
             raise InputError(
-                f"the noise of {name} is {value!r}", mend="give a positive standard deviation in SI"
+                f"the noise of {name} is {value!r}", hint="give a positive standard deviation in SI"
             )
 
 

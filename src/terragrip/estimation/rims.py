@@ -52,9 +52,9 @@ def rims_of(vehicle: Vehicle, channels: Collection[str], source: str | None = No
     named = [name.removeprefix("wheel_speed_") for name in channels if name.startswith("wheel_speed_")]
     for wheel in named:
         if wheel not in vehicle.wheels:
-            mend = f"its wheels are {', '.join(vehicle.wheels)}"
+            hint = f"its wheels are {', '.join(vehicle.wheels)}"
             place = f"column wheel_speed_{wheel}"
-            raise InputError(f"the vehicle has no wheel {wheel}", file=source, place=place, mend=mend)
+            raise InputError(f"the vehicle has no wheel {wheel}", file=source, place=place, hint=hint)
     if named:
         radii, sides = wheel_radii(vehicle)[1], wheel_sides(vehicle)
         return tuple(

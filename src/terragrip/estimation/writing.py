@@ -26,7 +26,7 @@ def require_suffix(path: str | os.PathLike[str]) -> None:
     if suffix not in SUFFIXES:
         problem = f"estimates cannot be written as {suffix!r}" if suffix else "the name has no suffix"
         named = " or ".join(SUFFIXES)
-        raise InputError(problem, file=path, mend=f"name it {Path(path).stem}{SUFFIXES[0]}, or any {named}")
+        raise InputError(problem, file=path, hint=f"name it {Path(path).stem}{SUFFIXES[0]}, or any {named}")
 
 
 def write_parts(parts: Iterable[Estimates], path: str | os.PathLike[str]) -> None:
@@ -40,7 +40,7 @@ def write_parts(parts: Iterable[Estimates], path: str | os.PathLike[str]) -> Non
         for part in parts:
             writer.write(part)
         if writer.is_empty:
-            raise InputError("there is no row to estimate", mend="give a log with at least one row")
+            raise InputError("there is no row to estimate", hint="give a log with at least one row")
 
 
 class _Writer:

@@ -28,8 +28,8 @@ def bound(profile: Profile, log: LogTable, *, partial: bool = False) -> tuple[Pr
         if silent and not (origin.optional or partial):
             assert found is not None
             problem = 'holds no value: it was sent as "not available" or "error" throughout'
-            mend = "name another source in the profile, or join a log that has it (--with)"
-            raise InputError(problem, file=log.source, place=f"signal {', '.join(found.columns)}", mend=mend)
+            hint = "name another source in the profile, or join a log that has it (--with)"
+            raise InputError(problem, file=log.source, place=f"signal {', '.join(found.columns)}", hint=hint)
         if found is not None and not silent:
             channels[name] = found
             if len(origin.chain) > 1 or any("*" in c for c in origin.columns) or len(origin.candidates) > 1:
@@ -100,8 +100,8 @@ def _holds(log: LogTable, column: str) -> bool:
 
 def _missing(column: str, log: LogTable, *, others: bool = False) -> InputError:
     close = nearest(column, log.names)
-    mend = f"the nearest column is {close!r}" if close else f"its columns are {', '.join(log.names[:12])}"
+    hint = f"the nearest column is {close!r}" if close else f"its columns are {', '.join(log.names[:12])}"
     problem = "is missing, but the profile names it"
     if others:
         problem += ", and so are the others that would do"
-    return InputError(problem, file=log.source, place=f"column {column}", mend=mend)
+    return InputError(problem, file=log.source, place=f"column {column}", hint=hint)

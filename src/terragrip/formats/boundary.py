@@ -45,7 +45,7 @@ def needed(module: str, what: str) -> Any:
         missing = (error.name or module).partition(".")[0]
         raise InputError(
             f"to read {what} the Python package {missing!r} is needed",
-            mend="pip install 'terragrip[formats]'",
+            hint="pip install 'terragrip[formats]'",
         ) from error
     # What its logger has to say of a damaged file, the InputError or a note says.
     logging.getLogger(module.partition(".")[0]).setLevel(logging.CRITICAL + 1)
@@ -68,7 +68,7 @@ def reading(source: str | os.PathLike[str], kind: str, *errors: type[Exception])
     except (*DAMAGE, *errors) as error:
         said = " ".join(str(error).split())[:100] or type(error).__name__
         raise InputError(
-            f"is a damaged {kind}, or none ({said})", file=source, mend="copy or record it again"
+            f"is a damaged {kind}, or none ({said})", file=source, hint="copy or record it again"
         ) from error
 
 

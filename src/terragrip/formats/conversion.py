@@ -160,8 +160,8 @@ def _channel(name: str, origin: Source, log: LogTable, time: Floats) -> tuple[Co
         if origin.constant is not None:
             return np.full(len(time), str(origin.constant), dtype=object), None
         if origin.column is None:
-            mend = "write 'from: <column>' or 'constant: <label>'"
-            raise InputError("is a label", file=log.source, place=f"column {name}", mend=mend)
+            hint = "write 'from: <column>' or 'constant: <label>'"
+            raise InputError("is a label", file=log.source, place=f"column {name}", hint=hint)
         return texts(name, log.columns[str(origin.column)], len(time), log.source), None
     deviation = None
     if origin.constant is not None:
@@ -204,9 +204,9 @@ def _factor(name: str, origin: Source, log: LogTable) -> float:
     try:
         return factor_to(stated, target)
     except UnitError as error:
-        mend = f"give {name} a unit or a scale in the profile"
+        hint = f"give {name} a unit or a scale in the profile"
         raise InputError(
-            error.problem, file=log.source, place=f"column {origin.column}", mend=mend
+            error.problem, file=log.source, place=f"column {origin.column}", hint=hint
         ) from error
 
 
@@ -275,13 +275,13 @@ def _kept(rows: Rows, log: LogTable) -> npt.NDArray[np.bool_]:
         keep = np.array([label.strip() == str(rows.equals) for label in labels], dtype=bool)
         if not keep.any():
             present = ", ".join(sorted({str(label) for label in labels})[:8])
-            mend = f"the column holds {present}"
+            hint = f"the column holds {present}"
             raise InputError(
-                f"no row equals {rows.equals!r}", file=log.source, place=f"column {rows.column}", mend=mend
+                f"no row equals {rows.equals!r}", file=log.source, place=f"column {rows.column}", hint=hint
             )
     if not keep.any():
-        mend = "mend 'rows:' in the profile"
+        hint = "hint 'rows:' in the profile"
         raise InputError(
-            f"no row equals {rows.equals!r}", file=log.source, place=f"column {rows.column}", mend=mend
+            f"no row equals {rows.equals!r}", file=log.source, place=f"column {rows.column}", hint=hint
         )
     return np.asarray(keep)

@@ -69,9 +69,9 @@ def _text_of(path: str) -> bytes:
     with closing(opened(path)) as stream:
         raw = read(stream, _LONG + 1 if is_packed(path) else -1, path)
     if len(raw) > _LONG and is_packed(path):
-        raise InputError("is not a table of text", file=path, mend="give a CSV or Parquet file")
+        raise InputError("is not a table of text", file=path, hint="give a CSV or Parquet file")
     if not raw.strip():
-        raise InputError("is empty", file=path, mend="give a table with a header and rows")
+        raise InputError("is empty", file=path, hint="give a table with a header and rows")
     return to_text(raw, path)
 
 
@@ -84,7 +84,7 @@ def _lines(source: str, size: int) -> Iterator[tuple[bytes, bool]]:
             end = data.rfind(b"\n") + 1
             rest = data[end:]
             if len(rest) > 4 * size:
-                raise InputError("has no line ends", file=source, mend="give a table of text, a row a line")
+                raise InputError("has no line ends", file=source, hint="give a table of text, a row a line")
             if end:
                 yield data[:end], is_first
                 is_first = False

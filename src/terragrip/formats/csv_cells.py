@@ -30,7 +30,7 @@ def chosen_of(dialect: Dialect, chosen: set[str], source: str) -> list[int]:
     places = [k for k, name in enumerate(names) if name in chosen]
     twice = next((names[k] for k in places if names.count(names[k]) > 1), None)
     if twice is not None:
-        raise InputError("stands twice", file=source, place=f"column {twice}", mend="keep one of them")
+        raise InputError("stands twice", file=source, place=f"column {twice}", hint="keep one of them")
     return places
 
 
@@ -133,9 +133,9 @@ def _ragged(body: bytes, dialect: Dialect, error: Exception, source: str, first:
         cells = len(split(line, separator))
         if cells != width:
             problem = f"has {cells} cells, the header {width}"
-            return InputError(problem, file=source, place=f"row {row}", mend="give every row as many cells")
+            return InputError(problem, file=source, place=f"row {row}", hint="give every row as many cells")
     problem = f"is not a regular table ({str(error)[:80]})"
-    return InputError(problem, file=source, mend="look for unbalanced quotes")
+    return InputError(problem, file=source, hint="look for unbalanced quotes")
 
 
 def _numbers_of_texts(name: str, column: pa.ChunkedArray, source: str, first: int) -> npt.NDArray[Any]:
@@ -155,6 +155,6 @@ def _numbers_of_texts(name: str, column: pa.ChunkedArray, source: str, first: in
                 return np.array(cells, dtype=object)
             shown = repr(cell) if len(cell) <= 30 else repr(cell[:27] + "...")
             place = f"column {name}, row {first + row + 1}"
-            mend = "leave the cell empty or give a number"
-            raise InputError(f"{shown} is not a number", file=source, place=place, mend=mend) from None
+            hint = "leave the cell empty or give a number"
+            raise InputError(f"{shown} is not a number", file=source, place=place, hint=hint) from None
     return found

@@ -49,9 +49,9 @@ def to_text(data: bytes, source: str) -> bytes:
     """The content as UTF-8 without a byte order mark; raises InputError if it is no text."""
     if data.startswith(b"\xef\xbb\xbf"):
         return data[3:]
-    for magic, problem, mend in _MAGIC:
+    for magic, problem, hint in _MAGIC:
         if data.startswith(magic):
-            raise InputError(problem, file=source, mend=mend)
+            raise InputError(problem, file=source, hint=hint)
     head = data[:HEAD]
     encoding = None
     if data.startswith((b"\xff\xfe", b"\xfe\xff")):
@@ -94,7 +94,7 @@ def detect(data: bytes, source: str) -> Dialect:
         head = head[: head.rindex(b"\n")]
     lines = [line for line in head.decode("utf-8", "replace").splitlines() if line.strip()][:60]
     if not lines:
-        raise InputError("is empty", file=source, mend="give a table with a header and rows")
+        raise InputError("is empty", file=source, hint="give a table with a header and rows")
     if lines[0].lower().startswith("sep="):  # Excel's own hint
         start = _after_lines(data, start, 1)
         lines = lines[1:] or [""]
@@ -107,7 +107,7 @@ def detect(data: bytes, source: str) -> Dialect:
         raise InputError(
             "the first row holds numbers, not column names",
             file=source,
-            mend="put a header row above the numbers",
+            hint="put a header row above the numbers",
         )
     rows = 1
     units: dict[str, str] = {}
@@ -266,4 +266,4 @@ def _after_lines(data: bytes, start: int, count: int) -> int:
 
 
 def _binary(source: str) -> InputError:
-    return InputError("is not a table of text", file=source, mend="give a CSV or Parquet file")
+    return InputError("is not a table of text", file=source, hint="give a CSV or Parquet file")

@@ -274,7 +274,7 @@ def _is_large(column: npt.NDArray[Any], unit: str) -> bool:
 def _cause(error: InputError) -> str:
     """An error as a sentence without the file, which the report names once."""
     place = f"{error.place}: " if error.place else ""
-    return f"{place}{error.problem}" + (f"; {error.mend}" if error.mend else "")
+    return f"{place}{error.problem}" + (f"; {error.hint}" if error.hint else "")
 
 
 def _as_table(recording: Recording, table: LogTable | SignalLog) -> LogTable:

@@ -133,7 +133,7 @@ def _checked(
             columns = {**columns, TIME: time - origin}
         elif origin is not None:
             raise InputError(
-                "holds dates and numbers", file=source, place=f"column {TIME}", mend="give one of them"
+                "holds dates and numbers", file=source, place=f"column {TIME}", hint="give one of them"
             )
         block = _block(columns, source, first, after, silent, tuple(dict.fromkeys((*notes, *said))), digest)
         if first == 0 and (late := lag_within(block.time, block.channels)):

@@ -111,7 +111,7 @@ def _finished(tree: Mapping[str, Any], path: str, wanted: Wanted | None) -> Sign
         problem = "holds no numeric column"
         if notes:
             problem += f"; {notes[0].rstrip('.')}"
-        raise InputError(problem, file=path, mend="save arrays or structs with a time vector beside them")
+        raise InputError(problem, file=path, hint="save arrays or structs with a time vector beside them")
     if not found.signals:
         return _table_of(found.loose, path, wanted, notes)
     clocks: dict[int, Floats] = {}

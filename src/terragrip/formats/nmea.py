@@ -79,7 +79,7 @@ def read_nmea(path: str, wanted: Wanted | None, databases: Databases) -> SignalL
         problem = (
             f"holds no usable RMC, VTG or GGA sentence ({track.bad} damaged, {track.no_fix} without a fix)"
         )
-        raise InputError(problem, file=path, mend="check that the receiver sent them, and had a fix")
+        raise InputError(problem, file=path, hint="check that the receiver sent them, and had a fix")
     notes = []
     if track.bad:
         notes.append(f"{track.bad} sentences are damaged and were left out.")

@@ -69,13 +69,13 @@ def _guarded(source: str, work: Callable[[], Any]) -> Any:
         return work()
     except (pa.ArrowException, OSError, UnicodeDecodeError) as error:
         problem = f"is a damaged Parquet file, or none ({str(error)[:100]})"
-        raise InputError(problem, file=source, mend="write it again, or give a CSV file") from error
+        raise InputError(problem, file=source, hint="write it again, or give a CSV file") from error
 
 
 def _refuse_twice(names: tuple[str, ...], chosen: list[str], source: str) -> None:
     twice = next((name for name in chosen if names.count(name) > 1), None)
     if twice is not None:
-        raise InputError("stands twice", file=source, place=f"column {twice}", mend="keep one of them")
+        raise InputError("stands twice", file=source, place=f"column {twice}", hint="keep one of them")
 
 
 FORMATS = (

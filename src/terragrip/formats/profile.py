@@ -99,18 +99,18 @@ class Source(Part):
             if getattr(self, k) is not None
         ]
         if len(given) != 1:
-            mend = "write one of from, derivative_of, norm_of, pitch_of, roll_of, constant"
-            raise Fault("needs exactly one source", mend)
+            hint = "write one of from, derivative_of, norm_of, pitch_of, roll_of, constant"
+            raise Fault("needs exactly one source", hint)
         for key in ("window", "forward"):
             if key in self.model_fields_set and self.derivative_of is None:
                 raise Fault("serves derivative_of only", "leave it out", (key,))
         if self.over is not None and self.column is None:
             raise Fault("serves from only", "leave it out", ("over",))
         if self.over is not None and self.over_minimum <= 0:
-            mend = "write e.g. 'over_minimum: 0.3', in the divisor's unit"
+            hint = "write e.g. 'over_minimum: 0.3', in the divisor's unit"
             raise Fault(
                 "needs a positive over_minimum, since a quotient over next to nothing is noise",
-                mend,
+                hint,
                 ("over",),
             )
         if self.over is None and "over_minimum" in self.model_fields_set:
@@ -189,7 +189,7 @@ class Profile(Part):
     def load(cls, path: str | os.PathLike[str]) -> Self:
         """Read a profile file, or take one of `SHIPPED` by name.
 
-        Raises InputError with the file, the key, its line and the mend.
+        Raises InputError with the file, the key, its line and the fix.
         """
         own = Path(__file__).with_name("profiles") / f"{path}.yaml"
         if os.fspath(path) in SHIPPED and not Path(path).is_file():
@@ -197,8 +197,8 @@ class Profile(Part):
         name = os.fspath(path)
         if not Path(path).exists() and Path(path).parent == Path() and not Path(path).suffix:
             close = nearest(name, SHIPPED)
-            mend = f"did you mean {close!r}?" if close else f"those are {', '.join(SHIPPED)}"
-            raise InputError(f"{name!r} is no file, and no profile that comes with Terragrip", mend=mend)
+            hint = f"did you mean {close!r}?" if close else f"those are {', '.join(SHIPPED)}"
+            raise InputError(f"{name!r} is no file, and no profile that comes with Terragrip", hint=hint)
         found = validate(cls, read_yaml(path))
         here = Path(path).parent
         return found.model_copy(update={"dbc": tuple(os.fspath(here / name) for name in found.dbc)})
@@ -234,12 +234,12 @@ class Profile(Part):
                 close = nearest(
                     name, (*CHANNELS, *LABELS, *(f"{q}_fl" for q in (*WHEEL_CHANNELS, *AXLE_CHANNELS)))
                 )
-                mend = (
+                hint = (
                     f"did you mean {close!r}?"
                     if close
-                    else "the names are in DESIGN section 3, e.g. wheel_speed_fl"
+                    else "the names are in architecture.md, contracts, e.g. wheel_speed_fl"
                 )
-                raise Fault("no such channel", mend, ("channels", name))
+                raise Fault("no such channel", hint, ("channels", name))
             for one in source.chain:
                 _check_unit(name, one)
         return self
@@ -289,7 +289,7 @@ def unit_factor(unit: str, target: str) -> float:
     try:
         return factor_to(unit, target)
     except UnitError as error:
-        raise Fault(error.problem, error.mend or "") from error
+        raise Fault(error.problem, error.hint or "") from error
 
 
 def _check_unit(name: str, origin: Source) -> None:
@@ -301,7 +301,7 @@ def _check_unit(name: str, origin: Source) -> None:
         if origin.constant is not None and name not in LABELS:
             quantity(origin.constant, target or "1")
     except UnitError as error:
-        raise Fault(error.problem, error.mend or "write an SI unit", ("channels", name)) from error
+        raise Fault(error.problem, error.hint or "write an SI unit", ("channels", name)) from error
 
 
 def rate_unit(unit: str) -> str:

@@ -39,7 +39,7 @@ def read(
     one; a list of profiles has one for each. Clocks are aligned by their stamps where both count from 1970, then by
     the correlation of the speeds, and the notes say by how much.
 
-    Raises InputError with file, column, row and mend for whatever makes the log unusable.
+    Raises InputError with file, column, row and hint for whatever makes the log unusable.
     """
     databases: Databases = (dbc,) if isinstance(dbc, str | os.PathLike) else tuple(dbc)
     if not isinstance(path, str | os.PathLike):
@@ -48,7 +48,7 @@ def read(
         paths = list(path)
         return merged([_part(p, own, databases) for p, own in zip(paths, _each(profile, paths), strict=True)])
     if isinstance(profile, list | tuple):
-        raise InputError("there are several profiles for one log", file=path, mend="give one profile")
+        raise InputError("there are several profiles for one log", file=path, hint="give one profile")
     chosen = _loaded(profile)  # type: ignore[arg-type]  # a sequence was refused above
     if chosen is not None:
         return recording_of(read_table(path, chosen.wants, (*databases, *chosen.dbc)), chosen)
@@ -101,8 +101,8 @@ def read_log(path: PathLike, wanted: Wanted | None = None, databases: Databases 
     """Read a log as `read_table` does; signals with clocks of their own are left on them."""
     own = format_of(path)
     if databases and not own.takes_databases:
-        mend = "leave out --dbc, or 'dbc:' in the profile"
-        raise InputError(f"is a {own.title}, which needs no DBC", file=path, mend=mend)
+        hint = "leave out --dbc, or 'dbc:' in the profile"
+        raise InputError(f"is a {own.title}, which needs no DBC", file=path, hint=hint)
     if own.read is not None:
         return own.read(os.fspath(path), wanted, databases)
     table = None if own.in_blocks is None else own.in_blocks(os.fspath(path))
@@ -110,7 +110,7 @@ def read_log(path: PathLike, wanted: Wanted | None = None, databases: Databases 
         raise InputError(
             f"is a {own.title}, which its format does not read",
             file=path,
-            mend="update the package that brings it",
+            hint="update the package that brings it",
         )
     return table.whole(wanted)
 
@@ -124,14 +124,14 @@ def _each(
 ) -> list[Profile | None]:
     """The profile of each source."""
     if not paths:
-        raise InputError("there is no log", mend="give at least one")
+        raise InputError("there is no log", hint="give at least one")
     if profile is None or isinstance(profile, Profile | str | os.PathLike):
         return [_loaded(profile)] * len(paths)
     found = [_loaded(own) for own in profile]
     if len(found) != len(paths):
         raise InputError(
             f"there are {len(found)} profiles for {len(paths)} logs",
-            mend="give one profile, or one for each log",
+            hint="give one profile, or one for each log",
         )
     return found
 
@@ -155,7 +155,7 @@ def _part(path: PathLike, profile: Profile | None, databases: Databases, also: t
             "is missing",
             file=table.source,
             place=f"column {TIME}",
-            mend="name it in a profile for this source",
+            hint="name it in a profile for this source",
         )
     table, unset = since_clock_was_set(table, TIME, _time_unit(table))
     columns = in_si(table)
@@ -175,5 +175,5 @@ def _require(table: LogTable) -> None:
     except InputError as error:
         if not table.clocked:
             raise
-        mend = f"map its signals in a profile: {', '.join(SHIPPED)}, or your own ('terragrip inspect' proposes one)"
-        raise InputError(error.problem, file=error.file, place=error.place, mend=mend) from error
+        hint = f"map its signals in a profile: {', '.join(SHIPPED)}, or your own ('terragrip inspect' proposes one)"
+        raise InputError(error.problem, file=error.file, place=error.place, hint=hint) from error

@@ -72,14 +72,14 @@ def formats() -> dict[str, Format]:
     """The registered formats by name, ours first; raises InputError where one of another package cannot be loaded, or takes a name."""
     found = {one.name: one for module in _OWN for one in import_module(f"terragrip.formats.{module}").FORMATS}
     for entry in entry_points(group=GROUP):
-        place, mend = f"format {entry.name}", f"update or remove the package that brings {entry.value}"
+        place, hint = f"format {entry.name}", f"update or remove the package that brings {entry.value}"
         try:
             one = entry.load()
         except (ImportError, AttributeError) as error:
-            raise InputError(f"cannot be loaded ({error})", place=place, mend=mend) from error
+            raise InputError(f"cannot be loaded ({error})", place=place, hint=hint) from error
         if not isinstance(one, Format) or one.name in found:
             problem = f"{entry.value} is no Format" if not isinstance(one, Format) else "is there already"
-            raise InputError(problem, place=place, mend=mend)
+            raise InputError(problem, place=place, hint=hint)
         found[one.name] = one
     return found
 

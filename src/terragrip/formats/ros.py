@@ -190,10 +190,10 @@ def _files_of(path: str) -> list[Path]:
         if found:
             return found
     packed = [p.name for p in Path(path).iterdir() if p.suffix in (".zstd", ".zst")]
-    mend = (
+    hint = (
         f"unpack {packed[0]} first (zstd -d)" if packed else "name the bag's folder, with .db3 or .mcap files"
     )
-    raise InputError("holds no bag file", file=path, mend=mend)
+    raise InputError("holds no bag file", file=path, hint=hint)
 
 
 def _collect(
@@ -274,7 +274,7 @@ def log_of(topics: Iterable[Topic], path: str, notes: list[str], files: Iterable
         bad = sum(topic.bad for topic in topics)
         problem = f"holds no message that can be read ({bad} cannot)" if bad else "holds no message"
         raise InputError(
-            f"{problem}{'; ' + said[0] if said else ''}", file=path, mend="check how it was recorded"
+            f"{problem}{'; ' + said[0] if said else ''}", file=path, hint="check how it was recorded"
         )
     digest = "+".join(sha256(file) for file in files) or sha256(path)
     return SignalLog(tuple(names), found, path, digest, tuple(said))

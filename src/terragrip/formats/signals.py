@@ -65,7 +65,7 @@ class SignalLog:
         if not len(base):
             if self.signals:
                 raise InputError(
-                    "holds no sample of any known signal", file=self.source, mend="check that it was recorded"
+                    "holds no sample of any known signal", file=self.source, hint="check that it was recorded"
                 )
             return LogTable((TIME, *self.names), {}, {}, self.source, self.sha256, tuple(notes), clocked=True)
         place = dict(zip(orders, rows, strict=True))

@@ -42,7 +42,7 @@ def joined(
     for number, part in enumerate(parts):
         if not part.columns:
             raise InputError(
-                "holds no channel", file=part.source, mend="leave it out, or name its columns in a profile"
+                "holds no channel", file=part.source, hint="leave it out, or name its columns in a profile"
             )
         shift = 0.0
         if number:

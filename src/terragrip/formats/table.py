@@ -80,7 +80,7 @@ def in_si(table: LogTable) -> dict[str, npt.NDArray[Any]]:
             factor = factor_to(unit, target)
         except UnitError as error:
             raise InputError(
-                error.problem, file=table.source, place=f"column {name}", mend=error.mend
+                error.problem, file=table.source, place=f"column {name}", hint=error.hint
             ) from error
         if factor != 1.0:
             columns[name] = columns[name] * np.float64(factor)
@@ -132,7 +132,7 @@ def from_arrow(name: str, column: Any, source: str | None) -> npt.NDArray[Any]:
         column = column.cast(pa.int8())
     elif not (pa.types.is_floating(kind) or pa.types.is_integer(kind) or pa.types.is_decimal(kind)):
         raise InputError(
-            f"holds {kind}, not numbers", file=source, place=f"column {name}", mend="give one number a row"
+            f"holds {kind}, not numbers", file=source, place=f"column {name}", hint="give one number a row"
         )
     if column.null_count or not pa.types.is_integer(column.type):
         column = column.cast(pa.float64())

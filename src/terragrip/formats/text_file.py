@@ -36,7 +36,7 @@ def read(stream: BinaryIO, size: int, source: str) -> bytes:
         return stream.read(size)
     except (EOFError, zlib.error, gzip.BadGzipFile) as error:
         problem = f"is a damaged gzip file ({error})"
-        raise InputError(problem, file=source, mend="copy or pack it again") from error
+        raise InputError(problem, file=source, hint="copy or pack it again") from error
     except OSError as error:
         raise unreadable(source, error) from error
 

@@ -38,7 +38,7 @@ def read_vbo(path: str, wanted: Wanted | None, databases: Databases = ()) -> Log
     names = _distinct(sections.get("column names", "").split())
     rows = [line.split() for line in sections.get("data", "").splitlines() if line.strip()]
     if not names or not rows:
-        raise InputError("has no [column names] or no [data]", file=path, mend="export it again")
+        raise InputError("has no [column names] or no [data]", file=path, hint="export it again")
     notes = []
     if len(rows[-1]) < len(names) and not text.endswith("\n"):
         rows.pop()
@@ -46,7 +46,7 @@ def read_vbo(path: str, wanted: Wanted | None, databases: Databases = ()) -> Log
     for number, row in enumerate(rows, start=1):
         if len(row) != len(names):
             problem = f"has {len(row)} cells, the header {len(names)}"
-            raise InputError(problem, file=path, place=f"row {number}", mend="give every row as many cells")
+            raise InputError(problem, file=path, place=f"row {number}", hint="give every row as many cells")
     columns: dict[str, npt.NDArray[Any]] = {}
     for k, name in enumerate(names):
         if wanted is None or wanted(name):
@@ -78,7 +78,7 @@ def _column(name: str, cells: list[str], path: str) -> npt.NDArray[np.float64]:
         row = next(k for k, cell in enumerate(cells, start=1) if not _is_number(cell))
         problem = f"{cells[row - 1]!r} is not a number"
         raise InputError(
-            problem, file=path, place=f"column {name}, row {row}", mend="leave the row out"
+            problem, file=path, place=f"column {name}, row {row}", hint="leave the row out"
         ) from None
     bare = name.lstrip("_").lower()
     if bare == "time":

@@ -106,8 +106,8 @@ class Worker:
     def _damaged(self, why: str) -> InputError:
         self._is_lost = self._is_lost or why == _ENDED
         said = " ".join(why.split())[:100]
-        mend = "copy or record it again"
-        return InputError(f"is a damaged {self._kind}, or none ({said})", file=self._path, mend=mend)
+        hint = "copy or record it again"
+        return InputError(f"is a damaged {self._kind}, or none ({said})", file=self._path, hint=hint)
 
 
 def _started(module: str) -> subprocess.Popen[bytes]:

@@ -82,7 +82,7 @@ def _prepared(blocks: Blocks, names: Sequence[str]) -> tuple[Array, Model, NDArr
     """Signals of the blocks that tell any (NaN: not told), their model, and which blocks these are."""
     for name in names:
         if name not in SIGNALS:
-            raise InputError(f"there is no signal {name!r}", mend=f"take of {', '.join(SIGNALS)}")
+            raise InputError(f"there is no signal {name!r}", hint=f"take of {', '.join(SIGNALS)}")
     every = signals_of(blocks, tuple(names))
     told = np.asarray(np.isfinite(every).any(axis=1))
     signals, usual = every[told], Model.of(names).weight
@@ -147,7 +147,7 @@ def _pelt(cost: _Cost, price: float) -> list[int]:
     except ImportError:
         raise InputError(
             "finding changes of a whole drive needs ruptures",
-            mend="install it with pip install 'terragrip[ground]'",
+            hint="install it with pip install 'terragrip[ground]'",
         ) from None
     search = Pelt(min_size=LEAST, jump=_JUMP)
     search.cost = cost

@@ -142,9 +142,9 @@ class LiveGround:
                 found._filter.travelled = state["travelled"]
                 found._changes.restore(state["changes"])
         except (ValueError, KeyError, TypeError, IndexError) as error:
-            raise InputError(f"the snapshot of the ground is damaged ({error})", mend="start anew") from None
+            raise InputError(f"the snapshot of the ground is damaged ({error})", hint="start anew") from None
         if not same:
             raise InputError(
-                "the snapshot of the ground is of another version, vehicle or library", mend="start anew"
+                "the snapshot of the ground is of another version, vehicle or library", hint="start anew"
             )
         return found

@@ -1,4 +1,4 @@
-"""What is known of the ground of one drive, and ground.json (DESIGN 3)."""
+"""What is known of the ground of one drive, and ground.json (architecture.md, contracts)."""
 
 from __future__ import annotations
 
@@ -128,7 +128,7 @@ def read(path: str | os.PathLike[str]) -> tuple[Ground, ...]:
         return tuple(_ground(one, data) for one in data["runs"])
     except (KeyError, TypeError, ValueError, AttributeError) as error:
         raise InputError(
-            f"is damaged ({error})", file=file, mend="write it anew with 'terragrip ground'"
+            f"is damaged ({error})", file=file, hint="write it anew with 'terragrip ground'"
         ) from None
 
 

@@ -1,4 +1,4 @@
-"""Sections of a drive: stretches in which vehicle and tool are on one soil, and what slip and adhesion were there (PHYSICS 7).
+"""Sections of a drive: stretches in which vehicle and tool are on one soil, and what slip and adhesion were there (physics.md 7).
 
 A section counts from where the tool has followed the vehicle onto the soil to where the vehicle leaves it.
 """

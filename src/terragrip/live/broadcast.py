@@ -53,7 +53,7 @@ class Broadcast:
         uri = Uri.parse(f"studio://127.0.0.1{request}", {"studio": OPTIONS}, "sink")
         binary = uri.options.get("format", "json") == "binary"
         if uri.options.get("format", "json") not in ("json", "binary"):
-            raise InputError(f"has no format {uri.options['format']!r}", place=request, mend="json or binary")
+            raise InputError(f"has no format {uri.options['format']!r}", place=request, hint="json or binary")
         client = Outbox(uri)
         every = list(self.columns)
         columns = every if client.columns is None else [n for n in every if client.columns.wants(n)]

@@ -21,16 +21,16 @@ def check(uri: Uri) -> str:
     _python_can()
     interface = uri.options.get("interface", "socketcan")
     if not uri.path:
-        raise InputError("names no channel", place=uri.text, mend="write can:can0")
+        raise InputError("names no channel", place=uri.text, hint="write can:can0")
     if interface not in INTERFACES:
         raise InputError(
-            f"there is no interface {interface!r}", place=uri.text, mend=f"one of {', '.join(INTERFACES)}"
+            f"there is no interface {interface!r}", place=uri.text, hint=f"one of {', '.join(INTERFACES)}"
         )
     if interface == "udp_multicast" and find_spec("msgpack") is None:
         raise InputError(
             "udp_multicast needs the Python package 'msgpack'",
             place=uri.text,
-            mend="pip install 'terragrip[live]'",
+            hint="pip install 'terragrip[live]'",
         )
     return interface
 

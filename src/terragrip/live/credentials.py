@@ -47,10 +47,10 @@ def _from_file(path: Path) -> dict[str, str]:
         text = path.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as error:
         why = getattr(error, "strerror", None) or "is no text"
-        raise InputError(f"cannot be read ({why})", file=path, place=FILE, mend="check the path") from error
+        raise InputError(f"cannot be read ({why})", file=path, place=FILE, hint="check the path") from error
     if stat.S_IMODE(mode) & 0o077:
         raise InputError(
-            f"others may read it (mode {stat.S_IMODE(mode):04o})", file=path, place=FILE, mend="chmod 600"
+            f"others may read it (mode {stat.S_IMODE(mode):04o})", file=path, place=FILE, hint="chmod 600"
         )
     result: dict[str, str] = {}
     for number, line in enumerate(text.splitlines(), 1):
@@ -60,7 +60,7 @@ def _from_file(path: Path) -> dict[str, str]:
         if not colon or key.strip() not in _KEYS:
             raise InputError(
                 "is neither username, password nor token", file=path, place=f"line {number}",
-                mend="write 'username: …'",
+                hint="write 'username: …'",
             )  # fmt: skip
         result[key.strip()] = value.strip()
     return result

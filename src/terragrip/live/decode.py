@@ -240,7 +240,7 @@ def _refuse_looking_ahead(name: str, source: Source) -> None:
         raise InputError(
             "derivative_of looks ahead, which live samples cannot",
             place=f"channels.{name}",
-            mend="give a source of the speed itself",
+            hint="give a source of the speed itself",
         )
 
 
@@ -257,5 +257,5 @@ def check_channels(profile: Profile, vehicle: Vehicle) -> None:
         raise InputError(
             f"the profile gives no {lacking[0]}",
             place="--profile",
-            mend="live estimates need the ground speed and each wheel's speed; without torques wheel_based_speed does as well",
+            hint="live estimates need the ground speed and each wheel's speed; without torques wheel_based_speed does as well",
         )

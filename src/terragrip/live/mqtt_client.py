@@ -20,12 +20,12 @@ def check(uri: Uri) -> Credentials:
     import aiomqtt  # noqa: F401  # so that a missing package is said at once
 
     if not uri.host or not uri.path.strip("/"):
-        raise InputError("names no broker and topic", place=uri.text, mend="write mqtt://127.0.0.1/machine/+")
+        raise InputError("names no broker and topic", place=uri.text, hint="write mqtt://127.0.0.1/machine/+")
     credentials = Credentials.find()
     if uri.scheme == "mqtts":
         _tls(uri)
     elif credentials.password and not uri.is_loopback():
-        raise InputError("the password would travel openly", place=uri.text, mend="use mqtts:")
+        raise InputError("the password would travel openly", place=uri.text, hint="use mqtts:")
     return credentials
 
 
@@ -55,7 +55,7 @@ def _tls(uri: Uri) -> ssl.SSLContext:
     except (OSError, ssl.SSLError) as error:
         raise InputError(
             f"the CA cannot be read ({error.strerror or error})", file=uri.options.get("ca"), place=uri.text,
-            mend="name a PEM file",
+            hint="name a PEM file",
         ) from error  # fmt: skip
 
 
@@ -63,5 +63,5 @@ def quality(uri: Uri) -> int:
     """The quality of service asked for; raises InputError unless it is 0, 1 or 2."""
     text = uri.options.get("qos", "0")
     if text not in ("0", "1", "2"):
-        raise InputError(f"qos is {text!r}", place=uri.text, mend="give 0, 1 or 2")
+        raise InputError(f"qos is {text!r}", place=uri.text, hint="give 0, 1 or 2")
     return int(text)

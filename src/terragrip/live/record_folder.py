@@ -39,7 +39,7 @@ def read_record(folder: str | os.PathLike[str]) -> tuple[Recording, Estimates]:
     number = last_snapshot(place) if place.is_dir() else None
     if number is None:
         raise InputError(
-            "holds no record", file=folder, mend="name a folder that terragrip live --record made"
+            "holds no record", file=folder, hint="name a folder that terragrip live --record made"
         )
     core = load_snapshot(place, number)
     tables: dict[str, list[Any]] = {RECORDING: [], ESTIMATES: []}
@@ -51,7 +51,7 @@ def read_record(folder: str | os.PathLike[str]) -> tuple[Recording, Estimates]:
             tables[RECORDING].append(segment.to_recording())
             tables[ESTIMATES].append(segment.to_estimates(core.estimator).to_arrow())
     if not tables[RECORDING]:
-        raise InputError("the record holds no row yet", file=folder, mend="record some samples first")
+        raise InputError("the record holds no row yet", file=folder, hint="record some samples first")
     rows = pa.concat_tables(tables[RECORDING], promote_options="default")
     metadata = tables[ESTIMATES][-1].schema.metadata
     estimates = pa.concat_tables(tables[ESTIMATES], promote_options="default").replace_schema_metadata(
@@ -94,7 +94,7 @@ def locked(folder: Path) -> int:
     except OSError as error:
         os.close(file)
         raise InputError(
-            "is in use by another terragrip live", file=folder, place="--record", mend="choose another folder"
+            "is in use by another terragrip live", file=folder, place="--record", hint="choose another folder"
         ) from error
     return file
 
@@ -105,7 +105,7 @@ def refuse_other(folder: Path, kept: Core, wanted: Core) -> None:
         if before[name] != now[name]:
             raise InputError(
                 f"the record was made with {name} {before[name]}, not {now[name]}",
-                file=folder, place="--record", mend="give the same, or choose another folder",
+                file=folder, place="--record", hint="give the same, or choose another folder",
             )  # fmt: skip
     soils = [None if one is None else one.to_dict() for one in (kept.library, wanted.library)]
     for what, same in (
@@ -116,7 +116,7 @@ def refuse_other(folder: Path, kept: Core, wanted: Core) -> None:
             continue
         raise InputError(
             f"the record was made with another {what}", file=folder, place="--record",
-            mend="give the same, or choose another folder",
+            hint="give the same, or choose another folder",
         )  # fmt: skip
 
 
@@ -166,5 +166,5 @@ def load_snapshot(folder: Path, number: int) -> Core:
     raise InputError(
         "is damaged, or of another version of Terragrip",
         file=path,
-        mend="begin a new record in another folder",
+        hint="begin a new record in another folder",
     )

@@ -31,7 +31,7 @@ def domain_of(uri: Uri) -> int:
     """The ROS domain; raises InputError if it is none."""
     text = uri.options.get("domain", "0")
     if not text.isdigit() or int(text) > 232:
-        raise InputError(f"domain is {text!r}", place=uri.text, mend="give a number from 0 to 232")
+        raise InputError(f"domain is {text!r}", place=uri.text, hint="give a number from 0 to 232")
     return int(text)
 
 

@@ -76,7 +76,7 @@ class Service:
         method_named(method)
         if not sources:
             raise InputError(
-                "there is no source", place="--source", mend="name one, e.g. udp://127.0.0.1:9870"
+                "there is no source", place="--source", hint="name one, e.g. udp://127.0.0.1:9870"
             )
         decoders = [Decoder(profile) for _ in sources]
         opened = [open_source(text, decoder) for text, decoder in zip(sources, decoders, strict=True)]
@@ -102,7 +102,7 @@ class Service:
         if settings.ground and core.estimator is not None and core.estimator.rims:
             raise InputError(
                 "ground changes show in adhesion and soil resistance, which need drive torques",
-                place="--ground", mend="leave it out: the sources give speeds alone",
+                place="--ground", hint="leave it out: the sources give speeds alone",
             )  # fmt: skip
         self.sinks = [open_sink(text, vehicle, core.columns) for text in sinks]
         self.inbox = Inbox(capacity)
@@ -175,7 +175,7 @@ class Service:
             gc.unfreeze()
         if self.pipeline.failure:
             raise InputError(
-                self.pipeline.failure, place="--record", mend="free space or choose another folder"
+                self.pipeline.failure, place="--record", hint="free space or choose another folder"
             )
 
     async def _until_all_is_estimated(self, sources: Sequence[asyncio.Task[None]]) -> None:

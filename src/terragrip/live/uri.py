@@ -33,18 +33,18 @@ class Uri:
             port = parts.port
         except ValueError as error:
             raise InputError(
-                f"{head}:… is no URI ({error})", place=f"--{role}", mend="write host:port"
+                f"{head}:… is no URI ({error})", place=f"--{role}", hint="write host:port"
             ) from error
         if parts.username or parts.password:
             raise InputError(
                 f"credentials do not belong on the command line ({scheme}://…@{parts.hostname})", place=f"--{role}",
-                mend="set TERRAGRIP_USERNAME and TERRAGRIP_PASSWORD, or TERRAGRIP_CREDENTIALS=FILE of mode 0600",
+                hint="set TERRAGRIP_USERNAME and TERRAGRIP_PASSWORD, or TERRAGRIP_CREDENTIALS=FILE of mode 0600",
             )  # fmt: skip
         if not colon or scheme not in schemes:
             near = nearest(scheme, schemes)
-            mend = f"did you mean {near}:?" if near else f"give one of {', '.join(f'{s}:' for s in schemes)}"
+            hint = f"did you mean {near}:?" if near else f"give one of {', '.join(f'{s}:' for s in schemes)}"
             raise InputError(
-                f"{head[:20]!r} names no {role} that Terragrip knows", place=f"--{role}", mend=mend
+                f"{head[:20]!r} names no {role} that Terragrip knows", place=f"--{role}", hint=hint
             )
         # The fragment sign is a wild card of MQTT, not the beginning of a fragment.
         rest = text[len(head) + 1 :]
@@ -56,8 +56,8 @@ class Uri:
             if name not in schemes[scheme]:
                 near = nearest(name, schemes[scheme])
                 known = ", ".join(sorted(schemes[scheme])) or "none"
-                mend = f"did you mean {near}?" if near else f"its options are: {known}"
-                raise InputError(f"{scheme}: has no option {name!r}", place=f"--{role} {text}", mend=mend)
+                hint = f"did you mean {near}?" if near else f"its options are: {known}"
+                raise InputError(f"{scheme}: has no option {name!r}", place=f"--{role} {text}", hint=hint)
         return cls(text, scheme, parts.hostname or "", port, unquote(path), options)
 
     @property
@@ -75,7 +75,7 @@ class Uri:
         except ValueError:
             value = 0.0
         if not 0.0 < value < float("inf"):
-            raise InputError(f"{option} is {text!r}", place=self.text, mend="give a positive number")
+            raise InputError(f"{option} is {text!r}", place=self.text, hint="give a positive number")
         return value
 
     def is_loopback(self) -> bool:

@@ -35,11 +35,11 @@ def config(uri: Uri) -> Any:
             raise InputError(
                 f"anyone could connect to {end}",
                 place=uri.text,
-                mend="listen on tcp/127.0.0.1:7447, or connect to a router",
+                hint="listen on tcp/127.0.0.1:7447, or connect to a router",
             )
     scout = uri.options.get("scout", "0")
     if scout not in ("0", "1"):
-        raise InputError(f"scout is {scout!r}", place=uri.text, mend="give 0 or 1")
+        raise InputError(f"scout is {scout!r}", place=uri.text, hint="give 0 or 1")
     try:
         result.insert_json5("mode", '"peer"')
         result.insert_json5("scouting/multicast/enabled", "true" if scout == "1" else "false")
@@ -50,7 +50,7 @@ def config(uri: Uri) -> Any:
             result.insert_json5("connect/exit_on_failure", "true")
     except zenoh.ZError as error:
         raise InputError(
-            "names no endpoint", place=uri.text, mend="write connect=tcp/127.0.0.1:7447"
+            "names no endpoint", place=uri.text, hint="write connect=tcp/127.0.0.1:7447"
         ) from error
     return result
 
@@ -63,5 +63,5 @@ def key_of(uri: Uri, where: str) -> str:
         return str(zenoh.KeyExpr(uri.path.strip("/")))
     except zenoh.ZError as error:
         raise InputError(
-            f"{uri.path!r} is no key expression", place=uri.text, mend=f"write zenoh:{where}"
+            f"{uri.path!r} is no key expression", place=uri.text, hint=f"write zenoh:{where}"
         ) from error

@@ -1,4 +1,4 @@
-"""Adhesion-slip curves mu(s): the models of PHYSICS 5 as small records (name, parameters, value, slope, peak).
+"""Adhesion-slip curves mu(s): the models of physics.md 5 as small records (name, parameters, value, slope, peak).
 
 Every curve is odd in slip: value(-s) = -value(s). Printed forms hold for s >= 0 only (the paper's eq. 8 gives mu(-0.5) = -199).
 A net-traction sensor sees kappa = mu - rho: pass `intercept` = -rho.
@@ -190,7 +190,7 @@ def wismer_luth_resistance(wheel_numeric: ArrayLike) -> Array:
 
 
 def effective_parameters(parameters: Mapping[str, Any]) -> dict[str, Any]:
-    """What the data can tell of the paper's four parameters: A = a(1-p), k = -alpha_2, d = a p alpha_1 (PHYSICS 5).
+    """What the data can tell of the paper's four parameters: A = a(1-p), k = -alpha_2, d = a p alpha_1 (physics.md 5).
 
     mu ~ A(1 - e^{-k s}) - d s, with p e^{alpha_1 s} ~ p(1 + alpha_1 s).
     """
@@ -234,7 +234,7 @@ CURVES: Mapping[str, CurveModel] = MappingProxyType(
                     Parameter("d", "1", -2.0, 3.0, 0.0, "fall with slip"),
                 ),
                 *_effective,
-                "identifiable form of eq. 8 (PHYSICS 5)",
+                "identifiable form of eq. 8 (physics.md 5)",
             ),
             CurveModel(
                 "burckhardt",

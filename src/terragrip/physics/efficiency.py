@@ -26,7 +26,7 @@ def gross_traction(adhesion: ArrayLike, tire_resistance: ArrayLike) -> NDArray[A
 
 def motion_resistance(soil_resistance: ArrayLike, tire_resistance: ArrayLike) -> NDArray[Any]:
     """Motion resistance ratio ρ = ρ_s + ρ_t (ASABE S296), the unindexed ρ of paper eq. 7 as read here
-    (PHYSICS §2).
+    (physics.md 2).
 
     Dimensionless, broadcast shape.
     """

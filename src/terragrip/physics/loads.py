@@ -1,4 +1,4 @@
-"""Vertical loads of axles and wheels from plain mechanics (PHYSICS §3).
+"""Vertical loads of axles and wheels from plain mechanics (physics.md 3).
 
 The paper takes the front load as an input whose source is not public. A measured axle load, where there is
 one, replaces these formulas.
@@ -29,7 +29,7 @@ def axle_loads(
     spin_torque: ArrayLike = 0.0,
     gravity: float = GRAVITY,
 ) -> NDArray[Any]:
-    """Vertical load of each axle, N, along the normal of the ground (PHYSICS §3).
+    """Vertical load of each axle, N, along the normal of the ground (physics.md 3).
 
     Two axles, moments about the rear contact, L the wheelbase, l_r from there to the centre of gravity::
 
@@ -97,7 +97,7 @@ def lateral_shares(
     track: float,
     gravity: float = GRAVITY,
 ) -> NDArray[Any]:
-    """Each wheel's share of its axle's load, left to right: 1/2 ∓ (a_y/g) h/track (PHYSICS §3).
+    """Each wheel's share of its axle's load, left to right: 1/2 ∓ (a_y/g) h/track (physics.md 3).
 
     Parameters
     ----------

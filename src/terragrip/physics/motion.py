@@ -1,4 +1,4 @@
-"""Longitudinal motion of wheels and vehicle (paper eq. 2 and 3, PHYSICS §1), any number of wheels.
+"""Longitudinal motion of wheels and vehicle (paper eq. 2 and 3, physics.md 1), any number of wheels.
 
 Wheels are the last axis of ``wheel_speed``, ``torque``, ``adhesion`` and ``load``; all other axes broadcast.
 """
@@ -66,7 +66,7 @@ def specific_force(
     gravity: ArrayLike,
 ) -> NDArray[Any]:
     """What an accelerometer along the vehicle reads: a_x = (Σ μ_i F_zi - F_dx)/m - ρ_s g cosθ, m/s²
-    (PHYSICS §1).
+    (physics.md 1).
 
     It is dv/dt + g sinθ, so it does not see the slope but through cosθ. Arguments and shape as in
     :func:`ground_acceleration`; a bias of the sensor is not in it.
@@ -87,7 +87,7 @@ def algebraic_adhesion(
     tire_resistance: ArrayLike,
     bearing_resistance: ArrayLike,
 ) -> NDArray[Any]:
-    """μ_i = (M_i - J_i dω_i/dt - r ρ_w ω_i)/(r F_zi) - ρ_t: eq. 2 solved for the adhesion (PHYSICS §1).
+    """μ_i = (M_i - J_i dω_i/dt - r ρ_w ω_i)/(r F_zi) - ρ_t: eq. 2 solved for the adhesion (physics.md 1).
 
     wheel_acceleration dω/dt in rad/s²; the others as in :func:`wheel_acceleration`. Returns (..., wheels).
     """
@@ -107,8 +107,7 @@ def algebraic_soil_resistance(
     mass: ArrayLike,
     gravity: ArrayLike,
 ) -> NDArray[Any]:
-    """ρ_s = (Σ μ_i F_zi - F_dx - m dv/dt - m g sinθ)/(m g cosθ): eq. 3 solved for the resistance (PHYSICS
-    §1).
+    """ρ_s = (Σ μ_i F_zi - F_dx - m dv/dt - m g sinθ)/(m g cosθ): eq. 3 solved for the resistance (physics.md 1).
 
     acceleration dv/dt in m/s², not the specific force; the others as in :func:`ground_acceleration`.
     Returns (...).

@@ -1,4 +1,4 @@
-"""Deflection and radii of a loaded tire (PHYSICS §4).
+"""Deflection and radii of a loaded tire (physics.md 4).
 
 The paper's own formula ("Guskov p. 40") is not public.
 """

@@ -1,4 +1,4 @@
-"""What makes a table unusable, said with column, row and mend."""
+"""What makes a table unusable, said with column, row and hint."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def place(column: str, row: int, time: Floats | None = None, *, first_row: int =
 def require_columns(columns: Collection[str], source: str | None) -> None:
     """Raise InputError unless time, ground_speed and a wheel speed are among the columns."""
     if not columns:
-        raise InputError("there are no columns", file=source, mend="give a table with a header")
+        raise InputError("there are no columns", file=source, hint="give a table with a header")
     wheels = "wheel_based_speed" in columns or any(
         c.startswith("wheel_speed_") and len(c) > len("wheel_speed_") for c in columns
     )
@@ -34,12 +34,12 @@ def require_columns(columns: Collection[str], source: str | None) -> None:
     if not missing:
         return
     near = {name: nearest(name.replace("_<wheel>", ""), columns) for name in missing}
-    # The name with a likely cousin in the table is the one to mend first.
+    # The name with a likely cousin in the table is the one to hint first.
     name = next((n for n in missing if near[n]), missing[0])
-    mend = f"the nearest column is {near[name]!r}: rename it, or map it in a profile"
+    hint = f"the nearest column is {near[name]!r}: rename it, or map it in a profile"
     if near[name] is None:
-        mend = "map the log's columns in a profile ('terragrip inspect' proposes one)"
-    raise InputError("is missing", file=source, place=f"column {name}", mend=mend)
+        hint = "map the log's columns in a profile ('terragrip inspect' proposes one)"
+    raise InputError("is missing", file=source, place=f"column {name}", hint=hint)
 
 
 def remarks(columns: Collection[str]) -> list[str]:
@@ -60,7 +60,7 @@ def check_time(time: Floats, source: str | None, *, first_row: int = 0, after: f
     A block of a longer table says how many rows stand before it, and the time of the last of them.
     """
     if len(time) == 0:
-        raise InputError("the table is empty", file=source, mend="give a log with at least one row")
+        raise InputError("the table is empty", file=source, hint="give a log with at least one row")
     before = time[0] - 1.0 if after is None else after
     with np.errstate(invalid="ignore"):
         forward = np.diff(time, prepend=before) > 0
@@ -70,15 +70,15 @@ def check_time(time: Floats, source: str | None, *, first_row: int = 0, after: f
     if len(unknown):
         where = place(TIME, unknown[0], first_row=first_row)
         raise InputError(
-            "time is not a finite number", file=source, place=where, mend="drop the row, or mend it"
+            "time is not a finite number", file=source, place=where, hint="drop the row, or hint it"
         )
     row = int(np.argmin(forward))
     last = before if row == 0 else time[row - 1]
     if time[row] == last:
-        problem, mend = "time repeats", "keep one row an instant"
+        problem, hint = "time repeats", "keep one row an instant"
     else:
-        problem, mend = f"time runs back from {last:.10g} s", "sort the rows, or split the log there"
-    raise InputError(problem, file=source, place=place(TIME, row, time, first_row=first_row), mend=mend)
+        problem, hint = f"time runs back from {last:.10g} s", "sort the rows, or split the log there"
+    raise InputError(problem, file=source, place=place(TIME, row, time, first_row=first_row), hint=hint)
 
 
 def refuse_infinite(
@@ -90,11 +90,11 @@ def refuse_infinite(
     infinite = np.flatnonzero(np.isinf(values))
     if len(infinite):
         where = place(name, infinite[0], time, first_row=first_row)
-        raise InputError("is infinite", file=source, place=where, mend="leave the cell empty instead")
+        raise InputError("is infinite", file=source, place=where, hint="leave the cell empty instead")
 
 
 def refuse_empty(name: str, source: str | None) -> None:
     """Raise InputError where a channel that holds no value at all is one that estimates rest on."""
     if name.startswith(_ESSENTIAL):
-        mend = "fill it, or leave the column out"
-        raise InputError("holds no value", file=source, place=f"column {name}", mend=mend)
+        hint = "fill it, or leave the column out"
+        raise InputError("holds no value", file=source, place=f"column {name}", hint=hint)

@@ -34,16 +34,16 @@ def columns_of(frame: Any, source: str | None) -> dict[str, npt.NDArray[Any]]:
         raise InputError(
             f"{type(frame).__name__} is not a table",
             file=source,
-            mend="give a DataFrame or a dict of arrays",
+            hint="give a DataFrame or a dict of arrays",
         )
     columns: dict[str, npt.NDArray[Any]] = {}
     for name, values in pairs:
         if str(name) in columns:
-            raise InputError("stands twice", file=source, place=f"column {name}", mend="keep one of them")
+            raise InputError("stands twice", file=source, place=f"column {name}", hint="keep one of them")
         column = _array(str(name), values, source)
         if columns and len(column) != len(next(iter(columns.values()))):
             problem = f"has {len(column)} rows, the first column {len(next(iter(columns.values())))}"
-            raise InputError(problem, file=source, place=f"column {name}", mend="give columns of one length")
+            raise InputError(problem, file=source, place=f"column {name}", hint="give columns of one length")
         columns[str(name)] = column
     return columns
 
@@ -52,7 +52,7 @@ def numbers(name: str, column: npt.NDArray[Any], time: Floats | None, source: st
     """A column as float64, missing = NaN; raises InputError at the first cell that is no number."""
     if time is not None and len(column) != len(time):
         problem = f"has {len(column)} rows, time has {len(time)}"
-        raise InputError(problem, file=source, place=f"column {name}", mend="give one value an instant")
+        raise InputError(problem, file=source, place=f"column {name}", hint="give one value an instant")
     if column.dtype.kind in "fiub":
         return column.astype(np.float64, copy=False)
     if column.dtype.kind in "OUST":
@@ -64,7 +64,7 @@ def numbers(name: str, column: npt.NDArray[Any], time: Floats | None, source: st
         f"holds {column.dtype}, not numbers",
         file=source,
         place=f"column {name}",
-        mend="give plain numbers in SI",
+        hint="give plain numbers in SI",
     )
 
 
@@ -83,7 +83,7 @@ def texts(name: str, column: npt.NDArray[Any], rows: int, source: str | None) ->
     """A label column as text (n,), empty where there is none; equal labels share one string."""
     if len(column) != rows:
         problem = f"has {len(column)} rows, time has {rows}"
-        raise InputError(problem, file=source, place=f"column {name}", mend="give one label an instant")
+        raise InputError(problem, file=source, place=f"column {name}", hint="give one label an instant")
     if column.dtype.kind == "f" and np.isnan(column).all():
         return np.full(rows, "", dtype=object)
     try:
@@ -98,7 +98,7 @@ def texts(name: str, column: npt.NDArray[Any], rows: int, source: str | None) ->
             found[k] = shared.setdefault(label, _label(label))
         except TypeError:  # an unhashable cell
             problem, where = f"holds a {type(label).__name__}", place(name, int(starts[k]))
-            raise InputError(problem, file=source, place=where, mend="give text labels") from None
+            raise InputError(problem, file=source, place=where, hint="give text labels") from None
     return np.repeat(found, np.diff(np.r_[starts, rows]))
 
 
@@ -123,11 +123,11 @@ def _array(name: str, values: Any, source: str | None) -> npt.NDArray[Any]:
             f"is not a column ({error})",
             file=source,
             place=f"column {name}",
-            mend="give a 1-D array of numbers",
+            hint="give a 1-D array of numbers",
         ) from error
     if array.ndim != 1:
         problem = f"has {array.ndim} dimensions"
-        raise InputError(problem, file=source, place=f"column {name}", mend="give a 1-D array of numbers")
+        raise InputError(problem, file=source, place=f"column {name}", hint="give a 1-D array of numbers")
     return array
 
 
@@ -146,6 +146,6 @@ def _cell_by_cell(name: str, column: npt.NDArray[Any], time: Floats | None, sour
                 f"{text} is not a number",
                 file=source,
                 place=place(name, row, time),
-                mend="give numbers in SI",
+                hint="give numbers in SI",
             ) from None
     return found

@@ -1,4 +1,4 @@
-"""The columns of a recording (DESIGN §3): their names and their units."""
+"""The columns of a recording (architecture.md, contracts): their names and their units."""
 
 from __future__ import annotations
 

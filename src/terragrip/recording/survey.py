@@ -84,7 +84,7 @@ def survey_of(log: LogBlocks, progress: Progress | None = None) -> Survey:
         if progress is not None:
             progress(rows)
     if last is None:
-        raise InputError("there is no row to estimate", mend="give a log with at least one row")
+        raise InputError("there is no row to estimate", hint="give a log with at least one row")
     if len(last) == rows:  # one block: its rows need not be put together
         sample = last.select(sampled_rows(rows))
     else:

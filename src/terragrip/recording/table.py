@@ -24,7 +24,7 @@ Floats = npt.NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class Recording:
-    """Measured channels on one time base (columns and units: DESIGN §3).
+    """Measured channels on one time base (columns and units: architecture.md, contracts).
 
     ``time`` (n,) [s] runs forward; ``channels`` hold float64 (n,) by name, NaN = not measured at that
     instant; ``labels`` hold text (n,), empty = unlabelled; ``notes`` are plain sentences for the user;
@@ -138,20 +138,20 @@ class Recording:
                 raise self._unfit(name, f"the vehicle has no wheel {owner}", f"its wheels are {known}")
         for wheel, driven in zip(vehicle.wheels, vehicle.driven, strict=True):
             if wheel not in self.wheels:
-                mend = (
+                hint = (
                     f"the log has wheel speeds for {', '.join(self.wheels)}; the vehicle has wheels {known}"
                 )
-                raise self._unfit(f"wheel_speed_{wheel}", "is missing", mend)
+                raise self._unfit(f"wheel_speed_{wheel}", "is missing", hint)
             if driven and f"drive_torque_{wheel}" not in self.channels:
-                mend = "add it, or say 'driven: false' for its axle in the vehicle file"
+                hint = "add it, or say 'driven: false' for its axle in the vehicle file"
                 raise self._unfit(
-                    f"drive_torque_{wheel}", f"is missing, but the wheel {wheel} is driven", mend
+                    f"drive_torque_{wheel}", f"is missing, but the wheel {wheel} is driven", hint
                 )
         towing = "drawbar_force" in self.channels and len(vehicle.axles) > 1
         if towing and "hitch_height" not in vehicle.model_fields_set:
-            mend = "add e.g. 'hitch_height: 0.25 m' to the vehicle file"
+            hint = "add e.g. 'hitch_height: 0.25 m' to the vehicle file"
             problem = "the pull moves load between the axles, but the vehicle has no hitch_height"
-            raise self._unfit("drawbar_force", problem, mend)
+            raise self._unfit("drawbar_force", problem, hint)
 
-    def _unfit(self, column: str, problem: str, mend: str) -> InputError:
-        return InputError(problem, file=self.source, place=f"column {column}", mend=mend)
+    def _unfit(self, column: str, problem: str, hint: str) -> InputError:
+        return InputError(problem, file=self.source, place=f"column {column}", hint=hint)

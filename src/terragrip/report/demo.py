@@ -84,7 +84,7 @@ def run_demo(
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         problem = f"folder cannot be made ({error.strerror})"
-        raise InputError(problem, file=folder, mend="choose another folder") from error
+        raise InputError(problem, file=folder, hint="choose another folder") from error
     campaign = estimate_campaign(folder, seed, workers, progress, runs)
     campaign.vehicle.save(output / "vehicle.yaml")
     seconds = time.monotonic() - begin

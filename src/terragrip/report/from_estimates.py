@@ -74,7 +74,7 @@ def report_of(
         raise InputError(
             "no row of these estimates moves",
             file=paths[0],
-            mend="give estimates of a drive, not of a standstill",
+            hint="give estimates of a drive, not of a standstill",
         )
     main, together = shown[0], sorted(shown, key=lambda run: run.name)
     comparisons: list[Comparison] = [c for run in together for c in compare(run)]
@@ -122,7 +122,7 @@ def _read(
     for number_, path in enumerate(paths, 1):
         estimates = Estimates.read(path)
         if len(estimates) < 2:
-            raise InputError("holds fewer than two rows", file=path, mend="leave it out")
+            raise InputError("holds fewer than two rows", file=path, hint="leave it out")
         if estimates.has_adhesion:
             gathered.add(estimates, path.stem, file=str(path))
         own[path.stem] = [event.to_dict() for event in events(estimates)]

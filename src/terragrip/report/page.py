@@ -81,7 +81,7 @@ def render(page: Page, print_css: str = "") -> str:
     try:
         import jinja2
     except ImportError:
-        raise InputError("Jinja2 is not installed", mend="pip install 'terragrip[report]'") from None
+        raise InputError("Jinja2 is not installed", hint="pip install 'terragrip[report]'") from None
     environment = jinja2.Environment(
         loader=jinja2.PackageLoader("terragrip.report"),
         autoescape=True,
@@ -116,7 +116,7 @@ def write_whole(path: Path, text: str) -> None:
         path.parent.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise InputError(
-            f"folder cannot be made ({error.strerror})", file=path.parent, mend="choose another folder"
+            f"folder cannot be made ({error.strerror})", file=path.parent, hint="choose another folder"
         ) from error
     with replacing(path) as temporary:
         temporary.write_text(text, encoding="utf-8")
@@ -145,4 +145,4 @@ def require_drawing() -> None:
 
     missing = [name for name in ("matplotlib", "jinja2") if find_spec(name) is None]
     if missing:
-        raise InputError(f"{missing[0]} is not installed", mend="pip install 'terragrip[report]'")
+        raise InputError(f"{missing[0]} is not installed", hint="pip install 'terragrip[report]'")

@@ -33,7 +33,7 @@ def write_pdf(page: Page, path: Path) -> Path:
     try:
         import plutoprint
     except ImportError:
-        raise InputError("plutoprint is not installed, so there is no PDF", mend=EXTRA) from None
+        raise InputError("plutoprint is not installed, so there is no PDF", hint=EXTRA) from None
     html = render(page, print_css=_faces() + f'body, figure svg text {{ font-family: "{_FONT}"; }}')
     book = plutoprint.Book(plutoprint.PAGE_SIZE_A4, media=plutoprint.MEDIA_TYPE_PRINT)
     book.set_metadata(plutoprint.PDF_METADATA_TITLE, page.title)

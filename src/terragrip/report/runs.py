@@ -44,7 +44,7 @@ of the simulated `multi2` is as long as the 245-255 s that the paper leaves out.
 class Run:
     """One recorded or simulated drive.
 
-    `estimates` is an Estimates table (DESIGN §3). `truth`, of a simulation, and `recording`, what was
+    `estimates` is an Estimates table (architecture.md, contracts). `truth`, of a simulation, and `recording`, what was
     measured, have the same rows; `vehicle` is the one that was estimated with. `events`: what the ground room
     found (kind, start, end). Each may be absent.
     """
@@ -113,7 +113,7 @@ class Run:
         """F_x/F_z of the reference sensor (paper eq. 4), (n,), NaN where it has no sample or no load.
 
         The sensor sits on the axle: it reads the net force (no soil resistance in it) over a load without
-        the wheel's weight (PHYSICS §2), so it lies between mu and kappa of the ground.
+        the wheel's weight (physics.md 2), so it lies between mu and kappa of the ground.
         """
         wheel = self.sensor_wheel
         if wheel is None:
@@ -187,7 +187,7 @@ class Run:
     def soil(self) -> NDArray[np.object_]:
         """The soil's label at each row, "" where there is none: a run without labels, or a transition.
 
-        A transition lasts until vehicle and tool are on the same soil (PHYSICS §7): by a simulation's truth, else by the distance
+        A transition lasts until vehicle and tool are on the same soil (physics.md 7): by a simulation's truth, else by the distance
         driven and the vehicle's length.
         """
         for table in (self.estimates, self.recording, self.truth):
@@ -271,7 +271,7 @@ class Run:
 def axle_ratio(
     net_traction: FloatArray, load: FloatArray, specific_force: FloatArray, mass: float
 ) -> FloatArray:
-    """F_x/F_z in the axle of a wheel of `mass` [kg] (n,): (κ F_z - m_w a)/(F_z - m_w g) (PHYSICS §2, paper eq. 1).
+    """F_x/F_z in the axle of a wheel of `mass` [kg] (n,): (κ F_z - m_w a)/(F_z - m_w g) (physics.md 2, paper eq. 1).
 
     `net_traction` κ, `load` F_z [N] and `specific_force` dv/dt + g sinθ [m/s²] are (n,); NaN where the load is the wheel's own.
     """

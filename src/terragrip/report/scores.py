@@ -19,7 +19,7 @@ PAPER_R2_WHOLE, PAPER_R2_WITHOUT_STUCK, PAPER_NRMSE = 0.445, 0.848, 0.09
 
 QUANTITIES = ("net_traction", "adhesion")
 SENSOR_RATIO = "sensor_ratio"
-"""What the sensor reads if estimate or truth is right (PHYSICS §2): kappa over the load without the wheel, less its inertia."""
+"""What the sensor reads if estimate or truth is right (physics.md 2): kappa over the load without the wheel, less its inertia."""
 TRUTH = "the truth itself"
 """Stands in a method's place where the simulated truth is compared with the sensor."""
 PARTS = ("whole", "without_outlier", "without_stuck", "without_flagged")

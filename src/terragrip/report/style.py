@@ -86,7 +86,7 @@ def new_figure(width: float = 9.6, height: float = 3.4) -> Figure:
         from matplotlib import rc_context
         from matplotlib.figure import Figure
     except ImportError:
-        raise InputError("matplotlib is not installed", mend="pip install 'terragrip[report]'") from None
+        raise InputError("matplotlib is not installed", hint="pip install 'terragrip[report]'") from None
     with rc_context(_RC):
         return Figure(figsize=(width, height), layout="constrained")
 

@@ -30,7 +30,7 @@ def simulate_campaign(
     """
     runs = list(set_runs("campaign") if names is None else names)
     if workers < 1:
-        raise InputError(f"{workers} workers", mend="give at least 1")
+        raise InputError(f"{workers} workers", hint="give at least 1")
     scenarios = [Scenario.load(name) for name in runs]
     return _results(runs, scenarios, seed, progress, workers)
 

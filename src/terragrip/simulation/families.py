@@ -1,7 +1,7 @@
 """Families of machines, grounds and sensors, and their split into development and held-out (docs/decisions/0095) (R).
 
 A kind says which decade of mass, which family of adhesion curves and which set of sensors; a seed draws the rest: layout,
-dimensions, ground, work and drive. Everything follows the 139 kg robot of PHYSICS §8 by geometric similarity: with the length
+dimensions, ground, work and drive. Everything follows the 139 kg robot of physics.md 8 by geometric similarity: with the length
 scale L = (mass/139 kg)^(1/3), forces grow as L³, torques as L⁴, inertia as L⁵, speeds (Froude) and times as L^(1/2), each with spread.
 """
 
@@ -125,7 +125,7 @@ def scenario(
 ) -> Scenario:
     """The scenario that :func:`draw` simulates. Raises as it does."""
     if kind not in kinds():
-        raise InputError(f"no such kind {kind}", mend="take one of families.kinds()")
+        raise InputError(f"no such kind {kind}", hint="take one of families.kinds()")
     rng = stream(seed, f"family {kind}")
     machine = draw_machine(rng, MASSES[kind.mass])
     soils, spots = draw_soils(rng, kind.curve, machine)

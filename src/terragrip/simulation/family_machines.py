@@ -1,4 +1,4 @@
-"""Machines drawn at random: layout and dimensions by geometric similarity with the robot of PHYSICS §8 (R)."""
+"""Machines drawn at random: layout and dimensions by geometric similarity with the robot of physics.md 8 (R)."""
 
 from __future__ import annotations
 

@@ -102,7 +102,7 @@ def _saturating(rng: np.random.Generator, machine: Machine) -> tuple[Tree, float
 
 
 def _brixius(rng: np.random.Generator, machine: Machine) -> tuple[Tree, float, float]:
-    """Brixius by cone index, 100 kPa to 3 MPa; of those the mobility numbers 10 to 80 (PHYSICS §5)."""
+    """Brixius by cone index, 100 kPa to 3 MPa; of those the mobility numbers 10 to 80 (physics.md 5)."""
     while True:
         cone_index = float(np.exp(rng.uniform(np.log(1e5), np.log(3e6))))
         load = machine.corner_mass * STANDARD_GRAVITY

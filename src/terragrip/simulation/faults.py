@@ -28,7 +28,7 @@ def apply(faults: tuple[Fault, ...], series: list[Series], duration: float, seed
             raise InputError(
                 f"no channel {fault.channel!r} on board",
                 place=f"faults.{k}.channel",
-                mend=f"did you mean {close!r}?" if close else f"channels are {', '.join(known)}",
+                hint=f"did you mean {close!r}?" if close else f"channels are {', '.join(known)}",
             )
         rng = stream(seed, f"fault {k} {fault.kind}")
         windows = _windows(fault, duration, rng)

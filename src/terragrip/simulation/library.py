@@ -35,7 +35,7 @@ def set_names() -> tuple[str, ...]:
 def set_runs(name: str = "campaign") -> tuple[str, ...]:
     """Names of the runs of a set, in order; raises InputError if there is no such set."""
     if name not in set_names():
-        raise InputError(f"no scenario set {name!r}", mend=f"sets are {', '.join(set_names())}")
+        raise InputError(f"no scenario set {name!r}", hint=f"sets are {', '.join(set_names())}")
     return tuple(_run_name(run) for run in _packaged()[name].data["runs"])
 
 
@@ -46,12 +46,12 @@ def scenario_document(path_or_name: str | os.PathLike[str]) -> Document:
     if found is None:
         if not name.endswith((".yaml", ".yml")) and not Path(name).exists():
             close = nearest(name, scenario_names())
-            mend = (
+            hint = (
                 f"did you mean {close!r}?"
                 if close
                 else "give a file, or a name that `terragrip simulate --list` shows"
             )
-            raise InputError(f"no scenario {name!r}", mend=mend)
+            raise InputError(f"no scenario {name!r}", hint=hint)
         found = read_yaml(path_or_name)
     tree = resolve({"name": Path(name).stem, **found.data}, found.file)
     return Document(tree, found.file, found.lines)
@@ -82,7 +82,7 @@ def _extended(tree: Tree, file: str | None, depth: int) -> Tree:
         close = nearest(str(parent), scenario_names())
         problem = f"no scenario {parent!r}" if found is None else "extends itself"
         raise InputError(
-            problem, file=file, place="extends", mend=f"did you mean {close!r}?" if close else None
+            problem, file=file, place="extends", hint=f"did you mean {close!r}?" if close else None
         )
     inherited = {key: value for key, value in found.data.items() if key not in ("name", "description")}
     return _merged(_extended(inherited, found.file, depth + 1), own)
@@ -106,9 +106,9 @@ def _entry(section: str, value: Any, file: str | None, place: str) -> Any:
     name, entries = str(value["use"]), _library(section)
     if name not in entries:
         close = nearest(name, entries)
-        mend = f"did you mean {close!r}?" if close else f"known are {', '.join(entries)}"
+        hint = f"did you mean {close!r}?" if close else f"known are {', '.join(entries)}"
         raise InputError(
-            f"nothing called {name!r} in the library's {section}", file=file, place=place, mend=mend
+            f"nothing called {name!r} in the library's {section}", file=file, place=place, hint=hint
         )
     return _merged(entries[name], {key: item for key, item in value.items() if key != "use"})
 

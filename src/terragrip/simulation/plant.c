@@ -237,7 +237,7 @@ static void derive(const plant_machine *m, const plant_ground *g, const conduct 
         f->vv += stiff * by_hub * hub_by_v / m->mass;
     }
 
-    /* Axle loads follow dv/dt (PHYSICS 3; more than two axles as a rigid body on equal springs) and rolling resistance follows
+    /* Axle loads follow dv/dt (physics.md 3; more than two axles as a rigid body on equal springs) and rolling resistance follows
      * the loads: one linear equation in dv/dt. The push of an operator acts at the hitch. Rolling resistance takes loads
      * without roughness: a rut forms over the contact. */
     const double hitch = f->bar[0] - c->assist;

@@ -50,7 +50,7 @@ typedef enum {
 } plant_column;
 
 typedef enum {
-    PLANT_AXLE_LOAD = 0, /* N, without roughness (PHYSICS 3) */
+    PLANT_AXLE_LOAD = 0, /* N, without roughness (physics.md 3) */
     PLANT_RESISTANCE,    /* rolling resistance force over that load */
     PLANT_AXLE_COLUMNS
 } plant_axle_column;

@@ -36,7 +36,7 @@ def check_layout(vehicle: Vehicle) -> None:
         raise InputError(
             "only a vehicle of one to four axles, each with one wheel or with a left and a right one, can be simulated",
             place="vehicle",
-            mend="give axles with one or two wheels each, and 'track:' where there are two",
+            hint="give axles with one or two wheels each, and 'track:' where there are two",
         )
 
 
@@ -79,7 +79,7 @@ def _check_step(scenario: Scenario, vehicle: Vehicle) -> None:
                 f"{stiffness:g} N/m with {damping:g} N s/m on {mass:g} kg is too stiff for steps of {scenario.step:g} s",
                 file=scenario.name or None,
                 place=place,
-                mend="use a smaller 'step:', a softer spring or less damping",
+                hint="use a smaller 'step:', a softer spring or less damping",
             )
 
 
@@ -132,7 +132,7 @@ def run(plant: Plant, duration: float, step: float, stride: int) -> Floats:
         raise InputError(
             f"the motion diverges after {rows[0] * stride * step:.3g} s",
             place="step",
-            mend="use a smaller step or softer springs",
+            hint="use a smaller step or softer springs",
         )
     if status != lib.PLANT_OK:
         raise RuntimeError(f"the plant refused its arguments (status {status})")

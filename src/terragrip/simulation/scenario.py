@@ -391,7 +391,7 @@ class Scenario(Part):
     def load(cls, path_or_name: str | os.PathLike[str]) -> Self:
         """Read a scenario of the package by name, or a file (a path, or a name ending in .yaml).
 
-        Raises InputError with the file, the key, its line and the mend.
+        Raises InputError with the file, the key, its line and the fix.
         """
         from terragrip.simulation.library import scenario_document
 

@@ -38,7 +38,7 @@ class Errors:
 
 
 def signals(sensor: str, trace: Trace) -> dict[str, Floats]:
-    """True values (n,) of a sensor's channels, in the recording's units and signs (DESIGN §3)."""
+    """True values (n,) of a sensor's channels, in the recording's units and signs (architecture.md, contracts)."""
     wheels, axles = trace.vehicle.wheels, trace.vehicle.axle_names
     pitch, turn = trace["body_pitch"], trace["curvature"] * trace["speed"]
     if sensor in ("wheel_speed", "drive_torque"):
@@ -121,7 +121,7 @@ def _channels(name: str, sensor: Sensor, source: dict[str, Floats], wheels: tupl
         raise InputError(
             f"no wheel {odd!r}",
             place=f"sensors.{name}.wheels",
-            mend=f"wheels are {', '.join(wheels)}",
+            hint=f"wheels are {', '.join(wheels)}",
         )
     return [c for c in source if keep is None or c.rsplit("_", 1)[1] in keep]
 

@@ -55,7 +55,7 @@ class SimulationResult:
             target.mkdir(parents=True, exist_ok=True)
         except OSError as error:
             raise InputError(
-                f"cannot be made ({error.strerror})", file=target, mend="choose another folder"
+                f"cannot be made ({error.strerror})", file=target, hint="choose another folder"
             ) from error
         with replacing(target / "recording.parquet") as temporary:
             self.recording.to_pandas().to_parquet(temporary, index=False)
@@ -79,7 +79,7 @@ def simulate(
         scenario = Scenario.load(scenario)
     seed = scenario.seed if seed is None else seed
     if min(seed, machine_seed or 0) < 0:
-        raise InputError(f"the seed {min(seed, machine_seed or 0)} is negative", mend="give 0 or more")
+        raise InputError(f"the seed {min(seed, machine_seed or 0)} is negative", hint="give 0 or more")
     machine_seed = seed if machine_seed is None else machine_seed
     vehicle = scenario.nominal_vehicle()
     plant.check_layout(vehicle)
@@ -126,7 +126,7 @@ def one_table(series: list[Series]) -> tuple[Floats, dict[str, Floats]]:
         measured.append(some)
     if not any(some.any() for some in measured):
         raise InputError(
-            "no sensor reads anything", place="faults", mend="leave some samples outside the gaps"
+            "no sensor reads anything", place="faults", hint="leave some samples outside the gaps"
         )
     time = np.unique(np.concatenate([one.time[some] for one, some in zip(series, measured, strict=True)]))
     channels: dict[str, Floats] = {}

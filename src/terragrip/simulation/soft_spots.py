@@ -181,7 +181,7 @@ def _loads(rng: np.random.Generator, length: float, most: float) -> list[list[fl
 def _ground(rng: np.random.Generator, curve: str) -> Tree:
     """A soil: one of the paper's, or a sand whose curve peaks and falls; half of them with clods."""
     if curve not in CURVES:
-        raise InputError(f"no such curve {curve!r}", mend=f"curves are {', '.join(CURVES)}")
+        raise InputError(f"no such curve {curve!r}", hint=f"curves are {', '.join(CURVES)}")
     soil: Tree = dict(library_soil(str(rng.choice(_SOILS))))
     if curve == "peaking":
         c1, c2, c3 = rng.uniform(0.5, 0.75), rng.uniform(10, 25), rng.uniform(0.1, 0.3)

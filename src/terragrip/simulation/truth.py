@@ -27,7 +27,7 @@ PUSH_FORCE = 5.0  # N
 def truth_frame(trace: Trace, whole: Trace) -> pd.DataFrame:
     """The truth at the rows of ``trace``; ``whole`` is the run at its full rate, from which spells are taken.
 
-    Signed quantities are in the direction of travel. ``true_adhesion_<w>`` = F_h/F_z; ``true_soil_resistance`` = rolling
+    Signed quantities are in the direction of travel. ``true_adhesion_<w>`` = F_h/F_z (paper eq. 4); ``true_soil_resistance`` = rolling
     resistance over m g cosθ (paper eq. 3), ``true_soil_resistance_<axle>`` over the axle's load; ``true_slip_<w>`` from
     the wheel's own hub speed and true radius (paper eq. 6, NaN at standstill); ``true_slope`` holds what the local
     gradients under the wheels add. ``stuck``: wheels turn, the machine does not (hysteresis of ``STUCK_SPEED`` and

@@ -122,11 +122,11 @@ def blocks_of(
                 "is missing",
                 file=file,
                 place=f"column {name}",
-                mend="write the estimates anew with terragrip estimate",
+                hint="write the estimates anew with terragrip estimate",
             )
     time = np.asarray(columns["time"], dtype=float)
     if not time.size:
-        raise InputError("holds no row", file=file, mend="estimate a log that is not empty")
+        raise InputError("holds no row", file=file, hint="estimate a log that is not empty")
     distance = np.asarray(columns["distance"], dtype=float)
     if not np.isfinite(distance).all():
         row = int(np.argmin(np.isfinite(distance)))
@@ -134,7 +134,7 @@ def blocks_of(
             f"{distance[row]} is no distance",
             file=file,
             place=f"column distance, row {row}",
-            mend="write the estimates anew with terragrip estimate",
+            hint="write the estimates anew with terragrip estimate",
         )
     first = float(time[0]) if origin is None else origin
     count = np.floor((time - first) / PERIOD + 1e-9).astype(np.int64)
@@ -210,7 +210,7 @@ def estimates_blocks(
         raise InputError(
             "holds slip but no adhesion: the ground is told by adhesion and soil resistance, which need drive torques",
             file=file,
-            mend="estimate a log with torques; slip alone changes with the pull, on one and the same ground",
+            hint="estimate a log with torques; slip alone changes with the pull, on one and the same ground",
         )
     columns = {name: estimates[name] for name in estimates.names}
     if rows is not None:

@@ -64,13 +64,13 @@ def compare_forms(
     """
     names = tuple(candidates or FORMS)
     if asked not in FORMS:
-        raise InputError(f"no curve form {asked!r}", mend=f"take one of {', '.join(FORMS)}")
+        raise InputError(f"no curve form {asked!r}", hint=f"take one of {', '.join(FORMS)}")
     if asked not in names:
         names = (asked, *names)
     levels = int(np.count_nonzero(bins.used))
     compared = [name for name in names if len(_parameters(name)[1]) <= levels - 2]
     if levels < LEAST_BINS or asked not in compared:
-        raise InputError(f"{levels} slip bins are too few to compare forms", mend="drive at more slips")
+        raise InputError(f"{levels} slip bins are too few to compare forms", hint="drive at more slips")
     splits = list(_run_folds(bins, folds) or _bin_folds(bins, folds))
     by_run = bins.clusters >= 2
     scores = sorted(
@@ -155,6 +155,6 @@ def _score(form: str, splits: Sequence[Split]) -> FormScore:
         off = (model.value(test_slip, found, drop) - test_mean)[test_weight > 0]
         errors.append(float(np.sqrt(np.mean(off**2))))
     if not errors:
-        raise InputError("the runs are too unlike to compare forms on one left out", mend="drive more runs")
+        raise InputError("the runs are too unlike to compare forms on one left out", hint="drive more runs")
     error = float(np.mean(errors))
     return FormScore(form, error, float(np.std(errors) / np.sqrt(len(errors))), len(free))

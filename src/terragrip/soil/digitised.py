@@ -48,13 +48,13 @@ def read_points(path: str | os.PathLike[str]) -> list[DigitisedCurve]:
     first = next((i for i, row in enumerate(rows) if any(_plain(cell) is not None for cell in row)), None)
     if first is None:
         raise InputError(
-            "holds no numbers", file=file, mend="export the points as CSV, a pair of columns a curve"
+            "holds no numbers", file=file, hint="export the points as CSV, a pair of columns a curve"
         )
     body, head = rows[first:], rows[:first]
     width = max(len(row) for row in body)
     if width % 2:
         raise InputError(
-            f"has {width} columns", file=file, mend="give a pair of columns (slip, value) for each curve"
+            f"has {width} columns", file=file, hint="give a pair of columns (slip, value) for each curve"
         )
     columns = [_numbers(body, i, first, file) for i in range(width)]
     return [_curve(columns[i], columns[i + 1], _title(head, i), file) for i in range(0, width, 2)]
@@ -88,7 +88,7 @@ def _numbers(body: list[list[str]], column: int, first: int, file: str) -> Array
         if value is None or np.isinf(value):
             place = f"row {first + i + 1}, column {column + 1}"
             raise InputError(
-                f"{cell!r} is not a number", file=file, place=place, mend="mend or delete that row"
+                f"{cell!r} is not a number", file=file, place=place, hint="hint or delete that row"
             )
         out.append(value)
     return np.array(out)
@@ -105,7 +105,7 @@ def _curve(slip: Array, value: Array, name: str, file: str) -> DigitisedCurve:
     good = np.isfinite(slip) & np.isfinite(value)
     slip, value = slip[good], value[good]
     if slip.size < 2:
-        raise InputError(f"{name} has {slip.size} points", file=file, mend="digitise at least two")
+        raise InputError(f"{name} has {slip.size} points", file=file, hint="digitise at least two")
     notes: tuple[str, ...] = ()
     if np.abs(slip).max() > 1.5:
         slip, notes = slip / 100, ("slip was read as per cent",)
@@ -113,7 +113,7 @@ def _curve(slip: Array, value: Array, name: str, file: str) -> DigitisedCurve:
         raise InputError(
             f"{name} has a slip of {np.abs(slip).max():g}",
             file=file,
-            mend="slip lies between -1 and 1 (or -100 and 100 %)",
+            hint="slip lies between -1 and 1 (or -100 and 100 %)",
         )
     order = np.argsort(slip, kind="stable")
     return DigitisedCurve(name, slip[order], value[order], notes)
@@ -137,13 +137,13 @@ def soils_of_points(
             raise InputError(
                 f"holds {len(found)} curves, and --soil names one",
                 file=os.fspath(path),
-                mend="leave --soil out: the header names them",
+                hint="leave --soil out: the header names them",
             )
         found = [replace(one, name=soil) for one in found]
     for one in found:
         if one.name in soils or one.name in missed:
             raise InputError(
-                f"two curves are named {one.name!r}", file=os.fspath(path), mend="rename one in its header"
+                f"two curves are named {one.name!r}", file=os.fspath(path), hint="rename one in its header"
             )
         inside = one.slip[(one.slip >= template.bins.lower) & (one.slip < template.bins.upper)]
         steps = np.diff(np.unique(inside))

@@ -54,7 +54,7 @@ def distinct(files: Sequence[str | os.PathLike[str]]) -> list[Path]:
     seen: set[Path] = set()
     for path in paths:
         if path.resolve() in seen:
-            raise InputError("is given twice", file=path, mend="name each run once")
+            raise InputError("is given twice", file=path, hint="name each run once")
         seen.add(path.resolve())
     return paths
 
@@ -75,11 +75,11 @@ class GatheredRuns:
     def add(self, estimates: Estimates, run: str, soil: str | None = None, file: str | None = None) -> None:
         """Take one run; `soil` names all its rows, `file` is named where it is unusable."""
         if not estimates.has_adhesion:
-            problem, mend = (
+            problem, hint = (
                 "holds slip but no adhesion, so no soil can be learned",
                 "estimate a log with torques",
             )
-            raise InputError(problem, file=file or run, mend=mend)
+            raise InputError(problem, file=file or run, hint=hint)
         self.runs.append(run)
         self.pairs += pairs_of(estimates, run, soil)
         for name, found in labelled_blocks(estimates, soil, file or run):

@@ -36,7 +36,7 @@ class AdhesionCurve:
 
     After `fit`: `parameters_` (all of the model's, and intercept), `free_`, `interval_` {name: (low, high)}, `r2_`, `nrmse_`, `bins_`,
     `identifiability_`, `notes_` (plain sentences). Where the data do not fix the four parameters of eq. 8 one by one, `interval_`
-    holds the effective A, k, d instead (PHYSICS 5).
+    holds the effective A, k, d instead (physics.md 5).
     """
 
     def __init__(
@@ -51,9 +51,9 @@ class AdhesionCurve:
         common_sd: float = 0.0,
     ) -> None:
         if model not in CURVES:
-            raise InputError(f"no curve model {model!r}", mend=f"take one of {', '.join(CURVES)}")
+            raise InputError(f"no curve model {model!r}", hint=f"take one of {', '.join(CURVES)}")
         if weights not in (None, "count"):
-            raise InputError(f"no weighting {weights!r}", mend="take None or 'count'")
+            raise InputError(f"no weighting {weights!r}", hint="take None or 'count'")
         self.model, self.fixed, self.intercept, self.weights = model, fixed, intercept, weights
         self.bins, self.bootstrap, self.seed = bins or BinSettings(), bootstrap, seed
         self.common_sd = common_sd
@@ -78,7 +78,7 @@ class AdhesionCurve:
             raise InputError(
                 f"{np.count_nonzero(used)} slip bins between {bins.settings.lower:.0%} and {bins.settings.upper:.0%} hold "
                 f"{bins.settings.least_said} or more, too few to fit {', '.join(free)}",
-                mend="drive at more slips, or widen the bins",
+                hint="drive at more slips, or widen the bins",
             )
         slip, mean = bins.slip[used], bins.mean[used]
         weights = self._bin_weights(bins)[used]
@@ -136,7 +136,7 @@ class AdhesionCurve:
         return CURVES[self.model].peak(self._of_model())
 
     def to_dict(self) -> dict[str, Any]:
-        """The fit as soils.json holds it (DESIGN 3)."""
+        """The fit as soils.json holds it (architecture.md, contracts)."""
         badge = self.identifiability_
         return {
             "model": self.model,
@@ -167,7 +167,7 @@ class AdhesionCurve:
         if isinstance(self.fixed, str):
             if self.fixed != FREE:
                 raise InputError(
-                    f"fixed={self.fixed!r} is no choice", mend="give a mapping of names to numbers, or 'free'"
+                    f"fixed={self.fixed!r} is no choice", hint="give a mapping of names to numbers, or 'free'"
                 )
             return {}
         try:

@@ -146,7 +146,7 @@ def learn_soils(
         grouped.setdefault(part.soil, []).append(part)
     if not grouped:
         raise InputError(
-            "no sample has a soil label", mend="give a 'soil' column, or name the soil with --soil"
+            "no sample has a soil label", hint="give a 'soil' column, or name the soil with --soil"
         )
     soils, missed, words = {}, {}, []
     for name, parts in sorted(grouped.items()):
@@ -319,6 +319,6 @@ def explaining(curve: AdhesionCurve) -> AdhesionCurve:
         raise InputError(
             f"the {curve.model} curve explains nothing of its {np.count_nonzero(curve.bins_.used)} bins (R2 {curve.r2_:.2f}): "
             "slip may have been too small to tell from its noise",
-            mend="drive at more slip",
+            hint="drive at more slip",
         )
     return curve

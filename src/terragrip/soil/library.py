@@ -1,4 +1,4 @@
-"""The soil library: soils by name with curve, interval, bins and provenance; soils.json (DESIGN 3)."""
+"""The soil library: soils by name with curve, interval, bins and provenance; soils.json (architecture.md, contracts)."""
 
 from __future__ import annotations
 
@@ -105,9 +105,9 @@ class SoilLibrary(Mapping[str, Soil]):
         try:
             data = read_json(file, "soils", VERSION, "'terragrip soils'", pairs=_refuse_twins)
         except _Twin as twin:
-            raise InputError(f"two entries are named {twin}", file=file, mend="rename one") from None
+            raise InputError(f"two entries are named {twin}", file=file, hint="rename one") from None
         if not isinstance(data["soils"], dict):
-            raise InputError("holds no 'soils'", file=file, mend="give a file written by 'terragrip soils'")
+            raise InputError("holds no 'soils'", file=file, hint="give a file written by 'terragrip soils'")
         soils = {name: _soil(name, entry, file) for name, entry in data["soils"].items()}
         return cls(soils, data.get("provenance") or {}, data.get("not_fitted") or {})
 
@@ -129,11 +129,11 @@ class SoilLibrary(Mapping[str, Soil]):
     def merge(self, other: SoilLibrary, clash: str = "refuse") -> SoilLibrary:
         """Both libraries' soils. `clash`: "refuse" two soils of one name (InputError), "keep" ours, or "replace" by theirs."""
         if clash not in ("refuse", "keep", "replace"):
-            raise InputError(f"clash={clash!r} is no choice", mend="take 'refuse', 'keep' or 'replace'")
+            raise InputError(f"clash={clash!r} is no choice", hint="take 'refuse', 'keep' or 'replace'")
         twins = sorted(set(self.soils) & set(other.soils))
         if twins and clash == "refuse":
             raise InputError(
-                f"both libraries hold a soil {twins[0]!r}", mend="choose which to keep, or rename one"
+                f"both libraries hold a soil {twins[0]!r}", hint="choose which to keep, or rename one"
             )
         both = {**self.soils, **other.soils} if clash == "replace" else {**other.soils, **self.soils}
         order = [*self.soils, *(name for name in other.soils if name not in self.soils)]
@@ -189,7 +189,7 @@ def _soil(name: str, entry: Any, file: str) -> Soil:
             f"curve model {model!r} is not known",
             file=file,
             place=place,
-            mend=f"take one of {', '.join(CURVES)}",
+            hint=f"take one of {', '.join(CURVES)}",
         )
     parameters = entry.get("parameters")
     if not isinstance(parameters, dict):
@@ -269,5 +269,5 @@ def _optional(value: Any, file: str, place: str) -> float | None:
 
 def _number(value: Any, file: str, place: str) -> float:
     if isinstance(value, bool) or not isinstance(value, (int, float)) or not math.isfinite(value):
-        raise InputError(f"{value!r} is not a number", file=file, place=place, mend="write a finite number")
+        raise InputError(f"{value!r} is not a number", file=file, place=place, hint="write a finite number")
     return float(value)

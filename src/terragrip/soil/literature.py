@@ -43,7 +43,7 @@ def paper_soils() -> SoilLibrary:
 
 
 def burckhardt_grounds() -> SoilLibrary:
-    """Burckhardt's seven road surfaces (PHYSICS 5)."""
+    """Burckhardt's seven road surfaces (physics.md 5)."""
     soils = (
         Soil(name, "burckhardt", {"c1": c1, "c2": c2, "c3": c3}, source="Burckhardt 1993 (car tyre)")
         for name, (c1, c2, c3) in _BURCKHARDT.items()

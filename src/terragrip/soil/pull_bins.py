@@ -3,7 +3,7 @@
 Slip answers to the ground: under one pull a weak spot slips more than a strong one. Sorted by their own slip, bins of high slip gather
 weak spots, and bins at 5 % leave the strongest ground out (decision 0075); noise of slip sorts too. The pull does not answer to the spot.
 So a pair goes into the bin of the slip that the soil's mean curve gives for the vehicle's pull, its driven wheels' mean adhesion.
-The bin's adhesion is the mean over its metres. Its slip is the mean too, on the scale of the prototype curve g (PHYSICS 5): a spot of
+The bin's adhesion is the mean over its metres. Its slip is the mean too, on the scale of the prototype curve g (physics.md 5): a spot of
 scale a_i has mu_i = a_i g(s_i), so that mean(mu) = a mean(g(s)), which the plain mean of s would miss where the curve bends. Random errors
 of slip cancel in that mean but for g's bend, which is known: the mean of e^(-k s) under normal errors is e^(k^2 sigma^2 / 2) too large.
 
@@ -43,7 +43,7 @@ def bin_by_pull(
     cluster: integer labels (run) of what is not independent (default: one). slip_std: SD of the random part of each slip, taken as 0 where
     it is NaN and as 0.1 where it is more (default: exact). A bin short of `settings.metres` or `settings.runs`
     (clusters, if there are as many) is joined to the next, the last to the one before. The scale of the curve that sorts is the one that
-    the bins then give (fixed point, PHYSICS 5's least squares).
+    the bins then give (fixed point, physics.md 5's least squares).
     `std` of a bin is the SD of adhesion about the curve through it. Pairs without slip, adhesion, pull or way, and pulls outside
     the range, are left out and counted. ValueError if the lengths differ.
     """

@@ -72,7 +72,7 @@ class Signature:
                 "is no signature of a soil",
                 file=file,
                 place=place,
-                mend="learn the library anew with terragrip soils",
+                hint="learn the library anew with terragrip soils",
             )
         return cls(
             arrays["level"],

@@ -1,4 +1,4 @@
-"""Where the vehicle and its tool stand on one soil: the geometric transition mask (PHYSICS 7)."""
+"""Where the vehicle and its tool stand on one soil: the geometric transition mask (physics.md 7)."""
 
 from __future__ import annotations
 

@@ -131,7 +131,7 @@ def sample(table: Estimates, recording: Recording | None, time: float) -> dict[s
 def why(table: Estimates, recording: Recording | None, row: int) -> list[str]:
     """Why adhesion moved around a sample: a sentence a wheel, the wheel that moved most first.
 
-    Compares the half second before with the half second after by the torque balance of a wheel (PHYSICS 1):
+    Compares the half second before with the half second after by the torque balance of a wheel (physics.md 1):
     mu = (M - J domega/dt - r rho_w omega)/(r F_z) - rho_t, one term changed at a time. Of slip alone: how that moved.
     """
     before, after = _half_seconds(table.time, row)

@@ -55,7 +55,7 @@ class Folder:
     def __init__(self, root: str | os.PathLike[str]) -> None:
         self.root = Path(root).resolve()
         if not self.root.is_dir():
-            raise InputError("is no folder", file=root, mend="name a folder with logs, or make it")
+            raise InputError("is no folder", file=root, hint="name a folder with logs, or make it")
         self._kinds: dict[tuple[str, int, float], str | None] = {}
 
     def resolve(self, path: str) -> Path:
@@ -64,7 +64,7 @@ class Folder:
         parts = pure.parts
         bad = not parts or pure.is_absolute() or "\\" in path or any(ord(c) < 32 for c in path)
         if bad or any(part == ".." or part.startswith(".") or len(part.encode()) > 200 for part in parts):
-            raise InputError("is no path in the studio's folder", file=path, mend="give a relative path")
+            raise InputError("is no path in the studio's folder", file=path, hint="give a relative path")
         try:
             target = (self.root / pure).resolve()
         except (OSError, RuntimeError):
@@ -77,7 +77,7 @@ class Folder:
         """As `resolve`, for a file that exists."""
         target = self.resolve(path)
         if not target.is_file():
-            raise InputError("no such file in this folder", file=path, mend="reload the list")
+            raise InputError("no such file in this folder", file=path, hint="reload the list")
         return target
 
     def new_file(self, path: str, suffixes: tuple[str, ...]) -> Path:
@@ -85,10 +85,10 @@ class Folder:
         target = self.resolve(path)
         if target.suffix.lower() not in suffixes:
             raise InputError(
-                "has another ending", file=path, mend=f"end the name with {' or '.join(suffixes)}"
+                "has another ending", file=path, hint=f"end the name with {' or '.join(suffixes)}"
             )
         if target.is_dir() or not target.parent.is_dir():
-            raise InputError("cannot be written there", file=path, mend="name a file in a folder that exists")
+            raise InputError("cannot be written there", file=path, hint="name a file in a folder that exists")
         return target
 
     def version(self, path: str) -> str:

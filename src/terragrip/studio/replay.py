@@ -128,7 +128,7 @@ async def relayed(address: str, token: str | None) -> AsyncIterator[str | bytes]
         raise InputError(
             f"does not answer ({error})",
             place=address,
-            mend="start 'terragrip live' with --sink studio://127.0.0.1:8766",
+            hint="start 'terragrip live' with --sink studio://127.0.0.1:8766",
         ) from error
 
 

@@ -73,7 +73,7 @@ def _token() -> str:
         return secrets.token_urlsafe(24)
     if len(given) < SHORTEST or not given.isascii() or not given.isprintable():
         raise InputError(
-            f"is shorter than {SHORTEST} printable characters", place=TOKEN, mend="choose a longer one"
+            f"is shorter than {SHORTEST} printable characters", place=TOKEN, hint="choose a longer one"
         )
     return given
 
@@ -87,7 +87,7 @@ def _bind(address: str, port: int) -> socket.socket:
     except OSError as error:
         listener.close()
         raise InputError(
-            f"{address}:{port} cannot be had ({error.strerror})", place="--port", mend="choose another, or 0"
+            f"{address}:{port} cannot be had ({error.strerror})", place="--port", hint="choose another, or 0"
         ) from error
     return listener
 

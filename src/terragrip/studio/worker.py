@@ -67,7 +67,7 @@ def _soils(request: dict[str, Any]) -> str:
     if not learning:
         raise InputError(
             "the estimates hold slip but no adhesion, so no soil can be learned",
-            mend="estimate a log with torques",
+            hint="estimate a log with torques",
         )
     campaign = soils_of(learning, progress=_Reporter())
     campaign.library({"from": [path.name for path in learning]}).write(request["output"])

@@ -61,7 +61,7 @@ def calibrate(
     """
     logs = [recordings] if isinstance(recordings, Recording) else list(recordings)
     if not logs:
-        raise InputError("there is no recording to calibrate from", mend="give at least one log")
+        raise InputError("there is no recording to calibrate from", hint="give at least one log")
     sources = [log.source or f"recording {k + 1}" for k, log in enumerate(logs)]
     doubts = tuple(dict.fromkeys(said for log in logs for said in unit_warnings(log, vehicle)))
     if all(speeds_alone(log.channels, vehicle) for log in logs):

@@ -1,7 +1,7 @@
 """Rolling radius of each wheel: ground speed over wheel speed, taken to zero adhesion.
 
 On a zero-pull straight pass the wheels still pull the vehicle's own rolling resistance, and slip a little for
-it: v/ω = r (1 - s). The model is that of PHYSICS §5 in its identifiable form without the falling part, turned
+it: v/ω = r (1 - s). The model is that of physics.md 5 in its identifiable form without the falling part, turned
 round::
 
     v/ω_i = r_i (1 - s),   s = -(A_j/C_j) ln(1 - μ_i/A_j)

@@ -1,7 +1,7 @@
 """Wheels that share one adhesion curve: torque gains of the wheels relative to each other.
 
 Wheels at the same slip on the same soil have the same adhesion, so what one wheel's torque says beyond the others is
-its gain. Model of the mean torque of wheel i over window n (PHYSICS §1, averaged)::
+its gain. Model of the mean torque of wheel i over window n (physics.md 1, averaged)::
 
     M_in = k_i (B_in + r_i F_in (m_n + d_n (s_in - s_n + (1 - s_in) e_i))) + o_i,   B = J dω/dt + r ρ_t F + r ρ_w ω
 

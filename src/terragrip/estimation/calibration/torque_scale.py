@@ -1,7 +1,7 @@
 """The scale of the torque columns, common to all wheels, from the forces that mass and drawbar tell.
 
 For a log whose torque columns are only proportional to torque (from a motor current, say), and as a check on any
-other. By PHYSICS §1, summed over the wheels and averaged over a window::
+other. By physics.md 1, summed over the wheels and averaged over a window::
 
     X = K (Y + R),   X = Σ M_i/r_i,   Y = F_dx + m (dv/dt + g sinθ),
     R = Σ (J dω_i/dt)/r_i + Σ (ρ_t F_i + ρ_w ω_i) + ρ_s m g
@@ -80,7 +80,7 @@ def identify_torque_scale(recordings: Recording | Sequence[Recording], vehicle: 
         raise InputError(
             f"{int(used.sum())} windows of driving are too few to identify the torque scale, {_LEAST} are needed",
             file=logs[0].source,
-            mend="use a longer log",
+            hint="use a longer log",
         )
     table = table.select(used)
     rows = _balance(table, vehicle)
@@ -94,7 +94,7 @@ def identify_torque_scale(recordings: Recording | Sequence[Recording], vehicle: 
         raise InputError(
             "pull, acceleration and slope vary too little to tell the torque scale",
             file=logs[0].source,
-            mend="use a log with starts, stops, slopes or a towed load",
+            hint="use a log with starts, stops, slopes or a towed load",
         )
     considered = np.hypot(
         _SLIP_RESISTANCE * vehicle.mass * GRAVITY * _partial_slope(rows.slip, rows, weight),

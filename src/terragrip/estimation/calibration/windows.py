@@ -1,6 +1,6 @@
 """Recordings as means over short windows: the rows that calibration works on.
 
-A window's mean has little noise, needs no common sampling and no filter, and the wheel equation (PHYSICS §1) is
+A window's mean has little noise, needs no common sampling and no filter, and the wheel equation (physics.md 1) is
 linear in the channels that are averaged, so it holds for the means.
 """
 
@@ -173,7 +173,7 @@ def wheel_loads(
     lateral: Floats,
     measured: Floats,
 ) -> Floats:
-    """Vertical load of each wheel (n, wheels), N (PHYSICS §3); a measured axle load (n, axles) wins, the other of two
+    """Vertical load of each wheel (n, wheels), N (physics.md 3); a measured axle load (n, axles) wins, the other of two
     takes the rest.
 
     push is dv/dt + g sinθ [m/s²], slope θ [rad], lateral a_y [m/s²], all (n,).

@@ -8,7 +8,7 @@
     ukf.step(y=[0.2], u=1.0, dt=0.1)
 
 The equations are the paper's (Kobelski, Osinenko, Streif 2021, "Adaptive Unscented Kalman filter") with the
-corrections of PHYSICS §6. Any filter can be made adaptive (:class:`AdaptiveFilter`) or stand in a
+corrections of physics.md 6. Any filter can be made adaptive (:class:`AdaptiveFilter`) or stand in a
 :class:`Bank`; :class:`TractionFilter` puts the parts together as the kernel does.
 """
 

@@ -1,4 +1,4 @@
-"""The adaptation matrix A_k: process noise that follows the innovations (PHYSICS §6 (R))."""
+"""The adaptation matrix A_k: process noise that follows the innovations (physics.md 6 (R))."""
 
 from __future__ import annotations
 
@@ -103,7 +103,7 @@ class Adaptation:
         return np.clip(self.scale * np.exp(step), SMALLEST, LARGEST)
 
     def _carry(self, update: Update) -> None:
-        """The sensitivities through an update as PHYSICS §6 prints them; Huber weights count as constants."""
+        """The sensitivities through an update as physics.md 6 prints them; Huber weights count as constants."""
         if not update.present.any():
             return
         H = update.observation.matrix[update.present]
@@ -134,7 +134,7 @@ def _divided(stack: NDArray[Any], S: Matrix) -> NDArray[Any]:
 
 
 class AdaptiveFilter:
-    """Any filter with Q_k = [I + γ_k (A_k - I)] Q_0 + extra, Q_0 = diag(walk) dt (PHYSICS §6 (R)).
+    """Any filter with Q_k = [I + γ_k (A_k - I)] Q_0 + extra, Q_0 = diag(walk) dt (physics.md 6 (R)).
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""A bank of filters that differ in the scale of Q, mixed as an interacting multiple model (PHYSICS §6)."""
+"""A bank of filters that differ in the scale of Q, mixed as an interacting multiple model (physics.md 6)."""
 
 from __future__ import annotations
 

@@ -103,7 +103,7 @@ class GaussianFilter(ABC):
     R: measurement covariance, (m, m).
     x0, P0: first mean (n,) and covariance (n, n).
     huber: 0, or the number of innovation SDs beyond which a channel is trusted less: its variance in R is
-        divided by w = huber SD/|ν|. Never a hard gate (PHYSICS §6). All weights come from the prior.
+        divided by w = huber SD/|ν|. Never a hard gate (physics.md 6). All weights come from the prior.
     """
 
     def __init__(self, Q: Noise, R: ArrayLike, x0: ArrayLike, P0: ArrayLike, *, huber: float = 0.0) -> None:
@@ -142,7 +142,7 @@ class GaussianFilter(ABC):
         seen: Observation | None = None,
         weight: Vector | None = None,
     ) -> Update:
-        """Take the measurement y (m,); NaN is a missing channel, all NaN changes nothing.
+        """Update by the measurement y (m,) (paper eq. 12 and 13); NaN is a missing channel, all NaN changes nothing.
 
         R and h replace the filter's own; weight (m,) replaces the Huber weights, seen the observation.
         """

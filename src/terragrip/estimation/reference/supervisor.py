@@ -1,4 +1,4 @@
-"""The fuzzy supervisor: how lively the machine is, as a number γ between 0.1 and 1 (PHYSICS §6 (R))."""
+"""The fuzzy supervisor: how lively the machine is, as a number γ between 0.1 and 1 (physics.md 6 (R))."""
 
 from __future__ import annotations
 

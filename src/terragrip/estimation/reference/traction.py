@@ -1,4 +1,4 @@
-"""The machine as a model for the filters: paper eq. 2 and 3 for n wheels, affine in the state."""
+"""The machine as a model for the filters (paper eq. 9): paper eq. 2 and 3 for n wheels, affine in the state."""
 
 from __future__ import annotations
 
@@ -128,7 +128,7 @@ class TractionModel:
         return power
 
     def output(self, x: Vector, u: Input) -> Vector:
-        """ŷ (..., n+2): wheel speeds, ground speed, and what an accelerometer reads (PHYSICS §1)."""
+        """ŷ (..., n+2): wheel speeds, ground speed, and what an accelerometer reads (physics.md 1)."""
         _, _, adhesion, soil_resistance = self.split(x)
         force = specific_force(
             adhesion,

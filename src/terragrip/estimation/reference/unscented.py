@@ -1,4 +1,4 @@
-"""The unscented Kalman filter as the paper prints it, with PHYSICS §6's corrections."""
+"""The unscented Kalman filter as the paper prints it, with physics.md 6's corrections."""
 
 from __future__ import annotations
 
@@ -32,8 +32,7 @@ class UnscentedKalmanFilter(GaussianFilter):
     f, h: see :data:`Transition` and :data:`Measurement`; a continuous model goes through :func:`runge_kutta`.
     Q, R, x0, P0, huber: as of :class:`GaussianFilter`.
     alpha, beta, kappa: spread of the points (Wan and van der Merwe). The default makes the centre's weight
-        in the mean 0. alpha = 1e-3 costs nine digits and kappa = 3 - n makes that weight negative (PHYSICS
-        §1): refused.
+        in the mean 0. alpha = 1e-3 costs nine digits and kappa = 3 - n makes that weight negative (physics.md 1): refused.
     vectorized: f and h take all points at once, (points, n).
     """
 
@@ -76,6 +75,7 @@ class UnscentedKalmanFilter(GaussianFilter):
         return function(points) if self.vectorized else np.stack([function(point) for point in points])
 
     def _propagate(self, u: Any, dt: float) -> tuple[Vector, Matrix, Matrix]:
+        """Predicted mean and covariance without Q, and the cross covariance (paper eq. 10 and 11)."""
         points = self.sigma_points()
         moved = self._through(lambda x: self.f(x, u, dt), points)
         mean = self.mean_weights @ moved
@@ -83,6 +83,7 @@ class UnscentedKalmanFilter(GaussianFilter):
         return mean, (moved - mean).T @ weighted, (points - self.x).T @ weighted
 
     def observe(self, h: Measurement | None = None) -> Observation:
+        """ŷ, S without R, and C, from points redrawn from the prediction (the paper's unnumbered equations before eq. 12)."""
         points = self.sigma_points()
         outputs = self._through(self.h if h is None else h, points)
         mean = self.mean_weights @ outputs

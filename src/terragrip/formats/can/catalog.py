@@ -123,9 +123,9 @@ def _read_dbc(path: str | os.PathLike[str]) -> list[Message]:
         found = [message_of(database, message) for message in database.messages]
     except errors as error:
         said = " ".join(str(error).split())[:120]
-        raise InputError(f"is no DBC that can be read ({said})", file=file, mend="export it again") from error
+        raise InputError(f"is no DBC that can be read ({said})", file=file, hint="export it again") from error
     if not found:
-        raise InputError("describes no message", file=file, mend="give the DBC of the machine's bus")
+        raise InputError("describes no message", file=file, hint="give the DBC of the machine's bus")
     return found
 
 

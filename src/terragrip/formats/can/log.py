@@ -70,7 +70,7 @@ def read_frame_table(path: str, wanted: Wanted | None, databases: Databases) -> 
     def parse(lines: Iterator[str], count: Count, frames: Frames) -> Iterator[Frame]:
         layout = layout_of(next(lines, ""))
         if layout is None:
-            raise InputError("is no table of CAN frames", file=path, mend="give time, id and data columns")
+            raise InputError("is no table of CAN frames", file=path, hint="give time, id and data columns")
         return table(lines, layout, count, frames)
 
     return _from_lines(path, "table of CAN frames", wanted, databases, parse)
@@ -90,7 +90,7 @@ def finished(
     ``scale`` takes the stamps to seconds; ``refuse_unknown`` False lets a log pass that has other signals.
     """
     if not frames.count:
-        raise InputError("holds no CAN frame", file=path, mend="check that the bus was recorded")
+        raise InputError("holds no CAN frame", file=path, hint="check that the bus was recorded")
     if not frames.seen and refuse_unknown:
         count = len(frames.unknown)
         shown = ", ".join(map(identifier_text, sorted(frames.unknown)[:6])) + (", ..." if count > 6 else "")
@@ -103,7 +103,7 @@ def finished(
         raise InputError(
             f"{which} in {what}",
             file=path,
-            mend="give the bus's DBC: --dbc FILE, or 'dbc:' in the profile",
+            hint="give the bus's DBC: --dbc FILE, or 'dbc:' in the profile",
         )
     signals, said = signals_of(frames)
     if scale != 1.0:
@@ -143,14 +143,14 @@ def _from_lines(
     except OSError as error:
         raise unreadable(path, error) from error
     if count.bad > _MOST_BAD * (count.bad + frames.count):
-        problem, mend = (
+        problem, hint = (
             f"is a damaged {kind}, or none: {count.bad} lines hold no frame",
             "copy or record it again",
         )
         if count.unstamped:
-            problem, mend = "its frames have no stamps", "record it by candump -l, or with -t a"
+            problem, hint = "its frames have no stamps", "record it by candump -l, or with -t a"
         place = f"line {count.first} ({count.shown!r})"
-        raise InputError(problem, file=path, place=place, mend=mend)
+        raise InputError(problem, file=path, place=place, hint=hint)
     notes = []
     if count.bad:
         what = (

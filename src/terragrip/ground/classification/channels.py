@@ -98,13 +98,13 @@ def tables_of(recordings: Any) -> list[Columns]:
     """
     if isinstance(recordings, Recording | Mapping | str) or hasattr(recordings, "columns"):
         raise InputError(
-            "recordings is one table, not a list", place="recordings", mend="give a list: [recording]"
+            "recordings is one table, not a list", place="recordings", hint="give a list: [recording]"
         )
     try:
         listed = list(recordings)
     except TypeError:
         problem = f"{type(recordings).__name__} is not a list of recordings"
-        raise InputError(problem, place="recordings", mend="give a list of Recording or DataFrames") from None
+        raise InputError(problem, place="recordings", hint="give a list of Recording or DataFrames") from None
     return [_table(recording, k) for k, recording in enumerate(listed)]
 
 
@@ -154,7 +154,7 @@ def _table(recording: Any, index: int) -> Columns:
         return Columns(recording.time, used, recording.source or name)
     columns = columns_of(recording, name)
     if TIME not in columns:
-        raise InputError("is missing", file=name, place=f"column {TIME}", mend="add the instants in seconds")
+        raise InputError("is missing", file=name, place=f"column {TIME}", hint="add the instants in seconds")
     time, _ = seconds(columns[TIME], name)
     check_time(time, name)
     channels = {}
@@ -173,4 +173,4 @@ def _refuse_absurd(column: str, values: Floats, time: Floats, name: str) -> None
     if len(rows):
         where = place(column, int(rows[0]), time)
         problem = f"{values[rows[0]]:.3g} is no measurement"
-        raise InputError(problem, file=name, place=where, mend="leave the cell empty instead")
+        raise InputError(problem, file=name, place=where, hint="leave the cell empty instead")

@@ -41,7 +41,7 @@ class GroundClassifier:
     After `fit`: ``classes_`` (the labels, sorted), ``n_features_in_``, ``feature_names_in_``, ``sensors_`` (the sets
     of sensors that it can judge from), ``notes_`` (sentences on what was left out or learnt in another way).
 
-    Recordings are `Recording` or tables with recording columns (DESIGN 3); a motor current may stand as
+    Recordings are `Recording` or tables with recording columns (architecture.md, contracts); a motor current may stand as
     ``drive_torque_<wheel>`` in any unit or as ``motor_current_<wheel>``. Sensors may be missing in any of them:
     there is an expert for each set of sensors, and a window goes to the one that uses most of what it holds.
 
@@ -77,7 +77,7 @@ class GroundClassifier:
         known = self.get_params()
         for name, value in parameters.items():
             if name not in known:
-                raise InputError("is no parameter", place=name, mend=f"there are {', '.join(known)}")
+                raise InputError("is no parameter", place=name, hint=f"there are {', '.join(known)}")
             setattr(self, name, value)
         return self
 
@@ -107,14 +107,14 @@ class GroundClassifier:
         signals = [signals_of(table, held) for table in tables]
         for recorded, (_, _, name) in zip(signals, tables, strict=True):
             if not recorded.families:
-                mend = "give wheel_speed_*, drive_torque_*, acceleration_* or angular_velocity_* columns, or leave it out"
-                raise InputError("holds no usable channel", file=name, mend=mend)
+                hint = "give wheel_speed_*, drive_torque_*, acceleration_* or angular_velocity_* columns, or leave it out"
+                raise InputError("holds no usable channel", file=name, hint=hint)
         notes += rates_apart(signals, codes)
         layout, slow = layout_of(signals, self.window)
         if not layout.period:
             fastest = min(shortest_period(family) for one in signals for family in one.families.values())
             problem = f"{self.window:g} s is shorter than two samples, which come every {fastest:.3g} s"
-            raise InputError(problem, place="window", mend=f"take a window of {4 * fastest:.2g} s or more")
+            raise InputError(problem, place="window", hint=f"take a window of {4 * fastest:.2g} s or more")
         random = np.random.default_rng(self.random_state)
         training = collect(signals, codes, layout, self.max_windows, random)
         notes += [
@@ -223,7 +223,7 @@ class GroundClassifier:
     def _known(self) -> Learnt:
         """What was learnt; raises InputError if nothing was."""
         if not hasattr(self, "_learnt"):
-            raise InputError("the classifier knows no ground yet", mend="call fit(recordings, labels) first")
+            raise InputError("the classifier knows no ground yet", hint="call fit(recordings, labels) first")
         return self._learnt
 
     def check_parameters(self) -> None:
@@ -241,10 +241,10 @@ class GroundClassifier:
                 continue
             number = isinstance(value, int | float | np.number) and not isinstance(value, bool)
             if not number or not (low <= value < high) or (value == low and not closed):
-                mend = f"give a number {'from' if closed else 'above'} {low:g}" + (
+                hint = f"give a number {'from' if closed else 'above'} {low:g}" + (
                     f" to {high:g}" if high < np.inf else ""
                 )
-                raise InputError(f"{value!r} is out of range", place=name, mend=mend)
+                raise InputError(f"{value!r} is out of range", place=name, hint=hint)
 
 
 def _joined(parts: list[Floats], *columns: int) -> Floats:

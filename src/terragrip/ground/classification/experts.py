@@ -127,16 +127,16 @@ def _nothing_to_learn(
     fewest = int(windows[best][rarest])
     if not fewest and np.bincount(training.codes)[rarest] >= FEWEST_WINDOWS:
         problem = "there is no sensor that was measured through whole windows on every ground"
-        mend = f"give recordings with the same channels, longer than a window ({classes[rarest]!s} has none with {best})"
+        hint = f"give recordings with the same channels, longer than a window ({classes[rarest]!s} has none with {best})"
     elif fewest < FEWEST_WINDOWS:
         problem = f"there is no sensor with {FEWEST_WINDOWS} windows of every ground"
-        mend = f"give more or longer recordings ({classes[rarest]!s} has {fewest} windows)"
+        hint = f"give more or longer recordings ({classes[rarest]!s} has {fewest} windows)"
     else:
-        problem, mend = (
+        problem, hint = (
             "nothing measured differs from window to window",
             "give recordings of a vehicle that drives",
         )
-    return InputError(problem, place="recordings", mend=mend)
+    return InputError(problem, place="recordings", hint=hint)
 
 
 def _sensor_sets(training: TrainingSet, measured: dict[str, npt.NDArray[np.bool_]]) -> list[frozenset[str]]:

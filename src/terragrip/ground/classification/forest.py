@@ -103,8 +103,8 @@ def _trees(seed: int) -> Any:
     try:
         from sklearn.ensemble import ExtraTreesClassifier
     except ImportError:
-        mend = "pip install 'terragrip[ground]'"
-        raise InputError("scikit-learn is needed to train a GroundClassifier", mend=mend) from None
+        hint = "pip install 'terragrip[ground]'"
+        raise InputError("scikit-learn is needed to train a GroundClassifier", hint=hint) from None
     return ExtraTreesClassifier(
         _TREES, min_samples_leaf=_LEAF, class_weight="balanced", n_jobs=1, random_state=seed
     )

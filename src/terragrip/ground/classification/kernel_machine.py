@@ -91,6 +91,6 @@ def _svm(width: float) -> Any:
     try:
         from sklearn.svm import SVC
     except ImportError:
-        mend = "pip install 'terragrip[ground]'"
-        raise InputError("scikit-learn is needed to train a GroundClassifier", mend=mend) from None
+        hint = "pip install 'terragrip[ground]'"
+        raise InputError("scikit-learn is needed to train a GroundClassifier", hint=hint) from None
     return SVC(C=PENALTY, gamma=width, class_weight="balanced", cache_size=300)

@@ -43,7 +43,7 @@ def read_labels(path: str | os.PathLike[str], logs: Sequence[Path] = ()) -> list
         if not name or not label:
             missing = "label" if name else "file"
             raise InputError(
-                f"the {missing} is empty", file=path, place=place, mend="fill it, or leave the row out"
+                f"the {missing} is empty", file=path, place=place, hint="fill it, or leave the row out"
             )
         log = _named(name, logs, path, place) if logs else folder / name
         others = tuple(
@@ -52,20 +52,20 @@ def read_labels(path: str | os.PathLike[str], logs: Sequence[Path] = ()) -> list
         for file in (log, *others):
             if not file.exists():
                 raise InputError(
-                    f"there is no run {file}", file=path, place=place, mend="correct the file's name"
+                    f"there is no run {file}", file=path, place=place, hint="correct the file's name"
                 )
         if log in taken:
             problem = f"{name} is labelled in row {taken[log]} too"
-            raise InputError(problem, file=path, place=place, mend="name each run once")
+            raise InputError(problem, file=path, place=place, hint="name each run once")
         taken[log] = row
         found.append(LabelledDrive(label, (log, *others)))
     for log in logs:
         if log not in taken:
             raise InputError(
-                f"holds no label for {log}", file=path, mend="add a row for it, or leave the log out"
+                f"holds no label for {log}", file=path, hint="add a row for it, or leave the log out"
             )
     if not found:
-        raise InputError("holds no run", file=path, mend="write a row for each run: file,label")
+        raise InputError("holds no run", file=path, hint="write a row for each run: file,label")
     return found
 
 
@@ -97,18 +97,18 @@ def _rows(path: str | os.PathLike[str]) -> list[tuple[int, dict[str, str]]]:
     try:
         listed = list(csv.reader(text.splitlines(), delimiter=separator))
     except csv.Error as error:
-        raise InputError(f"is no table ({error})", file=path, mend="write a CSV: file,label") from None
+        raise InputError(f"is no table ({error})", file=path, hint="write a CSV: file,label") from None
     names = [cell.strip().lower() for cell in listed[0]] if listed else []
     for name in ("file", "label"):
         if name not in names:
-            raise InputError("is missing", file=path, place=f"column {name}", mend="write a CSV: file,label")
+            raise InputError("is missing", file=path, place=f"column {name}", hint="write a CSV: file,label")
     rows = []
     for number, cells in enumerate(listed[1:], 2):
         if any(cell.strip() for cell in cells):
             if len(cells) != len(names):
                 problem = f"has {len(cells)} cells for {len(names)} columns"
                 raise InputError(
-                    problem, file=path, place=f"row {number}", mend="put texts with separators in quotes"
+                    problem, file=path, place=f"row {number}", hint="put texts with separators in quotes"
                 )
             rows.append((number, dict(zip(names, (cell.strip() for cell in cells), strict=True))))
     return rows
@@ -124,7 +124,7 @@ def _named(name: str, logs: Sequence[Path], path: str | os.PathLike[str], place:
     if len(same) == 1:
         return same[0]
     if same:
-        raise InputError(f"{len(same)} logs are named {name}", file=path, place=place, mend="write its path")
+        raise InputError(f"{len(same)} logs are named {name}", file=path, place=place, hint="write its path")
     near = nearest(name, [log.name for log in logs])
-    mend = f"did you mean {near}?" if near else "name one of the logs given"
-    raise InputError(f"{name!r} names no run", file=path, place=place, mend=mend)
+    hint = f"did you mean {near}?" if near else "name one of the logs given"
+    raise InputError(f"{name!r} names no run", file=path, place=place, hint=hint)

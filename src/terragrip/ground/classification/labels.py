@@ -20,7 +20,7 @@ def one_each(labels: Any, count: int) -> list[Any]:
         listed = []
     if isinstance(labels, dict) or len(listed) != count:
         problem = f"there are {len(listed)} labels for {count} recordings"
-        raise InputError(problem, place="labels", mend="give a list with one label for each recording")
+        raise InputError(problem, place="labels", hint="give a list with one label for each recording")
     return [label.item() if isinstance(label, np.generic) else label for label in listed]
 
 
@@ -32,14 +32,14 @@ def classes_of(labels: Any, count: int) -> tuple[npt.NDArray[Any], npt.NDArray[n
     listed = one_each(labels, count)
     for k, label in enumerate(listed):
         if not isinstance(label, str | int | float) or label != label or label == "":
-            raise InputError(f"{label!r} is no label", place=f"labels[{k}]", mend="give a text or a number")
+            raise InputError(f"{label!r} is no label", place=f"labels[{k}]", hint="give a text or a number")
         if label == UNKNOWN:
-            mend = "leave the recording out: what fits no ground is called unknown"
-            raise InputError("'unknown' is no ground to learn", place=f"labels[{k}]", mend=mend)
+            hint = "leave the recording out: what fits no ground is called unknown"
+            raise InputError("'unknown' is no ground to learn", place=f"labels[{k}]", hint=hint)
     if len({isinstance(label, str) for label in listed}) > 1:
-        raise InputError("texts and numbers are mixed", place="labels", mend="give labels of one kind")
+        raise InputError("texts and numbers are mixed", place="labels", hint="give labels of one kind")
     classes, codes = np.unique(np.array(listed), return_inverse=True)
     if len(classes) < 2:
         said = f"there is one ground only, {classes[0]!s}" if len(classes) else "there is no recording"
-        raise InputError(said, place="labels", mend="give recordings of two grounds or more")
+        raise InputError(said, place="labels", hint="give recordings of two grounds or more")
     return classes, codes

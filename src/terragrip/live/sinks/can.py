@@ -49,7 +49,7 @@ class CanSink:
         self.uri = uri
         check(uri)
         if len(vehicle.wheels) > _MOST:
-            raise InputError(f"the DBC has {_MOST} wheels", place=uri.text, mend="use another sink")
+            raise InputError(f"the DBC has {_MOST} wheels", place=uri.text, hint="use another sink")
         uri.options.setdefault("rate", RATE)
         self._database: Any = cantools.database.load_file(DBC)
         self._wheels = vehicle.wheels

@@ -34,7 +34,7 @@ class FoxgloveSink:
         if not uri.is_loopback():
             raise InputError(
                 "Foxglove's protocol asks nobody for a password", place=uri.text,
-                mend="serve on 127.0.0.1, and reach it by an SSH tunnel",
+                hint="serve on 127.0.0.1, and reach it by an SSH tunnel",
             )  # fmt: skip
         self._folder = Path(uri.options["mcap"]) if "mcap" in uri.options else None
         self._context = foxglove.Context()

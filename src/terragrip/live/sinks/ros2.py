@@ -29,7 +29,7 @@ class Ros2Sink:
         self.domain = domain_of(uri)
         self.name = uri.path.strip("/")
         if not self.name:
-            raise InputError("names no topic", place=uri.text, mend="write ros2:/terragrip")
+            raise InputError("names no topic", place=uri.text, hint="write ros2:/terragrip")
         self.by_rclpy = has_rclpy()
         if not self.by_rclpy:
             from terragrip.live.zenoh_session import config

@@ -32,7 +32,7 @@ class StudioSink:
         self._credentials = Credentials.find()
         if not uri.is_loopback() and not self._credentials.token:
             raise InputError(
-                "anyone could listen here", place=uri.text, mend="serve on 127.0.0.1, or set TERRAGRIP_TOKEN"
+                "anyone could listen here", place=uri.text, hint="serve on 127.0.0.1, or set TERRAGRIP_TOKEN"
             )
 
     async def run(self, outbox: Outbox) -> None:

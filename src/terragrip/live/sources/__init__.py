@@ -57,5 +57,5 @@ def packages_of(uri: Uri) -> Iterator[None]:
         if (error.name or "").split(".")[0] == "terragrip":
             raise
         raise InputError(
-            f"needs the Python package {error.name}", place=uri.text, mend="pip install 'terragrip[live]'"
+            f"needs the Python package {error.name}", place=uri.text, hint="pip install 'terragrip[live]'"
         ) from error

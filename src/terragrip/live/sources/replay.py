@@ -61,7 +61,7 @@ def open_source(uri: Uri, decoder: Decoder) -> ReplaySource:
     from terragrip.formats import read
 
     if not uri.path:
-        raise InputError("names no log", place=uri.text, mend="write replay:drive.csv")
+        raise InputError("names no log", place=uri.text, hint="write replay:drive.csv")
     text = uri.options.get("speed", "1")
     speed = math.inf if text == "max" else uri.number("speed", 1.0)
     return ReplaySource(read(uri.path, decoder.profile), speed)

@@ -31,7 +31,7 @@ class Ros2Source:
         parts = [part.partition(":") for part in uri.path.split(",") if part]
         self.topics = {name: kind for name, _, kind in parts}
         if not parts or not all(name.startswith("/") for name in self.topics):
-            raise InputError("names no topic", place=uri.text, mend="write ros2:/joint_states,/odom")
+            raise InputError("names no topic", place=uri.text, hint="write ros2:/joint_states,/odom")
         self.by_rclpy = has_rclpy()
         if not self.by_rclpy:
             from terragrip.live.zenoh_session import config

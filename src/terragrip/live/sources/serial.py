@@ -31,7 +31,7 @@ class SerialSource:
         self._has_rmc = False
         self.baud = round(uri.number("baud", 4800))
         if not uri.path:
-            raise InputError("names no device", place=uri.text, mend="write serial:/dev/ttyUSB0")
+            raise InputError("names no device", place=uri.text, hint="write serial:/dev/ttyUSB0")
 
     async def run(self, feed: Feed) -> None:
         """Feed sentences; raises Lost where the device is not there or goes away."""

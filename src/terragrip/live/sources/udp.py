@@ -27,11 +27,11 @@ class UdpSource:
         self.uri = uri
         self.allowed = frozenset(filter(None, uri.options.get("allow", "").split(",")))
         if uri.port is None:
-            raise InputError("names no port", place=uri.text, mend="write udp://127.0.0.1:9870")
+            raise InputError("names no port", place=uri.text, hint="write udp://127.0.0.1:9870")
         if not uri.is_loopback() and not self.allowed:
             raise InputError(
                 "anyone could send samples here", place=uri.text,
-                mend="listen on 127.0.0.1, or name the senders: ?allow=192.168.1.7",
+                hint="listen on 127.0.0.1, or name the senders: ?allow=192.168.1.7",
             )  # fmt: skip
 
     async def run(self, feed: Feed) -> None:

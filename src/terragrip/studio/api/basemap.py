@@ -59,18 +59,18 @@ def _mercator(target: Path, path: str) -> Any:
         from rasterio.vrt import WarpedVRT
     except ModuleNotFoundError as error:
         raise InputError(
-            "a GeoTIFF needs rasterio", file=path, mend="pip install 'terragrip[geo]'"
+            "a GeoTIFF needs rasterio", file=path, hint="pip install 'terragrip[geo]'"
         ) from error
     try:
         raster = rasterio.open(target)
         if raster.crs is None:
             raster.close()
             raise InputError(
-                "does not say where it lies", file=path, mend="save it as PNG and place it by hand"
+                "does not say where it lies", file=path, hint="save it as PNG and place it by hand"
             )
         return WarpedVRT(raster, crs="EPSG:3857", add_alpha=raster.count in (1, 3))
     except RasterioError as error:
-        raise InputError("is no GeoTIFF that can be read", file=path, mend="export it anew") from error
+        raise InputError("is no GeoTIFF that can be read", file=path, hint="export it anew") from error
 
 
 def _eight_bits(bands: Any) -> Any:

@@ -35,7 +35,7 @@ def _table(studio: Studio, path: str, version: str = "") -> Estimates:
     """Estimates of the folder. Raises InputError where the file is no longer the `version` that the page was told of: what it draws
     would be a mixture of two runs."""
     if version and studio.folder.version(path) != version:
-        raise InputError("was replaced since it was opened", file=path, mend="open it again")
+        raise InputError("was replaced since it was opened", file=path, hint="open it again")
     return studio.estimates.get(studio.folder.file(path))
 
 
@@ -119,7 +119,7 @@ def track(
     """Time, longitude, latitude and columns along the way, thinned evenly, rows without a position left out."""
     table = _table(studio, path, version)
     if "latitude" not in table.columns or "longitude" not in table.columns:
-        raise InputError("holds no positions", file=path, mend="estimate a log with latitude and longitude")
+        raise InputError("holds no positions", file=path, hint="estimate a log with latitude and longitude")
     for name in column:
         if name not in table.columns:
             raise InputError("is not in the estimates", place=f"column {name}")
@@ -132,7 +132,7 @@ def track(
 
 def _known(table: Estimates, wheel: str) -> None:
     if wheel not in table.wheels:
-        raise InputError(f"there is no wheel {wheel!r}", mend=f"take one of {', '.join(table.wheels)}")
+        raise InputError(f"there is no wheel {wheel!r}", hint=f"take one of {', '.join(table.wheels)}")
 
 
 def _ground(studio: Studio, path: str) -> dict[str, Any] | None:

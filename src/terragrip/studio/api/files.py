@@ -142,9 +142,9 @@ def finite(value: Any) -> Any:
 def _free(folder: Folder, path: str, replace: bool) -> Path:
     target = folder.resolve(path)
     if target.exists() and not (replace and target.is_file()):
-        raise InputError("exists already", file=path, mend="choose another name, or replace it")
+        raise InputError("exists already", file=path, hint="choose another name, or replace it")
     if not target.parent.is_dir():
-        raise InputError("cannot be written there", file=path, mend="name a folder that exists")
+        raise InputError("cannot be written there", file=path, hint="name a folder that exists")
     return target
 
 
@@ -160,11 +160,11 @@ async def _receive(stream: AsyncIterator[bytes], target: Path, limit: int, path:
             size += len(chunk)
             if size > limit:
                 raise InputError(
-                    f"is larger than {limit / 1e6:.0f} MB", file=path, mend="copy it into the folder yourself"
+                    f"is larger than {limit / 1e6:.0f} MB", file=path, hint="copy it into the folder yourself"
                 )
             await asyncio.to_thread(file.write, chunk)
     if size == 0:
-        raise InputError("is empty", file=path, mend="drop a file with content")
+        raise InputError("is empty", file=path, hint="drop a file with content")
 
 
 def _check(temporary: Path, path: str) -> None:
@@ -187,10 +187,10 @@ def _check(temporary: Path, path: str) -> None:
             check_picture(temporary.read_bytes()[:64], temporary.suffix.lower(), path)
         elif kind is None or kind == "report":
             raise InputError(
-                "is nothing that the studio takes", mend="drop a log, a vehicle, a profile or a picture"
+                "is nothing that the studio takes", hint="drop a log, a vehicle, a profile or a picture"
             )
     except InputError as error:
-        raise InputError(error.problem, file=path, place=error.place, mend=error.mend) from None
+        raise InputError(error.problem, file=path, place=error.place, hint=error.hint) from None
 
 
 _MAGIC = {
@@ -208,6 +208,6 @@ def check_picture(head: bytes, suffix: str, path: str) -> None:
     """
     if suffix not in _MAGIC:
         known = ", ".join(sorted(PICTURES & set(_MAGIC)))
-        raise InputError("is no picture that the studio takes", file=path, mend=f"give one of {known}")
+        raise InputError("is no picture that the studio takes", file=path, hint=f"give one of {known}")
     if not head.startswith(_MAGIC[suffix]):
         raise InputError(f"is no {suffix[1:].upper()} picture, whatever its name says", file=path)

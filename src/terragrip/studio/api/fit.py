@@ -46,7 +46,7 @@ class BinChoice(BaseModel):
         try:
             return BinSettings(self.width, self.lower, self.upper, self.minimum, self.by)
         except ValueError as error:
-            raise InputError(str(error), mend="widen the range") from None
+            raise InputError(str(error), hint="widen the range") from None
 
 
 class FitRequest(BaseModel):
@@ -107,7 +107,7 @@ def models() -> list[dict[str, Any]]:
 def curve(wanted: CurveRequest) -> dict[str, Any]:
     """Samples of a curve over slip, and where its largest value lies: the pages draw these and compute no model."""
     if wanted.model not in CURVES:
-        raise InputError(f"there is no curve model {wanted.model!r}", mend=f"take one of {', '.join(CURVES)}")
+        raise InputError(f"there is no curve model {wanted.model!r}", hint=f"take one of {', '.join(CURVES)}")
     model = CURVES[wanted.model]
     own = {name: value for name, value in wanted.parameters.items() if name != "intercept"}
     try:
@@ -158,7 +158,7 @@ def fit(studio: Here, wanted: FitRequest) -> dict[str, Any]:
         if slip.size != adhesion.size:
             raise InputError(f"{slip.size} slips but {adhesion.size} adhesions")
         if slip.size < 2:
-            raise InputError("there are fewer than two points", mend="choose a soil, or click points")
+            raise InputError("there are fewer than two points", hint="choose a soil, or click points")
         curve = _unfitted(wanted, _bins_of_points(slip)).fit(slip, adhesion, np.arange(slip.size))
     found: dict[str, Any] = curve.to_dict()
     grid = np.linspace(0.0, 1.0, 101)
@@ -247,7 +247,7 @@ def _gathered(studio: Studio, target: Path, soil: str) -> GatheredRuns:
         raise InputError(
             f"no usable samples on {soil or 'unlabelled ground'}",
             file=studio.folder.name(target),
-            mend="choose another soil",
+            hint="choose another soil",
         )
     return found
 

@@ -68,7 +68,7 @@ async def add_estimate(studio: Here, wanted: EstimateRequest) -> dict[str, Any]:
     """Queue an estimate."""
     folder = studio.folder
     if not method_named(wanted.method).can_smooth and wanted.smooth:
-        raise InputError(f"the method {wanted.method} cannot smooth", mend="choose another method")
+        raise InputError(f"the method {wanted.method} cannot smooth", hint="choose another method")
     output = _output(studio, wanted.output, ".parquet", wanted.replace)
     request = {
         "recording": str(folder.file(wanted.recording)),
@@ -79,7 +79,7 @@ async def add_estimate(studio: Here, wanted: EstimateRequest) -> dict[str, Any]:
         "output": output,
     }
     if output in (request["recording"], request["vehicle"], request["profile"]):
-        raise InputError("is an input of this job", file=wanted.output, mend="choose another name")
+        raise InputError("is an input of this job", file=wanted.output, hint="choose another name")
     job = studio.jobs.add("estimate", wanted.recording, wanted.output, request)
     return job.to_dict()
 
@@ -96,7 +96,7 @@ async def add_soils(studio: Here, wanted: SoilsRequest) -> dict[str, Any]:
 def _output(studio: Here, path: str, suffix: str, replace: bool) -> str:
     target = studio.folder.new_file(path, (suffix,))
     if target.exists() and not replace:
-        raise InputError("exists already", file=path, mend="choose another name, or replace it")
+        raise InputError("exists already", file=path, hint="choose another name, or replace it")
     return str(target)
 
 

@@ -58,7 +58,7 @@ async def _frames(studio: Studio, replay: str, speed: float, start: float) -> As
         return replayed(table, speed, start)
     if studio.live is None:
         raise InputError(
-            "no live service was named", mend="start the studio with --live ws://HOST:PORT, or replay a run"
+            "no live service was named", hint="start the studio with --live ws://HOST:PORT, or replay a run"
         )
     return relayed(studio.live, os.environ.get(LIVE_TOKEN))
 

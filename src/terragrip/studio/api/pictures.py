@@ -63,15 +63,15 @@ def get_calibration(studio: Here, path: Named) -> Calibration:
     try:
         data = json.loads(file.read_bytes())
     except (ValueError, RecursionError) as error:
-        raise InputError("is not JSON", file=name, mend="remove it and calibrate anew") from error
+        raise InputError("is not JSON", file=name, hint="remove it and calibrate anew") from error
     if isinstance(data, dict) and isinstance(data.get("version"), int) and data["version"] > VERSION:
-        raise InputError(f"has version {data['version']}", file=name, mend="update terragrip")
+        raise InputError(f"has version {data['version']}", file=name, hint="update terragrip")
     try:
         return Calibration.model_validate(data)
     except ValidationError as error:
         first = error.errors()[0]
         place = ".".join(str(part) for part in first["loc"])
-        raise InputError(first["msg"], file=name, place=place, mend="remove it and calibrate anew") from None
+        raise InputError(first["msg"], file=name, place=place, hint="remove it and calibrate anew") from None
 
 
 @router.put("/picture")
@@ -101,7 +101,7 @@ def _check(axis: Axis | None, name: str, path: str) -> None:
             "two marks of one axis must differ in place and value",
             file=path,
             place=name,
-            mend="click two points",
+            hint="click two points",
         )
     if axis.log and min(first.value, second.value) <= 0:
-        raise InputError("a logarithmic axis has no zero", file=path, place=name, mend="give positive values")
+        raise InputError("a logarithmic axis has no zero", file=path, place=name, hint="give positive values")
