@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Callable, Mapping
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
@@ -113,7 +114,8 @@ def by_live(folder: Path, drive: Any, patch: pytest.MonkeyPatch) -> Mapping[str,
     known = Estimates.read_about(settings_of(folder))["settings"]
     source = f"replay:{folder / 'log.csv'}?speed=max"
     service = Service(drive[1], [source], noise=known["noise"], held=known["held"], record=folder / "live")
-    asyncio.run(service.run())
+    with ThreadPoolExecutor(1) as apart:  # a browser test may have left its loop running in this thread
+        apart.submit(lambda: asyncio.run(service.run())).result()
     parts = sorted((folder / "live").glob("estimates*.parquet"))
     return pd.concat([pd.read_parquet(part) for part in parts])
 
