@@ -74,8 +74,7 @@ static tg_tuned default_tuned(void)
     return k;
 }
 
-/* Tuned on the simulation's scenarios accuracy-clean and accuracy-faults, seeds 1000 to 1019, and on nothing else: walks, scales of the
- * bank, and the constants at the head of this floor's files (docs/decisions/0098, 0115). */
+/* What is tuned here, on which machines, and what halving and doubling does: docs/decisions/0098, docs/families.md. */
 tg_settings tg_default_settings(void)
 {
     tg_settings s;
