@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import asyncio
+import subprocess
+import sys
 from collections.abc import Callable, Mapping
-from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +15,6 @@ import pytest
 import terragrip as tg
 from terragrip.cli import main
 from terragrip.estimation import Estimates
-from terragrip.live.service import Service
 from terragrip.recording.chunks import CHUNK, CHUNKS, sampled_rows
 from terragrip.recording.survey import LogBlocks, survey_of
 from terragrip.report import campaign
@@ -111,11 +110,18 @@ def by_sample(folder: Path, drive: Any, patch: pytest.MonkeyPatch) -> Mapping[st
 
 
 def by_live(folder: Path, drive: Any, patch: pytest.MonkeyPatch) -> Mapping[str, Any]:
-    known = Estimates.read_about(settings_of(folder))["settings"]
+    words = [
+        "--vehicle",
+        folder / "vehicle.yaml",
+        "--settings",
+        settings_of(folder),
+        "--record",
+        folder / "live",
+        "--quiet",
+    ]
     source = f"replay:{folder / 'log.csv'}?speed=max"
-    service = Service(drive[1], [source], noise=known["noise"], held=known["held"], record=folder / "live")
-    with ThreadPoolExecutor(1) as apart:  # a browser test may have left its loop running in this thread
-        apart.submit(lambda: asyncio.run(service.run())).result()
+    command_line = [sys.executable, "-m", "terragrip", "live", "--source", source, *map(str, words)]
+    subprocess.run(command_line, check=True, timeout=120)  # a process of its own, as live has
     parts = sorted((folder / "live").glob("estimates*.parquet"))
     return pd.concat([pd.read_parquet(part) for part in parts])
 
