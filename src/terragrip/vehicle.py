@@ -16,6 +16,7 @@ import numpy.typing as npt
 from pydantic import BeforeValidator, Field, PlainSerializer, field_validator, model_validator
 
 from terragrip.document import Fault, Part, read_yaml, validate
+from terragrip.errors import InputError
 from terragrip.units import UnitError, factor_to, quantity
 
 Floats = npt.NDArray[np.float64]
@@ -23,6 +24,7 @@ Floats = npt.NDArray[np.float64]
 MAX_WHEELS = 8
 _MASS_TOLERANCE = 0.01  # share of the mass by which the axles may miss it
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_]*$")
+_ADD_WHEELS = "add e.g. 'wheel: {radius: 0.2 m, inertia: 0.15 kg m^2}': only slip from wheel_based_speed alone needs none"
 
 
 def _read(unit: str, low: float, high: float, likely: tuple[str, ...], above: bool) -> Callable[[Any], float]:
@@ -185,7 +187,8 @@ class Uncertainty(Part):
 class Calibration(Part):
     """Gains and offsets found by ``terragrip calibrate``: corrected value = (raw value - offset) / gain.
 
-    ``wheel_radius`` [m] takes the place of ``wheel.radius`` for the wheels it names.
+    ``wheel_radius`` [m] takes the place of ``wheel.radius`` for the wheels it names; ``wheel_based_speed_gain`` is that of the drive
+    train's speed on a machine whose file gives no wheels' radii.
     """
 
     drive_torque_gain: dict[str, _Gain] = Field(default_factory=dict)
@@ -194,13 +197,15 @@ class Calibration(Part):
     acceleration_bias_x: _SignedAcceleration = 0.0
     pitch_offset: _SignedAngle = 0.0
     wheel_radius: dict[str, _Radius] = Field(default_factory=dict)
+    wheel_based_speed_gain: _Gain | None = None
 
 
 class Vehicle(Part):
     """A machine of 1 to 8 wheels on one or more axles.
 
     Fields are those of the vehicle file (architecture.md, contracts) in SI; ``wheelbase`` [m] reaches from the first axle to
-    the last. The properties hold numbers per wheel or axle as read-only arrays, in the order of ``wheels``.
+    the last. The properties hold numbers per wheel or axle as read-only arrays, in the order of ``wheels``. Without any ``wheel`` (see
+    `knows_wheels`) the vehicle does for slip from ``wheel_based_speed`` alone.
     """
 
     name: str = ""
@@ -261,10 +266,8 @@ class Vehicle(Part):
                     "give every wheel its own name",
                     ("axles", key, "wheels"),
                 )
-            if axle.wheel is None and self.wheel is None:
-                raise Fault(
-                    "has no wheel data", "add 'wheel: {radius: 0.2 m, inertia: 0.15 kg m^2}'", ("axles", key)
-                )
+            if axle.wheel is None and not self.knows_wheels and any(a.wheel for a in self.axles.values()):
+                raise Fault("has no wheel data, and another axle has", _ADD_WHEELS, ("axles", key))
         carried = sum(axle.mass for axle in self.axles.values())
         if abs(carried - self.mass) > _MASS_TOLERANCE * self.mass:
             raise Fault(
@@ -299,11 +302,19 @@ class Vehicle(Part):
         counts = [len(axle.wheels) for axle in self.axles.values()]
         return _frozen(np.repeat(np.arange(len(counts)), counts))
 
+    @property
+    def knows_wheels(self) -> bool:
+        """Whether the file gives the wheels' radii and inertias; slip from ``wheel_based_speed`` alone does without."""
+        return self.wheel is not None or all(axle.wheel is not None for axle in self.axles.values())
+
     @cached_property
     def wheel_data(self) -> tuple[Wheel, ...]:
-        """Each wheel's radius, inertia, width and radius model: its axle's, else the vehicle's."""
+        """Each wheel's radius, inertia, width and radius model: its axle's, else the vehicle's; raises InputError where there is none."""
+        if not self.knows_wheels:
+            of = f" of {self.name}" if self.name else ""
+            raise InputError(f"the vehicle file{of} has no wheel data", place="wheel", hint=_ADD_WHEELS)
         return tuple(
-            axle.wheel or self.wheel  # type: ignore[misc]  # _check saw to one of them
+            axle.wheel or self.wheel  # type: ignore[misc]  # one of them is there
             for axle in self.axles.values()
             for _ in axle.wheels
         )

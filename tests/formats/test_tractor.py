@@ -100,3 +100,76 @@ def test_a_radar_that_falls_silent_is_replaced_by_gnss(tmp_path: Path) -> None:
     recording = tg.read(write_log(tmp_path / "log.blf", frames), "tractor-isobus")
     assert np.nanmedian(recording["ground_speed"]) == pytest.approx(1.9)
     assert "ground_speed is from SpeedOverGround." in recording.notes
+
+
+WITHOUT_WHEELS = TRACTOR.replace("wheel: {radius: 0.8 m, inertia: 50 kg m^2}\n", "")
+
+
+@pytest.mark.parametrize("smooth", [False, True])
+def test_a_machine_known_by_its_bus_speed_alone_needs_no_wheel_radii(tmp_path: Path, smooth: bool) -> None:
+    """The machine's own radius is in its speed: slip is the same to rounding with any radius, and without one."""
+    machine = drive(1000, 120.0)
+    recording = tg.read(write_log(tmp_path / "log.blf", machine.frames), "tractor-isobus")
+    (tmp_path / "bus.yaml").write_text(WITHOUT_WHEELS)
+    (tmp_path / "sized.yaml").write_text(TRACTOR)
+    bare, sized = (tg.Vehicle.load(tmp_path / f"{name}.yaml") for name in ("bus", "sized"))
+    assert not bare.knows_wheels
+    found, known = (tg.estimate(recording, vehicle, smooth=smooth) for vehicle in (bare, sized))
+    for name in ("slip_drive", "slip_drive_std", "ground_speed", "distance"):
+        np.testing.assert_allclose(found[name], known[name], rtol=1e-6, atol=1e-9)
+    # What needs a radius is not there, rather than for a wheel of 1 m.
+    assert not [name for name in found.names if name.startswith(("wheel_speed", "zero_slip_radius"))]
+    assert any("of the speed that the machine gives" in note for note in found.notes)
+    error = found["slip_drive"] - relative_slip(machine, found.time)
+    assert np.sqrt(np.nanmean(error**2)) < 0.009
+
+
+def test_the_bus_speed_is_calibrated_without_radii(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    machine = drive(1000, 120.0)
+    free = [
+        (t, i, payload(machine.scale * np.interp(t - machine.frames[0][0], machine.time, machine.speed)))
+        if i == WHEEL_BASED
+        else (t, i, d)
+        for t, i, d in machine.frames
+    ]
+    (tmp_path / "bus.yaml").write_text(WITHOUT_WHEELS)
+    empty, work = (
+        write_log(tmp_path / f"{name}.blf", frames)
+        for name, frames in (("empty", free), ("work", machine.frames))
+    )
+    words = ["--vehicle", str(tmp_path / "bus.yaml"), "--profile", "tractor-isobus"]
+    assert main(["inspect", str(work), *words]) == 0
+    target = tmp_path / "calibrated.yaml"
+    assert main(["calibrate", str(empty), *words, "--light", "all", "-o", str(target)]) == 0
+    assert "wheel_based_speed_gain" in capsys.readouterr().out
+    calibrated = tg.Vehicle.load(target)
+    assert calibrated.calibration.wheel_based_speed_gain == pytest.approx(machine.scale, rel=0.004)
+    assert 0 < (calibrated.uncertainty.wheel_radius or 0) < 0.005
+    out = tmp_path / "estimates.parquet"
+    words[1] = str(target)
+    assert main(["estimate", str(work), *words, "-o", str(out)]) == 0
+    estimates = tg.Estimates.read(out)
+    truth = np.interp(estimates.time, machine.time, machine.slip)
+    assert np.nanmean(estimates["slip_drive"] - truth) == pytest.approx(0, abs=0.003)
+    page = tmp_path / "report.html"
+    assert main(["report", str(out), "-o", str(page)]) == 0
+    assert "Slip counts from the calibrated speed." in page.read_text()
+
+
+def test_what_needs_a_radius_asks_for_it(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Wheel speeds in rad/s, and torques, mean nothing without a radius."""
+    (tmp_path / "bus.yaml").write_text(WITHOUT_WHEELS)
+    time = np.arange(0, 20, 0.1)
+    wheels = "".join(f",wheel_speed_{wheel}" for wheel in ("fl", "fr", "rl", "rr"))
+    torques = ",drive_torque_rl,drive_torque_rr"
+    for name, header, row in (("speeds", wheels, ",1" * 4), ("torques", wheels + torques, ",1" * 6)):
+        log = tmp_path / f"{name}.csv"
+        log.write_text(f"time,ground_speed{header}\n" + "".join(f"{t:.1f},1{row}\n" for t in time))
+        out = tmp_path / f"{name}.parquet"
+        assert main(["estimate", str(log), "--vehicle", str(tmp_path / "bus.yaml"), "-o", str(out)]) == 2
+        said = capsys.readouterr().err
+        assert said.count("\n") == 1
+        assert "has no wheel data; add e.g. 'wheel: {radius" in said
+        assert not out.exists()

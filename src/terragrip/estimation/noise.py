@@ -85,7 +85,9 @@ def _check(given: Mapping[str, float], channels: tuple[str, ...]) -> None:
 
 def _guesses(vehicle: Vehicle) -> dict[str, float]:
     """Cautious SDs from the vehicle's size, by sensor."""
-    radius, weight = float(vehicle.wheel_radius.mean()), vehicle.mass * GRAVITY
+    # Without radii slip is from the drive train's speed, whose noise is in m/s.
+    radius = float(vehicle.wheel_radius.mean()) if vehicle.knows_wheels else 1.0
+    weight = vehicle.mass * GRAVITY
     return {
         "wheel_speed": 0.02 / radius,
         "ground_speed": 0.05,

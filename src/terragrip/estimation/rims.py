@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -28,7 +28,8 @@ class Rim:
     """A wheel whose slip is told, and the ``channel`` that tells its speed.
 
     ``scale``: reading of the channel at 1 rad/s (1, or for the drive train the radius that it supposes [m]); ``radius`` [m] at zero slip
-    and its relative SD ``spread``; ``side``: m left of the vehicle's middle.
+    and its relative SD ``spread``; ``side``: m left of the vehicle's middle. Where no radius is known (``has_radius``) the drive train is a
+    wheel of 1 m, which slip does not see, and what a radius is needed for is no column.
     """
 
     wheel: str
@@ -37,6 +38,7 @@ class Rim:
     radius: float
     spread: float
     side: float
+    has_radius: bool = True
 
 
 def speeds_alone(channels: Collection[str], vehicle: Vehicle) -> bool:
@@ -62,23 +64,35 @@ def rims_of(vehicle: Vehicle, channels: Collection[str], source: str | None = No
             for wheel, radius, side in zip(vehicle.wheels, radii, sides, strict=True)
             if wheel in named
         )
-    supposed = supposed_radius(vehicle)
-    calibrated = calibrated_scale(vehicle)
+    supposed, calibrated = supposed_radius(vehicle), calibrated_scale(vehicle)
     if calibrated is None:
-        return (
-            Rim(DRIVE, "wheel_based_speed", supposed, supposed, UNTOLD if stated is None else stated, 0.0),
-        )
-    return (Rim(DRIVE, "wheel_based_speed", supposed, calibrated * supposed, spread, 0.0),)
+        calibrated, spread = 1.0, UNTOLD if stated is None else stated
+    return (
+        Rim(
+            DRIVE,
+            "wheel_based_speed",
+            supposed,
+            calibrated * supposed,
+            spread,
+            0.0,
+            has_radius=vehicle.knows_wheels,
+        ),
+    )
 
 
 def supposed_radius(vehicle: Vehicle) -> float:
-    """The driven wheels' mean radius [m] as the vehicle file says it, before calibration: a drive train's speed in m/s stands for any."""
+    """Mean radius [m] of the driven wheels by the vehicle file uncalibrated; 1 m where it has none: any will do for a speed in m/s."""
+    if not vehicle.knows_wheels:
+        return 1.0
     radii = [data.radius for data, driven in zip(vehicle.wheel_data, vehicle.driven, strict=True) if driven]
     return float(np.mean(radii))
 
 
 def calibrated_scale(vehicle: Vehicle) -> float | None:
-    """What the drive train's speed is to be multiplied by, where all driven wheels are calibrated."""
+    """What the drive train's speed is to be multiplied by, where it or all driven wheels are calibrated."""
+    if not vehicle.knows_wheels:
+        gain = vehicle.calibration.wheel_based_speed_gain
+        return None if gain is None else 1 / gain
     found = vehicle.calibration.wheel_radius
     driven = [
         (wheel, data.radius)
@@ -92,7 +106,7 @@ def calibrated_scale(vehicle: Vehicle) -> float | None:
 
 def at_zero(rim: Rim, zero: Zero) -> Rim:
     """The rim with the radius that a log tells."""
-    return Rim(rim.wheel, rim.channel, rim.scale, zero.ratio * rim.radius, zero.std, rim.side)
+    return replace(rim, radius=zero.ratio * rim.radius, spread=zero.std)
 
 
 def slots_in(rims: Collection[Rim]) -> dict[str, int]:
@@ -114,6 +128,8 @@ def slots_out(rims: Collection[Rim]) -> dict[str, int]:
         ("zero_slip_radius", lib.TG_OUT_ZERO_SLIP_RADIUS, lib.TG_OUT_ZERO_SLIP_RADIUS_STD),
     ):
         for i, rim in enumerate(rims):
+            if quantity != "slip" and not rim.has_radius:
+                continue
             slots[f"{quantity}_{rim.wheel}"] = value + i
             slots[f"{quantity}_{rim.wheel}_std"] = std + i
     return slots | {"nis": lib.TG_OUT_NIS, "channels": lib.TG_OUT_CHANNELS}

@@ -124,10 +124,17 @@ def _said(rim: Rim, zero: Zero | None, learns: bool) -> list[str]:
         ]
     base = rim.scale if rim.wheel == DRIVE else rim.radius
     beside = "the vehicle file says" if learns or rim.wheel != DRIVE else "before calibration"
-    said = (
-        f"Zero-slip radius of {what} in this log: {zero.ratio * base:.4f} ± {zero.std * base:.4f} m, from {zero.windows} windows of the "
-        f"lightest work ({beside} {base:.4f} m)"
-    )
+    if rim.has_radius:
+        at, beside = (
+            f"radius of {what} in this log: {zero.ratio * base:.4f} ± {zero.std * base:.4f} m",
+            f" ({beside} {base:.4f} m)",
+        )
+    else:
+        at, beside = (
+            f"ground speed in this log: {zero.ratio:.4f} ± {zero.std:.4f} of the speed that the machine gives",
+            "",
+        )
+    said = f"Zero-slip {at}, from {zero.windows} windows of the lightest work{beside}"
     if zero.doubt:
         return [f"{said}; {zero.doubt}."]
     return [said + (". Slip counts from there." if learns else ".")]

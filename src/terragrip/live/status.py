@@ -129,6 +129,8 @@ def _wheels(row: Row, table: Any) -> Any:
 
 
 def _with_std(estimate: Any, name: str, scale: float, digits: int) -> str:
+    if name not in estimate.places:
+        return "—"
     value, std = scale * estimate[name], scale * estimate[f"{name}_std"]
     return "—" if value != value else f"{value:.{digits}f} ± {std:.{digits}f}"
 

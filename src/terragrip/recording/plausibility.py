@@ -56,6 +56,8 @@ def unit_warnings(recording: Recording, vehicle: Vehicle | None) -> list[str]:
 
 def _speed_warnings(recording: Recording, vehicle: Vehicle) -> list[str]:
     found: dict[str, list[tuple[str, float]]] = {}
+    if not vehicle.knows_wheels:
+        return []
     for wheel, radius in zip(vehicle.wheels, vehicle.wheel_radius, strict=True):
         ratio = _speed_ratio(recording, wheel, float(radius))
         if ratio is None or _PLAUSIBLE[0] <= ratio <= _PLAUSIBLE[1]:

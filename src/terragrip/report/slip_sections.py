@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from terragrip.estimation.rims import DRIVE
+from terragrip.estimation.rims import DRIVE, calibrated_scale
 from terragrip.physics.geodesy import metres_of
 from terragrip.report.page import Picture, Section, Table, names, number
 from terragrip.report.runs import FloatArray, Run
@@ -52,13 +52,8 @@ def zero_told(run: Run) -> tuple[str, ...]:
         else ""
     )
     vehicle = run.vehicle
-    calibrated = vehicle is not None and all(
-        wheel in vehicle.calibration.wheel_radius
-        for wheel, driven in zip(vehicle.wheels, vehicle.driven, strict=True)
-        if driven
-    )
-    if calibrated:
-        return (f"Slip counts from the calibrated radius.{beside}",)
+    if vehicle is not None and calibrated_scale(vehicle) is not None:
+        return (f"Slip counts from the calibrated {'radius' if vehicle.knows_wheels else 'speed'}.{beside}",)
     if DRIVE in found:
         return (
             f"Slip counts from the log's own zero: calibrate on a pass without load to make it absolute.{beside}",

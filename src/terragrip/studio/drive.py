@@ -44,6 +44,8 @@ def radii(table: Estimates) -> dict[str, float]:
     """Rolling radius [m] of each wheel of the table: the vehicle file's, by the zero of slip where the log told one. The drive train
     of a tractor, which stands for all driven wheels, has their mean."""
     vehicle = table.vehicle
+    if not vehicle.knows_wheels:
+        return {}
     known = dict(zip(vehicle.wheels, vehicle.wheel_radius.tolist(), strict=True))
     if DRIVE in table.wheels:
         known[DRIVE] = supposed_radius(vehicle)

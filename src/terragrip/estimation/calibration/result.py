@@ -154,6 +154,7 @@ _PLACES = {
     "acceleration_bias_x",
     "pitch_offset",
     "wheel_radius",
+    "wheel_based_speed_gain",
 }
 
 
