@@ -68,7 +68,7 @@ int main(int argc, char **argv)
     if (!rows) stop("no memory");
     take(file, rows, steps * (size_t)width);
     fclose(file);
-    tg_filter *filter = malloc(tg_filter_size());
+    tg_filter *filter = malloc(sizeof *filter);
     if (!filter) stop("no memory");
 
     for (size_t m = 0; m < sizeof METHODS / sizeof *METHODS; m++) {

@@ -2,7 +2,8 @@
  *
  * Two floors. The filter floor (tg_filter_*) is the Kalman filter of physics.md 1 and 6 for one machine. The estimator floor
  * (tg_estimator_*) takes raw samples with missing channels and gives traction estimates: it adds vertical loads, input
- * noise, standstill, gaps, soft outlier weighting and the considered constants. Both are plain data: copy to clone.
+ * noise, standstill, gaps, soft outlier weighting and the considered constants. Both are plain data, of a size that depends on the policy
+ * (tg_filter_size, tg_estimator_size): storage need be no larger, and a copy of that many bytes is a clone.
  *
  * State order, n wheels:  x = (omega_1..omega_n, v, mu_1..mu_n, rho_s), nx = 2n+2.
  * Channel order:          y = (omega_1..omega_n, v, a_x), ny = n+2. A NaN channel is missing at that instant.
@@ -24,7 +25,9 @@
 #define TG_MAX_CHANNELS 10
 #define TG_MODES 4
 #define TG_MAX_CONSIDERED 14
-#define TG_ESTIMATOR_ROOM 81920 /* bytes, aligned as a double, that hold any tg_estimator: storage without malloc */
+/* Bytes, aligned as a double, that hold a tg_estimator: storage without malloc. Of any policy, of TG_FIXED; of filters: end of this file. */
+#define TG_ESTIMATOR_ROOM 81920
+#define TG_ESTIMATOR_ROOM_FIXED 40960
 
 /* A program and its kernel must agree on the precision: whoever includes this header asks the linker for the symbol of its own. */
 #ifdef TG_FLOAT
@@ -103,7 +106,7 @@ typedef struct { /* what one update did; arrays in channel or state order, unuse
 } tg_step;
 
 typedef struct tg_filter tg_filter;
-size_t tg_filter_size(void);
+size_t tg_filter_size(int32_t policy); /* bytes of storage that a filter of this tg_policy needs */
 tg_tuning tg_default_tuning(void);
 tg_status tg_filter_init(tg_filter *f, const tg_machine *machine, const tg_tuning *tuning, const tg_real *x0, const tg_real *P0);
 /* Predict over dt with `before` held (Q once, at the end), then update with y. `q_input`: extra variance added to each state in this
@@ -359,7 +362,7 @@ typedef struct {
 } tg_settings;
 
 typedef struct tg_estimator tg_estimator;
-size_t tg_estimator_size(void);
+size_t tg_estimator_size(int32_t policy); /* bytes of storage that an estimator of this tg_policy needs */
 /* Tuned thresholds, tuning and priors; the machine is left empty, and with it the random walks. */
 tg_settings tg_default_settings(void);
 /* The random walks (tuning.walk) of the machine that the settings hold, by their tuned numbers. */
@@ -384,7 +387,8 @@ tg_status tg_estimator_smooth(const tg_estimator *e, size_t rows, const tg_real 
 /* Bytes that continue bit for bit, with this kernel's version and precision only. */
 size_t tg_snapshot_size(const tg_estimator *e); /* by its policy */
 tg_status tg_estimator_snapshot(const tg_estimator *e, uint8_t *bytes);
-tg_status tg_estimator_restore(tg_estimator *e, const uint8_t *bytes, size_t size);
+/* `room`: bytes of storage at `e`. TG_BAD_ARGUMENT where the snapshot's estimator needs more. */
+tg_status tg_estimator_restore(tg_estimator *e, size_t room, const uint8_t *bytes, size_t size);
 tg_status tg_estimator_settings(const tg_estimator *e, tg_settings *settings);
 /* cdef end */
 
@@ -444,12 +448,16 @@ struct tg_filter {
     int32_t channel[TG_MAX_CHANNELS];
     tg_real gain[TG_MAX_CHANNELS][TG_ROWS]; /* each after the ones before it; without a bank */
     tg_real accelerometer[TG_ROWS];      /* row of H of a_x in the last step */
-    tg_supervisor_state supervisor;
-    union {
-        tg_adaptation_state adaptation;
+    union { /* last, so that storage ends with the part that the policy uses: see tg_filter_size */
+        struct {
+            tg_adaptation_state adaptation; /* TG_ADAPTIVE, TG_SUPERVISED */
+            tg_supervisor_state supervisor; /* TG_SUPERVISED */
+        } adaptive;
         tg_bank_state bank;
     } policy;
 };
+#define TG_FILTER_ROOM sizeof(tg_filter)                /* of any policy */
+#define TG_FILTER_ROOM_FIXED offsetof(tg_filter, policy) /* of TG_FIXED */
 
 struct tg_consider {
     int32_t columns, wheels, states;

@@ -194,11 +194,18 @@ TG_INLINE int adapt(tg_adaptation_state *s, const tg_filter *f, const tgi_plan *
     return is_finite(s, n, stride);
 }
 
+void tgi_adaptation_init(tg_filter *f)
+{
+    tg_adaptation_state *const s = &f->policy.adaptive.adaptation;
+    for (int j = 0; j < f->states; j++) s->scale[j] = 1;
+    for (int c = 0; c <= f->wheels; c++) s->C[c][c] = 1;
+}
+
 tg_status tgi_adapt(tg_filter *f, const tgi_plan *plan, const tgi_result *result)
 {
     tg_adaptation_state next;
-    copy(&next, &f->policy.adaptation, f->states, f->stride);
+    copy(&next, &f->policy.adaptive.adaptation, f->states, f->stride);
     if (!adapt(&next, f, plan, result, f->wheels, f->stride)) return TG_DIVERGED;
-    copy(&f->policy.adaptation, &next, f->states, f->stride);
+    copy(&f->policy.adaptive.adaptation, &next, f->states, f->stride);
     return TG_OK;
 }

@@ -191,7 +191,7 @@ static void tell_adaptation(const tg_estimator *e, tg_real *o)
     const int32_t policy = e->settings.tuning.policy;
     if (policy != TG_ADAPTIVE && policy != TG_SUPERVISED) return;
     for (int32_t j = 0; j < e->filter.states; j++)
-        o[TG_OUT_ADAPTATION + j] = e->filter.policy.adaptation.scale[tgi_row(e->filter.wheels, j)];
+        o[TG_OUT_ADAPTATION + j] = e->filter.policy.adaptive.adaptation.scale[tgi_row(e->filter.wheels, j)];
 }
 
 /* Whether nothing tells slip: after a gap, before both a wheel speed and the ground speed are back, and while wheels are silent. */

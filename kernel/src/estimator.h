@@ -190,9 +190,9 @@ struct tg_estimator {
     tg_real curve_wait, curve_distance; /* s and m since the curves were last brought up to date */
     tgi_speeds speeds;         /* of the method TG_SPEEDS, */
     tgi_speed_mode speed_mode[TG_SPEED_MODES];
-    tg_filter filter;
     tg_consider consider;
     tg_track *track;           /* while a smoother's records are written, else null */
+    tg_filter filter;          /* last, since its size depends on the policy: see tg_estimator_size */
 };
 
 TG_INLINE tg_real tgi_square(tg_real x) { return x * x; }

@@ -22,7 +22,7 @@ static const tgi_field tuning[] = {INTEGERS(T, engine), INTEGERS(T, policy), REA
 #undef T
 #define T tg_settings
 const tgi_field tgi_settings_fields[] = {
-    INTEGERS(T, method), INTEGERS(T, axles), INTEGERS(T, towing), INTEGERS(T, wheel_axle), INTEGERS(T, driven),
+    INTEGERS(T, method), INTEGERS(T, axles), INTEGERS(T, towing), INTEGERS(T, wheel_axle), INTEGERS(T, driven), INTEGERS(T, powered),
     INSIDE(T, machine, tg_machine, machine), INSIDE(T, tuning, tg_tuning, tuning), REALS(T, load_share), REALS(T, load_transfer),
     REALS(T, wheel_share), REALS(T, wheel_side), REALS(T, lateral_share), REALS(T, center_of_gravity_height), REALS(T, hitch_height),
     REALS(T, rolling_radius), REALS(T, offset), REALS(T, gain), REALS(T, noise), REALS(T, held_period), REALS(T, uncertainty),
@@ -65,14 +65,21 @@ static const tgi_field supervisor[] = {REALS(T, value), DOUBLES(T, time), REALS(
 const tgi_field tgi_filter_fields[] = {
     DOUBLES(T, clock), REALS(T, slope), REALS(T, cosine), REALS(T, sine), REALS(T, x), REALS(T, d), REALS(T, u), REALS(T, P), INTEGERS(T, formed),
     INTEGERS(T, factor_steps), REALS(T, x_prior), REALS(T, passage), INTEGERS(T, taken), INTEGERS(T, channel), REALS(T, gain),
-    REALS(T, accelerometer), INSIDE(T, supervisor, tg_supervisor_state, supervisor), END};
+    REALS(T, accelerometer), END};
 #undef T
 #define T tg_adaptation_state
-const tgi_field tgi_adaptation_fields[] = {REALS(T, scale), REALS(T, dx), REALS(T, dP), REALS(T, C), INTEGERS(T, updates), END};
+static const tgi_field adaptation[] = {REALS(T, scale), REALS(T, dx), REALS(T, dP), REALS(T, C), INTEGERS(T, updates), END};
 #undef T
 #define T tg_bank_state
-const tgi_field tgi_bank_fields[] = {REALS(T, x), REALS(T, d), REALS(T, u), REALS(T, gain), REALS(T, probability), DOUBLES(T, mixed),
-                                     INTEGERS(T, updates), END};
+static const tgi_field bank[] = {REALS(T, x), REALS(T, d), REALS(T, u), REALS(T, gain), REALS(T, probability), DOUBLES(T, mixed),
+                                INTEGERS(T, updates), END};
+#undef T
+#define T tg_filter
+#define ADAPTATION INSIDE(T, policy.adaptive.adaptation, tg_adaptation_state, adaptation)
+const tgi_field tgi_policy_fields[][3] = {[TG_FIXED] = {END},
+                                          [TG_ADAPTIVE] = {ADAPTATION, END},
+                                          [TG_SUPERVISED] = {ADAPTATION, INSIDE(T, policy.adaptive.supervisor, tg_supervisor_state, supervisor), END},
+                                          [TG_BANK] = {INSIDE(T, policy.bank, tg_bank_state, bank), END}};
 #undef T
 const tgi_field tgi_consider_fields[] = {REALS(tg_consider, s), REALS(tg_consider, prior), END};
 

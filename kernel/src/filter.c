@@ -5,7 +5,16 @@
 
 const int TG_PRECISION = (int)sizeof(tg_real);
 
-size_t tg_filter_size(void) { return sizeof(tg_filter); }
+size_t tg_filter_size(int32_t policy)
+{
+    switch (policy) {
+    case TG_FIXED: return TG_FILTER_ROOM_FIXED;
+    case TG_ADAPTIVE: return offsetof(tg_filter, policy.adaptive.supervisor);
+    case TG_SUPERVISED: return offsetof(tg_filter, policy.adaptive) + sizeof ((tg_filter *)0)->policy.adaptive;
+    case TG_BANK: return offsetof(tg_filter, policy.bank) + sizeof(tg_bank_state);
+    default: return 0;
+    }
+}
 
 /* Settings of physics.md 6; `walk` stays 0 and is the caller's. */
 tg_tuning tg_default_tuning(void)
@@ -71,7 +80,7 @@ tg_status tg_filter_init(tg_filter *f, const tg_machine *machine, const tg_tunin
     }
     const tg_status status = tgi_factorise(rows, stride, P, u, d);
     if (status != TG_OK) return status;
-    memset(f, 0, sizeof *f);
+    memset(f, 0, tg_filter_size(tuning->policy));
     f->machine = *machine;
     f->tuning = *tuning;
     f->wheels = n;
@@ -93,21 +102,30 @@ tg_status tg_filter_init(tg_filter *f, const tg_machine *machine, const tg_tunin
     }
     memcpy(f->d, d, sizeof d);
     memcpy(f->u, u, sizeof u);
-    if (tuning->policy == TG_BANK)
-        tgi_bank_init(f);
-    else {
-        for (int j = 0; j < rows; j++) f->policy.adaptation.scale[j] = 1;
-        for (int c = 0; c <= n; c++) f->policy.adaptation.C[c][c] = 1;
-    }
-    tgi_supervisor_init(f);
+    if (tuning->policy == TG_BANK) tgi_bank_init(f);
+    if (tuning->policy == TG_ADAPTIVE || tuning->policy == TG_SUPERVISED) tgi_adaptation_init(f);
+    if (tuning->policy == TG_SUPERVISED) tgi_supervisor_init(f);
     return TG_OK;
 }
 
-/* Q of this step (physics.md 6): [I + gamma (A - I)] Q0 on top of the inputs' noise. */
-TG_INLINE void scale_noise(const tg_filter *f, tg_real gamma, tgi_plan *plan, const int n)
+/* a_j of this step; 1 where nothing adapts. */
+TG_INLINE void noise_scales(const tg_filter *f, tg_real *a, const int stride)
 {
-    const tg_real *const a = f->policy.adaptation.scale, dt = plan->passage.dt;
-    for (int j = 0; j < TG_TWICE(n); j++) plan->passage.q[j] += (1 + gamma * (a[j] - 1)) * f->walk[j] * dt;
+    const int adapts = f->tuning.policy != TG_FIXED;
+    for (int i = 0; i < stride; i += TG_LANES) lanes_store(a + i, adapts ? lanes_load(f->policy.adaptive.adaptation.scale + i) : lanes_all(1));
+}
+
+static tg_real gamma_of(const tg_filter *f, const tgi_call *call, const tgi_plan *plan)
+{
+    if (f->tuning.policy == TG_FIXED) return 0;
+    if (f->tuning.policy == TG_ADAPTIVE) return 1;
+    return call->y ? tgi_supervise(f, plan, call->now) : f->policy.adaptive.supervisor.gamma;
+}
+
+/* Q of this step (physics.md 6): [I + gamma (A - I)] Q0 on top of the inputs' noise. */
+TG_INLINE void scale_noise(const tg_filter *f, const tg_real *a, tgi_plan *plan, const int n)
+{
+    for (int j = 0; j < TG_TWICE(n); j++) plan->passage.q[j] += (1 + plan->gamma * (a[j] - 1)) * f->walk[j] * plan->passage.dt;
 }
 
 /* ln N of the residuals, which are independent of each other. */
@@ -213,12 +231,9 @@ TG_INLINE tg_status advance_one(tg_filter *f, const tgi_call *call, tgi_plan *pl
     const int32_t policy = f->tuning.policy;
     tg_real scale[TG_ROWS];
     tgi_result result;
-    plan->gamma = policy == TG_FIXED      ? 0
-                  : policy == TG_ADAPTIVE ? 1
-                  : call->y               ? tgi_supervise(f, plan, call->now)
-                                          : f->supervisor.gamma;
-    scale_noise(f, plan->gamma, plan, n);
-    for (int i = 0; i < stride; i += TG_LANES) lanes_store(scale + i, lanes_load(f->policy.adaptation.scale + i));
+    plan->gamma = gamma_of(f, call, plan);
+    noise_scales(f, scale, stride);
+    scale_noise(f, scale, plan, n);
     int formed = 0;
 #if TGI_DIRECT
     tgi_direct direct;
@@ -322,7 +337,7 @@ tg_status tg_filter_factors(const tg_filter *f, int32_t mode, tg_real *U, tg_rea
 tg_status tg_filter_sensitivity(const tg_filter *f, int32_t j, tg_real *dx, tg_real *dP)
 {
     if (!f || j < 0 || j >= f->states || (f->tuning.policy != TG_ADAPTIVE && f->tuning.policy != TG_SUPERVISED)) return TG_BAD_ARGUMENT;
-    const tg_adaptation_state *const s = &f->policy.adaptation;
+    const tg_adaptation_state *const s = &f->policy.adaptive.adaptation;
     const int n = f->wheels, parameter = tgi_row(n, j);
     for (int e = 0; e < f->states; e++) {
         const int i = tgi_row(n, e);
@@ -354,7 +369,7 @@ void tgi_restart(int n, int stride, const tg_real *q, tg_real *u, tg_real *d)
 /* Forget the outputs' sensitivities: their variances are given now. */
 static void restart_sensitivities(tg_filter *f)
 {
-    tg_adaptation_state *const s = &f->policy.adaptation;
+    tg_adaptation_state *const s = &f->policy.adaptive.adaptation;
     const int first = f->wheels + 1;
     for (int i = first; i < f->states; i++) {
         memset(s->dx + i * f->stride, 0, (size_t)f->stride * sizeof *s->dx);

@@ -283,7 +283,14 @@ void tgi_believe(tg_estimator *e)
     tgi_covariance_of(f, e->belief.P);
 }
 
+size_t tg_estimator_size(int32_t policy)
+{
+    const size_t filter = tg_filter_size(policy);
+    return filter ? offsetof(tg_estimator, filter) + filter : 0;
+}
+
 typedef char tgi_room_is_enough[sizeof(tg_estimator) <= TG_ESTIMATOR_ROOM ? 1 : -1];
+typedef char tgi_fixed_room_is_enough[offsetof(tg_estimator, filter) + TG_FILTER_ROOM_FIXED <= TG_ESTIMATOR_ROOM_FIXED ? 1 : -1];
 
 /* The machine and the tuning are checked by the filter. */
 tg_status tg_estimator_init(tg_estimator *e, const tg_settings *settings)
@@ -297,9 +304,9 @@ tg_status tg_estimator_init(tg_estimator *e, const tg_settings *settings)
     memset(&consider, 0, sizeof consider);
     status = tgi_filter_anew(&filter, &consider, settings);
     if (status != TG_OK) return status;
-    memset(e, 0, sizeof *e);
+    memset(e, 0, tg_estimator_size(settings->tuning.policy));
     e->settings = *settings;
-    memcpy(&e->filter, &filter, sizeof filter);
+    memcpy(&e->filter, &filter, tg_filter_size(settings->tuning.policy));
     memcpy(&e->consider, &consider, sizeof consider);
     e->belief.columns = tgi_deviation_columns(settings);
     e->direction = 1;

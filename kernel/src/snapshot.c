@@ -3,7 +3,7 @@
 #include "fields.h"
 #include <limits.h>
 
-#define TG_SNAPSHOT_VERSION 9u
+#define TG_SNAPSHOT_VERSION 10u
 
 typedef struct {
     char magic[8];
@@ -16,22 +16,16 @@ typedef struct {
 static tg_snapshot_header header_of_this_kernel(void)
 {
     const size_t size = tgi_fields_size(tgi_settings_fields) + tgi_fields_size(tgi_estimator_fields) + tgi_fields_size(tgi_filter_fields) +
-                        tgi_fields_size(tgi_adaptation_fields) + tgi_fields_size(tgi_bank_fields) + tgi_fields_size(tgi_consider_fields);
+                        tgi_fields_size(tgi_policy_fields[TG_SUPERVISED]) + tgi_fields_size(tgi_policy_fields[TG_BANK]) +
+                        tgi_fields_size(tgi_consider_fields);
     const tg_snapshot_header h = {"TERRAGR", TG_SNAPSHOT_VERSION, 1u, (uint32_t)sizeof(tg_real), (uint32_t)size};
     return h;
-}
-
-/* Of the policy: a filter of fixed noise has neither. */
-static const tgi_field *policy_fields(const tg_settings *s)
-{
-    static const tgi_field none[] = {{0, 0, 0, NULL}};
-    return s->tuning.policy == TG_BANK ? tgi_bank_fields : s->tuning.policy == TG_FIXED ? none : tgi_adaptation_fields;
 }
 
 static size_t size_of(const tg_settings *s)
 {
     return sizeof(tg_snapshot_header) + tgi_fields_size(tgi_settings_fields) + tgi_fields_size(tgi_estimator_fields) +
-           tgi_fields_size(tgi_filter_fields) + tgi_fields_size(policy_fields(s)) + tgi_fields_size(tgi_consider_fields) + sizeof(uint64_t);
+           tgi_fields_size(tgi_filter_fields) + tgi_fields_size(tgi_policy_fields[s->tuning.policy]) + tgi_fields_size(tgi_consider_fields) + sizeof(uint64_t);
 }
 
 /* FNV-1a, 64 bits. */
@@ -40,11 +34,6 @@ static uint64_t checksum(const uint8_t *bytes, size_t size)
     uint64_t hash = 14695981039346656037u;
     for (size_t k = 0; k < size; k++) hash = (hash ^ bytes[k]) * 1099511628211u;
     return hash;
-}
-
-size_t tg_estimator_size(void)
-{
-    return sizeof(tg_estimator);
 }
 
 size_t tg_snapshot_size(const tg_estimator *e)
@@ -61,7 +50,7 @@ tg_status tg_estimator_snapshot(const tg_estimator *e, uint8_t *bytes)
     to = tgi_write_fields(tgi_settings_fields, &e->settings, to);
     to = tgi_write_fields(tgi_estimator_fields, e, to);
     to = tgi_write_fields(tgi_filter_fields, &e->filter, to);
-    to = tgi_write_fields(policy_fields(&e->settings), &e->filter.policy, to);
+    to = tgi_write_fields(tgi_policy_fields[e->settings.tuning.policy], &e->filter, to);
     to = tgi_write_fields(tgi_consider_fields, &e->consider, to);
     const uint64_t hash = checksum(bytes, (size_t)(to - bytes));
     memcpy(to, &hash, sizeof hash);
@@ -79,8 +68,11 @@ static int filter_is_sound(const tg_filter *f)
     if (!is_within(f->taken, 0, f->channels) || !is_within(f->formed, 0, 1) || !is_within(f->factor_steps, 0, 1000)) return 0;
     for (int32_t c = 0; c < f->taken; c++)
         if (!is_within(f->channel[c], 0, f->channels - 1)) return 0;
-    if (!is_within(f->supervisor.count, 0, TG_SNAPSHOTS) || !is_within(f->supervisor.first, 0, TG_SNAPSHOTS - 1)) return 0;
-    return is_within(f->tuning.policy == TG_BANK ? f->policy.bank.updates : f->policy.adaptation.updates, 0, INT_MAX / 2);
+    if (f->tuning.policy == TG_FIXED) return 1;
+    if (f->tuning.policy == TG_BANK) return is_within(f->policy.bank.updates, 0, INT_MAX / 2);
+    const tg_supervisor_state *const s = &f->policy.adaptive.supervisor;
+    if (f->tuning.policy == TG_SUPERVISED && !(is_within(s->count, 0, TG_SNAPSHOTS) && is_within(s->first, 0, TG_SNAPSHOTS - 1))) return 0;
+    return is_within(f->policy.adaptive.adaptation.updates, 0, INT_MAX / 2);
 }
 
 static int is_sound(const tg_estimator *e)
@@ -89,7 +81,7 @@ static int is_sound(const tg_estimator *e)
            is_within(e->seen_motion, 0, 1) && is_within(e->standing, 0, 1);
 }
 
-tg_status tg_estimator_restore(tg_estimator *e, const uint8_t *bytes, size_t size)
+tg_status tg_estimator_restore(tg_estimator *e, size_t room, const uint8_t *bytes, size_t size)
 {
     if (!e || !bytes) return TG_BAD_ARGUMENT;
     const tg_snapshot_header header = header_of_this_kernel();
@@ -99,14 +91,16 @@ tg_status tg_estimator_restore(tg_estimator *e, const uint8_t *bytes, size_t siz
     if (size < sizeof header + tgi_fields_size(tgi_settings_fields) || memcmp(bytes, &header, sizeof header) != 0) return TG_BAD_SNAPSHOT;
     memset(&settings, 0, sizeof settings);
     const uint8_t *from = tgi_read_fields(tgi_settings_fields, &settings, bytes + sizeof header);
-    if (size != size_of(&settings)) return TG_BAD_SNAPSHOT;
+    const size_t object = tg_estimator_size(settings.tuning.policy);
+    if (!object || size != size_of(&settings)) return TG_BAD_SNAPSHOT;
     memcpy(&hash, bytes + size - sizeof hash, sizeof hash);
     if (hash != checksum(bytes, size - sizeof hash) || tg_estimator_init(&found, &settings) != TG_OK) return TG_BAD_SNAPSHOT;
     from = tgi_read_fields(tgi_estimator_fields, &found, from);
     from = tgi_read_fields(tgi_filter_fields, &found.filter, from);
-    from = tgi_read_fields(policy_fields(&settings), &found.filter.policy, from);
+    from = tgi_read_fields(tgi_policy_fields[settings.tuning.policy], &found.filter, from);
     tgi_read_fields(tgi_consider_fields, &found.consider, from);
     if (!is_sound(&found)) return TG_BAD_SNAPSHOT;
-    memcpy(e, &found, sizeof *e);
+    if (room < object) return TG_BAD_ARGUMENT;
+    memcpy(e, &found, object);
     return TG_OK;
 }

@@ -14,8 +14,8 @@ static const tg_real RULES[3][3] = { /* rows: wheel speeds small, medium, large;
 
 void tgi_supervisor_init(tg_filter *f)
 {
-    for (int i = 0; i <= f->wheels; i++) f->supervisor.last[i] = (tg_real)NAN;
-    f->supervisor.gamma = RULES[0][0];
+    for (int i = 0; i <= f->wheels; i++) f->policy.adaptive.supervisor.last[i] = (tg_real)NAN;
+    f->policy.adaptive.supervisor.gamma = RULES[0][0];
 }
 
 static tg_real clip(tg_real x) { return x < 0 ? 0 : x > 1 ? 1 : x; }
@@ -45,7 +45,7 @@ static tg_real mean_slip(const tg_filter *f, const tg_real *omega, tg_real v)
 /* Last known omega and v, this instant's included. */
 static void known_values(const tg_filter *f, const tgi_plan *plan, tg_real *known)
 {
-    for (int i = 0; i <= f->wheels; i++) known[i] = f->supervisor.last[i];
+    for (int i = 0; i <= f->wheels; i++) known[i] = f->policy.adaptive.supervisor.last[i];
     for (int o = 0; plan->count && o <= f->wheels; o++)
         if (plan->present[o]) known[tgi_channel(f->wheels, o)] = plan->y[o];
 }
@@ -62,7 +62,7 @@ static void watched_values(const tg_filter *f, const tg_real *known, const tg_in
 /* Place among the snapshots, oldest first, of the newest one a window old at time t; else of the oldest. */
 static int reference(const tg_filter *f, double t)
 {
-    const tg_supervisor_state *const s = &f->supervisor;
+    const tg_supervisor_state *const s = &f->policy.adaptive.supervisor;
     int found = 0;
     while (found + 1 < s->count && s->time[(s->first + found + 1) % TG_SNAPSHOTS] <= t - (double)f->tuning.window + CLOCK_TOLERANCE) found++;
     return found;
@@ -78,7 +78,7 @@ static tg_real floor_of(const tg_filter *f, int i)
 
 tg_real tgi_supervise(const tg_filter *f, const tgi_plan *plan, const tg_input *now)
 {
-    const tg_supervisor_state *const s = &f->supervisor;
+    const tg_supervisor_state *const s = &f->policy.adaptive.supervisor;
     const int n = f->wheels;
     tg_real known[TG_MAX_WHEELS + 1], value[TG_MAX_WHEELS + 1], change[2] = {0, 0}, m[2][3];
     known_values(f, plan, known);
@@ -109,7 +109,7 @@ tg_real tgi_supervise(const tg_filter *f, const tgi_plan *plan, const tg_input *
 
 void tgi_supervisor_remember(tg_filter *f, const tgi_plan *plan, const tg_input *now)
 {
-    tg_supervisor_state *const s = &f->supervisor;
+    tg_supervisor_state *const s = &f->policy.adaptive.supervisor;
     const double t = f->clock + (double)plan->passage.dt, apart = (double)f->tuning.window / APART;
     tg_real known[TG_MAX_WHEELS + 1];
     known_values(f, plan, known);

@@ -162,12 +162,12 @@ static void absent_are_nan(const tg_real *o, int n, const char *what)
 
 static void estimator_floor(int n, int method, int policy)
 {
-    const size_t size = tg_estimator_size();
+    const size_t size = tg_estimator_size(policy);
     tg_settings s = settings_of(n, method, policy), broken = s;
     tg_estimator *const e = malloc(size), *const before = malloc(size);
     tg_sample sample;
     tg_estimate out;
-    CHECK(e && before && size <= TG_ESTIMATOR_ROOM, "room");
+    CHECK(e && before && size > 0 && size <= (policy == TG_FIXED ? TG_ESTIMATOR_ROOM_FIXED : TG_ESTIMATOR_ROOM), "room");
     CHECK(tg_estimator_init(e, &s) == TG_OK, "init");
     uint8_t *const bytes = malloc(tg_snapshot_size(e));
     for (int k = 0; k < TG_SLOTS; k++) sample.value[k] = (tg_real)NAN;
@@ -201,8 +201,8 @@ static void estimator_floor(int n, int method, int policy)
     ESTIMATOR_REFUSED(tg_estimator_init(e, &broken));
     CHECK(bytes && tg_estimator_snapshot(e, bytes) == TG_OK, "snapshot");
     bytes[200] ^= 1;
-    ESTIMATOR_REFUSED(tg_estimator_restore(e, bytes, tg_snapshot_size(e)));
-    ESTIMATOR_REFUSED(tg_estimator_restore(e, bytes, 7));
+    ESTIMATOR_REFUSED(tg_estimator_restore(e, size, bytes, tg_snapshot_size(e)));
+    ESTIMATOR_REFUSED(tg_estimator_restore(e, size, bytes, 7));
     broken.machine.wheels = 9;
     const tg_settings kept = broken;
     CHECK(tg_tune_walks(&broken) != TG_OK && memcmp(&broken, &kept, sizeof kept) == 0, "walks");

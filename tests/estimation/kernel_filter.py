@@ -23,7 +23,7 @@ class KernelFilter:
 
     def __init__(self, machine: Machine, tuning: Tuning, x0: Array, P0: Array) -> None:
         self.wheels, self.states = len(machine.radius), 2 * len(machine.radius) + 2
-        self.pointer = allocated("tg_filter *", lib.tg_filter_size())
+        self.pointer = allocated("tg_filter *", lib.tg_filter_size(kernel_tuning(tuning).policy))
         checked(
             lib.tg_filter_init(
                 self.pointer, kernel_machine(machine), kernel_tuning(tuning), reals(x0), reals(P0.ravel())

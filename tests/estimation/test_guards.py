@@ -27,7 +27,7 @@ def test_fast_math_is_refused(source: str, flag: str) -> None:
 
 def test_a_program_does_not_link_with_a_kernel_of_the_other_precision(tmp_path: Path) -> None:
     program = tmp_path / "program.c"
-    program.write_text('#include "terragrip.h"\nint main(void) { return tg_filter_size() == 0; }\n')
+    program.write_text('#include "terragrip.h"\nint main(void) { return tg_filter_size(TG_FIXED) == 0; }\n')
     common = [str(program), str(library()), "-lm", "-o", str(tmp_path / "program")]
     assert compiled("-DTG_FLOAT", *common).returncode == 0
     refused = compiled(*common)

@@ -130,7 +130,8 @@ class Engine:
         self.inputs = tuple(self.slots_in)
         self.outputs = tuple(self._slots_out)
         self.filtered_only = tuple(name for name, slot in self._slots_out.items() if not _is_smoothed(slot))
-        self._memory = ffi.new("char[]", lib.tg_estimator_size() + 64)
+        self._size = lib.tg_estimator_size(settings.tuning.policy)
+        self._memory = ffi.new("char[]", self._size + 64)
         address = int(ffi.cast("uintptr_t", self._memory))
         self.handle = ffi.cast("tg_estimator *", address + -address % 64)  # lives as long as this object
         status = lib.tg_estimator_init(self.handle, settings)
@@ -240,7 +241,9 @@ class Engine:
 
     def restore(self, data: bytes) -> None:
         """Continue from a snapshot; raises InputError if it is damaged or another kernel's."""
-        status = lib.tg_estimator_restore(self.handle, ffi.from_buffer("uint8_t[]", data), len(data))
+        status = lib.tg_estimator_restore(
+            self.handle, self._size, ffi.from_buffer("uint8_t[]", data), len(data)
+        )
         if status != lib.TG_OK:
             raise refusal(status, None)
 
