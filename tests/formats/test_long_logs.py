@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import gzip
 import sys
+import tracemalloc
 from pathlib import Path
 from typing import Any
 
@@ -111,6 +112,39 @@ def test_a_small_file_that_unpacks_to_a_large_one_is_read_in_blocks(
     path.write_bytes(gzip.compress(bytes(100_000)))
     with pytest.raises(InputError, match="is not a table of text"):
         tg.read(path)
+
+
+@pytest.mark.parametrize(
+    "content", ["0.0,1.0,5.0,1\n", "\n", "\0", "1"], ids=["rows", "lines", "zeros", "one line"]
+)
+def test_a_packed_file_that_unpacks_to_no_log_is_refused_before_it_fills_the_memory(
+    tmp_path: Path, content: str
+) -> None:
+    path = tmp_path / "bomb.csv.gz"
+    size = 120_000_000
+    path.write_bytes(gzip.compress((TEXTS["plain"][0] + content * (size // len(content))).encode(), 6))
+    assert path.stat().st_size < size / 300
+    tracemalloc.start()
+    try:
+        for look in (tg.read, inspect):
+            with pytest.raises(
+                InputError, match=r"unpacks to more than \d+ MB from .* MB.*gunzip"
+            ) as refused:
+                look(path)
+            assert "\n" not in str(refused.value)
+        assert tracemalloc.get_traced_memory()[1] < 2 * size
+    finally:
+        tracemalloc.stop()
+
+
+def test_a_packed_log_of_a_standing_machine_is_no_bomb(tmp_path: Path) -> None:
+    """Forty megabytes of text, packed as well as a log ever is: only its clock counts."""
+    path = tmp_path / "log.csv.gz"
+    rows = 1_000_000
+    text = TEXTS["plain"][0] + "".join(f"{i / 100:.3f},0.000000000,0.000000000,0\n" for i in range(rows))
+    path.write_bytes(gzip.compress(text.encode()))
+    assert len(text) > 34_000_000
+    assert len(tg.read(path)) == rows
 
 
 def drive_of_a_robot(rows: int = 3000) -> pd.DataFrame:

@@ -98,6 +98,25 @@ def test_all_four_parameters_warn_and_give_the_effective_ones():
     assert "same curve" in curve.notes_[0]
 
 
+def test_a_fit_keeps_to_its_bounds_and_what_stops_there_is_not_identified():
+    slip, mu, run = pairs(5, a=0.85)
+    free = AdhesionCurve().fit(slip, mu, run)
+    assert free.identifiability_.identifiable
+    assert free.at_bound_ == []
+    wide = AdhesionCurve(bounds={"a": (0.1, 2.0)}).fit(slip, mu, run)
+    assert wide.parameters_["a"] == pytest.approx(free.parameters_["a"], rel=1e-9)
+    assert wide.interval_["a"] == pytest.approx(free.interval_["a"], rel=1e-9)
+    held = AdhesionCurve(bounds={"a": (1.0, 2.0)}).fit(slip, mu, run)
+    assert held.parameters_["a"] == pytest.approx(1.0)
+    assert held.at_bound_ == ["a"]
+    assert not held.identifiability_.identifiable
+    assert "a stopped at an end of its range" in held.notes_[0]
+    assert held.interval_["a"][0] >= 1.0
+    for wrong in ({"a": (2.0, 1.0)}, {"a": (-1e9, 1.0)}, {"k": (0.0, 1.0)}):
+        with pytest.raises(InputError, match="bounds of"):
+            AdhesionCurve(bounds=wrong).fit(slip, mu, run)
+
+
 def test_net_traction_needs_its_intercept():
     slip, mu, run = pairs(6, a=0.85)
     with_rho = AdhesionCurve(intercept=True).fit(slip, mu - 0.12, run)

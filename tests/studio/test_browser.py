@@ -109,6 +109,52 @@ def test_a_fit_leaves_a_held_parameter_and_leaving_the_page_loses_nothing(page: 
     assert page.locator("#soil-list li").count() > 0
 
 
+def test_undo_is_kept_while_another_page_is_open(page: Any, served: Served) -> None:
+    open_fit(page, served, "estimates.parquet")
+    page.wait_for_selector("#soil-list li")
+    page.fill("#field-a", "0.7")
+    page.press("#field-a", "Tab")
+    page.fill("#field-a", "0.4")
+    page.press("#field-a", "Tab")
+    page.keyboard.press("Control+z")
+    page.click("nav >> text=Folder")
+    page.wait_for_selector("text=recording.parquet")
+    page.click("nav >> text=Fit")
+    page.wait_for_selector("#slider-a")
+    assert page.input_value("#field-a") == "0.7"
+    page.keyboard.press("Control+Shift+z")
+    assert page.input_value("#field-a") == "0.4"
+    page.click("text=Undo")
+    page.click("text=Undo")
+    assert page.input_value("#field-a") == "1"
+
+
+def test_a_fit_keeps_to_the_bounds_of_a_slider_and_says_where_it_stopped(page: Any, served: Served) -> None:
+    open_fit(page, served, "estimates.parquet")
+    page.wait_for_selector("#soil-list li")
+    page.click("#fit-button")
+    page.wait_for_selector(".badge.good")
+    free = float(page.input_value("#field-a"))
+    page.fill("#lower-a", f"{1.02 * free:.4f}")
+    page.press("#lower-a", "Tab")
+    assert float(page.input_value("#field-a")) == pytest.approx(1.02 * free, abs=1e-3)
+    assert float(page.get_attribute("#slider-a", "min")) == pytest.approx(1.02 * free, abs=1e-3)
+    page.click("#fit-button")
+    page.wait_for_selector(".badge.poor")
+    assert float(page.input_value("#field-a")) == pytest.approx(1.02 * free, abs=1e-3)
+    assert "stopped at an end" in page.text_content(".result")
+    page.fill("#upper-a", "0.01")  # under the lower end: nothing is taken over
+    page.press("#upper-a", "Tab")
+    assert page.locator(".bounds input:invalid").count() == 1
+    page.fill("#upper-a", "")
+    page.press("#upper-a", "Tab")
+    page.fill("#lower-a", "")
+    page.press("#lower-a", "Tab")
+    page.click("#fit-button")
+    page.wait_for_selector(".badge.good")
+    assert float(page.input_value("#field-a")) == pytest.approx(free)
+
+
 def test_the_fit_page_by_keyboard_alone(page: Any, served: Served) -> None:
     open_fit(page, served, "estimates.parquet")
     page.wait_for_selector("#soil-list li")

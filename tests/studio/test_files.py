@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gzip
 from pathlib import Path
 
 import pytest
@@ -37,6 +38,7 @@ def test_a_good_log_is_taken_and_told(client: TestClient, folder: Path) -> None:
         ("picture.svg", b"<svg xmlns='http://www.w3.org/2000/svg'/>", "no picture that the studio takes"),
         ("bad.yaml", b"axles: {front: {mass: -1 kg}}", ""),
         ("soils.json", b"{}", "exists already"),
+        ("bomb.csv.gz", gzip.compress(b"time,ground_speed\n" + b"1,1\n" * 15_000_000), "unpacks to more than 34 MB"),
         ("lib.json", b'{"soils": {"x": {"model": "none"}}}', "not known"),
         ("no/such/folder.csv", b"a,b\n1,2\n", "cannot be written there"),
     ],

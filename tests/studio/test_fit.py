@@ -168,3 +168,15 @@ def test_a_parameter_on_its_bound_is_told(client: TestClient) -> None:
     assert found["at_bound"] == on
     good = 0.6 * -np.expm1(-10 * slip)
     assert client.post("/api/fit", json={**sent, "adhesion": good.tolist()}).json()["at_bound"] == []
+
+
+def test_a_fit_of_estimates_keeps_to_the_bounds_that_are_sent(client: TestClient) -> None:
+    sent = {"path": "estimates.parquet", "soil": "grass"}
+    free = fit(client, **sent).json()["parameters"]["a"]
+    answer = fit(client, **sent, bounds={"a": [1.02 * free, 2.0]})
+    assert answer.status_code == 200, answer.text
+    assert answer.json()["parameters"]["a"] == pytest.approx(1.02 * free)
+    assert answer.json()["at_bound"] == ["a"]
+    refused = fit(client, **sent, bounds={"a": [2.0, 1.0]})
+    assert refused.status_code == 422
+    assert "bounds of a" in refused.json()["detail"]

@@ -11,6 +11,12 @@ from terragrip.errors import InputError
 from terragrip.files import unreadable
 
 _GZIP = b"\x1f\x8b"
+_RATIO = 200
+"""Bytes of text that a packed byte may become: logs reach 3 to 30, the most that gzip can do is 1032."""
+_HARMLESS = 32 << 20
+"""Bytes of text that any packed file may become."""
+_MOST = 16 << 30
+"""Bytes of text that no packed file may become; an unpacked one may be longer."""
 
 
 def is_packed(source: str) -> bool:
@@ -31,14 +37,31 @@ def opened(source: str) -> BinaryIO:
 
 
 def read(stream: BinaryIO, size: int, source: str) -> bytes:
-    """Up to ``size`` bytes of what `opened` gave; raises InputError where the file is damaged or cannot be read."""
+    """Up to ``size`` bytes of what `opened` gave, all of them where it is negative.
+
+    Raises InputError where the file is damaged, cannot be read, or unpacks to so much that it is no log: never more than that is held.
+    """
     try:
-        return stream.read(size)
+        if not isinstance(stream, gzip.GzipFile):
+            return stream.read(size)
+        most = _most(source)
+        left = most - stream.tell() + 1
+        data = stream.read(left if size < 0 else min(size, left))
     except (EOFError, zlib.error, gzip.BadGzipFile) as error:
         problem = f"is a damaged gzip file ({error})"
         raise InputError(problem, file=source, hint="copy or pack it again") from error
     except OSError as error:
         raise unreadable(source, error) from error
+    if stream.tell() > most:
+        packed = os.path.getsize(source)
+        problem = f"unpacks to more than {most / 1e6:.0f} MB from {packed / 1e6:.3g} MB, which no log does"
+        raise InputError(problem, file=source, hint="if it is one, unpack it with 'gunzip' and give the text")
+    return data
+
+
+def _most(source: str) -> int:
+    """How many bytes a packed file may unpack to."""
+    return min(_MOST, max(_HARMLESS, _RATIO * os.path.getsize(source)))
 
 
 def length_of(source: str) -> int:

@@ -17,6 +17,8 @@ from terragrip.soil.least_squares import INTERCEPT, solve, starts
 
 Array = NDArray[np.float64]
 FREE = "free"
+AT_BOUND = 1e-3
+"""Share of a parameter's range that counts as its end."""
 
 
 class AdhesionCurve:
@@ -26,6 +28,7 @@ class AdhesionCurve:
     ----------
     model : a name of `terragrip.physics.adhesion.CURVES`; "exponential" is the paper's eq. 8.
     fixed : parameters held, e.g. {"p": .52}; None = the model's own choice (the paper's prototype shape), "free" = hold none.
+    bounds : (lower, upper) of free parameters, within the model's own; those not named keep the model's.
     intercept : also fit a constant, for a sensor that sees net traction (kappa = mu - rho).
     weights : None (the paper: each bin counts alike) or "count" (by the samples' standard error of the mean).
     bins : BinSettings.
@@ -35,7 +38,8 @@ class AdhesionCurve:
         widens the intervals.
 
     After `fit`: `parameters_` (all of the model's, and intercept), `free_`, `interval_` {name: (low, high)}, `r2_`, `nrmse_`, `bins_`,
-    `identifiability_`, `notes_` (plain sentences). Where the data do not fix the four parameters of eq. 8 one by one, `interval_`
+    `identifiability_`, `at_bound_` (free parameters that stopped at an end of their range: the end gave the value, not the data, so the
+    curve is not identifiable), `notes_` (plain sentences). Where the data do not fix the four parameters of eq. 8 one by one, `interval_`
     holds the effective A, k, d instead (physics.md 5).
     """
 
@@ -49,6 +53,7 @@ class AdhesionCurve:
         bootstrap: int = 1000,
         seed: int = 0,
         common_sd: float = 0.0,
+        bounds: Mapping[str, tuple[float, float]] | None = None,
     ) -> None:
         if model not in CURVES:
             raise InputError(f"no curve model {model!r}", hint=f"take one of {', '.join(CURVES)}")
@@ -56,20 +61,20 @@ class AdhesionCurve:
             raise InputError(f"no weighting {weights!r}", hint="take None or 'count'")
         self.model, self.fixed, self.intercept, self.weights = model, fixed, intercept, weights
         self.bins, self.bootstrap, self.seed = bins or BinSettings(), bootstrap, seed
-        self.common_sd = common_sd
+        self.common_sd, self.bounds = common_sd, dict(bounds or {})
 
     def fit(self, slip: ArrayLike, adhesion: ArrayLike, run: ArrayLike | None = None) -> AdhesionCurve:
         """Fit to pairs, each of shape (n,); `run` (n,) are integer or string labels of what is not independent.
 
         Pairs are sorted by slip; bins by pull need to know the pull: `pull_bins.bin_by_pull` and `fit_bins`.
-        Raises InputError where the data hold fewer used bins than free parameters, or only one.
+        Raises InputError where the data hold fewer used bins than free parameters, or only one, and on bounds that the model does not have.
         """
         labels = None if run is None else np.unique(np.ravel(np.asarray(run)), return_inverse=True)[1]
         return self.fit_bins(bin_pairs(slip, adhesion, labels, replace(self.bins, by=BY_SLIP)))
 
     def fit_bins(self, bins: Bins) -> AdhesionCurve:
         """Fit to bins that stand already. Raises as `fit`."""
-        curve = CURVES[self.model]
+        curve = self._bounded(CURVES[self.model])
         held = self._held(curve)
         free = [name for name in curve.names if name not in held] + ([INTERCEPT] if self.intercept else [])
         used = bins.used
@@ -94,6 +99,10 @@ class AdhesionCurve:
         self.r2_ = float(1 - residual @ residual / max(float(spread @ spread), 1e-300))
         self.nrmse_ = float(np.sqrt(np.mean(residual**2)) / max(float(np.ptp(mean)), 1e-300))
         self.identifiability_: Identifiability = judge(curve, self._of_model(), free, slip, self.r2_)
+        self.at_bound_ = _at_bound(curve, self.parameters_, free)
+        if self.at_bound_:
+            ends = f"{', '.join(self.at_bound_)} stopped at an end of its range, so the data do not fix it."
+            self.identifiability_ = replace(self.identifiability_, identifiable=False, sentence=ends)
         self.notes_: list[str] = (
             [] if self.identifiability_.identifiable else [self.identifiability_.sentence]
         )
@@ -176,6 +185,23 @@ class AdhesionCurve:
             raise InputError(str(error)) from None
         return {name: float(value) for name, value in self.fixed.items()}
 
+    def _bounded(self, curve: CurveModel) -> CurveModel:
+        """The model with this fit's bounds in place of its own."""
+        own = {p.name: p for p in curve.parameters}
+        for name, (lower, upper) in self.bounds.items():
+            if name not in own:
+                raise InputError(
+                    f"bounds of {name!r}, which the curve model {curve.name} does not have",
+                    hint=f"it has {', '.join(own)}",
+                )
+            if not own[name].lower <= lower < upper <= own[name].upper:
+                raise InputError(
+                    f"the bounds of {name} are {lower:g} and {upper:g}",
+                    hint=f"give a lower and a larger upper one from {own[name].lower:g} to {own[name].upper:g}",
+                )
+            own[name] = replace(own[name], lower=float(lower), upper=float(upper))
+        return replace(curve, parameters=tuple(own.values()))
+
     def _bin_weights(self, bins: Bins) -> Array:
         if self.weights is None:
             return bins.used.astype(float)
@@ -208,7 +234,9 @@ class AdhesionCurve:
         begin = np.repeat(best[None, :], len(slip), axis=0)
         x, _ = solve(curve, free, held, slip, mean, weight, begin, iterations=25)
         widen = _student(clusters - 1) / 1.959964 * np.sqrt(clusters / (clusters - 1))
-        self.samples_ = best + (x - best) * widen
+        ends = {p.name: (p.lower, p.upper) for p in curve.parameters}
+        lower, upper = zip(*(ends.get(name, (-np.inf, np.inf)) for name in free), strict=True)
+        self.samples_ = np.clip(best + (x - best) * widen, lower, upper)
         samples = self.samples_
         columns = {name: samples[:, i] for i, name in enumerate(free)}
         if not self.identifiability_.told_apart and self.model == "exponential":
@@ -222,9 +250,29 @@ class AdhesionCurve:
         """The same curve, not fitted; `changes` are arguments of the constructor."""
         same = {
             name: getattr(self, name)
-            for name in ("model", "fixed", "intercept", "weights", "bins", "bootstrap", "seed", "common_sd")
+            for name in (
+                "model",
+                "fixed",
+                "intercept",
+                "weights",
+                "bins",
+                "bootstrap",
+                "seed",
+                "common_sd",
+                "bounds",
+            )
         }
         return AdhesionCurve(**{**same, **changes})
+
+
+def _at_bound(curve: CurveModel, parameters: Mapping[str, float], free: Sequence[str]) -> list[str]:
+    """The free parameters within AT_BOUND of an end of their range."""
+    return [
+        p.name
+        for p in curve.parameters
+        if p.name in free
+        and min(parameters[p.name] - p.lower, p.upper - parameters[p.name]) <= AT_BOUND * (p.upper - p.lower)
+    ]
 
 
 def _student(freedom: int) -> float:

@@ -60,7 +60,7 @@ export class CurvesPanel {
       h("div", { class: "field" }, h("label", { for: "curve-name" }, "Name"), this.nameField(curve)),
       h("div", { class: "field" }, h("label", { for: "curve-model" }, "Model"), this.modelChoice(curve)),
       h("p", { class: "source" }, model?.source ?? ""),
-      h("p", { class: "hint" }, "Ticked: held. A fit leaves it as it is."),
+      h("p", { class: "hint" }, "Ticked: held, a fit leaves it as it is. Below each slider: the ends that a fit keeps to."),
       parameters.map((p) => this.row(curve, p)),
       this.interceptChoice(curve),
       h(
@@ -111,6 +111,7 @@ export class CurvesPanel {
       const intercept = curve.parameters["intercept"];
       curve.model = model.name;
       curve.held = [...model.fixed];
+      curve.bounds = {};
       curve.parameters = Object.fromEntries(model.parameters.map((p) => [p.name, p.start]));
       if (intercept !== undefined) curve.parameters["intercept"] = intercept;
       curve.fit = null;
@@ -123,7 +124,7 @@ export class CurvesPanel {
 
   private row(curve: Curve, parameter: Parameter): HTMLElement {
     const { name } = parameter;
-    const [low, high] = WIDE[name] ?? [parameter.lower, parameter.upper];
+    const [low, high] = curve.bounds[name] ?? WIDE[name] ?? [parameter.lower, parameter.upper];
     const now = curve.parameters[name] ?? parameter.start;
     const slider = h("input", {
       type: "range",
@@ -170,7 +171,40 @@ export class CurvesPanel {
       slider,
       field,
       name === "intercept" ? null : hold,
+      name === "intercept" ? null : this.bounds(curve, parameter),
     );
+  }
+
+  /** The two ends of a parameter for the fit; an empty field is the model's own end. */
+  private bounds(curve: Curve, parameter: Parameter): HTMLElement {
+    const { name, lower, upper } = parameter;
+    const ends = [lower, upper].map((own, i) => {
+      const now = curve.bounds[name]?.[i];
+      const field = h("input", { type: "number", step: "any", id: `${i ? "upper" : "lower"}-${name}`, placeholder: digits(own, 3), "aria-label": `${name}, ${i ? "largest" : "smallest"} value of a fit` });
+      field.value = now === undefined || now === own ? "" : digits(now, 5);
+      field.addEventListener("change", () => set());
+      return field;
+    });
+    const set = (): void => {
+      const typed = ends.map((field) => field.valueAsNumber);
+      const [from, to] = [Number.isFinite(typed[0]) ? (typed[0] as number) : lower, Number.isFinite(typed[1]) ? (typed[1] as number) : upper];
+      const right = lower <= from && from < to && to <= upper;
+      const asked = ends.find((field) => field === document.activeElement) ?? (ends[0] as HTMLInputElement);
+      for (const field of ends) field.setCustomValidity("");
+      if (!right) {
+        asked.setCustomValidity(`the smaller first, from ${lower} to ${upper}`);
+        asked.reportValidity();
+        return;
+      }
+      if (from === lower && to === upper) delete curve.bounds[name];
+      else curve.bounds[name] = [from, to];
+      curve.parameters[name] = Math.min(Math.max(curve.parameters[name] ?? parameter.start, from), to);
+      const focused = document.activeElement?.id;
+      this.state.commit();
+      this.state.changed("all");
+      if (focused) document.getElementById(focused)?.focus();
+    };
+    return h("div", { class: "bounds" }, ends[0], h("span", { "aria-hidden": "true" }, "to"), ends[1]);
   }
 
   private settle(): void {

@@ -113,7 +113,7 @@ async function fit(state: State): Promise<void> {
     note("Choose a soil, or digitise a line of a picture, first.", "error");
     return;
   }
-  const wanted = { model: curve.model, intercept: "intercept" in curve.parameters, fixed: held(curve), ...data };
+  const wanted = { model: curve.model, intercept: "intercept" in curve.parameters, fixed: held(curve), bounds: curve.bounds, ...data };
   const found = await tried(() => send<FitResult>("POST", "fit", wanted));
   if (!found) return;
   curve.fit = found;

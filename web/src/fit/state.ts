@@ -53,6 +53,8 @@ export interface Curve {
   shown: boolean;
   /** Parameters that a fit leaves as they are. */
   held: string[];
+  /** Ends that a fit keeps to, where they are not the model's own. */
+  bounds: Record<string, [number, number]>;
   fit: FitResult | null;
   source: string;
 }
@@ -78,8 +80,19 @@ interface Kept {
 
 const DEEP = 200;
 
-/** What is kept while another page is open. */
-let left: Pick<State, "kept" | "soils" | "images" | "target"> | null = null;
+/** What is kept while another page is open, undo too. */
+interface Left {
+  kept: Kept;
+  soils: Soil[];
+  images: Map<string, HTMLImageElement>;
+  target: string;
+  past: string[];
+  future: string[];
+  settled: string;
+  colors: number;
+}
+
+let left: Left | null = null;
 
 export class State {
   models: Model[] = [];
@@ -135,14 +148,14 @@ export class State {
 
   /** Keep what is shown for the next time that the page opens. */
   leave(): void {
-    left = { kept: this.kept, soils: this.soils, images: this.images, target: this.target };
+    const { kept, soils, images, target, past, future, settled, colors } = this;
+    left = { kept, soils, images, target, past, future, settled, colors };
   }
 
   /** Take up what was left; false where nothing was. */
   takeUp(): boolean {
     if (!left) return false;
     Object.assign(this, left);
-    this.settled = JSON.stringify(this.kept);
     return true;
   }
 
@@ -178,6 +191,7 @@ export class State {
       color: this.nextColor(),
       shown: true,
       held: [...(chosen?.fixed ?? [])],
+      bounds: {},
       fit: null,
       source,
     };

@@ -22,8 +22,6 @@ from terragrip.studio.state import Here, Studio
 
 router = APIRouter(tags=["fit"])
 
-AT_BOUND = 1e-3
-"""Share of a parameter's range that counts as its end."""
 SHOWN = 4000
 """Points of one soil that a page gets; the fit takes them all."""
 
@@ -54,6 +52,7 @@ class FitRequest(BaseModel):
 
     model: str
     fixed: dict[str, FiniteFloat] | Literal["free"] | None = None
+    bounds: dict[str, tuple[FiniteFloat, FiniteFloat]] = {}
     intercept: bool = False
     weights: Literal["count"] | None = None
     slip: list[FiniteFloat] = Field(default=[], max_length=200_000)
@@ -166,7 +165,7 @@ def fit(studio: Here, wanted: FitRequest) -> dict[str, Any]:
         low, high = curve.band(grid)
         found["band"] = {"slip": grid.tolist(), "low": low.tolist(), "high": high.tolist()}
     found["peak"] = curve.peak()
-    found["at_bound"] = _at_bound(curve)
+    found["at_bound"] = curve.at_bound_
     plain: dict[str, Any] = finite(found)
     return plain
 
@@ -190,17 +189,6 @@ def save(studio: Here, wanted: SaveRequest) -> dict[str, Any]:
     return {"path": wanted.library, "soils": list(merged)}
 
 
-def _at_bound(curve: AdhesionCurve) -> list[str]:
-    """Free parameters that a fit left at an end of their range, to a thousandth of it: the bound gave the value, not the data."""
-    return [
-        p.name
-        for p in CURVES[curve.model].parameters
-        if p.name in curve.free_
-        and min(curve.parameters_[p.name] - p.lower, p.upper - curve.parameters_[p.name])
-        <= AT_BOUND * (p.upper - p.lower)
-    ]
-
-
 def _plain(soil: Soil) -> dict[str, Any]:
     plain: dict[str, Any] = finite({"name": soil.name, **soil.to_dict()})
     return plain
@@ -215,7 +203,15 @@ def _bins_of_points(slip: np.ndarray[Any, Any]) -> BinSettings:
 
 
 def _unfitted(wanted: FitRequest, bins: BinSettings) -> AdhesionCurve:
-    return AdhesionCurve(wanted.model, wanted.fixed, wanted.intercept, wanted.weights, bins, wanted.bootstrap)
+    return AdhesionCurve(
+        wanted.model,
+        wanted.fixed,
+        wanted.intercept,
+        wanted.weights,
+        bins,
+        wanted.bootstrap,
+        bounds=wanted.bounds,
+    )
 
 
 def _learned(studio: Studio, target: Path, wanted: FitRequest) -> LearnedSoil:
