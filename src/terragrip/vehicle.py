@@ -240,14 +240,20 @@ class Vehicle(Part):
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write a vehicle file that ``load`` reads back to an equal vehicle; raises InputError on failure."""
-        import yaml
-
         from terragrip.files import replacing
 
-        data = self.model_dump(exclude_unset=True, mode="json")
-        text = yaml.safe_dump(data, sort_keys=False, allow_unicode=True, default_flow_style=None, width=110)
         with replacing(path) as temporary:
-            temporary.write_text(text, encoding="utf-8")
+            temporary.write_text(self.to_yaml(), encoding="utf-8")
+
+    def to_yaml(self) -> str:
+        """The text of a vehicle file."""
+        import yaml
+
+        data = self.model_dump(exclude_unset=True, mode="json")
+        text: str = yaml.safe_dump(
+            data, sort_keys=False, allow_unicode=True, default_flow_style=None, width=110
+        )
+        return text
 
     @model_validator(mode="after")
     def _check(self) -> Self:

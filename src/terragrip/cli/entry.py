@@ -19,6 +19,7 @@ from terragrip.cli.ground import command as ground
 from terragrip.cli.ground_classifier import app as ground_classifier
 from terragrip.cli.inspect import command as inspect
 from terragrip.cli.live import command as live
+from terragrip.cli.new import app as new
 from terragrip.cli.report import command as report_command
 from terragrip.cli.simulate import command as simulate
 from terragrip.cli.soils import command as soils
@@ -33,6 +34,7 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
 )
 app.command("demo")(demo)
+app.add_typer(new, name="new")
 app.command("inspect")(inspect)
 app.command("estimate")(estimate)
 app.command("calibrate")(calibrate)

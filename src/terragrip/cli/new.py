@@ -1,0 +1,237 @@
+"""``terragrip new``: files to begin with."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from terragrip.cli.options import Quiet
+from terragrip.cli.output import check_file
+from terragrip.errors import InputError
+
+if TYPE_CHECKING:
+    from terragrip.vehicle_maker import Made
+
+app = typer.Typer(help="Make a file to begin with.", rich_markup_mode=None, pretty_exceptions_enable=False)
+
+
+@app.callback()
+def _new() -> None:
+    """Make a file to begin with."""
+
+
+def _list_classes(wanted: bool) -> None:
+    if wanted:
+        from terragrip.vehicle_maker import classes, fields
+
+        for machine in classes():
+            print(f"{machine.name}: {machine.title}")
+            for field in fields(machine, "torque"):
+                print(f"    {field.assumption} ({field.typical.source})")
+        raise typer.Exit
+
+
+@app.command("vehicle")
+def vehicle(
+    output: Annotated[
+        Path, typer.Option("--output", "-o", metavar="FILE", help="The vehicle file (YAML), a new one.")
+    ],
+    machine: Annotated[
+        str | None, typer.Option("--class", metavar="NAME", help="The class of machine; --list names them.")
+    ] = None,
+    signals: Annotated[
+        str | None,
+        typer.Option(
+            metavar="WHAT",
+            help="What its log measures: torque (default), wheel-speeds or bus-speed (docs/vehicle.md).",
+        ),
+    ] = None,
+    name: Annotated[str, typer.Option(metavar="TEXT", help="The machine's name.")] = "",
+    mass: Annotated[
+        str | None, typer.Option(metavar="VALUE", help="Mass, ready to work, e.g. '6.2 t'.")
+    ] = None,
+    front_mass: Annotated[
+        str | None, typer.Option(metavar="VALUE", help="Of it on the front axle, at rest.")
+    ] = None,
+    wheelbase: Annotated[str | None, typer.Option(metavar="VALUE", help="First axle to last.")] = None,
+    track: Annotated[str | None, typer.Option(metavar="VALUE", help="Between left and right wheels.")] = None,
+    center_of_gravity_height: Annotated[
+        str | None, typer.Option(metavar="VALUE", help="Above ground.")
+    ] = None,
+    hitch_height: Annotated[str | None, typer.Option(metavar="VALUE", help="Above ground.")] = None,
+    wheel_radius: Annotated[
+        str | None,
+        typer.Option(
+            metavar="VALUE", help="Rolling radius; the rear wheels' where the front ones are smaller."
+        ),
+    ] = None,
+    front_wheel_radius: Annotated[
+        str | None, typer.Option(metavar="VALUE", help="Of a tractor's front wheels.")
+    ] = None,
+    wheel_inertia: Annotated[
+        str | None, typer.Option(metavar="VALUE", help="Of a wheel with its geared drive, e.g. '0.2 kg m^2'.")
+    ] = None,
+    tire_rolling_resistance: Annotated[
+        str | None, typer.Option(metavar="VALUE", help="The tyres' own, share of the load.")
+    ] = None,
+    bearing_resistance: Annotated[str | None, typer.Option(metavar="VALUE", help="In N s/rad.")] = None,
+    drive_torque_gain: Annotated[
+        str | None,
+        typer.Option(metavar="VALUE", help="Standard deviation of the torques' scale, e.g. '5 %'."),
+    ] = None,
+    drive_torque_offset: Annotated[
+        str | None,
+        typer.Option(metavar="VALUE", help="Standard deviation of the torques' zero, e.g. '2 N m'."),
+    ] = None,
+    drawbar_offset: Annotated[
+        str | None, typer.Option(metavar="VALUE", help="Standard deviation of the drawbar force's zero.")
+    ] = None,
+    slope: Annotated[
+        str | None,
+        typer.Option(
+            metavar="VALUE", help="Standard deviation of the ground's slope, where no pitch is measured."
+        ),
+    ] = None,
+    known_classes: Annotated[
+        bool,
+        typer.Option(
+            "--list",
+            callback=_list_classes,
+            is_eager=True,
+            help="Name the classes and what is typical of each.",
+        ),
+    ] = False,
+    quiet: Quiet = False,
+) -> None:
+    """Make a vehicle file.
+
+    Asks on a terminal where no class is given. What is not known is typical of the class, and its doubt widens the intervals; a table
+    says how much each missing number costs.
+    """
+    given = {
+        "mass": mass,
+        "front_mass": front_mass,
+        "wheelbase": wheelbase,
+        "track": track,
+        "center_of_gravity_height": center_of_gravity_height,
+        "hitch_height": hitch_height,
+        "wheel_radius": wheel_radius,
+        "front_wheel_radius": front_wheel_radius,
+        "wheel_inertia": wheel_inertia,
+        "tire_rolling_resistance": tire_rolling_resistance,
+        "bearing_resistance": bearing_resistance,
+        "drive_torque_gain": drive_torque_gain,
+        "drive_torque_offset": drive_torque_offset,
+        "drawbar_offset": drawbar_offset,
+        "slope": slope,
+    }
+    from terragrip.vehicle_maker import make
+
+    if output.exists():  # it may be one that the user has worked on
+        raise InputError("exists already", file=output, place="--output", hint="name a new file")
+    check_file(output, suffixes=(".yaml", ".yml"))
+    if machine is None:
+        if not sys.stdin.isatty():
+            raise InputError(
+                "no class of machine is given",
+                place="--class",
+                hint="name one of those of 'terragrip new vehicle --list', or run it on a terminal to be asked",
+            )
+        machine, signals = _ask_kind(signals)
+        given = _ask_values(machine, signals, given)
+    made = make(machine, signals or "torque", given, name=name)  # type: ignore[arg-type]  # make checks it
+    made.save(output)
+    if not quiet:
+        print(_said(made))
+        print(f"Written to {output}")
+
+
+def _ask_kind(signals: str | None) -> tuple[str, str]:
+    """The class of machine and what its log measures, from the terminal."""
+    from terragrip.vehicle_maker import SIGNALS, classes
+
+    machines = {one.name: one.title for one in classes()}
+    machine = _choice("Which machine?", machines)
+    return machine, signals or _choice("What does its log measure, beside the ground speed?", SIGNALS)
+
+
+def _choice(question: str, choices: dict[str, str]) -> str:
+    typer.echo(question)
+    names = list(choices)
+    for number, (name, title) in enumerate(choices.items(), 1):
+        typer.echo(f"  {number}  {name}: {title}")
+    while True:
+        answer = typer.prompt("number or name").strip()
+        if answer in choices:
+            return str(answer)
+        if answer.isdigit() and 1 <= int(answer) <= len(names):
+            return names[int(answer) - 1]
+        typer.echo(f"  {answer} is none of them")
+
+
+def _ask_values(machine: str, signals: str, given: dict[str, str | None]) -> dict[str, str | None]:
+    """What the options left open, from the terminal; an empty answer is "not known"."""
+    from terragrip.units import quantity
+    from terragrip.vehicle_maker import class_named, fields, make, read_values
+
+    chosen = class_named(machine)
+    known = {name: value for name, value in given.items() if value is not None}
+    read_values(chosen, signals, known)  # type: ignore[arg-type]  # fields checks it
+    asked = fields(chosen, signals)  # type: ignore[arg-type]
+    if asked:
+        typer.echo(
+            "A number with its unit, or Enter where it is not known: then what is typical is taken, and its doubt counted."
+        )
+    for field in asked:
+        if field.name in known:
+            continue
+        numbers = {
+            name: quantity(value, one.unit)
+            for name, value in known.items()
+            for one in asked
+            if one.name == name
+        }
+        now = next(one for one in fields(chosen, signals, numbers) if one.name == field.name)  # type: ignore[arg-type]
+        typical = now.assumption.split(": ", 1)[1]
+        while True:
+            important = "; needed for a useful result" if field.needed else ""
+            answer = typer.prompt(
+                f"{field.title} [typical: {typical}{important}]", default="", show_default=False
+            )
+            if not answer.strip():
+                break
+            try:
+                make(chosen, signals, known | {field.name: answer})  # type: ignore[arg-type]
+            except InputError as error:
+                typer.echo(f"  {error}")
+                continue
+            known[field.name] = answer
+            break
+    return dict(known)
+
+
+def _said(made: Made) -> str:
+    """What is assumed and what it costs, as text."""
+    from terragrip.vehicle_maker import cost_table, fields, interval_costs
+
+    lines = [cost_table(interval_costs(made))]
+    lines.append(
+        "Computed, not measured: this machine at work on paper, each doubt alone through the filter (docs/vehicle.md)."
+    )
+    lacking = [
+        f.name
+        for f in fields(made.machine, made.signals, made.known)
+        if f.needed and f.name not in made.known
+    ]
+    if lacking:
+        lines.append(f"Find out first: {', '.join(lacking)}. Then 'terragrip calibrate' on a log.")
+    elif made.signals == "bus-speed":
+        lines.append(
+            "Next: estimate a log that holds 40 s without load (headland, road), or calibrate on one."
+        )
+    else:
+        lines.append("Next: 'terragrip calibrate' on a log, then 'terragrip estimate'.")
+    return "\n".join(lines)

@@ -1,0 +1,217 @@
+"""A vehicle file from what is known of a machine: what is not known is typical, and its doubt is considered."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from terragrip.errors import InputError
+from terragrip.physics.loads import GRAVITY, axle_loads
+from terragrip.vehicle import Vehicle
+from terragrip.vehicle_maker.classes import MachineClass, class_named
+from terragrip.vehicle_maker.fields import SIGNALS, Field, Signals, fields, read_values
+
+RADIUS_BY_TAPE = 0.02
+"""Relative SD of a rolling radius by tape or data sheet; `terragrip calibrate` does better. What slip alone counts with, too."""
+WORK = 0.15
+"""Pull over weight of the work that loads are judged by (R)."""
+PUSH = 0.03
+"""Acceleration over gravity that loads and inertias are judged by (R)."""
+
+
+_COUNTS = {
+    "bus-speed": "of the numbers here none counts, and the log itself gives the zero of slip.",
+    "wheel-speeds": "of the numbers here only the radii count, and in turns the track. The rest is typical.",
+}
+
+
+@dataclass(frozen=True)
+class Made:
+    """A vehicle that was made: ``vehicle``, its ``machine`` class, the ``signals`` of its log, the ``known`` numbers [SI], and the fields
+    that are ``assumed``: typical of the class, their spread considered."""
+
+    vehicle: Vehicle
+    machine: MachineClass
+    signals: Signals
+    known: Mapping[str, float]
+    assumed: tuple[Field, ...]
+
+    def to_yaml(self) -> str:
+        """The vehicle file, with a head that says what is assumed and from where."""
+        lines = [f"# {self.machine.title}; known by {SIGNALS[self.signals]}."]
+        if self.signals != "torque":
+            lines.append(f"# Slip alone: {_COUNTS[self.signals]}")
+        if self.assumed:
+            lines.append(
+                "# Not known, typical of the class; the standard deviations are considered under 'uncertainty':"
+            )
+            lines += [f"#   {field.assumption} ({field.typical.source})" for field in self.assumed]
+        return "\n".join(lines) + "\n" + self.vehicle.to_yaml()
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Write the vehicle file, whole or not at all; raises InputError if it cannot."""
+        from terragrip.files import replacing
+
+        with replacing(path) as temporary:
+            temporary.write_text(self.to_yaml(), encoding="utf-8")
+
+
+def make(
+    machine: str | MachineClass,
+    signals: Signals = "torque",
+    known: Mapping[str, object] | None = None,
+    *,
+    name: str = "",
+) -> Made:
+    """A vehicle of a class from what is known of it.
+
+    ``machine``: the name of a class (`classes`). ``known``: numbers [SI] or texts with a unit by the names of `fields`; None, or a name
+    left out, is not known. ``name`` of the vehicle. Raises InputError on a class, name or value that there is not.
+    """
+    chosen = machine if isinstance(machine, MachineClass) else class_named(machine)
+    if signals not in SIGNALS:
+        raise InputError(f"no signals {signals!r}", place="--signals", hint=f"say {', '.join(SIGNALS)}")
+    values = read_values(chosen, signals, known or {})
+    asked = fields(chosen, signals, values)
+    assumed = tuple(field for field in asked if field.name not in values)
+    return Made(
+        vehicle_of(chosen, signals, values, [f.name for f in assumed], name), chosen, signals, values, assumed
+    )
+
+
+def vehicle_of(
+    machine: MachineClass,
+    signals: Signals,
+    known: Mapping[str, float],
+    doubted: Collection[str],
+    name: str = "",
+    *,
+    is_calibrated: bool = False,
+) -> Vehicle:
+    """The vehicle of known numbers [SI], the rest typical; the spread of the ``doubted`` fields goes into its uncertainty.
+
+    ``is_calibrated``: a known wheel radius has no error. Raises InputError on impossible values.
+    """
+    typical = {field.name: field.typical for field in fields(machine, "torque", known)}
+    values = {field: spec.value for field, spec in typical.items()} | dict(known)
+    tree = _tree(machine, values, name)
+    if signals == "bus-speed":
+        for axle in (tree, *tree["axles"].values()):
+            axle.pop("wheel", None)
+        for key in ("tire_rolling_resistance", "bearing_resistance"):
+            tree.pop(key, None)
+        return Vehicle.from_dict(tree)
+    spread = {field: typical[field].spread for field in doubted if field in typical}
+    considered = _considered(Vehicle.from_dict(tree), machine, values, spread)
+    if not is_calibrated and considered.get("wheel_radius", 0.0) < RADIUS_BY_TAPE:
+        scale = considered.get("drive_torque_gain_common", 0.0)
+        considered |= {
+            "wheel_radius": RADIUS_BY_TAPE,
+            "drive_torque_gain_common": float(np.hypot(scale, RADIUS_BY_TAPE)),
+        }
+    for field in ("drive_torque_gain", "drive_torque_offset", "drawbar_offset", "slope"):
+        share = (
+            known.get(field, typical[field].value if field in doubted else 0.0) if field in typical else 0.0
+        )
+        if share:
+            considered[field] = float(np.hypot(considered.get(field, 0.0), share))
+    if signals == "wheel-speeds":
+        considered = {"wheel_radius": considered.get("wheel_radius", 0.0)}
+    tree["uncertainty"] = {
+        key: _digits(value) for key, value in considered.items() if value or key == "wheel_radius"
+    }
+    return Vehicle.from_dict(tree)
+
+
+def _digits(value: float) -> float:
+    return float(f"{value:.4g}")
+
+
+def _tree(machine: MachineClass, values: Mapping[str, float], name: str) -> dict[str, Any]:
+    """A vehicle file's content."""
+    mass, radius = values["mass"], values["wheel_radius"]
+    front = values.get("front_mass", mass)
+    if front >= mass and len(machine.axles) > 1:
+        raise InputError(
+            f"{front:g} kg is no part of {mass:g} kg",
+            place="front_mass",
+            hint="give what the front axle carries at rest",
+        )
+    masses = [_digits(front)] if len(machine.axles) == 1 else [_digits(front), _digits(mass - _digits(front))]
+    axles = {}
+    for (key, own), load in zip(machine.axles.items(), masses, strict=True):
+        axles[key] = {"mass": load, "wheels": list(own["wheels"])}
+        if own.get("driven") is False:
+            axles[key]["driven"] = False
+    inertia = values["wheel_inertia"]
+    tree: dict[str, Any] = {"name": name or machine.title, "mass": _digits(sum(masses))}
+    for key in ("wheelbase", "track", "center_of_gravity_height", "hitch_height"):
+        if key in values:
+            tree[key] = _digits(values[key])
+    wheel = {"radius": _digits(radius), "inertia": _digits(inertia)}
+    if machine.has_small_front_wheels:
+        small = values["front_wheel_radius"]
+        own_inertia = inertia * masses[0] / masses[1] * (small / radius) ** 2
+        axles["front"]["wheel"] = {"radius": _digits(small), "inertia": _digits(own_inertia)}
+    return tree | {
+        "axles": axles,
+        "wheel": wheel,
+        "tire_rolling_resistance": _digits(values["tire_rolling_resistance"]),
+        "bearing_resistance": _digits(values["bearing_resistance"]),
+    }
+
+
+def _considered(
+    vehicle: Vehicle, machine: MachineClass, values: Mapping[str, float], spread: Mapping[str, float]
+) -> dict[str, float]:
+    """What the doubts about a machine's numbers are to the constants that a vehicle file considers.
+
+    An adhesion is torque over radius and load, so the errors of mass and radius are one of all torques' scale; the errors of lengths
+    and of the axles' shares shift load between the axles, as at `WORK` and `PUSH`; the errors of inertia and bearings
+    are torques, at `PUSH` and at the class's speed.
+    """
+    relative = {name: value / values[name] for name, value in spread.items()}
+    found: dict[str, float] = {}
+
+    def widen(key: str, value: float) -> None:
+        if value:
+            found[key] = float(np.hypot(found.get(key, 0.0), value))
+
+    radius = values["wheel_radius"]
+    worst = max(
+        relative.get(name, 0.0) for name in ("wheel_radius", "front_wheel_radius")
+    )  # one spread for all wheels
+    widen("wheel_radius", worst)
+    widen("drive_torque_gain_common", worst)
+    widen("drive_torque_gain_common", relative.get("mass", 0.0))
+    widen("tire_rolling_resistance", spread.get("tire_rolling_resistance", 0.0))
+    widen("drive_torque_offset", spread.get("wheel_inertia", 0.0) * PUSH * GRAVITY / radius)
+    widen("drive_torque_offset", spread.get("bearing_resistance", 0.0) * machine.speed)
+    for name in ("front_mass", "wheelbase", "center_of_gravity_height", "hitch_height"):
+        if name in spread:
+            widen("vertical_load", _shift(vehicle, values, name, spread[name]))
+    return found
+
+
+def _shift(vehicle: Vehicle, values: Mapping[str, float], name: str, error: float) -> float:
+    """Load that an error of a field moves between the axles, over the mean axle load, root of the mean square over some states."""
+    drawbar = np.array([0.0, WORK, WORK, 2 * WORK]) * vehicle.mass * GRAVITY
+    acceleration = np.array([0.0, 0.0, PUSH, -PUSH]) * GRAVITY
+
+    def front(changed: Mapping[str, float]) -> np.ndarray:
+        loads = axle_loads(
+            [changed["front_mass"], vehicle.mass - changed["front_mass"]],
+            [changed["wheelbase"], 0.0],
+            center_of_gravity_height=changed["center_of_gravity_height"],
+            hitch_height=changed.get("hitch_height", 0.0),
+            drawbar=drawbar,
+            acceleration=acceleration,
+        )
+        return loads[:, 0]
+
+    moved = front({**values, name: values[name] + error}) - front(values)
+    return float(np.sqrt(np.mean(moved**2))) / (vehicle.mass * GRAVITY / 2)
