@@ -22,7 +22,8 @@ KERNEL_TESTS := $(patsubst kernel/tests/%.c,%,$(wildcard kernel/tests/*.c))
 BUILD_INPUTS := pyproject.toml setup.py cffi_build.py $(KERNEL_SOURCES) $(KERNEL_HEADERS) \
 	$(wildcard kernel/python/*.[ch] src/terragrip/*/*.c src/terragrip/*/*.h)
 
-.PHONY: help demo test lint kernel-test web-test pytest studio system bench lock clean
+.PHONY: help demo test lint kernel-test web-test pytest studio wheel system bench lock clean \
+	kernel-aarch64 kernel-others
 
 help: ## show this list
 	@sed -n 's/^\([a-z-]*\):[^#]*## /  make \1\t/p' $(MAKEFILE_LIST)
@@ -54,6 +55,13 @@ pytest: $(VENV)/package $(VENV)/dev studio ## the Python tests alone
 
 studio: $(VENV)/made ## build the studio's pages, where Node.js 20 or newer is
 	@$(BIN)/python build_pages.py
+
+wheel: $(VENV)/package studio ## a source distribution and, from it, an abi3 wheel with the studio's pages, in dist
+	@$(BIN)/python build_pages.py --required
+	@rm -rf dist && mkdir dist
+	@$(BIN)/python -c "from setuptools import build_meta; build_meta.build_sdist('dist')" > build/sdist.log
+	@CC="$(CC)" $(PIP) wheel --quiet --no-deps --no-build-isolation -w dist dist/*.tar.gz
+	@ls -l dist
 
 web-test: studio ## the pages' own tests, where Node.js is
 	@if [ -d web/node_modules ]; then cd web && npm run --silent test; else echo "SKIPPED: the tests of the pages need Node.js 20 or newer" >&2; fi
@@ -126,3 +134,24 @@ $(eval $(call kernel_rules,float,-DTG_FLOAT))
 
 kernel-test: $(foreach real,double float,$(KERNEL_TESTS:%=build/kernel/$(real)/%)) $(SANITIZED) ## compile the kernel with every warning an error, run its C tests
 	@for program in $^; do echo "$$program"; ./$$program || exit 1; done
+
+# The same tests built for a 64-bit ARM machine (a Raspberry Pi, a Jetson) and run by qemu. Not part of `make test`: see docs/install.md.
+AARCH64_CC ?= aarch64-linux-gnu-gcc
+AARCH64_RUN ?= qemu-aarch64 -L /usr/aarch64-linux-gnu
+$(eval $(call kernel_rules,aarch64-double,))
+$(eval $(call kernel_rules,aarch64-float,-DTG_FLOAT))
+
+kernel-aarch64: ## cross-compile the kernel for 64-bit ARM and run its C tests under qemu
+	@for name in $(AARCH64_CC) $(firstword $(AARCH64_RUN)); do command -v $$name >/dev/null 2>&1 || { \
+	  echo "make: $$name is missing; on Debian and Ubuntu: apt-get install gcc-aarch64-linux-gnu libc6-dev-arm64-cross qemu-user" >&2; exit 1; }; done
+	@$(MAKE) --no-print-directory CC=$(AARCH64_CC) $(foreach real,double float,$(KERNEL_TESTS:%=build/kernel/aarch64-$(real)/%))
+	@for program in $(foreach real,double float,$(KERNEL_TESTS:%=build/kernel/aarch64-$(real)/%)); do \
+	  echo "$$program"; $(AARCH64_RUN) ./$$program || exit 1; done
+
+# Does the C of the package compile for macOS and Windows? By clang inside the PyPI package ziglang, put into build; nothing is run.
+OTHERS := aarch64-macos x86_64-macos x86_64-windows-gnu aarch64-windows-gnu
+kernel-others: $(VENV)/made ## compile the package's C for macOS and Windows (downloads ziglang, 80 MB)
+	@$(PIP) install --quiet --target build/ziglang --upgrade ziglang
+	@for target in $(OTHERS); do for source in $(KERNEL_SOURCES) kernel/python/cpu.c src/terragrip/simulation/plant.c; do \
+	  PYTHONPATH=build/ziglang $(BIN)/python -m ziglang cc -target $$target -std=c99 -O2 -fno-math-errno -fno-trapping-math -ffp-contract=off -Wall -Wextra -Werror \
+	    -Wno-bitwise-instead-of-logical -Ikernel/include -Ikernel/src -c -o build/others.o $$source || exit 1; done; echo "$$target: compiles"; done

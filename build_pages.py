@@ -6,6 +6,7 @@ exits 0 in either case and says what it did; `--required` makes a missing build 
 
 from __future__ import annotations
 
+import json
 import re
 import shutil
 import subprocess
@@ -31,7 +32,24 @@ def build() -> str | None:
         if done.returncode:
             text = (done.stderr or done.stdout).strip().splitlines()
             return f"the studio's pages are not built: npm {words[0]} failed ({text[-1] if text else 'no message'})"
+    (STATIC / "licences.txt").write_text(notices(WEB), encoding="utf-8")
     return None
+
+
+def notices(web: Path) -> str:
+    """The licence texts of the packages inside the pages, which most of them require to go with every copy."""
+    lock = json.loads((web / "package-lock.json").read_text(encoding="utf-8"))
+    parts = []
+    for path, about in lock["packages"].items():
+        if path and not about.get("dev"):
+            title = f"{path.rpartition('node_modules/')[2]} {about['version']}: {about.get('license', 'see its source')}"
+            texts = [
+                file.read_text(encoding="utf-8", errors="replace").strip()
+                for file in sorted((web / path).glob("*"))
+                if re.match(r"(licen[cs]e|copying|notice)", file.name, re.IGNORECASE) and file.is_file()
+            ]
+            parts.append("\n\n".join([title, *texts]))
+    return f"\n\n{'-' * 78}\n\n".join(parts) + "\n"
 
 
 def stale() -> bool:

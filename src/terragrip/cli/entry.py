@@ -13,6 +13,7 @@ import typer
 
 from terragrip.cli.calibrate import command as calibrate
 from terragrip.cli.demo import command as demo
+from terragrip.cli.doctor import command as doctor
 from terragrip.cli.estimate import command as estimate
 from terragrip.cli.failure import INTERRUPTED, report
 from terragrip.cli.ground import command as ground
@@ -25,12 +26,14 @@ from terragrip.cli.simulate import command as simulate
 from terragrip.cli.soils import command as soils
 from terragrip.cli.studio import command as studio
 
+COMPLETION = "_TERRAGRIP_COMPLETE"
+"""The environment variable by which a shell's completion calls the program."""
+
 app = typer.Typer(
     name="terragrip",
     help="Traction under the wheels, estimated from signals that a machine already has.",
     # Plain help: rich's boxes triple the time of `--help` and break the one-line rule for errors.
     rich_markup_mode=None,
-    add_completion=False,
     pretty_exceptions_enable=False,
 )
 app.command("demo")(demo)
@@ -45,6 +48,7 @@ app.command("report")(report_command)
 app.command("simulate")(simulate)
 app.command("live")(live)
 app.command("studio")(studio)
+app.command("doctor")(doctor)
 
 
 def _print_version(wanted: bool) -> None:
@@ -108,6 +112,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def _run(words: Sequence[str]) -> int:
     # Parsing eats the list it is given, and the report needs the words.
     command: Any = typer.main.get_command(app)
+    if COMPLETION in os.environ:  # the shell asks what may follow; the answer goes to standard output
+        return int(command.main(list(words), prog_name="terragrip", standalone_mode=False) or 0)
     try:
         with command.make_context("terragrip", list(words)) as context:
             command.invoke(context)
