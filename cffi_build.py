@@ -87,9 +87,8 @@ def kernel_bindings() -> list[Binding]:
 def plant_bindings() -> list[Binding]:
     """Return the simulation's plant."""
     folder = ROOT / "src/terragrip/simulation"
-    if not (folder / "plant.c").exists():
-        return []
-    return [Binding("terragrip.simulation._plant", (folder / "plant.h",), (folder / "plant.c",))]
+    sources = tuple(sorted(folder.glob("plant*.c")))
+    return [Binding("terragrip.simulation._plant", (folder / "plant.h",), sources)] if sources else []
 
 
 def python_headers_exist() -> bool:

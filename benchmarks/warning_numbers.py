@@ -20,8 +20,8 @@ import snow_runs
 from bench_warning import HEALTHY, Course, Tally, course_of, jobs, judge
 from marked import put
 from terragrip.estimation import estimate
-from terragrip.estimation.engine import watch_limits
 from terragrip.estimation.reference.immobilization import Row, Watch, pace, rows_of
+from terragrip.estimation.settings import watch_limits
 from terragrip.recording import Recording
 from terragrip.simulation import families
 from terragrip.simulation.families import Kind

@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from terragrip.simulation.plant import wheel_sides
 from terragrip.units import STANDARD_GRAVITY
 from terragrip.vehicle import Vehicle
 
@@ -38,7 +37,7 @@ def make_body(vehicle: Vehicle, radius: Floats, step: float) -> Body:
     import mujoco
 
     masses, n = wheel_masses(vehicle), len(vehicle.wheels)
-    at = np.stack([vehicle.axle_to_rear[vehicle.wheel_axle], wheel_sides(vehicle), radius], axis=1)
+    at = np.stack([vehicle.axle_to_rear[vehicle.wheel_axle], vehicle.wheel_side, radius], axis=1)
     whole = np.array([vehicle.center_of_gravity_to_rear, 0.0, vehicle.center_of_gravity_height])
     chassis = vehicle.mass - masses.sum()
     centre = (vehicle.mass * whole - masses @ at) / chassis

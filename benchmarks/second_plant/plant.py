@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 from second_plant.body import make_body
 from second_plant.native import native
 from second_plant.terramechanics import Soil, Wheel, sinkage_under, steady, stresses, table
-from terragrip.simulation.plant import wheel_sides
 from terragrip.simulation.scenario import Robot
 from terragrip.units import STANDARD_GRAVITY
 from terragrip.vehicle import Vehicle
@@ -169,7 +168,7 @@ def _pointer(ffi: Any, kept: list[Any], values: Any) -> Any:
 def _fill(
     ffi: Any, machine: Any, vehicle: Vehicle, radius: Floats, robot: Robot, body: Any, kept: list[Any]
 ) -> None:
-    n, sides = len(vehicle.wheels), wheel_sides(vehicle)
+    n, sides = len(vehicle.wheels), vehicle.wheel_side
     machine.wheels, machine.base_dofs, machine.chassis_body = n, 6, 1
     for i in range(n):
         machine.wheel_body[i], machine.radius[i] = 2 + i, radius[i]

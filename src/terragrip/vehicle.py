@@ -355,6 +355,15 @@ class Vehicle(Part):
         return _frozen(np.linspace(self.wheelbase or 0.0, 0.0, count) if count > 1 else np.zeros(1))
 
     @cached_property
+    def wheel_side(self) -> Floats:
+        """Distance of each wheel from the vehicle's middle (n,) [m], left positive; 0 without a track."""
+        half = (self.track or 0.0) / 2
+        counts = [len(axle.wheels) for axle in self.axles.values()]
+        return _frozen(
+            np.concatenate([np.linspace(half, -half, n) if n > 1 else np.zeros(1) for n in counts])
+        )
+
+    @cached_property
     def center_of_gravity_to_rear(self) -> float:
         """Distance of the centre of gravity to the rear axle [m], from the axles' masses; 0 with one axle."""
         return float(self.axle_mass @ self.axle_to_rear / self.axle_mass.sum())

@@ -55,6 +55,40 @@ def test_the_formula_at_rest_on_a_slope_and_under_a_pull():
     assert found["vertical_load_rear"][-1] == pytest.approx(wanted[1], rel=1e-3)
 
 
+@pytest.mark.parametrize("axles", [1, 2, 3, 4])
+def test_the_formula_holds_on_any_number_of_axles(axles):
+    masses = np.linspace(40.0, 70.0, axles)
+    names = [f"a{k}" for k in range(axles)]
+    layout = {
+        name: {"mass": float(m), "wheels": [f"{name}l", f"{name}r"]}
+        for name, m in zip(names, masses, strict=True)
+    }
+    vehicle = robot(axles=layout, mass=float(masses.sum()), **({} if axles > 1 else {"wheelbase": None}))
+    slope, pull = 0.1, 100.0
+    wheels = {f"wheel_speed_{w}": 3.2 for w in vehicle.wheels} | {
+        f"drive_torque_{w}": 15.0 for w in vehicle.wheels
+    }
+    given = {
+        "ground_speed": 0.6,
+        "drawbar_force": pull,
+        "pitch": slope,
+        "acceleration_x": GRAVITY * np.sin(slope),
+        **wheels,
+    }
+    time = np.arange(0, 12, 0.01)
+    found = estimate(Recording(time, {k: np.full(len(time), v) for k, v in given.items()}), vehicle, held={})
+    wanted = axle_loads(
+        vehicle.axle_mass,
+        vehicle.axle_to_rear,
+        center_of_gravity_height=0.30,
+        hitch_height=0.25,
+        drawbar=pull,
+        slope=slope,
+    )
+    got = [found[f"vertical_load_{name}"][-1] for name in names]
+    np.testing.assert_allclose(got, wanted, rtol=1e-3)
+
+
 def test_a_measured_load_wins_and_the_other_axle_takes_the_rest():
     found = estimate(steady(vertical_load_front=400.0), robot(), held={})
     assert found["vertical_load_front"][-1] == 400.0

@@ -11,8 +11,9 @@ import numpy as np
 import pytest
 
 from terragrip.estimation import TractionEstimator, estimate
-from terragrip.estimation.engine import EVENTS, SIGNS, watch_limits
+from terragrip.estimation.engine import EVENTS, SIGNS
 from terragrip.estimation.reference.immobilization import Row, Watch, pace, rows_of
+from terragrip.estimation.settings import watch_limits
 from terragrip.ground.events import events
 from terragrip.recording import Recording
 from terragrip.simulation import simulate

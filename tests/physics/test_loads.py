@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from terragrip.physics.loads import GRAVITY, axle_loads, lateral_shares
+from terragrip.physics.loads import GRAVITY, axle_loads, lateral_shares, load_levers, wheel_shares
 
 ROBOT = {
     "axle_mass": [54.0, 85.0],
@@ -123,3 +123,21 @@ def test_lateral_shares_balance_force_and_roll(wheels):
     np.testing.assert_allclose(
         got @ left, -np.array([-1.0, 0.0, 3.0]) / GRAVITY * 0.4, rtol=1e-12, atol=1e-15
     )
+
+
+@pytest.mark.parametrize("position", [[0.638, 0.0], [2.0, 0.7, 0.0], [3.0, 2.0, 1.0, 0.0]])
+def test_levers_add_no_weight_and_one_moment(position):
+    levers = load_levers(position)
+    assert levers.sum() == pytest.approx(0, abs=1e-15)
+    assert levers @ np.array(position) == pytest.approx(1)
+    assert load_levers([0.0]).tolist() == [0.0]
+
+
+def test_wheel_shares_are_lateral_shares_of_every_axle():
+    given = {"center_of_gravity_height": 0.4, "track": 1.2}
+    level, leaning = wheel_shares([1, 2, 3], **given)
+    wanted = np.concatenate([lateral_shares(n, -1.7, **given) for n in (1, 2, 3)])
+    np.testing.assert_allclose(level + 1.7 * leaning, wanted, rtol=1e-14)
+    unknown, none = wheel_shares([2], center_of_gravity_height=0.4, track=None)
+    assert unknown.tolist() == [0.5, 0.5]
+    assert none.tolist() == [0.0, 0.0]

@@ -5,8 +5,7 @@ from __future__ import annotations
 import math
 import struct
 from array import array
-from collections.abc import Callable, Collection, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -14,10 +13,7 @@ import numpy.typing as npt
 
 from terragrip._kernel import ffi, lib
 from terragrip.errors import InputError
-from terragrip.estimation.methods import Method
-from terragrip.physics.loads import GRAVITY, lateral_shares
-from terragrip.physics.radius import biderman_deflection, hadekel_deflection, loaded_radius, rolling_radius
-from terragrip.vehicle import BidermanRadius, HadekelRadius, Vehicle, Wheel
+from terragrip.vehicle import Vehicle
 
 Floats = npt.NDArray[np.float64]
 
@@ -29,46 +25,6 @@ SIGNS = ("rise", "high_slip", "leading", "resistance", "command")
 
 _MISSING = (math.nan,) * lib.TG_SLOTS
 _BLOCK = 1 << 18  # rows a call: Ctrl-C and progress get a turn between calls
-
-
-@dataclass(frozen=True)
-class Thresholds:
-    """What a user may set. Speeds in m/s, times in s; None keeps the kernel's tuned default."""
-
-    gap: float | None = None
-    standstill_speed: float | None = None
-    max_step: float | None = None
-
-    def put(self, settings: Any) -> None:
-        """Write what the user set into a tg_settings."""
-        for name in ("gap", "standstill_speed", "max_step"):
-            value = getattr(self, name)
-            if value is not None:
-                setattr(settings, name, value)
-
-
-def watch_limits() -> dict[str, float]:
-    """The thresholds by which the estimator flags rows: tg_watch_settings, ``gap`` [s] and ``standstill_speed`` [m/s]."""
-    settings = lib.tg_default_settings()
-    names = [name for name, _ in ffi.typeof("tg_watch_settings").fields]
-    found = {name: float(getattr(settings.watch, name)) for name in names}
-    return found | {"gap": float(settings.gap), "standstill_speed": float(settings.standstill_speed)}
-
-
-def sample_slots(vehicle: Vehicle) -> dict[str, int]:
-    """The place in tg_sample.value of each recording column that the estimator looks at."""
-    return {
-        **{f"wheel_speed_{w}": lib.TG_WHEEL_SPEED + i for i, w in enumerate(vehicle.wheels)},
-        "ground_speed": lib.TG_GROUND_SPEED,
-        **{f"drive_torque_{w}": lib.TG_DRIVE_TORQUE + i for i, w in enumerate(vehicle.wheels)},
-        "drawbar_force": lib.TG_DRAWBAR_FORCE,
-        "acceleration_x": lib.TG_ACCELERATION_X,
-        "acceleration_y": lib.TG_ACCELERATION_Y,
-        "pitch": lib.TG_PITCH,
-        "roll": lib.TG_ROLL,
-        "angular_velocity_z": lib.TG_YAW_RATE,
-        **{f"vertical_load_{a}": lib.TG_VERTICAL_LOAD + k for k, a in enumerate(vehicle.axle_names)},
-    }
 
 
 def estimate_slots(vehicle: Vehicle, *, adaptive: bool = False) -> dict[str, int]:
@@ -266,161 +222,6 @@ _MEND = {
 def refusal(status: int, place: str | None) -> InputError:
     """The error for a tg_status that a sample or a snapshot came back with."""
     return InputError(_STATUS.get(status, f"status {status}"), place=place, hint=_MEND.get(status))
-
-
-def settings_of(
-    vehicle: Vehicle,
-    method: Method,
-    *,
-    noise: Mapping[str, float],
-    held: Mapping[str, float],
-    channels: Collection[str],
-    thresholds: Thresholds,
-) -> Any:
-    """A tg_settings for the vehicle.
-
-    ``noise``: SD of each channel the estimator looks at, SI. ``held``: update period [s] of held channels.
-    ``channels``: the columns that samples will carry, which tells whether a drawbar force and the torque of an
-    undriven wheel are measured.
-    """
-    settings = ffi.new("tg_settings *", lib.tg_default_settings())
-    settings.method = method.kind
-    settings.tuning.engine = method.engine
-    settings.tuning.policy = method.policy
-    settings.tuning.supervisor = method.supervisor
-    settings.axles = len(vehicle.axle_names)
-    settings.towing = "drawbar_force" in channels
-    _set_wheels(settings, vehicle, channels)
-    lib.tg_tune_walks(settings)
-    _set_loads(settings, vehicle)
-    _set_calibration(settings, vehicle)
-    _set_uncertainty(settings, vehicle, "pitch" in channels)
-    for name, slot in sample_slots(vehicle).items():
-        settings.noise[slot] = noise.get(name, 0.0)
-        settings.held_period[slot] = held.get(name, 0.0)
-    thresholds.put(settings)
-    return settings
-
-
-def _set_wheels(settings: Any, vehicle: Vehicle, channels: Collection[str]) -> None:
-    machine = settings.machine
-    machine.wheels = len(vehicle.wheels)
-    machine.mass = vehicle.mass
-    machine.gravity = GRAVITY
-    machine.tire_rolling_resistance = vehicle.tire_rolling_resistance
-    arms, rolling = wheel_radii(vehicle)
-    for i, wheel in enumerate(vehicle.wheels):
-        machine.radius[i] = arms[i]
-        settings.rolling_radius[i] = rolling[i]
-        machine.inertia[i] = vehicle.wheel_inertia[i]
-        machine.bearing_resistance[i] = vehicle.bearing_resistance
-        settings.wheel_axle[i] = vehicle.wheel_axle[i]
-        settings.powered[i] = bool(vehicle.driven[i])
-        settings.driven[i] = bool(vehicle.driven[i]) or f"drive_torque_{wheel}" in channels
-
-
-def wheel_radii(vehicle: Vehicle) -> tuple[Floats, Floats]:
-    """Torque arm and rolling radius of each wheel (n,) [m] under its static load (physics.md 4)."""
-    arms, rolling = np.array(vehicle.wheel_radius), np.array(vehicle.wheel_radius)
-    counts = np.bincount(vehicle.wheel_axle)
-    for i, wheel in enumerate(vehicle.wheel_data):
-        axle = vehicle.wheel_axle[i]
-        deflection = _deflection(
-            wheel, float(arms[i]), GRAVITY * float(vehicle.axle_mass[axle]) / counts[axle]
-        )
-        if deflection > 0:
-            loaded = loaded_radius(arms[i], deflection)
-            arms[i], rolling[i] = loaded, rolling_radius(arms[i], loaded)
-    return arms, rolling
-
-
-def _deflection(wheel: Wheel, radius: float, load: float) -> float:
-    model = wheel.radius_model
-    if isinstance(model, HadekelRadius):
-        found = hadekel_deflection(
-            load, unloaded_radius=radius, width=wheel.width or 0.0, inflation_pressure=model.pressure
-        )
-    elif isinstance(model, BidermanRadius):
-        found = biderman_deflection(
-            load, inflation_pressure=model.pressure, carcass_pressure=model.p0, c1=model.C1, c2=model.C2
-        )
-    else:
-        return 0.0
-    if found >= 0.5 * radius:
-        raise InputError(
-            f"the radius model deflects a tire of {radius:g} m by {float(found):.3g} m",
-            place="wheel.radius_model",
-            hint="check its pressure and constants",
-        )
-    return float(found)
-
-
-def _set_loads(settings: Any, vehicle: Vehicle) -> None:
-    """Shares and levers of the load formulas (physics.md 3), as physics.loads.axle_loads has them."""
-    position, mass = vehicle.axle_to_rear, vehicle.axle_mass
-    offset = position - position.mean()
-    lever = offset / np.sum(offset**2) if len(mass) > 1 else np.zeros(1)
-    for k in range(len(mass)):
-        settings.load_share[k] = mass[k] / mass.sum()
-        settings.load_transfer[k] = lever[k]
-    settings.center_of_gravity_height = vehicle.center_of_gravity_height
-    settings.hitch_height = vehicle.hitch_height
-    place = 0
-    for axle in vehicle.axles.values():
-        count = len(axle.wheels)
-        shares = np.full((2, count), 1 / count)
-        if vehicle.track:
-            shares = lateral_shares(
-                count,
-                [0.0, 1.0],
-                center_of_gravity_height=vehicle.center_of_gravity_height,
-                track=vehicle.track,
-            )
-        for level, leaning in zip(shares[0], shares[1], strict=True):
-            settings.wheel_share[place] = level
-            settings.lateral_share[place] = level - leaning
-            place += 1
-    for i, side in enumerate(wheel_sides(vehicle)):
-        settings.wheel_side[i] = side
-
-
-def wheel_sides(vehicle: Vehicle) -> Floats:
-    """Distance of each wheel (n,) [m] from the vehicle's middle, left positive; 0 without a track."""
-    half = (vehicle.track or 0.0) / 2
-    counts = [len(axle.wheels) for axle in vehicle.axles.values()]
-    return np.concatenate([np.linspace(half, -half, n) if n > 1 else np.zeros(1) for n in counts])
-
-
-def _set_calibration(settings: Any, vehicle: Vehicle) -> None:
-    for i in range(len(vehicle.wheels)):
-        settings.gain[lib.TG_DRIVE_TORQUE + i] = vehicle.drive_torque_gain[i]
-        settings.offset[lib.TG_DRIVE_TORQUE + i] = vehicle.drive_torque_offset[i]
-    settings.offset[lib.TG_DRAWBAR_FORCE] = vehicle.calibration.drawbar_offset
-    settings.offset[lib.TG_ACCELERATION_X] = vehicle.calibration.acceleration_bias_x
-    settings.offset[lib.TG_PITCH] = vehicle.calibration.pitch_offset
-
-
-_SENSED_SLOPE = np.deg2rad(0.2)  # SD of a pitch sensor's mounting, where the vehicle file does not say
-
-
-def _set_uncertainty(settings: Any, vehicle: Vehicle, pitch_measured: bool) -> None:
-    """The vehicle file's spreads. A measured pitch leaves only its mounting unknown, not the slope."""
-    given = vehicle.uncertainty
-    spread = settings.uncertainty
-    for name in (
-        "drive_torque_gain",
-        "drive_torque_gain_common",
-        "drive_torque_offset",
-        "drawbar_gain",
-        "drawbar_offset",
-        "tire_rolling_resistance",
-        "vertical_load",
-        "wheel_radius",
-        "acceleration_bias",
-    ):
-        setattr(spread, name, getattr(given, name) or 0.0)
-    slope = given.slope or 0.0
-    spread.slope = min(slope, _SENSED_SLOPE) if pitch_measured and given.slope is not None else slope
 
 
 def _pointer(values: Floats, first: int) -> Any:

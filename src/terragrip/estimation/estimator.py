@@ -11,19 +11,12 @@ from typing import TYPE_CHECKING, Any, Self
 
 from terragrip.errors import InputError
 from terragrip.estimation import rims as speeds
-from terragrip.estimation.engine import (
-    EVENTS,
-    Engine,
-    Thresholds,
-    estimate_slots,
-    refusal,
-    sample_slots,
-    settings_of,
-)
+from terragrip.estimation.engine import EVENTS, Engine, estimate_slots, refusal
 from terragrip.estimation.methods import DEFAULT, SLIP_ONLY, method_named
 from terragrip.estimation.noise import channel_noise
 from terragrip.estimation.rims import Rim, rims_of, speeds_alone
 from terragrip.estimation.sealed import seal, unseal
+from terragrip.estimation.settings import Thresholds, sample_slots, settings_of
 from terragrip.vehicle import Vehicle
 
 if TYPE_CHECKING:

@@ -10,8 +10,8 @@ import numpy as np
 
 from terragrip._kernel import ffi, lib
 from terragrip.errors import InputError
-from terragrip.estimation.engine import Thresholds, wheel_radii, wheel_sides
 from terragrip.estimation.methods import SLIP_ONLY
+from terragrip.estimation.settings import Thresholds, wheel_radii
 from terragrip.estimation.zero_slip import UNTOLD, Zero
 from terragrip.physics.loads import GRAVITY
 from terragrip.recording.schema import has_torque
@@ -58,7 +58,7 @@ def rims_of(vehicle: Vehicle, channels: Collection[str], source: str | None = No
             place = f"column wheel_speed_{wheel}"
             raise InputError(f"the vehicle has no wheel {wheel}", file=source, place=place, hint=hint)
     if named:
-        radii, sides = wheel_radii(vehicle)[1], wheel_sides(vehicle)
+        radii, sides = wheel_radii(vehicle)[1], vehicle.wheel_side
         return tuple(
             Rim(wheel, f"wheel_speed_{wheel}", 1.0, float(radius), spread, float(side))
             for wheel, radius, side in zip(vehicle.wheels, radii, sides, strict=True)

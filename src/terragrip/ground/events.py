@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from terragrip.estimation import Estimates
-from terragrip.estimation.engine import EVENTS, SIGNS, watch_limits
+from terragrip.estimation.engine import EVENTS, SIGNS
+from terragrip.estimation.settings import watch_limits
 
 Array = NDArray[np.float64]
 

@@ -6,6 +6,7 @@ one, replaces these formulas.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -84,9 +85,37 @@ def axle_loads(
         - hitch_load * hitch_overhang
         - spin_torque
     )
+    return static + hitch_load / mass.size + (moment - hitch_load * np.mean(position)) * load_levers(position)
+
+
+def load_levers(axle_position: ArrayLike) -> NDArray[Any]:
+    """Load that each axle gains per N m of nose-down moment (axles,) [1/m]: ±1/L of two axles (physics.md 3).
+
+    ``axle_position``: (axles,) m ahead of the rear axle. A single axle gains none: the hitch takes moments.
+    """
+    position = np.asarray(axle_position, dtype=float)
     offset = position - np.mean(position)
-    tilt = (moment - hitch_load * np.mean(position)) / np.sum(offset**2)
-    return static + hitch_load / mass.size + tilt * offset
+    return offset / np.sum(offset**2) if position.size > 1 else np.zeros(1)
+
+
+def wheel_shares(
+    wheels: Sequence[int], *, center_of_gravity_height: float, track: float | None, gravity: float = GRAVITY
+) -> tuple[NDArray[Any], NDArray[Any]]:
+    """Of every wheel (n,): its share of its axle's load, and what it loses of that per m/s² to the left [s²/m].
+
+    ``wheels``: how many each axle has, front to rear. ``track`` [m]; None: nothing is known of the sides, no share changes.
+    So that a load is axle_load (share - lateral a_y), as :func:`lateral_shares` has it.
+    """
+    level = np.concatenate([np.full(count, 1 / count) for count in wheels])
+    if track is None:
+        return level, np.zeros_like(level)
+    leaning = [
+        lateral_shares(
+            count, 1.0, center_of_gravity_height=center_of_gravity_height, track=track, gravity=gravity
+        )
+        for count in wheels
+    ]
+    return level, level - np.concatenate(leaning)
 
 
 def lateral_shares(

@@ -167,13 +167,12 @@ class Run:
         """
         if self.recording is None or self.vehicle is None:
             return None
-        from terragrip.estimation.calibration.windows import wheel_side
         from terragrip.physics.slip import slip
 
         wheel = self.vehicle.wheels.index(self.shown_wheel)
         hub = self.recording["ground_speed"].to_numpy(dtype=np.float64)
         if "angular_velocity_z" in self.recording:
-            hub = hub - wheel_side(self.vehicle)[wheel] * self._everywhere("angular_velocity_z")
+            hub = hub - self.vehicle.wheel_side[wheel] * self._everywhere("angular_velocity_z")
         turning = self._everywhere(f"wheel_speed_{self.shown_wheel}")
         return slip(turning, hub, float(self.vehicle.wheel_radius[wheel]))
 

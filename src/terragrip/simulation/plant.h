@@ -129,6 +129,9 @@ typedef struct {
     int32_t axles, wheels;
     double axle_position[4];  /* m ahead of the rear axle, falling to 0 */
     double axle_share[4];     /* of the weight, at rest on level ground */
+    double axle_lever[4];     /* 1/m, load gained per N m of nose-down moment */
+    double wheel_share[8];    /* of the axle's load, */
+    double lateral_share[8];  /* s^2/m, less this per m/s^2 to the left */
     int32_t wheel_axle[8], wheel_track[8], driven[8];
     double side[8];           /* m left of the middle */
     double radius[8], inertia[8], bearing[8];

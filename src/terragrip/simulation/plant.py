@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from terragrip.errors import InputError
+from terragrip.physics.loads import load_levers, wheel_shares
 from terragrip.simulation.scenario import Scenario
 from terragrip.simulation.terrain import CURVE_INTERVALS, Terrain
 from terragrip.units import STANDARD_GRAVITY
@@ -40,25 +41,13 @@ def check_layout(vehicle: Vehicle) -> None:
         )
 
 
-def wheel_sides(vehicle: Vehicle) -> Floats:
-    """How far each wheel stands left of the middle (n,) [m]."""
-    half = 0.5 * (vehicle.track or 0.0)
-    return np.array(
-        [
-            side
-            for axle in vehicle.axles.values()
-            for side in ((0.0,) if len(axle.wheels) == 1 else (half, -half))
-        ]
-    )
-
-
 def warp_stiffness(vehicle: Vehicle, torsion: float) -> Floats:
     """Forces that corner heights cause through a chassis that resists what is no heave, pitch or roll (n, n) [N/m].
 
     ``torsion`` is the force at each wheel of a two-axle, four-wheel chassis per metre of one diagonal over the other.
     """
     ahead = vehicle.axle_to_rear[vehicle.wheel_axle]
-    rigid = np.stack([np.ones(len(ahead)), ahead - ahead.mean(), wheel_sides(vehicle)], axis=1)
+    rigid = np.stack([np.ones(len(ahead)), ahead - ahead.mean(), vehicle.wheel_side], axis=1)
     return 4.0 * torsion * (np.eye(len(ahead)) - rigid @ np.linalg.pinv(rigid))
 
 
@@ -170,9 +159,16 @@ def _machine(ffi: Any, lib: Any, scenario: Scenario, vehicle: Vehicle, radius: F
     machine.hitch_overhang = vehicle.hitch_overhang
     machine.tire_resistance = vehicle.tire_rolling_resistance
     machine.axles, machine.wheels = len(vehicle.axles), len(vehicle.wheels)
+    levers = load_levers(vehicle.axle_to_rear)
     for a, share in enumerate(vehicle.axle_mass / vehicle.axle_mass.sum()):
         machine.axle_position[a], machine.axle_share[a] = float(vehicle.axle_to_rear[a]), float(share)
-    sides = wheel_sides(vehicle)
+        machine.axle_lever[a] = float(levers[a])
+    sides = vehicle.wheel_side
+    level, leaning = wheel_shares(
+        [len(axle.wheels) for axle in vehicle.axles.values()],
+        center_of_gravity_height=vehicle.center_of_gravity_height,
+        track=vehicle.track,
+    )
     machine.steers = int(scenario.robot.steers)
     for i, row in enumerate(warp_stiffness(vehicle, scenario.robot.chassis_torsion)):
         for j, value in enumerate(row):
@@ -180,6 +176,7 @@ def _machine(ffi: Any, lib: Any, scenario: Scenario, vehicle: Vehicle, radius: F
     for i in range(len(vehicle.wheels)):
         machine.wheel_axle[i], machine.side[i] = int(vehicle.wheel_axle[i]), float(sides[i])
         machine.wheel_track[i] = int(sides[i] < 0)
+        machine.wheel_share[i], machine.lateral_share[i] = float(level[i]), float(leaning[i])
         machine.command_ratio[i] = float(vehicle.wheel_radius[0] / vehicle.wheel_radius[i])
         machine.radius[i] = float(radius[i])
         machine.inertia[i] = float(vehicle.wheel_inertia[i])

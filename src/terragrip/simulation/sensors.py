@@ -11,7 +11,6 @@ import numpy.typing as npt
 
 from terragrip.errors import InputError
 from terragrip.simulation.fields import stream
-from terragrip.simulation.plant import wheel_sides
 from terragrip.simulation.route import geographic
 from terragrip.simulation.scenario import Scenario, Sensor, Sensors
 from terragrip.simulation.trace import Trace
@@ -57,7 +56,7 @@ def signals(sensor: str, trace: Trace) -> dict[str, Floats]:
         }
     if sensor == "angular_velocity":
         time, height = trace["time"], trace["height"]
-        sides = wheel_sides(trace.vehicle)
+        sides = trace.vehicle.wheel_side
         width = float(sides @ sides)
         roll = height @ sides / width if width > 0 else np.zeros(len(time))
         nodding = trace["body_pitch_rate"] + np.gradient(trace["slope"], time)

@@ -12,7 +12,7 @@ from dataclasses import dataclass, fields
 import numpy as np
 import numpy.typing as npt
 
-from terragrip.physics.loads import GRAVITY, axle_loads, lateral_shares
+from terragrip.physics.loads import GRAVITY, axle_loads, wheel_shares
 from terragrip.recording import Recording
 from terragrip.vehicle import Vehicle
 
@@ -136,7 +136,7 @@ def _windows_of(index: int, recording: Recording, vehicle: Vehicle, length: floa
         pitch=pitch,
         yaw_rate=yaw,
         lateral=lateral,
-        hub_speed=speed[:, None] - np.nan_to_num(yaw)[:, None] * wheel_side(vehicle),
+        hub_speed=speed[:, None] - np.nan_to_num(yaw)[:, None] * vehicle.wheel_side,
         wheel_speed=wheel_speed,
         wheel_acceleration=wheel_acceleration,
         torque=torque,
@@ -196,28 +196,14 @@ def wheel_loads(
         for here, other in ((0, 1), (1, 0)):
             rest = known[:, here] & ~known[:, other]
             axles[rest, other] = total[rest] - axles[rest, here]
-    loads = np.empty((len(drawbar), len(vehicle.wheels)))
-    for axle in range(len(vehicle.axles)):
-        own = vehicle.wheel_axle == axle
-        shares = lateral_shares(
-            int(own.sum()),
-            lateral if vehicle.track else np.zeros_like(lateral),
-            center_of_gravity_height=vehicle.center_of_gravity_height,
-            track=vehicle.track or 1.0,
-        )
-        static = vehicle.axle_mass[axle] * GRAVITY / own.sum()
-        loads[:, own] = np.maximum(shares * axles[:, [axle]], _LEAST_LOAD * static)
-    return loads
-
-
-def wheel_side(vehicle: Vehicle) -> Floats:
-    """Distance of each wheel (n,) [m] from the vehicle's middle, left positive; 0 without a track."""
-    sides = []
-    for axle in range(len(vehicle.axles)):
-        count = int(np.sum(vehicle.wheel_axle == axle))
-        half = (vehicle.track or 0.0) / 2 if count > 1 else 0.0
-        sides.append(np.linspace(half, -half, count))
-    return np.concatenate(sides)
+    level, leaning = wheel_shares(
+        [len(axle.wheels) for axle in vehicle.axles.values()],
+        center_of_gravity_height=vehicle.center_of_gravity_height,
+        track=vehicle.track,
+    )
+    shares = level - leaning * lateral[:, np.newaxis]
+    static = vehicle.axle_mass[vehicle.wheel_axle] * GRAVITY * level
+    return np.asarray(np.maximum(shares * axles[:, vehicle.wheel_axle], _LEAST_LOAD * static))
 
 
 def _driven(vehicle: Vehicle) -> list[str]:

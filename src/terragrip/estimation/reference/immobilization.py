@@ -108,7 +108,7 @@ def _ends(vehicle: Vehicle, driven: NDArray[np.bool_]) -> list[NDArray[np.bool_]
 
 
 def pace(vehicle: Vehicle, limits: Mapping[str, float]) -> float:
-    """The watch's unit of time [s]; ``limits`` as :func:`~terragrip.estimation.engine.watch_limits` gives them."""
+    """The watch's unit of time [s]; ``limits`` as :func:`~terragrip.estimation.settings.watch_limits` gives them."""
     place = vehicle.axle_to_rear - np.mean(vehicle.axle_to_rear)
     length = sqrt(2 * float(np.sum(place**2))) if len(place) > 1 else 3 * float(vehicle.wheel_radius[0])
     return limits["pace"] * sqrt(length / GRAVITY)
@@ -122,7 +122,7 @@ def _low_pass(mean: float, dt: float, tau: float, x: float) -> float:
 class Watch:
     """Given each row, says whether the wheels dig or the vehicle is stuck.
 
-    ``limits``: as :func:`~terragrip.estimation.engine.watch_limits` gives them; ``pace``: the unit of time [s].
+    ``limits``: as :func:`~terragrip.estimation.settings.watch_limits` gives them; ``pace``: the unit of time [s].
     """
 
     limits: Mapping[str, float]

@@ -1,0 +1,78 @@
+"""The plant's loads in motion against physics.loads, which gives it shares and levers: on every layout, pulling, uphill, in a curve."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from terragrip.physics.loads import axle_loads, lateral_shares
+from terragrip.simulation.family_machines import LAYOUTS
+
+
+@pytest.mark.parametrize("counts", [counts for _, counts in LAYOUTS], ids=str)
+def test_axle_loads_in_motion_are_the_formulas(counts, quiet, drive):
+    trace = drive(moving(counts, quiet), stride=20)
+    vehicle = trace.vehicle
+    wanted = axle_loads(
+        vehicle.axle_mass,
+        vehicle.axle_to_rear,
+        center_of_gravity_height=vehicle.center_of_gravity_height,
+        hitch_height=vehicle.hitch_height,
+        drawbar=trace["drawbar"] - trace["assist"],
+        acceleration=trace["acceleration"],
+        slope=trace["slope"],
+        spin_torque=trace["wheel_acceleration"] @ vehicle.wheel_inertia,
+    )
+    assert np.ptp(trace["drawbar"]) > 100
+    assert np.ptp(trace["acceleration"]) > 0.5
+    np.testing.assert_allclose(trace["axle_load"], wanted, rtol=1e-10)
+
+
+@pytest.mark.parametrize("counts", [c for _, c in LAYOUTS if max(c) > 1], ids=str)
+def test_wheel_loads_in_a_steady_curve_are_the_formulas(counts, quiet, drive):
+    bend = {"path": [[0, 0], [8, 0], [8, 8]], "turn_radius": 6.0, "around": "even"}
+    trace = drive(moving(counts, quiet, route=bend, duration=14), stride=20)
+    vehicle = trace.vehicle
+    bending = trace["curvature"] > 0.16
+    settled = bending & (trace["time"] > trace["time"][bending][0] + 1)
+    lateral = trace["speed"] ** 2 * trace["curvature"]
+    assert settled.sum() > 100
+    assert lateral[settled].min() > 0.05
+    for axle, count in enumerate(counts):
+        shares = lateral_shares(
+            count, lateral, center_of_gravity_height=vehicle.center_of_gravity_height, track=vehicle.track
+        )
+        wanted = trace["axle_load"][:, [axle]] * shares
+        got = trace["load"][:, vehicle.wheel_axle == axle]
+        np.testing.assert_allclose(
+            got[settled], wanted[settled], rtol=5e-4
+        )  # a curve moves 9e-3; the chassis twists
+
+
+CLIMB = {"segments": [{"soil": "even", "length": 60}], "slope": {"mean": 0.05}}
+
+
+def moving(counts, quiet, *, route=CLIMB, duration=8):
+    """A machine of that layout that starts and pulls."""
+    share = np.linspace(1.0, 1.4, len(counts))
+    names = [f"axle{k}" for k in range(len(counts))]
+    return quiet(
+        vehicle={
+            "mass": 139.0,
+            "track": 0.5,
+            "center_of_gravity_height": 0.3,
+            "hitch_height": 0.25,
+            "wheelbase": 0.9,
+            "axles": {
+                name: {
+                    "mass": float(139.0 * s / share.sum()),
+                    "wheels": [f"{name}{side}" for side in "lr"[:count]],
+                }
+                for name, s, count in zip(names, share, counts, strict=True)
+            },
+            "wheel": {"radius": 0.2, "inertia": 0.15},
+        },
+        route=route,
+        duration=duration,
+        sensors={"use": "exact", "wheel_force": None},
+    )
