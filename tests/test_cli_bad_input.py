@@ -156,7 +156,7 @@ def test_a_missing_vehicle_a_missing_profile_and_an_unknown_method(refused: Refu
     assert "smooth" in smooth
 
 
-@pytest.mark.parametrize("output", ["log.csv", "vehicle.yaml", "no/out.parquet", "out.xlsx", "."])
+@pytest.mark.parametrize("output", ["log.csv", "vehicle.yaml", "no/out.parquet", "out.doc", "."])
 def test_outputs(refused: Refused, output: str) -> None:
     assert "--output" in refused(output=output)
 

@@ -8,8 +8,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from terragrip.estimation import DEFAULT, Estimates, estimated
+from terragrip.estimation.export import require_room, require_suffix
 from terragrip.estimation.summary import Tally
-from terragrip.estimation.writing import require_suffix, write_parts
+from terragrip.estimation.writing import write_parts
 from terragrip.recording import LogBlocks, Recording
 from terragrip.recording.survey import ROWS
 
@@ -35,7 +36,7 @@ def estimate_file(
     standstill_speed: float | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> str:
-    """Estimate a log into a Parquet file (or CSV, by its suffix); returns the summary as text.
+    """Estimate a log into a file, Parquet or another by its suffix (docs/export.md); returns the summary as text.
 
     The rows are those of :func:`terragrip.estimate`, to the last digit, whatever the log's length: it is gone through once for the
     noise and the held channels, which stand in the file's metadata with all other settings, and then in blocks, so that memory stays
@@ -69,6 +70,7 @@ def estimate_file(
         gap=gap,
         standstill_speed=standstill_speed,
         beside=Path(output).parent,
+        planned=lambda rows, names: require_room(output, rows, names),
         progress=progress,
     )
     tally, notes = Tally(), dict[str, None]()

@@ -12,6 +12,7 @@ from typing import Annotated, Any
 import typer
 
 from terragrip.cli.calibrate import command as calibrate
+from terragrip.cli.convert import command as convert
 from terragrip.cli.demo import command as demo
 from terragrip.cli.doctor import command as doctor
 from terragrip.cli.estimate import command as estimate
@@ -40,6 +41,7 @@ app.command("demo")(demo)
 app.add_typer(new, name="new")
 app.command("inspect")(inspect)
 app.command("estimate")(estimate)
+app.command("convert")(convert)
 app.command("calibrate")(calibrate)
 app.command("soils")(soils)
 app.command("ground")(ground)

@@ -11,6 +11,7 @@ from terragrip.cli.options import DbcFiles, Logs, OtherSources, ProfileFile, Qui
 from terragrip.cli.output import check_file, check_folder, files_in
 from terragrip.cli.progress import progress
 from terragrip.errors import InputError
+from terragrip.estimation.export import KINDS, require_suffix
 from terragrip.estimation.methods import DEFAULT, METHODS
 
 
@@ -20,7 +21,10 @@ def command(
     output: Annotated[
         Path,
         typer.Option(
-            "--output", "-o", metavar="PATH", help="Parquet or CSV file; with several logs, a folder."
+            "--output",
+            "-o",
+            metavar="PATH",
+            help="Parquet file, or another by its suffix (docs/export.md); with several logs, a folder.",
         ),
     ],
     profile: ProfileFile = None,
@@ -72,7 +76,9 @@ def _targets(logs: list[Path], output: Path, beside: list[Path]) -> list[Path]:
     """The file of each log's estimates, tried before the long work; ``beside`` are the other inputs."""
     inputs = [*logs, *beside]
     if len(logs) == 1:
-        return [check_file(output, inputs, suffixes=(".parquet", ".csv"))]
+        target = check_file(output, inputs, suffixes=tuple(KINDS))
+        require_suffix(target)
+        return [target]
     for log in logs:
         if not log.exists():
             raise InputError("no such file", file=log, hint="check the path")

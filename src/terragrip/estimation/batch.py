@@ -17,6 +17,7 @@ from terragrip.estimation.methods import DEFAULT, SLIP_ONLY, method_named
 from terragrip.estimation.rims import speeds_alone
 from terragrip.estimation.slip_only import found_in
 from terragrip.recording import LogBlocks, Recording, survey_of, unit_warnings
+from terragrip.recording.clock import clock_text
 
 if TYPE_CHECKING:
     import os
@@ -85,13 +86,15 @@ def estimated(
     gap: float | None = None,
     standstill_speed: float | None = None,
     beside: str | os.PathLike[str] | None = None,
+    planned: Callable[[int, tuple[str, ...]], None] | None = None,
     progress: Progress | None = None,
 ) -> Iterator[Estimates]:
     """The estimates of a log in blocks, a table a block, in the order of time; arguments as for :func:`estimate`.
 
     A first pass over the log finds the noise and the held channels (`terragrip.recording.survey`), so that the blocks' size
     changes no digit. ``beside``: the folder in whose neighbourhood blocks wait for the backward pass of ``smooth``, where the log
-    has more than one; None: the system's. Raises InputError as :func:`estimate` does, each when its block is reached.
+    has more than one; None: the system's. ``planned`` is called with the rows and the columns that there will be, before any row is
+    estimated. Raises InputError as :func:`estimate` does, each when its block is reached.
     """
     if smooth and not method_named(method).can_smooth:
         raise InputError(
@@ -115,6 +118,9 @@ def estimated(
         standstill_speed=standstill_speed,
         found=found,
     )
+    if planned is not None:
+        beside_them = (*passed_on(known.sample, estimator), *known.sample.labels)
+        planned(known.rows, ("time", *estimator.columns, *beside_them, "event"))
     notes = notes_of(estimator, known.sample)
     blocks = (known.without_empty(block) for block in log.blocks())
     forward = passes.of(log.from_disk)
@@ -223,7 +229,7 @@ def finished(
 ) -> Estimates:
     """Estimates from the kernel's columns, with what is passed on and notes."""
     out |= {name: recording.channels[name] for name in passed_on(recording, estimator)}
-    about = about_run(estimator, recording.source, recording.sha256, smooth=smooth)
+    about = about_run(estimator, about_recording(recording), smooth=smooth)
     return Estimates(recording.time, out, event, dict(recording.labels), about, tuple(notes))
 
 
@@ -240,9 +246,20 @@ def flag_before_gaps(event: Codes, before: Codes | None = None) -> None:
     event[np.flatnonzero((event[1:] == GAP) & (event[:-1] != GAP))] = GAP
 
 
-def about_run(
-    estimator: TractionEstimator, source: str | None, sha256: str | None, *, smooth: bool
-) -> dict[str, Any]:
+def about_recording(recording: Recording) -> dict[str, Any]:
+    """The log of a table: source and SHA-256, the clock time of its first row (``start``) and of its time 0 (``time_zero``) where
+    it says them, and the profile that it was read by (a list, of several)."""
+    about: dict[str, Any] = {"source": recording.source, "sha256": recording.sha256}
+    zero = recording.clock_zero
+    if zero is not None:
+        about |= {"start": clock_text(zero + float(recording.time[0])), "time_zero": clock_text(zero)}
+    if recording.profiles:
+        profiles = [dict(profile) for profile in recording.profiles]
+        about["profile"] = profiles[0] if len(profiles) == 1 else profiles
+    return about
+
+
+def about_run(estimator: TractionEstimator, recording: dict[str, Any], *, smooth: bool) -> dict[str, Any]:
     """What the table was made from, ready for JSON."""
     from terragrip import __version__
 
@@ -251,7 +268,7 @@ def about_run(
         "method": estimator.method,
         "smooth": smooth,
         "vehicle": estimator.vehicle.to_dict(),
-        "recording": {"source": source, "sha256": sha256},
+        "recording": recording,
         "settings": {
             "noise": estimator.noise,
             "held": estimator.held,

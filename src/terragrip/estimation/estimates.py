@@ -5,7 +5,8 @@ from __future__ import annotations
 import json
 import os
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from datetime import datetime
 from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
@@ -13,7 +14,9 @@ import numpy.typing as npt
 
 from terragrip.errors import InputError
 from terragrip.estimation.arrow import choices, floats, texts
+from terragrip.estimation.columns import column_named
 from terragrip.estimation.engine import EVENTS
+from terragrip.recording.clock import clock_index
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -38,9 +41,9 @@ class Estimates:
     """Estimates of one recording.
 
     ``time`` (n,) [s]; ``columns`` float64 (n,) by name in the table's order, then what was passed through from
-    the recording (position, references); ``event_codes`` (n,) index
+    the recording (position, references), each with the unit of `terragrip.estimation.columns`; ``event_codes`` (n,) index
     :data:`~terragrip.estimation.engine.EVENTS`; ``labels`` text (n,), such as ``soil``; ``about``: version,
-    method, smooth, vehicle, recording (source, sha256), settings (noise, held, thresholds); ``notes``: plain
+    method, smooth, vehicle, recording (source, sha256, start, profile), settings (noise, held, thresholds); ``notes``: plain
     sentences for the user.
 
     Quantities have a twin ``_std``: one standard deviation that holds the filter's own variance and the
@@ -84,6 +87,16 @@ class Estimates:
             return np.array(EVENTS, dtype=object)[self.event_codes]
         return self.labels[name] if name in self.labels else self.columns[name]
 
+    def select(self, rows: Any) -> Self:
+        """The rows of a mask, a slice or an array of increasing indices; a slice copies nothing."""
+        return replace(
+            self,
+            time=self.time[rows],
+            columns={name: values[rows] for name, values in self.columns.items()},
+            event_codes=self.event_codes[rows],
+            labels={name: values[rows] for name, values in self.labels.items()},
+        )
+
     @property
     def wheels(self) -> tuple[str, ...]:
         """Names of the wheels, in the vehicle's order."""
@@ -108,8 +121,18 @@ class Estimates:
             raise InputError("the estimates hold no vehicle", hint="estimate the log anew with this version")
         return Vehicle.from_dict(self.about["vehicle"])
 
+    @property
+    def start(self) -> datetime | None:
+        """When the log's time 0 was (UTC), None where the log does not say; dates without a zone count as UTC."""
+        text = self.about.get("recording", {}).get("time_zero")
+        return None if text is None else datetime.fromisoformat(text)
+
     def to_pandas(self) -> pd.DataFrame:
-        """The whole table as a pandas DataFrame; ``event`` and labels are text."""
+        """The whole table as a pandas DataFrame; ``event`` and labels are text.
+
+        Its index is the clock time (UTC) where the log says it, else the row's number. ``attrs`` hold ``units`` and ``descriptions``
+        by column, ``notes``, and what `about` holds.
+        """
         import pandas as pd
 
         table: dict[str, Any] = {"time": self.time, **self.columns}
@@ -120,16 +143,30 @@ class Estimates:
             }
         )
         table["event"] = pd.Series(self._events().to_pandas(), dtype=pd.StringDtype(na_value=np.nan))
-        return pd.DataFrame(table, copy=False)
+        found = pd.DataFrame(table, copy=False)
+        if self.start is not None:
+            found.index = clock_index(self.time, self.start)
+        meanings = {name: column_named(name) for name in self.names}
+        found.attrs = {
+            **self.about,
+            "notes": list(self.notes),
+            "units": {name: column.unit for name, column in meanings.items()},
+            "descriptions": {name: column.description for name, column in meanings.items()},
+        }
+        return found
 
     def to_arrow(self) -> pa.Table:
-        """The whole table as an Arrow table without copies, with its metadata."""
+        """The whole table as an Arrow table without copies, with its metadata and each column's unit and description."""
         import pyarrow as pa
 
         arrays: dict[str, Any] = {name: floats(values) for name, values in self._numbers()}
         arrays |= {name: texts(values) for name, values in self.labels.items()}
         arrays["event"] = self._events()
-        return pa.table(arrays).replace_schema_metadata({METADATA_KEY: self.metadata()})
+        fields = [
+            pa.field(name, values.type, metadata=column_named(name)._asdict())
+            for name, values in arrays.items()
+        ]
+        return pa.table(list(arrays.values()), schema=pa.schema(fields, {METADATA_KEY: self.metadata()}))
 
     def _events(self) -> pa.Array:
         return choices(self.event_codes, EVENTS)
@@ -143,9 +180,9 @@ class Estimates:
         return json.dumps({**self.about, "notes": list(self.notes)}).encode()
 
     def write(self, path: str | os.PathLike[str]) -> None:
-        """Write a file, whole or not at all: Parquet, or CSV (which `read` does not take) where the name ends so.
+        """Write a file, whole or not at all, in the format of its suffix (docs/export.md); `read` takes Parquet alone.
 
-        Raises InputError where the name ends otherwise, or the file cannot be written.
+        Raises InputError where the suffix is none of `terragrip.estimation.export.KINDS`, or the file cannot hold the table or be written.
         """
         from terragrip.estimation.writing import write_parts
 
@@ -156,7 +193,7 @@ class Estimates:
         """Read a Parquet file of estimates; raises InputError if it is missing, damaged or no such table."""
         import pyarrow.parquet as pq
 
-        return cls.from_arrow(_opened(path, pq.read_table), source=os.fspath(path))
+        return cls.from_arrow(opened(path, pq.read_table), source=os.fspath(path))
 
     @classmethod
     def read_about(cls, path: str | os.PathLike[str]) -> dict[str, Any]:
@@ -164,7 +201,7 @@ class Estimates:
         import pyarrow.parquet as pq
 
         about: dict[str, Any] = json.loads(
-            (_opened(path, pq.read_schema).metadata or {}).get(METADATA_KEY, b"{}")
+            (opened(path, pq.read_schema).metadata or {}).get(METADATA_KEY, b"{}")
         )
         about.pop("notes", None)
         return about
@@ -200,7 +237,7 @@ class Estimates:
         return tally.text(self.notes)
 
 
-def _opened(path: str | os.PathLike[str], reading: Callable[[str], Any]) -> Any:
+def opened(path: str | os.PathLike[str], reading: Callable[[str], Any]) -> Any:
     """What ``reading`` makes of a Parquet file; raises InputError where it is missing, damaged or none."""
     import pyarrow as pa
 

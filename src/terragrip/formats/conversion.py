@@ -19,11 +19,11 @@ from terragrip.formats.derivation import (
     yaw_of,
 )
 from terragrip.formats.profile import Profile, Rows, Source, TimeSource, matching, rate_unit
-from terragrip.formats.table import SINCE_1970, LogTable, since_clock_was_set
+from terragrip.formats.table import LogTable, since_clock_was_set
 from terragrip.formats.timebase import spread, union
 from terragrip.physics.geodesy import metres_of
 from terragrip.recording import Recording
-from terragrip.recording.columns import columns_of, numbers, seconds, texts
+from terragrip.recording.columns import SINCE_1970, columns_of, numbers, seconds, start_of, texts
 from terragrip.recording.schema import LABELS, TIME, unit_of
 from terragrip.units import UnitError, factor_to, quantity
 
@@ -51,7 +51,10 @@ def convert(profile: Profile, log: Any, source: str | None = None) -> Recording:
         log = LogTable(tuple(columns), columns, source=source)
     part = converted(profile, log)
     frame = {TIME: part.time, **part.columns}
-    return Recording.from_frame(frame, part.source, sha256=part.sha256, notes=part.notes, noise=part.noise)
+    recording = Recording.from_frame(
+        frame, part.source, sha256=part.sha256, notes=part.notes, noise=part.noise, start=part.start
+    )
+    return replace(recording, profiles=(profile.to_dict(),))
 
 
 def converted(profile: Profile, log: LogTable, *, partial: bool = False) -> Part:
@@ -139,15 +142,15 @@ def _time(origin: TimeSource, log: LogTable) -> tuple[Floats, float | None, list
     return time, start, notes
 
 
-def start_of(stamps: Column, time: Floats) -> float | None:
-    """When time 0 was [s since 1970] of stamps as they were written and as ``time`` [s]; None where they do not say."""
-    if stamps.dtype.kind == "M" and len(stamps):
-        return float((stamps[0] - np.datetime64(0, "s")) / np.timedelta64(1, "s"))
-    return 0.0 if len(time) and time[0] > SINCE_1970 else None
+def first_start(origin: TimeSource, stamps: Column) -> float | None:
+    """When time 0 was [s since 1970] of a log whose first stamps (n,) these are, if they say."""
+    if stamps.dtype.kind in "Mm":
+        return start_of(stamps, np.empty(0))
+    return _since_1970(stamps, origin)
 
 
 def _since_1970(stamps: Column, origin: TimeSource) -> float | None:
-    """When time 0 was [s since 1970], where the stamps are so large that they count from then."""
+    """When time 0 was [s since 1970], where the stamps (n,), numbers, are so large that they count from then."""
     first = float(stamps[0]) * factor_to(origin.unit, "s") if len(stamps) else np.nan
     if not SINCE_1970 < first < np.inf:
         return None

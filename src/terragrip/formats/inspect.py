@@ -17,10 +17,11 @@ from terragrip.formats.proposal import is_ready, missing_channels, profile_text,
 from terragrip.formats.reading import read, read_log, recording_of
 from terragrip.formats.recognition import Proposal, propose, silent
 from terragrip.formats.signals import SignalLog
-from terragrip.formats.table import SINCE_1970, LogTable, Sparse
+from terragrip.formats.table import LogTable, Sparse
 from terragrip.formats.time_column import find_time
 from terragrip.formats.vocabulary import GENERAL, Vocabulary
 from terragrip.recording import Recording, unit_warnings
+from terragrip.recording.columns import SINCE_1970
 from terragrip.recording.held import fresh_samples, held_period, measured_part
 from terragrip.recording.noise import white_noise
 from terragrip.recording.schema import TIME, has_torque, is_own, unit_of

@@ -3,20 +3,21 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import replace
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
 from terragrip.errors import InputError
 from terragrip.formats.clocks import lag_within
-from terragrip.formats.conversion import converted_block, settled
+from terragrip.formats.conversion import converted_block, first_start, settled
 from terragrip.formats.profile import Profile
 from terragrip.formats.registry import format_of
 from terragrip.formats.table import LogTable, in_si, since_clock_was_set
 from terragrip.formats.table_on_disk import Columns, TableOnDisk
 from terragrip.recording import LogBlocks, Recording, checks
-from terragrip.recording.columns import numbers, seconds, texts
+from terragrip.recording.columns import numbers, seconds, start_of, texts
 from terragrip.recording.schema import LABELS, TIME, is_own
 from terragrip.recording.survey import ROWS
 
@@ -54,23 +55,34 @@ def recordings_of(log: TableOnDisk, profile: Profile | None = None) -> Iterator[
     only.
     """
     table = LogTable(log.names, {}, log.units, log.source, clocked=log.clocked)
+    about = _About()
     if profile is None:
         chosen = [name for name in log.names if is_own(name)]
         own = (
             in_si(block)
             for block in _since_set(log, log.blocks(chosen, 1), table, TIME, log.units.get(TIME, "s"))
         )
-        return _checked(own, log.names, chosen, log.source, log.digest, log.notes)
+        return _checked(own, log.names, chosen, log.source, log.digest, about, log.notes)
     found = settled(profile, table)
     if found is None:
         return None
     ready, notes = found
     log.notes.extend(notes)
     names = [TIME, *ready.channels]
-    return _checked(_converted(log, ready, table), tuple(names), names, log.source, log.digest, log.notes)
+    about.profiles = (profile.to_dict(),)
+    blocks = _converted(log, ready, table, about)
+    return _checked(blocks, tuple(names), names, log.source, log.digest, about, log.notes)
 
 
-def _converted(log: TableOnDisk, profile: Profile, table: LogTable) -> Iterator[Columns]:
+@dataclass
+class _About:
+    """What a log's recordings say of all of it: when time 0 was, known once the first block came, and the profile."""
+
+    start: float | None = None
+    profiles: tuple[Mapping[str, Any], ...] = ()
+
+
+def _converted(log: TableOnDisk, profile: Profile, table: LogTable, about: _About) -> Iterator[Columns]:
     """The blocks of a log as a `settled` profile makes channels of them."""
     asked = {profile.time.column, *(c for origin in profile.channels.values() for c in origin.columns)}
     first = None
@@ -82,6 +94,7 @@ def _converted(log: TableOnDisk, profile: Profile, table: LogTable) -> Iterator[
         if first is None:
             first = stamps[0]
             log.notes.extend(seconds(stamps[:1], log.source)[1])
+            about.start = first_start(profile.time, stamps)
         yield converted_block(profile, block, first)
 
 
@@ -110,13 +123,14 @@ def _checked(
     chosen: list[str],
     source: str,
     digest: str,
+    about: _About,
     said: Sequence[str] = (),
 ) -> Iterator[Recording]:
     """Consecutive blocks of columns as checked recordings; they together are what `Recording.from_frame` makes of all.
 
-    ``names``: all columns of the log, ``chosen``: those in the blocks; ``digest``: SHA-256 of the file; ``said``: notes, to which
-    the blocks may add as they come. Raises InputError as that does, each when its block is reached; that a channel is empty over the
-    whole file shows at the end only.
+    ``names``: all columns of the log, ``chosen``: those in the blocks; ``digest``: SHA-256 of the file; ``about``: what is known of all
+    of it; ``said``: notes, to which the blocks may add as they come. Raises InputError as that does, each when its block is reached;
+    that a channel is empty over the whole file shows at the end only.
     """
     checks.require_columns(names, source)
     notes = list(checks.remarks(names))
@@ -136,6 +150,9 @@ def _checked(
                 "holds dates and numbers", file=source, place=f"column {TIME}", hint="give one of them"
             )
         block = _block(columns, source, first, after, silent, tuple(dict.fromkeys((*notes, *said))), digest)
+        if first == 0 and about.start is None:
+            about.start = start_of(time, block.time)
+        block = replace(block, start=about.start, profiles=about.profiles)
         if first == 0 and (late := lag_within(block.time, block.channels)):
             notes += late
             block = replace(block, notes=(*block.notes, *late))

@@ -208,6 +208,10 @@ class Profile(Part):
         """Build from a mapping as a profile file holds; raises InputError, which names ``file`` if given."""
         return validate(cls, data, file=file)
 
+    def to_dict(self) -> dict[str, Any]:
+        """What `from_dict` takes, ready for JSON."""
+        return self.model_dump(mode="json", by_alias=True, exclude_unset=True)
+
     @field_validator("dbc", mode="before")
     @classmethod
     def _one_or_several(cls, value: Any) -> Any:

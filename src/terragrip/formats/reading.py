@@ -10,13 +10,13 @@ import numpy as np
 
 from terragrip.errors import InputError
 from terragrip.formats.clocks import lag_within
-from terragrip.formats.conversion import Part, start_of
+from terragrip.formats.conversion import Part
 from terragrip.formats.profile import SHIPPED, Profile
 from terragrip.formats.registry import Databases, format_of
 from terragrip.formats.signals import SignalLog
 from terragrip.formats.table import LogTable, Wanted, in_si, since_clock_was_set
 from terragrip.recording import Recording, checks
-from terragrip.recording.columns import seconds
+from terragrip.recording.columns import seconds, start_of
 from terragrip.recording.schema import TIME, is_own
 
 PathLike = str | os.PathLike[str]
@@ -46,7 +46,10 @@ def read(
         from terragrip.formats.sources import merged
 
         paths = list(path)
-        return merged([_part(p, own, databases) for p, own in zip(paths, _each(profile, paths), strict=True)])
+        chosen_ones = _each(profile, paths)
+        recording = merged([_part(p, own, databases) for p, own in zip(paths, chosen_ones, strict=True)])
+        used = {id(own): own.to_dict() for own in chosen_ones if own is not None}
+        return replace(recording, profiles=tuple(used.values()))
     if isinstance(profile, list | tuple):
         raise InputError("there are several profiles for one log", file=path, hint="give one profile")
     chosen = _loaded(profile)  # type: ignore[arg-type]  # a sequence was refused above
@@ -67,7 +70,9 @@ def _as_it_stands(table: LogTable) -> Recording:
     notes = [*table.notes, *checks.remarks(table.names)]
     table, unset = since_clock_was_set(table, TIME, _time_unit(table))
     notes += unset
-    return Recording.from_frame(in_si(table), table.source, sha256=table.sha256, notes=notes)
+    return Recording.from_frame(
+        in_si(table), table.source, sha256=table.sha256, notes=notes, start=table.start
+    )
 
 
 def read_channels(

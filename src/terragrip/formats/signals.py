@@ -9,7 +9,8 @@ import numpy as np
 import numpy.typing as npt
 
 from terragrip.errors import InputError
-from terragrip.formats.table import SINCE_1970, LogTable
+from terragrip.formats.table import LogTable
+from terragrip.recording.columns import SINCE_1970
 from terragrip.recording.schema import TIME
 
 Floats = npt.NDArray[np.float64]

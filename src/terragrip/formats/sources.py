@@ -28,7 +28,7 @@ def merged(parts: Sequence[Part]) -> Recording:
     Raises InputError where a source has no usable channel or time, and for whatever `Recording.from_frame` refuses.
     """
     frame, source, digests, notes, noise = joined(parts)
-    return Recording.from_frame(frame, source, sha256=digests, notes=notes, noise=noise)
+    return Recording.from_frame(frame, source, sha256=digests, notes=notes, noise=noise, start=parts[0].start)
 
 
 def joined(

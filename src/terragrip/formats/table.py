@@ -10,12 +10,11 @@ import numpy as np
 import numpy.typing as npt
 
 from terragrip.errors import InputError
+from terragrip.recording.columns import SINCE_1970
 from terragrip.recording.schema import unit_of
 from terragrip.units import UnitError, factor_to
 
 Wanted = Callable[[str], bool]
-SINCE_1970 = 1e8
-"""Larger stamps [s] count from 1970, smaller ones from some start of their own."""
 _FIRST = 1000  # rows in which a logger's clock is set, if it was not
 _SAMPLES = 10_000  # of a signal that are kept or left out together, where a log is looked at in parts
 

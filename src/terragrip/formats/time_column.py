@@ -8,8 +8,8 @@ import numpy as np
 import numpy.typing as npt
 
 from terragrip.formats.candidates import kind_of
-from terragrip.formats.table import SINCE_1970
 from terragrip.formats.vocabulary import GENERAL, Vocabulary
+from terragrip.recording.columns import SINCE_1970
 from terragrip.recording.schema import TIME
 from terragrip.units import factor_to
 

@@ -102,7 +102,7 @@ class Segment:
         if len(self) and estimator is not None:
             import pyarrow.parquet as pq
 
-            from terragrip.estimation.writing import parquet_options
+            from terragrip.estimation.export.arrow_files import parquet_options
 
             for name, table in (
                 (RECORDING, self.to_recording()),
@@ -143,7 +143,7 @@ class Segment:
         columns |= {
             name: measured[name] for name in ("latitude", "longitude", "altitude") if name in measured
         }
-        about = about_run(estimator, None, None, smooth=False)
+        about = about_run(estimator, {"source": None, "sha256": None}, smooth=False)
         stamps = self._stamps()
         time, codes = (np.ascontiguousarray(stamps[name]) for name in ("time", "code"))
         return Estimates(time, columns, codes, {}, about)

@@ -68,6 +68,21 @@ def numbers(name: str, column: npt.NDArray[Any], time: Floats | None, source: st
     )
 
 
+SINCE_1970 = 1e8
+"""Larger stamps [s] count from 1970, smaller ones from some start of their own."""
+
+
+def start_of(stamps: npt.NDArray[Any], time: Floats) -> float | None:
+    """When time 0 was [s since 1970] of stamps as they were written and as ``time`` [s]; None where they do not say.
+
+    Dates without a zone count as UTC.
+    """
+    if stamps.dtype.kind == "M" and len(stamps):
+        found = float((stamps[0] - np.datetime64(0, "s")) / np.timedelta64(1, "s"))
+        return None if np.isnan(found) else found
+    return 0.0 if len(time) and time[0] > SINCE_1970 else None
+
+
 def seconds(column: npt.NDArray[Any], source: str | None) -> tuple[Floats, list[str]]:
     """The time column [s], with a note where dates became seconds since the first."""
     if column.dtype.kind == "m":

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from datetime import UTC, datetime
 from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
@@ -11,8 +12,17 @@ import numpy.typing as npt
 
 from terragrip.errors import InputError
 from terragrip.recording import checks
-from terragrip.recording.columns import columns_of, numbers, seconds, texts
-from terragrip.recording.schema import LABELS, REFERENCE, TIME, is_channel, split_channel, wheel_names_in
+from terragrip.recording.clock import LATEST, clock_index
+from terragrip.recording.columns import columns_of, numbers, seconds, start_of, texts
+from terragrip.recording.schema import (
+    LABELS,
+    REFERENCE,
+    TIME,
+    is_channel,
+    split_channel,
+    unit_of,
+    wheel_names_in,
+)
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -28,8 +38,9 @@ class Recording:
 
     ``time`` (n,) [s] runs forward; ``channels`` hold float64 (n,) by name, NaN = not measured at that
     instant; ``labels`` hold text (n,), empty = unlabelled; ``notes`` are plain sentences for the user;
-    ``noise`` is the standard deviation of a channel where the reader knows it (a derived one). Arrays
-    may be read-only.
+    ``noise`` is the standard deviation of a channel where the reader knows it (a derived one); ``start`` is when time 0 was
+    [s since 1970], None where the log does not say; ``profiles`` are those that the log was read by, as their files hold them.
+    Arrays may be read-only.
     """
 
     time: Floats
@@ -39,6 +50,8 @@ class Recording:
     sha256: str | None = None
     notes: tuple[str, ...] = ()
     noise: dict[str, float] = field(default_factory=dict)
+    start: float | None = None
+    profiles: tuple[Mapping[str, Any], ...] = ()
 
     @classmethod
     def from_frame(
@@ -49,18 +62,22 @@ class Recording:
         sha256: str | None = None,
         notes: Sequence[str] = (),
         noise: Mapping[str, float] | None = None,
+        start: float | None = None,
     ) -> Self:
         """Take a pandas or polars frame, an Arrow table or a mapping of arrays; float64 is not copied.
 
         Raises InputError with column and row on a missing required column (time, ground_speed, a wheel
         speed), text or infinities in a channel, a required channel without any value, time that is NaN,
-        repeats or runs back, and on an empty table. ``source`` is the file that errors name.
+        repeats or runs back, and on an empty table. ``source`` is the file that errors name. Without ``start``, dates and stamps
+        since 1970 tell it.
         """
         columns = columns_of(frame, source)
         checks.require_columns(columns, source)
         time, remark = seconds(columns[TIME], source)
         said = [*notes, *remark, *checks.remarks(columns)]
         checks.check_time(time, source)
+        if start is None:
+            start = start_of(columns[TIME], time)
         channels: dict[str, Floats] = {}
         labels: dict[str, npt.NDArray[np.object_]] = {}
         for name, column in columns.items():
@@ -74,7 +91,8 @@ class Recording:
                     said.append(f"{name} holds no value and is left out.")
                 else:
                     channels[name] = values
-        return cls(time, channels, labels, source, sha256, tuple(dict.fromkeys(said)), dict(noise or {}))
+        notes = tuple(dict.fromkeys(said))
+        return cls(time, channels, labels, source, sha256, notes, dict(noise or {}), start)
 
     def __len__(self) -> int:
         return len(self.time)
@@ -87,6 +105,13 @@ class Recording:
         if name == TIME:
             return self.time
         return self.labels[name] if name in self.labels else self.channels[name]
+
+    @property
+    def clock_zero(self) -> float | None:
+        """``start``, where it and the last row are dates of 1970 to 2199; else None."""
+        if self.start is None or not len(self) or not -LATEST < self.start < LATEST:
+            return None
+        return self.start if self.start + self.time[0] > 0 and self.start + self.time[-1] < LATEST else None
 
     @property
     def wheels(self) -> tuple[str, ...]:
@@ -117,10 +142,17 @@ class Recording:
         return replace(self, notes=tuple(dict.fromkeys((*self.notes, *notes))))
 
     def to_pandas(self) -> pd.DataFrame:
-        """The whole table as a pandas DataFrame, time first."""
+        """The whole table as a pandas DataFrame, time first.
+
+        Its index is the clock time (UTC) where the log says it, else the row's number; ``attrs`` hold ``units`` and ``notes``.
+        """
         import pandas as pd
 
-        return pd.DataFrame({TIME: self.time, **self.channels, **self.labels}, copy=False)
+        found = pd.DataFrame({TIME: self.time, **self.channels, **self.labels}, copy=False)
+        if self.clock_zero is not None:
+            found.index = clock_index(self.time, datetime.fromtimestamp(self.clock_zero, UTC))
+        found.attrs = {"units": {name: unit_of(name) or "" for name in found}, "notes": list(self.notes)}
+        return found
 
     def check_against(self, vehicle: Vehicle) -> None:
         """Raise InputError unless the log's wheels and axles are the vehicle's, with all that estimates need.

@@ -1,0 +1,37 @@
+"""``terragrip convert``: estimates as the file of another program."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from terragrip.cli.options import Quiet
+from terragrip.cli.output import check_file
+from terragrip.cli.progress import progress
+from terragrip.estimation.export import KINDS, require_suffix
+
+
+def command(
+    estimates: Annotated[
+        Path, typer.Argument(metavar="ESTIMATES", help="A Parquet file written by 'terragrip estimate'.")
+    ],
+    output: Annotated[
+        Path, typer.Option("--output", "-o", metavar="FILE", help=f"The file: {', '.join(KINDS)}.")
+    ],
+    quiet: Quiet = False,
+) -> None:
+    """Write estimates as a file of another program.
+
+    Excel, MATLAB, QGIS, Foxglove: the suffix says which. All columns with their units and what the estimates were made from; what a file
+    cannot hold is refused before the work.
+    """
+    from terragrip.estimation.converting import convert
+
+    target = check_file(output, [estimates], suffixes=tuple(KINDS))
+    require_suffix(target)
+    with progress(output.name, quiet) as step:
+        convert(estimates, target, step)
+    if not quiet:
+        print(f"Written to {output}")

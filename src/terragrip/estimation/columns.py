@@ -1,0 +1,83 @@
+"""The columns of estimates: the unit and the description that files, tables and figures give each."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import NamedTuple
+
+from terragrip.recording.schema import REFERENCE, unit_of
+
+
+class Column(NamedTuple):
+    """What a column holds: its ``unit`` (SI or deg; "1" for a ratio or a count, "" for text) and its ``description``."""
+
+    unit: str
+    description: str
+
+
+_WHOLE = {
+    "time": Column("s", "time on the log's own clock"),
+    "distance": Column("m", "distance travelled since the first row, forward and backward alike"),
+    "ground_speed": Column("m/s", "forward speed of the vehicle over ground"),
+    "soil_resistance": Column("1", "soil rolling resistance: the force that the ground opposes, over the vehicle's weight"),
+    "curve_a": Column("1", "scale of the adhesion curve known so far, of the vehicle"),
+    "warning": Column("1", "score of the warning of immobilization"),
+    "warning_usual_slip": Column("1", "the slip that the warning holds for usual"),
+    "nis": Column("1", "normalised innovation squared of the row, over all its channels"),
+    "channels": Column("1", "channels that the row's update took: what nis is expected to be"),
+    "supervisor": Column("1", "supervisor gamma: how far the noise is adapted, 0 to 1"),
+    "event": Column("", "what happened: empty, or a word of docs/events.md"),
+    "soil": Column("", "the log's own name of the ground, empty where it has none"),
+    "latitude": Column("deg", "measured latitude, WGS 84"),
+    "longitude": Column("deg", "measured longitude, WGS 84"),
+    "altitude": Column("m", "measured altitude"),
+    "drawbar_force": Column("N", "measured drawbar force, backward pull positive"),
+}  # fmt: skip
+_BY_WHEEL = {
+    "wheel_speed": Column("rad/s", "angular velocity of wheel {}"),
+    "adhesion": Column(
+        "1", "adhesion (mu) of wheel {}: horizontal force of the ground over the wheel's load"
+    ),
+    "slip": Column("1", "slip of wheel {}: 1 spins on the spot, -1 is a locked wheel"),
+    "net_traction": Column("1", "net traction ratio of wheel {}: adhesion less soil resistance"),
+    "efficiency": Column("1", "tractive efficiency of wheel {}: drawbar power over wheel power"),
+    "curve_a": Column("1", "scale of the adhesion curve known so far, of wheel {}"),
+    "vertical_load": Column("N", "vertical load of axle {}"),
+    "wheel_force_x": Column("N", "measured longitudinal force of wheel {}, a reference"),
+    "wheel_force_z": Column("N", "measured vertical force of wheel {}, a reference"),
+    "adaptation": Column("1", "factor of the adaptation on the process noise of {}"),
+    "warning": Column("1", "sign {} of the warning of immobilization, in points"),
+}
+
+
+def column_named(name: str) -> Column:
+    """Unit and description of a column of estimates; of a foreign one ``Column("", "")``."""
+    if name.startswith(REFERENCE):
+        inner = column_named(name.removeprefix(REFERENCE))
+        return Column(inner.unit, f"true value: {inner.description}".removesuffix(": "))
+    known = _WHOLE.get(name) or _of_a_part(name)
+    if known is not None:
+        return known
+    if name.endswith("_std"):
+        inner = column_named(name.removesuffix("_std"))
+        if inner.description:
+            return Column(inner.unit, f"one standard deviation of {name.removesuffix('_std')}")
+    return Column(unit_of(name) or "", "")
+
+
+def units_of(names: Iterable[str]) -> dict[str, str]:
+    """The unit of each column."""
+    return {name: column_named(name).unit for name in names}
+
+
+def _of_a_part(name: str) -> Column | None:
+    """Of a column of one wheel, axle, state or sign."""
+    if name.endswith("_std"):
+        return None
+    for quantity, column in _BY_WHEEL.items():
+        if name.startswith(f"{quantity}_") and len(name) > len(quantity) + 1:
+            part = name.removeprefix(f"{quantity}_").replace(
+                "_", " " if quantity in ("warning", "adaptation") else "_"
+            )
+            return Column(column.unit, column.description.format(part))
+    return None

@@ -1,0 +1,107 @@
+"""Estimates in the files of others: what each suffix can hold, and who writes it.
+
+A writer takes consecutive parts of one table, the first when it is made, and is closed or, after a failure, dropped.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Collection
+from dataclasses import dataclass
+from importlib import import_module
+from importlib.util import find_spec
+from pathlib import Path
+from typing import TYPE_CHECKING, Protocol
+
+from terragrip.errors import InputError
+
+if TYPE_CHECKING:
+    from terragrip.estimation.estimates import Estimates
+
+
+class TableWriter(Protocol):
+    """Writes one file, part by part."""
+
+    def write(self, part: Estimates) -> None:
+        """Write the rows of a part."""
+        ...
+
+    def close(self) -> None:
+        """Complete the file; raises InputError where it cannot hold what was written."""
+        ...
+
+    def drop(self) -> None:
+        """Let go of the file, whose rest will not come."""
+        ...
+
+
+@dataclass(frozen=True)
+class FileKind:
+    """What a suffix stands for: its ``title``, the class that writes it (module of this package, name), the ``package`` it needs and the
+    extra that brings it, the columns that it ``needs``, and how many rows it takes at ``most`` of a table with those columns."""
+
+    title: str
+    writer: tuple[str, str]
+    package: str | None = None
+    extra: str = ""
+    needs: tuple[str, ...] = ()
+    most: Callable[[Collection[str]], int] | None = None
+
+
+def _sheet_rows(names: Collection[str]) -> int:
+    from terragrip.estimation.export.limits import SHEET_ROWS
+
+    return SHEET_ROWS - 1
+
+
+def _struct_rows(names: Collection[str]) -> int:
+    from terragrip.estimation.export.limits import struct_rows
+
+    return struct_rows(names)
+
+
+_PLACE = ("latitude", "longitude")
+KINDS: dict[str, FileKind] = {
+    ".parquet": FileKind("Parquet", ("arrow_files", "ParquetFile")),
+    ".csv": FileKind("CSV", ("arrow_files", "CsvFile")),
+    ".xlsx": FileKind("an Excel sheet", ("spreadsheet", "Spreadsheet"), "xlsxwriter", "formats", most=_sheet_rows),
+    ".mat": FileKind("a MATLAB file", ("matlab", "MatFile"), most=_struct_rows),
+    ".geojson": FileKind("GeoJSON", ("places", "GeoJson"), needs=_PLACE),
+    ".gpkg": FileKind("a GeoPackage", ("places", "GeoPackage"), "pyogrio", "maps", needs=_PLACE),
+    ".mcap": FileKind("MCAP", ("foxglove", "McapFile"), "mcap", "formats"),
+}  # fmt: skip
+"""By the suffix of the file."""
+
+
+def require_suffix(path: str | os.PathLike[str]) -> FileKind:
+    """What a file's name stands for; raises InputError where its suffix is none of `KINDS`, or what it needs is not installed."""
+    suffix = Path(path).suffix.lower()
+    if suffix not in KINDS:
+        problem = f"estimates cannot be written as {suffix!r}" if suffix else "the name has no suffix"
+        named = f"{', '.join(list(KINDS)[:-1])} or {list(KINDS)[-1]}"
+        raise InputError(problem, file=path, hint=f"name it {Path(path).stem}.parquet, or any {named}")
+    kind = KINDS[suffix]
+    if kind.package is not None and find_spec(kind.package) is None:
+        problem = f"to write {kind.title} the Python package {kind.package!r} is needed"
+        raise InputError(problem, file=path, hint=f"pip install 'terragrip[{kind.extra}]'")
+    return kind
+
+
+def require_room(path: str | os.PathLike[str], rows: int, names: Collection[str]) -> None:
+    """Raise InputError where a file of this name cannot hold ``rows`` of a table with those columns, or lacks one that it needs."""
+    kind = require_suffix(path)
+    missing = next((name for name in kind.needs if name not in names), None)
+    if missing is not None:
+        problem = f"the log holds no {missing}, so {kind.title} has no places to show"
+        raise InputError(problem, file=path, hint="write .parquet, or name the positions in a profile")
+    most = None if kind.most is None else kind.most(names)
+    if most is not None and rows > most:
+        problem = f"{rows} rows are more than the {most} that {kind.title} takes"
+        raise InputError(problem, file=path, hint="write .parquet, or give a shorter part of the log")
+
+
+def writer_of(path: Path, first: Estimates, target: Path) -> TableWriter:
+    """The writer of the file ``path`` by its suffix, for a table that begins with ``first``; errors name ``target``, what it becomes."""
+    module, name = require_suffix(path).writer
+    made: TableWriter = getattr(import_module(f"{__name__}.{module}"), name)(path, first, target)
+    return made

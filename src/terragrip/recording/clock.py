@@ -1,0 +1,35 @@
+"""Clock time of a log: its own seconds beside the calendar's."""
+
+from __future__ import annotations
+
+from datetime import UTC, datetime
+from typing import TYPE_CHECKING
+
+import numpy as np
+import numpy.typing as npt
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+Floats = npt.NDArray[np.float64]
+
+LATEST = 7.25e9
+"""s since 1970, in 2199: what is beyond is a clock in another unit."""
+
+
+def clock_index(time: Floats, start: datetime) -> pd.DatetimeIndex:
+    """The index ``clock`` (n,) of a log's ``time`` (n,) [s] whose 0 was at ``start``: UTC, to the microsecond."""
+    import pandas as pd
+
+    return pd.DatetimeIndex(clock_times(time, start), name="clock").tz_localize("UTC")
+
+
+def clock_times(time: Floats, start: datetime) -> npt.NDArray[np.datetime64]:
+    """A log's ``time`` (n,) [s] whose 0 was at ``start`` as dates (n,) in UTC, to the microsecond."""
+    zero = np.datetime64(start.astimezone(UTC).replace(tzinfo=None), "us")
+    return zero + np.round(1e6 * np.asarray(time)).astype("timedelta64[us]")
+
+
+def clock_text(when: float) -> str:
+    """A time [s since 1970] in ISO 8601, UTC, to the microsecond."""
+    return datetime.fromtimestamp(when, UTC).isoformat()
