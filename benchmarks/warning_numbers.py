@@ -46,7 +46,7 @@ def tallies_of(recording: Recording, vehicle: Vehicle, course: Course) -> dict[V
     rows = rows_of(estimates, np.isfinite(recording.channels["ground_speed"]))
     found = {}
     for name, factor in VARIATIONS:
-        limits = watch_limits()
+        limits = watch_limits(float(np.mean(vehicle.wheel_radius)))
         if name:
             limits[name] *= factor
         found[name, factor] = judge(course, *starts(rows, Watch(limits, pace(vehicle, limits))))

@@ -320,6 +320,7 @@ typedef struct {
     tg_real jolt_memory;            /* s: of what the accelerometer reads beyond the model */
     tg_real swing;                  /* samples that a jolt lasts */
     tg_real longest_walk;           /* s of random walk that a gap adds at most: beyond it the ground is simply unknown */
+    tg_real standstill;             /* V: below it a machine counts as standing */
     tg_real uneven_length;          /* wheel radii: shorter changes of adhesion and resistance are the ground's unevenness */
     tg_real uneven_memory;          /* wheel radii over which their mean squares are taken */
     tg_real uneven_most;            /* usual squares that one counts at most: a border between soils is no bump */
@@ -350,7 +351,7 @@ typedef struct {
     tg_real prior_adhesion, prior_adhesion_std;     /* before the first sample */
     tg_real prior_resistance, prior_resistance_std;
     tg_real slope_spread;           /* rad: by how much the slope may differ from the measured pitch (from 0 without one) */
-    tg_real standstill_speed;       /* m/s */
+    tg_real standstill_speed;       /* m/s; 0: by its tuned number and the machine's size */
     tg_real dead_band;              /* m/s: TG_SPEEDS takes rims of at most this for unknown while the vehicle moves */
     tg_real gap;                    /* s without any wheel or ground speed after which the motion starts anew */
     tg_real max_step;               /* s; a longer step is predicted in pieces */

@@ -102,7 +102,7 @@ static int32_t advance(tg_estimator *e, tg_row *row, const tg_drive *drive, tg_r
     if (status == TG_OK) status = tg_filter_step(&e->filter, dt, &over, &now, q, y, r, &step);
     if (status != TG_OK) {
         tgi_forget(e);
-        tgi_restart_from(e, row, 0, 0);
+        tgi_restart_from(e, row, 0);
         return 0;
     }
     tgi_follow(e, e->deviation);
@@ -115,7 +115,7 @@ static int32_t advance(tg_estimator *e, tg_row *row, const tg_drive *drive, tg_r
 
 /* ---- a row ---- */
 
-typedef enum { TG_WAIT, TG_ANEW, TG_DRIFT, TG_REST, TG_START, TG_GO } tg_course; /* TG_START: goes on from rest */
+typedef enum { TG_WAIT, TG_ANEW, TG_DRIFT, TG_REST, TG_START, TG_TURN, TG_GO } tg_course; /* TG_START: goes on from rest, TG_TURN: the other way */
 
 static tg_course course_of(const tg_estimator *e, const tg_row *row, int32_t was_standing, int32_t turned, int32_t *gap)
 {
@@ -124,7 +124,7 @@ static tg_course course_of(const tg_estimator *e, const tg_row *row, int32_t was
     if (!e->seen_motion) return row->measured ? (e->standing ? TG_REST : TG_ANEW) : TG_WAIT;
     if (*gap && !row->measured) return TG_DRIFT;
     if (e->standing) return TG_REST;
-    return *gap || turned ? TG_ANEW : was_standing ? TG_START : TG_GO;
+    return *gap ? TG_ANEW : turned ? (was_standing ? TG_START : TG_TURN) : was_standing ? TG_START : TG_GO;
 }
 
 static void balance_forces(tg_estimator *e, const tg_drive *drive, double time)
@@ -137,23 +137,23 @@ static void balance_forces(tg_estimator *e, const tg_drive *drive, double time)
     tgi_lowpass(&e->balance, e->standing ? 0 : d * force * e->constants.inverse_mass, time, e->settings.load_filter);
 }
 
-static int32_t go_on(tg_estimator *e, tg_row *row, const tg_drive *drive, tg_course course, int32_t turned, tg_real dt, tg_real *q)
+static int32_t go_on(tg_estimator *e, tg_row *row, const tg_drive *drive, tg_course course, tg_real dt, tg_real *q)
 {
     int32_t sound = 1;
-    const int32_t start = course == TG_START || (course == TG_ANEW && turned);
     tg_belief *b = &e->belief;
     b->nis = b->supervisor = 0;
-    e->scene.anew = 0;
+    e->scene.anew = course == TG_TURN; /* to a smoother: values along the travel change their signs */
     b->channels = 0;
     if (e->settings.method == TG_ALGEBRAIC) {
         if (course != TG_WAIT && course != TG_DRIFT && course != TG_REST) tgi_algebraic(e, row, drive, course != TG_GO);
         return 1;
     }
-    if (course == TG_ANEW) tgi_restart_from(e, row, start, dt);
-    if (start && e->started) tgi_unknown_adhesion(e);
+    if (course == TG_ANEW) tgi_restart_from(e, row, dt);
+    if (course == TG_TURN) tgi_turn(e);
+    if (course == TG_TURN || (course == TG_START && e->started)) tgi_unknown_adhesion(e);
     if (course == TG_DRIFT) tgi_drift(e, dt);
-    else if (course == TG_REST) tgi_rest(e);
-    else if (course == TG_GO || course == TG_START) sound = advance(e, row, drive, dt, q);
+    else if (course == TG_REST) tgi_rest(e, drive);
+    else if (course >= TG_START) sound = advance(e, row, drive, dt, q);
     tgi_believe(e);
     return sound;
 }
@@ -214,6 +214,14 @@ static int32_t event_of(const tg_estimator *e, const tg_row *row, int32_t gap, i
     return watched != TG_EVENT_NONE ? watched : row->outlier ? TG_EVENT_OUTLIER : TG_EVENT_NONE;
 }
 
+/* Inputs along the travel, as seen in the other direction. */
+static void mirror(tg_input *u, int32_t wheels)
+{
+    for (int32_t i = 0; i < wheels; i++) u->torque[i] = -u->torque[i];
+    u->drawbar = -u->drawbar;
+    u->slope = -u->slope;
+}
+
 tg_status tg_estimator_update(tg_estimator *e, const tg_sample *sample, tg_estimate *out)
 {
     if (!e || !sample || !out) return TG_BAD_ARGUMENT;
@@ -233,6 +241,7 @@ tg_status tg_estimator_update(tg_estimator *e, const tg_sample *sample, tg_estim
     tg_real dt = e->started ? (tg_real)(row.time - e->time) : 0, travelled = tgi_fabs(e->belief.x[n + 1]);
     tgi_doubt_speeds(e, &row);
     int32_t turned = tgi_track_motion(e, &row);
+    if (turned) mirror(&e->held, n);
     tgi_track_turn(e, &row);
     tg_real q[TG_MAX_STATES];
     tgi_take_inputs(e, &row, dt, &drive);
@@ -243,7 +252,7 @@ tg_status tg_estimator_update(tg_estimator *e, const tg_sample *sample, tg_estim
     tgi_reckon(e, &drive, course == TG_GO ? dt : 0, &row, q);
     if (e->settings.method == TG_FILTERED) tgi_hold_wheels(e, course == TG_GO ? dt : 0, &row);
     tell_adaptation(e, out->value);
-    const int32_t lost = !go_on(e, &row, &drive, course, turned, dt, q), breaks = gap || lost;
+    const int32_t lost = !go_on(e, &row, &drive, course, dt, q), breaks = gap || lost;
     balance_forces(e, &drive, row.time);
     tgi_watch_roughness(e, course == TG_GO && !breaks, e->standing ? 0 : travelled * dt);
     if (course == TG_GO && !row.reckoned && !isnan(row.value[TG_GROUND_SPEED])) tgi_remember_slip(e, &drive, dt);
@@ -260,8 +269,8 @@ tg_status tg_estimator_update(tg_estimator *e, const tg_sample *sample, tg_estim
     out->distance = e->distance;
     report(e, &drive, out);
     memcpy(out->value + TG_OUT_CHANNEL_NIS, row.channel_nis, sizeof row.channel_nis);
-    const int32_t blind = is_blind(e, &row, breaks) && course != TG_WAIT, moves = course == TG_GO || course == TG_START || course == TG_ANEW;
-    tgi_watch_over(e, &row, &drive, !blind && moves, blind || course == TG_START || course == TG_ANEW || breaks, dt, out->value);
+    const int32_t blind = is_blind(e, &row, breaks) && course != TG_WAIT, moves = course >= TG_START || course == TG_ANEW;
+    tgi_watch_over(e, &row, &drive, !blind && moves, blind || (moves && course != TG_GO) || breaks, dt, out->value);
     out->event = event_of(e, &row, gap || blind || course == TG_WAIT, lost);
     const int32_t learn = out->event == TG_EVENT_NONE || out->event == TG_EVENT_IMMOBILIZATION;
     tgi_curves(e, course == TG_GO && learn && !row.outlier, dt, e->standing ? 0 : travelled * dt, drive.load, out->value);

@@ -14,7 +14,8 @@ typedef struct { /* an input between its samples */
     tg_real mean;     /* over the step that ends with this row */
     tg_real level;    /* mean square of its increments, spikes clipped */
     tg_real interval; /* s between its last two samples, */
-    tg_real step;     /* square of the change between them */
+    tg_real rate;     /* 1/s, of the change between them */
+    tg_real bend, bends; /* square of what that change is beyond the one before, over the same time; its mean */
     tg_real spike;    /* square of the last increment where that was a spike, else 0 */
     double time;      /* of the last sample */
     int32_t count;    /* samples seen, saturating */
@@ -173,7 +174,7 @@ struct tg_estimator {
     tg_real yaw_rate;
     double yaw_time;           /* of its last sample */
     double slow_time;          /* when the ground speed was last near 0 */
-    tg_lowpass soon[8];        /* wheel speeds, low-passed as little as can be */
+    tg_lowpass soon[8], soon_ground; /* speeds, low-passed as little as can be */
     tg_lowpass wheel_speed[8], ground_speed, acceleration, lateral, balance;
     tgi_slip_memory slip_memory;
     tgi_slope slope;
@@ -209,7 +210,8 @@ int32_t tgi_track_motion(tg_estimator *e, const tg_row *row);
 void tgi_loads(tg_estimator *e, const tg_row *row, tg_drive *drive);
 
 /* inputs.c */
-void tgi_hold_update(tg_hold *h, const tg_tuned *k, tg_real x, double time, tg_real dt, tg_real noise, tg_real rate);
+void tgi_hold_update(tg_hold *h, const tg_tuned *k, tg_real x, double time, tg_real dt, tg_real noise, tg_real rate,
+                     int32_t moving);
 void tgi_take_inputs(tg_estimator *e, tg_row *row, tg_real dt, tg_drive *drive);
 void tgi_input_noise(const tg_estimator *e, double time, tg_real dt, tg_real *q);
 void tgi_along(const tg_estimator *e, const tg_drive *drive, tg_input *u);
@@ -241,9 +243,10 @@ void tgi_watch_roughness(tg_estimator *e, int32_t flowing, tg_real distance);
 /* restarts.c */
 void tgi_follow(tg_estimator *e, const tg_deviation *deviation);
 void tgi_forget(tg_estimator *e);
-void tgi_restart_from(tg_estimator *e, const tg_row *row, int32_t start, tg_real walk);
+void tgi_restart_from(tg_estimator *e, const tg_row *row, tg_real walk);
 void tgi_unknown_adhesion(tg_estimator *e);
-void tgi_rest(tg_estimator *e);
+void tgi_turn(tg_estimator *e);
+void tgi_rest(tg_estimator *e, const tg_drive *drive);
 void tgi_drift(tg_estimator *e, tg_real dt);
 
 /* algebraic.c */

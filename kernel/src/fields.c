@@ -31,8 +31,8 @@ const tgi_field tgi_settings_fields[] = {
     REALS(T, algebraic_filter), REALS(T, watch), REALS(T, tuned), END};
 #undef T
 #define T tg_hold
-static const tgi_field hold[] = {REALS(T, value), REALS(T, variance), REALS(T, raw), REALS(T, calm), REALS(T, mean), REALS(T, level),
-                                 REALS(T, interval), REALS(T, step), REALS(T, spike), DOUBLES(T, time), INTEGERS(T, count), INTEGERS(T, fresh), END};
+static const tgi_field hold[] = {REALS(T, value), REALS(T, variance), REALS(T, raw), REALS(T, calm), REALS(T, mean),
+                                 REALS(T, level), REALS(T, rate), REALS(T, bend), REALS(T, bends), REALS(T, interval), REALS(T, spike), DOUBLES(T, time), INTEGERS(T, count), INTEGERS(T, fresh), END};
 #undef T
 static const tgi_field lowpass[] = {REALS(tg_lowpass, value), DOUBLES(tg_lowpass, time), INTEGERS(tg_lowpass, seen), END};
 
@@ -90,7 +90,7 @@ const tgi_field tgi_estimator_fields[] = {
     REALS(T, deviation), INTEGERS(T, started), INTEGERS(T, seen_motion), INTEGERS(T, standing), INTEGERS(T, direction), DOUBLES(T, time),
     DOUBLES(T, measured_time), DOUBLES(T, distance), REALS(T, last_raw), DOUBLES(T, last_raw_time), HOLDS(torque), HOLDS(drawbar), HOLDS(pitch),
     HOLDS(axle_load), HOLDS(wheel), HOLDS(ground), INTEGERS(T, sparse_wheels), INTEGERS(T, unseen), REALS(T, yaw_rate), DOUBLES(T, yaw_time),
-    DOUBLES(T, slow_time), LOWPASS(soon), LOWPASS(wheel_speed), LOWPASS(ground_speed), LOWPASS(acceleration), LOWPASS(lateral),
+    DOUBLES(T, slow_time), LOWPASS(soon), LOWPASS(soon_ground), LOWPASS(wheel_speed), LOWPASS(ground_speed), LOWPASS(acceleration), LOWPASS(lateral),
     LOWPASS(balance), REALS(T, slip_memory), INSIDE(T, slope, tgi_slope, slope), REALS(T, roughness), DOUBLES(T, ground_time), REALS(T, jolt),
     REALS(T, held), INSIDE(T, belief, tg_belief, belief), INSIDE(T, algebra, tg_algebra, algebra), INSIDE(T, watch, tgi_watch, watch),
     REALS(T, scene), REALS(T, curve), REALS(T, wheel_curve), REALS(T, curve_std), REALS(T, wheel_curve_std), REALS(T, curve_wait),

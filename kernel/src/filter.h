@@ -83,6 +83,7 @@ void tgi_bank_factors_of(const tg_filter *f, int mode, tg_real *u, tg_real *d); 
 void tgi_restart(int n, int stride, const tg_real *q, tg_real *u, tg_real *d);
 
 /* factor.c */
+void tgi_place_adhesion(tg_filter *f, const tg_real *mu);
 tg_status tgi_factorise(int rows, int stride, const tg_real *P, tg_real *u, tg_real *d);
 void tgi_covariance(int rows, int stride, const tg_real *u, const tg_real *d, tg_real *P);
 tg_status tgi_factors_of(const tg_filter *f, tg_real *u, tg_real *d); /* without a bank, whichever the filter holds */

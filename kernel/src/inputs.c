@@ -23,8 +23,10 @@ static tg_real before_spike(const tg_hold *h, tg_real x)
 
 /* Take a sample of an input (NaN: none) at `time`, the row before it being dt old. The mean square of its increments is kept over about
  * 1 s; one far beyond it is a spike: until the next sample tells, the value before it stands and its square counts as uncertainty, and the
- * mean square sees it clipped. `rate`: what the signal may change a second without being one. */
-void tgi_hold_update(tg_hold *h, const tg_tuned *k, tg_real x, double time, tg_real dt, tg_real noise, tg_real rate)
+ * mean square sees it clipped. `rate`: what the signal may change a second without being one. `moving`: else the increments are those of a
+ * standstill, which say nothing of the start. */
+void tgi_hold_update(tg_hold *h, const tg_tuned *k, tg_real x, double time, tg_real dt, tg_real noise, tg_real rate,
+                     int32_t moving)
 {
     h->fresh = 0;
     h->mean = h->calm;
@@ -43,25 +45,28 @@ void tgi_hold_update(tg_hold *h, const tg_tuned *k, tg_real x, double time, tg_r
         } else {
             track(h, x, h->level - 2 * noise * noise, noise, interval, k->input_lag);
             h->calm = x;
-            h->step = tgi_square(x - before);
+            h->bend = h->count > 1 ? tgi_square(x - before - h->rate * interval) : 0;
+            h->rate = (x - before) / interval;
             h->mean = x - (x - before) * (dt < interval ? dt / interval : 1) / 2; /* of a straight line since the last sample */
             h->fresh = 1;
         }
         tg_real memory = interval / (k->increment_memory + interval);
         if (memory * (tg_real)h->count < 1) memory = 1 / (tg_real)h->count; /* a plain mean at first */
-        h->level += memory * (change - h->level);
+        if (moving) h->level += memory * (change - h->level);
+        if (moving && h->fresh) h->bends += memory * (h->bend - h->bends);
         h->interval = interval;
     }
     h->raw = x;
     h->time = time;
-    if (h->count < 100) h->count++;
+    if (h->count == 0 || (moving && h->count < 100)) h->count++;
 }
 
 /* The leap was the vehicle's own. */
 static void believe_leap(tg_hold *h, tg_real dt)
 {
     h->mean = h->raw - (h->raw - h->calm) * (dt < h->interval ? dt / h->interval : 1) / 2;
-    h->step = h->spike;
+    h->bend = h->spike;
+    h->rate = (h->raw - h->calm) / h->interval;
     h->value = h->calm = h->raw;
     h->spike = 0;
     h->fresh = 1;
@@ -81,16 +86,19 @@ static void judge_leaps(tg_estimator *e, double time, tg_real dt)
 }
 
 /* Error of one input as extra variance of its state over the step that ends at `time`. Where the step ends with a sample, the mean over
- * it is known but for the noise of two samples and what the input does beside the straight line: the twelfth of its squared increment, whether it
- * walks at random (Brownian bridge) or leaps at some instant in between. Where it does not, the last value stands: its error stays the same, so that `age` after it it has moved the state
- * by (age error), and this step adds error^2 (age^2 - (age - dt)^2); and the input wanders on as a random walk w, of whose integral the
- * variance is w age^3/3. `unknown` is the variance before the first sample and once the last one is older than a gap. */
+ * it is known but for the noise of two samples and what the input does beside the straight line. A ramp does nothing beside it; an input that
+ * walks at random (Brownian bridge) or leaps at some instant in between adds the twelfth of its squared increment, and its second difference
+ * has two of these squares, and six of the noise. Where the step does not end with a sample, the last value stands: its error stays the same,
+ * so that `age` after it it has moved the state by (age error), and this step adds error^2 (age^2 - (age - dt)^2); and the input wanders on as a
+ * random walk w, of whose integral the variance is w age^3/3. `unknown` is the variance before the first sample and once the last one is older than a gap. */
 static tg_real held_noise(const tg_estimator *e, const tg_hold *h, double time, tg_real dt, tg_real noise, tg_real unknown)
 {
     if (h->count == 0 || (h->count == 1 && time == h->time)) return dt * unknown; /* over the step before its first sample, too */
-    const tg_real white = 2 * noise * noise, usual = h->level > white ? h->level - white : 0, now = h->step > white ? h->step - white : 0;
-    const tg_real walk = h->interval > 0 ? usual / h->interval : 0, most = h->interval > 0 && now > usual ? now / h->interval : walk;
-    if (h->fresh) return dt * dt * (noise * noise / 2 + most * dt / 12);
+    const tg_real white = 2 * noise * noise, walk = h->interval > 0 && h->level > white ? (h->level - white) / h->interval : 0;
+    if (h->fresh) {
+        const tg_real bend = (h->bend > h->bends ? h->bend : h->bends) / 2 - 3 * noise * noise;
+        return dt * dt * (noise * noise / 2 + (bend > 0 ? bend * dt / (12 * h->interval) : 0));
+    }
     const tg_real age = h->spike > 0 && time == h->time ? dt : (tg_real)(time - h->time), since = age - dt;
     const tg_real constant = noise * noise + h->spike + (age > e->settings.gap ? unknown : 0);
     return dt * (2 * age - dt) * constant + walk * (age * age * age - since * since * since) / 3;
@@ -146,7 +154,7 @@ void tgi_take_inputs(tg_estimator *e, tg_row *row, tg_real dt, tg_drive *drive)
     memset(drive, 0, sizeof *drive);
     for (int32_t i = 0; i < s->machine.wheels; i++) {
         const int32_t slot = TG_DRIVE_TORQUE + i;
-        if (s->driven[i]) tgi_hold_update(&e->torque[i], &s->tuned, row->value[slot], row->time, dt, s->noise[slot], 0);
+        if (s->driven[i]) tgi_hold_update(&e->torque[i], &s->tuned, row->value[slot], row->time, dt, s->noise[slot], 0, !e->standing);
     }
     judge_leaps(e, row->time, dt);
     for (int32_t i = 0; i < s->machine.wheels; i++) {
@@ -156,8 +164,8 @@ void tgi_take_inputs(tg_estimator *e, tg_row *row, tg_real dt, tg_drive *drive)
         drive->mean_torque[i] = h->mean;
         row->outlier |= h->spike > 0;
     }
-    tgi_hold_update(&e->drawbar, &s->tuned, row->value[TG_DRAWBAR_FORCE], row->time, dt, s->noise[TG_DRAWBAR_FORCE], 0);
-    tgi_hold_update(&e->pitch, &s->tuned, row->value[TG_PITCH], row->time, dt, s->noise[TG_PITCH], 0);
+    tgi_hold_update(&e->drawbar, &s->tuned, row->value[TG_DRAWBAR_FORCE], row->time, dt, s->noise[TG_DRAWBAR_FORCE], 0, !e->standing);
+    tgi_hold_update(&e->pitch, &s->tuned, row->value[TG_PITCH], row->time, dt, s->noise[TG_PITCH], 0, !e->standing);
     row->outlier |= e->drawbar.spike > 0;
     drive->drawbar = e->drawbar.calm;
     drive->mean_drawbar = e->drawbar.mean;

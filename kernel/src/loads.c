@@ -19,7 +19,7 @@ static void take_measured(tg_estimator *e, const tg_row *row, tg_real weight, tg
     tg_real rest = weight, computed = 0, share = 0;
     for (int32_t k = 0; k < s->axles; k++) {
         tg_hold *h = &e->axle_load[k];
-        tgi_hold_update(h, &s->tuned, row->value[TG_VERTICAL_LOAD + k], row->time, 0, s->noise[TG_VERTICAL_LOAD + k], 0);
+        tgi_hold_update(h, &s->tuned, row->value[TG_VERTICAL_LOAD + k], row->time, 0, s->noise[TG_VERTICAL_LOAD + k], 0, !e->standing);
         measured[k] = h->count > 0 && row->time - h->time <= 1;
         any |= measured[k];
         if (measured[k]) {

@@ -63,7 +63,7 @@ void tgi_doubt_speeds(tg_estimator *e, tg_row *row)
     for (int32_t i = 0; i <= n; i++) {
         const int32_t slot = i < n ? TG_WHEEL_SPEED + i : TG_GROUND_SPEED;
         tg_hold *const h = i < n ? &e->wheel[i] : &e->ground;
-        tgi_hold_update(h, &s->tuned, row->value[slot], row->time, 0, s->noise[slot], i < n ? agile / s->rolling_radius[i] : agile);
+        tgi_hold_update(h, &s->tuned, row->value[slot], row->time, 0, s->noise[slot], i < n ? agile / s->rolling_radius[i] : agile, !e->standing);
         row->doubt[i] = h->time == row->time ? h->spike : 0;
         row->outlier |= row->doubt[i] > 0;
     }
@@ -127,14 +127,16 @@ static tg_real soon(tg_lowpass *f, tg_real x, double time, tg_real tau, tg_real 
     return f->value;
 }
 
-/* Low-passed speeds tell standstill and the direction of travel, both with hysteresis so that noise does not flicker. A ground speed
- * that is a second old no longer counts. Returns 1 where the direction has turned. */
+/* Low-passed speeds tell standstill, speeds low-passed as little as their noise allows the direction of travel, both with hysteresis so that
+ * noise does not flicker. A ground speed that is a second old no longer counts. Returns 1 where the direction has turned. */
 int32_t tgi_track_motion(tg_estimator *e, const tg_row *row)
 {
     const tg_settings *s = &e->settings;
     const tg_real tau = (tg_real)0.2, age = 1;
     int32_t n = s->machine.wheels, seen = 0;
-    tg_real fastest = 0, soonest = 0, over = 0, rim = 0, ground = settle(&e->ground_speed, row->doubt[n] > 0 ? (tg_real)NAN : row->value[TG_GROUND_SPEED], row->time, tau);
+    const tg_real seen_ground = row->doubt[n] > 0 ? (tg_real)NAN : row->value[TG_GROUND_SPEED];
+    tg_real fastest = 0, soonest = 0, over = 0, rim = 0, ground = settle(&e->ground_speed, seen_ground, row->time, tau);
+    tg_real course = soon(&e->soon_ground, seen_ground, row->time, tau, s->noise[TG_GROUND_SPEED], s->standstill_speed);
     for (int32_t i = 0; i < n; i++) {
         const tg_real measured = row->doubt[i] > 0 ? (tg_real)NAN : row->value[TG_WHEEL_SPEED + i];
         const tg_real w = s->rolling_radius[i] * settle(&e->wheel_speed[i], measured, row->time, tau);
@@ -143,7 +145,7 @@ int32_t tgi_track_motion(tg_estimator *e, const tg_row *row)
         if (!recent(&e->wheel_speed[i], row->time, s->gap)) continue;
         if (tgi_fabs(now) > soonest) soonest = tgi_fabs(now);
         seen++;
-        rim += w;
+        rim += now;
         if (tgi_fabs(w) > fastest) fastest = tgi_fabs(w);
     }
     if (seen > 0) rim /= (tg_real)seen;
@@ -151,14 +153,14 @@ int32_t tgi_track_motion(tg_estimator *e, const tg_row *row)
         seen++;
         if (moves(e, ground, row->time)) over = tgi_fabs(ground);
     } else {
-        ground = rim;
+        course = rim;
     }
     if (seen == 0) return 0;
     const tg_real threshold = s->standstill_speed, leave = e->standing ? (tg_real)1.25 : 1; /* a ground speed at rest wanders by its noise */
     e->standing = fastest < leave * threshold && soonest < leave * threshold && over < (e->standing ? 2 : 1) * threshold + 2 * s->noise[TG_GROUND_SPEED];
 
     const tg_real trust = 1 / (1 + tgi_square(s->noise[TG_GROUND_SPEED] / s->standstill_speed)); /* a noisy ground speed says less than the wheels */
-    tg_real motion = (rim + trust * ground) / (1 + trust);
+    tg_real motion = (rim + trust * course) / (1 + trust);
     if (e->standing || tgi_fabs(motion) < s->standstill_speed) return 0;
     int32_t direction = motion > 0 ? 1 : -1, turned = direction != e->direction;
     e->direction = direction;

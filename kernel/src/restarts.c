@@ -30,8 +30,8 @@ static void restart(tg_estimator *e, tg_real walk, const tg_real *outputs, const
 }
 
 /* Outputs as this row measures them, along the travel. What it does not measure follows from the rest, broadly: a wheel from the
- * ground speed, the ground speed from the wheels or, but for a `start` from rest or a turn of direction, from what it just was. */
-void tgi_restart_from(tg_estimator *e, const tg_row *row, int32_t start, tg_real walk)
+ * ground speed, the ground speed from what it just was, else from the wheels. */
+void tgi_restart_from(tg_estimator *e, const tg_row *row, tg_real walk)
 {
     const tg_settings *s = &e->settings;
     const int32_t n = s->machine.wheels;
@@ -43,7 +43,7 @@ void tgi_restart_from(tg_estimator *e, const tg_row *row, int32_t start, tg_real
         rim += s->rolling_radius[i] * y[TG_WHEEL_SPEED + i];
         seen++;
     }
-    int32_t late = !start && isnan(v) && e->ground_speed.seen && row->time - e->ground_speed.time <= 1;
+    int32_t late = isnan(v) && e->ground_speed.seen && row->time - e->ground_speed.time <= 1;
     if (late) v = e->ground_speed.value;
     else if (isnan(v)) v = seen ? rim / (tg_real)seen : 0;
     tg_real broad = tgi_square((tg_real)0.3 * tgi_fabs(v) + (tg_real)0.1), noise = tgi_square(s->noise[TG_GROUND_SPEED]) + row->doubt[n];
@@ -65,10 +65,29 @@ void tgi_unknown_adhesion(tg_estimator *e)
     tg_real q[TG_MAX_STATES] = {0};
     for (int32_t i = 0; i < n; i++) q[n + 1 + i] = tgi_square(e->settings.prior_adhesion_std);
     if (tg_filter_predict(&e->filter, TG_NO_TIME, &e->held, q) == TG_OK) tgi_follow(e, NULL);
+    if (e->filter.tuning.policy != TG_BANK) return;
+    for (int b = 0; b < TG_MODES; b++) e->filter.policy.bank.probability[b] = (tg_real)1 / TG_MODES;
 }
 
-/* At standstill the low-passed speeds stand for the outputs. */
-void tgi_rest(tg_estimator *e)
+/* The direction of travel turns, and with it the signs of all that counts along it: the belief of the row before is mirrored, so that this row
+ * is predicted from it. What opposed the travel drives it now, since forces go on where the motion turns. */
+void tgi_turn(tg_estimator *e)
+{
+    const int32_t n = e->settings.machine.wheels, stride = tgi_stride(n);
+    tg_real x[9], P[9], mu[TG_MAX_WHEELS];
+    for (int32_t j = 0; j <= n; j++) {
+        const int32_t row = tgi_row(n, j);
+        x[j] = -e->belief.x[row];
+        P[j] = e->belief.P[row * stride + row];
+    }
+    for (int32_t i = 0; i < n; i++) mu[i] = -e->belief.x[i];
+    restart(e, 0, x, P);
+    tgi_place_adhesion(&e->filter, mu);
+}
+
+/* At standstill the low-passed speeds stand for the outputs. Adhesion is held; before the first motion there is none to hold, and it is what the
+ * torques say, as little known as ever. */
+void tgi_rest(tg_estimator *e, const tg_drive *drive)
 {
     const tg_settings *s = &e->settings;
     const int32_t n = s->machine.wheels;
@@ -80,6 +99,13 @@ void tgi_rest(tg_estimator *e)
     x[n] = d * e->ground_speed.value;
     P[n] = tgi_square(s->noise[TG_GROUND_SPEED]);
     restart(e, 0, x, P);
+    if (e->distance > 0) return;
+    tg_real mu[TG_MAX_WHEELS];
+    for (int32_t i = 0; i < n; i++) {
+        const tg_real said = e->torque[i].count ? d * e->torque[i].value / (s->machine.radius[i] * drive->load[i]) : 0;
+        mu[i] = tgi_fabs(said) > 1 ? e->belief.x[i] : said;
+    }
+    tgi_place_adhesion(&e->filter, mu);
 }
 
 /* Nothing measured for too long: the estimate stays and its spread grows, since old torques must not be integrated. */

@@ -67,6 +67,7 @@ static tg_tuned default_tuned(void)
     k.jolt_memory = 5;
     k.swing = 2;
     k.longest_walk = 30;
+    k.standstill = (tg_real)0.01;
     k.uneven_length = 4;
     k.uneven_memory = 40;
     k.uneven_most = 4;
@@ -89,7 +90,6 @@ tg_settings tg_default_settings(void)
     s.prior_resistance = (tg_real)0.05;
     s.prior_resistance_std = (tg_real)0.05;
     s.slope_spread = (tg_real)0.02;
-    s.standstill_speed = (tg_real)0.03;
     s.gap = 2;
     s.max_step = (tg_real)0.1;
     s.outlier_weight = (tg_real)0.5;
@@ -112,6 +112,11 @@ static tg_real force_walk(const tg_settings *s)
 {
     const tg_real T = natural_time(&s->machine), g = s->machine.gravity; /* V^2/T = g^2 T */
     return s->tuned.force_walk * g * g * T;
+}
+
+static tg_real standstill_speed(const tg_settings *s)
+{
+    return s->tuned.standstill * s->machine.gravity * natural_time(&s->machine); /* V = g T */
 }
 
 /* Densities, variance per second. A rim and the ground speed wander alike, in m/s. */
@@ -306,6 +311,7 @@ tg_status tg_estimator_init(tg_estimator *e, const tg_settings *settings)
     if (status != TG_OK) return status;
     memset(e, 0, tg_estimator_size(settings->tuning.policy));
     e->settings = *settings;
+    if (!(settings->standstill_speed > 0)) e->settings.standstill_speed = standstill_speed(settings);
     memcpy(&e->filter, &filter, tg_filter_size(settings->tuning.policy));
     memcpy(&e->consider, &consider, sizeof consider);
     e->belief.columns = tgi_deviation_columns(settings);

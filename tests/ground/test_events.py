@@ -209,7 +209,8 @@ def test_the_events_are_in_order_and_cover_every_flagged_row(soft):
 
 
 def assert_twins_agree(recording, table):
-    watch = Watch(watch_limits(), pace(table.vehicle, watch_limits()))
+    limits = watch_limits(float(np.mean(table.vehicle.wheel_radius)))
+    watch = Watch(limits, pace(table.vehicle, limits))
     measured = np.isfinite(recording.channels["ground_speed"])
     said, points, score = [], [], []
     for row in rows_of(table, measured):

@@ -273,7 +273,7 @@ def about_run(estimator: TractionEstimator, recording: dict[str, Any], *, smooth
             "noise": estimator.noise,
             "held": estimator.held,
             "gap": estimator.thresholds.gap,
-            "standstill_speed": estimator.thresholds.standstill_speed,
+            "standstill_speed": estimator.engine.standstill_speed,
         },
     }
     if estimator.found is not None:

@@ -109,6 +109,13 @@ class Engine:
         self._room_in = ffi.buffer(self.sample)
         self._room_out = ffi.buffer(self.estimate.value, real * self._used)
 
+    @property
+    def standstill_speed(self) -> float:
+        """Below it vehicle and wheels count as standing [m/s]: as it was set, else by the machine's size."""
+        settings = ffi.new("tg_settings *")
+        lib.tg_estimator_settings(self.handle, settings)
+        return float(settings.standstill_speed)
+
     def update(self, time: float, sample: Mapping[str, Any]) -> int:
         """Take a sample and fill ``self.estimate``; returns tg_status. Raises struct.error on what is no number."""
         self._pack(self._room_in, 0, time, *map(sample.get, self._names, _MISSING))

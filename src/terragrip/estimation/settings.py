@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -35,12 +36,16 @@ class Thresholds:
                 setattr(settings, name, value)
 
 
-def watch_limits() -> dict[str, float]:
-    """The thresholds by which the estimator flags rows: tg_watch_settings, ``gap`` [s] and ``standstill_speed`` [m/s]."""
+def watch_limits(wheel_radius: float = 0.2) -> dict[str, float]:
+    """The thresholds by which the estimator flags rows: tg_watch_settings, ``gap`` [s] and ``standstill_speed`` [m/s].
+
+    ``wheel_radius`` [m]: the machine's mean one, which says below what speed it stands; default: the robot of physics.md 8.
+    """
     settings = lib.tg_default_settings()
     names = [name for name, _ in ffi.typeof("tg_watch_settings").fields]
     found = {name: float(getattr(settings.watch, name)) for name in names}
-    return found | {"gap": float(settings.gap), "standstill_speed": float(settings.standstill_speed)}
+    standing = float(settings.tuned.standstill) * math.sqrt(GRAVITY * wheel_radius)
+    return found | {"gap": float(settings.gap), "standstill_speed": standing}
 
 
 def sample_slots(vehicle: Vehicle) -> dict[str, int]:

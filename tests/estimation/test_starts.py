@@ -1,0 +1,48 @@
+"""How soon adhesion is right where the motion begins, turns, or creeps: simulated machines, against their truth."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from terragrip.estimation import estimate
+from terragrip.estimation.engine import EVENTS
+from terragrip.simulation.families import Kind, draw
+
+STANDSTILL = EVENTS.index("standstill")
+
+
+@pytest.mark.parametrize("rate", [100.0, 10.0])
+def test_a_machine_that_rolls_back_and_then_drives_forward_has_its_adhesion_at_once(rate: float):
+    """20 kg, motors off on a slope until 1.4 s: at .32 m/s backwards they start, and it turns within .15 s."""
+    drive = draw(Kind("light", "brixius", "uncoupled"), 14, rate=rate)
+    found, truth, time = estimate(drive.recording, drive.vehicle), drive.truth, drive.recording.time
+    speed = truth["true_ground_speed"].to_numpy()
+    turn = time[np.flatnonzero(speed < -0.1)[-1] + 1]
+    after = (time > turn + max(0.1, 1 / rate)) & (time < turn + 1) & (speed > 0.05)
+    assert after.sum() >= 0.6 * rate
+    for wheel in drive.vehicle.wheels:
+        error = (found[f"adhesion_{wheel}"] - truth[f"true_adhesion_{wheel}"].to_numpy())[after]
+        assert np.sqrt(np.mean(error**2)) < 0.12
+
+
+def test_a_light_machine_that_creeps_at_two_centimetres_a_second_does_not_stand():
+    """8 kg with wheels of 8 cm: for it that is a tenth of its usual speed."""
+    drive = draw(Kind("light", "sinkage", "plain"), 25, rate=100.0)
+    found, speed = (
+        estimate(drive.recording, drive.vehicle),
+        drive.truth["true_ground_speed"].to_numpy(),
+    )
+    creeps = (speed > 0.02) & (speed < 0.03)
+    assert creeps.sum() > 20
+    assert np.mean(found.event_codes[creeps] == STANDSTILL) < 0.2
+
+
+def test_before_the_first_motion_adhesion_is_what_the_torques_say():
+    """Motors off: none, and as little known as ever."""
+    drive = draw(Kind("light", "brixius", "plain"), 45, rate=20.0)
+    found = estimate(drive.recording, drive.vehicle)
+    rest = drive.recording.time < 1.0
+    for wheel in drive.vehicle.wheels:
+        assert np.abs(found[f"adhesion_{wheel}"][rest]).max() < 0.05
+        assert found[f"adhesion_{wheel}_std"][rest].min() > 0.25
