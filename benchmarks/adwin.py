@@ -22,7 +22,7 @@ def adwin_changes(blocks: Blocks, names: tuple[str, ...] = GROUND, delta: float 
     A change's time is when it is told; ADWIN gives no spread and no probability: std is NaN, probability 1.
     """
     make: Any = drift.ADWIN  # river carries no types
-    signals, told = signals_of(blocks, names), []
+    signals, reported = signals_of(blocks, names), []
     unit = np.array([(LAWS[n].mean, _SPAN * LAWS[n].sd) for n in names])
     detectors = [make(delta=delta, clock=1) for _ in names]
     for k, row in enumerate((signals - unit[:, 0]) / unit[:, 1] + 0.5):
@@ -30,9 +30,9 @@ def adwin_changes(blocks: Blocks, names: tuple[str, ...] = GROUND, delta: float 
             continue
         for detector, x in zip(detectors, row, strict=True):
             detector.update(float(x))
-        found = [d for d in detectors if d.drift_detected]
-        if found:
+        result = [d for d in detectors if d.drift_detected]
+        if result:
             now = float(blocks.end[k])
-            told.append(Change(now, float("nan"), 1.0, {}, now))
+            reported.append(Change(now, float("nan"), 1.0, {}, now))
             detectors = [make(delta=delta, clock=1) for _ in names]
-    return tuple(told)
+    return tuple(reported)

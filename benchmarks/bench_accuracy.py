@@ -100,23 +100,23 @@ def score_seed(seed: int) -> Drive:
 
 def score(result: SimulationResult, vehicle: Vehicle, name: str, seed: int, method: str) -> Score:
     """One method on one recording."""
-    found = estimate(result.recording, vehicle, method=method)
+    estimates = estimate(result.recording, vehicle, method=method)
     truth = result.truth
     moving = np.abs(truth["true_ground_speed"].to_numpy()) > MOVING
     columns = (f"adhesion_{WHEEL}", f"slip_{WHEEL}", "soil_resistance")
     mu = truth[f"true_{columns[0]}"].to_numpy()
-    fit = agreement(mu, found[columns[0]], ~truth["standstill"].to_numpy())
-    errors = [mean_absolute_error(truth[f"true_{c}"], found[c], moving) for c in columns]
-    held = [coverage(truth[f"true_{c}"], found[c], found[f"{c}_std"], mask=moving) for c in columns]
-    return Score(name, seed, method, fit.r2, fit.nrmse, *errors, *held, _nis(found))
+    fit = agreement(mu, estimates[columns[0]], ~truth["standstill"].to_numpy())
+    errors = [mean_absolute_error(truth[f"true_{c}"], estimates[c], moving) for c in columns]
+    held = [coverage(truth[f"true_{c}"], estimates[c], estimates[f"{c}_std"], mask=moving) for c in columns]
+    return Score(name, seed, method, fit.r2, fit.nrmse, *errors, *held, _nis(estimates))
 
 
-def _nis(found: Estimates) -> float:
+def _nis(estimates: Estimates) -> float:
     """NIS over its expectation; NaN for a method without innovations."""
-    taken = found["channels"] > 0
-    if not taken.any() or not (found["nis"][taken] > 0).any():
+    taken = estimates["channels"] > 0
+    if not taken.any() or not (estimates["nis"][taken] > 0).any():
         return float("nan")
-    return nis_consistency(found["nis"], found["channels"]).ratio
+    return nis_consistency(estimates["nis"], estimates["channels"]).ratio
 
 
 def tables(drives: Sequence[Drive], seeds: Sequence[int]) -> str:

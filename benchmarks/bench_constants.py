@@ -63,9 +63,9 @@ def main() -> None:
             continue
         cells = [name, value]
         for factor in (0.5, 2.0):
-            found = figures(drawn, scaled(name, factor))
-            change = found.r2 - usual.r2
-            cells += [f"{np.median(change):+.4f}", f"{change.min():+.4f}", f"{np.median(found.nis):.2f}"]
+            out = figures(drawn, scaled(name, factor))
+            change = out.r2 - usual.r2
+            cells += [f"{np.median(change):+.4f}", f"{change.min():+.4f}", f"{np.median(out.nis):.2f}"]
         lines.append("| " + " | ".join(cells) + " |")
         print(lines[-1], flush=True)
     text = "\n".join(lines)
@@ -91,11 +91,11 @@ def damaged(result: SimulationResult, bare: bool) -> SimulationResult:
 def numbers() -> dict[str, str]:
     """Every tuned number by name, and its value."""
     settings = lib.tg_default_settings()
-    found = {name: f"{getattr(settings.tuned, name):.3g}" for name, _ in ffi.typeof("tg_tuned").fields}
-    found["scales"] = " ".join(f"{scale:g}" for scale in settings.tuning.scales)
+    out = {name: f"{getattr(settings.tuned, name):.3g}" for name, _ in ffi.typeof("tg_tuned").fields}
+    out["scales"] = " ".join(f"{scale:g}" for scale in settings.tuning.scales)
     for name in ("huber", "dwell"):
-        found[name] = f"{getattr(settings.tuning, name):g}"
-    return found
+        out[name] = f"{getattr(settings.tuning, name):g}"
+    return out
 
 
 def scaled(name: str, factor: float) -> Callable[[Any], None]:
@@ -124,14 +124,14 @@ def figures(drawn: list[SimulationResult], change: Callable[[Any], None]) -> Fig
     estimator_module.settings_of = changed
     r2, nis = [], []
     for result in drawn:
-        found = estimate(result.recording, result.vehicle)
+        estimates = estimate(result.recording, result.vehicle)
         wheels = [w for w, driven in zip(result.vehicle.wheels, result.vehicle.driven, strict=True) if driven]
         measured = np.isfinite(result.recording[f"wheel_speed_{wheels[0]}"])
         rows = moving_rows(result) & measured
         truth = np.stack([result.truth[f"true_adhesion_{w}"] for w in wheels], axis=1)
-        r2.append(pooled_r2(truth, np.stack([found[f"adhesion_{w}"] for w in wheels], axis=1), rows))
-        taken = (found["channels"] > 0) & ~np.isin(found.event_codes, AT_REST)
-        nis.append(float(found["nis"][taken].sum() / found["channels"][taken].sum()))
+        r2.append(pooled_r2(truth, np.stack([estimates[f"adhesion_{w}"] for w in wheels], axis=1), rows))
+        taken = (estimates["channels"] > 0) & ~np.isin(estimates.event_codes, AT_REST)
+        nis.append(float(estimates["nis"][taken].sum() / estimates["channels"][taken].sum()))
     estimator_module.settings_of = as_set
     return Figures(np.array(r2), np.array(nis))
 

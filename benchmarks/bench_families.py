@@ -95,22 +95,22 @@ def main() -> None:
         drawn = list(source or families.machines(part, arguments.machines, arguments.seed))
         rates = tuple(arguments.rates)
         jobs = [(part, kind, seed, rates, arguments.method, not arguments.quick) for kind, seed in drawn]
-        found: list[Row] = []
+        result: list[Row] = []
         views: list[View] = []
         slow: list[float] = []
         with ProcessPoolExecutor(arguments.workers) as pool:
             for rows, seen, at_1_hz in pool.map(score_machine, jobs):
-                found += rows
+                result += rows
                 views += seen
                 slow += at_1_hz
                 print(_line(rows), flush=True)
-        text = f"{summary(found, rates)}\n\n"
+        text = f"{summary(result, rates)}\n\n"
         if views:
             text += f"At {VIEW_RATE:g} Hz:\n\n{views_table(views)}\n\n"
         if slow:
             text += f"At 1 Hz, {len(slow)} tractors: ground speed within its 95 % interval in {100 * np.mean(slow):.0f} % of moving rows "
             text += f"(worst {100 * min(slow):.0f} %).\n\n"
-        text += by_machine(found, rates)
+        text += by_machine(result, rates)
         print(f"\n{part}, {arguments.method}\n\n{text}\n")
         if arguments.write:
             put(DOCUMENT, BEGIN.format(part=part), text)
@@ -146,15 +146,15 @@ def view_machine(draw: Callable[..., SimulationResult], kind: Kind, seed: int, m
                 continue
             recording = without(recording, "acceleration")
             seen = replace(seen, recording=recording, truth=_at(seen, recording))
-        found = estimate(recording, vehicle, method=method)
+        estimates = estimate(recording, vehicle, method=method)
         driven, moving = driven_wheels(seen), moving_rows(seen)
-        held = intervals(seen, found, driven, moving)
+        held = intervals(seen, estimates, driven, moving)
         outage = 0.6 * seen.scenario.duration
         outside = moving & ~((recording.time > outage) & (recording.time < outage + OUTAGE + 1.0))
         truth = np.stack([seen.truth[f"true_adhesion_{w}"] for w in driven], axis=1)
-        said = np.stack([found[f"adhesion_{w}"] for w in driven], axis=1)
+        estimated = np.stack([estimates[f"adhesion_{w}"] for w in driven], axis=1)
         over = {name: held.score[name] / oracle[name] for name in SCORED}
-        out.append(View(kind, seed, view, pooled_r2(truth, said, outside), held, over))
+        out.append(View(kind, seed, view, pooled_r2(truth, estimated, outside), held, over))
     return out
 
 
@@ -172,9 +172,9 @@ def without(recording: Recording, start: str) -> Recording:
 
 def speeds_hold(result: SimulationResult, method: str) -> float:
     """Share of moving rows whose ground speed lies within its 95 % interval."""
-    found = estimate(result.recording, result.vehicle, method=method)
-    error = found["ground_speed"] - result.truth["true_ground_speed"].to_numpy()
-    return float(np.mean((np.abs(error) <= 1.96 * found["ground_speed_std"])[moving_rows(result)]))
+    estimates = estimate(result.recording, result.vehicle, method=method)
+    error = estimates["ground_speed"] - result.truth["true_ground_speed"].to_numpy()
+    return float(np.mean((np.abs(error) <= 1.96 * estimates["ground_speed_std"])[moving_rows(result)]))
 
 
 def driven_wheels(result: SimulationResult) -> list[str]:
@@ -186,7 +186,7 @@ def driven_wheels(result: SimulationResult) -> list[str]:
 def score(result: SimulationResult, kind: Kind, seed: int, rate: float, method: str) -> Row:
     """Our method and the plain filter on one recording."""
     vehicle, recording = result.vehicle, result.recording
-    found = estimate(recording, vehicle, method=method)
+    estimates = estimate(recording, vehicle, method=method)
     driven = driven_wheels(result)
     rows = np.isfinite(recording[f"wheel_speed_{driven[0]}"])
     truth = np.stack([result.truth[f"true_adhesion_{w}"] for w in driven], axis=1)[rows]
@@ -194,17 +194,17 @@ def score(result: SimulationResult, kind: Kind, seed: int, rate: float, method: 
     used = [
         c for c in recording.channels if c.startswith(("wheel_speed", "drive_torque", "ground", "drawbar"))
     ]
-    heard = np.logical_or.reduce([np.isfinite(recording[c]) for c in used])
-    plain = plain_filter(recording.select(heard), vehicle)
+    measured = np.logical_or.reduce([np.isfinite(recording[c]) for c in used])
+    plain = plain_filter(recording.select(measured), vehicle)
     n = len(vehicle.wheels)
     first = [n + 1 + vehicle.wheels.index(w) for w in driven]
-    plains = [plain.state[q][rows[heard]][:, first] for q in range(len(INTENSITIES))]
-    scores = [pooled_r2(truth, said, moving) for said in plains]
+    plains = [plain.state[q][rows[measured]][:, first] for q in range(len(INTENSITIES))]
+    scores = [pooled_r2(truth, estimated, moving) for estimated in plains]
     best = int(np.argmax(scores))
-    ours = np.stack([found[f"adhesion_{w}"] for w in driven], axis=1)[rows]
+    ours = np.stack([estimates[f"adhesion_{w}"] for w in driven], axis=1)[rows]
     return Row(
         kind, seed, rate, vehicle.mass, n, pooled_r2(truth, ours, moving), scores[best], INTENSITIES[best],
-        lag(truth, ours, moving), lag(truth, plains[best], moving), intervals(result, found, driven, moving_rows(result)).covered,
+        lag(truth, ours, moving), lag(truth, plains[best], moving), intervals(result, estimates, driven, moving_rows(result)).covered,
     )  # fmt: skip
 
 
@@ -214,20 +214,20 @@ def moving_rows(result: SimulationResult) -> NDArray[np.bool_]:
     return np.asarray(speed > min(MOVING, 0.1 * float(np.median(speed[speed > 0.01]))))
 
 
-def pooled_r2(truth: Floats, said: Floats, rows: NDArray[np.bool_]) -> float:
+def pooled_r2(truth: Floats, estimated: Floats, rows: NDArray[np.bool_]) -> float:
     """1 - SSE/SST over all columns together, each (n, wheels)."""
-    true, estimate = truth[rows], said[rows]
+    true, estimate = truth[rows], estimated[rows]
     return float(1 - np.sum((estimate - true) ** 2) / np.sum((true - true.mean()) ** 2))
 
 
-def lag(truth: Floats, said: Floats, rows: NDArray[np.bool_]) -> float:
+def lag(truth: Floats, estimated: Floats, rows: NDArray[np.bool_]) -> float:
     """By how many samples the estimate follows the truth: where their correlation, wheel by wheel, is best."""
 
     def correlation(shift: int) -> float:
         n = len(truth)
         now = np.arange(max(0, shift), min(n, n + shift))
         both = rows[now] & rows[now - shift]
-        pairs = zip(truth[now - shift][both].T, said[now][both].T, strict=True)
+        pairs = zip(truth[now - shift][both].T, estimated[now][both].T, strict=True)
         return float(np.mean([np.corrcoef(true, estimate)[0, 1] for true, estimate in pairs]))
 
     values = [correlation(shift) for shift in range(-LAGS, LAGS + 1)]

@@ -59,23 +59,23 @@ BEGIN = "<!-- made by benchmarks/bench_ground.py --write -->"
 
 
 @dataclass
-class Told:
+class Matches:
     """Changes of one way on some drives: borders, how many were found, changes told, hours driven, delays [s]; of each change its stated
     probability and whether it was right; of each right one its error in time and its stated SD [s]."""
 
     borders: int = 0
     found: int = 0
-    told: int = 0
+    reported: int = 0
     hours: float = 0.0
     delays: list[float] = field(default_factory=list)
     stated: list[float] = field(default_factory=list)
     right: list[bool] = field(default_factory=list)
     errors: list[tuple[float, float]] = field(default_factory=list)
 
-    def add(self, other: Told) -> None:
+    def add(self, other: Matches) -> None:
         self.borders += other.borders
         self.found += other.found
-        self.told += other.told
+        self.reported += other.reported
         self.hours += other.hours
         self.delays += other.delays
         self.stated += other.stated
@@ -88,11 +88,11 @@ class Told:
 
     @property
     def precision(self) -> float:
-        return self.found / self.told if self.told else float("nan")
+        return self.found / self.reported if self.reported else float("nan")
 
     @property
     def false_an_hour(self) -> float:
-        return (self.told - self.found) / self.hours
+        return (self.reported - self.found) / self.hours
 
 
 @dataclass
@@ -100,7 +100,7 @@ class Drive:
     """Scores of one drive: changes by way; shares of rows, and of settled rows, with the right soil; seconds until a soil was named."""
 
     group: str
-    changes: dict[str, Told]
+    changes: dict[str, Matches]
     right: dict[str, float] = field(default_factory=dict)
     settled: dict[str, float] = field(default_factory=dict)
     naming: dict[str, list[float]] = field(default_factory=dict)
@@ -119,9 +119,9 @@ def main() -> None:
     drives: list[Drive] = []
     jobs = [(seed, k < ALONE) for k, seed in enumerate(arguments.seeds)]
     with ProcessPoolExecutor(arguments.workers) as pool:
-        for (seed, _), found in zip(jobs, pool.map(score_seed, jobs), strict=True):
-            drives += found
-            right = [d.right["another, offline"] for d in found if d.right]
+        for (seed, _), result in zip(jobs, pool.map(score_seed, jobs), strict=True):
+            drives += result
+            right = [d.right["another, offline"] for d in result if d.right]
             print(f"seed {seed}: soil right in {100 * np.mean(right):.1f} % of rows", flush=True)
     text = tables(drives, arguments.seeds)
     print("\n" + text)
@@ -140,10 +140,10 @@ def library_of(seed: int) -> tuple[Vehicle, SoilLibrary]:
     vehicle = calibrate(by, Scenario.load(MULTI[0]).nominal_vehicle()).apply(logs[names[0]].vehicle)
     parts, blocks, made_by = [], {}, ""
     for name in names:
-        found = estimate(logs[name].recording, vehicle)
-        parts += pairs_of(found, name)
-        made_by = maker(found)
-        for soil, one in labelled_blocks(found, None, name):
+        estimates = estimate(logs[name].recording, vehicle)
+        parts += pairs_of(estimates, name)
+        made_by = maker(estimates)
+        for soil, one in labelled_blocks(estimates, None, name):
             blocks.setdefault(soil, []).append(one)
     library = learn_soils(parts).library()
     return vehicle, SoilLibrary(with_signatures(library.soils, blocks, made_by))
@@ -166,7 +166,7 @@ def score_seed(job: tuple[int, bool]) -> list[Drive]:
         drives.append(score(result, calibrated, name, another, None))
     if alone:
         singles = [name for name in set_runs("campaign") if name not in MULTI]
-        drives += [Drive("single", told(run(name, seed), vehicle)) for name in singles]
+        drives += [Drive("single", changes_by_way(run(name, seed), vehicle)) for name in singles]
     return drives
 
 
@@ -174,31 +174,36 @@ def score(
     result: SimulationResult, vehicle: Vehicle, group: str, another: SoilLibrary, own: SoilLibrary | None
 ) -> Drive:
     """One drive over several soils."""
-    found = estimate(result.recording, vehicle)
-    drive = Drive(group, changes(found, result))
+    estimates = estimate(result.recording, vehicle)
+    drive = Drive(group, changes(estimates, result))
     truth = np.array([ONE.get(x, x) for x in result.truth["soil"]], dtype=object)
     mixed = result.truth["transition"].to_numpy(dtype=bool)
     for label, library in (("another", another), ("own", own)):
         if library is None:
             continue
         for way in ("offline", "online"):
-            ground, table = analyse(found, library, group, Settings(online=way == "online"))
+            ground, table = analyse(estimates, library, group, Settings(online=way == "online"))
             named = np.array([ONE.get(x, x) for x in table["soil_estimate"]], dtype=object)
             key = f"{label}, {way}"
             drive.right[key] = float((named == truth).mean())
             drive.settled[key] = float((named == truth)[~mixed].mean())
             drive.timelines[key] = ground.timeline
             if way == "online":
-                drive.naming[label] = list(naming(found.time, truth, named, result))
+                drive.naming[label] = list(naming(estimates.time, truth, named, result))
     for soils in (("grass",), ("coarse",), ("fine", "wet"), ("hard",)):
         rest = SoilLibrary({k: v for k, v in another.items() if k not in soils})
-        timeline = analyse(found, rest, group)[0].timeline
-        told_unknown = timeline.soil == UNKNOWN
+        timeline = analyse(estimates, rest, group)[0].timeline
+        predicted_unknown = timeline.soil == UNKNOWN
         missing, there = (
             np.isin(timeline.label, soils),
             (timeline.label != "") & ~np.isin(timeline.label, soils),
         )
-        counts = [missing.sum(), (missing & told_unknown).sum(), there.sum(), (there & told_unknown).sum()]
+        counts = [
+            missing.sum(),
+            (missing & predicted_unknown).sum(),
+            there.sum(),
+            (there & predicted_unknown).sum(),
+        ]
         drive.unknown[" and ".join(soils)] = (int(counts[0]), int(counts[1]), int(counts[2]), int(counts[3]))
     return drive
 
@@ -218,18 +223,20 @@ def naming(
             yield float(time[rows[0]] - time[k]) if rows.size else 15.0
 
 
-def told(result: SimulationResult, vehicle: Vehicle) -> dict[str, Told]:
+def changes_by_way(result: SimulationResult, vehicle: Vehicle) -> dict[str, Matches]:
     """Changes on one drive, by way."""
     return changes(estimate(result.recording, vehicle), result)
 
 
-def changes(found: Estimates, result: SimulationResult) -> dict[str, Told]:
-    blocks = estimates_blocks(found)
-    offline = analyse(found)[0].changes
-    online = analyse(found, settings=Settings(online=True))[0].changes
+def changes(estimates: Estimates, result: SimulationResult) -> dict[str, Matches]:
+    blocks = estimates_blocks(estimates)
+    offline = analyse(estimates)[0].changes
+    online = analyse(estimates, settings=Settings(online=True))[0].changes
     ways: dict[str, Sequence[Change]] = {"offline": offline, "online": online, "adwin": adwin_changes(blocks)}
     spans = list(borders(result))
-    return {way: match(some, spans, float(found.time[-1] - found.time[0])) for way, some in ways.items()}
+    return {
+        way: match(some, spans, float(estimates.time[-1] - estimates.time[0])) for way, some in ways.items()
+    }
 
 
 def borders(result: SimulationResult) -> Iterator[tuple[float, float, float, bool]]:
@@ -247,24 +254,26 @@ def borders(result: SimulationResult) -> Iterator[tuple[float, float, float, boo
             yield time[first], time[after - 1], time[inside][turn[0] + 1], len(sides) > 1
 
 
-def match(some: Sequence[Change], spans: Sequence[tuple[float, float, float, bool]], seconds: float) -> Told:
+def match(
+    some: Sequence[Change], spans: Sequence[tuple[float, float, float, bool]], seconds: float
+) -> Matches:
     """One change a border; a border between fine and wet may be told or not."""
-    out, taken = Told(borders=sum(differ for *_, differ in spans), hours=seconds / 3600), set()
+    out, matched = Matches(borders=sum(differ for *_, differ in spans), hours=seconds / 3600), set()
     for change in some:
         near = [k for k, (a, b, _, _) in enumerate(spans) if a - MARGIN <= change.time <= b + MARGIN]
-        free = [k for k in near if k not in taken]
+        free = [k for k in near if k not in matched]
         if free and not spans[free[0]][3]:
-            taken.add(free[0])
+            matched.add(free[0])
             continue
-        out.told += 1
+        out.reported += 1
         out.stated.append(change.probability)
         out.right.append(bool(free))
         if free:
             out.errors.append((change.time - spans[free[0]][2], change.std))
-            taken.add(free[0])
+            matched.add(free[0])
             out.found += 1
-            if change.told is not None:
-                out.delays.append(change.told - spans[free[0]][2])
+            if change.reported is not None:
+                out.delays.append(change.reported - spans[free[0]][2])
     return out
 
 
@@ -295,8 +304,8 @@ def _groups(drives: Iterable[Drive]) -> dict[str, list[Drive]]:
     return out
 
 
-def _pooled(drives: Iterable[Drive], way: str) -> Told:
-    out = Told()
+def _pooled(drives: Iterable[Drive], way: str) -> Matches:
+    out = Matches()
     for drive in drives:
         out.add(drive.changes[way])
     return out
@@ -370,9 +379,9 @@ def _timelines(drives: Sequence[Drive], key: str) -> list[Timeline]:
 
 
 def _confusion_table(drives: Sequence[Drive]) -> str:
-    found = confusion(_timelines(drives, "another, offline"))
-    lines = ["| label | " + " | ".join(found.soils) + " |", "|---|" + "---:|" * len(found.soils)]
-    for name, row in zip(found.labels, found.counts, strict=True):
+    result = confusion(_timelines(drives, "another, offline"))
+    lines = ["| label | " + " | ".join(result.soils) + " |", "|---|" + "---:|" * len(result.soils)]
+    for name, row in zip(result.labels, result.counts, strict=True):
         lines.append(f"| {name} | " + " | ".join(f"{100 * x / row.sum():.1f}" for x in row) + " |")
     return (
         "Per cent of settled blocks of a label, offline, the other machine's library.\n\n"

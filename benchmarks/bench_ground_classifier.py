@@ -144,9 +144,9 @@ def unknown_ground(runs: list[borealtc.Run]) -> pd.DataFrame:
     """Each ground left out of training in turn, beside held-out runs of the others; means over three folds."""
     rows = []
     for left_out in sorted({r.ground for r in runs}):
-        found = [novelties(runs, left_out, *fold) for fold in islice(grouped(runs), 3)]
+        result = [novelties(runs, left_out, *fold) for fold in islice(grouped(runs), 3)]
         for smooth in SPANS:
-            seen = [of_fold[smooth] for of_fold in found]
+            seen = [of_fold[smooth] for of_fold in result]
             area = [roc_auc_score(np.r_[a * 0, b * 0 + 1], -np.r_[a, b]) for a, b in seen]
             row = {"left out": left_out, "judged over s": f"{smooth or WINDOW:g}", "AUROC": np.mean(area)}
             for rate in (0.02, 0.05, 0.2):
@@ -180,17 +180,17 @@ def accuracy_table(named: dict[str, Verdicts], complete: np.ndarray) -> str:
     lines = [score_line("5 s partitions", view, *partition.of(view)[:2], partition) for view in VIEWS]
     of_run = run.of("all sensors")[4]
     for view in (*VIEWS, "smoothed"):
-        truth, said = run.of(view)[:2]
+        truth, predicted = run.of(view)[:2]
         if view != "wheels only":
             seen = complete[of_run]
-            truth, said = truth[seen], said[seen]
+            truth, predicted = truth[seen], predicted[seen]
             peer = [column[seen] for column in run.of("peer")]
         else:
             peer = run.of("peer")
         group = "whole runs left out, " + (
             "71 runs" if view == "wheels only" else "68 runs with the body sensor"
         )
-        lines.append(score_line(group, view, truth, said, run, peer))
+        lines.append(score_line(group, view, truth, predicted, run, peer))
     lines.append(
         score_line("whole runs left out, 71 runs", "all sensors there are", *run.of("all sensors")[:2], run)
     )
@@ -202,7 +202,7 @@ def score_line(
     protocol: str,
     view: str,
     truth: np.ndarray,
-    said: np.ndarray,
+    predicted: np.ndarray,
     verdicts: Verdicts,
     peer: list[np.ndarray] | None = None,
 ) -> str:
@@ -210,13 +210,13 @@ def score_line(
     if view.startswith("all sensors"):
         other = f"{balanced_accuracy_score(*(peer or verdicts.of('peer'))):.3f}"
     name = "all sensors, with 10 s of neighbours (`smooth=10`)" if view == "smoothed" else view
-    balanced = balanced_accuracy_score(truth, said)
-    return f"| {protocol} | {name} | {len(truth)} | **{balanced:.3f}** | {(truth == said).mean():.3f} | {other} |"
+    balanced = balanced_accuracy_score(truth, predicted)
+    return f"| {protocol} | {name} | {len(truth)} | **{balanced:.3f}** | {(truth == predicted).mean():.3f} | {other} |"
 
 
 def confusion_text(verdicts: Verdicts) -> str:
-    truth, said = verdicts.of("all sensors")[:2]
-    share = confusion_matrix(truth, said, labels=verdicts.classes, normalize="true")
+    truth, predicted = verdicts.of("all sensors")[:2]
+    share = confusion_matrix(truth, predicted, labels=verdicts.classes, normalize="true")
     head = "| driven \\ said | " + " | ".join(verdicts.classes) + " |\n|" + "---|" * (len(share) + 1)
     rows = [
         f"| {c} | " + " | ".join(f"{x:.3f}" for x in row) + " |"
@@ -235,7 +235,7 @@ def calibration_text(named: dict[str, Verdicts]) -> str:
     for low, high in pairwise(edges):
         cells = []
         for verdicts in named.values():
-            truth, said, chances = verdicts.of("all sensors")[:3]
+            truth, predicted, chances = verdicts.of("all sensors")[:3]
             weight = 1 / pd.Series(truth).map(pd.Series(truth).value_counts()).to_numpy()
             top = chances.max(axis=1)
             inside = (top >= low) & (top < high)
@@ -245,7 +245,7 @@ def calibration_text(named: dict[str, Verdicts]) -> str:
             w = weight[inside]
             cells += [
                 f"{np.average(top[inside], weights=w):.3f}",
-                f"{np.average((truth == said)[inside], weights=w):.3f}",
+                f"{np.average((truth == predicted)[inside], weights=w):.3f}",
             ]
         lines.append(f"| {low:.2f} to {min(high, 1):.2f} | " + " | ".join(cells) + " |")
     return "\n".join(lines)
@@ -257,12 +257,12 @@ def rejection_text(named: dict[str, Verdicts]) -> str:
         "|---|---|---|---|---|",
     ]
     for protocol, verdicts in named.items():
-        truth, said, _, novelty, _ = verdicts.of("all sensors")
+        truth, predicted, _, novelty, _ = verdicts.of("all sensors")
         weight = 1 / pd.Series(truth).map(pd.Series(truth).value_counts()).to_numpy()
         for rate in (0.01, 0.02, 0.05, 0.1):
             out = novelty < rate
-            wrong = (truth != said)[out].mean() if out.any() else np.nan
-            rest = balanced_accuracy_score(truth[~out], said[~out])
+            wrong = (truth != predicted)[out].mean() if out.any() else np.nan
+            rest = balanced_accuracy_score(truth[~out], predicted[~out])
             share = np.average(out, weights=weight)
             lines.append(f"| {protocol} | {rate:.2f} | {share:.3f} | {wrong:.2f} | {rest:.3f} |")
     return "\n".join(lines)

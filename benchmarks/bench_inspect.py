@@ -86,7 +86,7 @@ class Case:
     seen: Seen | None = None
     refused: str = ""
     counts: Counter[str] = field(default_factory=Counter)
-    said: list[str] = field(default_factory=list)
+    lines: list[str] = field(default_factory=list)
 
 
 def main() -> None:
@@ -95,7 +95,7 @@ def main() -> None:
     table = _table(cases)
     print(table)
     for case in cases:
-        for line in case.said:
+        for line in case.lines:
             print(f"{case.file}: {line}")
     if "--write" in sys.argv:
         put(PAGE, "<!-- bench_inspect -->", table)
@@ -119,7 +119,7 @@ def _cases() -> list[Case]:
 def _headers() -> list[Case]:
     folder = DATA / "headers"
     truth = json.loads((folder / "truth.json").read_text())
-    found = []
+    result = []
     for file, channels in truth.items():
         own: dict[str, tuple[list[list[str]], str | None]] = {}
         for channel, entry in channels.items():
@@ -129,8 +129,8 @@ def _headers() -> list[Case]:
             if channel == TIME:
                 ways += [[part] for part in ways[0]] if len(ways[0]) > 1 else []
             own[_plain(channel)] = (ways, entry["unit"])
-        found.append(Case(f"headers/{file}", ONE_LOGGER.get(file[:2], file), own))
-    return found
+        result.append(Case(f"headers/{file}", ONE_LOGGER.get(file[:2], file), own))
+    return result
 
 
 def _others() -> list[Case]:
@@ -160,7 +160,7 @@ def _open(case: Case) -> None:
 def _judge(case: Case, vocabulary: Vocabulary) -> None:
     if case.seen is None:
         case.counts["left open"] += len(case.truth)
-        case.said.append(f"refused: {case.refused.split(': ', 1)[-1]}")
+        case.lines.append(f"refused: {case.refused.split(': ', 1)[-1]}")
         return
     seen = Seen.of(read_log(DATA / case.file), vocabulary=vocabulary)
     proposals = dict(seen.proposals(vocabulary))
@@ -168,10 +168,10 @@ def _judge(case: Case, vocabulary: Vocabulary) -> None:
         proposals[TIME] = Proposal({"from": seen.stamp[0]}, unit=seen.stamp[1])
     proposals.pop("soil", None)
     for channel in sorted(case.truth.keys() | proposals.keys()):
-        kind, said = _verdict(channel, case.truth, proposals)
+        kind, estimated = _verdict(channel, case.truth, proposals)
         case.counts[kind] += 1
         if kind != "right":
-            case.said.append(f"{channel} {kind}: {said}")
+            case.lines.append(f"{channel} {kind}: {estimated}")
 
 
 def _verdict(
@@ -188,14 +188,14 @@ def _verdict(
     ways, unit = truth.get(channel, ([], None))
     same = any(columns == sorted(_bare(c) for c in way) for way in ways)
     right = same and (unit is None or channel == TIME or _alike(made.unit, unit))
-    said = (
+    sentence = (
         f"{made.columns} in {made.unit}"
         + (f", was {ways[0]} in {unit}" if ways else ", was none")
         + (f" ({made.doubt})" if made.doubt else "")
     )
     if right:
-        return ("right, with a ?" if made.doubt else "right"), said
-    return ("wrong, with a ?" if made.doubt else "wrong and sure"), said
+        return ("right, with a ?" if made.doubt else "right"), sentence
+    return ("wrong, with a ?" if made.doubt else "wrong and sure"), sentence
 
 
 def _alike(made: str | None, true: str) -> bool:
@@ -221,11 +221,11 @@ def _vocabulary(case: Case, cases: list[Case]) -> Vocabulary:
 
 
 def _words(columns: Iterable[str]) -> frozenset[str]:
-    found: set[str] = set()
+    result: set[str] = set()
     for column in columns:
         for word in words_of(column):
-            found |= {word, *GENERAL.known_in(word)} if not _is_cut(word) else {word}
-    return frozenset(found)
+            result |= {word, *GENERAL.known_in(word)} if not _is_cut(word) else {word}
+    return frozenset(result)
 
 
 def _is_cut(word: str) -> bool:

@@ -135,8 +135,8 @@ class Outcome:
 
     def run(self, step: str, *words: object) -> bool:
         """Run a command line in this process; whether it is done."""
-        said, wrong = io.StringIO(), io.StringIO()
-        with contextlib.redirect_stdout(said), contextlib.redirect_stderr(wrong):
+        output, wrong = io.StringIO(), io.StringIO()
+        with contextlib.redirect_stdout(output), contextlib.redirect_stderr(wrong):
             code = terragrip([step, *map(str, words)])
         lines = wrong.getvalue().strip().splitlines()
         self.steps.setdefault(step, []).append((code, lines[-1] if lines else ""))
@@ -154,8 +154,8 @@ class Outcome:
     def refusals(self) -> list[str]:
         """Each refusal once, with how often, and without the file's name."""
         lines = []
-        for step, found in self.steps.items():
-            for code, line in found:
+        for step, result in self.steps.items():
+            for code, line in result:
                 if code:
                     why = line.removeprefix("terragrip: ").split(": ", 1)[-1]
                     lines.append(
@@ -196,8 +196,8 @@ def whole_way(source: Source, data: Path, folder: Path) -> tuple[Outcome, list[L
         tables.append(table)
         vehicle = Vehicle.load(where / "vehicle.yaml")
         recording = read(log, profile)
-        found = estimate_with_channel_nis(recording, vehicle)
-        logs.append(Log(source, files[k].name.split(".")[0].split("__")[0], found, recording, vehicle))
+        estimated = estimate_with_channel_nis(recording, vehicle)
+        logs.append(Log(source, files[k].name.split(".")[0].split("__")[0], estimated, recording, vehicle))
     if source.calibrates:
         outcome.run("calibrate", *prepared, *options, "-o", folder / "calibrated.yaml")
     if tables:
@@ -209,14 +209,14 @@ def whole_way(source: Source, data: Path, folder: Path) -> tuple[Outcome, list[L
 STEPS = ("inspect", "estimate", "calibrate", "ground", "soils", "report")
 
 
-def way_table(found: list[tuple[Source, Outcome, int]]) -> str:
+def way_table(result: list[tuple[Source, Outcome, int]]) -> str:
     """How many files each step took, and what was refused."""
     lines = ["| data | files | " + " | ".join(STEPS) + " |", "|---" * (2 + len(STEPS)) + "|"]
-    said = []
-    for source, outcome, files in found:
+    output = []
+    for source, outcome, files in result:
         lines.append(f"| {source.name} | {files} | " + " | ".join(map(outcome.cell, STEPS)) + " |")
-        said += [f"- {source.name}, {line}" for line in outcome.refusals()]
-    return "\n".join([*lines, "", "Refused, with exit code 2 and these lines:", "", *said])
+        output += [f"- {source.name}, {line}" for line in outcome.refusals()]
+    return "\n".join([*lines, "", "Refused, with exit code 2 and these lines:", "", *output])
 
 
 def middle(values: Floats) -> float:
@@ -336,9 +336,9 @@ def causes(logs: list[Log]) -> str:
             noise = log.estimates.about["settings"]["noise"]
             changed = {channel: factor * sd for channel, sd in noise.items() if channel.startswith(kind)}
             again = estimate_with_channel_nis(log.recording, log.vehicle, sensors=changed)
-            for found, means in ((log.estimates, before), (again, after)):
+            for result, means in ((log.estimates, before), (again, after)):
                 means.append(
-                    np.mean([mean for channel, (mean, _) in moving_nis(found).items() if channel in changed])
+                    np.mean([mean for channel, (mean, _) in moving_nis(result).items() if channel in changed])
                 )
         lines.append(f"| {name} | {kind} | {factor:g} | {np.mean(before):.2f} | {np.mean(after):.2f} |")
     return "\n".join(lines)
@@ -354,7 +354,7 @@ def main() -> None:
     if not given.data.is_dir():
         print(f"bench_real_logs: NOT RUN: {given.data} is absent; give the folder of measured data as --data")
         raise SystemExit(2 if given.write else 0)
-    found, logs = [], []
+    result, logs = [], []
     for source in SOURCES:
         if given.only and given.only not in source.name:
             continue
@@ -365,12 +365,12 @@ def main() -> None:
                 f"bench_real_logs: {given.data / source.files}: no file; give the folder of measured data as --data"
             )
         print(source.name, outcome.steps if given.only else "", flush=True)
-        found.append((source, outcome, files))
+        result.append((source, outcome, files))
         logs += estimated
     if not given.only:
         sys.path.insert(0, str(EXAMPLES))
         import real_logs
-    tables = {"the way": way_table(found), "slip and events": slip_table(logs), "NIS": nis_table(logs)}
+    tables = {"the way": way_table(result), "slip and events": slip_table(logs), "NIS": nis_table(logs)}
     if not given.only:
         tables |= {
             m.name: real_logs.table(real_logs.verdicts(m, given.data, "kalman")) for m in real_logs.MACHINES

@@ -198,14 +198,14 @@ def main() -> None:
     for seed in options.seeds:
         scores += campaign_scores(seed)
         print(f"seed {seed} done", flush=True)
-    said = verdicts(scores)
-    print(table(scores), *said, sep="\n")
+    text = verdicts(scores)
+    print(table(scores), *text, sep="\n")
     if options.write:
         seeds = f"Seeds {options.seeds[0]} to {options.seeds[-1]}, {len(options.seeds)} campaigns of 68 runs."
         put(
             DOCUMENT,
             BEGIN,
-            "\n".join([seeds, "", table(scores), "", *(f"- {line}" for line in said)]),
+            "\n".join([seeds, "", table(scores), "", *(f"- {line}" for line in text)]),
         )
 
 

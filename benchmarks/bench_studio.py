@@ -177,10 +177,10 @@ def main() -> None:
             last = page.evaluate(
                 "() => [window.terragripLive.feed.messages, window.terragripLive.traces.redraws]"
             )
-            passed = time.monotonic() - begin
-            share = (processor_seconds(process) - before) / passed
-            updates = (last[0] - first[0]) / passed
-            drawn = (last[1] - first[1]) / passed
+            elapsed = time.monotonic() - begin
+            share = (processor_seconds(process) - before) / elapsed
+            updates = (last[0] - first[0]) / elapsed
+            drawn = (last[1] - first[1]) / elapsed
             figures.append(
                 (
                     "live updates [1/s]",

@@ -157,8 +157,8 @@ def score(job: tuple[str, Kind, int, str, float]) -> Tally:
 
 def starts(recording: Recording, vehicle: Vehicle) -> tuple[list[float], list[float]]:
     """When warnings, and `stuck`, begin [s]."""
-    found = events(estimate(recording, vehicle))
-    warnings, stuck = ([e.start for e in found if e.kind == kind] for kind in ("immobilization", "stuck"))
+    estimates = events(estimate(recording, vehicle))
+    warnings, stuck = ([e.start for e in estimates if e.kind == kind] for kind in ("immobilization", "stuck"))
     return warnings, stuck
 
 

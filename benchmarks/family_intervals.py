@@ -52,16 +52,16 @@ def interval_score(error: Floats, sd: Floats) -> float:
     return float(np.mean(2 * half + 2 / MISS * np.maximum(np.abs(error) - half, 0.0)))
 
 
-def intervals(result: SimulationResult, found: Estimates, driven: list[str], moving: Flags) -> Intervals:
+def intervals(result: SimulationResult, estimates: Estimates, driven: list[str], moving: Flags) -> Intervals:
     """Those of an estimate, driven wheels together."""
     covered, score = {}, {}
     for quantity in COVERED:
         errors, sds = [], []
         for name in [quantity] if quantity == "soil_resistance" else [f"{quantity}_{w}" for w in driven]:
-            error = found[name] - result.truth[f"true_{name}"].to_numpy()
-            rows = moving & np.isfinite(error) & np.isfinite(found[f"{name}_std"])
+            error = estimates[name] - result.truth[f"true_{name}"].to_numpy()
+            rows = moving & np.isfinite(error) & np.isfinite(estimates[f"{name}_std"])
             errors.append(error[rows])
-            sds.append(found[f"{name}_std"][rows])
+            sds.append(estimates[f"{name}_std"][rows])
         error, sd = np.concatenate(errors), np.concatenate(sds)
         covered[quantity] = float(np.mean(np.abs(error) <= Z * sd)) if len(error) else float("nan")
         score[quantity] = interval_score(error, sd) if len(error) else float("nan")

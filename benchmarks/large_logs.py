@@ -39,10 +39,10 @@ def drive(rows: int) -> dict[str, np.ndarray]:
     """A robot of four driven wheels that pulls, at 100 Hz, by the recording's own names."""
     draws = np.random.default_rng(0)
     speed = 1 + 0.2 * np.sin(np.arange(rows) / 300)
-    found = {"ground_speed": speed + 0.01 * draws.standard_normal(rows)}
-    found |= {f"wheel_speed_{w}": speed / 0.2 / 0.9 + 0.02 * draws.standard_normal(rows) for w in CORNERS}
-    found |= {f"drive_torque_{w}": 15 + draws.standard_normal(rows) for w in CORNERS}
-    return found | {"drawbar_force": 200 + 4 * draws.standard_normal(rows)}
+    result = {"ground_speed": speed + 0.01 * draws.standard_normal(rows)}
+    result |= {f"wheel_speed_{w}": speed / 0.2 / 0.9 + 0.02 * draws.standard_normal(rows) for w in CORNERS}
+    result |= {f"drive_torque_{w}": 15 + draws.standard_normal(rows) for w in CORNERS}
+    return result | {"drawbar_force": 200 + 4 * draws.standard_normal(rows)}
 
 
 # --- ROS -----------------------------------------------------------------------------------------------------------
@@ -81,7 +81,7 @@ def ros_minute(store: Any, *, one: bool) -> list[tuple[list[bytes], ...]]:
         step=IMAGE[0], data=raw,
     )  # fmt: skip
     write = store.serialize_ros1 if one else store.serialize_cdr
-    found: list[tuple[list[bytes], ...]] = []
+    result: list[tuple[list[bytes], ...]] = []
     for k in range(TICKS):
         joints = made(
             CONNECTIONS[0][1],
@@ -104,11 +104,11 @@ def ros_minute(store: Any, *, one: bool) -> list[tuple[list[bytes], ...]]:
             angular_velocity=vector(0.01), angular_velocity_covariance=np.zeros(9),
             linear_acceleration=vector(0.1 * np.sin(k)), linear_acceleration_covariance=np.zeros(9),
         )  # fmt: skip
-        found.append(
+        result.append(
             tuple(bytes(write(m, c[1])) for m, c in zip((joints, odometry, imu), CONNECTIONS, strict=False))
         )
-    found.append((bytes(write(image, CONNECTIONS[3][1])),))
-    return found
+    result.append((bytes(write(image, CONNECTIONS[3][1])),))
+    return result
 
 
 def ros_messages(store: Any, size: int, *, one: bool, images: bool) -> Iterator[Message]:

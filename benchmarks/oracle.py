@@ -37,11 +37,11 @@ def oracle(result: SimulationResult, wheel: str, rows: NDArray[np.bool_]) -> Ora
     """Try every pair of scales with the true calibration; `rows` are those that count."""
     vehicle = knowing(result)
     truth = result.truth[f"true_adhesion_{wheel}"].to_numpy()
-    found = []
+    out = []
     for adhesion, resistance in itertools.product(ADHESION_SCALES, RESISTANCE_SCALES):
         estimate = _adhesion(result.recording, vehicle, wheel, adhesion, resistance)
-        found.append(Oracle(r_squared(truth, estimate, rows), adhesion, resistance))
-    return max(found, key=lambda item: item.r2)
+        out.append(Oracle(r_squared(truth, estimate, rows), adhesion, resistance))
+    return max(out, key=lambda item: item.r2)
 
 
 def knowing(result: SimulationResult) -> Vehicle:

@@ -125,11 +125,11 @@ def _start_slip(rng: np.random.Generator, time: Array, start: float) -> Array:
 def _wander(rng: np.random.Generator, time: Array, memory: float, deviation: float) -> Array:
     """A first-order random signal of SD ``deviation``."""
     keep = np.exp(-1 / (RATE * memory))
-    found, noise = np.empty(len(time)), rng.normal(0, deviation, len(time))
-    found[0] = noise[0]
+    result, noise = np.empty(len(time)), rng.normal(0, deviation, len(time))
+    result[0] = noise[0]
     for k in range(1, len(time)):
-        found[k] = keep * found[k - 1] + np.sqrt(1 - keep**2) * noise[k]
-    return found
+        result[k] = keep * result[k - 1] + np.sqrt(1 - keep**2) * noise[k]
+    return result
 
 
 def _measured(

@@ -79,9 +79,9 @@ def studio(folder: Path) -> Iterator[tuple[str, int]]:
             line = process.stdout.readline()
             if not line:
                 raise SystemExit("the studio did not start")
-        found = re.search(r"http://\S+", line)
-        assert found is not None
-        yield found.group(0), process.pid
+        match = re.search(r"http://\S+", line)
+        assert match is not None
+        yield match.group(0), process.pid
     finally:
         process.terminate()
         process.wait(10)

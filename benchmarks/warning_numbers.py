@@ -44,13 +44,13 @@ def tallies_of(recording: Recording, vehicle: Vehicle, course: Course) -> dict[V
     """One drive under every variation."""
     estimates = estimate(recording, vehicle)
     rows = rows_of(estimates, np.isfinite(recording.channels["ground_speed"]))
-    found = {}
+    result = {}
     for name, factor in VARIATIONS:
         limits = watch_limits(float(np.mean(vehicle.wheel_radius)))
         if name:
             limits[name] *= factor
-        found[name, factor] = judge(course, *starts(rows, Watch(limits, pace(vehicle, limits))))
-    return found
+        result[name, factor] = judge(course, *starts(rows, Watch(limits, pace(vehicle, limits))))
+    return result
 
 
 def starts(rows: list[Row], watch: Watch) -> tuple[list[float], list[float]]:
@@ -109,11 +109,11 @@ def main() -> None:
     family, snow = ({key: Tally() for key in VARIATIONS} for _ in range(2))
     listed = list(jobs("development", arguments.stops, arguments.hours, [10.0], arguments.seed))
     with ProcessPoolExecutor(arguments.workers) as pool:
-        for found in pool.map(family_drive, listed):
-            for key, tally in found.items():
+        for result in pool.map(family_drive, listed):
+            for key, tally in result.items():
                 family[key].add(tally)
-    for found in snow_drives():
-        for key, tally in found.items():
+    for result in snow_drives():
+        for key, tally in result.items():
             snow[key].add(tally)
     head = ["", "missed", "lead (s)", "false in 30 min", "snow: missed", "lead (s)", "false in 30 min"]
     lines = ["| " + " | ".join(head) + " |", "|---|" + "---:|" * (len(head) - 1)]

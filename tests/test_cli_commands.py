@@ -46,9 +46,9 @@ def test_simulate_writes_a_drive_that_its_seed_makes_again(
 
 def test_simulate_names_what_there_is(capsys: pytest.CaptureFixture[str]) -> None:
     run("simulate", "--list")
-    said = capsys.readouterr().out
-    assert "campaign" in said
-    assert "accuracy-clean" in said
+    output = capsys.readouterr().out
+    assert "campaign" in output
+    assert "accuracy-clean" in output
 
 
 def test_estimate_writes_the_table_and_says_what_it_found(
@@ -127,9 +127,9 @@ def test_inspect_reports_and_proposes(
 ) -> None:
     profile = tmp_path / "profile.yaml"
     run("inspect", drive / "log.csv", "--vehicle", drive / "vehicle.yaml", "--write-profile", profile)
-    said = capsys.readouterr().out
-    assert "wheel_speed_fl" in said
-    assert str(profile) in said
+    output = capsys.readouterr().out
+    assert "wheel_speed_fl" in output
+    assert str(profile) in output
     out = tmp_path / "out.parquet"
     run(
         "estimate",
@@ -163,9 +163,9 @@ def test_calibrate_writes_a_vehicle_that_estimates(
     pd.concat([standing, log]).to_csv(tmp_path / "work.csv", index=False)
     out = tmp_path / "calibrated.yaml"
     run("calibrate", tmp_path / "work.csv", "--vehicle", drive / "vehicle.yaml", "-o", out)
-    said = capsys.readouterr().out
-    assert "95 % interval" in said
-    assert "Not told by the data" in said
+    output = capsys.readouterr().out
+    assert "95 % interval" in output
+    assert "Not determined by the data" in output
     calibrated = Vehicle.load(out)
     assert calibrated.calibration.drive_torque_offset["fl"] == pytest.approx(0.4, abs=0.05)
     assert calibrated.name == Vehicle.load(drive / "vehicle.yaml").name

@@ -65,8 +65,8 @@ def test_one_drive_with_a_library(files, tmp_path, capsys):
         str(table),
     ]
     assert main(words) == 0
-    said = capsys.readouterr().out
-    assert "run1: 1 change, 2 sections, 0 events; grass, fine" in said
+    output = capsys.readouterr().out
+    assert "run1: 1 change, 2 sections, 0 events; grass, fine" in output
     data = json.loads(out.read_text())
     assert [s["soil"] for s in data["sections"]] == ["grass", "fine"]
     assert data["library"] == "soils.json"

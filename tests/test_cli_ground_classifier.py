@@ -41,12 +41,12 @@ def test_drives_never_seen_are_told_in_a_table_of_windows(
     words = ["ground-classifier", "predict", *logs, "-c", str(folder / "grounds.npz"), "--rejection", "0"]
     assert main([*words, "-o", str(tmp_path / "windows.csv")]) == 0
     assert "hard0.csv: 11 windows; hard" in capsys.readouterr().out
-    told = pd.read_csv(tmp_path / "windows.csv")
+    windows = pd.read_csv(tmp_path / "windows.csv")
     named = ["file", "start", "end", "ground", "novelty", "probability_hard", "probability_loose"]
-    assert list(told.columns) == named
-    np.testing.assert_allclose(told["end"] - told["start"], 1.7)
-    np.testing.assert_allclose(told[["probability_hard", "probability_loose"]].sum(axis=1), 1.0, atol=1e-5)
-    assert (told["ground"] + "0.csv" == told["file"]).mean() > 0.9
+    assert list(windows.columns) == named
+    np.testing.assert_allclose(windows["end"] - windows["start"], 1.7)
+    np.testing.assert_allclose(windows[["probability_hard", "probability_loose"]].sum(axis=1), 1.0, atol=1e-5)
+    assert (windows["ground"] + "0.csv" == windows["file"]).mean() > 0.9
     assert main([*words, "--step", "0.5", "-q", "-o", str(tmp_path / "windows.parquet")]) == 0
     closer = pd.read_parquet(tmp_path / "windows.parquet")
     first = closer[closer["file"] == "hard0.csv"]["start"]
@@ -101,7 +101,7 @@ def test_labels_may_be_a_column_of_the_logs(tmp_path: Path, capsys: pytest.Captu
 
 
 @pytest.mark.parametrize(
-    ("table", "more", "said"),
+    ("table", "more", "expected"),
     [
         ("file,label\nhard1.csv,hard\nhard2.csv,hard\n", [], "there is one ground only, hard"),
         ("file,label\nhard1.csv,hard\nlose1.csv,loose\n", [], "row 3: there is no run"),
@@ -121,34 +121,34 @@ def test_labels_may_be_a_column_of_the_logs(tmp_path: Path, capsys: pytest.Captu
     ],
 )
 def test_what_cannot_be_learnt_from_is_one_line(
-    folder: Path, capsys: pytest.CaptureFixture[str], table: str, more: list[str], said: str
+    folder: Path, capsys: pytest.CaptureFixture[str], table: str, more: list[str], expected: str
 ) -> None:
     labels = folder / "wrong.csv"
     labels.write_text(table, encoding="utf-8")
     words = ["ground-classifier", "train", "--labels", str(labels), *more, "-o", str(folder / "no.npz")]
     assert main(words) == 2
     line = capsys.readouterr().err
-    assert said in line
+    assert expected in line
     assert line.count("\n") == 1
     assert not (folder / "no.npz").exists()
 
 
 @pytest.mark.parametrize(
-    ("rows", "said"),
+    ("rows", "expected"),
     [
         ("hard1.csv,hard\nlose2.csv,loose\n", "row 3: 'lose2.csv' names no run; did you mean loose2.csv?"),
         ("hard1.csv,hard\n", "holds no label for"),
     ],
 )
 def test_a_label_that_names_no_given_log_is_refused_and_a_log_without_one(
-    folder: Path, capsys: pytest.CaptureFixture[str], rows: str, said: str
+    folder: Path, capsys: pytest.CaptureFixture[str], rows: str, expected: str
 ) -> None:
     labels = folder / "wrong.csv"
     labels.write_text(f"file,label\n{rows}", encoding="utf-8")
     logs = [str(folder / "hard1.csv"), str(folder / "loose2.csv")]
     words = ["ground-classifier", "train", *logs, "--labels", str(labels), "-o", str(folder / "no.npz")]
     assert main(words) == 2
-    assert said in capsys.readouterr().err
+    assert expected in capsys.readouterr().err
 
 
 def test_a_log_without_a_learnt_sensor_or_too_short_and_a_foreign_classifier_are_refused(

@@ -116,9 +116,9 @@ def test_ctrl_c_leaves_whole_files(tmp_path: Path) -> None:
     ):
         time.sleep(0.02)
     os.killpg(run.pid, signal.SIGINT)  # as a terminal does: to the workers too
-    _, said = run.communicate(timeout=60)
+    _, output = run.communicate(timeout=60)
     assert run.returncode == 130
-    assert len(said.strip().splitlines()) == 1
+    assert len(output.strip().splitlines()) == 1
     written = list(tmp_path.glob("out/*/*"))
     assert written
     assert not [path for path in written if path.name.startswith(".")]

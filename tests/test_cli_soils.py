@@ -83,8 +83,8 @@ def fails(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> Fails:
 
 def learn(output: Path, *words: Any) -> dict[str, Any]:
     assert main(["soils", *map(str, words), "-o", str(output)]) == 0
-    found: dict[str, Any] = json.loads(output.read_text(encoding="utf-8"))
-    return found
+    result: dict[str, Any] = json.loads(output.read_text(encoding="utf-8"))
+    return result
 
 
 def test_two_soils_of_six_runs(write: Write, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -98,14 +98,14 @@ def test_two_soils_of_six_runs(write: Write, tmp_path: Path, capsys: pytest.Capt
         assert low < soil["parameters"]["a"] < high
         assert soil["r2"] > 0.97
     text = capsys.readouterr().out
-    for said in ("fine", "no data between", "Written to"):
-        assert said in text
+    for sentence in ("fine", "no data between", "Written to"):
+        assert sentence in text
 
 
 def test_quiet_says_nothing(write: Write, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     learn(tmp_path / "soils.json", write("a"), "--quiet")
-    said = capsys.readouterr()
-    assert said.out + said.err == ""
+    output = capsys.readouterr()
+    assert output.out + output.err == ""
 
 
 def test_literature_is_added(write: Write, tmp_path: Path) -> None:
@@ -177,7 +177,7 @@ def spoiled(change: Callable[[dict[str, Any]], Any]) -> str:
 
 
 @pytest.mark.parametrize(
-    ("text", "said"),
+    ("text", "expected"),
     [
         (spoiled(lambda x: x.update(version=99)), "is of version 99"),
         (spoiled(lambda x: x["soils"]["hard"].update(model="cubic")), "curve model 'cubic' is not known"),
@@ -192,11 +192,11 @@ def spoiled(change: Callable[[dict[str, Any]], Any]) -> str:
         ("[]", "holds no 'soils'"),
     ],
 )
-def test_a_library_that_is_none(write: Write, fails: Fails, tmp_path: Path, text: str, said: str) -> None:
+def test_a_library_that_is_none(write: Write, fails: Fails, tmp_path: Path, text: str, expected: str) -> None:
     path = tmp_path / "library.json"
     path.write_text(text, encoding="utf-8")
     line = fails(write("a"), "--merge", path)
-    assert said in line
+    assert expected in line
     assert "library.json" in line
 
 
@@ -219,7 +219,7 @@ def test_a_file_twice(write: Write, fails: Fails) -> None:
 
 
 @pytest.mark.parametrize(
-    ("words", "said"),
+    ("words", "expected"),
     [
         (("--model", "cubic"), "no curve model 'cubic'"),
         (("--width", "0"), "no bins"),
@@ -229,8 +229,8 @@ def test_a_file_twice(write: Write, fails: Fails) -> None:
         (("--merge", "absent.json"), "absent.json"),
     ],
 )
-def test_calls_that_make_no_sense(write: Write, fails: Fails, words: tuple[str, ...], said: str) -> None:
-    assert said in fails(write("a"), *words)
+def test_calls_that_make_no_sense(write: Write, fails: Fails, words: tuple[str, ...], expected: str) -> None:
+    assert expected in fails(write("a"), *words)
 
 
 def test_output_that_would_overwrite_an_input(
@@ -251,12 +251,12 @@ def test_digitised_points_become_soils_beside_learned_ones(
     rows = "\n".join(f"{x:.2f};{y:.4f};{x:.2f};{z:.4f}" for x, y, z in zip(s, *mu, strict=True))
     points = tmp_path / "points.csv"
     points.write_text(f"clay;;stubble;\nX;Y;X;Y\n{rows}\n")
-    found = learn(tmp_path / "soils.json", write("a"), points)["soils"]
-    assert set(found) == {"fine", "clay", "stubble"}
-    assert found["clay"]["parameters"]["a"] == pytest.approx(0.6, rel=1e-3)
-    assert found["stubble"]["parameters"]["a"] == pytest.approx(1.1, rel=1e-3)
-    assert found["clay"]["interval"] == {}
-    assert "points.csv" in found["clay"]["source"]
+    result = learn(tmp_path / "soils.json", write("a"), points)["soils"]
+    assert set(result) == {"fine", "clay", "stubble"}
+    assert result["clay"]["parameters"]["a"] == pytest.approx(0.6, rel=1e-3)
+    assert result["stubble"]["parameters"]["a"] == pytest.approx(1.1, rel=1e-3)
+    assert result["clay"]["interval"] == {}
+    assert "points.csv" in result["clay"]["source"]
     assert "data fix it" in capsys.readouterr().out
     points.write_text("slip;mu\n0.1;x\n0.2;0.3\n")
     assert "is not a number" in fails(write("b"), points)
@@ -270,9 +270,9 @@ def test_libraries_are_joined_twins_refused_and_others_compared(
     learn(hard, *(write(f"h{i}", a=1.42, soil="hard") for i in range(5)), "--quiet")
     both = tmp_path / "both.json"
     assert set(learn(both, fine, hard, "--quiet")["soils"]) == {"fine", "hard"}
-    said = fails(fine, both)
-    assert "'fine'" in said
-    assert "both.json" in said
+    sentence = fails(fine, both)
+    assert "'fine'" in sentence
+    assert "both.json" in sentence
     capsys.readouterr()
     learn(tmp_path / "again.json", *(write(f"g{i}", a=0.95) for i in range(5)), "--compare", both)
     line = next(text for text in capsys.readouterr().out.splitlines() if text.startswith("  fine: "))
@@ -290,8 +290,8 @@ def test_a_soil_is_named_for_points_and_a_name_that_names_nothing_is_refused(
     points = tmp_path / "points.csv"
     rows = [(s, 0.7 * (1 - np.exp(-9 * s))) for s in np.linspace(0.06, 0.5, 12)]
     points.write_text("slip,mu\n" + "\n".join(f"{s:.4f},{m:.4f}" for s, m in rows))
-    found = learn(tmp_path / "soils.json", points, "--soil", "clay")["soils"]
-    assert list(found) == ["clay"]
+    result = learn(tmp_path / "soils.json", points, "--soil", "clay")["soils"]
+    assert list(result) == ["clay"]
     assert "libraries only" in fails(tmp_path / "soils.json", "--soil", "clay")
     points.write_text("clay,,stubble,\nX,Y,X,Y\n" + "\n".join(f"{s},{m},{s},{m}" for s, m in rows))
     assert "holds 2 curves" in fails(points, "--soil", "clay")
@@ -306,9 +306,9 @@ def test_data_do_not_fix_a_curve_that_explains_little_of_them(
         (s, m + 0.08 * draws.standard_normal()) for s, m in zip(np.linspace(0.06, 0.55, 25), mu, strict=True)
     ]
     points.write_text("slip,mu\n" + "\n".join(f"{s:.4f},{m:.4f}" for s, m in rows))
-    found = learn(tmp_path / "soils.json", points, "--soil", "clay")["soils"]["clay"]
-    assert 0 < found["r2"] < 0.5
-    assert found["identifiability"]["identifiable"] is False
-    assert any("explains little of the bins" in note for note in found["notes"])
-    said = capsys.readouterr().out
-    assert f"no (R2 {found['r2']:.2f})" in said
+    result = learn(tmp_path / "soils.json", points, "--soil", "clay")["soils"]["clay"]
+    assert 0 < result["r2"] < 0.5
+    assert result["identifiability"]["identifiable"] is False
+    assert any("explains little of the bins" in note for note in result["notes"])
+    output = capsys.readouterr().out
+    assert f"no (R2 {result['r2']:.2f})" in output

@@ -24,9 +24,9 @@ def demo_fixture(
 ) -> tuple[DemoResult, Path, list[tuple[int, int, str]]]:
     """The demo of multi1, multi2 and one short run, and what its progress said."""
     folder = tmp_path_factory.mktemp("demo")
-    said: list[tuple[int, int, str]] = []
-    result = run_demo(folder, SEED, 2, lambda *step: said.append(step), runs=("fine-03",))
-    return result, folder, said
+    progress: list[tuple[int, int, str]] = []
+    result = run_demo(folder, SEED, 2, lambda *step: progress.append(step), runs=("fine-03",))
+    return result, folder, progress
 
 
 def test_every_file_is_there_and_nothing_else(
@@ -109,10 +109,10 @@ def test_the_page_says_simulated_and_loads_nothing(
 
 
 def test_progress_counts_every_step_once(demo: tuple[DemoResult, Path, list[tuple[int, int, str]]]) -> None:
-    said = demo[2]
-    total = said[0][1]
-    assert [done for done, _, _ in said] == list(range(1, total + 1))
-    assert {"multi1", "multi2", "fine-03"} <= {what for _, _, what in said}
+    progress = demo[2]
+    total = progress[0][1]
+    assert [done for done, _, _ in progress] == list(range(1, total + 1))
+    assert {"multi1", "multi2", "fine-03"} <= {what for _, _, what in progress}
 
 
 def test_an_interrupt_leaves_whole_files_only(tmp_path: Path) -> None:

@@ -35,11 +35,11 @@ def places() -> Iterator[tuple[int, str, str]]:
 
 def cited(text: str) -> set[int]:
     """The numbers that a text cites as ``eq. 2``, ``eq. 2 and 3``, ``eq. 4, 5, 7`` or ``eq. 10 to 13``."""
-    found: set[int] = set()
+    result: set[int] = set()
     for listed in re.findall(r"eq\. (\d+(?:(?:, | and | to )\d+)*)", text):
         numbers = [int(x) for x in re.findall(r"\d+", listed)]
-        found |= set(range(numbers[0], numbers[-1] + 1)) if " to " in listed else set(numbers)
-    return found
+        result |= set(range(numbers[0], numbers[-1] + 1)) if " to " in listed else set(numbers)
+    return result
 
 
 def words_of_python(path: Path, name: str) -> str:

@@ -105,8 +105,8 @@ def by_sample(folder: Path, drive: Any, patch: pytest.MonkeyPatch) -> Mapping[st
     names = [name for name in log.channels if name not in log.references]
     one = tg.TractionEstimator(vehicle, sensors=known["noise"], held=known["held"], channels=names)
     rows = zip(log.time.tolist(), *(log[name].tolist() for name in names), strict=True)
-    found = [one.update(dict(zip(("time", *names), row, strict=True))) for row in rows]
-    return {name: np.array([e[name] for e in found]) for name in found[0]}
+    out = [one.update(dict(zip(("time", *names), row, strict=True))) for row in rows]
+    return {name: np.array([e[name] for e in out]) for name in out[0]}
 
 
 def by_live(folder: Path, drive: Any, patch: pytest.MonkeyPatch) -> Mapping[str, Any]:
@@ -150,13 +150,13 @@ def test_every_road_gives_the_same_digits(
     log, vehicle, _ = drive
     whole = tg.estimate(log, vehicle)
     assert set(whole.about["settings"]["held"]) == {"ground_speed"}
-    found = road(folder, drive, monkeypatch)
+    result = road(folder, drive, monkeypatch)
     for name in ("time", *whole.columns):
         if name not in log.references and name not in ("latitude", "longitude", "altitude"):
-            assert np.array_equal(np.asarray(found[name]), whole[name], equal_nan=True), name
-    assert [str(event) for event in found["event"]] == whole["event"].tolist()
-    if isinstance(found, Estimates):
-        assert found.about["settings"] == whole.about["settings"]
+            assert np.array_equal(np.asarray(result[name]), whole[name], equal_nan=True), name
+    assert [str(event) for event in result["event"]] == whole["event"].tolist()
+    if isinstance(result, Estimates):
+        assert result.about["settings"] == whole.about["settings"]
 
 
 def test_smoothing_in_blocks_gives_the_same_digits(
@@ -166,9 +166,9 @@ def test_smoothing_in_blocks_gives_the_same_digits(
     whole = tg.estimate(log, vehicle, smooth=True)
     monkeypatch.setattr("terragrip.formats.parquet._LONG", 0)
     monkeypatch.setattr("terragrip.formats.parquet.ROWS", 150)
-    found = command(folder, "log.parquet", "--smooth")
+    result = command(folder, "log.parquet", "--smooth")
     for name in whole.columns:
-        assert np.array_equal(found[name], whole[name], equal_nan=True), name
+        assert np.array_equal(result[name], whole[name], equal_nan=True), name
     assert not [path for path in folder.iterdir() if path.name.startswith(".")]
 
 
@@ -181,10 +181,10 @@ def test_an_optional_channel_without_values_is_left_out_at_every_length(
     whole = command(folder, "log.parquet")
     monkeypatch.setattr("terragrip.formats.parquet._LONG", 0)
     monkeypatch.setattr("terragrip.formats.parquet.ROWS", 150)
-    found = command(folder, "log.parquet")
-    assert np.array_equal(found["adhesion_rr_std"], whole["adhesion_rr_std"], equal_nan=True)
-    assert any("pitch holds no value" in note for note in found.notes)
-    assert set(found.notes) == set(whole.notes)
+    result = command(folder, "log.parquet")
+    assert np.array_equal(result["adhesion_rr_std"], whole["adhesion_rr_std"], equal_nan=True)
+    assert any("pitch holds no value" in note for note in result.notes)
+    assert set(result.notes) == set(whole.notes)
 
 
 @pytest.mark.parametrize("rows", [100, CHUNK * CHUNKS, CHUNK * CHUNKS + 1, 7 * CHUNK * CHUNKS + 345])

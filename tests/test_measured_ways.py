@@ -21,8 +21,8 @@ Located = Callable[[str], Path]
 def run(capsys: pytest.CaptureFixture[str], *words: object) -> tuple[int, str, str]:
     """The exit code of a command line, and what it said on both streams."""
     code = main([str(word) for word in words])
-    said = capsys.readouterr()
-    return code, said.out, said.err
+    output = capsys.readouterr()
+    return code, output.out, output.err
 
 
 def test_a_tractors_hour_from_inspect_to_report(
@@ -32,15 +32,15 @@ def test_a_tractors_hour_from_inspect_to_report(
     log = shared("data/tractor_t7/session2_hour.csv.gz")
     vehicle, profile, out = EXAMPLES / "tractor_t7/vehicle.yaml", tmp_path / "p.yaml", tmp_path / "e.parquet"
     assert run(capsys, "inspect", log, "--write-profile", profile)[0] == 0
-    code, said, _ = run(capsys, "estimate", log, "--vehicle", vehicle, "--profile", profile, "-o", out)
+    code, output, _ = run(capsys, "estimate", log, "--vehicle", vehicle, "--profile", profile, "-o", out)
     assert code == 0
-    assert "s behind the wheel speeds" in said  # PROVENANCE: GNSS is late by about .2 s
+    assert "s behind the wheel speeds" in output  # PROVENANCE: GNSS is late by about .2 s
     table, source = pd.read_parquet(out), pd.read_csv(log)
     moves = source["CAN1.CCVS1.WheelBasedVehicleSpeed"] / 3.6 > 0.5
     for state, slip in (("W", 0.079), ("T", 0.001)):
         rows = (moves & (source["STATE"] == state)).to_numpy()
-        found = table["slip_drive"].to_numpy()[rows]
-        assert np.nanmedian(found) == pytest.approx(slip, abs=0.012)
+        result = table["slip_drive"].to_numpy()[rows]
+        assert np.nanmedian(result) == pytest.approx(slip, abs=0.012)
         assert np.nanmedian(table["slip_drive_std"].to_numpy()[rows]) < 0.06
     assert not set(table["event"]) & {"stuck", "immobilization", "push"}
     for step in ("ground", "soils"):  # no torque, no adhesion
@@ -51,8 +51,10 @@ def test_a_tractors_hour_from_inspect_to_report(
     calibrated = tmp_path / "c.yaml"
     assert run(capsys, "calibrate", log, "--vehicle", vehicle, "--profile", profile, "-o", calibrated)[0] == 0
     # The same zero of slip, whoever finds it.
-    told = tg.estimate(read(log, profile), tg.Vehicle.load(vehicle)).about["zero_slip"]["drive"]["ratio"]
-    assert tg.Vehicle.load(calibrated).calibration.wheel_radius["rl"] == pytest.approx(0.8 * told, rel=1e-4)
+    estimates = tg.estimate(read(log, profile), tg.Vehicle.load(vehicle)).about["zero_slip"]["drive"]["ratio"]
+    assert tg.Vehicle.load(calibrated).calibration.wheel_radius["rl"] == pytest.approx(
+        0.8 * estimates, rel=1e-4
+    )
 
 
 @pytest.mark.parametrize("run_name", ["SNOW/pro_05", "ICE/pro_04"])
@@ -83,12 +85,12 @@ def test_a_bus_on_which_nothing_moves_proposes_no_speed(
 ) -> None:
     """Speeds are 0 or "not available" throughout (PROVENANCE): no channel, and the reason."""
     profile = tmp_path / "p.yaml"
-    code, said, _ = run(
+    code, sentence, _ = run(
         capsys, "inspect", shared(f"data/ingest_samples/{inside}"), "--write-profile", profile
     )
     assert code == 0
     # A receiver's positions are left over where its speed is 0: a doubtful ground speed may be made of them, never of the zeros.
-    assert "is 0 throughout" in said or "? ground_speed <- GnssLatitude" in said
+    assert "is 0 throughout" in sentence or "? ground_speed <- GnssLatitude" in sentence
     text = profile.read_text()
     assert "\n  wheel_based_speed" not in text
     assert "SpeedOverGround" not in text
@@ -113,8 +115,8 @@ GRASS = (
 def test_nobody_is_stuck_on_the_grass(shared: Located, name: str) -> None:
     log = shared(f"data/drive_warthog/raw20hz/warthog_wheels_{name}.csv.gz")
     vehicle = tg.Vehicle.load(EXAMPLES / "drive_warthog/vehicle.yaml")
-    found = tg.estimate(read(log, EXAMPLES / "drive_warthog/profile.yaml"), vehicle)
-    assert not set(found["event"]) & {"stuck", "immobilization"}
+    estimates = tg.estimate(read(log, EXAMPLES / "drive_warthog/profile.yaml"), vehicle)
+    assert not set(estimates["event"]) & {"stuck", "immobilization"}
 
 
 def test_innovations_on_grass_are_of_the_right_order(shared: Located) -> None:
@@ -124,10 +126,10 @@ def test_innovations_on_grass_are_of_the_right_order(shared: Located) -> None:
     assert len(logs) == 5
     vehicle = tg.Vehicle.load(EXAMPLES / "drive_warthog/vehicle.yaml")
     for log in logs:
-        found = estimate_with_channel_nis(read(log, EXAMPLES / "drive_warthog/profile.yaml"), vehicle)
-        rows = found.event_codes == 0
+        estimates = estimate_with_channel_nis(read(log, EXAMPLES / "drive_warthog/profile.yaml"), vehicle)
+        rows = estimates.event_codes == 0
         mean = {
-            name: float(np.nanmean(found[f"{PREFIX}{name}"][rows]))
+            name: float(np.nanmean(estimates[f"{PREFIX}{name}"][rows]))
             for name in ("acceleration_x", "ground_speed")
         }
         assert 0.6 < mean["acceleration_x"] < 1.3
@@ -139,12 +141,14 @@ def test_wheels_of_a_turning_robot_are_expected_too_sure(shared: Located) -> Non
     vehicle = tg.Vehicle.load(EXAMPLES / "alostar_4wd/vehicle.yaml")
     nis: dict[bool, list[np.ndarray]] = {False: [], True: []}
     for log in sorted(shared("data/alostar_4wd").glob("*.txt")):
-        found = estimate_with_channel_nis(read(log, EXAMPLES / "alostar_4wd/profile.yaml"), vehicle)
-        left, right = (sum(found[f"wheel_speed_{w}"] for w in side) for side in (("fl", "rl"), ("fr", "rr")))
+        estimates = estimate_with_channel_nis(read(log, EXAMPLES / "alostar_4wd/profile.yaml"), vehicle)
+        left, right = (
+            sum(estimates[f"wheel_speed_{w}"] for w in side) for side in (("fl", "rl"), ("fr", "rr"))
+        )
         turning = np.abs(left - right) >= 0.1 * np.abs(left + right)
         for which in nis:
-            rows = (found.event_codes == 0) & (turning == which)
-            nis[which] += [found[f"{PREFIX}wheel_speed_{w}"][rows] for w in vehicle.wheels]
+            rows = (estimates.event_codes == 0) & (turning == which)
+            nis[which] += [estimates[f"{PREFIX}wheel_speed_{w}"][rows] for w in vehicle.wheels]
     straight, turns = (float(np.nanmean(np.concatenate(nis[which]))) for which in (False, True))
     assert 0.5 < straight < 1.3
     assert 1.3 < turns < 2.2

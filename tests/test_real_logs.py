@@ -57,17 +57,17 @@ def assert_complete(estimates: Estimates) -> None:
 def test_alostar_on_the_floor(shared: Located, judging: ModuleType) -> None:
     machine = judging.MACHINES[0]
     data = shared("data/alostar_4wd").parent
-    found = {v.log: v for v in judging.verdicts(machine, data, "kalman")}
-    assert len(found) == 6
-    for verdict in found.values():
+    result = {v.log: v for v in judging.verdicts(machine, data, "kalman")}
+    assert len(result) == 6
+    for verdict in result.values():
         # The robot mostly waits between its moves; its wheels turn against each other with next to no ground speed.
         assert 0.3 < verdict.standing < 0.9
         # Slip is taken against each side's hub, by the gyro. It shows 1/2.2 of the turn that the wheels make, so about half
         # of the rim's travel reads as slip; in log90-2 the gyro is dead, and the hub seems to stand still.
         low, high = (0.85, 1.0) if verdict.log == "log90-2" else (0.4, 0.7)
         assert low < verdict.on_the_spot <= high
-    del found["log90-90-90-90"]  # it drives straight for a second
-    for verdict in found.values():
+    del result["log90-90-90-90"]  # it drives straight for a second
+    for verdict in result.values():
         assert verdict.straight >= 80  # enough to judge a median by
         # v/(R ω) is 0.95 to 0.99 there, in pushes of half a second too; wheel speeds are of 3 Hz in three logs, which the
         # spread must show.
@@ -79,7 +79,7 @@ def test_alostar_on_the_floor(shared: Located, judging: ModuleType) -> None:
         assert abs(verdict.adhesion - verdict.resistance) < (0.03 if verdict.log == "log90-3" else 0.02)
     # Rows 0.2 to 0.4 s apart, in which the robot starts and stops: innovations are larger than the filter expects, but of its order.
     for name in ("log3300-180-3300-180", "log_3300x"):
-        assert 0.6 < found[name].nis_straight < 2.5
+        assert 0.6 < result[name].nis_straight < 2.5
 
 
 def test_every_row_of_alostar_has_an_estimate_or_a_reason(shared: Located) -> None:
@@ -92,9 +92,9 @@ def test_every_row_of_alostar_has_an_estimate_or_a_reason(shared: Located) -> No
 def test_warthog_on_grass(shared: Located, judging: ModuleType) -> None:
     machine = judging.MACHINES[1]
     data = shared("data/drive_warthog/raw20hz").parents[1]
-    found = judging.verdicts(machine, data, "kalman")
-    assert len(found) == 5
-    for verdict in found:
+    result = judging.verdicts(machine, data, "kalman")
+    assert len(result) == 5
+    for verdict in result:
         assert verdict.straight >= 80
         # 4 Hz and a pose of 7 to 9 Hz, repeated in a log of 20 Hz.
         assert 3.8 < verdict.held["wheel_speed_left"] < 4.2
@@ -176,9 +176,9 @@ def test_the_warthogs_current_is_that_of_the_battery(shared: Located) -> None:
 
 def test_the_warthogs_torque_scale_goes_with_its_mass(shared: Located, judging: ModuleType) -> None:
     """The logs give scale times mass, and to a factor of two at best: starts are few and a current comes once in 2 s."""
-    said = judging.torque_scale(shared("data/drive_warthog/raw20hz").parents[1])
+    text = judging.torque_scale(shared("data/drive_warthog/raw20hz").parents[1])
     scale, low, high = (
-        float(said.split(mark)[1].split()[0].rstrip(")")) for mark in ("scale ", "% ", " to ")
+        float(text.split(mark)[1].split()[0].rstrip(")")) for mark in ("scale ", "% ", " to ")
     )
     assert 0 < low < scale < high
     # No drive gives more power than it takes, so the true scale is 1 or more at the true mass, 250 to 700 kg.
@@ -198,10 +198,10 @@ def test_the_command_line_on_real_logs(
         out = tmp_path / f"{machine}.parquet"
         words = ["--vehicle", files / "vehicle.yaml", "--profile", files / "profile.yaml", "-o", out]
         assert main(["estimate", str(log), *map(str, words)]) == 0
-        said = capsys.readouterr().out
-        assert "standstill" in said
-        assert "no drawbar_force" in said
-        assert ("Held channels" in said) == (machine == "drive_warthog")
+        output = capsys.readouterr().out
+        assert "standstill" in output
+        assert "no drawbar_force" in output
+        assert ("Held channels" in output) == (machine == "drive_warthog")
         written = pd.read_parquet(out)
         assert len(written) > 300
         assert set(written["event"]) <= set(EVENTS)

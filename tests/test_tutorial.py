@@ -19,7 +19,7 @@ BLOCK = re.compile(r"^```(\w*)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 def blocks() -> list[tuple[str, int, str]]:
     """Language, line and text of each code block."""
     text = PAGE.read_text(encoding="utf-8")
-    return [(found[1], text.count("\n", 0, found.start(2)) + 1, found[2]) for found in BLOCK.finditer(text)]
+    return [(match[1], text.count("\n", 0, match.start(2)) + 1, match[2]) for match in BLOCK.finditer(text)]
 
 
 def run_commands(text: str) -> None:

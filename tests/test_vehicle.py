@@ -213,11 +213,11 @@ def test_any_mapping_is_a_vehicle_or_refused(changes: dict[str, Any]) -> None:
     try:
         Vehicle.from_dict({**_base, **changes})
     except InputError as refusal:
-        told = str(refusal)
+        message = str(refusal)
     else:
         return
-    assert told
-    assert "\n" not in told
+    assert message
+    assert "\n" not in message
 
 
 @settings(max_examples=100)

@@ -133,9 +133,9 @@ def read_json(
         raise unreadable(file, error) from None
     if not isinstance(data, dict) or key not in data:
         raise InputError(f"holds no {key!r}", file=file, hint=hint)
-    found = data.get("version", version)
-    if not isinstance(found, int) or found > version:
-        problem = f"is of version {found}, this terragrip reads up to {version}"
+    result = data.get("version", version)
+    if not isinstance(result, int) or result > version:
+        problem = f"is of version {result}, this terragrip reads up to {version}"
         raise InputError(problem, file=file, hint="update terragrip")
     return data
 

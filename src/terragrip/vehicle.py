@@ -328,9 +328,9 @@ class Vehicle(Part):
     @cached_property
     def wheel_radius(self) -> Floats:
         """Radius of each wheel (n,) [m], calibrated where known; unloaded where it has a radius model."""
-        found = self.calibration.wheel_radius
+        result = self.calibration.wheel_radius
         return _frozen(
-            np.array([found.get(n, w.radius) for n, w in zip(self.wheels, self.wheel_data, strict=True)])
+            np.array([result.get(n, w.radius) for n, w in zip(self.wheels, self.wheel_data, strict=True)])
         )
 
     @cached_property

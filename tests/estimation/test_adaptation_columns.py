@@ -17,10 +17,10 @@ SENSORS = {"wheel_speed": 0.03, "ground_speed": 0.02}
 SECONDS = 10.0
 
 
-def late_means(found: Estimates) -> dict[str, float]:
+def late_means(estimates: Estimates) -> dict[str, float]:
     """The geometric mean of each factor after 4 s, by state."""
-    late = found.time > 4
-    return {s: float(np.exp(np.log(found[f"adaptation_{s}"][late]).mean())) for s in STATES}
+    late = estimates.time > 4
+    return {s: float(np.exp(np.log(estimates[f"adaptation_{s}"][late]).mean())) for s in STATES}
 
 
 def restless(channel: str) -> Estimates:
@@ -35,20 +35,20 @@ def restless(channel: str) -> Estimates:
 @pytest.mark.parametrize("method", METHODS)
 def test_only_methods_that_adapt_have_the_columns(method):
     log = drive(1.0).recording
-    found = estimate(log, robot(), method)
-    assert tuple(n for n in found.names if n.startswith("adaptation")) == (
+    estimates = estimate(log, robot(), method)
+    assert tuple(n for n in estimates.names if n.startswith("adaptation")) == (
         COLUMNS if method in ("aukf", "aukf-fs", "aukf-fs-drive") else ()
     )
-    assert TractionEstimator.for_recording(log, robot(), method).columns == tuple(found.columns)
+    assert TractionEstimator.for_recording(log, robot(), method).columns == tuple(estimates.columns)
 
 
 @pytest.mark.parametrize("method", ["aukf", "aukf-fs"])
 def test_the_factors_start_at_1_and_stay_in_their_bounds(method):
-    found = estimate(drive(SECONDS).recording, robot(), method)
+    estimates = estimate(drive(SECONDS).recording, robot(), method)
     for name in COLUMNS:
-        assert found[name][0] == 1
-        assert 0.05 <= found[name].min() <= found[name].max() <= 50
-        assert len(np.unique(found[name])) > 10, name  # it moves
+        assert estimates[name][0] == 1
+        assert 0.05 <= estimates[name].min() <= estimates[name].max() <= 50
+        assert len(np.unique(estimates[name])) > 10, name  # it moves
 
 
 @pytest.mark.parametrize("wheel", WHEELS)
@@ -68,11 +68,11 @@ def test_a_restless_ground_speed_raises_those_of_the_vehicle():
 
 def test_the_factor_decides_how_sure_the_filter_is():
     """Adhesion's variance grows with its process noise; the wheels differ in nothing else."""
-    found = restless("wheel_speed_rr")
-    late = found.time > 4
-    steps = np.abs(np.diff(found["adhesion_rr"][late])), np.abs(np.diff(found["adhesion_rl"][late]))
+    result = restless("wheel_speed_rr")
+    late = result.time > 4
+    steps = np.abs(np.diff(result["adhesion_rr"][late])), np.abs(np.diff(result["adhesion_rl"][late]))
     assert np.mean(steps[0]) > 3 * np.mean(steps[1])
-    assert found["adhesion_rr_std"][late].mean() > 1.2 * found["adhesion_rl_std"][late].mean()
+    assert result["adhesion_rr_std"][late].mean() > 1.2 * result["adhesion_rl_std"][late].mean()
 
 
 def test_smoothing_leaves_them_as_they_were():

@@ -26,9 +26,9 @@ def test_floats_of_a_stride():
 
 @given(st.lists(st.none() | st.text(st.characters(exclude_categories=["Cs"]), max_size=5)))
 def test_texts(values):
-    found = texts(values)
-    found.validate(full=True)
-    assert found.equals(pa.array(values, type=pa.string()))
+    result = texts(values)
+    result.validate(full=True)
+    assert result.equals(pa.array(values, type=pa.string()))
 
 
 @pytest.mark.parametrize("codes", [[], [2, 0, 1, 0]])

@@ -16,19 +16,19 @@ SPEEDS = (*(f"wheel_speed_{wheel}" for wheel in WHEELS), "ground_speed")
 @pytest.mark.parametrize("method", ["kalman", "bank", "aukf-fs"])
 def test_it_stands_beside_the_estimates_and_changes_none(method: str) -> None:
     log = drive(10, seed=3).recording
-    found, plain = estimate_with_channel_nis(log, robot(), method), estimate(log, robot(), method)
+    estimates, plain = estimate_with_channel_nis(log, robot(), method), estimate(log, robot(), method)
     for name in plain:
-        np.testing.assert_array_equal(found[name], plain[name], err_msg=name)
-    moving = (found.event_codes == 0) & (
-        found["channels"] > 0
+        np.testing.assert_array_equal(estimates[name], plain[name], err_msg=name)
+    moving = (estimates.event_codes == 0) & (
+        estimates["channels"] > 0
     )  # the first row starts the filter and updates nothing
     assert moving.sum() > 900
     for name in SPEEDS:
-        assert np.isfinite(found[f"nis_{name}"][moving]).all()
+        assert np.isfinite(estimates[f"nis_{name}"][moving]).all()
     # The row's is of all channels together: a channel's own, which knows no other of the row, cannot be larger.
-    most = np.max([found[f"nis_{name}"] for name in SPEEDS], axis=0)
+    most = np.max([estimates[f"nis_{name}"] for name in SPEEDS], axis=0)
     if method != "bank":
-        assert (most <= found["nis"] * (1 + 1e-9) + 1e-9)[moving].all()
+        assert (most <= estimates["nis"] * (1 + 1e-9) + 1e-9)[moving].all()
 
 
 def test_stated_noise_gives_what_the_filter_expects() -> None:
@@ -44,9 +44,9 @@ def test_it_names_the_channel_whose_noise_is_stated_at_half(wrong: str) -> None:
     log = drive(60, seed=5).recording
     right = moving_nis(estimate_with_channel_nis(log, robot(), "kalman"))
     half = {"ground_speed": 0.01, "wheel_speed_rl": 0.015}[wrong]
-    found = moving_nis(estimate_with_channel_nis(log, robot(), "kalman", sensors={wrong: half}))
+    estimates = moving_nis(estimate_with_channel_nis(log, robot(), "kalman", sensors={wrong: half}))
     for name in SPEEDS:
-        rise = found[name][0] / right[name][0]
+        rise = estimates[name][0] / right[name][0]
         assert rise > 1.25 if name == wrong else 0.9 < rise < 1.1
 
 
@@ -56,25 +56,25 @@ def test_a_missing_channel_and_a_reckoned_ground_speed_have_none() -> None:
     silent = (given.time > 10) & (given.time < 20)
     columns["ground_speed"][silent] = np.nan
     columns["wheel_speed_fr"][50:60] = np.nan
-    found = estimate_with_channel_nis(
+    estimates = estimate_with_channel_nis(
         tg.Recording.from_frame({"time": given.time, **columns}), robot(), "kalman"
     )
-    np.testing.assert_array_equal(np.isnan(found["nis_ground_speed"][silent]), True)
-    np.testing.assert_array_equal(np.isnan(found["nis_wheel_speed_fr"][50:60]), True)
-    assert np.isfinite(found["nis_wheel_speed_fl"][silent]).all()
+    np.testing.assert_array_equal(np.isnan(estimates["nis_ground_speed"][silent]), True)
+    np.testing.assert_array_equal(np.isnan(estimates["nis_wheel_speed_fr"][50:60]), True)
+    assert np.isfinite(estimates["nis_wheel_speed_fl"][silent]).all()
     # Nor does the row count them: four wheels are left.
-    assert set(found["channels"][silent][20:]) == {4.0}
+    assert set(estimates["channels"][silent][20:]) == {4.0}
 
 
 def test_of_speeds_alone_the_channels_add_up_to_the_row() -> None:
     given = drive(30, seed=7).recording
     columns = {"time": given.time, **{name: given[name] for name in SPEEDS}}
-    found = estimate_with_channel_nis(tg.Recording.from_frame(columns), robot())
-    assert "slip_fl" in found
-    assert "adhesion_fl" not in found
-    started = np.flatnonzero(found["nis"] > 0)
+    estimates = estimate_with_channel_nis(tg.Recording.from_frame(columns), robot())
+    assert "slip_fl" in estimates
+    assert "adhesion_fl" not in estimates
+    started = np.flatnonzero(estimates["nis"] > 0)
     assert len(started) > 2000
-    total = np.sum([found[f"nis_{name}"] for name in SPEEDS], axis=0)
-    np.testing.assert_allclose(total[started], found["nis"][started], rtol=1e-9)
-    for name, (mean, _) in moving_nis(found).items():
+    total = np.sum([estimates[f"nis_{name}"] for name in SPEEDS], axis=0)
+    np.testing.assert_allclose(total[started], estimates["nis"][started], rtol=1e-9)
+    for name, (mean, _) in moving_nis(estimates).items():
         assert 0.6 < mean < 1.3, name

@@ -57,9 +57,9 @@ def test_one_sample_at_a_time_gives_the_same_bits(drive, estimates):
     part = drive.recording.select(np.arange(len(drive.recording)) < 1500)
     estimator = tg.TractionEstimator.for_recording(part, drive.vehicle)
     whole = tg.estimate(part, drive.vehicle)
-    found = [estimator.update(row) for row in part.to_pandas().to_dict("records")]
+    result = [estimator.update(row) for row in part.to_pandas().to_dict("records")]
     for name in COLUMNS:
-        single = np.array([row[name] for row in found])
+        single = np.array([row[name] for row in result])
         if name == "curve_a":
             assert np.ptp(single) > 0.01
         np.testing.assert_array_equal(single, whole[name])
@@ -103,9 +103,9 @@ def test_the_vehicle_lies_between_its_wheels(estimates):
 @pytest.mark.parametrize("method", ["algebraic", "bank", "aukf-fs"])
 def test_every_method_carries_it(drive, method):
     part = drive.recording.select(np.arange(len(drive.recording)) < 1200)
-    found = tg.estimate(part, drive.vehicle, method)
-    assert np.isfinite(found["curve_a"]).all()
-    assert found["curve_a_std"][-1] < 0.4
+    estimated = tg.estimate(part, drive.vehicle, method)
+    assert np.isfinite(estimated["curve_a"]).all()
+    assert estimated["curve_a_std"][-1] < 0.4
 
 
 def test_a_new_ground_by_hand_forgets(drive):

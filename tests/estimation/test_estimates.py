@@ -87,13 +87,13 @@ def test_a_folder_that_is_not_there_is_refused(estimates, tmp_path):
 def test_the_suffix_says_how_a_table_is_written(estimates, tmp_path):
     path = tmp_path / "x.csv"
     estimates.write(path)
-    found = pd.read_csv(path, keep_default_na=False, na_values=["nan"])
-    assert list(found) == list(estimates)
+    result = pd.read_csv(path, keep_default_na=False, na_values=["nan"])
+    assert list(result) == list(estimates)
     for name in estimates:
         if name in ("event", "soil"):
-            assert found[name].tolist() == estimates[name].tolist()
+            assert result[name].tolist() == estimates[name].tolist()
         else:
-            assert np.array_equal(found[name], estimates[name], equal_nan=True), name
+            assert np.array_equal(result[name], estimates[name], equal_nan=True), name
 
 
 @pytest.mark.parametrize("name", ["x.doc", "x"])
@@ -127,17 +127,17 @@ def test_the_summary_says_what_was_met(estimates):
 def test_held_channels_are_in_the_summary():
     recording = drive(20.0).recording
     held = np.repeat(recording["ground_speed"][::5], 5)[: len(recording)]
-    found = estimate(recording.with_channels(ground_speed=held), robot())
-    assert found.about["settings"]["held"]["ground_speed"] == pytest.approx(0.05, rel=0.05)
-    assert "ground_speed (20 Hz)" in found.summary()
+    result = estimate(recording.with_channels(ground_speed=held), robot())
+    assert result.about["settings"]["held"]["ground_speed"] == pytest.approx(0.05, rel=0.05)
+    assert "ground_speed (20 Hz)" in result.summary()
 
 
 def test_distance_is_the_way_travelled(estimates):
     driven = drive(20.0)
-    found = estimate(driven.recording, robot())
-    way = np.trapezoid(driven.truth["ground_speed"], found.time)
-    assert found["distance"][-1] == pytest.approx(way, rel=0.01)
-    assert (np.diff(found["distance"]) >= 0).all()
+    result = estimate(driven.recording, robot())
+    way = np.trapezoid(driven.truth["ground_speed"], result.time)
+    assert result["distance"][-1] == pytest.approx(way, rel=0.01)
+    assert (np.diff(result["distance"]) >= 0).all()
 
 
 @pytest.mark.parametrize("cuts", [(0, 800), (0, 1, 250, 500, 800), (0, 499, 501, 800)])
@@ -146,9 +146,9 @@ def test_a_file_from_blocks_is_the_whole_file(estimates, tmp_path, cuts):
     recording, path, seen = labelled(), tmp_path / "e.parquet", []
     log = in_blocks([recording.select(slice(a, b)) for a, b in pairwise(cuts)])
     write_parts(estimated(log, robot(), progress=lambda done, of: seen.append((done, of))), path)
-    found = Estimates.read(path)
-    pd.testing.assert_frame_equal(found.to_pandas(), estimates.to_pandas(), check_exact=True)
-    assert (found.about, found.notes) == (estimates.about, estimates.notes)
+    result = Estimates.read(path)
+    pd.testing.assert_frame_equal(result.to_pandas(), estimates.to_pandas(), check_exact=True)
+    assert (result.about, result.notes) == (estimates.about, estimates.notes)
     assert seen[-1] == (800, 800)
 
 

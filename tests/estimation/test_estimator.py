@@ -24,23 +24,23 @@ def noisy():
 @pytest.mark.parametrize("method", METHODS)
 def test_an_exact_drive_is_recovered(method):
     exact = drive(20.0, noise=0.0)
-    found = estimate(exact.recording, robot(), method)
-    late = found.time > 8
+    estimates = estimate(exact.recording, robot(), method)
+    late = estimates.time > 8
     for name in NUMBERS:
-        error = np.abs(found[name] - exact.truth[name])[late]
+        error = np.abs(estimates[name] - exact.truth[name])[late]
         assert error.max() < 0.012, (name, error.max())
 
 
 @pytest.mark.parametrize("method", METHODS)
 def test_noise_is_averaged_and_within_the_intervals(method):
     noisy = drive(30.0)
-    found = estimate(noisy.recording, robot(), method)
-    late = found.time > 5
+    estimates = estimate(noisy.recording, robot(), method)
+    late = estimates.time > 5
     for name in ("adhesion_rr", "slip_rr", "soil_resistance"):
-        error = np.abs(found[name] - noisy.truth[name])[late]
+        error = np.abs(estimates[name] - noisy.truth[name])[late]
         assert error.mean() < 0.02, name
         if method != "algebraic":
-            assert np.mean(error < 1.96 * found[f"{name}_std"][late]) > 0.9, name
+            assert np.mean(error < 1.96 * estimates[f"{name}_std"][late]) > 0.9, name
 
 
 @pytest.mark.parametrize("method", METHODS)
@@ -134,8 +134,8 @@ def test_noise_the_file_does_not_name_comes_from_the_log(noisy):
 def test_a_guessed_noise_is_said():
     exact = drive(5.0, noise=0.0)
     constant = exact.recording.with_channels(ground_speed=np.full(len(exact.recording), 0.6))
-    found = estimate(constant, robot(sensors={}))
-    assert any("ground_speed" in note and "guess" in note for note in found.notes)
+    estimates = estimate(constant, robot(sensors={}))
+    assert any("ground_speed" in note and "guess" in note for note in estimates.notes)
 
 
 def test_calibration_is_applied_before_anything_else(noisy):
@@ -179,12 +179,12 @@ def test_one_axle_and_many(wheels):
     for wheel in wheels:
         channels[f"wheel_speed_{wheel}"] = exact.recording["wheel_speed_fl"]
         channels[f"drive_torque_{wheel}"] = (torque - inertia_share - bearing_share) / len(wheels)
-    found = estimate(Recording(exact.recording.time, channels), vehicle)
-    mean = sum(found[f"adhesion_{w}"] * 1 for w in wheels) / len(wheels)
-    late = found.time > 8
+    estimates = estimate(Recording(exact.recording.time, channels), vehicle)
+    mean = sum(estimates[f"adhesion_{w}"] * 1 for w in wheels) / len(wheels)
+    late = estimates.time > 8
     if len(wheels) != 6:  # with three axles the loads differ, and with them each wheel's adhesion
         assert np.abs(mean - exact.truth["adhesion_fl"])[late].max() < 0.015
-    assert np.abs(found["soil_resistance"] - 0.08)[late].max() < 0.015
+    assert np.abs(estimates["soil_resistance"] - 0.08)[late].max() < 0.015
 
 
 MASS_OF = 139.0

@@ -30,20 +30,20 @@ def delayed(recording: Recording, after: float, by: float) -> Recording:
 @pytest.mark.parametrize("method", METHODS)
 def test_a_long_gap_is_flagged_on_both_sides_and_widens(method):
     base = drive(20.0)
-    found = run(delayed(base.recording, 10.0, 5.0), method)
-    flagged = np.flatnonzero(found["event"] == "gap")
+    estimates = run(delayed(base.recording, 10.0, 5.0), method)
+    flagged = np.flatnonzero(estimates["event"] == "gap")
     assert list(flagged) == [999, 1000]
-    assert np.isfinite(found["adhesion_rr"]).all()
+    assert np.isfinite(estimates["adhesion_rr"]).all()
     if method != "algebraic":
-        assert found["adhesion_rr_std"][1000] > 1.5 * found["adhesion_rr_std"][998]
-        assert found["ground_speed_std"][1000] > found["ground_speed_std"][998]
-    assert np.abs(found["adhesion_rr"] - base.truth["adhesion_rr"])[1300:].mean() < 0.02
+        assert estimates["adhesion_rr_std"][1000] > 1.5 * estimates["adhesion_rr_std"][998]
+        assert estimates["ground_speed_std"][1000] > estimates["ground_speed_std"][998]
+    assert np.abs(estimates["adhesion_rr"] - base.truth["adhesion_rr"])[1300:].mean() < 0.02
 
 
 def test_a_short_gap_only_widens():
-    found = run(delayed(drive(20.0).recording, 10.0, 1.5))
-    assert not (found["event"] == "gap").any()
-    assert found["ground_speed_std"][1000] > found["ground_speed_std"][998]
+    estimates = run(delayed(drive(20.0).recording, 10.0, 1.5))
+    assert not (estimates["event"] == "gap").any()
+    assert estimates["ground_speed_std"][1000] > estimates["ground_speed_std"][998]
 
 
 def test_the_length_of_a_gap_is_a_setting():
@@ -57,32 +57,32 @@ def test_rows_without_any_speed_are_a_gap_too():
     dead = (base.time > 8) & (base.time < 13)
     for name in ("ground_speed", *(f"wheel_speed_{w}" for w in WHEELS)):
         base = with_values(base, name, dead, np.nan)
-    found = run(base)
-    event, rows = found["event"], np.flatnonzero(dead)
+    estimates = run(base)
+    event, rows = estimates["event"], np.flatnonzero(dead)
     assert (event[rows[210] : rows[-1] + 2] == "gap").all()
     assert (event[rows[0] : rows[180]] == "").all()
-    assert np.isfinite(found["slip_rr"][event != "gap"]).all()
-    assert np.isnan(found["slip_rr"][rows[210] : rows[-1]]).all()  # nothing tells it
-    assert found["adhesion_rr_std"][rows[-1]] > 2 * found["adhesion_rr_std"][rows[0]]
+    assert np.isfinite(estimates["slip_rr"][event != "gap"]).all()
+    assert np.isnan(estimates["slip_rr"][rows[210] : rows[-1]]).all()  # nothing tells it
+    assert estimates["adhesion_rr_std"][rows[-1]] > 2 * estimates["adhesion_rr_std"][rows[0]]
 
 
 @pytest.mark.parametrize("method", METHODS)
 def test_at_standstill_slip_is_undefined_and_the_ground_is_held(method):
     """Drive, stop for 6 s with noisy sensors, drive on."""
     stop = drive(24.0, speed=lambda t: 0.6 * np.clip(np.minimum(np.abs(t - 13) - 3, 1), 0, 1) + 1e-9)
-    found = run(stop.recording, method)
-    event = found["event"]
-    still = (found.time > 11) & (found.time < 15.5)
+    estimates = run(stop.recording, method)
+    event = estimates["event"]
+    still = (estimates.time > 11) & (estimates.time < 15.5)
     assert (event[still] == "standstill").all()
     for wheel in WHEELS:
-        assert np.isnan(found[f"slip_{wheel}"][still]).all()
-        assert np.isnan(found[f"efficiency_{wheel}"][still]).all()
-        assert len(np.unique(found[f"adhesion_{wheel}"][still])) == 1
-    assert len(np.unique(found["soil_resistance"][still])) == 1
-    moving = (found.time > 1) & ((found.time < 9) | (found.time > 17.5))
+        assert np.isnan(estimates[f"slip_{wheel}"][still]).all()
+        assert np.isnan(estimates[f"efficiency_{wheel}"][still]).all()
+        assert len(np.unique(estimates[f"adhesion_{wheel}"][still])) == 1
+    assert len(np.unique(estimates["soil_resistance"][still])) == 1
+    moving = (estimates.time > 1) & ((estimates.time < 9) | (estimates.time > 17.5))
     assert (event[moving] == "").all()
-    assert np.isfinite(found["slip_rr"][moving]).all()
-    assert found["distance"][still].max() == found["distance"][still].min()
+    assert np.isfinite(estimates["slip_rr"][moving]).all()
+    assert estimates["distance"][still].max() == estimates["distance"][still].min()
 
 
 def test_a_leap_of_the_ground_speed_does_not_end_standstill():
@@ -90,17 +90,17 @@ def test_a_leap_of_the_ground_speed_does_not_end_standstill():
     recording = drive(10.0, speed=lambda t: 0.0 * t + 1e-9).recording
     recording = with_values(recording, "drive_torque_fr", slice(None), -20.0)
     recording = with_values(recording, "ground_speed", slice(500, 505), 0.4)
-    found = run(recording)
-    assert (found["event"] == "standstill").all()
-    assert np.abs(found["ground_speed"]).max() < 0.1
+    estimates = run(recording)
+    assert (estimates["event"] == "standstill").all()
+    assert np.abs(estimates["ground_speed"]).max() < 0.1
 
 
 def test_wheels_that_spin_on_the_spot_are_no_standstill():
     base = drive(10.0, slip=lambda t: 0.0 * t + 0.97, speed=lambda t: 0.02 + 0.0 * t)
-    found = run(base.recording)
-    late = found.time > 3
-    assert not (found["event"] == "standstill").any()
-    assert np.abs(found["slip_rr"] - 0.97)[late].max() < 0.05
+    estimates = run(base.recording)
+    late = estimates.time > 3
+    assert not (estimates["event"] == "standstill").any()
+    assert np.abs(estimates["slip_rr"] - 0.97)[late].max() < 0.05
 
 
 @pytest.mark.parametrize("channel", ["ground_speed", "wheel_speed_fr", "drive_torque_rr", "drawbar_force"])
@@ -128,8 +128,8 @@ def test_clean_data_has_hardly_an_outlier():
 def test_a_step_that_lasts_is_followed_and_not_gated():
     """A hard gate would lock the estimate out for good."""
     step = drive(30.0, resistance=lambda t: np.where(t < 15, 0.05, 0.25))
-    found = run(step.recording)
-    assert np.abs(found["soil_resistance"] - step.truth["soil_resistance"])[1900:].mean() < 0.02
+    estimates = run(step.recording)
+    assert np.abs(estimates["soil_resistance"] - step.truth["soil_resistance"])[1900:].mean() < 0.02
 
 
 @pytest.mark.parametrize("method", METHODS)
@@ -149,9 +149,9 @@ def test_backwards_is_the_mirror_image(method):
 def test_backwards_the_ground_is_found_too(method):
     """With heights: driving backwards the pull loads the front."""
     back = drive(20.0, noise=0.0, direction=-1, imu=True)
-    found = run(back.recording, method)
+    estimates = run(back.recording, method)
     for name in ("adhesion_rr", "adhesion_fl", "slip_fl", "soil_resistance", "ground_speed"):
-        assert np.abs(found[name] - back.truth[name])[800:].max() < 0.012, name
+        assert np.abs(estimates[name] - back.truth[name])[800:].max() < 0.012, name
 
 
 def test_turning_back_starts_the_motion_anew():
@@ -161,47 +161,47 @@ def test_turning_back_starts_the_motion_anew():
         name: np.concatenate([values, back.recording[name]])
         for name, values in there.recording.channels.items()
     }
-    found = run(Recording(time, channels))
-    settled = (found.time > 3) & ((found.time < 9.5) | (found.time > 12))
-    assert np.abs(found["adhesion_rr"] - np.tile(there.truth["adhesion_rr"], 2))[settled].max() < 0.08
-    assert (found["ground_speed"][found.time > 11] < 0).all()
+    estimates = run(Recording(time, channels))
+    settled = (estimates.time > 3) & ((estimates.time < 9.5) | (estimates.time > 12))
+    assert np.abs(estimates["adhesion_rr"] - np.tile(there.truth["adhesion_rr"], 2))[settled].max() < 0.08
+    assert (estimates["ground_speed"][estimates.time > 11] < 0).all()
 
 
 @pytest.mark.parametrize("missing", ["ground_speed", "wheel_speed_fl", "drive_torque_rr", "drawbar_force"])
 def test_a_channel_may_begin_late(missing):
     base = drive(20.0)
-    found = run(with_values(base.recording, missing, slice(0, 500), np.nan))
-    assert np.isfinite(found["adhesion_rr"]).all()
-    assert np.isfinite(found["slip_fl"]).all()
+    estimates = run(with_values(base.recording, missing, slice(0, 500), np.nan))
+    assert np.isfinite(estimates["adhesion_rr"]).all()
+    assert np.isfinite(estimates["slip_fl"]).all()
     for name in ("adhesion_rr", "slip_fl", "soil_resistance"):
-        assert np.abs(found[name] - base.truth[name])[1000:].mean() < 0.02, name
+        assert np.abs(estimates[name] - base.truth[name])[1000:].mean() < 0.02, name
     if missing == "drive_torque_rr":
-        assert found["adhesion_rr_std"][400] > 5 * found["adhesion_rr_std"][1500]
+        assert estimates["adhesion_rr_std"][400] > 5 * estimates["adhesion_rr_std"][1500]
 
 
 def test_before_the_first_speed_there_is_a_gap():
     base = drive(5.0).recording
     for name in ("ground_speed", *(f"wheel_speed_{w}" for w in WHEELS)):
         base = with_values(base, name, slice(0, 100), np.nan)
-    found = run(base)
-    assert (found["event"][:100] == "gap").all()
-    assert np.isnan(found["slip_rr"][:100]).all()
-    assert np.isfinite(found["adhesion_rr"]).all()
-    assert np.isfinite(found["slip_rr"][100:]).all()
+    estimates = run(base)
+    assert (estimates["event"][:100] == "gap").all()
+    assert np.isnan(estimates["slip_rr"][:100]).all()
+    assert np.isfinite(estimates["adhesion_rr"]).all()
+    assert np.isfinite(estimates["slip_rr"][100:]).all()
 
 
 @pytest.mark.parametrize("imu", [False, True])
 def test_eight_seconds_without_ground_speed(imu):
     base = drive(40.0, imu=imu)
     lost = (base.recording.time > 15) & (base.recording.time < 23)
-    found = run(with_values(base.recording, "ground_speed", lost, np.nan))
-    before, end = np.searchsorted(found.time, [14.9, 22.9])
-    assert found["slip_rr_std"][end] > 1.5 * found["slip_rr_std"][before]
-    assert np.abs(found["slip_rr"] - base.truth["slip_rr"])[lost].max() < 0.15
-    assert np.abs(found["soil_resistance"] - 0.08)[lost].max() < 0.05
-    inside = np.abs(found["slip_rr"] - base.truth["slip_rr"]) < 1.96 * found["slip_rr_std"]
+    estimates = run(with_values(base.recording, "ground_speed", lost, np.nan))
+    before, end = np.searchsorted(estimates.time, [14.9, 22.9])
+    assert estimates["slip_rr_std"][end] > 1.5 * estimates["slip_rr_std"][before]
+    assert np.abs(estimates["slip_rr"] - base.truth["slip_rr"])[lost].max() < 0.15
+    assert np.abs(estimates["soil_resistance"] - 0.08)[lost].max() < 0.05
+    inside = np.abs(estimates["slip_rr"] - base.truth["slip_rr"]) < 1.96 * estimates["slip_rr_std"]
     assert inside[lost].mean() > 0.9
-    assert np.abs(found["slip_rr"] - base.truth["slip_rr"])[2500:].mean() < 0.02
+    assert np.abs(estimates["slip_rr"] - base.truth["slip_rr"])[2500:].mean() < 0.02
 
 
 def test_channels_at_their_own_rates():
@@ -213,12 +213,12 @@ def test_channels_at_their_own_rates():
         every = 2 if name.startswith("wheel") else 10 if name == "ground_speed" else 5
         if name not in ("acceleration_x", "pitch"):
             recording = with_values(recording, name, rows % every != every - 1, np.nan)
-    found = run(recording)
-    late = found.time > 5
+    estimates = run(recording)
+    late = estimates.time > 5
     for name, most in (("adhesion_rr", 0.02), ("slip_rr", 0.03), ("soil_resistance", 0.02)):
-        error = np.abs(found[name] - base.truth[name])[late]
+        error = np.abs(estimates[name] - base.truth[name])[late]
         assert error.mean() < most, name
-        assert np.mean(error < 1.96 * found[f"{name}_std"][late]) > 0.9, name
+        assert np.mean(error < 1.96 * estimates[f"{name}_std"][late]) > 0.9, name
 
 
 def test_held_values_count_once():
@@ -227,11 +227,11 @@ def test_held_values_count_once():
     sparse = np.where(np.arange(len(base)) % 5 == 0, base["ground_speed"], np.nan)
     held = np.repeat(base["ground_speed"][::5], 5)
     wanted = run(base.with_channels(ground_speed=sparse), held={})
-    found = run(base.with_channels(ground_speed=held), held={"ground_speed": 0.05})
+    estimates = run(base.with_channels(ground_speed=held), held={"ground_speed": 0.05})
     naive = run(base.with_channels(ground_speed=held), held={})
-    np.testing.assert_array_equal(found["slip_rr"], wanted["slip_rr"])
-    np.testing.assert_array_equal(found["channels"], wanted["channels"])
-    assert naive["channels"].sum() > found["channels"].sum() + 0.7 * len(base)
+    np.testing.assert_array_equal(estimates["slip_rr"], wanted["slip_rr"])
+    np.testing.assert_array_equal(estimates["channels"], wanted["channels"])
+    assert naive["channels"].sum() > estimates["channels"].sum() + 0.7 * len(base)
 
 
 @pytest.mark.parametrize(
@@ -239,10 +239,10 @@ def test_held_values_count_once():
 )
 def test_an_impossible_value_is_no_measurement(channel, value):
     base = drive(8.0, imu=True).recording
-    absent, found = (run(with_values(base, channel, slice(400, 410), v)) for v in (np.nan, value))
-    assert (found["event"][400:410] == "outlier").all()
+    absent, result = (run(with_values(base, channel, slice(400, 410), v)) for v in (np.nan, value))
+    assert (result["event"][400:410] == "outlier").all()
     for name in ("adhesion_rr", "slip_fl", "soil_resistance"):
-        np.testing.assert_array_equal(found[name], absent[name])
+        np.testing.assert_array_equal(result[name], absent[name])
 
 
 def test_in_a_turn_slip_is_that_of_the_hub():
@@ -254,11 +254,11 @@ def test_in_a_turn_slip_is_that_of_the_hub():
     for wheel, left in (("fl", 1), ("fr", -1), ("rl", 1), ("rr", -1)):
         share = (base["ground_speed"] - left * side * yaw) / base["ground_speed"]
         channels[f"wheel_speed_{wheel}"] = rim * share / 0.2
-    found = run(Recording(base.time, channels))
+    estimates = run(Recording(base.time, channels))
     straight = run(base)
-    late = found.time > 5
+    late = estimates.time > 5
     for wheel in WHEELS:
-        assert np.abs(found[f"slip_{wheel}"] - straight[f"slip_{wheel}"])[late].max() < 0.02
+        assert np.abs(estimates[f"slip_{wheel}"] - straight[f"slip_{wheel}"])[late].max() < 0.02
 
 
 values = st.one_of(
@@ -277,11 +277,11 @@ def test_whatever_comes_there_is_no_nan_without_an_event(rows, method):
     estimator, time = TractionEstimator(robot(), method, channels=names), 0.0
     for step, sample in rows:
         time += step
-        found = estimator.update({"time": time, **sample})
+        result = estimator.update({"time": time, **sample})
         for name in estimator.columns:
-            value = found[name]
+            value = result[name]
             if math.isnan(value):
-                assert found.event in ("standstill", "gap"), (name, found.event)
+                assert result.event in ("standstill", "gap"), (name, result.event)
                 assert not name.startswith(("adhesion", "soil", "net_traction", "vertical", "nis"))
             else:
                 assert math.isfinite(value), (name, value)
@@ -305,7 +305,7 @@ def test_an_input_that_comes_late_does_not_start_the_filter_anew(late: float) ->
     for name, start in columns.items():
         recording = with_values(recording, name, recording.time < start, np.nan)
     for method in ("kalman", "bank", "aukf-fs"):
-        found = estimate(recording, robot(), method)
-        assert "restart" not in set(found["event"])
-        after = found.time > late + 8
-        assert np.sqrt(np.mean((found["adhesion_rl"] - made.truth["adhesion_rl"])[after] ** 2)) < 0.05
+        estimates = estimate(recording, robot(), method)
+        assert "restart" not in set(estimates["event"])
+        after = estimates.time > late + 8
+        assert np.sqrt(np.mean((estimates["adhesion_rl"] - made.truth["adhesion_rl"])[after] ** 2)) < 0.05

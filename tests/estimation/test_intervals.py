@@ -37,7 +37,7 @@ def without(recording: Recording, channels: tuple[str, ...]) -> Recording:
 @cache
 def held(scenario: str, missing: tuple[str, ...] = ()) -> dict[str, dict[str, NDArray[np.bool_]]]:
     """By quantity and soil: whether each interval holds the truth, while moving and with nobody pushing."""
-    found: dict[str, dict[str, list[NDArray[np.bool_]]]] = {name: {} for name in QUANTITIES}
+    out: dict[str, dict[str, list[NDArray[np.bool_]]]] = {name: {} for name in QUANTITIES}
     for seed in SEEDS:
         result = drive(scenario, seed)
         truth, estimates = result.truth, estimate(without(result.recording, missing), result.vehicle)
@@ -47,8 +47,8 @@ def held(scenario: str, missing: tuple[str, ...] = ()) -> dict[str, dict[str, ND
             inside = np.abs(error) <= 1.96 * estimates[f"{name}_std"]
             for soil in ("hard", "fine", "wet", "coarse", "grass"):
                 rows = counts.to_numpy() & (truth["soil"] == soil).to_numpy() & np.isfinite(error)
-                found[name].setdefault(soil, []).append(inside[rows])
-    return {n: {soil: np.concatenate(parts) for soil, parts in by.items()} for n, by in found.items()}
+                out[name].setdefault(soil, []).append(inside[rows])
+    return {n: {soil: np.concatenate(parts) for soil, parts in by.items()} for n, by in out.items()}
 
 
 @pytest.mark.parametrize("scenario", ["accuracy-clean", "accuracy-faults"])
@@ -77,16 +77,16 @@ def test_intervals_hold_over_machines() -> None:
     inside: dict[str, list[NDArray[np.bool_]]] = {}
     for kind, seed in machines("development", 6):
         result = draw(kind, seed, rate=50.0)
-        truth, found = result.truth, estimate(result.recording, result.vehicle)
+        truth, estimates = result.truth, estimate(result.recording, result.vehicle)
         speed = np.abs(truth["true_ground_speed"].to_numpy())
         moving = speed > min(0.05, 0.1 * float(np.median(speed[speed > 0.01])))
         driven = [w for w, driven in zip(result.vehicle.wheels, result.vehicle.driven, strict=True) if driven]
         for name in [f"{q}_{w}" for q in ("adhesion", "slip", "net_traction") for w in driven] + [
             "soil_resistance"
         ]:
-            error = found[name] - truth[f"true_{name}"].to_numpy()
+            error = estimates[name] - truth[f"true_{name}"].to_numpy()
             rows = moving & np.isfinite(error)
-            half = 1.96 * found[f"{name}_std"][rows]
+            half = 1.96 * estimates[f"{name}_std"][rows]
             quantity = name if name == "soil_resistance" else name.rpartition("_")[0]
             inside.setdefault(quantity, []).append(np.abs(error[rows]) <= half)
     for quantity, parts in inside.items():
@@ -100,10 +100,11 @@ def test_what_the_accelerometer_reads_too_much_moves_resistance_but_not_speed() 
     for bias in (0.001, 0.3):
         data = result.vehicle.to_dict()
         data["uncertainty"]["acceleration_bias"] = bias
-        found = estimate(result.recording, Vehicle.from_dict(data))
-        rows = found["time"] > 20.0
+        estimates = estimate(result.recording, Vehicle.from_dict(data))
+        rows = estimates["time"] > 20.0
         spread[bias] = {
-            name: float(np.median(found[f"{name}_std"][rows])) for name in ("ground_speed", "soil_resistance")
+            name: float(np.median(estimates[f"{name}_std"][rows]))
+            for name in ("ground_speed", "soil_resistance")
         }
     assert spread[0.3]["soil_resistance"] == pytest.approx(0.3 / 9.81, rel=0.1)
     assert spread[0.3]["ground_speed"] < 1.05 * spread[0.001]["ground_speed"]

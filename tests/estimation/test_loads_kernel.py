@@ -29,12 +29,12 @@ def test_loads_follow_pull_acceleration_and_slope(imu):
         speed=lambda t: 0.8 + 0.3 * np.sin(t / 4),
         slope=lambda t: 0.1 * np.sin(t / 9) * imu,
     )
-    found = estimate(moved.recording, robot())
-    late = found.time > 10
+    estimates = estimate(moved.recording, robot())
+    late = estimates.time > 10
     swing = np.ptp(moved.truth["vertical_load_front"][late])
     assert swing > 40
     for axle in ("front", "rear"):
-        off = np.abs(found[f"vertical_load_{axle}"] - moved.truth[f"vertical_load_{axle}"])[late]
+        off = np.abs(estimates[f"vertical_load_{axle}"] - moved.truth[f"vertical_load_{axle}"])[late]
         assert off.max() < 0.15 * swing
 
 
@@ -42,7 +42,7 @@ def test_the_formula_at_rest_on_a_slope_and_under_a_pull():
     """A steady state: the specific force is g sin(slope), nothing spins up."""
     slope, pull = 0.1, 200.0
     recording = steady(drawbar_force=pull, pitch=slope, acceleration_x=GRAVITY * np.sin(slope))
-    found = estimate(recording, robot(), held={})
+    estimates = estimate(recording, robot(), held={})
     wanted = axle_loads(
         (54.0, 85.0),
         (0.638, 0.0),
@@ -51,8 +51,8 @@ def test_the_formula_at_rest_on_a_slope_and_under_a_pull():
         drawbar=pull,
         slope=slope,
     )
-    assert found["vertical_load_front"][-1] == pytest.approx(wanted[0], rel=1e-3)
-    assert found["vertical_load_rear"][-1] == pytest.approx(wanted[1], rel=1e-3)
+    assert estimates["vertical_load_front"][-1] == pytest.approx(wanted[0], rel=1e-3)
+    assert estimates["vertical_load_rear"][-1] == pytest.approx(wanted[1], rel=1e-3)
 
 
 @pytest.mark.parametrize("axles", [1, 2, 3, 4])
@@ -90,23 +90,23 @@ def test_the_formula_holds_on_any_number_of_axles(axles):
 
 
 def test_a_measured_load_wins_and_the_other_axle_takes_the_rest():
-    found = estimate(steady(vertical_load_front=400.0), robot(), held={})
-    assert found["vertical_load_front"][-1] == 400.0
-    assert found["vertical_load_rear"][-1] == pytest.approx(139 * GRAVITY - 400.0, rel=1e-9)
+    estimates = estimate(steady(vertical_load_front=400.0), robot(), held={})
+    assert estimates["vertical_load_front"][-1] == 400.0
+    assert estimates["vertical_load_rear"][-1] == pytest.approx(139 * GRAVITY - 400.0, rel=1e-9)
 
 
 def test_both_measured_loads_are_taken():
-    found = estimate(steady(vertical_load_front=400.0, vertical_load_rear=1000.0), robot(), held={})
-    assert found["vertical_load_rear"][-1] == 1000.0
+    estimates = estimate(steady(vertical_load_front=400.0, vertical_load_rear=1000.0), robot(), held={})
+    assert estimates["vertical_load_rear"][-1] == 1000.0
 
 
 def test_lateral_acceleration_moves_load_to_the_outer_wheels():
     """Through the adhesion: the same torque over another load."""
     sideways = 2.0
-    found = estimate(steady(acceleration_y=sideways), robot(), held={})
+    estimates = estimate(steady(acceleration_y=sideways), robot(), held={})
     straight = estimate(steady(), robot(), held={})
     left, right = lateral_shares(2, sideways, center_of_gravity_height=0.30, track=0.554)
-    gross = [found[f"adhesion_{w}"][-1] + 0.02 for w in ("rl", "rr")]
+    gross = [estimates[f"adhesion_{w}"][-1] + 0.02 for w in ("rl", "rr")]
     plain = straight["adhesion_rl"][-1] + 0.02
     assert gross[0] == pytest.approx(plain * 0.5 / left, rel=0.02)
     assert gross[1] == pytest.approx(plain * 0.5 / right, rel=0.02)
@@ -120,6 +120,6 @@ def test_roll_stands_in_for_a_missing_accelerometer():
 
 def test_a_wheel_never_floats():
     """A pull that would lift the front: the adhesion stays a number."""
-    found = estimate(steady(drawbar_force=2000.0), robot(), held={})
-    assert found["vertical_load_front"][-1] < 100
-    assert np.isfinite(found["adhesion_fl"]).all()
+    estimates = estimate(steady(drawbar_force=2000.0), robot(), held={})
+    assert estimates["vertical_load_front"][-1] < 100
+    assert np.isfinite(estimates["adhesion_fl"]).all()

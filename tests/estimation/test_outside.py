@@ -104,16 +104,17 @@ def tractor(seed: int = 0) -> Drive:
     return drive(vehicle, np.array(speed), np.zeros(len(speed)), dt, 1.0, seed)
 
 
-def r2(truth: Floats, said: Floats) -> float:
-    return float(1 - np.sum((said - truth) ** 2) / np.sum((truth - truth.mean()) ** 2))
+def r2(truth: Floats, estimated: Floats) -> float:
+    return float(1 - np.sum((estimated - truth) ** 2) / np.sum((truth - truth.mean()) ** 2))
 
 
-def lag(truth: Floats, said: Floats) -> int:
+def lag(truth: Floats, estimated: Floats) -> int:
     """Samples by which the estimate follows the truth: where their correlation is best."""
     most = 15
     inner = truth[most:-most]
     shifted = [
-        np.corrcoef(inner, said[most + k : len(said) - most + k])[0, 1] for k in range(-most, most + 1)
+        np.corrcoef(inner, estimated[most + k : len(estimated) - most + k])[0, 1]
+        for k in range(-most, most + 1)
     ]
     return int(np.argmax(shifted)) - most
 
@@ -132,10 +133,10 @@ def without(log: Recording, lost: dict[str, tuple[float, float]]) -> Recording:
 def test_adhesion_does_not_lag_a_torque_that_comes_with_every_row(method: str, most: int) -> None:
     """It lagged by 50 ms at 100 Hz, R² .92: the torque's own motion counted as noise of the input."""
     d = robot()
-    found = estimate(d.recording, d.vehicle, method)
+    estimates = estimate(d.recording, d.vehicle, method)
     rows = slice(300, None)
-    assert lag(d.adhesion[rows], found["adhesion_rr"][rows]) <= most
-    assert r2(d.adhesion[rows], found["adhesion_rr"][rows]) > 0.975
+    assert lag(d.adhesion[rows], estimates["adhesion_rr"][rows]) <= most
+    assert r2(d.adhesion[rows], estimates["adhesion_rr"][rows]) > 0.975
 
 
 def test_spikes_cost_nothing() -> None:
@@ -179,11 +180,11 @@ def test_a_start_is_followed_at_once() -> None:
     t = np.arange(0.0, 30.0, 1e-3)
     speed = np.interp(t, [0, 2, 3, 10, 10.5, 14, 15.5, 30], [0.0, 0, 0.7, 0.7, 0, 0, 0.7, 0.7])
     d = drive(vehicle, speed, np.where(t > 12, 300.0, 60.0), 1e-3, 100.0, 3)
-    found = estimate(d.recording, vehicle)
+    estimates = estimate(d.recording, vehicle)
     moving = (d.speed > 0.05) & (d.recording.time > 14) & (d.recording.time < 14.6)
-    assert (found.event_codes[moving] != STANDSTILL).all()
+    assert (estimates.event_codes[moving] != STANDSTILL).all()
     assert (
-        np.abs(found["adhesion_rr"] - d.adhesion)[moving].max() < 0.08
+        np.abs(estimates["adhesion_rr"] - d.adhesion)[moving].max() < 0.08
     )  # 0.25 to 0.35, after 0.1 before the stop
 
 
@@ -191,31 +192,31 @@ def test_a_start_is_followed_at_once() -> None:
 def test_manoeuvres_at_1_hz_are_no_outliers(seed: int) -> None:
     """A speed came out as 4.41 ± .49 where ground speed and wheels said .98, and a tenth of the rows as outliers."""
     d = tractor(seed)
-    found = estimate(d.recording, d.vehicle)
-    error = np.abs(found["ground_speed"] - d.speed)
+    estimates = estimate(d.recording, d.vehicle)
+    error = np.abs(estimates["ground_speed"] - d.speed)
     assert error.max() < 4.5 * 0.05  # what the sensor itself errs by
-    assert np.mean(error < 1.96 * found["ground_speed_std"]) > 0.92
-    assert np.mean(found.event_codes == OUTLIER) < 0.03
+    assert np.mean(error < 1.96 * estimates["ground_speed_std"]) > 0.92
+    assert np.mean(estimates.event_codes == OUTLIER) < 0.03
 
 
 def test_after_a_gap_nothing_is_said_of_slip_before_it_is_known() -> None:
     """Slips of .9 and warnings of a stuck vehicle where no wheel was measured; speeds a row late where the ground speed was not."""
     d = tractor()
     lost = {"": (60.0, 80.0), "wheel": (60.0, 90.0)}
-    found = estimate(without(d.recording, lost), d.vehicle)
+    estimates = estimate(without(d.recording, lost), d.vehicle)
     silent = (d.recording.time > 62) & (d.recording.time < 90)
-    assert (found.event_codes[silent] == GAP).all()
-    assert np.isnan(found["slip_fl"][silent]).all()
-    assert np.isnan(found["efficiency_fl"][silent]).all()
+    assert (estimates.event_codes[silent] == GAP).all()
+    assert np.isnan(estimates["slip_fl"][silent]).all()
+    assert np.isnan(estimates["efficiency_fl"][silent]).all()
 
     lost = {"": (60.0, 80.0), "ground": (60.0, 90.0)}
-    found = estimate(without(d.recording, lost), d.vehicle)
+    estimates = estimate(without(d.recording, lost), d.vehicle)
     late = (d.recording.time >= 80) & (d.recording.time < 90)
-    assert (found.event_codes[late] == GAP).all()
+    assert (estimates.event_codes[late] == GAP).all()
     known = late & (d.speed > 0.3)
     assert known.sum() > 5
-    assert (np.abs(found["slip_fl"] - d.slip)[known] < 2 * found["slip_fl_std"][known]).all()
-    assert not (found.event_codes == STUCK)[(d.recording.time > 60) & (d.recording.time < 90)].any()
+    assert (np.abs(estimates["slip_fl"] - d.slip)[known] < 2 * estimates["slip_fl_std"][known]).all()
+    assert not (estimates.event_codes == STUCK)[(d.recording.time > 60) & (d.recording.time < 90)].any()
 
 
 def test_the_advice_on_noise_leaves_standstill_out() -> None:
@@ -227,12 +228,12 @@ def test_the_advice_on_noise_leaves_standstill_out() -> None:
         return next(line for line in tally.text().splitlines() if line.startswith("Normalised innovation"))
 
     d = tractor()
-    found = estimate(d.recording, d.vehicle)
-    rest = found.event_codes == STANDSTILL
+    estimates = estimate(d.recording, d.vehicle)
+    rest = estimates.event_codes == STANDSTILL
     assert rest.sum() > 20
     quiet = {
-        **found.columns,
-        "nis": np.where(rest, 0.1, found["nis"]),
-        "channels": np.where(rest, 5.0, found["channels"]),
+        **estimates.columns,
+        "nis": np.where(rest, 0.1, estimates["nis"]),
+        "channels": np.where(rest, 5.0, estimates["channels"]),
     }
-    assert ratio(replace(found, columns=quiet)) == ratio(found)
+    assert ratio(replace(estimates, columns=quiet)) == ratio(estimates)

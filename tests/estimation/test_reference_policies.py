@@ -152,13 +152,13 @@ def test_A_finds_a_wrong_noise_of_a_random_walk(assumed):
     adaptive = AdaptiveFilter(
         KalmanFilter([[1.0]], [[1.0]], [[0.0]], [[r]], [0.0], [[1.0]]), [assumed * true_walk], 1, memory=10.0
     )
-    found = []
+    result = []
     for k, value in enumerate(y):
         adaptive.step([value], dt=dt)
         if k > 3000:
-            found.append(assumed * adaptive.adaptation.scale[0])
+            result.append(assumed * adaptive.adaptation.scale[0])
     assert (
-        0.6 < np.exp(np.mean(np.log(found))) < 1.6
+        0.6 < np.exp(np.mean(np.log(result))) < 1.6
     )  # in shares of the true noise, though assumed 10 times off
 
 
@@ -171,13 +171,15 @@ def test_A_finds_a_wrong_adhesion_noise_of_a_machine(assumed):
     truth = np.array([3.0, 0.5, 0.25, 0.08])
     tuning = Tuning(walk * [1, 1, assumed, 1], policy="adaptive", memory=10.0)
     filter = TractionFilter(machine, tuning, truth, np.diag([5e-4, 3e-5, 4e-5, 5e-6]))
-    found = []
+    result = []
     for _ in range(2000):
         truth = model.transition(truth, held, 0.01) + rng.normal(size=4) * np.sqrt(walk * 0.01)
         y = model.output(truth, held) + rng.normal(size=3) * np.sqrt(r)
         y[2] = np.nan
-        found.append(assumed * filter.step(0.01, held, held, np.zeros(4), y, r).adaptation[2])
-    assert 0.4 < np.exp(np.mean(np.log(found[1000:]))) < 2.5  # shares of the true noise; assumed 10 times off
+        result.append(assumed * filter.step(0.01, held, held, np.zeros(4), y, r).adaptation[2])
+    assert (
+        0.4 < np.exp(np.mean(np.log(result[1000:]))) < 2.5
+    )  # shares of the true noise; assumed 10 times off
 
 
 def test_A_stays_within_its_bounds():
@@ -463,9 +465,9 @@ def test_bank_finds_the_scale_that_made_the_data():
             [0.1, 1.0, 10.0],
             dwell=100.0,
         )
-        x, found = 0.0, []
+        x, result = 0.0, []
         for _ in range(500):
             x += rng.normal(0, np.sqrt(true_scale * 0.5 * 0.1))
             bank.step([x + rng.normal(0, 0.1)], dt=0.1)
-            found.append(bank.probabilities[0 if true_scale < 1 else 2])
-        assert np.mean(found[100:]) > 0.8
+            result.append(bank.probabilities[0 if true_scale < 1 else 2])
+        assert np.mean(result[100:]) > 0.8

@@ -155,8 +155,8 @@ def test_a_dead_band_leaves_slip_open() -> None:
     assert np.isnan(estimates["slip_drive"][blind]).mean() > 0.99
     assert set(estimates["event"][blind]) <= {"gap", "standstill"}
     assert np.nanmax(np.abs(estimates["slip_drive"] - 0.05)) < 0.25
-    said = " ".join(estimates.notes)
-    assert "do not see, so slip is left open there" in said
+    sentence = " ".join(estimates.notes)
+    assert "do not see, so slip is left open there" in sentence
 
 
 def test_some_torques_missing_is_an_error_not_slip() -> None:
@@ -216,7 +216,7 @@ def test_measured_rover(shared: Callable[[str], Path]) -> None:
     slips = np.concatenate([estimates[f"slip_{w}"][moving] for w in wheels])
     assert np.nanmedian(slips) == pytest.approx(1 / excess - 1, abs=0.04)
     turned = {"channels": {**{f"wheel_speed_{w}": f"w_{w}" for w in wheels}, "ground_speed": path}}
-    told = tg.estimate(
+    estimated = tg.estimate(
         tg.Profile.from_dict({"time": {"from": "time_s"}, **turned}).apply(read_table(log)), robot(radius)
     )
-    assert any("fl, rl is against the travel" in note for note in told.notes)
+    assert any("fl, rl is against the travel" in note for note in estimated.notes)

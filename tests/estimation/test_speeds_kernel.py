@@ -38,7 +38,7 @@ def test_kernel_and_twin_agree(wheels: int, seed: int) -> None:
     columns |= {f"wheel_speed_{w}": speeds[:, 1 + k] / RADIUS for k, w in enumerate(names)}
     log, sensors = tg.Recording.from_frame(columns), {"ground_speed": 0.03, "wheel_speed": 0.02 / RADIUS}
     options = {"sensors": sensors, "held": {}, "gap": 1e3}
-    found = tg.estimate(log, machine(names), **options)
+    estimates = tg.estimate(log, machine(names), **options)
     smooth = tg.estimate(log, machine(names), smooth=True, **options)
 
     twin = SpeedsFilter(np.r_[0.03, np.full(wheels, 0.02)])
@@ -50,10 +50,10 @@ def test_kernel_and_twin_agree(wheels: int, seed: int) -> None:
         densities.append(twin.densities)
         scores.append((twin.nis, twin.weight.min()))
     score = np.array(scores)
-    assert np.allclose(found["nis"], score[:, 0], rtol=1e-9, atol=1e-9)
-    assert np.array_equal(found["event"] == "outlier", score[:, 1] < 0.5)
+    assert np.allclose(estimates["nis"], score[:, 0], rtol=1e-9, atol=1e-9)
+    assert np.array_equal(estimates["event"] == "outlier", score[:, 1] < 0.5)
     assert np.sum(score[:, 1] < 0.5) >= 3
-    _same(found, states, covariances, names)
+    _same(estimates, states, covariances, names)
     for k in range(len(time) - 2, -1, -1):  # Rauch, Tung and Striebel
         dt = time[k + 1] - time[k]
         move = transition(dt, wheels + 2)
@@ -66,20 +66,20 @@ def test_kernel_and_twin_agree(wheels: int, seed: int) -> None:
 
 
 def _same(
-    found: tg.Estimates,
+    estimates: tg.Estimates,
     states: list[np.ndarray],
     covariances: list[np.ndarray],
     names: tuple[str, ...],
     rtol: float = 1e-9,
 ) -> None:
     x, P = np.stack(states), np.stack(covariances)
-    assert np.allclose(found["ground_speed"], x[:, 0], rtol=rtol)
-    assert np.allclose(found["ground_speed_std"], np.sqrt(P[:, 0, 0]), rtol=rtol)
+    assert np.allclose(estimates["ground_speed"], x[:, 0], rtol=rtol)
+    assert np.allclose(estimates["ground_speed_std"], np.sqrt(P[:, 0, 0]), rtol=rtol)
     for k, name in enumerate(names):
         rim = x[:, 0] + x[:, 2 + k]
         spread = P[:, 0, 0] + 2 * P[:, 0, 2 + k] + P[:, 2 + k, 2 + k]
-        assert np.allclose(found[f"wheel_speed_{name}"], rim / RADIUS, rtol=rtol)
-        assert np.allclose(found[f"wheel_speed_{name}_std"], np.sqrt(spread) / RADIUS, rtol=rtol)
+        assert np.allclose(estimates[f"wheel_speed_{name}"], rim / RADIUS, rtol=rtol)
+        assert np.allclose(estimates[f"wheel_speed_{name}_std"], np.sqrt(spread) / RADIUS, rtol=rtol)
 
 
 def test_intervals_on_simulated_slip() -> None:
@@ -94,12 +94,12 @@ def test_intervals_on_simulated_slip() -> None:
         "wheel_speed_a": (speed / (1 - slip) + 0.02 * draws.standard_normal(len(time))) / RADIUS,
     }
     vehicle = tg.Vehicle.from_dict({**machine(("a",)).to_dict(), "uncertainty": {"wheel_radius": 0.0}})
-    found = tg.estimate(
+    estimates = tg.estimate(
         tg.Recording.from_frame(columns),
         vehicle,
         sensors={"ground_speed": 0.03, "wheel_speed": 0.02 / RADIUS},
         held={},
     )
-    inside = np.abs(found["slip_a"] - slip) < 1.96 * found["slip_a_std"]
+    inside = np.abs(estimates["slip_a"] - slip) < 1.96 * estimates["slip_a_std"]
     assert 0.9 < inside.mean() < 0.99
-    assert 0.7 < found["nis"].sum() / found["channels"].sum() < 1.2
+    assert 0.7 < estimates["nis"].sum() / estimates["channels"].sum() < 1.2

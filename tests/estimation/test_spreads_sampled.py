@@ -58,9 +58,9 @@ def test_spreads_agree_with_sampling(slip):
     rho = rho - error * (x[5:9] @ loads) / (MASS * GRAVITY)
     assert unseen >= _kernel.lib.tg_default_settings().tuned.least_load_spread
     mu = mu * (1 - error) + x[5:9] * unseen * rng.standard_normal((DRAWS, 4))
-    found = slip_of(drawn[:, :4], drawn[:, 4:5], RADIUS * (1 + error))
+    result = slip_of(drawn[:, :4], drawn[:, 4:5], RADIUS * (1 + error))
     net = mu - rho
-    efficiency = np.where(net > 0, net / (mu + TIRE) * (1 - found), 0.0)
-    for name, values in (("slip", found), ("net_traction", net), ("efficiency", efficiency)):
+    efficiency = np.where(net > 0, net / (mu + TIRE) * (1 - result), 0.0)
+    for name, values in (("slip", result), ("net_traction", net), ("efficiency", efficiency)):
         stated = np.array([last[f"{name}_{w}_std"] for w in WHEELS])
         np.testing.assert_allclose(stated, values.std(axis=0), rtol=0.04, err_msg=name)

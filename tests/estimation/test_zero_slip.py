@@ -58,10 +58,10 @@ def test_light_work_is_found_in_a_field_day(seed: int, light: float) -> None:
 def test_estimate_and_calibrate_give_one_answer() -> None:
     log = log_of(field_day(1000), 1.02, 1000)
     estimates = tg.estimate(log, tractor())
-    found = calibrate(log, tractor())
+    calibration = calibrate(log, tractor())
     zero = estimates.about["zero_slip"]["drive"]
-    assert found["wheel_radius rl"].value == zero["ratio"] * 0.8
-    assert found["wheel_radius rl"].std == zero["std"] * 0.8
+    assert calibration["wheel_radius rl"].value == zero["ratio"] * 0.8
+    assert calibration["wheel_radius rl"].std == zero["std"] * 0.8
 
 
 def test_field_work_alone_is_not_called_light() -> None:
@@ -72,16 +72,16 @@ def test_field_work_alone_is_not_called_light() -> None:
     moving = estimates["event"] == ""
     error = estimates["slip_drive"][moving] - 0.1
     assert np.mean(np.abs(error) < 1.96 * estimates["slip_drive_std"][moving]) > 0.95
-    found = calibrate(log, tractor())
-    assert not found.quantities
-    assert "record 40 s without load" in found.unknown[0].why
+    calibration = calibrate(log, tractor())
+    assert not calibration.quantities
+    assert "record 40 s without load" in calibration.unknown[0].why
 
 
 def test_rows_that_the_user_calls_light_are_taken() -> None:
     slip = np.r_[np.full(1500, 0.1), np.full(1500, 0.0)]
     log = log_of(slip, 0.93, 1002)  # a radius that nobody would guess
-    found = calibrate(log, tractor(), light=[(305.0, 600.0)])
-    radius = found["wheel_radius rl"]
+    calibration = calibrate(log, tractor(), light=[(305.0, 600.0)])
+    radius = calibration["wheel_radius rl"]
     assert radius.value == pytest.approx(0.8 / 0.93, abs=3 * radius.std)
     assert radius.std < 0.003
 
@@ -114,9 +114,9 @@ def test_measured_field_hour(shared: Callable[[str], Path]) -> None:
     for name, slip in (("W", 0.079), ("T", 0.001)):
         rows = (state == name) & (rim > 0.5)
         assert np.nanmedian(estimates["slip_drive"][rows]) == pytest.approx(slip, abs=0.012)
-    found = calibrate(log, tractor())["wheel_radius rl"]
-    assert found.value == estimates.about["zero_slip"]["drive"]["ratio"] * 0.8
-    assert found.interval[0] < 1.005 * 0.8 < found.interval[1]
+    calibration = calibrate(log, tractor())["wheel_radius rl"]
+    assert calibration.value == estimates.about["zero_slip"]["drive"]["ratio"] * 0.8
+    assert calibration.interval[0] < 1.005 * 0.8 < calibration.interval[1]
     moving = rim > 0.5
     assert np.mean(estimates["event"][moving] == "outlier") < 0.01
     assert np.nanmax(np.abs(estimates["ground_speed"] - ground)[moving]) < 0.15

@@ -79,20 +79,20 @@ def test_candump_as_printed_and_other_tables(tmp_path: Path) -> None:
 def decoded(
     frames: list[tuple[float, int, bytes]], databases: tuple[Path, ...] = ()
 ) -> dict[str, np.ndarray]:
-    taken = Frames(catalog(databases))
+    collected = Frames(catalog(databases))
     for time, identifier, data in frames:
-        taken.take(time, identifier, data)
-    return {name: signal.values for name, signal in signals_of(taken)[0].items()}
+        collected.add(time, identifier, data)
+    return {name: signal.values for name, signal in signals_of(collected)[0].items()}
 
 
 @settings(max_examples=60)
 @given(data=st.binary(min_size=8, max_size=8))
 def test_bits_agree_with_cantools(data: bytes) -> None:
     database = cantools.database.load_string(DBC, "dbc")
-    taken = Frames(Catalog(message_of(database, message) for message in database.messages))
-    taken.take(0.0, 291, data)
-    taken.take(0.0, 292 | EXTENDED, data)
-    found = {name: signal.values[0] for name, signal in signals_of(taken)[0].items()}
+    collected = Frames(Catalog(message_of(database, message) for message in database.messages))
+    collected.add(0.0, 291, data)
+    collected.add(0.0, 292 | EXTENDED, data)
+    result = {name: signal.values[0] for name, signal in signals_of(collected)[0].items()}
     expected: dict[str, float] = {}
     name_of = {291: "Wheels", 292: "Floats"}
     for identifier in (291, 292):
@@ -101,19 +101,19 @@ def test_bits_agree_with_cantools(data: bytes) -> None:
         except cantools.database.errors.DecodeError:  # no such page: the other signals are there all the same
             page = data[7] >> 4
             assert page > 1
-            assert found["page"] == page
+            assert result["page"] == page
     for name, value in expected.items():
-        assert found[name] == pytest.approx(value, rel=1e-12, nan_ok=True), name
+        assert result[name] == pytest.approx(value, rel=1e-12, nan_ok=True), name
     for name in {"front", "rear"} - set(expected):
-        assert np.isnan(found[name])
+        assert np.isnan(result[name])
 
 
 def test_a_short_frame_lacks_what_it_does_not_reach(dbc: Path) -> None:
-    found = decoded([(0.0, 291, bytes(3)), (1.0, 291, bytes(8))], (dbc,))
-    assert np.isnan(found["page"][0])
-    assert found["page"][1] == 0
-    assert np.isnan(found["wide"][0])
-    assert found["odd"][1] == 1.0
+    result = decoded([(0.0, 291, bytes(3)), (1.0, 291, bytes(8))], (dbc,))
+    assert np.isnan(result["page"][0])
+    assert result["page"][1] == 0
+    assert np.isnan(result["wide"][0])
+    assert result["odd"][1] == 1.0
 
 
 @pytest.mark.parametrize(
@@ -129,8 +129,8 @@ def test_codes_for_error_and_not_available(
     bits: int, valid: tuple[int, ...], missing: tuple[int, ...]
 ) -> None:
     raw = np.array([*valid, *missing], dtype=np.uint64)
-    found = missing_codes(Field("x", 0, bits, codes=True), raw)
-    assert list(found) == [False] * len(valid) + [True] * len(missing)
+    result = missing_codes(Field("x", 0, bits, codes=True), raw)
+    assert list(result) == [False] * len(valid) + [True] * len(missing)
 
 
 def test_not_available_is_missing_and_reverse_is_negative() -> None:
@@ -152,16 +152,16 @@ def test_any_source_address_and_priority() -> None:
 
 
 def test_of_several_senders_the_one_with_values_counts() -> None:
-    silent, heard = 0x0CFE4903 | EXTENDED, 0x0CFE4980 | EXTENDED
+    silent, sending = 0x0CFE4903 | EXTENDED, 0x0CFE4980 | EXTENDED
     frames = [(0.1 * k, silent, payload(65.535)) for k in range(5)]
-    frames += [(0.1 * k, heard, payload(2.0)) for k in range(4)]
-    found = decoded(frames)
-    assert list(found["GroundBasedMachineSpeed"]) == [2.0] * 4
-    assert np.isnan(found["GroundBasedMachineSpeed@03"]).all()
-    taken = Frames(catalog())
+    frames += [(0.1 * k, sending, payload(2.0)) for k in range(4)]
+    result = decoded(frames)
+    assert list(result["GroundBasedMachineSpeed"]) == [2.0] * 4
+    assert np.isnan(result["GroundBasedMachineSpeed@03"]).all()
+    collected = Frames(catalog())
     for frame in frames:
-        taken.take(*frame)
-    assert any("address 80" in note for note in signals_of(taken)[1])
+        collected.add(*frame)
+    assert any("address 80" in note for note in signals_of(collected)[1])
 
 
 def test_messages_of_several_frames() -> None:
@@ -176,9 +176,9 @@ def test_messages_of_several_frames() -> None:
     frames = [(0.1 * k, position, data) for k, data in enumerate(fast)]
     frames += [(1.0, position, fast[0]), (1.1, position, fast[2])]  # a part is lost
     frames += [(2.0 + 0.1 * k, position, data) for k, data in enumerate(fast)]
-    found = decoded(frames)
-    assert list(found["GnssPositionLatitude"]) == [latitude] * 2
-    assert list(found["GnssPositionAltitude"]) == [altitude] * 2
+    result = decoded(frames)
+    assert list(result["GnssPositionLatitude"]) == [latitude] * 2
+    assert list(result["GnssPositionAltitude"]) == [altitude] * 2
     # The same group by J1939's broadcast announce message.
     announce = bytes([32, 43, 0, 7, 255, 0x05, 0xF8, 0x01])
     frames = [(0.0, 0x1CECFF05 | EXTENDED, announce)]

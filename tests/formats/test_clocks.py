@@ -164,10 +164,10 @@ def test_a_lag_within_one_file_is_found_and_said(tmp_path: Path, seed: int, held
 
     wheels = noisy(5 * speed_at(TIME), seed + 100, 0.05)
     late = tg.read(put(tmp_path / "late.csv", table(TIME, ground(0.2), wheels)))
-    (said,) = [note for note in late.notes if "behind" in note]
-    found, spread = (float(said.split()[k]) for k in (2, 4))
-    assert found == pytest.approx(0.2, abs=0.03)
-    assert abs(found - 0.2) < 3 * spread
+    (notes,) = [note for note in late.notes if "behind" in note]
+    result, spread = (float(notes.split()[k]) for k in (2, 4))
+    assert result == pytest.approx(0.2, abs=0.03)
+    assert abs(result - 0.2) < 3 * spread
     (block,) = recordings_of(csv_on_disk(str(tmp_path / "late.csv"))) or ()
     assert block.notes == late.notes
     right = tg.read(put(tmp_path / "right.csv", table(TIME, ground(0.0), wheels)))
@@ -186,7 +186,7 @@ def test_effort_is_a_torque(tmp_path: Path) -> None:
     )
     seen = inspect(put(tmp_path / "log.csv", frame))
     assert seen.recognised["drive_torque_l"] == ("effort_l",)
-    assert not any("No drive torque" in said for said in seen.missing)
+    assert not any("No drive torque" in text for text in seen.missing)
 
 
 @pytest.mark.parametrize("seed", range(1000, 1003))

@@ -226,12 +226,12 @@ def test_any_bytes_are_a_recording_or_refused(
     try:
         recording = read(path)
     except InputError as refusal:
-        told = str(refusal)
+        message = str(refusal)
     else:
         assert np.all(np.diff(recording.time) > 0)
         return
-    assert "\n" not in told
-    assert str(path) in told
+    assert "\n" not in message
+    assert str(path) in message
 
 
 @pytest.mark.parametrize("suffix", ["csv", "parquet"])

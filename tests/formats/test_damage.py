@@ -86,10 +86,10 @@ def test_the_command_line_says_it_in_one_line(
     target = tmp_path / f"damaged{sample.suffix}"
     target.write_bytes(sample.read_bytes()[:100].ljust(2000, b"\xff"))
     assert main(["inspect", str(target)]) == 2
-    said = capfd.readouterr().err.strip().splitlines()
-    assert len(said) == 1
-    assert str(target) in said[0]
-    assert "Traceback" not in said[0]
+    sentence = capfd.readouterr().err.strip().splitlines()
+    assert len(sentence) == 1
+    assert str(target) in sentence[0]
+    assert "Traceback" not in sentence[0]
 
 
 @pytest.mark.parametrize("suffix", [".mf4", ".blf", ".bag", ".db3", ".mcap", ".mat"])

@@ -63,19 +63,19 @@ def test_other_names_are_left_alone(name: str) -> None:
 def test_a_ready_log_needs_no_profile(tmp_path: Path, log: pd.DataFrame) -> None:
     path = tmp_path / "log.csv"
     log.drop(index=range(100, 180)).to_csv(path, index=False)
-    found = inspect(path)
-    assert found.ready
-    assert found.rows == 220
-    assert found.time is not None
-    assert found.time.spacing_50 == pytest.approx(0.01)
-    assert found.time.gap_count == 1
-    assert found.time.gaps[0] == pytest.approx((0.99, 0.81))
-    speed = next(column for column in found.columns if column.name == "ground_speed")
+    inspection = inspect(path)
+    assert inspection.ready
+    assert inspection.rows == 220
+    assert inspection.time is not None
+    assert inspection.time.spacing_50 == pytest.approx(0.01)
+    assert inspection.time.gap_count == 1
+    assert inspection.time.gaps[0] == pytest.approx((0.99, 0.81))
+    speed = next(column for column in inspection.columns if column.name == "ground_speed")
     assert speed.noise == pytest.approx(0.02, rel=0.3)
     assert (speed.minimum, speed.maximum) == (log["ground_speed"].drop(range(100, 180)).min(), speed.maximum)
-    assert any("pitch" in sentence for sentence in found.missing)
-    assert "can be estimated as it is" in found.to_text()
-    json.dumps(found.to_dict(), allow_nan=False)
+    assert any("pitch" in sentence for sentence in inspection.missing)
+    assert "can be estimated as it is" in inspection.to_text()
+    json.dumps(inspection.to_dict(), allow_nan=False)
 
 
 def test_time_has_no_noise(tmp_path: Path, log: pd.DataFrame) -> None:
@@ -91,11 +91,11 @@ def test_an_empty_column_of_ours_is_told_as_empty(tmp_path: Path, rows: int) -> 
     path = tmp_path / "log.csv"
     turning = (f"{k * 0.01},,{1 + 0.01 * np.sin(k)}" for k in range(rows))
     path.write_text("\n".join(["time,ground_speed,wheel_speed_l", *turning]) + "\n")
-    found = inspect(path)
-    kinds = {column.name: column.kind for column in found.columns}
+    inspection = inspect(path)
+    kinds = {column.name: column.kind for column in inspection.columns}
     assert kinds["ground_speed"] == "empty"
-    assert found.rows == rows
-    assert "ground_speed" in found.to_text()
+    assert inspection.rows == rows
+    assert "ground_speed" in inspection.to_text()
 
 
 def test_the_proposed_profile_works_as_it_stands(tmp_path: Path) -> None:
@@ -116,15 +116,15 @@ def test_the_proposed_profile_works_as_it_stands(tmp_path: Path) -> None:
     )
     log, profile = tmp_path / "log.csv", tmp_path / "profile.yaml"
     frame.to_csv(log, index=False)
-    found = inspect(log)
-    assert not found.ready
-    assert found.recognised["ground_speed"] == ("pose_x", "pose_y")
-    profile.write_text(found.profile)
+    inspection = inspect(log)
+    assert not inspection.ready
+    assert inspection.recognised["ground_speed"] == ("pose_x", "pose_y")
+    profile.write_text(inspection.profile)
     recording = read(log, profile)
     assert recording.wheels == ("l", "r")
     assert recording["soil"][0] == "mud"
     assert np.nanmedian(recording["ground_speed"]) == pytest.approx(0.6, rel=0.02)
-    assert "scale" in found.profile
+    assert "scale" in inspection.profile
     again = inspect(log, profile)
     assert again.ready
     assert {"ground_speed", "drive_torque_l"} <= {column.name for column in again.columns}
@@ -145,36 +145,36 @@ def test_wheels_and_units_are_held_against_the_vehicle(tmp_path: Path, log: pd.D
 def test_nothing_is_required_but_a_table(tmp_path: Path) -> None:
     path = tmp_path / "log.csv"
     path.write_text("a,b,c\n1,x,\n2,y,\n")
-    found = inspect(path)
-    assert (found.rows, found.time, found.ready) == (2, None, False)
-    assert [column.kind for column in found.columns] == ["number", "text", "empty"]
+    inspection = inspect(path)
+    assert (inspection.rows, inspection.time, inspection.ready) == (2, None, False)
+    assert [column.kind for column in inspection.columns] == ["number", "text", "empty"]
     assert Profile.from_dict({"channels": {}}) is not None
     profile = tmp_path / "profile.yaml"
-    profile.write_text(found.profile)
+    profile.write_text(inspection.profile)
     Profile.load(profile)
-    assert "needed" in found.to_text()
+    assert "needed" in inspection.to_text()
     path.write_bytes(b"\x00\x01")
     with pytest.raises(InputError, match="is not a table of text"):
         inspect(path)
 
 
 def test_measured_warthog(shared: Callable[[str], Path]) -> None:
-    found = inspect(shared("data/drive_warthog/raw20hz/warthog_wheels_grass.csv.gz"))
-    assert found.recognised["wheel_speed_l"] == ("meas_left_vel",)
-    assert found.recognised["drive_torque_r"] == ("right_wheel_current",)
-    assert found.recognised["ground_speed"] == ("icp_pos_x", "icp_pos_y")
-    held = {column.name: column.held_period for column in found.columns}
+    inspection = inspect(shared("data/drive_warthog/raw20hz/warthog_wheels_grass.csv.gz"))
+    assert inspection.recognised["wheel_speed_l"] == ("meas_left_vel",)
+    assert inspection.recognised["drive_torque_r"] == ("right_wheel_current",)
+    assert inspection.recognised["ground_speed"] == ("icp_pos_x", "icp_pos_y")
+    held = {column.name: column.held_period for column in inspection.columns}
     assert held["meas_left_vel"] == pytest.approx(0.25, rel=0.02)
     assert held["imu_z"] is None
-    assert "quaternion: [icp_quat_x" in found.profile
+    assert "quaternion: [icp_quat_x" in inspection.profile
 
 
 def test_measured_pathfinder_takes_positions_not_odometry(shared: Callable[[str], Path]) -> None:
-    found = inspect(shared("data/pathfinder_rover/test17run_odom_gps_10hz.csv.gz"))
-    assert [c for c in found.recognised if c.startswith("wheel_speed")] == [
+    inspection = inspect(shared("data/pathfinder_rover/test17run_odom_gps_10hz.csv.gz"))
+    assert [c for c in inspection.recognised if c.startswith("wheel_speed")] == [
         f"wheel_speed_{w}" for w in ("fl", "fr", "rl", "rr")
     ]
-    assert found.recognised["ground_speed"] == ("gps_e", "gps_n")
+    assert inspection.recognised["ground_speed"] == ("gps_e", "gps_n")
 
 
 def test_a_speed_that_says_nothing_is_named_and_a_shaft_is_no_ground(tmp_path: Path) -> None:
@@ -186,10 +186,10 @@ def test_a_speed_that_says_nothing_is_named_and_a_shaft_is_no_ground(tmp_path: P
         "RearPTOSpeed": 540 + np.sin(time),
     }
     pd.DataFrame(frame).to_csv(path, index=False)
-    found = inspect(path)
-    assert "ground_speed" not in found.recognised
+    inspection = inspect(path)
+    assert "ground_speed" not in inspection.recognised
     assert any(
         "WheelBasedVehicleSpeed goes by the name of wheel_based_speed, but is 0 throughout" in w
-        for w in found.warnings
+        for w in inspection.warnings
     )
-    assert any("nor a drive train's (wheel_based_speed)" in sentence for sentence in found.missing)
+    assert any("nor a drive train's (wheel_based_speed)" in sentence for sentence in inspection.missing)

@@ -65,31 +65,31 @@ def test_a_table_in_blocks_is_the_table(
     whole = read_table(path)
     monkeypatch.setattr(csv, "_LONG", 0)
     monkeypatch.setattr(csv, "_BLOCK", 1000)
-    found = read_table(path)
-    assert (found.names, found.units, found.sha256) == (whole.names, whole.units, whole.sha256)
+    result = read_table(path)
+    assert (result.names, result.units, result.sha256) == (whole.names, whole.units, whole.sha256)
     for name, column in whole.columns.items():
         if name == "odd":  # blocks of numbers alone stay numbers, beside the text
-            assert [str(float(c)) if str(c) != "x" else "x" for c in found.columns[name]][249:252] == [
+            assert [str(float(c)) if str(c) != "x" else "x" for c in result.columns[name]][249:252] == [
                 "249.0",
                 "x",
                 "251.0",
             ]
         elif column.dtype.kind == "O":
-            assert found.columns[name].tolist() == column.tolist()
+            assert result.columns[name].tolist() == column.tolist()
         else:
-            assert np.array_equal(found.columns[name], column, equal_nan=True)
+            assert np.array_equal(result.columns[name], column, equal_nan=True)
 
 
 @pytest.mark.usefixtures("in_blocks")
 def test_what_is_wrong_in_a_late_block_is_named_by_its_row(tmp_path: Path) -> None:
     path = tmp_path / "log.csv"
     lines = text_of("plain").splitlines(keepends=True)
-    for row, line, said in (
+    for row, line, text in (
         (350, "3.49,fast,5,1\n", "column ground_speed, row 350: 'fast' is not a number"),
         (360, "3.59,1.0,5\n", "row 360: has 3 cells, the header 4"),
     ):
         path.write_text("".join([*lines[:row], line, *lines[row + 1 :]]))
-        with pytest.raises(InputError, match=said):
+        with pytest.raises(InputError, match=text):
             tg.read(path)
     path.write_text("".join(lines) + "4.00,1.")
     cut = tg.read(path)

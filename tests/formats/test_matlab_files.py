@@ -87,8 +87,8 @@ def test_one_span_of_the_calendar_does_not_hide_the_other_variables(
 
 def test_plain_arrays_that_matlab_wrote(shared: Callable[[str], Path]) -> None:
     table = read_table(shared("data/ingest_samples/matlab") / "test_basic_v7.mat")
-    (said,) = table.notes
-    assert "complex_array (complex)" in said  # its real part alone would be silently wrong
-    assert "struct" not in said.partition(":")[2].partition(";")[0]
+    (text,) = table.notes
+    assert "complex_array (complex)" in text  # its real part alone would be silently wrong
+    assert "struct" not in text.partition(":")[2].partition(";")[0]
     with pytest.raises(InputError, match="holds no numeric column"):
         read_table(shared("data/ingest_samples/matlab") / "test_string_v7.mat")

@@ -198,15 +198,15 @@ def test_damaged_objects_are_read_or_refused_in_one_line(log: Path, tmp_path: Pa
             read_table(target)
         except InputError as error:
             refusals.append(str(error))
-    assert not any("\n" in said for said in refusals)
+    assert not any("\n" in text for text in refusals)
 
 
 def test_a_regular_clock_asks_for_no_more_than_the_data_have() -> None:
     data = np.ones((3, 1))
     for count, expected in ((3.0, True), (4e9, False), (np.nan, False)):
         about = {"Start_": np.zeros((1, 1)), "Increment_": np.ones((1, 1)), "Length": np.array([[count]])}
-        found = plain(thing("timeseries", {"Data_": data, "TimeInfo": thing("tsdata.timemetadata", about)}))
-        assert (found == Opaque("timeseries")) is not expected
+        result = plain(thing("timeseries", {"Data_": data, "TimeInfo": thing("tsdata.timemetadata", about)}))
+        assert (result == Opaque("timeseries")) is not expected
 
 
 def test_objects_that_refer_to_each_other_end() -> None:

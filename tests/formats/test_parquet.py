@@ -119,8 +119,8 @@ def test_a_damaged_file_is_a_recording_or_refused(
     try:
         recording = read(path)
     except InputError as refusal:
-        told = str(refusal)
+        message = str(refusal)
     else:
         assert np.all(np.diff(recording.time) > 0)
         return
-    assert "\n" not in told
+    assert "\n" not in message

@@ -21,7 +21,7 @@ def test_numbers_in_their_order():
 
 
 @pytest.mark.parametrize(
-    ("entries", "said"),
+    ("entries", "expected"),
     [
         ({"format": "struct", "layout": "d5f", "fields": ["a"]}, "holds 6 numbers, not 1"),
         ({"format": "doubles"}, "packed numbers need names"),
@@ -32,7 +32,7 @@ def test_numbers_in_their_order():
         ({"format": "struct", "layout": "@P", "fields": ["a"]}, "layout"),
     ],
 )
-def test_what_does_not_fit_is_refused_with_its_place(entries, said):
+def test_what_does_not_fit_is_refused_with_its_place(entries, expected):
     with pytest.raises(InputError, match="payload") as refused:
         payload(**entries)
-    assert said in str(refused.value)
+    assert expected in str(refused.value)

@@ -153,12 +153,12 @@ def test_signed_speed_from_positions(forward: dict[str, Any], seed: int) -> None
     frame, speed = drive(20, seed=seed, noise=0.002)
     source = {"derivative_of": ["x", "y"], "unit": "m", "window": "0.5 s", "forward": forward}
     recording = apply(frame, ground_speed=source)
-    found = recording["ground_speed"]
+    result = recording["ground_speed"]
     # The turn-round takes no time, which no derivative can follow; a one-sided window tells little.
     away = np.abs(recording.time - 40) > 0.5
-    assert recording.time[away & np.isnan(found)] == pytest.approx([0, 0.05, 59.9, 59.95])
-    away &= np.isfinite(found)
-    error = (found - speed)[away]
+    assert recording.time[away & np.isnan(result)] == pytest.approx([0, 0.05, 59.9, 59.95])
+    away &= np.isfinite(result)
+    error = (result - speed)[away]
     assert np.std(error) < 0.008
     assert abs(np.mean(error)) < 0.002
     assert recording.noise["ground_speed"] == pytest.approx(np.std(error), rel=0.25)
@@ -179,9 +179,9 @@ def test_outlying_positions_weigh_nothing(seed: int) -> None:
     clean = apply(frame, ground_speed=source)["ground_speed"][away] - speed[away]
     rows = np.random.default_rng(seed).choice(1200, 30, replace=False)
     frame.loc[rows, "x"] += 0.03
-    found = apply(frame, ground_speed=source)["ground_speed"][away] - speed[away]
-    assert np.isfinite(found).mean() > 0.9
-    assert np.nanstd(found) < 1.3 * np.nanstd(clean)
+    result = apply(frame, ground_speed=source)["ground_speed"][away] - speed[away]
+    assert np.isfinite(result).mean() > 0.9
+    assert np.nanstd(result) < 1.3 * np.nanstd(clean)
 
 
 def test_speed_from_one_coordinate_and_without_heading() -> None:
@@ -208,14 +208,14 @@ def test_jumps_of_the_pose_gaps_and_held_poses(seed: int) -> None:
         "window": "0.6 s",
         "forward": {"yaw": "yaw_deg", "unit": "deg"},
     }
-    found = apply(frame, ground_speed=source)["ground_speed"]
-    known = np.isfinite(found)
+    result = apply(frame, ground_speed=source)["ground_speed"]
+    known = np.isfinite(result)
     assert known.mean() == pytest.approx(0.5 * (1 - 72 / 1200), abs=0.02)
     assert not known[500:562].any()
     time = np.arange(1200) / 20
     away = known & (np.abs(time - 40) > 0.7)
     # A pose stands for the instant it appeared at; half a row of lag moves the speed by 0.003.
-    assert np.abs((found - speed)[away]).max() < 0.03
+    assert np.abs((result - speed)[away]).max() < 0.03
 
 
 def test_pitch_and_roll_from_a_quaternion() -> None:
@@ -327,7 +327,7 @@ def test_a_quotient_is_missing_where_the_divisor_is_small_and_while_the_dividend
 
 
 @pytest.mark.parametrize(
-    ("source", "said"),
+    ("source", "expected"),
     [
         ({"from": "amps", "over": "speed"}, "over_minimum"),
         ({"from": "amps", "over_minimum": 0.3}, "serves over only"),
@@ -336,7 +336,7 @@ def test_a_quotient_is_missing_where_the_divisor_is_small_and_while_the_dividend
     ],
 )
 def test_a_quotient_needs_both_columns_and_a_least_divisor(
-    foreign: pd.DataFrame, source: dict[str, Any], said: str
+    foreign: pd.DataFrame, source: dict[str, Any], expected: str
 ) -> None:
-    with pytest.raises(InputError, match=said):
+    with pytest.raises(InputError, match=expected):
         apply(foreign, drive_torque_l=source)

@@ -60,11 +60,11 @@ def test_a_gnss_speed_is_no_wheel_and_prefixes_are_seen_through() -> None:
         "CAN2.gnss_speed.Speed": SPEED,
         **{f"CAN2.gnss_pos.{name}": values for name, values in _place().items()},
     }
-    found = _propose(columns)
-    assert set(found) == {"wheel_based_speed", "ground_speed", "latitude", "longitude"}
-    assert found["ground_speed"].columns == ("CAN2.gnss_speed.Speed",)
-    assert (found["ground_speed"].unit, found["ground_speed"].doubt) == ("m/s", "")
-    assert found["wheel_based_speed"].entry["unit"] == "km/h"
+    result = _propose(columns)
+    assert set(result) == {"wheel_based_speed", "ground_speed", "latitude", "longitude"}
+    assert result["ground_speed"].columns == ("CAN2.gnss_speed.Speed",)
+    assert (result["ground_speed"].unit, result["ground_speed"].doubt) == ("m/s", "")
+    assert result["wheel_based_speed"].entry["unit"] == "km/h"
 
 
 def test_motors_are_left_out_where_wheels_are_and_need_a_gear_ratio_where_not() -> None:
@@ -80,41 +80,41 @@ def test_motors_are_left_out_where_wheels_are_and_need_a_gear_ratio_where_not() 
     ("unit", "factor"), [("m/s", 1.0), ("km/h", 3.6), ("mm/s", 1000.0), ("mph", 1 / 0.44704)]
 )
 def test_positions_tell_the_unit_of_a_speed(unit: str, factor: float) -> None:
-    found = _propose({"speed": factor * SPEED, **_place()})["ground_speed"]
-    assert (found.unit, found.doubt) == (unit, "")
-    assert any("path of lat, lon" in sentence for sentence in found.evidence)
+    result = _propose({"speed": factor * SPEED, **_place()})["ground_speed"]
+    assert (result.unit, result.doubt) == (unit, "")
+    assert any("path of lat, lon" in sentence for sentence in result.evidence)
 
 
 @pytest.mark.parametrize("factor", [1.0, 1000.0])
 def test_a_speed_without_unit_or_check_has_a_question_mark(factor: float) -> None:
-    found = _propose({"speed": factor * SPEED}).get("ground_speed")
-    assert found is None or "no unit" in found.doubt  # 3000 m/s is none
+    result = _propose({"speed": factor * SPEED}).get("ground_speed")
+    assert result is None or "no unit" in result.doubt  # 3000 m/s is none
 
 
 def test_a_speed_that_positions_contradict_is_not_proposed() -> None:
-    found = _propose({"speed": 17 * SPEED, **_place()}, {"speed": "m/s"})
-    assert found.get("ground_speed") is None or found["ground_speed"].columns != ("speed",)
+    result = _propose({"speed": 17 * SPEED, **_place()}, {"speed": "m/s"})
+    assert result.get("ground_speed") is None or result["ground_speed"].columns != ("speed",)
 
 
 def test_a_stated_unit_that_positions_contradict_is_in_doubt() -> None:
-    found = _propose({"gps_speed": 3.6 * SPEED, **_place()}, {"gps_speed": "m/s"})["ground_speed"]
-    assert "km/h" in found.doubt
+    result = _propose({"gps_speed": 3.6 * SPEED, **_place()}, {"gps_speed": "m/s"})["ground_speed"]
+    assert "km/h" in result.doubt
 
 
 @pytest.mark.parametrize(("unit", "gravity"), [("g", 1.0), ("m/s^2", 9.80665), ("mg", 1000.0)])
 def test_gravity_tells_the_unit_of_accelerations(unit: str, gravity: float) -> None:
     noise = np.random.default_rng(1).normal(0, 0.02, (2, len(TIME))) * gravity
-    found = _propose(
+    result = _propose(
         {"acc_x": noise[0], "acc_y": noise[1], "acc_z": gravity + 0 * TIME + 0.01 * gravity * np.sin(TIME)}
     )
-    assert {(p.unit, p.doubt) for p in found.values()} == {(unit, "")}
+    assert {(p.unit, p.doubt) for p in result.values()} == {(unit, "")}
 
 
 @pytest.mark.parametrize(("unit", "factor"), [("rad/s", 1.0), ("deg/s", 57.29578)])
 def test_a_heading_tells_the_unit_of_a_gyro(unit: str, factor: float) -> None:
     rate = np.gradient(HEADING, TIME)
-    found = _propose({"heading": np.degrees(HEADING) % 360, "gyro_z": factor * rate})["angular_velocity_z"]
-    assert (found.unit, found.doubt) == (unit, "")
+    result = _propose({"heading": np.degrees(HEADING) % 360, "gyro_z": factor * rate})["angular_velocity_z"]
+    assert (result.unit, result.doubt) == (unit, "")
 
 
 def test_a_wheel_speed_whose_radius_is_no_wheels_is_in_doubt() -> None:
@@ -123,15 +123,15 @@ def test_a_wheel_speed_whose_radius_is_no_wheels_is_in_doubt() -> None:
         "wheel_speed_fl_rads": SPEED / 0.002,
         "wheel_speed_fr_rads": SPEED / 0.3,
     }
-    found = _propose(columns)
-    assert "radius of 0.002 m" in found["wheel_speed_fl"].doubt
-    assert found["wheel_speed_fr"].doubt == ""
+    result = _propose(columns)
+    assert "radius of 0.002 m" in result["wheel_speed_fl"].doubt
+    assert result["wheel_speed_fr"].doubt == ""
 
 
 def test_odometry_is_no_ground_speed() -> None:
-    found = _propose({"odom_vx": SPEED, "gps_speed_mps": SPEED})
-    assert found["ground_speed"].columns == ("gps_speed_mps",)
-    assert found["wheel_based_speed"].columns == ("odom_vx",)
+    result = _propose({"odom_vx": SPEED, "gps_speed_mps": SPEED})
+    assert result["ground_speed"].columns == ("gps_speed_mps",)
+    assert result["wheel_based_speed"].columns == ("odom_vx",)
     assert "ground_speed" not in _propose({"odom_vx": SPEED})
 
 
@@ -144,9 +144,9 @@ def test_units_and_several_header_rows_reach_the_profile(tmp_path: Path) -> None
     path.write_text(
         f"Time;Wheel speed left;Wheel speed right;GPS speed\nms;1/min;1/min;km/h\nt;nl;nr;v\n{rows}"
     )
-    found = inspect(path)
-    profile.write_text(found.profile)
-    assert "?" not in found.profile.split("\n", 1)[1].replace("???", "")
+    inspection = inspect(path)
+    profile.write_text(inspection.profile)
+    assert "?" not in inspection.profile.split("\n", 1)[1].replace("???", "")
     recording = read(path, profile)
     np.testing.assert_allclose(recording["ground_speed"], SPEED, atol=1e-4)
     np.testing.assert_allclose(recording["wheel_speed_l"], 95 * SPEED * 2 * np.pi / 60, rtol=1e-4)
@@ -175,10 +175,10 @@ def test_a_vbo_file_is_read_in_seconds_and_degrees(tmp_path: Path) -> None:
         "[column names]\r\nsats time lat long velocity YawRate WheelSpFL\r\n\r\n[data]\r\n"
         "014 235959.50 +3141.60 +0099.60 036.0 +1.0E+00 35.0\r\n014 000000.50 +3141.66 +0099.60 036.0 -1.0E+00 36.0\r\n".encode("latin-1")
     )  # fmt: skip
-    found = inspect(path)
-    by_name = {column.name: column for column in found.columns}
-    assert found.time is not None
-    assert found.time.duration == pytest.approx(1.0)
+    inspection = inspect(path)
+    by_name = {column.name: column for column in inspection.columns}
+    assert inspection.time is not None
+    assert inspection.time.duration == pytest.approx(1.0)
     assert (by_name["lat"].minimum, by_name["long"].minimum) == pytest.approx((52.36, -1.66))
     assert [by_name[n].unit for n in ("velocity", "YawRate", "WheelSpFL")] == ["km/h", "deg/s", "km/h"]
 
@@ -212,23 +212,23 @@ def _log(path: Path, columns: dict[str, np.ndarray]) -> Path:
 
 
 def test_a_bus_speed_that_goes_with_positions_may_still_be_the_wheels() -> None:
-    found = _propose({"VehicleSpeed_kmh": 3.6 * SPEED, **_place()})["ground_speed"]
-    assert "wheels" in found.doubt
+    result = _propose({"VehicleSpeed_kmh": 3.6 * SPEED, **_place()})["ground_speed"]
+    assert "wheels" in result.doubt
 
 
 def test_a_receiver_that_stands_contradicts_no_speed() -> None:
     noise = np.cumsum(np.random.default_rng(3).normal(0, 2e-8, (2, len(TIME))), axis=1)
     columns = {"gps_speed_mps": 0.02 + 0.01 * np.sin(TIME), "lat": 45 + noise[0], "lon": 11 + noise[1]}
-    found = _propose(columns)["ground_speed"]
-    assert (found.columns, found.doubt) == (("gps_speed_mps",), "")
+    result = _propose(columns)["ground_speed"]
+    assert (result.columns, result.doubt) == (("gps_speed_mps",), "")
 
 
 def test_wheels_that_never_turn_are_named_in_the_refusal(tmp_path: Path) -> None:
-    found = inspect(
+    inspection = inspect(
         _log(tmp_path / "idle.csv", {"WheelBasedVehicleSpeed": 0 * TIME, "EngineSpeed": 90 + SPEED})
     )
-    assert "WheelBasedVehicleSpeed" in found.refused
-    assert "0 throughout" in found.refused
+    assert "WheelBasedVehicleSpeed" in inspection.refused
+    assert "0 throughout" in inspection.refused
 
 
 def test_several_logs_and_a_folder_in_one_call(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -240,10 +240,10 @@ def test_several_logs_and_a_folder_in_one_call(tmp_path: Path, capsys: pytest.Ca
     (folder / "notes.md").write_text("# not a log\n")
     alone = _log(tmp_path / "imu.csv", {"gyro_z": SPEED})
     assert main(["inspect", str(folder), str(alone)]) == 0
-    said = capsys.readouterr().out
-    assert all(name in said for name in ("a.csv", "b.csv", "imu.csv"))
-    assert said.count("# Proposed by") == 1  # a and b have the same columns, imu has no wheels
-    assert "imu.csv has no wheel speed" in said
+    output = capsys.readouterr().out
+    assert all(name in output for name in ("a.csv", "b.csv", "imu.csv"))
+    assert output.count("# Proposed by") == 1  # a and b have the same columns, imu has no wheels
+    assert "imu.csv has no wheel speed" in output
     (folder / "c.csv").write_bytes(b"\x00\x01")
     profile = tmp_path / "p.yaml"
     assert main(["inspect", str(folder), "--write-profile", str(profile)]) == 2
@@ -291,13 +291,13 @@ def test_the_efforts_of_a_joint_state_are_torques_and_a_profile_that_fits_says_w
     for wheel in ("front_left", "front_right", "rear_left", "rear_right"):
         columns[f"/joint_states.velocity.{wheel}_wheel"] = 10 * SPEED
         columns[f"/joint_states.effort.{wheel}_wheel"] = 5 + 0 * SPEED + np.sin(TIME)
-    found = inspect(_log(tmp_path / "robot.csv", columns))
-    assert {"drive_torque_fl", "wheel_speed_rr"} <= found.recognised.keys()
-    assert not any("drive torque" in sentence for sentence in found.missing)
-    (said,) = (sentence for sentence in found.nearly if "ros2-4wd" in sentence)
-    assert "wheel_speed_fl <- /joint_states.velocity.front_left_wheel" in said
-    assert "no ground_speed" in said
-    assert "twist.twist.linear.x" in said
+    inspection = inspect(_log(tmp_path / "robot.csv", columns))
+    assert {"drive_torque_fl", "wheel_speed_rr"} <= inspection.recognised.keys()
+    assert not any("drive torque" in sentence for sentence in inspection.missing)
+    (text,) = (sentence for sentence in inspection.nearly if "ros2-4wd" in sentence)
+    assert "wheel_speed_fl <- /joint_states.velocity.front_left_wheel" in text
+    assert "no ground_speed" in text
+    assert "twist.twist.linear.x" in text
 
 
 @pytest.mark.parametrize(
@@ -347,10 +347,10 @@ def test_any_table_gives_proposals(
     rows = np.array(cells, dtype=np.float64)
     columns = {name: np.random.default_rng(seed).permutation(rows) for name, seed in seeds.items()}
     clocks = dict.fromkeys(columns, np.arange(len(rows)) / 10) if timed else {}
-    found = propose(columns, (), {} if unit is None else dict.fromkeys(columns, unit), clocks)
-    used = [column for proposal in found.values() for column in proposal.columns]
+    result = propose(columns, (), {} if unit is None else dict.fromkeys(columns, unit), clocks)
+    used = [column for proposal in result.values() for column in proposal.columns]
     assert set(used) <= set(columns)
-    assert all(0 <= proposal.confidence <= 1 for proposal in found.values())
+    assert all(0 <= proposal.confidence <= 1 for proposal in result.values())
 
 
 def test_measured_headers_leaving_one_logger_out(shared: Callable[[str], Path]) -> None:

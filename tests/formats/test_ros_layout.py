@@ -168,7 +168,7 @@ def test_a_ros1_bag_with_a_damaged_chunk_is_read_around_it(tmp_path: Path) -> No
 def packed(whole: bytes, packing: str) -> bytes:
     """The bag with its chunks packed, and without what stands between them: index and bag header are not needed."""
     pack = bz2.compress if packing == "bz2" else lz4.frame.compress
-    found, place = bytearray(whole[:13]), 13
+    result, place = bytearray(whole[:13]), 13
     while place < len(whole):
         (length,) = struct.unpack_from("<I", whole, place)
         header = whole[place + 4 : place + 4 + length]
@@ -179,8 +179,8 @@ def packed(whole: bytes, packing: str) -> bytes:
             fields = [b"op=\x05", b"compression=" + packing.encode(), b"size=" + struct.pack("<I", size)]
             header = b"".join(struct.pack("<I", len(f)) + f for f in fields)
             data = pack(data)
-            found += struct.pack("<I", len(header)) + header + struct.pack("<I", len(data)) + data
-    return bytes(found)
+            result += struct.pack("<I", len(header)) + header + struct.pack("<I", len(data)) + data
+    return bytes(result)
 
 
 def test_a_topic_whose_first_messages_are_empty(tmp_path: Path) -> None:

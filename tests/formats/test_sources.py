@@ -30,11 +30,11 @@ def test_the_offset_of_a_clock_is_found(seed: int, ahead: float) -> None:
     mine, theirs = np.arange(0, 200, 0.05), np.sort(draws.uniform(20, 260, 1500))
     a = 5.0 * speed_at(mine) + 0.1 * draws.standard_normal(len(mine))  # wheel speed: another scale
     b = speed_at(theirs) + 0.05 * draws.standard_normal(len(theirs))
-    found = offset_between((mine, a), (theirs + ahead, b))
-    assert found is not None
-    assert found.seconds == pytest.approx(ahead, abs=0.05)
-    assert abs(found.seconds - ahead) < 4 * found.std
-    assert found.correlation > 0.95
+    result = offset_between((mine, a), (theirs + ahead, b))
+    assert result is not None
+    assert result.seconds == pytest.approx(ahead, abs=0.05)
+    assert abs(result.seconds - ahead) < 4 * result.std
+    assert result.correlation > 0.95
 
 
 def test_speeds_that_tell_nothing_give_no_offset() -> None:
@@ -73,10 +73,10 @@ def test_a_tractor_and_a_receiver_of_its_own(tmp_path: Path, capsys: pytest.Capt
         [log, gnss], ["tractor-isobus", tg.Profile.from_dict({"channels": {"ground_speed": "ground_speed"}})]
     )
     note = next(note for note in recording.notes if "clock of gnss.nmea" in note)
-    told = re.search(r"gnss.nmea is ([\d.]+) ± ([\d.]+) s behind the first one", note)
-    assert told is not None, note
-    assert float(told[1]) == pytest.approx(18.0, abs=0.2)
-    assert abs(float(told[1]) - 18.0) < 3 * float(told[2])
+    reported = re.search(r"gnss.nmea is ([\d.]+) ± ([\d.]+) s behind the first one", note)
+    assert reported is not None, note
+    assert float(reported[1]) == pytest.approx(18.0, abs=0.2)
+    assert abs(float(reported[1]) - 18.0) < 3 * float(reported[2])
     fresh = np.isfinite(recording["ground_speed"])
     truth = np.interp(recording.time[fresh], machine.time, machine.speed)
     assert np.sqrt(np.mean((recording["ground_speed"][fresh] - truth) ** 2)) < 0.02

@@ -62,9 +62,9 @@ def test_the_command_line_says_what_is_missing(
     out = tmp_path / "estimates.parquet"
     words = ["estimate", str(log), "--vehicle", str(vehicle), "--profile", "tractor-isobus", "-o", str(out)]
     assert main(words) == 0
-    said = capsys.readouterr().out
-    assert "There is no drive torque: slip, speeds and distance are estimated" in said
-    assert "Zero-slip radius of the drive in this log: 0.76" in said or "log: 0.77" in said
+    output = capsys.readouterr().out
+    assert "There is no drive torque: slip, speeds and distance are estimated" in output
+    assert "Zero-slip radius of the drive in this log: 0.76" in output or "log: 0.77" in output
     assert tg.Estimates.read(out).wheels == ("drive",)
     assert main(["soils", str(out), "-o", str(tmp_path / "soils.json")]) == 2
     assert "holds slip but no adhesion" in capsys.readouterr().err
@@ -79,12 +79,12 @@ def test_a_pass_without_load_makes_slip_absolute(tmp_path: Path, vehicle: Path) 
         for t, i, d in machine.frames
     ]
     empty = tg.read(write_log(tmp_path / "empty.blf", free), "tractor-isobus")
-    found = calibrate(empty, tg.Vehicle.load(vehicle))
-    radius = found["wheel_radius rl"]
+    calibration = calibrate(empty, tg.Vehicle.load(vehicle))
+    radius = calibration["wheel_radius rl"]
     assert radius.value == pytest.approx(0.8 / machine.scale, abs=3 * radius.std + 1e-3)
-    assert "wheel_radius fl" not in found
+    assert "wheel_radius fl" not in calibration
     work = tg.read(write_log(tmp_path / "work.blf", machine.frames), "tractor-isobus")
-    estimates = tg.estimate(work, found.apply(tg.Vehicle.load(vehicle)), smooth=True)
+    estimates = tg.estimate(work, calibration.apply(tg.Vehicle.load(vehicle)), smooth=True)
     truth = np.interp(estimates.time, machine.time, machine.slip)
     assert np.nanmean(estimates["slip_drive"] - truth) == pytest.approx(0, abs=0.003)
 

@@ -16,6 +16,6 @@ def learned(tables: Sequence[Estimates]) -> SoilLibrary:
     library = learn_soils([pair for k, one in enumerate(tables) for pair in pairs_of(one, str(k))]).library()
     blocks: dict[str, list] = {}
     for one in tables:
-        for name, found in labelled_blocks(one, None, "table"):
-            blocks.setdefault(name, []).append(found)
+        for name, one_soil in labelled_blocks(one, None, "table"):
+            blocks.setdefault(name, []).append(one_soil)
     return SoilLibrary(with_signatures(library.soils, blocks, maker(tables[0])))

@@ -40,8 +40,8 @@ def predictive(model: Model, x: np.ndarray) -> np.ndarray:
 def test_evidence_is_the_product_of_student_predictives(seed, n):
     model = replace(Model.of(GROUND), weight=np.ones(4))
     x = model.mean + np.random.default_rng(seed).standard_normal((n, 4)) * 0.1
-    found = model.evidence(np.full((1, 4), float(n)), x.sum(axis=0)[None], (x**2).sum(axis=0)[None])
-    assert found[0] == pytest.approx(predictive(model, x).sum(), rel=1e-9, abs=1e-8)
+    result = model.evidence(np.full((1, 4), float(n)), x.sum(axis=0)[None], (x**2).sum(axis=0)[None])
+    assert result[0] == pytest.approx(predictive(model, x).sum(), rel=1e-9, abs=1e-8)
 
 
 @pytest.mark.parametrize("seed", range(5))
@@ -64,13 +64,13 @@ def test_the_segmentation_is_the_best_of_all(seed):
 
 
 def test_a_change_is_found_where_it_is():
-    found = changes_of(estimates_blocks(drive(1, [("grass", GRASS, 40), ("coarse", COARSE, 40)])))
-    assert len(found) == 1
-    assert found[0].time == pytest.approx(40, abs=1)
-    assert found[0].std < 1
-    assert found[0].probability > 0.99
-    assert found[0].shift["soil_resistance"] > 2
-    assert found[0].shift["adhesion_sd"] > 1
+    result = changes_of(estimates_blocks(drive(1, [("grass", GRASS, 40), ("coarse", COARSE, 40)])))
+    assert len(result) == 1
+    assert result[0].time == pytest.approx(40, abs=1)
+    assert result[0].std < 1
+    assert result[0].probability > 0.99
+    assert result[0].shift["soil_resistance"] > 2
+    assert result[0].shift["adhesion_sd"] > 1
 
 
 def test_pull_alone_is_no_change():
@@ -132,22 +132,22 @@ def test_the_detector_is_the_plain_recursion(monkeypatch):
 
 
 def test_a_change_is_told_soon_and_once():
-    told = online_changes(estimates_blocks(drive(4, [("grass", GRASS, 40), ("fine", FINE, 40)])))
-    assert len(told) == 1
-    assert 40 < told[0].told < 43.5
-    assert told[0].time == pytest.approx(40, abs=1)
-    assert 0.8 <= told[0].probability <= 1
+    changes = online_changes(estimates_blocks(drive(4, [("grass", GRASS, 40), ("fine", FINE, 40)])))
+    assert len(changes) == 1
+    assert 40 < changes[0].reported < 43.5
+    assert changes[0].time == pytest.approx(40, abs=1)
+    assert 0.8 <= changes[0].probability <= 1
 
 
 def test_block_by_block_and_with_a_break_it_tells_the_same():
     blocks = estimates_blocks(drive(5, [("grass", GRASS, 30), ("coarse", COARSE, 30)]))
     whole = online_changes(blocks)
     first = OnlineChanges()
-    found = [told for k in range(50) for told in first.update(blocks[k : k + 1])]
+    result = [reported for k in range(50) for reported in first.update(blocks[k : k + 1])]
     second = OnlineChanges()
     second.restore(first.to_dict())
-    found += second.update(blocks[50:])
-    assert found == whole
+    result += second.update(blocks[50:])
+    assert result == whole
     assert len(whole) == 1
 
 
@@ -161,8 +161,8 @@ def test_slow_roughness_lets_levels_speak():
         event_codes=estimates.event_codes[::5],
         labels={k: v[::5] for k, v in estimates.labels.items()},
     )
-    found = changes_of(estimates_blocks(thin))
-    assert [round(c.time) for c in found] == [40]
+    result = changes_of(estimates_blocks(thin))
+    assert [round(c.time) for c in result] == [40]
 
 
 def test_short_and_empty_drives_have_none():

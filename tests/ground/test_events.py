@@ -41,12 +41,12 @@ def soft():
 @pytest.mark.parametrize(("curve", "rate"), [("prototype", 100.0), ("prototype", 10.0), ("peaking", 10.0)])
 def test_a_soft_spot_is_warned_of_before_the_vehicle_stands(curve, rate):
     result = simulate(soft_spot_drive(1002, curve, rate=rate, drawbar=False))
-    found = events(estimate(result.recording, result.vehicle))
+    estimates = events(estimate(result.recording, result.vehicle))
     stop = full_stop(result.truth)
-    warned = [e.start for e in found if e.kind == "immobilization" and e.start < stop]
+    warned = [e.start for e in estimates if e.kind == "immobilization" and e.start < stop]
     assert warned
     assert result.truth["true_distance"][result.truth["time"] >= warned[0]].iloc[0] > 6  # not before the spot
-    stuck = [e for e in found if e.kind == "stuck"]
+    stuck = [e for e in estimates if e.kind == "stuck"]
     assert len(stuck) == 1
     assert abs(stuck[0].start - stop) < 1.5
 
@@ -64,13 +64,13 @@ def test_hills_hits_and_stops_are_not_called_stuck_and_rarely_warned_of():
 
 def warned_by(drive, unit=1.0):
     """Times at which the twin warns of a drive: slip as it is asked for, at a steady .6 m/s of the rims; ``unit`` of time [s]."""
-    watch, found = Watch(watch_limits(), unit), []
+    watch, out = Watch(watch_limits(), unit), []
     for k in range(3000):
         t, slip, ahead = 0.01 * k, *drive(0.01 * k)
         row = Row(t, slip, 0.01, 0.6, 0.25 * ahead, 0.25, 0.1, 0.6, 0.6 * (1 - slip))
         if watch.update(row) == "immobilization":
-            found.append(t)
-    return found
+            out.append(t)
+    return out
 
 
 def rising(start=25.0, rate=0.1):
@@ -104,8 +104,8 @@ def test_a_start_from_rest_with_much_slip_is_no_warning():
         t = 0.01 * k
         rim = 0.8 * min(t, 1.0)
         slip = 0.55 if t < 1.0 else max(0.55 - 0.9 * (t - 1.0), 0.06)
-        said = watch.update(Row(t, slip, 0.01, rim, 0.25, 0.25, 0.1, rim, rim * (1 - slip)))
-        assert said == ""
+        text = watch.update(Row(t, slip, 0.01, rim, 0.25, 0.25, 0.1, rim, rim * (1 - slip)))
+        assert text == ""
 
 
 def test_one_diagonal_that_spins_is_seen_and_stuck_in_time():
@@ -131,12 +131,14 @@ def test_every_snow_run_is_warned_of_in_time_and_called_stuck_within_half_a_seco
     leads = []
     for seed in range(RUNS):
         run = snow_run_of(seed)
-        found = events(estimates_of(run))
+        result = events(estimates_of(run))
         leads += [
-            run.stop - e.start for e in found if e.kind == "immobilization" and run.begun < e.start < run.stop
+            run.stop - e.start
+            for e in result
+            if e.kind == "immobilization" and run.begun < e.start < run.stop
         ][:1]
-        assert not [e for e in found if e.kind == "immobilization" and e.start < run.begun]
-        assert [e for e in found if e.kind == "stuck" and run.begun < e.start <= run.stop + 0.5]
+        assert not [e for e in result if e.kind == "immobilization" and e.start < run.begun]
+        assert [e for e in result if e.kind == "stuck" and run.begun < e.start <= run.stop + 0.5]
     assert len(leads) == RUNS
     assert np.median(leads) >= 1.5
 
@@ -149,13 +151,13 @@ def test_turning_on_the_spot_is_neither_a_warning_nor_stuck():
     for wheel, side in sides.items():
         channels[f"wheel_speed_{wheel}"] = (side * rim + rng.normal(0, 0.05, len(time)) * (rim > 0)) / RADIUS
         channels[f"drive_torque_{wheel}"] = side * 10.0 * (rim > 0) + rng.normal(0, 1, len(time))
-    found = events(estimate(Recording(time=time, channels=channels), rover()))
-    assert not [e for e in found if e.kind in ("immobilization", "stuck")]
+    estimates = events(estimate(Recording(time=time, channels=channels), rover()))
+    assert not [e for e in estimates if e.kind in ("immobilization", "stuck")]
 
 
 def test_the_made_up_snow_runs_look_as_described():
     """Mean times before the stop at which the wheels' mean slip passes .2 to .5: 3.9, 2.8, 2.1, 1.4 s."""
-    passed = np.zeros((RUNS, 4))
+    delay = np.zeros((RUNS, 4))
     for seed in range(RUNS):
         run = snow_run_of(seed)
         speeds = np.stack([run.recording.channels[f"wheel_speed_{w}"] for w in rover().wheels], axis=1)
@@ -165,8 +167,8 @@ def test_the_made_up_snow_runs_look_as_described():
         late = (run.time > run.begun) & (run.time < run.stop)
         for k, level in enumerate((0.2, 0.3, 0.4, 0.5)):
             above = run.time[late & (slip > level)]
-            passed[seed, k] = run.stop - above[0] if len(above) else 0
-    np.testing.assert_allclose(passed.mean(axis=0), [3.9, 2.8, 2.1, 1.4], atol=0.4)
+            delay[seed, k] = run.stop - above[0] if len(above) else 0
+    np.testing.assert_allclose(delay.mean(axis=0), [3.9, 2.8, 2.1, 1.4], atol=0.4)
 
 
 def test_healthy_driving_on_snow_with_starts_and_stops_is_quiet():
@@ -178,8 +180,8 @@ def test_healthy_driving_on_snow_with_starts_and_stops_is_quiet():
 
 def test_the_reason_is_made_of_the_kernels_signs(soft):
     _, table = soft
-    found = {e.kind: e for e in events(table)}
-    warning = found["immobilization"]
+    result = {e.kind: e for e in events(table)}
+    warning = result["immobilization"]
     row = np.searchsorted(table.time, warning.start)
     assert table["warning"][row] > watch_limits()["warn"]
     largest = max(SIGNS, key=lambda sign: table[f"warning_{sign}"][row])
@@ -189,7 +191,7 @@ def test_the_reason_is_made_of_the_kernels_signs(soft):
         f"is {table['warning'][row]:.1f} and warns above {watch_limits()['warn']:g}",
     ):
         assert part in warning.why
-    assert "stuck where ground speed stays below 10%" in found["stuck"].why
+    assert "stuck where ground speed stays below 10%" in result["stuck"].why
 
 
 def test_estimates_without_the_signs_still_have_their_events(soft):
@@ -201,29 +203,29 @@ def test_estimates_without_the_signs_still_have_their_events(soft):
 
 def test_the_events_are_in_order_and_cover_every_flagged_row(soft):
     _, table = soft
-    found = events(table)
-    assert [e.start for e in found] == sorted(e.start for e in found)
+    result = events(table)
+    assert [e.start for e in result] == sorted(e.start for e in result)
     for row in np.flatnonzero(table.event_codes):
         kind = EVENTS[table.event_codes[row]]
-        assert any(e.kind == kind and e.start <= table.time[row] <= e.end for e in found)
+        assert any(e.kind == kind and e.start <= table.time[row] <= e.end for e in result)
 
 
 def assert_twins_agree(recording, table):
     limits = watch_limits(float(np.mean(table.vehicle.wheel_radius)))
     watch = Watch(limits, pace(table.vehicle, limits))
     measured = np.isfinite(recording.channels["ground_speed"])
-    said, points, score = [], [], []
+    notes, points, score = [], [], []
     for row in rows_of(table, measured):
-        said.append(watch.update(row))
+        notes.append(watch.update(row))
         points.append(list(watch.points))
         score.append(watch.score)
-    for ours, kernel in zip(said, table["event"], strict=True):
+    for ours, kernel in zip(notes, table["event"], strict=True):
         if kernel not in ("gap", "standstill"):
             assert ours == (kernel if kernel in ("immobilization", "stuck") else "")
     np.testing.assert_allclose(score, table["warning"], atol=1e-9)
     for k, sign in enumerate(SIGNS):
         np.testing.assert_allclose(np.array(points)[:, k], table[f"warning_{sign}"], atol=1e-9)
-    return set(said)
+    return set(notes)
 
 
 def test_the_kernel_and_its_twin_flag_the_same_rows_for_the_same_signs(soft):
@@ -252,12 +254,12 @@ def test_sample_by_sample_and_across_a_snapshot_the_events_are_the_same(soft):
     result, table = soft
     estimator = TractionEstimator.for_recording(result.recording, result.vehicle)
     middle = int(np.argmax(table["event"] == "immobilization")) - 20
-    said = []
+    notes = []
     for k, row in enumerate(result.recording.to_pandas().to_dict("records")):
         if k == middle:
             estimator = TractionEstimator.restore(estimator.snapshot())
-        said.append(estimator.update(row).event)
-    assert said == list(table["event"])
+        notes.append(estimator.update(row).event)
+    assert notes == list(table["event"])
 
 
 def test_a_tool_that_runs_up_is_a_push():
@@ -266,12 +268,12 @@ def test_a_tool_that_runs_up_is_a_push():
     pushed = (log.time >= 20) & (log.time < 21)
     channels["drawbar_force"] = np.where(pushed, -80.0, channels["drawbar_force"])
     vehicle = simulate("constant").vehicle
-    found = [
+    result = [
         e for e in events(estimate(Recording(time=log.time, channels=channels), vehicle)) if e.kind == "push"
     ]
-    assert len(found) >= 1
-    assert 20 <= found[0].start < 20.3
-    assert "pushes from behind" in found[0].why
+    assert len(result) >= 1
+    assert 20 <= result[0].start < 20.3
+    assert "pushes from behind" in result[0].why
 
 
 def test_an_empty_table_has_no_events(soft):

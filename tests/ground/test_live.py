@@ -32,11 +32,11 @@ def rows(estimates):
 @pytest.fixture
 def estimates():
     """A drive with a standstill, a gap in its rows and a stretch without slip."""
-    found = drive(1, [("grass", GRASS, 25), ("fine", FINE, 25), ("coarse", COARSE, 25)])
-    found.event_codes[200:230] = EVENTS.index("standstill")
-    found.columns["slip_fl"][200:230] = np.nan
-    found.time[900:] += 3.3
-    return found
+    result = drive(1, [("grass", GRASS, 25), ("fine", FINE, 25), ("coarse", COARSE, 25)])
+    result.event_codes[200:230] = EVENTS.index("standstill")
+    result.columns["slip_fl"][200:230] = np.nan
+    result.time[900:] += 3.3
+    return result
 
 
 @pytest.fixture
@@ -45,10 +45,10 @@ def estimator(monkeypatch):
     made = TractionEstimator(Vehicle.from_dict(VEHICLE))
     there = set(drive(0, [("fine", FINE, 1)]).columns)
     monkeypatch.setattr(TractionEstimator, "columns", property(lambda self: tuple(there)))
-    made.told = 0
+    made.new_grounds = 0
 
     def new_ground():
-        made.told += 1
+        made.new_grounds += 1
 
     made.new_ground = new_ground
     return made
@@ -63,12 +63,12 @@ def test_it_is_the_whole_drive_without_looking_ahead(estimates, estimator, libra
     states = follow(live, rows(estimates))
     states.append(live.finish())
     ground, table = analyse(estimates, library, settings=Settings(online=True))
-    found = np.array([[s.probabilities[n] for n in ground.timeline.names] for s in states])
-    np.testing.assert_array_equal(found, ground.timeline.probabilities)
+    result = np.array([[s.probabilities[n] for n in ground.timeline.names] for s in states])
+    np.testing.assert_array_equal(result, ground.timeline.probabilities)
     assert [s.known for s in states] == ground.timeline.known.tolist()
     assert tuple(s.change for s in states if s.change) == ground.changes
     assert len(ground.changes) == 2
-    assert estimator.told == 2
+    assert estimator.new_grounds == 2
     # a row of the table holds what had been said before it
     at = {s.time: s.soil for s in states[:-1]}
     time, soil = estimates.time, table["soil_estimate"]

@@ -97,10 +97,10 @@ def test_reliability_finds_honest_and_boastful_probabilities():
 def test_confusion_counts_and_merging_adds_up():
     one = timeline(np.array([0.9, 0.9, 0.1, 0.9]), np.array([True, True, False, False]))
     one.label[1] = ""
-    found = confusion([one])
-    assert (found.labels, found.soils) == (("a", "b"), ("a", "b"))
-    np.testing.assert_array_equal(found.counts, [[1, 0], [1, 1]])
-    assert found.right == pytest.approx(2 / 3)
+    result = confusion([one])
+    assert (result.labels, result.soils) == (("a", "b"), ("a", "b"))
+    np.testing.assert_array_equal(result.counts, [[1, 0], [1, 1]])
+    assert result.right == pytest.approx(2 / 3)
     both = merged(one, {"a": "ab", "b": "ab"})
     assert both.names == ("ab", "unknown")
     np.testing.assert_allclose(both.probabilities[:, 0], one.probabilities[:, :2].sum(axis=1))

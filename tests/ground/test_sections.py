@@ -29,14 +29,14 @@ def test_its_statistics_are_over_rows_without_an_event():
     estimates.columns["slip_rr"][300:310] = np.nan
     rows = np.ones(600, dtype=bool)
     rows[100:200] = rows[300:310] = False
-    (found,) = sections_of(estimates, [Stretch(0, 600, ONE)], LENGTH)
+    (result,) = sections_of(estimates, [Stretch(0, 600, ONE)], LENGTH)
     share = np.array([500, 500, 860, 860]) / 2720
     slip = np.column_stack([estimates[f"slip_{w}"] for w in ("fl", "fr", "rl", "rr")])[rows] @ share
-    assert (found.slip_mean, found.slip_std) == pytest.approx((slip.mean(), slip.std()))
+    assert (result.slip_mean, result.slip_std) == pytest.approx((slip.mean(), slip.std()))
     mu = estimates["adhesion_rl"][rows]
-    assert found.wheels["rl"]["adhesion_mean"] == pytest.approx(mu.mean())
-    assert found.wheels["rl"]["adhesion_std"] == pytest.approx(mu.std())
-    assert found.samples == rows.sum()
+    assert result.wheels["rl"]["adhesion_mean"] == pytest.approx(mu.mean())
+    assert result.wheels["rl"]["adhesion_std"] == pytest.approx(mu.std())
+    assert result.samples == rows.sum()
 
 
 def test_a_force_sensor_gives_the_measured_ratio():
@@ -44,14 +44,14 @@ def test_a_force_sensor_gives_the_measured_ratio():
     estimates.columns["wheel_force_x_rr"] = np.full(200, 100.0)
     estimates.columns["wheel_force_z_rr"] = np.full(200, 400.0)
     estimates.columns["wheel_force_z_rr"][:50] = 1.0  # lifted
-    (found,) = sections_of(estimates, [Stretch(0, 200, ONE)], LENGTH)
-    assert found.measured == {"rr": {"force_ratio_mean": 0.25, "force_ratio_std": 0.0}}
+    (result,) = sections_of(estimates, [Stretch(0, 200, ONE)], LENGTH)
+    assert result.measured == {"rr": {"force_ratio_mean": 0.25, "force_ratio_std": 0.0}}
 
 
 def test_a_stretch_too_short_for_the_tool_is_no_section():
     pieces = [Stretch(0, 400, ONE), Stretch(400, 440, {"grass": 1.0}), Stretch(440, 800, ONE)]
-    found = sections_of(drive(4, [("fine", FINE, 40)]), pieces, LENGTH)
-    assert [s.entered for s in found] == [0.0, 22.0]
+    result = sections_of(drive(4, [("fine", FINE, 40)]), pieces, LENGTH)
+    assert [s.entered for s in result] == [0.0, 22.0]
 
 
 def test_they_come_from_the_changes_of_a_drive(library):

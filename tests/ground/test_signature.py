@@ -17,10 +17,10 @@ from terragrip.soil.signature import Signature, _ground, learn_signature, signat
 
 def test_it_finds_what_the_drives_were_drawn_from(library):
     for name, ground in {"grass": GRASS, "fine": FINE, "coarse": COARSE}.items():
-        found = signature_in(library[name])
-        assert found.level[0] == pytest.approx(ground.resistance, abs=3 * ground.varies / np.sqrt(100))
-        assert found.runs == 2
-        assert found.made_by == "bank"
+        result = signature_in(library[name])
+        assert result.level[0] == pytest.approx(ground.resistance, abs=3 * ground.varies / np.sqrt(100))
+        assert result.runs == 2
+        assert result.made_by == "bank"
     smooth, rough = signature_in(library["fine"]), signature_in(library["coarse"])
     assert np.exp(rough.roughness - smooth.roughness) == pytest.approx(
         5.0, rel=0.2

@@ -25,14 +25,14 @@ def simulated_library():
 
 
 @pytest.fixture(scope="module")
-def told():
+def analysis():
     result = run("multi1", 1003)
     return result, estimate(result.recording, result.vehicle)
 
 
-def test_soils_and_borders_of_a_simulated_drive(told, simulated_library):
-    result, found = told
-    ground, table = analyse(found, simulated_library, "multi1")
+def test_soils_and_borders_of_a_simulated_drive(analysis, simulated_library):
+    result, analysed = analysis
+    ground, table = analyse(analysed, simulated_library, "multi1")
     truth = result.truth
     one = truth["soil"].replace({"wet": "fine"}).to_numpy()
     named = np.where(table["soil_estimate"] == "wet", "fine", table["soil_estimate"])
@@ -50,9 +50,9 @@ def test_soils_and_borders_of_a_simulated_drive(told, simulated_library):
     assert all(0 < change.std < 5 and 0.5 < change.probability <= 1 for change in ground.changes)
 
 
-def test_streamed_through_the_estimator_it_is_the_same(told, simulated_library):
+def test_streamed_through_the_estimator_it_is_the_same(analysis, simulated_library):
     """Recording to estimator to ground, sample by sample, for a minute and a half; the estimator learns of each change."""
-    result, found = told
+    result, analysed = analysis
     estimator = TractionEstimator.for_recording(result.recording, result.vehicle)
     live, states = LiveGround(estimator, simulated_library), []
     channels = {name: values.tolist() for name, values in result.recording.channels.items()}
@@ -61,10 +61,12 @@ def test_streamed_through_the_estimator_it_is_the_same(told, simulated_library):
             break
         state = live.update(estimator.update({"time": time, **{name: v[k] for name, v in channels.items()}}))
         states += [state] * (state is not None)
-    ground = analyse(found, simulated_library, settings=Settings(online=True))[0]
+    ground = analyse(analysed, simulated_library, settings=Settings(online=True))[0]
     expected = ground.timeline.probabilities[: len(states)]
     np.testing.assert_array_equal(
         [[s.probabilities[n] for n in ground.timeline.names] for s in states], expected
     )
-    assert [s.change for s in states if s.change] == [c for c in ground.changes if c.told <= states[-1].time]
+    assert [s.change for s in states if s.change] == [
+        c for c in ground.changes if c.reported <= states[-1].time
+    ]
     assert any(s.change for s in states)

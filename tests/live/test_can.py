@@ -22,10 +22,10 @@ from terragrip.live.sinks.can import DBC
 
 
 def heard(bus) -> list:
-    found = []
+    result = []
     while (frame := bus.recv(0.0)) is not None:
-        found.append(frame)
-    return found
+        result.append(frame)
+    return result
 
 
 @pytest.mark.asyncio
@@ -160,17 +160,17 @@ def test_frames_are_decoded_as_cantools_does(dbc, identifier, data):
         expected = message.decode(data)
     except cantools.database.DecodeError:  # a page that there is not
         return
-    found = FrameDecoder([str(dbc)], lambda name: False).fields(identifier, False, data)
-    assert found == pytest.approx(expected, nan_ok=True)
+    result = FrameDecoder([str(dbc)], lambda name: False).fields(identifier, False, data)
+    assert result == pytest.approx(expected, nan_ok=True)
 
 
 def test_j1939s_not_available_is_missing_and_a_sender_has_a_name():
     decoder = FrameDecoder([], lambda name: name.endswith("@F0"))
     data = struct.pack("<HIBB", 0xFFFF, 0xFFFFFFFF, 0xFF, 0xFF)
     assert decoder.fields(0x0CFE49F0, True, data) == {}
-    found = decoder.fields(0x0CFE49F0, True, struct.pack("<HIBB", 1500, 0, 0xFF, 0xFF))
-    assert found["GroundBasedMachineSpeed"] == pytest.approx(1.5)
-    assert found["GroundBasedMachineSpeed@F0"] == pytest.approx(1.5)
+    result = decoder.fields(0x0CFE49F0, True, struct.pack("<HIBB", 1500, 0, 0xFF, 0xFF))
+    assert result["GroundBasedMachineSpeed"] == pytest.approx(1.5)
+    assert result["GroundBasedMachineSpeed@F0"] == pytest.approx(1.5)
     assert decoder.fields(0x123, False, data) == {}
     assert decoder.unknown == {0x123: 1}
 

@@ -80,7 +80,7 @@ def run(capsys, files, *options: str) -> tuple[int, str, str]:
 
 
 @pytest.mark.parametrize(
-    ("options", "said"),
+    ("options", "expected"),
     [
         (["--source", "nothing"], "names no source"),
         (["--source", "udp://127.0.0.1:9", "--sink", "udp://127.0.0.1"], "names no host and port"),
@@ -94,12 +94,12 @@ def run(capsys, files, *options: str) -> tuple[int, str, str]:
         ),
     ],
 )
-def test_what_cannot_be_is_one_line_and_exit_2(capsys, files, options, said):
+def test_what_cannot_be_is_one_line_and_exit_2(capsys, files, options, expected):
     code, out, err = run(capsys, files, *options)
     assert code == 2
     assert out == ""
     assert len(err.splitlines()) == 1
-    assert said in err
+    assert expected in err
 
 
 def test_a_missing_package_names_the_extra(capsys, files, monkeypatch):

@@ -62,8 +62,8 @@ def test_as_a_profile_makes_of_a_log(log):
 
 def test_a_delay_makes_a_sample_of_its_own():
     profile = {"channels": {"ground_speed": {"from": "v", "delay": "50 ms"}, "wheel_speed_fl": {"from": "w"}}}
-    found = Decoder(Profile.from_dict(profile)).samples({"time": 1.0, "v": 2.0, "w": 3.0})
-    assert dict(found) == {0.95: {"ground_speed": 2.0}, 1.0: {"wheel_speed_fl": 3.0}}
+    result = Decoder(Profile.from_dict(profile)).samples({"time": 1.0, "v": 2.0, "w": 3.0})
+    assert dict(result) == {0.95: {"ground_speed": 2.0}, 1.0: {"wheel_speed_fl": 3.0}}
 
 
 def test_the_better_source_wins_once_it_speaks():

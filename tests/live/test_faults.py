@@ -48,7 +48,7 @@ def stuck_at_6_s(vehicle, seconds: float):
 def jittered(recording, seed: int) -> list[tuple[float, bytes]]:
     """Arrival and text of each message of a drive; with all that senders and networks do to some of them."""
     generator = random.Random(seed)
-    names, found = ["time", *recording.channels], []
+    names, result = ["time", *recording.channels], []
     for k, row in enumerate(rows_in(recording)):
         message = dict(zip(names, row, strict=True))
         chance = generator.random() if k > 40 else 1.0
@@ -74,18 +74,20 @@ def jittered(recording, seed: int) -> list[tuple[float, bytes]]:
         if 0.11 < chance < 0.14:
             place = generator.randrange(len(data))
             data = data[:place] + bytes([generator.randrange(256)]) + data[place + 1 :]
-        found.append((row[0] + 0.002 * generator.random(), data))
+        result.append((row[0] + 0.002 * generator.random(), data))
         if 0.08 < chance < 0.09:
-            found.append((row[0] + 0.003, data))
+            result.append((row[0] + 0.003, data))
         elif 0.09 < chance < 0.1:
-            found[-2:] = (
-                [(found[-1][0], found[-2][1]), (found[-2][0], found[-1][1])] if len(found) > 1 else found
+            result[-2:] = (
+                [(result[-1][0], result[-2][1]), (result[-2][0], result[-1][1])]
+                if len(result) > 1
+                else result
             )
         elif 0.1 < chance < 0.105:
-            found.append((row[0] + 0.004, data[:-5]))
+            result.append((row[0] + 0.004, data[:-5]))
         elif 0.105 < chance < 0.11:
-            found.append((row[0] + 0.3, data.replace(b'"time": ', b'"time": 9')))
-    return found
+            result.append((row[0] + 0.3, data.replace(b'"time": ', b'"time": 9')))
+    return result
 
 
 async def fed(service, sent, last=lambda: None) -> None:

@@ -47,20 +47,20 @@ def feed(profile: Profile | None) -> Feed:
 
 @given(st.binary(max_size=60) | anything.map(lambda value: json.dumps(value).encode()), st.booleans())
 def test_any_message(data, with_profile):
-    found = feed(PROFILE if with_profile else None)
-    found.message(data)
-    found.message(data, topic="a/b")
-    json.dumps(found.inbox.notes())
-    assert all(isinstance(value, float) for sample in found.inbox.samples for value in sample[3].values())
+    result = feed(PROFILE if with_profile else None)
+    result.message(data)
+    result.message(data, topic="a/b")
+    json.dumps(result.inbox.notes())
+    assert all(isinstance(value, float) for sample in result.inbox.samples for value in sample[3].values())
 
 
 @given(st.lists(st.dictionaries(st.sampled_from((*NAMES, "t", "fast", "a slow one")), anything), max_size=5))
 def test_any_fields(messages):
     for profile in (None, PROFILE):
-        found = feed(profile)
+        result = feed(profile)
         for fields in messages:
-            found.fields(fields)
-        for _, _, stamp, values in found.inbox.samples:
+            result.fields(fields)
+        for _, _, stamp, values in result.inbox.samples:
             assert all(abs(number) < float("inf") for number in (stamp, *values.values()))
 
 
@@ -94,6 +94,6 @@ def test_any_damage_to_a_write_ahead_file(tmp_path_factory, data):
     cut = data.draw(st.integers(0, len(content)))
     path.write_bytes(content[:cut])
     reading = Reading(path)
-    found = list(reading)
-    assert found == whole[: len(found)]
+    result = list(reading)
+    assert result == whole[: len(result)]
     assert reading.good <= max(cut, len(MAGIC))

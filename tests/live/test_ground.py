@@ -79,10 +79,10 @@ async def test_soils_and_changes_are_published(tmp_path, recording, library, veh
     service.listeners.append(seen.append)
     await service.run()
     changes = [message.data for message in seen if message.kind == "ground"]
-    told = [state.change.time for state in by_hand[1] if state.change is not None]
-    assert [change["time"] for change in changes] == told
-    assert min(abs(time - 20.0) for time in told) < 1.0
-    assert len(events(service, "ground_change")) == len(told)
+    reported = [state.change.time for state in by_hand[1] if state.change is not None]
+    assert [change["time"] for change in changes] == reported
+    assert min(abs(time - 20.0) for time in reported) < 1.0
+    assert len(events(service, "ground_change")) == len(reported)
     soils = [message.data for message in seen if message.kind == "soil"]
     assert [(soil["time"], soil["soil"], soil["probabilities"]) for soil in soils] == [
         (state.time, state.soil, state.probabilities) for state in by_hand[1]

@@ -142,8 +142,8 @@ async def test_foxglove_subscribes_and_an_mcap_holds_the_same(tmp_path, vehicle,
         async with connect(f"ws://127.0.0.1:{port}", subprotocols=["foxglove.sdk.v1"]) as client:
             channels = {}
             while len(channels) < len(NAMES):
-                found = json.loads(await client.recv())
-                channels |= {c["topic"]: c for c in found.get("channels", [])}
+                result = json.loads(await client.recv())
+                channels |= {c["topic"]: c for c in result.get("channels", [])}
             estimate = channels["/terragrip/estimate"]
             await client.send(
                 json.dumps({"op": "subscribe", "subscriptions": [{"id": 7, "channelId": estimate["id"]}]})
@@ -176,11 +176,11 @@ async def test_foxglove_subscribes_and_an_mcap_holds_the_same(tmp_path, vehicle,
 
 
 def readable_messages(path) -> int:
-    found = 0
+    result = 0
     with path.open("rb") as stream, contextlib.suppress(EndOfFile):
-        for found, _ in enumerate(NonSeekingReader(stream).iter_messages(log_time_order=False), 1):  # noqa: B007
+        for result, _ in enumerate(NonSeekingReader(stream).iter_messages(log_time_order=False), 1):  # noqa: B007
             pass
-    return found
+    return result
 
 
 async def test_foxglove_stays_on_this_machine(vehicle):
@@ -197,14 +197,14 @@ async def test_the_studios_websocket_in_json_and_in_doubles(tmp_path, vehicle, s
             hello, first = json.loads(await text.recv()), json.loads(await text.recv())
         async with connect(f"ws://127.0.0.1:{port}/?format=binary&columns=slip_fl*&rate=20") as packed:
             columns = json.loads(await packed.recv())["columns"]
-            found = [await packed.recv() for _ in range(10)]
+            result = [await packed.recv() for _ in range(10)]
         async with connect(f"ws://127.0.0.1:{port}/?colums=slip_fl") as wrong:
             await wrong.wait_closed()
             assert "did you mean columns" in wrong.close_reason
         service.stop()
     assert (hello["kind"], hello["columns"], hello["wheels"]) == ("hello", ["slip_fl"], list(vehicle.wheels))
     assert first.keys() == {"kind", "time", "arrival", "event", "predicted", "slip_fl"}
-    numbers = [struct.unpack("<5d", one) for one in found if isinstance(one, bytes)]
+    numbers = [struct.unpack("<5d", one) for one in result if isinstance(one, bytes)]
     assert columns == ["slip_fl", "slip_fl_std"]
     steps = [b[0] - a[0] for a, b in itertools.pairwise(numbers)]
     assert steps == pytest.approx([0.05] * len(steps))

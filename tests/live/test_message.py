@@ -23,20 +23,20 @@ def row(values: dict[str, float], time: float = 1.5, predicted: bool = False) ->
 @given(st.lists(st.floats(), min_size=1, max_size=4), st.floats(0, 1e9))
 def test_numbers_are_what_printf_writes_to_nine_digits(numbers, time):
     values = {f"slip_{k}": number for k, number in enumerate(numbers)}
-    found = json.loads(Columns().json(row(values, time)))
-    assert (found["time"], found["arrival"], found["event"]) == (time, 1.7e9 + 0.123456, "outlier")
+    result = json.loads(Columns().json(row(values, time)))
+    assert (result["time"], result["arrival"], result["event"]) == (time, 1.7e9 + 0.123456, "outlier")
     for name, number in values.items():
         if math.isfinite(number):
-            assert found[name] == float(f"{number:.9g}")
+            assert result[name] == float(f"{number:.9g}")
         else:
-            assert found[name] is None
+            assert result[name] is None
 
 
 def test_only_the_wanted_columns_are_written():
     values = {"slip_fl": 0.1, "slip_fl_std": 0.2, "nis": 3.0, "channels": 9.0}
-    found = json.loads(Columns("slip_*, channels").json(row(values, predicted=True)))
-    assert list(found) == ["time", "arrival", "event", "predicted", "slip_fl", "slip_fl_std", "channels"]
-    assert found["predicted"] is True
+    result = json.loads(Columns("slip_*, channels").json(row(values, predicted=True)))
+    assert list(result) == ["time", "arrival", "event", "predicted", "slip_fl", "slip_fl_std", "channels"]
+    assert result["predicted"] is True
     assert json.loads(Columns("curve_*").json(row(values))).keys() == {
         "time",
         "arrival",

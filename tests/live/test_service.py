@@ -44,9 +44,9 @@ class Sender:
 
 @pytest.fixture
 def sender(port):
-    found = Sender(port)
-    yield found
-    found.close()
+    result = Sender(port)
+    yield result
+    result.close()
 
 
 async def test_a_replay_gives_what_the_estimator_gives(tmp_path, vehicle, short):
@@ -111,9 +111,9 @@ async def test_datagrams_in_estimates_out(vehicle, short, port, sender):
             sender.send(*messages(short.recording, 300))
             await until(lambda: len([m for m in got if "slip_fl" in m]) == 300)
         loop.remove_reader(receiver)
-    found = [m for m in got if "slip_fl" in m]
-    assert [m["time"] for m in found] == short.recording.time[:300].tolist()
-    assert found[-1].keys() == {
+    result = [m for m in got if "slip_fl" in m]
+    assert [m["time"] for m in result] == short.recording.time[:300].tolist()
+    assert result[-1].keys() == {
         "time",
         "arrival",
         "event",
@@ -121,7 +121,7 @@ async def test_datagrams_in_estimates_out(vehicle, short, port, sender):
         "soil_resistance",
         "soil_resistance_std",
     } | {f"slip_{w}{std}" for w in vehicle.wheels for std in ("", "_std")}
-    assert found[-1]["slip_fl"] == pytest.approx(short.truth["slip_fl"][299], abs=0.05)
+    assert result[-1]["slip_fl"] == pytest.approx(short.truth["slip_fl"][299], abs=0.05)
 
 
 async def test_simulinks_doubles_in_and_out(vehicle, short, port, sender):

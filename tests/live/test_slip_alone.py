@@ -60,16 +60,18 @@ def test_sample_by_sample_is_what_the_whole_log_gives() -> None:
     frame, vehicle = drive(), calibrated()
     whole = tg.estimate(tg.Recording.from_frame(frame), vehicle, sensors={"wheel_based_speed": 0.01}, held={})
     one = TractionEstimator(vehicle, channels=CHANNELS, sensors={"wheel_based_speed": 0.01})
-    found = [one.update(sample) for sample in samples(frame)]
+    result = [one.update(sample) for sample in samples(frame)]
     for name in ("slip_drive", "slip_drive_std", "ground_speed", "wheel_speed_drive", "distance", "nis"):
-        assert np.allclose([e[name] for e in found], whole[name], rtol=1e-9, atol=1e-12, equal_nan=True), name
+        assert np.allclose([e[name] for e in result], whole[name], rtol=1e-9, atol=1e-12, equal_nan=True), (
+            name
+        )
     events = whole["event"].tolist()
     before_gap = events.index("gap")  # only a whole log knows what follows
-    assert [e.event for e in found[:before_gap]] == events[:before_gap]
-    assert "gap" in [e.event for e in found]
-    steady = [e.slip_drive for e in found if 20 < e.time < 90]
+    assert [e.event for e in result[:before_gap]] == events[:before_gap]
+    assert "gap" in [e.event for e in result]
+    steady = [e.slip_drive for e in result if 20 < e.time < 90]
     assert np.mean(steady) == pytest.approx(0.12, abs=0.005)
-    assert found[-1].zero_slip_radius_drive == pytest.approx(0.824)
+    assert result[-1].zero_slip_radius_drive == pytest.approx(0.824)
 
 
 def test_a_snapshot_goes_on_bit_for_bit() -> None:
@@ -177,12 +179,12 @@ def test_can_frames_give_the_drives_slip_for_each_driven_wheel() -> None:
         estimate = one.update(row)
     sink = CanSink(Uri.parse("can:x?interface=virtual", {"can": ("interface", "rate")}, "sink"), calibrated())
     base = cantools.database.load_file(DBC)
-    told = {
+    reported = {
         base.get_message_by_frame_id(i).name: base.decode_message(i, data)
         for i, data in sink.frames(Row(0.0, {}, estimate))
     }
-    assert told["TG_Wheel3"]["Slip3"] == pytest.approx(estimate.slip_drive, abs=1e-3)
+    assert reported["TG_Wheel3"]["Slip3"] == pytest.approx(estimate.slip_drive, abs=1e-3)
     absent = base.get_message_by_name("TG_Wheel1").get_signal_by_name("Slip1")
-    assert told["TG_Wheel1"]["Slip1"] == pytest.approx(
+    assert reported["TG_Wheel1"]["Slip1"] == pytest.approx(
         absent.offset + absent.scale * ((1 << absent.length) - 1)
     )

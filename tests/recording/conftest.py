@@ -35,9 +35,9 @@ def columns() -> Columns:
     rng = np.random.default_rng(3)
     time = np.arange(6000) / 100
     speed = 0.6 + 0.05 * np.sin(time / 7)
-    found: Columns = {"time": time, "ground_speed": speed + 0.02 * rng.standard_normal(6000)}
+    result: Columns = {"time": time, "ground_speed": speed + 0.02 * rng.standard_normal(6000)}
     for wheel in WHEELS:
-        found[f"wheel_speed_{wheel}"] = speed / 0.2 / 0.93 + 0.03 * rng.standard_normal(6000)
-        found[f"drive_torque_{wheel}"] = 15 + rng.standard_normal(6000)
-    found["drawbar_force"] = 200 + 4 * rng.standard_normal(6000)
-    return found
+        result[f"wheel_speed_{wheel}"] = speed / 0.2 / 0.93 + 0.03 * rng.standard_normal(6000)
+        result[f"drive_torque_{wheel}"] = 15 + rng.standard_normal(6000)
+    result["drawbar_force"] = 200 + 4 * rng.standard_normal(6000)
+    return result

@@ -46,11 +46,11 @@ def held(time: np.ndarray, period: float, seed: int, *, jitter: float = 0.0) -> 
 )
 def test_held_channels_are_found(rate: int, period: float, jitter: float, seed: int) -> None:
     time = np.arange(0, 60, 1 / rate)
-    found = held_period(time, held(time, period, seed, jitter=jitter))
+    result = held_period(time, held(time, period, seed, jitter=jitter))
     if period * rate < 1.1:  # one row in twenty repeats: hardly held, either answer serves
-        assert found is None or found == pytest.approx(period, rel=0.1)
+        assert result is None or result == pytest.approx(period, rel=0.1)
     else:
-        assert found == pytest.approx(period, rel=0.05 + 0.2 * jitter)
+        assert result == pytest.approx(period, rel=0.05 + 0.2 * jitter)
 
 
 @pytest.mark.parametrize("seed", SEEDS)

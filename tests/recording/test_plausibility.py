@@ -16,7 +16,7 @@ def scaled(columns: Columns, prefix: str, factor: float) -> Recording:
 
 
 @pytest.mark.parametrize(
-    ("prefix", "factor", "told"),
+    ("prefix", "factor", "expected"),
     [
         ("ground_speed", 3.6, "ground_speed may be in km/h"),
         ("wheel_speed", 3.6, "may come from km/h"),
@@ -30,24 +30,24 @@ def scaled(columns: Columns, prefix: str, factor: float) -> Recording:
     ],
 )
 def test_a_wrong_unit_is_named(
-    columns: Columns, vehicle: Vehicle, prefix: str, factor: float, told: str
+    columns: Columns, vehicle: Vehicle, prefix: str, factor: float, expected: str
 ) -> None:
-    said = unit_warnings(scaled(columns, prefix, factor), vehicle)
-    assert len(said) == 1
-    assert told in said[0]
-    assert "fl, fr, rl, rr" in said[0]
+    notes = unit_warnings(scaled(columns, prefix, factor), vehicle)
+    assert len(notes) == 1
+    assert expected in notes[0]
+    assert "fl, fr, rl, rr" in notes[0]
 
 
 def test_a_rim_speed_in_kmh_is_named(columns: Columns, vehicle: Vehicle) -> None:
     tractor = Vehicle.from_dict({**vehicle.to_dict(), "wheel": {"radius": 0.8, "inertia": 40}})
-    said = unit_warnings(scaled(columns, "wheel_speed", 0.2 * 3.6), tractor)
-    assert "rim's speed in km/h" in said[0]
+    notes = unit_warnings(scaled(columns, "wheel_speed", 0.2 * 3.6), tractor)
+    assert "rim's speed in km/h" in notes[0]
 
 
 def test_one_wheel_alone_is_named(columns: Columns, vehicle: Vehicle) -> None:
-    said = unit_warnings(scaled(columns, "wheel_speed_rl", 9.549), vehicle)
-    assert len(said) == 1
-    assert "wheel speed of rl times" in said[0]
+    notes = unit_warnings(scaled(columns, "wheel_speed_rl", 9.549), vehicle)
+    assert len(notes) == 1
+    assert "wheel speed of rl times" in notes[0]
 
 
 @pytest.mark.parametrize("slip", [-0.2, 0.0, 0.1, 0.3, 0.5])
@@ -83,8 +83,13 @@ def test_angles_acceleration_and_time(columns: Columns, vehicle: Vehicle) -> Non
         "latitude": np.full(n, 501.0),
     }
     frame["time"] = columns["time"] * 1000
-    said = " ".join(unit_warnings(Recording.from_frame(frame), vehicle))
-    for told in ("pitch reaches 5 rad", "may be in g", "latitude exceeds 180", "time may not be in seconds"):
-        assert told in said
+    notes = " ".join(unit_warnings(Recording.from_frame(frame), vehicle))
+    for expected in (
+        "pitch reaches 5 rad",
+        "may be in g",
+        "latitude exceeds 180",
+        "time may not be in seconds",
+    ):
+        assert expected in notes
     upside_down = {**columns, "acceleration_z": np.full(n, -9.8)}
     assert "other way" in unit_warnings(Recording.from_frame(upside_down), vehicle)[0]

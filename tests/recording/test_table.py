@@ -222,8 +222,8 @@ def test_any_table_is_a_recording_or_refused(table: dict[str, Any]) -> None:
     try:
         recording = Recording.from_frame(table)
     except InputError as error:
-        told = str(error)
-        assert "\n" not in told
+        message = str(error)
+        assert "\n" not in message
         return
     assert np.all(np.diff(recording.time) > 0)
     assert all(len(values) == len(recording) > 0 for values in recording.channels.values())

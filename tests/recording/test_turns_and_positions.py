@@ -72,7 +72,7 @@ def test_right_channels_say_nothing() -> None:
 
 
 @pytest.mark.parametrize(
-    ("channel", "factor", "told"),
+    ("channel", "factor", "expected"),
     [
         (
             "wheel_based_speed",
@@ -92,13 +92,13 @@ def test_right_channels_say_nothing() -> None:
         ),
     ],
 )
-def test_kmh_is_told_in_both_directions(channel: str, factor: float, told: str) -> None:
+def test_kmh_is_told_in_both_directions(channel: str, factor: float, expected: str) -> None:
     columns = of_drive(field())
     columns[channel] = columns[channel] * factor
     log = Recording.from_frame(columns)
-    assert any(told in said for said in unit_warnings(log, None))
-    assert any(told in note for note in tg.estimate(log, machine()).notes)
-    assert any(told in note for note in calibrate(log, machine()).notes)
+    assert any(expected in notes for notes in unit_warnings(log, None))
+    assert any(expected in note for note in tg.estimate(log, machine()).notes)
+    assert any(expected in note for note in calibrate(log, machine()).notes)
 
 
 def test_a_scale_of_units_is_no_radius() -> None:
@@ -106,9 +106,9 @@ def test_a_scale_of_units_is_no_radius() -> None:
     estimates = tg.estimate(Recording.from_frame(of_drive(field(), 3.6)), machine())
     assert estimates.about["zero_slip"]["drive"]["ratio"] == 1
     assert "check the units" in " ".join(estimates.notes)
-    found = calibrate(Recording.from_frame(of_drive(field(), 3.6)), machine())
-    assert not found.quantities
-    assert "check the units" in found.unknown[0].why
+    calibration = calibrate(Recording.from_frame(of_drive(field(), 3.6)), machine())
+    assert not calibration.quantities
+    assert "check the units" in calibration.unknown[0].why
 
 
 def test_an_inverted_yaw_rate_is_noticed_everywhere(
@@ -119,11 +119,13 @@ def test_an_inverted_yaw_rate_is_noticed_everywhere(
     columns = field()
     columns["angular_velocity_z"] = -columns["angular_velocity_z"]
     log = Recording.from_frame(columns)
-    told = "angular_velocity_z is of the wrong sign: the positions and the wheels' speeds turn the other way"
-    assert any(told in note for note in tg.estimate(log, machine()).notes)
-    assert any(told in note for note in calibrate(log, machine()).notes)
+    expected = (
+        "angular_velocity_z is of the wrong sign: the positions and the wheels' speeds turn the other way"
+    )
+    assert any(expected in note for note in tg.estimate(log, machine()).notes)
+    assert any(expected in note for note in calibrate(log, machine()).notes)
     pd.DataFrame(columns).to_csv(tmp_path / "log.csv", index=False)
-    assert any(told in note for note in inspect(tmp_path / "log.csv", vehicle=machine()).warnings)
+    assert any(expected in note for note in inspect(tmp_path / "log.csv", vehicle=machine()).warnings)
     # Without a vehicle the positions alone speak.
     assert any("wrong sign: the positions turn" in note for note in inspect(tmp_path / "log.csv").warnings)
     machine().save(tmp_path / "v.yaml")
@@ -136,7 +138,7 @@ def test_an_inverted_yaw_rate_is_noticed_everywhere(
         str(tmp_path / "c.yaml"),
     ]
     assert main(words) == 0
-    assert told in capsys.readouterr().out
+    assert expected in capsys.readouterr().out
 
 
 def test_wheels_exchanged_from_side_to_side_are_told_apart_from_a_yaw_rate() -> None:
@@ -144,8 +146,8 @@ def test_wheels_exchanged_from_side_to_side_are_told_apart_from_a_yaw_rate() -> 
     for left, right in (("fl", "fr"), ("rl", "rr")):
         a, b = f"wheel_speed_{left}", f"wheel_speed_{right}"
         columns[a], columns[b] = columns[b], columns[a]
-    said = unit_warnings(Recording.from_frame(columns), machine())
-    assert said == [
+    notes = unit_warnings(Recording.from_frame(columns), machine())
+    assert notes == [
         "angular_velocity_z turns with the positions and against the wheels' speeds: left and right wheels may be exchanged."
     ]
 
@@ -158,13 +160,13 @@ def test_slip_alone_turns_by_the_positions(position: bool) -> None:
     if not position:
         columns = {n: v for n, v in columns.items() if n not in ("latitude", "longitude")}
     estimates = tg.estimate(Recording.from_frame(columns), machine())
-    said = " ".join(estimates.notes)
+    sentence = " ".join(estimates.notes)
     error = np.abs(estimates["slip_fl"][turning] - 0.05)
     if position:
-        assert "The rate of turn is that of the positions" in said
+        assert "The rate of turn is that of the positions" in sentence
         assert np.median(error) < 0.02
     else:
-        assert "nothing says how fast the machine turned" in said
+        assert "nothing says how fast the machine turned" in sentence
         assert np.median(error) > 0.1
 
 

@@ -101,9 +101,9 @@ def test_without_plutoprint_the_page_is_written_and_one_line_says_what_to_instal
 ) -> None:
     monkeypatch.setattr("terragrip.report.pdf.pdf_possible", lambda: False)
     assert main(["report", files[0], "-o", str(tmp_path / "a.html"), "--quiet"]) == 0
-    said = capsys.readouterr()
-    assert "pip install 'terragrip[report]'" in said.out
-    assert len(said.out.splitlines()) == 1
+    output = capsys.readouterr()
+    assert "pip install 'terragrip[report]'" in output.out
+    assert len(output.out.splitlines()) == 1
     assert {path.name for path in tmp_path.iterdir()} == {"a.html"}
 
 
@@ -121,7 +121,7 @@ def test_one_run_without_labels_or_sensor_leaves_sections_out_with_a_sentence(tm
 
 
 @pytest.mark.parametrize(
-    ("words", "said"),
+    ("words", "expected"),
     [
         (["{0}", "{0}", "-o", "a.html"], "is given twice"),
         (["{0}", "-o", "a.txt"], "is not named .html"),
@@ -134,7 +134,7 @@ def test_one_run_without_labels_or_sensor_leaves_sections_out_with_a_sentence(tm
 def test_what_cannot_be_used_is_one_line_and_leaves_nothing(
     files: list[str],
     words: list[str],
-    said: str,
+    expected: str,
     tmp_path: Path,
     capsys: pytest.CaptureFixture[str],
     monkeypatch: pytest.MonkeyPatch,
@@ -143,7 +143,7 @@ def test_what_cannot_be_used_is_one_line_and_leaves_nothing(
     assert main(["report", *(word.format(files[0]) for word in words)]) == 2
     lines = capsys.readouterr().err.splitlines()
     assert len(lines) == 1
-    assert said in lines[0]
+    assert expected in lines[0]
     assert list(tmp_path.iterdir()) == []
 
 

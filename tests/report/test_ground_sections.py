@@ -87,9 +87,9 @@ def test_events_are_listed_with_their_reasons_and_short_ones_counted() -> None:
     "section", [ground_sections.recognised, ground_sections.section_points, ground_sections.events]
 )
 def test_without_a_ground_each_section_says_so(section) -> None:
-    found = section([])
-    assert found.omitted
-    assert "ground.json" in found.omitted
+    result = section([])
+    assert result.omitted
+    assert "ground.json" in result.omitted
 
 
 def test_a_warning_is_listed_however_short_and_its_reason_is_read_from_the_left() -> None:

@@ -131,8 +131,8 @@ def test_with_nothing_to_compare_the_sections_say_so(drive: Drive) -> None:
 
 
 def test_coverage_pools_rows_not_runs(drive: Drive) -> None:
-    found = [*run_coverage(drive("a", seconds=30.0)), *run_coverage(drive("b", seconds=300.0, seed=3))]
-    together = {item.quantity: item for item in pooled(found)}
+    result = [*run_coverage(drive("a", seconds=30.0)), *run_coverage(drive("b", seconds=300.0, seed=3))]
+    together = {item.quantity: item for item in pooled(result)}
     mu = together["adhesion µ"]
     assert mu.rows == 4 * (600 + 5900)  # the 5 s stuck are left out
     assert mu.share() == pytest.approx(0.95, abs=0.006)

@@ -56,6 +56,6 @@ def test_the_figure_says_what_it_shows(drive: Drive) -> None:
 
 def test_without_a_reference_the_section_says_so(drive: Drive) -> None:
     run = replace(drive(), truth=None, recording=None)
-    found = residuals.section(run)
-    assert found.omitted
-    assert not found.content
+    result = residuals.section(run)
+    assert result.omitted
+    assert not result.content

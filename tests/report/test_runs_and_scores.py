@@ -131,15 +131,16 @@ def test_rows_in_events_are_left_out_and_are_stuck_where_no_truth_says_it(drive:
         {"kind": "stuck", "start": 60.0, "end": 64.95},
         {"kind": "standstill", "start": 0.0, "end": 9.0},
     )
-    told = Run(run.name, run.estimates, run.method, run.truth, run.recording, run.vehicle, events)
-    kappa = next(c for c in compare(told) if (c.quantity, c.against) == ("net_traction", "sensor"))
+    estimates = Run(run.name, run.estimates, run.method, run.truth, run.recording, run.vehicle, events)
+    kappa = next(c for c in compare(estimates) if (c.quantity, c.against) == ("net_traction", "sensor"))
     assert kappa.without_flagged is not None
     # a standstill is left out as it is, a stuck spell from 1 s before to 2 s after
-    assert told.flagged[told.time <= 9.0].all()
+    assert estimates.flagged[estimates.time <= 9.0].all()
     assert (
-        told.flagged[told.time > 9.0] == ((told.time >= 59) & (told.time <= 66.95))[told.time > 9.0]
+        estimates.flagged[estimates.time > 9.0]
+        == ((estimates.time >= 59) & (estimates.time <= 66.95))[estimates.time > 9.0]
     ).all()
-    assert kappa.without_flagged.count == (~told.flagged).sum()
+    assert kappa.without_flagged.count == (~estimates.flagged).sum()
     bare = Run(run.name, run.estimates, run.method, events=events)
     assert bare.stuck.sum() == 100
     assert (bare.stuck == run.stuck).all()

@@ -40,36 +40,36 @@ def by_anchor(sections: tuple[Section, ...]) -> dict[str, Section]:
 
 def test_slip_over_time_by_way_and_by_place(tmp_path: Path) -> None:
     page = report_of([drive(tmp_path, position=True)])
-    found = by_anchor(page.sections)
+    result = by_anchor(page.sections)
     for key in ("slip-placed", "slip-histogram-placed", "slip-map-placed", "honesty", "runs"):
-        assert not found[key].omitted, key
-    table = found["slip-histogram-placed"].content[1]
+        assert not result[key].omitted, key
+    table = result["slip-histogram-placed"].content[1]
     shares = {row[0]: float(row[2].removesuffix(" %")) for row in table.rows}
     assert shares["10 to 15 %"] == pytest.approx(50, abs=4)  # half of the time, at the same mean speed
-    assert "no drive torque" in found["without-torque"].omitted
-    assert not {"tracking-placed", "soils", "residuals"} & set(found)
+    assert "no drive torque" in result["without-torque"].omitted
+    assert not {"tracking-placed", "soils", "residuals"} & set(result)
     assert "east [m]" in render(page)
 
 
 def test_without_positions_the_map_is_left_out_with_its_reason(tmp_path: Path) -> None:
-    found = by_anchor(report_of([drive(tmp_path, position=False)]).sections)
-    assert "no position" in found["slip-map-bare"].omitted
-    assert not found["slip-bare"].omitted
+    result = by_anchor(report_of([drive(tmp_path, position=False)]).sections)
+    assert "no position" in result["slip-map-bare"].omitted
+    assert not result["slip-bare"].omitted
 
 
 def test_the_ground_says_what_it_needs(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     path = drive(tmp_path, position=False)
     assert main(["ground", str(path), "-o", str(tmp_path / "ground.json")]) == 2
-    said = capfd.readouterr().err.strip().splitlines()
-    assert len(said) == 1
-    assert "holds slip but no adhesion" in said[0]
-    assert "estimate a log with torques" in said[0]
+    text = capfd.readouterr().err.strip().splitlines()
+    assert len(text) == 1
+    assert "holds slip but no adhesion" in text[0]
+    assert "estimate a log with torques" in text[0]
     assert not (tmp_path / "ground.json").exists()
 
 
 def test_it_is_said_where_slip_counts_from(tmp_path: Path) -> None:
-    found = by_anchor(report_of([drive(tmp_path, position=False)]).sections)
-    said = found["slip-bare"].prose[0]
-    assert "from the log's own zero" in said
-    ratio = float(said.split("drive: ")[1].split(" ±")[0])
+    result = by_anchor(report_of([drive(tmp_path, position=False)]).sections)
+    text = result["slip-bare"].prose[0]
+    assert "from the log's own zero" in text
+    ratio = float(text.split("drive: ")[1].split(" ±")[0])
     assert ratio == pytest.approx(1 / 1.03, abs=0.005)  # the machine's own speed was made 3 % too fast

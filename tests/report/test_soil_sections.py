@@ -33,7 +33,7 @@ def curves_fixture() -> list[SoilCurves]:
         n: AdhesionCurve(bootstrap=0).fit(slip, CURVES["exponential"].value(slip, {"a": a}))
         for n, a in made_up.A.items()
     }
-    return soil_sections.told_by_all(campaign, truth, true)
+    return soil_sections.curves_of_all(campaign, truth, true)
 
 
 def tables(section: Section) -> list[Table]:
@@ -76,12 +76,12 @@ def test_hard_stands_first_and_alone_as_in_the_paper(curves: list[SoilCurves]) -
 def test_maxima_are_those_of_the_formula(curves: list[SoilCurves]) -> None:
     """eta = kappa/(kappa + rho)(1 - s) on a fine grid, written out here once more."""
     soil = Soil("x", "exponential", {"a": 0.85}, resistance=(0.1, 0.0))
-    found = maxima(soil, 0.02)
+    result = maxima(soil, 0.02)
     s = np.linspace(1e-4, 1, 200_001)
     mu = 0.85 * (1 - 0.52 * np.exp(0.01 * s) - 0.48 * np.exp(-11.36 * s))
     eta = np.where(mu > 0.1, (mu - 0.1) / (mu + 0.02) * (1 - s), 0)
-    assert found.adhesion == pytest.approx((s[mu.argmax()], mu.max()), abs=2e-4)
-    assert found.efficiency == pytest.approx((s[eta.argmax()], eta.max()), abs=2e-4)
+    assert result.adhesion == pytest.approx((s[mu.argmax()], mu.max()), abs=2e-4)
+    assert result.efficiency == pytest.approx((s[eta.argmax()], eta.max()), abs=2e-4)
     (table,) = tables(soil_sections.both_maxima(curves, 0.02))
     fine = dict(zip(table.header, next(row for row in table.rows if row[0] == "fine"), strict=True))
     assert fine["true largest η"] == f"{eta.max():.2f} at {100 * s[eta.argmax()]:.0f} %"
@@ -130,8 +130,8 @@ def test_a_library_is_shown_as_it_was_learned(curves: list[SoilCurves], tmp_path
     Campaign({one.name: one.learned for one in curves}, {}, ()).library().write(tmp_path / "soils.json")
     campaign = known_soils(SoilLibrary.load(tmp_path / "soils.json"), ["hard", "fine", "clay"])
     assert campaign.not_fitted == {"clay": "the library does not hold it"}
-    shown = soil_sections.told_by_all(campaign)
-    fresh = soil_sections.told_by_all(Campaign({one.name: one.learned for one in curves}, {}, ()))
+    shown = soil_sections.curves_of_all(campaign)
+    fresh = soil_sections.curves_of_all(Campaign({one.name: one.learned for one in curves}, {}, ()))
     for mine, theirs in zip(
         tables(soil_sections.fits(shown, {})), tables(soil_sections.fits(fresh, {})), strict=True
     ):
@@ -149,13 +149,13 @@ def test_full_bins_are_not_called_enough_where_the_data_fix_no_curve(curves: lis
     from dataclasses import replace
 
     full = [replace(one, learned=replace(one.learned, gaps=())) for one in curves]
-    (said,) = soil_sections.what_is_missing(full, {}).prose
-    assert "Yet" not in said or not all(one.learned.curve.identifiability_.identifiable for one in full)
+    (text,) = soil_sections.what_is_missing(full, {}).prose
+    assert "Yet" not in text or not all(one.learned.curve.identifiability_.identifiable for one in full)
     curve = full[0].learned.curve
     before = curve.identifiability_
     try:
         curve.identifiability_ = replace(before, identifiable=False)
-        (said,) = soil_sections.what_is_missing(full, {}).prose
+        (text,) = soil_sections.what_is_missing(full, {}).prose
     finally:
         curve.identifiability_ = before
-    assert f"the data do not fix the curve of {full[0].name} (R² " in said
+    assert f"the data do not fix the curve of {full[0].name} (R² " in text

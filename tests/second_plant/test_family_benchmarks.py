@@ -43,9 +43,9 @@ def test_lag_and_r2_of_a_shifted_signal():
 def test_warnings_are_judged_by_edge_and_stop():
     time = np.arange(0.0, 30.0, 0.1)
     course = Course(edge=10.0, stop=20.0, end=30.0, time=time, travel=0.5 * time, length=2.0, speed=0.5)
-    said = judge(course, [4.0, 17.0], [20.4])
-    assert (said.stops, said.leads, said.late, said.false, said.seconds) == (1, [3.0], 0, 1, 10.0)
-    assert said.lengths == [pytest.approx(0.75)]
+    text = judge(course, [4.0, 17.0], [20.4])
+    assert (text.stops, text.leads, text.late, text.false, text.seconds) == (1, [3.0], 0, 1, 10.0)
+    assert text.lengths == [pytest.approx(0.75)]
     missed = judge(course, [20.1], [21.0])
     assert (missed.stops, missed.leads, missed.late, missed.false) == (1, [], 1, 0)
     healthy = judge(Course(np.inf, np.nan, 30.0, time, 0.5 * time, 2.0, 0.5), [5.0], [])
@@ -68,11 +68,11 @@ def test_the_plain_filter_finds_the_constants_of_a_steady_drive():
     n = 2000
     columns = {"wheel_speed_w": omega, "ground_speed": 0.55, "drive_torque_w": torque, "drawbar_force": pull}
     time = np.arange(n) / 50.0
-    found = plain_filter(
+    result = plain_filter(
         Recording(time, {name: np.full(n, value) for name, value in columns.items()}), vehicle
     )
     weight = mass * 9.80665
     mu = torque / (radius * weight) - 0.02 - 1.5 * omega / weight
     for q in range(1, len(INTENSITIES)):
-        assert found.state[q, -1, 2] == pytest.approx(mu, abs=1e-4)
-        assert found.state[q, -1, 3] == pytest.approx(mu - pull / weight, abs=2e-3)
+        assert result.state[q, -1, 2] == pytest.approx(mu, abs=1e-4)
+        assert result.state[q, -1, 3] == pytest.approx(mu - pull / weight, abs=2e-3)

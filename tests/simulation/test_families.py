@@ -108,8 +108,8 @@ def test_a_machine_twice_as_long_does_the_same_at_its_own_pace():
     ):  # fmt: skip
         at = s.time.to_numpy()[(s.time > 4) & (s.time < 9)]
         expected = factor * np.interp(at, s.time, s[column])
-        found = np.interp(at * beat, t.time, t[column])
-        np.testing.assert_allclose(found, expected, atol=0.01 * np.abs(expected).max(), err_msg=column)
+        result = np.interp(at * beat, t.time, t[column])
+        np.testing.assert_allclose(result, expected, atol=0.01 * np.abs(expected).max(), err_msg=column)
 
 
 def _scaled(scale: float) -> Scenario:
@@ -236,12 +236,12 @@ def test_another_kind_is_refused():
 
 def test_true_gains_undo_the_machines_errors(drawn):
     for result in drawn:
-        found = result.true_parameters["calibration"]
-        made = Vehicle.from_dict({**result.vehicle.to_dict(), "calibration": found})
+        out = result.true_parameters["calibration"]
+        made = Vehicle.from_dict({**result.vehicle.to_dict(), "calibration": out})
         w = next(w for w, driven in zip(made.wheels, made.driven, strict=True) if driven)
         raw = result.recording[f"drive_torque_{w}"]
         rows = np.isfinite(raw)
-        corrected = (raw[rows] - found["drive_torque_offset"][w]) / found["drive_torque_gain"][w]
+        corrected = (raw[rows] - out["drive_torque_offset"][w]) / out["drive_torque_gain"][w]
         error = corrected - result.truth[f"true_drive_torque_{w}"][rows]
         sd = result.vehicle.sensors.drive_torque
         assert abs(error.mean()) < 5 * sd / np.sqrt(rows.sum())

@@ -183,12 +183,12 @@ def test_a_sensor_on_a_wheel_that_is_not_there_is_refused(quiet):
 
 
 @pytest.mark.parametrize(
-    ("spot", "said"),
+    ("spot", "expected"),
     [
         ({"at": 5, "length": 1.0, "edge": 0.6}, "two edges are longer than it"),
         ({"at": 5, "adhesion_loss": 0.6, "adhesion_fall": 0.6}, "more adhesion is lost than there is"),
     ],
 )
-def test_an_impossible_soft_spot_is_refused(spot, said):
-    with pytest.raises(InputError, match=said):
+def test_an_impossible_soft_spot_is_refused(spot, expected):
+    with pytest.raises(InputError, match=expected):
         Scenario.from_dict({"extends": "constant", "soft_spots": [spot]})

@@ -172,10 +172,10 @@ def test_save_and_read_back(tmp_path):
 
 
 def test_campaign_runs_are_the_same_alone_and_among_others():
-    names, said = ["hard-02", "grass-05", "wet-01"], []
-    among = dict(simulate_campaign(names, seed=9, workers=2, progress=lambda *a: said.append(a)))
+    names, notes = ["hard-02", "grass-05", "wet-01"], []
+    among = dict(simulate_campaign(names, seed=9, workers=2, progress=lambda *a: notes.append(a)))
     assert list(among) == names
-    assert said == [(1, 3, "hard-02"), (2, 3, "grass-05"), (3, 3, "wet-01")]
+    assert notes == [(1, 3, "hard-02"), (2, 3, "grass-05"), (3, 3, "wet-01")]
     ((_, alone),) = simulate_campaign(["grass-05"], seed=9, workers=1)
     pd.testing.assert_frame_equal(among["grass-05"].truth, alone.truth)
     assert among["hard-02"].true_parameters == alone.true_parameters

@@ -125,11 +125,11 @@ def test_digitised_points(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("text", "say"),
+    ("text", "expected"),
     [("", "no numbers"), ("a,b\n", "no numbers"), ("1,2\n3,x\n", "row 2, column 2"), ("1,2,3\n4,5,6\n", "3 columns"),
      ("0.1,0.2\n", "1 points"), ("500,1\n600,2\n", "slip lies between"), ("0.1,inf\n0.2,1\n", "not a number")],
 )  # fmt: skip
-def test_digitised_points_that_are_none(tmp_path, text, say):
+def test_digitised_points_that_are_none(tmp_path, text, expected):
     (tmp_path / "p.csv").write_text(text)
-    with pytest.raises(InputError, match=say):
+    with pytest.raises(InputError, match=expected):
         read_points(tmp_path / "p.csv")

@@ -90,14 +90,14 @@ def test_kernel_agrees_with_numpy(seed, pairs):
 
 def drive(curve, rng, a, seconds, slip=(0.1, 0.4), rate=100, noise=0.02):
     """Rows at `rate` with noise that is alike over 0.3 s; returns a and a_std of each row."""
-    error, found = 0.0, []
+    error, result = 0.0, []
     keep = np.exp(-1 / (rate * 0.3))
     for _ in range(int(seconds * rate)):
         s = rng.uniform(*slip)
         error = keep * error + noise * np.sqrt(1 - keep**2) * rng.standard_normal()
         curve.update(1 / rate, s, a * float(g(s)) + error, adhesion_std=noise, distance=0.5 / rate)
-        found.append((curve.a, curve.a_std))
-    return np.array(found)
+        result.append((curve.a, curve.a_std))
+    return np.array(result)
 
 
 def test_the_interval_holds_the_truth():
@@ -190,7 +190,7 @@ def test_distance_forgets_up_to_what_is_known_of_any_ground():
 
 
 @pytest.mark.parametrize(
-    ("change", "said"),
+    ("change", "expected"),
     [
         ({"dt": -0.1}, "back in time"),
         ({"dt": np.nan}, "no number"),
@@ -201,6 +201,6 @@ def test_distance_forgets_up_to_what_is_known_of_any_ground():
         ({"radius_std": -0.1}, "negative spread"),
     ],
 )
-def test_refusals(change, said):
-    with pytest.raises(ValueError, match=said):
+def test_refusals(change, expected):
+    with pytest.raises(ValueError, match=expected):
         OnlineCurve().update(**{"dt": 0.01, "slip": 0.2, "adhesion": 0.3, **change})

@@ -59,9 +59,9 @@ def test_a_shape_that_is_not_the_prototypes_is_found():
     slip = rng.uniform(0.03, 0.5, 20_000)
     mu = CURVES["effective"].value(slip, {"A": 0.45, "k": 18.0, "d": 0.0})
     bins = bin_by_pull(slip, mu, mu, np.full(slip.size, 0.01), np.arange(slip.size) % 10, BY_PULL)
-    found = AdhesionCurve("effective", bootstrap=0).fit_bins(bins).parameters_
-    assert found["k"] == pytest.approx(18.0, rel=0.02)
-    assert found["A"] == pytest.approx(0.45, rel=0.01)
+    result = AdhesionCurve("effective", bootstrap=0).fit_bins(bins).parameters_
+    assert result["k"] == pytest.approx(18.0, rel=0.02)
+    assert result["A"] == pytest.approx(0.45, rel=0.01)
 
 
 def test_metres_count_not_samples():

@@ -422,10 +422,10 @@ def test_axe_finds_nothing_serious(browser: Any, served: Served, where: str, the
     tab.wait_for_selector("main select, main h1")
     tab.wait_for_timeout(500)
     tab.add_script_tag(path=str(AXE))
-    found = tab.evaluate("() => axe.run(document, { resultTypes: ['violations'] })")
+    result = tab.evaluate("() => axe.run(document, { resultTypes: ['violations'] })")
     serious = [
         (v["id"], v["nodes"][0]["html"][:120])
-        for v in found["violations"]
+        for v in result["violations"]
         if v["impact"] in ("serious", "critical")
     ]
     context.close()

@@ -75,8 +75,8 @@ def test_long_buckets_from_blocks_are_those_from_rows(
         return
     rows = column[starts[0] : starts[-1]]
     expected = extremes(rows, starts - starts[0])
-    found = Extremes(column).of(column.__getitem__, starts)
-    np.testing.assert_array_equal(found, expected)
+    result = Extremes(column).of(column.__getitem__, starts)
+    np.testing.assert_array_equal(result, expected)
 
 
 def test_a_long_run_shows_every_extreme_whatever_the_window(made: Path) -> None:
@@ -227,13 +227,13 @@ def test_a_torque_step_is_named_as_what_moved_adhesion(client: TestClient, folde
         "recording": {"source": "step.csv", "sha256": back.sha256},
     }
     Estimates(time, columns, np.zeros(len(time), np.uint8), {}, about).write(folder / "step.parquet")
-    found = client.get("/api/drive/sample", params={"path": "step.parquet", "time": 10.0}).json()
-    first = found["why"][0]
+    result = client.get("/api/drive/sample", params={"path": "step.parquet", "time": 10.0}).json()
+    first = result["why"][0]
     moved = 10.0 / (vehicle.wheel_radius[vehicle.wheels.index("rr")] * load["rear"])
     assert first.startswith("rr: adhesion")
     assert f"{moved:+.3f} within 1 s; torque +10.0 N m ({moved:+.3f})" in first
-    assert found["measured"]["drive_torque_rr"] == 30.0
-    assert all(f"adhesion {0:+.3f}" in text for text in found["why"][1:])
+    assert result["measured"]["drive_torque_rr"] == 30.0
+    assert all(f"adhesion {0:+.3f}" in text for text in result["why"][1:])
 
 
 def test_the_track_holds_every_position(client: TestClient, folder: Path) -> None:
@@ -271,8 +271,8 @@ def test_a_ground_file_of_several_runs_gives_this_runs_sections(client: TestClie
 
     several = {"changes": [], "sections": [section("multi1", "coarse"), section("estimates", "hard")]}
     (folder / "ground.json").write_text(json.dumps(several))
-    found = client.get("/api/drive", params={"path": RUN}).json()["ground"]
-    assert [one["soil"] for one in found["sections"]] == ["hard"]
+    result = client.get("/api/drive", params={"path": RUN}).json()["ground"]
+    assert [one["soil"] for one in result["sections"]] == ["hard"]
     del several["sections"][1]
     (folder / "ground.json").write_text(json.dumps(several))
     assert client.get("/api/drive", params={"path": RUN}).json()["ground"] is None

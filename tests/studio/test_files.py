@@ -22,9 +22,9 @@ def test_a_good_log_is_taken_and_told(client: TestClient, folder: Path) -> None:
     text = b"time,wheel_speed_fl,ground_speed\n" + b"".join(b"%d,5.0,1.0\n" % i for i in range(50))
     assert put(client, "new.csv", text)[0] == 201
     assert (folder / "new.csv").read_bytes() == text
-    found = client.get("/api/inspect", params={"path": "new.csv"}).json()
-    assert found["rows"] == 50
-    assert str(folder) not in found["text"]
+    result = client.get("/api/inspect", params={"path": "new.csv"}).json()
+    assert result["rows"] == 50
+    assert str(folder) not in result["text"]
 
 
 @pytest.mark.parametrize(

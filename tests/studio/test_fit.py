@@ -25,11 +25,11 @@ def test_points_on_a_curve_give_the_curve_back(client: TestClient) -> None:
     slip = np.linspace(0.02, 0.9, 25)
     for name, given in (("burckhardt", {"c1": 0.9, "c2": 18.0, "c3": 0.3}), ("exponential", {"a": 0.71})):
         mu = CURVES[name].value(slip, given)
-        found = fit(client, model=name, slip=slip.tolist(), adhesion=mu.tolist()).json()
+        result = fit(client, model=name, slip=slip.tolist(), adhesion=mu.tolist()).json()
         for parameter, value in given.items():
-            assert math.isclose(found["parameters"][parameter], value, rel_tol=1e-4)
-        assert found["r2"] > 0.999999
-        assert len(found["bins"]) == len(slip)
+            assert math.isclose(result["parameters"][parameter], value, rel_tol=1e-4)
+        assert result["r2"] > 0.999999
+        assert len(result["bins"]) == len(slip)
 
 
 def test_a_soil_of_estimates_is_fitted_as_terragrip_soils_does(client: TestClient, folder: Path) -> None:
@@ -37,9 +37,9 @@ def test_a_soil_of_estimates_is_fitted_as_terragrip_soils_does(client: TestClien
         soil["name"]: soil for soil in client.get("/api/soils", params={"path": "estimates.parquet"}).json()
     }
     reference = soils_of([folder / "estimates.parquet"]).soils["grass"].curve.to_dict()
-    found = fit(client, path="estimates.parquet", soil="grass", bootstrap=1000).json()
-    assert {name: found[name] for name in reference} == json.loads(json.dumps(reference))
-    assert shown["grass"]["bins"] == found["bins"]
+    result = fit(client, path="estimates.parquet", soil="grass", bootstrap=1000).json()
+    assert {name: result[name] for name in reference} == json.loads(json.dumps(reference))
+    assert shown["grass"]["bins"] == result["bins"]
 
 
 def test_bins_of_estimates_are_sorted_by_pull_as_terragrip_soils_sorts_them(
@@ -57,11 +57,11 @@ def test_bins_of_estimates_are_sorted_by_pull_as_terragrip_soils_sorts_them(
     labels = {"soil": np.full(8000, "fine", dtype=object)}
     Estimates(time, columns, np.zeros(8000, np.uint8), labels, known.about).write(folder / "made_up.parquet")
     reference = soils_of([folder / "made_up.parquet"]).soils["fine"].curve.to_dict()
-    found = fit(client, path="made_up.parquet", soil="fine", bootstrap=1000).json()
-    assert found["settings"]["by"] == "pull"
-    assert {name: found[name] for name in reference} == json.loads(json.dumps(reference))
+    result = fit(client, path="made_up.parquet", soil="fine", bootstrap=1000).json()
+    assert result["settings"]["by"] == "pull"
+    assert {name: result[name] for name in reference} == json.loads(json.dumps(reference))
     (shown,) = client.get("/api/soils", params={"path": "made_up.parquet"}).json()
-    assert shown["bins"] == found["bins"]
+    assert shown["bins"] == result["bins"]
 
 
 def test_curves_are_served_as_samples(client: TestClient) -> None:
@@ -79,10 +79,10 @@ def test_curves_are_served_as_samples(client: TestClient) -> None:
 def test_enough_points_carry_intervals_and_a_band(client: TestClient) -> None:
     slip = np.linspace(0.02, 0.6, 40)
     mu = CURVES["exponential"].value(slip, {"a": 0.8}) + 0.01 * np.random.default_rng(1).standard_normal(40)
-    found = fit(client, slip=slip.tolist(), adhesion=mu.tolist()).json()
-    low, high = found["interval"]["a"]
+    result = fit(client, slip=slip.tolist(), adhesion=mu.tolist()).json()
+    low, high = result["interval"]["a"]
     assert low < 0.8 < high
-    assert found["band"]["low"][30] < found["band"]["high"][30]
+    assert result["band"]["low"][30] < result["band"]["high"][30]
 
 
 def test_too_few_points_get_a_sentence_and_no_curve(client: TestClient) -> None:
@@ -98,9 +98,9 @@ def test_too_few_points_get_a_sentence_and_no_curve(client: TestClient) -> None:
 def test_all_four_parameters_carry_the_badge(client: TestClient) -> None:
     slip = np.linspace(0.05, 0.6, 30)
     mu = CURVES["exponential"].value(slip, {"a": 0.85}) + 0.01 * np.sin(40 * slip)
-    found = fit(client, fixed="free", slip=slip.tolist(), adhesion=mu.tolist()).json()
-    assert found["identifiability"]["identifiable"] is False
-    assert set(found["interval"]) == {"A", "k", "d"}
+    result = fit(client, fixed="free", slip=slip.tolist(), adhesion=mu.tolist()).json()
+    assert result["identifiability"]["identifiable"] is False
+    assert set(result["interval"]) == {"A", "k", "d"}
 
 
 def test_a_saved_curve_is_read_back_and_another_of_its_name_refused(client: TestClient, folder: Path) -> None:
@@ -148,7 +148,7 @@ def test_a_parameter_on_its_bound_is_told(client: TestClient) -> None:
     """A straight line through the points needs ever slower a rise than the range of k allows."""
     slip = np.linspace(0.02, 0.5, 30)
     sent = {"model": "effective", "fixed": "free", "slip": slip.tolist(), "bootstrap": 0}
-    found = client.post("/api/fit", json={**sent, "adhesion": (5.0 * np.sign(slip)).tolist()}).json()
+    result = client.post("/api/fit", json={**sent, "adhesion": (5.0 * np.sign(slip)).tolist()}).json()
     limits = {
         p["name"]: p
         for m in client.get("/api/models").json()
@@ -157,15 +157,15 @@ def test_a_parameter_on_its_bound_is_told(client: TestClient) -> None:
     }
     on = [
         name
-        for name in found["free"]
+        for name in result["free"]
         if min(
-            found["parameters"][name] - limits[name]["lower"],
-            limits[name]["upper"] - found["parameters"][name],
+            result["parameters"][name] - limits[name]["lower"],
+            limits[name]["upper"] - result["parameters"][name],
         )
         < 1e-3 * (limits[name]["upper"] - limits[name]["lower"])
     ]
     assert on
-    assert found["at_bound"] == on
+    assert result["at_bound"] == on
     good = 0.6 * -np.expm1(-10 * slip)
     assert client.post("/api/fit", json={**sent, "adhesion": good.tolist()}).json()["at_bound"] == []
 

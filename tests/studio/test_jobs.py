@@ -155,8 +155,8 @@ def test_ready_means_that_the_estimate_will_run(client: TestClient, folder: Path
         folder / "odd.csv", index=False
     )
     for log in ("odd.csv", "recording.parquet"):
-        found = client.get("/api/inspect", params={"path": log, "vehicle": "vehicle.yaml"}).json()
+        result = client.get("/api/inspect", params={"path": log, "vehicle": "vehicle.yaml"}).json()
         job = wait(client, ask(client, recording=log, output="try.parquet", replace=True).json()["id"])
-        assert found["ready"] == (job["state"] == "done")
-        if not found["ready"]:
-            assert found["problem"] == job["text"]
+        assert result["ready"] == (job["state"] == "done")
+        if not result["ready"]:
+            assert result["problem"] == job["text"]

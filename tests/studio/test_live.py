@@ -20,7 +20,7 @@ STREAM = "ws://127.0.0.1:8750/api/live"
 
 def test_a_replay_sends_every_row_as_the_table_holds_it(client: TestClient, folder: Path) -> None:
     table = Estimates.read(folder / "estimates.parquet")
-    blocks, hello, said = [], {}, []
+    blocks, hello, messages = [], {}, []
     with client.websocket_connect(f"{STREAM}?replay=estimates.parquet&speed=1000") as socket:
         while True:
             message = socket.receive()
@@ -31,15 +31,15 @@ def test_a_replay_sends_every_row_as_the_table_holds_it(client: TestClient, fold
             if text["kind"] == "end":
                 break
             hello = text if text["kind"] == "hello" else hello
-            said.append(text)
+            messages.append(text)
     rows = np.concatenate(blocks)
     np.testing.assert_array_equal(rows[:, 0], table.time)
     np.testing.assert_array_equal(rows[:, 2], table.event_codes)
     for name in ("slip_rr", "adhesion_fl", "curve_a"):
         np.testing.assert_array_equal(rows[:, 3 + hello["columns"].index(name)], table[name])
-    assert [m["soil"] for m in said if m["kind"] == "soil"] == ["grass"]
-    told = [m["kind"] for m in said if m.get("source") == "estimator"]
-    assert told[0] == table["event"][np.flatnonzero(table.event_codes)[0]]
+    assert [m["soil"] for m in messages if m["kind"] == "soil"] == ["grass"]
+    expected = [m["kind"] for m in messages if m.get("source") == "estimator"]
+    assert expected[0] == table["event"][np.flatnonzero(table.event_codes)[0]]
 
 
 @pytest.mark.parametrize(
@@ -53,10 +53,10 @@ def test_a_replay_sends_every_row_as_the_table_holds_it(client: TestClient, fold
 )
 def test_what_cannot_be_played_is_said(client: TestClient, query: str, why: str) -> None:
     with client.websocket_connect(f"{STREAM}?{query}") as socket:
-        said = socket.receive_json()
-    assert said["kind"] == "problem"
-    assert why in said["text"]
-    assert "\n" not in said["text"]
+        messages = socket.receive_json()
+    assert messages["kind"] == "problem"
+    assert why in messages["text"]
+    assert "\n" not in messages["text"]
 
 
 @pytest.fixture

@@ -51,19 +51,19 @@ def command(
         for number, log in enumerate(logs, 1):
             recordings.append(read(log, profile, dbc=tuple(dbc or ())))
             step(number, len(logs), log.name)
-    found = calibrate(recordings, machine, light=spans)
-    if not any(quantity.applies for quantity in found.quantities):
-        for note in found.notes:
+    calibration = calibrate(recordings, machine, light=spans)
+    if not any(quantity.applies for quantity in calibration.quantities):
+        for note in calibration.notes:
             print(f"Note: {note}")
-        reasons = "; ".join(f"{unknown.name}: {unknown.why}" for unknown in found.unknown)
+        reasons = "; ".join(f"{unknown.name}: {unknown.why}" for unknown in calibration.unknown)
         raise InputError(
             f"nothing can be calibrated ({reasons})",
             file=logs[0],
             hint="record a standstill, a straight pass without load and some minutes of work",
         )
-    found.apply(machine).save(output)
+    calibration.apply(machine).save(output)
     if not quiet:
-        print(found.table())
+        print(calibration.table())
         print(f"\nWritten to {output}")
 
 

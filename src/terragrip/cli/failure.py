@@ -89,8 +89,8 @@ def _refusal(failure: BaseException) -> str | None:
     """The operating system said no. Arrow and Polars put its number into their text."""
     number = getattr(failure, "errno", None)
     if number is None:
-        found = re.search(r"(?:errno|os error) (\d+)", str(failure), re.IGNORECASE)
-        number = int(found.group(1)) if found else None
+        match = re.search(r"(?:errno|os error) (\d+)", str(failure), re.IGNORECASE)
+        number = int(match.group(1)) if match else None
     if number not in _REFUSALS:
         return None
     place = getattr(failure, "filename2", None) or getattr(failure, "filename", None)

@@ -102,17 +102,17 @@ def _signals(given: list[str] | None) -> tuple[str, ...]:
 
 def _names(files: list[Path]) -> list[str]:
     """A name for each drive: its file's; refuses a file given twice and two files of one name."""
-    taken: dict[str, Path] = {}
+    seen: dict[str, Path] = {}
     for path in files:
-        other = taken.get(path.stem)
+        other = seen.get(path.stem)
         if other is not None:
             if other.resolve() == path.resolve():
                 raise InputError("is given twice", file=path, hint="name each run once")
             raise InputError(
                 f"has the same name as {other}", file=path, hint="rename one: runs are told apart by name"
             )
-        taken[path.stem] = path
-    return list(taken)
+        seen[path.stem] = path
+    return list(seen)
 
 
 def _tables(table: Path | None, estimates: list[Path], inputs: list[Path]) -> list[Path]:

@@ -125,15 +125,15 @@ def predict(
     if rejection is not None:
         known.set_params(rejection=rejection)
     known.check_parameters()
-    told: list[pd.DataFrame] = []
+    tables: list[pd.DataFrame] = []
     with progress("ground-classifier", quiet) as show:
         for number, log in enumerate(logs, 1):
             columns = read_channels([log, *(others or ())], profile, dbc=dbc or (), also=CURRENT)
-            told.append(_judged(known, columns, log))
+            tables.append(_judged(known, columns, log))
             show(number, len(logs), log.name)
-    _write(told, target)
+    _write(tables, target)
     if not quiet:
-        for log, table in zip(logs, told, strict=True):
+        for log, table in zip(logs, tables, strict=True):
             shares = table["ground"].value_counts(normalize=True)
             print(
                 f"{log.name}: {len(table)} windows; " + ", ".join(f"{g} {s:.0%}" for g, s in shares.items())
@@ -209,12 +209,12 @@ def _judged(known: GroundClassifier, columns: Any, log: Path) -> pd.DataFrame:
     return table
 
 
-def _write(told: list[pd.DataFrame], target: Path) -> None:
+def _write(tables: list[pd.DataFrame], target: Path) -> None:
     import pandas as pd
 
     from terragrip.files import replacing
 
-    table = pd.concat(told, ignore_index=True)
+    table = pd.concat(tables, ignore_index=True)
     with replacing(target) as temporary:
         if target.suffix.lower() == ".parquet":
             table.to_parquet(temporary, index=False)

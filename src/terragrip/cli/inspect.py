@@ -47,29 +47,31 @@ def command(
         check_file(write_profile, option="--write-profile")
     paths = _logs_in(logs)
     if len(paths) == 1:
-        found = [inspect(paths[0], profile, vehicle, dbc=dbc or ())]
-        print(found[0].to_text())
+        result = [inspect(paths[0], profile, vehicle, dbc=dbc or ())]
+        print(result[0].to_text())
     else:
-        found, faults = [], []
+        result, faults = [], []
         for path in paths:
             try:
-                found.append(inspect(path, profile, vehicle, dbc=dbc or ()))
+                result.append(inspect(path, profile, vehicle, dbc=dbc or ()))
             except InputError as error:
                 faults.append(str(error))
-        if found:
-            print(summary_of(found))
+        if result:
+            print(summary_of(result))
         for fault in faults[:-1]:
             typer.echo(fault, err=True)
         if faults:
             raise InputError(f"{faults[-1]} ({len(faults)} of {len(paths)} logs could not be read)")
     if write_profile is not None:
-        _refuse_several(found, write_profile)
+        _refuse_several(result, write_profile)
         with replacing(write_profile) as temporary:
-            temporary.write_text(found[0].profile, encoding="utf-8")
+            temporary.write_text(result[0].profile, encoding="utf-8")
         print(f"Proposed profile written to {write_profile}")
-    elif found and all(one.refused for one in found):
+    elif result and all(one.refused for one in result):
         raise InputError(
-            found[0].refused, file=found[0].file, hint="log the wheels too, or join it to a log that has them"
+            result[0].refused,
+            file=result[0].file,
+            hint="log the wheels too, or join it to a log that has them",
         )
 
 
@@ -77,10 +79,10 @@ def _logs_in(paths: list[Path]) -> list[Path]:
     """The logs, with those of each folder that is not a bag itself; raises InputError where a folder holds none."""
     from terragrip.formats.registry import is_bag, suffixes
 
-    found: list[Path] = []
+    result: list[Path] = []
     for path in paths:
         if not path.is_dir() or is_bag(path):
-            found.append(path)
+            result.append(path)
             continue
         known = suffixes()
         inside = sorted(
@@ -92,17 +94,17 @@ def _logs_in(paths: list[Path]) -> list[Path]:
             raise InputError(
                 "holds no log", file=path, hint=f"name a folder with files such as *{known[0]}, or a log"
             )
-        found += inside
-    return found
+        result += inside
+    return result
 
 
-def _refuse_several(found: list[Inspection], target: Path) -> None:
+def _refuse_several(result: list[Inspection], target: Path) -> None:
     """Raise InputError unless the logs have the same columns, so that one profile is theirs."""
-    layouts = {tuple(column.name for column in one.columns) for one in found}
+    layouts = {tuple(column.name for column in one.columns) for one in result}
     if len(layouts) != 1:
         problem = (
             f"would be one profile for {len(layouts)} layouts of columns"
-            if found
+            if result
             else "there is no log to propose it for"
         )
         raise InputError(problem, file=target, place="--write-profile", hint="inspect logs of one kind")

@@ -126,7 +126,7 @@ def _held(pairs: list[str]) -> dict[str, float]:
     """Update periods by channel."""
     from terragrip.recording.schema import is_channel
 
-    found = {}
+    result = {}
     for pair in pairs:
         name, _, text = pair.partition("=")
         try:
@@ -137,8 +137,8 @@ def _held(pairs: list[str]) -> dict[str, float]:
             raise InputError(
                 f"{pair!r} is no channel and period", place="--held", hint="write ground_speed=0.2"
             )
-        found[name] = period
-    return found
+        result[name] = period
+    return result
 
 
 def _library(path: Path | None) -> SoilLibrary | None:

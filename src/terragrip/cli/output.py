@@ -70,18 +70,18 @@ def files_in(folder: Path, logs: Iterable[Path], suffix: str) -> list[Path]:
     InputError: two logs would write to one file, or one is an input itself.
     """
     logs = list(logs)
-    taken: dict[Path, Path] = {}
+    seen: dict[Path, Path] = {}
     for log in logs:
         target = folder / f"{log.name.split('.')[0] or log.stem}{suffix}"
-        if target in taken:
+        if target in seen:
             raise InputError(
-                f"has the same name as {taken[target]}: both would be written to {target}",
+                f"has the same name as {seen[target]}: both would be written to {target}",
                 file=log,
                 hint="rename one, or estimate them one at a time",
             )
         _refuse_inputs(target, logs)
-        taken[target] = log
-    return list(taken)
+        seen[target] = log
+    return list(seen)
 
 
 def _refuse_inputs(path: Path, inputs: Iterable[Path]) -> None:

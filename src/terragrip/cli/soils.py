@@ -153,10 +153,10 @@ def comparison(library: SoilLibrary, other: SoilLibrary, path: Path | None) -> s
     lines = [f"Compared with {path}, adhesion over 5 % to 60 % slip:"]
     for row in rows:
         meet = row["intervals_meet"]
-        said = "; ".join(f"intervals of {k} {'meet' if v else 'do not meet'}" for k, v in meet.items())
+        sentence = "; ".join(f"intervals of {k} {'meet' if v else 'do not meet'}" for k, v in meet.items())
         lines.append(
             f"  {row['soil']}: {-row['mean']:+.3f} in the mean, {row['largest']:.3f} at most"
-            + (f"; {said}" if said else "")
+            + (f"; {sentence}" if sentence else "")
         )
     return "\n".join(lines)
 

@@ -15,7 +15,7 @@ from terragrip.estimation.estimates import Estimates
 from terragrip.estimation.estimator import TractionEstimator
 from terragrip.estimation.methods import DEFAULT, SLIP_ONLY, method_named
 from terragrip.estimation.rims import speeds_alone
-from terragrip.estimation.slip_only import found_in
+from terragrip.estimation.slip_only import slip_reference_in
 from terragrip.recording import LogBlocks, Recording, survey_of, unit_warnings
 from terragrip.recording.clock import clock_text
 
@@ -61,7 +61,7 @@ def estimate(
     InputError: the recording or the vehicle is unusable, there is no such method, or `algebraic` is to smooth.
     """
     log = recording if isinstance(recording, Recording) else Recording.from_frame(recording)
-    (found,) = estimated(
+    (result,) = estimated(
         LogBlocks.of(log),
         vehicle,
         method,
@@ -72,7 +72,7 @@ def estimate(
         standstill_speed=standstill_speed,
         progress=progress,
     )
-    return found
+    return result
 
 
 def estimated(
@@ -107,7 +107,7 @@ def estimated(
     if not alone:
         known.sample.check_against(vehicle)
     # Where slip counts from may be told by one stretch of light work, which a sample of the rows can miss.
-    found = found_in(log.whole(), vehicle) if alone else None
+    reference = slip_reference_in(log.whole(), vehicle) if alone else None
     estimator = TractionEstimator.for_recording(
         known.sample,
         vehicle,
@@ -116,7 +116,7 @@ def estimated(
         held=held,
         gap=gap,
         standstill_speed=standstill_speed,
-        found=found,
+        slip_reference=reference,
     )
     if planned is not None:
         beside_them = (*passed_on(known.sample, estimator), *known.sample.labels)
@@ -202,8 +202,8 @@ def run(
 def prepared(estimator: TractionEstimator, recording: Recording) -> tuple[Floats, dict[str, Floats]]:
     """Time and those channels that the estimator looks at, each contiguous."""
     wanted, channels = estimator.engine.slots_in, recording.channels
-    if estimator.found is not None:
-        channels = estimator.found.completed(recording.time, channels)
+    if estimator.slip_reference is not None:
+        channels = estimator.slip_reference.completed(recording.time, channels)
     columns = {name: np.ascontiguousarray(values) for name, values in channels.items() if name in wanted}
     return np.ascontiguousarray(recording.time), columns
 
@@ -276,10 +276,10 @@ def about_run(estimator: TractionEstimator, recording: dict[str, Any], *, smooth
             "standstill_speed": estimator.engine.standstill_speed,
         },
     }
-    if estimator.found is not None:
+    if estimator.slip_reference is not None:
         about["zero_slip"] = {
             wheel: {"ratio": zero.ratio, "std": zero.std, "windows": zero.windows, "doubt": zero.doubt}
-            for wheel, zero in estimator.found.zero.items()
+            for wheel, zero in estimator.slip_reference.zero.items()
         }
     plain: dict[str, Any] = json.loads(json.dumps(about))
     return plain
@@ -287,12 +287,12 @@ def about_run(estimator: TractionEstimator, recording: dict[str, Any], *, smooth
 
 def notes_of(estimator: TractionEstimator, recording: Recording) -> tuple[str, ...]:
     """Sentences of the reader, on units that are likely wrong, and on what the estimator had to assume."""
-    said = [*recording.notes, *unit_warnings(recording, estimator.vehicle)]
+    notes = [*recording.notes, *unit_warnings(recording, estimator.vehicle)]
     guessed = [name for name in estimator.guessed if name in recording.channels]
     if guessed:
         shown = ", ".join(f"{name} ({estimator.noise[name]:.3g})" for name in guessed)
-        said.append(f"The noise of {shown} is a guess from the vehicle's size: give it under 'sensors'.")
-    if estimator.found is not None:
-        said = [note for note in said if not note.startswith("There is no drawbar_force")]
-        said += estimator.found.notes
-    return tuple(dict.fromkeys(said))
+        notes.append(f"The noise of {shown} is a guess from the vehicle's size: give it under 'sensors'.")
+    if estimator.slip_reference is not None:
+        notes = [note for note in notes if not note.startswith("There is no drawbar_force")]
+        notes += estimator.slip_reference.notes
+    return tuple(dict.fromkeys(notes))

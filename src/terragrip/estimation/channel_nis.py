@@ -50,13 +50,13 @@ def moving_nis(estimates: Estimates) -> dict[str, tuple[float, int]]:
 
     ``estimates``: of :func:`estimate_with_channel_nis`. A channel without such a row is left out.
     """
-    found = {}
+    result = {}
     for name in estimates:
         if name.startswith(PREFIX):
             values = estimates[name][(estimates.event_codes == 0) & np.isfinite(estimates[name])]
             if len(values):
-                found[name.removeprefix(PREFIX)] = (float(values.mean()), len(values))
-    return found
+                result[name.removeprefix(PREFIX)] = (float(values.mean()), len(values))
+    return result
 
 
 def _places(slots_in: Mapping[str, int]) -> dict[str, int]:

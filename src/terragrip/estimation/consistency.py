@@ -67,8 +67,8 @@ def agreement(observed: ArrayLike, predicted: ArrayLike, mask: ArrayLike | None 
     (physics.md 5; paper, section 3). Raises InputError when fewer than two rows are finite or the
     observations do not vary, since then neither figure exists.
     """
-    seen, said = _finite_rows((observed, predicted), mask, least=2)
-    error = said - seen
+    seen, estimated = _finite_rows((observed, predicted), mask, least=2)
+    error = estimated - seen
     spread = float(np.ptp(seen))
     if spread == 0.0:
         raise InputError("the observations do not vary, so R² and NRMSE do not exist")
@@ -89,8 +89,8 @@ def nrmse(observed: ArrayLike, predicted: ArrayLike, mask: ArrayLike | None = No
 
 def mean_absolute_error(truth: ArrayLike, estimate: ArrayLike, mask: ArrayLike | None = None) -> float:
     """Mean |estimate - truth| over the finite rows of `mask`. Raises InputError when there is none."""
-    true, said = _finite_rows((truth, estimate), mask, least=1)
-    return float(np.mean(np.abs(said - true)))
+    true, estimated = _finite_rows((truth, estimate), mask, least=1)
+    return float(np.mean(np.abs(estimated - true)))
 
 
 def coverage(
@@ -110,9 +110,9 @@ def coverage(
 
     if not 0.0 < probability < 1.0:
         raise InputError(f"an interval's probability must lie inside 0..1, not {probability}")
-    true, said, sd = _finite_rows((truth, estimate, std), mask, least=1)
+    true, estimated, sd = _finite_rows((truth, estimate, std), mask, least=1)
     half = float(ndtri(0.5 + probability / 2.0)) * sd
-    return float(np.mean(np.abs(said - true) <= half))
+    return float(np.mean(np.abs(estimated - true) <= half))
 
 
 def nis_bounds(channels: int, probability: float = 0.95, count: int = 1) -> tuple[float, float]:

@@ -34,12 +34,12 @@ def estimate_slots(vehicle: Vehicle, *, adaptive: bool = False) -> dict[str, int
     """
     slots = {"distance": lib.TG_OUT_DISTANCE}
 
-    def take(name: str, slot: int, std: int, place: int = 0) -> None:
+    def add(name: str, slot: int, std: int, place: int = 0) -> None:
         slots[name] = slot + place
         slots[f"{name}_std"] = std + place
 
-    take("ground_speed", lib.TG_OUT_GROUND_SPEED, lib.TG_OUT_GROUND_SPEED_STD)
-    take("soil_resistance", lib.TG_OUT_SOIL_RESISTANCE, lib.TG_OUT_SOIL_RESISTANCE_STD)
+    add("ground_speed", lib.TG_OUT_GROUND_SPEED, lib.TG_OUT_GROUND_SPEED_STD)
+    add("soil_resistance", lib.TG_OUT_SOIL_RESISTANCE, lib.TG_OUT_SOIL_RESISTANCE_STD)
     for quantity, slot, std in (
         ("wheel_speed", lib.TG_OUT_WHEEL_SPEED, lib.TG_OUT_WHEEL_SPEED_STD),
         ("adhesion", lib.TG_OUT_ADHESION, lib.TG_OUT_ADHESION_STD),
@@ -48,12 +48,12 @@ def estimate_slots(vehicle: Vehicle, *, adaptive: bool = False) -> dict[str, int
         ("efficiency", lib.TG_OUT_EFFICIENCY, lib.TG_OUT_EFFICIENCY_STD),
     ):
         for i, wheel in enumerate(vehicle.wheels):
-            take(f"{quantity}_{wheel}", slot, std, i)
+            add(f"{quantity}_{wheel}", slot, std, i)
     for k, axle in enumerate(vehicle.axle_names):
         slots[f"vertical_load_{axle}"] = lib.TG_OUT_VERTICAL_LOAD + k
-    take("curve_a", lib.TG_OUT_CURVE, lib.TG_OUT_CURVE_STD)
+    add("curve_a", lib.TG_OUT_CURVE, lib.TG_OUT_CURVE_STD)
     for i, wheel in enumerate(vehicle.wheels):
-        take(f"curve_a_{wheel}", lib.TG_OUT_WHEEL_CURVE, lib.TG_OUT_WHEEL_CURVE_STD, i)
+        add(f"curve_a_{wheel}", lib.TG_OUT_WHEEL_CURVE, lib.TG_OUT_WHEEL_CURVE_STD, i)
     slots["warning"] = lib.TG_OUT_WARNING
     slots["warning_usual_slip"] = lib.TG_OUT_USUAL_SLIP
     for k, sign in enumerate(SIGNS):
@@ -126,8 +126,8 @@ class Engine:
         """A copy of the numbers in ``self.estimate``: doubles, a column of `outputs` at each place of ``index_out``."""
         if not self._doubles:
             return array("d", ffi.unpack(self.estimate.value, self._used)).tobytes()
-        found: bytes = self._room_out[:]
-        return found
+        result: bytes = self._room_out[:]
+        return result
 
     def run(
         self,

@@ -259,8 +259,8 @@ def _event_codes(table: pa.Table, source: str | None) -> npt.NDArray[np.uint8]:
     import pyarrow.compute as pc
 
     column = table.column("event").combine_chunks()
-    found = pc.index_in(column.cast(pa.string()), value_set=pa.array(EVENTS))
-    if found.null_count:
-        unknown = column.filter(pc.is_null(found))[0]
+    result = pc.index_in(column.cast(pa.string()), value_set=pa.array(EVENTS))
+    if result.null_count:
+        unknown = column.filter(pc.is_null(result))[0]
         raise InputError(f"there is no event {unknown!s}", file=source, place="column event")
-    return found.to_numpy().astype(np.uint8)
+    return result.to_numpy().astype(np.uint8)

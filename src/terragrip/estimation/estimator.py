@@ -21,7 +21,7 @@ from terragrip.vehicle import Vehicle
 
 if TYPE_CHECKING:
     from terragrip.estimation.estimates import Estimates
-    from terragrip.estimation.slip_only import Found
+    from terragrip.estimation.slip_only import SlipReference
     from terragrip.recording import Recording
 
 _SNAPSHOT_MAGIC = b"TGRIPSN2"
@@ -118,7 +118,7 @@ class TractionEstimator:
         self.held = dict(held or {})
         self.channels = default_channels(vehicle) if channels is None else tuple(channels)
         self.thresholds = Thresholds(gap=gap, standstill_speed=standstill_speed)
-        self.found: Found | None = None
+        self.slip_reference: SlipReference | None = None
         self.rims: tuple[Rim, ...] = ()
         if speeds_alone(self.channels, vehicle):
             self.method = SLIP_ONLY.name
@@ -149,22 +149,22 @@ class TractionEstimator:
         held: Mapping[str, float] | None = None,
         gap: float | None = None,
         standstill_speed: float | None = None,
-        found: Found | None = None,
+        slip_reference: SlipReference | None = None,
     ) -> Self:
         """An estimator set up as :func:`estimate` does it: noise and held channels found in the log where not given; where it holds
-        no torque, also what slip counts from (``found``; None finds it)."""
+        no torque, also what slip counts from (``slip_reference``; None finds it)."""
         from terragrip.estimation.noise import logged_noise, sensor_of
-        from terragrip.estimation.slip_only import found_in
+        from terragrip.estimation.slip_only import slip_reference_in
         from terragrip.recording import held_periods
 
         periods = dict(held_periods(recording) if held is None else held)
         logged = logged_noise(recording, vehicle, periods)
         mine = dict(sensors or {})
         logged = {name: sd for name, sd in logged.items() if sensor_of(name) not in mine}
-        if found is None and speeds_alone(recording.channels, vehicle):
-            found = found_in(recording, vehicle)
-        if found is not None:
-            used = speeds.slots_in(found.rims)
+        if slip_reference is None and speeds_alone(recording.channels, vehicle):
+            slip_reference = slip_reference_in(recording, vehicle)
+        if slip_reference is not None:
+            used = speeds.slots_in(slip_reference.rims)
             logged = {name: sd for name, sd in logged.items() if name in used}
         made = cls(
             vehicle,
@@ -175,9 +175,9 @@ class TractionEstimator:
             gap=gap,
             standstill_speed=standstill_speed,
         )
-        if found is not None:
-            made.found, made.rims = found, found.rims
-            made._start({**logged, **mine}, found.dead_band)
+        if slip_reference is not None:
+            made.slip_reference, made.rims = slip_reference, slip_reference.rims
+            made._start({**logged, **mine}, slip_reference.dead_band)
         return made
 
     @property
@@ -272,7 +272,7 @@ class TractionEstimator:
             raise refusal(6, None)
         length = struct.unpack("<I", body[:4])[0]
         about = json.loads(body[4 : 4 + length])
-        found = cls(
+        restored = cls(
             Vehicle.from_dict(about["vehicle"]),
             DEFAULT if about["rims"] else about["method"],
             sensors=about["noise"],
@@ -282,11 +282,11 @@ class TractionEstimator:
             standstill_speed=about["standstill_speed"],
         )
         if about["rims"]:
-            found.rims = tuple(Rim(**rim) for rim in about["rims"])
-            found._start(about["noise"], about["dead_band"])
-        found.guessed = tuple(about["guessed"])
-        found._engine.restore(body[4 + length :])
-        return found
+            restored.rims = tuple(Rim(**rim) for rim in about["rims"])
+            restored._start(about["noise"], about["dead_band"])
+        restored.guessed = tuple(about["guessed"])
+        restored._engine.restore(body[4 + length :])
+        return restored
 
     def _refused(self, status: int, sample: Mapping[str, float | None]) -> InputError:
         if status == 2:

@@ -34,15 +34,15 @@ def channel_noise(
     given = dict(sensors or {})
     _check(given, channels)
     guesses = _guesses(vehicle)
-    found, guessed = {}, []
+    result, guessed = {}, []
     for name in channels:
         sensor = sensor_of(name)
         value = given.get(name, given.get(sensor, getattr(vehicle.sensors, sensor, None)))
         if value is None:
             value = guesses[sensor]
             guessed.append(name)
-        found[name] = float(value)
-    return found, tuple(guessed)
+        result[name] = float(value)
+    return result, tuple(guessed)
 
 
 def logged_noise(recording: Recording, vehicle: Vehicle, held: dict[str, float]) -> dict[str, float]:

@@ -43,7 +43,7 @@ class TablesAside:
             raise unwritable(where, error, "free space or choose another folder") from error
         self._count += 1
 
-    def take(self) -> pa.Table:
+    def finish(self) -> pa.Table:
         """Take the table that was put last off the pile; raises IndexError where there is none."""
         from pyarrow import feather
 

@@ -93,15 +93,15 @@ def calibrated_scale(vehicle: Vehicle) -> float | None:
     if not vehicle.knows_wheels:
         gain = vehicle.calibration.wheel_based_speed_gain
         return None if gain is None else 1 / gain
-    found = vehicle.calibration.wheel_radius
+    result = vehicle.calibration.wheel_radius
     driven = [
         (wheel, data.radius)
         for wheel, data, on in zip(vehicle.wheels, vehicle.wheel_data, vehicle.driven, strict=True)
         if on
     ]
-    if not all(wheel in found for wheel, _ in driven):
+    if not all(wheel in result for wheel, _ in driven):
         return None
-    return float(np.mean([found[wheel] / radius for wheel, radius in driven]))
+    return float(np.mean([result[wheel] / radius for wheel, radius in driven]))
 
 
 def at_zero(rim: Rim, zero: Zero) -> Rim:

@@ -33,7 +33,7 @@ WHAT_IS_MISSING = (
 
 
 @dataclass(frozen=True)
-class Found:
+class SlipReference:
     """Rims of a log, the zero of each that has one, the rims' dead band [m/s], sentences for the user; and the ``track``, where the rate of
     turn is that of the positions."""
 
@@ -50,7 +50,7 @@ class Found:
         return {**columns, "angular_velocity_z": self.track.at("turn", time)}
 
 
-def found_in(log: Recording, vehicle: Vehicle) -> Found:
+def slip_reference_in(log: Recording, vehicle: Vehicle) -> SlipReference:
     """What a log without torque tells; raises InputError where a wheel of it is not the vehicle's.
 
     Slip of a wheel is against the radius of the vehicle file. The drive train's speed is by a radius that the machine supposes: it
@@ -79,7 +79,7 @@ def found_in(log: Recording, vehicle: Vehicle) -> Found:
         if track is not None and not np.isfinite(track.turn).any():
             track = None
         notes += _turns(log, rims, track)
-    return Found(tuple(rims), zero, band, tuple(notes), track)
+    return SlipReference(tuple(rims), zero, band, tuple(notes), track)
 
 
 def _turns(log: Recording, rims: Sequence[Rim], track: Track | None) -> list[str]:
@@ -134,10 +134,10 @@ def _said(rim: Rim, zero: Zero | None, learns: bool) -> list[str]:
             f"ground speed in this log: {zero.ratio:.4f} ± {zero.std:.4f} of the speed that the machine gives",
             "",
         )
-    said = f"Zero-slip {at}, from {zero.windows} windows of the lightest work{beside}"
+    sentence = f"Zero-slip {at}, from {zero.windows} windows of the lightest work{beside}"
     if zero.doubt:
-        return [f"{said}; {zero.doubt}."]
-    return [said + (". Slip counts from there." if learns else ".")]
+        return [f"{sentence}; {zero.doubt}."]
+    return [sentence + (". Slip counts from there." if learns else ".")]
 
 
 def _dead_band(log: Recording, rims: Sequence[Rim]) -> tuple[float, int]:

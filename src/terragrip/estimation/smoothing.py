@@ -79,17 +79,17 @@ def smoothed(
         end = engine.snapshot()
         carry, following, count = engine.smooth_carry(), None, rows
         while True:
-            found, following = _smooth(estimator, last, carry, following, notes, step)
-            count -= len(found)
+            result, following = _smooth(estimator, last, carry, following, notes, step)
+            count -= len(result)
             backward(rows - count)
             if not behind:
                 break
-            finals.put(found.to_arrow())
-            last = _of_table(filtered.take(), last.block, behind.pop())
+            finals.put(result.to_arrow())
+            last = _of_table(filtered.finish(), last.block, behind.pop())
         engine.restore(end)
-        yield found
+        yield result
         while len(finals):
-            yield Estimates.from_arrow(finals.take())
+            yield Estimates.from_arrow(finals.finish())
 
 
 def _filter(estimator: TractionEstimator, block: Recording, step: int, forward: Done) -> _Forward:

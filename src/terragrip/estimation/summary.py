@@ -126,7 +126,7 @@ class Tally:
 
 def _quantities(wheels: tuple[str, ...]) -> list[tuple[str, str, str]]:
     """Title, column and unit of what is summarised."""
-    found = [("ground speed", "ground_speed", " m/s"), ("soil resistance", "soil_resistance", "")]
+    result = [("ground speed", "ground_speed", " m/s"), ("soil resistance", "soil_resistance", "")]
     for quantity in ("adhesion", "slip", "efficiency"):
-        found += [(f"{quantity} {wheel}", f"{quantity}_{wheel}", "") for wheel in wheels]
-    return found
+        result += [(f"{quantity} {wheel}", f"{quantity}_{wheel}", "") for wheel in wheels]
+    return result

@@ -72,7 +72,7 @@ def zero_of(
         for log, span in zip(logs, spans, strict=True)
         if channel in log.channels and (span is not None or not declared)
     ]
-    ratio = np.concatenate([np.empty(0), *(found for found, _ in parts)])
+    ratio = np.concatenate([np.empty(0), *(result for result, _ in parts)])
     if len(ratio) < FEWEST:
         return None
     if declared:
@@ -154,8 +154,8 @@ def _fit(ratio: Floats, number: int, mean: Floats) -> tuple[float, list[tuple[fl
         mean = (weight[:, :-1] * ratio[:, None]).sum(axis=0) / held[:-1]
         square = (weight[:, :-1] * (ratio[:, None] - mean) ** 2).sum(axis=0) / held[:-1]
         spread = np.maximum(np.sqrt(square), _FLOOR)
-    found = sorted(zip(mean.tolist(), spread.tolist(), share.tolist(), strict=False))
-    return 3 * number * float(np.log(n)) - 2 * likelihood, found
+    result = sorted(zip(mean.tolist(), spread.tolist(), share.tolist(), strict=False))
+    return 3 * number * float(np.log(n)) - 2 * likelihood, result
 
 
 def _windows(

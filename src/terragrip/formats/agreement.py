@@ -71,7 +71,7 @@ class Agreement:
 
     def _paths(self, ranked: Mapping[str, list[Guess]]) -> list[Way]:
         """What was driven, in metres: by latitude and longitude, by positions, by a distance."""
-        found: list[Way] = []
+        result: list[Way] = []
         best = [
             max(ranked.get(c, []), key=lambda g: g.confidence, default=None)
             for c in ("latitude", "longitude")
@@ -85,7 +85,7 @@ class Agreement:
             pair = (best[0].column.column, best[1].column.column)
             factor = 1.0 if best[0].unit == "deg" else 180 / np.pi
             if (path := self._evidence.displacements(pair, degrees=True, unit=factor)) is not None:
-                found.append((f"{pair[0]}, {pair[1]}", path))
+                result.append((f"{pair[0]}, {pair[1]}", path))
         for name, column in self._columns.items():
             if (
                 column.kind == "length"
@@ -107,15 +107,15 @@ class Agreement:
                         (name, other), degrees=False, unit=factor_to(column.unit, "m")
                     )
                     if path is not None:
-                        found.append((f"{name}, {other}", path))
+                        result.append((f"{name}, {other}", path))
         for name, column in self._columns.items():
             if (
                 column.name.has("distance")
                 and not column.name.has("statistic", "command")
                 and column.kind in (None, "length")
             ):
-                found.append((name, factor_to(column.unit or "m", "m")))
-        return found
+                result.append((name, factor_to(column.unit or "m", "m")))
+        return result
 
     def _speed(self, guess: Guess, paths: list[Way]) -> Guess:
         name = guess.column.column
@@ -174,14 +174,14 @@ class Agreement:
             if guess.column.name.has("wheel", "odometry") or guess.confidence >= 0.9:
                 kept.append(guess)
                 continue
-            found = self._evidence.ratio(best.column.column, guess.column.column)
-            if found is not None and found[1] > 0.5 and 0.6 < found[0] < 1.4:
-                said = f"goes with {best.column.column}, of which it is {1 / found[0]:.3g} times"
+            result = self._evidence.ratio(best.column.column, guess.column.column)
+            if result is not None and result[1] > 0.5 and 0.6 < result[0] < 1.4:
+                sentence = f"goes with {best.column.column}, of which it is {1 / result[0]:.3g} times"
                 kept.append(
                     replace(
                         guess,
                         confidence=0.6,
-                        evidence=(*guess.evidence, said),
+                        evidence=(*guess.evidence, sentence),
                         doubt="the wheels' own speed, beside one over ground?",
                     )
                 )
@@ -200,15 +200,15 @@ class Agreement:
         for channel in [c for c in ranked if c.startswith("wheel_speed_")]:
             judged = []
             for guess in ranked[channel]:
-                found = None
+                result = None
                 if (
                     ground is not None
                     and (ratio := self._evidence.ratio(ground[0], guess.column.column)) is not None
                 ):
-                    found = ratio[0] * ground[1], ground[0]
+                    result = ratio[0] * ground[1], ground[0]
                 elif ground is None:
-                    found = self._by_path(guess, paths)
-                judged.append(guess if found is None else guess.with_finding(self._rim(guess, *found)))
+                    result = self._by_path(guess, paths)
+                judged.append(guess if result is None else guess.with_finding(self._rim(guess, *result)))
             ranked[channel] = judged
         if ground is not None:
             ranked["wheel_based_speed"] = [
@@ -247,21 +247,21 @@ class Agreement:
             u: f"as {ground} in {u}" for u in ("m/s", "km/h") if abs(np.log(metres * SPEED_UNITS[u])) < 0.12
         }
         if len(likely) == 1:
-            unit, said = next(iter(likely.items()))
-            return Finding(True, said, unit)
+            unit, notes = next(iter(likely.items()))
+            return Finding(True, notes, unit)
         if not likely:
             return Finding(False, f"with {ground} no radius of a wheel fits")
         return Finding(False, f"with {ground} {' or '.join(likely)}?")
 
     def _as_fast(self, guess: Guess, ground: str, factor: float) -> Finding | None:
-        found = self._evidence.ratio(ground, guess.column.column)
-        if found is None:
+        result = self._evidence.ratio(ground, guess.column.column)
+        if result is None:
             return None
         if guess.unit is not None and guess.column.unit is not None:
-            share = found[0] * factor / factor_to(guess.unit, "m/s")
+            share = result[0] * factor / factor_to(guess.unit, "m/s")
             return Finding(0.5 < share < 1.6, f"{ground} is {share:.3g} times as fast")
         unit = nearest_unit(
-            1 / (found[0] * factor), {k: SPEED_UNITS[k] for k in ("m/s", "km/h", "mm/s")}, 0.4
+            1 / (result[0] * factor), {k: SPEED_UNITS[k] for k in ("m/s", "km/h", "mm/s")}, 0.4
         )
         return Finding(
             unit is not None,
@@ -289,13 +289,13 @@ class Agreement:
             return
         judged = []
         for guess in ranked["acceleration_x"]:
-            found = self._evidence.fit(guess.column.column, *rate)
-            if found is not None and found[1] > 0.6:
-                unit = nearest_unit(found[0], {"m/s^2": 1.0, "g": 1 / 9.80665}, 0.35)
+            result = self._evidence.fit(guess.column.column, *rate)
+            if result is not None and result[1] > 0.6:
+                unit = nearest_unit(result[0], {"m/s^2": 1.0, "g": 1 / 9.80665}, 0.35)
                 plain = guess.column.unit is not None or guess.unit == unit
-                said = f"goes with the derivative of {ground[0]} (correlation {found[1]:.2f})"
+                sentence = f"goes with the derivative of {ground[0]} (correlation {result[1]:.2f})"
                 guess = guess.with_finding(
-                    Finding(True, said, unit if not plain or guess.column.unit is None else None)
+                    Finding(True, sentence, unit if not plain or guess.column.unit is None else None)
                 )
             judged.append(guess)
         ranked["acceleration_x"] = judged
@@ -309,14 +309,14 @@ class Agreement:
         judged = []
         for guess in guesses:
             for source, rate in references:
-                found = self._evidence.fit(guess.column.column, *rate)
-                if found is None or abs(found[1]) < 0.8:
+                result = self._evidence.fit(guess.column.column, *rate)
+                if result is None or abs(result[1]) < 0.8:
                     continue
-                unit = nearest_unit(abs(found[0]), RATE_UNITS, 0.3)
+                unit = nearest_unit(abs(result[0]), RATE_UNITS, 0.3)
                 if unit is None:
                     continue
-                said = f"goes with the rate of turn by {source} (correlation {found[1]:.2f})"
-                judged_once = guess.with_finding(Finding(True, said, unit))
+                sentence = f"goes with the rate of turn by {source} (correlation {result[1]:.2f})"
+                judged_once = guess.with_finding(Finding(True, sentence, unit))
                 guess = replace(
                     judged_once,
                     confidence=max(judged_once.confidence, 0.75)
@@ -361,7 +361,7 @@ class Agreement:
         return Finding(True, f"in rad/s it would be {sideways:.0f} m/s^2 sideways at {ground[0]}", "deg/s")
 
     def _turns(self, ranked: Mapping[str, list[Guess]]) -> list[tuple[str, Series]]:
-        found: list[tuple[str, Series]] = []
+        result: list[tuple[str, Series]] = []
         for name, column in self._columns.items():
             read = column.name
             if read.has(
@@ -373,7 +373,7 @@ class Agreement:
             ):
                 degrees = column.unit in ("deg", "°") if column.unit else self._evidence.size(name) > 7
                 if (rate := self._evidence.rate_of_angle(name, degrees=degrees)) is not None:
-                    found.append((name, rate))
+                    result.append((name, rate))
         lateral = max(ranked.get("acceleration_y", []), key=lambda g: g.confidence, default=None)
         ground = self._ground(ranked)
         if lateral is not None and lateral.unit is not None and ground is not None:
@@ -385,5 +385,5 @@ class Agreement:
                     sideways = np.where(
                         np.abs(speed) > 1.0, series[1] * factor_to(lateral.unit, "m/s^2") / speed, np.nan
                     )
-                found.append((f"{lateral.column.column} over {ground[0]}", (series[0], sideways)))
-        return found
+                result.append((f"{lateral.column.column} over {ground[0]}", (series[0], sideways)))
+        return result

@@ -21,19 +21,19 @@ def bound(profile: Profile, log: LogTable, *, partial: bool = False) -> tuple[Pr
     absent: list[str] = []
     channels: dict[str, Source] = {}
     for name, origin in profile.channels.items():
-        found = next((own for source in origin.chain if (own := _bound(source, log)) is not None), None)
+        result = next((own for source in origin.chain if (own := _bound(source, log)) is not None), None)
         silent = (
-            log.clocked and found is not None and not all(_holds(log, column) for column in found.columns)
+            log.clocked and result is not None and not all(_holds(log, column) for column in result.columns)
         )
         if silent and not (origin.optional or partial):
-            assert found is not None
+            assert result is not None
             problem = 'holds no value: it was sent as "not available" or "error" throughout'
             hint = "name another source in the profile, or join a log that has it (--with)"
-            raise InputError(problem, file=log.source, place=f"signal {', '.join(found.columns)}", hint=hint)
-        if found is not None and not silent:
-            channels[name] = found
+            raise InputError(problem, file=log.source, place=f"signal {', '.join(result.columns)}", hint=hint)
+        if result is not None and not silent:
+            channels[name] = result
             if len(origin.chain) > 1 or any("*" in c for c in origin.columns) or len(origin.candidates) > 1:
-                notes.append(f"{name} is from {', '.join(found.columns)}.")
+                notes.append(f"{name} is from {', '.join(result.columns)}.")
         elif origin.optional or partial:
             absent.append(name)
         else:
@@ -48,8 +48,8 @@ def bound(profile: Profile, log: LogTable, *, partial: bool = False) -> tuple[Pr
             raise _missing(time.column, log)
         time = time.model_copy(update={"column": TIME, "unit": "s"})
     elif (stated := log.units.get(time.column)) is not None and stated != time.unit:
-        time, said = _in_its_unit(time, stated)
-        notes += said
+        time, remarks = _in_its_unit(time, stated)
+        notes += remarks
     if rows is not None and rows.column not in log.columns:
         if not partial:
             raise _missing(rows.column, log)
@@ -65,21 +65,21 @@ def _in_its_unit(time: TimeSource, stated: str) -> tuple[TimeSource, list[str]]:
         return time, []
     if "unit" not in time.model_fields_set:
         return time.model_copy(update={"unit": stated}), []
-    said = f"The log states {stated} for {time.column}; the profile's {time.unit} counts."
-    return time, [] if same else [said]
+    sentence = f"The log states {stated} for {time.column}; the profile's {time.unit} counts."
+    return time, [] if same else [sentence]
 
 
 def _bound(origin: Source, log: LogTable) -> Source | None:
     """A source with existing columns for its names; None if the log lacks one, or has several alternatives without a value."""
     update: dict[str, object] = {}
     if origin.candidates:
-        found = [column for name in origin.candidates for column in matching(name, log.columns)]
-        if not found:
+        result = [column for name in origin.candidates for column in matching(name, log.columns)]
+        if not result:
             return None
-        held = next((column for column in found if _holds(log, column)), None)
+        held = next((column for column in result if _holds(log, column)), None)
         if held is None and origin.otherwise is not None:
             return None
-        update["column"] = held or found[0]
+        update["column"] = held or result[0]
     for key in ("derivative_of", "norm_of", "pitch_of", "roll_of"):
         names = getattr(origin, key)
         if names is not None:

@@ -40,7 +40,7 @@ def needed(module: str, what: str) -> Any:
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # of other people's modules, at import
-            found = import_module(module)
+            result = import_module(module)
     except ModuleNotFoundError as error:
         missing = (error.name or module).partition(".")[0]
         raise InputError(
@@ -49,7 +49,7 @@ def needed(module: str, what: str) -> Any:
         ) from error
     # What its logger has to say of a damaged file, the InputError or a note says.
     logging.getLogger(module.partition(".")[0]).setLevel(logging.CRITICAL + 1)
-    return found
+    return result
 
 
 @contextmanager
@@ -66,9 +66,9 @@ def reading(source: str | os.PathLike[str], kind: str, *errors: type[Exception])
     except InputError:
         raise
     except (*DAMAGE, *errors) as error:
-        said = " ".join(str(error).split())[:100] or type(error).__name__
+        sentence = " ".join(str(error).split())[:100] or type(error).__name__
         raise InputError(
-            f"is a damaged {kind}, or none ({said})", file=source, hint="copy or record it again"
+            f"is a damaged {kind}, or none ({sentence})", file=source, hint="copy or record it again"
         ) from error
 
 

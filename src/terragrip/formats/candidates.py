@@ -47,12 +47,12 @@ def columns_of(
     """Every numeric column's name as read; ``constants`` are the texts that never change, by column."""
     odometry = {_root(c) for c, text in constants.items() if "odometry" in vocabulary.read(text).concepts}
     alike = _numbered(numbers)
-    found = {}
+    result = {}
     for column in numbers:
         name = vocabulary.read(column)
         index = re.search(r"(\d+)$", column)
         if index is not None:  # name0 = wheel_left_joint says of velocity0 which it is
-            told = next(
+            unit_word = next(
                 (
                     t
                     for c, t in constants.items()
@@ -60,8 +60,8 @@ def columns_of(
                 ),
                 None,
             )
-            if told is not None:
-                other = vocabulary.read(told)
+            if unit_word is not None:
+                other = vocabulary.read(unit_word)
                 name = replace(name, concepts=name.concepts | other.concepts, wheel=other.wheel)
         if {"twist", "pose"} & set(name.words) and _root(column) in odometry:
             name = replace(name, concepts=name.concepts | {"odometry"})
@@ -74,8 +74,8 @@ def columns_of(
         stated = units.get(column)
         readable = None if stated is not None and _MISSPELT.fullmatch(stated) else stated
         unit = readable or name.unit or _unit_of_ros(column)
-        found[column] = Column(column, name, unit, kind_of(unit), stated)
-    return found
+        result[column] = Column(column, name, unit, kind_of(unit), stated)
+    return result
 
 
 def kind_of(unit: str | None) -> str | None:
@@ -105,9 +105,9 @@ def candidates_of(column: Column) -> list[Candidate]:
     if column.name.has("command", "statistic", "change", "other"):
         return []
     for ways in (_of_wheels, _of_motion, _of_place, _of_speed):
-        found = ways(column)
-        if found:
-            return [c for c in found if column.kind is None or _fits(column.kind, c.channel)]
+        result = ways(column)
+        if result:
+            return [c for c in result if column.kind is None or _fits(column.kind, c.channel)]
     return []
 
 

@@ -106,15 +106,15 @@ def _measured(time: Floats, values: npt.NDArray[Any] | None) -> tuple[Floats, Fl
 
 def lag_between(first: Speed, second: Speed, *, reach: float | None = None) -> Lag | None:
     """How far ``second`` is behind ``first``, with what a vehicle's dynamics explain of it; None as `offset_between`."""
-    found = offset_between((first.time, first.values), (second.time, second.values), reach=reach)
-    if found is None:
+    result = offset_between((first.time, first.values), (second.time, second.values), reach=reach)
+    if result is None:
         return None
     low = high = 0.0
     if first.pace is None and second.pace is not None:
         high = second.pace / (STANDARD_GRAVITY * _STIFFNESS)
     elif second.pace is None and first.pace is not None:
         low = -first.pace / (STANDARD_GRAVITY * _STIFFNESS)
-    return Lag(found.seconds, found.std, found.correlation, (low, high))
+    return Lag(result.seconds, result.std, result.correlation, (low, high))
 
 
 def lag_within(time: Floats, columns: Mapping[str, npt.NDArray[Any]]) -> list[str]:
@@ -215,11 +215,11 @@ def _correlation(a: Floats, b: Floats) -> tuple[Floats, npt.NDArray[np.intp]]:
     floor = 1e-9 * common * max(float(values[0].var()), float(values[1].var()), 1e-12)
     enough = count >= max(_LEAST_OVERLAP / _STEP, _LEAST_SHARE * min(masks[0].sum(), masks[1].sum()))
     with np.errstate(invalid="ignore", divide="ignore"):
-        found = cross / np.sqrt(np.maximum(spread_a, floor) * np.maximum(spread_b, floor))
+        result = cross / np.sqrt(np.maximum(spread_a, floor) * np.maximum(spread_b, floor))
     lags = np.arange(size)
     lags = np.where(lags < len(a), lags, lags - size)
     order = np.argsort(lags)
-    return np.where(enough, found, -np.inf)[order], lags[order]
+    return np.where(enough, result, -np.inf)[order], lags[order]
 
 
 def _refined(
@@ -248,17 +248,17 @@ def _refined(
         weight = np.ones(len(target))
         for _ in range(_ROUNDS):
             normal = design.T @ (weight[:, None] * design) + 1e-12 * np.eye(2)
-            found = np.linalg.solve(normal, design.T @ (weight * target))
-            rest = target - design @ found
+            result = np.linalg.solve(normal, design.T @ (weight * target))
+            rest = target - design @ result
             scale = max(1.4826 * float(np.median(np.abs(rest))), 1e-9)
             weight = np.clip(1.0 - (rest / (4.7 * scale)) ** 2, 0.0, None) ** 2
-        if found[0] <= 0:
+        if result[0] <= 0:
             break
-        step = float(np.clip(-found[1] / found[0], -_APART, _APART))
+        step = float(np.clip(-result[1] / result[0], -_APART, _APART))
         seconds += step
         # Points within the smoothing are alike: so many count as one.
         spread = scale**2 * 2 * _WIDTH * np.linalg.inv(normal)[1, 1]
-        deviation = max(float(np.sqrt(spread) / found[0]), _LEAST_STD)
+        deviation = max(float(np.sqrt(spread) / result[0]), _LEAST_STD)
         if abs(step) < 0.1 * deviation:
             break
     return seconds, deviation
@@ -269,8 +269,8 @@ def _smooth(values: Floats) -> Floats:
     half = _WIDTH // 2
     sums = np.r_[0.0, np.cumsum(np.nan_to_num(values))]
     missing = np.r_[0, np.cumsum(np.isnan(values))]
-    found = np.full(len(values), np.nan)
+    result = np.full(len(values), np.nan)
     inner = np.arange(half, len(values) - half)
     whole = missing[inner + half + 1] == missing[inner - half]
-    found[inner] = np.where(whole, (sums[inner + half + 1] - sums[inner - half]) / (2 * half + 1), np.nan)
-    return found
+    result[inner] = np.where(whole, (sums[inner + half + 1] - sums[inner - half]) / (2 * half + 1), np.nan)
+    return result

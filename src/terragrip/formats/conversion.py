@@ -62,8 +62,8 @@ def converted(profile: Profile, log: LogTable, *, partial: bool = False) -> Part
     profile, notes = bound(profile, log, partial=partial)
     log, unset = since_clock_was_set(log, profile.time.column, profile.time.unit)
     notes += unset
-    time, start, said = _time(profile.time, log)
-    notes += said
+    time, start, remarks = _time(profile.time, log)
+    notes += remarks
     channels: dict[str, Column] = {}
     noise: dict[str, float] = {}
     for name, origin in profile.channels.items():
@@ -105,8 +105,8 @@ def settled(profile: Profile, log: LogTable) -> tuple[Profile, list[str]] | None
 
 def _ways(origin: Source, names: tuple[str, ...]) -> int:
     """In how many ways a log's columns could give a source."""
-    found = [len(matching(column, names)) for column in origin.columns]
-    return sum(found) if origin.candidates else int(np.prod(found))  # a constant can be given in one
+    result = [len(matching(column, names)) for column in origin.columns]
+    return sum(result) if origin.candidates else int(np.prod(result))  # a constant can be given in one
 
 
 def converted_block(profile: Profile, block: LogTable, first: Any) -> dict[str, Column]:
@@ -245,16 +245,16 @@ def _rate(origin: Source, log: LogTable, time: Floats) -> tuple[Floats, float | 
     rates, deviations = zip(
         *(derivative(time[fresh], p[fresh], origin.window) for p in positions), strict=True
     )
-    found = np.full(len(time), np.nan)
+    result = np.full(len(time), np.nan)
     if origin.forward is not None:
         heading = _heading(origin, log, time)[fresh]
-        found[fresh] = rates[0] * np.cos(heading) + rates[1] * np.sin(heading)
+        result[fresh] = rates[0] * np.cos(heading) + rates[1] * np.sin(heading)
     elif len(rates) == 1:
-        found[fresh] = rates[0]
+        result[fresh] = rates[0]
     else:
-        found[fresh] = np.sqrt(sum(rate**2 for rate in rates))
+        result[fresh] = np.sqrt(sum(rate**2 for rate in rates))
     known = [deviation for deviation in deviations if deviation is not None]
-    return found, float(np.mean(known)) if known else None
+    return result, float(np.mean(known)) if known else None
 
 
 def _heading(origin: Source, log: LogTable, time: Floats) -> Floats:

@@ -52,8 +52,8 @@ def csv_on_disk(path: str) -> TableOnDisk:
                 continue
             text = in_utf8(data.removeprefix(b"\xef\xbb\xbf"))
             # A byte order mark, comments and the header stand in the first block only.
-            body, said = body_of(text, dialect, dialect.start if is_first else 0, more=not is_first)
-            notes.extend(said)
+            body, remarks = body_of(text, dialect, dialect.start if is_first else 0, more=not is_first)
+            notes.extend(remarks)
             columns = parse(body, dialect, chosen, path, row)
             row += max((len(column) for column in columns.values()), default=0)
             yield columns

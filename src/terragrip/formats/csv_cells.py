@@ -70,8 +70,8 @@ def parse(
     except (pa.ArrowInvalid, pa.ArrowKeyError) as error:
         texts = _arrow_of_texts(body, dialect, chosen, error, source, first)
         return {names[k]: _numbers_of_texts(names[k], texts.column(_field(k)), source, first) for k in chosen}
-    found = {names[k]: from_arrow(names[k], table.column(_field(k)), source) for k in chosen}
-    return {name: _as_times(name, column) for name, column in found.items()}
+    result = {names[k]: from_arrow(names[k], table.column(_field(k)), source) for k in chosen}
+    return {name: _as_times(name, column) for name, column in result.items()}
 
 
 def _as_times(name: str, column: npt.NDArray[Any]) -> npt.NDArray[Any]:
@@ -144,12 +144,12 @@ def _numbers_of_texts(name: str, column: pa.ChunkedArray, source: str, first: in
     times = times_of(cells) if name == TIME or not (is_channel(name) or name in LABELS) else None
     if times is not None:
         return times
-    found = np.full(len(cells), np.nan)
+    result = np.full(len(cells), np.nan)
     for row, cell in enumerate(cells):
         if cell is None:
             continue
         try:
-            found[row] = float(cell.replace(",", "."))
+            result[row] = float(cell.replace(",", "."))
         except ValueError:
             if name in LABELS or not (is_channel(name) or name == TIME):
                 return np.array(cells, dtype=object)
@@ -157,4 +157,4 @@ def _numbers_of_texts(name: str, column: pa.ChunkedArray, source: str, first: in
             place = f"column {name}, row {first + row + 1}"
             hint = "leave the cell empty or give a number"
             raise InputError(f"{shown} is not a number", file=source, place=place, hint=hint) from None
-    return found
+    return result

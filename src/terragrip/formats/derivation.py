@@ -57,9 +57,9 @@ def derivative(time: Floats, position: Floats, window: float) -> tuple[Floats, f
     floor = quantum(position) / np.sqrt(12.0)
     for first in range(0, n, _BLOCK):
         low, high = max(first - half, 0), min(first + _BLOCK + half, n)
-        found = _parabolas(time[low:high], position[low:high], half, (half + 0.5) * spacing, floor)
+        result = _parabolas(time[low:high], position[low:high], half, (half + 0.5) * spacing, floor)
         inner = slice(first - low, min(first + _BLOCK, n) - low)
-        speed[first : first + _BLOCK], deviation[first : first + _BLOCK] = found[0][inner], found[1][inner]
+        speed[first : first + _BLOCK], deviation[first : first + _BLOCK] = result[0][inner], result[1][inner]
     known = deviation[_moving(speed, np.isfinite(speed)) & (deviation > 0)]
     return speed, float(np.median(known)) if len(known) else None
 

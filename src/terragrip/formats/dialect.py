@@ -122,9 +122,9 @@ def detect(data: bytes, source: str) -> Dialect:
         rows, units = 3, dict(zip(header, (_bare(cell) for cell in second), strict=False))
     if len(second) == len(header) + 1 and not second[-1]:
         header.append("")
-    names, said = _names_and_units(header)
+    names, notes = _names_and_units(header)
     units = {names[header.index(h)]: u for h, u in units.items() if u}
-    return Dialect(separator, decimal, names, {**said, **units}, _after_lines(data, start, rows))
+    return Dialect(separator, decimal, names, {**notes, **units}, _after_lines(data, start, rows))
 
 
 def _preamble(lines: list[str]) -> int:

@@ -42,7 +42,7 @@ class Finding:
     """What a check found: whether it speaks for the guess, a sentence, and the unit that the sizes tell (None: none)."""
 
     agrees: bool
-    said: str
+    sentence: str
     unit: str | None = None
 
 
@@ -92,10 +92,10 @@ class Evidence:
 
     def at(self, name: str, instants: Floats) -> Floats | None:
         """Values of a column at ``instants`` (m,), on straight lines between its samples; NaN outside and in gaps."""
-        found = self.series(name)
-        if found is None:
+        out = self.series(name)
+        if out is None:
             return None
-        time, values = found
+        time, values = out
         result = np.interp(instants, time, values, left=np.nan, right=np.nan)
         gap = _gap(time)
         place = np.clip(np.searchsorted(time, instants), 1, len(time) - 1)
@@ -136,11 +136,11 @@ class Evidence:
 
     def run_over(self, name: str, path: Path) -> tuple[float, float] | None:
         """The integral of a column's size over a path's pieces, divided by their length, and that length [m]; None of short paths."""
-        found = self.series(name)
+        result = self.series(name)
         begins, ends, lengths = path
-        if found is None or not len(lengths):
+        if result is None or not len(lengths):
             return None
-        time, values = found
+        time, values = result
         total = np.concatenate(([0.0], np.cumsum(0.5 * np.abs(values[1:] + values[:-1]) * np.diff(time))))
         inside = (begins >= time[0]) & (ends <= time[-1])
         run = np.interp(ends, time, total) - np.interp(begins, time, total)
@@ -153,10 +153,10 @@ class Evidence:
 
     def against_path(self, name: str, path: Path, source: str) -> Finding | None:
         """A speed column against a path: its integral over the pieces divided by their lengths tells the unit."""
-        found = self.run_over(name, path)
-        if found is None:
+        result = self.run_over(name, path)
+        if result is None:
             return None
-        ratio, driven = found
+        ratio, driven = result
         # A short way does not tell miles from kilometres.
         likely = SPEED_UNITS if driven > 50 else {unit: SPEED_UNITS[unit] for unit in ("m/s", "km/h", "mm/s")}
         unit = nearest_unit(ratio, likely, 0.12 if driven > 50 else 0.3)
@@ -166,10 +166,10 @@ class Evidence:
 
     def against_distance(self, name: str, distance: str, metres: float) -> Finding | None:
         """A speed column against a column of distance run, ``metres`` a count."""
-        found = self.series(distance)
-        if found is None or not self._timed:
+        result = self.series(distance)
+        if result is None or not self._timed:
             return None
-        time, values = found
+        time, values = result
         moved = np.concatenate(([True], np.diff(values) > 0))
         time, values = time[moved], values[moved]
         if len(time) < 3:
@@ -181,13 +181,13 @@ class Evidence:
 
     def ratio(self, upper: str, lower: str) -> tuple[float, float] | None:
         """Sum of absolute values of one column over that of another where the latter moves, and their correlation."""
-        found = self.series(lower)
-        if found is None:
+        result = self.series(lower)
+        if result is None:
             return None
-        other = self.at(upper, found[0])
+        other = self.at(upper, result[0])
         if other is None:
             return None
-        a, b = np.abs(other), np.abs(found[1])
+        a, b = np.abs(other), np.abs(result[1])
         known = np.isfinite(a)
         a, b = a[known], b[known]
         if len(b) < 5 or (limit := 0.1 * float(np.quantile(b, 0.95))) <= 0:
@@ -211,10 +211,10 @@ class Evidence:
 
     def rate_of_angle(self, name: str, *, degrees: bool) -> Series | None:
         """The rate [rad/s] of an angle column that wraps."""
-        found = self.series(name)
-        if found is None or not self._timed:
+        result = self.series(name)
+        if result is None or not self._timed:
             return None
-        time, angle = found
+        time, angle = result
         fresh = np.concatenate(([True], np.diff(angle) != 0))
         time, angle = time[fresh], np.unwrap(np.radians(angle[fresh]) if degrees else angle[fresh])
         if len(time) < 8:
@@ -225,10 +225,10 @@ class Evidence:
 
     def derivative(self, name: str, factor: float = 1.0) -> Series | None:
         """The derivative of a column times ``factor``, over fresh values."""
-        found = self.series(name)
-        if found is None or not self._timed:
+        result = self.series(name)
+        if result is None or not self._timed:
             return None
-        time, values = found
+        time, values = result
         fresh = np.concatenate(([True], np.diff(values) != 0))
         time, values = time[fresh], values[fresh] * factor
         if len(time) < 10:

@@ -39,19 +39,19 @@ def fit_of(log: LogTable | SignalLog) -> Fit:
         if recording is not None and is_ready(recording):
             names.append(name)
             channels |= recording.channels.keys()
-        elif said := _nearly(name, profile, log.names):
-            nearly.append(said)
+        elif text := _nearly(name, profile, log.names):
+            nearly.append(text)
     return Fit(tuple(names), frozenset(channels), () if names else tuple(nearly))
 
 
 def _nearly(name: str, profile: Profile, columns: tuple[str, ...]) -> str:
     """A sentence on a profile of which some of the speeds are there; empty if none is, or all are."""
     needed = {c: s for c, s in profile.channels.items() if not s.optional}
-    found = {c: near for c, source in needed.items() if (near := _found(source, columns))}
-    lacking = [c for c in needed if c not in found]
-    if not found or not lacking:
+    result = {c: near for c, source in needed.items() if (near := _found(source, columns))}
+    lacking = [c for c in needed if c not in result]
+    if not result or not lacking:
         return ""
-    there = ", ".join(f"{channel} <- {column}" for channel, column in found.items())
+    there = ", ".join(f"{channel} <- {column}" for channel, column in result.items())
     away = "; ".join(
         f"{channel} (looked for {', '.join(_wanted(needed[channel])[:3])})" for channel in lacking[:4]
     )

@@ -21,8 +21,8 @@ def text_of(inspection: Inspection) -> str:
         parts.append(_time_text(inspection.time))
     parts.append(_table([_HEAD, *(_row(column) for column in inspection.columns)]))
     if inspection.recognised:
-        found = [_proposal_text(channel, own) for channel, own in inspection.proposals.items()]
-        parts.append("Recognised, with confidence and evidence\n" + "\n".join(found))
+        result = [_proposal_text(channel, own) for channel, own in inspection.proposals.items()]
+        parts.append("Recognised, with confidence and evidence\n" + "\n".join(result))
     if inspection.missing:
         parts.append("Missing\n" + "\n".join(f"  {sentence}" for sentence in inspection.missing))
     if inspection.warnings:
@@ -63,8 +63,8 @@ def summary_of(inspections: Sequence[Inspection]) -> str:
     for alike in layouts.values():
         first = alike[0]
         others = f" and {len(alike) - 1} more with the same columns" if len(alike) > 1 else ""
-        found = [_proposal_text(channel, own) for channel, own in first.proposals.items()]
-        parts.append("\n".join([f"{first.file}{others}", *found]))
+        result = [_proposal_text(channel, own) for channel, own in first.proposals.items()]
+        parts.append("\n".join([f"{first.file}{others}", *result]))
         parts += ["\n".join(first.nearly)] if first.nearly else []
         if not first.ready and not first.fitting:
             parts.append(first.profile.rstrip() if not first.refused else f"{first.file} {first.refused}.")

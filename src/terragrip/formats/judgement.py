@@ -46,16 +46,16 @@ class Guess:
         if finding is None:
             return self
         if not finding.agrees:
-            return replace(self, confidence=0.5 * self.confidence, doubt=finding.said)
+            return replace(self, confidence=0.5 * self.confidence, doubt=finding.sentence)
         stated = self.column.unit
         if stated is not None and finding.unit is not None and not _same(stated, finding.unit):
-            said = f"stated in {stated}, but {finding.said}"
-            return replace(self, confidence=0.6 * self.confidence, doubt=said)
+            sentence = f"stated in {stated}, but {finding.sentence}"
+            return replace(self, confidence=0.6 * self.confidence, doubt=sentence)
         surer = 1 - 0.45 * (1 - self.confidence)
         unit = stated or finding.unit or self.unit
         clear = self.doubt if finding.unit is None and stated is None else ""
         return replace(
-            self, confidence=surer, unit=unit, evidence=(*self.evidence, finding.said), doubt=clear
+            self, confidence=surer, unit=unit, evidence=(*self.evidence, finding.sentence), doubt=clear
         )
 
 

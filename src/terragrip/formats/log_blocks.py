@@ -63,10 +63,10 @@ def recordings_of(log: TableOnDisk, profile: Profile | None = None) -> Iterator[
             for block in _since_set(log, log.blocks(chosen, 1), table, TIME, log.units.get(TIME, "s"))
         )
         return _checked(own, log.names, chosen, log.source, log.digest, about, log.notes)
-    found = settled(profile, table)
-    if found is None:
+    result = settled(profile, table)
+    if result is None:
         return None
-    ready, notes = found
+    ready, notes = result
     log.notes.extend(notes)
     names = [TIME, *ready.channels]
     about.profiles = (profile.to_dict(),)
@@ -105,16 +105,16 @@ def _since_set(
     for number, block in enumerate(blocks):
         part = replace(table, columns=block)
         if number == 0:
-            part, said = since_clock_was_set(part, column, unit)
-            log.notes.extend(said)
+            part, notes = since_clock_was_set(part, column, unit)
+            log.notes.extend(notes)
         yield part
 
 
 def long_log(path: str | os.PathLike[str]) -> TableOnDisk | None:
     """A log that is a long table; None of any other, or where its rows cannot be told beforehand."""
     own = format_of(path)
-    found = None if own.in_blocks is None else own.in_blocks(os.fspath(path))
-    return found if found is not None and found.is_long else None
+    result = None if own.in_blocks is None else own.in_blocks(os.fspath(path))
+    return result if result is not None and result.is_long else None
 
 
 def _checked(
@@ -124,7 +124,7 @@ def _checked(
     source: str,
     digest: str,
     about: _About,
-    said: Sequence[str] = (),
+    expected: Sequence[str] = (),
 ) -> Iterator[Recording]:
     """Consecutive blocks of columns as checked recordings; they together are what `Recording.from_frame` makes of all.
 
@@ -149,7 +149,9 @@ def _checked(
             raise InputError(
                 "holds dates and numbers", file=source, place=f"column {TIME}", hint="give one of them"
             )
-        block = _block(columns, source, first, after, silent, tuple(dict.fromkeys((*notes, *said))), digest)
+        block = _block(
+            columns, source, first, after, silent, tuple(dict.fromkeys((*notes, *expected))), digest
+        )
         if first == 0 and about.start is None:
             about.start = start_of(time, block.time)
         block = replace(block, start=about.start, profiles=about.profiles)

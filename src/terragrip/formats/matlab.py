@@ -19,7 +19,7 @@ from terragrip.files import sha256
 from terragrip.formats.boundary import needed, reading
 from terragrip.formats.matlab_hdf5 import is_hdf5, tree_of
 from terragrip.formats.matlab_records import IN_RECORDS
-from terragrip.formats.matlab_signals import Found, seconds_of, walk
+from terragrip.formats.matlab_signals import Contents, seconds_of, walk
 from terragrip.formats.matlab_values import Array, Opaque
 from terragrip.formats.registry import Databases, Format
 from terragrip.formats.signals import Signal, SignalLog
@@ -38,8 +38,8 @@ def read_matlab(path: str, wanted: Wanted | None, databases: Databases) -> Signa
     """Read a MATLAB file; raises InputError if it is damaged, or holds no numeric column."""
     if not is_hdf5(path):
         with _worker(path) as worker:
-            worker.say(None)
-            read = worker.hear()["tree"]
+            worker.send(None)
+            read = worker.receive()["tree"]
             return _finished({name: _of_worker(part, worker) for name, part in read.items()}, path, wanted)
     h5py = needed("h5py", "a MATLAB 7.3 file")
     with reading(path, "MATLAB file", RuntimeError), h5py.File(path, "r") as file:
@@ -54,8 +54,8 @@ def _with_objects(tree: dict[str, Any], path: str, wanted: Wanted | None) -> Sig
     with ExitStack() as kept:  # the process lives until its arrays were read
         try:
             worker = kept.enter_context(_worker(path))
-            worker.say(names)
-            read = worker.hear()["tree"]
+            worker.send(names)
+            read = worker.receive()["tree"]
         except InputError:
             return _finished(tree, path, wanted)  # the notes name what is left
         known = {name: _merged(tree[name], _of_worker(part, worker)) for name, part in read.items()}
@@ -87,7 +87,7 @@ def _of_worker(node: Any, worker: Worker) -> Any:
 
 
 def _asked(worker: Worker, number: int) -> npt.NDArray[Any]:
-    worker.say(number)
+    worker.send(number)
     return worker.array()
 
 
@@ -104,26 +104,26 @@ def _merged(own: Any, objects: Any) -> Any:
 
 def _finished(tree: Mapping[str, Any], path: str, wanted: Wanted | None) -> SignalLog | LogTable:
     """The wanted signals of what a file holds."""
-    found = Found()
-    walk(tree, "", found, 0)
-    notes = [*_notes(found), *found.notes]
-    if not found.signals and not found.loose:
+    contents = Contents()
+    walk(tree, "", contents, 0)
+    notes = [*_notes(contents), *contents.notes]
+    if not contents.signals and not contents.loose:
         problem = "holds no numeric column"
         if notes:
             problem += f"; {notes[0].rstrip('.')}"
         raise InputError(problem, file=path, hint="save arrays or structs with a time vector beside them")
-    if not found.signals:
-        return _table_of(found.loose, path, wanted, notes)
+    if not contents.signals:
+        return _table_of(contents.loose, path, wanted, notes)
     clocks: dict[int, Floats] = {}
     arrays: dict[int, npt.NDArray[Any]] = {}
     signals = {}
-    for name, (clock, values, column) in found.signals.items():
+    for name, (clock, values, column) in contents.signals.items():
         if wanted is not None and not wanted(name):
             continue
         length = int(np.prod(clock.shape))
         rows = kept_rows(length, wanted)
         if id(clock) not in clocks:
-            whole = seconds_of(_read(clock).ravel(), found.scales.get(id(clock), 1.0))
+            whole = seconds_of(_read(clock).ravel(), contents.scales.get(id(clock), 1.0))
             clocks[id(clock)] = whole[rows]
         if isinstance(values, Array) and values.part is not None:
             flat = values.column(column or 0, length)
@@ -132,22 +132,22 @@ def _finished(tree: Mapping[str, Any], path: str, wanted: Wanted | None) -> Sign
                 arrays = {id(values): _read(values)}  # columns of one matrix stand side by side
             flat = arrays[id(values)].reshape(length, -1)[:, column or 0]
         signals[name] = Signal(
-            clocks[id(clock)], np.asarray(flat[rows], dtype=np.float64), found.units.get(name)
+            clocks[id(clock)], np.asarray(flat[rows], dtype=np.float64), contents.units.get(name)
         )
-    return SignalLog(tuple(found.signals), signals, path, sha256(path), tuple(notes))
+    return SignalLog(tuple(contents.signals), signals, path, sha256(path), tuple(notes))
 
 
-def _notes(found: Found) -> list[str]:
+def _notes(contents: Contents) -> list[str]:
     notes = []
-    records = [name for name, kind in found.opaque.items() if kind == IN_RECORDS]
+    records = [name for name, kind in contents.opaque.items() if kind == IN_RECORDS]
     if records:
         notes.append(
             f"The samples of {_some(records)} are in records that cannot be read here (a Dataset saved with -v7.3): save "
             f"it in MATLAB by save('log.mat', '{records[0].partition('.')[0]}', '-v7')."
         )
-    if found.signals and found.loose:
-        notes.append(f"No time vector stands beside {_some(list(found.loose))}, which were left out.")
-    shown = [f"{n} ({kind})" if kind else n for n, kind in found.opaque.items() if kind != IN_RECORDS]
+    if contents.signals and contents.loose:
+        notes.append(f"No time vector stands beside {_some(list(contents.loose))}, which were left out.")
+    shown = [f"{n} ({kind})" if kind else n for n, kind in contents.opaque.items() if kind != IN_RECORDS]
     if shown:
         notes.append(
             f"What is no series of plain numbers was left out: {_some(shown)}; save it from MATLAB as arrays or structs, a table by "

@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from terragrip.formats.boundary import needed, reading
 from terragrip.formats.matlab_hdf5 import is_hdf5, tree_of
-from terragrip.formats.matlab_signals import Found, seconds_of, walk
+from terragrip.formats.matlab_signals import Contents, seconds_of, walk
 from terragrip.formats.matlab_values import Array
 from terragrip.formats.table_on_disk import TableOnDisk
 from terragrip.recording.schema import TIME
@@ -27,10 +27,10 @@ def long_matlab(path: str) -> TableOnDisk | None:
         return None
     h5py = needed("h5py", "a MATLAB 7.3 file")
     with reading(path, "MATLAB file", RuntimeError), h5py.File(path, "r") as file:
-        found = _on_one_clock(tree_of(file, h5py))
-        if found is None or not _runs_forward(*found.clock):
+        contents = _on_one_clock(tree_of(file, h5py))
+        if contents is None or not _runs_forward(*contents.clock):
             return None
-        rows, names, units = found.clock[1], tuple(found.signals), found.units
+        rows, names, units = contents.clock[1], tuple(contents.signals), contents.units
 
     def blocks(chosen: list[str], every: int) -> Iterator[dict[str, npt.NDArray[Any]]]:
         origin = None
@@ -58,16 +58,18 @@ class _OneClock:
 
 def _on_one_clock(tree: dict[str, Any]) -> _OneClock | None:
     """The signals of a file if all of them share one clock, and parts of each can be read."""
-    found = Found()
-    walk(tree, "", found, 0)
-    clocks = {id(clock): clock for clock, _, _ in found.signals.values()}
-    if len(clocks) != 1 or found.opaque:
+    contents = Contents()
+    walk(tree, "", contents, 0)
+    clocks = {id(clock): clock for clock, _, _ in contents.signals.values()}
+    if len(clocks) != 1 or contents.opaque:
         return None
     ((key, clock),) = clocks.items()
-    arrays = {name: (values, column or 0) for name, (_, values, column) in found.signals.items()}
+    arrays = {name: (values, column or 0) for name, (_, values, column) in contents.signals.items()}
     if any(not isinstance(a, Array) or a.part is None for a in (clock, *(a for a, _ in arrays.values()))):
         return None
-    return _OneClock((clock, int(np.prod(clock.shape))), found.scales.get(key, 1.0), arrays, found.units)
+    return _OneClock(
+        (clock, int(np.prod(clock.shape))), contents.scales.get(key, 1.0), arrays, contents.units
+    )
 
 
 def _block(held: _OneClock | None, chosen: list[str], part: slice) -> dict[str, npt.NDArray[np.float64]]:

@@ -149,11 +149,11 @@ def _series(held: Mapping[str, Any]) -> dict[str, Any] | None:
         rows = np.moveaxis(data, -1, 0).reshape(count, -1)
     else:
         return None
-    found: dict[str, Any] = {"Time": time, "Data": rows}
+    result: dict[str, Any] = {"Time": time, "Data": rows}
     unit = plain(_properties(held.get("DataInfo")).get("Units"))
     if isinstance(unit, Mapping):
         unit = unit.get("Name")  # a Simulink.SimulationData.Unit
-    return found | ({"Unit": unit} if isinstance(unit, str) and unit.strip() else {})
+    return result | ({"Unit": unit} if isinstance(unit, str) and unit.strip() else {})
 
 
 def _times(held: Mapping[str, Any], about: Mapping[str, Any]) -> npt.NDArray[np.float64] | None:

@@ -72,7 +72,7 @@ def _series(struct: Mapping[str, Any], records: Any, ticks: Mapping[str, float])
     if not isinstance(about, Mapping):
         raise ValueError("a series without attributes")
     time, count = _time(struct, records, ticks)
-    found = {"Time": time, "Data": _data(struct, about, records, count)}
+    result = {"Time": time, "Data": _data(struct, about, records, count)}
     unit = struct.get("DataUnits", struct.get("Units"))
     if isinstance(unit, Mapping):
         unit = unit.get("Value")
@@ -80,7 +80,7 @@ def _series(struct: Mapping[str, Any], records: Any, ticks: Mapping[str, float])
     if isinstance(properties, Mapping):
         unit = properties.get("VariableUnits")
         unit = unit[0] if isinstance(unit, list) and unit else unit
-    return found | ({"Unit": unit} if isinstance(unit, str) and unit.strip() else {})
+    return result | ({"Unit": unit} if isinstance(unit, str) and unit.strip() else {})
 
 
 def _time(struct: Mapping[str, Any], records: Any, ticks: Mapping[str, float]) -> tuple[Array, int]:

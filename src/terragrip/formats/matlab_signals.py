@@ -28,7 +28,7 @@ _DATENUM_1970 = 719_529.0
 
 
 @dataclass
-class Found:
+class Contents:
     """Signals by name, with what their clock and column are read from; ``opaque`` objects with their class; vectors without a clock.
 
     ``notes`` say which of several vectors was taken for time.
@@ -42,56 +42,58 @@ class Found:
     notes: list[str] = field(default_factory=list)
 
 
-def walk(value: Any, name: str, found: Found, depth: int, above: Any = None) -> None:
+def walk(value: Any, name: str, contents: Contents, depth: int, above: Any = None) -> None:
     """Find the signals under a value; ``above``: the time vector of the structs around it, for those that have none."""
     if depth > _DEEPEST:
         return
     if isinstance(value, Opaque):
-        found.opaque[name] = value.kind
+        contents.opaque[name] = value.kind
     elif isinstance(value, Mapping):
-        _walk_struct(value, name, found, depth, above)
+        _walk_struct(value, name, contents, depth, above)
     elif isinstance(value, list) or (isinstance(value, np.ndarray) and value.dtype == object):
         for k, part in enumerate(list(np.ravel(value)) if isinstance(value, np.ndarray) else value):
             own = _own_name(part)
-            walk(part, _joined(name, own) if own else f"{name}[{k}]", found, depth + 1, above)
+            walk(part, _joined(name, own) if own else f"{name}[{k}]", contents, depth + 1, above)
 
 
-def _walk_struct(struct: Mapping[str, Any], name: str, found: Found, depth: int, above: Any) -> None:
+def _walk_struct(struct: Mapping[str, Any], name: str, contents: Contents, depth: int, above: Any) -> None:
     lower = {key.lower(): key for key in reversed(list(struct))}  # of names that differ in case, the first
-    clock_name = _clock_name(struct, name, found)
+    clock_name = _clock_name(struct, name, contents)
     clock = above if clock_name is None else struct[clock_name]
     if clock is not None:
         length = int(np.prod(clock.shape))
         if clock_name is not None:
-            found.scales[id(clock)] = _SCALES.get(clock_name.rpartition("_")[2].lower(), 1.0)
-        if "signals" in lower and _structure_with_time(struct[lower["signals"]], clock, length, name, found):
+            contents.scales[id(clock)] = _SCALES.get(clock_name.rpartition("_")[2].lower(), 1.0)
+        if "signals" in lower and _structure_with_time(
+            struct[lower["signals"]], clock, length, name, contents
+        ):
             return
         for key, part in struct.items():
             if key != clock_name and _is_numeric(part) and length in part.shape[:2]:
                 plain = key.lower() in _DATA and name
                 unit = struct[lower["unit"]] if plain and "unit" in lower else None
-                _add(found, name if plain else _joined(name, key), clock, part, length, unit)
+                _add(contents, name if plain else _joined(name, key), clock, part, length, unit)
     for key, part in struct.items():
         if _is_numeric(part):
             if clock is None and _is_vector(part):
-                found.loose[_joined(name, key)] = part
+                contents.loose[_joined(name, key)] = part
         elif key.lower() == "values" and isinstance(part, Mapping | Opaque):
-            walk(part, name, found, depth + 1, clock)  # a Dataset's element: its name is the signal's
+            walk(part, name, contents, depth + 1, clock)  # a Dataset's element: its name is the signal's
         elif key.lower() in ("elements", "signals") and not isinstance(part, str):
             own = _own_name(part)  # one element alone is no list
-            walk(part, _joined(name, own) if own else name, found, depth + 1, clock)
+            walk(part, _joined(name, own) if own else name, contents, depth + 1, clock)
         elif not isinstance(part, str):
-            walk(part, _joined(name, key), found, depth + 1, clock)
+            walk(part, _joined(name, key), contents, depth + 1, clock)
 
 
-def _clock_name(struct: Mapping[str, Any], name: str, found: Found) -> str | None:
+def _clock_name(struct: Mapping[str, Any], name: str, contents: Contents) -> str | None:
     """Which vector of a struct is time, None if none: of names that differ in case only (``t``, ``T``), the one that runs forward."""
     for word in _TIMES:
         alike = [key for key in struct if key.lower() == word and _is_vector(struct[key])]
         if len(alike) > 1:
             alike.sort(key=lambda key: (not _runs_forward(struct[key]), key != word))
             others = ", ".join(_joined(name, key) for key in alike[1:])
-            found.notes.append(f"{_joined(name, alike[0])} is taken for time; {others} is a signal.")
+            contents.notes.append(f"{_joined(name, alike[0])} is taken for time; {others} is a signal.")
         if alike:
             return alike[0]
     return None
@@ -102,7 +104,7 @@ def _runs_forward(value: Any) -> bool:
     return bool((stamps[1:] > stamps[:-1]).all())
 
 
-def _structure_with_time(signals: Any, clock: Any, length: int, name: str, found: Found) -> bool:
+def _structure_with_time(signals: Any, clock: Any, length: int, name: str, contents: Contents) -> bool:
     """Simulink's "structure with time": whether ``signals`` is such a list, whose values were taken."""
     parts = (
         [signals] if isinstance(signals, Mapping) else list(np.ravel(signals)) if _is_list(signals) else []
@@ -115,7 +117,7 @@ def _structure_with_time(signals: Any, clock: Any, length: int, name: str, found
             {key: part[k] for key, part in signals.items() if _is_list(part) and len(part) == rows}
             for k in range(rows)
         ]
-    taken = False
+    is_used = False
     for k, part in enumerate(parts):
         if (
             isinstance(part, Mapping)
@@ -123,12 +125,12 @@ def _structure_with_time(signals: Any, clock: Any, length: int, name: str, found
             and length in part["values"].shape[:2]
         ):
             own = _own_name(part) or f"signals[{k}]"
-            _add(found, _joined(name, own), clock, part["values"], length)
-            taken = True
-    return taken
+            _add(contents, _joined(name, own), clock, part["values"], length)
+            is_used = True
+    return is_used
 
 
-def _add(found: Found, name: str, clock: Any, values: Any, length: int, unit: Any = None) -> None:
+def _add(contents: Contents, name: str, clock: Any, values: Any, length: int, unit: Any = None) -> None:
     """Add a vector, or the columns of a matrix with a row for each instant."""
     width = int(np.prod(values.shape)) // max(length, 1)
     if width == 1:
@@ -138,9 +140,9 @@ def _add(found: Found, name: str, clock: Any, values: Any, length: int, unit: An
     else:
         return
     for own, column in added.items():
-        found.signals[own] = clock, values, column
+        contents.signals[own] = clock, values, column
         if isinstance(unit, str) and is_common(unit):
-            found.units[own] = unit
+            contents.units[own] = unit
 
 
 def _own_name(part: Any) -> str:

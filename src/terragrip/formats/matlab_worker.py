@@ -22,15 +22,15 @@ from terragrip.formats.worker import Outlet, serve
 def work(path: str, out: Outlet) -> None:
     """Serve one file."""
     matio = needed("matio", "an object of MATLAB")
-    names = out.hear()
+    names = out.receive()
     loaded = matio.load_from_mat(path, variable_names=names)
     arrays: list[Array] = []
     with records_of(path) as records:
         chosen = names or [name for name in loaded if not name.startswith("__")]
         tree = {name: resolved(plain(loaded.pop(name)), records, TICKS) for name in chosen if name in loaded}
-        out.say({"tree": {name: _skeleton(value, arrays) for name, value in tree.items()}})
-        while (number := out.hear()) is not None:
-            out.send(np.asarray(arrays[number].read(), dtype=np.float64))
+        out.send({"tree": {name: _skeleton(value, arrays) for name, value in tree.items()}})
+        while (number := out.receive()) is not None:
+            out.send_array(np.asarray(arrays[number].read(), dtype=np.float64))
 
 
 def _skeleton(value: Any, arrays: list[Array]) -> Any:

@@ -16,7 +16,7 @@ from terragrip.formats.table import Wanted
 
 _EPOCH = ("timestamp", "stamp", "time")
 
-Take = Callable[[float, bytes], None]
+Add = Callable[[float, bytes], None]
 """Takes a message that came at a time [s]; raises what its decoder raises on damage."""
 
 
@@ -36,7 +36,7 @@ def collect(file: Path, wanted: Wanted | None, topics: dict[str, Topic], types: 
     exceptions, kinds = needed("mcap.exceptions", "an MCAP file"), needed("mcap.records", "an MCAP file")
     notes: list[str] = []
     schemas: dict[int, Any] = {}
-    channels: dict[int, tuple[Topic, Take | None]] = {}
+    channels: dict[int, tuple[Topic, Add | None]] = {}
     unreadable: dict[str, None] = {}
     with (
         as_far_as_it_goes(file, "MCAP file", notes, exceptions.McapError) as seen,
@@ -45,9 +45,9 @@ def collect(file: Path, wanted: Wanted | None, topics: dict[str, Topic], types: 
         for record in records(stream, notes):
             if isinstance(record, kinds.Message):
                 seen.messages += 1
-                topic, take = channels[record.channel_id]
-                if take is not None and topic.is_wanted:
-                    _take(topic, take, record.log_time * 1e-9, record.data)
+                topic, add = channels[record.channel_id]
+                if add is not None and topic.is_wanted:
+                    _add(topic, add, record.log_time * 1e-9, record.data)
             elif isinstance(record, kinds.Schema):
                 schemas[record.id] = record
             elif isinstance(record, kinds.Channel) and record.id not in channels:
@@ -85,10 +85,10 @@ def records(stream: BinaryIO, notes: list[str]) -> Iterator[Any]:
         notes.append(f"{damaged} chunks are damaged and were left out.")
 
 
-def _take(topic: Topic, take: Take, receipt: float, content: bytes) -> None:
+def _add(topic: Topic, add: Add, receipt: float, content: bytes) -> None:
     """Hand a message to its topic; one that cannot be read is counted."""
     try:
-        take(receipt, content)
+        add(receipt, content)
     except DAMAGE:
         topic.bad += 1
     except Exception as error:
@@ -99,7 +99,7 @@ def _take(topic: Topic, take: Take, receipt: float, content: bytes) -> None:
 
 def _channel(
     channel: Any, schema: Any, wanted: Wanted | None, topics: dict[str, Topic], types: Types
-) -> tuple[Topic, Take | None]:
+) -> tuple[Topic, Add | None]:
     """The topic of a channel, and what takes its messages; None if its encoding is not known."""
     encoding = channel.message_encoding
     if encoding in ("cdr", "ros1") and schema is not None:
@@ -117,10 +117,10 @@ def _channel(
             if not isinstance(error, (*DAMAGE,)) and type(error).__name__ != "DecodeError":
                 raise
             return topic, None
-        return topic, lambda receipt, content: topic.take(receipt, decode(content))
+        return topic, lambda receipt, content: topic.add(receipt, decode(content))
     topic = _topic(channel.topic, _parts_of_json, _stamp_of_json, dict.__getitem__, wanted, topics)
     if encoding == "json":
-        return topic, lambda receipt, content: topic.take(receipt, json.loads(content))
+        return topic, lambda receipt, content: topic.add(receipt, json.loads(content))
     return topic, None
 
 
@@ -162,13 +162,13 @@ def _parts_of_protobuf(message: Any) -> Iterable[tuple[str, Any]]:
         "google.protobuf.Duration",
     ):
         return ()
-    found = []
+    result = []
     for part in descriptor.fields:
         value = getattr(message, part.name)
         if not isinstance(value, bool | int | float | str | bytes) and not hasattr(value, "DESCRIPTOR"):
             value = list(value) if not hasattr(value, "keys") else []
-        found.append((part.name, value))
-    return found
+        result.append((part.name, value))
+    return result
 
 
 def _stamp_of_protobuf(message: Any) -> float | None:

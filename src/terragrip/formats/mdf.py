@@ -22,15 +22,15 @@ def read_mdf(path: str, wanted: Wanted | None, databases: Databases) -> SignalLo
     """Read an MDF file; raises InputError if it is damaged, or holds neither signals nor known frames."""
     frames = Frames(catalog(databases), wanted)
     with Worker("terragrip.formats.mdf_worker", "asammdf", path, "MDF file") as worker:
-        head = worker.hear()
+        head = worker.receive()
         start, units = float(head["start"]), dict(head["units"])
-        worker.say([name for name in units if wanted is None or wanted(name)])
+        worker.send([name for name in units if wanted is None or wanted(name)])
         signals: dict[str, Signal] = {}
         clocks: dict[int, npt.NDArray[np.float64]] = {}
-        while "end" not in (message := worker.hear()):
+        while "end" not in (message := worker.receive()):
             if "frames" in message:
                 time, identifiers, lengths, data = (worker.array() for _ in range(4))
-                frames.take_many(start + time, identifiers, lengths, data)
+                frames.add_many(start + time, identifiers, lengths, data)
                 continue
             group = int(message["group"])
             if not message["shared"]:

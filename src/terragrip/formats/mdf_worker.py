@@ -37,9 +37,9 @@ def _serve(file: Any, out: Outlet) -> None:
     buses = [k for k, group in enumerate(file.groups) if _is_bus(group)]
     names = _names(file, set(buses))
     units = {name: str(file.groups[g].channels[i].unit or "") for name, (g, i) in names.items()}
-    out.say({"start": file.start_time.timestamp(), "units": units})
+    out.send({"start": file.start_time.timestamp(), "units": units})
     clocks: dict[int, int] = {}
-    for name in out.hear():
+    for name in out.receive():
         group, index = names[name]
         signal = file.get(group=group, index=index)
         values = _values(signal.samples)
@@ -48,16 +48,16 @@ def _serve(file: Any, out: Outlet) -> None:
         # Invalid samples are left out of some signals of a group: those have a clock of their own.
         shared = clocks.get(group) == len(values)
         clocks.setdefault(group, len(values))
-        out.say({"name": name, "unit": signal.unit or "", "group": group, "shared": shared})
+        out.send({"name": name, "unit": signal.unit or "", "group": group, "shared": shared})
         if not shared:
-            out.send(np.asarray(signal.timestamps, dtype=np.float64))
-        out.send(values)
+            out.send_array(np.asarray(signal.timestamps, dtype=np.float64))
+        out.send_array(values)
         _let_go(file)
     for group in (k for k in buses if any(c.name.startswith(_FRAME) for c in file.groups[k].channels)):
         for block in _frames(file, group):
-            out.say({"frames": True})
+            out.send({"frames": True})
             for array in block:
-                out.send(array)
+                out.send_array(array)
             _let_go(file)
 
 

@@ -69,8 +69,8 @@ class Topic:
         """Whether any field is wanted; True until some messages told which there are."""
         return bool(self._columns) or self.count < _TRIED
 
-    def take(self, receipt: float, message: Any) -> None:
-        """Take a message that came at ``receipt`` [s]."""
+    def add(self, receipt: float, message: Any) -> None:
+        """Add a message that came at ``receipt`` [s]."""
         labels = self._names_of_entries(message)
         if not self._columns or labels != self._labels:
             self._learn(message, labels)
@@ -103,17 +103,19 @@ class Topic:
         """What stands in a message where the columns are, None where nothing does."""
         paths = [column.path for column in self._columns.values()]
         if self.field_of is None or self._labels is not None:
-            found: dict[Path, Any] = {}
-            self._walk(message, (), found, {path[0] for path in paths if path})
-            return [found.get(path) for path in paths]
+            fields: dict[Path, Any] = {}
+            self._walk(message, (), fields, {path[0] for path in paths if path})
+            return [fields.get(path) for path in paths]
         return [_at(message, path, self.field_of) for path in paths]
 
     def fields(self, message: Any) -> dict[str, Any]:
         """The wanted fields of one message by name, for who takes messages as they come; nothing is collected."""
         self._labels = self._names_of_entries(message)
-        found: dict[Path, Any] = {}
-        self._walk(message, (), found, None)
-        names = {f"{self.name}.{_shown(path)}" if path else self.name: value for path, value in found.items()}
+        fields: dict[Path, Any] = {}
+        self._walk(message, (), fields, None)
+        names = {
+            f"{self.name}.{_shown(path)}" if path else self.name: value for path, value in fields.items()
+        }
         return {name: value for name, value in names.items() if self.wanted is None or self.wanted(name)}
 
     def signals(self) -> tuple[dict[str, Signal], list[str]]:
@@ -125,9 +127,9 @@ class Topic:
             )
         if self.bad:
             notes.append(f"{self.name}: {self.bad} messages cannot be read and were left out.")
-        time, said = self._time()
-        notes += said
-        found = {}
+        time, remarks = self._time()
+        notes += remarks
+        fields = {}
         for name, column in self._columns.items():
             # A view: the samples of a long log shall not stand twice.
             values = np.array(column.texts, dtype=object) if column.is_text else np.frombuffer(column.numbers)
@@ -135,8 +137,8 @@ class Topic:
             missing = len(time) - len(values)
             if missing:
                 values = np.r_[np.full(missing, None if column.is_text else np.nan), values]
-            found[name] = Signal(time, values)
-        return found, notes
+            fields[name] = Signal(time, values)
+        return fields, notes
 
     def _time(self) -> tuple[np.ndarray, list[str]]:
         """When the values were measured: the sender's stamps where there are, on the receiver's clock."""
@@ -148,25 +150,25 @@ class Topic:
         if abs(typical) <= _OTHER_CLOCK:
             return stamps, []
         offset = float(np.quantile(delay, _QUICKEST))
-        told = (
+        instant = (
             f"{self.name} is stamped {offset:.3f} s off the recorder's clock; the stamps were moved onto it."
         )
-        return stamps + offset, [told]
+        return stamps + offset, [instant]
 
     def _names_of_entries(self, message: Any) -> tuple[str, ...] | None:
         """The list ``name`` of a message, as of a JointState's joints; None if it has none."""
-        found = next((value for key, value in self.parts(message) if key == "name"), None)
-        if isinstance(found, list | tuple) and all(isinstance(entry, str) for entry in found):
-            return tuple(found)
+        fields = next((value for key, value in self.parts(message) if key == "name"), None)
+        if isinstance(fields, list | tuple) and all(isinstance(entry, str) for entry in fields):
+            return tuple(fields)
         return None
 
     def _learn(self, message: Any, labels: tuple[str, ...] | None) -> None:
         """Make columns of the fields of a message, beside those that there are."""
         self._labels = labels
-        found: dict[Path, Any] = {}
-        self._walk(message, (), found, None)
+        fields: dict[Path, Any] = {}
+        self._walk(message, (), fields, None)
         names = dict.fromkeys(self.names)
-        for path, value in found.items():
+        for path, value in fields.items():
             name = f"{self.name}.{_shown(path)}" if path else self.name
             names[name] = None
             if name in self._columns or (self.wanted is not None and not self.wanted(name)):
@@ -174,13 +176,13 @@ class Topic:
             self._columns[name] = Column(path, isinstance(value, str))
         self.names = tuple(names)
 
-    def _walk(self, value: Any, path: Path, found: dict[Path, Any], only: set[str | int] | None) -> None:
+    def _walk(self, value: Any, path: Path, fields: dict[Path, Any], only: set[str | int] | None) -> None:
         """Collect the numbers and texts under a value by path; ``only``: in these first fields."""
         if isinstance(value, bool | int | float | str | np.number | np.bool_):
-            found[path] = value
+            fields[path] = value
             return
         if isinstance(value, np.ndarray | list | tuple):
-            self._walk_list(value, path, found)
+            self._walk_list(value, path, fields)
             return
         if len(path) >= _DEEPEST:
             return
@@ -188,9 +190,9 @@ class Topic:
             if not path and only is not None and key not in only:
                 continue
             if key not in ("frame_id", "child_frame_id") and "covariance" not in key:
-                self._walk(part, (*path, key), found, only)
+                self._walk(part, (*path, key), fields, only)
 
-    def _walk_list(self, values: Any, path: Path, found: dict[Path, Any]) -> None:
+    def _walk_list(self, values: Any, path: Path, fields: dict[Path, Any]) -> None:
         if not len(values) or isinstance(values[0], str):
             return
         plain = isinstance(values[0], bool | int | float | np.number | np.bool_)
@@ -198,7 +200,7 @@ class Topic:
             return
         named = self._labels if self._labels and len(self._labels) == len(values) and len(path) == 1 else None
         for k, value in enumerate(values):
-            self._walk(value, (*path, k if named is None else named[k]), found, None)
+            self._walk(value, (*path, k if named is None else named[k]), fields, None)
 
 
 def _at(message: Any, path: Path, field_of: Callable[[Any, str], Any]) -> Any:

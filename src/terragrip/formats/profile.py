@@ -199,9 +199,9 @@ class Profile(Part):
             close = nearest(name, SHIPPED)
             hint = f"did you mean {close!r}?" if close else f"those are {', '.join(SHIPPED)}"
             raise InputError(f"{name!r} is no file, and no profile that comes with Terragrip", hint=hint)
-        found = validate(cls, read_yaml(path))
+        result = validate(cls, read_yaml(path))
         here = Path(path).parent
-        return found.model_copy(update={"dbc": tuple(os.fspath(here / name) for name in found.dbc)})
+        return result.model_copy(update={"dbc": tuple(os.fspath(here / name) for name in result.dbc)})
 
     @classmethod
     def from_dict(cls, data: dict[str, Any], file: str | None = None) -> Self:
@@ -285,7 +285,7 @@ def matching(name: str, names: Iterable[str]) -> list[str]:
     if "*" not in name:
         return [name] if name in names else []
     pattern = as_pattern(name)
-    return [found for found in names if fnmatch.fnmatchcase(found, pattern)]
+    return [result for result in names if fnmatch.fnmatchcase(result, pattern)]
 
 
 def unit_factor(unit: str, target: str) -> float:

@@ -17,35 +17,37 @@ _LIKE_YAML = {"yes", "no", "on", "off", "true", "false", "null", "y", "n"}
 
 def missing_channels(proposals: Collection[str], has_time: bool) -> list[str]:
     """What is not among the channels that were found, and what follows, as sentences."""
-    said = [] if has_time else ["No time column was found: it is needed, in seconds that run forward."]
+    notes = [] if has_time else ["No time column was found: it is needed, in seconds that run forward."]
     wheels = [w for w in wheel_names_in(proposals) if f"wheel_speed_{w}" in proposals]
     if not wheels and "wheel_based_speed" not in proposals:
-        said.append(
+        notes.append(
             "No wheel speed was found, nor a drive train's (wheel_based_speed): nothing can be estimated without."
         )
     if "ground_speed" not in proposals:
-        said.append(
+        notes.append(
             "No ground speed was found: there is no slip and no resistance without; positions will do."
         )
     if not wheels and "wheel_based_speed" not in proposals:
-        return said  # nothing else matters
+        return notes  # nothing else matters
     without = [wheel for wheel in wheels if f"drive_torque_{wheel}" not in proposals]
     if len(without) == len(wheels) and (wheels or "wheel_based_speed" in proposals):
-        said.append(
+        notes.append(
             "No drive torque was found: slip, its zero-slip radius, distance and maps of slip can be had; adhesion, soil "
             "resistance, net traction and efficiency cannot, and no soil can be learned."
         )
-        return said
-    said += [f"No drive torque was found for wheel {wheel}: its axle must be undriven." for wheel in without]
+        return notes
+    notes += [f"No drive torque was found for wheel {wheel}: its axle must be undriven." for wheel in without]
     if "drawbar_force" not in proposals:
-        said.append("No drawbar force was found: the vehicle is taken to tow nothing.")
+        notes.append("No drawbar force was found: the vehicle is taken to tow nothing.")
     if "acceleration_x" not in proposals:
-        said.append(
+        notes.append(
             "No acceleration_x was found: soil resistance is estimated from speed alone, more slowly."
         )
     if "pitch" not in proposals:
-        said.append("No pitch was found: the ground is taken as level, and a slope reads as soil resistance.")
-    return said
+        notes.append(
+            "No pitch was found: the ground is taken as level, and a slope reads as soil resistance."
+        )
+    return notes
 
 
 def refusal(channels: Collection[str], silent: Sequence[str]) -> str:
@@ -55,13 +57,13 @@ def refusal(channels: Collection[str], silent: Sequence[str]) -> str:
     """
     if "wheel_based_speed" in channels or any(c.startswith("wheel_speed_") for c in channels):
         return ""
-    found = (
+    result = (
         ", ".join(sorted(c for c in channels if not c.startswith("true_"))) or "nothing that Terragrip knows"
     )
     wheels = next((s for s in silent if "wheel_speed_" in s or "wheel_based_speed" in s), "").rstrip(".")
     if wheels:
         return f"has no wheel speed that ever changes: {wheels}"
-    return f"has no wheel speed, nor one of the drive train: nothing can be estimated from it alone (found: {found})"
+    return f"has no wheel speed, nor one of the drive train: nothing can be estimated from it alone (found: {result})"
 
 
 def is_ready(recording: Recording) -> bool:

@@ -132,13 +132,13 @@ def _each(
         raise InputError("there is no log", hint="give at least one")
     if profile is None or isinstance(profile, Profile | str | os.PathLike):
         return [_loaded(profile)] * len(paths)
-    found = [_loaded(own) for own in profile]
-    if len(found) != len(paths):
+    result = [_loaded(own) for own in profile]
+    if len(result) != len(paths):
         raise InputError(
-            f"there are {len(found)} profiles for {len(paths)} logs",
+            f"there are {len(result)} profiles for {len(paths)} logs",
             hint="give one profile, or one for each log",
         )
-    return found
+    return result
 
 
 def _part(path: PathLike, profile: Profile | None, databases: Databases, also: tuple[str, ...] = ()) -> Part:

@@ -49,8 +49,8 @@ class Proposal:
     def columns(self) -> tuple[str, ...]:
         """The log's columns that it would read."""
         keys = ("from", "derivative_of", "norm_of", "pitch_of")
-        found = next((self.entry[k] for k in keys if k in self.entry), None)
-        return (found,) if isinstance(found, str) else tuple(found) if isinstance(found, list) else ()
+        result = next((self.entry[k] for k in keys if k in self.entry), None)
+        return (result,) if isinstance(result, str) else tuple(result) if isinstance(result, list) else ()
 
 
 def propose(
@@ -88,7 +88,7 @@ def silent(
     numbers: Mapping[str, Floats], proposals: Mapping[str, Proposal], units: Mapping[str, str]
 ) -> list[str]:
     """Sentences on columns that go by the name of a speed or torque which was not found, but hold nothing or never change."""
-    said = []
+    notes = []
     for name, column in columns_of(tuple(numbers), {}, units, GENERAL).items():
         values = numbers[name]
         guess = next(iter(candidates_of(column)), None)
@@ -97,8 +97,8 @@ def silent(
         if guess.channel.startswith(("ground_speed", "wheel_based_speed", "wheel_speed_", "drive_torque_")):
             known = values[np.isfinite(values)]
             held = f"is {known[0]:.4g} throughout" if len(known) else "holds no value"
-            said.append(f"{name} goes by the name of {guess.channel}, but {held}.")
-    return said[:6]
+            notes.append(f"{name} goes by the name of {guess.channel}, but {held}.")
+    return notes[:6]
 
 
 def _assigned(ranked: Mapping[str, list[Guess]]) -> dict[str, Guess]:
@@ -213,12 +213,12 @@ def _east_and_north(columns: Mapping[str, Column]) -> tuple[str, str] | None:
 
 def _constants(texts: Texts) -> dict[str, str]:
     """The text columns that hold one text throughout, with it."""
-    found = {}
+    result = {}
     for name, cells in texts.items():
         present = {str(cell) for cell in cells if cell not in (None, "")}
         if len(present) == 1:
-            found[name] = present.pop()
-    return found
+            result[name] = present.pop()
+    return result
 
 
 def _varies(values: Floats) -> bool:

@@ -70,18 +70,20 @@ def _own() -> dict[str, Format]:
 @cache
 def formats() -> dict[str, Format]:
     """The registered formats by name, ours first; raises InputError where one of another package cannot be loaded, or takes a name."""
-    found = {one.name: one for module in _OWN for one in import_module(f"terragrip.formats.{module}").FORMATS}
+    result = {
+        one.name: one for module in _OWN for one in import_module(f"terragrip.formats.{module}").FORMATS
+    }
     for entry in entry_points(group=GROUP):
         place, hint = f"format {entry.name}", f"update or remove the package that brings {entry.value}"
         try:
             one = entry.load()
         except (ImportError, AttributeError) as error:
             raise InputError(f"cannot be loaded ({error})", place=place, hint=hint) from error
-        if not isinstance(one, Format) or one.name in found:
+        if not isinstance(one, Format) or one.name in result:
             problem = f"{entry.value} is no Format" if not isinstance(one, Format) else "is there already"
             raise InputError(problem, place=place, hint=hint)
-        found[one.name] = one
-    return found
+        result[one.name] = one
+    return result
 
 
 def suffixes() -> tuple[str, ...]:
@@ -100,13 +102,13 @@ def format_of(path: str | os.PathLike[str]) -> Format:
             head = stream.read(_HEAD)
     except OSError as error:
         raise unreadable(path, error) from error
-    found = next((one for one in known.values() if head.startswith(one.magic)), None)
-    if found is None:
-        found = next(
+    result = next((one for one in known.values() if head.startswith(one.magic)), None)
+    if result is None:
+        result = next(
             (one for one in known.values() if one.recognises is not None and one.recognises(head)), None
         )
-    if found is not None:
-        return found
+    if result is not None:
+        return result
     # Nothing tells. Of a file that is no text, the name says which reader shall say what is wrong; a text is a table, unless another
     # package knows its name.
     binary = b"\0" in head and not head.startswith((b"\xff\xfe", b"\xfe\xff"))

@@ -93,9 +93,9 @@ class Types:
             return name
         try:
             read = self._typesys.get_types_from_idl if language == "idl" else self._typesys.get_types_from_msg
-            found = read(definition) if language == "idl" else read(definition, name)
+            result = read(definition) if language == "idl" else read(definition, name)
             store = self._typesys.get_typestore(self._typesys.Stores.EMPTY)
-            given = {k: v for k, v in found.items() if k not in store.fielddefs}
+            given = {k: v for k, v in result.items() if k not in store.fielddefs}
             base = self._known()
             lacking = {k: v for k, v in base.fielddefs.items() if k not in given and k not in store.fielddefs}
             store.register({**lacking, **given} if _refers_out(given) else given)
@@ -161,9 +161,9 @@ def ros_topic(name: str, wanted: Wanted | None) -> Topic:
 
 def bag_topic(name: str, wanted: Wanted | None, topics: dict[str, Topic]) -> RosTopic:
     """The topic of a bag of this name, of several connections the same one."""
-    found = topics.setdefault(f"ros {name}", RosTopic(name, _parts, _stamp, wanted))
-    assert isinstance(found, RosTopic)
-    return found
+    result = topics.setdefault(f"ros {name}", RosTopic(name, _parts, _stamp, wanted))
+    assert isinstance(result, RosTopic)
+    return result
 
 
 def _parts(message: Any) -> Iterable[tuple[str, Any]]:
@@ -186,9 +186,9 @@ def _files_of(path: str) -> list[Path]:
     if Path(path).is_file():
         return [Path(path)]
     for suffix in (".db3", ".mcap"):
-        found = sorted(p for p in Path(path).iterdir() if p.suffix == suffix)
-        if found:
-            return found
+        result = sorted(p for p in Path(path).iterdir() if p.suffix == suffix)
+        if result:
+            return result
     packed = [p.name for p in Path(path).iterdir() if p.suffix in (".zstd", ".zst")]
     hint = (
         f"unpack {packed[0]} first (zstd -d)" if packed else "name the bag's folder, with .db3 or .mcap files"
@@ -262,22 +262,22 @@ def _topics_of(
 
 def log_of(topics: Iterable[Topic], path: str, notes: list[str], files: Iterable[Path] = ()) -> SignalLog:
     """The signals of all topics; raises InputError if no message could be read."""
-    found: dict[str, Signal] = {}
+    result: dict[str, Signal] = {}
     names: dict[str, None] = {}
-    topics, said = list(topics), list(notes)
+    topics, remarks = list(topics), list(notes)
     for topic in topics:
         signals, own = topic.signals()
-        found |= signals
-        said += own
+        result |= signals
+        remarks += own
         names |= dict.fromkeys(topic.names)
     if not any(topic.count for topic in topics):
         bad = sum(topic.bad for topic in topics)
         problem = f"holds no message that can be read ({bad} cannot)" if bad else "holds no message"
         raise InputError(
-            f"{problem}{'; ' + said[0] if said else ''}", file=path, hint="check how it was recorded"
+            f"{problem}{'; ' + remarks[0] if remarks else ''}", file=path, hint="check how it was recorded"
         )
     digest = "+".join(sha256(file) for file in files) or sha256(path)
-    return SignalLog(tuple(names), found, path, digest, tuple(said))
+    return SignalLog(tuple(names), result, path, digest, tuple(remarks))
 
 
 FORMATS = (

@@ -136,10 +136,10 @@ class _Walk:
 
     def _length(self) -> int:
         self._align(4)
-        found = struct.unpack_from(f"{self._order}I", self._raw, self.place)[0]
+        result = struct.unpack_from(f"{self._order}I", self._raw, self.place)[0]
         self.marks.append((self.place, self.place + 4))
         self.place += 4
-        return int(found)
+        return int(result)
 
     def _align(self, size: int) -> None:
         if not self._one:

@@ -200,8 +200,8 @@ def _stamps(layout: Layout, data: Bytes) -> npt.NDArray[np.float64]:
     """The senders' stamps (n,) [s] of messages (n, bytes), NaN where there are none."""
     if _SECONDS not in layout.numbers or _NANOSECONDS not in layout.numbers:
         return np.full(len(data), np.nan)
-    found = layout.number(_SECONDS, data) + 1e-9 * layout.number(_NANOSECONDS, data)
-    return np.where(found == 0, np.nan, found)
+    result = layout.number(_SECONDS, data) + 1e-9 * layout.number(_NANOSECONDS, data)
+    return np.where(result == 0, np.nan, result)
 
 
 def _equal(first: Any, second: Any) -> bool:

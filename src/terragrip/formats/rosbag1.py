@@ -91,16 +91,16 @@ def _indexed(stream: BinaryIO, fields: dict[bytes, bytes]) -> Iterator[Connectio
 
 def _fields(header: bytes) -> dict[bytes, bytes]:
     """The fields of a header by name."""
-    found, place = {}, 0
+    result, place = {}, 0
     while place < len(header):
         (length,) = _LENGTH.unpack_from(header, place)
         place += _LENGTH.size
         if place + length > len(header):
             raise ValueError("a field reaches beyond its header")
         name, _, value = header[place : place + length].partition(b"=")
-        found[name] = value
+        result[name] = value
         place += length
-    return found
+    return result
 
 
 def _unpacked(fields: dict[bytes, bytes], content: bytes) -> bytes:
@@ -158,7 +158,7 @@ def _connection(fields: dict[bytes, bytes], content: bytes) -> Connection:
 
 def exactly(stream: BinaryIO, size: int) -> bytes:
     """The next ``size`` bytes; raises ValueError where there are fewer."""
-    found = stream.read(size)
-    if len(found) < size:
+    result = stream.read(size)
+    if len(result) < size:
         raise ValueError("it ends within a record")
-    return found
+    return result

@@ -148,9 +148,9 @@ def _spread(values: npt.NDArray[Any], rows: npt.NDArray[np.int32], length: int) 
     if values.dtype.kind in "fiub":
         if values.dtype == np.float64 and len(rows) == length and _rises(rows):
             return values  # measured at every instant
-        found = np.full(length, np.nan)
-        found[rows] = values
-        return found
+        result = np.full(length, np.nan)
+        result[rows] = values
+        return result
     texts = np.full(length, None, dtype=object)
     texts[rows] = values
     last = np.maximum.accumulate(np.where(texts != None, np.arange(length), -1))  # noqa: E711  (elementwise)

@@ -47,8 +47,8 @@ def joined(
         shift = 0.0
         if number:
             notes += part.notes
-            shift, said = _shift(reference, part)
-            notes.append(said)
+            shift, remarks = _shift(reference, part)
+            notes.append(remarks)
         for name, values in part.columns.items():
             if name in signals:
                 continue
@@ -78,18 +78,18 @@ def _shift(reference: Part, part: Part) -> tuple[float, str]:
         stated = float(part.time[0] - reference.time[0])  # only one counts from 1970: they start together
     name = Path(str(part.source)).name
     mine, theirs = speed_of(reference.time, reference.columns), speed_of(part.time, part.columns)
-    found = None
+    result = None
     if mine is not None and theirs is not None:
-        found = lag_between(mine, replace(theirs, time=theirs.time - stated), reach=reach)
-    if found is None:
+        result = lag_between(mine, replace(theirs, time=theirs.time - stated), reach=reach)
+    if result is None:
         how = "counts from 1970 as the first does" if reach is not None else "starts with the first one"
         return stated, f"The clock of {name} is taken as it is (it {how}): the speeds do not tell an offset."
-    side = "ahead of" if found.seconds >= 0 else "behind"
+    side = "ahead of" if result.seconds >= 0 else "behind"
     beyond = "its stamps" if reach is not None else "its start"
-    said = (
-        f"The clock of {name} is {abs(found.seconds):.3f} ± {found.std:.3f} s {side} the first one beyond {beyond}, by the "
-        f"correlation of the speeds ({found.correlation:.3f})"
+    sentence = (
+        f"The clock of {name} is {abs(result.seconds):.3f} ± {result.std:.3f} s {side} the first one beyond {beyond}, by the "
+        f"correlation of the speeds ({result.correlation:.3f})"
     )
-    if not found.is_of_the_clock:
-        return stated, f"{said}; {found.why_not}, so it is taken as it is."
-    return stated + found.seconds, f"{said}, and was set right."
+    if not result.is_of_the_clock:
+        return stated, f"{sentence}; {result.why_not}, so it is taken as it is."
+    return stated + result.seconds, f"{sentence}, and was set right."

@@ -104,8 +104,8 @@ def since_clock_was_set(table: LogTable, column: str, unit: str) -> tuple[LogTab
     count = int(jumps[-1]) + 1
     kept = {name: values[count:] for name, values in table.columns.items()}
     rows = "row was" if count == 1 else "rows were"
-    said = f"The first {count} {rows} stamped before the logger's clock was set ({stamps[0]}, then {stamps[count]}), and left out."
-    return replace(table, columns=kept), [said]
+    sentence = f"The first {count} {rows} stamped before the logger's clock was set ({stamps[0]}, then {stamps[count]}), and left out."
+    return replace(table, columns=kept), [sentence]
 
 
 def from_arrow(name: str, column: Any, source: str | None) -> npt.NDArray[Any]:

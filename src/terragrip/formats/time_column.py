@@ -83,8 +83,8 @@ def _score(column: str, values: Floats, stated: str | None, vocabulary: Vocabula
 
 def _unit_word(words: tuple[str, ...], vocabulary: Vocabulary) -> str | None:
     """A unit of time that stands anywhere in a name and needs no more than itself (``millisSinceGpsEpoch``)."""
-    found = (vocabulary.unit_word(word) for word in words if len(word) > 2)
-    return next((unit for unit in found if kind_of(unit) == "time"), None)
+    result = (vocabulary.unit_word(word) for word in words if len(word) > 2)
+    return next((unit for unit in result if kind_of(unit) == "time"), None)
 
 
 def _forward(known: Floats) -> float:

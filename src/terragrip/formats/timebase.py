@@ -37,6 +37,6 @@ def spread(
     if len(values) == length and np.array_equal(rows, np.arange(length)):
         return values
     empty = "" if values.dtype.kind == "O" else np.nan
-    found = np.full(length, empty, dtype=values.dtype)
-    found[rows] = values
-    return found
+    result = np.full(length, empty, dtype=values.dtype)
+    result[rows] = values
+    return result

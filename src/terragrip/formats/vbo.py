@@ -64,11 +64,11 @@ def _sections(text: str) -> dict[str, str]:
 def _distinct(names: list[str]) -> tuple[str, ...]:
     """Names that were cut to the same letters get a number."""
     seen: dict[str, int] = {}
-    found = []
+    result = []
     for name in names:
         seen[name] = seen.get(name, 0) + 1
-        found.append(name if seen[name] == 1 else f"{name}#{seen[name]}")
-    return tuple(found)
+        result.append(name if seen[name] == 1 else f"{name}#{seen[name]}")
+    return tuple(result)
 
 
 def _column(name: str, cells: list[str], path: str) -> npt.NDArray[np.float64]:
@@ -102,13 +102,13 @@ def _units(names: tuple[str, ...], section: str) -> dict[str, str]:
     """Units by column: the receiver's own are fixed; those that the file lists are of the last columns."""
     listed = [line.strip() for line in section.rstrip("\n").split("\n")]
     listed = listed[1:] if listed and not listed[0] else listed
-    found = {}
+    result = {}
     for name, unit in zip(reversed(names), reversed(listed), strict=False):
         plain = _AS_WRITTEN.get(unit, unit)
         if plain and not plain.startswith("°"):
-            found[name] = plain
+            result[name] = plain
     own = {name: _UNITS[bare] for name in names if (bare := name.lstrip("_").lower()) in _UNITS}
-    return {**found, **own, **({"time": "s"} if "time" in names else {})}
+    return {**result, **own, **({"time": "s"} if "time" in names else {})}
 
 
 def _is_vbo(head: bytes) -> bool:

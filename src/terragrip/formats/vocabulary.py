@@ -196,17 +196,17 @@ class Vocabulary:
         if unit is None and bracket and body != name:
             unit = self._unit_in_bracket(bracket[1])
         unit = unit or next((u for w in words if w in _ALWAYS and (u := self.unit_word(w))), None)
-        said = words[: len(words) - used] or words
-        if said == ["t"]:
+        text = words[: len(words) - used] or words
+        if text == ["t"]:
             concepts.add("time")
-        if len(said) == 2 and said[0] in _AXIS_SYMBOLS and said[1] in ("x", "y", "z"):
-            said = ["".join(said)]  # a_z
+        if len(text) == 2 and text[0] in _AXIS_SYMBOLS and text[1] in ("x", "y", "z"):
+            text = ["".join(text)]  # a_z
         if len(words) > 1 and unit in ("rpm", "rev/s"):
             concepts.add("rotation")
-        if len(said) == 2 and said[0] in _SYMBOLS and (said[1] in _CORNERS or said[1] in "lr12345678"):
-            concepts.add(_SYMBOLS[said[0]])  # M1, w_rl
-            said = said[1:]
-        for word in said:
+        if len(text) == 2 and text[0] in _SYMBOLS and (text[1] in _CORNERS or text[1] in "lr12345678"):
+            concepts.add(_SYMBOLS[text[0]])  # M1, w_rl
+            text = text[1:]
+        for word in text:
             short = _SYMBOL_OF_AXIS.match(word)
             if short is not None and word not in self._known:
                 concepts |= {_AXIS_SYMBOLS[short[1][0]]}
@@ -215,8 +215,8 @@ class Vocabulary:
                 axis = word
             else:
                 concepts |= self.concepts_of(word)
-        if said and said[0] in _SYMBOLS and concepts & {"wheel", "motor"}:
-            concepts.add(_SYMBOLS[said[0]])  # nRadVL
+        if text and text[0] in _SYMBOLS and concepts & {"wheel", "motor"}:
+            concepts.add(_SYMBOLS[text[0]])  # nRadVL
         if "speed" in concepts and words and words[-1] in _COMPASS:
             concepts.add(_COMPASS[words[-1]])  # VelN, vel_d
             unit = None if unit == "N" else unit
@@ -263,7 +263,7 @@ GENERAL = Vocabulary()
 
 def words_of(name: str) -> list[str]:
     """The words of a name in their order, in lower case: parts of camel case and between other characters, numbers apart."""
-    found: list[str] = []
+    result: list[str] = []
     for part in re.split(r"[^A-Za-z0-9]+", _ordinals(name)):
         if part.lower() in (
             "nm",
@@ -279,11 +279,11 @@ def words_of(name: str) -> list[str]:
             "ms2",
             "mps2",
         ):
-            found.append(part.lower())
+            result.append(part.lower())
             continue
         # A plural abbreviation in capitals beside a word (WheelSpFL) comes apart by case alone.
-        found += [word.lower() for word in _WORD.findall(part)]
-    return _rejoined(found)
+        result += [word.lower() for word in _WORD.findall(part)]
+    return _rejoined(result)
 
 
 def _rejoined(words: list[str]) -> list[str]:

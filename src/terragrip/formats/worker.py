@@ -49,7 +49,7 @@ class Worker:
         waiting = [p for p in _idle.pop((self._module, os.getpid()), []) if p.poll() is None]
         self._process = waiting.pop() if waiting else _started(self._module)
         _idle[self._module, os.getpid()] = waiting
-        self.say(self._path)
+        self.send(self._path)
         return self
 
     def __exit__(self, kind: type[BaseException] | None, *failure: object) -> None:
@@ -58,9 +58,9 @@ class Worker:
             return
         try:
             if not self._has_ended:
-                self.say(None)  # nothing more is asked for
+                self.send(None)  # nothing more is asked for
             while not self._has_ended:
-                self.hear()
+                self.receive()
         except (InputError, ValueError):  # it was still sending, or is gone
             self._kill()
             return
@@ -70,7 +70,7 @@ class Worker:
         self._process.kill()
         self._process.communicate()
 
-    def say(self, message: Any) -> None:
+    def send(self, message: Any) -> None:
         """Send the worker something."""
         assert self._process.stdin is not None
         try:
@@ -79,7 +79,7 @@ class Worker:
         except OSError as error:
             raise self._damaged(_ENDED) from error
 
-    def hear(self) -> dict[str, Any]:
+    def receive(self) -> dict[str, Any]:
         """The next message."""
         assert self._process.stdout is not None
         line = self._process.stdout.readline()
@@ -105,9 +105,9 @@ class Worker:
 
     def _damaged(self, why: str) -> InputError:
         self._is_lost = self._is_lost or why == _ENDED
-        said = " ".join(why.split())[:100]
+        sentence = " ".join(why.split())[:100]
         hint = "copy or record it again"
-        return InputError(f"is a damaged {self._kind}, or none ({said})", file=self._path, hint=hint)
+        return InputError(f"is a damaged {self._kind}, or none ({sentence})", file=self._path, hint=hint)
 
 
 def _started(module: str) -> subprocess.Popen[bytes]:
@@ -128,24 +128,24 @@ def _end_all() -> None:
 
 
 class Outlet:
-    """What a worker says, to whoever runs it."""
+    """The messages of a worker to the process that runs it."""
 
     def __init__(self, out: BinaryIO) -> None:
         self._out = out
         self.write = out.write  # for NumPy, which takes this for no file and so keeps the order of bytes
 
-    def say(self, message: dict[str, Any]) -> None:
+    def send(self, message: dict[str, Any]) -> None:
         """Send a message."""
         self._out.write(json.dumps(message).encode() + b"\n")
         self._out.flush()
 
-    def send(self, array: npt.NDArray[Any]) -> None:
+    def send_array(self, array: npt.NDArray[Any]) -> None:
         """Send an array."""
         np.lib.format.write_array(self, np.ascontiguousarray(array), allow_pickle=False)
         self._out.flush()
 
-    def hear(self) -> Any:
-        """What the other side says."""
+    def receive(self) -> Any:
+        """The next message of the other side."""
         return json.loads(sys.stdin.readline())
 
 
@@ -159,20 +159,20 @@ def serve(package: str, work: Callable[[str, Outlet], None]) -> int:
             path = json.loads(line)
             _limit(path)
             work(path, out)
-            out.say({"end": True})
-        except Exception as error:  # noqa: BLE001 - whatever a damaged file brings is told to the one who asked
+            out.send({"end": True})
+        except Exception as error:  # noqa: BLE001 - whatever a damaged file brings is reported to the caller
             with contextlib.suppress(OSError):
-                out.say({"error": f"{type(error).__name__}: {error}"[:200]})
+                out.send({"error": f"{type(error).__name__}: {error}"[:200]})
     return 0
 
 
 def _limit(path: str) -> None:
     """Bound what a damaged file may cost, beyond what the process has taken so far."""
     with open("/proc/self/statm") as stream:
-        taken = int(stream.read().split()[0]) * resource.getpagesize()
+        in_use = int(stream.read().split()[0]) * resource.getpagesize()
     size = os.path.getsize(path)  # which may be mapped
     used = resource.getrusage(resource.RUSAGE_SELF)
     seconds = int(used.ru_utime + used.ru_stime) + _SECONDS + size // _BYTES_A_SECOND
-    for what, most in ((resource.RLIMIT_AS, taken + size + _MEMORY), (resource.RLIMIT_CPU, seconds)):
+    for what, most in ((resource.RLIMIT_AS, in_use + size + _MEMORY), (resource.RLIMIT_CPU, seconds)):
         hard = resource.getrlimit(what)[1]  # stays, so that the next file may have more
         resource.setrlimit(what, (most if hard == resource.RLIM_INFINITY else min(most, hard), hard))

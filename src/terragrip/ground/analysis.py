@@ -114,8 +114,8 @@ def _soils(timeline: Timeline) -> tuple[str, ...]:
 def _changes(blocks: Blocks, settings: Settings) -> tuple[Change, ...]:
     if not settings.online:
         return changes_of(blocks, settings.signals, settings.length)
-    told = online_changes(blocks, OnlineSettings(length=settings.length, names=settings.signals))
-    return tuple(Change(one.time, one.std, one.probability, {}, one.told) for one in told)
+    changes = online_changes(blocks, OnlineSettings(length=settings.length, names=settings.signals))
+    return tuple(Change(one.time, one.std, one.probability, {}, one.reported) for one in changes)
 
 
 def _stretches(estimates: Estimates, changes: Sequence[Change], timeline: Timeline) -> list[Stretch]:
@@ -123,42 +123,44 @@ def _stretches(estimates: Estimates, changes: Sequence[Change], timeline: Timeli
     cuts = [float(change.time) for change in changes if change.probability >= SURE]
     rows = np.searchsorted(estimates.time, cuts)
     borders = sorted({0, *(int(k) for k in rows if 0 < k < len(estimates)), len(estimates)})
-    found = []
+    result = []
     for first, last in pairwise(borders):
         inside = (timeline.time >= estimates.time[first]) & (timeline.time <= estimates.time[last - 1])
-        told = inside & timeline.known if (inside & timeline.known).any() else inside
-        if not told.any():
-            told = np.arange(len(timeline.time)) == max(
+        certain = inside & timeline.known if (inside & timeline.known).any() else inside
+        if not certain.any():
+            certain = np.arange(len(timeline.time)) == max(
                 int(np.searchsorted(timeline.time, estimates.time[first])) - 1, 0
             )
-        mean = timeline.probabilities[told].mean(axis=0)
+        mean = timeline.probabilities[certain].mean(axis=0)
         probabilities = {name: round(float(p), 4) for name, p in zip(timeline.names, mean, strict=True)}
-        found.append(Stretch(first, last, probabilities))
-    return found
+        result.append(Stretch(first, last, probabilities))
+    return result
 
 
 def _notes(
     blocks: Blocks, emissions: Emissions, timeline: Timeline, short: int, library: bool
 ) -> tuple[str, ...]:
-    said = list(emissions.notes)
+    notes = list(emissions.notes)
     known = timeline.known
     if not known.any():
-        said.append(
+        notes.append(
             "No stretch of the drive tells of the ground: it stands, spins, is flagged or lacks values throughout."
         )
     elif library and (timeline.soil[known] == UNKNOWN).all():
-        said.append("No soil of the library fits any of the drive: all of it is unknown.")
+        notes.append("No soil of the library fits any of the drive: all of it is unknown.")
     elif library:
         share = float((timeline.soil[known] == UNKNOWN).mean())
         if share >= 0.01:
-            said.append(f"No soil of the library fits {100 * share:.0f} % of the drive: there it is unknown.")
+            notes.append(
+                f"No soil of the library fits {100 * share:.0f} % of the drive: there it is unknown."
+            )
     if short:
-        said.append(
+        notes.append(
             f"{short} stretch{'es' * (short > 1)} between changes {'are' if short > 1 else 'is'} too short for vehicle and tool "
             "to be on together, and no section."
         )
     if 0 < known.mean() < 0.5:
-        said.append(
+        notes.append(
             f"Only {100 * known.mean():.0f} % of the drive tells of the ground; elsewhere the soil is carried on."
         )
-    return tuple(said)
+    return tuple(notes)

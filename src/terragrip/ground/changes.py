@@ -38,20 +38,20 @@ _SHIFT = 20.0
 class Change:
     """The ground changes at `time` [s], known to `std` [s], with `probability`.
 
-    `shift`: by how many SDs (of a block on one ground) each signal moved. `told` [s]: when it was known while driving, None afterwards.
+    `shift`: by how many SDs (of a block on one ground) each signal moved. `reported` [s]: when it was known while driving, None afterwards.
     """
 
     time: float
     std: float
     probability: float
     shift: Mapping[str, float] = field(default_factory=dict)
-    told: float | None = None
+    reported: float | None = None
 
     def to_dict(self) -> dict[str, Any]:
         """As ground.json holds it."""
         out: dict[str, Any] = {"time": self.time, "std": self.std, "probability": self.probability}
-        if self.told is not None:
-            out["told"] = self.told
+        if self.reported is not None:
+            out["told"] = self.reported
         return {**out, "shift": dict(self.shift)} if self.shift else out
 
 
@@ -63,15 +63,15 @@ def changes_of(
     `names`: which of `SIGNALS` to look at. `length` [m]: mean way on one ground before the data speak. `penalty`: price of a change as
     twice a log likelihood; None takes it from `length` and the drive's own speed. Raises InputError where ruptures is not installed.
     """
-    signals, model, told = _prepared(blocks, names)
+    signals, model, measured = _prepared(blocks, names)
     if len(signals) < 2 * LEAST:
         return ()
-    driven = float(np.diff(blocks.travelled[told]).clip(0).sum())
+    driven = float(np.diff(blocks.travelled[measured]).clip(0).sum())
     chance = float(np.clip(driven / len(signals) / length, 1e-6, 0.5))
     price = -2 * np.log(chance) if penalty is None else penalty
     cost = _Cost(signals, model)
     borders = _pelt(cost, price)
-    where, ends = blocks[told], [0, *borders, len(signals)]
+    where, ends = blocks[measured], [0, *borders, len(signals)]
     return tuple(
         _change(cost, where, signals, names, (before, border, after), np.exp(-price / 2))
         for before, border, after in zip(ends, ends[1:], ends[2:], strict=False)
@@ -111,11 +111,11 @@ class _Cost:
     min_size = LEAST
 
     def __init__(self, signals: Array, model: Model) -> None:
-        told = np.isfinite(signals)
-        filled = np.where(told, signals, 0.0)
+        measured = np.isfinite(signals)
+        filled = np.where(measured, signals, 0.0)
         zero = np.zeros((1, signals.shape[1]))
         self._count, self._sum, self._square = (
-            np.vstack([zero, np.cumsum(x, axis=0)]) for x in (told.astype(float), filled, filled**2)
+            np.vstack([zero, np.cumsum(x, axis=0)]) for x in (measured.astype(float), filled, filled**2)
         )
         self._model = model
         self.signal = signals

@@ -62,17 +62,17 @@ class Emissions:
         foreign = {
             name: one.made_by for name, one in self.signatures.items() if one and not self._comparable(one)
         }
-        said = []
+        remarks = []
         if bare:
-            said.append(
+            remarks.append(
                 f"The library holds no signature of {', '.join(bare)}: recognised by curve and resistance alone, with less certainty."
             )
         if foreign:
-            said.append(
+            remarks.append(
                 f"The library learned {', '.join(foreign)} from estimates by {', '.join(sorted(set(foreign.values())))}, "
                 f"these are by {self.made_by}: their roughness is not compared."
             )
-        return tuple(said)
+        return tuple(remarks)
 
     @cached_property
     def states(self) -> NDArray[np.int64]:
@@ -91,9 +91,9 @@ class Emissions:
         """
         out = np.zeros((len(blocks), self.states.size))
         rough = np.isfinite(blocks.roughness).all(axis=1)
-        for rows, told in ((blocks.known & rough, True), (blocks.known & ~rough, False)):
+        for rows, is_rough in ((blocks.known & rough, True), (blocks.known & ~rough, False)):
             if rows.any():
-                out[rows] = self._likelihood(blocks[rows], told)
+                out[rows] = self._likelihood(blocks[rows], is_rough)
         return out
 
     def _likelihood(self, blocks: Blocks, rough: bool) -> Array:

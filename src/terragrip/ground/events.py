@@ -41,22 +41,22 @@ def events(estimates: Estimates) -> tuple[Event, ...]:
 
     The estimator flags them while driving (docs/events.md); here each gets its reason, from the values at the time.
     """
-    found = []
+    result = []
     for kind, rows in _spells(estimates):
         time = estimates.time[rows]
-        found.append(Event(kind, float(time[0]), float(time[-1]), _WHY[kind](estimates, rows)))
-    return tuple(sorted(found, key=lambda event: event.start))
+        result.append(Event(kind, float(time[0]), float(time[-1]), _WHY[kind](estimates, rows)))
+    return tuple(sorted(result, key=lambda event: event.start))
 
 
 def _spells(estimates: Estimates) -> list[tuple[str, NDArray[np.intp]]]:
     """Kind and rows of each spell; spells of one kind closer than CLOSE are one."""
-    found = []
+    result = []
     for code, kind in enumerate(EVENTS):
         rows = np.flatnonzero(estimates.event_codes == code)
         if kind and len(rows):
             apart = (np.diff(estimates.time[rows]) > CLOSE) & (np.diff(rows) > 1)
-            found += [(kind, part) for part in np.split(rows, np.flatnonzero(apart) + 1)]
-    return found
+            result += [(kind, part) for part in np.split(rows, np.flatnonzero(apart) + 1)]
+    return result
 
 
 def _mean(estimates: Estimates, quantity: str, rows: NDArray[np.intp]) -> Array:
@@ -74,15 +74,15 @@ def _immobilization(estimates: Estimates, rows: NDArray[np.intp]) -> str:
     points = {sign: float(estimates[f"warning_{sign}"][row]) for sign in SIGNS}
     change = {sign: points[sign] * limits[sign] for sign in ("rise", "leading", "resistance")}
     most = max(points.values())
-    said = {
+    sentence = {
         "rise": f"slip of the worst wheels rose by {change['rise']:.0%}",
         "high_slip": f"it is surely above {limits['high_slip']:.0%}",
         "leading": f"the leading wheels' adhesion against the trailing ones' fell by {change['leading']:.2f} below its usual",
         "resistance": f"soil resistance rose by {change['resistance']:.2f}",
     }
     reasons = [
-        f"{said[sign]} ({points[sign]:.1f} points{', the most that count' if points[sign] >= limits['most'] == most else ''})"
-        for sign in sorted(said, key=lambda sign: -points[sign])
+        f"{sentence[sign]} ({points[sign]:.1f} points{', the most that count' if points[sign] >= limits['most'] == most else ''})"
+        for sign in sorted(sentence, key=lambda sign: -points[sign])
         if points[sign] > LEAST_POINTS
     ]
     off = f", less {-points['command']:.1f} for speed gained" if points["command"] < -LEAST_POINTS else ""
@@ -132,11 +132,11 @@ def _gap(estimates: Estimates, rows: NDArray[np.intp]) -> str:
 
 
 def _outlier(estimates: Estimates, rows: NDArray[np.intp]) -> str:
-    nis, taken = estimates["nis"][rows], estimates["channels"][rows]
+    nis, channels = estimates["nis"][rows], estimates["channels"][rows]
     worst = int(np.nanargmax(nis)) if np.isfinite(nis).any() else 0
     return (
         f"A value lay far from what the filter, or the channel's own past, led to expect (at {estimates.time[rows[worst]]:.2f} s "
-        f"the squared innovation is {nis[worst]:.0f}, {taken[worst]:.0f} are usual): it was taken with little weight."
+        f"the squared innovation is {nis[worst]:.0f}, {channels[worst]:.0f} are usual): it was taken with little weight."
     )
 
 

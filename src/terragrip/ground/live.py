@@ -89,8 +89,12 @@ class LiveGround:
         self._before = (int(block.number[0]), int(block.streak[0]))
         self._rows.clear()
         probabilities = by_soil(self._filter.update(block).filtered, self._emissions.states)[0]
-        told = self._changes.update(block)
-        change = Change(told[0].time, told[0].std, told[0].probability, {}, told[0].told) if told else None
+        changes = self._changes.update(block)
+        change = (
+            Change(changes[0].time, changes[0].std, changes[0].probability, {}, changes[0].reported)
+            if changes
+            else None
+        )
         if change is not None:
             self.estimator.new_ground()
         names = self._emissions.names
@@ -127,24 +131,24 @@ class LiveGround:
         changes: OnlineSettings | None = None,
     ) -> Self:
         """Go on from a snapshot with the same estimator and library; raises InputError where it is damaged or of others."""
-        found = cls(estimator, library, changes)
+        result = cls(estimator, library, changes)
         try:
             state = json.loads(data)
             same = (
                 state["version"] == _VERSION
-                and state["soils"] == list(found._emissions.soils)
-                and state["columns"] == list(found._columns)
+                and state["soils"] == list(result._emissions.soils)
+                and state["columns"] == list(result._columns)
             )
             if same:
-                found._origin, found._number, found._rows = state["origin"], state["number"], state["rows"]
-                found._before = None if state["before"] is None else (state["before"][0], state["before"][1])
-                found._filter.probabilities = np.array(state["probabilities"], dtype=float)
-                found._filter.travelled = state["travelled"]
-                found._changes.restore(state["changes"])
+                result._origin, result._number, result._rows = state["origin"], state["number"], state["rows"]
+                result._before = None if state["before"] is None else (state["before"][0], state["before"][1])
+                result._filter.probabilities = np.array(state["probabilities"], dtype=float)
+                result._filter.travelled = state["travelled"]
+                result._changes.restore(state["changes"])
         except (ValueError, KeyError, TypeError, IndexError) as error:
             raise InputError(f"the snapshot of the ground is damaged ({error})", hint="start anew") from None
         if not same:
             raise InputError(
                 "the snapshot of the ground is of another version, vehicle or library", hint="start anew"
             )
-        return found
+        return result

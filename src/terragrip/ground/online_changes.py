@@ -37,10 +37,10 @@ class OnlineSettings:
 
 
 @dataclass(frozen=True)
-class Told:
+class ReportedChange:
     """A change as it is told while driving: when it was told, when it was, its SD and probability. Times in s."""
 
-    told: float
+    reported: float
     time: float
     std: float
     probability: float
@@ -61,17 +61,17 @@ class OnlineChanges:
         self._quiet_until = -np.inf
         self.probability = 0.0
 
-    def update(self, blocks: Blocks) -> list[Told]:
+    def update(self, blocks: Blocks) -> list[ReportedChange]:
         """Take blocks, one or many; returns the changes that they tell of."""
-        found = []
+        result = []
         signals = signals_of(blocks, self.settings.names)
         for k in range(len(blocks)):
-            change = self._take(
+            change = self._add(
                 signals[k], float(blocks.start[k]), float(blocks.end[k]), float(blocks.travelled[k])
             )
             if change is not None:
-                found.append(change)
-        return found
+                result.append(change)
+        return result
 
     def to_dict(self) -> dict[str, Any]:
         """The state as plain values, exact."""
@@ -94,7 +94,7 @@ class OnlineChanges:
         self._travelled, self.probability = state["travelled"], float(state["probability"])
         self._quiet_until = -np.inf if state["quiet"] is None else float(state["quiet"])
 
-    def _take(self, x: Array, start: float, end: float, travelled: float) -> Told | None:
+    def _add(self, x: Array, start: float, end: float, travelled: float) -> ReportedChange | None:
         driven = 0.0 if self._travelled is None else max(travelled - self._travelled, 0.0)
         self._travelled = travelled
         hazard = -np.expm1(-driven / self.settings.length)
@@ -107,7 +107,7 @@ class OnlineChanges:
         if seen.any():
             self._learn(np.where(seen, x, 0.0), np.where(seen, self._weight, 0.0))
         self._prune()
-        return self._tell(end)
+        return self._report(end)
 
     def _learn(self, x: Array, weight: Array) -> None:
         """Weigh the runs by what they predicted, then take the block into each."""
@@ -134,7 +134,7 @@ class OnlineChanges:
             setattr(self, name, getattr(self, name)[keep])
         self._probability = self._probability / self._probability.sum()
 
-    def _tell(self, now: float) -> Told | None:
+    def _report(self, now: float) -> ReportedChange | None:
         recent = self._begin > max(now - self.settings.recent, self._quiet_until)
         self.probability = float(self._probability[recent].sum())
         if self.probability < self.settings.threshold:
@@ -142,11 +142,11 @@ class OnlineChanges:
         weight, at = self._probability[recent] / self.probability, self._begin[recent]
         time = float((weight * at).sum())
         self._quiet_until = now
-        return Told(
+        return ReportedChange(
             now, time, float(np.sqrt((weight * (at - time) ** 2).sum() + PERIOD**2 / 12)), self.probability
         )
 
 
-def online_changes(blocks: Blocks, settings: OnlineSettings | None = None) -> Sequence[Told]:
+def online_changes(blocks: Blocks, settings: OnlineSettings | None = None) -> Sequence[ReportedChange]:
     """All changes of a drive as they would have been told while driving."""
     return OnlineChanges(settings).update(blocks)

@@ -82,11 +82,11 @@ def reliability(
         right.append((one.soil == one.label)[rows])
     p, r = (np.concatenate(x) if x else np.zeros(0) for x in (stated, right))
     place = np.clip(np.searchsorted(np.asarray(edges), p, side="right") - 1, 0, len(edges) - 2)
-    found = []
+    result = []
     for k in range(len(edges) - 1):
         inside = place == k
         if inside.any():
-            found.append(
+            result.append(
                 ReliabilityBin(
                     edges[k],
                     edges[k + 1],
@@ -95,7 +95,7 @@ def reliability(
                     int(inside.sum()),
                 )
             )
-    return tuple(found)
+    return tuple(result)
 
 
 def calibration_error(bins: Sequence[ReliabilityBin]) -> float:

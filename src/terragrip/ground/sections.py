@@ -71,14 +71,14 @@ def sections_of(estimates: Estimates, stretches: Sequence[Stretch], length: floa
     known of what lies behind it.
     """
     values = _Values(estimates)
-    distance, found = np.asarray(estimates["distance"], dtype=float), []
+    distance, result = np.asarray(estimates["distance"], dtype=float), []
     for k, stretch in enumerate(stretches):
         begin = stretch.first
         if k:
             begin += int(np.searchsorted(distance[begin : stretch.last], distance[begin] + length))
         if begin < stretch.last:
-            found.append(values.section(stretch, begin))
-    return tuple(found)
+            result.append(values.section(stretch, begin))
+    return tuple(result)
 
 
 class _Values:

@@ -44,14 +44,14 @@ def require_columns(columns: Collection[str], source: str | None) -> None:
 
 def remarks(columns: Collection[str]) -> list[str]:
     """Sentences on what the columns of a table are not used for."""
-    said = []
+    notes = []
     unused = [c for c in columns if c != TIME and c not in LABELS and not is_channel(c)]
     if unused:
         more = f" and {len(unused) - 8} more" if len(unused) > 8 else ""
-        said.append(f"Columns that are not used: {', '.join(unused[:8])}{more}.")
+        notes.append(f"Columns that are not used: {', '.join(unused[:8])}{more}.")
     if "drawbar_force" not in columns:
-        said.append("There is no drawbar_force: the vehicle is taken to tow nothing.")
-    return said
+        notes.append("There is no drawbar_force: the vehicle is taken to tow nothing.")
+    return notes
 
 
 def check_time(time: Floats, source: str | None, *, first_row: int = 0, after: float | None = None) -> None:

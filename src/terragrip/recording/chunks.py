@@ -23,5 +23,5 @@ def sampled_rows(rows: int) -> slice | npt.NDArray[np.intp]:
     while -(-chunks // every) > CHUNKS:
         every *= 2
     first = CHUNK * np.arange(0, chunks, every)
-    found = (first[:, None] + np.arange(CHUNK)).ravel()
-    return found[found < rows]
+    result = (first[:, None] + np.arange(CHUNK)).ravel()
+    return result[result < rows]

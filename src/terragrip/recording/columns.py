@@ -90,8 +90,8 @@ def seconds(column: npt.NDArray[Any], source: str | None) -> tuple[Floats, list[
     if column.dtype.kind != "M":
         return numbers(TIME, column, None, source), []
     since = column - column[0] if len(column) else column.astype("timedelta64[ns]")
-    found = np.where(np.isnat(since), np.nan, since / np.timedelta64(1, "s"))
-    return found.astype(np.float64), ["time was a date; it counts seconds from the first row."]
+    result = np.where(np.isnat(since), np.nan, since / np.timedelta64(1, "s"))
+    return result.astype(np.float64), ["time was a date; it counts seconds from the first row."]
 
 
 def texts(name: str, column: npt.NDArray[Any], rows: int, source: str | None) -> npt.NDArray[np.object_]:
@@ -107,14 +107,14 @@ def texts(name: str, column: npt.NDArray[Any], rows: int, source: str | None) ->
         changed = np.ones(max(rows - 1, 0), dtype=bool)
     starts = np.r_[0, np.flatnonzero(changed) + 1] if rows else np.empty(0, dtype=np.intp)
     shared: dict[Any, str] = {}
-    found = np.empty(len(starts), dtype=object)
+    result = np.empty(len(starts), dtype=object)
     for k, label in enumerate(column[starts].tolist()):
         try:
-            found[k] = shared.setdefault(label, _label(label))
+            result[k] = shared.setdefault(label, _label(label))
         except TypeError:  # an unhashable cell
             problem, where = f"holds a {type(label).__name__}", place(name, int(starts[k]))
             raise InputError(problem, file=source, place=where, hint="give text labels") from None
-    return np.repeat(found, np.diff(np.r_[starts, rows]))
+    return np.repeat(result, np.diff(np.r_[starts, rows]))
 
 
 def _label(value: Any) -> str:
@@ -148,13 +148,13 @@ def _array(name: str, values: Any, source: str | None) -> npt.NDArray[Any]:
 
 def _cell_by_cell(name: str, column: npt.NDArray[Any], time: Floats | None, source: str | None) -> Floats:
     """Convert a column of mixed objects; missing cells become NaN."""
-    found = np.full(len(column), np.nan)
+    result = np.full(len(column), np.nan)
     for row, cell in enumerate(column.tolist()):
         blank = isinstance(cell, str) and not cell.strip()
         if cell is None or blank or type(cell).__name__ in ("NAType", "NaTType"):
             continue
         try:
-            found[row] = float(cell)
+            result[row] = float(cell)
         except (TypeError, ValueError, OverflowError):
             text = repr(cell) if len(repr(cell)) <= 30 else repr(cell)[:27] + "..."
             raise InputError(
@@ -163,4 +163,4 @@ def _cell_by_cell(name: str, column: npt.NDArray[Any], time: Floats | None, sour
                 place=place(name, row, time),
                 hint="give numbers in SI",
             ) from None
-    return found
+    return result

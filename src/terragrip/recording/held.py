@@ -33,14 +33,14 @@ _WORTH_A_LOOK = 0.01  # share of exact repeats under which a channel is taken to
 
 def held_periods(recording: Recording) -> dict[str, float]:
     """Update period [s] of each channel whose values are held between updates; fresh channels are absent."""
-    found = {}
+    result = {}
     for name, values in recording.channels.items():
         if name.startswith(REFERENCE):
             continue
         period = held_period(recording.time, values)
         if period is not None:
-            found[name] = period
-    return found
+            result[name] = period
+    return result
 
 
 def held_period(time: Floats, values: Floats) -> float | None:

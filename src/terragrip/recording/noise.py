@@ -29,7 +29,7 @@ def sensor_noise(recording: Recording, held: dict[str, float] | None = None) -> 
     few samples, or one that never changes, is absent.
     """
     held = held_periods(recording) if held is None else held
-    found = {}
+    outcome = {}
     for name, values in recording.channels.items():
         if name.startswith(REFERENCE) or name in _NOT_SENSED:
             continue
@@ -41,8 +41,8 @@ def sensor_noise(recording: Recording, held: dict[str, float] | None = None) -> 
                 time, sample = time[fresh], sample[fresh]
             known = white_noise(time, sample)
         if known is not None:
-            found[name] = known
-    return found
+            outcome[name] = known
+    return outcome
 
 
 def white_noise(time: Floats, values: Floats) -> float | None:

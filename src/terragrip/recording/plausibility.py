@@ -55,7 +55,7 @@ def unit_warnings(recording: Recording, vehicle: Vehicle | None) -> list[str]:
 
 
 def _speed_warnings(recording: Recording, vehicle: Vehicle) -> list[str]:
-    found: dict[str, list[tuple[str, float]]] = {}
+    result: dict[str, list[tuple[str, float]]] = {}
     if not vehicle.knows_wheels:
         return []
     for wheel, radius in zip(vehicle.wheels, vehicle.wheel_radius, strict=True):
@@ -68,11 +68,11 @@ def _speed_warnings(recording: Recording, vehicle: Vehicle) -> list[str]:
         distance, why = min((abs(np.log(ratio / (1.08 * r))), text) for r, text in reasons)
         if distance > np.log(1.35):
             why = "check units, gear ratio and radius"
-        found.setdefault(why, []).append((wheel, ratio))
+        result.setdefault(why, []).append((wheel, ratio))
     return [
         f"The wheel speed of {', '.join(wheel for wheel, _ in those)} times the radius is "
         f"{np.median([ratio for _, ratio in those]):.3g} times the ground speed: {why}."
-        for why, those in found.items()
+        for why, those in result.items()
     ]
 
 
@@ -101,14 +101,14 @@ def _position_warnings(recording: Recording, track: Track | None) -> list[str]:
     """
     if track is None or "ground_speed" not in recording.channels:
         return []
-    found = _ratio(recording.time, recording.channels["ground_speed"], track.at("speed", recording.time))
-    if found is None:
+    result = _ratio(recording.time, recording.channels["ground_speed"], track.at("speed", recording.time))
+    if result is None:
         return []
-    said = f"ground_speed is {1 / found:.3g} times the speed of the positions"
-    if 2.9 < 1 / found < 4.4:
-        return [f"{said}: it may be in km/h: 1 km/h is 0.2778 m/s."]
-    if 2.9 < found < 4.4 and _straight_ahead(recording, track) > _OUTRUN:
-        return [f"{said}: it was taken for km/h, and may be in m/s."]
+    sentence = f"ground_speed is {1 / result:.3g} times the speed of the positions"
+    if 2.9 < 1 / result < 4.4:
+        return [f"{sentence}: it may be in km/h: 1 km/h is 0.2778 m/s."]
+    if 2.9 < result < 4.4 and _straight_ahead(recording, track) > _OUTRUN:
+        return [f"{sentence}: it was taken for km/h, and may be in m/s."]
     return []
 
 
@@ -130,13 +130,13 @@ def _turn_warnings(recording: Recording, vehicle: Vehicle | None, track: Track |
     yaw = recording.channels.get("angular_velocity_z")
     if yaw is None:
         return []
-    said: dict[str, float] = {}
+    text: dict[str, float] = {}
     if track is not None:
-        said["the positions"] = _agreement(recording.time, yaw, track.at("turn", recording.time))
+        text["the positions"] = _agreement(recording.time, yaw, track.at("turn", recording.time))
     if vehicle is not None:
-        said["the wheels' speeds"] = _agreement(recording.time, yaw, _wheel_turn(recording, vehicle))
-    against = [who for who, value in said.items() if value < -_SURE]
-    agreed = [who for who, value in said.items() if value > _SURE]
+        text["the wheels' speeds"] = _agreement(recording.time, yaw, _wheel_turn(recording, vehicle))
+    against = [who for who, value in text.items() if value < -_SURE]
+    agreed = [who for who, value in text.items() if value > _SURE]
     if not against:
         return []
     if agreed:
@@ -222,16 +222,16 @@ def _pairs(time: Floats, speed: Floats, turning: Floats) -> tuple[Floats, Floats
 
 
 def _angle_warnings(recording: Recording) -> list[str]:
-    said = []
+    notes = []
     for name in ("pitch", "roll"):
         size = _typical_size(recording, name)
         if size is not None and size > 1.6:
-            said.append(f"{name} reaches {size:.3g} rad: it may be in degrees.")
+            notes.append(f"{name} reaches {size:.3g} rad: it may be in degrees.")
     for name in ("latitude", "longitude"):
         values = recording.channels.get(name)
         if values is not None and np.nanmax(np.abs(values), initial=0.0) > 180:
-            said.append(f"{name} exceeds 180: it must be in degrees.")
-    return said
+            notes.append(f"{name} exceeds 180: it must be in degrees.")
+    return notes
 
 
 def _acceleration_warnings(recording: Recording) -> list[str]:

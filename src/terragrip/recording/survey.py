@@ -91,8 +91,8 @@ def survey_of(log: LogBlocks, progress: Progress | None = None) -> Survey:
         sample = _joined([part for number in sorted(kept) for part in kept[number]], last)
     empty = tuple(name for name in sample.channels if name not in holding)
     notes = [f"{name} holds no value and is left out." for name in empty]
-    found = Survey(rows, sample, empty)
-    return replace(found, sample=found.without_empty(sample).with_notes(*notes))
+    result = Survey(rows, sample, empty)
+    return replace(result, sample=result.without_empty(sample).with_notes(*notes))
 
 
 def _copied(block: Recording, rows: slice) -> Recording:

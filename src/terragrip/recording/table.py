@@ -74,7 +74,7 @@ class Recording:
         columns = columns_of(frame, source)
         checks.require_columns(columns, source)
         time, remark = seconds(columns[TIME], source)
-        said = [*notes, *remark, *checks.remarks(columns)]
+        remarks = [*notes, *remark, *checks.remarks(columns)]
         checks.check_time(time, source)
         if start is None:
             start = start_of(columns[TIME], time)
@@ -88,10 +88,10 @@ class Recording:
                 checks.refuse_infinite(name, values, time, source)
                 if np.isnan(values).all():
                     checks.refuse_empty(name, source)
-                    said.append(f"{name} holds no value and is left out.")
+                    remarks.append(f"{name} holds no value and is left out.")
                 else:
                     channels[name] = values
-        notes = tuple(dict.fromkeys(said))
+        notes = tuple(dict.fromkeys(remarks))
         return cls(time, channels, labels, source, sha256, notes, dict(noise or {}), start)
 
     def __len__(self) -> int:
@@ -148,11 +148,11 @@ class Recording:
         """
         import pandas as pd
 
-        found = pd.DataFrame({TIME: self.time, **self.channels, **self.labels}, copy=False)
+        result = pd.DataFrame({TIME: self.time, **self.channels, **self.labels}, copy=False)
         if self.clock_zero is not None:
-            found.index = clock_index(self.time, datetime.fromtimestamp(self.clock_zero, UTC))
-        found.attrs = {"units": {name: unit_of(name) or "" for name in found}, "notes": list(self.notes)}
-        return found
+            result.index = clock_index(self.time, datetime.fromtimestamp(self.clock_zero, UTC))
+        result.attrs = {"units": {name: unit_of(name) or "" for name in result}, "notes": list(self.notes)}
+        return result
 
     def check_against(self, vehicle: Vehicle) -> None:
         """Raise InputError unless the log's wheels and axles are the vehicle's, with all that estimates need.

@@ -46,10 +46,10 @@ class Track:
         if known.sum() < 2:
             return np.full(len(time), np.nan)
         when = self.time[known]
-        found = np.interp(time, when, values[known])
+        result = np.interp(time, when, values[known])
         place = np.clip(np.searchsorted(when, time), 1, len(when) - 1)
         far = np.minimum(np.abs(time - when[place - 1]), np.abs(time - when[place])) > WINDOW
-        return np.where(far, np.nan, found)
+        return np.where(far, np.nan, result)
 
 
 def track_of(recording: Recording, window: float = WINDOW) -> Track | None:
@@ -77,7 +77,7 @@ def track_of(recording: Recording, window: float = WINDOW) -> Track | None:
     middle = slice(half, len(rows) - half)
     ago = shown(time, span) - time[middle, None]
     fits = [_fitted(ago, shown(x, span) - x[middle, None], 2) for x in (north, east)]
-    (_, vn, an), (_, ve, ae) = (found.T for found, _ in fits)
+    (_, vn, an), (_, ve, ae) = (result.T for result, _ in fits)
     an, ae, bent = 2 * an, 2 * ae, 2 * np.hypot(fits[0][1][:, 2], fits[1][1][:, 2]) / np.sqrt(2)
     speed = np.hypot(vn, ve)
     with np.errstate(invalid="ignore", divide="ignore"):
@@ -96,12 +96,12 @@ def _fitted(ago: Floats, values: Floats, degree: int) -> tuple[Floats, Floats]:
     basis = (ago / size)[:, :, None] ** np.arange(degree + 1)
     normal = np.einsum("nki,nkj->nij", basis, basis)
     right = np.einsum("nki,nk->ni", basis, values)
-    found = np.linalg.solve(normal, right[..., None])[..., 0]
+    result = np.linalg.solve(normal, right[..., None])[..., 0]
     freedom = ago.shape[1] - degree - 1
-    square = np.sum((values - np.einsum("nki,ni->nk", basis, found)) ** 2, axis=1) / freedom
+    square = np.sum((values - np.einsum("nki,ni->nk", basis, result)) ** 2, axis=1) / freedom
     spread = np.sqrt(np.median(square) * np.diagonal(np.linalg.inv(normal), axis1=1, axis2=2))
     powers = size ** np.arange(degree + 1)
-    return np.asarray(found / powers), np.asarray(spread / powers)
+    return np.asarray(result / powers), np.asarray(spread / powers)
 
 
 def _grade(recording: Recording, time: Floats, speed: Floats) -> Floats:

@@ -35,22 +35,22 @@ def fits_of_truth(
     campaign: Campaign, pairs: Sequence[RunPairs], by: str | None = None
 ) -> dict[str, AdhesionCurve]:
     """The fit of each of the campaign's soils on true pairs, bins by the same settings (sorted `by` another quantity), no intervals."""
-    found = {}
+    result = {}
     for name, learned in campaign.soils.items():
         parts = [part for part in pairs if part.soil == name]
         settings = learned.curve.bins if by is None else replace(learned.curve.bins, by=by)
         try:
-            found[name] = learned.curve.unfitted(bootstrap=0).fit_bins(bin_parts(parts, settings))
+            result[name] = learned.curve.unfitted(bootstrap=0).fit_bins(bin_parts(parts, settings))
         except (InputError, ValueError):  # too few bins: what the truth does not show is left out
             continue
-    return found
+    return result
 
 
 def soils_of_scenario(scenario: str, pairs: Sequence[RunPairs]) -> dict[str, Soil]:
     """The soils a scenario was made with: their curves, and the mean true resistance over `pairs`."""
     from terragrip.simulation import Scenario
 
-    found = {}
+    result = {}
     for name, soil in Scenario.load(scenario).soils.items():
         resistance = [part.resistance for part in pairs if part.soil == name]
         if not resistance:
@@ -58,5 +58,5 @@ def soils_of_scenario(scenario: str, pairs: Sequence[RunPairs]) -> dict[str, Soi
         values = np.concatenate(resistance)
         parameters = {key: value for key, value in soil.curve.items() if key != "name"}
         known = (float(np.nanmean(values)), float(np.nanstd(values)))
-        found[name] = Soil(name, str(soil.curve["name"]), parameters, resistance=known, source="simulated")
-    return found
+        result[name] = Soil(name, str(soil.curve["name"]), parameters, resistance=known, source="simulated")
+    return result

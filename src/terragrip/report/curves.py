@@ -110,13 +110,13 @@ def draw_both_maxima(curve: SoilCurves, tire_resistance: float) -> str:
         if curve.truth is not None:
             voices.append((" of the truth", curve.truth, {"linewidth": 0.9, "linestyle": "--"}))
         slip = np.linspace(0.0, 1.0, 401)
-        for ending, soil, look in voices:
+        for ending, soil, style in voices:
             eta = _efficiency(soil, slip, tire_resistance)
             for label, values, color in (
                 ("adhesion µ", soil.value(slip), BLUE),
                 ("efficiency η", eta, GREEN),
             ):
-                plot.plot(slip, values, color=INK if ending else color, label=f"{label}{ending}", **look)
+                plot.plot(slip, values, color=INK if ending else color, label=f"{label}{ending}", **style)
         peaks = maxima(curve.learned.soil, tire_resistance)
         for (at, height), what, color, marker in (
             (peaks.adhesion, "µ", BLUE, "o"),
@@ -124,8 +124,10 @@ def draw_both_maxima(curve: SoilCurves, tire_resistance: float) -> str:
         ):
             if np.isfinite(at):
                 plot.plot([at], [height], marker, color=color, markersize=7)
-                said = f"largest {what}: {height:.2f} at {at:.0%} slip"
-                plot.annotate(said, (at, height), (9, 9), textcoords="offset points", color=INK, fontsize=9)
+                sentence = f"largest {what}: {height:.2f} at {at:.0%} slip"
+                plot.annotate(
+                    sentence, (at, height), (9, 9), textcoords="offset points", color=INK, fontsize=9
+                )
         plot.set_xlim(0, 1)
         plot.set_ylim(0, 1.15 * max(peaks.adhesion[1], peaks.efficiency[1]))
         plot.set_xlabel("slip s [–]")
@@ -157,15 +159,15 @@ def draw_all_maxima(curves: Sequence[SoilCurves], tire_resistance: float) -> str
         return to_svg(figure)
 
 
-def _draw_fit(plot: Axes, told: SoilCurves) -> dict[str, Any]:
+def _draw_fit(plot: Axes, shown: SoilCurves) -> dict[str, Any]:
     """Draw one soil; the legend's entries by label."""
     named: dict[str, Any] = {}
-    paper, counts = told.learned.by_slip, told.learned.curve
+    paper, counts = shown.learned.by_slip, shown.learned.curve
     named["bins by slip, mean ± SD"] = _draw_bins(plot, paper, "x", MUTED, 4)
     if counts is not paper:
         named["bins by pull, mean ± SD"] = _draw_bins(plot, counts, "o", BLUE, 3.5)
-    if told.learned.curve.has_band:
-        low, high = told.learned.curve.band(SLIPS)
+    if shown.learned.curve.has_band:
+        low, high = shown.learned.curve.band(SLIPS)
         named["95 % of the fit"] = plot.fill_between(SLIPS, low, high, color=BLUE, alpha=0.22, linewidth=0)
     lines: list[tuple[str, Array | None, dict[str, Any]]] = [
         (
@@ -178,12 +180,12 @@ def _draw_fit(plot: Axes, told: SoilCurves) -> dict[str, Any]:
             paper.predict(SLIPS) if counts is not paper else None,
             {"color": MUTED, "linewidth": 1.4, "linestyle": "--"},
         ),
-        ("paper", _value(told.paper), {"color": ORANGE, "linewidth": 1.4, "linestyle": "-."}),
-        ("simulated truth", _value(told.truth), {"color": INK, "linewidth": 0.9}),
+        ("paper", _value(shown.paper), {"color": ORANGE, "linewidth": 1.4, "linestyle": "-."}),
+        ("simulated truth", _value(shown.truth), {"color": INK, "linewidth": 0.9}),
     ]
-    for label, values, look in lines:
+    for label, values, style in lines:
         if values is not None:
-            (named[label],) = plot.plot(SLIPS, values, **look)
+            (named[label],) = plot.plot(SLIPS, values, **style)
     plot.set_xlim(0, SLIPS[-1])
     plot.set_ylim(bottom=0)
     return named

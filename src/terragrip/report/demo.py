@@ -110,7 +110,7 @@ def _page(campaign: EstimatedCampaign, seed: int, seconds: float) -> Page:
     minutes = sum(item.duration for item in runs) / 60
     true_pairs = [part for run in runs for part in run.true_pairs]
     truth = soils_of_scenario(main.name, true_pairs)
-    curves = soil_sections.told_by_all(
+    curves = soil_sections.curves_of_all(
         campaign.soils,
         truth=truth,
         true_pairs=fits_of_truth(campaign.soils, true_pairs),
@@ -157,49 +157,49 @@ def _headlines(campaign: EstimatedCampaign, default: str) -> tuple[Headline, ...
     sensor = find(campaign.comparisons, run=main, method=default, quantity=SENSOR_RATIO, against="sensor")
     itself = find(campaign.comparisons, run=main, method=TRUTH, quantity=SENSOR_RATIO, against="sensor")
     truth = find(campaign.comparisons, run=main, method=default, quantity="adhesion", against="truth")
-    found = []
+    result = []
     if sensor and sensor.whole and sensor.without_flagged and itself and itself.without_flagged:
-        whole, told = sensor.whole, sensor.without_flagged
-        found += [
+        whole, unflagged = sensor.whole, sensor.without_flagged
+        result += [
             Headline(
                 number(whole.r2),
                 f"R² in {main} against the simulated force sensor, all samples",
                 f"paper {PAPER_R2_WHOLE}",
             ),
             Headline(
-                number(told.r2),
+                number(unflagged.r2),
                 "the same without the rows that the estimates' own events flag, no window cut by hand",
                 f"paper {PAPER_R2_WITHOUT_STUCK}, cut by hand; the truth itself {number(itself.without_flagged.r2)}",
             ),
-            Headline(number(told.nrmse), "NRMSE, same rows", f"paper {PAPER_NRMSE}"),
+            Headline(number(unflagged.nrmse), "NRMSE, same rows", f"paper {PAPER_NRMSE}"),
         ]
     if truth and truth.without_outlier:
         value = number(truth.without_outlier.r2)
-        found.append(
+        result.append(
             Headline(value, f"R² of µ in {main} against the simulated truth", "without the stuck spell")
         )
     mu = next((item for item in pooled(campaign.coverage) if item.quantity == "adhesion µ"), None)
     if mu:
         label = "of rows hold the true µ in the 95 % interval"
-        found.append(Headline(percent(mu.share()), label, f"all {len(campaign.runs)} runs"))
-    return tuple(found)
+        result.append(Headline(percent(mu.share()), label, f"all {len(campaign.runs)} runs"))
+    return tuple(result)
 
 
 def _sensor_prose(run: Run) -> tuple[str, ...]:
     """What the reference sensor reads, and what happens while stuck."""
-    said = [
+    notes = [
         "The force sensor sits on the axle of the rear right wheel. It reads the force that reaches the chassis, "
         "from which soil resistance is already taken, over a load that lacks the wheel's own weight. So it "
         "follows κ = µ − ρs and is drawn with it. The paper compares its sensor with µ; the tables below hold "
         "both comparisons."
     ]
     if run.stuck.any():
-        said.append(
+        notes.append(
             "While the vehicle is stuck its tool slides up and pushes: the force on the axle falls or turns "
             "negative, the torque and with it µ stay high. The paper cuts the longest such spell out by hand; here the "
             "estimates' own events flag all of them, and R² stands with and without the flagged rows."
         )
-    return tuple(said)
+    return tuple(notes)
 
 
 _METHOD_PROSE = (

@@ -126,9 +126,9 @@ def _read(
         if estimates.has_adhesion:
             gathered.add(estimates, path.stem, file=str(path))
         own[path.stem] = [event.to_dict() for event in events(estimates)]
-        told = any(ground.run == path.stem for ground in grounds)
+        has_ground = any(ground.run == path.stem for ground in grounds)
         happened = tuple(event for ground in grounds if ground.run == path.stem for event in ground.events)
-        if not told:
+        if not has_ground:
             happened = tuple(own[path.stem])
         table = estimates.to_pandas()
         table.attrs["zero_slip"] = estimates.about.get("zero_slip")
@@ -146,7 +146,7 @@ def _read(
 
 def _sections(main: Run, together: Sequence[Run], campaign: Campaign) -> Iterator[Section]:
     """Traction over time, slip and resistance, curves and operating points; of drawn runs without torques slip alone."""
-    curves = soil_sections.told_by_all(campaign)
+    curves = soil_sections.curves_of_all(campaign)
     tire = main.vehicle.tire_rolling_resistance if main.vehicle is not None else 0.0
     yield from (sections.tracking(run) for run in together if run.has_adhesion)
     yield sections.slip_and_resistance(main)
@@ -176,14 +176,14 @@ def _of_slip(together: Sequence[Run]) -> Iterator[Section]:
 def _summary(run: Run) -> _Summary:
     distance = run.estimated("distance")[-1] if "distance" in run.estimates else np.nan
     events = run.estimates["event"].value_counts() if "event" in run.estimates else {}
-    told = ", ".join(f"{kind} {count / len(run.time):.0%}" for kind, count in events.items() if kind)
+    has_ground = ", ".join(f"{kind} {count / len(run.time):.0%}" for kind, count in events.items() if kind)
     return _Summary(
         run.name,
         float(run.time[-1] - run.time[0]),
         float(np.nan_to_num(distance)),
         run.soils,
         run.method,
-        told or "–",
+        has_ground or "–",
     )
 
 

@@ -32,10 +32,10 @@ LISTED = 40
 def recognised(grounds: Sequence[Ground], simulated: bool = False) -> Section:
     """Probabilities of the soils over the drives, changes, and the confusion matrix where the recording names its soils."""
     title = "What the ground was"
-    told = [ground for ground in grounds if len(ground.timeline.time) > 1]
-    if not told:
+    with_time = [ground for ground in grounds if len(ground.timeline.time) > 1]
+    if not with_time:
         return Section("ground", title, omitted="Left out: no ground.json was given, or it holds no drive.")
-    shown = sorted(told, key=lambda ground: -len(ground.changes))[:SHOWN]
+    shown = sorted(with_time, key=lambda ground: -len(ground.changes))[:SHOWN]
     sim = "Simulated run" if simulated else "Run"
     content: list[Picture | Table] = []
     for ground in sorted(shown, key=lambda one: one.run):
@@ -54,8 +54,10 @@ def recognised(grounds: Sequence[Ground], simulated: bool = False) -> Section:
             f"Probabilities of soils over time in {ground.run}",
         )
         content.append(picture)
-    matrix = confusion([ground.timeline for ground in told])
-    prose = [note if len(told) == 1 else f"{ground.run}: {note}" for ground in shown for note in ground.notes]
+    matrix = confusion([ground.timeline for ground in with_time])
+    prose = [
+        note if len(with_time) == 1 else f"{ground.run}: {note}" for ground in shown for note in ground.notes
+    ]
     if matrix is not None:
         prose.insert(0, matrix[1])
         content.append(matrix[0])
@@ -117,17 +119,17 @@ def section_points(grounds: Sequence[Ground], simulated: bool = False) -> Sectio
 
 
 def events(
-    grounds: Sequence[Ground], found: Mapping[str, Sequence[Mapping[str, Any]]] | None = None
+    grounds: Sequence[Ground], result: Mapping[str, Sequence[Mapping[str, Any]]] | None = None
 ) -> Section:
     """What happened, with start, end and the reason in the user's words.
 
     found: events of the estimates themselves by run (kind, start, end, why), for the runs that no `grounds` tells of.
     """
     title = "Events"
-    told = {ground.run for ground in grounds}
+    with_time = {ground.run for ground in grounds}
     every = [(ground.run, one) for ground in grounds for one in ground.events]
-    every += [(run, one) for run, mine in (found or {}).items() if run not in told for one in mine]
-    if not grounds and not found:
+    every += [(run, one) for run, mine in (result or {}).items() if run not in with_time for one in mine]
+    if not grounds and not result:
         return Section(
             "events",
             title,
@@ -180,23 +182,23 @@ def confusion(timelines: Iterable[Timeline]) -> tuple[Table, str] | None:
         rows = timeline.known & (timeline.label != "")
         truth.append(timeline.label[rows])
         taken.append(timeline.soil[rows])
-    true, said = (
+    true, estimated = (
         np.concatenate([np.zeros(0, dtype=object), *truth]),
         np.concatenate([np.zeros(0, dtype=object), *taken]),
     )
     if not len(true):
         return None
-    columns = sorted(set(said), key=lambda name: (name == "unknown", name))
+    columns = sorted(set(estimated), key=lambda name: (name == "unknown", name))
     rows_ = []
     for name in sorted(set(true)):
-        mine = said[true == name]
+        mine = estimated[true == name]
         rows_.append(
             (name, *(percent(float(np.mean(mine == other)), 0) for other in columns), str(len(mine)))
         )
-    sentence = f"By the recordings' own labels the soil is right in {percent(float(np.mean(true == said)))} of the time"
+    sentence = f"By the recordings' own labels the soil is right in {percent(float(np.mean(true == estimated)))} of the time"
     if set(ALIKE) <= set(true):
-        alike = np.isin(true, ALIKE) & np.isin(said, ALIKE)
-        joined = percent(float(np.mean((true == said) | alike)))
+        alike = np.isin(true, ALIKE) & np.isin(estimated, ALIKE)
+        joined = percent(float(np.mean((true == estimated) | alike)))
         sentence += f", in {joined} with {names(ALIKE)} taken as one, which the paper could not tell apart"
     table = Table(
         "The soil by its label (rows) and what it was taken for (columns), in shares of the row.",
@@ -257,8 +259,8 @@ def _mark_changes(plot: Axes, ground: Ground) -> None:
 
 def _sensor(measured: object) -> str:
     """The force sensor's mean and SD of a section, "–" without one."""
-    for found in measured.values() if isinstance(measured, dict) else ():
-        mean, std = found.get("force_ratio_mean"), found.get("force_ratio_std")
+    for result in measured.values() if isinstance(measured, dict) else ():
+        mean, std = result.get("force_ratio_mean"), result.get("force_ratio_std")
         if mean is not None:
             return f"{number(mean)} ± {number(std)}"
     return "–"

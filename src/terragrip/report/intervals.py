@@ -45,24 +45,26 @@ def run_coverage(run: Run) -> list[Coverage]:
     return result
 
 
-def pooled(found: Sequence[Coverage]) -> list[Coverage]:
+def pooled(coverages: Sequence[Coverage]) -> list[Coverage]:
     """Coverage of each quantity over all runs together."""
     result = []
     for quantity in QUANTITIES:
-        parts = [item for item in found if item.quantity == quantity and item.rows]
+        parts = [item for item in coverages if item.quantity == quantity and item.rows]
         if parts:
             held = tuple(sum(item.held[i] for item in parts) for i in range(len(LEVELS)))
             result.append(Coverage("all", quantity, sum(item.rows for item in parts), held))
     return result
 
 
-def draw_coverage(found: Sequence[Coverage]) -> str:
+def draw_coverage(coverages: Sequence[Coverage]) -> str:
     """An SVG: observed against nominal coverage. Above the diagonal is careful, under it is too sure."""
     figure = new_figure(width=5.6, height=4.4)
     with styled():
         plot = figure.subplots()
         plot.plot([0.45, 1], [0.45, 1], color=INK, linewidth=0.9, linestyle="--", label="honest")
-        for item, color, marker in zip(pooled(found), (BLUE, ORANGE, GREEN), ("o", "s", "^"), strict=False):
+        for item, color, marker in zip(
+            pooled(coverages), (BLUE, ORANGE, GREEN), ("o", "s", "^"), strict=False
+        ):
             shares = [item.share(level) for level in LEVELS]
             plot.plot(LEVELS, shares, color=color, marker=marker, markersize=5, label=item.quantity)
         plot.set_xlabel("probability the interval claims")
@@ -72,11 +74,11 @@ def draw_coverage(found: Sequence[Coverage]) -> str:
         return to_svg(figure)
 
 
-def coverage_table(found: Sequence[Coverage]) -> Table:
+def coverage_table(coverages: Sequence[Coverage]) -> Table:
     """Coverage at 95 %: pooled, and the spread over runs."""
     rows = []
-    for item in pooled(found):
-        shares = [part.share() for part in found if part.quantity == item.quantity and part.rows]
+    for item in pooled(coverages):
+        shares = [part.share() for part in coverages if part.quantity == item.quantity and part.rows]
         low = f"{sum(share < 0.9 for share in shares)} of {len(shares)}"
         figures = (item.share(), float(np.median(shares)), min(shares))
         rows.append((item.quantity, *(percent(share) for share in figures), low))
@@ -130,9 +132,14 @@ def nis_table(runs: Sequence[Run]) -> Table:
     """NIS over its expectation, and the share inside its 95 % bounds, for each run."""
     rows = []
     for run in runs:
-        found = nis_consistency(*nis_by_channels(run))
+        coverages = nis_consistency(*nis_by_channels(run))
         rows.append(
-            (f"{run.name}, {run.method}", number(found.ratio, 2), percent(found.within), str(found.count))
+            (
+                f"{run.name}, {run.method}",
+                number(coverages.ratio, 2),
+                percent(coverages.within),
+                str(coverages.count),
+            )
         )
     return Table(
         "Normalised innovation squared over its expectation (1 for noise settings that are right) and the "
@@ -149,10 +156,10 @@ def _triples(run: Run, columns: Sequence[str]) -> tuple[FloatArray, FloatArray, 
         true = run.true(name)
         if true is None:
             continue
-        said, sd = run.estimated(name), run.estimated(f"{name}_std")
-        rows = run.judged & np.isfinite(true) & np.isfinite(said) & np.isfinite(sd)
+        estimated, sd = run.estimated(name), run.estimated(f"{name}_std")
+        rows = run.judged & np.isfinite(true) & np.isfinite(estimated) & np.isfinite(sd)
         truth.append(true[rows])
-        estimate.append(said[rows])
+        estimate.append(estimated[rows])
         std.append(sd[rows])
     if not truth:
         return np.empty(0), np.empty(0), np.empty(0)

@@ -108,14 +108,14 @@ def cross_table(crosses: Iterable[Cross], what: str) -> Table:
     by_soil: dict[str, dict[str, Cross]] = {}
     for cross in crosses:
         by_soil.setdefault(cross.soil, {})[cross.voice] = cross
-    voices = [v for v in ("measured", "estimated", "true") if any(v in said for said in by_soil.values())]
+    voices = [v for v in ("measured", "estimated", "true") if any(v in kinds for kinds in by_soil.values())]
     others = [v for v in voices if v != "estimated"]
     named = {"measured": "sensor", "estimated": "estimated", "true": "true"}
     rows = []
-    for soil, said in by_soil.items():
-        row = [soil, *(_spread(said.get(v)) for v in voices)]
-        row += [_apart(said.get("estimated"), said.get(v)) for v in others]
-        row += [number(said[v].slip) if v in said else "–" for v in voices]
+    for soil, kinds in by_soil.items():
+        row = [soil, *(_spread(kinds.get(v)) for v in voices)]
+        row += [_apart(kinds.get("estimated"), kinds.get(v)) for v in others]
+        row += [number(kinds[v].slip) if v in kinds else "–" for v in voices]
         rows.append(tuple(row))
     return Table(
         f"Mean ± SD of {what} and mean slip by soil."
@@ -145,12 +145,12 @@ def _voices(run: Run, quantity: str) -> list[tuple[str, FloatArray, FloatArray]]
     wheel = run.shown_wheel
     slip = run.estimated(f"slip_{wheel}")
     measured = run.measured_slip()
-    found = [
+    result = [
         ("measured", slip if measured is None else measured, run.measured_ratio()),
         ("estimated", slip, run.estimated(f"{quantity}_{wheel}")),
         ("true", run.true(f"slip_{wheel}"), run.true(f"{quantity}_{wheel}")),
     ]
-    return [(voice, slip, mu) for voice, slip, mu in found if slip is not None and mu is not None]
+    return [(voice, slip, mu) for voice, slip, mu in result if slip is not None and mu is not None]
 
 
 def _cross(soil: str, voice: str, slip: FloatArray, mu: FloatArray) -> Cross:

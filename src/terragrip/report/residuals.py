@@ -29,7 +29,7 @@ class Residual:
 
 def residuals(run: Run) -> list[Residual]:
     """kappa against the sensor and mu against the truth of the shown wheel, while it moves and is neither stuck nor pushed."""
-    wheel, found = run.shown_wheel, []
+    wheel, shown = run.shown_wheel, []
     for voice, what, column, reference in (
         ("sensor", "κ − sensor", f"net_traction_{wheel}", run.measured_ratio()),
         ("truth", "µ − truth", f"adhesion_{wheel}", run.true(f"adhesion_{wheel}")),
@@ -39,21 +39,21 @@ def residuals(run: Run) -> list[Residual]:
         off = np.where(run.judged, run.estimated(column) - reference, np.nan)
         known = np.isfinite(off)
         if known.sum() > 2:
-            found.append(Residual(voice, what, off[known], _white(run.time[known], off[known])))
-    return found
+            shown.append(Residual(voice, what, off[known], _white(run.time[known], off[known])))
+    return shown
 
 
 def section(run: Run) -> Section:
     """The report's section: histogram and autocorrelation, and their figures as a table."""
     title = "Residuals"
-    found = residuals(run)
-    if not found:
+    shown = residuals(run)
+    if not shown:
         return Section(
             "residuals", title, omitted="Left out: there is neither a reference force sensor nor a truth."
         )
     picture = Picture(
         f"residuals-{run.name}",
-        draw_residuals(found),
+        draw_residuals(shown),
         f"{'Simulated run' if run.truth is not None else 'Run'} {run.name}: residuals of wheel {run.shown_wheel} while the vehicle moves "
         "by itself. Left: their histogram and the normal law of the same mean and SD. Right: their autocorrelation; within the dashed "
         "lines it is that of white noise. A tail to the right says that the estimate lags or that ground is rougher than the model.",
@@ -69,7 +69,7 @@ def section(run: Run) -> Section:
             number(_memory(one.white), 1) if one.white else "–",
             ("yes" if one.white.p_value > 0.05 else "no") if one.white else "–",
         )
-        for one in found
+        for one in shown
     )
     table = Table(
         f"Residuals of {run.name}. White: the Ljung-Box test over {LAGS * STEP:g} s does not refuse it at 5 %. A normal law has 0.27 % "
@@ -80,13 +80,13 @@ def section(run: Run) -> Section:
     return Section("residuals", title, (), (picture, table))
 
 
-def draw_residuals(found: list[Residual]) -> str:
+def draw_residuals(shown: list[Residual]) -> str:
     """An SVG: a row a voice would repeat the axes, so both voices share two plots."""
     figure = new_figure(9.6, 3.5)
     colors = {"sensor": MEASURED, "truth": TRUE}
     with styled():
         left, right = figure.subplots(1, 2)
-        for one in found:
+        for one in shown:
             color = colors[one.voice]
             low, high = np.percentile(one.values, [0.2, 99.8])
             heights, edges = np.histogram(one.values, bins=60, range=(low, high))

@@ -192,15 +192,15 @@ class Run:
         for table in (self.estimates, self.recording, self.truth):
             if table is not None and "soil" in table:
                 labels = [x if isinstance(x, str) else "" for x in table["soil"].to_numpy(dtype=object)]
-                found = np.array(labels, dtype=object)
+                result = np.array(labels, dtype=object)
                 if self.truth is not None and "transition" in self.truth:
-                    found[self.truth["transition"].to_numpy(dtype=np.bool_)] = ""
+                    result[self.truth["transition"].to_numpy(dtype=np.bool_)] = ""
                 elif self.vehicle is not None and "distance" in self.estimates:
                     from terragrip.soil.estimates import whole_length
                     from terragrip.soil.transitions import settled
 
-                    found[~settled(self.estimated("distance"), found, whole_length(self.vehicle))] = ""
-                return found
+                    result[~settled(self.estimated("distance"), result, whole_length(self.vehicle))] = ""
+                return result
         return np.full(len(self.time), "", dtype=object)
 
     @cached_property
@@ -218,32 +218,32 @@ class Run:
     @cached_property
     def outlier(self) -> BoolArray:
         """The longest stuck spell and AFTER_STUCK seconds after it: what the paper cuts out of `multi2` by hand."""
-        found = np.zeros(len(self.time), dtype=np.bool_)
+        result = np.zeros(len(self.time), dtype=np.bool_)
         spells = stretches(self.stuck)
         if spells:
             first, last = max(spells, key=lambda spell: self.time[spell[1]] - self.time[spell[0]])
-            found = (self.time >= self.time[first]) & (self.time <= self.time[last] + AFTER_STUCK)
-        return found
+            result = (self.time >= self.time[first]) & (self.time <= self.time[last] + AFTER_STUCK)
+        return result
 
     @cached_property
     def flagged(self) -> BoolArray:
         """Rows that the product itself flags, without a look at truth or sensor: inside an event of FLAGGED, and from
         BEFORE_STUCK before to AFTER_STUCK after one of STUCK, the same for all."""
-        found = self._during(FLAGGED)
+        result = self._during(FLAGGED)
         for first, last in stretches(self._during(STUCK)):
             start, end = self.time[first] - BEFORE_STUCK, self.time[last] + AFTER_STUCK
-            found |= (self.time >= start) & (self.time <= end)
-        return found
+            result |= (self.time >= start) & (self.time <= end)
+        return result
 
     def _during(self, kinds: tuple[str, ...]) -> BoolArray:
         """Rows inside an event of `kinds`, by the estimates' column or by `events`."""
-        found = np.zeros(len(self.time), dtype=np.bool_)
+        result = np.zeros(len(self.time), dtype=np.bool_)
         if "event" in self.estimates:
-            found |= np.asarray(self.estimates["event"].isin(kinds).to_numpy(), dtype=np.bool_)
+            result |= np.asarray(self.estimates["event"].isin(kinds).to_numpy(), dtype=np.bool_)
         for event in self.events:
             if event["kind"] in kinds:
-                found |= (self.time >= event["start"]) & (self.time <= event["end"])
-        return found
+                result |= (self.time >= event["start"]) & (self.time <= event["end"])
+        return result
 
     @cached_property
     def moving(self) -> BoolArray:

@@ -52,7 +52,7 @@ class Comparison:
             "method": self.method,
             "quantity": self.quantity,
             "against": self.against,
-            **{part: found.to_dict() if (found := getattr(self, part)) else None for part in PARTS},
+            **{part: result.to_dict() if (result := getattr(self, part)) else None for part in PARTS},
         }
 
 
@@ -154,8 +154,8 @@ def sensor_table(run: Run) -> Table | None:
 
 def _two_r2(c: Comparison | None) -> tuple[str, str]:
     """R² with all samples and with the flagged ones left out."""
-    whole, told = (c.whole, c.without_flagged) if c else (None, None)
-    return number(whole.r2 if whole else None), number(told.r2 if told else None)
+    whole, unflagged = (c.whole, c.without_flagged) if c else (None, None)
+    return number(whole.r2 if whole else None), number(unflagged.r2 if unflagged else None)
 
 
 def method_tables(comparisons: Sequence[Comparison], default: str) -> list[Table]:
@@ -228,13 +228,13 @@ def _table(rows: list[Comparison], caption: str, default: str) -> Table:
 def _figures(c: Comparison | None) -> list[str]:
     if c is None:
         return ["–"] * 5
-    whole, cut, free, told = c.whole, c.without_outlier, c.without_stuck, c.without_flagged
+    whole, cut, free, unflagged = c.whole, c.without_outlier, c.without_stuck, c.without_flagged
     return [
         number(whole.r2 if whole else None),
         number(cut.r2 if cut else None),
         number(cut.nrmse if cut else None),
         number(free.r2 if free else None),
-        number(told.r2 if told else None),
+        number(unflagged.r2 if unflagged else None),
     ]
 
 

@@ -134,7 +134,7 @@ def soils(run: Run, together: Sequence[Run]) -> Section:
         return Section("soils", title, omitted="Left out: no section of these runs carries a soil label.")
     voice = next((v for v in ("measured", "estimated") if any(c.voice == v for c in crosses)), "estimated")
     pooled = soil_crosses(together, quantity)
-    said = names([v for v in ("measured", "estimated", "true") if any(c.voice == v for c in pooled)])
+    text = names([v for v in ("measured", "estimated", "true") if any(c.voice == v for c in pooled)])
     sim = "simulated " if run.truth is not None else ""
     what = "net traction ratio κ" if quantity == "net_traction" else "adhesion µ"
     sections_picture = Picture(
@@ -148,7 +148,7 @@ def soils(run: Run, together: Sequence[Run]) -> Section:
         "soils",
         draw_crosses(pooled, ("measured", "estimated", "true"), what),
         f"Mean ± SD of slip and {what} by soil over the {sim}run{'s' * (len(together) > 1)} {names([r.name for r in together])}, "
-        f"{said}. "
+        f"{text}. "
         + (
             "Measured slip comes from the raw speeds, so its SD holds their noise."
             if run.recording is not None
@@ -245,11 +245,11 @@ def _lane(
 
 def _voices(lane: Lane) -> str:
     """Who speaks in a lane, in words."""
-    said = ["the estimate"] + (["its 95 % interval"] if lane.std is not None else [])
-    said += [
+    notes = ["the estimate"] + (["its 95 % interval"] if lane.std is not None else [])
+    notes += [
         "the simulated force sensor's F_x/F_z" if lane.truth is not None else "the force sensor's F_x/F_z"
     ] * (lane.measured is not None)
-    return names(said + (["the truth"] if lane.truth is not None else []))
+    return names(notes + (["the truth"] if lane.truth is not None else []))
 
 
 def _zoom(run: Run) -> tuple[float, float, str]:

@@ -39,22 +39,22 @@ def over_time(run: Run) -> Section:
         "standstill slip is undefined.",
         f"Slip and ground speed over time in {run.name}",
     )
-    return Section(f"slip-{run.name}", f"Slip in {run.name}", zero_told(run), (picture,))
+    return Section(f"slip-{run.name}", f"Slip in {run.name}", zero_sentence(run), (picture,))
 
 
-def zero_told(run: Run) -> tuple[str, ...]:
+def zero_sentence(run: Run) -> tuple[str, ...]:
     """Where slip counts from, and what the log's own lightest stretches say beside it."""
-    found = run.estimates.attrs.get("zero_slip") or {}
-    told = "; ".join(f"{wheel}: {one['ratio']:.4f} ± {one['std']:.4f}" for wheel, one in found.items())
+    zero_slip = run.estimates.attrs.get("zero_slip") or {}
+    ratios = "; ".join(f"{wheel}: {one['ratio']:.4f} ± {one['std']:.4f}" for wheel, one in zero_slip.items())
     beside = (
-        f" In the lightest tenth of the log's steady stretches ground speed over rim speed, by the vehicle file's radius, is {told}."
-        if told
+        f" In the lightest tenth of the log's steady stretches ground speed over rim speed, by the vehicle file's radius, is {ratios}."
+        if ratios
         else ""
     )
     vehicle = run.vehicle
     if vehicle is not None and calibrated_scale(vehicle) is not None:
         return (f"Slip counts from the calibrated {'radius' if vehicle.knows_wheels else 'speed'}.{beside}",)
-    if DRIVE in found:
+    if DRIVE in zero_slip:
         return (
             f"Slip counts from the log's own zero: calibrate on a pass without load to make it absolute.{beside}",
         )

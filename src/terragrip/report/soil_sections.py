@@ -23,7 +23,7 @@ NO_SOILS = "Left out: no sample of these estimates carries a soil label, so ther
 NONE_FITTED = "Left out: no soil could be fitted."
 
 
-def told_by_all(
+def curves_of_all(
     campaign: Campaign,
     truth: Mapping[str, Soil] | None = None,
     true_pairs: Mapping[str, AdhesionCurve] | None = None,
@@ -31,7 +31,7 @@ def told_by_all(
 ) -> list[SoilCurves]:
     """The campaign's soils, the one to show first in front, each with what paper and simulation tell of it."""
     paper = paper_soils()
-    found = [
+    result = [
         SoilCurves(
             name,
             learned,
@@ -42,7 +42,7 @@ def told_by_all(
         )
         for name, learned in campaign.soils.items()
     ]
-    return sorted(found, key=lambda one: (one.name != FIRST, -len(one.learned.soil.bins)))
+    return sorted(result, key=lambda one: (one.name != FIRST, -len(one.learned.soil.bins)))
 
 
 def both_maxima(
@@ -92,20 +92,20 @@ def fits(curves: Sequence[SoilCurves], not_fitted: Mapping[str, str]) -> Section
             prose=missed,
         )
     first, rest = curves[0], curves[1:]
-    said = _voices(curves)
+    text = _voices(curves)
     alike = [
         one
         for one in curves
         if one.truth and one.paper and one.truth.parameters.get("a") == one.paper.parameters["a"]
     ]
     if len(alike) == len(curves):
-        said += "; the simulated soils were made with the paper's a, so that both lie on one line"
+        text += "; the simulated soils were made with the paper's a, so that both lie on one line"
     how = _preparation(curves)
     content: list[Picture | Table] = [
         Picture(
             f"fit-{_stem(first.name)}",
             draw_fits([first], 1),
-            f"Adhesion over slip on {first.name}: {said}. {how}",
+            f"Adhesion over slip on {first.name}: {text}. {how}",
             f"Bins and fitted curve on {first.name}",
         )
     ]
@@ -114,7 +114,7 @@ def fits(curves: Sequence[SoilCurves], not_fitted: Mapping[str, str]) -> Section
             Picture(
                 "fits",
                 draw_fits(rest),
-                f"The same on {names([one.name for one in rest])}: {said}."
+                f"The same on {names([one.name for one in rest])}: {text}."
                 + (
                     " On grass slips above 40 % are too few and left out, as in the paper."
                     if any(c.name == "grass" for c in rest)
@@ -193,32 +193,32 @@ def what_is_missing(curves: Sequence[SoilCurves], not_fitted: Mapping[str, str] 
 
 def _nothing_missing(curves: Sequence[SoilCurves]) -> str:
     """What full bins say, and what they do not: a count of samples, not how well a curve explains them."""
-    said = "Every slip bin of every soil holds enough samples."
+    sentence = "Every slip bin of every soil holds enough samples."
     poor = [
         f"{one.name} (R² {number(one.learned.soil.r2, 2)})"
         for one in curves
         if not one.learned.curve.identifiability_.identifiable
     ]
     if poor:
-        said += f" Yet the data do not fix the curve of {names(poor)}: more of the same does not help there, see What to trust."
-    return said
+        sentence += f" Yet the data do not fix the curve of {names(poor)}: more of the same does not help there, see What to trust."
+    return sentence
 
 
 def _preparation(curves: Sequence[SoilCurves]) -> str:
     """How samples became bins."""
     settings = curves[0].learned.curve.bins_.settings
-    said = (
+    sentence = (
         f"Bins of {percent(settings.width, 0)} slip from {percent(settings.lower, 0)} to {percent(settings.upper, 0)}; "
         "samples on a transition or under an event are left out."
     )
     if any(one.learned.curve.bins_.settings.by == BY_PULL for one in curves):
-        said += (
+        sentence += (
             " By pull: each sample goes into the bin whose slip the mean curve gives for the vehicle's pull, so that a bin holds weak and "
             f"strong ground alike; bins of less than {settings.metres:g} m or {settings.runs} runs are joined. Slips "
             "beyond them are met where the ground gives way, not by a steady pull: there the curve is the prototype's shape, and the bins "
             "by slip show what was met."
         )
-    return f"{said} By slip, the paper's way: each sample by its own slip, at least {settings.minimum} samples a bin."
+    return f"{sentence} By slip, the paper's way: each sample by its own slip, at least {settings.minimum} samples a bin."
 
 
 def _quality_table(curves: Sequence[SoilCurves]) -> Table:
@@ -277,15 +277,15 @@ def _scale_table(curves: Sequence[SoilCurves]) -> Table:
     if true:
         head += ["true pairs, by pull", "true pairs, by slip", "truth"] if both else ["true pairs", "truth"]
     full = float(CURVES["exponential"].value(1.0, {"a": 1.0}))
-    said = f"The scale a of the prototype curve (µ at full slip is {full:.3f} a)."
+    sentence = f"The scale a of the prototype curve (µ at full slip is {full:.3f} a)."
     if both:
-        said += (
+        sentence += (
             " By pull: bins of the vehicle's pull, each a fair sample of the ground. By slip: the paper's bins; "
             "those of high slip gather the weak spots."
         )
     if true:
-        said += " The truth is what the soil was made with, the mean over its ground; true pairs show what the sorting alone does."
-    return Table(said, tuple(head), tuple(rows))
+        sentence += " The truth is what the soil was made with, the mean over its ground; true pairs show what the sorting alone does."
+    return Table(sentence, tuple(head), tuple(rows))
 
 
 def _true(curves: Sequence[SoilCurves]) -> bool:
@@ -350,17 +350,17 @@ def _badge(badge: Identifiability, r2: float | None) -> str:
     """Whether the data fix the fit, with what says so: the condition number, or R2 where the curve explains too little."""
     if badge.condition != badge.condition:  # a curve that was not fitted
         return "–"
-    if badge.told_apart and not badge.identifiable:
+    if badge.separable and not badge.identifiable:
         return f"no (R² {number(r2, 2)})"
     return f"{'yes' if badge.identifiable else 'no'} ({badge.condition:.3g})"
 
 
 def _ranking(curves: Sequence[SoilCurves]) -> list[Table]:
     """Errors of every form of curve on runs left out, by soil; no table where no soil has enough bins to compare."""
-    told = {one.name: one.learned.verdict.ranking for one in curves if one.learned.verdict is not None}
-    forms = sorted({score.form for ranking in told.values() for score in ranking})
+    rankings = {one.name: one.learned.verdict.ranking for one in curves if one.learned.verdict is not None}
+    forms = sorted({score.form for ranking in rankings.values() for score in ranking})
     rows = []
-    for name, ranking in told.items():
+    for name, ranking in rankings.items():
         errors = {score.form: number(score.error, 4) for score in ranking}
         rows.append((name, ranking[0].form, *(errors.get(form, "–") for form in forms)))
     caption = "Root-mean-square error of each form of curve on the bin means of runs left out of its fit; the smallest is the best."
@@ -388,16 +388,16 @@ def _free_shape(one: SoilCurves) -> str:
 
 def _voices(curves: Sequence[SoilCurves]) -> str:
     both = _both(curves)
-    said = ["mean and SD of each bin" + " by pull and by slip" * both]
-    said += ["the fit" + " to those by pull" * both + " with its 95 % interval"] + [
+    notes = ["mean and SD of each bin" + " by pull and by slip" * both]
+    notes += ["the fit" + " to those by pull" * both + " with its 95 % interval"] + [
         "the paper's fit by slip"
     ] * both
     for field, what in (
         ("paper", "the paper's curve"),
         ("truth", "the simulated truth"),
     ):
-        said += [what] * any(getattr(one, field) is not None for one in curves)
-    return names(said)
+        notes += [what] * any(getattr(one, field) is not None for one in curves)
+    return names(notes)
 
 
 def _scale(soil: Soil | None) -> str:

@@ -87,9 +87,9 @@ def soil_strip(plot: Axes, time: FloatArray, soil: NDArray[np.object_], soils: t
     span = float(time[-1] - time[0]) or 1.0
     bar: dict[str, Any] = {"transform": across, "clip_on": False, "linewidth": 0}
     plot.broken_barh([(float(time[0]), span)], (1.015, 0.055), facecolor=MUTED, alpha=0.25, **bar)
-    found = [(label, float(time[a]), float(time[b])) for label, a, b in label_stretches(soil)]
-    roomy = all((end - start) / span > 0.011 * len(label) + 0.01 for label, start, end in found)
-    for label, start, end in found:
+    result = [(label, float(time[a]), float(time[b])) for label, a, b in label_stretches(soil)]
+    roomy = all((end - start) / span > 0.011 * len(label) + 0.01 for label, start, end in result)
+    for label, start, end in result:
         plot.broken_barh([(start, end - start)], (1.015, 0.055), facecolor=soil_color(label, soils), **bar)
         if roomy:
             plot.text(

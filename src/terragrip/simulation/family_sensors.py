@@ -88,7 +88,7 @@ def draw_faults(duration: float, machine: Machine, sensors: str) -> list[Tree]:
     """All defects in one log: gaps, spikes on every channel, jitter, held values, and one outage of the ground speed."""
     minutes, beat, wheel = duration / 60, np.sqrt(machine.scale), machine.wheels[-1]
     weight = machine.corner_mass * STANDARD_GRAVITY
-    found: list[Tree] = [
+    result: list[Tree] = [
         {"kind": "gap", "duration": 0.6, "count": max(1, round(minutes))},
         {"kind": "loss", "channel": "ground_speed", "at": 0.6 * duration, "duration": 6.0},
         {"kind": "spike", "channel": "ground_speed", "size": 0.8 * beat, "count": max(1, round(6 * minutes))},
@@ -99,7 +99,7 @@ def draw_faults(duration: float, machine: Machine, sensors: str) -> list[Tree]:
     ]  # fmt: skip
     if sensors != "uncoupled":
         size = 0.3 * machine.mass * STANDARD_GRAVITY
-        found.append(
+        result.append(
             {"kind": "spike", "channel": "drawbar_force", "size": size, "count": max(1, round(3 * minutes))}
         )
-    return found
+    return result

@@ -42,8 +42,8 @@ def set_runs(name: str = "campaign") -> tuple[str, ...]:
 def scenario_document(path_or_name: str | os.PathLike[str]) -> Document:
     """The whole scenario, `extends` and `use` carried out, with the lines of its file; raises InputError."""
     name = os.fspath(path_or_name)
-    found = _by_name(name)
-    if found is None:
+    result = _by_name(name)
+    if result is None:
         if not name.endswith((".yaml", ".yml")) and not Path(name).exists():
             close = nearest(name, scenario_names())
             hint = (
@@ -52,9 +52,9 @@ def scenario_document(path_or_name: str | os.PathLike[str]) -> Document:
                 else "give a file, or a name that `terragrip simulate --list` shows"
             )
             raise InputError(f"no scenario {name!r}", hint=hint)
-        found = read_yaml(path_or_name)
-    tree = resolve({"name": Path(name).stem, **found.data}, found.file)
-    return Document(tree, found.file, found.lines)
+        result = read_yaml(path_or_name)
+    tree = resolve({"name": Path(name).stem, **result.data}, result.file)
+    return Document(tree, result.file, result.lines)
 
 
 def resolve(tree: Tree, file: str | None = None) -> Tree:
@@ -77,15 +77,15 @@ def _extended(tree: Tree, file: str | None, depth: int) -> Tree:
     own = {key: value for key, value in tree.items() if key != "extends"}
     if parent is None:
         return own
-    found = _by_name(str(parent))
-    if found is None or depth > _DEPTH:
+    result = _by_name(str(parent))
+    if result is None or depth > _DEPTH:
         close = nearest(str(parent), scenario_names())
-        problem = f"no scenario {parent!r}" if found is None else "extends itself"
+        problem = f"no scenario {parent!r}" if result is None else "extends itself"
         raise InputError(
             problem, file=file, place="extends", hint=f"did you mean {close!r}?" if close else None
         )
-    inherited = {key: value for key, value in found.data.items() if key not in ("name", "description")}
-    return _merged(_extended(inherited, found.file, depth + 1), own)
+    inherited = {key: value for key, value in result.data.items() if key not in ("name", "description")}
+    return _merged(_extended(inherited, result.file, depth + 1), own)
 
 
 def _merged(below: Tree, above: Tree) -> Tree:

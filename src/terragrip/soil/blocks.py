@@ -195,8 +195,8 @@ def blocks_of(
 def driven_wheels(vehicle: Vehicle) -> dict[str, str]:
     """The driven wheels and the axle of each; all wheels where none is driven."""
     names = [vehicle.axle_names[k] for k in vehicle.wheel_axle]
-    found = {w: a for w, a, on in zip(vehicle.wheels, names, vehicle.driven, strict=True) if on}
-    return found or dict(zip(vehicle.wheels, names, strict=True))
+    result = {w: a for w, a, on in zip(vehicle.wheels, names, vehicle.driven, strict=True) if on}
+    return result or dict(zip(vehicle.wheels, names, strict=True))
 
 
 def estimates_blocks(

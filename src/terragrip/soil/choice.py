@@ -150,9 +150,9 @@ def _score(form: str, splits: Sequence[Split]) -> FormScore:
         begin = starts(model, free, np.where(weight > 0, mean, np.nan))
         many = np.ones((len(begin), 1))
         x, cost = solve(model, free, held, many * slip, many * mean, many * weight, begin)
-        found = {**held, **dict(zip(free, x[int(np.argmin(cost))], strict=True))}
-        drop = found.pop(INTERCEPT, 0.0)
-        off = (model.value(test_slip, found, drop) - test_mean)[test_weight > 0]
+        result = {**held, **dict(zip(free, x[int(np.argmin(cost))], strict=True))}
+        drop = result.pop(INTERCEPT, 0.0)
+        off = (model.value(test_slip, result, drop) - test_mean)[test_weight > 0]
         errors.append(float(np.sqrt(np.mean(off**2))))
     if not errors:
         raise InputError("the runs are too unlike to compare forms on one left out", hint="drive more runs")

@@ -131,16 +131,16 @@ def soils_of_points(
     template = curve or AdhesionCurve()
     soils: dict[str, Soil] = {}
     missed: dict[str, str] = {}
-    found = read_points(path)
+    result = read_points(path)
     if soil is not None:
-        if len(found) > 1:
+        if len(result) > 1:
             raise InputError(
-                f"holds {len(found)} curves, and --soil names one",
+                f"holds {len(result)} curves, and --soil names one",
                 file=os.fspath(path),
                 hint="leave --soil out: the header names them",
             )
-        found = [replace(one, name=soil) for one in found]
-    for one in found:
+        result = [replace(one, name=soil) for one in result]
+    for one in result:
         if one.name in soils or one.name in missed:
             raise InputError(
                 f"two curves are named {one.name!r}", file=os.fspath(path), hint="rename one in its header"

@@ -82,8 +82,8 @@ class GatheredRuns:
             raise InputError(problem, file=file or run, hint=hint)
         self.runs.append(run)
         self.pairs += pairs_of(estimates, run, soil)
-        for name, found in labelled_blocks(estimates, soil, file or run):
-            self.blocks.setdefault(name, []).append(found)
+        for name, blocks in labelled_blocks(estimates, soil, file or run):
+            self.blocks.setdefault(name, []).append(blocks)
         self.makers.add(maker(estimates))
         self.periods.append(float(np.median(np.diff(estimates.time))) if len(estimates) > 1 else np.nan)
         vehicle = estimates.vehicle
@@ -95,8 +95,8 @@ class GatheredRuns:
         """Take all runs of `other` too."""
         self.runs += other.runs
         self.pairs += other.pairs
-        for name, found in other.blocks.items():
-            self.blocks.setdefault(name, []).extend(found)
+        for name, blocks in other.blocks.items():
+            self.blocks.setdefault(name, []).extend(blocks)
         self.makers |= other.makers
         self.periods += other.periods
         self.masses += other.masses
@@ -105,7 +105,7 @@ class GatheredRuns:
 
     def only(self, soil: str) -> GatheredRuns:
         """The same runs with the rows of one soil."""
-        blocks = {name: found for name, found in self.blocks.items() if name == soil}
+        blocks = {name: blocks for name, blocks in self.blocks.items() if name == soil}
         return replace(self, pairs=[part for part in self.pairs if part.soil == soil], blocks=blocks)
 
     def learn(

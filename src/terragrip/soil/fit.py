@@ -239,7 +239,7 @@ class AdhesionCurve:
         self.samples_ = np.clip(best + (x - best) * widen, lower, upper)
         samples = self.samples_
         columns = {name: samples[:, i] for i, name in enumerate(free)}
-        if not self.identifiability_.told_apart and self.model == "exponential":
+        if not self.identifiability_.separable and self.model == "exponential":
             columns = effective_parameters({**held, **columns})
         self.interval_ = {
             name: (float(low), float(high))

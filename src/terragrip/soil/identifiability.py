@@ -36,7 +36,7 @@ class Identifiability:
     sentence: str
 
     @property
-    def told_apart(self) -> bool:
+    def separable(self) -> bool:
         """Whether the bins' slips tell the parameters apart, however well the curve explains the bins."""
         return self.condition < LIMIT
 

@@ -61,8 +61,8 @@ def bin_by_pull(
     cells = edges.size - 1
 
     def sums(values: Array) -> Array:
-        found = np.bincount(flat, weights=values[inside], minlength=clusters * cells)
-        return found.astype(float).reshape(clusters, cells)
+        result = np.bincount(flat, weights=values[inside], minlength=clusters * cells)
+        return result.astype(float).reshape(clusters, cells)
 
     a = _start(mu, height, dx, edges[0])
     for _ in range(_ROUNDS):

@@ -123,8 +123,8 @@ def learn_signature(soil: Soil, runs: Sequence[Blocks], made_by: str = "") -> Si
     if not levels:
         return None
     level, noise, rough = np.concatenate(levels), np.concatenate(noises), np.concatenate(roughness)
-    told = np.isfinite(level).all(axis=1) & np.isfinite(noise).all(axis=1)
-    level, noise, rough = level[told], noise[told], rough[np.isfinite(rough).all(axis=1)]
+    measured = np.isfinite(level).all(axis=1) & np.isfinite(noise).all(axis=1)
+    level, noise, rough = level[measured], noise[measured], rough[np.isfinite(rough).all(axis=1)]
     if min(len(level), len(rough)) < LEAST_BLOCKS:
         return None
     middle, sd = _ground(level, noise)

@@ -32,12 +32,12 @@ def spans(labels: npt.NDArray[Any], time: Floats) -> list[dict[str, Any]]:
         return []
     edges = np.flatnonzero(labels[1:] != labels[:-1]) + 1
     starts, ends = np.r_[0, edges], np.r_[edges, len(labels)] - 1
-    found = [
+    result = [
         {"name": str(labels[a]), "start": float(time[a]), "end": float(time[b])}
         for a, b in zip(starts, ends, strict=True)
         if labels[a]
     ]
-    return found[:MOST_SPANS]
+    return result[:MOST_SPANS]
 
 
 def radii(table: Estimates) -> dict[str, float]:
@@ -79,12 +79,12 @@ def recording_of(studio: Studio, table: Estimates, *, search: bool = False) -> t
         return None
     items = studio.folder.items()
     place = _find(studio, items, name, wanted)
-    found = None if place is None else _read(studio, items, place, table)
-    if place is None or found is None:
+    result = None if place is None else _read(studio, items, place, table)
+    if place is None or result is None:
         studio.origins[wanted] = None
         return None
-    studio.origins[wanted] = (place, found[0])
-    return place, found[1]
+    studio.origins[wanted] = (place, result[0])
+    return place, result[1]
 
 
 def _find(studio: Studio, items: Sequence[Item], name: str, wanted: str) -> Path | None:
@@ -204,9 +204,9 @@ def _sentence(
     parts.append(
         (f"wheel acceleration {rate[1] - rate[0]:+.1f} rad/s²", -inertia * (rate[1] - rate[0]) / arm)
     )
-    told = ", ".join(
+    wheels = ", ".join(
         f"{text} ({effect:+.3f})" if np.isfinite(effect) else text
         for text, effect in sorted(parts, key=lambda part: -abs(part[1]) if np.isfinite(part[1]) else 0.0)
     )
     slip = _mean(table[f"slip_{wheel}"], after) - _mean(table[f"slip_{wheel}"], before)
-    return f"{wheel}: adhesion {moved:+.3f} within {2 * SPAN:g} s; {told}; slip {100 * slip:+.1f} points."
+    return f"{wheel}: adhesion {moved:+.3f} within {2 * SPAN:g} s; {wheels}; slip {100 * slip:+.1f} points."

@@ -102,14 +102,14 @@ class Folder:
 
     def items(self) -> list[Item]:
         """All files that the studio knows what to do with, by path."""
-        found = []
+        result = []
         for path, status in self._walk(self.root, DEPTH):
             kind = self._kind(path, status)
             if kind is not None:
-                found.append(Item(self.name(path), kind, status.st_size, status.st_mtime))
-            if len(found) >= MOST:
+                result.append(Item(self.name(path), kind, status.st_size, status.st_mtime))
+            if len(result) >= MOST:
                 break
-        return sorted(found, key=lambda item: item.path)
+        return sorted(result, key=lambda item: item.path)
 
     def _walk(self, at: Path, depth: int) -> Iterator[tuple[Path, os.stat_result]]:
         try:

@@ -118,24 +118,24 @@ class Jobs:
             await process.stdin.drain()
             process.stdin.close()
         async for line in process.stdout:
-            self._hear(job, line)
+            self._read_message(job, line)
         await process.wait()
         self._process = None
         if job.state == "running":
             self._end(job, "failed", DEFECT)
 
-    def _hear(self, job: Job, line: bytes) -> None:
+    def _read_message(self, job: Job, line: bytes) -> None:
         try:
-            said = json.loads(line)
+            message = json.loads(line)
         except ValueError:  # a library that prints
             return
-        if job.state != "running" or not isinstance(said, dict):
+        if job.state != "running" or not isinstance(message, dict):
             return
-        if said.get("state") == "running":
-            job.done, job.total = int(said["done"]), int(said["total"])
+        if message.get("state") == "running":
+            job.done, job.total = int(message["done"]), int(message["total"])
             self._tell(job)
-        elif said.get("state") in ("done", "failed"):
-            self._end(job, said["state"], str(said.get("text", "")))
+        elif message.get("state") in ("done", "failed"):
+            self._end(job, message["state"], str(message.get("text", "")))
 
     def _end(self, job: Job, state: str, text: str) -> None:
         root = f"{self._folder}/"
@@ -143,4 +143,4 @@ class Jobs:
         self._tell(job)
 
     def _tell(self, job: Job) -> None:
-        self._notices.tell("job", job=job.to_dict())
+        self._notices.publish("job", job=job.to_dict())

@@ -26,7 +26,7 @@ class Notices:
         queue: asyncio.Queue[dict[str, Any]] = asyncio.Queue(BACKLOG)
         self._pages.add(queue)
         if self._watch is None:
-            self._watch = asyncio.create_task(self._look())
+            self._watch = asyncio.create_task(self._watch_folder())
         return queue
 
     def leave(self, queue: asyncio.Queue[dict[str, Any]]) -> None:
@@ -36,18 +36,18 @@ class Notices:
             self._watch.cancel()
             self._watch = None
 
-    def tell(self, kind: str, **content: Any) -> None:
+    def publish(self, kind: str, **content: Any) -> None:
         """Send {"kind": kind, ...} to every page."""
         for queue in self._pages:
             if queue.full():
                 queue.get_nowait()
             queue.put_nowait({"kind": kind, **content})
 
-    async def _look(self) -> None:
+    async def _watch_folder(self) -> None:
         seen: list[Item] | None = None
         while True:
             items = await asyncio.to_thread(self._folder.items)
             if seen is not None and items != seen:
-                self.tell("folder")
+                self.publish("folder")
             seen = items
             await asyncio.sleep(PERIOD)

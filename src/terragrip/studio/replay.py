@@ -44,7 +44,9 @@ async def replayed(table: Estimates, speed: float, start: float) -> AsyncIterato
         {"kind": "hello", "version": __version__, "vehicle": table.vehicle.name, "columns": names, "wheels": list(table.wheels),
          "events": list(EVENTS), "replay": {"start": float(table.time[0]), "end": float(table.time[-1])}}
     )  # fmt: skip
-    told = [{"kind": e.kind, "source": "estimator", "time": e.start, "text": e.why} for e in events(table)]
+    messages = [
+        {"kind": e.kind, "source": "estimator", "time": e.start, "text": e.why} for e in events(table)
+    ]
     soils = _soils(table)
     row = int(np.searchsorted(table.time, start))
     loop = asyncio.get_running_loop()
@@ -56,7 +58,7 @@ async def replayed(table: Estimates, speed: float, start: float) -> AsyncIterato
         last = min(int(np.searchsorted(table.time, now, "right")), len(table))
         if last > row:
             yield _rows(table, names, row, last)
-            for message in _until(told, now):
+            for message in _until(messages, now):
                 yield json.dumps(message)
             for message in _until(soils, now):
                 yield json.dumps(message)

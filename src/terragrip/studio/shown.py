@@ -50,11 +50,11 @@ class Shown:
         first, last = int(starts[0]), int(starts[-1])
         cut = len(starts) - 1 < last - first
         long = are_long(last - first, width)
-        found = []
+        result = []
         for name in names:
             values = self._values(recording, name)
             if not cut:
-                found.append(values(slice(first, last)).astype(np.float64))
+                result.append(values(slice(first, last)).astype(np.float64))
                 continue
             if not long:
                 low, high = extremes(values(slice(first, last)), starts - first)
@@ -63,12 +63,12 @@ class Shown:
                     self._extremes[name] = Extremes(values(slice(None)))
                 low, high = self._extremes[name].of(values, starts)
             pair = {"low": (low, low), "high": (high, high)}.get(name.rpartition(":")[2], (low, high))
-            found.append(np.stack(pair, axis=1).ravel())
+            result.append(np.stack(pair, axis=1).ravel())
         if not cut:
-            return False, time[first:last], found
+            return False, time[first:last], result
         begin = time[starts[:-1]]
         following = np.r_[begin[1:], time[last - 1]]
-        return True, np.stack((begin, (begin + following) / 2), axis=1).ravel(), found
+        return True, np.stack((begin, (begin + following) / 2), axis=1).ravel(), result
 
     def _values(self, recording: Recording | None, name: str) -> Callable[[slice], Floats]:
         """Gives rows of what a name means."""
@@ -101,12 +101,12 @@ def consistency(time: Floats, nis: Floats, channels: Floats) -> dict[str, Floats
     """
     from scipy.special import chdtri
 
-    taken = np.nan_to_num(channels).astype(np.intp)
+    bits = np.nan_to_num(channels).astype(np.intp)
     first = np.searchsorted(time, time - MEAN / 2, "left")
     last = np.searchsorted(time, time + MEAN / 2, "right")
     degrees, total = (
         np.concatenate(([0], np.cumsum(values)))
-        for values in (taken, np.where(taken > 0, np.nan_to_num(nis), 0.0))
+        for values in (bits, np.where(bits > 0, np.nan_to_num(nis), 0.0))
     )
     freedom, summed = degrees[last] - degrees[first], total[last] - total[first]
     count = np.arange(1, int(freedom.max(initial=0)) + 1)

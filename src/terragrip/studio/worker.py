@@ -26,10 +26,10 @@ class _Reporter:
         now = time.monotonic()
         if now - self._last >= PERIOD or done == total:
             self._last = now
-            say(state="running", done=int(done), total=int(total))
+            send(state="running", done=int(done), total=int(total))
 
 
-def say(**content: Any) -> None:
+def send(**content: Any) -> None:
     """One line to the studio."""
     print(json.dumps(content), flush=True)
 
@@ -92,9 +92,9 @@ def main() -> int:
     signal.signal(signal.SIGTERM, _stop)
     request = json.load(sys.stdin)
     try:
-        say(state="done", text=run(request))
+        send(state="done", text=run(request))
     except InputError as error:
-        say(state="failed", text=str(error))
+        send(state="failed", text=str(error))
         return 2
     except KeyboardInterrupt:
         return 130

@@ -18,7 +18,7 @@ WHEELS = ("fl", "fr", "rl", "rr")
 Make = Callable[..., Recording]
 
 
-def found(logs: Recording | list[Recording], vehicle: Vehicle) -> tuple[np.ndarray, np.ndarray]:
+def relative_gains(logs: Recording | list[Recording], vehicle: Vehicle) -> tuple[np.ndarray, np.ndarray]:
     result = calibrate(logs, vehicle)
     quantities = [result[f"drive_torque_gain {wheel}"] for wheel in WHEELS]
     return np.array([q.value for q in quantities]), np.array([q.std for q in quantities])
@@ -38,14 +38,14 @@ def rows(seed: int = 0, gain: np.ndarray = GAIN, loads: float = 1.0) -> Sharing:
 
 
 def test_exact_logs_give_the_gains(drive: Make, vehicle: Vehicle) -> None:
-    value, std = found(drive(gain=GAIN, standing=10), vehicle)
+    value, std = relative_gains(drive(gain=GAIN, standing=10), vehicle)
     assert np.abs(value - RELATIVE).max() < 5e-4
     assert std.max() < 0.02
 
 
 def test_a_common_gain_leaves_no_trace_and_is_said_to(drive: Make, vehicle: Vehicle) -> None:
-    alone, _ = found(drive(gain=GAIN), vehicle)
-    louder, _ = found(drive(gain=1.05 * GAIN), vehicle)
+    alone, _ = relative_gains(drive(gain=GAIN), vehicle)
+    louder, _ = relative_gains(drive(gain=1.05 * GAIN), vehicle)
     # Only the known part of the torque (tire and bearing resistance) does not scale, hence not zero.
     assert np.abs(louder / alone - 1).max() < 3e-3
     result = calibrate(drive(gain=GAIN), vehicle)
@@ -81,7 +81,7 @@ def test_patchy_ground_alone_sets_the_error_of_the_fit() -> None:
 def test_no_label_does_as_well(drive: Make, vehicle: Vehicle) -> None:
     log = drive(gain=GAIN)
     plain = Recording(log.time, log.channels, {}, log.source)
-    assert np.abs(found(plain, vehicle)[0] - RELATIVE).max() < 2e-3
+    assert np.abs(relative_gains(plain, vehicle)[0] - RELATIVE).max() < 2e-3
 
 
 def test_gains_come_as_well_from_soils_in_one_log(drive: Make, vehicle: Vehicle) -> None:
@@ -89,7 +89,7 @@ def test_gains_come_as_well_from_soils_in_one_log(drive: Make, vehicle: Vehicle)
         drive(gain=GAIN, seed=1, soil="a", standing=10),
         drive(gain=GAIN, seed=2, soil="b", slip=(0.1, 0.4)),
     ]
-    assert np.abs(found(logs, vehicle)[0] - RELATIVE).max() < 5e-4
+    assert np.abs(relative_gains(logs, vehicle)[0] - RELATIVE).max() < 5e-4
 
 
 def test_load_sensitivity_is_that_of_a_refit() -> None:

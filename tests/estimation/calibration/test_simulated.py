@@ -31,12 +31,12 @@ def machines() -> list[tuple[Calibration, dict[str, Any]]]:
     Ordinary sensors: 25 to 100 Hz, torque gains 2 %, torque zeros 0.3 N m, drawbar zero 3 N, accelerometer 0.03 m/s².
     """
     free, work = Scenario.from_dict(FREE), Scenario.from_dict(WORK)
-    found = []
+    out = []
     for seed in SEEDS:
         logs = [simulate(s, seed + 10_000 * k, machine_seed=seed) for k, s in enumerate((free, work))]
         result = calibrate([log.recording for log in logs], logs[0].vehicle)
-        found.append((result, logs[0].true_parameters["calibration"]))
-    return found
+        out.append((result, logs[0].true_parameters["calibration"]))
+    return out
 
 
 def errors(machines: list[tuple[Calibration, dict[str, Any]]], key: str) -> tuple[np.ndarray, np.ndarray]:
@@ -81,9 +81,9 @@ def test_relative_gains_are_told_well_under_their_prior(
     miss, own = [], []
     for result, truth in machines:
         log = np.log([truth["drive_torque_gain"][wheel] for wheel in WHEELS])
-        told = [result[f"drive_torque_gain {wheel}"] for wheel in WHEELS]
-        miss.append(np.log([q.value for q in told]) - (log - log.mean()))
-        own.append([q.own_std for q in told])
+        reported = [result[f"drive_torque_gain {wheel}"] for wheel in WHEELS]
+        miss.append(np.log([q.value for q in reported]) - (log - log.mean()))
+        own.append([q.own_std for q in reported])
     assert np.sqrt(np.mean(np.square(miss))) < 0.010  # the prior is 0.02
     assert np.mean(own) < 0.007
 

@@ -22,16 +22,16 @@ def bare(log: Recording) -> Recording:
 @pytest.mark.parametrize("soft", [0.05, 0.15])
 def test_a_circling_machine_is_asked_for_a_yaw_rate(seed: int, soft: float) -> None:
     """Without it the sides came out with gains of 2.2 and .46, and the torque scale as 1.24 to 1.52 (truth: 1 and 1)."""
-    found = calibrate(bare(turning_log(seed, soft=soft, circling=True)), machine())
+    calibration = calibrate(bare(turning_log(seed, soft=soft, circling=True)), machine())
     assert not [
         q.name
-        for q in found.quantities
+        for q in calibration.quantities
         if q.key in ("drive_torque_gain", "wheel_radius", "drive_torque_scale")
     ]
-    said = {u.name: u.why for u in found.unknown}
+    text = {u.name: u.why for u in calibration.unknown}
     assert (
         "this machine turned in 100% of its driving and nothing says how fast: give a yaw rate"
-        in said["angular_velocity_z"]
+        in text["angular_velocity_z"]
     )
 
 
@@ -40,40 +40,42 @@ def test_a_circling_machine_is_asked_for_a_yaw_rate(seed: int, soft: float) -> N
 @pytest.mark.parametrize("soft", [0.05, 0.15])
 def test_positions_give_yaw_rate_and_slope(seed: int, circling: bool, soft: float) -> None:
     true = 0.985 * RADIUS
-    found = calibrate(turning_log(seed, radius=true, soft=soft, circling=circling), machine())
-    assert found.notes == ("The rate of turn is that of the positions; the slope is that of the altitude.",)
+    calibration = calibrate(turning_log(seed, radius=true, soft=soft, circling=circling), machine())
+    assert calibration.notes == (
+        "The rate of turn is that of the positions; the slope is that of the altitude.",
+    )
     for wheel in ("l", "r"):
-        radius = found[f"wheel_radius {wheel}"]
+        radius = calibration[f"wheel_radius {wheel}"]
         assert radius.value == pytest.approx(true, rel=0.005)
         assert radius.interval[0] < true < radius.interval[1]
-    scale = found["drive_torque_scale"]
+    scale = calibration["drive_torque_scale"]
     assert scale.interval[0] < 1 < scale.interval[1]
     assert scale.std < 0.04
-    for quantity in found.quantities:
+    for quantity in calibration.quantities:
         if quantity.key == "drive_torque_gain":
             assert quantity.interval[0] < 1 < quantity.interval[1]
-    assert ("drive_torque_gain l" in found) == (not circling)
+    assert ("drive_torque_gain l" in calibration) == (not circling)
 
 
 def test_an_unseen_slope_is_in_the_interval_of_the_scale() -> None:
-    found = calibrate(bare(turning_log(1000)), machine())
-    scale = found["drive_torque_scale"]
+    calibration = calibrate(bare(turning_log(1000)), machine())
+    scale = calibration["drive_torque_scale"]
     assert scale.interval[0] < 1 < scale.interval[1]
-    assert found["drive_torque_gain l"].value == pytest.approx(1, abs=0.01)
+    assert calibration["drive_torque_gain l"].value == pytest.approx(1, abs=0.01)
 
 
 @pytest.mark.parametrize(
-    ("key", "value", "told"),
+    ("key", "value", "expected"),
     [
         ("drive_torque_gain", 0.53, "no sensor is off by more than 0.74 to 1.35"),
         ("drive_torque_gain", 1.9, "no sensor is off by more than 0.74 to 1.35"),
         ("wheel_radius", 0.17, "the vehicle file says 0.65 m"),
     ],
 )
-def test_what_no_machine_has_is_not_written(key: str, value: float, told: str) -> None:
+def test_what_no_machine_has_is_not_written(key: str, value: float, expected: str) -> None:
     unknown: list[Unknown] = []
     assert plausible([Quantity(key, value, 0.01, "1", (), "", wheel="l")], machine(), unknown) == []
-    assert told in unknown[0].why
+    assert expected in unknown[0].why
     near = Quantity(key, 1.02 if key == "drive_torque_gain" else 0.64, 0.01, "1", (), "", wheel="l")
     assert plausible([near], machine(), unknown) == [near]
 
@@ -81,7 +83,7 @@ def test_what_no_machine_has_is_not_written(key: str, value: float, told: str) -
 def test_speeds_in_kmh_make_no_radius() -> None:
     log = turning_log(1000)
     wrong = log.with_channels(ground_speed=log["ground_speed"] / 3.6)
-    found = calibrate(wrong, machine())
-    assert not [q.name for q in found.quantities if q.key == "wheel_radius"]
-    assert any("it was taken for km/h" in note for note in found.notes)
-    assert np.isfinite([q.value for q in found.quantities]).all()
+    calibration = calibrate(wrong, machine())
+    assert not [q.name for q in calibration.quantities if q.key == "wheel_radius"]
+    assert any("it was taken for km/h" in note for note in calibration.notes)
+    assert np.isfinite([q.value for q in calibration.quantities]).all()

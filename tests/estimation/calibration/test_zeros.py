@@ -94,10 +94,10 @@ def test_with_pitch_the_difference_is_told_and_split_by_the_priors(drive: Make, 
     machine = Vehicle.from_dict(data)
     result = calibrate(inclined(drive, bias=0.06, pitch_zero=-0.004), machine)
     bias, pitch = result["acceleration_bias_x"], result["pitch_offset"]
-    told = 0.06 + GRAVITY * 0.004  # b - g p: the data know no more
-    assert bias.value - GRAVITY * pitch.value == pytest.approx(told, abs=2e-3)
+    reported = 0.06 + GRAVITY * 0.004  # b - g p: the data know no more
+    assert bias.value - GRAVITY * pitch.value == pytest.approx(reported, abs=2e-3)
     share = 0.05**2 / (0.05**2 + (GRAVITY * np.radians(0.2)) ** 2)
-    assert bias.value == pytest.approx(share * told, abs=2e-3)
+    assert bias.value == pytest.approx(share * reported, abs=2e-3)
     assert bias.interval[0] < 0.06 < bias.interval[1]
     assert bias.std < 0.05
     assert result.apply(machine).uncertainty.acceleration_bias == pytest.approx(bias.std, rel=0.01)

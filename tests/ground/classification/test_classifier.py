@@ -36,10 +36,10 @@ def test_grounds_that_do_not_differ_are_not_told() -> None:
     """The control: three names for one ground score about a third, so nothing but the ground is learnt."""
     same = [drive("wet", seed) for seed in range(1020, 1032)]
     names = ["a", "b", "c"] * 4
-    found = GroundClassifier(max_windows=80, rejection=0).fit(same, names)
+    result = GroundClassifier(max_windows=80, rejection=0).fit(same, names)
     tested = [drive("wet", seed) for seed in range(1040, 1049)]
-    assert 0.1 < found.score(tested, ["a", "b", "c"] * 3) < 0.6
-    assert found.predict_proba(tested).max(axis=1).mean() < 0.7
+    assert 0.1 < result.score(tested, ["a", "b", "c"] * 3) < 0.6
+    assert result.predict_proba(tested).max(axis=1).mean() < 0.7
 
 
 def test_a_gain_on_a_channel_and_the_wheels_names_do_not_matter(
@@ -88,18 +88,18 @@ def test_sensors_may_be_missing_in_part_of_the_training() -> None:
         without([t], *BODY)[0] if g == "wet" and k % 6 < 3 else t
         for k, (t, g) in enumerate(zip(tables, labels, strict=True))
     ]
-    found = GroundClassifier(max_windows=120).fit(tables, labels)
+    result = GroundClassifier(max_windows=120).fit(tables, labels)
     shown, truth = drives(HELD_OUT)
-    assert found.score(without(shown, *BODY), truth) > 0.8
-    assert found.score(shown, truth) > 0.9
+    assert result.score(without(shown, *BODY), truth) > 0.8
+    assert result.score(shown, truth) > 0.9
 
 
 @pytest.mark.parametrize("wheels", [("only",), ("fl", "fr", "ml", "mr", "rl", "rr", "tl", "tr")])
 def test_one_to_eight_wheels(wheels: tuple[str, ...]) -> None:
     tables, labels = drives(range(1000, 1003), wheels=wheels)
-    found = GroundClassifier(max_windows=80).fit(without(tables, *BODY), labels)
+    result = GroundClassifier(max_windows=80).fit(without(tables, *BODY), labels)
     shown, truth = drives(HELD_OUT, wheels=wheels)
-    assert found.score(without(shown, *BODY), truth) > 0.85
+    assert result.score(without(shown, *BODY), truth) > 0.85
 
 
 def test_ground_speed_is_used_where_there_is_one() -> None:
@@ -113,9 +113,9 @@ def test_ground_speed_is_used_where_there_is_one() -> None:
     labels = ["firm", "slick"] * 4
     learnt = [slipping(1000 + k, 0.05 + 0.4 * (k % 2)) for k in range(8)]
     shown = [slipping(1100 + k, 0.05 + 0.4 * (k % 2)) for k in range(8)]
-    found = GroundClassifier(max_windows=80).fit(learnt, labels)
-    assert found.score(shown, labels) > 0.9
-    assert found.score(without(shown, "ground_speed"), labels) < 0.75
+    result = GroundClassifier(max_windows=80).fit(learnt, labels)
+    assert result.score(shown, labels) > 0.9
+    assert result.score(without(shown, "ground_speed"), labels) < 0.75
 
 
 def test_runs_may_hold_different_sensors_on_different_grounds() -> None:
@@ -123,11 +123,11 @@ def test_runs_may_hold_different_sensors_on_different_grounds() -> None:
     tables, labels = drives(range(1000, 1003), ("hard", "loose"))
     own = {"hard": "acceleration", "loose": "angular_velocity"}
     tables = [without([t], own[g])[0] for t, g in zip(tables, labels, strict=True)]
-    found = GroundClassifier(max_windows=80).fit(tables, labels)
-    assert set().union(*found.sensors_) == {"wheel speed", "torque"}
-    assert any("acceleration, angular velocity" in note for note in found.notes_)
+    result = GroundClassifier(max_windows=80).fit(tables, labels)
+    assert set().union(*result.sensors_) == {"wheel speed", "torque"}
+    assert any("acceleration, angular velocity" in note for note in result.notes_)
     shown, truth = drives(HELD_OUT, ("hard", "loose"))
-    assert found.score(shown, truth) > 0.85
+    assert result.score(shown, truth) > 0.85
 
 
 def test_a_ground_unlike_all_is_unknown_and_the_known_are_not(
@@ -151,17 +151,17 @@ def test_probabilities_are_calibrated_on_drives_never_seen() -> None:
     near = {"a": (5.0, 0.1, 0.3, 20.0), "b": (5.5, 0.12, 0.33, 20.0)}
     learnt = [(drive(near[g], seed), g) for g in near for seed in range(1000, 1010)]
     shown = [(drive(near[g], seed), g) for g in near for seed in range(1070, 1082)]
-    found = GroundClassifier(max_windows=250).fit(
+    result = GroundClassifier(max_windows=250).fit(
         without([t for t, _ in learnt], *BODY), [g for _, g in learnt]
     )
     tables, labels = without([t for t, _ in shown], *BODY), np.array([g for _, g in shown])
-    chances = found.predict_proba(tables)
-    truth = labels[found.windows(tables)["recording"]]
-    right = found.classes_[chances.argmax(axis=1)] == truth
-    said = chances.max(axis=1)
+    chances = result.predict_proba(tables)
+    truth = labels[result.windows(tables)["recording"]]
+    right = result.classes_[chances.argmax(axis=1)] == truth
+    text = chances.max(axis=1)
     assert 0.55 < right.mean() < 0.99
-    assert abs(said.mean() - right.mean()) < 0.08
-    assert right[said > np.median(said)].mean() > right[said <= np.median(said)].mean()
+    assert abs(text.mean() - right.mean()) < 0.08
+    assert right[text > np.median(text)].mean() > right[text <= np.median(text)].mean()
 
 
 def test_windows_say_whose_row_is_whose(classifier: GroundClassifier) -> None:
@@ -200,11 +200,11 @@ def test_each_window_is_judged_from_its_own_time_only(classifier: GroundClassifi
 
 def test_smoothing_shares_evidence_along_a_drive() -> None:
     tables, labels = drives(TRAINED)
-    found = GroundClassifier(max_windows=60, rejection=0).fit(without(tables, *BODY, "drive_torque"), labels)
+    result = GroundClassifier(max_windows=60, rejection=0).fit(without(tables, *BODY, "drive_torque"), labels)
     shown, truth = drives(range(1080, 1086))
     shown = without(shown, *BODY, "drive_torque")
-    alone = found.score(shown, truth)
-    assert found.set_params(smooth=15.0).score(shown, truth) >= alone
+    alone = result.score(shown, truth)
+    assert result.set_params(smooth=15.0).score(shown, truth) >= alone
 
 
 def test_nothing_measured_is_unknown_with_equal_chances(classifier: GroundClassifier) -> None:
@@ -248,26 +248,26 @@ def test_scikit_learn_can_cross_validate_it() -> None:
 def test_a_long_drive_is_judged_as_its_parts_are(classifier: GroundClassifier) -> None:
     """More windows than are worked on at a time, every 0.01 s."""
     table = drive("loose", 1013, 30.0)
-    found = classifier.predict_proba([table])
+    result = classifier.predict_proba([table])
     try:
         often = classifier.set_params(step=0.01).predict_proba([table])
     finally:
         classifier.set_params(step=None)
     assert len(often) > 2000
-    np.testing.assert_allclose(often[::170][: len(found)], found, atol=1e-6)
+    np.testing.assert_allclose(often[::170][: len(result)], result, atol=1e-6)
 
 
 def test_labels_may_be_numbers() -> None:
     tables, labels = drives(range(1000, 1002), ("hard", "loose"), seconds=20.0)
-    found = GroundClassifier().fit(tables, [7 if g == "hard" else 9 for g in labels])
-    assert set(found.predict(tables)) <= {7, 9, "unknown"}
-    assert found.score(tables, [7 if g == "hard" else 9 for g in labels]) > 0.9
+    result = GroundClassifier().fit(tables, [7 if g == "hard" else 9 for g in labels])
+    assert set(result.predict(tables)) <= {7, 9, "unknown"}
+    assert result.score(tables, [7 if g == "hard" else 9 for g in labels]) > 0.9
 
 
 def test_one_recording_of_a_ground_is_enough_but_is_told() -> None:
-    found = GroundClassifier(rejection=0).fit([drive("hard", 1000), drive("loose", 1000)], ["hard", "loose"])
-    assert found.score([drive("hard", 1001), drive("loose", 1001)], ["hard", "loose"]) > 0.8
-    assert any("one recording" in note for note in found.notes_)
+    result = GroundClassifier(rejection=0).fit([drive("hard", 1000), drive("loose", 1000)], ["hard", "loose"])
+    assert result.score([drive("hard", 1001), drive("loose", 1001)], ["hard", "loose"]) > 0.8
+    assert any("one recording" in note for note in result.notes_)
 
 
 GOOD = drive("hard", 1000, 20.0)
@@ -276,7 +276,7 @@ STILL = GOOD[["time"]].assign(**dict.fromkeys(BODY, 1.0))
 
 
 @pytest.mark.parametrize(
-    ("recordings", "labels", "parameters", "said"),
+    ("recordings", "labels", "parameters", "expected"),
     [
         ([GOOD, OTHER], ["hard", "hard"], {}, "one ground only, hard"),
         ([GOOD, OTHER], ["hard"], {}, "1 labels for 2 recordings"),
@@ -314,11 +314,11 @@ STILL = GOOD[["time"]].assign(**dict.fromkeys(BODY, 1.0))
     ],
 )
 def test_what_cannot_be_learnt_from_is_refused_in_one_line(
-    recordings: object, labels: object, parameters: dict, said: str
+    recordings: object, labels: object, parameters: dict, expected: str
 ) -> None:
     with pytest.raises(InputError) as refused:
         GroundClassifier(**parameters).fit(recordings, labels)
-    assert said in str(refused.value)
+    assert expected in str(refused.value)
     assert "\n" not in str(refused.value)
 
 
@@ -340,6 +340,6 @@ def test_slow_channels_are_left_out_and_named() -> None:
         for name in ("drive_torque_left", "drive_torque_right"):
             table[name] = table[name].where(keep)
         slow.append(table)
-    found = GroundClassifier(max_windows=60).fit(slow, labels)
-    assert any(note.startswith("torque: sampled too slowly") for note in found.notes_)
-    assert not any("torque" in sensors for sensors in found.sensors_)
+    result = GroundClassifier(max_windows=60).fit(slow, labels)
+    assert any(note.startswith("torque: sampled too slowly") for note in result.notes_)
+    assert not any("torque" in sensors for sensors in result.sensors_)

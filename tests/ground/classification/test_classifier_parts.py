@@ -87,8 +87,8 @@ def test_windows_lie_in_the_recording_and_fill_it(
 def test_a_regular_channel_comes_out_as_it_was_measured() -> None:
     channel = Channel(np.arange(100) / 6.5, np.arange(100.0) ** 1.5)
     starts = np.array([0.0, 1.0, 3.3])
-    found = samples_in([channel], starts, 1.7, 1 / 6.5, channel)[:, 0]
-    for row, start in zip(found, starts, strict=True):
+    result = samples_in([channel], starts, 1.7, 1 / 6.5, channel)[:, 0]
+    for row, start in zip(result, starts, strict=True):
         first = np.searchsorted(channel.time, start - 1e-9)
         np.testing.assert_allclose(row, channel.values[first : first + 11], rtol=1e-9)
 
@@ -97,8 +97,8 @@ def test_a_hole_makes_a_window_not_measured() -> None:
     time = np.arange(0, 10, 0.01)
     time = time[(time < 4.0) | (time > 5.0)]
     channel = Channel(time, time)
-    found = samples_in([channel], np.array([0.0, 3.5, 4.2, 5.1, 9.5]), 1.7, 0.01, channel)[:, 0]
-    assert np.isfinite(found).all(axis=1).tolist() == [True, False, False, True, False]
+    result = samples_in([channel], np.array([0.0, 3.5, 4.2, 5.1, 9.5]), 1.7, 0.01, channel)[:, 0]
+    assert np.isfinite(result).all(axis=1).tolist() == [True, False, False, True, False]
 
 
 @given(st.lists(st.integers(0, 3), min_size=8, max_size=60).filter(lambda c: set(c) == {0, 1, 2, 3}))

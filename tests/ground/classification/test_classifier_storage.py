@@ -72,10 +72,10 @@ def test_a_stored_classifier_needs_no_scikit_learn(content: bytes, tmp_path: Pat
         "try:\n    tg.GroundClassifier().fit([table, table], ['a', 'b'])\n"
         "except tg.InputError as error:\n    print(error)\n"
     )
-    said = subprocess.run(
+    output = subprocess.run(
         [sys.executable, "-c", program], capture_output=True, text=True, timeout=120, check=True
     )
-    first, second = said.stdout.splitlines()
+    first, second = output.stdout.splitlines()
     assert first.split(",") == GroundClassifier.load(path).predict(SHOWN[:1]).tolist()
     assert "pip install 'terragrip[ground]'" in second
 
@@ -100,12 +100,12 @@ def test_a_damaged_file_is_refused_or_says_the_same(
     try:
         loaded = GroundClassifier.load(path)
     except InputError as error:
-        said = str(error)
+        text = str(error)
     else:
-        said = f"{path} is whole"
+        text = f"{path} is whole"
         assert np.array_equal(loaded.predict_proba(SHOWN), classifier.predict_proba(SHOWN))
-    assert str(path) in said
-    assert "\n" not in said
+    assert str(path) in text
+    assert "\n" not in text
 
 
 def rewritten(content: bytes, path: Path, **changes: object) -> Path:
@@ -121,7 +121,7 @@ def rewritten(content: bytes, path: Path, **changes: object) -> Path:
 
 
 @pytest.mark.parametrize(
-    ("changes", "said"),
+    ("changes", "expected"),
     [
         ({"version": 2}, "version 2"),
         ({"version": 4}, "version 4"),
@@ -139,9 +139,9 @@ def rewritten(content: bytes, path: Path, **changes: object) -> Path:
     ],
 )
 def test_a_header_that_does_not_fit_is_refused(
-    content: bytes, tmp_path: Path, changes: dict[str, object], said: str
+    content: bytes, tmp_path: Path, changes: dict[str, object], expected: str
 ) -> None:
-    with pytest.raises(InputError, match=said) as refused:
+    with pytest.raises(InputError, match=expected) as refused:
         GroundClassifier.load(rewritten(content, tmp_path / "other.npz", **changes))
     assert "other.npz" in str(refused.value)
 

@@ -37,35 +37,35 @@ def test_an_axis_that_one_ground_lacks_is_not_its_mark() -> None:
     tables = [
         t.drop(columns="acceleration_z") if g == "wet" else t for t, g in zip(tables, labels, strict=True)
     ]
-    found = learnt(tables, labels)
-    assert any("acceleration_z" in note for note in found.notes_)
+    result = learnt(tables, labels)
+    assert any("acceleration_z" in note for note in result.notes_)
     shown, truth = drives(HELD_OUT)
-    assert found.score(shown, truth) > 0.9
-    assert found.score([t.drop(columns="acceleration_z") for t in shown], truth) > 0.9
+    assert result.score(shown, truth) > 0.9
+    assert result.score([t.drop(columns="acceleration_z") for t in shown], truth) > 0.9
 
 
 def test_a_drive_that_lacks_an_axis_is_told_from_the_other_sensors() -> None:
-    found = learnt(*drives(TRAINED))
+    result = learnt(*drives(TRAINED))
     shown, truth = drives(HELD_OUT)
-    assert found.score([t.drop(columns="acceleration_z") for t in shown], truth) > 0.85
+    assert result.score([t.drop(columns="acceleration_z") for t in shown], truth) > 0.85
 
 
 def test_current_is_not_told_from_what_was_learnt_of_torque() -> None:
     """Amperes for newton metres would be a vehicle that pulls fifty times less: the wheels' speeds have to do."""
-    found = learnt(*wheels_only(TRAINED))
+    result = learnt(*wheels_only(TRAINED))
     shown, _ = wheels_only(HELD_OUT)
     speeds = [t[[c for c in t if not c.startswith("drive_torque")]] for t in shown]
     np.testing.assert_array_equal(
-        found.predict_proba([with_current(t, torque=False) for t in shown]), found.predict_proba(speeds)
+        result.predict_proba([with_current(t, torque=False) for t in shown]), result.predict_proba(speeds)
     )
 
 
 def test_where_both_are_logged_either_torque_or_current_is_learnt_from() -> None:
     tables, labels = wheels_only(TRAINED)
-    found = learnt([with_current(t) for t in tables], labels)
-    assert any("motor_current_*" in note for note in found.notes_)
+    result = learnt([with_current(t) for t in tables], labels)
+    assert any("motor_current_*" in note for note in result.notes_)
     shown, truth = wheels_only(HELD_OUT)
-    assert found.score(shown, truth) > 0.85
+    assert result.score(shown, truth) > 0.85
 
 
 def test_a_ground_recorded_at_another_rate_is_said() -> None:
@@ -75,8 +75,8 @@ def test_a_ground_recorded_at_another_rate_is_said() -> None:
         for t, g in zip(tables, labels, strict=True)
     ]
     assert not any("rate" in note for note in learnt(*wheels_only(TRAINED)).notes_)
-    found = learnt(slow, labels)
-    assert [note.partition(":")[0] for note in found.notes_ if "may be the rate" in note] == [
+    result = learnt(slow, labels)
+    assert [note.partition(":")[0] for note in result.notes_ if "may be the rate" in note] == [
         "angular velocity",
         "acceleration",
     ]
@@ -84,11 +84,11 @@ def test_a_ground_recorded_at_another_rate_is_said() -> None:
 
 def test_the_words_in_wheels_names_do_not_matter() -> None:
     plain, worded = ("a", "b", "c", "d"), ("front_left", "front_right", "rear_left", "rear_right")
-    told = [
+    reported = [
         learnt(*wheels_only(TRAINED, wheels)).predict_proba(wheels_only(HELD_OUT, wheels)[0])
         for wheels in (plain, worded)
     ]
-    np.testing.assert_array_equal(*told)
+    np.testing.assert_array_equal(*reported)
 
 
 def test_a_very_short_run_beside_a_long_one_does_not_stop_the_training() -> None:
@@ -96,9 +96,9 @@ def test_a_very_short_run_beside_a_long_one_does_not_stop_the_training() -> None
     tables = [drive(ground, seed, 20.0) for ground in GROUNDS for seed in (1000, 1001)]
     labels = [ground for ground in GROUNDS for _ in range(2)]
     tables[-1] = drive(labels[-1], 1001, 0.5)
-    found = learnt(tables, labels)
-    assert any("one recording" in note for note in found.notes_)
-    assert found.score(*drives(HELD_OUT)) > 0.85
+    result = learnt(tables, labels)
+    assert any("one recording" in note for note in result.notes_)
+    assert result.score(*drives(HELD_OUT)) > 0.85
 
 
 @pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig", "cp1252", "utf-16"])

@@ -87,8 +87,10 @@ def relative_gains(
     disagreement = _disagreement(rows)
     own = disagreement**2 * fit.covariance
     covariance = own + _considered_loads(fit, table, vehicle, driven, errors)
-    told = evidence(table, [Spell(int(k), int(k)) for k in range(len(table))], sources, table.torque_count)
-    quantities = _quantities(fit, covariance, own, vehicle, driven, told, disagreement)
+    rests_on = evidence(
+        table, [Spell(int(k), int(k)) for k in range(len(table))], sources, table.torque_count
+    )
+    quantities = _quantities(fit, covariance, own, vehicle, driven, rests_on, disagreement)
     radius, radius_std = np.ones(len(vehicle.wheels)), np.zeros(len(vehicle.wheels))
     radius[driven] += fit.radius
     radius_std[driven] = np.sqrt(np.diag(covariance)[len(driven) :])
@@ -101,27 +103,27 @@ def _quantities(
     own: Floats,
     vehicle: Vehicle,
     driven: Ints,
-    told: tuple[Evidence, ...],
+    rests_on: tuple[Evidence, ...],
     disagreement: float,
 ) -> list[Quantity]:
     from scipy.special import stdtrit  # scipy.stats would take seconds to load
 
     factor = float(stdtrit(fit.blocks - 1, 0.975))
-    said = (
+    sentence = (
         "relative to the mean of all wheels, with the loads that the vehicle file gives: torques of wheels at one "
         f"slip on one soil compared, {fit.windows} windows on {fit.blocks} stretches of track; it assumes that "
         "the soil under rear wheels is as under front ones"
     )
     if disagreement > 1:
-        said += f"; the soils disagree, so the intervals are {disagreement:.1f} times wider"
+        sentence += f"; the soils disagree, so the intervals are {disagreement:.1f} times wider"
     return [
         Quantity(
             "drive_torque_gain",
             float(np.exp(value)),
             float(np.exp(value) * np.sqrt(variance)),
             "1",
-            told,
-            said,
+            rests_on,
+            sentence,
             wheel=vehicle.wheels[index],
             factor=factor,
             # Wrong loads shift the gains so that adhesion comes out right: the estimator counts them by themselves.

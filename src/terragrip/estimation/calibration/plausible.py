@@ -42,8 +42,8 @@ def completed_by_positions(log: Recording) -> tuple[Recording, list[str]]:
         "angular_velocity_z": "The rate of turn is that of the positions",
         "pitch": "the slope is that of the altitude",
     }
-    said = "; ".join(words[name] for name in added)
-    return log.with_channels(**added), [f"{said[0].upper()}{said[1:]}."] if said else []
+    sentence = "; ".join(words[name] for name in added)
+    return log.with_channels(**added), [f"{sentence[0].upper()}{sentence[1:]}."] if sentence else []
 
 
 def plausible(quantities: Sequence[Quantity], vehicle: Vehicle, unknown: list[Unknown]) -> list[Quantity]:
@@ -72,9 +72,9 @@ def _beyond(quantity: Quantity, vehicle: Vehicle) -> str:
     return ""
 
 
-def turned_unseen(logs: Sequence[Recording], vehicle: Vehicle, told: Collection[str]) -> list[Unknown]:
+def turned_unseen(logs: Sequence[Recording], vehicle: Vehicle, known: Collection[str]) -> list[Unknown]:
     """A line that says to give a yaw rate, where the machine turned, nothing tells how fast, and radii or gains are lacking."""
-    if any(name.startswith(("wheel_radius", "drive_torque_gain")) for name in told):
+    if any(name.startswith(("wheel_radius", "drive_torque_gain")) for name in known):
         return []
     table = windows(logs, vehicle, 2.0)
     moving = np.abs(table.ground_speed) > 0.2

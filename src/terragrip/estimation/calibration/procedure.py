@@ -63,17 +63,17 @@ def calibrate(
     if not logs:
         raise InputError("there is no recording to calibrate from", hint="give at least one log")
     sources = [log.source or f"recording {k + 1}" for k, log in enumerate(logs)]
-    doubts = tuple(dict.fromkeys(said for log in logs for said in unit_warnings(log, vehicle)))
+    doubts = tuple(dict.fromkeys(remarks for log in logs for remarks in unit_warnings(log, vehicle)))
     if all(speeds_alone(log.channels, vehicle) for log in logs):
         return replace(calibrate_radii(logs, vehicle, sources, light), notes=doubts)
     for log in logs:
         log.check_against(vehicle)
     logs = [without_held(log) for log in logs]
-    found, unknown, yaw_zero = _zeros(logs, vehicle, sources)
-    zeroed = Calibration(tuple(found), ()).apply(vehicle)
+    quantities, unknown, yaw_zero = _zeros(logs, vehicle, sources)
+    zeroed = Calibration(tuple(quantities), ()).apply(vehicle)
     completed = [completed_by_positions(_corrected(log, zeroed, yaw_zero)) for log in logs]
     corrected = [log for log, _ in completed]
-    doubts += tuple(dict.fromkeys(said for _, notes in completed for said in notes))
+    doubts += tuple(dict.fromkeys(text for _, notes in completed for text in notes))
 
     passes = windows(corrected, zeroed, RADIUS_WINDOW)
     rolling = rolling_radii(passes, zeroed, track_blocks(passes), sources)
@@ -85,7 +85,11 @@ def calibrate(
         unknown.append(rolling)
 
     gains = relative_gains(
-        corrected, rolled, _offset_errors(found, vehicle), _channel_errors(found, vehicle, logs), sources
+        corrected,
+        rolled,
+        _offset_errors(quantities, vehicle),
+        _channel_errors(quantities, vehicle, logs),
+        sources,
     )
     shared: list[Quantity] = []
     if isinstance(gains, RelativeGains):
@@ -96,14 +100,14 @@ def calibrate(
         unknown += gains
     if isinstance(rolling, Rolling) and rolled is not zeroed:
         apart = gains if isinstance(gains, RelativeGains) and shared else None
-        found += _useful(plausible(_radii(rolling, apart, vehicle), vehicle, unknown), vehicle, unknown)
-    found += shared
+        quantities += _useful(plausible(_radii(rolling, apart, vehicle), vehicle, unknown), vehicle, unknown)
+    quantities += shared
     try:
-        found.append(identify_torque_scale(_with_gains(corrected, shared), rolled))
+        quantities.append(identify_torque_scale(_with_gains(corrected, shared), rolled))
     except InputError as error:
         unknown.append(Unknown("drive_torque_scale", error.problem))
-    unknown += turned_unseen(corrected, vehicle, [q.name for q in found])
-    return Calibration(tuple(found), tuple(unknown), _left(found, vehicle), doubts)
+    unknown += turned_unseen(corrected, vehicle, [q.name for q in quantities])
+    return Calibration(tuple(quantities), tuple(unknown), _left(quantities, vehicle), doubts)
 
 
 def _zeros(
@@ -111,18 +115,20 @@ def _zeros(
 ) -> tuple[list[Quantity], list[Unknown], float]:
     """Everything that standstill tells; the last is the gyroscope's zero, which has no place in the vehicle file."""
     noise, standing = _sensor_noise(logs, vehicle), windows(logs, vehicle, zeros.WINDOW)
-    found: list[Quantity] = []
+    quantities: list[Quantity] = []
     unknown: list[Unknown] = []
-    for quantities, missing in (
+    for zeroed, missing in (
         zeros.torque_zeros(standing, vehicle, sources, noise["drive_torque"]),
         zeros.drawbar_zero(standing, vehicle, sources, noise["drawbar_force"]),
         zeros.inclination_zeros(standing, vehicle, sources, noise["acceleration"]),
     ):
         unknown += missing
-        possible = _possible(quantities, vehicle, unknown)
+        possible = _possible(zeroed, vehicle, unknown)
         for key in dict.fromkeys(quantity.key for quantity in possible):
-            found += _useful([quantity for quantity in possible if quantity.key == key], vehicle, unknown)
-    return found, unknown, zeros.yaw_rate_zero(standing, vehicle, standing.yaw_rate)
+            quantities += _useful(
+                [quantity for quantity in possible if quantity.key == key], vehicle, unknown
+            )
+    return quantities, unknown, zeros.yaw_rate_zero(standing, vehicle, standing.yaw_rate)
 
 
 def _possible(quantities: Sequence[Quantity], vehicle: Vehicle, unknown: list[Unknown]) -> list[Quantity]:
@@ -176,22 +182,24 @@ def _sensor_noise(logs: Sequence[Recording], vehicle: Vehicle) -> dict[str, floa
         stated = getattr(vehicle.sensors, sensor)
         if stated is None:
             measured = [sensor_noise(log, {}) for log in logs] if measured is None else measured
-            found = [value for log in measured for name, value in log.items() if name.startswith(column)]
-            stated = float(np.median(found)) if found else 0.0
+            quantities = [value for log in measured for name, value in log.items() if name.startswith(column)]
+            stated = float(np.median(quantities)) if quantities else 0.0
         noise[sensor] = stated
     return noise
 
 
-def _offset_errors(found: Sequence[Quantity], vehicle: Vehicle) -> npt.NDArray[np.float64]:
+def _offset_errors(quantities: Sequence[Quantity], vehicle: Vehicle) -> npt.NDArray[np.float64]:
     """Standard error (w,) of each wheel's torque zero if it was found, else the vehicle's prior, else 0."""
     prior = vehicle.uncertainty.drive_torque_offset or 0.0
-    told = {q.wheel: q.std for q in found if q.key == "drive_torque_offset"}
-    return np.array([told.get(wheel, prior) for wheel in vehicle.wheels])
+    spread = {q.wheel: q.std for q in quantities if q.key == "drive_torque_offset"}
+    return np.array([spread.get(wheel, prior) for wheel in vehicle.wheels])
 
 
-def _channel_errors(found: Sequence[Quantity], vehicle: Vehicle, logs: Sequence[Recording]) -> ChannelErrors:
+def _channel_errors(
+    quantities: Sequence[Quantity], vehicle: Vehicle, logs: Sequence[Recording]
+) -> ChannelErrors:
     """Errors that the channels keep: they move load between the wheels, and so the gains."""
-    stated, errors = vehicle.uncertainty, {quantity.name: quantity.std for quantity in found}
+    stated, errors = vehicle.uncertainty, {quantity.name: quantity.std for quantity in quantities}
     ground = GRAVITY * (_SLOPE if stated.slope is None else stated.slope) / np.sqrt(len(logs))
     sensor = _SENSOR_BIAS if stated.acceleration_bias is None else stated.acceleration_bias
     measured = all("acceleration_x" in log.channels for log in logs)
@@ -234,20 +242,20 @@ def _radii(rolling: Rolling, gains: RelativeGains | None, vehicle: Vehicle) -> l
     """The radii of all wheels: what the passes say of them together, and the gains of each."""
     wheels = len(vehicle.wheels)
     differences = (np.ones(wheels), np.zeros(wheels)) if gains is None else (gains.radius, gains.radius_std)
-    said = (
+    sentence = (
         "ground speed over wheel speed on straight steady passes at zero pull, corrected for the slip of "
         f"{100 * rolling.slip:.2f} % there"
     )
     if gains is not None:
-        said += "; what a wheel differs from the others is told by its torque over slip"
+        sentence += "; what a wheel differs from the others is told by its torque over slip"
     return [
         Quantity(
             "wheel_radius",
             float(radius * apart),
             float(radius * np.hypot(std, own_std)),
             "m",
-            rolling.told,
-            said,
+            rolling.rests_on,
+            sentence,
             wheel=wheel,
             factor=rolling.factor,
         )
@@ -257,12 +265,12 @@ def _radii(rolling: Rolling, gains: RelativeGains | None, vehicle: Vehicle) -> l
     ]
 
 
-def _left(found: Sequence[Quantity], vehicle: Vehicle) -> dict[str, Any]:
+def _left(quantities: Sequence[Quantity], vehicle: Vehicle) -> dict[str, Any]:
     """The vehicle's considered constants after calibration: what remains unknown of each that was calibrated."""
     prior, left = vehicle.uncertainty, {}
 
     def spread(key: str) -> float | None:
-        errors = [q.spread for q in found if q.key == key]
+        errors = [q.spread for q in quantities if q.key == key]
         return float(np.sqrt(np.mean(np.square(errors)))) if errors else None
 
     for key, name in (
@@ -273,13 +281,13 @@ def _left(found: Sequence[Quantity], vehicle: Vehicle) -> dict[str, Any]:
         error = spread(key)
         if error is not None:
             left[name] = error
-    radius = [q.spread / q.value for q in found if q.key == "wheel_radius"]
+    radius = [q.spread / q.value for q in quantities if q.key == "wheel_radius"]
     if radius:
         left["wheel_radius"] = float(np.sqrt(np.mean(np.square(radius))))
     gain = spread("drive_torque_gain")
     if gain is not None and prior.drive_torque_gain is not None:
         # Independent errors of n wheels: their mean, prior/√n, is common to all and stays; the rest is known now.
-        wheels = sum(q.key == "drive_torque_gain" for q in found)
+        wheels = sum(q.key == "drive_torque_gain" for q in quantities)
         known_common = prior.drive_torque_gain_common or 0.0
         left["drive_torque_gain_common"] = float(
             np.hypot(known_common, prior.drive_torque_gain / np.sqrt(wheels))

@@ -62,14 +62,14 @@ class Rolling:
     """Rolling radii from zero-pull passes.
 
     ``radius`` (w,) m; ``std`` (w,) relative, with all that is considered; ``factor`` of its 95 % interval; ``slip`` the
-    mean slip that was corrected; ``told`` what it rests on.
+    mean slip that was corrected; ``rests_on``: the evidence.
     """
 
     radius: Floats
     std: Floats
     factor: float
     slip: float
-    told: tuple[Evidence, ...]
+    rests_on: tuple[Evidence, ...]
 
 
 def rolling_radii(
@@ -102,9 +102,9 @@ def rolling_radii(
     typical = float(np.average(steepness[code[free]]))
     variance = own + _considered(vehicle, typical)
     rolled = slip(windows.wheel_speed[free], windows.hub_speed[free], radius, standstill_speed=0.0)
-    told = evidence(windows, [Spell(int(k), int(k)) for k in np.flatnonzero(free)], sources)
+    rests_on = evidence(windows, [Spell(int(k), int(k)) for k in np.flatnonzero(free)], sources)
     factor = float(stdtrit(max(1.0, stretches - 1), 0.975))
-    return Rolling(radius, np.sqrt(variance), factor, float(np.mean(rolled)), told)
+    return Rolling(radius, np.sqrt(variance), factor, float(np.mean(rolled)), rests_on)
 
 
 def _adhesion(windows: Windows, vehicle: Vehicle) -> Floats:

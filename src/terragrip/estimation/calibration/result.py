@@ -139,9 +139,9 @@ class Calibration:
         lines = [
             "  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)) for row in rows
         ]
-        said = dict.fromkeys((quantity.key, quantity.sentence) for quantity in self.quantities)
-        lines += ["", *(f"{key}: {sentence}" for key, sentence in said)] if said else []
-        lines += ["", "Not told by the data:"] if self.unknown else []
+        sentences = dict.fromkeys((quantity.key, quantity.sentence) for quantity in self.quantities)
+        lines += ["", *(f"{key}: {sentence}" for key, sentence in sentences)] if sentences else []
+        lines += ["", "Not determined by the data:"] if self.unknown else []
         lines += [f"  {unknown.name}: {unknown.why}" for unknown in self.unknown]
         lines += ["", *(f"Note: {note}" for note in self.notes)] if self.notes else []
         return "\n".join(line.rstrip() for line in lines)

@@ -156,14 +156,14 @@ class _Problem:
         level, _, _ = self._levels(values)
         slip, soil = self.data.slip.mean(axis=1), self.data.soil
         size = np.abs(slip)
-        best, found = np.inf, np.zeros(len(slip))
+        best, result = np.inf, np.zeros(len(slip))
         for k in _STEEPNESS if np.ptp(size) > 0.02 else [-PROTOTYPE["alpha_2"]]:
             form = np.sign(slip) * -np.expm1(-k * size)
             amplitude = np.bincount(soil, form * level) / np.maximum(np.bincount(soil, form**2), 1e-12)
             loss = float(np.sum(np.abs(level - amplitude[soil] * form)))
             if loss < best:
-                best, found = loss, np.maximum(amplitude[soil], 0.0) * k * np.exp(-k * size)
-        return replace(self, steepness=found)
+                best, result = loss, np.maximum(amplitude[soil], 0.0) * k * np.exp(-k * size)
+        return replace(self, steepness=result)
 
     def _levels(self, values: Floats) -> tuple[Floats, Floats, Floats]:
         """m_n (n,), the residual torque (n, w) and its spread (n, w) at the unknowns' values."""

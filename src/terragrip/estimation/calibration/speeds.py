@@ -22,7 +22,7 @@ def calibrate_radii(
     Of the drive train's speed (``wheel_based_speed``) all driven wheels get the one radius at which it would be right, or, where the
     vehicle file gives no radii, that speed its gain. ``light``: of each log the span [s] without load, where the user knows one.
     """
-    found: list[Quantity | Unknown] = []
+    quantities: list[Quantity | Unknown] = []
     if vehicle.knows_wheels:
         for wheel, data, driven in zip(vehicle.wheels, vehicle.wheel_data, vehicle.driven, strict=True):
             channel, radius = f"wheel_speed_{wheel}", data.radius
@@ -34,16 +34,16 @@ def calibrate_radii(
             radius_of = Quantity(
                 "wheel_radius", data.radius, 0.0, "m", _evidence(logs, sources, channel), "", wheel=wheel
             )
-            found.append(_scaled(radius_of, zero))
+            quantities.append(_scaled(radius_of, zero))
     else:
         zero = zero_of(logs, "wheel_based_speed", 1.0, light)
         gain = Quantity(
             "wheel_based_speed_gain", 1.0, 0.0, "1", _evidence(logs, sources, "wheel_based_speed"), ""
         )
-        found.append(_scaled(gain, zero))
-    known = tuple(q for q in found if isinstance(q, Quantity))
+        quantities.append(_scaled(gain, zero))
+    known = tuple(q for q in quantities if isinstance(q, Quantity))
     relative = max((q.std / q.value for q in known), default=0.0)
-    unknown = tuple(u for u in found if isinstance(u, Unknown))
+    unknown = tuple(u for u in quantities if isinstance(u, Unknown))
     return Calibration(known, unknown, {"wheel_radius": relative} if relative else {})
 
 

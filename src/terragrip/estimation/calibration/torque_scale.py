@@ -101,8 +101,8 @@ def identify_torque_scale(recordings: Recording | Sequence[Recording], vehicle: 
         np.hypot(_drawbar_gain(table, vehicle), _unseen_slope(vehicle, rows, weight)),
     )
     std = float(np.hypot(error, scale * considered))
-    said = "torques over radius against drawbar force and mass times acceleration and slope; it goes with the mass"
-    return Quantity("drive_torque_scale", float(scale), std, "1", _evidence(table, logs), said)
+    sentence = "torques over radius against drawbar force and mass times acceleration and slope; it goes with the mass"
+    return Quantity("drive_torque_scale", float(scale), std, "1", _evidence(table, logs), sentence)
 
 
 def _window_length(logs: Sequence[Recording]) -> float:

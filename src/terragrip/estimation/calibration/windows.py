@@ -225,16 +225,16 @@ def _rate(values: Floats, step: float) -> Floats:
 
 def _labels(recording: Recording, bin_of: Ints, n: int) -> npt.NDArray[np.object_]:
     """The soil of each window: empty where it is unlabelled or changes within."""
-    found = np.full(n, "", dtype=object)
+    result = np.full(n, "", dtype=object)
     labels = recording.labels.get("soil")
     if labels is None:
-        return found
+        return result
     # Few rows change the label: look at the runs between them, not at every row.
     edge = np.flatnonzero(labels[1:] != labels[:-1]) + 1
     first = np.searchsorted(bin_of, np.arange(n))
     here = np.minimum(first, len(labels) - 1)
-    found[:] = labels[here]
-    found[np.bincount(bin_of, minlength=n) == 0] = ""
+    result[:] = labels[here]
+    result[np.bincount(bin_of, minlength=n) == 0] = ""
     inside = edge[bin_of[edge] == bin_of[edge - 1]]
-    found[bin_of[inside]] = ""
-    return found
+    result[bin_of[inside]] = ""
+    return result

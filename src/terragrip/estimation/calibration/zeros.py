@@ -53,8 +53,8 @@ def standstills(windows: Windows, vehicle: Vehicle) -> list[Spell]:
     rim = np.abs(windows.wheel_speed) * vehicle.wheel_radius
     standing = (np.abs(windows.ground_speed) < _STANDING) & np.all(rim < _STANDING, axis=1)
     least = int(np.ceil(_LEAST_STANDING / windows.length))
-    found = spells(standing, windows.recording, least)
-    return [Spell(s.first + (not _starts_a_log(s, windows)), s.last) for s in found]
+    stops = spells(standing, windows.recording, least)
+    return [Spell(s.first + (not _starts_a_log(s, windows)), s.last) for s in stops]
 
 
 def _starts_a_log(spell: Spell, windows: Windows) -> bool:
@@ -73,7 +73,7 @@ def spells(wanted: npt.NDArray[np.bool_], recording: npt.NDArray[np.intp], least
 
 
 def evidence(
-    windows: Windows, found: Sequence[Spell], sources: Sequence[str], count: Floats | None = None
+    windows: Windows, stops: Sequence[Spell], sources: Sequence[str], count: Floats | None = None
 ) -> tuple[Evidence, ...]:
     """One entry per recording: from the first spell's start to the last one's end, with the samples used.
 
@@ -81,7 +81,7 @@ def evidence(
     """
     count = windows.count if count is None else count
     entries: dict[int, list[Spell]] = {}
-    for spell in found:
+    for spell in stops:
         entries.setdefault(int(windows.recording[spell.first]), []).append(spell)
     return tuple(
         Evidence(
@@ -94,17 +94,17 @@ def evidence(
     )
 
 
-def spell_mean(values: Floats, found: Sequence[Spell], count: Floats, noise: float) -> tuple[float, float]:
+def spell_mean(values: Floats, stops: Sequence[Spell], count: Floats, noise: float) -> tuple[float, float]:
     """Mean and standard error of values (n,) over spells; what varies from spell to spell counts in the error.
 
     ``noise`` is the standard deviation of one of the ``count`` (n,) samples: a few windows may scatter less by chance.
     """
-    inside = [values[spell.rows] for spell in found]
+    inside = [values[spell.rows] for spell in stops]
     pooled = np.concatenate(inside)
     pooled = pooled[np.isfinite(pooled)]
     if len(pooled) < 2:
         return float("nan"), float("nan")
-    samples = max(1.0, float(sum(count[spell.rows].sum() for spell in found)))
+    samples = max(1.0, float(sum(count[spell.rows].sum() for spell in stops)))
     within = max(float(np.std(pooled, ddof=1)) / np.sqrt(len(pooled)), noise / np.sqrt(samples))
     means = np.array([np.nanmean(part) for part in inside if np.isfinite(part).any()])
     if len(means) < 3:
@@ -114,40 +114,40 @@ def spell_mean(values: Floats, found: Sequence[Spell], count: Floats, noise: flo
     return float(np.mean(means)), max(within, float(np.std(means, ddof=1)) / np.sqrt(len(means)))
 
 
-def resting(values: Floats, found: Sequence[Spell], count: Floats, noise: float) -> list[Spell]:
+def resting(values: Floats, stops: Sequence[Spell], count: Floats, noise: float) -> list[Spell]:
     """The spells that read alike in all of ``values`` (n, k), within noise: the most numerous such group.
 
     A zero is the same at every stop, what a drive holds or a bar keeps is not. Of groups of one size the one nearest to
     zero is taken.
     """
-    found = [spell for spell in found if np.isfinite(values[spell.rows]).any(axis=0).all()]
-    if len(found) < 2 or noise <= 0:
-        return found
-    means = np.array([np.nanmean(values[spell.rows], axis=0) for spell in found])
-    errors = noise / np.sqrt([max(1.0, count[spell.rows].sum()) for spell in found])
+    stops = [spell for spell in stops if np.isfinite(values[spell.rows]).any(axis=0).all()]
+    if len(stops) < 2 or noise <= 0:
+        return stops
+    means = np.array([np.nanmean(values[spell.rows], axis=0) for spell in stops])
+    errors = noise / np.sqrt([max(1.0, count[spell.rows].sum()) for spell in stops])
     apart = np.max(np.abs(means[:, None] - means[None]), axis=2)
     alike = apart < _ALIKE * np.hypot(errors[:, None], errors[None])
-    rank = [(int(alike[k].sum()), -float(np.max(np.abs(means[k])))) for k in range(len(found))]
-    group = alike[max(range(len(found)), key=lambda k: rank[k])]
+    rank = [(int(alike[k].sum()), -float(np.max(np.abs(means[k])))) for k in range(len(stops))]
+    group = alike[max(range(len(stops)), key=lambda k: rank[k])]
     near = np.max(np.abs(means - np.median(means[group], axis=0)), axis=1) < _ALIKE * errors
-    return [spell for spell, member in zip(found, near, strict=True) if member]
+    return [spell for spell, member in zip(stops, near, strict=True) if member]
 
 
 def torque_zeros(
     windows: Windows, vehicle: Vehicle, sources: Sequence[str], noise: float
 ) -> tuple[list[Quantity], list[Unknown]]:
     """Torque zero of each driven wheel from standstill; ``noise`` is the standard deviation of a torque sample, N m."""
-    key, found = "drive_torque_offset", standstills(windows, vehicle)
-    if not found:
+    key, stops = "drive_torque_offset", standstills(windows, vehicle)
+    if not stops:
         return [], [Unknown(key, f"no standstill of {_LEAST_STANDING:.0f} s or longer")]
     quantities, unknown = [], []
     driven = np.flatnonzero(vehicle.driven)
-    found = resting(windows.torque[:, driven], found, windows.torque_count, noise)
-    if not found:
+    stops = resting(windows.torque[:, driven], stops, windows.torque_count, noise)
+    if not stops:
         return [], [Unknown(key, "no torque was measured at standstill")]
     for index in driven:
         wheel, torque = vehicle.wheels[index], windows.torque[:, index]
-        value, error = spell_mean(torque, found, windows.torque_count, noise)
+        value, error = spell_mean(torque, stops, windows.torque_count, noise)
         driving = np.abs(torque[np.abs(windows.ground_speed) > _DRIVING])
         work = float(np.nanquantile(driving, 0.95)) if np.isfinite(driving).any() else np.inf
         allowed = max(3 * (vehicle.uncertainty.drive_torque_offset or 0.0), _IDLE_SHARE * work)
@@ -155,11 +155,11 @@ def torque_zeros(
             why = f"at standstill the drive reads {value:.2f} N m, so it seems to hold the vehicle"
             unknown.append(Unknown(f"{key} {wheel}", why))
         else:
-            said = (
+            sentence = (
                 "mean of the stops that read alike; it assumes that nothing drives or holds the wheels there"
             )
-            entry = evidence(windows, found, sources, windows.torque_count)
-            quantities.append(Quantity(key, value, error, "N m", entry, said, wheel=wheel))
+            entry = evidence(windows, stops, sources, windows.torque_count)
+            quantities.append(Quantity(key, value, error, "N m", entry, sentence, wheel=wheel))
     return quantities, unknown
 
 
@@ -174,23 +174,23 @@ def drawbar_zero(
     if not np.isfinite(windows.drawbar).any() or not np.any(windows.drawbar):
         return [], [Unknown(key, "there is no drawbar_force")]
     allowed = max(3 * (vehicle.uncertainty.drawbar_offset or 0.0), 0.01 * vehicle.mass * GRAVITY)
-    found = standstills(windows, vehicle)
-    said = "mean of the stops that read alike; it assumes that the bar is slack there"
+    stops = standstills(windows, vehicle)
+    sentence = "mean of the stops that read alike; it assumes that the bar is slack there"
     why = f"no standstill of {_LEAST_STANDING:.0f} s or longer, and none free of a tool"
-    found = resting(windows.drawbar[:, None], found, windows.drawbar_count, noise)
-    if found:
-        value, error = spell_mean(windows.drawbar, found, windows.drawbar_count, noise)
+    stops = resting(windows.drawbar[:, None], stops, windows.drawbar_count, noise)
+    if stops:
+        value, error = spell_mean(windows.drawbar, stops, windows.drawbar_count, noise)
         why = f"at standstill it reads {value:.1f} N, so the bar seems to be under tension"
-    if not found or not abs(value) <= allowed:
-        found = _free_passes(windows, noise)
-        said = "mean over driving in which the drawbar force does not move; it assumes that nothing is towed there"
-        if not found:
+    if not stops or not abs(value) <= allowed:
+        stops = _free_passes(windows, noise)
+        sentence = "mean over driving in which the drawbar force does not move; it assumes that nothing is towed there"
+        if not stops:
             return [], [Unknown(key, why)]
-        value, error = spell_mean(windows.drawbar, found, windows.drawbar_count, noise)
+        value, error = spell_mean(windows.drawbar, stops, windows.drawbar_count, noise)
         if not abs(value) <= allowed:
             return [], [Unknown(key, why)]
     return [
-        Quantity(key, value, error, "N", evidence(windows, found, sources, windows.drawbar_count), said)
+        Quantity(key, value, error, "N", evidence(windows, stops, sources, windows.drawbar_count), sentence)
     ], []
 
 
@@ -198,12 +198,12 @@ def _free_passes(windows: Windows, noise: float) -> list[Spell]:
     """Spells of driving in which the windows' drawbar means scatter no more than sensor noise makes them."""
     moving = (np.abs(windows.ground_speed) > _DRIVING) & np.isfinite(windows.drawbar)
     least = int(_LEAST_FREE / windows.length)
-    found = []
+    stops = []
     for spell in spells(moving, windows.recording, least):
         bar, count = windows.drawbar[spell.rows], windows.drawbar_count[spell.rows]
         if np.std(bar) < 2 * noise / np.sqrt(np.median(count)):
-            found.append(spell)
-    return found
+            stops.append(spell)
+    return stops
 
 
 def inclination_zeros(
@@ -224,18 +224,18 @@ def inclination_zeros(
             Unknown(bias_key, "there is no acceleration_x"),
             Unknown(pitch_key, why) if pitched else no_pitch,
         ]
-    found = [s for s in standstills(windows, vehicle) if np.isfinite(windows.acceleration[s.rows]).any()]
-    if not found:
+    stops = [s for s in standstills(windows, vehicle) if np.isfinite(windows.acceleration[s.rows]).any()]
+    if not stops:
         why = f"no standstill of {_LEAST_STANDING:.0f} s or longer"
         return [], [Unknown(bias_key, why), Unknown(pitch_key, why) if pitched else no_pitch]
-    pitched = all(np.isfinite(windows.pitch[s.rows]).any() for s in found)
+    pitched = all(np.isfinite(windows.pitch[s.rows]).any() for s in stops)
     slope = windows.pitch if pitched else np.zeros(len(windows))
     total, error = spell_mean(
-        windows.acceleration - GRAVITY * np.sin(slope), found, windows.acceleration_count, noise
+        windows.acceleration - GRAVITY * np.sin(slope), stops, windows.acceleration_count, noise
     )
-    stated, told = vehicle.uncertainty, evidence(windows, found, sources, windows.acceleration_count)
+    stated, rests_on = vehicle.uncertainty, evidence(windows, stops, sources, windows.acceleration_count)
     # The ground differs from spell to spell, a sensor's zero does not.
-    ground = (_DEFAULT_SLOPE if stated.slope is None else stated.slope) / np.sqrt(len(found))
+    ground = (_DEFAULT_SLOPE if stated.slope is None else stated.slope) / np.sqrt(len(stops))
     other = GRAVITY * (_DEFAULT_PITCH if pitched else ground)
     own = _UNKNOWN_BIAS if stated.acceleration_bias is None else stated.acceleration_bias
     if abs(total) > 3 * np.hypot(own, other):
@@ -243,19 +243,27 @@ def inclination_zeros(
     share = own**2 / (own**2 + other**2)
     left = own * other / np.hypot(own, other)
     if not pitched:
-        said = "mean at standstill, split between bias and slope by their priors: they cannot be told apart"
-        bias = Quantity(bias_key, share * total, float(np.hypot(share * error, left)), "m/s^2", told, said)
+        sentence = (
+            "mean at standstill, split between bias and slope by their priors: they cannot be told apart"
+        )
+        bias = Quantity(
+            bias_key, share * total, float(np.hypot(share * error, left)), "m/s^2", rests_on, sentence
+        )
         return [bias], [no_pitch]
-    said = "accelerometer less g sin(pitch) at standstill, split between the two zeros by their priors: only the difference is told"
+    sentence = "accelerometer less g sin(pitch) at standstill, split between the two zeros by their priors: only the difference is told"
     rest = 1 - share
-    bias = Quantity(bias_key, share * total, float(np.hypot(share * error, left)), "m/s^2", told, said)
+    bias = Quantity(
+        bias_key, share * total, float(np.hypot(share * error, left)), "m/s^2", rests_on, sentence
+    )
     tilt = -rest * total / GRAVITY
-    pitch = Quantity(pitch_key, tilt, float(np.hypot(rest * error, left)) / GRAVITY, "rad", told, said)
+    pitch = Quantity(
+        pitch_key, tilt, float(np.hypot(rest * error, left)) / GRAVITY, "rad", rests_on, sentence
+    )
     return [bias, pitch], []
 
 
 def yaw_rate_zero(windows: Windows, vehicle: Vehicle, yaw_rate: Floats) -> float:
     """Mean of the yaw rate (n,) at standstill, 0 without any: a gyroscope's zero shifts the slip from side to side."""
-    found = standstills(windows, vehicle)
-    rest = [yaw_rate[s.rows][np.isfinite(yaw_rate[s.rows])] for s in found]
+    stops = standstills(windows, vehicle)
+    rest = [yaw_rate[s.rows][np.isfinite(yaw_rate[s.rows])] for s in stops]
     return float(np.mean(np.concatenate(rest))) if sum(map(len, rest)) else 0.0

@@ -154,13 +154,13 @@ class Watch:
         if row.rim < 3 * self.limits["standstill_speed"]:
             self._rest()
             self.sinking = False
-        elif self._look(row):
+        elif self._evaluate(row):
             begins = self.score > self.limits["warn"] and self.slips and self.spinning <= 0
             holds = self.sinking and 2 * self.score > self.limits["warn"]
             self.sinking = not self.stuck and (begins or holds)
         return "stuck" if self.stuck else "immobilization" if self.sinking else ""
 
-    def _look(self, row: Row) -> bool:
+    def _evaluate(self, row: Row) -> bool:
         weight = 1 / (row.deviation + SHARP) ** 2
         seen = (
             row.slip, row.deviation, row.leading, row.trailing, row.resistance, row.rim, row.travel

@@ -63,18 +63,18 @@ class SpeedsFilter:
         scale = move @ self.state  # the noise of slip speeds is in proportion to speed
         stay, leave = np.exp(-dt / DWELL), -np.expm1(-dt / DWELL) / len(PAIRS)
         prior = stay * self.probability + leave
-        found = []
+        result = []
         for m, (manoeuvre, slipping) in enumerate(PAIRS):
             x, P = self._mixed(m, stay * self.probability[m] / prior[m])
             Q = process_noise(scale, dt, manoeuvre, slipping**2)
-            found.append(self._update(move @ x, move @ P @ move.T + Q, speeds, usable))
-        score = np.log(prior) + [one[2] for one in found]
+            result.append(self._update(move @ x, move @ P @ move.T + Q, speeds, usable))
+        score = np.log(prior) + [one[2] for one in result]
         p = np.exp(score - score.max())
         p /= p.sum()
         self.probability = p
-        self.means, self.spreads = np.stack([one[0] for one in found]), np.stack([one[1] for one in found])
-        self.nis = float(p @ [one[3] for one in found])
-        self.weight = p @ np.stack([one[4] for one in found])
+        self.means, self.spreads = np.stack([one[0] for one in result]), np.stack([one[1] for one in result])
+        self.nis = float(p @ [one[3] for one in result])
+        self.weight = p @ np.stack([one[4] for one in result])
         self.channels = int(usable.sum())
         self.densities = float(p @ [q for q, _ in PAIRS]), float(p @ [c * c for _, c in PAIRS])
         self._merge()

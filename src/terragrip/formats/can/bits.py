@@ -44,7 +44,7 @@ class Field:
 
 def raw_of(field: Field, data: Bytes) -> npt.NDArray[np.uint64]:
     """Raw values (n,) of a field in payloads (n, bytes); the payloads must reach to the field's last byte."""
-    found = np.zeros(len(data), dtype=np.uint64)
+    result = np.zeros(len(data), dtype=np.uint64)
     if field.little_endian:
         first, last = field.start // 8, field.last_byte
         shifts = [8 * (byte - first) - field.start % 8 for byte in range(first, last + 1)]
@@ -55,10 +55,10 @@ def raw_of(field: Field, data: Bytes) -> npt.NDArray[np.uint64]:
         shifts = [8 * (last - byte) - trailing for byte in range(first, last + 1)]
     for byte, shift in zip(range(first, last + 1), shifts, strict=True):
         part = data[:, byte].astype(np.uint64)
-        found |= part << np.uint64(shift) if shift >= 0 else part >> np.uint64(-shift)
+        result |= part << np.uint64(shift) if shift >= 0 else part >> np.uint64(-shift)
     if field.length < 64:
-        found &= np.uint64((1 << field.length) - 1)
-    return found
+        result &= np.uint64((1 << field.length) - 1)
+    return result
 
 
 def missing_codes(field: Field, raw: npt.NDArray[np.uint64]) -> npt.NDArray[np.bool_]:
@@ -115,7 +115,7 @@ def decode(
             there = there & present(parent) & np.isin(raw(parent), np.array(field.chosen, dtype=np.uint64))
         return there
 
-    found = {}
+    result = {}
     for field in (f for f in fields if f.name in wanted):
         known = present(field)
         if field.codes:
@@ -124,6 +124,6 @@ def decode(
         if field.reverse is not None:
             backward = by_name[field.reverse]
             values = np.where(present(backward) & (raw(backward) == 0), -values, values)
-        found[field.name] = values
+        result[field.name] = values
     raws.clear()  # the functions above know each other, and would keep it until Python looks for such circles
-    return found
+    return result

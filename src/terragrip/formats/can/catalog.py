@@ -67,10 +67,10 @@ class Catalog:
 
     def message_of(self, identifier: int) -> Message | None:
         """The message of a frame's identifier (`EXTENDED` set where it has 29 bits); None if it is unknown."""
-        found = self.by_identifier.get(identifier)
-        if found is None and identifier & EXTENDED:
-            found = self.by_group.get(group_of(identifier))
-        return found
+        result = self.by_identifier.get(identifier)
+        if result is None and identifier & EXTENDED:
+            result = self.by_group.get(group_of(identifier))
+        return result
 
     def name(self, message: Message, field: Field) -> str:
         """The name of a signal in a log."""
@@ -120,13 +120,15 @@ def _read_dbc(path: str | os.PathLike[str]) -> list[Message]:
     errors = (*DAMAGE, cantools.Error, needed("textparser", "a DBC").Error)
     try:
         database = cantools.database.load_file(file, strict=False, cache_dir=None)
-        found = [message_of(database, message) for message in database.messages]
+        result = [message_of(database, message) for message in database.messages]
     except errors as error:
-        said = " ".join(str(error).split())[:120]
-        raise InputError(f"is no DBC that can be read ({said})", file=file, hint="export it again") from error
-    if not found:
+        sentence = " ".join(str(error).split())[:120]
+        raise InputError(
+            f"is no DBC that can be read ({sentence})", file=file, hint="export it again"
+        ) from error
+    if not result:
         raise InputError("describes no message", file=file, hint="give the DBC of the machine's bus")
-    return found
+    return result
 
 
 def message_of(database: Any, message: Any) -> Message:

@@ -20,14 +20,14 @@ def identifier_text(identifier: int) -> str:
 
 def names_of(frames: Frames) -> tuple[str, ...]:
     """All signals of the messages that occur; those of one of several senders also by ``Name@F0``."""
-    found: dict[str, None] = {}
+    result: dict[str, None] = {}
     for (_, sender), message in frames.seen.items():
         for f in message.fields:
             name = frames.catalog.name(message, f)
-            found[name] = None
+            result[name] = None
             if frames.senders(message) > 1:
-                found[of_sender(name, sender)] = None
-    return tuple(found)
+                result[of_sender(name, sender)] = None
+    return tuple(result)
 
 
 def signals_of(frames: Frames) -> tuple[dict[str, Signal], list[str]]:
@@ -36,7 +36,7 @@ def signals_of(frames: Frames) -> tuple[dict[str, Signal], list[str]]:
     Where several senders give a message, a plain name is the signal of the sender with most valid samples, of the
     lowest address among equals.
     """
-    found: dict[str, Signal] = {}
+    result: dict[str, Signal] = {}
     best: dict[str, tuple[int, int]] = {}  # plain name: valid samples, and the sender's address made negative
     several: set[str] = set()
     for (name, sender), kept in frames.kept.items():
@@ -44,12 +44,12 @@ def signals_of(frames: Frames) -> tuple[dict[str, Signal], list[str]]:
         shared = frames.senders(message) > 1
         for plain, signal in _decoded(frames, message, sender, kept).items():
             if shared and (frames.wanted is None or frames.wanted(of_sender(plain, sender))):
-                found[of_sender(plain, sender)] = signal
+                result[of_sender(plain, sender)] = signal
             rank = int(np.isfinite(signal.values).sum()), -sender
             if (frames.wanted is None or frames.wanted(plain)) and rank > best.get(plain, (-1, 0)):
-                best[plain], found[plain] = rank, signal
+                best[plain], result[plain] = rank, signal
                 several |= {plain} if shared else set()
-    return found, [*_on_senders(best, several), *_on_missing(found), *_on_frames(frames)]
+    return result, [*_on_senders(best, several), *_on_missing(result), *_on_frames(frames)]
 
 
 def _decoded(frames: Frames, message: Message, sender: int, kept: Payloads) -> dict[str, Signal]:
@@ -76,10 +76,10 @@ def _on_senders(best: dict[str, tuple[int, int]], several: set[str]) -> list[str
     ]
 
 
-def _on_missing(found: dict[str, Signal]) -> list[str]:
+def _on_missing(result: dict[str, Signal]) -> list[str]:
     """Signals that were sent, but as "not available" or "error" only."""
     silent = [
-        n for n, s in found.items() if "@" not in n and len(s.values) and not np.isfinite(s.values).any()
+        n for n, s in result.items() if "@" not in n and len(s.values) and not np.isfinite(s.values).any()
     ]
     if not silent:
         return []
@@ -88,16 +88,16 @@ def _on_missing(found: dict[str, Signal]) -> list[str]:
 
 
 def _on_frames(frames: Frames) -> list[str]:
-    said = []
+    notes = []
     given = frames.catalog.given
     if given and not any(name in given for name, _ in frames.seen):
-        said.append(f"None of the DBC's messages occurs in the log ({', '.join(sorted(given)[:6])}).")
+        notes.append(f"None of the DBC's messages occurs in the log ({', '.join(sorted(given)[:6])}).")
     if frames.unknown:
         count, total = len(frames.unknown), sum(frames.unknown.values())
         often = sorted(frames.unknown, key=lambda i: (-frames.unknown[i], i))
         shown = ", ".join(map(identifier_text, often[:6])) + (f" and {count - 6} more" if count > 6 else "")
         what = "identifier" if count == 1 else "identifiers"
-        said.append(f"{total} of {frames.count} frames are in no DBC or table, those of the {what} {shown}.")
+        notes.append(f"{total} of {frames.count} frames are in no DBC or table, those of the {what} {shown}.")
     if frames.transport.broken:
-        said.append(f"{frames.transport.broken} messages of several frames lack a part and were left out.")
-    return said
+        notes.append(f"{frames.transport.broken} messages of several frames lack a part and were left out.")
+    return notes

@@ -79,8 +79,8 @@ class Frames:
     def __post_init__(self) -> None:
         self.every = every_of(self.wanted)
 
-    def take(self, time: float, identifier: int, payload: bytes) -> None:
-        """Take a data frame; ``identifier`` has `EXTENDED` set where it has 29 bits."""
+    def add(self, time: float, identifier: int, payload: bytes) -> None:
+        """Add a data frame; ``identifier`` has `EXTENDED` set where it has 29 bits."""
         if self.every > 1:
             self._number += 1
             if skips(self._number - 1, _BLOCK, self.wanted):
@@ -97,14 +97,14 @@ class Frames:
         elif identifier in self.unknown:
             self.unknown[identifier] += 1
 
-    def take_many(
+    def add_many(
         self,
         time: npt.NDArray[np.float64],
         identifiers: npt.NDArray[np.int64],
         lengths: npt.NDArray[np.int64],
         data: npt.NDArray[np.uint8],
     ) -> None:
-        """Take data frames (n,) with payloads (n, bytes), as `take` does one by one."""
+        """Add data frames (n,) with payloads (n, bytes), as `take` does one by one."""
         if self.every > 1:
             read = (self._number + np.arange(len(time))) // _BLOCK % self.every == 0
             self._number += len(time)
@@ -169,16 +169,16 @@ class Frames:
         return None if place is None else place.add
 
     def _transported(self, group: int, source: int, destination: int) -> Callable[[float, bytes], None]:
-        def take(time: float, payload: bytes) -> None:
-            self._long(time, source, self.transport.take(group, source, destination, payload))
+        def add(time: float, payload: bytes) -> None:
+            self._long(time, source, self.transport.add(group, source, destination, payload))
 
-        return take
+        return add
 
     def _fast(self, group: int, source: int) -> Callable[[float, bytes], None]:
-        def take(time: float, payload: bytes) -> None:
-            self._long(time, source, self.transport.take_fast(group, source, payload))
+        def add(time: float, payload: bytes) -> None:
+            self._long(time, source, self.transport.add_fast(group, source, payload))
 
-        return take
+        return add
 
     def _long(self, time: float, source: int, whole: tuple[int, bytes] | None) -> None:
         """Keep a message of several frames, once it is whole, at the time of its last frame."""

@@ -44,7 +44,7 @@ def read_blf(path: str, wanted: Wanted | None, databases: Databases) -> SignalLo
         as_far_as_it_goes(path, "BLF log", notes, needed("can.io.blf", "a BLF log").BLFParseError) as seen,
     ):
         for frame in frames_of(can.BLFReader(stream)):
-            frames.take(*frame)
+            frames.add(*frame)
             seen.messages += 1
     return finished(frames, path, notes, databases)
 
@@ -105,11 +105,11 @@ def finished(
             file=path,
             hint="give the bus's DBC: --dbc FILE, or 'dbc:' in the profile",
         )
-    signals, said = signals_of(frames)
+    signals, remarks = signals_of(frames)
     if scale != 1.0:
         scaled = {id(s.time): s.time * scale for s in signals.values()}
         signals = {n: type(s)(scaled[id(s.time)], s.values, s.unit) for n, s in signals.items()}
-    return SignalLog(names_of(frames), signals, path, sha256(path), (*notes, *said))
+    return SignalLog(names_of(frames), signals, path, sha256(path), (*notes, *remarks))
 
 
 def _text_by_python_can(
@@ -138,7 +138,7 @@ def _from_lines(
         with Path(path).open("rb") as stream:
             lines = io.TextIOWrapper(stream, encoding="utf-8", errors="replace", newline="\n")
             for time, identifier, payload in parse(_bounded(lines), count, frames):
-                frames.take(time, identifier, payload)
+                frames.add(time, identifier, payload)
                 last = time
     except OSError as error:
         raise unreadable(path, error) from error

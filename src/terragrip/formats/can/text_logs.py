@@ -114,17 +114,17 @@ def candump(lines: Iterable[str], count: Count, frames: Frames) -> Iterator[Fram
     has no use for are counted there and not looked at any further.
     """
     passing: list[Frames] = []
-    found = _candump(lines, count, frames, passing)
-    head = list(itertools.islice(found, _HEAD))
+    result = _candump(lines, count, frames, passing)
+    head = list(itertools.islice(result, _HEAD))
     stamps = [stamp for stamp, _, _ in head]
     back = sum(after < before for before, after in itertools.pairwise(stamps))
     if len(head) < 3 or back < _BACK * len(head) or max(stamps) > _LONGEST_STEP:
         passing.append(frames)
         yield from head
-        yield from found
+        yield from result
         return
     now = 0.0
-    for step, identifier, payload in itertools.chain(head, found):  # every one, since steps add up
+    for step, identifier, payload in itertools.chain(head, result):  # every one, since steps add up
         now += step
         yield now, identifier, payload
 
@@ -245,8 +245,8 @@ def asc_lines(lines: Iterable[str], frames: Frames) -> Iterator[str]:
                 continue
             if name not in unwanted:
                 identifier = _asc_identifier(name, base)
-                passed = identifier is not None and frames.are_unwanted(identifier)
-                unwanted[name] = identifier if passed else None
+                is_unwanted = identifier is not None and frames.are_unwanted(identifier)
+                unwanted[name] = identifier if is_unwanted else None
             elif (known := unwanted[name]) is not None:
                 frames.pass_by(known)
                 continue

@@ -25,8 +25,8 @@ class Transport:
     _open: dict[tuple[int, int], _Message] = field(default_factory=dict)
     _fast: dict[tuple[int, int], tuple[int, _Message]] = field(default_factory=dict)
 
-    def take(self, group: int, source: int, destination: int, data: bytes) -> tuple[int, bytes] | None:
-        """Take a frame of `CONNECTION` or `DATA`; returns group and payload once a message is whole."""
+    def add(self, group: int, source: int, destination: int, data: bytes) -> tuple[int, bytes] | None:
+        """Add a frame of `CONNECTION` or `DATA`; returns group and payload once a message is whole."""
         if len(data) < 8:
             return None
         key = source, destination
@@ -47,8 +47,8 @@ class Transport:
         del self._open[key]
         return self._whole(message, range(1, -(-message.length // 7) + 1))
 
-    def take_fast(self, group: int, source: int, data: bytes) -> tuple[int, bytes] | None:
-        """Take a frame of a fast packet; returns group and payload once a message is whole."""
+    def add_fast(self, group: int, source: int, data: bytes) -> tuple[int, bytes] | None:
+        """Add a frame of a fast packet; returns group and payload once a message is whole."""
         if len(data) < 2:
             return None
         key, sequence, number = (group, source), data[0] >> 5, data[0] & 31

@@ -110,7 +110,7 @@ def tables_of(recordings: Any) -> list[Columns]:
 
 def held_channels(tables: Sequence[Columns]) -> dict[str, float]:
     """Update period [s] of each channel whose logger repeats values, judged on all recordings together."""
-    found = {}
+    result = {}
     for name in sorted({name for _, channels, _ in tables for name in channels}):
         times, values, offset = [], [], 0.0
         for time, channels, _ in tables:
@@ -126,8 +126,8 @@ def held_channels(tables: Sequence[Columns]) -> dict[str, float]:
         if (
             period is not None and period > _HELD * rows
         ):  # short of that it is a quantised signal at its own rate
-            found[name] = period
-    return found
+            result[name] = period
+    return result
 
 
 def signals_of(table: Columns, held: Mapping[str, float]) -> Signals:

@@ -89,8 +89,8 @@ class GroundClassifier:
 
     def __repr__(self) -> str:
         defaults = inspect.signature(type(self)).parameters
-        told = (f"{n}={v!r}" for n, v in self.get_params().items() if v != defaults[n].default)
-        return f"{type(self).__name__}({', '.join(told)})"
+        changed = (f"{n}={v!r}" for n, v in self.get_params().items() if v != defaults[n].default)
+        return f"{type(self).__name__}({', '.join(changed)})"
 
     def fit(self, recordings: Iterable[Any], labels: Sequence[Any]) -> Self:
         """Learn from recordings, one label each.
@@ -121,10 +121,10 @@ class GroundClassifier:
             f"{family}: sampled too slowly for windows of {self.window:g} s, not used." for family in slow
         ]
         notes += [f"{name}: logged with repeats, true updates every {p:.2g} s." for name, p in held.items()]
-        experts, said = train_experts(training, classes, int(random.integers(2**31)))
+        experts, remarks = train_experts(training, classes, int(random.integers(2**31)))
         used = {name for expert in experts for name in expert.features}
         names = tuple(name for name in training.names if name in used)
-        return self._know(Learnt(classes, names, tuple(experts), layout, held, (*notes, *said), left_out))
+        return self._know(Learnt(classes, names, tuple(experts), layout, held, (*notes, *remarks), left_out))
 
     def predict(self, recordings: Iterable[Any]) -> npt.NDArray[Any]:
         """The label (windows,) of each window, ``"unknown"`` where none fits; recordings follow one another.
@@ -132,7 +132,7 @@ class GroundClassifier:
         `windows` tells which recording and time a row belongs to. Raises InputError as `fit` does on tables that
         cannot be read, and if not fitted.
         """
-        return self._told(self._judge(recordings))
+        return self._grounds(self._judge(recordings))
 
     def predict_proba(self, recordings: Iterable[Any]) -> Floats:
         """Probability (windows, classes) of each class in ``classes_``, given that it is one of them.
@@ -159,7 +159,7 @@ class GroundClassifier:
         """
         judged = self._judge(recordings)
         table = _windows([one.starts for one in judged], self._known())
-        table["ground"] = self._told(judged)
+        table["ground"] = self._grounds(judged)
         table["novelty"] = _joined([one.novelty for one in judged])
         chances = _joined([one.probabilities for one in judged], len(self.classes_))
         for k, name in enumerate(self.classes_):
@@ -170,9 +170,9 @@ class GroundClassifier:
         """Share of windows whose label is that of their recording; unknown counts as wrong. Raises InputError."""
         listed = list(recordings)
         truth = one_each(labels, len(listed))
-        found = self.predict(listed)
+        result = self.predict(listed)
         of_window = self.windows(listed)["recording"].to_numpy()
-        return float(np.mean([a == truth[k] for a, k in zip(found.tolist(), of_window, strict=True)]))
+        return float(np.mean([a == truth[k] for a, k in zip(result.tolist(), of_window, strict=True)]))
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write the classifier to one file that holds numbers and text only; raises InputError if it cannot."""
@@ -200,10 +200,10 @@ class GroundClassifier:
         self.check_parameters()
         return [learnt.judge(table, self.step, self.smooth) for table in tables_of(recordings)]
 
-    def _told(self, judged: list[Judgement]) -> npt.NDArray[Any]:
+    def _grounds(self, judged: list[Judgement]) -> npt.NDArray[Any]:
         """The likeliest class of each window, or unknown."""
-        found = _joined([one.probabilities for one in judged], len(self.classes_))
-        labels = self.classes_[found.argmax(axis=1)]
+        result = _joined([one.probabilities for one in judged], len(self.classes_))
+        labels = self.classes_[result.argmax(axis=1)]
         strange = ~(_joined([one.novelty for one in judged]) >= self.rejection)  # NaN, too
         if not strange.any():
             return labels

@@ -40,9 +40,9 @@ class Discriminants:
     def distance(self, points: Floats) -> Floats:
         """Log distance (n,) to the tenth nearest known window."""
         near = min(_NEIGHBOURS, len(self.points)) - 1
-        found = np.empty(len(points))
+        result = np.empty(len(points))
         for begin in range(0, len(points), 1000):  # bounds the memory of a long drive
             block = points[begin : begin + 1000].astype(np.float32) @ self.axes
             square = sum((block[:, k, None] - self.points[:, k]) ** 2 for k in range(block.shape[1]))
-            found[begin : begin + 1000] = np.partition(square, near, axis=1)[:, near]
-        return 0.5 * np.log(found + 1e-12)
+            result[begin : begin + 1000] = np.partition(square, near, axis=1)[:, near]
+        return 0.5 * np.log(result + 1e-12)

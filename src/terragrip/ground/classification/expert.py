@@ -104,10 +104,10 @@ def train(
     with _one_thread_each(), ThreadPoolExecutor(threads) as pool:
         fitted = list(pool.map(lambda rows: Parts.fit(names, windows, rows, seed), learnt_from))
         held_out = [(parts, windows.features[folds == k]) for k, parts in enumerate(fitted[1:])]
-        found = list(pool.map(lambda pair: pair[0].decide(names, pair[1]), held_out))
-    scores = np.empty((len(found[0][0]), len(codes), found[0][0].shape[2]))
-    odd = np.empty((len(found[0][1]), len(codes)))
-    for fold, (of_scores, of_odd) in enumerate(found):
+        result = list(pool.map(lambda pair: pair[0].decide(names, pair[1]), held_out))
+    scores = np.empty((len(result[0][0]), len(codes), result[0][0].shape[2]))
+    odd = np.empty((len(result[0][1]), len(codes)))
+    for fold, (of_scores, of_odd) in enumerate(result):
         scores[:, folds == fold], odd[:, folds == fold] = of_scores, of_odd
     same = np.ones(len(codes))
     strangeness = Strangeness.fit(odd, _class_weights(same, codes), windows.groups, windows.starts)
@@ -138,9 +138,9 @@ def calibrate(scores: Floats, codes: Codes, weight: Floats, recordings: int) -> 
 
     def loss(parameters: Floats) -> tuple[float, Floats]:
         slopes, offsets = np.exp(parameters[:parts]), parameters[parts:]
-        found = probabilities(scores, slopes, offsets)
-        value = -(weight * np.log(found[rows, codes] + 1e-12)).sum() + (pull * parameters**2).sum()
-        off = (found - hit) * weight[:, None]
+        result = probabilities(scores, slopes, offsets)
+        value = -(weight * np.log(result[rows, codes] + 1e-12)).sum() + (pull * parameters**2).sum()
+        off = (result - hit) * weight[:, None]
         gradient = np.r_[slopes * (off * scores).sum(axis=(1, 2)), off.sum(axis=0)] + 2 * pull * parameters
         return value, gradient
 

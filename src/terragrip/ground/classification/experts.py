@@ -41,11 +41,11 @@ def train_experts(
     """
     measured = measured_families(training.names, training.features)
     sets = _sensor_sets(training, measured)
-    found = _trained(training, training.folds, sets, measured, seed)
-    within = training.by_recording and not found  # too little is left of a ground with a recording held out
+    result = _trained(training, training.folds, sets, measured, seed)
+    within = training.by_recording and not result  # too little is left of a ground with a recording held out
     if within:
-        found = _trained(training, training.parts, sets, measured, seed)
-    if not found:
+        result = _trained(training, training.parts, sets, measured, seed)
+    if not result:
         raise _nothing_to_learn(training, classes, measured)
     notes = []
     if within or not training.by_recording:
@@ -53,16 +53,16 @@ def train_experts(
         notes.append(
             f"A ground has but {one}: probabilities are learnt within runs and too sure on new ones."
         )
-    unused = frozenset(measured).difference(*(expert.families for expert in found))
+    unused = frozenset(measured).difference(*(expert.families for expert in result))
     if unused:
         notes.append(f"Not measured on every ground, so not used: {', '.join(sorted(unused))}.")
-    lost = {n for e in found for n in _candidates(training.names, e.families)}.difference(
-        *(e.features for e in found)
+    lost = {n for e in result for n in _candidates(training.names, e.families)}.difference(
+        *(e.features for e in result)
     )
     if lost:
         of = ", ".join(sorted(frozenset[str]().union(*map(families_needed, lost))))
         notes.append(f"Not measured on every ground, so not used: {len(lost)} features of {of}.")
-    return sorted(found, key=lambda e: (-len(e.features), sorted(e.families))), notes
+    return sorted(result, key=lambda e: (-len(e.features), sorted(e.families))), notes
 
 
 def _trained(
@@ -73,11 +73,11 @@ def _trained(
     seed: int,
 ) -> list[Expert]:
     """The experts that hold out the windows of one of ``folds`` (n,) at a time."""
-    found: list[Expert] = []
+    result: list[Expert] = []
     classes = int(training.codes.max()) + 1
     for families in sets:
         rows = np.flatnonzero(np.all([measured[f] for f in families], axis=0))
-        if found:  # stand-ins for the first are kept cheap
+        if result:  # stand-ins for the first are kept cheap
             folds = folds % _STAND_IN_FOLDS
             if len(families) == 1 and len(rows) > _MANY * classes:
                 rows = rows[::3]
@@ -92,8 +92,8 @@ def _trained(
             continue
         _, renumbered = np.unique(folds[rows], return_inverse=True)
         windows = Examples(features, codes, training.groups[rows], training.starts[rows], renumbered)
-        found.append(train(families, names, windows, threads=min(4, os.cpu_count() or 1), seed=seed))
-    return found
+        result.append(train(families, names, windows, threads=min(4, os.cpu_count() or 1), seed=seed))
+    return result
 
 
 def _candidates(names: Sequence[str], families: frozenset[str]) -> list[str]:

@@ -66,31 +66,31 @@ def features_of(signals: Signals, starts: Floats, layout: Layout) -> Table:
     if len(starts) > _BLOCK:
         blocks = [features_of(signals, starts[k : k + _BLOCK], layout) for k in range(0, len(starts), _BLOCK)]
         return {name: np.concatenate([block[name] for block in blocks]) for name in blocks[0]}
-    found: Table = {}
+    result: Table = {}
     usable = {f: c for f, c in signals.families.items() if f in layout.period}
     with np.errstate(invalid="ignore", divide="ignore"):
         speeds = _wheels(usable.get(SPEED, {}), starts, layout, SPEED)
         if speeds is not None:
-            found |= _named(SPEED, motion(speeds[0], layout.size[SPEED]))
-            found |= _each(SPEED, usable[SPEED], speeds[0], layout)
+            result |= _named(SPEED, motion(speeds[0], layout.size[SPEED]))
+            result |= _each(SPEED, usable[SPEED], speeds[0], layout)
         torques = _wheels(usable.get(TORQUE, {}), starts, layout, TORQUE)
         if torques is not None:
-            found |= _named(TORQUE, effort_of(torques[0], layout.size[TORQUE]))
-            found |= _each(TORQUE, usable[TORQUE], torques[0], layout)
+            result |= _named(TORQUE, effort_of(torques[0], layout.size[TORQUE]))
+            result |= _each(TORQUE, usable[TORQUE], torques[0], layout)
             if speeds is not None:
                 beside = _drive_beside_motion(usable, starts, layout, torques)
-                found |= _named(f"{SPEED}+{TORQUE}", beside)
+                result |= _named(f"{SPEED}+{TORQUE}", beside)
         if GROUND in usable:
-            found |= _ground(usable, starts, layout, speeds)
+            result |= _ground(usable, starts, layout, speeds)
         for family in (TURN, ACCELERATION):
             if family in usable:
-                found |= _body(family, usable[family], starts, layout)
+                result |= _body(family, usable[family], starts, layout)
                 if speeds is not None:
-                    pace = found[f"{SPEED}: pace"]
-                    found[f"{SPEED}+{family}: per speed"] = found[f"{family}: all spread"] - pace
+                    pace = result[f"{SPEED}: pace"]
+                    result[f"{SPEED}+{family}: per speed"] = result[f"{family}: all spread"] - pace
         if speeds is not None and TURN in usable:
-            found |= _named(f"{SPEED}+{TURN}", _yaw(usable, starts, layout, speeds))
-    return found
+            result |= _named(f"{SPEED}+{TURN}", _yaw(usable, starts, layout, speeds))
+    return result
 
 
 @cache
@@ -157,14 +157,14 @@ def _drive_beside_motion(
     effort, pace = over_wheels(np.abs(torque))[0], over_wheels(np.abs(speed))[0]
     net = over_wheels(speed)[0]
     size = layout.size[TORQUE] * layout.size[SPEED]
-    found = {
+    result = {
         "power": log_size((effort * pace).mean(axis=-1), size),
         "rise together": likeness(effort, pace),
         "rise with acceleration": likeness(effort[:, 1:], np.diff(pace, axis=-1)),
     }
     # Wheels are paired by name where both are measured; mean net effort needs no pairing.
     forward = over_wheels(torque)[0] * np.sign(net)
-    found["net effort"] = forward.mean(axis=-1) / layout.size[TORQUE]
+    result["net effort"] = forward.mean(axis=-1) / layout.size[TORQUE]
     pairs = {wheel_of(name): k for k, name in enumerate(usable[SPEED])}
     own = [(k, pairs[wheel_of(n)]) for k, n in enumerate(usable[TORQUE]) if wheel_of(n) in pairs]
     if len(own) > 1:
@@ -173,11 +173,11 @@ def _drive_beside_motion(
         rows = np.arange(len(level))
         floor = FLOOR * layout.size[TORQUE]
         fast, slow = np.nan_to_num(rate).argmax(axis=1), np.nan_to_num(rate, nan=np.inf).argmin(axis=1)
-        found["fast against slow wheel"] = np.log((level[rows, fast] + floor) / (level[rows, slow] + floor))
+        result["fast against slow wheel"] = np.log((level[rows, fast] + floor) / (level[rows, slow] + floor))
         if torque.shape[-1] > 2:
             pair = np.abs(torque[:, [t for t, _ in own]]), speed[:, [s for _, s in own]]
-            found |= sides(*pair, layout.size[TORQUE], layout.size[SPEED])
-    return found
+            result |= sides(*pair, layout.size[TORQUE], layout.size[SPEED])
+    return result
 
 
 def _ground(
@@ -192,7 +192,7 @@ def _ground(
     size = layout.size[GROUND]
     moving = _stack(channels, starts, layout, period, channels["ground_speed"])[:, 0]
     level = np.abs(moving).mean(axis=-1)
-    found = _named(
+    result = _named(
         GROUND,
         {
             "level": log_size(level, size),
@@ -202,8 +202,8 @@ def _ground(
     if speeds is not None:
         pace = over_wheels(np.abs(speeds[0]))[0].mean(axis=-1)
         slip = log_size(pace, layout.size[SPEED]) - log_size(level, size)
-        found[f"{SPEED}+{GROUND}: slip"] = slip
-    return found
+        result[f"{SPEED}+{GROUND}: slip"] = slip
+    return result
 
 
 def _body(family: str, channels: dict[str, Channel], starts: Floats, layout: Layout) -> Table:
@@ -213,41 +213,41 @@ def _body(family: str, channels: dict[str, Channel], starts: Floats, layout: Lay
     size = layout.size[family]
     values = _stack(channels, starts, layout, period, _lead(channels))
     axes = [name.rpartition("_")[2] for name in channels]
-    found: Table = {}
+    result: Table = {}
     each = moments(values)
     spread = np.log(each.pop("spread") / size + 1e-3)
     total = 0.5 * np.log(np.nansum(np.exp(2 * spread), axis=1)) + 0.0 * spread.sum(axis=1)
-    found["all spread"] = total
-    found["unsteadiness"] = unsteadiness(values)
+    result["all spread"] = total
+    result["unsteadiness"] = unsteadiness(values)
     energies = band_energies(values, period, edges) / size**2 if len(edges) else None
     if energies is not None:
         whole = energies.sum(axis=1)
-        found |= {f"all {name}": shape for name, shape in spectral_shape(whole, edges).items()}
+        result |= {f"all {name}": shape for name, shape in spectral_shape(whole, edges).items()}
         spectrum = np.log(energies + 1e-7)
         resolved = np.isfinite(spectrum)
         mean = np.where(resolved, spectrum, 0.0).sum(axis=-1, keepdims=True)
         shape = spectrum - mean / resolved.sum(axis=-1, keepdims=True)
         octaves = _octaves(whole)
-        found |= {f"all octave {k}": np.log(band + 1e-7) for k, band in enumerate(octaves)}
+        result |= {f"all octave {k}": np.log(band + 1e-7) for k, band in enumerate(octaves)}
     for k, axis in enumerate(axes):
-        found[f"{axis} spread"] = spread[:, k]
-        found[f"{axis} share"] = spread[:, k] - total
-        found |= {f"{axis} {name}": of_axes[:, k] for name, of_axes in each.items()}
+        result[f"{axis} spread"] = spread[:, k]
+        result[f"{axis} share"] = spread[:, k] - total
+        result |= {f"{axis} {name}": of_axes[:, k] for name, of_axes in each.items()}
         if energies is not None:
-            found |= {f"{axis} band {b}": shape[:, k, b] for b in range(shape.shape[-1])}
+            result |= {f"{axis} band {b}": shape[:, k, b] for b in range(shape.shape[-1])}
         for j in range(k):
-            found[f"{axes[j]}{axis} alike"] = np.abs(likeness(values[:, j], values[:, k]))
-    return _named(family, found)
+            result[f"{axes[j]}{axis} alike"] = np.abs(likeness(values[:, j], values[:, k]))
+    return _named(family, result)
 
 
 def _octaves(energies: Floats) -> list[Floats]:
     """Band energies (windows, bands) summed by octave, from the highest down."""
-    found, high = [], energies.shape[-1]
+    result, high = [], energies.shape[-1]
     while high >= 1:
         low = high // 2
-        found.append(energies[:, low:high].sum(axis=-1))
+        result.append(energies[:, low:high].sum(axis=-1))
         high = low
-    return found
+    return result
 
 
 def _yaw(

@@ -62,7 +62,7 @@ class Forest:
 
     def decide(self, features: Floats) -> Floats:
         """Log probabilities (n, classes), no class being ruled out, of windows with these features (n, features)."""
-        found = np.empty((len(features), self.share.shape[1]))
+        result = np.empty((len(features), self.share.shape[1]))
         for begin in range(0, len(features), 1000):  # bounds the memory of a long drive
             block = _filled(features[begin : begin + 1000], self.centre)
             rows = np.arange(len(block))[:, None]
@@ -73,8 +73,8 @@ class Forest:
                 if np.array_equal(onward, node):
                     break
                 node = onward
-            found[begin : begin + 1000] = self.share[node].mean(axis=1)
-        return doubting_log(found)
+            result[begin : begin + 1000] = self.share[node].mean(axis=1)
+        return doubting_log(result)
 
     def check(self) -> None:
         """Raise ValueError on nodes that do not make trees."""

@@ -34,7 +34,7 @@ def read_labels(path: str | os.PathLike[str], logs: Sequence[Path] = ()) -> list
     the name of one. Raises InputError, naming the row, on a label that names no run, a run without a label or with two, an
     empty label, and a file that is no such table.
     """
-    found: list[LabelledDrive] = []
+    result: list[LabelledDrive] = []
     taken: dict[Path, int] = {}
     folder = Path(path).parent
     for row, cells in _rows(path):
@@ -58,15 +58,15 @@ def read_labels(path: str | os.PathLike[str], logs: Sequence[Path] = ()) -> list
             problem = f"{name} is labelled in row {taken[log]} too"
             raise InputError(problem, file=path, place=place, hint="name each run once")
         taken[log] = row
-        found.append(LabelledDrive(label, (log, *others)))
+        result.append(LabelledDrive(label, (log, *others)))
     for log in logs:
         if log not in taken:
             raise InputError(
                 f"holds no label for {log}", file=path, hint="add a row for it, or leave the log out"
             )
-    if not found:
+    if not result:
         raise InputError("holds no run", file=path, hint="write a row for each run: file,label")
-    return found
+    return result
 
 
 def stretches(columns: Columns, labels: npt.NDArray[Any], shortest: float) -> list[tuple[Columns, str]]:
@@ -77,12 +77,12 @@ def stretches(columns: Columns, labels: npt.NDArray[Any], shortest: float) -> li
     time = np.asarray(columns["time"], dtype=float)
     text = np.array(["" if label is None or label != label else str(label) for label in labels], dtype=str)
     borders = np.flatnonzero(text[1:] != text[:-1]) + 1
-    found: list[tuple[Columns, str]] = []
+    result: list[tuple[Columns, str]] = []
     for part in np.split(np.arange(len(text)), borders):
         if len(part) > 1 and text[part[0]] and time[part[-1]] - time[part[0]] >= shortest:
             rows = slice(int(part[0]), int(part[-1]) + 1)
-            found.append(({name: values[rows] for name, values in columns.items()}, str(text[part[0]])))
-    return found
+            result.append(({name: values[rows] for name, values in columns.items()}, str(text[part[0]])))
+    return result
 
 
 def _rows(path: str | os.PathLike[str]) -> list[tuple[int, dict[str, str]]]:

@@ -40,6 +40,6 @@ def classes_of(labels: Any, count: int) -> tuple[npt.NDArray[Any], npt.NDArray[n
         raise InputError("texts and numbers are mixed", place="labels", hint="give labels of one kind")
     classes, codes = np.unique(np.array(listed), return_inverse=True)
     if len(classes) < 2:
-        said = f"there is one ground only, {classes[0]!s}" if len(classes) else "there is no recording"
-        raise InputError(said, place="labels", hint="give recordings of two grounds or more")
+        sentence = f"there is one ground only, {classes[0]!s}" if len(classes) else "there is no recording"
+        raise InputError(sentence, place="labels", hint="give recordings of two grounds or more")
     return classes, codes

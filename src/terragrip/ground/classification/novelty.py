@@ -53,12 +53,12 @@ class Strangeness:
 def _averaged(strange: Floats, groups: npt.NDArray[np.intp], starts: Floats, span: float) -> Floats:
     if not span:
         return strange
-    found = np.empty(len(strange))
+    result = np.empty(len(strange))
     for group in np.unique(groups):
         mine = np.flatnonzero(groups == group)
         mine = mine[np.argsort(starts[mine], kind="stable")]
-        found[mine] = nearby_mean(strange[mine], starts[mine], span / 2)
-    return found
+        result[mine] = nearby_mean(strange[mine], starts[mine], span / 2)
+    return result
 
 
 def _exceeded(strange: Floats, weight: Floats) -> Floats:

@@ -136,10 +136,10 @@ def _arrays(expert: Expert) -> dict[str, Any]:
         "law": parts.law,
     }
     there = {name: part for name, part in held.items() if part is not None}
-    found = {
+    result = {
         _key(name, field): getattr(part, field) for name, part in there.items() for field in _PARTS[name]
     }
-    return {_OFFSETS: expert.offsets, **found}
+    return {_OFFSETS: expert.offsets, **result}
 
 
 def _key(part: str, field: str) -> str:

@@ -90,7 +90,7 @@ def effort_of(torque: Floats, size: float) -> Table:
     step = np.sqrt(over_wheels(np.diff(torque, axis=-1) ** 2)[0].mean(axis=-1))
     hardest = over_wheels(effort.mean(axis=-1))
     spread = over_wheels(torque.std(axis=-1))
-    found = {
+    result = {
         "level": log_size(level, size),
         "spread": log_size(along["spread"], size),
         "evenness": np.log(along["spread"] / base + FLOOR),
@@ -111,8 +111,8 @@ def effort_of(torque: Floats, size: float) -> Table:
     count = np.isfinite(flat).sum(axis=-1)
     for share in (0.1, 0.25, 0.5, 0.75, 0.9):
         at = np.clip(np.rint(share * (count - 1)), 0, None).astype(int)
-        found[f"quantile {share:g}"] = log_size(flat[np.arange(len(flat)), at], size)
-    return found
+        result[f"quantile {share:g}"] = log_size(flat[np.arange(len(flat)), at], size)
+    return result
 
 
 def sides(effort: Floats, speed: Floats, size: float, usual_speed: float) -> Table:
@@ -131,7 +131,7 @@ def sides(effort: Floats, speed: Floats, size: float, usual_speed: float) -> Tab
     difference = (fast - slow).mean(axis=-1) / size
     travelled = over_wheels(effort * pace)[0].mean(axis=-1) / (usual + 0.1 * usual_speed)
     speed_jerk = over_wheels(jerk(speed))[0]
-    found = {
+    result = {
         "fast level": log_size(fast.mean(axis=-1), size),
         "slow level": log_size(slow.mean(axis=-1), size),
         "difference": np.clip(difference, -3.0, 3.0),
@@ -149,7 +149,7 @@ def sides(effort: Floats, speed: Floats, size: float, usual_speed: float) -> Tab
         ),
         "per way": log_size(travelled, size),
     }
-    return {f"{SIDES}{name}": values for name, values in found.items()}
+    return {f"{SIDES}{name}": values for name, values in result.items()}
 
 
 def jerk(values: Floats) -> Floats:

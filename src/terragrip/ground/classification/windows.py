@@ -38,17 +38,17 @@ def samples_in(
     first = np.minimum(np.searchsorted(lead.time, starts - 1e-6 * period), len(lead.time) - 1)
     instants = lead.time[first][:, None] + period * np.arange(count)
     inside = (instants > starts[:, None] - period) & (instants < starts[:, None] + window + period)
-    found = np.empty((len(starts), len(channels), count))
+    result = np.empty((len(starts), len(channels), count))
     before: Channel | None = None
     measured = np.empty(0, dtype=bool)
     for k, channel in enumerate(channels):
         if before is None or not np.array_equal(channel.time, before.time):
             near = _distance(channel.time, instants) <= _NEAR * max(period, channel.period)
             measured = (near & inside).mean(axis=1) >= _MEASURED
-        found[:, k] = np.interp(instants, channel.time, channel.values)
-        found[~measured, k] = np.nan
+        result[:, k] = np.interp(instants, channel.time, channel.values)
+        result[~measured, k] = np.nan
         before = channel
-    return found
+    return result
 
 
 def _distance(time: Floats, instants: Floats) -> Floats:

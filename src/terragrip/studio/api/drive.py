@@ -43,15 +43,15 @@ def _table(studio: Studio, path: str, version: str = "") -> Estimates:
 def about(studio: Here, path: Named) -> dict[str, Any]:
     """What a run holds: columns, wheels, time, events with their reasons, soils, the recording it came from, the ground where known."""
     table = _table(studio, path)
-    found = drive.recording_of(studio, table, search=True)
+    result = drive.recording_of(studio, table, search=True)
     plain: dict[str, Any] = finite(
         {
             "rows": len(table),
             "start": float(table.time[0]) if len(table) else 0.0,
             "end": float(table.time[-1]) if len(table) else 0.0,
             "columns": list(table.columns),
-            "measured": [] if found is None else sorted(found[1].channels),
-            "recording": None if found is None else studio.folder.name(found[0]),
+            "measured": [] if result is None else sorted(result[1].channels),
+            "recording": None if result is None else studio.folder.name(result[0]),
             "wheels": list(table.wheels),
             "method": table.method,
             "vehicle": table.vehicle.name,
@@ -74,8 +74,8 @@ def window(
     table = _table(studio, path, version)
     if not len(table) or end <= start:
         raise InputError("holds nothing between these times", file=path)
-    found = drive.recording_of(studio, table) if any(c.startswith(MEASURED) for c in column) else None
-    recording = None if found is None else found[1]
+    result = drive.recording_of(studio, table) if any(c.startswith(MEASURED) for c in column) else None
+    recording = None if result is None else result[1]
     shown = studio.shown.get(studio.folder.file(path))
     cut, time, columns = shown.window(recording, column, start, end, width)
     head = {"columns": ["time", *column], "count": len(time), "cut": cut}
@@ -104,8 +104,8 @@ def sample(studio: Here, path: Named, time: Time, version: str = "") -> dict[str
     table = _table(studio, path, version)
     if not len(table):
         raise InputError("holds no rows", file=path)
-    found = drive.recording_of(studio, table)
-    plain: dict[str, Any] = finite(drive.sample(table, None if found is None else found[1], time))
+    result = drive.recording_of(studio, table)
+    plain: dict[str, Any] = finite(drive.sample(table, None if result is None else result[1], time))
     return plain
 
 

@@ -38,12 +38,12 @@ async def notices(socket: WebSocket, studio: Here) -> None:
     await socket.accept()
     queue = studio.notices.join()
 
-    async def hear_the_end() -> None:
+    async def wait_for_end() -> None:
         with contextlib.suppress(WebSocketDisconnect):
             while True:
                 await socket.receive_text()
 
-    end = asyncio.create_task(hear_the_end())
+    end = asyncio.create_task(wait_for_end())
     try:
         while not end.done():
             wait = asyncio.create_task(queue.get())
@@ -70,7 +70,7 @@ def get_file(studio: Here, path: Named) -> Response:
 
 
 @router.put("/file", status_code=201)
-async def take_file(request: Request, studio: Here, path: Named, replace: bool = False) -> dict[str, Any]:
+async def upload(request: Request, studio: Here, path: Named, replace: bool = False) -> dict[str, Any]:
     """Take a file into the folder, whole or not at all; its content must be what its name says."""
     target = _free(studio.folder, path, replace)
     temporary = target.with_name(f".{secrets.token_hex(8)}{_suffixes(target)}")
@@ -102,14 +102,14 @@ def inspect_log(
     log = studio.folder.file(path)
     chosen = studio.folder.file(profile) if profile else None
     machine = studio.folder.file(vehicle) if vehicle else None
-    found = inspect(log, chosen, machine)
-    problem = _begun(log, chosen, machine, method) if found.ready and machine is not None else None
+    inspection = inspect(log, chosen, machine)
+    problem = _begun(log, chosen, machine, method) if inspection.ready and machine is not None else None
     root = f"{studio.folder.root}/"
     plain: dict[str, Any] = {
-        **finite(found.to_dict()),
+        **finite(inspection.to_dict()),
         "file": path,
-        "text": found.to_text().replace(root, ""),
-        "ready": found.ready and problem is None,
+        "text": inspection.to_text().replace(root, ""),
+        "ready": inspection.ready and problem is None,
         "problem": None if problem is None else problem.replace(root, ""),
     }
     return plain

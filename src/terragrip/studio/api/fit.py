@@ -159,14 +159,14 @@ def fit(studio: Here, wanted: FitRequest) -> dict[str, Any]:
         if slip.size < 2:
             raise InputError("there are fewer than two points", hint="choose a soil, or click points")
         curve = _unfitted(wanted, _bins_of_points(slip)).fit(slip, adhesion, np.arange(slip.size))
-    found: dict[str, Any] = curve.to_dict()
+    result: dict[str, Any] = curve.to_dict()
     grid = np.linspace(0.0, 1.0, 101)
     if curve.samples_ is not None:
         low, high = curve.band(grid)
-        found["band"] = {"slip": grid.tolist(), "low": low.tolist(), "high": high.tolist()}
-    found["peak"] = curve.peak()
-    found["at_bound"] = curve.at_bound_
-    plain: dict[str, Any] = finite(found)
+        result["band"] = {"slip": grid.tolist(), "low": low.tolist(), "high": high.tolist()}
+    result["peak"] = curve.peak()
+    result["at_bound"] = curve.at_bound_
+    plain: dict[str, Any] = finite(result)
     return plain
 
 
@@ -238,14 +238,14 @@ def _gathered(studio: Studio, target: Path, soil: str) -> GatheredRuns:
     labelled = "soil" in table and any(table["soil"] != "")
     every = GatheredRuns()
     every.add(table, target.stem, None if labelled else "unlabelled", studio.folder.name(target))
-    found = every.only(soil if labelled else "unlabelled")
-    if not found.pairs:
+    result = every.only(soil if labelled else "unlabelled")
+    if not result.pairs:
         raise InputError(
             f"no usable samples on {soil or 'unlabelled ground'}",
             file=studio.folder.name(target),
             hint="choose another soil",
         )
-    return found
+    return result
 
 
 def _shown(name: str, studio: Studio, target: Path) -> dict[str, Any]:

@@ -73,11 +73,11 @@ async def _send_all(socket: WebSocket, frames: AsyncIterator[str | bytes]) -> No
             else:
                 await socket.send_bytes(frame)
 
-    async def hear() -> None:
+    async def receive() -> None:
         while True:
             await socket.receive_text()
 
-    tasks = {asyncio.create_task(pump()), asyncio.create_task(hear())}
+    tasks = {asyncio.create_task(pump()), asyncio.create_task(receive())}
     done, pending = await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
     for task in pending:
         task.cancel()

@@ -84,7 +84,7 @@ async def put_calibration(
     file = _beside(studio.folder.file(path))
     with replacing(file) as temporary:
         temporary.write_text(calibration.model_dump_json(indent=1) + "\n", encoding="utf-8")
-    studio.notices.tell("picture", path=path, by=by)
+    studio.notices.publish("picture", path=path, by=by)
     return {"path": studio.folder.name(file)}
 
 
