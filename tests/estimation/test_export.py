@@ -111,16 +111,17 @@ def test_a_matlab_file_is_plain_structs(written, estimates):
     from scipy.io import loadmat
 
     path = written(".mat")
-    assert top_level_of(path.read_bytes()) == dict.fromkeys(
-        ("estimates", "units", "descriptions", "about"), 2
-    )
+    structs = ("estimates", "units", "descriptions", "texts", "about")
+    assert top_level_of(path.read_bytes()) == dict.fromkeys(structs, 2)
     found = loadmat(path, simplify_cells=False)
     struct_ = found["estimates"][0, 0]
     assert struct_.dtype.names == estimates.names
-    assert struct_["slip_fl"].shape == (len(estimates), 1)
-    columns = {name: struct_[name] for name in estimates}
-    columns |= {n: np.char.rstrip(struct_[n]) for n in ("event", "soil")}
-    same({n: v[:, 0] if v.ndim == 2 else v for n, v in columns.items()}, estimates)
+    assert all(struct_[name].shape == (len(estimates), 1) for name in estimates)
+    columns = {name: struct_[name][:, 0] for name in estimates}
+    for name in ("event", "soil"):
+        texts = [str(cell[0]) if len(cell) else "" for cell in found["texts"][0, 0][name][:, 0]]
+        columns[name] = [texts[int(number) - 1] for number in columns[name]]
+    same(columns, estimates)
     assert found["units"][0, 0]["wheel_speed_rr"][0] == "rad/s"
     assert found["about"][0, 0]["start"][0] == "2019-06-12T08:00:00.250000+00:00"
     assert found["about"][0, 0]["notes"][0, 0][0] == NOTE

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -17,14 +18,17 @@ if TYPE_CHECKING:
 
 
 class MatFile:
-    """Structs ``estimates`` (columns (n, 1); texts as rows of characters), ``units`` and ``descriptions`` by the same names, ``about``.
+    """Structs ``estimates`` (columns (n, 1)), ``units`` and ``descriptions`` by the same names, ``about``, and ``texts``: a column of
+    texts holds numbers from 1, of the texts in its cell there.
 
-    ``struct2table(estimates)`` gives MATLAB's table, ``cellstr(estimates.event)`` the texts.
+    ``struct2table(estimates)`` gives MATLAB's table, ``texts.event(estimates.event)`` its texts. Not a matrix of characters: Octave
+    takes its UTF-8 apart byte by byte.
     """
 
     def __init__(self, path: Path, first: Estimates, target: Path) -> None:
         self._path, self._target, self._first, self._rows = path, target, first, 0
         self._parts: dict[str, list[Any]] = {name: [] for name in first.names}
+        self._texts: dict[str, dict[str, int]] = {name: {} for name in ("event", *first.labels)}
 
     def write(self, part: Estimates) -> None:
         """Keep the rows of a part: a struct is written whole."""
@@ -36,8 +40,12 @@ class MatFile:
                 file=self._target, hint="write .parquet (parquetread), or give a shorter part of the log",
             )  # fmt: skip
         for name, parts in self._parts.items():
-            values = part[name]
-            parts.append(values.astype(str) if values.dtype.kind == "O" else values)
+            parts.append(self._coded(name, part) if name in self._texts else part[name])
+
+    def _coded(self, name: str, part: Estimates) -> Any:
+        """A column of texts as numbers (n,) from 1."""
+        known = self._texts[name]
+        return np.array([known.setdefault(text, len(known) + 1) for text in part[name].tolist()], dtype=float)
 
     def close(self) -> None:
         """Write the file."""
@@ -45,16 +53,14 @@ class MatFile:
 
         columns: dict[str, Any] = {}
         for name in self._first.names:  # joined one by one, so that no column stands twice for long
-            values = np.concatenate(self._parts.pop(name))
-            columns[name] = values if values.dtype.kind == "U" else values[:, None]
+            columns[name] = np.concatenate(self._parts.pop(name))[:, None]
         meanings = {name: column_named(name) for name in self._first.names}
-        notes = np.empty(len(self._first.notes), dtype=object)
-        notes[:] = self._first.notes
         content = {
             "estimates": columns,
             "units": {name: column.unit for name, column in meanings.items()},
             "descriptions": {name: column.description for name, column in meanings.items()},
-            "about": {**about_texts(self._first), "notes": notes},
+            "texts": {name: _cell(known) for name, known in self._texts.items()},
+            "about": {**about_texts(self._first), "notes": _cell(self._first.notes)},
         }
         with self._path.open("wb") as stream:
             savemat(stream, content, long_field_names=True)
@@ -62,3 +68,10 @@ class MatFile:
     def drop(self) -> None:
         """Nothing was written."""
         self._parts.clear()
+
+
+def _cell(texts: Collection[str]) -> Any:
+    """Texts as a cell (n, 1)."""
+    cell = np.empty((len(texts), 1), dtype=object)
+    cell[:, 0] = list(texts)
+    return cell
