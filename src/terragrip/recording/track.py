@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -27,7 +28,7 @@ _GRADE_WAY = 16.0  # m
 @dataclass(frozen=True)
 class Track:
     """At each fix: ``time`` (n,) [s], ``north`` and ``east`` (n,) [m], ``speed`` (n,) [m/s], ``turn`` (n,) [rad/s, to the left] and
-    ``grade`` (n,) [rad, uphill].
+    ``grade`` (n,) [rad, uphill], from ``altitude`` (n,) [m]; ``gap`` (n,): whether fixes are missing there.
 
     ``turn`` and ``grade`` are NaN where the vehicle hardly moves, or the positions are too noisy to tell; ``grade`` too without altitude.
     """
@@ -37,7 +38,15 @@ class Track:
     east: Floats
     speed: Floats
     turn: Floats
-    grade: Floats
+    altitude: Floats
+    gap: npt.NDArray[np.bool_]
+
+    @cached_property
+    def grade(self) -> Floats:
+        """Grade (n,) [rad, uphill]; it takes longer than all the rest, and few ask for it."""
+        found = _grade(self.time, self.speed, self.altitude)
+        found[(self.speed < _SLOWEST) | self.gap] = np.nan
+        return found
 
     def at(self, name: str, time: Floats) -> Floats:
         """A column at other instants (m,), NaN further from a fix than the window is long."""
@@ -85,32 +94,42 @@ def track_of(recording: Recording, window: float = WINDOW) -> Track | None:
     reach = np.ptp(ago, axis=1)
     gap = reach > 3 * max(window, float(np.median(reach)))
     turn[(speed < _SLOWEST) | gap | ~(bent < _VAGUE_TURN * speed)] = np.nan
-    grade = _grade(recording, time[middle], speed)
-    grade[(speed < _SLOWEST) | gap] = np.nan
-    return Track(time[middle], north[middle], east[middle], speed, turn, grade)
+    altitude = _altitude(recording, time[middle])
+    return Track(time[middle], north[middle], east[middle], speed, turn, altitude, gap)
+
+
+def _altitude(recording: Recording, time: Floats) -> Floats:
+    """Altitude [m] at instants (n,), NaN without any."""
+    altitude = recording.channels.get("altitude")
+    if altitude is None or np.isfinite(altitude).sum() < 2:
+        return np.full(len(time), np.nan)
+    known = np.isfinite(altitude)
+    return np.interp(time, recording.time[known], altitude[known])
 
 
 def _fitted(ago: Floats, values: Floats, degree: int) -> tuple[Floats, Floats]:
     """Coefficients (n, 1 + degree) of polynomials through rows of (n, k), about 0, and their SDs by what the rows scatter about them."""
     size = np.maximum(np.abs(ago).max(axis=1, keepdims=True), 1e-9)
-    basis = (ago / size)[:, :, None] ** np.arange(degree + 1)
-    normal = np.einsum("nki,nkj->nij", basis, basis)
-    right = np.einsum("nki,nk->ni", basis, values)
+    place, powers = np.arange(degree + 1), [np.ones_like(ago)]
+    for _ in range(2 * degree):
+        powers.append(powers[-1] * (ago / size))
+    moments = np.stack([power.sum(axis=1) for power in powers], axis=1)
+    normal = moments[:, place[:, None] + place]
+    right = np.stack([np.sum(powers[k] * values, axis=1) for k in place], axis=1)
     result = np.linalg.solve(normal, right[..., None])[..., 0]
     freedom = ago.shape[1] - degree - 1
-    square = np.sum((values - np.einsum("nki,ni->nk", basis, result)) ** 2, axis=1) / freedom
+    left = values - sum(result[:, k, None] * powers[k] for k in place)
+    square = np.sum(left**2, axis=1) / freedom
     spread = np.sqrt(np.median(square) * np.diagonal(np.linalg.inv(normal), axis1=1, axis2=2))
-    powers = size ** np.arange(degree + 1)
-    return np.asarray(result / powers), np.asarray(spread / powers)
+    scale = size**place
+    return np.asarray(result / scale), np.asarray(spread / scale)
 
 
-def _grade(recording: Recording, time: Floats, speed: Floats) -> Floats:
+def _grade(time: Floats, speed: Floats, height: Floats) -> Floats:
     """Grade (n,) [rad]: cubics through the altitude over `_GRADE_WAY` metres, which do not flatten hills as straight lines do."""
-    altitude, unknown = recording.channels.get("altitude"), np.full(len(time), np.nan)
-    if altitude is None or np.isfinite(altitude).sum() < 2 or not (speed > _SLOWEST).any():
+    unknown = np.full(len(time), np.nan)
+    if np.isnan(height).all() or not (speed > _SLOWEST).any():
         return unknown
-    known = np.isfinite(altitude)
-    height = np.interp(time, recording.time[known], altitude[known])
     way = np.r_[0.0, np.cumsum(np.diff(time) * (speed[1:] + speed[:-1]) / 2)]
     step = float(np.median(np.diff(way)[speed[1:] > _SLOWEST])) if len(way) > 1 else 0.0
     span = max(7, int(_GRADE_WAY / max(step, 1e-6)) | 1)
