@@ -48,6 +48,7 @@ def place(tmp_path: Path) -> Path:
     """A folder with a good log and a good vehicle file."""
     table().to_csv(tmp_path / "log.csv", index=False)
     (tmp_path / "vehicle.yaml").write_text(VEHICLE)
+    (tmp_path / "empty").mkdir()
     return tmp_path
 
 
@@ -89,7 +90,8 @@ def refused(place: Path, capsys: pytest.CaptureFixture[str]) -> Refused:
     ("log", "words"),
     [
         ("logg.csv", ["logg.csv", "no such file", "log.csv"]),
-        (".", ["is a folder"]),
+        ("empty", ["holds no log"]),
+        ("*.mat", ["no file matches"]),
         (table().iloc[:0], ["bad.csv", "empty"]),
         (table().drop(columns="ground_speed"), ["ground_speed"]),
         (table().rename(columns={"ground_speed": "groundspeed"}), ["ground_speed", "'groundspeed'"]),

@@ -27,7 +27,7 @@ def estimate_file(
     output: PathLike,
     method: str = DEFAULT,
     *,
-    profile: Profile | PathLike | None = None,
+    profile: Profile | PathLike | Sequence[Profile | PathLike | None] | None = None,
     dbc: Sequence[PathLike] = (),
     smooth: bool = False,
     sensors: Mapping[str, float] | None = None,

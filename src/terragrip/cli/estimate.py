@@ -1,13 +1,15 @@
-"""``terragrip estimate``: from a log to estimates."""
+"""``terragrip estimate``: from logs to estimates."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from terragrip.cli.options import DbcFiles, Logs, OtherSources, ProfileFile, Quiet, VehicleFile
+from terragrip.cli.drives import Drive, drives_in, drives_of
+from terragrip.cli.options import DbcFiles, OtherSources, ProfileFiles, Quiet, VehicleFile
 from terragrip.cli.output import check_file, check_folder, files_in
 from terragrip.cli.progress import progress
 from terragrip.errors import InputError
@@ -16,7 +18,6 @@ from terragrip.estimation.methods import DEFAULT, METHODS
 
 
 def command(
-    logs: Logs,
     vehicle: VehicleFile,
     output: Annotated[
         Path,
@@ -27,9 +28,23 @@ def command(
             help="Parquet file, or another by its suffix (docs/export.md); with several logs, a folder.",
         ),
     ],
-    profile: ProfileFile = None,
+    logs: Annotated[
+        list[Path] | None,
+        typer.Argument(
+            metavar="LOG", help="Logs of any known format (docs/formats.md), or folders or patterns of them."
+        ),
+    ] = None,
+    profile: ProfileFiles = None,
     dbc: DbcFiles = None,
     others: OtherSources = None,
+    table: Annotated[
+        Path | None,
+        typer.Option(
+            "--drives",
+            metavar="TABLE",
+            help="In place of LOG: a CSV with the columns log, profile, drive; logs of one drive are joined.",
+        ),
+    ] = None,
     method: Annotated[str, typer.Option(metavar="NAME", help=f"One of {', '.join(METHODS)}.")] = DEFAULT,
     smooth: Annotated[bool, typer.Option("--smooth", help="Run the whole log backwards too.")] = False,
     quiet: Quiet = False,
@@ -37,7 +52,8 @@ def command(
     """Estimate traction from logs.
 
     Adhesion, slip, soil resistance, net traction and efficiency of every wheel at every row, each with its
-    standard deviation, as Parquet. Where no torque was logged: slip, from speeds alone.
+    standard deviation, as Parquet. Where no torque was logged: slip, from speeds alone. A log of several that cannot be read
+    does not stop the others; the exit code is 2 then.
     """
     from terragrip.estimation.methods import method_named
     from terragrip.from_log import estimate_file
@@ -45,43 +61,103 @@ def command(
 
     if not method_named(method).can_smooth and smooth:
         raise InputError(f"the method {method} cannot smooth", place="--smooth", hint="choose another method")
-    if others and len(logs) > 1:
-        raise InputError(
-            "there are several logs", place="--with", hint="join the sources of one log at a time"
-        )
     machine = Vehicle.load(vehicle)
-    targets = _targets(
-        logs, output, [vehicle, *([profile] if profile else []), *(dbc or []), *(others or [])]
-    )
-    for number, (log, target) in enumerate(zip(logs, targets, strict=True), 1):
-        title = log.name if len(logs) == 1 else f"{log.name} ({number} of {len(logs)})"
+    drives = _drives(logs or [], profile or [], others or [], table)
+    used = [p for drive in drives for p in drive.profiles if p is not None]
+    targets = _targets(drives, output, [vehicle, *used, *(dbc or []), *([table] if table else [])])
+
+    def estimated(drive: Drive, target: Path, title: str) -> str:
         with progress(title, quiet) as step:
-            text = estimate_file(
-                [log, *others] if others else log,
+            return estimate_file(
+                drive.source,
                 machine,
                 target,
                 method,
-                profile=profile,
+                profile=drive.profile,
                 dbc=dbc or (),
                 smooth=smooth,
                 progress=step,
             )
+
+    if len(drives) == 1:
+        text = estimated(drives[0], targets[0], drives[0].name)
         if not quiet:
-            print(text if len(logs) == 1 else f"{log.name}: {text.splitlines()[0]}")
-    if not quiet:
-        print(f"Written to {output}")
+            print(text)
+            print(f"Written to {output}")
+        return
+    _one_by_one(drives, targets, output, estimated, quiet)
 
 
-def _targets(logs: list[Path], output: Path, beside: list[Path]) -> list[Path]:
-    """The file of each log's estimates, tried before the long work; ``beside`` are the other inputs."""
+def _drives(logs: list[Path], profiles: list[Path], others: list[Path], table: Path | None) -> list[Drive]:
+    """What to estimate; raises InputError where the call says it twice or not at all, or a profile cannot be used."""
+    from terragrip.formats import Profile
+
+    if table is not None:
+        if logs or profiles or others:
+            raise InputError(
+                "names the logs and profiles itself",
+                file=table,
+                place="--drives",
+                hint="leave out the others",
+            )
+        drives = drives_in(table)
+    elif logs:
+        drives = drives_of(logs, profiles, others)
+    else:
+        raise InputError("no log is named", place="LOG", hint="name logs or a folder, or a table by --drives")
+    for profile in {profile for drive in drives for profile in drive.profiles if profile is not None}:
+        Profile.load(profile)
+    return drives
+
+
+def _one_by_one(
+    drives: list[Drive],
+    targets: list[Path],
+    output: Path,
+    estimated: Callable[[Drive, Path, str], str],
+    quiet: bool,
+) -> None:
+    """Estimate all drives; those that cannot be are named on standard error, and raise InputError at the end."""
+    faults = []
+    for number, (drive, target) in enumerate(zip(drives, targets, strict=True), 1):
+        try:
+            text = estimated(drive, target, f"{drive.name} ({number} of {len(drives)})")
+        except InputError as error:
+            fault = str(error) if drive.logs[0].name in str(error) else f"{drive.name}: {error}"
+            faults.append(fault)
+            continue
+        if not quiet:
+            first, *rest = text.splitlines()
+            print(
+                "\n  ".join([f"{drive.name}: {first}", *(line for line in rest if line.startswith("Note: "))])
+            )
+    if not quiet and len(faults) < len(drives):
+        print(f"Written to {output}: {len(drives) - len(faults)} of {len(drives)}")
+    for fault in faults[:-1]:
+        typer.echo(f"terragrip: {fault}", err=True)
+    if faults:
+        raise InputError(
+            f"{faults[-1]} ({len(faults)} of {len(drives)} logs could not be estimated; the others are)"
+        )
+
+
+def _targets(drives: list[Drive], output: Path, beside: list[Path]) -> list[Path]:
+    """The file of each drive's estimates, tried before the long work; ``beside`` are the other inputs."""
+    logs = [log for drive in drives for log in drive.logs]
     inputs = [*logs, *beside]
-    if len(logs) == 1:
+    if len(drives) == 1:
         target = check_file(output, inputs, suffixes=tuple(KINDS))
         require_suffix(target)
         return [target]
+    if output.suffix.lower() in KINDS and not output.is_dir():
+        raise InputError(
+            f"is one file for {len(drives)} logs", file=output, place="--output", hint="name a folder"
+        )
     for log in logs:
         if not log.exists():
             raise InputError("no such file", file=log, hint="check the path")
-    targets = files_in(output, logs, ".parquet")
+    targets = files_in(
+        output, [drive.logs[0].with_name(Path(drive.name).name) for drive in drives], ".parquet"
+    )
     check_folder(output)
     return [check_file(target, inputs) for target in targets]

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from terragrip.cli.drives import logs_in
 from terragrip.cli.options import DbcFiles, ProfileFile
 from terragrip.cli.output import check_file
 from terragrip.errors import InputError
@@ -18,7 +19,9 @@ if TYPE_CHECKING:
 def command(
     logs: Annotated[
         list[Path],
-        typer.Argument(metavar="LOG", help="Logs of any known format (docs/formats.md), or folders of them."),
+        typer.Argument(
+            metavar="LOG", help="Logs of any known format (docs/formats.md), or folders or patterns of them."
+        ),
     ],
     profile: ProfileFile = None,
     dbc: DbcFiles = None,
@@ -45,7 +48,7 @@ def command(
                 "exists already", file=write_profile, place="--write-profile", hint="name a new file"
             )
         check_file(write_profile, option="--write-profile")
-    paths = _logs_in(logs)
+    paths = logs_in(logs)
     if len(paths) == 1:
         result = [inspect(paths[0], profile, vehicle, dbc=dbc or ())]
         print(result[0].to_text())
@@ -73,29 +76,6 @@ def command(
             file=result[0].file,
             hint="log the wheels too, or join it to a log that has them",
         )
-
-
-def _logs_in(paths: list[Path]) -> list[Path]:
-    """The logs, with those of each folder that is not a bag itself; raises InputError where a folder holds none."""
-    from terragrip.formats.registry import is_bag, suffixes
-
-    result: list[Path] = []
-    for path in paths:
-        if not path.is_dir() or is_bag(path):
-            result.append(path)
-            continue
-        known = suffixes()
-        inside = sorted(
-            entry
-            for entry in path.iterdir()
-            if (entry.is_file() and entry.name.lower().endswith(known)) or (entry.is_dir() and is_bag(entry))
-        )
-        if not inside:
-            raise InputError(
-                "holds no log", file=path, hint=f"name a folder with files such as *{known[0]}, or a log"
-            )
-        result += inside
-    return result
 
 
 def _refuse_several(result: list[Inspection], target: Path) -> None:

@@ -11,6 +11,15 @@ Logs = Annotated[
     list[Path], typer.Argument(metavar="LOG", help="Logs of any known format (docs/formats.md).")
 ]
 VehicleFile = Annotated[Path, typer.Option("--vehicle", metavar="FILE", help="The vehicle file (YAML).")]
+ProfileFiles = Annotated[
+    list[Path] | None,
+    typer.Option(
+        "--profile",
+        metavar="FILE",
+        help="How the log's columns become Terragrip's: a YAML file, or tractor-isobus, ros2-4wd or simulink; may be repeated: "
+        "one for each LOG, or for it and each --with.",
+    ),
+]
 ProfileFile = Annotated[
     Path | None,
     typer.Option(

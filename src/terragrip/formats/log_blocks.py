@@ -26,7 +26,7 @@ PathLike = str | os.PathLike[str]
 
 def log_in_blocks(
     path: PathLike | Sequence[PathLike],
-    profile: Profile | PathLike | None = None,
+    profile: Profile | PathLike | Sequence[Profile | PathLike | None] | None = None,
     *,
     dbc: Sequence[PathLike] = (),
 ) -> LogBlocks:
@@ -37,7 +37,9 @@ def log_in_blocks(
     """
     from terragrip.formats.reading import read
 
-    chosen = profile if profile is None or isinstance(profile, Profile) else Profile.load(profile)
+    if isinstance(profile, list | tuple):
+        return LogBlocks.of(read(path, profile, dbc=dbc), ROWS)
+    chosen = profile if profile is None or isinstance(profile, Profile) else Profile.load(profile)  # type: ignore[arg-type]
     log = long_log(path) if isinstance(path, str | os.PathLike) and not dbc else None
     if log is None or recordings_of(log, chosen) is None:
         return LogBlocks.of(read(path, chosen, dbc=dbc), ROWS)

@@ -24,7 +24,7 @@ PathLike = str | os.PathLike[str]
 
 def read(
     path: PathLike | Sequence[PathLike],
-    profile: Profile | PathLike | Sequence[Profile | PathLike] | None = None,
+    profile: Profile | PathLike | Sequence[Profile | PathLike | None] | None = None,
     *,
     dbc: PathLike | Sequence[PathLike] = (),
 ) -> Recording:
@@ -36,7 +36,7 @@ def read(
     profile's own.
 
     Several paths are sources of one drive: each gives the channels that it has, the first source where several have
-    one; a list of profiles has one for each. Clocks are aligned by their stamps where both count from 1970, then by
+    one; a list of profiles has one for each, None for one with our names. Clocks are aligned by their stamps where both count from 1970, then by
     the correlation of the speeds, and the notes say by how much.
 
     Raises InputError with file, column, row and hint for whatever makes the log unusable.
@@ -125,7 +125,7 @@ def _loaded(profile: Profile | PathLike | None) -> Profile | None:
 
 
 def _each(
-    profile: Profile | PathLike | Sequence[Profile | PathLike] | None, paths: list[PathLike]
+    profile: Profile | PathLike | Sequence[Profile | PathLike | None] | None, paths: list[PathLike]
 ) -> list[Profile | None]:
     """The profile of each source."""
     if not paths:

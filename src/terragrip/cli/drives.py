@@ -1,0 +1,155 @@
+"""Which logs a command line names, which of them are one drive, and by which profile each is read."""
+
+from __future__ import annotations
+
+import glob
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from terragrip.errors import InputError
+
+_COLUMNS = ("log", "profile", "drive")
+
+
+@dataclass(frozen=True)
+class Drive:
+    """One drive: its ``name``, its ``logs`` (several sources are joined) and a profile for each, or one for all, or None."""
+
+    name: str
+    logs: tuple[Path, ...]
+    profiles: tuple[Path | None, ...]
+
+    @property
+    def source(self) -> Path | list[Path]:
+        """What `terragrip.read` takes as path."""
+        return self.logs[0] if len(self.logs) == 1 else list(self.logs)
+
+    @property
+    def profile(self) -> Path | list[Path | None] | None:
+        """What `terragrip.read` takes as profile."""
+        return self.profiles[0] if len(set(self.profiles)) == 1 else list(self.profiles)
+
+
+def logs_in(paths: Sequence[Path]) -> list[Path]:
+    """The logs that arguments name: files, those of each folder that is not a bag itself, those that a pattern matches.
+
+    Raises InputError where a folder holds none, or nothing matches a pattern.
+    """
+    from terragrip.formats.registry import is_bag
+
+    result: list[Path] = []
+    for path in paths:
+        if path.is_dir() and not is_bag(path):
+            result += _logs_of(path)
+        elif glob.has_magic(str(path)) and not path.exists():
+            matches = [Path(name) for name in sorted(glob.glob(str(path), recursive=True))]
+            if not matches:
+                raise InputError("no file matches", file=path, hint="check the pattern and the folder")
+            result += matches
+        else:
+            result.append(path)
+    return list(dict.fromkeys(result))
+
+
+def _logs_of(folder: Path) -> list[Path]:
+    from terragrip.formats.registry import is_bag, suffixes
+
+    known = suffixes()
+    inside = sorted(
+        entry
+        for entry in folder.iterdir()
+        if (entry.is_file() and entry.name.lower().endswith(known)) or (entry.is_dir() and is_bag(entry))
+    )
+    if not inside:
+        raise InputError(
+            "holds no log", file=folder, hint=f"name a folder with files such as *{known[0]}, or a log"
+        )
+    return inside
+
+
+def drives_of(arguments: Sequence[Path], profiles: Sequence[Path], joined: Sequence[Path]) -> list[Drive]:
+    """The drives that LOG arguments name, each log its own, or with the ``joined`` sources one.
+
+    One profile is for all; several are one for each source of a joined drive, else one for each argument, for all the logs that a folder
+    or pattern names. Raises InputError where the numbers differ, or several logs are to be joined to.
+    """
+    if joined:
+        logs = logs_in(arguments)
+        if len(logs) > 1:
+            raise InputError(
+                "there are several logs",
+                place="--with",
+                hint="join one drive at a time, or say which by --drives TABLE",
+            )
+        sources = (*logs, *joined)
+        return [Drive(logs[0].name, sources, _each(profiles, len(sources), "source of the drive"))]
+    each = _each(profiles, len(arguments), "LOG (a folder or pattern is one)")
+    by_log: dict[Path, Path | None] = {}
+    for argument, profile in zip(arguments, each, strict=True):
+        for log in logs_in([argument]):
+            by_log.setdefault(log, profile)
+    return [Drive(log.name, (log,), (profile,)) for log, profile in by_log.items()]
+
+
+def _each(profiles: Sequence[Path], count: int, what: str) -> tuple[Path | None, ...]:
+    if len(profiles) <= 1:
+        return (profiles[0] if profiles else None,) * count
+    if len(profiles) != count:
+        raise InputError(
+            f"there are {len(profiles)} profiles for {count}",
+            place="--profile",
+            hint=f"give one, or one for each {what}",
+        )
+    return tuple(profiles)
+
+
+def drives_in(table: Path) -> list[Drive]:
+    """The drives of a table (CSV: `log`, and where needed `profile` and `drive`): a row a log, those of one drive are joined.
+
+    Paths are from the table's folder. Raises InputError where it is no such table.
+    """
+    import csv
+
+    from terragrip.files import refuse_missing
+
+    refuse_missing(table)
+    try:
+        with table.open(encoding="utf-8-sig", newline="") as stream:
+            rows = csv.DictReader(stream)
+            names = [name.strip() for name in rows.fieldnames or ()]
+            odd = next((name for name in names if name not in _COLUMNS), None)
+            if "log" not in names or odd is not None:
+                problem = "has no column log" if "log" not in names else f"has an unknown column {odd!r}"
+                raise InputError(
+                    problem, file=table, place="line 1", hint=f"its columns are {', '.join(_COLUMNS)}"
+                )
+            listed = [{k.strip(): (v or "").strip() for k, v in row.items() if k} for row in rows]
+    except (UnicodeDecodeError, csv.Error) as error:
+        raise InputError(f"is no table ({error})", file=table, hint="write it as CSV, in UTF-8") from error
+    listed = [row for row in listed if any(row.values())]
+    if not listed:
+        raise InputError("names no log", file=table, hint="write a log in each line")
+    groups: dict[str, list[tuple[Path, Path | None]]] = {}
+    for number, row in enumerate(listed, 2):
+        if not row["log"]:
+            raise InputError("names no log", file=table, place=f"row {number}", hint="write its path")
+        log = table.parent / row["log"]
+        groups.setdefault(row.get("drive") or f"{row['log']}", []).append(
+            (log, _profile(table, row.get("profile", "")))
+        )
+    return [
+        Drive(
+            name if len(parts) > 1 else parts[0][0].name,
+            tuple(log for log, _ in parts),
+            tuple(p for _, p in parts),
+        )
+        for name, parts in groups.items()
+    ]
+
+
+def _profile(table: Path, name: str) -> Path | None:
+    """A profile by its path from the table's folder, or one that comes with Terragrip by its name."""
+    if not name:
+        return None
+    return table.parent / name if Path(name).suffix or (table.parent / name).exists() else Path(name)
