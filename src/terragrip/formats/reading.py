@@ -36,8 +36,8 @@ def read(
     profile's own.
 
     Several paths are sources of one drive: each gives the channels that it has, the first source where several have
-    one; a list of profiles has one for each, None for one with our names. Clocks are aligned by their stamps where both count from 1970, then by
-    the correlation of the speeds, and the notes say by how much.
+    one; a list of profiles has one for each, None for one with our names. Clocks are aligned by their stamps where both
+    count from 1970, then by the correlation of the speeds, and the notes say by how much.
 
     Raises InputError with file, column, row and hint for whatever makes the log unusable.
     """
