@@ -391,6 +391,8 @@ tg_status tg_estimator_snapshot(const tg_estimator *e, uint8_t *bytes);
 /* `room`: bytes of storage at `e`. TG_BAD_ARGUMENT where the snapshot's estimator needs more. */
 tg_status tg_estimator_restore(tg_estimator *e, size_t room, const uint8_t *bytes, size_t size);
 tg_status tg_estimator_settings(const tg_estimator *e, tg_settings *settings);
+/* From the next sample on, these SDs and update periods of the channels (32 each, as in tg_settings); the estimate goes on. */
+tg_status tg_estimator_set_noise(tg_estimator *e, const tg_real *noise, const tg_real *held_period);
 /* cdef end */
 
 /* ---- What a filter is made of, so that C code can hold one without allocation. Read and write it by the functions above only. ----

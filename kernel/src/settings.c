@@ -224,6 +224,7 @@ static void place_wheels(const tg_settings *s, tgi_constants *c)
 
 static void work_out_constants(const tg_settings *s, tgi_constants *c)
 {
+    memset(c, 0, sizeof *c);
     const tg_machine *m = &s->machine;
     const tg_real weight = m->mass * m->gravity;
     for (int32_t k = 0; k < TG_SLOTS; k++) {
@@ -331,5 +332,19 @@ tg_status tg_estimator_settings(const tg_estimator *e, tg_settings *settings)
 {
     if (!e || !settings) return TG_BAD_ARGUMENT;
     *settings = e->settings;
+    return TG_OK;
+}
+
+tg_status tg_estimator_set_noise(tg_estimator *e, const tg_real *noise, const tg_real *held_period)
+{
+    if (!e || !noise || !held_period) return TG_BAD_ARGUMENT;
+    tg_settings s = e->settings;
+    memcpy(s.noise, noise, sizeof s.noise);
+    memcpy(s.held_period, held_period, sizeof s.held_period);
+    const tg_status status = check(&s);
+    if (status != TG_OK) return status;
+    e->settings = s;
+    work_out_constants(&s, &e->constants);
+    if (!e->seen_motion || e->jolt < e->constants.least_jolt) e->jolt = e->constants.least_jolt;
     return TG_OK;
 }

@@ -203,6 +203,10 @@ static void estimator_floor(int n, int method, int policy)
     bytes[200] ^= 1;
     ESTIMATOR_REFUSED(tg_estimator_restore(e, size, bytes, tg_snapshot_size(e)));
     ESTIMATOR_REFUSED(tg_estimator_restore(e, size, bytes, 7));
+    tg_real negative[TG_SLOTS] = {-1}, none[TG_SLOTS] = {0};
+    ESTIMATOR_REFUSED(tg_estimator_set_noise(e, negative, none)); /* also no SD of the ground speed */
+    ESTIMATOR_REFUSED(tg_estimator_set_noise(e, s.noise, negative));
+    ESTIMATOR_REFUSED(tg_estimator_set_noise(e, NULL, none));
     broken.machine.wheels = 9;
     const tg_settings kept = broken;
     CHECK(tg_tune_walks(&broken) != TG_OK && memcmp(&broken, &kept, sizeof kept) == 0, "walks");

@@ -97,6 +97,7 @@ def command(
         window=window / 1000.0,
         held={**known["held"], **_held(held or [])},
         noise=known["noise"],
+        learn=settings is None,
         ground=ground,
         library=_library(library),
     )

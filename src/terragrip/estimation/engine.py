@@ -191,6 +191,12 @@ class Engine:
         if status != lib.TG_OK:
             raise refusal(status, None)
 
+    def set_noise(self, settings: Any) -> None:
+        """From the next sample on, the noise and the update periods of these settings; raises InputError on unusable ones."""
+        status = lib.tg_estimator_set_noise(self.handle, settings.noise, settings.held_period)
+        if status != lib.TG_OK:
+            raise refusal(status, None)
+
     def new_ground(self) -> None:
         """Forget the adhesion curves: the ground is another one."""
         lib.tg_estimator_new_ground(self.handle)

@@ -129,14 +129,19 @@ class TractionEstimator:
         self.dead_band = dead_band
         slots = speeds.slots_in(self.rims) if self.rims else sample_slots(self.vehicle)
         self.noise, self.guessed = channel_noise(self.vehicle, tuple(slots), sensors)
+        out = (
+            speeds.slots_out(self.rims)
+            if self.rims
+            else estimate_slots(self.vehicle, adaptive=method_named(self.method).adapts)
+        )
+        self._engine = Engine(self._settings(), slots, out)
+
+    def _settings(self) -> Any:
+        """The kernel's settings by what this estimator has."""
         common: dict[str, Any] = {"noise": self.noise, "held": self.held, "thresholds": self.thresholds}
         if self.rims:
-            settings = speeds.speed_settings(self.vehicle, self.rims, dead_band=dead_band, **common)
-            self._engine = Engine(settings, slots, speeds.slots_out(self.rims))
-            return
-        method = method_named(self.method)
-        settings = settings_of(self.vehicle, method, channels=self.channels, **common)
-        self._engine = Engine(settings, slots, estimate_slots(self.vehicle, adaptive=method.adapts))
+            return speeds.speed_settings(self.vehicle, self.rims, dead_band=self.dead_band, **common)
+        return settings_of(self.vehicle, method_named(self.method), channels=self.channels, **common)
 
     @classmethod
     def for_recording(
@@ -153,14 +158,11 @@ class TractionEstimator:
     ) -> Self:
         """An estimator set up as :func:`estimate` does it: noise and held channels found in the log where not given; where it holds
         no torque, also what slip counts from (``slip_reference``; None finds it)."""
-        from terragrip.estimation.noise import logged_noise, sensor_of
+        from terragrip.estimation.noise import settings_in
         from terragrip.estimation.slip_only import slip_reference_in
-        from terragrip.recording import held_periods
 
-        periods = dict(held_periods(recording) if held is None else held)
-        logged = logged_noise(recording, vehicle, periods)
+        logged, periods = settings_in(recording, vehicle, sensors=sensors, held=held)
         mine = dict(sensors or {})
-        logged = {name: sd for name, sd in logged.items() if sensor_of(name) not in mine}
         if slip_reference is None and speeds_alone(recording.channels, vehicle):
             slip_reference = slip_reference_in(recording, vehicle)
         if slip_reference is not None:
@@ -238,6 +240,16 @@ class TractionEstimator:
         from terragrip.estimation.batch import run
 
         return run(self, recording)
+
+    def set_noise(self, sensors: Mapping[str, float], held: Mapping[str, float]) -> None:
+        """From the next sample on, these SDs [SI] by channel and update periods [s]; the estimate goes on.
+
+        As for a new estimator: an SD that ``sensors`` lack is the vehicle file's, else a guess; a channel that ``held`` lacks is not
+        held. Raises InputError as making one does.
+        """
+        self.noise, self.guessed = channel_noise(self.vehicle, self._engine.inputs, sensors)
+        self.held = dict(held)
+        self._engine.set_noise(self._settings())
 
     def new_ground(self) -> None:
         """Forget the adhesion curves (``curve_a``, ``curve_a_<wheel>``): from here on the ground is another one.

@@ -45,6 +45,25 @@ def channel_noise(
     return result, tuple(guessed)
 
 
+def settings_in(
+    recording: Recording,
+    vehicle: Vehicle,
+    *,
+    sensors: Mapping[str, float] | None = None,
+    held: Mapping[str, float] | None = None,
+) -> tuple[dict[str, float], dict[str, float]]:
+    """What a log tells of its sensors: SDs [SI] by channel, and the update periods [s] of held channels.
+
+    Without the SDs that the vehicle file or ``sensors`` (by channel or sensor) give; ``held``: None finds the periods.
+    """
+    from terragrip.recording import held_periods
+
+    periods = dict(held_periods(recording) if held is None else held)
+    logged = logged_noise(recording, vehicle, periods)
+    given = sensors or {}
+    return {n: sd for n, sd in logged.items() if n not in given and sensor_of(n) not in given}, periods
+
+
 def logged_noise(recording: Recording, vehicle: Vehicle, held: dict[str, float]) -> dict[str, float]:
     """SDs that the log gives where the vehicle file is silent, by channel."""
     from terragrip.recording import sensor_noise

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 from terragrip.errors import InputError
 from terragrip.estimation.engine import estimate_slots
 from terragrip.estimation.estimator import Estimate, TractionEstimator, default_channels
+from terragrip.estimation.learning import SettingsLearner
 from terragrip.estimation.methods import DEFAULT
 from terragrip.estimation.rims import DRIVE, speeds_alone
 from terragrip.live.clock import SourceClock, Stamped
@@ -27,7 +28,7 @@ if TYPE_CHECKING:
     from terragrip.vehicle import Vehicle
 
 WINDOW = 0.02  # s
-FORMAT = 2  # of `Core.state`
+FORMAT = 3  # of `Core.state`
 _WARNINGS = {
     "immobilization": "about to dig in",
     "stuck": "stuck",
@@ -44,7 +45,8 @@ class Settings:
 
     ``window`` [s]: how long a row waits for what is due. ``channels``: columns the samples carry; empty: those seen by the
     first row. ``sources``: their URIs without options. ``held`` [s]: update periods of channels that are repeated between
-    updates. ``noise``: SDs [SI] by channel, over the vehicle file's. ``ground``: whether ground changes and soils are followed.
+    updates. ``noise``: SDs [SI] by channel, over the vehicle file's. ``ground``: whether ground changes and soils are followed. ``learn``:
+    whether noise and held channels that are not given are told from the rows as they come (`terragrip.estimation.learning`).
     """
 
     sources: tuple[str, ...]
@@ -54,6 +56,7 @@ class Settings:
     held: Mapping[str, float] = field(default_factory=dict)
     ground: bool = False
     noise: Mapping[str, float] = field(default_factory=dict)
+    learn: bool = True
 
     def to_dict(self) -> dict[str, Any]:
         """As JSON holds it."""
@@ -65,6 +68,7 @@ class Settings:
             "held": dict(self.held),
             "ground": self.ground,
             "noise": dict(self.noise),
+            "learn": self.learn,
         }
 
     @classmethod
@@ -130,6 +134,7 @@ class Core:
         align = len(settings.sources) > 1
         self.clocks = [SourceClock(align) for _ in settings.sources]
         self.estimator: TractionEstimator | None = None
+        self.learner: SettingsLearner | None = None
         self.rows = 0
         self.event = ""  # the last row's
         if settings.channels:
@@ -139,11 +144,17 @@ class Core:
         method, held, noise = self.settings.method, self.settings.held, self.settings.noise
         estimator = TractionEstimator(self.vehicle, method, channels=channels, held=held, sensors=noise)
         self.estimator = estimator
+        self.learner = self._learner(estimator)
         if self.settings.ground and not estimator.rims:
             from terragrip.ground.live import LiveGround
 
             self.ground = LiveGround(estimator, self.library)
         return estimator
+
+    def _learner(self, estimator: TractionEstimator) -> SettingsLearner | None:
+        if not self.settings.learn:
+            return None
+        return SettingsLearner(self.vehicle, estimator.engine.inputs, self.settings.noise, self.settings.held)
 
     @property
     def columns(self) -> tuple[str, ...]:
@@ -218,9 +229,23 @@ class Core:
                 state = self.ground.update(estimate)
                 if state is not None:
                     out += _ground_outputs(state)
+            if self.learner is not None:
+                self._learn(estimator, self.learner, row, out)
         if self.reorder.changes:
             self._report_changes(out)
         return out
+
+    def _learn(
+        self, estimator: TractionEstimator, learner: SettingsLearner, row: Pending, out: list[Output]
+    ) -> None:
+        """Noise and held channels by the rows so far, from the next row on, with an event."""
+        learned = learner.add(row.time, row.values)
+        changes = learned.changes(estimator) if learned is not None else []
+        if learned is None or not changes:
+            return
+        learned.apply(estimator)
+        text = f"from {learned.seconds:.0f} s of the drive: {'; '.join(changes)}"
+        out.append(Event(row.time, "learned", "estimator", text))
 
     def _watch(self, estimate: Estimate, out: list[Output]) -> None:
         """An event where a warning begins."""
@@ -279,6 +304,7 @@ class Core:
             "clocks": [clock.state() for clock in self.clocks],
             "reorder": self.reorder.state(),
             "counts": self.counts.state(),
+            "learner": None if self.learner is None else self.learner.state(),
             "rows": self.rows,
             "event": self.event,
             "ground": base64.b64encode(self.ground.snapshot()).decode() if self.ground else "",
@@ -297,6 +323,10 @@ class Core:
         result = cls(Vehicle.from_dict(state["vehicle"]), Settings.from_dict(state["settings"]), library)
         snapshot = base64.b64decode(state["estimator"])
         result.estimator = TractionEstimator.restore(snapshot) if snapshot else None
+        if result.estimator is not None and state["learner"] is not None:
+            result.learner = result._learner(result.estimator)
+            if result.learner is not None:
+                result.learner.restore(state["learner"])
         result.clocks = [SourceClock.from_state(one) for one in state["clocks"]]
         result.counts = Counts.from_state(state["counts"])
         result.reorder.counts = result.counts

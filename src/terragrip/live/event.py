@@ -7,7 +7,7 @@ from typing import Any
 
 KINDS = (
     "source_lost", "source_back", "channel_lost", "channel_back", "clock_jump", "unreadable", "schema",
-    "behind", "refused", "resumed", "sink_lost", "sink_back", "record_failed", "ground_change",
+    "behind", "refused", "resumed", "sink_lost", "sink_back", "record_failed", "ground_change", "learned",
     "immobilization", "stuck", "push",
 )  # fmt: skip
 

@@ -51,6 +51,7 @@ class Service:
     window: s that a row waits for what is due (`terragrip.live.reorder`).
     held: update periods [s] of channels that a source repeats between updates.
     noise: SDs [SI] by channel, as estimates of a log hold them; they win over the vehicle file's.
+    learn: tell noise and held channels that are not given from the rows as they come.
     ground: report ground changes while driving; library: and which of these soils it is.
     capacity: samples that may wait for the estimator before they are dropped.
 
@@ -69,6 +70,7 @@ class Service:
         window: float = WINDOW,
         held: Mapping[str, float] | None = None,
         noise: Mapping[str, float] | None = None,
+        learn: bool = True,
         ground: bool = False,
         library: SoilLibrary | None = None,
         capacity: int = CAPACITY,
@@ -97,6 +99,7 @@ class Service:
             dict(held or {}),
             ground or library is not None,
             dict(noise or {}),
+            learn,
         )
         core = Core(vehicle, settings, library)
         if settings.ground and core.estimator is not None and core.estimator.rims:

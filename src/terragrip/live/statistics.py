@@ -134,11 +134,23 @@ class Statistics:
         lossy = {box.uri.name: box.dropped for box in self._outboxes if box.dropped}
         if lossy:
             lines.append("messages that sinks were too slow for: " + _by_number(lossy))
+        if core.learner is not None and core.estimator is not None:
+            lines += _learned(*core.learner.used(core.estimator))
         if self.event_counts:
             lines.append(
                 "events: " + ", ".join(f"{kind} {number}" for kind, number in self.event_counts.items())
             )
         return "\n".join(lines)
+
+
+def _learned(noise: dict[str, float], held: dict[str, float]) -> list[str]:
+    lines = []
+    if noise:
+        lines.append("noise learned: " + ", ".join(f"{name} {sd:.3g}" for name, sd in noise.items()))
+    if held:
+        periods = ", ".join(f"{name} {period:.3g} s" for name, period in held.items())
+        lines.append("held channels learned, and their periods: " + periods)
+    return lines
 
 
 def _by_number(numbers: dict[str, int]) -> str:

@@ -1,0 +1,143 @@
+"""Live learns noise and held channels from what has come so far: it ends with a file's settings, and a restart changes no digit."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import terragrip as tg
+from drives import drive, robot
+from machine import rows_of
+from terragrip.estimation import learning
+from terragrip.estimation.learning import SettingsLearner
+from terragrip.live import read_record
+from terragrip.live.core import Core, Row, Settings
+from terragrip.live.event import Event
+from terragrip.live.pipeline import Pipeline
+
+UNKNOWN = {"drawbar_force": 4.0, "pitch": 0.002}  # all else the log must tell
+
+
+@pytest.fixture(scope="module")
+def vehicle():
+    return robot(sensors=UNKNOWN)
+
+
+@pytest.fixture(scope="module")
+def long():
+    """A minute whose sensors are not as the guesses have it, and whose ground speed comes five times a second."""
+    made = drive(60.0, noise=2.0, seed=3)
+    recording = made.recording
+    held = np.repeat(recording["ground_speed"][::20], 20)[: len(recording)]
+    return replace(made, recording=recording.with_channels(ground_speed=held))
+
+
+def core_of(vehicle, recording, **changes) -> Core:
+    return Core(vehicle, Settings(("replay:test",), channels=tuple(recording.channels), **changes))
+
+
+def played(core: Core, recording):
+    """The estimates by column (n,), and the events."""
+    outputs = [out for time, values in rows_of(recording) for out in core.process(time, 0, time, values)]
+    outputs += core.flush()
+    rows = [out.estimate for out in outputs if isinstance(out, Row)]
+    columns = {name: np.array([row[name] for row in rows]) for name in core.estimator.columns}
+    return columns, [out for out in outputs if isinstance(out, Event)]
+
+
+def test_it_ends_with_the_settings_of_the_file(vehicle, long):
+    wanted = tg.estimate(long.recording, vehicle).about["settings"]
+    core = core_of(vehicle, long.recording)
+    _, events = played(core, long.recording)
+    assert core.estimator.held == pytest.approx(wanted["held"], rel=0.05)
+    measured = [name for name in core.estimator.noise if name in long.recording.channels]
+    assert len(measured) >= 10
+    for name in measured:
+        assert core.estimator.noise[name] == pytest.approx(wanted["noise"][name], rel=0.15), name
+    learned = [event for event in events if event.kind == "learned"]
+    assert 1 <= len(learned) <= 6
+    assert "noise of wheel_speed_fl" in learned[0].text
+    assert "ground_speed is held, one value in 0.2 s" in learned[0].text
+
+
+def test_its_intervals_hold_and_those_of_the_guesses_do_not_fit(vehicle, long):
+    late = long.recording.time > 30
+    learned, _ = played(core_of(vehicle, long.recording), long.recording)
+    guessed, _ = played(core_of(vehicle, long.recording, learn=False), long.recording)
+    for name in ("ground_speed", "slip_rl", "adhesion_rl"):
+        off = np.abs(learned[name] - long.truth[name])[late] / learned[f"{name}_std"][late]
+        assert np.mean(off < 1.96) > 0.9, name
+    fit = [np.sum(c["nis"][late]) / np.sum(c["channels"][late]) for c in (learned, guessed)]
+    assert 0.7 < fit[0] < 1.4
+    assert not 0.5 < fit[1] < 2.0
+
+
+def test_it_is_causal_and_given_settings_are_not_touched(vehicle, long):
+    """The rows up to the first event are those of the guesses; with the file's settings nothing is learned."""
+    learned, events = played(core_of(vehicle, long.recording), long.recording)
+    guessed, _ = played(core_of(vehicle, long.recording, learn=False), long.recording)
+    first = next(event.time for event in events if event.kind == "learned")
+    before = long.recording.time <= first
+    assert 900 < before.sum() < 1100
+    for name, values in guessed.items():
+        assert np.array_equal(values[before], learned[name][before], equal_nan=True), name
+    assert not np.array_equal(guessed["adhesion_fl"][~before], learned["adhesion_fl"][~before])
+
+    whole = tg.estimate(long.recording, vehicle)
+    known = whole.about["settings"]
+    again, events = played(
+        core_of(vehicle, long.recording, noise=known["noise"], held=known["held"]), long.recording
+    )
+    assert not [event for event in events if event.kind == "learned"]
+    for name, values in again.items():
+        assert np.array_equal(whole.columns[name], values, equal_nan=True), name
+
+
+@pytest.mark.parametrize("stops", [(950, 1003, 1800), (400, 2500, 4100)])
+def test_a_restart_changes_no_digit(vehicle, long, tmp_path, stops):
+    """Broken off and gone on, before and after what was learned; snapshots and write-ahead file both hold it."""
+    through, _ = played(core_of(vehicle, long.recording), long.recording)
+    rows = list(rows_of(long.recording))
+    begin = 0
+    for stop in (*stops, len(rows)):
+        pipeline = Pipeline(core_of(vehicle, long.recording), tmp_path, rows=700)
+        for time, values in rows[begin:stop]:
+            pipeline.process(time, 0, time, values)
+        pipeline.write()
+        begin = stop
+        if stop < len(rows):
+            pipeline.recorder.abandon()
+    pipeline.flush()
+    pipeline.close()
+    _, estimates = read_record(tmp_path)
+    for name, values in through.items():
+        assert np.array_equal(values, estimates.columns[name], equal_nan=True), name
+
+
+def test_what_a_standing_machine_does_not_show_stays_known(vehicle, long):
+    moving = long.recording
+    core = core_of(vehicle, moving)
+    played(core, moving)
+    before = dict(core.estimator.noise)
+    rng = np.random.default_rng(0)
+    for k in range(30_000):  # five minutes: no chunk of the drive but the first is kept
+        time = 60.0 + 0.01 * k
+        still = dict.fromkeys(moving.channels, 0.0) | {"drawbar_force": rng.normal()}
+        core.process(time, 0, time, still)
+    assert core.estimator.noise == pytest.approx(before, rel=0.5)
+    assert core.estimator.held["ground_speed"] == pytest.approx(0.2, rel=0.05)
+
+
+def test_memory_is_bounded_and_its_moments_become_rarer(vehicle, monkeypatch):
+    monkeypatch.setattr(learning, "ROWS", 50)
+    learner = SettingsLearner(vehicle, ("ground_speed",), {}, {})
+    rng = np.random.default_rng(0)
+    moments = [
+        k
+        for k, speed in enumerate(1 + 0.1 * rng.standard_normal(5000))
+        if learner.add(0.01 * k, {"ground_speed": float(speed)}) is not None
+    ]
+    assert moments == [50 * n for n in (1, 2, 3, 4, 5, 7, 9, 13, 17, 25, 33, 49, 65, 97)]
+    assert len(str(learner.state())) < 6 * 50 * 2 * 8 * 1.5
