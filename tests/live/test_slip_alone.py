@@ -124,7 +124,7 @@ def test_a_held_channel_counts_once() -> None:
 
 
 def test_the_core_takes_up_where_it_was() -> None:
-    settings = Settings(("udp://x",), channels=CHANNELS)
+    settings = Settings(("udp://x",), channels=CHANNELS, learn=False)
     rows, core = samples(drive(600)), Core(calibrated(), settings)
     outputs = []
     for k, row in enumerate(rows):
