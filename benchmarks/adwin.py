@@ -17,9 +17,9 @@ half a minute. Span and `delta` are those that do best on the development seeds:
 
 
 def adwin_changes(blocks: Blocks, names: tuple[str, ...] = GROUND, delta: float = 0.05) -> tuple[Change, ...]:
-    """Changes as ADWIN would have told them while driving, `delta` its confidence; at a change all signals start anew.
+    """Changes as ADWIN would have reported them while driving, `delta` its confidence; at a change all signals start anew.
 
-    A change's time is when it is told; ADWIN gives no spread and no probability: std is NaN, probability 1.
+    A change's time is when it is reported; ADWIN gives no spread and no probability: std is NaN, probability 1.
     """
     make: Any = drift.ADWIN  # river carries no types
     signals, reported = signals_of(blocks, names), []

@@ -61,7 +61,7 @@ def line(machines: list[tuple[Calibration, dict[str, Any]]], key: str) -> str:
                 own.append(quantity.std if quantity.own_std is None else quantity.own_std)
                 inside.append(quantity.interval[0] <= true <= quantity.interval[1])
     if not errors:
-        return "not told"
+        return "not determined"
     rms = [float(np.sqrt(np.mean(np.square(values)))) for values in (errors, spreads, own)]
     held = f"{int(np.sum(inside))}/{len(inside)}"
     return f"{rms[0]:10.4g} {rms[1]:10.4g} {rms[2]:10.4g} {held:>8}"

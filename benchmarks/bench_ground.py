@@ -1,15 +1,15 @@
-"""How well the ground is told: changes and soils on simulated drives that nothing was tuned on.
+"""How well the ground is recognised: changes and soils on simulated drives that nothing was tuned on.
 
     python benchmarks/bench_ground.py [--seeds 3000 ...] [--write]
 
 A machine a seed, calibrated from its own campaign as `make demo` does it. Three libraries: of *another* machine (the 66 single-soil runs
 of seed 2000), of its *own* single-soil runs (other ground than the scored drives), and the other machine's without one soil at a time.
 Scored: `multi1` and `multi2` (the campaign's routes over several soils), `accuracy-clean` and `accuracy-faults` (another route, other
-sensors, faults), and the single-soil runs of the first two seeds, where every change told is a false alarm.
+sensors, faults), and the single-soil runs of the first two seeds, where every change reported is a false alarm.
 
 A border counts where two soils that differ meet (fine and wet are one); it is found by a change within its transition (some part of
 vehicle or tool on a border, or on another soil than the rest) +- 2 s, one change a border. A second change in one transition, or one
-anywhere else, is false. Delay: from the soil under the centre of gravity changing to the change being told. Soils count by rows, all of
+anywhere else, is false. Delay: from the soil under the centre of gravity changing to the change being reported. Soils count by rows, all of
 them: standstill, transitions and stuck spells too. --write puts the tables and the reliability diagram into docs.
 """
 
@@ -60,7 +60,7 @@ BEGIN = "<!-- made by benchmarks/bench_ground.py --write -->"
 
 @dataclass
 class Matches:
-    """Changes of one way on some drives: borders, how many were found, changes told, hours driven, delays [s]; of each change its stated
+    """Changes of one way on some drives: borders, how many were found, changes reported, hours driven, delays [s]; of each change its stated
     probability and whether it was right; of each right one its error in time and its stated SD [s]."""
 
     borders: int = 0
@@ -257,7 +257,7 @@ def borders(result: SimulationResult) -> Iterator[tuple[float, float, float, boo
 def match(
     some: Sequence[Change], spans: Sequence[tuple[float, float, float, bool]], seconds: float
 ) -> Matches:
-    """One change a border; a border between fine and wet may be told or not."""
+    """One change a border; a border between fine and wet may be determined or not."""
     out, matched = Matches(borders=sum(differ for *_, differ in spans), hours=seconds / 3600), set()
     for change in some:
         near = [k for k, (a, b, _, _) in enumerate(spans) if a - MARGIN <= change.time <= b + MARGIN]
@@ -425,7 +425,7 @@ def _targets(drives: Sequence[Drive]) -> str:
         ("borders found, while driving", online.recall, 0.9, True),
         ("precision of changes, while driving", online.precision, 0.85, True),
         ("rows with the right soil, offline, another machine's library, %", right, 88.0, True),
-        ("median delay of a change told while driving, s", float(np.median(online.delays)), 3.0, False),
+        ("median delay of a change reported while driving, s", float(np.median(online.delays)), 3.0, False),
     ]
     lines = ["| figure, all drives over several soils | reached | target | |", "|---|---:|---:|---|"]
     for name, value, target, least in rows:

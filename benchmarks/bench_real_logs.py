@@ -271,7 +271,7 @@ def findings(logs: list[Log], data: Path) -> str:
 
 
 def ways(estimates: Estimates) -> list[tuple[str, npt.NDArray[np.bool_]]]:
-    """Rows that move and carry no event; where left and right wheels are told apart, also those straight ahead (sides alike to 10 %)
+    """Rows that move and carry no event; where left and right wheels are distinguished, also those straight ahead (sides alike to 10 %)
     and those that turn."""
     moving = estimates.event_codes == 0
     sides = [[w for w in estimates.wheels if w == word or w[1:] == word[0]] for word in ("left", "right")]

@@ -34,7 +34,7 @@ def drive() -> Any:
     noisy = log["wheel_speed_fl"] + np.where(late, 0.2, 0.0) * draws.standard_normal(len(log))
     held = np.repeat(log["ground_speed"][::10], 10)[: len(log)]
     held[:150] = log["ground_speed"][:150]
-    sensors = {"sensors": {}}  # so that all noise is told by the log
+    sensors = {"sensors": {}}  # so that all noise is learned from the log
     vehicle = Vehicle.from_dict({**result.vehicle.to_dict(), **sensors})
     return log.with_channels(wheel_speed_fl=noisy, ground_speed=held), vehicle, result
 

@@ -128,7 +128,7 @@ typedef struct { /* see speeds.c; all reals, since a smoother's record is this *
     tg_real dt, manoeuvre, slipping;  /* how this row was reached: s, mean densities */
     tg_real anew;                     /* 1: nothing links this row to the one before */
     tg_real yaw, standing;
-    tg_real open;                     /* 1: the rims read nothing that slip could be told from */
+    tg_real open;                     /* 1: the rims read nothing that slip could be computed from */
 } tgi_speeds;
 
 typedef struct {

@@ -83,7 +83,7 @@ static tg_real count_seconds(tg_real seconds, tg_real dt, int32_t holds, tg_real
 }
 
 /* Warn where the score is high and slip surely above its usual; go on until the score is half of that. Of rims that hardly turn, or
- * against each other, nothing is foretold. */
+ * against each other, no warning is given. */
 static void watch_digging(tg_estimator *e, const tg_row *row, const tgi_view *l)
 {
     const tg_watch_settings *s = &e->settings.watch;

@@ -83,7 +83,7 @@ def _same(
 
 
 def test_intervals_on_simulated_slip() -> None:
-    """Slip that wanders as a random walk does, seen by noise that is told: 95 % of the rows are in their intervals."""
+    """Slip that wanders as a random walk does, seen through known noise: 95 % of the rows are in their intervals."""
     draws = np.random.default_rng(1004)
     time = np.arange(0, 200, 0.1)
     speed = 1.5 + 0.3 * np.sin(time / 8)

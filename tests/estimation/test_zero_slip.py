@@ -90,7 +90,7 @@ def test_one_level_of_slip_is_said_to_be_one() -> None:
     log = log_of(np.full(3000, 0.0), 1.02, 1003)
     zero = zero_of([log], "wheel_based_speed", 1.0)
     assert zero is not None
-    assert "light work cannot be told from field work" in zero.doubt
+    assert "light work cannot be distinguished from field work" in zero.doubt
     assert abs(zero.ratio - 1 / 1.02) < 1.96 * zero.std
     assert zero.std > 0.02
 

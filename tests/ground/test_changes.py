@@ -74,7 +74,7 @@ def test_a_change_is_found_where_it_is():
 
 
 def test_pull_alone_is_no_change():
-    """More pull on one soil moves slip and adhesion along its curve: told where these are the signals, and not else."""
+    """More pull on one soil moves slip and adhesion along its curve: reported where these are the signals, and not else."""
     for seed in range(6):
         blocks = estimates_blocks(drive(seed, [("fine", FINE, 60), ("fine", replace(FINE, slip=0.3), 60)]))
         assert changes_of(blocks) == ()
@@ -95,7 +95,7 @@ def test_correlation_lowers_what_a_block_counts_for():
 
 
 def test_standing_still_changes_nothing():
-    """The chance of a change goes with the way: the same signals at a standstill are told later, or never."""
+    """The chance of a change goes with the way: the same signals at a standstill are reported later, or never."""
     estimates = drive(2, [("fine", FINE, 60), ("grass", GRASS, 4)])
     still = replace(
         estimates, columns={**estimates.columns, "distance": np.minimum(estimates.columns["distance"], 33.0)}

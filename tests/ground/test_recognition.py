@@ -90,7 +90,7 @@ def test_what_no_soil_can_be_is_unknown(library):
 
 
 def test_twins_share_the_probability(library):
-    """Two soils that cannot be told apart: half each, whichever was driven."""
+    """Two soils that cannot be distinguished: half each, whichever was driven."""
     twins = SoilLibrary({**library, "twin": replace(library["fine"], name="twin")})
     timeline = analyse(drive(5, [("fine", FINE, 60)]), twins)[0].timeline
     last = dict(zip(timeline.names, timeline.probabilities[-1], strict=True))

@@ -1,4 +1,4 @@
-"""The whole way in small, on the simulated campaign (development seeds): runs on one soil make the library, multi1 is told by it."""
+"""The whole way in small, on the simulated campaign (development seeds): runs on one soil make the library, multi1 is recognised by it."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ def run(name, seed):
 
 @pytest.fixture(scope="module")
 def simulated_library():
-    """Four runs a soil, of another machine than the one that is told."""
+    """Four runs a soil, of another machine than the one that is recognised."""
     names = [f"{soil}-{k}" for soil in ("fine", "wet", "coarse", "grass") for k in ("01", "02", "06", "09")]
     return learned([estimate((r := run(name, 1000)).recording, r.vehicle) for name in names])
 

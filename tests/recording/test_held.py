@@ -1,4 +1,4 @@
-"""Held channels are told from fresh, quantised and standing ones, on made-up signals and on measured ones."""
+"""Held channels are distinguished from fresh, quantised and standing ones, on made-up signals and on measured ones."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Units that are likely wrong are told, right ones are not."""
+"""Units that are likely wrong are reported, right ones are not."""
 
 from __future__ import annotations
 

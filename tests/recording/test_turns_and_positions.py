@@ -1,4 +1,4 @@
-"""Speeds and rates of turn that positions or wheels contradict are told, by whoever reads the log."""
+"""Speeds and rates of turn that positions or wheels contradict are reported, by whoever reads the log."""
 
 from __future__ import annotations
 

@@ -84,7 +84,7 @@ def test_all_panels_of_four_wheels_are_drawn_at_once(page: Any, served: Served, 
 
 
 def test_slip_beyond_the_usual_is_drawn_or_told(page: Any, served: Served, folder: Path) -> None:
-    """A stretch at -120 % (a locked wheel rolling back) is drawn; a spike of 900 % is told in the corner."""
+    """A stretch at -120 % (a locked wheel rolling back) is drawn; a spike of 900 % is listed in the corner."""
     table = pl.read_parquet(folder / "estimates.parquet")
     time = table["time"].to_numpy()
     slip = table["slip_rr"].to_numpy().copy()

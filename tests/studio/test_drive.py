@@ -329,7 +329,7 @@ def test_a_page_of_a_replaced_file_is_refused(client: TestClient, folder: Path) 
 
 
 def test_a_tractors_drive_train_has_a_radius(made: Path) -> None:
-    """Its speed in rad/s is drawn in m/s: the mean radius of the driven wheels, by the zero of slip that the log told."""
+    """Its speed in rad/s is drawn in m/s: the mean radius of the driven wheels, by the zero of slip that the log gave."""
     import terragrip as tg
 
     vehicle = tg.Vehicle.load(made / "vehicle.yaml")

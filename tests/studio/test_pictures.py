@@ -1,4 +1,4 @@
-"""A picture's calibration is kept beside it, checked, and told to every page."""
+"""A picture's calibration is kept beside it, checked, and sent to every page."""
 
 from __future__ import annotations
 

@@ -34,7 +34,7 @@ def command(
     ] = None,
     online: Annotated[
         bool,
-        typer.Option("--online", help="As it would have been told while driving, without looking ahead."),
+        typer.Option("--online", help="As it would have been reported while driving, without looking ahead."),
     ] = False,
     length: Annotated[
         float, typer.Option(metavar="M", help="Mean way on one ground before the data speak.")
@@ -109,7 +109,7 @@ def _names(files: list[Path]) -> list[str]:
             if other.resolve() == path.resolve():
                 raise InputError("is given twice", file=path, hint="name each run once")
             raise InputError(
-                f"has the same name as {other}", file=path, hint="rename one: runs are told apart by name"
+                f"has the same name as {other}", file=path, hint="rename one: runs are distinguished by name"
             )
         seen[path.stem] = path
     return list(seen)

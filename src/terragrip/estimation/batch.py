@@ -106,7 +106,7 @@ def estimated(
     alone = speeds_alone(known.sample.channels, vehicle)
     if not alone:
         known.sample.check_against(vehicle)
-    # Where slip counts from may be told by one stretch of light work, which a sample of the rows can miss.
+    # Where slip counts from may be determined by one stretch of light work, which a sample of the rows can miss.
     reference = slip_reference_in(log.whole(), vehicle) if alone else None
     estimator = TractionEstimator.for_recording(
         known.sample,

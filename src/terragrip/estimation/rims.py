@@ -1,4 +1,4 @@
-"""Rims whose slip is told without torque: a wheel each, or a drive train as one wheel, and the radii that slip counts from."""
+"""Rims whose slip is known without torque: a wheel each, or a drive train as one wheel, and the radii that slip counts from."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ _RADIUS = 0.02  # relative SD of a radius that the vehicle file gives without on
 
 @dataclass(frozen=True)
 class Rim:
-    """A wheel whose slip is told, and the ``channel`` that tells its speed.
+    """A wheel whose slip is known, and the ``channel`` that gives its speed.
 
     ``scale``: reading of the channel at 1 rad/s (1, or for the drive train the radius that it supposes [m]); ``radius`` [m] at zero slip
     and its relative SD ``spread``; ``side``: m left of the vehicle's middle. Where no radius is known (``has_radius``) the drive train is a
@@ -110,7 +110,7 @@ def at_zero(rim: Rim, zero: Zero) -> Rim:
 
 
 def slots_in(rims: Collection[Rim]) -> dict[str, int]:
-    """The place in tg_sample.value of each column that slip is told from."""
+    """The place in tg_sample.value of each column that slip is computed from."""
     wheels = {rim.channel: lib.TG_WHEEL_SPEED + i for i, rim in enumerate(rims)}
     return {**wheels, "ground_speed": lib.TG_GROUND_SPEED, "angular_velocity_z": lib.TG_YAW_RATE}
 

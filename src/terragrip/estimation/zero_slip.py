@@ -2,7 +2,7 @@
 
 Speeds tell slip only against a condition that is called zero (ASABE S296: "zero condition"): driving without load on firm ground.
 A log of work holds such stretches too, on the headland and on the road. Over windows of some seconds the ratio then has more than
-one mode; the mode of the highest ratio is light work. Where there is one mode only, field work cannot be told from light work, and
+one mode; the mode of the highest ratio is light work. Where there is one mode only, field work cannot be distinguished from light work, and
 that is said. The modes are Gaussians beside a uniform floor, fitted by expectation and maximisation, their number by the Bayesian
 information criterion (Schwarz 1978). (R), our own construction.
 """
@@ -49,7 +49,7 @@ _STRAY = 0.1  # share of windows that are of no mode, at most
 @dataclass(frozen=True)
 class Zero:
     """``ratio``: ground speed over supposed rim speed at zero slip, with its SD; ``windows`` it rests on (0: none); ``doubt``: why light
-    work cannot be told from field work, empty where it can."""
+    work cannot be distinguished from field work, empty where it can."""
 
     ratio: float
     std: float
@@ -91,7 +91,7 @@ def _judged(ratio: Floats, fast: npt.NDArray[np.bool_]) -> Zero:
     if len(modes) > 1 or np.mean(fast) > 0.8:
         return Zero(value, std, count)
     if abs(value - 1) <= _NEAR:
-        why = f"all windows slip alike, so light work cannot be told from field work: {_MEND}"
+        why = f"all windows slip alike, so light work cannot be distinguished from field work: {_MEND}"
         return Zero(value, float(np.hypot(std, UNTOLD)), count, why)
     why = (
         f"all windows slip alike and run {abs(1 - value):.0%} {'behind' if value < 1 else 'ahead of'} the supposed radius, so that it is "

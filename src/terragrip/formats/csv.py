@@ -34,7 +34,7 @@ def csv_on_disk(path: str) -> TableOnDisk:
         head = read(stream, HEAD, path)
     whole = None
     if b"\n" not in head or head.startswith((b"\xff\xfe", b"\xfe\xff")) or head.count(0) > 0.2 * len(head):
-        whole = _text_of(path)  # its lines cannot be told in its bytes: one block
+        whole = _text_of(path)  # its lines cannot be determined in its bytes: one block
         dialect = detect(whole, path)
     else:
         dialect = detect(to_text(head[: head.rindex(b"\n") + 1], path), path)

@@ -46,7 +46,7 @@ def derivative(time: Floats, position: Floats, window: float) -> tuple[Floats, f
     (Savitzky and Golay 1964, on the actual instants); Tukey's biweight keeps jumps of the position out. NaN
     where fewer than four samples lie within the window, or nearly all to one side (at gaps and ends). The
     deviation follows from the residuals while moving, or the position's resolution where that is coarser,
-    for white noise; None if it cannot be told.
+    for white noise; None if it cannot be determined.
     """
     n = len(time)
     speed, deviation = np.full(n, np.nan), np.full(n, np.nan)

@@ -114,7 +114,7 @@ def inspect(
 ) -> Inspection:
     """Tell what is in a log, which of our channels it holds or lacks, and propose a profile.
 
-    With a profile, what the log becomes through it is told. With a vehicle, wheels and units are held against
+    With a profile, what the log becomes through it is reported. With a vehicle, wheels and units are held against
     it. Nothing is required of the log but that it is a table; raises InputError if it is none.
     """
     machine = vehicle if isinstance(vehicle, Vehicle) or vehicle is None else Vehicle.load(vehicle)
@@ -179,7 +179,7 @@ def inspect(
 
 @dataclass(frozen=True)
 class Seen:
-    """What is told of a log: columns and units by name, the time's column and unit, its instants [s].
+    """What is known of a log: columns and units by name, the time's column and unit, its instants [s].
 
     ``clocks``: the instants of signals that have their own.
     """

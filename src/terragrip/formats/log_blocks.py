@@ -32,7 +32,7 @@ def log_in_blocks(
 ) -> LogBlocks:
     """The recording that `terragrip.formats.read` gives of a log, or of several sources of one drive, in blocks.
 
-    A long table is read a block at a time where each of its rows can be told by itself; any other log is read whole and cut. Raises
+    A long table is read a block at a time where each of its rows can be determined by itself; any other log is read whole and cut. Raises
     InputError as `read` does, of a long table each where its block is reached.
     """
     from terragrip.formats.reading import read
@@ -113,7 +113,7 @@ def _since_set(
 
 
 def long_log(path: str | os.PathLike[str]) -> TableOnDisk | None:
-    """A log that is a long table; None of any other, or where its rows cannot be told beforehand."""
+    """A log that is a long table; None of any other, or where its rows cannot be determined beforehand."""
     own = format_of(path)
     result = None if own.in_blocks is None else own.in_blocks(os.fspath(path))
     return result if result is not None and result.is_long else None
@@ -126,12 +126,12 @@ def _checked(
     source: str,
     digest: str,
     about: _About,
-    expected: Sequence[str] = (),
+    more_notes: Sequence[str] = (),
 ) -> Iterator[Recording]:
     """Consecutive blocks of columns as checked recordings; they together are what `Recording.from_frame` makes of all.
 
     ``names``: all columns of the log, ``chosen``: those in the blocks; ``digest``: SHA-256 of the file; ``about``: what is known of all
-    of it; ``said``: notes, to which the blocks may add as they come. Raises InputError as that does, each when its block is reached;
+    of it; ``more_notes``: notes, to which the blocks may add as they come. Raises InputError as that does, each when its block is reached;
     that a channel is empty over the whole file shows at the end only.
     """
     checks.require_columns(names, source)
@@ -152,7 +152,7 @@ def _checked(
                 "holds dates and numbers", file=source, place=f"column {TIME}", hint="give one of them"
             )
         block = _block(
-            columns, source, first, after, silent, tuple(dict.fromkeys((*notes, *expected))), digest
+            columns, source, first, after, silent, tuple(dict.fromkeys((*notes, *more_notes))), digest
         )
         if first == 0 and about.start is None:
             about.start = start_of(time, block.time)

@@ -43,7 +43,7 @@ def records_of(path: str) -> Iterator[Any]:
 
 
 def resolved(value: Any, records: Any, ticks: Mapping[str, float]) -> Any:
-    """A value of `terragrip.formats.matlab_objects.plain` in which series stand where structs told of records.
+    """A value of `terragrip.formats.matlab_objects.plain` in which series stand where structs described records.
 
     A series is ``{"Time": (n,) s, "Data": (n, columns), "Unit": text}``; its samples are read when they are asked for. ``ticks``:
     seconds by the names of units of time.

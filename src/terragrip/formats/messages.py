@@ -66,7 +66,7 @@ class Topic:
 
     @property
     def is_wanted(self) -> bool:
-        """Whether any field is wanted; True until some messages told which there are."""
+        """Whether any field is wanted; True until some messages have shown which there are."""
         return bool(self._columns) or self.count < _TRIED
 
     def add(self, receipt: float, message: Any) -> None:

@@ -42,7 +42,7 @@ def read_ros1(path: str, wanted: Wanted | None, databases: Databases) -> SignalL
             number, receipt, content = record
             seen.messages += 1
             if number not in connections:
-                lost += 1  # who sent it was told in a part that is damaged
+                lost += 1  # its sender was named in a part that is damaged
                 continue
             topic, form = connections[number]
             if topic.is_wanted:

@@ -75,7 +75,7 @@ def _next(stream: BinaryIO) -> tuple[int, dict[bytes, bytes], bytes, bool] | Non
 
 
 def _indexed(stream: BinaryIO, fields: dict[bytes, bytes]) -> Iterator[Connection]:
-    """The connections that the index at the end repeats, if there is one: the chunk that told first may be damaged."""
+    """The connections that the index at the end repeats, if there is one: the chunk that named them first may be damaged."""
     here = stream.tell()
     try:
         (place,) = _PLACE.unpack(fields.get(b"index_pos", bytes(8)))

@@ -19,7 +19,7 @@ from terragrip.recording.schema import TIME, unit_of
 
 Floats = npt.NDArray[np.float64]
 
-_REACH = 60.0  # s that clocks which both count from 1970 may differ by: leap seconds are 18 s, time zones are told apart
+_REACH = 60.0  # s that clocks which both count from 1970 may differ by: leap seconds are 18 s, time zones are distinguished
 
 
 def merged(parts: Sequence[Part]) -> Recording:

@@ -33,7 +33,7 @@ SURE = 0.5
 
 @dataclass(frozen=True)
 class Settings:
-    """How a drive is looked at. `online`: as it would have been told while driving (no look ahead); `length` [m]: mean way on one
+    """How a drive is looked at. `online`: as it would have been reported while driving (no look ahead); `length` [m]: mean way on one
     ground before the data speak, of changes; `chain`: the prior of the soils; `signals`: what changes are looked for in."""
 
     online: bool = False

@@ -79,18 +79,18 @@ def changes_of(
 
 
 def _prepared(blocks: Blocks, names: Sequence[str]) -> tuple[Array, Model, NDArray[np.bool_]]:
-    """Signals of the blocks that tell any (NaN: not told), their model, and which blocks these are."""
+    """Signals of the blocks that hold any (NaN: not measured), their model, and which blocks these are."""
     for name in names:
         if name not in SIGNALS:
             raise InputError(f"there is no signal {name!r}", hint=f"take of {', '.join(SIGNALS)}")
     every = signals_of(blocks, tuple(names))
-    told = np.asarray(np.isfinite(every).any(axis=1))
-    signals, usual = every[told], Model.of(names).weight
+    is_measured = np.asarray(np.isfinite(every).any(axis=1))
+    signals, usual = every[is_measured], Model.of(names).weight
     enough = np.isfinite(signals).sum(axis=0) >= LEAST_FOR_WEIGHTS
     measured = np.array(
         [weights(x[np.isfinite(x)]) if ok else w for x, ok, w in zip(signals.T, enough, usual, strict=True)]
     )
-    return signals, Model.of(names, measured), told
+    return signals, Model.of(names, measured), is_measured
 
 
 def weights(signal: Array) -> float:

@@ -1,4 +1,4 @@
-"""The ground while driving: estimates in, one by one; every half second the soils' probabilities, and changes as they are told.
+"""The ground while driving: estimates in, one by one; every half second the soils' probabilities, and changes as they are reported.
 
 The same blocks, the same model and the same code as for a whole drive looked at without looking ahead: identical results.
 """
@@ -30,7 +30,7 @@ _VERSION = 1
 class GroundState:
     """What is known at the end of a block. `time` [s]: of the row that ended it; `soil`: the most probable; `probabilities` of all soils.
 
-    `known`: whether the block told of the ground (else the probabilities are carried on). `change`: a change told now, or None.
+    `known`: whether the block says anything of the ground (else the probabilities are carried on). `change`: a change reported now, or None.
     """
 
     time: float
@@ -43,8 +43,8 @@ class GroundState:
 class LiveGround:
     """Follows the ground along the estimates of one drive.
 
-    estimator: the estimator that the estimates come from; told of a new ground (`new_ground()`) at every change, so that its adhesion curve
-    starts anew. library: the known soils; without one every soil is unknown, and changes are told only.
+    estimator: the estimator that the estimates come from; notified of a new ground (`new_ground()`) at every change, so that its adhesion curve
+    starts anew. library: the known soils; without one every soil is unknown, and only changes are reported.
     """
 
     def __init__(

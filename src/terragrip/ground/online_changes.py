@@ -28,7 +28,7 @@ _RUNS = ("_mean", "_count", "_shape", "_scale")
 
 @dataclass(frozen=True)
 class OnlineSettings:
-    """`length` [m]: mean way on one ground; `threshold`: probability at which a change is told; `recent` [s]: how far back to look."""
+    """`length` [m]: mean way on one ground; `threshold`: probability at which a change is reported; `recent` [s]: how far back to look."""
 
     length: float = 30.0
     threshold: float = 0.8
@@ -38,7 +38,7 @@ class OnlineSettings:
 
 @dataclass(frozen=True)
 class ReportedChange:
-    """A change as it is told while driving: when it was told, when it was, its SD and probability. Times in s."""
+    """A change as it is reported while driving: when it was reported, when it was, its SD and probability. Times in s."""
 
     reported: float
     time: float
@@ -148,5 +148,5 @@ class OnlineChanges:
 
 
 def online_changes(blocks: Blocks, settings: OnlineSettings | None = None) -> Sequence[ReportedChange]:
-    """All changes of a drive as they would have been told while driving."""
+    """All changes of a drive as they would have been reported while driving."""
     return OnlineChanges(settings).update(blocks)

@@ -47,7 +47,7 @@ _ROUGHNESS_COVARIANCE = np.array([[0.50, 0.24], [0.24, 0.32]])
 
 
 def cells(blocks: Blocks, roughness: Array | None) -> Array:
-    """Tempered log likelihoods (blocks, CELLS) of known blocks; `roughness` (blocks, 2), None where it is not told."""
+    """Tempered log likelihoods (blocks, CELLS) of known blocks; `roughness` (blocks, 2), None where it is not known."""
     rows = len(blocks)
     level = broad_level(blocks)
     broad = level[:, None, None, None]

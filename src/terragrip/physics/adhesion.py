@@ -38,7 +38,7 @@ class CurveModel:
     """A family of adhesion-slip curves.
 
     `positive` and `positive_slope` give mu and dmu/ds for s >= 0; parameters may be arrays that broadcast against slip.
-    `fixed` names the parameters that a fit leaves at their start value unless told otherwise.
+    `fixed` names the parameters that a fit leaves at their start value unless stated otherwise.
     `native_intercept` gives the intercept that the printed form holds itself (Schreiber-Kutzbach), else 0.
     """
 

@@ -1,4 +1,4 @@
-"""The rows that a long log's noise and held channels are told from: chunks of neighbouring rows, spread over the whole of it.
+"""The rows that a long log's noise and held channels are learned from: chunks of neighbouring rows, spread over the whole of it.
 
 Chunks, since every k-th row would destroy rates, held values and noise. Every second, fourth, eighth ... chunk counts, so that
 they can be chosen while the log goes by and its length is not known yet.

@@ -1,6 +1,6 @@
 """Held channels: values that a logger repeats between true updates.
 
-How a held channel is told from a fresh one. A fresh sample repeats its predecessor exactly only when the
+How a held channel is distinguished from a fresh one. A fresh sample repeats its predecessor exactly only when the
 signal moved by less than its quantum (the step of which all steps are multiples), so a run of equal values
 ends in a step of about one quantum, or belongs to a standstill that happens a few times a log. A held
 channel shows run after run of two and more equal values that begin and end with steps of several quanta,

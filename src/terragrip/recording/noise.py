@@ -46,7 +46,7 @@ def sensor_noise(recording: Recording, held: dict[str, float] | None = None) -> 
 
 
 def white_noise(time: Floats, values: Floats) -> float | None:
-    """Robust standard deviation of the white noise on a smooth signal (n,); None if it cannot be told.
+    """Robust standard deviation of the white noise on a smooth signal (n,); None if it cannot be determined.
 
     The third divided difference Σ c_j x_j, c_j = Π 1/(t_j - t_i), of four samples is blind to any motion
     that is quadratic over them; over √Σc² it has the noise's variance, and its median absolute value

@@ -28,7 +28,7 @@ _RATIOS = (
     (1e-3, "ground_speed may be in mm/s"),
     (1e3, "wheel_speed or ground_speed may be off by a factor of 1000"),
 )
-_ENOUGH = 4000  # rows: a median that is to be told from another by a third needs no more
+_ENOUGH = 4000  # rows: a median that is to be distinguished from another by a third needs no more
 _PLAUSIBLE = (0.6, 2.2)  # a median ratio within is left to slip
 _OUTRUN = 1.5  # straight line over way: above, the way is too short
 _WAY_WINDOW = 10.0  # s

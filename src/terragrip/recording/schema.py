@@ -46,7 +46,7 @@ def is_own(name: str) -> bool:
 
 
 def has_torque(names: Iterable[str]) -> bool:
-    """Whether any of the columns is a wheel's drive torque; without one, slip is all that can be told."""
+    """Whether any of the columns is a wheel's drive torque; without one, slip is all that can be determined."""
     return any(name.startswith("drive_torque_") for name in names)
 
 

@@ -23,7 +23,7 @@ class LogBlocks:
     """A recording as consecutive blocks that can be gone through more than once.
 
     ``rows``: how many there are, about; ``blocks``: gives the blocks anew, from the first; ``whole``: gives all rows as one
-    recording, for what cannot be told block by block; ``from_disk``: each pass reads a file, so that it takes time.
+    recording, for what cannot be determined block by block; ``from_disk``: each pass reads a file, so that it takes time.
     """
 
     rows: int

@@ -162,7 +162,7 @@ def _sections(main: Run, together: Sequence[Run], campaign: Campaign) -> Iterato
 
 
 def _of_slip(together: Sequence[Run]) -> Iterator[Section]:
-    """What can be told where no run has a torque, and what cannot."""
+    """What can be determined where no run has a torque, and what cannot."""
     for run in together:
         yield from slip_sections.of(run)
     yield Section(

@@ -40,9 +40,9 @@ def recognised(grounds: Sequence[Ground], simulated: bool = False) -> Section:
     content: list[Picture | Table] = []
     for ground in sorted(shown, key=lambda one: one.run):
         way = (
-            "as it was told while driving"
+            "as it was reported while driving"
             if ground.about.get("online")
-            else "told afterwards, from the whole drive"
+            else "reported afterwards, from the whole drive"
         )
         labelled = any(ground.timeline.label)
         strip = " The strip on top is the recording's own label, grey a transition." if labelled else ""
@@ -133,7 +133,7 @@ def events(
         return Section(
             "events",
             title,
-            omitted="Left out: no ground.json was given, and no estimates whose events could be told.",
+            omitted="Left out: no ground.json was given, and no estimates whose events could be determined.",
         )
     if not every:
         return Section("events", title, ("No event.",))

@@ -78,10 +78,10 @@ def slip_and_resistance(run: Run) -> Section:
     return Section(f"slip-{run.name}", "Slip and soil resistance", (), (picture,))
 
 
-def online_curve(run: Run, scales: Mapping[str, float], told: str = "of the fits below") -> Section:
+def online_curve(run: Run, scales: Mapping[str, float], by_whom: str = "of the fits below") -> Section:
     """The scale a of the adhesion curve as it is known while driving (paper, Fig. 2), beside each soil's own.
 
-    `scales`: a by soil, drawn as steps; `told`: whose they are, for the caption.
+    `scales`: a by soil, drawn as steps; `by_whom`: whose they are, for the caption.
     """
     title = "The curve, known while driving"
     if "curve_a" not in run.estimates:
@@ -96,9 +96,9 @@ def online_curve(run: Run, scales: Mapping[str, float], told: str = "of the fits
         std,
         truth=steps if np.isfinite(steps).any() else None,
         limits=(0.0, 1.25 * float(top)),
-        reference=f"a {told}",
+        reference=f"a {by_whom}",
     )
-    beside = f", beside the a {told}" if lane.truth is not None else ""
+    beside = f", beside the a {by_whom}" if lane.truth is not None else ""
     picture = Picture(
         f"online-{run.name}",
         timeline(run, [lane]),
@@ -200,7 +200,7 @@ def honesty(shown: Run, covered: Sequence[Coverage]) -> Section:
 
 
 def calibrated(calibration: Calibration) -> Section:
-    """What the vehicle's own logs told of its sensors and wheels."""
+    """What the vehicle's own logs say of its sensors and wheels."""
     rows = tuple(
         (
             item.name,

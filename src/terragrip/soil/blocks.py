@@ -1,6 +1,6 @@
 """Blocks of half a second of a drive: the level of rho_s, mu and slip, and how much they vary within the block.
 
-Both are what a soil is told by: its level and its roughness. Blocks count from a fixed instant, so that a drive gives the same blocks
+Both are what a soil is recognised by: its level and its roughness. Blocks count from a fixed instant, so that a drive gives the same blocks
 sample by sample as at once.
 """
 
@@ -208,7 +208,7 @@ def estimates_blocks(
     """
     if not estimates.has_adhesion:
         raise InputError(
-            "holds slip but no adhesion: the ground is told by adhesion and soil resistance, which need drive torques",
+            "holds slip but no adhesion: the ground is recognised by adhesion and soil resistance, which need drive torques",
             file=file,
             hint="estimate a log with torques; slip alone changes with the pull, on one and the same ground",
         )

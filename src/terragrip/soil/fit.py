@@ -118,7 +118,7 @@ class AdhesionCurve:
 
     @property
     def has_band(self) -> bool:
-        """Whether `band` can be told: by the bootstrap, or by the interval of the one free parameter of a fit that was read."""
+        """Whether `band` can be determined: by the bootstrap, or by the interval of the one free parameter of a fit that was read."""
         return self.samples_ is not None or (len(self.free_) == 1 and self.free_[0] in self.interval_)
 
     def band(self, slip: ArrayLike, level: float = 0.95) -> tuple[Array, Array]:
@@ -218,7 +218,7 @@ class AdhesionCurve:
         clusters = int(np.count_nonzero(alive))
         if clusters < 3:
             self.notes_.append(
-                f"All samples come from {clusters} run{'s' * (clusters != 1)}: no interval can be told; "
+                f"All samples come from {clusters} run{'s' * (clusters != 1)}: no interval can be determined; "
                 "give the runs, or drive more of them."
             )
             return

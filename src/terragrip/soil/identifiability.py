@@ -13,7 +13,7 @@ from terragrip.physics.adhesion import CurveModel, effective_parameters
 Array = NDArray[np.float64]
 
 LIMIT = 1e4
-"""Condition number (columns scaled to unit change of each parameter's own size) beyond which parameters are not told apart."""
+"""Condition number (columns scaled to unit change of each parameter's own size) beyond which parameters are not distinguished."""
 POOR = 0.5
 """R2 below which a curve explains too little of its bins for them to fix its parameters."""
 

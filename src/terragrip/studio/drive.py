@@ -41,7 +41,7 @@ def spans(labels: npt.NDArray[Any], time: Floats) -> list[dict[str, Any]]:
 
 
 def radii(table: Estimates) -> dict[str, float]:
-    """Rolling radius [m] of each wheel of the table: the vehicle file's, by the zero of slip where the log told one. The drive train
+    """Rolling radius [m] of each wheel of the table: the vehicle file's, by the zero of slip where the log gave one. The drive train
     of a tractor, which stands for all driven wheels, has their mean."""
     vehicle = table.vehicle
     if not vehicle.knows_wheels:

@@ -1,4 +1,4 @@
-"""Relative torque gains: what is told, what is not, and whether the intervals hold."""
+"""Relative torque gains: what is determined, what is not, and whether the intervals hold."""
 
 from __future__ import annotations
 

@@ -108,7 +108,7 @@ def test_without_pitch_the_slope_stays_in_the_interval(drive: Make, vehicle: Veh
     bias = result["acceleration_bias_x"]
     assert bias.interval[0] < 0.3 < bias.interval[1]
     assert bias.std > 0.8 * GRAVITY * np.radians(0.5)
-    assert "cannot be told apart" in bias.sentence
+    assert "cannot be distinguished" in bias.sentence
 
 
 def test_a_bias_beyond_its_prior_is_not_shrunk_away(drive: Make, vehicle: Vehicle) -> None:

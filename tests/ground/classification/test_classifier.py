@@ -103,7 +103,7 @@ def test_one_to_eight_wheels(wheels: tuple[str, ...]) -> None:
 
 
 def test_ground_speed_is_used_where_there_is_one() -> None:
-    """Grounds alike but for slip: told with a ground speed, not without."""
+    """Grounds alike but for slip: recognised with a ground speed, not without."""
 
     def slipping(seed: int, slip: float) -> pd.DataFrame:
         table = without([drive("hard", seed)], *BODY, "drive_torque")[0]

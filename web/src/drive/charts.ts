@@ -356,7 +356,7 @@ function limits(plot: uPlot, low: number | null, high: number | null, panel: Pan
   return [from - room, to + room];
 }
 
-/** Values that lie outside the axis are told in its corner: nothing is left out in silence. */
+/** Values that lie outside the axis are listed in its corner: nothing is left out in silence. */
 function beyond(plot: uPlot, panel: Panel): void {
   const { min, max } = plot.scales["y"] ?? {};
   if (panel.log || typeof min !== "number" || typeof max !== "number") return;

@@ -233,8 +233,8 @@ export const page: Page = (main, { notices, query }) => {
     const soil = during(run.soils, time)?.name;
     const section = during(run.ground?.sections, time);
     const event = during(run.events, time);
-    const told = section ? `recognised: ${section.soil} (${digits(100 * (section.probabilities[section.soil] ?? 0), 2)} %)` : "";
-    readout.value = [`t ${time.toFixed(2)} s`, soil, told, event && `${event.kind}${event.why ? `: ${event.why}` : ""}`].filter(Boolean).join("   ");
+    const recognised = section ? `recognised: ${section.soil} (${digits(100 * (section.probabilities[section.soil] ?? 0), 2)} %)` : "";
+    readout.value = [`t ${time.toFixed(2)} s`, soil, recognised, event && `${event.kind}${event.why ? `: ${event.why}` : ""}`].filter(Boolean).join("   ");
   }
 
   charts.onCursor = hover;

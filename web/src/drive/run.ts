@@ -59,7 +59,7 @@ export interface Panel {
   traces: Trace[];
   /** Values at which lines cross the panel, such as the expected NIS. */
   levels?: number[];
-  /** What intervals may stretch the axis to; and values, where these differ from it. What lies beyond is told in a corner. */
+  /** What intervals may stretch the axis to; and values, where these differ from it. What lies beyond is listed in a corner. */
   low?: number;
   high?: number;
   least?: number;

@@ -16,7 +16,7 @@ export function brushed(): Brush | null {
 
 /** Other times are shown. */
 export function brush(path: string, range: [number, number]): void {
-  if (now && now.path === path && now.range[0] === range[0] && now.range[1] === range[1]) return; // also what another tab has just told
+  if (now && now.path === path && now.range[0] === range[0] && now.range[1] === range[1]) return; // also what another tab has just set
   now = { path, range };
   channel.postMessage(now);
 }

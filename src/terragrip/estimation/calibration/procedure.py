@@ -233,7 +233,7 @@ def _useful(quantities: list[Quantity], vehicle: Vehicle, unknown: list[Unknown]
         f"{100 * x:.2g} %" if relative else f"{x:.2g} {quantities[0].unit}" for x in (max(errors), prior)
     )
     unknown.append(
-        Unknown(key, f"told to {worst} only, and the vehicle file knows it to {known}: record more")
+        Unknown(key, f"determined to {worst} only, and the vehicle file knows it to {known}: record more")
     )
     return []
 
@@ -247,7 +247,7 @@ def _radii(rolling: Rolling, gains: RelativeGains | None, vehicle: Vehicle) -> l
         f"{100 * rolling.slip:.2f} % there"
     )
     if gains is not None:
-        sentence += "; what a wheel differs from the others is told by its torque over slip"
+        sentence += "; what a wheel differs from the others is determined by its torque over slip"
     return [
         Quantity(
             "wheel_radius",

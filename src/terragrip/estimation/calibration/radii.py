@@ -12,7 +12,7 @@ says so. v/ω is regressed on μ, not the reverse: the noise of a speed is in v/
 construction.
 
 Driven wheels share one correction of the vehicle file's radii here, and their mean μ: which wheel's radius
-differs shows only in which wheel pulls more, and there it is one with the torque gains, so it is told together
+differs shows only in which wheel pulls more, and there it is one with the torque gains, so it is determined together
 with them (:mod:`~terragrip.estimation.calibration.sharing`). An undriven wheel has a radius of its own.
 """
 

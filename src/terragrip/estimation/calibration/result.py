@@ -1,4 +1,4 @@
-"""What a calibration hands back: quantities with their intervals, and what could not be told."""
+"""What a calibration hands back: quantities with their intervals, and what could not be determined."""
 
 from __future__ import annotations
 
@@ -132,7 +132,7 @@ class Calibration:
         return Vehicle.from_dict(data)
 
     def table(self) -> str:
-        """The quantities with their intervals and evidence, and what could not be told, as plain text."""
+        """The quantities with their intervals and evidence, and what could not be determined, as plain text."""
         rows = [("quantity", "value", "95 % interval", "unit", "from")]
         rows += [_row(quantity) for quantity in self.quantities]
         widths = [max(len(row[k]) for row in rows) for k in range(len(rows[0]))]

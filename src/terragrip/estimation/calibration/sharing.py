@@ -8,7 +8,7 @@ its gain. Model of the mean torque of wheel i over window n (physics.md 1, avera
 m_n is the adhesion that all wheels have at the window's mean slip s_n, unknown anew in every window: so neither the noise of
 ground speed, nor the curve's form, nor what the soil does to all wheels alike enters the gains. The curve is needed only
 for its steepness d_n, which carries the wheels' small differences of slip. Unknown are ln k_i (mean 0: a gain common to all
-wheels cannot be told from m_n) and, with their priors, the relative radii e_i and the offsets o_i. Weighted least squares
+wheels cannot be distinguished from m_n) and, with their priors, the relative radii e_i and the offsets o_i. Weighted least squares
 with Huber weights; (R), our own construction.
 
 Adhesion differs from place to place, so the errors of neighbouring windows hang together: the covariance is the sandwich
@@ -279,7 +279,7 @@ def effective_blocks(normal: Floats, jacobian: Floats, block: Ints, unknown: int
 
 
 def _inverse(matrix: Floats) -> Floats:
-    """Inverse of a positive semidefinite matrix after scaling its diagonal to 1; what is not told stays 0."""
+    """Inverse of a positive semidefinite matrix after scaling its diagonal to 1; what is not determined stays 0."""
     size = np.sqrt(np.maximum(np.diag(matrix), 1e-300))
     inverse = np.linalg.pinv(matrix / np.outer(size, size), hermitian=True, rcond=1e-13)
     return np.asarray(inverse / np.outer(size, size))

@@ -209,7 +209,7 @@ def _free_passes(windows: Windows, noise: float) -> list[Spell]:
 def inclination_zeros(
     windows: Windows, vehicle: Vehicle, sources: Sequence[str], noise: float
 ) -> tuple[list[Quantity], list[Unknown]]:
-    """Zeros of accelerometer and pitch sensor from standstill, as far as they can be told.
+    """Zeros of accelerometer and pitch sensor from standstill, as far as they can be determined.
 
     Standing on slope θ the accelerometer reads b + g sinθ, the pitch sensor p + θ: the data tell b - g p, or b + g sinθ
     where there is no pitch sensor, and no more. The sum is split by the priors' variances (the best linear estimate),
@@ -244,13 +244,13 @@ def inclination_zeros(
     left = own * other / np.hypot(own, other)
     if not pitched:
         sentence = (
-            "mean at standstill, split between bias and slope by their priors: they cannot be told apart"
+            "mean at standstill, split between bias and slope by their priors: they cannot be distinguished"
         )
         bias = Quantity(
             bias_key, share * total, float(np.hypot(share * error, left)), "m/s^2", rests_on, sentence
         )
         return [bias], [no_pitch]
-    sentence = "accelerometer less g sin(pitch) at standstill, split between the two zeros by their priors: only the difference is told"
+    sentence = "accelerometer less g sin(pitch) at standstill, split between the two zeros by their priors: only the difference is determined"
     rest = 1 - share
     bias = Quantity(
         bias_key, share * total, float(np.hypot(share * error, left)), "m/s^2", rests_on, sentence

@@ -1,4 +1,4 @@
-"""Considered constants: what cannot be told from the data still widens the interval (Schmidt; physics.md 6)."""
+"""Considered constants: what cannot be distinguished from the data still widens the interval (Schmidt; physics.md 6)."""
 
 from __future__ import annotations
 

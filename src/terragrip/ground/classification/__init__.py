@@ -1,1 +1,1 @@
-"""Grounds told apart from any recording, window by window: `classifier.GroundClassifier` and its parts."""
+"""Grounds distinguished from any recording, window by window: `classifier.GroundClassifier` and its parts."""

@@ -154,7 +154,7 @@ class GroundClassifier:
         return _windows([learnt.windows(table, self.step) for table in tables_of(recordings)], learnt)
 
     def judge(self, recordings: Iterable[Any]) -> pd.DataFrame:
-        """All that is told of every window, judged once: the columns of `windows`, ``ground`` (`predict`), ``novelty`` and
+        """All that is known of every window, judged once: the columns of `windows`, ``ground`` (`predict`), ``novelty`` and
         ``probability_<class>`` (`predict_proba`). Raises InputError as `predict`.
         """
         judged = self._judge(recordings)

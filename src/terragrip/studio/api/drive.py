@@ -32,7 +32,7 @@ Time = Annotated[float, Query(allow_inf_nan=False)]
 
 
 def _table(studio: Studio, path: str, version: str = "") -> Estimates:
-    """Estimates of the folder. Raises InputError where the file is no longer the `version` that the page was told of: what it draws
+    """Estimates of the folder. Raises InputError where the file is no longer the `version` that the page was given: what it draws
     would be a mixture of two runs."""
     if version and studio.folder.version(path) != version:
         raise InputError("was replaced since it was opened", file=path, hint="open it again")

@@ -31,7 +31,7 @@ SLIPS = np.linspace(-1.0, 1.0, 401)
 
 
 class BinChoice(BaseModel):
-    """Slip bins, as fractions; by the vehicle's pull unless told otherwise, as `terragrip soils` has them."""
+    """Slip bins, as fractions; by the vehicle's pull unless stated otherwise, as `terragrip soils` has them."""
 
     width: float = Field(0.01, gt=0, le=0.5)
     lower: float = Field(0.05, ge=-1, le=1)
