@@ -34,7 +34,7 @@ static double seconds(void)
     return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
 }
 
-static void take(FILE *file, double *to, size_t count)
+static void read_numbers(FILE *file, double *to, size_t count)
 {
     if (fread(to, sizeof *to, count, file) != count) stop("the problem file is short");
 }
@@ -45,7 +45,7 @@ int main(int argc, char **argv)
     FILE *file = fopen(argv[1], "rb");
     if (!file) stop("the problem file cannot be read");
     double head[6];
-    take(file, head, 6);
+    read_numbers(file, head, 6);
     const int n = (int)head[0], nx = 2 * n + 2, width = 3 * n + 2;
     const size_t steps = (size_t)head[1];
     const double dt = head[2];
@@ -55,18 +55,18 @@ int main(int argc, char **argv)
     machine.mass = head[3];
     machine.gravity = head[4];
     machine.tire_rolling_resistance = head[5];
-    take(file, machine.radius, (size_t)n);
-    take(file, machine.inertia, (size_t)n);
-    take(file, machine.bearing_resistance, (size_t)n);
+    read_numbers(file, machine.radius, (size_t)n);
+    read_numbers(file, machine.inertia, (size_t)n);
+    read_numbers(file, machine.bearing_resistance, (size_t)n);
     double walk[18], x0[18], P0[18 * 18], r[10] = {0}, q_input[18] = {0};
-    take(file, walk, (size_t)nx);
-    take(file, x0, (size_t)nx);
-    take(file, P0, (size_t)(nx * nx));
-    take(file, r, (size_t)(n + 1));
+    read_numbers(file, walk, (size_t)nx);
+    read_numbers(file, x0, (size_t)nx);
+    read_numbers(file, P0, (size_t)(nx * nx));
+    read_numbers(file, r, (size_t)(n + 1));
     r[n + 1] = 1.0; /* of the accelerometer, which is missing */
     double *rows = malloc(steps * (size_t)width * sizeof *rows);
     if (!rows) stop("no memory");
-    take(file, rows, steps * (size_t)width);
+    read_numbers(file, rows, steps * (size_t)width);
     fclose(file);
     tg_filter *filter = malloc(sizeof *filter);
     if (!filter) stop("no memory");

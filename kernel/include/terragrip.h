@@ -317,8 +317,8 @@ typedef struct {
     tg_real slip_spread;            /* SD of a remembered slip; its variance grows by a fifth a second */
     tg_real alike, carried_alike;   /* s over which the error of a reckoned speed stays alike; of one that the accelerometer carries on */
     tg_real reckoned_force, carried_force; /* force_walk times this beside it, meanwhile */
-    tg_real jolt_memory;            /* s: of what the accelerometer reads beyond the model */
-    tg_real swing;                  /* samples that a jolt lasts */
+    tg_real shock_memory;           /* s: of what the accelerometer reads beyond the model */
+    tg_real shock_samples;          /* samples that a shock lasts */
     tg_real longest_walk;           /* s of random walk that a gap adds at most: beyond it the ground is simply unknown */
     tg_real standstill;             /* V: below it a machine counts as standing */
     tg_real uneven_length;          /* wheel radii: shorter changes of adhesion and resistance are the ground's unevenness */

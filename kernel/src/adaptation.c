@@ -63,7 +63,7 @@ TG_INLINE void sensitivity_predict(tg_adaptation_state *s, const tg_filter *f, c
 }
 
 /* One channel: dP <- (I - K h) dP (I - K h)', dx <- dx + dK residual - K h dx. */
-TG_INLINE void sensitivity_take(tg_adaptation_state *s, const tgi_plan *plan, const tgi_result *result, int c, const int n, const int stride)
+TG_INLINE void sensitivity_update(tg_adaptation_state *s, const tgi_plan *plan, const tgi_result *result, int c, const int n, const int stride)
 {
     const int rows = TG_TWICE(n), o = result->channel[c];
     const tg_real *const K = result->gain[c], *const h = plan->accelerometer;
@@ -190,7 +190,7 @@ TG_INLINE int adapt(tg_adaptation_state *s, const tg_filter *f, const tgi_plan *
     sensitivity_predict(s, f, plan, n, stride);
     if (result->taken && remember_innovations(s, f, plan, result) == n + 1 && ++s->updates % f->tuning.stride == 0)
         descend(s, f, result, n, stride);
-    for (int c = 0; c < result->taken; c++) sensitivity_take(s, plan, result, c, n, stride);
+    for (int c = 0; c < result->taken; c++) sensitivity_update(s, plan, result, c, n, stride);
     return is_finite(s, n, stride);
 }
 

@@ -134,7 +134,7 @@ TG_INLINE void bank_variances(const tgi_plan *plan, const array *a, const tg_lan
 }
 
 /* Take one channel in every mode (Bierman's update, see factor_measure). `along`: U'h, zero before column `first`. */
-TG_INLINE void bank_take(const tgi_plan *plan, tgi_update *out, int o, const tg_lanes *along, int first, tg_lanes residual, const int n)
+TG_INLINE void bank_update_channel(const tgi_plan *plan, tgi_update *out, int o, const tg_lanes *along, int first, tg_lanes residual, const int n)
 {
     tgi_modes *const m = &out->state;
     tg_lanes *const K = out->gain[out->taken];
@@ -169,7 +169,7 @@ TG_INLINE void bank_update(const tgi_plan *plan, tgi_update *out, const int n)
         tg_lanes along[TG_MAX_STATES];
         if (!plan->present[o]) continue;
         for (int k = j; k < TG_TWICE(n); k++) along[k] = m->u[k][j];
-        bank_take(plan, out, o, along, j, lanes_sub(lanes_all(plan->y[o]), m->x[j]), n);
+        bank_update_channel(plan, out, o, along, j, lanes_sub(lanes_all(plan->y[o]), m->x[j]), n);
     }
     if (!plan->present[n + 1]) return;
     tg_lanes along[TG_MAX_STATES];
@@ -177,7 +177,7 @@ TG_INLINE void bank_update(const tgi_plan *plan, tgi_update *out, const int n)
         along[k] = bank_zeros();
         for (int i = 0; i <= n && i <= k; i++) along[k] = lanes_mul_add(lanes_all(h[i]), m->u[k][i], along[k]);
     }
-    bank_take(plan, out, n + 1, along, 0, bank_jolt(plan, m->x, n), n);
+    bank_update_channel(plan, out, n + 1, along, 0, bank_shock(plan, m->x, n), n);
 }
 
 /* What residual c takes from residual b < c: the channel's row of H times b's gain. */

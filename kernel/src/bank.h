@@ -79,7 +79,7 @@ TG_INLINE void bank_innovations(const tg_filter *f, const tgi_plan *plan, const 
 }
 
 /* Residual of the accelerometer after the channels before it. */
-TG_INLINE tg_lanes bank_jolt(const tgi_plan *plan, const tg_lanes *x, const int n)
+TG_INLINE tg_lanes bank_shock(const tgi_plan *plan, const tg_lanes *x, const int n)
 {
     tg_lanes residual = lanes_all(plan->y[n + 1] - plan->accelerometer_shift);
     for (int i = 0; i <= n; i++) residual = lanes_mul_sub(lanes_all(plan->accelerometer[i]), x[i], residual);

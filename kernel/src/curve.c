@@ -55,24 +55,24 @@ static tg_real answer(tg_real slip, tg_real height, tg_real slope, tg_real varia
     return mean > slope ? mean : slope;
 }
 
-/* Seen from the prototype, odd in slip. `told` is 0 where the pair tells nothing. */
-tgi_sight tgi_look(const tg_pair *p)
+/* Seen from the prototype, odd in slip. `is_usable` is 0 where the pair says nothing. */
+tgi_observation tgi_observe(const tg_pair *p)
 {
-    tgi_sight found;
+    tgi_observation result;
     const tg_real s = tgi_fabs(p->slip), sum = p->adhesion + p->adhesion_variance + p->slip_variance + p->adhesion_constant;
-    memset(&found, 0, sizeof found);
-    if (!(s <= TG_LARGEST_SLIP) || isnan(sum) || isinf(sum)) return found;
+    memset(&result, 0, sizeof result);
+    if (!(s <= TG_LARGEST_SLIP) || isnan(sum) || isinf(sum)) return result;
     const tg_real first = TG_CURVE_SHARE * slow(s), second = (1 - TG_CURVE_SHARE) * tgi_exp(TG_CURVE_RISE * s), g = 1 - first - second;
-    found.told = 1;
-    found.adhesion = p->adhesion;
-    found.height = p->slip < 0 ? -g : g;
-    found.slope = answer(s, g, -TG_CURVE_SLOW * first - TG_CURVE_RISE * second, p->slip_variance);
-    found.variance = p->adhesion_variance;
-    found.slip_variance = p->slip_variance;
-    found.constant = p->adhesion_constant * p->adhesion_constant;
-    found.radius = p->radius_error;
-    found.travel = 1 - s;
-    return found;
+    result.is_usable = 1;
+    result.adhesion = p->adhesion;
+    result.height = p->slip < 0 ? -g : g;
+    result.slope = answer(s, g, -TG_CURVE_SLOW * first - TG_CURVE_RISE * second, p->slip_variance);
+    result.variance = p->adhesion_variance;
+    result.slip_variance = p->slip_variance;
+    result.constant = p->adhesion_constant * p->adhesion_constant;
+    result.radius = p->radius_error;
+    result.travel = 1 - s;
+    return result;
 }
 
 /* The residual mu - a g(s): its variance (a itself is uncertain: `size` is the root of E[a^2]), and by how much one SD of all constants moves it. A radius error e too much lowers mu by mu e
@@ -81,7 +81,7 @@ typedef struct {
     tg_real adhesion, height, variance, constant;
 } tgi_measurement;
 
-static tgi_measurement measure(const tgi_sight *k, tg_real a, tg_real size)
+static tgi_measurement measure(const tgi_observation *k, tg_real a, tg_real size)
 {
     const tg_real slope = size * k->slope, radius = (tgi_fabs(k->adhesion) + tgi_fabs(slope) * k->travel) * k->radius;
     const tg_real scatter = TG_SCATTER * a * k->height;
@@ -91,14 +91,14 @@ static tgi_measurement measure(const tgi_sight *k, tg_real a, tg_real size)
 }
 
 /* The mean of the wheels by `share`; their errors are taken as alike, which no count of wheels makes smaller. */
-static int32_t mean_of(const tgi_sight *sight, const tg_real *share, int32_t pairs, const tg_curve *c, tgi_measurement *mean)
+static int32_t mean_of(const tgi_observation *observed, const tg_real *share, int32_t pairs, const tg_curve *c, tgi_measurement *mean)
 {
     const tg_real size = tgi_sqrt(c->a * c->a + c->variance);
     tg_real sum = 0, sd = 0;
     memset(mean, 0, sizeof *mean);
     for (int32_t i = 0; i < pairs; i++) {
-        if (!sight[i].told || !(share[i] > 0)) continue;
-        const tgi_measurement m = measure(&sight[i], c->a, size);
+        if (!observed[i].is_usable || !(share[i] > 0)) continue;
+        const tgi_measurement m = measure(&observed[i], c->a, size);
         sum += share[i];
         mean->adhesion += share[i] * m.adhesion;
         mean->height += share[i] * m.height;
@@ -148,7 +148,7 @@ static void start_anew(tg_curve *c, const tgi_measurement *m)
 
 /* A row counts as the share dt/TG_MEMORY of an independent pair. The constants' column goes through the same gain (Schmidt-Kalman): no
  * number of pairs makes it smaller. */
-static void take(tg_curve *c, const tgi_measurement *m, tg_real dt)
+static void learn_pair(tg_curve *c, const tgi_measurement *m, tg_real dt)
 {
     average(c, m, dt);
     if (!(tgi_fabs(c->height) >= TG_LEAST_HEIGHT)) return;
@@ -165,17 +165,17 @@ static void take(tg_curve *c, const tgi_measurement *m, tg_real dt)
     c->constant = keep * c->constant + tgi_fabs(gain) * m->constant;
 }
 
-void tgi_curve_take(tg_curve *c, tg_real dt, tg_real distance, int32_t pairs, const tgi_sight *sight, const tg_real *share)
+void tgi_curve_learn(tg_curve *c, tg_real dt, tg_real distance, int32_t pairs, const tgi_observation *observed, const tg_real *share)
 {
     tgi_measurement m;
     wander(c, distance);
-    if (dt > 0 && mean_of(sight, share, pairs, c, &m)) take(c, &m, dt);
+    if (dt > 0 && mean_of(observed, share, pairs, c, &m)) learn_pair(c, &m, dt);
     else if (c->silence >= 0) c->silence += dt;
 }
 
 tg_status tg_curve_update(tg_curve *c, tg_real dt, tg_real distance, int32_t pairs, const tg_pair *pair, const tg_real *share)
 {
-    tgi_sight sight[TG_MAX_WHEELS];
+    tgi_observation observed[TG_MAX_WHEELS];
     if (!c || pairs < 0 || pairs > TG_MAX_WHEELS || (pairs > 0 && (!pair || !share))) return TG_BAD_ARGUMENT;
     if (isnan(dt) || isinf(dt) || isnan(distance) || isinf(distance)) return TG_NOT_FINITE;
     if (dt < 0) return TG_TIME_REVERSED;
@@ -185,8 +185,8 @@ tg_status tg_curve_update(tg_curve *c, tg_real dt, tg_real distance, int32_t pai
             return TG_NOT_FINITE;
         if (!(share[i] > 0)) return TG_NOT_POSITIVE;
         if (pair[i].adhesion_variance < 0 || pair[i].slip_variance < 0 || pair[i].radius_error < 0) return TG_NOT_POSITIVE;
-        sight[i] = tgi_look(&pair[i]);
+        observed[i] = tgi_observe(&pair[i]);
     }
-    tgi_curve_take(c, dt, distance < 0 ? -distance : distance, pairs, sight, share);
+    tgi_curve_learn(c, dt, distance < 0 ? -distance : distance, pairs, observed, share);
     return TG_OK;
 }

@@ -15,9 +15,9 @@ typedef struct {
     tg_real adhesion, height, slope; /* mu, g(s), |dg/ds| */
     tg_real variance, slip_variance, constant;
     tg_real radius, travel;          /* relative radius error; 1 - |s| */
-    int32_t told;
-} tgi_sight;
+    int32_t is_usable;
+} tgi_observation;
 
-tgi_sight tgi_look(const tg_pair *p);
-void tgi_curve_take(tg_curve *c, tg_real dt, tg_real distance, int32_t pairs, const tgi_sight *sight, const tg_real *share);
+tgi_observation tgi_observe(const tg_pair *p);
+void tgi_curve_learn(tg_curve *c, tg_real dt, tg_real distance, int32_t pairs, const tgi_observation *observed, const tg_real *share);
 #endif

@@ -38,16 +38,16 @@ static tg_pair pair_of(const tg_estimator *e, int32_t i, const tg_real *o)
 static void learn_curves(tg_estimator *e, int32_t learn, const tg_real *load, const tg_real *o)
 {
     const int32_t n = e->settings.machine.wheels;
-    tgi_sight sight[TG_MAX_WHEELS];
+    tgi_observation observed[TG_MAX_WHEELS];
     for (int32_t i = 0; i < n; i++) {
         if (learn) {
             const tg_pair pair = pair_of(e, i, o);
-            sight[i] = tgi_look(&pair);
+            observed[i] = tgi_observe(&pair);
         }
-        tgi_curve_take(&e->wheel_curve[i], e->curve_wait, e->curve_distance, learn ? 1 : 0, &sight[i], &load[i]);
+        tgi_curve_learn(&e->wheel_curve[i], e->curve_wait, e->curve_distance, learn ? 1 : 0, &observed[i], &load[i]);
         e->wheel_curve_std[i] = tg_curve_std(&e->wheel_curve[i]);
     }
-    tgi_curve_take(&e->curve, e->curve_wait, e->curve_distance, learn ? n : 0, sight, load);
+    tgi_curve_learn(&e->curve, e->curve_wait, e->curve_distance, learn ? n : 0, observed, load);
     e->curve_std = tg_curve_std(&e->curve);
     e->curve_wait = e->curve_distance = 0;
 }

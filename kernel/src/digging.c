@@ -4,7 +4,7 @@
 #include "estimator.h"
 
 #define TG_SHORT ((tg_real)0.1) /* of the unit of time: rows within it are averaged, and the signals low-passed */
-#define TG_SHARP ((tg_real)0.02) /* SD of slip from which on a row of a look counts less: between measured speeds it is large */
+#define TG_SHARP ((tg_real)0.02) /* SD of slip from which on a row of an interval counts less: between measured speeds it is large */
 #define TG_FLOOR ((tg_real)0.1) /* adhesion that is added where two small ones are compared */
 
 static tg_real low_pass(tg_real mean, tg_real dt, tg_real tau, tg_real x)
@@ -50,9 +50,9 @@ static void add(tgi_view *sum, const tgi_view *l, tg_real weight)
     sum->travel += weight * l->travel;
 }
 
-/* Add a row to the look, weighted by how well its slip is known; returns whether that ended one, whose signals then are in the means.
+/* Add a row to the interval, weighted by how well its slip is known; returns whether that ended one, whose signals then are in the means.
  * `since` becomes the time between two looks. */
-static int32_t look(tg_estimator *e, double time, const tgi_view *row, tg_real *since)
+static int32_t add_row(tg_estimator *e, double time, const tgi_view *row, tg_real *since)
 {
     tgi_digging *d = &e->watch.digging;
     const tg_real pace = e->constants.pace;
@@ -93,13 +93,13 @@ void tgi_digging_rest(tgi_digging *d)
     d->weight = d->score = 0;
 }
 
-/* After a row; returns whether it ended a look. */
+/* After a row; returns whether it ended an interval. */
 int32_t tgi_digging_update(tg_estimator *e, double time, const tgi_view *row)
 {
     const tg_watch_settings *s = &e->settings.watch;
     tgi_digging *d = &e->watch.digging;
     tg_real since;
-    if (!look(e, time, row, &since)) return 0;
+    if (!add_row(e, time, row, &since)) return 0;
     const tg_real slip = d->now[TGI_SLIP], sure = slip - d->now[TGI_DEVIATION];
     const tg_real rim = d->now[TGI_RIM] - d->mean[TGI_RIM], gain = d->now[TGI_TRAVEL] - d->mean[TGI_TRAVEL];
     const tg_real command = tgi_max(tgi_max(rim, gain), -rim / 2); /* rims slow by command and in hits, yet also of a weak drive that digs in */

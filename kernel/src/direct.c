@@ -87,7 +87,7 @@ TG_INLINE int noise_holds(const tg_real *q, const tgi_block *P, const int n)
 }
 
 /* P less h h' inverse; K = h inverse. */
-TG_INLINE void block_take(tgi_block *P, const tgi_gain *h, tg_real one_over, tgi_gain *K, const int n)
+TG_INLINE void block_update(tgi_block *P, const tgi_gain *h, tg_real one_over, tgi_gain *K, const int n)
 {
     const tg_lanes inverse = lanes_all(one_over), h_rho = lanes_all(lanes_at(h->rest, 0)), h_v = lanes_all(lanes_at(h->rest, 1));
     K->mu = lanes_mul(h->mu, inverse);
@@ -111,17 +111,17 @@ TG_INLINE void block_take(tgi_block *P, const tgi_gain *h, tg_real one_over, tgi
 typedef struct { /* the step on its way */
     tgi_direct *out;
     tg_real noise; /* product of the channels' weighted R: the second half of the bound */
-} taking;
+} channel_updates;
 
 /* One channel with h = P H' and the residual after the channels before it; its prior innovation and variance give the weight. */
-TG_INLINE void take(const tg_filter *f, const tgi_plan *plan, taking *t, int o, const tgi_gain *h, tg_real product, tg_real residual,
+TG_INLINE void update_channel(const tg_filter *f, const tgi_plan *plan, channel_updates *t, int o, const tgi_gain *h, tg_real product, tg_real residual,
                     tg_real innovation, tg_real variance, const int n)
 {
     tgi_direct *const out = t->out;
     const tg_real weight = tgi_weight(f->tuning.huber, innovation, variance), r = weight < 1 ? plan->r[o] / weight : plan->r[o];
     const tg_real S = product + r, inverse = 1 / S;
     tgi_gain *const K = &out->gain[out->taken];
-    block_take(&out->P, h, inverse, K, n);
+    block_update(&out->P, h, inverse, K, n);
     const tg_lanes nu = lanes_all(residual);
     out->x.mu = lanes_mul_add(nu, K->mu, out->x.mu);
     out->x.rest = lanes_mul_add(nu, K->rest, out->x.rest);
@@ -141,7 +141,7 @@ TG_INLINE void take(const tg_filter *f, const tgi_plan *plan, taking *t, int o, 
 
 TG_INLINE tg_real dot(tg_lanes a, tg_lanes b) { return lanes_sum(lanes_mul(a, b)); }
 
-TG_INLINE void take_accelerometer(const tg_filter *f, const tgi_plan *plan, taking *t, tg_lanes a, tg_real a_rho, tg_real innovation,
+TG_INLINE void update_accelerometer(const tg_filter *f, const tgi_plan *plan, channel_updates *t, tg_lanes a, tg_real a_rho, tg_real innovation,
                                   tg_real variance, const int n)
 {
     const tgi_block *const P = &t->out->P;
@@ -159,11 +159,11 @@ TG_INLINE void take_accelerometer(const tg_filter *f, const tgi_plan *plan, taki
     h.rest = lanes_mul_add(weight, P->rho_rest, lanes_of(dot(a, P->rho_mu), dot(a, P->v_mu), 0, 0));
     const tg_real product = dot(a, h.mu) + a_rho * lanes_at(h.rest, 0);
     const tg_real expected = dot(a, t->out->x.mu) + a_rho * lanes_at(t->out->x.rest, 0);
-    take(f, plan, t, n + 1, &h, product, plan->y[n + 1] - plan->accelerometer_shift - expected, innovation, variance, n);
+    update_channel(f, plan, t, n + 1, &h, product, plan->y[n + 1] - plan->accelerometer_shift - expected, innovation, variance, n);
 }
 
 /* Channels in the order of the other engine: omega_n..omega_1, v, a_x. */
-TG_INLINE void take_channels(const tg_filter *f, const tgi_plan *plan, taking *t, const int n)
+TG_INLINE void update_channels(const tg_filter *f, const tgi_plan *plan, channel_updates *t, const int n)
 {
     tgi_direct *const out = t->out;
     tgi_block *const P = &out->P;
@@ -186,13 +186,13 @@ TG_INLINE void take_channels(const tg_filter *f, const tgi_plan *plan, taking *t
     for (int j = n - 1; j >= 0; j--)
         if (plan->present[1 + j]) {
             const tgi_gain h = {P->omega_mu[j], P->omega_rest[j], P->omega[j]};
-            take(f, plan, t, 1 + j, &h, lanes_at(h.omega, j), plan->y[1 + j] - lanes_at(out->x.omega, j), innovation[1 + j], variance[1 + j], n);
+            update_channel(f, plan, t, 1 + j, &h, lanes_at(h.omega, j), plan->y[1 + j] - lanes_at(out->x.omega, j), innovation[1 + j], variance[1 + j], n);
         }
     if (plan->present[0]) {
         const tgi_gain h = {P->v_mu, P->v_rest, P->v_omega};
-        take(f, plan, t, 0, &h, lanes_at(h.rest, 1), plan->y[0] - lanes_at(out->x.rest, 1), innovation[0], variance[0], n);
+        update_channel(f, plan, t, 0, &h, lanes_at(h.rest, 1), plan->y[0] - lanes_at(out->x.rest, 1), innovation[0], variance[0], n);
     }
-    if (plan->present[n + 1]) take_accelerometer(f, plan, t, a, a_rho, innovation[n + 1], variance[n + 1], n);
+    if (plan->present[n + 1]) update_accelerometer(f, plan, t, a, a_rho, innovation[n + 1], variance[n + 1], n);
 }
 
 TG_INLINE int is_finite(const tgi_direct *out, const int n)
@@ -234,8 +234,8 @@ TG_INLINE int direct_step(const tg_filter *f, const tg_real *P, const tgi_plan *
     out->taken = 0;
     out->result->nis = 0;
     out->result->volume = 1;
-    taking t = {out, 1};
-    if (plan->count) take_channels(f, plan, &t, n);
+    channel_updates t = {out, 1};
+    if (plan->count) update_channels(f, plan, &t, n);
     out->result->taken = out->taken;
     return t.noise >= TGI_NOISE_SHARE * out->result->volume && is_finite(out, n);
 }

@@ -5,8 +5,8 @@
 
 /* ---- the filter ---- */
 
-/* The row's channels along the travel, and their variances. The accelerometer's jolts come in swings, not as white noise, and so count
- * TG_SWING times. */
+/* The row's channels along the travel, and their variances. The accelerometer's shocks last several samples, so they are no white noise, and count
+ * shock_samples times. */
 static void measured(const tg_estimator *e, const tg_row *row, tg_real *y, tg_real *r)
 {
     const int32_t n = e->settings.machine.wheels;
@@ -18,19 +18,19 @@ static void measured(const tg_estimator *e, const tg_row *row, tg_real *y, tg_re
     y[n] = d * row->value[TG_GROUND_SPEED];
     r[n] = row->ground_variance;
     y[n + 1] = d * row->value[TG_ACCELERATION_X];
-    r[n + 1] = e->constants.least_jolt + e->settings.tuned.swing * (e->jolt - e->constants.least_jolt);
+    r[n + 1] = e->constants.least_shock + e->settings.tuned.shock_samples * (e->shock - e->constants.least_shock);
 }
 
-/* What the accelerometer reads beyond the model, its mean square over about jolt_memory: on rough ground the body's jolts are
+/* What the accelerometer reads beyond the model, its mean square over about shock_memory: on rough ground the body's shocks are
  * larger than the sensor's noise. */
-static void watch_jolts(tg_estimator *e, const tg_step *step, tg_real r, tg_real dt)
+static void watch_shocks(tg_estimator *e, const tg_step *step, tg_real r, tg_real dt)
 {
     const int32_t c = e->settings.machine.wheels + 1;
     if (isnan(step->innovation[c])) return;
     tg_real square = tgi_square(step->innovation[c]), bound = 16 * step->innovation_variance[c];
     if (square > bound) square = bound;
-    e->jolt += dt / (e->settings.tuned.jolt_memory + dt) * (square - (step->innovation_variance[c] - r) - e->jolt);
-    if (e->jolt < e->constants.least_jolt) e->jolt = e->constants.least_jolt;
+    e->shock += dt / (e->settings.tuned.shock_memory + dt) * (square - (step->innovation_variance[c] - r) - e->shock);
+    if (e->shock < e->constants.least_shock) e->shock = e->constants.least_shock;
 }
 
 static tg_real supervisor_of(const tg_estimator *e, const tg_step *step)
@@ -106,7 +106,7 @@ static int32_t advance(tg_estimator *e, tg_row *row, const tg_drive *drive, tg_r
         return 0;
     }
     tgi_follow(e, e->deviation);
-    watch_jolts(e, &step, r[s->machine.wheels + 1], dt);
+    watch_shocks(e, &step, r[s->machine.wheels + 1], dt);
     watch_consistency(e, row, &step, r);
     e->belief.supervisor = supervisor_of(e, &step);
     row->outlier |= is_outlier(e, row, &step);

@@ -98,15 +98,15 @@ typedef struct { /* of the driven wheels, along the travel; see immobilization.c
 enum { TGI_SLIP, TGI_DEVIATION, TGI_BALANCE, TGI_RESISTANCE, TGI_RIM, TGI_TRAVEL, TGI_SIGNALS };
 
 typedef struct { /* see digging.c */
-    tgi_view sum;              /* of the rows since the last look, weighted, */
+    tgi_view sum;              /* of the rows since the last interval, weighted, */
     tg_real weight;            /* and of their weights */
     tg_real now[TGI_SIGNALS], mean[TGI_SIGNALS]; /* low-passed over a tenth of the unit of time, and over it */
     tg_real usual[2];          /* slip, balance */
     tg_real age;               /* s of looking in all */
     tg_real points[TG_SIGNS];
     tg_real score;             /* their sum, low-passed */
-    double time;               /* of the last look, or where the motion began */
-    int32_t moving;            /* there was a look since the motion began */
+    double time;               /* of the end of the last interval, or where the motion began */
+    int32_t moving;            /* there was an interval since the motion began */
     int32_t slips;             /* slip is surely above its usual, and rises far */
 } tgi_digging;
 
@@ -146,7 +146,7 @@ typedef struct { /* what follows from the settings alone */
     tg_real unknown_torque[8];      /* variance of a torque never seen */
     tg_real unknown_pull;
     tg_real least_load[8];          /* N; the model divides by the load */
-    tg_real least_jolt;             /* (m/s^2)^2, variance of the accelerometer at rest */
+    tg_real least_shock;            /* (m/s^2)^2, variance of the accelerometer at rest */
     tg_real scale_score[TG_MODES];  /* of the bank: log scale, 0 the smallest, 1 the largest */
     tg_real force_walk;             /* m^2/s^3 */
     tg_real mounting_walk, terrain_walk; /* rad^2/s */
@@ -180,7 +180,7 @@ struct tg_estimator {
     tgi_slope slope;
     tgi_roughness roughness;
     double ground_time;        /* of the last measured ground speed */
-    tg_real jolt;              /* variance of the accelerometer about the model, (m/s^2)^2 */
+    tg_real shock;             /* variance of the accelerometer about the model, (m/s^2)^2 */
     tg_input held;             /* inputs of the last row, along the travel */
     tg_belief belief;
     tg_algebra algebra;
@@ -283,8 +283,8 @@ TG_INLINE tgi_slip tgi_slip_of(tg_real omega, tg_real v, tg_real radius, tg_real
     const tg_real inverse = 1 / (larger > least ? larger : least), s = (rim - travel) * inverse;
     const tg_real moving = larger > least ? s : 0; /* the divisor moves too, unless floored */
     const tg_real by_rim = inverse * (1 - (rim >= travel ? moving : 0)), by_travel = -inverse * (1 + (rim >= travel ? 0 : moving));
-    const tgi_slip found = {s, omega < 0 ? -radius * by_rim : radius * by_rim, v < 0 ? -by_travel : by_travel, rim * by_rim};
-    return found;
+    const tgi_slip result = {s, omega < 0 ? -radius * by_rim : radius * by_rim, v < 0 ? -by_travel : by_travel, rim * by_rim};
+    return result;
 }
 
 void tgi_traction(const tg_settings *s, const tg_belief *b, const tg_real (*S)[TG_ROWS], const tgi_scene *scene, tg_real *o);

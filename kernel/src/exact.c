@@ -30,7 +30,7 @@ TG_INLINE void exact_predict(const tg_filter *f, const tgi_factors *from, const 
 
 /* Take one channel. `along`: U'h, zero before column `first`; `coupling`: h times the gains of the channels before it. From those come the
  * innovation and its variance as they were before any channel was taken, and from them the weight. */
-TG_INLINE void exact_take(const tg_filter *f, const tgi_plan *plan, tgi_result *out, int o, const tg_real *along, const tg_real *coupling,
+TG_INLINE void exact_update(const tg_filter *f, const tgi_plan *plan, tgi_result *out, int o, const tg_real *along, const tg_real *coupling,
                           int first, tg_real residual, const int n, const int stride)
 {
     const int taken = out->taken;
@@ -68,7 +68,7 @@ TG_INLINE void exact_take_output(const tg_filter *f, const tgi_plan *plan, tgi_r
     if (!plan->present[o]) return;
     for (int k = j; k < TG_TWICE(n); k++) along[k] = out->u[k * stride + j];
     for (int c = 0; c < out->taken; c++) coupling[c] = out->gain[c][j];
-    exact_take(f, plan, out, o, along, coupling, j, plan->y[o] - out->x[j], n, stride);
+    exact_update(f, plan, out, o, along, coupling, j, plan->y[o] - out->x[j], n, stride);
 }
 
 TG_INLINE void exact_take_accelerometer(const tg_filter *f, const tgi_plan *plan, tgi_result *out, const int n, const int stride)
@@ -84,7 +84,7 @@ TG_INLINE void exact_take_accelerometer(const tg_filter *f, const tgi_plan *plan
         for (int i = 0; i <= n; i++) coupling[c] += h[i] * out->gain[c][i];
     }
     for (int i = 0; i <= n; i++) residual -= h[i] * out->x[i];
-    exact_take(f, plan, out, n + 1, along, coupling, 0, residual, n, stride);
+    exact_update(f, plan, out, n + 1, along, coupling, 0, residual, n, stride);
 }
 
 void tgi_exact_step(const tg_filter *f, const tgi_factors *from, const tgi_plan *plan, tgi_result *out)

@@ -75,7 +75,7 @@ static void forget_motion(tgi_watch *w)
     w->sinking = w->stuck = 0;
 }
 
-/* Seconds that something holds, and `back` times as fast back: neither a jolt nor a sample decides. */
+/* Seconds that something holds, and `back` times as fast back: neither a shock nor a sample decides. */
 static tg_real count_seconds(tg_real seconds, tg_real dt, int32_t holds, tg_real back, tg_real most)
 {
     seconds += holds ? dt : -back * dt;

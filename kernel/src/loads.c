@@ -2,7 +2,7 @@
 #include "estimator.h"
 
 /* Specific force along the vehicle, dv/dt + g sin(slope): the accelerometer's where it is alive, else the balance of the estimated
- * forces; low-passed, for the loads do not follow a jolt. */
+ * forces; low-passed, for the loads do not follow a shock. */
 static tg_real specific_force(tg_estimator *e, const tg_row *row)
 {
     const tg_settings *s = &e->settings;

@@ -37,8 +37,8 @@ static tg_real slip_at(const tgi_slip_memory *m, tg_real most, tg_real adhesion)
     tg_real level = m->adhesion > (tg_real)0.1 ? m->adhesion : (tg_real)0.1, slip = m->slip > 0 ? m->slip : 0;
     tg_real slope = slip > 0 ? tgi_expm1(TG_STEEPNESS * slip) / (TG_STEEPNESS * level) : 1 / (TG_STEEPNESS * level);
     if (slope > most) slope = most;
-    tg_real found = m->slip + slope * (adhesion - m->adhesion);
-    return found < (tg_real)-0.2 ? (tg_real)-0.2 : found > (tg_real)0.8 ? (tg_real)0.8 : found;
+    tg_real result = m->slip + slope * (adhesion - m->adhesion);
+    return result < (tg_real)-0.2 ? (tg_real)-0.2 : result > (tg_real)0.8 ? (tg_real)0.8 : result;
 }
 
 /* Give the row a reckoned ground speed where the sensor has been silent. Its error stays alike for a while, which the variance makes up

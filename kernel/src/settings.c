@@ -64,8 +64,8 @@ static tg_tuned default_tuned(void)
     k.carried_alike = (tg_real)0.5;
     k.reckoned_force = 30;
     k.carried_force = 3;
-    k.jolt_memory = 5;
-    k.swing = 2;
+    k.shock_memory = 5;
+    k.shock_samples = 2;
     k.longest_walk = 30;
     k.standstill = (tg_real)0.01;
     k.uneven_length = 4;
@@ -251,7 +251,7 @@ static void work_out_constants(const tg_settings *s, tgi_constants *c)
     c->pace = tgi_pace(s);
     place_wheels(s, c);
     c->unknown_pull = tgi_square((tg_real)0.3 * weight);
-    c->least_jolt = c->variance[TG_ACCELERATION_X] + c->variance[TG_DRAWBAR_FORCE] * tgi_square(c->inverse_mass);
+    c->least_shock = c->variance[TG_ACCELERATION_X] + c->variance[TG_DRAWBAR_FORCE] * tgi_square(c->inverse_mass);
     tg_real low = s->tuning.scales[0], high = low;
     for (int32_t b = 1; b < TG_MODES; b++) {
         if (s->tuning.scales[b] < low) low = s->tuning.scales[b];
@@ -318,7 +318,7 @@ tg_status tg_estimator_init(tg_estimator *e, const tg_settings *settings)
     e->belief.columns = tgi_deviation_columns(settings);
     e->direction = 1;
     work_out_constants(settings, &e->constants);
-    e->jolt = e->constants.least_jolt;
+    e->shock = e->constants.least_shock;
     e->slope.error_variance = tgi_square(settings->slope_spread);
     e->slip_memory.slip = (tg_real)0.08; /* a guess until the first ground speed */
     e->slip_memory.adhesion = settings->prior_adhesion;

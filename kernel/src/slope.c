@@ -17,7 +17,7 @@ static void start(tgi_slope *s, const tg_settings *settings, tg_real speed)
 static void predict(tgi_slope *s, const tg_settings *settings, tg_real pitch, tg_real walk, tg_real force, tg_real dt)
 {
     const tg_real g = settings->machine.gravity, k = g * dt;
-    const tg_real noise = tgi_square(settings->noise[TG_ACCELERATION_X]) * dt + force; /* of jolts that its noise does not hold */
+    const tg_real noise = tgi_square(settings->noise[TG_ACCELERATION_X]) * dt + force; /* of shocks that its noise does not hold */
     s->speed += dt * (s->acceleration - g * (tgi_sin(pitch) + s->error));
     s->speed_variance += k * (k * s->error_variance - 2 * s->covariance) + noise * dt;
     s->covariance -= k * s->error_variance;

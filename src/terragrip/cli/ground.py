@@ -95,7 +95,7 @@ def _signals(given: list[str] | None) -> tuple[str, ...]:
     for name in given or ():
         if name not in SIGNALS:
             near = nearest(name, SIGNALS)
-            hint = f"did you mean {near}?" if near else f"take of {', '.join(SIGNALS)}"
+            hint = f"did you mean {near}?" if near else f"choose one of {', '.join(SIGNALS)}"
             raise InputError(f"there is no signal {name!r}", place="--signal", hint=hint)
     return tuple(dict.fromkeys(given)) if given else GROUND
 

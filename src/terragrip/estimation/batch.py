@@ -98,7 +98,7 @@ def estimated(
     """
     if smooth and not method_named(method).can_smooth:
         raise InputError(
-            f"the method {method} cannot smooth", hint="take another method, or leave out smooth"
+            f"the method {method} cannot smooth", hint="use another method, or leave out smooth"
         )
     passes = _Passes(progress, log.rows, log.from_disk + 1 + smooth)
     known = survey_of(log, passes.first if log.from_disk else None)

@@ -82,7 +82,7 @@ def _prepared(blocks: Blocks, names: Sequence[str]) -> tuple[Array, Model, NDArr
     """Signals of the blocks that hold any (NaN: not measured), their model, and which blocks these are."""
     for name in names:
         if name not in SIGNALS:
-            raise InputError(f"there is no signal {name!r}", hint=f"take of {', '.join(SIGNALS)}")
+            raise InputError(f"there is no signal {name!r}", hint=f"choose one of {', '.join(SIGNALS)}")
     every = signals_of(blocks, tuple(names))
     is_measured = np.asarray(np.isfinite(every).any(axis=1))
     signals, usual = every[is_measured], Model.of(names).weight

@@ -125,7 +125,7 @@ def scenario(
 ) -> Scenario:
     """The scenario that :func:`draw` simulates. Raises as it does."""
     if kind not in kinds():
-        raise InputError(f"no such kind {kind}", hint="take one of families.kinds()")
+        raise InputError(f"no such kind {kind}", hint="choose one of families.kinds()")
     rng = stream(seed, f"family {kind}")
     machine = draw_machine(rng, MASSES[kind.mass])
     soils, spots = draw_soils(rng, kind.curve, machine)

@@ -64,7 +64,7 @@ def compare_forms(
     """
     names = tuple(candidates or FORMS)
     if asked not in FORMS:
-        raise InputError(f"no curve form {asked!r}", hint=f"take one of {', '.join(FORMS)}")
+        raise InputError(f"no curve form {asked!r}", hint=f"choose one of {', '.join(FORMS)}")
     if asked not in names:
         names = (asked, *names)
     levels = int(np.count_nonzero(bins.used))

@@ -56,9 +56,9 @@ class AdhesionCurve:
         bounds: Mapping[str, tuple[float, float]] | None = None,
     ) -> None:
         if model not in CURVES:
-            raise InputError(f"no curve model {model!r}", hint=f"take one of {', '.join(CURVES)}")
+            raise InputError(f"no curve model {model!r}", hint=f"choose one of {', '.join(CURVES)}")
         if weights not in (None, "count"):
-            raise InputError(f"no weighting {weights!r}", hint="take None or 'count'")
+            raise InputError(f"no weighting {weights!r}", hint="use None or 'count'")
         self.model, self.fixed, self.intercept, self.weights = model, fixed, intercept, weights
         self.bins, self.bootstrap, self.seed = bins or BinSettings(), bootstrap, seed
         self.common_sd, self.bounds = common_sd, dict(bounds or {})

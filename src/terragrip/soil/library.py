@@ -129,7 +129,7 @@ class SoilLibrary(Mapping[str, Soil]):
     def merge(self, other: SoilLibrary, clash: str = "refuse") -> SoilLibrary:
         """Both libraries' soils. `clash`: "refuse" two soils of one name (InputError), "keep" ours, or "replace" by theirs."""
         if clash not in ("refuse", "keep", "replace"):
-            raise InputError(f"clash={clash!r} is no choice", hint="take 'refuse', 'keep' or 'replace'")
+            raise InputError(f"clash={clash!r} is no choice", hint="use 'refuse', 'keep' or 'replace'")
         twins = sorted(set(self.soils) & set(other.soils))
         if twins and clash == "refuse":
             raise InputError(
@@ -189,7 +189,7 @@ def _soil(name: str, entry: Any, file: str) -> Soil:
             f"curve model {model!r} is not known",
             file=file,
             place=place,
-            hint=f"take one of {', '.join(CURVES)}",
+            hint=f"choose one of {', '.join(CURVES)}",
         )
     parameters = entry.get("parameters")
     if not isinstance(parameters, dict):

@@ -76,7 +76,7 @@ def correct_slip_noise(
     shift = dict(zip(free, (back[0] - table[0]).tolist(), strict=True))
     plain = {name: float(curve.parameters_[name]) for name in free}
     corrected = {name: plain[name] + shift[name] for name in free}
-    return shifted(curve, corrected, plain, s, sd, "take the corrected curve")
+    return shifted(curve, corrected, plain, s, sd, "use the corrected curve")
 
 
 def shifted(

@@ -114,7 +114,7 @@ class GroundClassifier:
         if not layout.period:
             fastest = min(shortest_period(family) for one in signals for family in one.families.values())
             problem = f"{self.window:g} s is shorter than two samples, which come every {fastest:.3g} s"
-            raise InputError(problem, place="window", hint=f"take a window of {4 * fastest:.2g} s or more")
+            raise InputError(problem, place="window", hint=f"use a window of {4 * fastest:.2g} s or more")
         random = np.random.default_rng(self.random_state)
         training = collect(signals, codes, layout, self.max_windows, random)
         notes += [

@@ -132,7 +132,7 @@ def track(
 
 def _known(table: Estimates, wheel: str) -> None:
     if wheel not in table.wheels:
-        raise InputError(f"there is no wheel {wheel!r}", hint=f"take one of {', '.join(table.wheels)}")
+        raise InputError(f"there is no wheel {wheel!r}", hint=f"choose one of {', '.join(table.wheels)}")
 
 
 def _ground(studio: Studio, path: str) -> dict[str, Any] | None:
