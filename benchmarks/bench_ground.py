@@ -60,7 +60,7 @@ BEGIN = "<!-- made by benchmarks/bench_ground.py --write -->"
 
 @dataclass
 class Matches:
-    """Changes of one way on some drives: borders, how many were found, changes reported, hours driven, delays [s]; of each change its stated
+    """Changes of one way on drives: borders, how many were found, changes reported, hours driven, delays [s]; of each change its stated
     probability and whether it was right; of each right one its error in time and its stated SD [s]."""
 
     borders: int = 0

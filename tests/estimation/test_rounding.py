@@ -12,7 +12,7 @@ import pytest
 from drives import WHEELS, drive, robot
 from single_precision import kernel
 from terragrip.errors import InputError
-from terragrip.estimation import METHODS, Estimates, TractionEstimator, engine, estimate
+from terragrip.estimation import METHODS, Estimates, TractionEstimator, engine, estimate, settings
 from terragrip.recording import Recording
 
 
@@ -22,8 +22,9 @@ def single(monkeypatch: pytest.MonkeyPatch) -> Any:
     module = kernel()
 
     def switch() -> None:
-        monkeypatch.setattr(engine, "ffi", module.ffi)
-        monkeypatch.setattr(engine, "lib", module.lib)
+        for user in (engine, settings):
+            monkeypatch.setattr(user, "ffi", module.ffi)
+            monkeypatch.setattr(user, "lib", module.lib)
 
     return switch
 

@@ -97,9 +97,7 @@ def estimated(
     estimated. Raises InputError as :func:`estimate` does, each when its block is reached.
     """
     if smooth and not method_named(method).can_smooth:
-        raise InputError(
-            f"the method {method} cannot smooth", hint="use another method, or leave out smooth"
-        )
+        raise InputError(f"the method {method} cannot smooth", hint="use another method, or leave out smooth")
     passes = _Passes(progress, log.rows, log.from_disk + 1 + smooth)
     known = survey_of(log, passes.first if log.from_disk else None)
     passes.rows = known.rows

@@ -30,7 +30,7 @@ _VERSION = 1
 class GroundState:
     """What is known at the end of a block. `time` [s]: of the row that ended it; `soil`: the most probable; `probabilities` of all soils.
 
-    `known`: whether the block says anything of the ground (else the probabilities are carried on). `change`: a change reported now, or None.
+    `known`: whether the block gave evidence (else the probabilities are carried on). `change`: a change reported now, or None.
     """
 
     time: float
@@ -43,7 +43,7 @@ class GroundState:
 class LiveGround:
     """Follows the ground along the estimates of one drive.
 
-    estimator: the estimator that the estimates come from; notified of a new ground (`new_ground()`) at every change, so that its adhesion curve
+    estimator: where the estimates come from; notified of a new ground (`new_ground()`) at every change, so that its adhesion curve
     starts anew. library: the known soils; without one every soil is unknown, and only changes are reported.
     """
 

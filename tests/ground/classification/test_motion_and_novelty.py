@@ -47,7 +47,7 @@ def test_a_motion_that_was_never_driven_on_a_ground_does_not_speak_against_it() 
 
 
 def test_a_driver_who_turns_and_hurries_on_one_ground_does_not_make_it_another() -> None:
-    """Wheels alone; on hard ground all learnt drives are slow. A fast one is still distinguished from loose ground, which was driven fast."""
+    """Wheels alone; on hard ground all learnt drives are slow. A fast one still differs from loose ground, which was driven fast."""
 
     def at(ground: str, seed: int, faster: float) -> object:
         table = drive(ground, seed, 25.0).drop(columns=BODY).dropna()

@@ -250,7 +250,7 @@ def inclination_zeros(
             bias_key, share * total, float(np.hypot(share * error, left)), "m/s^2", rests_on, sentence
         )
         return [bias], [no_pitch]
-    sentence = "accelerometer less g sin(pitch) at standstill, split between the two zeros by their priors: only the difference is determined"
+    sentence = "accelerometer less g sin(pitch) at standstill, split by the priors of the two zeros: only the difference is known"
     rest = 1 - share
     bias = Quantity(
         bias_key, share * total, float(np.hypot(share * error, left)), "m/s^2", rests_on, sentence

@@ -106,7 +106,9 @@ def models() -> list[dict[str, Any]]:
 def curve(wanted: CurveRequest) -> dict[str, Any]:
     """Samples of a curve over slip, and where its largest value lies: the pages draw these and compute no model."""
     if wanted.model not in CURVES:
-        raise InputError(f"there is no curve model {wanted.model!r}", hint=f"choose one of {', '.join(CURVES)}")
+        raise InputError(
+            f"there is no curve model {wanted.model!r}", hint=f"choose one of {', '.join(CURVES)}"
+        )
     model = CURVES[wanted.model]
     own = {name: value for name, value in wanted.parameters.items() if name != "intercept"}
     try:
