@@ -22,7 +22,7 @@ KERNEL_TESTS := $(patsubst kernel/tests/%.c,%,$(wildcard kernel/tests/*.c))
 BUILD_INPUTS := pyproject.toml setup.py cffi_build.py $(KERNEL_SOURCES) $(KERNEL_HEADERS) \
 	$(wildcard kernel/python/*.[ch] src/terragrip/*/*.c src/terragrip/*/*.h)
 
-.PHONY: help demo test lint kernel-test web-test pytest studio wheel system bench lock clean \
+.PHONY: help demo test lint kernel-test web-test pytest studio wheel docs system bench lock clean \
 	kernel-aarch64 kernel-others
 
 help: ## show this list
@@ -62,6 +62,9 @@ wheel: $(VENV)/package studio ## a source distribution and, from it, an abi3 whe
 	@$(BIN)/python -c "from setuptools import build_meta; build_meta.build_sdist('dist')" > build/sdist.log
 	@CC="$(CC)" $(PIP) wheel --quiet --no-deps --no-build-isolation -w dist dist/*.tar.gz
 	@ls -l dist
+
+docs: $(VENV)/package $(VENV)/dev ## the documentation site, with the reference from the code, in build/docs
+	@$(BIN)/python docs/site/make.py
 
 web-test: studio ## the pages' own tests, where Node.js is
 	@if [ -d web/node_modules ]; then cd web && npm run --silent test; else echo "SKIPPED: the tests of the pages need Node.js 20 or newer" >&2; fi

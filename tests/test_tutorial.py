@@ -1,4 +1,4 @@
-"""docs/tutorial.md works as it stands: every block, in order, in an empty folder."""
+"""Every tutorial of docs/ works as it stands: every block, in order, in an empty folder."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ import pytest
 
 from terragrip.cli import main
 
-PAGE = Path(__file__).parents[1] / "docs/tutorial.md"
+PAGES = sorted((Path(__file__).parents[1] / "docs").glob("tutorial*.md"))
 BLOCK = re.compile(r"^```(\w*)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 
 
-def blocks() -> list[tuple[str, int, str]]:
+def blocks(page: Path) -> list[tuple[str, int, str]]:
     """Language, line and text of each code block."""
-    text = PAGE.read_text(encoding="utf-8")
+    text = page.read_text(encoding="utf-8")
     return [(match[1], text.count("\n", 0, match.start(2)) + 1, match[2]) for match in BLOCK.finditer(text)]
 
 
@@ -30,16 +30,26 @@ def run_commands(text: str) -> None:
         assert main([*expanded, *(["--quiet"] if words[0] != "inspect" else [])]) == 0, line
 
 
-def test_every_block_is_one_that_the_test_runs() -> None:
-    assert {language for language, _, _ in blocks()} == {"python", "sh"}
+def write_file(text: str) -> None:
+    """A YAML block names its file in its first line, a comment."""
+    name, _, _ = text.removeprefix("# ").partition("\n")
+    assert re.fullmatch(r"[\w-]+\.yaml", name), text
+    Path(name).write_text(text, encoding="utf-8")
 
 
-def test_the_tutorial_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
+def test_every_block_is_one_that_the_test_runs(page: Path) -> None:
+    assert {language for language, _, _ in blocks(page)} <= {"python", "sh", "yaml"}
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
+def test_a_tutorial_runs(page: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     names: dict[str, Any] = {}
-    for language, line, text in blocks():
+    for language, line, text in blocks(page):
         if language == "sh":
             run_commands(text)
+        elif language == "yaml":
+            write_file(text)
         else:
-            exec(compile("\n" * (line - 1) + text, str(PAGE), "exec"), names)
-    assert (tmp_path / "soils.json").exists()
+            exec(compile("\n" * (line - 1) + text, str(page), "exec"), names)
