@@ -57,6 +57,7 @@ def estimates(seed: int, soils: tuple[str, ...], sensor: bool = False, rows: int
         load = 400.0 + rng.standard_normal(rows)
         columns["wheel_force_x_rr"] = (columns["net_traction_rr"] + 0.01 * rng.standard_normal(rows)) * load
         columns["wheel_force_z_rr"] = load
+        columns["latitude"], columns["longitude"] = np.full(rows, 51.0), 13 + 0.6 * time / 70_000
     labels = {"soil": np.array(soils, dtype=object)[part]} if any(soils) else {}
     about = {"method": "bank", "vehicle": Vehicle.from_dict(VEHICLE).to_dict()}
     return Estimates(time, columns, np.zeros(rows, dtype=np.uint8), labels, about)

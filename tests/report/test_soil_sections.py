@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+import json
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 import made_up
+from terragrip.errors import InputError
 from terragrip.physics.adhesion import CURVES
 from terragrip.report import soil_sections
-from terragrip.report.curves import SoilCurves, maxima
+from terragrip.report.curves import SoilCurves, draw_fits, maxima
 from terragrip.report.page import Picture, Section, Table
 from terragrip.soil.estimates import GatheredRuns
 from terragrip.soil.fit import AdhesionCurve
@@ -145,9 +148,32 @@ def test_a_library_is_shown_as_it_was_learned(curves: list[SoilCurves], tmp_path
     assert "terragrip soils" in (soil_sections.what_is_missing(shown).omitted or "")
 
 
-def test_full_bins_are_not_called_enough_where_the_data_fix_no_curve(curves: list[SoilCurves]) -> None:
-    from dataclasses import replace
+def test_a_library_carries_the_band_of_a_curve_with_several_free_parameters(tmp_path: Path) -> None:
+    gathered = GatheredRuns()
+    for i in range(6):
+        gathered.add(made_up.estimates(1100 + i, ("fine",)), f"fine-{i}")
+    learned = gathered.learn(AdhesionCurve("effective", "free", bootstrap=300)).soils["fine"]
+    assert len(learned.curve.free_) > 1
+    Campaign({"fine": learned}, {}, ()).library().write(tmp_path / "soils.json")
+    read = known_soils(SoilLibrary.load(tmp_path / "soils.json"), ["fine"]).soils["fine"].curve
+    slips = np.linspace(0.05, 0.6, 23)
+    low, high = learned.curve.band(slips)
+    assert np.max(np.abs(np.array(read.band(slips)) - np.array([low, high]))) < 0.05 * np.max(high - low)
+    drawn = draw_fits(soil_sections.curves_of_all(Campaign({"fine": replace(learned, curve=read)}, {}, ())))
+    assert "95 % of the fit" in drawn
+    data = json.loads((tmp_path / "soils.json").read_text())
+    for wrong in (
+        {"slip": [0, 1]},
+        {"slip": [1, 0], "low": [0, 0], "high": [1, 1]},
+        {"slip": [0, 1], "low": [0, "x"], "high": [1, 1]},
+    ):
+        data["soils"]["fine"]["band"] = wrong
+        (tmp_path / "bad.json").write_text(json.dumps(data))
+        with pytest.raises(InputError, match="band"):
+            SoilLibrary.load(tmp_path / "bad.json")
 
+
+def test_full_bins_are_not_called_enough_where_the_data_fix_no_curve(curves: list[SoilCurves]) -> None:
     full = [replace(one, learned=replace(one.learned, gaps=())) for one in curves]
     (text,) = soil_sections.what_is_missing(full, {}).prose
     assert "Yet" not in text or not all(one.learned.curve.identifiability_.identifiable for one in full)

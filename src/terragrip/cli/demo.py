@@ -35,6 +35,6 @@ def command(
         if result.pdf is None:
             from terragrip.report.pdf import EXTRA
 
-            print(f"No PDF: plutoprint is not installed; {EXTRA}")
+            print(f"No PDF: typst is not installed; {EXTRA}")
         else:
             print(f"The PDF: {result.pdf}")

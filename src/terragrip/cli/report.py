@@ -68,7 +68,7 @@ def command(
     if printed is None:
         return
     if not pdf_possible():
-        print(f"No PDF: plutoprint is not installed; {EXTRA}")
+        print(f"No PDF: typst is not installed; {EXTRA}")
         return
     write_pdf(page, printed)
     if not quiet:

@@ -10,6 +10,8 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
+from terragrip.report.blocks import Blocks, blocks_of
+from terragrip.report.ground_sections import WARNINGS
 from terragrip.report.intervals import Coverage, run_coverage
 from terragrip.report.runs import Run
 from terragrip.report.scores import Comparison, TruthScore, compare, compare_truth, truth_score
@@ -42,7 +44,8 @@ class EstimatedRun:
     """One run of the campaign. `run`, the whole tables, is kept of the benchmarks only; the rest is small.
 
     `path`: its estimates by the default method. `duration` [s]. `gathered`: what the soils'
-    curves are learned from; `true_pairs`: true slip and adhesion of the same rows.
+    curves are learned from; `true_pairs`: true slip and adhesion of the same rows. `distance` [m]; `blocks`: half minutes for the tables by
+    soil; `warnings`: kinds of the events that a driver acts on.
     """
 
     name: str
@@ -55,6 +58,9 @@ class EstimatedRun:
     gathered: GatheredRuns
     true_pairs: tuple[RunPairs, ...]
     run: Run | None
+    distance: float
+    blocks: Blocks
+    warnings: tuple[str, ...]
 
 
 @dataclass(frozen=True)
@@ -211,6 +217,7 @@ def _estimate(name: str, seed: int, vehicle: Vehicle, folder: Path) -> Estimated
     from terragrip.estimation import DEFAULT, METHODS, Estimates, estimate
     from terragrip.from_log import estimate_file
     from terragrip.ground.analysis import analyse
+    from terragrip.ground.events import events as events_of
     from terragrip.report.campaign_soils import true_pairs
     from terragrip.soil.estimates import GatheredRuns
 
@@ -245,6 +252,9 @@ def _estimate(name: str, seed: int, vehicle: Vehicle, folder: Path) -> Estimated
         gathered,
         tuple(true_pairs(estimates, result, name)),
         shown if name in BENCHMARKS else None,
+        float(shown.estimated("distance")[-1]),
+        blocks_of(shown),
+        tuple(one.kind for one in events_of(estimates) if one.kind in WARNINGS),
     )
 
 

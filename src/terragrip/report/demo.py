@@ -12,7 +12,16 @@ from typing import Any
 from terragrip import __version__
 from terragrip.errors import InputError
 from terragrip.ground.result import write as write_ground
-from terragrip.report import ground_sections, residuals, sections, soil_sections
+from terragrip.report import (
+    ground_sections,
+    path,
+    residuals,
+    sections,
+    soil_sections,
+    summary,
+    wheels,
+    work_sections,
+)
 from terragrip.report.campaign import BENCHMARKS, EstimatedCampaign, Progress, estimate_campaign
 from terragrip.report.campaign_soils import fits_of_truth, soils_of_scenario
 from terragrip.report.intervals import pooled
@@ -66,7 +75,7 @@ def run_demo(
 
     Parameters
     ----------
-    output: folder, made if it is not there. It gets index.html, report.pdf (where plutoprint is installed),
+    output: folder, made if it is not there. It gets index.html, report.pdf (where typst is installed),
         figures/*.svg, scores.json, soils.json, ground.json, vehicle.yaml (calibrated), estimates/<run>.parquet and, of the benchmarks,
         recordings/<run>.parquet; a file is written whole or not at all.
     seed: of the whole campaign. workers: processes.
@@ -124,14 +133,25 @@ def _page(campaign: EstimatedCampaign, seed: int, seconds: float) -> Page:
         "on five soils. Every number and figure here comes from simulation, save those marked as the paper's, "
         f"which come from its field. The method is {DEFAULT} where none is named.",
         (
+            summary.section(
+                [summary.Driven(run.name, run.duration, run.distance) for run in runs],
+                [run.blocks for run in runs],
+                curves,
+                tire,
+                _warnings(campaign),
+                simulated=True,
+            ),
+            path.section(campaign.benchmarks),
             sections.tracking(main, _sensor_prose(main)),
             sections.slip_and_resistance(main),
+            *(one for run in campaign.benchmarks if (one := wheels.section(run)) is not None),
             sections.online_curve(main, scales, "that the soils were made with"),
             soil_sections.both_maxima(curves, tire, campaign.soils.not_fitted),
             soil_sections.fits(curves, campaign.soils.not_fitted),
             soil_sections.trust(curves, campaign.soils.not_fitted),
             soil_sections.what_is_missing(curves, campaign.soils.not_fitted),
             sections.soils(main, campaign.benchmarks),
+            work_sections.bands([run.blocks for run in runs]),
             ground_sections.recognised(campaign.grounds, simulated=True),
             ground_sections.section_points(campaign.grounds, simulated=True),
             ground_sections.events(campaign.grounds),
@@ -149,6 +169,12 @@ def _page(campaign: EstimatedCampaign, seed: int, seconds: float) -> Page:
             ("Simulated and estimated in", f"{seconds:.0f} s"),
         ),
     )
+
+
+def _warnings(campaign: EstimatedCampaign) -> dict[str, int]:
+    """Events that a driver acts on, by kind, of all runs."""
+    kinds = [kind for run in campaign.runs for kind in run.warnings]
+    return {kind: kinds.count(kind) for kind in dict.fromkeys(kinds)}
 
 
 def _headlines(campaign: EstimatedCampaign, default: str) -> tuple[Headline, ...]:

@@ -4,17 +4,32 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from datetime import datetime, timedelta
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from terragrip import __version__
 from terragrip.errors import InputError
 from terragrip.estimation import Estimates
 from terragrip.ground.events import events
-from terragrip.report import ground_sections, residuals, sections, slip_sections, soil_sections
+from terragrip.report import (
+    ground_sections,
+    path,
+    residuals,
+    sections,
+    slip_sections,
+    soil_sections,
+    summary,
+    wheels,
+    work_sections,
+)
+from terragrip.report.blocks import Blocks, blocks_of
+from terragrip.report.field_work import parts_of
+from terragrip.report.ground_sections import WARNINGS
 from terragrip.report.page import Page, Section, Table, names, number
 from terragrip.report.runs import Run, label_stretches
 from terragrip.report.scores import Comparison, compare
@@ -28,6 +43,10 @@ if TYPE_CHECKING:
 
 SHOWN = 2
 """Runs drawn over time; the paper draws one and compares two."""
+HOURLY = 1800.0
+"""Seconds of a run from which on it is also given by the hour."""
+ALL = "the drive"
+"""What a run is called by that has neither labels nor positions."""
 
 
 @dataclass(frozen=True)
@@ -40,6 +59,24 @@ class _Summary:
     soils: tuple[str, ...]
     method: str
     events: str
+    began: datetime | None
+
+    @property
+    def driven(self) -> summary.Driven:
+        """As the summary on top takes it."""
+        return summary.Driven(self.name, self.duration, self.distance, self.began)
+
+
+@dataclass
+class _Gathered:
+    """What all runs say, gathered file after file."""
+
+    summaries: list[_Summary] = field(default_factory=list)
+    shown: list[Run] = field(default_factory=list)
+    gathered: GatheredRuns = field(default_factory=GatheredRuns)
+    events: dict[str, list[dict[str, Any]]] = field(default_factory=dict)
+    blocks: list[Blocks] = field(default_factory=list)
+    missing: list[str] = field(default_factory=list)
 
 
 def report_of(
@@ -63,7 +100,8 @@ def report_of(
         if progress is not None:
             progress(done, total)
 
-    summaries, shown, gathered, happened = _read(paths, grounds, step)
+    read = _read(paths, grounds, step)
+    summaries, shown, gathered, happened = read.summaries, read.shown, read.gathered, read.events
     campaign = Campaign({}, {}, ())
     if library is not None:
         campaign = known_soils(library, (part.soil for part in gathered.pairs))
@@ -84,7 +122,10 @@ def report_of(
         f"{sum(one.distance for one in summaries):.0f} m, estimated by {names(sorted({one.method for one in summaries}))}. "
         f"Drawn over time: {names([run.name for run in together])}.",
         (
+            _summarised(read, main, grounds, campaign),
+            path.section(together, [_labels(run) for run in together]),
             *(_sections(main, together, campaign) if main.has_adhesion else _of_slip(together)),
+            *_worked(read.blocks),
             ground_sections.recognised(grounds),
             ground_sections.section_points(grounds),
             ground_sections.events(grounds, happened),
@@ -110,38 +151,85 @@ def report_of(
     return page
 
 
-def _read(
-    paths: Sequence[Path], grounds: Sequence[Ground], step: Callable[[int], None]
-) -> tuple[list[_Summary], list[Run], GatheredRuns, dict[str, list[dict[str, Any]]]]:
-    """A summary of each run, the SHOWN most telling runs (most stretches of soil, then a sensor, then the longest), all pairs, and
-    the events of each run by its own estimates."""
-    own: dict[str, list[dict[str, Any]]] = {}
-    summaries: list[_Summary] = []
+def _read(paths: Sequence[Path], grounds: Sequence[Ground], step: Callable[[int], None]) -> _Gathered:
+    """What each run says, and the SHOWN most telling ones whole (most stretches of soil, then a sensor, then the longest)."""
+    read = _Gathered()
     kept: list[tuple[tuple[int, bool, float], Run]] = []
-    gathered = GatheredRuns()
-    for number_, path in enumerate(paths, 1):
-        estimates = Estimates.read(path)
+    for number_, file in enumerate(paths, 1):
+        estimates = Estimates.read(file)
         if len(estimates) < 2:
-            raise InputError("holds fewer than two rows", file=path, hint="leave it out")
+            raise InputError("holds fewer than two rows", file=file, hint="leave it out")
         if estimates.has_adhesion:
-            gathered.add(estimates, path.stem, file=str(path))
-        own[path.stem] = [event.to_dict() for event in events(estimates)]
-        has_ground = any(ground.run == path.stem for ground in grounds)
-        happened = tuple(event for ground in grounds if ground.run == path.stem for event in ground.events)
-        if not has_ground:
-            happened = tuple(own[path.stem])
-        table = estimates.to_pandas()
-        table.attrs["zero_slip"] = estimates.about.get("zero_slip")
-        run = Run(path.stem, table, estimates.method, vehicle=estimates.vehicle, events=happened)
-        summaries.append(_summary(run))
+            read.gathered.add(estimates, file.stem, file=str(file))
+        read.events[file.stem] = [event.to_dict() for event in events(estimates)]
+        run = _run(estimates, file.stem, grounds, read.events[file.stem])
+        read.summaries.append(_summary(run))
         if run.wheels and run.moving.any():
+            read.blocks.append(blocks_of(run, _labels(run)))
             soils = len(label_stretches(run.soil)) if run.has_adhesion else -1
-            worth = (soils, run.sensor_wheel is not None, summaries[-1].duration)
+            worth = (soils, run.sensor_wheel is not None, read.summaries[-1].duration)
             kept = sorted([*kept, (worth, run)], key=lambda one: one[0], reverse=True)[:SHOWN]
+        read.missing += [one for one in _lacks(run) if one not in read.missing]
         step(number_)
     if kept and len(kept) == SHOWN and kept[1][0][0] < 2 <= kept[0][0][0]:
         kept = kept[:1]  # a run on one soil says nothing beside one over several
-    return summaries, [run for _, run in kept], gathered, own
+    read.shown = [run for _, run in kept]
+    return read
+
+
+def _run(estimates: Estimates, name: str, grounds: Sequence[Ground], own: Sequence[dict[str, Any]]) -> Run:
+    """A run with its events: those of its ground, without one those of the estimates themselves."""
+    mine = [ground for ground in grounds if ground.run == name]
+    happened = tuple(event for ground in mine for event in ground.events) if mine else tuple(own)
+    table = estimates.to_pandas()
+    table.attrs["zero_slip"] = estimates.about.get("zero_slip")
+    table.attrs["recording"] = estimates.about.get("recording")
+    return Run(name, table, estimates.method, vehicle=estimates.vehicle, events=happened)
+
+
+def _labels(run: Run) -> NDArray[np.object_]:
+    """What each row is named by (n,): its soil label; of an unlabelled run what the machine did, where positions say it."""
+    if run.soils:
+        return run.soil
+    parts = parts_of(run) if not run.has_adhesion else None
+    return parts if parts is not None else np.where(run.moving, ALL, "").astype(object)
+
+
+def _lacks(run: Run) -> list[str]:
+    """What a log does not hold, and what would come with it, in clauses."""
+    columns, found = set(run.estimates.columns), []
+    if not run.has_adhesion:
+        found.append("no drive torque was logged, so adhesion, curves and efficiency cannot be had")
+    if not run.soils and run.has_adhesion:
+        found.append("no soil label, so no curve can be learned (a column soil)")
+    if not {"latitude", "longitude"} <= columns:
+        found.append("no position, so there is no map")
+    if run.began is None:
+        found.append("no clock time: times count from the start of each log")
+    return found
+
+
+def _summarised(read: _Gathered, main: Run, grounds: Sequence[Ground], campaign: Campaign) -> Section:
+    """The summary on top."""
+    known = {ground.run for ground in grounds}
+    every = [event["kind"] for ground in grounds for event in ground.events]
+    every += [event["kind"] for run, mine in read.events.items() if run not in known for event in mine]
+    missing = [*read.missing, *(f"{name} could not be fitted" for name in campaign.not_fitted)]
+    return summary.section(
+        [one.driven for one in read.summaries],
+        read.blocks,
+        soil_sections.curves_of_all(campaign),
+        main.vehicle.tire_rolling_resistance if main.vehicle is not None else 0.0,
+        {kind: every.count(kind) for kind in WARNINGS if kind in every},
+        missing,
+    )
+
+
+def _worked(blocks: Sequence[Blocks]) -> Iterator[Section]:
+    """Time by slip, and of long drives by the hour."""
+    yield work_sections.bands(blocks)
+    if any(len(one.start) and one.start[-1] - one.start[0] > HOURLY for one in blocks):
+        yield work_sections.by_hour(blocks)
 
 
 def _sections(main: Run, together: Sequence[Run], campaign: Campaign) -> Iterator[Section]:
@@ -150,6 +238,7 @@ def _sections(main: Run, together: Sequence[Run], campaign: Campaign) -> Iterato
     tire = main.vehicle.tire_rolling_resistance if main.vehicle is not None else 0.0
     yield from (sections.tracking(run) for run in together if run.has_adhesion)
     yield sections.slip_and_resistance(main)
+    yield from (one for run in together if (one := wheels.section(run)) is not None)
     yield from (one for run in together if not run.has_adhesion for one in slip_sections.of(run))
     yield sections.online_curve(
         main, {one.name: one.learned.soil.parameters.get("a", np.nan) for one in curves}
@@ -165,6 +254,8 @@ def _of_slip(together: Sequence[Run]) -> Iterator[Section]:
     """What can be determined where no run has a torque, and what cannot."""
     for run in together:
         yield from slip_sections.of(run)
+        if (every := wheels.section(run)) is not None:
+            yield every
     yield Section(
         "without-torque",
         "Adhesion and traction",
@@ -176,24 +267,27 @@ def _of_slip(together: Sequence[Run]) -> Iterator[Section]:
 def _summary(run: Run) -> _Summary:
     distance = run.estimated("distance")[-1] if "distance" in run.estimates else np.nan
     events = run.estimates["event"].value_counts() if "event" in run.estimates else {}
-    has_ground = ", ".join(f"{kind} {count / len(run.time):.0%}" for kind, count in events.items() if kind)
+    shares = ", ".join(f"{kind} {count / len(run.time):.0%}" for kind, count in events.items() if kind)
     return _Summary(
         run.name,
         float(run.time[-1] - run.time[0]),
         float(np.nan_to_num(distance)),
         run.soils,
         run.method,
-        has_ground or "–",
+        shares or "–",
+        run.began + timedelta(seconds=float(run.time[0])) if run.began is not None else None,
     )
 
 
 def _runs(summaries: Sequence[_Summary]) -> Section:
+    clocked = any(one.began is not None for one in summaries)
     table = Table(
         "The runs of this report. Events: the share of rows that carry each.",
-        ("run", "duration [s]", "distance [m]", "soils", "method", "events"),
+        ("run", *(["began"] * clocked), "duration [s]", "distance [m]", "soils", "method", "events"),
         tuple(
             (
                 one.name,
+                *([f"{one.began:%Y-%m-%d %H:%M:%S}" if one.began is not None else "–"] * clocked),
                 number(one.duration, 0),
                 number(one.distance, 0),
                 names(one.soils) or "unlabelled",

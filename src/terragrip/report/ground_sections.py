@@ -27,6 +27,8 @@ LEAST_EVENT = 0.5
 WARNINGS = ("immobilization", "stuck", "push")
 """Events that a driver acts on: each is listed, however short."""
 LISTED = 40
+ALIKE_LISTED = 3
+"""Of a run's events of one kind for one reason so many are listed, the longest, and the rest in one row; warnings are all listed."""
 
 
 def recognised(grounds: Sequence[Ground], simulated: bool = False) -> Section:
@@ -149,27 +151,47 @@ def events(
     counted = ", ".join(f"{count} {kind}" for kind, count in kinds.items())
     if not listed:
         return Section("events", title, (f"{counted}; none of half a second or more.",))
-    prose = f"{counted}; listed are warnings, and what lasts half a second or more:"
+    prose = f"{counted}; listed are warnings, and the longest of what lasts half a second or more:"
+    warned = [pair for pair in listed if pair[1]["kind"] in WARNINGS]
+    others = _longest([pair for pair in listed if pair[1]["kind"] not in WARNINGS])
     # Warnings are never crowded out by a row of outliers.
-    first = sorted(listed, key=lambda pair: pair[1]["kind"] not in WARNINGS)[:LISTED]
-    shown = [pair for pair in listed if pair in first]
-    rows = tuple(
-        (
-            f"{run}, {number(one['start'], 1)} s",
-            one["kind"],
-            number(one["end"] - one["start"], 1),
-            str(one.get("why") or "–"),
-        )
-        for run, one in shown
-    )
+    shown = [_event(run, one) for run, one in warned[:LISTED]] + others[: max(LISTED - len(warned), 0)]
+    whole = len(warned) + len(others)
     caption = (
-        f"Events; {LISTED} of {len(listed)}, warnings first."
-        if len(listed) > LISTED
-        else "Events and why each was raised."
+        "Events and why each was raised."
+        if whole <= LISTED
+        else f"Events; {LISTED} of {whole}, warnings first."
     )
     return Section(
-        "events", title, (prose,), (Table(caption, ("run, start", "event", "lasts [s]", "why"), rows),)
+        "events",
+        title,
+        (prose,),
+        (Table(caption, ("run, start", "event", "lasts [s]", "why"), tuple(shown)),),
     )
+
+
+def _event(run: str, one: Mapping[str, Any]) -> tuple[str, ...]:
+    """A row of the table of events."""
+    lasts = number(one["end"] - one["start"], 1)
+    return f"{run}, {number(one['start'], 1)} s", one["kind"], lasts, str(one.get("why") or "–")
+
+
+def _longest(listed: Sequence[tuple[str, Mapping[str, Any]]]) -> list[tuple[str, ...]]:
+    """Rows of the ALIKE_LISTED longest events of each run, kind and reason, in order of time, and one row for the others."""
+    groups: dict[tuple[str, str, str], list[Mapping[str, Any]]] = {}
+    for run, one in listed:
+        groups.setdefault((run, one["kind"], str(one.get("why"))), []).append(one)
+    rows = []
+    for (run, kind, _), mine in groups.items():
+        longest = sorted(mine, key=lambda one: (-round(one["end"] - one["start"], 3), one["start"]))
+        kept = longest if len(mine) <= ALIKE_LISTED + 1 else longest[:ALIKE_LISTED]
+        rows += [_event(run, one) for one in sorted(kept, key=lambda one: one["start"])]
+        if rest := longest[len(kept) :]:
+            seconds = sum(one["end"] - one["start"] for one in rest)
+            rows.append(
+                (f"{run}, {len(rest)} more", kind, number(seconds, 1), "for the same reason; seconds of all")
+            )
+    return rows
 
 
 def confusion(timelines: Iterable[Timeline]) -> tuple[Table, str] | None:

@@ -73,8 +73,8 @@ class Page:
     facts: tuple[tuple[str, str], ...] = field(default=())
 
 
-def render(page: Page, print_css: str = "") -> str:
-    """The page as one HTML document, styles and figures inside; `print_css` goes behind the page's own styles.
+def render(page: Page) -> str:
+    """The page as one HTML document, styles and figures inside.
 
     Raises InputError without Jinja2.
     """
@@ -92,7 +92,7 @@ def render(page: Page, print_css: str = "") -> str:
     css = environment.loader.get_source(environment, "page.css")[0] if environment.loader else ""
     return environment.get_template("page.html").render(
         page=page,
-        css=css + print_css,
+        css=css,
         inline=lambda picture: in_page(picture.svg, picture.alt, picture.name),
     )
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from datetime import datetime
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -71,6 +72,15 @@ class Run:
     def time(self) -> FloatArray:
         """Time of each row [s]."""
         return self.estimates["time"].to_numpy(dtype=np.float64)
+
+    @cached_property
+    def began(self) -> datetime | None:
+        """Clock time of time 0, where the log says it."""
+        text = (self.estimates.attrs.get("recording") or {}).get("time_zero")
+        try:
+            return datetime.fromisoformat(text) if text else None
+        except ValueError:
+            return None
 
     @cached_property
     def wheels(self) -> tuple[str, ...]:

@@ -131,13 +131,15 @@ def place(run: Run) -> Section:
     x = np.interp(run.time[rows], instants, east[fixed] - np.median(east[fixed]))
     figure = new_figure(height=5.0)
     with styled():
+        from matplotlib import colormaps
+
         plot = figure.subplots()
         shown: Any = plot.scatter(
             x,
             y,
             c=100 * slip[rows],
             s=7,
-            cmap="cividis",
+            cmap=colormaps["cividis"].resampled(32),  # so few that the scale is drawn, not painted
             vmin=0.0,
             vmax=max(5.0, 100 * float(np.percentile(slip[rows], 99))),
         )

@@ -27,6 +27,8 @@ MEASURED, ESTIMATED, TRUE = VERMILLION, BLUE, INK
 
 SOIL_COLORS = {"hard": MUTED, "fine": ORANGE, "wet": SKY, "coarse": PURPLE, "grass": GREEN}
 """None of them is a voice's."""
+PART_COLORS = {"work": GREEN, "headland": ORANGE, "road": SKY, "standing": PURPLE, "the drive": BLUE}
+"""Of what a machine did (field_work.py)."""
 _SPARE_COLORS = (YELLOW, VERMILLION, BLUE, "#8c510a", "#2f9e9e", "#7b52ab", "#a3b81f", "#e06c9f")
 """Beyond these hues are made, a golden angle apart."""
 _GOLDEN = 0.618034
@@ -139,9 +141,10 @@ def in_page(svg: str, label: str, prefix: str) -> str:
 
 def soil_color(soil: str, soils: Sequence[str] = ()) -> str:
     """The colour of a soil: fixed for the paper's five, for others one of its own by its place in `soils`."""
-    if soil in SOIL_COLORS:
-        return SOIL_COLORS[soil]
-    others = list(dict.fromkeys(name for name in soils if name not in SOIL_COLORS))
+    known = SOIL_COLORS | PART_COLORS
+    if soil in known:
+        return known[soil]
+    others = list(dict.fromkeys(name for name in soils if name not in known))
     if soil not in others:
         return MUTED
     place = others.index(soil)

@@ -19,6 +19,8 @@ Array = NDArray[np.float64]
 FREE = "free"
 AT_BOUND = 1e-3
 """Share of a parameter's range that counts as its end."""
+BAND = np.round(np.linspace(0.0, 1.0, 101), 3)
+"""Slips that a band is written at."""
 
 
 class AdhesionCurve:
@@ -62,6 +64,7 @@ class AdhesionCurve:
         self.model, self.fixed, self.intercept, self.weights = model, fixed, intercept, weights
         self.bins, self.bootstrap, self.seed = bins or BinSettings(), bootstrap, seed
         self.common_sd, self.bounds = common_sd, dict(bounds or {})
+        self.written_band: tuple[Array, Array, Array] | None = None  # slip, low, high of a fit that was read
 
     def fit(self, slip: ArrayLike, adhesion: ArrayLike, run: ArrayLike | None = None) -> AdhesionCurve:
         """Fit to pairs, each of shape (n,); `run` (n,) are integer or string labels of what is not independent.
@@ -118,15 +121,22 @@ class AdhesionCurve:
 
     @property
     def has_band(self) -> bool:
-        """Whether `band` can be determined: by the bootstrap, or by the interval of the one free parameter of a fit that was read."""
-        return self.samples_ is not None or (len(self.free_) == 1 and self.free_[0] in self.interval_)
+        """Whether `band` is known: by the bootstrap, of a fit that was read by its band or the interval of its one free parameter."""
+        return (
+            self.samples_ is not None
+            or self.written_band is not None
+            or (len(self.free_) == 1 and self.free_[0] in self.interval_)
+        )
 
     def band(self, slip: ArrayLike, level: float = 0.95) -> tuple[Array, Array]:
-        """Pointwise interval of the curve at slips (n,): from the bootstrap, or of 95 % between the curves at the ends of the one free
-        parameter's interval. Raises ValueError where neither is known."""
+        """Pointwise interval of the curve at slips (n,): from the bootstrap; of a fit that was read its 95 %, between the slips that it was
+        written at, or between the curves at the ends of the one free parameter's interval. Raises ValueError where none is known."""
         if not self.has_band:
             raise ValueError("this curve was fitted without a bootstrap")
         s = np.asarray(slip, dtype=float)
+        if self.samples_ is None and self.written_band is not None:
+            at, low, high = self.written_band
+            return np.interp(s, at, low), np.interp(s, at, high)
         if self.samples_ is None:
             ends = np.array(self.interval_[self.free_[0]])[:, None]
             given = {**self.parameters_, self.free_[0]: ends}
@@ -147,6 +157,12 @@ class AdhesionCurve:
     def to_dict(self) -> dict[str, Any]:
         """The fit as soils.json holds it (architecture.md, contracts)."""
         badge = self.identifiability_
+        band = {}
+        if self.samples_ is not None and len(self.free_) > 1:
+            low, high = self.band(BAND)
+            band = {
+                "band": {"slip": BAND.tolist(), "low": low.round(5).tolist(), "high": high.round(5).tolist()}
+            }
         return {
             "model": self.model,
             "parameters": {k: float(v) for k, v in self.parameters_.items()},
@@ -165,6 +181,7 @@ class AdhesionCurve:
                 "sentence": badge.sentence,
             },
             "notes": list(self.notes_),
+            **band,
         }
 
     def _of_model(self) -> dict[str, float]:

@@ -30,7 +30,7 @@ def _known(soil: Soil) -> LearnedSoil:
     if paper:
         its = replace(soil, parameters=paper["parameters"], interval=_pairs(paper.get("interval")), r2=paper["r2"],
                       nrmse=paper.get("nrmse"), bins=tuple(paper.get("bins") or ()))  # fmt: skip
-        by_slip = _fitted(its, {**soil.fit, "settings": paper.get("settings")})
+        by_slip = _fitted(its, {**soil.fit, "settings": paper.get("settings"), "band": paper.get("band")})
     noise = soil.fit.get("slip_noise")
     freed = None
     if noise:
@@ -47,7 +47,10 @@ def _fitted(soil: Soil, fit: Mapping[str, Any]) -> AdhesionCurve:
     curve.parameters_, curve.interval_ = dict(soil.parameters), dict(soil.interval)
     curve.r2_ = np.nan if soil.r2 is None else soil.r2
     curve.nrmse_ = np.nan if soil.nrmse is None else soil.nrmse
-    curve.samples_, curve.notes_ = None, list(fit.get("notes", ()))
+    curve.samples_, curve.notes_, curve.at_bound_ = None, list(fit.get("notes", ())), []
+    if band := fit.get("band"):
+        at, low, high = (np.array(band[name], dtype=float) for name in ("slip", "low", "high"))
+        curve.written_band = (at, low, high)
     column = {name: np.array([row.get(name, np.nan) for row in soil.bins], dtype=float) for name in _BIN}
     weight = np.where(np.isfinite(column["metres"]), column["metres"], column["count"])[None, :]
     curve.bins_ = Bins(

@@ -234,7 +234,8 @@ def _learn(
     soil = Soil.from_curve(name, curve, source, (float(np.nanmean(resistance)), float(np.nanstd(resistance))))
     if by_slip is not curve:
         papers = by_slip.to_dict()
-        shown = {key: papers[key] for key in ("parameters", "interval", "r2", "nrmse", "bins", "settings")}
+        kept = ("parameters", "interval", "r2", "nrmse", "bins", "settings", "band")
+        shown = {key: papers[key] for key in kept if key in papers}
         soil = replace(soil, fit={**soil.fit, "by_slip": shown})
     corrected = None
     if np.isfinite(_joined(parts, "slip_std")).any():

@@ -47,7 +47,8 @@ class Soil:
     ) -> Soil:
         """A soil from a fitted curve."""
         whole = curve.to_dict()
-        rest = {k: whole[k] for k in ("free", "settings", "clusters", "identifiability", "notes")}
+        kept = ("free", "settings", "clusters", "identifiability", "notes", "band")
+        rest: dict[str, Any] = {k: whole[k] for k in kept if k in whole}
         used = curve.bins_.used
         weight = curve.bins_.count[used]
         off = curve.bins_.mean[used] - curve.predict(curve.bins_.slip[used])
@@ -247,12 +248,30 @@ def _refuse_bad_fit(entry: Mapping[str, Any], values: Mapping[str, float], file:
             raise InputError(
                 "is neither true nor false", file=file, place=f"{place}.identifiability.identifiable"
             )
+    for name, fit in (("band", entry), ("by_slip.band", by_slip or {})):
+        _refuse_bad_band(fit.get("band"), file, f"{place}.{name}")
     if by_slip:
         parameters = by_slip.get("parameters")
         if not isinstance(parameters, dict) or not set(values) <= set(parameters):
             raise InputError("has not the soil's parameters", file=file, place=f"{place}.by_slip")
         for key, value in (*parameters.items(), ("r2", by_slip.get("r2"))):
             _number(value, file, f"{place}.by_slip.{key}")
+
+
+def _refuse_bad_band(band: Any, file: str, place: str) -> None:
+    """InputError unless a band is three lists of as many numbers, its slips in order."""
+    if band is None:
+        return
+    columns: list[Any] = (
+        [band.get(name) for name in ("slip", "low", "high")] if isinstance(band, dict) else []
+    )
+    if not columns or not all(isinstance(one, list) and len(one) == len(columns[0]) > 1 for one in columns):
+        raise InputError("is not lists slip, low and high of one length", file=file, place=place)
+    for column in columns:
+        for value in column:
+            _number(value, file, place)
+    if sorted(set(columns[0])) != columns[0]:
+        raise InputError("its slips are not in order", file=file, place=place)
 
 
 def _pair(value: Any, file: str, place: str) -> tuple[float, float] | None:

@@ -1,0 +1,78 @@
+"""What a machine did by its track: standing, turning on the headland, working, on the road."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from terragrip.physics.geodesy import metres_of
+from terragrip.report.runs import FloatArray, Run, label_stretches
+
+STANDING, HEADLAND, WORK, ROAD = "standing", "headland", "work", "road"
+PARTS = (WORK, HEADLAND, ROAD, STANDING)
+SLOWEST = 0.2
+"""Speed [m/s] under which a machine stands."""
+TURN = np.radians(5.0)
+"""Turn rate [rad/s] from which a machine turns: at 2 m/s a circle of 23 m radius."""
+WINDOW = 6.0
+"""Seconds that a heading is taken over."""
+PASS = 10.0
+"""Seconds that a straight stretch lasts at least: shorter ones belong to a turn on the headland."""
+FASTER = 1.3
+"""A stretch is road where it is driven faster than the passes' median speed by this factor."""
+
+
+def parts_of(run: Run) -> NDArray[np.object_] | None:
+    """What the machine did at each row (n,), one of PARTS, by its own positions alone; None where it has too few of them.
+
+    Straight stretches between turns are passes. What is much faster than the usual pass is road; turns, and what is shorter than a pass
+    between them, are headland.
+    """
+    if not {"latitude", "longitude"} <= set(run.estimates.columns):
+        return None
+    north, east = metres_of(run.estimated("latitude"), run.estimated("longitude"))
+    fixed = np.isfinite(north) & np.isfinite(east)
+    if fixed.sum() < 20 or run.time[fixed][-1] - run.time[fixed][0] < 4 * PASS:
+        return None
+    grid = np.arange(run.time[fixed][0], run.time[fixed][-1], 1.0)
+    x, y = (np.interp(grid, run.time[fixed], values[fixed]) for values in (east, north))
+    speed, turn = _motion(x, y)
+    standing = speed < SLOWEST
+    if standing.all():
+        return None
+    what = np.where(standing, STANDING, np.where(turn > TURN, HEADLAND, WORK)).astype(object)
+    for _, first, last in label_stretches(np.where(what == WORK, WORK, "").astype(object)):
+        if last - first + 1 < PASS:
+            what[first : last + 1] = HEADLAND
+    passes = [(first, last) for name, first, last in label_stretches(what) if name == WORK]
+    if passes:
+        speeds = np.array([speed[a : b + 1].mean() for a, b in passes])
+        usual = _median(speeds, np.array([b - a + 1.0 for a, b in passes]))
+        for (first, last), mean in zip(passes, speeds, strict=True):
+            if mean > FASTER * usual:
+                what[first : last + 1] = ROAD
+    nearest = np.clip(np.round(run.time - grid[0]).astype(int), 0, len(grid) - 1)
+    return what[nearest]
+
+
+def _motion(x: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Speed [m/s] and turn rate [rad/s, absolute] (n,) of positions a second apart, over WINDOW; a heading stays while it stands."""
+    half = int(WINDOW // 2)
+    index = np.arange(len(x))
+    before, behind = np.maximum(index - half, 0), np.minimum(index + half, len(x) - 1)
+    dx, dy, seconds = x[behind] - x[before], y[behind] - y[before], np.maximum(behind - before, 1)
+    steps = np.hypot(np.diff(x, prepend=x[0]), np.diff(y, prepend=y[0]))
+    way = np.cumsum(steps)
+    speed = (way[behind] - way[before]) / seconds
+    known = np.hypot(dx, dy) > 0.5
+    if not known.any():
+        return speed, np.zeros(len(x))
+    heading = np.unwrap(np.arctan2(dy, dx)[known])
+    heading = np.interp(index, index[known], heading)
+    return speed, np.abs(heading[behind] - heading[before]) / seconds
+
+
+def _median(values: FloatArray, weights: FloatArray) -> float:
+    order = np.argsort(values)
+    total = np.cumsum(weights[order])
+    return float(values[order][int(np.searchsorted(total, 0.5 * total[-1]))])
