@@ -345,6 +345,6 @@ tg_status tg_estimator_set_noise(tg_estimator *e, const tg_real *noise, const tg
     if (status != TG_OK) return status;
     e->settings = s;
     work_out_constants(&s, &e->constants);
-    if (!e->seen_motion || e->jolt < e->constants.least_jolt) e->jolt = e->constants.least_jolt;
+    if (!e->seen_motion || e->shock < e->constants.least_shock) e->shock = e->constants.least_shock;
     return TG_OK;
 }
