@@ -58,7 +58,8 @@ def test_estimate_writes_the_table_and_says_what_it_found(
     run("estimate", drive / "log.csv", "--vehicle", drive / "vehicle.yaml", "-o", out)
     streams = capsys.readouterr()
     assert streams.err == ""
-    assert "adhesion rr" in streams.out
+    assert "adhesion" in streams.out
+    assert f"Next: 'terragrip soils {out}" in streams.out
     assert str(out) in streams.out
     estimates, truth = Estimates.read(out), pd.read_parquet(drive / "truth.parquet")
     assert estimates.method == "bank"

@@ -75,7 +75,7 @@ def estimate_file(
     )
     tally, notes = Tally(), dict[str, None]()
     write_parts(_counted(parts, tally, notes), output)
-    return tally.text(notes)
+    return tally.text(notes, os.fspath(output))
 
 
 def _counted(parts: Iterator[Estimates], tally: Tally, notes: dict[str, None]) -> Iterator[Estimates]:

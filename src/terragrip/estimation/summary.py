@@ -1,8 +1,7 @@
-"""The summary of estimates as text, gathered block by block."""
+"""What a summary of estimates needs, gathered block by block; `summary_text` writes it."""
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
@@ -15,13 +14,10 @@ from terragrip.estimation.engine import EVENTS
 if TYPE_CHECKING:
     from terragrip.estimation.estimates import Estimates
 
-Floats = npt.NDArray[np.float64]
-
 STANDSTILL = EVENTS.index("standstill")
 
 _SAMPLE = 20_000  # rows a block that medians are taken from,
 _MOST = 200_000  # and rows in all
-_EXPECTED = (0.7, 1.4)  # of the normalised innovation squared a channel
 
 
 @dataclass
@@ -37,7 +33,8 @@ class Tally:
     event_starts: list[int] = field(default_factory=lambda: [0] * len(EVENTS))
     nis: float = 0.0
     channels: float = 0.0
-    sample: dict[str, list[Floats]] = field(default_factory=dict)
+    moving: dict[str, float] = field(default_factory=dict)
+    sample: dict[str, list[npt.NDArray[Any]]] = field(default_factory=dict)
     _first: float | None = None
     _last_event: int = 0
     _every: int = 1
@@ -58,13 +55,31 @@ class Tally:
             self.channels += float(np.nansum(block["channels"][moves]))
         moving = np.flatnonzero(block.event_codes == 0)
         chosen = moving[:: max(1, len(moving) // _SAMPLE)]
-        for name in (n for _, n, _ in _quantities(self.wheels) if n in block):
+        chosen = chosen[:: self._every]
+        for name in (n for n in quantities(self.wheels) if n in block):
             for column in (name, f"{name}_std"):
-                self.sample.setdefault(column, []).append(block[column][chosen[:: self._every]])
-        self._sampled += len(chosen[:: self._every])
+                self.sample.setdefault(column, []).append(block[column][chosen])
+        soil = block.labels.get("soil")
+        self.sample.setdefault("label", []).append(
+            np.full(len(chosen), "", dtype=object) if soil is None else soil[chosen]
+        )
+        self._sampled += len(chosen)
+        self._count_time(block)
         if self._sampled > _MOST:  # half of them do as well
             self.sample = {name: [np.concatenate(parts)[::2]] for name, parts in self.sample.items()}
             self._every, self._sampled = 2 * self._every, (self._sampled + 1) // 2
+
+    def _count_time(self, block: Estimates) -> None:
+        """Add up the time [s] of rows without an event, by label; a row lasts until the next one, at most as long as a gap is not one."""
+        longest = self.about.get("settings", {}).get("gap") or 1.0
+        lasts = np.minimum(np.diff(block.time, append=block.time[-1]), longest)
+        moving = block.event_codes == 0
+        soil = block.labels.get("soil")
+        names = np.full(len(block), "", dtype=object) if soil is None else soil
+        for name in dict.fromkeys(names.tolist()):
+            self.moving[str(name)] = self.moving.get(str(name), 0.0) + float(
+                lasts[moving & (names == name)].sum()
+            )
 
     def _count_events(self, codes: npt.NDArray[np.uint8]) -> None:
         starts = np.flatnonzero(np.diff(codes, prepend=np.uint8(self._last_event)))
@@ -74,59 +89,25 @@ class Tally:
         for code, count in enumerate(np.bincount(codes[starts], minlength=len(EVENTS))):
             self.event_starts[code] += int(count)
 
-    def text(self, notes: Iterable[str] = ()) -> str:
-        """Extent, defects met, consistency, medians with their spreads, and notes; lines of text."""
-        lines = [self._extent(), *self._defects(), *self._consistency(), *self._medians()]
-        return "\n".join([*lines, *(f"Note: {note}" for note in notes)])
+    def text(self, notes: Iterable[str] = (), output: str | None = None) -> str:
+        """What was driven, medians with their intervals, what is assumed, notes, what to do next; lines of text.
 
-    def _extent(self) -> str:
-        smooth = ", smoothed" if self.about.get("smooth") else ""
-        method = self.about.get("method", "unknown")
-        return (
-            f"{self.rows} rows, {self.duration:.1f} s, {self.distance:.1f} m, {len(self.wheels)} wheel{'s' * (len(self.wheels) != 1)}, "
-            f"method {method}{smooth}"
-        )
+        ``output``: the file of the estimates, for what to do next.
+        """
+        from terragrip.estimation.summary_text import summary_text
 
-    def _defects(self) -> list[str]:
-        lines = []
-        held = self.about.get("settings", {}).get("held", {})
-        if held:
-            shown = ", ".join(f"{name} ({1 / period:.3g} Hz)" for name, period in held.items())
-            lines.append(f"Held channels, taken as missing between their updates: {shown}")
-        met = [
-            f"{event} {self.event_starts[code]} ({self.event_rows[code]} rows)"
-            for code, event in enumerate(EVENTS)
-            if event and self.event_rows[code]
-        ]
-        return [*lines, f"Events: {', '.join(met) if met else 'none'}"]
+        return summary_text(self, tuple(notes), output)
 
-    def _consistency(self) -> list[str]:
-        if not self.channels:
-            return []
-        ratio, (low, high) = self.nis / self.channels, _EXPECTED
-        verdict = "as expected"
-        if not low < ratio < high:
-            verdict = "the noise may be set too high" if ratio < 1 else "the noise may be set too low"
-        return [f"Normalised innovation squared a channel: {ratio:.2f}, expected 1 ({verdict})"]
-
-    def _medians(self) -> list[str]:
-        columns = {name: np.concatenate(parts) for name, parts in self.sample.items()}
-        if not any(len(values) for values in columns.values()):
-            return ["There is no row without an event."]
-        lines = ["Medians (± 1 standard deviation) while moving:"]
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", RuntimeWarning)  # a column may be all NaN
-            for title, name, unit in _quantities(self.wheels):
-                if name not in columns:
-                    continue
-                value, spread = np.nanmedian(columns[name]), np.nanmedian(columns[f"{name}_std"])
-                lines.append(f"  {title:<18} {value:8.3f} ± {spread:.3f}{unit}")
-        return lines
+    @property
+    def columns(self) -> dict[str, npt.NDArray[Any]]:
+        """The sampled rows of each quantity that is summarised, and ``label``, the soil of each row."""
+        return {name: np.concatenate(parts) for name, parts in self.sample.items()}
 
 
-def _quantities(wheels: tuple[str, ...]) -> list[tuple[str, str, str]]:
-    """Title, column and unit of what is summarised."""
-    result = [("ground speed", "ground_speed", " m/s"), ("soil resistance", "soil_resistance", "")]
-    for quantity in ("adhesion", "slip", "efficiency"):
-        result += [(f"{quantity} {wheel}", f"{quantity}_{wheel}", "") for wheel in wheels]
-    return result
+def quantities(wheels: tuple[str, ...]) -> list[str]:
+    """Columns that are summarised."""
+    return [
+        "ground_speed",
+        "soil_resistance",
+        *(f"{quantity}_{wheel}" for quantity in ("slip", "adhesion", "efficiency") for wheel in wheels),
+    ]

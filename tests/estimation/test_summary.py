@@ -1,0 +1,102 @@
+"""The summary of an estimate, on one screen."""
+
+from __future__ import annotations
+
+import re
+
+import numpy as np
+import pandas as pd
+import pytest
+
+import terragrip as tg
+from terragrip.estimation.summary import Tally
+
+
+@pytest.fixture(scope="module")
+def drive() -> tuple[tg.Estimates, str]:
+    """A drive over two soils, with an unlabelled stretch."""
+    result = tg.simulate("constant", 7)
+    soil = np.where(result.recording.time < 20, "loam", np.where(result.recording.time < 30, "sand", ""))
+    recording = result.recording.to_pandas().assign(soil=soil)
+    estimates = tg.estimate(recording, result.vehicle)
+    return estimates, estimates.summary()
+
+
+def cells(line: str) -> list[tuple[float, float]]:
+    return [(float(a), float(b)) for a, b in re.findall(r"(-?\d+\.\d+) ± (\d+\.\d+)", line)]
+
+
+@pytest.mark.parametrize("label", ["loam", "sand", "no label", "all"])
+def test_medians_and_intervals_by_label(drive: tuple[tg.Estimates, str], label: str) -> None:
+    estimates, text = drive
+    table = estimates.to_pandas()
+    rows = (table["event"].isna() | (table["event"] == "")) & {
+        "all": True,
+        "no label": (table["soil"].isna() | (table["soil"] == "")),
+    }.get(label, table["soil"] == label)
+    line = next(line for line in text.splitlines() if line.strip().startswith(f"{label}  "))
+    speed, slip, adhesion, efficiency, resistance = cells(line)
+
+    def expected(*names: str) -> tuple[float, float]:
+        some = table.loc[rows]
+        return (
+            float(np.mean([some[name].median() for name in names])),
+            1.96 * float(np.mean([some[f"{name}_std"].median() for name in names])),
+        )
+
+    wheels = ("fl", "fr", "rl", "rr")
+    for cell, names in (
+        (speed, ["ground_speed"]),
+        (slip, [f"slip_{w}" for w in wheels]),
+        (adhesion, [f"adhesion_{w}" for w in wheels]),
+        (efficiency, [f"efficiency_{w}" for w in wheels]),
+        (resistance, ["soil_resistance"]),
+    ):
+        assert cell == pytest.approx(expected(*names), abs=6e-4)
+
+
+def test_it_says_what_was_driven_what_is_assumed_and_what_next(drive: tuple[tg.Estimates, str]) -> None:
+    estimates, text = drive
+    assert len(text.splitlines()) <= 24
+    assert text.startswith("Innok Heros 444 (4 wheels): ")
+    assert f"{estimates['distance'][-1]:.1f} m in 40.0 s" in text
+    assert "Assumed: considered as unknown drive_torque_gain ±2 %" in text
+    assert "the vehicle is not calibrated" in text
+    assert text.splitlines()[-1].startswith("Next: 'terragrip soils ESTIMATES")
+    moving = re.search(r"([\d.]+) s of it moving", text)
+    assert moving is not None
+    assert float(moving[1]) == pytest.approx(np.sum(estimates["event"] == "") * 0.01, abs=0.2)
+
+
+def test_blocks_give_the_summary_of_the_whole(drive: tuple[tg.Estimates, str]) -> None:
+    estimates, text = drive
+    tally = Tally()
+    for rows in np.array_split(np.arange(len(estimates)), 7):
+        part = tg.Estimates(
+            estimates.time[rows],
+            {name: values[rows] for name, values in estimates.columns.items()},
+            estimates.event_codes[rows],
+            {name: values[rows] for name, values in estimates.labels.items()},
+            estimates.about,
+            estimates.notes,
+        )
+        tally.add(part)
+    # The time of each block's last row is not known: a hundredth of a second a block.
+    strip = [re.sub(r"\d+\.\d s", "", line) for line in tally.text(estimates.notes).splitlines()]
+    assert strip == [re.sub(r"\d+\.\d s", "", line) for line in text.splitlines()]
+
+
+def test_nothing_considered_is_said_and_doubtful_units_come_first() -> None:
+    time = np.arange(0, 40, 0.1)
+    speed = np.clip(np.minimum(time - 2, 1.0), 0, None)
+    columns = {"time": time, "ground_speed": 3.6 * speed, "drawbar_force": 0 * time}
+    columns |= {f"wheel_speed_{w}": speed / 0.9 / 0.2 for w in ("l", "r")}
+    columns |= {f"drive_torque_{w}": np.where(speed > 0, 5.0, 0.0) for w in ("l", "r")}
+    vehicle = {
+        "mass": 60,
+        "axles": {"one": {"mass": 60, "wheels": ["l", "r"]}},
+        "wheel": {"radius": 0.2, "inertia": 0.1},
+    }
+    text = tg.estimate(pd.DataFrame(columns), tg.Vehicle.from_dict(vehicle)).summary()
+    assert "the intervals hold the sensors' noise alone" in text
+    assert text.splitlines()[-1].startswith("Next: settle what the notes doubt")
