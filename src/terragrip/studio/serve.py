@@ -84,6 +84,7 @@ def _bind(address: str, port: int) -> socket.socket:
     listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
     try:
         listener.bind((address, port))
+        listener.listen()  # from here on the printed address answers, if after a moment
     except OSError as error:
         listener.close()
         raise InputError(

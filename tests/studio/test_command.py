@@ -1,0 +1,73 @@
+"""``terragrip studio`` as a process: what it prints is what gets a browser in, also behind a reverse proxy."""
+
+from __future__ import annotations
+
+import http.client
+import os
+import re
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import pytest
+
+from terragrip.cli import main
+
+PUBLIC = "https://field.example.org/studio"
+
+
+@contextmanager
+def studio(folder: Path, *words: str, lines: int) -> Iterator[list[str]]:
+    """The command on the folder; its first lines."""
+    given = {name: value for name, value in os.environ.items() if name != "TERRAGRIP_TOKEN"}
+    command = [sys.executable, "-m", "terragrip", "studio", str(folder), "--port", "0", *words]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, env=given) as process:
+        try:
+            printed = [process.stdout.readline().rstrip() for _ in range(lines)]
+            yield [line for line in printed if not line.startswith("The pages are not built")]
+        finally:
+            process.terminate()
+            process.wait(20)
+
+
+def test_behind_a_proxy_the_printed_address_is_the_public_one_and_its_token_is_needed(
+    tmp_path: Path,
+) -> None:
+    with studio(tmp_path, "--public-url", PUBLIC, lines=2) as printed:
+        shown = re.fullmatch(rf"Terragrip studio: {PUBLIC}/\?token=(\S+)", printed[0])
+        own = re.fullmatch(r"The proxy passes on to http://127\.0\.0\.1:(\d+)/\.", printed[1])
+        assert shown, printed
+        assert own, printed
+
+        def get(path: str, **headers: str) -> http.client.HTTPResponse:
+            connection = http.client.HTTPConnection("127.0.0.1", int(own[1]), timeout=20)
+            proxied = {"Host": "field.example.org", "Origin": "https://field.example.org"}
+            connection.request("GET", path, headers={**proxied, **headers})
+            answer = connection.getresponse()
+            answer.read()
+            connection.close()
+            return answer
+
+        assert get("/api/folder").status == 401
+        answer = get(f"/?token={shown[1]}")
+        assert (answer.status, answer.getheader("location")) == (303, "/studio/")
+        cookie = answer.getheader("set-cookie")
+        assert "Path=/studio/; Secure" in cookie
+        mine = cookie.partition(";")[0]
+        assert get("/api/folder", Cookie=mine).status == 200
+        assert get("/api/folder", Cookie=mine, Host="evil.example").status == 403
+
+
+@pytest.mark.parametrize(
+    "url", ["field.example.org/studio", "ftp://field.example.org", "https://", "https://h/?a=1"]
+)
+def test_what_is_no_web_address_is_refused_in_one_line(
+    url: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["studio", str(tmp_path), "--public-url", url]) == 2
+    error = capsys.readouterr().err
+    assert error.count("\n") == 1
+    assert "--public-url" in error
+    assert "https://HOST" in error
