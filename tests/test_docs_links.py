@@ -98,3 +98,21 @@ def test_a_broken_link_and_a_broken_heading_are_found(tmp_path: Path) -> None:
         encoding="utf-8",
     )
     assert broken_links(page) == ["gone.md", "page.md#gone", "#no-heading"]
+
+
+PAGE_OF_AN_ERROR = re.compile(r"""(?:\bpage ?=|PAGE: ClassVar\[str \| None\] =) ?"([\w-]+)(?:#([\w-]+))?\"""")
+
+
+def test_every_page_that_an_error_names_exists() -> None:
+    named = {
+        (path.name, *found)
+        for path in (ROOT / "src").rglob("*.py")
+        for found in PAGE_OF_AN_ERROR.findall(path.read_text(encoding="utf-8"))
+    }
+    assert {("vehicle.py", "vehicle", "all-keys"), ("boundary.py", "install", "")} <= named
+    for source, page, heading in named:
+        path = ROOT / "docs" / f"{page}.md"
+        assert path.is_file(), f"{source} names docs/{page}.md"
+        assert not heading or heading in anchors_of(path.read_text("utf-8")), (
+            f"{source} names {page}#{heading}"
+        )

@@ -7,7 +7,7 @@ import os
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, ClassVar, TypeVar
 
 import yaml
 from pydantic import BaseModel, ConfigDict, ValidationError, model_validator
@@ -40,6 +40,8 @@ class Fault(ValueError):
 class Part(BaseModel):
     """A frozen part of a document: unknown keys are refused, and the nearest known key is named."""
 
+    PAGE: ClassVar[str | None] = None
+    """The page of the documentation that lists the document's keys; errors name it."""
     model_config = ConfigDict(frozen=True, extra="forbid", arbitrary_types_allowed=True)
 
     @model_validator(mode="before")
@@ -106,7 +108,7 @@ def validate(model: type[ModelT], document: Document | Any, *, file: str | None 
     try:
         return model.model_validate(document.data)
     except ValidationError as error:
-        raise _input_error(error, document) from error
+        raise _input_error(error, document, getattr(model, "PAGE", None)) from error
 
 
 def read_json(
@@ -169,7 +171,7 @@ def _collect_lines(node: Any, place: Place, lines: dict[Place, int], file: str) 
             _collect_lines(value, (*place, index), lines, file)
 
 
-def _input_error(error: ValidationError, document: Document) -> InputError:
+def _input_error(error: ValidationError, document: Document, page: str | None) -> InputError:
     """The fault a user should fix first, as one InputError."""
     faults = error.errors(include_url=False)
     order = {"unknown_key": 0, "missing": 2}
@@ -193,7 +195,8 @@ def _input_error(error: ValidationError, document: Document) -> InputError:
         )
     elif fault["type"] in _PLAIN:
         problem, hint = _PLAIN[fault["type"]]
-    return InputError(problem, file=document.file or None, place=_located(place, document), hint=hint)
+    place_text = _located(place, document)
+    return InputError(problem, file=document.file or None, place=place_text, hint=hint, page=page)
 
 
 def _place_in(data: Any, location: Place, *, missing: bool) -> Place:

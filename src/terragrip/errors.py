@@ -16,6 +16,7 @@ class InputError(ValueError):
     file: the file it is in, if it came from one.
     place: where in the file (``"column ground_speed, row 17"``, ``"axles.front.mass"``).
     hint: what the user can do about it.
+    page: the page of the documentation that explains it, and its heading: ``"vehicle#all-keys"`` is docs/vehicle.md.
 
     The command line prints ``str(error)`` and exits with 2.
     """
@@ -27,23 +28,29 @@ class InputError(ValueError):
         file: str | os.PathLike[str] | None = None,
         place: str | None = None,
         hint: str | None = None,
+        page: str | None = None,
     ) -> None:
         self.problem = problem
         self.file = None if file is None else os.fspath(file)
         self.place = place
         self.hint = hint
+        self.page = page
         text = ": ".join(part for part in (self.file, place, problem) if part)
         if hint:
             text = f"{text}; {hint}"
+        if page:
+            text = f"{text} (docs: {page})"
         super().__init__(" ".join(text.split()))
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Pickle by the arguments, so that the error survives a worker process."""
-        return _rebuild, (self.problem, self.file, self.place, self.hint)
+        return _rebuild, (self.problem, self.file, self.place, self.hint, self.page)
 
 
-def _rebuild(problem: str, file: str | None, place: str | None, hint: str | None) -> InputError:
-    return InputError(problem, file=file, place=place, hint=hint)
+def _rebuild(
+    problem: str, file: str | None, place: str | None, hint: str | None, page: str | None
+) -> InputError:
+    return InputError(problem, file=file, place=place, hint=hint, page=page)
 
 
 def nearest(name: str, known: Iterable[str]) -> str | None:

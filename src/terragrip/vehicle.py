@@ -9,7 +9,7 @@ import os
 import re
 from collections.abc import Callable
 from functools import cached_property
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Any, ClassVar, Literal, Self
 
 import numpy as np
 import numpy.typing as npt
@@ -207,6 +207,8 @@ class Vehicle(Part):
     the last. The properties hold numbers per wheel or axle as read-only arrays, in the order of ``wheels``. Without any ``wheel`` (see
     `knows_wheels`) the vehicle does for slip from ``wheel_based_speed`` alone.
     """
+
+    PAGE: ClassVar[str | None] = "vehicle#all-keys"
 
     name: str = ""
     mass: _Mass

@@ -61,7 +61,9 @@ def command(
         if (error.name or "").split(".")[0] == "terragrip":
             raise
         raise InputError(
-            f"the studio needs the Python package {error.name!r}", hint="pip install 'terragrip[studio]'"
+            f"the studio needs the Python package {error.name!r}",
+            hint="pip install 'terragrip[studio]'",
+            page="install",
         ) from error
     limit = upload_limit * 1_000_000
     serve(folder, address, port, loopback=home, live=live, upload_limit=limit, public=public_url)

@@ -46,6 +46,7 @@ def needed(module: str, what: str) -> Any:
         raise InputError(
             f"to read {what} the Python package {missing!r} is needed",
             hint="pip install 'terragrip[formats]'",
+            page="install",
         ) from error
     # What its logger has to say of a damaged file, the InputError or a note says.
     logging.getLogger(module.partition(".")[0]).setLevel(logging.CRITICAL + 1)

@@ -28,7 +28,7 @@ import os
 from collections.abc import Iterable
 from functools import cached_property
 from pathlib import Path
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Any, ClassVar, Literal, Self
 
 from pydantic import BeforeValidator, Field, field_validator, model_validator
 
@@ -176,6 +176,8 @@ class Rows(Part):
 
 class Profile(Part):
     """How a foreign log becomes a recording; the module's text shows the file."""
+
+    PAGE: ClassVar[str | None] = "formats#in-a-profile"
 
     name: str = ""
     description: str = ""

@@ -181,4 +181,6 @@ def _require(table: LogTable) -> None:
         if not table.clocked:
             raise
         hint = f"map its signals in a profile: {', '.join(SHIPPED)}, or your own ('terragrip inspect' proposes one)"
-        raise InputError(error.problem, file=error.file, place=error.place, hint=hint) from error
+        raise InputError(
+            error.problem, file=error.file, place=error.place, hint=hint, page=error.page
+        ) from error

@@ -39,7 +39,8 @@ def require_columns(columns: Collection[str], source: str | None) -> None:
     hint = f"the nearest column is {near[name]!r}: rename it, or map it in a profile"
     if near[name] is None:
         hint = "map the log's columns in a profile ('terragrip inspect' proposes one)"
-    raise InputError("is missing", file=source, place=f"column {name}", hint=hint)
+    page = "formats#in-a-profile"
+    raise InputError("is missing", file=source, place=f"column {name}", hint=hint, page=page)
 
 
 def remarks(columns: Collection[str]) -> list[str]:

@@ -81,7 +81,9 @@ def render(page: Page) -> str:
     try:
         import jinja2
     except ImportError:
-        raise InputError("Jinja2 is not installed", hint="pip install 'terragrip[report]'") from None
+        raise InputError(
+            "Jinja2 is not installed", hint="pip install 'terragrip[report]'", page="install"
+        ) from None
     environment = jinja2.Environment(
         loader=jinja2.PackageLoader("terragrip.report"),
         autoescape=True,

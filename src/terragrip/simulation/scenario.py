@@ -10,7 +10,7 @@ import os
 from collections.abc import Mapping
 from itertools import pairwise
 from math import dist
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Any, ClassVar, Literal, Self
 
 from pydantic import BeforeValidator, Field, field_validator, model_validator
 
@@ -334,6 +334,8 @@ class Fault(Part):
 class Scenario(Part):
     """One drive. ``speed``: points ``[time, speed]`` of the wheels' circumferential speed [m/s], linear between them;
     ``off`` for a speed switches the motors off until the next point."""
+
+    PAGE: ClassVar[str | None] = "simulation#scenarios"
 
     name: str = ""
     description: str = ""
