@@ -340,3 +340,22 @@ def test_a_quotient_needs_both_columns_and_a_least_divisor(
 ) -> None:
     with pytest.raises(InputError, match=expected):
         apply(foreign, drive_torque_l=source)
+
+
+def test_a_quotient_of_columns_that_never_stand_in_one_row_says_so(tmp_path: Path) -> None:
+    """It was "holds no value", which says nothing of the stamps."""
+    time, odd = np.arange(0, 20, 0.1), np.arange(200) % 2 == 1
+    columns = {
+        "time": time,
+        "v": 1.0 + 0 * time,
+        "w": np.where(odd, 10.0, np.nan),
+        "p": np.where(odd, np.nan, 30.0),
+    }
+    pd.DataFrame(columns).to_csv(tmp_path / "log.csv", index=False)
+    text = "channels:\n  ground_speed: {from: v}\n  wheel_speed_l: {from: w}\n"
+    text += "  drive_torque_l: {from: p, over: w, over_minimum: 0.3, unit: N m}\n"
+    (tmp_path / "p.yaml").write_text(text)
+    with pytest.raises(
+        InputError, match="channel drive_torque_l, over: p and w are never stamped together; log both"
+    ):
+        read(tmp_path / "log.csv", tmp_path / "p.yaml")

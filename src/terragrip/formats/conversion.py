@@ -181,15 +181,29 @@ def _channel(name: str, origin: Source, log: LogTable, time: Floats) -> tuple[Co
         raw = _without_invalid(_raw((str(origin.column),), log, time)[0], origin)
         if origin.over is not None:
             divisor = _raw((origin.over,), log, time)[0]
-            raw = quotient(
-                time, raw, _between(time, divisor) if log.clocked else divisor, origin.over_minimum
-            )
+            if log.clocked:
+                divisor = _between(time, divisor)
+            elif len(origin.chain) == 1 and not origin.optional:
+                _refuse_apart(name, origin, raw, divisor, log)
+            raw = quotient(time, raw, divisor, origin.over_minimum)
     factor = _factor(name, origin, log)
     if deviation is not None:
         deviation *= abs(factor * origin.scale)
     if (factor, origin.scale, origin.offset, origin.sign) == (1.0, 1.0, 0.0, 1):
         return raw, deviation
     return (origin.sign * factor) * (origin.scale * raw + origin.offset), deviation
+
+
+def _refuse_apart(name: str, origin: Source, dividend: Floats, divisor: Floats, log: LogTable) -> None:
+    """Raise InputError where both columns (n,) of a quotient hold values, and no row holds both."""
+    here, there = np.isfinite(dividend), np.isfinite(divisor)
+    if here.any() and there.any() and not (here & there).any():
+        raise InputError(
+            f"{origin.column} and {origin.over} are never stamped together",
+            file=log.source,
+            place=f"channel {name}, over",
+            hint="log both in one row, or fill the rows between",
+        )
 
 
 def _factor(name: str, origin: Source, log: LogTable) -> float:
