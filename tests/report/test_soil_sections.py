@@ -13,7 +13,7 @@ import pytest
 import made_up
 from terragrip.errors import InputError
 from terragrip.physics.adhesion import CURVES
-from terragrip.report import soil_sections
+from terragrip.report import soil_sections, trust_sections
 from terragrip.report.curves import SoilCurves, draw_fits, maxima
 from terragrip.report.page import Picture, Section, Table
 from terragrip.soil.estimates import GatheredRuns
@@ -91,7 +91,7 @@ def test_maxima_are_those_of_the_formula(curves: list[SoilCurves]) -> None:
 
 
 def test_the_badge_says_that_four_parameters_are_too_many(curves: list[SoilCurves]) -> None:
-    section = soil_sections.trust(curves)
+    section = trust_sections.trust(curves)
     assert "draws the same curve" in section.prose[0]
     assert re.search(r"A = 0\.\d+, k = \d+\.\d+, d = ", section.prose[0])
     badges, ranking = tables(section)
@@ -105,7 +105,7 @@ def test_the_badge_says_that_four_parameters_are_too_many(curves: list[SoilCurve
 
 
 def test_what_lacks_is_said_and_where_nothing_lacks_too(curves: list[SoilCurves]) -> None:
-    section = soil_sections.what_is_missing(curves)
+    section = trust_sections.what_is_missing(curves)
     (table,) = tables(section)
     assert all(row[1].endswith("to 60 %") for row in table.rows)
     assert any("no data between" in sentence for sentence in section.prose)
@@ -115,14 +115,14 @@ def test_without_soils_each_section_says_why() -> None:
     for section in (
         soil_sections.both_maxima([], 0.02),
         soil_sections.fits([], {}),
-        soil_sections.trust([]),
-        soil_sections.what_is_missing([]),
+        trust_sections.trust([]),
+        trust_sections.what_is_missing([]),
     ):
         assert section.omitted is not None
         assert "soil label" in section.omitted
         assert not section.content
     missed = {"clay": "1 slip bins"}
-    for section in (soil_sections.both_maxima([], 0.02, missed), soil_sections.trust([], missed)):
+    for section in (soil_sections.both_maxima([], 0.02, missed), trust_sections.trust([], missed)):
         assert section.omitted == "Left out: no soil could be fitted."
     missed = soil_sections.fits([], missed)
     assert missed.prose == ("clay: not fitted, 1 slip bins.",)
@@ -145,7 +145,7 @@ def test_a_library_is_shown_as_it_was_learned(curves: list[SoilCurves], tmp_path
         assert np.array_equal(mine.learned.curve.predict(grid), theirs.learned.curve.predict(grid))
         assert np.allclose(mine.learned.curve.band(grid), theirs.learned.curve.band(grid), rtol=1e-9)
         assert mine.learned.curve.bins_.to_list() == theirs.learned.curve.bins_.to_list()
-    assert "terragrip soils" in (soil_sections.what_is_missing(shown).omitted or "")
+    assert "terragrip soils" in (trust_sections.what_is_missing(shown).omitted or "")
 
 
 def test_a_library_carries_the_band_of_a_curve_with_several_free_parameters(tmp_path: Path) -> None:
@@ -175,13 +175,13 @@ def test_a_library_carries_the_band_of_a_curve_with_several_free_parameters(tmp_
 
 def test_full_bins_are_not_called_enough_where_the_data_fix_no_curve(curves: list[SoilCurves]) -> None:
     full = [replace(one, learned=replace(one.learned, gaps=())) for one in curves]
-    (text,) = soil_sections.what_is_missing(full, {}).prose
+    (text,) = trust_sections.what_is_missing(full, {}).prose
     assert "Yet" not in text or not all(one.learned.curve.identifiability_.identifiable for one in full)
     curve = full[0].learned.curve
     before = curve.identifiability_
     try:
         curve.identifiability_ = replace(before, identifiable=False)
-        (text,) = soil_sections.what_is_missing(full, {}).prose
+        (text,) = trust_sections.what_is_missing(full, {}).prose
     finally:
         curve.identifiability_ = before
     assert f"the data do not fix the curve of {full[0].name} (R² " in text

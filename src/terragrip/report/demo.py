@@ -19,6 +19,7 @@ from terragrip.report import (
     sections,
     soil_sections,
     summary,
+    trust_sections,
     wheels,
     work_sections,
 )
@@ -148,8 +149,8 @@ def _page(campaign: EstimatedCampaign, seed: int, seconds: float) -> Page:
             sections.online_curve(main, scales, "that the soils were made with"),
             soil_sections.both_maxima(curves, tire, campaign.soils.not_fitted),
             soil_sections.fits(curves, campaign.soils.not_fitted),
-            soil_sections.trust(curves, campaign.soils.not_fitted),
-            soil_sections.what_is_missing(curves, campaign.soils.not_fitted),
+            trust_sections.trust(curves, campaign.soils.not_fitted),
+            trust_sections.what_is_missing(curves, campaign.soils.not_fitted),
             sections.soils(main, campaign.benchmarks),
             work_sections.bands([run.blocks for run in runs]),
             ground_sections.recognised(campaign.grounds, simulated=True),

@@ -24,6 +24,7 @@ from terragrip.report import (
     slip_sections,
     soil_sections,
     summary,
+    trust_sections,
     wheels,
     work_sections,
 )
@@ -245,8 +246,8 @@ def _sections(main: Run, together: Sequence[Run], campaign: Campaign) -> Iterato
     )
     yield soil_sections.both_maxima(curves, tire, campaign.not_fitted)
     yield soil_sections.fits(curves, campaign.not_fitted)
-    yield soil_sections.trust(curves, campaign.not_fitted)
-    yield soil_sections.what_is_missing(curves, campaign.not_fitted)
+    yield trust_sections.trust(curves, campaign.not_fitted)
+    yield trust_sections.what_is_missing(curves, campaign.not_fitted)
     yield sections.soils(main, [run for run in together if run.has_adhesion])
 
 

@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from terragrip.errors import InputError, nearest
 from terragrip.simulation.fields import stream
-from terragrip.simulation.scenario import Fault
+from terragrip.simulation.scenario_sensors import Fault
 from terragrip.simulation.sensors import Series
 
 Floats = npt.NDArray[np.float64]

@@ -12,42 +12,28 @@ from itertools import pairwise
 from math import dist
 from typing import Annotated, Any, ClassVar, Literal, Self
 
-from pydantic import BeforeValidator, Field, field_validator, model_validator
+from pydantic import Field, field_validator, model_validator
 
 from terragrip.document import Fault as Refusal
 from terragrip.document import Part, validate
 from terragrip.physics.adhesion import CURVES
-from terragrip.units import UnitError, quantity
+from terragrip.simulation.quantities import (
+    Angle,
+    Coordinate,
+    Force,
+    Length,
+    Mass,
+    Number,
+    PositiveLength,
+    PositiveTime,
+    Rate,
+    Ratio,
+    Share,
+    Time,
+    number_within,
+)
+from terragrip.simulation.scenario_sensors import Fault, Sensors
 from terragrip.vehicle import Vehicle
-
-
-def _number(unit: str, low: float = 0.0, high: float = 1e6, *, above: bool = False) -> Any:
-    """Field metadata: a number or a text with a unit, within limits."""
-
-    def read(value: Any) -> float:
-        number = quantity(value, unit)
-        if number > high or (number <= low if above else number < low):
-            bound = "exceed" if above else "be at least"
-            raise UnitError(f"{number:g} is impossible", f"it must {bound} {low:g} and not exceed {high:g}")
-        return number
-
-    return BeforeValidator(read)
-
-
-Mass = Annotated[float, _number("kg", 0, 1e5, above=True)]
-Length = Annotated[float, _number("m")]
-PositiveLength = Annotated[float, _number("m", above=True)]
-Coordinate = Annotated[float, _number("m", -1e5, 1e5)]
-Time = Annotated[float, _number("s")]
-PositiveTime = Annotated[float, _number("s", above=True)]
-Force = Annotated[float, _number("N")]
-Share = Annotated[float, _number("1", 0, 1)]
-Ratio = Annotated[float, _number("1", 0, 10)]
-Number = Annotated[float, _number("1", 0, 1e9)]
-Signed = Annotated[float, _number("1", -1e9, 1e9)]
-Angle = Annotated[float, _number("rad", -0.6, 0.6)]
-Rate = Annotated[float, _number("1/s", 0, 1000, above=True)]
-
 
 LONGEST_ROUTE = 20_000.0  # m
 LONGEST_RUN = 7200.0  # s: a trace takes 100 kB a second
@@ -110,8 +96,8 @@ class Tool(Part):
     draught_speed: Ratio = 0.0
     shear_length: PositiveLength = 0.01
     slack: Length = 0.04
-    stiffness: Annotated[float, _number("N/m", high=1e8, above=True)] = 4e4
-    damping: Annotated[float, _number("N s/m")] = 800.0
+    stiffness: Annotated[float, number_within("N/m", high=1e8, above=True)] = 4e4
+    damping: Annotated[float, number_within("N s/m")] = 800.0
 
 
 class Segment(Part):
@@ -152,9 +138,9 @@ class Route(Part):
     skew: Coordinate = 0.1
     slope: Slope = Field(default_factory=Slope)
     start: tuple[Coordinate, Coordinate] = (0.0, 0.0)
-    heading: Annotated[float, _number("rad", -10, 10)] = 0.0
-    latitude: Annotated[float, _number("1", -80, 80)] = 51.0
-    longitude: Annotated[float, _number("1", -180, 180)] = 13.5
+    heading: Annotated[float, number_within("rad", -10, 10)] = 0.0
+    latitude: Annotated[float, number_within("1", -80, 80)] = 51.0
+    longitude: Annotated[float, number_within("1", -180, 180)] = 13.5
 
     @model_validator(mode="after")
     def _one_way(self) -> Self:
@@ -245,90 +231,22 @@ class Robot(Part):
     """
 
     wheel_mass: Mass = 5.4
-    tire_stiffness: Annotated[float, _number("N/m", high=1e8, above=True)] = 8e4
-    tire_damping: Annotated[float, _number("N s/m")] = 600.0
-    chassis_torsion: Annotated[float, _number("N/m", high=1e8)] = 1500.0
+    tire_stiffness: Annotated[float, number_within("N/m", high=1e8, above=True)] = 8e4
+    tire_damping: Annotated[float, number_within("N s/m")] = 600.0
+    chassis_torsion: Annotated[float, number_within("N/m", high=1e8)] = 1500.0
     resistance_length: PositiveLength = 0.02
-    slip_speed: Annotated[float, _number("m/s", 1e-3, 1)] = 0.05
-    wheel_rest_speed: Annotated[float, _number("rad/s", 1e-4, 1)] = 0.02
-    speed_gain: Annotated[float, _number("N m s/rad")] = 20.0
-    speed_integral: Annotated[float, _number("N m/rad")] = 100.0
+    slip_speed: Annotated[float, number_within("m/s", 1e-3, 1)] = 0.05
+    wheel_rest_speed: Annotated[float, number_within("rad/s", 1e-4, 1)] = 0.02
+    speed_gain: Annotated[float, number_within("N m s/rad")] = 20.0
+    speed_integral: Annotated[float, number_within("N m/rad")] = 100.0
     motor_lag: PositiveTime = 0.01
     antiwindup_time: PositiveTime = 0.1
-    torque_limit: Annotated[float, _number("N m", above=True)] = 130.0
-    power_limit: Annotated[float, _number("W", above=True)] = 1600.0
+    torque_limit: Annotated[float, number_within("N m", above=True)] = 130.0
+    power_limit: Annotated[float, number_within("W", above=True)] = 1600.0
     wheel_radius_sd: Share = 0.0
-    load_variation: Annotated[float, _number("1", 0, 0.3)] = 0.0
+    load_variation: Annotated[float, number_within("1", 0, 0.3)] = 0.0
     load_variation_length: PositiveLength = 0.25
     steers: bool = False
-
-
-class Sensor(Part):
-    """A sensor: reading = gain x true + offset + drift + noise, at ``rate`` [1/s], ``delay`` [s] late, rounded to
-    ``resolution``; per channel, gain - 1 and offset have spreads ``gain_sd`` and ``offset_sd``.
-
-    ``declared_delay`` is what the reader of the log takes off its time stamps. ``dropout``: share of samples lost, in
-    spells of mean ``dropout_length`` [s]. ``bandwidth`` [Hz]: first-order low pass. ``drift``: standard deviation of a
-    slow error of time constant ``drift_time`` [s]. ``wheels``: only these.
-    """
-
-    rate: Rate
-    delay: Time = 0.0
-    declared_delay: Time = 0.0
-    noise: Number = 0.0
-    resolution: Number = 0.0
-    gain: Signed = 1.0
-    gain_sd: Ratio = 0.0
-    offset: Signed = 0.0
-    offset_sd: Number = 0.0
-    drift: Number = 0.0
-    drift_time: PositiveTime = 30.0
-    bandwidth: Number | None = None
-    dropout: Share = 0.0
-    dropout_length: Time = 0.0
-    wheels: tuple[str, ...] | None = None
-
-
-class Sensors(Part):
-    """The sensors on board; absent: no such channel. Position noise is in metres."""
-
-    wheel_speed: Sensor
-    drive_torque: Sensor | None = None
-    ground_speed: Sensor | None = None
-    drawbar_force: Sensor | None = None
-    acceleration: Sensor | None = None
-    angular_velocity: Sensor | None = None
-    pitch: Sensor | None = None
-    vertical_load: Sensor | None = None
-    wheel_force: Sensor | None = None
-    position: Sensor | None = None
-
-
-FaultKind = Literal["gap", "loss", "held", "spike", "sign", "dead", "jitter"]
-
-
-class Fault(Part):
-    """A fault on demand, in ``channel`` (a column or a sensor; absent: all) from ``at`` for ``duration`` [s].
-
-    gap: no rows at all; loss: the channel is not measured; held: it repeats its last value; spike: ``count`` single
-    samples off by ``size``; sign: it is negated; dead: it reads ``size``; jitter: its stamps scatter by ``size`` [s].
-    Without ``at``, ``count`` of them lie anywhere in the run; without ``duration``, it lasts to the end.
-    """
-
-    kind: FaultKind
-    channel: str | None = None
-    at: Time | None = None
-    duration: PositiveTime | None = None
-    count: Annotated[int, Field(ge=1, le=10000)] = 1
-    size: Signed = 0.0
-
-    @model_validator(mode="after")
-    def _complete(self) -> Self:
-        if self.kind == "gap" and self.duration is None:
-            raise Refusal("a gap needs a duration", "add 'duration: 3 s'")
-        if self.kind in ("spike", "jitter") and self.size == 0:
-            raise Refusal(f"a {self.kind} needs a size", "add 'size:'")
-        return self
 
 
 class Scenario(Part):
@@ -345,13 +263,13 @@ class Scenario(Part):
     route: Route
     soils: dict[str, Soil]
     tools: Annotated[tuple[Tool, ...], Field(max_length=2)] = ()
-    speed: tuple[tuple[Time, Annotated[float, _number("m/s", -5, 5)] | Literal["off"]], ...]
-    duration: Annotated[float, _number("s", 0.1, LONGEST_RUN)]
+    speed: tuple[tuple[Time, Annotated[float, number_within("m/s", -5, 5)] | Literal["off"]], ...]
+    duration: Annotated[float, number_within("s", 0.1, LONGEST_RUN)]
     soft_spots: Annotated[tuple[SoftSpot, ...], Field(max_length=8)] = ()
     driver: Driver = Field(default_factory=Driver)
     sensors: Sensors
     faults: tuple[Fault, ...] = ()
-    step: Annotated[float, _number("s", 1e-6, 0.005)] = 0.001
+    step: Annotated[float, number_within("s", 1e-6, 0.005)] = 0.001
     log_rate: Rate = 200.0
 
     @field_validator("speed", mode="before")

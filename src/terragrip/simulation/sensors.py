@@ -12,7 +12,8 @@ import numpy.typing as npt
 from terragrip.errors import InputError
 from terragrip.simulation.fields import stream
 from terragrip.simulation.route import geographic
-from terragrip.simulation.scenario import Scenario, Sensor, Sensors
+from terragrip.simulation.scenario import Scenario
+from terragrip.simulation.scenario_sensors import Sensor, Sensors
 from terragrip.simulation.trace import Trace
 
 Floats = npt.NDArray[np.float64]
