@@ -17,7 +17,9 @@ from terragrip.cli import main
 from terragrip.errors import InputError
 from terragrip.formats.boundary import needed
 from terragrip.formats.reading import read_table
-from test_logs import matlab_content, write_hdf5, write_mcap, write_mdf, write_nmea, write_ros1, write_ros2
+from test_logs import write_mcap, write_mdf, write_ros1, write_ros2
+from test_matlab_exports import matlab_content, write_hdf5
+from test_nmea_logs import write_nmea
 
 
 def matlab_5(path: Path, packed: bool) -> Path:

@@ -1,21 +1,15 @@
-"""MDF, ROS bags, MCAP, MATLAB and NMEA: small files written with the libraries give back what was put in."""
+"""MDF, ROS bags and MCAP: small files written with the libraries give back what was put in."""
 
 from __future__ import annotations
 
 import json
-import struct
-import subprocess
-import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import asammdf
-import h5py
 import numpy as np
-import pynmea2
 import pytest
-import scipy.io
 from google.protobuf.descriptor_pb2 import FieldDescriptorProto, FileDescriptorProto, FileDescriptorSet
 from google.protobuf.descriptor_pool import DescriptorPool
 from google.protobuf.message_factory import GetMessageClass
@@ -27,7 +21,6 @@ from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 import terragrip as tg
 from can_frames import START, drive
-from terragrip.errors import InputError
 from terragrip.formats import inspect, read
 from terragrip.formats.reading import read_table
 
@@ -382,189 +375,3 @@ def test_a_schema_that_changes_in_mid_stream_is_counted(tmp_path: Path) -> None:
     assert np.isfinite(table.columns["/speed.v"]).sum() == 60
     assert any("39 values are absent, or of another kind" in note for note in table.notes)
     assert any("1 messages cannot be read" in note for note in table.notes)
-
-
-# --- MATLAB --------------------------------------------------------------------------------------------------------
-
-
-def matlab_content() -> dict[str, Any]:
-    return {
-        "tout": TIME[:, None],
-        "v": SPEED[:, None],
-        "omega": np.c_[SPEED, 2 * SPEED, 3 * SPEED],
-        "vehicle_name": "tractor",
-        "log": {
-            "time": TIME[:50],
-            "ground_speed": SPEED[:50],
-            "nested": {"t": TIME[:20], "pull": SPEED[:20]},
-        },
-        "series": {"Time": TIME[:30], "Data": 5 * SPEED[:30]},
-        "single": 4.0,
-    }
-
-
-EXPECTED = {
-    "v": SPEED,
-    "omega[1]": 2 * SPEED,
-    "log.ground_speed": SPEED[:50],
-    "log.nested.pull": SPEED[:20],
-    "series": 5 * SPEED[:30],
-}
-
-
-def write_hdf5(path: Path, content: dict[str, Any]) -> Path:
-    """As MATLAB 7.3 writes: columns as rows, classes as attributes, a block of 512 bytes before."""
-
-    def put(group: Any, name: str, value: Any) -> None:
-        if isinstance(value, dict):
-            inner = group.create_group(name)
-            inner.attrs["MATLAB_class"] = np.bytes_("struct")
-            for key, part in value.items():
-                put(inner, key, part)
-        elif isinstance(value, str):
-            item = group.create_dataset(name, data=np.array([[ord(c)] for c in value], dtype=np.uint16))
-            item.attrs["MATLAB_class"] = np.bytes_("char")
-        else:
-            array = np.atleast_2d(np.asarray(value, dtype=float))
-            array = array if array.shape[0] != 1 or array.size == 1 else array.T
-            group.create_dataset(name, data=array.T).attrs["MATLAB_class"] = np.bytes_("double")
-
-    with h5py.File(path, "w", userblock_size=512) as file:
-        for name, value in content.items():
-            put(file, name, value)
-    with path.open("r+b") as stream:
-        stream.write(
-            b"MATLAB 7.3 MAT-file, Platform: GLNXA64".ljust(124) + struct.pack("<HH", 0x0200, 0x4D49)
-        )
-    return path
-
-
-@pytest.mark.parametrize("version", ["5", "7.3"])
-def test_matlab_arrays_structs_and_exported_series(tmp_path: Path, version: str) -> None:
-    path = tmp_path / "log.mat"
-    if version == "5":
-        scipy.io.savemat(path, matlab_content())
-    else:
-        write_hdf5(path, matlab_content())
-    columns = read_table(path).columns
-    for name, values in EXPECTED.items():
-        known = columns[name][np.isfinite(columns[name])]
-        assert np.allclose(known, values), name
-    assert np.allclose(columns["time"], TIME)
-    assert "single" not in columns
-
-
-def test_matlab_structure_with_time_and_a_dataset_as_exported(tmp_path: Path) -> None:
-    signals = [
-        {"values": SPEED, "dimensions": 1.0, "label": "ground_speed", "blockName": "car/v"},
-        *({"values": SPEED / 0.2 + k, "dimensions": 1.0, "label": f"omega_{w}", "blockName": ""}
-          for k, w in enumerate(("fl", "fr", "rl", "rr"))),
-    ]  # fmt: skip
-    elements = [{"Name": "drawbar", "Values": {"Time": TIME[::2], "Data": 100 * SPEED[::2]}}]
-    scipy.io.savemat(
-        tmp_path / "run.mat", {"yout": {"time": TIME, "signals": signals}, "logsout": {"elements": elements}}
-    )
-    recording = read(tmp_path / "run.mat", "simulink")
-    assert np.allclose(recording["ground_speed"], SPEED)
-    assert np.allclose(recording["wheel_speed_rl"], SPEED / 0.2 + 2)
-    assert np.allclose(recording["drawbar_force"][::2], 100 * SPEED[::2])
-
-
-TABLES = """
-import sys
-import matio, numpy as np, pandas as pd
-t, v = np.arange(200) / 20, np.arange(200.0)
-spans = pd.Index(pd.to_timedelta(t, unit="s").as_unit("ms"), name="Time")
-run = pd.DataFrame({"ground_speed": v, "gear": np.arange(200) % 3}, index=spans)
-table = pd.DataFrame({"t": t[:50], "pull": 2 * v[:50]})
-matio.save_to_mat(sys.argv[1], {"run": run, "table": table}, version=sys.argv[2])
-"""
-
-
-@pytest.mark.parametrize("version", ["v7", "v7.3"])
-def test_matlab_tables_and_timetables(tmp_path: Path, version: str) -> None:
-    # In a process of its own: importing mat-io changes how pandas behaves.
-    path = tmp_path / "log.mat"
-    subprocess.run([sys.executable, "-W", "ignore", "-c", TABLES, str(path), version], check=True)
-    table = read_table(path)
-    assert np.array_equal(table.columns["run.ground_speed"], np.arange(COUNT))
-    assert np.allclose(table.columns["time"], TIME)
-    pull = table.columns["table.pull"]
-    assert np.array_equal(pull[np.isfinite(pull)], 2 * np.arange(50))
-    assert not table.notes
-
-
-def test_matlab_objects_are_named_with_the_way_out(tmp_path: Path) -> None:
-    path = write_hdf5(tmp_path / "log.mat", {"t": TIME, "v": SPEED})
-    with h5py.File(path, "r+") as file:
-        item = file.create_dataset("tt", data=np.zeros((1, 6), np.uint32))
-        item.attrs["MATLAB_class"] = np.bytes_("timetable")
-        item.attrs["MATLAB_object_decode"] = np.int32(3)
-    table = read_table(path)
-    assert "v" in table.columns
-    assert any("left out: tt (timetable); save it from MATLAB" in note for note in table.notes)
-
-
-# --- NMEA ----------------------------------------------------------------------------------------------------------
-
-
-def write_nmea(path: Path) -> Path:
-    lines = []
-    for k in range(100):
-        clock = f"2359{30 + k // 10:02d}.{k % 10}0" if k < 300 else ""
-        knots = SPEED[k] / (1852 / 3600)
-        rmc = ("A", "5103.0000", "N", "01344.0000", "E", f"{knots:.6f}", "90.0", "211126", "", "")
-        if k == 50:
-            rmc = ("V", *rmc[1:])
-        lines.append(str(pynmea2.RMC("GP", "RMC", (clock, *rmc))))
-        gga = (
-            clock,
-            "5103.0000",
-            "N",
-            "01344.0000",
-            "E",
-            "4",
-            "12",
-            "0.8",
-            "110.5",
-            "M",
-            "44.0",
-            "M",
-            "",
-            "",
-        )
-        lines.append(str(pynmea2.GGA("GN", "GGA", gga)))
-    lines[20] = lines[20].replace("01344", "01345")  # the checksum is wrong now
-    path.write_text("\r\n".join(lines) + "\r\n")
-    return path
-
-
-def test_nmea_sentences(tmp_path: Path) -> None:
-    table = read_table(write_nmea(tmp_path / "gnss.log"))
-    speed = table.columns["ground_speed"]
-    assert np.isfinite(speed).sum() == 98  # one without a fix, one damaged
-    known = np.isfinite(speed)
-    assert np.allclose(speed[known], SPEED[:100][np.isin(np.arange(100), [10, 50], invert=True)], atol=1e-5)
-    assert np.allclose(table.columns["time"], np.arange(100) / 10)
-    assert table.columns["latitude"][0] == pytest.approx(51.05)
-    assert table.columns["altitude"][0] == 110.5
-    assert {
-        "1 sentences are damaged and were left out.",
-        "1 sentences have no fix: their values are missing.",
-    } <= set(table.notes)
-    assert table.start == pytest.approx(1795305570.0)  # 2026-11-21 23:59:30 UTC
-
-
-def test_nmea_runs_past_midnight(tmp_path: Path) -> None:
-    clocks = ("235959.50", "000000.00", "000000.50")
-    gga = ("5103.0000", "N", "01344.0000", "E", "4", "12", "0.8", "110.5", "M", "44.0", "M", "", "")
-    path = tmp_path / "gnss.nmea"
-    path.write_text("\n".join(str(pynmea2.GGA("GN", "GGA", (clock, *gga))) for clock in clocks) + "\n")
-    assert np.allclose(read_table(path).columns["time"], [0, 0.5, 1.0])
-
-
-def test_a_log_without_any_sentence_of_ours(tmp_path: Path) -> None:
-    path = tmp_path / "gnss.nmea"
-    path.write_text("$GPGSV,1,1,00*79\n" * 5)
-    with pytest.raises(InputError, match="no usable RMC, VTG or GGA"):
-        read_table(path)

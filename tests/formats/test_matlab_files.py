@@ -11,7 +11,7 @@ import scipy.io
 
 from terragrip.errors import InputError
 from terragrip.formats import read_table
-from test_logs import write_hdf5
+from test_matlab_exports import write_hdf5
 
 TIME = np.arange(200) / 20
 SPEED = 1 + 0.2 * np.sin(TIME)

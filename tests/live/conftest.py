@@ -7,6 +7,6 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parent))
 
-from machine import port, short, vehicle
+from machine import port, sender, short, vehicle
 
-__all__ = ["port", "short", "vehicle"]
+__all__ = ["port", "sender", "short", "vehicle"]

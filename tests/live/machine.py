@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import json
 import socket
 import sys
 from contextlib import asynccontextmanager
@@ -74,3 +75,26 @@ def events(service: Service, kind: str) -> list[str]:
 
 def messages(recording, count: int):
     return [{"time": time, **values} for time, values in list(rows_of(recording))[:count]]
+
+
+class Sender:
+    """Sends datagrams to a service."""
+
+    def __init__(self, port: int) -> None:
+        self._link = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        self._link.connect(("127.0.0.1", port))
+
+    def send(self, *messages) -> None:
+        for message in messages:
+            data = message if isinstance(message, bytes) else json.dumps(message).encode()
+            self._link.send(data)
+
+    def close(self) -> None:
+        self._link.close()
+
+
+@pytest.fixture
+def sender(port):
+    result = Sender(port)
+    yield result
+    result.close()

@@ -1,0 +1,136 @@
+"""MATLAB: arrays, structs, exported series and tables, written with SciPy and h5py, give back what was put in."""
+
+from __future__ import annotations
+
+import struct
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+import pytest
+import scipy.io
+
+from terragrip.formats import read
+from terragrip.formats.reading import read_table
+from test_logs import COUNT, SPEED, TIME
+
+
+def matlab_content() -> dict[str, Any]:
+    return {
+        "tout": TIME[:, None],
+        "v": SPEED[:, None],
+        "omega": np.c_[SPEED, 2 * SPEED, 3 * SPEED],
+        "vehicle_name": "tractor",
+        "log": {
+            "time": TIME[:50],
+            "ground_speed": SPEED[:50],
+            "nested": {"t": TIME[:20], "pull": SPEED[:20]},
+        },
+        "series": {"Time": TIME[:30], "Data": 5 * SPEED[:30]},
+        "single": 4.0,
+    }
+
+
+EXPECTED = {
+    "v": SPEED,
+    "omega[1]": 2 * SPEED,
+    "log.ground_speed": SPEED[:50],
+    "log.nested.pull": SPEED[:20],
+    "series": 5 * SPEED[:30],
+}
+
+
+def write_hdf5(path: Path, content: dict[str, Any]) -> Path:
+    """As MATLAB 7.3 writes: columns as rows, classes as attributes, a block of 512 bytes before."""
+
+    def put(group: Any, name: str, value: Any) -> None:
+        if isinstance(value, dict):
+            inner = group.create_group(name)
+            inner.attrs["MATLAB_class"] = np.bytes_("struct")
+            for key, part in value.items():
+                put(inner, key, part)
+        elif isinstance(value, str):
+            item = group.create_dataset(name, data=np.array([[ord(c)] for c in value], dtype=np.uint16))
+            item.attrs["MATLAB_class"] = np.bytes_("char")
+        else:
+            array = np.atleast_2d(np.asarray(value, dtype=float))
+            array = array if array.shape[0] != 1 or array.size == 1 else array.T
+            group.create_dataset(name, data=array.T).attrs["MATLAB_class"] = np.bytes_("double")
+
+    with h5py.File(path, "w", userblock_size=512) as file:
+        for name, value in content.items():
+            put(file, name, value)
+    with path.open("r+b") as stream:
+        stream.write(
+            b"MATLAB 7.3 MAT-file, Platform: GLNXA64".ljust(124) + struct.pack("<HH", 0x0200, 0x4D49)
+        )
+    return path
+
+
+@pytest.mark.parametrize("version", ["5", "7.3"])
+def test_matlab_arrays_structs_and_exported_series(tmp_path: Path, version: str) -> None:
+    path = tmp_path / "log.mat"
+    if version == "5":
+        scipy.io.savemat(path, matlab_content())
+    else:
+        write_hdf5(path, matlab_content())
+    columns = read_table(path).columns
+    for name, values in EXPECTED.items():
+        known = columns[name][np.isfinite(columns[name])]
+        assert np.allclose(known, values), name
+    assert np.allclose(columns["time"], TIME)
+    assert "single" not in columns
+
+
+def test_matlab_structure_with_time_and_a_dataset_as_exported(tmp_path: Path) -> None:
+    signals = [
+        {"values": SPEED, "dimensions": 1.0, "label": "ground_speed", "blockName": "car/v"},
+        *({"values": SPEED / 0.2 + k, "dimensions": 1.0, "label": f"omega_{w}", "blockName": ""}
+          for k, w in enumerate(("fl", "fr", "rl", "rr"))),
+    ]  # fmt: skip
+    elements = [{"Name": "drawbar", "Values": {"Time": TIME[::2], "Data": 100 * SPEED[::2]}}]
+    scipy.io.savemat(
+        tmp_path / "run.mat", {"yout": {"time": TIME, "signals": signals}, "logsout": {"elements": elements}}
+    )
+    recording = read(tmp_path / "run.mat", "simulink")
+    assert np.allclose(recording["ground_speed"], SPEED)
+    assert np.allclose(recording["wheel_speed_rl"], SPEED / 0.2 + 2)
+    assert np.allclose(recording["drawbar_force"][::2], 100 * SPEED[::2])
+
+
+TABLES = """
+import sys
+import matio, numpy as np, pandas as pd
+t, v = np.arange(200) / 20, np.arange(200.0)
+spans = pd.Index(pd.to_timedelta(t, unit="s").as_unit("ms"), name="Time")
+run = pd.DataFrame({"ground_speed": v, "gear": np.arange(200) % 3}, index=spans)
+table = pd.DataFrame({"t": t[:50], "pull": 2 * v[:50]})
+matio.save_to_mat(sys.argv[1], {"run": run, "table": table}, version=sys.argv[2])
+"""
+
+
+@pytest.mark.parametrize("version", ["v7", "v7.3"])
+def test_matlab_tables_and_timetables(tmp_path: Path, version: str) -> None:
+    # In a process of its own: importing mat-io changes how pandas behaves.
+    path = tmp_path / "log.mat"
+    subprocess.run([sys.executable, "-W", "ignore", "-c", TABLES, str(path), version], check=True)
+    table = read_table(path)
+    assert np.array_equal(table.columns["run.ground_speed"], np.arange(COUNT))
+    assert np.allclose(table.columns["time"], TIME)
+    pull = table.columns["table.pull"]
+    assert np.array_equal(pull[np.isfinite(pull)], 2 * np.arange(50))
+    assert not table.notes
+
+
+def test_matlab_objects_are_named_with_the_way_out(tmp_path: Path) -> None:
+    path = write_hdf5(tmp_path / "log.mat", {"t": TIME, "v": SPEED})
+    with h5py.File(path, "r+") as file:
+        item = file.create_dataset("tt", data=np.zeros((1, 6), np.uint32))
+        item.attrs["MATLAB_class"] = np.bytes_("timetable")
+        item.attrs["MATLAB_object_decode"] = np.int32(3)
+    table = read_table(path)
+    assert "v" in table.columns
+    assert any("left out: tt (timetable); save it from MATLAB" in note for note in table.notes)

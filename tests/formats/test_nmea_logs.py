@@ -1,0 +1,75 @@
+"""NMEA 0183: small files written with pynmea2 give back what was put in."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pynmea2
+import pytest
+
+from terragrip.errors import InputError
+from terragrip.formats.reading import read_table
+from test_logs import SPEED
+
+
+def write_nmea(path: Path) -> Path:
+    lines = []
+    for k in range(100):
+        clock = f"2359{30 + k // 10:02d}.{k % 10}0" if k < 300 else ""
+        knots = SPEED[k] / (1852 / 3600)
+        rmc = ("A", "5103.0000", "N", "01344.0000", "E", f"{knots:.6f}", "90.0", "211126", "", "")
+        if k == 50:
+            rmc = ("V", *rmc[1:])
+        lines.append(str(pynmea2.RMC("GP", "RMC", (clock, *rmc))))
+        gga = (
+            clock,
+            "5103.0000",
+            "N",
+            "01344.0000",
+            "E",
+            "4",
+            "12",
+            "0.8",
+            "110.5",
+            "M",
+            "44.0",
+            "M",
+            "",
+            "",
+        )
+        lines.append(str(pynmea2.GGA("GN", "GGA", gga)))
+    lines[20] = lines[20].replace("01344", "01345")  # the checksum is wrong now
+    path.write_text("\r\n".join(lines) + "\r\n")
+    return path
+
+
+def test_nmea_sentences(tmp_path: Path) -> None:
+    table = read_table(write_nmea(tmp_path / "gnss.log"))
+    speed = table.columns["ground_speed"]
+    assert np.isfinite(speed).sum() == 98  # one without a fix, one damaged
+    known = np.isfinite(speed)
+    assert np.allclose(speed[known], SPEED[:100][np.isin(np.arange(100), [10, 50], invert=True)], atol=1e-5)
+    assert np.allclose(table.columns["time"], np.arange(100) / 10)
+    assert table.columns["latitude"][0] == pytest.approx(51.05)
+    assert table.columns["altitude"][0] == 110.5
+    assert {
+        "1 sentences are damaged and were left out.",
+        "1 sentences have no fix: their values are missing.",
+    } <= set(table.notes)
+    assert table.start == pytest.approx(1795305570.0)  # 2026-11-21 23:59:30 UTC
+
+
+def test_nmea_runs_past_midnight(tmp_path: Path) -> None:
+    clocks = ("235959.50", "000000.00", "000000.50")
+    gga = ("5103.0000", "N", "01344.0000", "E", "4", "12", "0.8", "110.5", "M", "44.0", "M", "", "")
+    path = tmp_path / "gnss.nmea"
+    path.write_text("\n".join(str(pynmea2.GGA("GN", "GGA", (clock, *gga))) for clock in clocks) + "\n")
+    assert np.allclose(read_table(path).columns["time"], [0, 0.5, 1.0])
+
+
+def test_a_log_without_any_sentence_of_ours(tmp_path: Path) -> None:
+    path = tmp_path / "gnss.nmea"
+    path.write_text("$GPGSV,1,1,00*79\n" * 5)
+    with pytest.raises(InputError, match="no usable RMC, VTG or GGA"):
+        read_table(path)
