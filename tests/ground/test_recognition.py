@@ -159,4 +159,4 @@ def test_nothing_to_read_is_said(library):
     ground = analyse(estimates, library)[0]
     assert "No stretch of the drive tells of the ground" in ground.notes[0]
     assert ground.sections[0].slip_mean is None
-    assert [e["kind"] for e in ground.events] == ["standstill"]
+    assert [e.kind for e in ground.events] == ["standstill"]

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from terragrip.ground.changes import Change
+from terragrip.ground.events import Event
 from terragrip.ground.result import Ground, Timeline
 from terragrip.ground.sections import Section as Stay
 from terragrip.report import ground_sections
@@ -74,8 +75,8 @@ def test_sections_carry_their_means_and_what_they_were_taken_for() -> None:
 
 def test_events_are_listed_with_their_reasons_and_short_ones_counted() -> None:
     happened = (
-        {"kind": "stuck", "start": 1.0, "end": 3.5, "why": "wheels turn at 0.9 m/s, the vehicle stands"},
-        {"kind": "outlier", "start": 4.0, "end": 4.1, "why": ""},
+        Event("stuck", 1.0, 3.5, "wheels turn at 0.9 m/s, the vehicle stands"),
+        Event("outlier", 4.0, 4.1, ""),
     )
     section = ground_sections.events([ground(["fine"] * 9, ["fine"] * 9, happened)])
     (table,) = only(section, Table)
@@ -95,11 +96,8 @@ def test_without_a_ground_each_section_says_so(section) -> None:
 def test_a_warning_is_listed_however_short_and_its_reason_is_read_from_the_left() -> None:
     why = "The wheels begin to dig: slip is 41 % in the mean of the wheels, at 0.31 m/s"
     happened = tuple(
-        [
-            {"kind": "outlier", "start": float(i), "end": i + 0.9, "why": "a row that fits nothing"}
-            for i in range(60)
-        ]
-        + [{"kind": "immobilization", "start": 70.0, "end": 70.2, "why": why}]
+        [Event("outlier", float(i), i + 0.9, "a row that fits nothing") for i in range(60)]
+        + [Event("immobilization", 70.0, 70.2, why)]
     )
     section = ground_sections.events([ground(["fine"] * 9, ["fine"] * 9, happened)])
     (table,) = only(section, Table)
@@ -119,7 +117,7 @@ def test_a_warning_is_listed_however_short_and_its_reason_is_read_from_the_left(
 
 
 def test_events_of_the_estimates_are_told_of_runs_without_a_ground() -> None:
-    mine = {"kind": "stuck", "start": 1.0, "end": 3.5, "why": "it stands"}
+    mine = Event("stuck", 1.0, 3.5, "it stands")
     section = ground_sections.events([ground(["fine"] * 9, ["fine"] * 9)], {"run 1": [mine], "run 2": [mine]})
     (table,) = only(section, Table)
     assert [row[0] for row in table.rows] == ["run 2, 1.0 s"]  # of run 1 the ground tells

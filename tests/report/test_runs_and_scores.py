@@ -9,6 +9,7 @@ import pandas as pd
 import pytest
 
 from terragrip.errors import InputError
+from terragrip.ground.events import Event
 from terragrip.report.runs import Run, label_stretches, stretches
 from terragrip.report.scores import (
     compare,
@@ -128,8 +129,8 @@ def test_tables_set_off_the_default_and_carry_the_papers_figures(drive: Drive) -
 def test_rows_in_events_are_left_out_and_are_stuck_where_no_truth_says_it(drive: Drive) -> None:
     run = drive()
     events = (
-        {"kind": "stuck", "start": 60.0, "end": 64.95},
-        {"kind": "standstill", "start": 0.0, "end": 9.0},
+        Event("stuck", 60.0, 64.95),
+        Event("standstill", 0.0, 9.0),
     )
     estimates = Run(run.name, run.estimates, run.method, run.truth, run.recording, run.vehicle, events)
     kappa = next(c for c in compare(estimates) if (c.quantity, c.against) == ("net_traction", "sensor"))

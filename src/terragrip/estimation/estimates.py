@@ -7,7 +7,7 @@ import os
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field, replace
 from datetime import datetime
-from typing import TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING, Any, Literal, Self, overload
 
 import numpy as np
 import numpy.typing as npt
@@ -21,6 +21,7 @@ from terragrip.recording.clock import clock_index
 if TYPE_CHECKING:
     import pandas as pd
     import pyarrow as pa
+    from matplotlib.figure import Figure
 
     from terragrip.vehicle import Vehicle
 
@@ -188,6 +189,21 @@ class Estimates:
 
         write_parts([self], path)
 
+    def plot(self, kind: Literal["time", "plane", "map"] = "time", quantity: str = "slip") -> Figure:
+        """A matplotlib figure, which a notebook shows: "time", speed, slip, adhesion and resistance with 95 % intervals and events;
+        "plane", adhesion over slip by soil; "map", the track coloured by a ``quantity``.
+
+        Raises InputError where there is nothing to draw so, or matplotlib is not installed.
+        """
+        from terragrip.estimation.views import plot
+
+        return plot(self, kind, quantity)
+
+    def _repr_html_(self) -> str:
+        from terragrip.estimation.views import html_of
+
+        return html_of(self) if len(self) else "<p>no row</p>"
+
     @classmethod
     def read(cls, path: str | os.PathLike[str]) -> Self:
         """Read a Parquet file of estimates; raises InputError if it is missing, damaged or no such table."""
@@ -228,8 +244,19 @@ class Estimates:
                 labels[name] = np.where(values == None, "", values)  # noqa: E711  (elementwise)
         return cls(columns.pop("time"), columns, _event_codes(table, source), labels, about, notes)
 
-    def summary(self) -> str:
-        """What a user wants to know first, in a few lines of text."""
+    @overload
+    def summary(self) -> str: ...
+
+    @overload
+    def summary(self, by: str) -> pd.DataFrame: ...
+
+    def summary(self, by: str | None = None) -> str | pd.DataFrame:
+        """What a user wants to know first, in a few lines of text; ``by`` a label ("soil") or "event": a table, a row a text of it
+        (see `terragrip.estimation.grouped.summary_by`). Raises InputError where ``by`` is no column of texts."""
+        if by is not None:
+            from terragrip.estimation.grouped import summary_by
+
+            return summary_by(self, by)
         from terragrip.estimation.summary import Tally
 
         tally = Tally()

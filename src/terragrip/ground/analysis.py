@@ -69,7 +69,7 @@ def analyse(
         soils,
         changes,
         sections,
-        tuple(event.to_dict() for event in events(estimates)),
+        events(estimates),
         timeline,
         _notes(blocks, emissions, timeline, len(stretches) - len(sections), library is not None),
         {"recording": estimates.about.get("recording", {}), "online": chosen.online},

@@ -54,6 +54,11 @@ class Change:
             out["told"] = self.reported
         return {**out, "shift": dict(self.shift)} if self.shift else out
 
+    @classmethod
+    def from_dict(cls, data: Mapping[str, Any]) -> Change:
+        """Of ground.json; raises TypeError where it is none."""
+        return cls(**{"reported" if name == "told" else name: value for name, value in data.items()})
+
 
 def changes_of(
     blocks: Blocks, names: Sequence[str] = GROUND, length: float = LENGTH, penalty: float | None = None

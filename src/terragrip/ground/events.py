@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +12,7 @@ from numpy.typing import NDArray
 from terragrip.estimation import Estimates
 from terragrip.estimation.engine import EVENTS, SIGNS
 from terragrip.estimation.settings import watch_limits
+from terragrip.ground.span import Span
 
 Array = NDArray[np.float64]
 
@@ -22,16 +24,16 @@ LEAST_POINTS = 0.3
 
 
 @dataclass(frozen=True)
-class Event:
+class Event(Span):
     """Something that happened: ``kind`` (a text of :data:`~terragrip.estimation.engine.EVENTS`), ``start`` and ``end`` [s],
     ``why``: one sentence."""
 
     kind: str
     start: float
     end: float
-    why: str
+    why: str = ""
 
-    def to_dict(self) -> dict[str, str | float]:
+    def to_dict(self) -> dict[str, Any]:
         """As ground.json holds it."""
         return {"kind": self.kind, "start": self.start, "end": self.end, "why": self.why}
 

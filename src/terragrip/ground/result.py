@@ -7,7 +7,7 @@ import math
 import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +16,12 @@ from terragrip.document import read_json
 from terragrip.errors import InputError
 from terragrip.files import replacing
 from terragrip.ground.changes import Change
+from terragrip.ground.events import Event
 from terragrip.ground.sections import Section
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.figure import Figure
 
 Array = NDArray[np.float64]
 
@@ -82,10 +87,27 @@ class Ground:
     soils: tuple[str, ...]
     changes: tuple[Change, ...]
     sections: tuple[Section, ...]
-    events: tuple[Mapping[str, Any], ...]
+    events: tuple[Event, ...]
     timeline: Timeline
     notes: tuple[str, ...] = ()
     about: Mapping[str, Any] = field(default_factory=dict)
+
+    def to_pandas(self) -> pd.DataFrame:
+        """A row a section, as ground.json holds it, and how many ``seconds`` it lasts; `views.table_of` makes one of events too."""
+        from terragrip.ground.views import table_of
+
+        return table_of(self.sections)
+
+    def plot(self) -> Figure:
+        """Soils over time with changes and events, as a matplotlib figure; raises InputError without matplotlib."""
+        from terragrip.ground.views import plot
+
+        return plot(self)
+
+    def _repr_html_(self) -> str:
+        from terragrip.ground.views import html_of
+
+        return html_of(self)
 
 
 def to_dict(grounds: Sequence[Ground], about: Mapping[str, Any] | None = None) -> dict[str, Any]:
@@ -95,7 +117,7 @@ def to_dict(grounds: Sequence[Ground], about: Mapping[str, Any] | None = None) -
         **(about or {}),
         "changes": [{"run": g.run, **one.to_dict()} for g in grounds for one in g.changes],
         "sections": [{"run": g.run, **one.to_dict()} for g in grounds for one in g.sections],
-        "events": [{"run": g.run, **one} for g in grounds for one in g.events],
+        "events": [{"run": g.run, **one.to_dict()} for g in grounds for one in g.events],
         "runs": [
             {
                 "run": g.run,
@@ -144,9 +166,9 @@ def _ground(one: Mapping[str, Any], data: Mapping[str, Any]) -> Ground:
         _finite(one["start"]),
         _finite(one["end"]),
         tuple(one["soils"]),
-        tuple(Change(**row) for row in mine("changes")),
+        tuple(Change.from_dict(row) for row in mine("changes")),
         tuple(Section(**row) for row in mine("sections")),
-        tuple(mine("events")),
+        tuple(Event(**row) for row in mine("events")),
         Timeline.from_dict(one["timeline"]),
         tuple(one["notes"]),
         {k: v for k, v in one.items() if k not in known},

@@ -13,13 +13,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from terragrip.estimation import Estimates
+from terragrip.ground.span import Span
 from terragrip.soil.blocks import driven_wheels, wheel_loads
 
 Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class Section:
+class Section(Span):
     """Vehicle and tool on one soil from `start` to `end` [s]; the vehicle came onto it at `entered`.
 
     `soil`: the most probable one; `probabilities` of all soils, the means over the section. `samples`: rows that count: moving and without

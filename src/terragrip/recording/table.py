@@ -154,6 +154,18 @@ class Recording:
         result.attrs = {"units": {name: unit_of(name) or "" for name in result}, "notes": list(self.notes)}
         return result
 
+    def _repr_html_(self) -> str:
+        from terragrip.html import figure_of, html_notes, html_table
+
+        span = f"{len(self)} rows, {self.time[-1] - self.time[0]:.1f} s" if len(self) else "no row"
+        rows = []
+        for name, values in self.channels.items():
+            known = values[np.isfinite(values)]
+            told = (known.min(), np.median(known), known.max()) if len(known) else (None, None, None)
+            rows.append((name, unit_of(name) or "", len(known), *map(figure_of, told)))
+        head = ("channel", "unit", "values", "min", "median", "max")
+        return html_table(head, rows, f"{self.source or 'recording'}: {span}") + html_notes(self.notes)
+
     def check_against(self, vehicle: Vehicle) -> None:
         """Raise InputError unless the log's wheels and axles are the vehicle's, with all that estimates need.
 

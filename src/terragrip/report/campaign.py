@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import signal
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, TypeVar
 
 from terragrip.report.blocks import Blocks, blocks_of
 from terragrip.report.ground_sections import WARNINGS
@@ -19,6 +19,7 @@ from terragrip.report.scores import Comparison, TruthScore, compare, compare_tru
 if TYPE_CHECKING:
     from terragrip.estimation import Estimates
     from terragrip.estimation.calibration import Calibration
+    from terragrip.ground.events import Event
     from terragrip.ground.result import Ground
     from terragrip.recording import Recording
     from terragrip.simulation import SimulationResult
@@ -263,7 +264,7 @@ def _run(
     estimates: Estimates,
     result: SimulationResult,
     vehicle: Vehicle,
-    events: Sequence[Mapping[str, Any]] = (),
+    events: Sequence[Event] = (),
 ) -> Run:
     """The report's view of one estimated run; `events` are the default method's, for every method."""
     table, recording = estimates.to_pandas(), result.recording.to_pandas()

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from datetime import datetime, timedelta
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from terragrip import __version__
 from terragrip.errors import InputError
 from terragrip.estimation import Estimates
-from terragrip.ground.events import events
+from terragrip.ground.events import Event, events
 from terragrip.report import (
     ground_sections,
     path,
@@ -75,7 +75,7 @@ class _Gathered:
     summaries: list[_Summary] = field(default_factory=list)
     shown: list[Run] = field(default_factory=list)
     gathered: GatheredRuns = field(default_factory=GatheredRuns)
-    events: dict[str, list[dict[str, Any]]] = field(default_factory=dict)
+    events: dict[str, tuple[Event, ...]] = field(default_factory=dict)
     blocks: list[Blocks] = field(default_factory=list)
     missing: list[str] = field(default_factory=list)
 
@@ -162,7 +162,7 @@ def _read(paths: Sequence[Path], grounds: Sequence[Ground], step: Callable[[int]
             raise InputError("holds fewer than two rows", file=file, hint="leave it out")
         if estimates.has_adhesion:
             read.gathered.add(estimates, file.stem, file=str(file))
-        read.events[file.stem] = [event.to_dict() for event in events(estimates)]
+        read.events[file.stem] = events(estimates)
         run = _run(estimates, file.stem, grounds, read.events[file.stem])
         read.summaries.append(_summary(run))
         if run.wheels and run.moving.any():
@@ -178,7 +178,7 @@ def _read(paths: Sequence[Path], grounds: Sequence[Ground], step: Callable[[int]
     return read
 
 
-def _run(estimates: Estimates, name: str, grounds: Sequence[Ground], own: Sequence[dict[str, Any]]) -> Run:
+def _run(estimates: Estimates, name: str, grounds: Sequence[Ground], own: Sequence[Event]) -> Run:
     """A run with its events: those of its ground, without one those of the estimates themselves."""
     mine = [ground for ground in grounds if ground.run == name]
     happened = tuple(event for ground in mine for event in ground.events) if mine else tuple(own)
@@ -213,8 +213,8 @@ def _lacks(run: Run) -> list[str]:
 def _summarised(read: _Gathered, main: Run, grounds: Sequence[Ground], campaign: Campaign) -> Section:
     """The summary on top."""
     known = {ground.run for ground in grounds}
-    every = [event["kind"] for ground in grounds for event in ground.events]
-    every += [event["kind"] for run, mine in read.events.items() if run not in known for event in mine]
+    every = [event.kind for ground in grounds for event in ground.events]
+    every += [event.kind for run, mine in read.events.items() if run not in known for event in mine]
     missing = [*read.missing, *(f"{name} could not be fitted" for name in campaign.not_fitted)]
     return summary.section(
         [one.driven for one in read.summaries],

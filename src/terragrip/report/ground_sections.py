@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -16,6 +16,7 @@ from terragrip.report.timeline import soil_strip
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
+    from terragrip.ground.events import Event
     from terragrip.ground.result import Ground, Timeline
 
 ALIKE = ("fine", "wet")
@@ -120,9 +121,7 @@ def section_points(grounds: Sequence[Ground], simulated: bool = False) -> Sectio
     return Section("sections", title, (), (picture, table))
 
 
-def events(
-    grounds: Sequence[Ground], result: Mapping[str, Sequence[Mapping[str, Any]]] | None = None
-) -> Section:
+def events(grounds: Sequence[Ground], result: Mapping[str, Sequence[Event]] | None = None) -> Section:
     """What happened, with start, end and the reason in the user's words.
 
     found: events of the estimates themselves by run (kind, start, end, why), for the runs that no `grounds` tells of.
@@ -139,21 +138,16 @@ def events(
         )
     if not every:
         return Section("events", title, ("No event.",))
-    listed = [
-        (run, one)
-        for run, one in every
-        if one["end"] - one["start"] >= LEAST_EVENT or one["kind"] in WARNINGS
-    ]
+    listed = [(run, one) for run, one in every if one.seconds >= LEAST_EVENT or one.kind in WARNINGS]
     kinds = {
-        kind: sum(one["kind"] == kind for _, one in every)
-        for kind in sorted({one["kind"] for _, one in every})
+        kind: sum(one.kind == kind for _, one in every) for kind in sorted({one.kind for _, one in every})
     }
     counted = ", ".join(f"{count} {kind}" for kind, count in kinds.items())
     if not listed:
         return Section("events", title, (f"{counted}; none of half a second or more.",))
     prose = f"{counted}; listed are warnings, and the longest of what lasts half a second or more:"
-    warned = [pair for pair in listed if pair[1]["kind"] in WARNINGS]
-    others = _longest([pair for pair in listed if pair[1]["kind"] not in WARNINGS])
+    warned = [pair for pair in listed if pair[1].kind in WARNINGS]
+    others = _longest([pair for pair in listed if pair[1].kind not in WARNINGS])
     # Warnings are never crowded out by a row of outliers.
     shown = [_event(run, one) for run, one in warned[:LISTED]] + others[: max(LISTED - len(warned), 0)]
     whole = len(warned) + len(others)
@@ -170,24 +164,24 @@ def events(
     )
 
 
-def _event(run: str, one: Mapping[str, Any]) -> tuple[str, ...]:
+def _event(run: str, one: Event) -> tuple[str, ...]:
     """A row of the table of events."""
-    lasts = number(one["end"] - one["start"], 1)
-    return f"{run}, {number(one['start'], 1)} s", one["kind"], lasts, str(one.get("why") or "–")
+    lasts = number(one.seconds, 1)
+    return f"{run}, {number(one.start, 1)} s", one.kind, lasts, one.why or "–"
 
 
-def _longest(listed: Sequence[tuple[str, Mapping[str, Any]]]) -> list[tuple[str, ...]]:
+def _longest(listed: Sequence[tuple[str, Event]]) -> list[tuple[str, ...]]:
     """Rows of the ALIKE_LISTED longest events of each run, kind and reason, in order of time, and one row for the others."""
-    groups: dict[tuple[str, str, str], list[Mapping[str, Any]]] = {}
+    groups: dict[tuple[str, str, str], list[Event]] = {}
     for run, one in listed:
-        groups.setdefault((run, one["kind"], str(one.get("why"))), []).append(one)
+        groups.setdefault((run, one.kind, one.why), []).append(one)
     rows = []
     for (run, kind, _), mine in groups.items():
-        longest = sorted(mine, key=lambda one: (-round(one["end"] - one["start"], 3), one["start"]))
+        longest = sorted(mine, key=lambda one: (-round(one.seconds, 3), one.start))
         kept = longest if len(mine) <= ALIKE_LISTED + 1 else longest[:ALIKE_LISTED]
-        rows += [_event(run, one) for one in sorted(kept, key=lambda one: one["start"])]
+        rows += [_event(run, one) for one in sorted(kept, key=lambda one: one.start)]
         if rest := longest[len(kept) :]:
-            seconds = sum(one["end"] - one["start"] for one in rest)
+            seconds = sum(one.seconds for one in rest)
             rows.append(
                 (f"{run}, {len(rest)} more", kind, number(seconds, 1), "for the same reason; seconds of all")
             )

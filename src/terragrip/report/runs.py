@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from datetime import datetime
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +17,7 @@ from terragrip.units import STANDARD_GRAVITY
 if TYPE_CHECKING:
     import pandas as pd
 
+    from terragrip.ground.events import Event
     from terragrip.vehicle import Vehicle
 
 FloatArray = NDArray[np.float64]
@@ -56,7 +56,7 @@ class Run:
     truth: pd.DataFrame | None = None
     recording: pd.DataFrame | None = None
     vehicle: Vehicle | None = None
-    events: tuple[Mapping[str, Any], ...] = ()
+    events: tuple[Event, ...] = ()
 
     def __post_init__(self) -> None:
         for what, table in (("truth", self.truth), ("recording", self.recording)):
@@ -251,8 +251,8 @@ class Run:
         if "event" in self.estimates:
             result |= np.asarray(self.estimates["event"].isin(kinds).to_numpy(), dtype=np.bool_)
         for event in self.events:
-            if event["kind"] in kinds:
-                result |= (self.time >= event["start"]) & (self.time <= event["end"])
+            if event.kind in kinds:
+                result |= event.rows(self.time)
         return result
 
     @cached_property

@@ -1,26 +1,50 @@
-"""The one look of all figures: colours that colour-blind readers can tell apart, one font, SVG out.
-
-The palette is Okabe and Ito's (jfly.uni-koeln.de/color). In a page the colours become CSS variables, so a
-figure follows the reader's light or dark scheme; a figure on disk keeps fixed colours on white.
-"""
+"""Figures of a page: SVG out, whose colours become CSS variables, so that a figure follows the reader's light or dark scheme; a figure on
+disk keeps fixed colours on white."""
 
 from __future__ import annotations
 
 import io
 import re
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-from terragrip.errors import InputError
+from terragrip.figures import (
+    BLUE,
+    GREEN,
+    GRID,
+    INK,
+    MUTED,
+    ORANGE,
+    PAPER,
+    PURPLE,
+    SKY,
+    VERMILLION,
+    YELLOW,
+    new_figure,
+    styled,
+)
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-INK, MUTED, GRID, PAPER = "#1b1f24", "#68707a", "#dfe3e8", "#ffffff"
+__all__ = [
+    "BLUE",
+    "GREEN",
+    "GRID",
+    "INK",
+    "MUTED",
+    "ORANGE",
+    "PAPER",
+    "PURPLE",
+    "SKY",
+    "VERMILLION",
+    "YELLOW",
+    "new_figure",
+    "styled",
+]
+
 ON_COLOR = "#101214"
 """Text on a patch of the palette, in either scheme."""
-ORANGE, SKY, GREEN, YELLOW = "#e69f00", "#56b4e9", "#009e73", "#f0e442"
-BLUE, VERMILLION, PURPLE = "#0072b2", "#d55e00", "#cc79a7"
 
 MEASURED, ESTIMATED, TRUE = VERMILLION, BLUE, INK
 """Colours of the three voices in every figure: the reference sensor, the estimate, the truth."""
@@ -43,61 +67,6 @@ WIDEST = 750.0
 """Points of a figure that would fill a sheet's width: one of 9.6 inches leaves room for a second below it."""
 PAGE_SCALE = 1.52
 """Pixels of a page that a point of a figure may grow to: 9.6 inches fill the text's width."""
-
-_RC: Any = {
-    "figure.facecolor": "none",
-    "savefig.facecolor": "none",
-    "axes.facecolor": "none",
-    "axes.edgecolor": MUTED,
-    "axes.labelcolor": INK,
-    "axes.titlecolor": INK,
-    "axes.titlelocation": "left",
-    "axes.titlesize": 10.5,
-    "axes.labelsize": 9.5,
-    "axes.linewidth": 0.8,
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "axes.grid": True,
-    "axes.axisbelow": True,
-    "grid.color": GRID,
-    "grid.linewidth": 0.7,
-    "text.color": INK,
-    "xtick.color": MUTED,
-    "ytick.color": MUTED,
-    "xtick.labelcolor": INK,
-    "ytick.labelcolor": INK,
-    "xtick.labelsize": 9,
-    "ytick.labelsize": 9,
-    "legend.frameon": False,
-    "legend.fontsize": 9,
-    "lines.linewidth": 1.3,
-    "lines.solid_joinstyle": "round",
-    "path.simplify": True,
-    "path.simplify_threshold": 0.3,
-    "font.size": 9.5,
-    "font.family": "sans-serif",
-    "font.sans-serif": ["DejaVu Sans", "Verdana", "Segoe UI", "Helvetica", "Arial", "sans-serif"],
-    "svg.fonttype": "none",  # text stays text: small files, searchable, readable by a screen reader
-    "svg.hashsalt": "terragrip",  # the same figure gives the same bytes
-}
-
-
-def new_figure(width: float = 9.6, height: float = 3.4) -> Figure:
-    """An empty figure in the report's style, size in inches. Raises InputError without matplotlib."""
-    try:
-        from matplotlib import rc_context
-        from matplotlib.figure import Figure
-    except ImportError:
-        raise InputError("matplotlib is not installed", hint="pip install 'terragrip[report]'") from None
-    with rc_context(_RC):
-        return Figure(figsize=(width, height), layout="constrained")
-
-
-def styled() -> Any:
-    """A context in which axes and artists take the report's style; draw and save inside it."""
-    from matplotlib import rc_context
-
-    return rc_context(_RC)
 
 
 def to_svg(figure: Figure) -> str:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -14,6 +14,11 @@ from terragrip.physics.adhesion import CURVES, CurveModel, effective_parameters
 from terragrip.soil.bins import BY_SLIP, Bins, BinSettings, bin_pairs
 from terragrip.soil.identifiability import Identifiability, judge
 from terragrip.soil.least_squares import INTERCEPT, solve, starts
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from terragrip.soil.library import SoilLibrary
 
 Array = NDArray[np.float64]
 FREE = "free"
@@ -153,6 +158,21 @@ class AdhesionCurve:
     def peak(self) -> tuple[float, float]:
         """(slip, mu) of the maximum on 0 to 1, without the intercept."""
         return CURVES[self.model].peak(self._of_model())
+
+    def plot(self) -> Figure:
+        """The fitted curve with its bins, as a matplotlib figure; raises InputError before `fit`, or without matplotlib."""
+        return self._library().plot()
+
+    def _repr_html_(self) -> str:
+        return self._library()._repr_html_() if hasattr(self, "bins_") else f"<p>{self.model}, not fitted</p>"
+
+    def _library(self) -> SoilLibrary:
+        """The curve as the one soil of a library."""
+        from terragrip.soil.library import Soil, SoilLibrary
+
+        if not hasattr(self, "bins_"):
+            raise InputError("the curve is not fitted", hint="call fit first")
+        return SoilLibrary({"curve": Soil.from_curve("curve", self)})
 
     def to_dict(self) -> dict[str, Any]:
         """The fit as soils.json holds it (architecture.md, contracts)."""

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from terragrip.errors import InputError
+from terragrip.html import html_notes
 from terragrip.soil.bins import BY_PULL, BY_SLIP, PAPER_BINS, Bins, BinSettings, bin_pairs
 from terragrip.soil.choice import FORMS, LEAST_BINS, FormVerdict, compare_forms
 from terragrip.soil.fit import AdhesionCurve
@@ -18,6 +19,10 @@ from terragrip.soil.missing import Gap, in_words, what_to_drive
 from terragrip.soil.pull_bins import bin_by_pull
 from terragrip.soil.slip_noise import SlipNoise, correct_slip_noise, shifted
 from terragrip.soil.transitions import settled
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.figure import Figure
 
 Array = NDArray[np.float64]
 
@@ -79,6 +84,17 @@ class Campaign:
         """As a soil library."""
         soils = {name: learned.soil for name, learned in self.soils.items()}
         return SoilLibrary(soils, dict(provenance or {}), dict(self.not_fitted))
+
+    def to_pandas(self) -> pd.DataFrame:
+        """As `SoilLibrary.to_pandas`."""
+        return self.library().to_pandas()
+
+    def plot(self) -> Figure:
+        """As `SoilLibrary.plot`."""
+        return self.library().plot()
+
+    def _repr_html_(self) -> str:
+        return self.library()._repr_html_() + html_notes(self.words)
 
 
 def usable_pairs(

@@ -7,7 +7,7 @@ import math
 import os
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -17,6 +17,10 @@ from terragrip.errors import InputError
 from terragrip.files import replacing
 from terragrip.physics.adhesion import CURVES
 from terragrip.soil.fit import AdhesionCurve
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.figure import Figure
 
 VERSION = 1
 
@@ -126,6 +130,23 @@ class SoilLibrary(Mapping[str, Soil]):
             "not_fitted": dict(self.not_fitted),
             "provenance": dict(self.provenance),
         }
+
+    def to_pandas(self) -> pd.DataFrame:
+        """A row a soil: model, parameters with their 95 % intervals, how well they fit (`terragrip.soil.views.table_of`)."""
+        from terragrip.soil.views import table_of
+
+        return table_of(self.soils)
+
+    def plot(self) -> Figure:
+        """The curves with their bins, as a matplotlib figure; raises InputError where there is none, or no matplotlib."""
+        from terragrip.soil.views import plot
+
+        return plot(self.soils)
+
+    def _repr_html_(self) -> str:
+        from terragrip.soil.views import html_of
+
+        return html_of(self.soils, self.not_fitted)
 
     def merge(self, other: SoilLibrary, clash: str = "refuse") -> SoilLibrary:
         """Both libraries' soils. `clash`: "refuse" two soils of one name (InputError), "keep" ours, or "replace" by theirs."""

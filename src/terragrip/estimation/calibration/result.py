@@ -5,9 +5,13 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from terragrip.vehicle import Vehicle
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.figure import Figure
 
 NORMAL_95 = 1.959963984540054
 
@@ -130,6 +134,23 @@ class Calibration:
             left = {name: float(f"{value:.3g}") for name, value in self.uncertainty.items()}
             data["uncertainty"] = {**data.get("uncertainty", {}), **left}
         return Vehicle.from_dict(data)
+
+    def to_pandas(self) -> pd.DataFrame:
+        """A row a quantity: value, standard error, 95 % interval, unit, samples, sentence."""
+        from terragrip.estimation.calibration.views import table_of
+
+        return table_of(self)
+
+    def plot(self) -> Figure:
+        """The quantities with their intervals, as a matplotlib figure; raises InputError where there is none, or no matplotlib."""
+        from terragrip.estimation.calibration.views import plot
+
+        return plot(self)
+
+    def _repr_html_(self) -> str:
+        from terragrip.estimation.calibration.views import html_of
+
+        return html_of(self)
 
     def table(self) -> str:
         """The quantities with their intervals and evidence, and what could not be determined, as plain text."""

@@ -1,0 +1,192 @@
+"""What results show in a notebook: tables as HTML, figures, summaries by label, frames with a clock."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from dataclasses import replace
+from html.parser import HTMLParser
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+
+import terragrip as tg
+from terragrip.errors import InputError
+from terragrip.estimation import Estimates
+from terragrip.ground.analysis import analyse
+from terragrip.ground.events import Event
+from terragrip.ground.sections import Section
+from terragrip.ground.span import Span
+from terragrip.ground.views import table_of
+from terragrip.simulation import simulate
+from terragrip.soil.estimates import GatheredRuns
+
+pytest.importorskip("matplotlib", reason="figures need terragrip[report]")
+
+
+@pytest.fixture(scope="module")
+def run() -> Any:
+    return simulate("multi2", 1000)
+
+
+@pytest.fixture(scope="module")
+def estimates(run: Any) -> Estimates:
+    time = run.recording.time
+    log = run.recording.with_channels(latitude=51 + 1e-9 * time, longitude=13 + 7e-6 * time)
+    return tg.estimate(replace(log, start=1.7e9), run.vehicle)
+
+
+class Cells(HTMLParser):
+    """The cells of all tables, and whether every tag was closed."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__()
+        self.cells: list[str] = []
+        self.open: list[str] = []
+        self.feed(text)
+        assert self.open == []
+
+    def handle_starttag(self, tag: str, attrs: Any) -> None:
+        self.open.append(tag)
+        if tag in ("td", "th"):
+            self.cells.append("")
+
+    def handle_endtag(self, tag: str) -> None:
+        assert self.open.pop() == tag
+
+    def handle_data(self, data: str) -> None:
+        if self.open and self.open[-1] in ("td", "th"):
+            self.cells[-1] += data
+
+
+def is_drawn(figure: Any) -> bool:
+    """Whether the figure shows itself as a picture with something on it."""
+    import io
+
+    from matplotlib.image import imread
+
+    picture = imread(io.BytesIO(figure._repr_png_()))
+    return bool(np.ptp(picture[..., :3]) > 0.5) and all(axes.has_data() for axes in figure.axes)
+
+
+def test_estimates_as_a_table(estimates: Estimates) -> None:
+    noted = replace(estimates, notes=("a <script> & more",))
+    text = noted._repr_html_()
+    cells = Cells(text).cells
+    calm = estimates.event_codes == 0
+    shown = (
+        f"{np.nanmedian(estimates['slip_fl'][calm]):.3f} ± {np.nanmedian(estimates['slip_fl_std'][calm]):.3f}"
+    )
+    assert shown in cells
+    assert "a &lt;script&gt; &amp; more" in text
+    assert "2023-11-14 22:13:20 UTC" in text
+
+
+@pytest.mark.parametrize("kind", ["time", "plane", "map"])
+def test_estimates_are_drawn(estimates: Estimates, kind: Any) -> None:
+    assert is_drawn(estimates.plot(kind))
+
+
+def test_what_cannot_be_drawn_is_refused(estimates: Estimates) -> None:
+    with pytest.raises(InputError, match="take one of time, plane, map"):
+        estimates.plot("pie")  # type: ignore[arg-type]
+    nowhere = replace(estimates, columns={k: v for k, v in estimates.columns.items() if k != "latitude"})
+    with pytest.raises(InputError, match="no positions"):
+        nowhere.plot("map")
+    with pytest.raises(InputError, match=r"'torque'.*slip"):
+        estimates.plot("map", "torque")
+
+
+def test_the_summary_by_soil_is_what_pandas_groups(estimates: Estimates) -> None:
+    found = estimates.summary(by="soil")
+    table = estimates.to_pandas()
+    assert set(found.index) == set(table["soil"])
+    assert found["rows"].sum() == len(estimates)
+    calm = table[table["event"] == ""].groupby("soil")
+    for column in ("slip_fl", "slip_fl_std", "adhesion_rr", "soil_resistance"):
+        pd.testing.assert_series_equal(found[column], calm[column].median(), check_index_type=False)
+    assert found["seconds"].sum() == pytest.approx(estimates.time[-1] - estimates.time[0])
+    assert found["metres"].sum() == pytest.approx(estimates["distance"][-1] - estimates["distance"][0])
+    assert estimates.summary(by="event").loc["standstill", "rows"] == (table["event"] == "standstill").sum()
+    with pytest.raises(InputError, match=r"no label 'field'.*event, soil"):
+        estimates.summary(by="field")
+
+
+def test_sections_and_events_are_spans(estimates: Estimates) -> None:
+    ground, _ = analyse(estimates, None, "multi2")
+    assert {type(one) for one in ground.events} == {Event}
+    assert {type(one) for one in ground.sections} == {Section}
+    every: list[Span] = [*ground.sections, *ground.events]
+    for span in every:
+        assert span.seconds == span.end - span.start
+        assert span.rows(estimates.time).sum() >= 1
+    assert len(table_of(ground.events)) == len(ground.events)
+    assert list(ground.to_pandas()["start"]) == [one.start for one in ground.sections]
+    assert ground.events[0].kind in Cells(ground._repr_html_()).cells
+    assert is_drawn(ground.plot())
+
+
+def test_soils(estimates: Estimates) -> None:
+    gathered = GatheredRuns()
+    gathered.add(estimates, "multi2")
+    campaign = gathered.learn(tg.AdhesionCurve(bootstrap=20))
+    assert campaign.soils
+    table = campaign.to_pandas()
+    assert list(table.index) == list(campaign.soils)
+    name = table.index[0]
+    assert table.loc[name, "a"] == campaign.soils[name].soil.parameters["a"]
+    for shown in (campaign, campaign.library(), campaign.soils[name].curve):
+        assert is_drawn(shown.plot())
+        assert Cells(shown._repr_html_()).cells
+    assert "not fitted" in tg.AdhesionCurve()._repr_html_()
+    with pytest.raises(InputError, match="not fitted"):
+        tg.AdhesionCurve().plot()
+
+
+def test_a_calibration() -> None:
+    from terragrip.estimation.calibration.result import Calibration, Evidence, Quantity, Unknown
+
+    evidence = (Evidence("log", 0.0, 10.0, 50),)
+    gains = [
+        Quantity("drive_torque_gain", 1.02 + 0.01 * k, 0.01, "1", evidence, "by tow", wheel=w)
+        for k, w in enumerate(("fl", "fr"))
+    ]
+    found = Calibration(
+        (*gains, Quantity("drawbar_offset", 3.0, 1.0, "N", evidence, "at rest")),
+        (Unknown("pitch", "flat <1 deg>"),),
+    )
+    assert list(found.to_pandas().index) == ["drive_torque_gain fl", "drive_torque_gain fr", "drawbar_offset"]
+    assert found.to_pandas().loc["drawbar_offset", "low"] == pytest.approx(3 - 1.96, abs=1e-3)
+    assert "flat &lt;1 deg&gt;" in found._repr_html_()
+    assert is_drawn(found.plot())
+    with pytest.raises(InputError, match="no quantity"):
+        Calibration((), ()).plot()
+
+
+def test_a_recording_as_a_table(run: Any) -> None:
+    cells = Cells(run.recording._repr_html_()).cells
+    assert {"ground_speed", "m/s", "wheel_speed_fl", "rad/s"} <= set(cells)
+
+
+@pytest.mark.parametrize("name", [n for n in tg.__all__ if n not in ("__version__", "InputError")])
+def test_public_signatures_are_typed(name: str) -> None:
+    """Every public function and method says what it takes and what it gives."""
+    public = getattr(tg, name)
+    made = [public] if not isinstance(public, type) else [v for k, v in vars(public).items() if k[0] != "_"]
+    for one in made:
+        function = getattr(one, "__func__", getattr(one, "fget", one))
+        if callable(function) and hasattr(function, "__code__"):
+            code = function.__code__
+            named = set(code.co_varnames[: code.co_argcount + code.co_kwonlyargcount]) - {"self", "cls"}
+            assert named | {"return"} <= set(function.__annotations__), function
+
+
+def test_estimates_and_views_load_no_drawing_library_until_they_draw() -> None:
+    code = (
+        "import sys, numpy as np\nimport terragrip.estimation.estimates, terragrip.ground.result, terragrip.soil.library\n"
+        "print([m for m in ('matplotlib', 'pandas') if m in sys.modules])"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "[]"
