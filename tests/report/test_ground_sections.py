@@ -123,6 +123,53 @@ def test_events_of_the_estimates_are_told_of_runs_without_a_ground() -> None:
     assert [row[0] for row in table.rows] == ["run 2, 1.0 s"]  # of run 1 the ground tells
 
 
+SEEN = {
+    "all cones": np.eye(3),
+    "deuteranopia": [
+        [0.367322, 0.860646, -0.227968],
+        [0.280085, 0.672501, 0.047413],
+        [-0.01182, 0.04294, 0.968881],
+    ],
+    "protanopia": [
+        [0.152286, 1.052583, -0.204868],
+        [0.114503, 0.786281, 0.099216],
+        [-0.003882, -0.048116, 1.051998],
+    ],
+    "tritanopia": [
+        [1.255528, -0.076749, -0.178779],
+        [-0.078411, 0.930809, 0.147602],
+        [0.004733, 0.691367, 0.3039],
+    ],
+}  # Machado, Oliveira and Fernandes (2009), severity 1
+TO_XYZ = np.array([[0.4124, 0.3576, 0.1805], [0.2126, 0.7152, 0.0722], [0.0193, 0.1192, 0.9505]])
+
+
+def seen(color: str, eye: str) -> np.ndarray:
+    """CIE L*a*b* of a colour as an eye sees it."""
+    coded = np.array([int(color[i : i + 2], 16) / 255 for i in (1, 3, 5)])
+    linear = np.where(coded <= 0.04045, coded / 12.92, ((coded + 0.055) / 1.055) ** 2.4)
+    white = TO_XYZ @ np.ones(3)
+    parts = TO_XYZ @ np.clip(np.array(SEEN[eye]) @ linear, 0, 1) / white
+    f = np.where(parts > 0.008856, np.cbrt(parts), 7.787 * parts + 16 / 116)
+    return np.array([116 * f[1] - 16, 500 * (f[0] - f[1]), 200 * (f[1] - f[2])])
+
+
+@pytest.mark.parametrize("eye", SEEN)
+@pytest.mark.parametrize(
+    "labels",
+    [
+        ["hard", "fine", "wet", "coarse", "grass"],
+        ["work", "headland", "road", "standing"],
+        [f"field {i}" for i in range(8)],
+    ],
+)
+def test_colour_blind_readers_tell_labels_apart(labels: list[str], eye: str) -> None:
+    """Two colours side by side differ from about 10 on (CIE 1976); two and a half is the least that can be seen."""
+    colors = [seen(soil_color(name, labels), eye) for name in labels]
+    apart = min(float(np.linalg.norm(a - b)) for i, a in enumerate(colors) for b in colors[:i])
+    assert apart > 12
+
+
 def test_labels_have_colours_of_their_own() -> None:
     names = ["hard", "fine", "wet", "coarse", "grass", *(f"field {i}" for i in range(20))]
     assert len({soil_color(name, names) for name in names}) == len(names)

@@ -53,8 +53,9 @@ SOIL_COLORS = {"hard": MUTED, "fine": ORANGE, "wet": SKY, "coarse": PURPLE, "gra
 """None of them is a voice's."""
 PART_COLORS = {"work": GREEN, "headland": ORANGE, "road": SKY, "standing": PURPLE, "the drive": BLUE}
 """Of what a machine did (field_work.py)."""
-_SPARE_COLORS = (YELLOW, VERMILLION, BLUE, "#8c510a", "#2f9e9e", "#7b52ab", "#a3b81f", "#e06c9f")
-"""Beyond these hues are made, a golden angle apart."""
+_SPARE_COLORS = (BLUE, VERMILLION, "#8d4b35", "#7f20df", "#cab472", "#a3bfdc", "#234e5c", "#72ca9e")
+"""Each as far as can be from those before and from the soils', to eyes of all kinds (a test sees with them). Beyond them hues are made,
+a golden angle apart."""
 _GOLDEN = 0.618034
 
 CSS_VARIABLES = {
