@@ -3,7 +3,8 @@
     python benchmarks/bench_install.py [--write]
 
 The wheel is the one in dist (make wheel). Times are the best of seven fresh processes, as other work only adds to them: by the clock,
-and of the processor, which other work on the machine touches least. Beside them stands the import of pandas alone. `--write` puts the table into docs/install.md.
+and of the processor, which other work on the machine touches least. Beside them stands the import of pandas alone.
+`--write` puts the table into docs/install.md.
 """
 
 from __future__ import annotations
