@@ -61,7 +61,7 @@ def test_alostar_on_the_floor(shared: Located, judging: ModuleType) -> None:
     assert len(result) == 6
     for verdict in result.values():
         # The robot mostly waits between its moves; its wheels turn against each other with next to no ground speed.
-        assert 0.3 < verdict.standing < 0.9
+        assert 0.25 < verdict.standing < 0.9  # it stands under 1.3 cm/s; rims at 2 to 3 cm/s move
         # Slip is taken against each side's hub, by the gyro. It shows 1/2.2 of the turn that the wheels make, so about half
         # of the rim's travel reads as slip; in log90-2 the gyro is dead, and the hub seems to stand still.
         low, high = (0.85, 1.0) if verdict.log == "log90-2" else (0.4, 0.7)

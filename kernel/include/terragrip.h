@@ -307,8 +307,7 @@ typedef struct {
     tg_real increment_memory;       /* s: of the usual increments */
     tg_real input_lag;              /* s, at most: low-pass of measured loads, pitch, and the pull as the loads feel it */
     tg_real unknown_slope;          /* rad: SD of a pitch never seen or long silent */
-    tg_real slow_wheel;             /* T between samples, from which on a wheel is quasi-steady */
-    tg_real wheel_late;             /* intervals after which a slow wheel's last sample stands for nothing */
+    tg_real wheel_late;             /* intervals after which a wheel's last sample stands for nothing */
     tg_real mounting_walk;          /* rad^2, gained in T: of what a pitch sensor does not tell of the slope */
     tg_real terrain_walk;           /* rad^2, gained in T: of the whole slope, where there is none */
     tg_real silence;                /* s without a ground speed after which it is reckoned from the wheels */
@@ -321,6 +320,8 @@ typedef struct {
     tg_real shock_samples;          /* samples that a shock lasts */
     tg_real longest_walk;           /* s of random walk that a gap adds at most: beyond it the ground is simply unknown */
     tg_real standstill;             /* V: below it a machine counts as standing */
+    tg_real slow_share;             /* of the ground speed's noise: SD of an error that stays alike for long, */
+    tg_real slow_stops;             /* as if so many stops had shown it */
     tg_real uneven_length;          /* wheel radii: shorter changes of adhesion and resistance are the ground's unevenness */
     tg_real uneven_memory;          /* wheel radii over which their mean squares are taken */
     tg_real uneven_most;            /* usual squares that one counts at most: a border between soils is no bump */

@@ -148,6 +148,8 @@ static int32_t go_on(tg_estimator *e, tg_row *row, const tg_drive *drive, tg_cou
         if (course != TG_WAIT && course != TG_DRIFT && course != TG_REST) tgi_algebraic(e, row, drive, course != TG_GO);
         return 1;
     }
+    if (course == TG_REST) tgi_rest_reading(e, row);
+    else tgi_rest_over(e);
     if (course == TG_ANEW) tgi_restart_from(e, row, dt);
     if (course == TG_TURN) tgi_turn(e);
     if (course == TG_TURN || (course == TG_START && e->started)) tgi_unknown_adhesion(e);
@@ -177,6 +179,7 @@ static void report(tg_estimator *e, const tg_drive *drive, tg_estimate *out)
     e->scene.seen_motion = (tg_real)e->seen_motion;
     e->scene.roughness = e->roughness.wander;
     e->scene.unseen_load = tgi_unseen_load(e);
+    e->scene.slow_speed = tgi_slow_variance(e);
     tgi_traction(&e->settings, &e->belief, (const tg_real(*)[TG_ROWS])e->consider.s, &e->scene, o);
     o[TG_OUT_NIS] = e->belief.nis;
     o[TG_OUT_CHANNELS] = (tg_real)e->belief.channels;

@@ -47,6 +47,7 @@ typedef struct { /* what a row's values need beside the belief; all reals, so th
     tg_real direction, standing, seen_motion; /* standing: or else without a slip */
     tg_real roughness; /* mean square of what rho_s wanders over uneven ground, see roughness.c */
     tg_real unseen_load; /* relative variance of a wheel's load */
+    tg_real slow_speed; /* variance of the ground speed's slow error, see slow_speed.c */
     tg_real anew; /* the filter was started anew: nothing links this row to the one before */
 } tgi_scene;
 
@@ -88,6 +89,11 @@ typedef struct { /* uneven ground, see roughness.c */
     tg_real scatter, square;         /* mean squares: of a wheel's adhesion beyond the others', of the adhesion */
     tg_real wander;                  /* mean square of rho_s about its low-pass */
 } tgi_roughness;
+
+typedef struct { /* what stops tell of the ground speed, see slow_speed.c */
+    tg_real mean, count;    /* of this stop's readings */
+    tg_real squares, stops; /* of all stops, weighted */
+} tgi_slow_speed;
 
 typedef struct { /* of the driven wheels, along the travel; see immobilization.c */
     tg_real slip, deviation, fastest; /* of the worst wheel of each side, their mean: slip, its SD, rim speed */
@@ -150,7 +156,6 @@ typedef struct { /* what follows from the settings alone */
     tg_real scale_score[TG_MODES];  /* of the bank: log scale, 0 the smallest, 1 the largest */
     tg_real force_walk;             /* m^2/s^3 */
     tg_real mounting_walk, terrain_walk; /* rad^2/s */
-    tg_real slow_wheel;             /* s */
     tg_real pace;                   /* s, the unit of time of the watch, see digging.c */
     int32_t watched[8], side[8];    /* wheel: powered, or no wheel is; by its place on its axle -1 left, 1 right, 0 middle */
     int32_t holds;                  /* some channel is held */
@@ -179,6 +184,7 @@ struct tg_estimator {
     tgi_slip_memory slip_memory;
     tgi_slope slope;
     tgi_roughness roughness;
+    tgi_slow_speed slow_speed;
     double ground_time;        /* of the last measured ground speed */
     tg_real shock;             /* variance of the accelerometer about the model, (m/s^2)^2 */
     tg_input held;             /* inputs of the last row, along the travel */
@@ -239,6 +245,11 @@ void tgi_reckon(tg_estimator *e, const tg_drive *drive, tg_real dt, tg_row *row,
 TG_INLINE tg_real tgi_rough_adhesion(const tgi_scene *scene, tg_real mu) { return scene->unseen_load * tgi_square(mu); }
 tg_real tgi_unseen_load(const tg_estimator *e);
 void tgi_watch_roughness(tg_estimator *e, int32_t flowing, tg_real distance);
+
+/* slow_speed.c */
+void tgi_rest_reading(tg_estimator *e, const tg_row *row);
+void tgi_rest_over(tg_estimator *e);
+tg_real tgi_slow_variance(const tg_estimator *e);
 
 /* restarts.c */
 void tgi_follow(tg_estimator *e, const tg_deviation *deviation);

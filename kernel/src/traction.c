@@ -40,10 +40,12 @@ TG_INLINE void gather(const tg_belief *b, const tg_real (*S)[TG_ROWS], const int
     }
 }
 
-/* Uneven ground (roughness.c): rho_s may hold all of what it wanders, and the wheels' loads come and go unseen. */
+/* Uneven ground (roughness.c): rho_s may hold all of what it wanders, and the wheels' loads come and go unseen. The ground speed may be off for
+ * long (slow_speed.c). */
 TG_INLINE void roughen(tgi_moments *c, const tg_real *x, const tgi_scene *scene, const int n)
 {
     c->rr += scene->roughness;
+    c->vv += scene->slow_speed;
     for (int i = 0; i < n; i++) c->mm[i] += tgi_rough_adhesion(scene, x[i]);
 }
 

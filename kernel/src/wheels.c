@@ -1,9 +1,9 @@
-/* Wheel speeds between the samples of a slow sensor (R; docs/decisions/0026-slow-wheel-speeds.md). A wheel's slip settles within milliseconds, so
- * that its speed changes as slowly as the drive does, while a stale torque integrated over a quarter of a second runs away with it. There the
- * last sample stands for the speed, and the adhesion takes what the torque says. */
+/* Wheel speeds between their samples (R; docs/decisions/0026-slow-wheel-speeds.md). A wheel's slip settles within milliseconds, so that its
+ * speed changes as slowly as the drive does, while a torque's noise, let alone a stale torque, integrated over the time between runs away
+ * with it. There the last sample stands for the speed, and the adhesion takes what the torque says. */
 #include "estimator.h"
 
-/* Give the row the speeds of slow wheels that it does not measure; `dt` 0: none. All rows until the next sample share one error, and so
+/* Give the row the speeds of wheels that it does not measure; `dt` 0: none. All rows until the next sample share one error, and so
  * count as one measurement together. */
 void tgi_hold_wheels(tg_estimator *e, tg_real dt, tg_row *row)
 {
@@ -14,9 +14,9 @@ void tgi_hold_wheels(tg_estimator *e, tg_real dt, tg_row *row)
         const tg_hold *const h = &e->wheel[i];
         const tg_real noise = e->settings.noise[TG_WHEEL_SPEED + i], x = row->value[TG_WHEEL_SPEED + i];
         const tg_real age = (tg_real)(row->time - h->time), motion = h->level - 2 * noise * noise;
-        if (!isnan(x) || h->count < 2 || h->interval < e->constants.slow_wheel || age > e->settings.tuned.wheel_late * h->interval || !(dt > 0)) continue;
+        if (!isnan(x) || h->count < 2 || h->spike > 0 || age > e->settings.tuned.wheel_late * h->interval || !(dt > 0)) continue;
         row->value[TG_WHEEL_SPEED + i] = h->raw;
-        row->wheel_variance[i] = (noise * noise + (motion > 0 ? motion * age / h->interval : 0)) * (1 + h->interval / dt);
+        row->wheel_variance[i] = (noise * noise + (motion > 0 ? motion * age / h->interval : 0)) * (h->interval / dt > 1 ? h->interval / dt : 1);
         row->held_wheels |= 1 << i;
     }
 }

@@ -19,9 +19,9 @@ WHEEL_RADIUS = 0.02
 COLUMNS = 7  # torque gain of each wheel, drawbar, slope, the tyres' rolling resistance
 
 
-def joint(estimator: TractionEstimator, recording: Any) -> tuple[Any, Any, Any, float]:
+def joint(estimator: TractionEstimator, recording: Any) -> tuple[Any, Any, Any, float, float]:
     """Mean (10,), covariance (10, 10) and considered columns (k, 10) after the recording's last row, state order, and the SD of
-    a wheel's unseen load, the last but one number of the row's scene."""
+    a wheel's unseen load and of the slow error of the ground speed, in the row's scene."""
     engine, ffi, lib = estimator.engine, _kernel.ffi, _kernel.lib
     time, columns = prepared(estimator, recording)
     last = engine.record(time, columns)[-1].copy()
@@ -29,7 +29,7 @@ def joint(estimator: TractionEstimator, recording: Any) -> tuple[Any, Any, Any, 
     x, P, s = np.empty(10), np.empty((10, 10)), np.empty((COLUMNS, 10))
     pointers = (ffi.cast("double *", a.ctypes.data) for a in (last, x, P, s))
     assert lib.tg_record_moments(4, COLUMNS, *pointers) == lib.TG_OK
-    return x, P, s, float(np.sqrt(last[-2]))
+    return x, P, s, float(np.sqrt(last[-3])), float(np.sqrt(last[-2]))
 
 
 @pytest.mark.parametrize("slip", [0.03, 0.12, 0.35])
@@ -41,7 +41,7 @@ def test_spreads_agree_with_sampling(slip):
             "wheel_radius": WHEEL_RADIUS,
         }
     )  # fmt: skip
-    x, P, s, unseen = joint(
+    x, P, s, unseen, slow = joint(
         TractionEstimator.for_recording(made.recording, vehicle, "kalman"), made.recording
     )
     whole = TractionEstimator.for_recording(made.recording, vehicle, "kalman").update_block(made.recording)
@@ -50,6 +50,8 @@ def test_spreads_agree_with_sampling(slip):
 
     rng = np.random.default_rng(0)
     drawn = rng.multivariate_normal(x, P, DRAWS, method="cholesky") + rng.standard_normal((DRAWS, len(s))) @ s
+    assert slow > 0
+    drawn[:, 4] += slow * rng.standard_normal(DRAWS)
     error = WHEEL_RADIUS * rng.standard_normal(
         (DRAWS, 1)
     )  # of the radius: more of it, less force in a torque

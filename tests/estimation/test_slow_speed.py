@@ -1,0 +1,58 @@
+"""A receiver's error that stays alike for half a minute: intervals of slip hold it, and stops tell how large it is."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from scipy.signal import lfilter
+
+from terragrip.estimation import Estimates, estimate
+from terragrip.simulation import SimulationResult
+from terragrip.simulation.families import Kind, draw, machines
+
+RATE, MEMORY = 50.0, 30.0  # 1/s, s
+
+
+def drifting(result: SimulationResult, share: float, seed: int) -> SimulationResult:
+    """The ground speed with a first-order Gauss-Markov error of this share of its noise on top."""
+    log, noise = result.recording, result.vehicle.sensors.ground_speed
+    assert noise is not None
+    keep = np.exp(-1 / (RATE * MEMORY))
+    rng = np.random.default_rng(seed)
+    start, drive = share * noise * rng.standard_normal(), np.sqrt(1 - keep**2) * share * noise
+    error = lfilter([1.0], [1.0, -keep], drive * rng.standard_normal(len(log.time)), zi=[keep * start])[0]
+    channels = dict(log.channels) | {"ground_speed": log["ground_speed"] + error}
+    return replace(result, recording=replace(log, channels=channels))
+
+
+def share_held(result: SimulationResult, found: Estimates) -> float:
+    """Share of moving rows and driven wheels whose 95 % interval holds the slip."""
+    speed = np.abs(result.truth["true_ground_speed"].to_numpy())
+    moving = speed > min(0.05, 0.1 * float(np.median(speed[speed > 0.01])))
+    inside = []
+    for wheel, driven in zip(result.vehicle.wheels, result.vehicle.driven, strict=True):
+        error = np.abs(found[f"slip_{wheel}"] - result.truth[f"true_slip_{wheel}"].to_numpy())
+        rows = moving & np.isfinite(error) & driven
+        inside.append((error <= 1.96 * found[f"slip_{wheel}_std"])[rows])
+    return float(np.mean(np.concatenate(inside)))
+
+
+def test_slip_intervals_hold_a_slow_error_of_the_ground_speed():
+    held = []
+    for kind, seed in machines("development", 8):
+        result = drifting(draw(kind, seed, rate=RATE), 0.5, seed)
+        held.append(share_held(result, estimate(result.recording, result.vehicle)))
+    assert np.mean(held) > 0.88  # .77 before anything stood for it
+
+
+def test_a_sensor_that_reads_nothing_at_rest_gets_narrower_intervals_than_one_that_does():
+    result = draw(Kind("light", "brixius", "plain"), 45, rate=RATE)  # stands for the first second
+    log, noise = result.recording, result.vehicle.sensors.ground_speed
+    rest = result.truth["true_ground_speed"].abs().to_numpy() < 0.003
+    assert rest.sum() > RATE
+    off = log["ground_speed"] + np.where(rest, 0.8 * noise, 0.0)
+    wide = estimate(replace(log, channels=dict(log.channels) | {"ground_speed": off}), result.vehicle)
+    usual = estimate(log, result.vehicle)
+    rows = ~rest & np.isfinite(log["ground_speed"])
+    assert np.median(wide["ground_speed_std"][rows]) > 1.15 * np.median(usual["ground_speed_std"][rows])
