@@ -22,7 +22,7 @@ KERNEL_TESTS := $(patsubst kernel/tests/%.c,%,$(wildcard kernel/tests/*.c))
 BUILD_INPUTS := pyproject.toml setup.py cffi_build.py $(KERNEL_SOURCES) $(KERNEL_HEADERS) \
 	$(wildcard kernel/python/*.[ch] src/terragrip/*/*.c src/terragrip/*/*.h)
 
-.PHONY: help demo test lint kernel-test web-test pytest studio wheel docs system bench lock clean \
+.PHONY: notebooks help demo test lint kernel-test web-test pytest studio wheel docs system bench lock clean \
 	kernel-aarch64 kernel-others
 
 help: ## show this list
@@ -68,6 +68,9 @@ docs: $(VENV)/package $(VENV)/dev ## the documentation site, with the reference 
 
 web-test: studio ## the pages' own tests, where Node.js is
 	@if [ -d web/node_modules ]; then cd web && npm run --silent test; else echo "SKIPPED: the tests of the pages need Node.js 20 or newer" >&2; fi
+
+notebooks: $(VENV)/package $(VENV)/dev ## execute the example notebooks into build/notebooks
+	@$(BIN)/python examples/notebooks.py
 
 bench: $(VENV)/package $(VENV)/dev ## every benchmark: ratios against a peer in the same run
 	@for script in benchmarks/bench_*.py; do echo "== $$script"; $(BIN)/python "$$script" || exit 1; done

@@ -79,6 +79,16 @@ def test_a_folder_or_a_pattern(place: Path, logs: str) -> None:
     assert slips(place / "out") == {"a0": 0.1, "a1": 0.2, "a2": 0.3}
 
 
+def test_a_folder_with_one_log_goes_into_a_folder_too(place: Path) -> None:
+    for name in ("a1.csv", "a2.csv"):
+        (place / "ours" / name).unlink()
+    assert estimate(place, place / "ours") == 0
+    assert slips(place / "out") == {"a0": 0.1}
+    words = ["--vehicle", str(place / "vehicle.yaml"), "-o", str(place / "one.parquet")]
+    assert main(["estimate", str(place / "ours"), *words]) == 0
+    assert tg.Estimates.read(place / "one.parquet").wheels == ("l", "r")
+
+
 def test_a_profile_each(place: Path, capsys: pytest.CaptureFixture[str]) -> None:
     profiles = ["--profile", place / "long.yaml", "--profile", place / "short.yaml"]
     assert estimate(place, place / "ours", place / "theirs/b[01].csv", *profiles) == 0

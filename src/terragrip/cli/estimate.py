@@ -56,6 +56,7 @@ def command(
     does not stop the others; the exit code is 2 then.
     """
     from terragrip.estimation.methods import method_named
+    from terragrip.formats.registry import is_bag
     from terragrip.from_log import estimate_file
     from terragrip.vehicle import Vehicle
 
@@ -64,7 +65,14 @@ def command(
     machine = Vehicle.load(vehicle)
     drives = _drives(logs or [], profile or [], others or [], table)
     used = [p for drive in drives for p in drive.profiles if p is not None]
-    targets = _targets(drives, output, [vehicle, *used, *(dbc or []), *([table] if table else [])])
+    # A folder that happens to hold one log goes into a folder all the same, as a script expects.
+    listed = table is not None or any(
+        not (log.is_file() or (log.is_dir() and is_bag(log))) for log in logs or []
+    )
+    into_folder = len(drives) > 1 or (listed and output.suffix.lower() not in KINDS)
+    targets = _targets(
+        drives, output, into_folder, [vehicle, *used, *(dbc or []), *([table] if table else [])]
+    )
 
     def estimated(drive: Drive, target: Path, title: str) -> str:
         with progress(title, quiet) as step:
@@ -79,7 +87,7 @@ def command(
                 progress=step,
             )
 
-    if len(drives) == 1:
+    if not into_folder:
         text = estimated(drives[0], targets[0], drives[0].name)
         if not quiet:
             print(text)
@@ -141,11 +149,11 @@ def _one_by_one(
         )
 
 
-def _targets(drives: list[Drive], output: Path, beside: list[Path]) -> list[Path]:
+def _targets(drives: list[Drive], output: Path, into_folder: bool, beside: list[Path]) -> list[Path]:
     """The file of each drive's estimates, tried before the long work; ``beside`` are the other inputs."""
     logs = [log for drive in drives for log in drive.logs]
     inputs = [*logs, *beside]
-    if len(drives) == 1:
+    if not into_folder:
         target = check_file(output, inputs, suffixes=tuple(KINDS))
         require_suffix(target)
         return [target]

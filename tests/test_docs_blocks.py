@@ -1,0 +1,86 @@
+"""Code on the pages of docs/ is right: each command line is one that the program takes, each Python block runs or at least compiles.
+
+Tutorials run as a whole in tests/test_tutorial.py, the format of docs/formats.md in tests/formats.
+"""
+
+from __future__ import annotations
+
+import re
+import shlex
+from pathlib import Path
+from typing import Any
+
+import pytest
+import typer
+
+import terragrip as tg
+from terragrip.cli.entry import app
+
+ROOT = Path(__file__).resolve().parents[1]
+PAGES = sorted([*ROOT.glob("docs/*.md"), ROOT / "README.md"])
+FENCED = re.compile(r"^```(\w*)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
+PROGRAM = re.compile(r"^(?: {4})?(?:\$ )?(?:\.venv/bin/)?terragrip ([a-z-]+(?: .*)?)$")
+
+
+def command_lines(page: Path) -> list[str]:
+    """What follows `terragrip` in a page's blocks, continued lines joined; shapes of calls ([--x], ...) are none."""
+    text = re.sub(r" *\\\n *", " ", page.read_text(encoding="utf-8"))
+    found = [match[1] for line in text.splitlines() if (match := PROGRAM.match(line))]
+    return [words for words in found if not re.search(r"\.\.\.|\[-|\[LOG| \| ", words)]
+
+
+def parse(words: list[str]) -> None:
+    """Parse without running; raises click's own error on a command or an option that there is not."""
+    command: Any = typer.main.get_command(app)
+    path = "terragrip"
+    while hasattr(command, "commands"):
+        path, name, words = f"{path} {words[0]}", words[0], words[1:]
+        assert name in command.commands, f"no command {name!r}"
+        command = command.commands[name]
+    command.make_context(path, words)
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
+def test_the_program_takes_every_command_line_of_a_page(page: Path) -> None:
+    for line in command_lines(page):
+        words = shlex.split(line, comments=True)
+        try:
+            parse(words)
+        except typer.Exit:  # --list and the like end the program while it parses
+            continue
+        except Exception as error:  # noqa: BLE001 - whatever click raises is the page's fault
+            pytest.fail(f"{page.name}: terragrip {line}: {getattr(error, 'message', error)}")
+
+
+def test_there_are_command_lines_and_a_wrong_option_is_found() -> None:
+    assert sum(len(command_lines(page)) for page in PAGES) > 40
+    with pytest.raises(Exception, match="--vehicel"):
+        parse(["estimate", "a.csv", "--vehicel", "v.yaml", "-o", "x.parquet"])
+
+
+def python_blocks(page: Path) -> list[str]:
+    return [
+        text for language, text in FENCED.findall(page.read_text(encoding="utf-8")) if language == "python"
+    ]
+
+
+@pytest.mark.parametrize("page", [p for p in PAGES if python_blocks(p)], ids=lambda page: page.stem)
+def test_every_python_block_compiles(page: Path) -> None:
+    for text in python_blocks(page):
+        compile(text, str(page), "exec")
+
+
+def test_the_blocks_of_readme_and_of_the_vehicle_file_run(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    drive = tg.simulate("fine-10", seed=1)
+    drive.vehicle.save("robot.yaml")
+    table = drive.recording.to_pandas()
+    table.to_csv("log.csv", index=False)
+    names: dict[str, Any] = {"sample": table.iloc[0].to_dict()}
+    for page in (ROOT / "README.md", ROOT / "docs/vehicle.md"):
+        for text in python_blocks(page):
+            exec(compile(text, str(page), "exec"), names)
+    assert names["out"]["time"] == table["time"][0]
+    assert tg.Vehicle.load("tractor.yaml").mass == pytest.approx(6200)
