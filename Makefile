@@ -75,6 +75,9 @@ notebooks: $(VENV)/package $(VENV)/dev ## execute the example notebooks into bui
 bench: $(VENV)/package $(VENV)/dev ## every benchmark: ratios against a peer in the same run
 	@for script in benchmarks/bench_*.py; do echo "== $$script"; $(BIN)/python "$$script" || exit 1; done
 
+mutants: $(VENV)/package $(VENV)/dev ## do the tests notice? 400 random changes of the Python, each tried by the tests of its line; about an hour
+	@$(BIN)/python benchmarks/mutants.py --workers $(WORKERS)
+
 lock: $(VENV)/made ## resolve the dependencies anew into requirements.lock and requirements-dev.lock
 	$(PIP) install --quiet uv
 	echo 'setuptools>=77' | $(BIN)/uv pip compile $(LOCK_FLAGS) --extra all pyproject.toml - -o requirements.lock

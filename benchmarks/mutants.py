@@ -1,0 +1,337 @@
+"""Do the tests notice? Small changes of the Python (mutants), each tried by the tests that run its line.
+
+    python benchmarks/mutants.py [--count 400] [--rooms physics recording estimation soil] [--workers 2] [--seed COMMIT]
+
+The sample is drawn by the hash of the commit: places (an operator, a comparison, a number, a truth value, a jump) uniformly over the
+source, of each place one change by the operators of cosmic-ray. Annotations and decorators are left out. A first run records which test
+runs which line (coverage with contexts) and how long it takes; a mutant then meets its tests, quickest first, until one fails. Killed: a
+test fails, the module cannot be imported, or the tests take far longer than they did. What lives is printed as a diff. Results are kept
+in build/mutants, and a run that was stopped goes on where it was. A whole run takes about an hour on two cores.
+"""
+
+from __future__ import annotations
+
+import argparse
+import ast
+import difflib
+import importlib
+import importlib.machinery
+import json
+import multiprocessing
+import os
+import random
+import re
+import subprocess
+import sys
+import time
+from collections import defaultdict
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+ROOT = Path(__file__).parents[1]
+KEPT = ROOT / "build" / "mutants"
+ROOMS = ("physics", "recording", "estimation", "soil")
+MORE_TESTS = ("ground",)  # rooms whose tests run lines of these
+BUDGET, MOST = 12.0, 40  # s and number of the tests that one mutant meets
+INTERNAL = 3  # exit code of pytest: an error of its own, which would pass for a kill
+PATIENCE = 4.0  # times what its tests took before, and a minute: beyond, a mutant counts as killed
+PRELOADED = (
+    "numpy",
+    "pandas",
+    "pyarrow",
+    "pydantic",
+    "scipy.optimize",
+    "scipy.stats",
+    "pint",
+    "yaml",
+)
+ARITHMETIC = ("Add", "Sub", "Mul", "Div")
+ORDER = ("Lt", "LtE", "Gt", "GtE", "Eq", "NotEq")
+
+
+@dataclass(frozen=True)
+class Mutant:
+    path: str
+    line: int
+    operator: str
+    occurrence: int
+
+
+def operators() -> list[str]:
+    """The operators of cosmic-ray that a slip of a programmer could be; `x << y` for `x + y` would only flatter the tests."""
+    names = [
+        f"ReplaceBinaryOperator_{a}_{b}"
+        for a in (*ARITHMETIC, "Pow", "FloorDiv", "Mod")
+        for b in ARITHMETIC
+        if a != b
+    ]
+    names += [f"ReplaceComparisonOperator_{a}_{b}" for a in ORDER for b in ORDER if a != b]
+    names += [
+        "ReplaceComparisonOperator_Is_IsNot",
+        "ReplaceComparisonOperator_IsNot_Is",
+        "ReplaceUnaryOperator_Delete_Not",
+    ]
+    names += [
+        "NumberReplacer",
+        "ReplaceAndWithOr",
+        "ReplaceOrWithAnd",
+        "ReplaceTrueWithFalse",
+        "ReplaceFalseWithTrue",
+    ]
+    names += [
+        "ReplaceUnaryOperator_USub_UAdd",
+        "ReplaceBreakWithContinue",
+        "ReplaceContinueWithBreak",
+        "AddNot",
+    ]
+    return names
+
+
+def unseen(source: str) -> set[tuple[int, int]]:
+    """Places (line, column) inside annotations, decorators and `if TYPE_CHECKING`: no run of a test sees these."""
+    out: set[tuple[int, int]] = set()
+    lines = source.splitlines()
+    for node in ast.walk(ast.parse(source)):
+        parts = [getattr(node, name, None) for name in ("annotation", "returns")]
+        parts += getattr(node, "decorator_list", [])
+        if isinstance(node, ast.If) and "TYPE_CHECKING" in ast.unparse(node.test):
+            parts.append(node)
+        for part in parts:
+            if part is not None:
+                for row in range(part.lineno, part.end_lineno + 1):
+                    first = part.col_offset if row == part.lineno else 0
+                    last = part.end_col_offset if row == part.end_lineno else len(lines[row - 1])
+                    out |= {(row, column) for column in range(first, last + 1)}
+    return out
+
+
+def mutants(path: Path) -> Iterator[tuple[tuple[int, int], Mutant]]:
+    """Every mutant of a file with its place."""
+    from cosmic_ray.ast import ast_nodes, get_ast
+    from cosmic_ray.plugins import get_operator
+
+    source = path.read_text(encoding="utf-8")
+    nodes, skipped = list(ast_nodes(get_ast(source))), unseen(source)
+    for name in operators():
+        operator, count = get_operator(f"core/{name}")(), 0
+        for node in nodes:
+            for start, _ in operator.mutation_positions(node):
+                if start not in skipped:
+                    yield start, Mutant(str(path.relative_to(ROOT)), start[0], name, count)
+                count += 1
+
+
+def sample(rooms: list[str], count: int, seed: str) -> list[Mutant]:
+    """`count` mutants, at as many places drawn by `seed`."""
+    by_place: dict[tuple[str, tuple[int, int]], list[Mutant]] = defaultdict(list)
+    for room in rooms:
+        for path in sorted((ROOT / "src" / "terragrip" / room).rglob("*.py")):
+            for place, one in mutants(path):
+                by_place[str(path), place].append(one)
+    draw = random.Random(seed)
+    places = draw.sample(sorted(by_place), min(count, len(by_place)))
+    return [draw.choice(by_place[place]) for place in places]
+
+
+def mutated(one: Mutant) -> str:
+    """The source of a mutant's file."""
+    from cosmic_ray.mutating import mutate_code
+    from cosmic_ray.plugins import get_operator
+
+    source = (ROOT / one.path).read_text(encoding="utf-8")
+    changed = mutate_code(source, get_operator(f"core/{one.operator}")(), one.occurrence)
+    if changed is None:
+        raise ValueError(f"{one} is not there")
+    return str(changed)
+
+
+def diff(one: Mutant) -> str:
+    source = (ROOT / one.path).read_text(encoding="utf-8")
+    lines = difflib.unified_diff(
+        source.splitlines(), mutated(one).splitlines(), one.path, one.path, lineterm="", n=0
+    )
+    return "\n".join(line for line in lines if not line.startswith(("---", "+++", "@@")))
+
+
+def record(rooms: list[str], data: Path, log: Path, workers: int) -> None:
+    """Run the rooms' tests once, under coverage."""
+    words = [
+        sys.executable,
+        "-m",
+        "pytest",
+        *(f"tests/{room}" for room in (*rooms, *MORE_TESTS)),
+        "-q",
+        "-vv",
+        "-n",
+        str(workers),
+    ]
+    words += [f"--cov=terragrip.{room}" for room in rooms]
+    words += ["--cov-context=test", "--cov-report=", "--durations=0", "-p", "no:cacheprovider"]
+    with log.open("w", encoding="utf-8") as out:
+        subprocess.run(
+            words,
+            cwd=ROOT,
+            stdout=out,
+            stderr=subprocess.STDOUT,
+            env={**os.environ, "COVERAGE_FILE": str(data)},
+            check=False,
+        )
+
+
+@dataclass
+class Coverage:
+    """Which tests run a line, quickest first, and how long each takes [s]."""
+
+    seconds: dict[str, float]
+    by_line: dict[str, dict[int, list[str]]]
+
+    @classmethod
+    def load(cls, data: Path, log: Path) -> Coverage:
+        from coverage import CoverageData
+
+        text = log.read_text(encoding="utf-8")
+        failed = set(re.findall(r"FAILED (tests/\S+)", text))
+        seconds: dict[str, float] = defaultdict(float)
+        for took, test in re.findall(r"^([\d.]+)s (?:setup|call|teardown) +(tests/.+)$", text, re.MULTILINE):
+            if test not in failed:
+                seconds[test] += float(took)
+        coverage = CoverageData(str(data))
+        coverage.read()
+        by_line: dict[str, dict[int, list[str]]] = {}
+        for path in coverage.measured_files():
+            lines = coverage.contexts_by_lineno(path)
+            by_line["src/" + path.rpartition("/src/")[2]] = {
+                number: [name for context in contexts if (name := context.partition("|")[0]) in seconds]
+                for number, contexts in lines.items()
+            }
+        return cls(dict(seconds), by_line)
+
+    def tests(self, one: Mutant) -> list[str]:
+        """Tests for a mutant. A line that only the import runs is met by the tests of its file."""
+        lines = self.by_line.get(one.path, {})
+        names = set(lines.get(one.line, ())) or {name for other in lines.values() for name in other}
+        chosen, spent = [], 0.0
+        for name in sorted(names, key=lambda name: (self.seconds[name], name)):
+            if len(chosen) == MOST or (chosen and spent + self.seconds[name] > BUDGET):
+                break
+            chosen.append(name)
+            spent += self.seconds[name]
+        return chosen
+
+
+def attempt(one: Mutant, tests: list[str], changed: bool = True) -> None:
+    """In a process of its own: pytest with the mutant in place of its module. The exit code is pytest's."""
+    path = str(ROOT / one.path)
+    source = mutated(one) if changed else Path(path).read_text(encoding="utf-8")
+    plain = importlib.machinery.SourceFileLoader.get_code
+
+    def get_code(self: Any, fullname: str) -> Any:
+        return compile(source, path, "exec") if self.path == path else plain(self, fullname)
+
+    importlib.machinery.SourceFileLoader.get_code = get_code  # type: ignore[method-assign]
+    nothing = os.open(os.devnull, os.O_WRONLY)
+    os.dup2(nothing, 1)
+    os.dup2(nothing, 2)
+    import pytest
+
+    os._exit(
+        int(pytest.main([*tests, "-x", "-q", "-p", "no:cacheprovider", "-p", "no:cov", "-p", "no:randomly"]))
+    )
+
+
+def verdicts(todo: list[Mutant], coverage: Coverage, workers: int) -> Iterator[tuple[Mutant, str]]:
+    """Each mutant and what became of it: killed, lived, untested."""
+    for name in PRELOADED:
+        importlib.import_module(name)
+    fork, waiting = multiprocessing.get_context("fork"), list(reversed(todo))
+    probe = next((one for one in todo if coverage.tests(one)), None)
+    if probe is not None:  # else a broken set-up would kill every mutant
+        process = fork.Process(target=attempt, args=(probe, coverage.tests(probe), False))
+        process.start()
+        process.join()
+        if process.exitcode != 0:
+            raise SystemExit(f"the tests of {probe.path}:{probe.line} fail without a mutant")
+    running: dict[Any, tuple[Mutant, float]] = {}
+    while waiting or running:
+        while waiting and len(running) < workers:
+            one = waiting.pop()
+            tests = coverage.tests(one)
+            if not tests:
+                yield one, "untested"
+                continue
+            process = fork.Process(target=attempt, args=(one, tests))
+            process.start()
+            limit = 60 + PATIENCE * sum(coverage.seconds[name] for name in tests)
+            running[process] = one, time.monotonic() + limit
+        for process, (one, until) in list(running.items()):
+            if process.exitcode is not None:
+                del running[process]
+                if process.exitcode == INTERNAL:
+                    raise RuntimeError(f"pytest itself failed on {one}")
+                yield one, {0: "lived", 5: "untested"}.get(process.exitcode, "killed")
+            elif time.monotonic() > until:
+                process.kill()
+                process.join()
+                del running[process]
+                yield one, "killed"
+        time.sleep(0.02)
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--count", type=int, default=400, help="mutants in the sample")
+    parser.add_argument("--rooms", nargs="+", default=list(ROOMS), help="packages of terragrip")
+    parser.add_argument("--workers", type=int, default=2)
+    parser.add_argument("--seed", help="draw by this instead of the commit's hash")
+    parser.add_argument(
+        "--at",
+        nargs="*",
+        default=(),
+        metavar="FILE:LINE",
+        help="every mutant of these lines instead of a sample",
+    )
+    wanted = parser.parse_args()
+    os.chdir(ROOT)
+    commit = subprocess.run(
+        ["git", "rev-parse", "HEAD"], capture_output=True, text=True, check=True
+    ).stdout.strip()
+    KEPT.mkdir(parents=True, exist_ok=True)
+    data, log = KEPT / f"{commit}.coverage", KEPT / f"{commit}.log"
+    if not data.exists():
+        print("Recording which test runs which line ...", flush=True)
+        record(wanted.rooms, data, log, wanted.workers)
+    coverage = Coverage.load(data, log)
+    if wanted.at:
+        places = [(name, int(line)) for name, _, line in (text.rpartition(":") for text in wanted.at)]
+        drawn = [
+            one for name in dict(places) for _, one in mutants(ROOT / name) if (one.path, one.line) in places
+        ]
+        seed = "at"
+    else:
+        seed = wanted.seed or commit
+        drawn = sample(wanted.rooms, wanted.count, seed)
+    kept = KEPT / f"{commit}.{seed[:12]}.jsonl"
+    known = {}
+    if kept.exists():
+        for line in kept.read_text(encoding="utf-8").splitlines():
+            entry = json.loads(line)
+            known[Mutant(**entry["mutant"])] = entry["verdict"]
+    todo = [one for one in drawn if one not in known]
+    with kept.open("a", encoding="utf-8") as out:
+        for one, verdict in verdicts(todo, coverage, wanted.workers):
+            known[one] = verdict
+            out.write(json.dumps({"mutant": asdict(one), "verdict": verdict}) + "\n")
+            out.flush()
+            if verdict != "killed":
+                print(f"{verdict}: {one.path}:{one.line} {one.operator}\n{diff(one)}\n", flush=True)
+    killed = sum(known[one] == "killed" for one in drawn)
+    print(f"{killed} of {len(drawn)} mutants killed ({killed / len(drawn):.0%}), drawn by {seed[:12]}")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
