@@ -97,11 +97,11 @@ void tgi_exact_step(const tg_filter *f, const tgi_factors *from, const tgi_plan 
     out->taken = 0;
     out->nis = 0;
     out->volume = 1;
-    tgi_gram gram = factor_begin(W, weight, rows, stride);
+    tgi_gram gram = tgi_factor_begin(W, weight, rows, stride);
     for (int j = rows - 1; j > 0; j--) {
-        factor_row(&gram, j, j / TG_LANES + 1, j == rows - 1, 1, plan->passage.q[j], out->u + j * stride, out->d + j);
+        tgi_factor_row(&gram, j, 1, plan->passage.q[j], out->u + j * stride, out->d + j);
         if (j > n && plan->count) exact_take_output(f, plan, out, j, n, stride);
     }
-    factor_last(&gram, plan->passage.q[0], out->u, out->d);
+    tgi_factor_last(&gram, plan->passage.q[0], out->u, out->d);
     if (plan->count && plan->present[n + 1]) exact_take_accelerometer(f, plan, out, n, stride);
 }

@@ -10,9 +10,9 @@ void tgi_restart(int n, int stride, const tg_real *q, tg_real *u, tg_real *d)
     const int rows = TG_TWICE(n);
     memcpy(W, u, (size_t)(rows * stride) * sizeof *u);
     memcpy(weight, d, (size_t)rows * sizeof *d);
-    tgi_gram gram = factor_begin(W, weight, rows, stride);
-    for (int j = n; j > 0; j--) factor_row(&gram, j, j / TG_LANES + 1, j == n, 1, q[j], u + j * stride, d + j);
-    factor_last(&gram, q[0], u, d);
+    tgi_gram gram = tgi_factor_begin(W, weight, rows, stride);
+    for (int j = n; j > 0; j--) tgi_factor_row(&gram, j, 1, q[j], u + j * stride, d + j);
+    tgi_factor_last(&gram, q[0], u, d);
     for (int j = n + 1; j < rows; j++) {
         d[j] = q[j];
         for (int i = 0; i < stride; i++) u[j * stride + i] = i == j;

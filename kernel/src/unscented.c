@@ -64,10 +64,10 @@ TG_INLINE void unscented_predict(const tg_filter *f, const tgi_plan *plan, const
         weight[k] = k ? w->other : w->covariance;
     }
     centre(w, W, out->x_prior, stride, n);
-    tgi_gram gram = factor_begin(W, weight, count, stride);
+    tgi_gram gram = tgi_factor_begin(W, weight, count, stride);
     for (int j = rows - 1; j > 0; j--)
-        factor_row(&gram, j, j / TG_LANES + 1, j == rows - 1, 1, plan->passage.q[j], out->u + j * stride, out->d + j);
-    factor_last(&gram, plan->passage.q[0], out->u, out->d);
+        tgi_factor_row(&gram, j, 1, plan->passage.q[j], out->u + j * stride, out->d + j);
+    tgi_factor_last(&gram, plan->passage.q[0], out->u, out->d);
 }
 
 /* Rows of the joint factor: the state, then a_x, v, omega_1..omega_n: the last is taken first, as in the exact engine. */
@@ -104,12 +104,12 @@ TG_INLINE void unscented_update(const tg_filter *f, const tgi_plan *plan, const 
         out->weight[o] = plan->present[o] ? tgi_weight(f->tuning.huber, out->innovation[o], out->variance[o]) : 1;
         r[j - rows] = plan->present[o] ? plan->r[o] / out->weight[o] : 1;
     }
-    tgi_gram gram = factor_begin(W, weight, count, joint);
+    tgi_gram gram = tgi_factor_begin(W, weight, count, joint);
     for (int j = all - 1; j >= rows; j--)
-        factor_row(&gram, j, j / TG_LANES + 1, j == all - 1, 1, r[j - rows], u[j - rows], d + (j - rows));
+        tgi_factor_row(&gram, j, 1, r[j - rows], u[j - rows], d + (j - rows));
     for (int j = rows - 1; j >= 0; j--) {
-        if (j > 0) factor_row(&gram, j, j / TG_LANES + 1, 0, 0, 0, column, out->d + j);
-        else factor_last(&gram, 0, column, out->d);
+        if (j > 0) tgi_factor_row(&gram, j, 0, 0, column, out->d + j);
+        else tgi_factor_last(&gram, 0, column, out->d);
         for (int i = 0; i < stride; i += TG_LANES) lanes_store(out->u + j * stride + i, lanes_load(column + i));
     }
     tg_real residual[TG_MAX_CHANNELS];
