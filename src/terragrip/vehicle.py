@@ -61,6 +61,7 @@ _Length = Annotated[float, *_quantity("m", 0.02, 30, likely=("mm", "cm"))]
 _Height = Annotated[float, *_quantity("m", 0, 5, likely=("mm", "cm"))]
 _Overhang = Annotated[float, *_quantity("m", -10, 10, likely=("mm", "cm"))]
 _ToolLength = Annotated[float, *_quantity("m", 0, 50, likely=("mm", "cm"))]
+_Offset = Annotated[float, *_quantity("m", -30, 30, likely=("mm", "cm"))]
 _Radius = Annotated[float, *_quantity("m", 0.01, 3, likely=("mm", "cm"))]
 _Inertia = Annotated[float, *_quantity("kg m^2", 0, 1e4, above=True)]
 _Pressure = Annotated[float, *_quantity("Pa", 1e3, 2e6, likely=("kPa", "bar"))]
@@ -157,6 +158,14 @@ def _wheel_name(name: Any) -> str:
     return str(name)
 
 
+class Antenna(Part):
+    """Where the position is taken, from the rear axle's centre: ``x`` forward, ``y`` to the left, ``z`` above the ground [m]."""
+
+    x: _Offset = 0.0
+    y: _Offset = 0.0
+    z: _Offset = 0.0
+
+
 class Sensors(Part):
     """Standard deviations of the sensors' white noise; absent: estimated from the log."""
 
@@ -222,6 +231,7 @@ class Vehicle(Part):
     wheel: Wheel | None = None
     tire_rolling_resistance: Annotated[float, *_quantity("1", 0, 0.5, likely=("%",))] = 0.0
     bearing_resistance: _Bearing = 0.0
+    antenna: Antenna | None = None
     sensors: Sensors = Field(default_factory=Sensors)
     uncertainty: Uncertainty = Field(default_factory=Uncertainty)
     calibration: Calibration = Field(default_factory=Calibration)

@@ -155,7 +155,7 @@ def placed_rows(estimates: Estimates) -> Any:
 
 
 def test_geojson_as_gdal_and_json_read_it(written, estimates):
-    geopandas = pytest.importorskip("geopandas", reason="needs terragrip[maps]")
+    geopandas = pytest.importorskip("geopandas", reason="needs terragrip[geo]")
     path, rows = written(".geojson"), placed_rows(estimates)
     frame = geopandas.read_file(path)
     assert len(frame) == len(rows) == 300
@@ -169,7 +169,7 @@ def test_geojson_as_gdal_and_json_read_it(written, estimates):
 
 
 def test_a_geopackage_as_sqlite_and_gdal_read_it(written, estimates):
-    geopandas = pytest.importorskip("geopandas", reason="needs terragrip[maps]")
+    geopandas = pytest.importorskip("geopandas", reason="needs terragrip[geo]")
     path, rows = written(".gpkg"), placed_rows(estimates)
     frame = geopandas.read_file(path)
     assert frame.crs.to_epsg() == 4326
@@ -317,7 +317,7 @@ def test_excels_own_limit():
 
 def test_a_missing_package_is_named_with_its_extra(estimates, tmp_path, monkeypatch):
     monkeypatch.setattr("terragrip.estimation.export.find_spec", lambda name: None)
-    with pytest.raises(InputError, match=r"pyogrio.*terragrip\[maps\]"):
+    with pytest.raises(InputError, match=r"pyogrio.*terragrip\[geo\]"):
         estimates.write(tmp_path / "x.gpkg")
     assert not list(tmp_path.iterdir())
 

@@ -21,6 +21,7 @@ from terragrip.cli.ground import command as ground
 from terragrip.cli.ground_classifier import app as ground_classifier
 from terragrip.cli.inspect import command as inspect
 from terragrip.cli.live import command as live
+from terragrip.cli.map import command as map_command
 from terragrip.cli.new import app as new
 from terragrip.cli.report import command as report_command
 from terragrip.cli.simulate import command as simulate
@@ -46,6 +47,7 @@ app.command("calibrate")(calibrate)
 app.command("soils")(soils)
 app.command("ground")(ground)
 app.add_typer(ground_classifier, name="ground-classifier")
+app.command("map")(map_command)
 app.command("report")(report_command)
 app.command("simulate")(simulate)
 app.command("live")(live)

@@ -67,7 +67,7 @@ KINDS: dict[str, FileKind] = {
     ".xlsx": FileKind("an Excel sheet", ("spreadsheet", "Spreadsheet"), "xlsxwriter", "formats", most=_sheet_rows),
     ".mat": FileKind("a MATLAB file", ("matlab", "MatFile"), most=_struct_rows),
     ".geojson": FileKind("GeoJSON", ("places", "GeoJson"), needs=_PLACE),
-    ".gpkg": FileKind("a GeoPackage", ("places", "GeoPackage"), "pyogrio", "maps", needs=_PLACE),
+    ".gpkg": FileKind("a GeoPackage", ("places", "GeoPackage"), "pyogrio", "geo", needs=_PLACE),
     ".mcap": FileKind("MCAP", ("foxglove", "McapFile"), "mcap", "formats"),
 }  # fmt: skip
 """By the suffix of the file."""

@@ -1,0 +1,130 @@
+"""``terragrip map``: georeferenced maps from estimates with positions."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from terragrip.cli.options import Quiet
+from terragrip.cli.output import check_file
+from terragrip.cli.progress import progress
+
+if TYPE_CHECKING:
+    from terragrip.maps import FieldMap
+
+
+def command(
+    inputs: Annotated[
+        list[Path],
+        typer.Argument(
+            metavar="ESTIMATES", help="Files written by 'terragrip estimate', in the order of their days."
+        ),
+    ],
+    output: Annotated[
+        Path,
+        typer.Option(
+            "--output",
+            "-o",
+            metavar="FILE",
+            help="The map: .gpkg, .parquet, .geojson, .tif, .png, .svg or .pdf.",
+        ),
+    ],
+    cell: Annotated[
+        float | None,
+        typer.Option(metavar="METRES", help="Size of a cell; 1 m, for machines above a tonne 3 m."),
+    ] = None,
+    slip: Annotated[float, typer.Option(metavar="SHARE", help="Slip that adhesion is mapped at.")] = 0.2,
+    soils: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="soils.json: the curves that carry adhesion to that slip."),
+    ] = None,
+    ground: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="ground.json of these runs: soils by what was recognised."),
+    ] = None,
+    fill: Annotated[
+        float, typer.Option(metavar="CELLS", help="Fill this many cells around the driven ones by kriging.")
+    ] = 0.0,
+    layer: Annotated[
+        str,
+        typer.Option(metavar="NAME", help="For .parquet and .geojson: cells, points, anomalies or changes."),
+    ] = "cells",
+    datum: Annotated[str, typer.Option(metavar="CRS", help="Of latitude and longitude.")] = "EPSG:4326",
+    quiet: Quiet = False,
+) -> None:
+    """Map the ground: adhesion at one slip, soil resistance, slip, efficiency.
+
+    Each cell has value, standard deviation, count and passes; patches unlike their surroundings and changes between passes are listed. A
+    log without torques gives slip alone.
+    """
+    from terragrip.errors import InputError
+    from terragrip.estimation import Estimates
+    from terragrip.maps import MapMaker, MapSettings, write_map
+    from terragrip.maps.layers import LAYERS
+    from terragrip.maps.writing import require_suffix
+    from terragrip.soil.estimates import distinct
+    from terragrip.soil.library import SoilLibrary
+
+    target = check_file(output, [*inputs, *(path for path in (soils, ground) if path)])
+    require_suffix(target)
+    for value, name, least, most in (
+        (cell, "--cell", 0.05, 1000.0),
+        (slip, "--slip", 0.02, 0.9),
+        (fill or None, "--fill", 1.0, 100.0),
+    ):
+        if value is not None and not least <= value <= most:
+            raise InputError(f"{value:g} is out of range", place=name, hint=f"take {least:g} to {most:g}")
+    if layer not in LAYERS:
+        raise InputError(f"there is no layer {layer!r}", place="--layer", hint=f"take {', '.join(LAYERS)}")
+    library = SoilLibrary.load(soils) if soils else None
+    files = distinct(inputs)
+    maker = MapMaker(
+        MapSettings(cell, slip, datum, fill), library, _sections(ground, [path.stem for path in files])
+    )
+    with progress("map", quiet) as step:
+        for number, path in enumerate(files, 1):
+            maker.add(Estimates.read(path), path.stem, str(path))
+            step(number, len(files) + 2)
+        made = maker.finish()
+        step(len(files) + 1, len(files) + 2)
+        write_map(made, target, layer)
+    if not quiet:
+        print(summary(made))
+        print(f"Written to {output}")
+
+
+def _sections(ground: Path | None, runs: list[str]) -> dict[str, list[Any]]:
+    """Sections of ground.json by run; those of one drive alone are the only run's."""
+    if ground is None:
+        return {}
+    from terragrip.document import read_json
+
+    found: dict[str, list[Any]] = {}
+    for one in read_json(str(ground), "sections", 1, "'terragrip ground'")["sections"]:
+        found.setdefault(str(one.get("run", runs[0])), []).append(one)
+    return found
+
+
+def summary(made: FieldMap) -> str:
+    """Lines of text: the grid, each quantity over field and headland, anomalies, changes, notes."""
+    import numpy as np
+
+    runs = f"{len(made.runs)} run{'s' * (len(made.runs) != 1)}"
+    lines = [f"{runs}, cells of {made.cell:g} m, EPSG:{made.epsg}"]
+    for name, cells in made.cells.items():
+        at = f" at {100 * made.reference_slip:g} % slip" if name == "adhesion" else ""
+        driven = cells.count > 0
+        line = f"{name}{at}: {int(driven.sum())} cells"
+        for area, inside in (("field", cells.headland <= 0.5), ("headland", cells.headland > 0.5)):
+            if (driven & inside).any():
+                low, middle, high = np.quantile(cells.value[driven & inside], [0.1, 0.5, 0.9])
+                line += f"; {area} {middle:.3f} ({low:.3f} to {high:.3f})"
+        found = made.anomalies.get(name, [])
+        line += f"; {len(found)} anomal{'y' if len(found) == 1 else 'ies'}"
+        changes = made.changes.get(name)
+        if changes is not None:
+            line += f"; {int(changes.significant.sum())} of {len(changes)} cells driven again changed"
+        lines.append(line)
+    return "\n".join([*lines, *made.notes])

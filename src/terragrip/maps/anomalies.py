@@ -1,0 +1,162 @@
+"""Anomalies of a map: firm patches and wet holes, as robust local outliers with the false discovery rate controlled."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from terragrip.maps.cells import Cells
+
+Floats = npt.NDArray[np.float64]
+
+AROUND = 96
+"""Cells around one, the nearest beyond `CORE`, whose median is what it should be."""
+CORE = 4.5
+"""Cell sizes around a cell that are left out of what is around it."""
+SIDE = 6
+"""Cells that a side of a cell's surroundings needs to be asked."""
+REACH = 15.0
+"""Cell sizes beyond which nothing is around."""
+SMOOTH = 1.5
+"""Cell sizes over which neighbouring residuals are judged together: a patch is larger than a cell."""
+FALSE_DISCOVERIES = 0.05
+"""Share of what is listed that may be chance (Benjamini and Hochberg 1995)."""
+LEAST_CELLS = 2
+"""Cells that a patch has at least."""
+
+
+@dataclass(frozen=True)
+class Anomaly:
+    """A patch unlike its surroundings: ``cells`` (indices), centre ``column``, ``row`` (in cells), its ``value``, that ``around``, the
+    ``difference`` with its ``std``, and ``p``, the smallest p-value of its cells."""
+
+    cells: npt.NDArray[np.intp]
+    column: float
+    row: float
+    value: float
+    around: float
+    difference: float
+    std: float
+    p: float
+
+
+def anomalies_of(cells: Cells, share: float = FALSE_DISCOVERIES) -> list[Anomaly]:
+    """Patches of cells unlike what is around them, the strongest first.
+
+    A cell's residual is what it lies beyond the medians of its surroundings on each side. Residuals of neighbours are joined by inverse
+    variance; the scatter (MAD) of such scores about the median of all that is around is the null (Efron 2004: most of a field is no
+    anomaly), so that soil varying as it does everywhere is none. At most `share` of what is listed is chance.
+    """
+    from scipy.spatial import cKDTree
+    from scipy.stats import norm
+
+    if len(cells) < AROUND:
+        return []
+    place = np.column_stack([cells.column, cells.row]).astype(float)
+    tree = cKDTree(place)
+    around, middle = _around(tree, place, cells.value)
+    variance = np.maximum(cells.std**2 - cells.constant**2, 1e-12)
+    plain, spread = _joined(tree, place, cells.value - middle, variance)
+    beyond, _ = _joined(tree, place, cells.value - around, variance)
+    known = np.isfinite(plain) & np.isfinite(beyond)
+    if known.sum() < AROUND:
+        return []
+    null = (plain / spread)[known]
+    scale = 1.4826 * np.median(np.abs(null - np.median(null)))
+    score = beyond / spread / max(scale, 1.0)
+    p = np.where(known, 2 * norm.sf(np.abs(np.nan_to_num(score))), 1.0)
+    chosen = significant(p, share)
+    return sorted(
+        (
+            _anomaly(patch, cells, place, around, variance, p)
+            for patch in _patches(tree, place, chosen, score)
+        ),
+        key=lambda one: one.p,
+    )
+
+
+def significant(p: Floats, share: float) -> npt.NDArray[np.bool_]:
+    """Which p-values (n,) are significant at a false discovery rate of `share` (Benjamini and Hochberg 1995)."""
+    order = np.argsort(p)
+    below = np.flatnonzero(p[order] <= share * np.arange(1, len(p) + 1) / max(len(p), 1))
+    chosen = np.zeros(len(p), dtype=bool)
+    if len(below):
+        chosen[order[: below[-1] + 1]] = True
+    return chosen
+
+
+def _around(tree: Any, place: Floats, value: Floats) -> tuple[Floats, Floats]:
+    """What each cell should be (n,), and the median of all around (n,).
+
+    The first: of the medians of the cells around on each of four sides the one nearest to the cell's value. At the border of two soils
+    one side agrees with it, so that a border is no anomaly; a value between the sides' medians agrees with its surroundings.
+    Around are `AROUND` cells, the nearest beyond `CORE` and within `REACH`; a side of less than `SIDE` of them is not
+    asked. NaN where fewer than half of them, or no side, are there.
+    """
+    inner = int(np.ceil(np.pi * CORE**2)) + 1
+    count = min(AROUND + inner, len(place))
+    distance, index = tree.query(place, k=count, distance_upper_bound=REACH)
+    near = np.isfinite(distance) & (distance > CORE)
+    index = np.minimum(index, len(value) - 1)
+    offset = place[index] - place[:, None, :]
+    sides = []
+    for axis in (0, 1):
+        for sign in (-1.0, 1.0):
+            inside = near & (sign * offset[:, :, axis] > 0)
+            enough = inside.sum(axis=1) >= SIDE
+            median = np.full(len(place), np.nan)
+            median[enough] = np.nanmedian(np.where(inside, value[index], np.nan)[enough], axis=1)
+            sides.append(median)
+    low, high = np.fmin.reduce(sides), np.fmax.reduce(sides)
+    known = (near.sum(axis=1) >= AROUND // 2) & np.isfinite(low)
+    middle = np.full(len(place), np.nan)
+    middle[known] = np.nanmedian(np.where(near, value[index], np.nan)[known], axis=1)
+    return np.where(known, np.clip(value, low, high), np.nan), middle
+
+
+def _joined(tree: Any, place: Floats, residual: Floats, variance: Floats) -> tuple[Floats, Floats]:
+    """Mean residual over `SMOOTH` by inverse variance, and its SD."""
+    distance, index = tree.query(place, k=min(9, len(place)), distance_upper_bound=SMOOTH)
+    index = np.minimum(index, len(residual) - 1)
+    usable = np.isfinite(distance) & np.isfinite(residual[index])
+    weight = np.where(usable, 1 / variance[index], 0.0)
+    total = weight.sum(axis=1)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        mean = np.sum(weight * np.nan_to_num(residual[index]), axis=1) / total
+        spread = 1 / np.sqrt(total)
+    mean[~np.isfinite(residual)] = np.nan
+    return mean, spread
+
+
+def _patches(
+    tree: Any, place: Floats, chosen: npt.NDArray[np.bool_], score: Floats
+) -> list[npt.NDArray[np.intp]]:
+    """Chosen cells of one sign that touch, corners included."""
+    from scipy.sparse import coo_matrix
+    from scipy.sparse.csgraph import connected_components
+
+    pairs = tree.query_pairs(1.5, output_type="ndarray")
+    alike = chosen[pairs[:, 0]] & chosen[pairs[:, 1]] & (score[pairs[:, 0]] * score[pairs[:, 1]] > 0)
+    pairs = pairs[alike]
+    graph = coo_matrix((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(len(place), len(place)))
+    label = connected_components(graph, directed=False)[1]
+    rows = np.flatnonzero(chosen)
+    order = rows[np.argsort(label[rows], kind="stable")]
+    if not len(order):
+        return []
+    cuts = np.flatnonzero(np.diff(label[order])) + 1
+    return [patch for patch in np.split(order, cuts) if len(patch) >= LEAST_CELLS]
+
+
+def _anomaly(
+    patch: npt.NDArray[np.intp], cells: Cells, place: Floats, around: Floats, variance: Floats, p: Floats
+) -> Anomaly:
+    weight = 1 / variance[patch]
+    value, base = (float(np.average(x[patch], weights=weight)) for x in (cells.value, around))
+    column, row = place[patch].mean(axis=0) + 0.5
+    return Anomaly(
+        patch, float(column), float(row), value, base, value - base, float(1 / np.sqrt(weight.sum())), float(p[patch].min())
+    )  # fmt: skip

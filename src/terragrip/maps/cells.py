@@ -1,0 +1,168 @@
+"""Block statistics: readings of many runs become cells of a grid, each with value, SD, count and passes."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from terragrip.maps.values import Reading
+
+Floats = npt.NDArray[np.float64]
+Ints = npt.NDArray[np.int64]
+
+PASS_TIME = 10.0
+"""Seconds of absence from a cell after which the vehicle's return is another pass."""
+HALVES = 2
+"""Parts of a cell's length whose scatter tells how much a cell's mean errs; finer ones are too alike to be so many."""
+CORRELATED = 2.5
+"""Wheel radii of way over which the estimator's random error is one error: unseen loads vary over 1.25 radii to either side
+(decision 0095)."""
+LEAST_WAY = 0.05
+"""Metres of wheel way; less in a cell says nothing."""
+LEAST_X = 0.1
+"""Where a cell was read at less than this share of the reference (x), its value would be an extrapolation ..."""
+VAGUE_X = 0.35
+"""... and where x is uncertain by more than this share of itself, a guess."""
+
+
+@dataclass(frozen=True)
+class Pieces:
+    """Consecutive rows of one reading in one part of a cell, many of them (m,).
+
+    ``column``, ``row``: the cell; ``run``: number of the run; ``time`` [s] of the first row; ``metres`` of way; ``x``, ``y`` and their
+    four SDs summed over the metres; ``rows``: how many; ``headland``: whether the first row is on a headland. Braked wheels' x and y are
+    turned round.
+    """
+
+    column: Ints
+    row: Ints
+    run: Ints
+    time: Floats
+    metres: Floats
+    x: Floats
+    y: Floats
+    constant: Floats
+    random: Floats
+    x_constant: Floats
+    x_random: Floats
+    rows: Ints
+    headland: npt.NDArray[np.bool_]
+
+
+@dataclass(frozen=True)
+class Cells:
+    """Cells of one quantity (k,), or of its passes: grid ``column`` and ``row``, ``value``, ``std``, ``constant`` (the part of ``std`` that
+    all cells share), ``count`` of rows, ``passes``; ``run``, ``time`` of the first pass; ``headland`` share of the way."""
+
+    column: Ints
+    row: Ints
+    value: Floats
+    std: Floats
+    constant: Floats
+    count: Ints
+    passes: Ints
+    run: Ints
+    time: Floats
+    headland: Floats
+
+    def __len__(self) -> int:
+        return len(self.value)
+
+
+def pieces_of(
+    reading: Reading, time: Floats, way: Floats, size: float, run: int, headland: npt.NDArray[np.bool_]
+) -> Pieces:
+    """A reading's rows summed over parts of cells of `size` [m]; `way` [m] (n,) not falling."""
+    rows = np.flatnonzero(reading.good)
+    column = np.floor(reading.east[rows] / size).astype(np.int64)
+    line = np.floor(reading.north[rows] / size).astype(np.int64)
+    part = np.floor(way[rows] / (size / HALVES)).astype(np.int64)
+    new = (np.diff(column) != 0) | (np.diff(line) != 0) | (np.diff(part) != 0)
+    begin = np.flatnonzero(np.r_[True, new][: len(rows)])
+    step = np.diff(way, prepend=way[:1])[rows]
+
+    def total(values: Floats) -> Floats:
+        return np.asarray(np.add.reduceat(step * values[rows], begin)) if len(begin) else np.zeros(0)
+
+    y = total(reading.y)
+    turned = np.where(y < 0, -1.0, 1.0) if reading.turns else np.ones(len(y))
+    spreads = [total(getattr(reading, name)) for name in ("constant", "random", "x_constant", "x_random")]
+    pieces = Pieces(
+        column[begin], line[begin], np.full(len(begin), run), time[rows][begin], total(np.ones(len(time))), turned * total(reading.x),
+        turned * y, spreads[0], spreads[1], spreads[2], spreads[3], np.diff(np.r_[begin, len(rows)]), headland[rows][begin],
+    )  # fmt: skip
+    return _where(pieces, pieces.metres > 0)
+
+
+def _where(pieces: Pieces, keep: npt.NDArray[np.bool_] | npt.NDArray[np.intp]) -> Pieces:
+    return Pieces(*(getattr(pieces, name)[keep] for name in Pieces.__dataclass_fields__))
+
+
+def cells_of(parts: Sequence[Pieces], correlated: float) -> tuple[Cells, Cells]:
+    """The cells of one quantity, and the same by pass. `correlated` [m]: `CORRELATED` wheel radii.
+
+    A cell's value is Σ y/Σ x: errors of x that average out do not draw it down, as least squares would. Its variance is the larger of
+    two, and the constants' besides, which no number of passes lessens: what the pieces scatter by (K Σ metres/(Σ x)², K pooled over the
+    map: how the ground varies within a cell, and random errors over a piece), and the estimator's own random variance, once for every
+    `correlated` metres of wheel way.
+    """
+    joined = Pieces(
+        *(np.concatenate([getattr(p, name) for p in parts]) for name in Pieces.__dataclass_fields__)
+    )
+    joined = _where(joined, np.lexsort((joined.time, joined.run, joined.row, joined.column)))
+    new_cell = _starts(joined.column, joined.row)
+    new_pass = new_cell | _starts(joined.run) | (np.diff(joined.time, prepend=-np.inf) > PASS_TIME)
+    cell = np.cumsum(new_cell) - 1
+    scatter = _scatter(joined, cell)
+    passes = np.bincount(cell, new_pass).astype(np.int64) if len(cell) else np.zeros(0, dtype=np.int64)
+    whole = _summed(joined, new_cell, scatter, correlated, passes)
+    each = _summed(joined, new_pass, scatter, correlated, np.ones(int(new_pass.sum()), dtype=np.int64))
+    return whole, each
+
+
+def _starts(*columns: npt.NDArray[np.generic]) -> npt.NDArray[np.bool_]:
+    new = np.zeros(len(columns[0]), dtype=bool)
+    new[:1] = True
+    for column in columns:
+        new[1:] |= column[1:] != column[:-1]
+    return new
+
+
+def _scatter(pieces: Pieces, cell: Ints) -> float:
+    """K [y² m]: the variance of y - value x over a metre, over all cells that hold two pieces or more."""
+    if not len(cell):
+        return 0.0
+    x = np.bincount(cell, pieces.x)
+    value = np.divide(np.bincount(cell, pieces.y), x, out=np.zeros(len(x)), where=x > 0)
+    freedom = len(cell) - len(x)
+    if freedom <= 0:
+        return 0.0
+    return float(np.sum((pieces.y - value[cell] * pieces.x) ** 2 / pieces.metres) / freedom)
+
+
+def _summed(
+    pieces: Pieces, start: npt.NDArray[np.bool_], scatter: float, correlated: float, passes: Ints
+) -> Cells:
+    begin = np.flatnonzero(start)
+
+    def total(values: Floats) -> Floats:
+        return np.asarray(np.add.reduceat(values, begin)) if len(begin) else np.zeros(0)
+
+    metres, x = total(pieces.metres), total(pieces.x)
+    safe = np.where(x > 0, x, np.nan)
+    value = total(pieces.y) / safe
+    x_share = total(pieces.x_random) / safe
+    random = np.hypot(total(pieces.random) / safe, value * x_share)
+    constant = np.hypot(total(pieces.constant) / safe, value * total(pieces.x_constant) / safe)
+    once = np.minimum(1.0, correlated / np.maximum(metres, 1e-9))
+    std = np.sqrt(np.maximum(scatter * metres / safe**2, random**2 * once) + constant**2)
+    rows = np.add.reduceat(pieces.rows, begin).astype(np.int64) if len(begin) else np.zeros(0, dtype=np.int64)
+    headland = total(pieces.metres * pieces.headland) / np.maximum(metres, 1e-9)
+    cells = Cells(
+        pieces.column[begin], pieces.row[begin], value, std, constant, rows, passes, pieces.run[begin], pieces.time[begin], headland
+    )  # fmt: skip
+    known = (metres > LEAST_WAY) & (x > LEAST_X * metres) & (x_share * np.sqrt(once) < VAGUE_X)
+    return Cells(*(getattr(cells, name)[known] for name in Cells.__dataclass_fields__))

@@ -1,0 +1,63 @@
+"""What became of the ground between passes and days: the change of each cell, and whether it is one."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from terragrip.maps.anomalies import FALSE_DISCOVERIES, significant
+from terragrip.maps.cells import Cells
+
+Floats = npt.NDArray[np.float64]
+Ints = npt.NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class Changes:
+    """Cells (k,) that were driven more than once: ``first`` and ``last`` value, ``difference`` with ``std``, ``p``, ``significant``; the
+    runs of both (numbers) and the seconds between them where both are of one run, else NaN."""
+
+    column: Ints
+    row: Ints
+    first: Floats
+    last: Floats
+    difference: Floats
+    std: Floats
+    p: Floats
+    significant: npt.NDArray[np.bool_]
+    first_run: Ints
+    last_run: Ints
+    seconds: Floats
+
+    def __len__(self) -> int:
+        return len(self.difference)
+
+
+def changes_of(passes: Cells, share: float = FALSE_DISCOVERIES, *, same_machine: bool = True) -> Changes:
+    """From the first to the last pass of each cell, in the order of the runs and of time.
+
+    `passes`: one row a pass (:func:`terragrip.maps.cells.cells_of`). On one machine constants that all passes share cannot make a change;
+    between machines each has its own. `significant` holds the false discovery rate at `share`.
+    """
+    from scipy.stats import norm
+
+    order = np.lexsort((passes.time, passes.run, passes.row, passes.column))
+    column, row = passes.column[order], passes.row[order]
+    new = np.ones(len(order), dtype=bool)
+    new[1:] = (column[1:] != column[:-1]) | (row[1:] != row[:-1])
+    begin = np.flatnonzero(new)
+    end = np.r_[begin[1:], len(order)] - 1
+    several = end > begin
+    first, last = order[begin[several]], order[end[several]]
+    variance = passes.std**2 - (passes.constant**2 if same_machine else 0.0)
+    difference = passes.value[last] - passes.value[first]
+    std = np.sqrt(np.maximum(variance[first] + variance[last], 1e-18))
+    p = 2 * norm.sf(np.abs(difference) / std)
+    same = passes.run[first] == passes.run[last]
+    return Changes(
+        passes.column[first], passes.row[first], passes.value[first], passes.value[last], difference, std, p,
+        significant(p, share), passes.run[first], passes.run[last],
+        np.where(same, passes.time[last] - passes.time[first], np.nan),
+    )  # fmt: skip

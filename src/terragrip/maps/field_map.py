@@ -1,0 +1,174 @@
+"""From runs to a map: the quantities of the ground by cell, the points along the way, anomalies and changes."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+import numpy as np
+import numpy.typing as npt
+
+from terragrip.errors import InputError
+from terragrip.maps.anomalies import Anomaly, anomalies_of
+from terragrip.maps.cells import CORRELATED, Cells, Pieces, cells_of, pieces_of
+from terragrip.maps.changes import Changes, changes_of
+from terragrip.maps.filling import filled
+from terragrip.maps.places import Places, has_positions, places_of, zone_of
+from terragrip.maps.points import Points, points_of
+from terragrip.maps.soils import SoilWay, soil_of_cells, soil_way
+from terragrip.maps.values import QUANTITIES, readings_of
+
+if TYPE_CHECKING:
+    from terragrip.estimation import Estimates
+    from terragrip.soil.library import SoilLibrary
+
+Floats = npt.NDArray[np.float64]
+
+REFERENCE_SLIP = 0.2
+"""Slip that adhesion is mapped at unless told otherwise."""
+GROUND = ("adhesion", "soil_resistance")
+"""What is the ground's own, and searched for anomalies; slip and efficiency answer to the load too, and slip stands in where it is all."""
+MOST_CELLS = 50_000_000
+"""Cells of the box around all runs beyond which a raster of them would not fit a common machine's memory."""
+LARGE_MACHINE = 1000.0
+"""kg: heavier machines are mapped by `LARGE_CELL` unless told otherwise, lighter ones by `SMALL_CELL`."""
+LARGE_CELL, SMALL_CELL = 3.0, 1.0
+
+
+@dataclass(frozen=True)
+class MapSettings:
+    """How a map is made: ``cell`` [m] (None: by the machine), ``reference_slip``, ``datum`` of the positions, ``fill``: cell sizes to
+    krige beyond the driven cells (0: none)."""
+
+    cell: float | None = None
+    reference_slip: float = REFERENCE_SLIP
+    datum: str = "EPSG:4326"
+    fill: float = 0.0
+
+
+@dataclass(frozen=True)
+class FieldMap:
+    """A map: ``epsg`` of its grid and the ``cell`` [m]; by quantity ``cells``, ``passes`` (a row a pass), ``anomalies``, ``changes``; the
+    ``soil`` of cells; the ``points`` along the way; names of the ``runs``; ``notes``: sentences for the user."""
+
+    epsg: int
+    cell: float
+    cells: Mapping[str, Cells]
+    passes: Mapping[str, Cells]
+    anomalies: Mapping[str, list[Anomaly]]
+    changes: Mapping[str, Changes]
+    soil: Mapping[tuple[int, int], tuple[str, float]]
+    points: Points
+    runs: tuple[str, ...]
+    reference_slip: float
+    notes: tuple[str, ...] = field(default=())
+
+
+@dataclass
+class MapMaker:
+    """Takes runs one by one, so that many fit the memory; `finish` makes the map."""
+
+    settings: MapSettings = field(default_factory=MapSettings)
+    library: SoilLibrary | None = None
+    ground: Mapping[str, list[Mapping[str, object]]] = field(default_factory=dict)
+    runs: list[str] = field(default_factory=list)
+    notes: list[str] = field(default_factory=list)
+    _epsg: int = 0
+    _cell: float = 0.0
+    _correlated: float = 0.0
+    _parts: dict[str, list[Pieces]] = field(default_factory=dict)
+    _soil: list[SoilWay] = field(default_factory=list)
+    _points: list[Points] = field(default_factory=list)
+    _machines: set[str] = field(default_factory=set)
+
+    def add(self, estimates: Estimates, run: str, file: str | None = None) -> None:
+        """Take one run. Raises InputError where it has no positions, or impossible ones; ``file`` is named there."""
+        vehicle = estimates.vehicle
+        if not has_positions(estimates):
+            raise InputError(
+                "holds no positions", file=file or run, hint="estimate a log with latitude and longitude"
+            )
+        if not self._epsg:
+            self._epsg = zone_of(estimates["latitude"], estimates["longitude"])
+            self._cell = self.settings.cell or (LARGE_CELL if vehicle.mass > LARGE_MACHINE else SMALL_CELL)
+            radius = float(vehicle.wheel_radius.mean()) if vehicle.knows_wheels else 0.5
+            self._correlated = CORRELATED * radius
+        places = places_of(estimates, self._epsg, self.settings.datum, file)
+        self._check_extent(places, file or run)
+        number = len(self.runs)
+        self.runs.append(run)
+        self._machines.add(str(estimates.about.get("vehicle")))
+        self.notes += [f"{run}: {note}" for note in places.notes]
+        if vehicle.antenna is None:
+            self.notes.append(
+                f"{run}: the vehicle file has no antenna; it is taken to stand over the rear axle."
+            )
+        way = np.maximum.accumulate(np.nan_to_num(estimates["distance"]))
+        for reading in readings_of(estimates, places, self.settings.reference_slip, self.library):
+            pieces = pieces_of(reading, estimates.time, way, self._cell, number, places.headland)
+            self._parts.setdefault(reading.quantity, []).append(pieces)
+        self._soil.append(soil_way(estimates, places, way, self._cell, self.ground.get(run, [])))
+        self._points.append(points_of(estimates, places, way, self._cell, number))
+
+    def _check_extent(self, places: Places, file: str) -> None:
+        known = np.isfinite(places.east)
+        if not known.any():
+            raise InputError(
+                "has no usable stretch of positions",
+                file=file,
+                hint="look at the positions: too few, or all jumps",
+            )
+        east, north = np.ptp(places.east[known]), np.ptp(places.north[known])
+        if (east / self._cell + 1) * (north / self._cell + 1) > MOST_CELLS:
+            enough = math.sqrt(east * north / MOST_CELLS)
+            raise InputError(
+                f"cells of {self._cell:g} m over {east:.0f} m by {north:.0f} m are more than {MOST_CELLS} cells",
+                file=file, place="--cell", hint=f"take {max(enough, self._cell) * 1.1:.2g} m or more",
+            )  # fmt: skip
+
+    def finish(self) -> FieldMap:
+        """The map of the runs taken. Raises InputError where none was, or no row counts."""
+        if not self.runs:
+            raise InputError("there is no run to map", hint="give files written by 'terragrip estimate'")
+        cells: dict[str, Cells] = {}
+        passes: dict[str, Cells] = {}
+        for quantity in (name for name in QUANTITIES if name in self._parts):
+            whole, each = cells_of(self._parts[quantity], self._correlated)
+            if len(whole):
+                cells[quantity], passes[quantity] = whole, each
+        if not cells:
+            raise InputError(
+                "no row of the runs tells of the ground where its place is known",
+                hint="drive, with positions",
+            )
+        judged = GROUND if any(name in cells for name in GROUND) else ("slip",)
+        anomalies = {name: anomalies_of(cells[name]) for name in judged if name in cells}
+        one = len(self._machines) == 1
+        changes = {
+            name: found for name, all_ in passes.items() if len(found := changes_of(all_, same_machine=one))
+        }
+        if not changes:
+            self.notes.append("Every cell was driven once: there is no map of changes.")
+        if self.settings.fill:
+            cells = {name: filled(one, self.settings.fill) for name, one in cells.items()}
+        return FieldMap(
+            self._epsg, self._cell, cells, passes, anomalies, changes, soil_of_cells(self._soil), Points.joined(self._points),
+            tuple(self.runs), self.settings.reference_slip, tuple(self.notes),
+        )  # fmt: skip
+
+
+def map_of(
+    runs: Iterable[tuple[str, Estimates]],
+    settings: MapSettings | None = None,
+    library: SoilLibrary | None = None,
+    progress: Callable[[int], None] | None = None,
+) -> FieldMap:
+    """The map of runs (name, estimates); raises as `MapMaker`."""
+    maker = MapMaker(settings or MapSettings(), library)
+    for number, (run, estimates) in enumerate(runs, 1):
+        maker.add(estimates, run)
+        if progress:
+            progress(number)
+    return maker.finish()

@@ -1,0 +1,96 @@
+"""A map as a picture: each quantity with its SD beside it, anomalies outlined."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from terragrip.maps.field_map import FieldMap
+from terragrip.maps.values import QUANTITIES
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+WIDTH = 9.0
+"""Inches."""
+QUANTILES = (0.02, 0.98)
+"""What the colours span; beyond, the colour bar's ends are pointed."""
+
+
+def picture(made: FieldMap) -> Figure:
+    """A row for each quantity: value with its anomalies on the left, SD on the right; metres from the south-west corner."""
+    from matplotlib.figure import Figure
+
+    corner, extent = _corner(made), _extent(made)
+    tall = WIDTH / 2.6 * min(max(extent[1] / max(extent[0], 1e-9), 0.25), 2.0) + 0.9
+    figure = Figure(figsize=(WIDTH, tall * len(made.cells)), layout="constrained")
+    axes = figure.subplots(len(made.cells), 2, squeeze=False, sharex=True, sharey=True)
+    for line, quantity in zip(axes, made.cells, strict=True):
+        cells = made.cells[quantity]
+        title = QUANTITIES[quantity]
+        if quantity == "adhesion":
+            title = title.replace("the reference slip", f"{100 * made.reference_slip:g} % slip")
+        _panel(line[0], made, cells.column, cells.row, cells.value, corner, "viridis", title)
+        _panel(line[1], made, cells.column, cells.row, cells.std, corner, "cividis", "its standard deviation")
+        for one in made.anomalies.get(quantity, []):
+            x, y = one.column * made.cell - corner[0], one.row * made.cell - corner[1]
+            size = np.sqrt(len(one.cells) / np.pi) * made.cell + made.cell
+            line[0].add_patch(_ring(x, y, size))
+        line[0].set_ylabel("north [m]")
+    for ax in axes[-1]:
+        ax.set_xlabel("east [m]")
+    west, south = corner
+    figure.suptitle(
+        f"EPSG:{made.epsg}, from east {west:.0f} m, north {south:.0f} m; cells of {made.cell:g} m; anomalies ringed",
+        fontsize=9,
+    )
+    return figure
+
+
+def _corner(made: FieldMap) -> tuple[float, float]:
+    columns = [cells.column.min() for cells in made.cells.values()]
+    rows = [cells.row.min() for cells in made.cells.values()]
+    return float(min(columns) * made.cell), float(min(rows) * made.cell)
+
+
+def _extent(made: FieldMap) -> tuple[float, float]:
+    return tuple(
+        made.cell
+        * (
+            max(getattr(c, n).max() for c in made.cells.values())
+            - min(getattr(c, n).min() for c in made.cells.values())
+            + 1
+        )
+        for n in ("column", "row")
+    )
+
+
+def _panel(
+    ax: Axes,
+    made: FieldMap,
+    column: np.ndarray,
+    row: np.ndarray,
+    values: np.ndarray,
+    corner: tuple[float, float],
+    colours: str,
+    title: str,
+) -> None:
+    west, south = int(column.min()), int(row.min())
+    image = np.full((int(row.max()) - south + 1, int(column.max()) - west + 1), np.nan)
+    image[row - south, column - west] = values
+    low, high = np.quantile(values, QUANTILES)
+    left, bottom = west * made.cell - corner[0], south * made.cell - corner[1]
+    shown = ax.imshow(
+        image, origin="lower", cmap=colours, vmin=low, vmax=max(high, low + 1e-9), interpolation="nearest",
+        extent=(left, left + image.shape[1] * made.cell, bottom, bottom + image.shape[0] * made.cell),
+    )  # fmt: skip
+    ax.figure.colorbar(shown, ax=ax, extend="both", shrink=0.85)
+    ax.set_title(title, fontsize=9)
+
+
+def _ring(x: float, y: float, radius: float):  # type: ignore[no-untyped-def]
+    from matplotlib.patches import Circle
+
+    return Circle((x, y), radius, fill=False, edgecolor="#d55e00", linewidth=1.5)

@@ -1,0 +1,207 @@
+"""Where a run's vehicle is, row by row: metres on a UTM grid, heading, outages and jumps of the positions cut."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+import numpy.typing as npt
+
+from terragrip.errors import InputError
+from terragrip.maps.plausible import refuse_impossible
+
+if TYPE_CHECKING:
+    from terragrip.estimation import Estimates
+    from terragrip.vehicle import Vehicle
+
+Floats = npt.NDArray[np.float64]
+
+OUTAGE_TIME = 1.0
+"""Seconds between two fixes, or five usual periods if that is longer, beyond which the way between them is an outage ..."""
+OUTAGE_WAY = 1.0
+"""... where the vehicle drove more metres than this meanwhile."""
+JUMP = 0.5
+"""Metres by which a step of the positions may differ from the way driven, beside eight times its usual scatter and `JUMP_SHARE`."""
+JUMP_SHARE = 0.3
+LEAST_FIXES = 5
+"""Fixes between two jumps or outages; fewer are taken for strays."""
+TURNED = np.radians(25.0)
+"""Beyond this angle from the main direction of the drive, or its reverse, the vehicle is on a headland."""
+
+
+@dataclass(frozen=True)
+class Places:
+    """Where the vehicle is at each row of a run.
+
+    ``east``, ``north`` (n,) [m] of the rear axle's centre, NaN where no position tells; ``heading`` (n,) [rad, from east towards north];
+    ``headland`` (n,): the vehicle turns or drives across the run's main direction; ``notes``: sentences on what was cut.
+    """
+
+    east: Floats
+    north: Floats
+    heading: Floats
+    headland: npt.NDArray[np.bool_]
+    notes: tuple[str, ...] = ()
+
+    def of(self, forward: float, left: float) -> tuple[Floats, Floats]:
+        """East and north (n,) [m] of a point of the vehicle, ``forward`` [m] of the rear axle's centre and to its ``left`` [m]."""
+        cosine, sine = np.cos(self.heading), np.sin(self.heading)
+        return self.east + forward * cosine - left * sine, self.north + forward * sine + left * cosine
+
+
+def zone_of(latitude: Floats, longitude: Floats) -> int:
+    """EPSG code of the UTM zone (of a polar grid beyond 84° N and 80° S) around the median of positions [deg] (n,)."""
+    known = np.isfinite(latitude) & np.isfinite(longitude)
+    north, east = float(np.median(latitude[known])), float(np.median(longitude[known]))
+    if not -80.0 <= north <= 84.0:
+        return 32661 if north > 0 else 32761
+    zone = int((east + 180.0) // 6.0) % 60 + 1
+    return (32600 if north >= 0 else 32700) + zone
+
+
+def has_positions(estimates: Estimates) -> bool:
+    """Whether any row has a position."""
+    return {"latitude", "longitude"} <= set(estimates.columns) and bool(
+        np.any(np.isfinite(estimates["latitude"]) & np.isfinite(estimates["longitude"]))
+    )
+
+
+def places_of(estimates: Estimates, epsg: int, datum: str = "EPSG:4326", file: str | None = None) -> Places:
+    """Where the vehicle is at each row.
+
+    `epsg`: the grid; `datum`: the coordinate reference system of latitude and longitude. The antenna stands where the vehicle file says
+    (``antenna``), over the rear axle's centre if it does not. Between fixes the place is interpolated; outages and jumps are cut. Raises
+    InputError where there are no positions, or where speed or turns contradict them (:mod:`terragrip.maps.plausible`).
+    """
+    if not has_positions(estimates):
+        raise InputError("holds no positions", file=file, hint="estimate a log with latitude and longitude")
+    latitude, longitude = estimates["latitude"], estimates["longitude"]
+    vehicle, way = estimates.vehicle, np.maximum.accumulate(np.nan_to_num(estimates["distance"]))
+    fixes = _fixes(latitude, longitude)
+    refuse_impossible(estimates, fixes, file)
+    east, north = _projected(latitude[fixes], longitude[fixes], epsg, datum)
+    piece, notes = _pieces(estimates.time[fixes], way[fixes], east, north)
+    x, y = _between(estimates.time, fixes, east, piece), _between(estimates.time, fixes, north, piece)
+    heading = _heading(x, y, way, _base(vehicle), np.nan_to_num(estimates["ground_speed"]))
+    antenna = vehicle.antenna
+    if antenna is not None:
+        cosine, sine = np.cos(heading), np.sin(heading)
+        x, y = x - antenna.x * cosine + antenna.y * sine, y - antenna.x * sine - antenna.y * cosine
+    return Places(x, y, heading, _headland(heading, way), notes)
+
+
+def _base(vehicle: Vehicle) -> float:
+    """Half the metres over which a heading is taken."""
+    return max(0.5, 0.5 * (vehicle.wheelbase or 0.0))
+
+
+def _fixes(latitude: Floats, longitude: Floats) -> npt.NDArray[np.intp]:
+    """Rows with a new position: those that repeat the last one are held, not measured."""
+    rows = np.flatnonzero(np.isfinite(latitude) & np.isfinite(longitude))
+    fresh = np.r_[True, (np.diff(latitude[rows]) != 0) | (np.diff(longitude[rows]) != 0)]
+    return np.asarray(rows[fresh])
+
+
+def _projected(latitude: Floats, longitude: Floats, epsg: int, datum: str) -> tuple[Floats, Floats]:
+    from pyproj import Transformer
+    from pyproj.exceptions import ProjError
+
+    try:
+        transformer = Transformer.from_crs(datum, epsg, always_xy=True)
+    except ProjError as error:
+        raise InputError(
+            f"{datum!r} is no coordinate reference system", place="--datum", hint="write e.g. EPSG:4258"
+        ) from error
+    east, north = transformer.transform(longitude, latitude)
+    return np.asarray(east), np.asarray(north)
+
+
+def _pieces(
+    time: Floats, way: Floats, east: Floats, north: Floats
+) -> tuple[npt.NDArray[np.intp], tuple[str, ...]]:
+    """Which unbroken piece each fix (n,) belongs to, -1 for strays; sentences on what was cut."""
+    if len(time) < 2:
+        return np.full(len(time), -1), ("There are fewer than two positions.",)
+    step, driven, wait = np.hypot(np.diff(east), np.diff(north)), np.diff(way), np.diff(time)
+    excess = step - driven
+    usual = 1.4826 * float(np.median(np.abs(excess - np.median(excess))))
+    jump = np.abs(excess - np.median(excess)) > JUMP + 8 * usual + JUMP_SHARE * driven
+    outage = (wait > max(OUTAGE_TIME, 5 * float(np.median(wait)))) & (driven > OUTAGE_WAY)
+    piece = np.r_[0, np.cumsum(jump | outage)]
+    count = np.bincount(piece)
+    stray = (count < LEAST_FIXES)[piece]
+    notes = []
+    if outage.any():
+        notes.append(
+            f"{int(outage.sum())} outages of the positions, {driven[outage].sum():.0f} m of way, are left blank."
+        )
+    if (jump & ~outage).any():
+        where = time[1:][jump & ~outage][0]
+        notes.append(
+            f"{int((jump & ~outage).sum())} jumps of the positions are cut, the first at {where:.1f} s."
+        )
+    return np.where(stray, -1, piece), tuple(notes)
+
+
+def _between(
+    time: Floats, fixes: npt.NDArray[np.intp], values: Floats, piece: npt.NDArray[np.intp]
+) -> Floats:
+    """Values at the fixes interpolated to all rows (n,), NaN outside the pieces."""
+    out = np.full(len(time), np.nan)
+    good = np.flatnonzero(piece >= 0)
+    if not len(good):
+        return out
+    when = time[fixes[good]]
+    after = np.clip(np.searchsorted(when, time, side="left"), 0, len(good) - 1)
+    before = np.clip(np.searchsorted(when, time, side="right") - 1, 0, len(good) - 1)
+    inside = (time >= when[0]) & (time <= when[-1]) & (piece[good[after]] == piece[good[before]])
+    out[inside] = np.interp(time[inside], when, values[good])
+    return out
+
+
+def _heading(east: Floats, north: Floats, way: Floats, base: float, speed: Floats) -> Floats:
+    """Course over `base` metres behind and ahead (n,) [rad], turned round in reverse; NaN where no place is known."""
+    known = np.isfinite(east)
+    heading = np.full(len(east), np.nan)
+    if known.sum() < 2:
+        return heading
+    rows = np.flatnonzero(known)
+    begin = np.r_[0, np.flatnonzero(np.diff(rows) > 1) + 1]
+    for first, last in zip(begin, np.r_[begin[1:], len(rows)], strict=True):
+        part = rows[first:last]
+        s = way[part]
+        fresh = np.r_[True, np.diff(s) > 1e-6]
+        x, y, at = east[part][fresh], north[part][fresh], s[fresh]
+        dx = np.interp(s + base, at, x) - np.interp(s - base, at, x)
+        dy = np.interp(s + base, at, y) - np.interp(s - base, at, y)
+        heading[part] = np.arctan2(dy, dx)
+    back = speed < 0
+    heading[back] = np.remainder(heading[back] + 2 * np.pi, 2 * np.pi) - np.pi
+    return heading
+
+
+def _headland(heading: Floats, way: Floats) -> npt.NDArray[np.bool_]:
+    """Where the vehicle does not drive along the main direction of the run or back (n,).
+
+    The main direction is the mean of the doubled angle over the way (axial mean, Mardia and Jupp 2000). A run that has none, half of
+    whose way would be headland, has no headlands.
+    """
+    length = np.r_[0.0, np.diff(way)]
+    known = np.isfinite(heading)
+    if not length[known].sum() > 0:
+        return np.zeros(len(heading), dtype=bool)
+    bins = np.bincount((np.remainder(heading[known], np.pi) / np.pi * 36).astype(int) % 36, length[known], 36)
+    ring = np.convolve(np.r_[bins[-1], bins, bins[0]], np.ones(3), mode="valid")
+    centre = (int(ring.argmax()) + 0.5) * np.pi / 36
+    near = known & (np.abs(_axial(heading - centre)) < TURNED)
+    main = centre + 0.5 * np.angle(np.sum(length[near] * np.exp(2j * (heading[near] - centre))))
+    headland = known & (np.abs(_axial(heading - main)) > TURNED)
+    if length[headland].sum() > 0.5 * length[known].sum():
+        return np.zeros(len(heading), dtype=bool)
+    return np.asarray(headland)
+
+
+def _axial(angle: Floats) -> Floats:
+    """An angle of a line without direction, between -π/2 and π/2."""
+    return np.asarray(np.remainder(angle + np.pi / 2, np.pi) - np.pi / 2)

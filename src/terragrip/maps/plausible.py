@@ -1,0 +1,124 @@
+"""Whether positions can be what they are named: latitude and longitude swapped, a sign lost, radians for degrees.
+
+Judged by what else the log tells of the motion: the speed over ground, and turns by the difference of the wheels' speeds.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+import numpy.typing as npt
+
+from terragrip.errors import InputError
+from terragrip.physics.geodesy import metres_of
+
+if TYPE_CHECKING:
+    from terragrip.estimation import Estimates
+
+Floats = npt.NDArray[np.float64]
+
+STRETCH = 3.0
+"""Metres over which a step of the positions and a turn are compared."""
+LEAST = 12
+"""Stretches needed to judge by."""
+APART = 0.2
+"""ln of the ratio of positions' to driven way, in the median of the stretches, that is implausible ..."""
+ALIKE = 0.1
+"""... where another reading of the columns comes as near as this."""
+MIRRORED = -0.6
+"""Correlation of the track's turns with those of the wheels below which the track is a mirror image."""
+
+
+def refuse_impossible(estimates: Estimates, fixes: npt.NDArray[np.intp], file: str | None = None) -> None:
+    """Raise InputError where positions contradict the motion, with what they look like. ``fixes``: rows with a fresh position."""
+    latitude, longitude = estimates["latitude"][fixes], estimates["longitude"][fixes]
+    place = "columns latitude, longitude"
+    if np.abs(latitude).max() > 90.0001 or np.abs(longitude).max() > 360.0001:
+        likely = (
+            "swapped"
+            if np.abs(latitude).max() <= 180 and np.abs(longitude).max() <= 90
+            else "metres of a grid"
+        )
+        raise InputError(
+            f"latitudes reach {np.abs(latitude).max():.6g}, beyond 90 degrees",
+            file=file,
+            place=place,
+            hint=f"they look {likely}: mend the profile"
+            if likely == "swapped"
+            else f"they look like {likely}: give degrees",
+        )
+    way = np.maximum.accumulate(np.nan_to_num(estimates["distance"]))[fixes]
+    ends = _stretches(way)
+    if len(ends) < LEAST + 1:
+        return
+    driven = np.diff(way[ends])
+    given = _apart(latitude, longitude, ends, driven)
+    if given > APART:
+        degrees = 180 / np.pi
+        others = {
+            "swapped": (longitude, latitude),
+            "in radians": (latitude * degrees, longitude * degrees),
+        }
+        for what, (north, east) in others.items():
+            if np.abs(north).max() <= 90 and _apart(north, east, ends, driven) < ALIKE:
+                raise InputError(
+                    f"positions move {np.exp(given):.3g} times as far as the wheels and the ground speed, or as little",
+                    file=file,
+                    place=place,
+                    hint=f"latitude and longitude look {what}: mend the profile",
+                )
+    turning = _wheel_turns(estimates, fixes, ends)
+    if turning is not None and _mirrored(latitude, longitude, ends, turning):
+        raise InputError(
+            "the track turns left where the wheels turn right",
+            file=file,
+            place=place,
+            hint="a sign of latitude or longitude is lost (west and south are negative), or they are swapped: mend the profile",
+        )
+
+
+def _stretches(way: Floats) -> npt.NDArray[np.intp]:
+    """Fixes that end stretches of `STRETCH` metres."""
+    number = ((way - way[0]) // STRETCH).astype(np.intp)
+    return np.flatnonzero(np.r_[True, np.diff(number) > 0])
+
+
+def _apart(latitude: Floats, longitude: Floats, ends: npt.NDArray[np.intp], driven: Floats) -> float:
+    """Median size of ln(way by positions / way driven) over stretches; a turn's chord is shorter, which the median bears."""
+    north, east = metres_of(latitude, longitude)
+    moved = np.hypot(np.diff(north[ends]), np.diff(east[ends]))
+    with np.errstate(divide="ignore"):
+        return float(np.median(np.abs(np.log(np.maximum(moved, 1e-9) / driven))))
+
+
+def _wheel_turns(
+    estimates: Estimates, fixes: npt.NDArray[np.intp], ends: npt.NDArray[np.intp]
+) -> Floats | None:
+    """Turn to the left by the wheels over each stretch, in any unit; None where no axle has two wheels."""
+    pairs = [
+        (axle.wheels[0], axle.wheels[-1]) for axle in estimates.vehicle.axles.values() if len(axle.wheels) > 1
+    ]
+    names = [pair for pair in pairs if all(f"wheel_speed_{wheel}" in estimates.columns for wheel in pair)]
+    if not names:
+        return None
+    total = np.zeros(len(estimates))
+    steps = np.diff(estimates.time, prepend=estimates.time[0])
+    for left, right in names:
+        total += np.nan_to_num(estimates[f"wheel_speed_{right}"] - estimates[f"wheel_speed_{left}"]) * steps
+    return np.diff(np.cumsum(total)[fixes[ends]])
+
+
+def _mirrored(latitude: Floats, longitude: Floats, ends: npt.NDArray[np.intp], turning: Floats) -> bool:
+    """Whether the track's turns are the wheels' with the other sign. Both must turn in enough stretches to tell."""
+    north, east = metres_of(latitude, longitude)
+    course = np.arctan2(np.diff(north[ends]), np.diff(east[ends]))
+    bend = np.remainder(np.diff(course) + np.pi, 2 * np.pi) - np.pi
+    by_wheels = 0.5 * (turning[1:] + turning[:-1])  # a bend lies between two stretches
+    clear = np.abs(bend) > 0.15
+    if clear.sum() < LEAST or np.ptp(by_wheels[clear]) == 0:
+        return False
+    strength = np.sum(bend[clear] * by_wheels[clear]) / np.sqrt(
+        np.sum(bend[clear] ** 2) * np.sum(by_wheels[clear] ** 2)
+    )
+    return bool(strength < MIRRORED)

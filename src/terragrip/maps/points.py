@@ -1,0 +1,84 @@
+"""The points of a map: the vehicle's way, a point a quarter of a cell, with what was estimated there."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+
+from terragrip.maps.places import Places
+
+if TYPE_CHECKING:
+    from terragrip.estimation import Estimates
+
+Floats = npt.NDArray[np.float64]
+
+SPACING = 0.25
+"""Of a cell's size, along the way."""
+_SKIPPED = ("latitude", "longitude", "altitude", "distance", "warning", "channels", "supervisor", "nis")
+
+
+@dataclass(frozen=True)
+class Points:
+    """Points (n,): number of the ``run``, ``time`` [s], ``east``, ``north`` [m] of the rear axle, ``heading`` [rad], ``headland``,
+    ``values`` by column of the estimates (the mean over the way of the point; SDs likewise, for neighbours err alike), ``soil``,
+    ``event``."""
+
+    run: npt.NDArray[np.int64]
+    time: Floats
+    east: Floats
+    north: Floats
+    heading: Floats
+    headland: npt.NDArray[np.bool_]
+    values: dict[str, Floats]
+    soil: npt.NDArray[np.object_]
+    event: npt.NDArray[np.object_]
+
+    def __len__(self) -> int:
+        return len(self.time)
+
+    @classmethod
+    def joined(cls, parts: Sequence[Points]) -> Points:
+        """All parts one after another; a column that a part lacks is NaN there."""
+        names = list(dict.fromkeys(name for part in parts for name in part.values))
+        values = {
+            name: np.concatenate([part.values.get(name, np.full(len(part), np.nan)) for part in parts])
+            for name in names
+        }
+
+        def whole(name: str) -> npt.NDArray[Any]:
+            return np.concatenate([getattr(part, name) for part in parts])
+
+        return cls(
+            whole("run"), whole("time"), whole("east"), whole("north"), whole("heading"), whole("headland"), values,
+            whole("soil"), whole("event"),
+        )  # fmt: skip
+
+
+def points_of(estimates: Estimates, places: Places, way: Floats, size: float, run: int) -> Points:
+    """A run's points. Between two of them lies `SPACING` of a cell; rows without a place are left out."""
+    rows = np.flatnonzero(np.isfinite(places.east))
+    number = np.floor(way[rows] / (SPACING * size))
+    begin = np.flatnonzero(np.r_[True, (np.diff(number) != 0) | (np.diff(rows) > 1)])
+    count = np.diff(np.r_[begin, len(rows)])
+
+    def mean(values: Floats) -> Floats:
+        known = np.isfinite(values[rows])
+        total = np.add.reduceat(np.where(known, values[rows], 0.0), begin)
+        many = np.add.reduceat(known, begin)
+        return np.where(many > 0, total / np.maximum(many, 1), np.nan)
+
+    names = [
+        n
+        for n in estimates.columns
+        if n not in _SKIPPED and not n.startswith(("warning_", "curve_", "adaptation_"))
+    ]
+    middle = rows[np.minimum(begin + count // 2, len(rows) - 1)]
+    labels = estimates.labels.get("soil", np.full(len(estimates), "", dtype=object))
+    return Points(
+        np.full(len(begin), run), estimates.time[middle], mean(places.east), mean(places.north), places.heading[middle],
+        places.headland[middle], {name: mean(estimates[name]) for name in names}, labels[middle], estimates["event"][middle],
+    )  # fmt: skip

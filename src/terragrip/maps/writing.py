@@ -1,0 +1,116 @@
+"""A map as a file: GeoPackage, GeoParquet, GeoJSON, GeoTIFF, or a picture. Each appears whole or not at all."""
+
+from __future__ import annotations
+
+import os
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from terragrip.errors import InputError
+from terragrip.files import replacing
+from terragrip.maps.field_map import MOST_CELLS, FieldMap
+
+KINDS: dict[str, tuple[str, str]] = {
+    ".gpkg": ("a GeoPackage with all layers", "pyogrio"),
+    ".parquet": ("a GeoParquet file of one layer", "geopandas"),
+    ".geojson": ("a GeoJSON file of one layer", "pyogrio"),
+    ".tif": ("a GeoTIFF, a band a quantity and a band its SD", "rasterio"),
+    ".tiff": ("a GeoTIFF, a band a quantity and a band its SD", "rasterio"),
+    ".png": ("a picture", "matplotlib"),
+    ".svg": ("a picture", "matplotlib"),
+    ".pdf": ("a picture", "matplotlib"),
+}
+"""What a suffix stands for, and the package that writes it."""
+
+
+def require_suffix(path: str | os.PathLike[str]) -> None:
+    """Raise InputError where a map cannot be written under this name, or what it needs is not installed."""
+    suffix = Path(path).suffix.lower()
+    if suffix not in KINDS:
+        problem = f"a map cannot be written as {suffix!r}" if suffix else "the name has no suffix"
+        raise InputError(
+            problem,
+            file=path,
+            place="--output",
+            hint=f"name it {Path(path).stem}.gpkg, or any of {', '.join(KINDS)}",
+        )
+    for package in ("pyproj", KINDS[suffix][1]):
+        if find_spec(package) is None:
+            extra = "report" if package == "matplotlib" else "geo"
+            raise InputError(
+                f"the Python package {package!r} is needed",
+                file=path,
+                hint=f"pip install 'terragrip[{extra}]'",
+            )
+
+
+def write_map(made: FieldMap, path: str | os.PathLike[str], layer: str = "cells") -> None:
+    """Write a map by the suffix of its name; `layer` is the one of GeoParquet and GeoJSON. Raises InputError as `require_suffix`."""
+    require_suffix(path)
+    suffix = Path(path).suffix.lower()
+    with replacing(path) as temporary:
+        if suffix == ".gpkg":
+            _geopackage(made, temporary)
+        elif suffix in (".parquet", ".geojson"):
+            from terragrip.maps.layers import layer as table
+
+            frame = table(made, layer)
+            if suffix == ".parquet":
+                frame.to_parquet(temporary, index=False)
+            else:
+                temporary.unlink()
+                frame.to_crs(4326).to_file(temporary, driver="GeoJSON", engine="pyogrio", RFC7946="YES")
+        elif suffix in (".tif", ".tiff"):
+            _geotiff(made, temporary)
+        else:
+            from terragrip.maps.picture import picture
+
+            picture(made).savefig(
+                temporary, format=suffix[1:], dpi=150, bbox_inches="tight", facecolor="white"
+            )
+
+
+def _geopackage(made: FieldMap, path: Path) -> None:
+    from terragrip.maps.layers import LAYERS
+    from terragrip.maps.layers import layer as table
+
+    path.unlink()
+    for name in LAYERS:
+        frame = table(made, name)
+        if not len(frame) and name != "cells":
+            continue
+        frame.to_file(path, layer=name, driver="GPKG", engine="pyogrio")
+
+
+def _geotiff(made: FieldMap, path: Path) -> None:
+    """Cloud-optimised, north up, NaN where nothing is known."""
+    import rasterio
+    from rasterio.transform import from_origin
+
+    from terragrip.maps.layers import cell_table
+
+    table = cell_table(made)
+    column, row = table["column"], table["row"]
+    west, top = int(column.min()), int(row.max())
+    width, height = int(column.max()) - west + 1, top - int(row.min()) + 1
+    if width * height > MOST_CELLS:
+        raise InputError(
+            f"a raster of {width} by {height} cells is too large",
+            file=path,
+            place="--cell",
+            hint="map the runs one by one, or coarser",
+        )
+    names = [name for quantity in made.cells for name in (quantity, f"{quantity}_std")]
+    profile: dict[str, Any] = {
+        "driver": "COG", "width": width, "height": height, "count": len(names), "dtype": "float32", "nodata": float("nan"),
+        "crs": made.epsg, "transform": from_origin(west * made.cell, (top + 1) * made.cell, made.cell, made.cell), "compress": "deflate",
+    }  # fmt: skip
+    with rasterio.open(path, "w", **profile) as file:
+        for band, name in enumerate(names, 1):
+            values = np.full((height, width), np.nan, dtype=np.float32)
+            values[top - row, column - west] = table[name]
+            file.write(values, band)
+            file.set_band_description(band, name)

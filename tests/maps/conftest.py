@@ -1,0 +1,6 @@
+"""The tests of maps import their drives from beside them."""
+
+import sys
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).parent))

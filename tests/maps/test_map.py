@@ -1,0 +1,185 @@
+"""Cells, anomalies and changes against what the drive was made of."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+
+pytest.importorskip("geopandas", reason="needs terragrip[geo]")
+
+from lane_drives import EARTH, REFERENCE, drive, lanes, local_east
+from terragrip.errors import InputError
+from terragrip.maps import MapMaker, MapSettings, map_of, write_map
+from terragrip.maps.layers import cell_table, layer
+
+if TYPE_CHECKING:
+    import geopandas
+
+
+@pytest.mark.parametrize("slip", [0.05, 0.1, 0.3])
+def test_adhesion_is_carried_to_the_reference_slip_whatever_the_slip_was(slip: float) -> None:
+    made = map_of([("a", drive(*lanes(2, 30, 3), slip=slip))])
+    np.testing.assert_allclose(made.cells["adhesion"].value, REFERENCE, rtol=2e-3)
+
+
+def test_errors_of_slip_do_not_draw_a_cell_down() -> None:
+    # least squares would, for E[x²] > E[x]²: to about 0.6 of the truth here
+    estimates = drive(*lanes(2, 60, 3), slip=0.04)
+    rng = np.random.default_rng(3)
+    for wheel in estimates.wheels:
+        estimates.columns[f"slip_{wheel}"] = 0.04 + 0.03 * rng.standard_normal(len(estimates))
+        estimates.columns[f"slip_{wheel}_std"] = np.full(len(estimates), 0.03)
+    value = map_of([("a", estimates)]).cells["adhesion"].value
+    assert np.median(value) == pytest.approx(REFERENCE, rel=0.15)
+
+
+def test_a_cell_lies_where_the_wheels_were_not_the_antenna() -> None:
+    ground = drive(*lanes(3, 30, 3), a=lambda e, n: np.where(e < 15, 0.5, 1.0), antenna=(3.0, 1.0))
+    made = map_of([("a", ground)], MapSettings(cell=1.0))
+    frame = layer(made, "cells").dropna(subset="adhesion")
+    east, low = local_east(frame), frame.adhesion.to_numpy() < 0.75 * REFERENCE
+    assert abs(east[low].max() - 15) < 1.3
+    assert abs(east[~low].min() - 15) < 1.3
+
+
+def test_ninety_percent_intervals_hold_where_errors_are_as_stated() -> None:
+    cells = map_of([("a", drive(*lanes(6, 60, 2), noise=0.02, std=0.02))]).cells["adhesion"]
+    held = np.abs(cells.value - REFERENCE) < 1.645 * cells.std
+    assert held.mean() > 0.85
+
+
+def test_constants_are_not_averaged_away_by_passes() -> None:
+    estimates = drive(*lanes(2, 30, 3), std=0.05)
+    estimates.about["vehicle"]["uncertainty"] = {"drive_torque_gain_common": 0.05}
+    once = map_of([("a", estimates)]).cells["adhesion"]
+    often = map_of([(name, estimates) for name in "abcdefgh"]).cells["adhesion"]
+    assert np.all(often.passes >= 8)
+    mu_share = often.constant / often.value
+    np.testing.assert_allclose(mu_share, 0.05, rtol=0.02)
+    assert np.all(often.std >= often.constant)
+    assert np.median(often.std) < np.median(once.std)
+
+
+def test_patches_are_listed_and_borders_are_not() -> None:
+    def ground(east: np.ndarray, north: np.ndarray) -> np.ndarray:
+        hole = (np.abs(east - 12) < 2) & (np.abs(north - 10) < 2)
+        firm = (np.abs(east - 40) < 2) & (np.abs(north - 20) < 2)
+        return np.where(east < 26, 0.8, 1.1) * np.where(hole, 0.5, 1.0) * np.where(firm, 1.5, 1.0)
+
+    made = map_of([("a", drive(*lanes(30, 52, 1), a=ground, noise=0.01))], MapSettings(cell=1.0))
+    found = layer(made, "anomalies")
+    found = found[found.quantity == "adhesion"]
+    assert sorted(found.kind) == ["grips", "slips"]
+    assert np.all(found.p < 0.05)
+    assert np.all(found.area.between(9, 60))
+
+
+def test_change_between_days_is_significant_where_it_is_one() -> None:
+    way = lanes(10, 40, 2)
+    before = drive(*way, noise=0.01, seed=1)
+    after = drive(*way, a=lambda e, n: np.where(e < 20, 0.8, 1.0), noise=0.01, seed=2)
+    changes = layer(map_of([("monday", before), ("friday", after)]), "changes")
+    changes = changes[(changes.quantity == "adhesion") & (changes.first_run != changes.last_run)]
+    east = local_east(changes)
+    assert changes.significant[east < 18].mean() > 0.9
+    assert changes.significant[east > 22].mean() < 0.06
+    assert np.median(changes["difference"][east < 18]) == pytest.approx(-0.2 * REFERENCE, rel=0.05)
+
+
+def test_a_single_pass_has_no_changes_and_says_so() -> None:
+    made = map_of([("a", drive(*lanes(1, 40, 2)))])
+    assert not made.changes
+    assert any("driven once" in note for note in made.notes)
+
+
+def test_headlands_are_apart_from_the_field() -> None:
+    made = map_of([("a", drive(*lanes(6, 40, 6)))])
+    assert 0.05 < np.mean(cell_table(made)["headland"] > 0.5) < 0.4
+    assert made.points.headland.any()
+
+
+def test_outages_and_jumps_are_cut_not_smeared() -> None:
+    east, north = lanes(1, 100, 2)
+    estimates = drive(east, north)
+    latitude = estimates["latitude"].copy()
+    latitude[(east > 40) & (east < 60)] = np.nan
+    latitude[(east > 70) & (east < 72)] += np.degrees(20.0 / EARTH)
+    estimates.columns["latitude"] = latitude
+    made = map_of([("a", estimates)])
+    x = local_east(layer(made, "cells"))
+    assert not ((x > 42) & (x < 58)).any()
+    assert ((x > 80) & (x < 99)).sum() > 15
+    assert any("outage" in note for note in made.notes)
+    assert any("jump" in note for note in made.notes)
+
+
+def test_kriging_fills_between_lanes_with_a_wider_interval() -> None:
+    pytest.importorskip("pykrige", reason="needs terragrip[geo]")
+    estimates = drive(*lanes(8, 40, 4), a=lambda e, n: 1 + 0.2 * np.sin(e / 8), noise=0.01)
+    cells = map_of([("a", estimates)], MapSettings(cell=1.0, fill=2.0)).cells["adhesion"]
+    filled = cells.count == 0
+    assert filled.sum() > 100
+    assert np.all(np.isfinite(cells.value))
+    assert np.median(cells.std[filled]) > np.median(cells.std[~filled])
+
+
+@pytest.mark.filterwarnings("ignore::PendingDeprecationWarning")  # rasterio's own products of affine maps
+@pytest.mark.parametrize("suffix", [".gpkg", ".parquet", ".geojson", ".tif", ".png"])
+def test_files_are_read_back_by_others(tmp_path: Path, suffix: str) -> None:
+    import rasterio
+
+    made = map_of([("a", drive(*lanes(3, 30, 2), a=lambda e, n: np.where(e < 15, 0.5, 1.0)))])
+    path = tmp_path / f"map{suffix}"
+    write_map(made, path)
+    cells, table = made.cells["adhesion"], cell_table(made)
+    if suffix == ".tif":
+        with rasterio.open(path) as file:
+            assert file.crs.to_epsg() == made.epsg == 32633
+            bands = dict(zip(file.descriptions, file.read(), strict=True))
+            row = round(file.bounds.top / made.cell) - 1 - cells.row[0]
+            column = cells.column[0] - round(file.bounds.left / made.cell)
+        assert bands["adhesion"][row, column] == pytest.approx(cells.value[0], rel=1e-6)
+        assert bands["adhesion_std"][row, column] == pytest.approx(cells.std[0], rel=1e-6)
+        assert np.isfinite(bands["adhesion"]).sum() == len(cells)
+    elif suffix == ".png":
+        assert path.read_bytes()[:4] == b"\x89PNG"
+    else:
+        frame = _read(path)
+        np.testing.assert_allclose(frame["adhesion"], table["adhesion"], rtol=1e-9)
+        wanted = {"adhesion_std", "count", "passes", "soil", "soil_probability", "soil_resistance"}
+        assert wanted <= set(frame.columns)
+        assert frame.crs.to_epsg() == (4326 if suffix == ".geojson" else 32633)
+        np.testing.assert_allclose(frame.to_crs(32633).geometry.area, made.cell**2, rtol=1e-2)
+
+
+def _read(path: Path) -> geopandas.GeoDataFrame:
+    import geopandas
+
+    if path.suffix == ".parquet":
+        return geopandas.read_parquet(path)
+    return geopandas.read_file(path, layer="cells") if path.suffix == ".gpkg" else geopandas.read_file(path)
+
+
+def test_soil_of_a_cell_is_the_label_of_most_metres() -> None:
+    east, north = lanes(2, 40, 3)
+    estimates = drive(east, north)
+    estimates.labels["soil"][:] = np.where(east < 20, "sand", "clay")
+    made = map_of([("a", estimates)])
+    assert {name for name, _ in made.soil.values()} == {"sand", "clay"}
+    assert sum(share == 1.0 for _, share in made.soil.values()) > 0.8 * len(made.soil)
+
+
+def test_slip_alone_gives_a_map_of_slip() -> None:
+    estimates = drive(*lanes(4, 40, 3))
+    for name in [n for n in estimates.columns if n.startswith(("adhesion", "soil_res", "efficiency"))]:
+        del estimates.columns[name]
+    assert list(map_of([("a", estimates)]).cells) == ["slip"]
+
+
+def test_a_cell_too_small_for_the_memory_is_refused_with_one_that_would_do() -> None:
+    maker = MapMaker(MapSettings(cell=0.001))
+    with pytest.raises(InputError, match=r"--cell.*take [\d.]+ m or more"):
+        maker.add(drive(*lanes(4, 60, 3)), "a")
