@@ -10,7 +10,7 @@ import pytest
 from fastapi.testclient import TestClient
 from PIL import Image
 
-rasterio = pytest.importorskip("rasterio", reason="basemaps need terragrip[maps]")
+rasterio = pytest.importorskip("rasterio", reason="basemaps need terragrip[geo]")
 
 pytestmark = pytest.mark.filterwarnings(
     "ignore::PendingDeprecationWarning"

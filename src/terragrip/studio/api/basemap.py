@@ -59,7 +59,7 @@ def _mercator(target: Path, path: str) -> Any:
         from rasterio.vrt import WarpedVRT
     except ModuleNotFoundError as error:
         raise InputError(
-            "a GeoTIFF needs rasterio", file=path, hint="pip install 'terragrip[maps]'"
+            "a GeoTIFF needs rasterio", file=path, hint="pip install 'terragrip[geo]'"
         ) from error
     try:
         raster = rasterio.open(target)
