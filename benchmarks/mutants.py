@@ -213,7 +213,15 @@ class Coverage:
         lines = self.by_line.get(one.path, {})
         names = set(lines.get(one.line, ())) or {name for other in lines.values() for name in other}
         chosen, spent = [], 0.0
+        seen: dict[str, int] = defaultdict(
+            int
+        )  # of each test function the quickest case first, then the second of each
+        turns = []
         for name in sorted(names, key=lambda name: (self.seconds[name], name)):
+            function = name.partition("[")[0]
+            turns.append((seen[function], name))
+            seen[function] += 1
+        for _, name in sorted(turns, key=lambda turn: turn[0]):
             if len(chosen) == MOST or (chosen and spent + self.seconds[name] > BUDGET):
                 break
             chosen.append(name)

@@ -15,6 +15,7 @@ from hypothesis import strategies as st
 
 from terragrip.errors import InputError
 from terragrip.recording import Recording, unit_of, wheel_names_in
+from terragrip.recording.clock import LATEST
 from terragrip.vehicle import Vehicle
 
 Columns = dict[str, np.ndarray]
@@ -228,3 +229,13 @@ def test_any_table_is_a_recording_or_refused(table: dict[str, Any]) -> None:
     assert np.all(np.diff(recording.time) > 0)
     assert all(len(values) == len(recording) > 0 for values in recording.channels.values())
     assert not any(np.isinf(values).any() for values in recording.channels.values())
+
+
+def test_a_clock_that_would_leave_its_range_within_the_recording_has_no_zero() -> None:
+    def zero(start: float, *time: float) -> float | None:
+        return Recording(np.array(time), {"ground_speed": np.ones(len(time))}, start=start).clock_zero
+
+    assert zero(LATEST - 10.0, 0.0, 5.0) == LATEST - 10.0
+    assert zero(LATEST - 10.0, 0.0, 15.0) is None
+    assert zero(-4.0, 5.0, 6.0) == -4.0  # its first row is after 1970
+    assert zero(-4.0, 3.0, 6.0) is None

@@ -11,6 +11,9 @@ import pytest
 
 import made_up
 from terragrip.cli import main
+from terragrip.estimation import Estimates
+from terragrip.report import soil_sections
+from terragrip.report.from_estimates import report_of
 from terragrip.report.page import number
 from terragrip.soil.library import Soil, SoilLibrary
 
@@ -196,3 +199,23 @@ def test_events_of_the_estimates_are_listed_without_a_ground(tmp_path: Path) -> 
     assert "1 gap; listed are warnings" in html
     assert "run, 30.0 s" in html
     assert "tool slides up" not in html
+
+
+def test_the_best_slip_counts_the_vehicles_own_rolling_resistance(
+    files: list[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    handed, made = [], soil_sections.both_maxima
+    monkeypatch.setattr(
+        soil_sections,
+        "both_maxima",
+        lambda curves, tire, *rest: handed.append(tire) or made(curves, tire, *rest),
+    )
+    report_of([Path(files[0])])
+    vehicle = Estimates.read(files[0]).vehicle
+    assert vehicle.tire_rolling_resistance > 0
+    assert handed == [vehicle.tire_rolling_resistance]
+
+
+def test_the_cover_names_three_files_and_counts_the_rest(report: Path) -> None:
+    html = (report / "report.html").read_text(encoding="utf-8")
+    assert "fine-0.parquet, fine-1.parquet and fine-2.parquet and 4 more" in html
