@@ -57,11 +57,11 @@ def _adhesion(
     """Adhesion of `wheel` by the method kalman with its process noise scaled."""
     estimator = TractionEstimator.for_recording(recording, vehicle, "kalman")
     settings = ffi.new("tg_settings *")
-    if lib.tg_estimator_settings(estimator.engine._estimator, settings) != lib.TG_OK:
+    if lib.tg_estimator_settings(estimator.engine.handle, settings) != lib.TG_OK:
         raise SystemExit("the kernel does not give its settings")
     n = settings.machine.wheels
     for i in range(n):
         settings.tuning.walk[n + 1 + i] *= adhesion
     settings.tuning.walk[2 * n + 1] *= resistance
-    estimator._engine = Engine(vehicle, settings)
+    estimator._engine = Engine(settings, estimator.engine.slots_in, estimator.engine.index_out)
     return np.asarray(estimator.update_block(recording)[f"adhesion_{wheel}"])
