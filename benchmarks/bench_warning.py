@@ -16,6 +16,7 @@ shares, Poisson's exact for rates, order statistics for medians.
 from __future__ import annotations
 
 import argparse
+import sys
 from collections.abc import Iterable, Iterator
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, field
@@ -270,8 +271,13 @@ def main() -> None:
                 tallies[part, snow_runs.RATE] = score_snow()
                 continue
             listed = list(jobs(part, arguments.stops, arguments.hours, arguments.rates, arguments.seed))
-            for job, tally in zip(listed, pool.map(score, listed), strict=True):
+            scored = pool.map(
+                score, listed, chunksize=len(arguments.rates)
+            )  # a machine's rates in one process
+            for k, (job, tally) in enumerate(zip(listed, scored, strict=True)):
                 tallies.setdefault((part, job[-1]), Tally()).add(tally)
+                if k % 100 == 99:
+                    print(f"{part}: {k + 1} of {len(listed)}\n{table(tallies)}", file=sys.stderr, flush=True)
     text = table(tallies)
     print(text)
     if arguments.write and arguments.families == ["snow"]:

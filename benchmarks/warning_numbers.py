@@ -49,7 +49,8 @@ def tallies_of(recording: Recording, vehicle: Vehicle, course: Course) -> dict[V
         limits = watch_limits(float(np.mean(vehicle.wheel_radius)))
         if name:
             limits[name] *= factor
-        result[name, factor] = judge(course, *starts(rows, Watch(limits, pace(vehicle, limits))))
+        watch = Watch(limits, pace(vehicle, limits), float(np.mean(vehicle.wheel_radius)))
+        result[name, factor] = judge(course, *starts(rows, watch))
     return result
 
 

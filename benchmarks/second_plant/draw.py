@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from second_plant.plant import Ground, Waves, Work, pull_over_weight, run, static_loads, tyres
+from second_plant.plant import Ground, Run, Waves, Work, pull_over_weight, run, static_loads, tyres
 from second_plant.result import result_of
 from second_plant.terramechanics import Soil, sinkage_under, soil_for, stresses
 from terragrip.simulation import SimulationResult
@@ -31,6 +31,9 @@ TIPPED = 0.7
 """rad: a machine that tips over is drawn anew."""
 SOFTNESS = (0.4, 0.9)
 """The most that soft ground bears, wheels dug in, over what is asked of it."""
+
+
+_last: dict[tuple[Kind, int, str, float], Run] = {}  # the drive just made: often wanted at another rate
 
 
 def kinds() -> tuple[Kind, ...]:
@@ -112,7 +115,11 @@ def draw(
     error = scenario.robot.wheel_radius_sd * stream(seed, "wheel radius").standard_normal()
     radius = vehicle.wheel_radius * (1.0 + error)
     step = 1.0 / (200.0 * np.ceil(0.005 / (0.002 * beat)))
-    done = run(vehicle, radius, scenario.robot, ground, work, float(step))
+    drive = (kind, seed, task, duration)  # sensors and rate change nothing of it
+    if drive not in _last:
+        _last.clear()
+        _last[drive] = run(vehicle, radius, scenario.robot, ground, work, float(step))
+    done = _last[drive]
     if max(np.abs(done["pitch"]).max(), np.abs(done["roll"]).max()) > TIPPED:
         return draw(
             kind,

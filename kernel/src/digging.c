@@ -1,15 +1,17 @@
 /* The signs that the wheels dig themselves in (R): what changed within the vehicle's own unit of time, `pace` square roots of its length
  * over gravity, and against what is usual for it. Each sign is in points: its change over the change that counts as one point
- * (tg_watch_settings); the points of a row are added, and their sum, low-passed, is the score that warns. */
+ * (tg_watch_settings), which grows by what is not sure of the signal; the points of a row are added, and their sum, low-passed, is the
+ * score that warns. Only rows whose ground speed was measured count: between them slip follows from the model. */
 #include "estimator.h"
 
 #define TG_SHORT ((tg_real)0.1) /* of the unit of time: rows within it are averaged, and the signals low-passed */
 #define TG_SHARP ((tg_real)0.02) /* SD of slip from which on a row of an interval counts less: between measured speeds it is large */
 #define TG_FLOOR ((tg_real)0.1) /* adhesion that is added where two small ones are compared */
 
+/* Exact also where intervals are longer than tau. */
 static tg_real low_pass(tg_real mean, tg_real dt, tg_real tau, tg_real x)
 {
-    return dt > 0 ? mean + dt / (tau + dt) * (x - mean) : mean;
+    return dt > 0 ? mean - tgi_expm1(-dt / tau) * (x - mean) : mean;
 }
 
 static tg_real bounded(tg_real x, tg_real least, tg_real most)
@@ -27,14 +29,20 @@ tg_real tgi_pace(const tg_settings *s)
     return s->watch.pace * tgi_sqrt(length / s->machine.gravity);
 }
 
+/* The change that counts as one point, where the signal has an SD: noise alone seldom makes one. */
+static tg_real one_point(tg_real change, tg_real deviation) { return tgi_sqrt(tgi_square(change) + tgi_square(deviation)); }
+
 /* Balance: of the leading wheels' adhesion against the trailing ones', within -1 and 1. A resistance that is not known says nothing. */
 static void signals_of(const tg_estimator *e, const tgi_view *l, tg_real *now)
 {
     const tg_real still = e->settings.standstill_speed, ahead = l->leading > 0 ? l->leading : 0, behind = l->trailing > 0 ? l->trailing : 0;
     now[TGI_SLIP] = l->slip;
     now[TGI_DEVIATION] = l->deviation;
-    now[TGI_BALANCE] = (ahead - behind) / (ahead + behind + TG_FLOOR);
+    const tg_real both = ahead + behind + TG_FLOOR;
+    now[TGI_BALANCE] = (ahead - behind) / both;
+    now[TGI_BALANCE_DEVIATION] = l->adhesion_deviation * tgi_sqrt(tgi_square(2 * behind + TG_FLOOR) + tgi_square(2 * ahead + TG_FLOOR)) / tgi_square(both);
     now[TGI_RESISTANCE] = isnan(l->resistance) ? 0 : l->resistance;
+    now[TGI_RESISTANCE_DEVIATION] = isnan(l->resistance_deviation) ? 0 : l->resistance_deviation;
     now[TGI_RIM] = tgi_log(l->rim + still);
     now[TGI_TRAVEL] = tgi_log((l->travel > 0 ? l->travel : 0) + still);
 }
@@ -46,12 +54,14 @@ static void add(tgi_view *sum, const tgi_view *l, tg_real weight)
     sum->leading += weight * l->leading;
     sum->trailing += weight * l->trailing;
     sum->resistance += weight * l->resistance;
+    sum->adhesion_deviation += weight * l->adhesion_deviation;
+    sum->resistance_deviation += weight * l->resistance_deviation;
     sum->rim += weight * l->rim;
     sum->travel += weight * l->travel;
 }
 
 /* Add a row to the interval, weighted by how well its slip is known; returns whether that ended one, whose signals then are in the means.
- * `since` becomes the time between two looks. */
+ * `since` becomes the time between the ends of two. */
 static int32_t add_row(tg_estimator *e, double time, const tgi_view *row, tg_real *since)
 {
     tgi_digging *d = &e->watch.digging;
@@ -93,26 +103,28 @@ void tgi_digging_rest(tgi_digging *d)
     d->weight = d->score = 0;
 }
 
-/* After a row; returns whether it ended an interval. */
+/* After a row whose ground speed was measured; returns whether it ended an interval. */
 int32_t tgi_digging_update(tg_estimator *e, double time, const tgi_view *row)
 {
     const tg_watch_settings *s = &e->settings.watch;
     tgi_digging *d = &e->watch.digging;
+    const tg_real *const now = d->now, *const mean = d->mean;
     tg_real since;
     if (!add_row(e, time, row, &since)) return 0;
-    const tg_real slip = d->now[TGI_SLIP], sure = slip - d->now[TGI_DEVIATION];
-    const tg_real rim = d->now[TGI_RIM] - d->mean[TGI_RIM], gain = d->now[TGI_TRAVEL] - d->mean[TGI_TRAVEL];
+    const tg_real slip = now[TGI_SLIP], deviation = now[TGI_DEVIATION], sure = slip - deviation, rise = slip - mean[TGI_SLIP];
+    const tg_real rim = now[TGI_RIM] - mean[TGI_RIM], gain = now[TGI_TRAVEL] - mean[TGI_TRAVEL];
     const tg_real command = tgi_max(tgi_max(rim, gain), -rim / 2); /* rims slow by command and in hits, yet also of a weak drive that digs in */
     const tg_real high = s->high_slip > 0 ? sure / s->high_slip - 1 : 0;
-    d->points[TG_SIGN_RISE] = bounded((slip - d->mean[TGI_SLIP]) / s->rise, -s->most, s->most);
+    const tg_real leading = d->usual[1] - now[TGI_BALANCE], resistance = now[TGI_RESISTANCE] - mean[TGI_RESISTANCE];
+    d->points[TG_SIGN_RISE] = bounded(rise / one_point(s->rise, deviation), -s->most, s->most);
     d->points[TG_SIGN_HIGH] = bounded(s->most * high, 0, 2 * s->most);
-    d->points[TG_SIGN_LEADING] = bounded((d->usual[1] - d->now[TGI_BALANCE]) / s->leading, -s->most, s->most);
-    d->points[TG_SIGN_RESISTANCE] = bounded((d->now[TGI_RESISTANCE] - d->mean[TGI_RESISTANCE]) / s->resistance, -s->most, s->most);
-    d->points[TG_SIGN_COMMAND] = -bounded(command / s->command, 0, 2 * s->most);
+    d->points[TG_SIGN_LEADING] = bounded(leading / one_point(s->leading, now[TGI_BALANCE_DEVIATION]), -s->most, s->most);
+    d->points[TG_SIGN_RESISTANCE] = bounded(resistance / one_point(s->resistance, now[TGI_RESISTANCE_DEVIATION]), -s->most, s->most);
+    d->points[TG_SIGN_COMMAND] = -bounded(command / one_point(s->command, deviation), 0, 2 * s->most); /* slip's SD is that of the speeds, relative */
     tg_real sum = 0;
     for (int32_t k = 0; k < TG_SIGNS; k++) sum += d->points[k];
     d->score = low_pass(d->score, since < e->constants.pace ? since : e->constants.pace, s->memory * e->constants.pace, sum);
-    d->slips = sure > d->usual[0] + s->level && sure + slip - d->mean[TGI_SLIP] > s->ahead;
+    d->slips = sure > d->usual[0] + s->level && sure + rise > s->ahead;
     return 1;
 }
 

@@ -99,9 +99,10 @@ typedef struct { /* of the driven wheels, along the travel; see immobilization.c
     tg_real slip, deviation, fastest; /* of the worst wheel of each side, their mean: slip, its SD, rim speed */
     tg_real leading, trailing; /* adhesion of these axles, alike where there is but one */
     tg_real resistance, rim, travel; /* rim: mean of all */
+    tg_real adhesion_deviation, resistance_deviation, travel_deviation; /* SDs; of the adhesion of either end */
 } tgi_view;
 
-enum { TGI_SLIP, TGI_DEVIATION, TGI_BALANCE, TGI_RESISTANCE, TGI_RIM, TGI_TRAVEL, TGI_SIGNALS };
+enum { TGI_SLIP, TGI_DEVIATION, TGI_BALANCE, TGI_RESISTANCE, TGI_RIM, TGI_TRAVEL, TGI_BALANCE_DEVIATION, TGI_RESISTANCE_DEVIATION, TGI_SIGNALS };
 
 typedef struct { /* see digging.c */
     tgi_view sum;              /* of the rows since the last interval, weighted, */
@@ -119,8 +120,9 @@ typedef struct { /* see digging.c */
 typedef struct { /* is the vehicle about to be stuck, stuck, pushed? */
     tgi_digging digging;
     tg_real rim, spinning, pushed; /* m/s low-passed; s that each has held */
+    tg_real turned;            /* m that the rims went since the motion began */
     double stuck_time;         /* of the last row that was judged for being stuck */
-    int32_t turning, sinking, stuck, pushing; /* turning: rim holds a value */
+    int32_t turning, held, sinking, stuck, pushing; /* turning: rim holds a value; held: the rims turn, the vehicle hardly moves */
 } tgi_watch;
 
 #define TG_SPEED_STATES (TG_MAX_WHEELS + 2)

@@ -53,8 +53,8 @@ static const tgi_field digging[] = {REALS(T, sum), REALS(T, weight), REALS(T, no
                                     REALS(T, points), REALS(T, score), DOUBLES(T, time), INTEGERS(T, moving), INTEGERS(T, slips), END};
 #undef T
 #define T tgi_watch
-static const tgi_field watch[] = {INSIDE(T, digging, tgi_digging, digging), REALS(T, rim), REALS(T, spinning), REALS(T, pushed),
-                                  DOUBLES(T, stuck_time), INTEGERS(T, turning), INTEGERS(T, sinking), INTEGERS(T, stuck), INTEGERS(T, pushing),
+static const tgi_field watch[] = {INSIDE(T, digging, tgi_digging, digging), REALS(T, rim), REALS(T, spinning), REALS(T, pushed), REALS(T, turned),
+                                  DOUBLES(T, stuck_time), INTEGERS(T, turning), INTEGERS(T, held), INTEGERS(T, sinking), INTEGERS(T, stuck), INTEGERS(T, pushing),
                                   END};
 #undef T
 #define T tg_supervisor_state

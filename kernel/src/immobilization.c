@@ -3,6 +3,8 @@
 #include "estimator.h"
 
 #define TG_CALM ((tg_real)0.1)         /* s, low-pass of the rim speed by which a vehicle is called stuck */
+#define TG_HALF_TURN ((tg_real)3.14)   /* wheel radii: rims that went less since the vehicle stood are a start */
+#define TG_SURE 2                      /* SDs of the ground speed */
 #define TG_LONGEST_LOOK ((tg_real)1.5) /* s between two measured ground speeds: after more, being stuck is judged anew */
 
 /* Which end of the machine wheel i is at, along the travel: 1 leading, -1 trailing, 0 neither. */
@@ -12,8 +14,8 @@ static int32_t end_of(const tg_estimator *e, int32_t i)
     return lever > 0 ? 1 : lever < 0 ? -1 : 0;
 }
 
-typedef struct { /* the worst slip (by what is sure of it), its SD and the fastest rim of a side's driven wheels */
-    tg_real slip, deviation, rim;
+typedef struct { /* the worst slip (by what is sure of it), its SD, the fastest rim and the sum of rims of a side's driven wheels */
+    tg_real slip, deviation, rim, sum;
     int32_t count;
 } side_view;
 
@@ -25,6 +27,7 @@ static void add_wheel(side_view *side, tg_real slip, tg_real deviation, tg_real 
         side->deviation = deviation;
     }
     if (!side->count || tgi_fabs(rim) > tgi_fabs(side->rim)) side->rim = rim;
+    side->sum += rim;
     side->count++;
 }
 
@@ -37,7 +40,7 @@ static tgi_view view_of(const tg_estimator *e, const tg_real *o)
     side_view side[2];
     memset(&l, 0, sizeof l);
     memset(side, 0, sizeof side);
-    tg_real count = 0, ahead = 0, behind = 0, adhesion = 0, turning = 0;
+    tg_real count = 0, ahead = 0, behind = 0, adhesion = 0;
     for (int32_t i = 0; i < s->machine.wheels; i++) {
         if (!e->constants.watched[i]) continue;
         const int32_t end = end_of(e, i), where = e->constants.side[i];
@@ -45,8 +48,8 @@ static tgi_view view_of(const tg_estimator *e, const tg_real *o)
         if (where <= 0) add_wheel(&side[0], o[TG_OUT_SLIP + i], o[TG_OUT_SLIP_STD + i], rim);
         if (where >= 0) add_wheel(&side[1], o[TG_OUT_SLIP + i], o[TG_OUT_SLIP_STD + i], rim);
         l.rim += rim;
-        turning += tgi_fabs(rim);
         adhesion += mu;
+        l.adhesion_deviation += tgi_square(o[TG_OUT_ADHESION_STD + i]);
         l.leading += end > 0 ? mu : 0;
         l.trailing += end < 0 ? mu : 0;
         ahead += end > 0;
@@ -56,13 +59,16 @@ static tgi_view view_of(const tg_estimator *e, const tg_real *o)
     const tg_real sides = (tg_real)((side[0].count > 0) + (side[1].count > 0));
     l.slip = (side[0].slip + side[1].slip) / sides;
     l.deviation = (side[0].deviation + side[1].deviation) / sides;
-    const int32_t onward = 2 * tgi_fabs(l.rim) > turning; /* wheels that turn against each other turn the vehicle on the spot */
+    const int32_t onward = sides < 2 || side[0].sum * side[1].sum > 0; /* sides that turn against each other turn the vehicle on the spot */
     l.fastest = onward ? tgi_fabs(side[0].rim + side[1].rim) / sides : 0;
     l.rim = onward ? tgi_fabs(l.rim) / count : 0;
     l.leading = ahead > 0 && behind > 0 ? l.leading / ahead : adhesion / count;
     l.trailing = ahead > 0 && behind > 0 ? l.trailing / behind : adhesion / count;
+    l.adhesion_deviation = tgi_sqrt(2 * l.adhesion_deviation) / count;
+    l.resistance_deviation = o[TG_OUT_SOIL_RESISTANCE_STD];
     l.resistance = o[TG_OUT_SOIL_RESISTANCE];
     l.travel = (tg_real)e->direction * o[TG_OUT_GROUND_SPEED];
+    l.travel_deviation = o[TG_OUT_GROUND_SPEED_STD];
     if (l.slip < (tg_real)-0.2) l.slip = (tg_real)-0.2;
     return l;
 }
@@ -71,8 +77,8 @@ static void forget_motion(tgi_watch *w)
 {
     tgi_digging_rest(&w->digging);
     w->turning = 0;
-    w->spinning = 0;
-    w->sinking = w->stuck = 0;
+    w->spinning = w->turned = 0;
+    w->sinking = w->stuck = w->held = 0;
 }
 
 /* Seconds that something holds, and `back` times as fast back: neither a shock nor a sample decides. */
@@ -84,7 +90,7 @@ static tg_real count_seconds(tg_real seconds, tg_real dt, int32_t holds, tg_real
 
 /* Warn where the score is high and slip surely above its usual; go on until the score is half of that. Of rims that hardly turn, or
  * against each other, no warning is given. */
-static void watch_digging(tg_estimator *e, const tg_row *row, const tgi_view *l)
+static void watch_digging(tg_estimator *e, const tg_row *row, const tgi_view *l, int32_t measured)
 {
     const tg_watch_settings *s = &e->settings.watch;
     tgi_watch *w = &e->watch;
@@ -93,12 +99,13 @@ static void watch_digging(tg_estimator *e, const tg_row *row, const tgi_view *l)
         w->sinking = 0;
         return;
     }
-    if (!tgi_digging_update(e, row->time, l)) return;
-    const int32_t begins = w->digging.score > s->warn && w->digging.slips && w->spinning <= 0; /* what stands is stuck, no warning */
+    if (!measured || !tgi_digging_update(e, row->time, l)) return;
+    const int32_t begins = w->digging.score > s->warn && w->digging.slips && !w->held; /* what stands is stuck, no warning */
     w->sinking = !w->stuck && (begins || (w->sinking && 2 * w->digging.score > s->warn));
 }
 
-/* Where the ground speed was measured, for a reckoned one follows from the slip last seen. Slower than the standstill speed is standing. */
+/* Where the ground speed was measured, for a reckoned one follows from the slip last seen. Slower than the standstill speed is standing.
+ * Time counts from when the vehicle may stand, for an estimate comes after the fact; stuck is what surely does not go freely. */
 static void watch_stuck(tg_estimator *e, const tg_row *row, const tgi_view *l)
 {
     const tg_watch_settings *s = &e->settings.watch;
@@ -110,14 +117,16 @@ static void watch_stuck(tg_estimator *e, const tg_row *row, const tgi_view *l)
         w->turning = w->stuck = 0;
         w->spinning = 0;
     }
-    w->rim = w->turning ? w->rim + dt / (TG_CALM + dt) * (l->fastest - w->rim) : l->fastest;
+    w->rim = w->turning ? w->rim - tgi_expm1(-dt / TG_CALM) * (l->fastest - w->rim) : l->fastest;
     w->turning = 1;
     w->stuck_time = row->time;
-    const int32_t turning = w->rim > 3 * still;
-    const int32_t held_up = turning && l->travel < tgi_max(s->stuck_travel * l->fastest, still);
-    w->spinning = turning ? count_seconds(w->spinning, dt, held_up, 1, s->stuck_duration) : 0;
+    w->turned += dt * l->fastest;
+    const tg_real hardly = tgi_max(s->stuck_travel * l->fastest, still), freely = s->free_travel * l->fastest, unsure = TG_SURE * l->travel_deviation;
+    const int32_t turning = w->rim > 3 * still && l->fastest > 3 * still, begun = w->turned > TG_HALF_TURN * e->constants.mean_radius;
+    w->spinning = turning ? count_seconds(w->spinning, dt, l->travel - unsure < hardly, 1, s->stuck_duration) : 0;
+    w->held = turning && l->travel < hardly && l->travel + unsure < freely;
     const int32_t long_enough = w->spinning + dt / 2 >= s->stuck_duration; /* to the nearest sample */
-    w->stuck = turning && ((held_up && long_enough) || (w->stuck && l->travel < s->free_travel * l->fastest));
+    w->stuck = turning && ((w->held && long_enough && begun) || (w->stuck && l->travel < freely));
     if (w->stuck) w->sinking = 0;
 }
 
@@ -149,8 +158,9 @@ void tgi_watch_over(tg_estimator *e, const tg_row *row, const tg_drive *drive, i
     if (!rests && moving) judge_push(e, drive, o, dt);
     if (!rests && moving && slips) {
         const tgi_view l = view_of(e, o);
-        if (!row->reckoned && !isnan(row->value[TG_GROUND_SPEED])) watch_stuck(e, row, &l);
-        watch_digging(e, row, &l);
+        const int32_t measured = !row->reckoned && !isnan(row->value[TG_GROUND_SPEED]);
+        if (measured) watch_stuck(e, row, &l);
+        watch_digging(e, row, &l, measured);
     }
     tgi_digging_report(&w->digging, o);
 }

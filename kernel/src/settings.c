@@ -24,8 +24,8 @@ static tg_watch_settings default_watch(void)
     w.memory = (tg_real)0.4;
     w.usual = 12;
     w.level = (tg_real)0.05;
-    w.ahead = (tg_real)0.22;
-    w.warn = (tg_real)3.6;
+    w.ahead = (tg_real)0.2;
+    w.warn = (tg_real)3.3;
     w.most = 3;
     w.rise = (tg_real)0.035;
     w.high_slip = (tg_real)0.25;

@@ -212,7 +212,7 @@ def test_the_events_are_in_order_and_cover_every_flagged_row(soft):
 
 def assert_twins_agree(recording, table):
     limits = watch_limits(float(np.mean(table.vehicle.wheel_radius)))
-    watch = Watch(limits, pace(table.vehicle, limits))
+    watch = Watch(limits, pace(table.vehicle, limits), float(np.mean(table.vehicle.wheel_radius)))
     measured = np.isfinite(recording.channels["ground_speed"])
     notes, points, score = [], [], []
     for row in rows_of(table, measured):

@@ -77,10 +77,10 @@ def _immobilization(estimates: Estimates, rows: NDArray[np.intp]) -> str:
     change = {sign: points[sign] * limits[sign] for sign in ("rise", "leading", "resistance")}
     most = max(points.values())
     sentence = {
-        "rise": f"slip of the worst wheels rose by {change['rise']:.0%}",
+        "rise": f"slip of the worst wheels rose by {change['rise']:.0%} or more",
         "high_slip": f"it is surely above {limits['high_slip']:.0%}",
-        "leading": f"the leading wheels' adhesion against the trailing ones' fell by {change['leading']:.2f} below its usual",
-        "resistance": f"soil resistance rose by {change['resistance']:.2f}",
+        "leading": f"the leading wheels' adhesion against the trailing ones' fell by {change['leading']:.2f} or more below its usual",
+        "resistance": f"soil resistance rose by {change['resistance']:.2f} or more",
     }
     reasons = [
         f"{sentence[sign]} ({points[sign]:.1f} points{', the most that count' if points[sign] >= limits['most'] == most else ''})"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from math import isnan, log, sqrt
+from math import expm1, hypot, isnan, log, sqrt
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,8 +17,8 @@ from terragrip.vehicle import Vehicle
 Array = NDArray[np.float64]
 
 SHORT, FLOOR, SHARP = 0.1, 0.1, 0.02
-CALM, LONGEST_LOOK = 0.1, 1.5
-SLIP, DEVIATION, BALANCE, RESISTANCE, RIM, TRAVEL = range(6)
+CALM, LONGEST_LOOK, HALF_TURN, SURE = 0.1, 1.5, 3.14, 2
+SLIP, DEVIATION, BALANCE, RESISTANCE, RIM, TRAVEL, BALANCE_DEVIATION, RESISTANCE_DEVIATION = range(8)
 
 
 @dataclass(frozen=True)
@@ -27,7 +27,8 @@ class Row:
 
     ``time`` [s]; ``slip``, ``deviation`` (its SD) and ``fastest`` (rim speed [m/s]): of the worst wheel of each side, their mean;
     ``leading`` and ``trailing``: adhesion of these axles, alike where there is but one; ``resistance``; ``rim`` (mean) and
-    ``travel`` [m/s]; ``measured``: the ground speed was. Rim speeds are 0 where wheels turn against each other.
+    ``travel`` [m/s]; ``measured``: the ground speed was. Rim speeds are 0 where the sides turn against each other. ``..._deviation``:
+    SDs, of the adhesion of either end.
     """
 
     time: float
@@ -40,6 +41,9 @@ class Row:
     rim: float
     travel: float
     measured: bool = True
+    adhesion_deviation: float = 0.0
+    resistance_deviation: float = 0.0
+    travel_deviation: float = 0.0
 
 
 def rows_of(estimates: Estimates, measured: NDArray[np.bool_]) -> list[Row]:
@@ -56,13 +60,15 @@ def rows_of(estimates: Estimates, measured: NDArray[np.bool_]) -> list[Row]:
         return np.stack([estimates[name.format(w)] for w in vehicle.wheels], axis=1)
 
     slip, deviation = columns("slip_{}"), np.nan_to_num(columns("slip_{}_std"))
+    adhesion_sd = columns("adhesion_{}_std")[:, driven]
     rims, adhesion = columns("wheel_speed_{}") * np.asarray(vehicle.wheel_radius), columns("adhesion_{}")
     direction = np.where(rims[:, driven].mean(axis=1) < 0, -1.0, 1.0)
     sides = [driven & (sign * side_of_wheels(vehicle) >= 0) for sign in (-1, 1)]
     worst = [_worst(slip[:, on], deviation[:, on], rims[:, on]) for on in sides if on.any()]
     ends = [adhesion[:, on].mean(axis=1) for on in _ends(vehicle, driven)]
     blind = np.isin(estimates.event_codes, [EVENTS.index(e) for e in ("gap", "standstill", "restart")])
-    onward = 2 * np.abs(rims[:, driven].sum(axis=1)) > np.abs(rims[:, driven]).sum(axis=1)
+    sums = [rims[:, on].sum(axis=1) for on in sides if on.any()]
+    onward = sums[0] * sums[-1] > 0 if len(sums) == 2 else np.ones(len(rims), bool)
     table = np.stack(
         [
             estimates.time,
@@ -74,10 +80,16 @@ def rows_of(estimates: Estimates, measured: NDArray[np.bool_]) -> list[Row]:
             estimates["soil_resistance"],
             np.abs(rims[:, driven].mean(axis=1)) * onward,
             direction * estimates["ground_speed"],
+            np.sqrt(2 * np.sum(adhesion_sd**2, axis=1)) / driven.sum(),
+            estimates["soil_resistance_std"],
+            estimates["ground_speed_std"],
         ],
         axis=1,
     )
-    names = ("time", "slip", "deviation", "fastest", "leading", "trailing", "resistance", "rim", "travel")
+    names = (
+        "time", "slip", "deviation", "fastest", "leading", "trailing", "resistance", "rim", "travel",
+        "adhesion_deviation", "resistance_deviation", "travel_deviation",
+    )  # fmt: skip
     return [
         Row(**dict(zip(names, row, strict=True)), measured=bool(seen))
         for row, seen in zip(table.tolist(), measured, strict=True)
@@ -115,18 +127,20 @@ def pace(vehicle: Vehicle, limits: Mapping[str, float]) -> float:
 
 
 def _low_pass(mean: float, dt: float, tau: float, x: float) -> float:
-    return mean + dt / (tau + dt) * (x - mean) if dt > 0 else mean
+    return mean - expm1(-dt / tau) * (x - mean) if dt > 0 else mean
 
 
 @dataclass
 class Watch:
     """Given each row, says whether the wheels dig or the vehicle is stuck.
 
-    ``limits``: as :func:`~terragrip.estimation.settings.watch_limits` gives them; ``pace``: the unit of time [s].
+    ``limits``: as :func:`~terragrip.estimation.settings.watch_limits` gives them; ``pace``: the unit of
+    time [s]; ``radius``: mean wheel radius [m].
     """
 
     limits: Mapping[str, float]
     pace: float
+    radius: float = 0.0
     usual: list[float] = field(default_factory=lambda: [0.0, 0.0])
     age: float = 0.0
 
@@ -137,11 +151,11 @@ class Watch:
         """What was seen of the motion; what is usual is kept."""
         self._rest()
         self.stuck_time: float | None = None
-        self.spinning, self.rim = 0.0, 0.0
-        self.sinking = self.stuck = False
+        self.spinning, self.rim, self.turned = 0.0, 0.0, 0.0
+        self.sinking = self.stuck = self.held = False
 
     def _rest(self) -> None:
-        self.sum, self.weight, self.moving, self.slips = np.zeros(7), 0.0, False, False
+        self.sum, self.weight, self.moving, self.slips = np.zeros(9), 0.0, False, False
         self.points, self.score, self.time = [0.0] * 5, 0.0, 0.0
 
     def update(self, row: Row) -> str:
@@ -154,8 +168,8 @@ class Watch:
         if row.rim < 3 * self.limits["standstill_speed"]:
             self._rest()
             self.sinking = False
-        elif self._evaluate(row):
-            begins = self.score > self.limits["warn"] and self.slips and self.spinning <= 0
+        elif row.measured and self._evaluate(row):
+            begins = self.score > self.limits["warn"] and self.slips and not self.held
             holds = self.sinking and 2 * self.score > self.limits["warn"]
             self.sinking = not self.stuck and (begins or holds)
         return "stuck" if self.stuck else "immobilization" if self.sinking else ""
@@ -163,7 +177,8 @@ class Watch:
     def _evaluate(self, row: Row) -> bool:
         weight = 1 / (row.deviation + SHARP) ** 2
         seen = (
-            row.slip, row.deviation, row.leading, row.trailing, row.resistance, row.rim, row.travel
+            row.slip, row.deviation, row.leading, row.trailing, row.resistance, row.rim, row.travel,
+            row.adhesion_deviation, row.resistance_deviation,
         )  # fmt: skip
         self.sum += weight * np.array(seen)
         self.weight += weight
@@ -179,17 +194,21 @@ class Watch:
         tau = min(self.age, self.limits["usual"] * self.pace)
         for k, x in enumerate((min(self.now[SLIP], self.limits["high_slip"]), self.now[BALANCE])):
             self.usual[k] = _low_pass(self.usual[k], since, tau, x) if self.age > 0 else x
-        self.sum, self.weight, self.moving, self.time = np.zeros(7), 0.0, True, row.time
+        self.sum, self.weight, self.moving, self.time = np.zeros(9), 0.0, True, row.time
         self.age += since
         self._judge(since)
         return True
 
     def _signals(self, mean: Array) -> tuple[float, ...]:
-        slip, deviation, leading, trailing, resistance, rim, travel = mean.tolist()
+        slip, deviation, leading, trailing, resistance, rim, travel, adhesion_sd, resistance_sd = (
+            mean.tolist()
+        )
         ahead, behind, still = max(leading, 0.0), max(trailing, 0.0), self.limits["standstill_speed"]
+        both = ahead + behind + FLOOR
         return (
-            slip, deviation, (ahead - behind) / (ahead + behind + FLOOR), 0.0 if isnan(resistance) else resistance,
+            slip, deviation, (ahead - behind) / both, 0.0 if isnan(resistance) else resistance,
             log(rim + still), log(max(travel, 0.0) + still),
+            adhesion_sd * hypot(2 * behind + FLOOR, 2 * ahead + FLOOR) / both**2, 0.0 if isnan(resistance_sd) else resistance_sd,
         )  # fmt: skip
 
     def _judge(self, since: float) -> None:
@@ -201,13 +220,17 @@ class Watch:
         def bounded(points: float, least: float, most: float) -> float:
             return min(max(points, least), most)
 
-        sure = self.now[SLIP] - self.now[DEVIATION]
+        deviation = self.now[DEVIATION]
+        sure = self.now[SLIP] - deviation
+        command = max(change(RIM), change(TRAVEL), -change(RIM) / 2)
+        leading = hypot(limits["leading"], self.now[BALANCE_DEVIATION])
+        resistance = hypot(limits["resistance"], self.now[RESISTANCE_DEVIATION])
         self.points = [
-            bounded(change(SLIP) / limits["rise"], -most, most),
+            bounded(change(SLIP) / hypot(limits["rise"], deviation), -most, most),
             bounded(most * (sure / limits["high_slip"] - 1), 0.0, 2 * most),
-            bounded((self.usual[1] - self.now[BALANCE]) / limits["leading"], -most, most),
-            bounded(change(RESISTANCE) / limits["resistance"], -most, most),
-            -bounded(max(change(RIM), change(TRAVEL), -change(RIM) / 2) / limits["command"], 0.0, 2 * most),
+            bounded((self.usual[1] - self.now[BALANCE]) / leading, -most, most),
+            bounded(change(RESISTANCE) / resistance, -most, most),
+            -bounded(command / hypot(limits["command"], deviation), 0.0, 2 * most),
         ]
         tau = limits["memory"] * self.pace
         self.score = _low_pass(self.score, min(since, self.pace), tau, sum(self.points))
@@ -222,12 +245,19 @@ class Watch:
         before = row.fastest if self.stuck_time is None else self.rim
         self.rim = _low_pass(before, dt, CALM, row.fastest)
         self.stuck_time = row.time
-        turning = self.rim > 3 * still
-        held_up = turning and row.travel < max(limits["stuck_travel"] * row.fastest, still)
-        spinning = min(max(self.spinning + (dt if held_up else -dt), 0.0), limits["stuck_duration"])
+        self.turned += dt * row.fastest
+        hardly = max(limits["stuck_travel"] * row.fastest, still)
+        freely, unsure = limits["free_travel"] * row.fastest, SURE * row.travel_deviation
+        turning = min(self.rim, row.fastest) > 3 * still
+        may_stand = row.travel - unsure < hardly
+        spinning = min(max(self.spinning + (dt if may_stand else -dt), 0.0), limits["stuck_duration"])
         self.spinning = spinning if turning else 0.0
-        sure = held_up and self.spinning + dt / 2 >= limits["stuck_duration"]
-        holds = self.stuck and row.travel < limits["free_travel"] * row.fastest
-        self.stuck = turning and (sure or holds)
+        self.held = turning and row.travel < hardly and row.travel + unsure < freely
+        sure = (
+            self.held
+            and self.spinning + dt / 2 >= limits["stuck_duration"]
+            and self.turned > HALF_TURN * self.radius
+        )
+        self.stuck = turning and (sure or (self.stuck and row.travel < freely))
         if self.stuck:
             self.sinking = False
