@@ -124,7 +124,7 @@ static void watch_stuck(tg_estimator *e, const tg_row *row, const tgi_view *l)
     const tg_real hardly = tgi_max(s->stuck_travel * l->fastest, still), freely = s->free_travel * l->fastest, unsure = TG_SURE * l->travel_deviation;
     const int32_t turning = w->rim > 3 * still && l->fastest > 3 * still, begun = w->turned > TG_HALF_TURN * e->constants.mean_radius;
     w->spinning = turning ? count_seconds(w->spinning, dt, l->travel - unsure < hardly, 1, s->stuck_duration) : 0;
-    w->held = turning && l->travel < hardly && l->travel + unsure < freely;
+    w->held = turning && l->travel < hardly && tgi_max(l->travel, 0) + unsure < freely;
     const int32_t long_enough = w->spinning + dt / 2 >= s->stuck_duration; /* to the nearest sample */
     w->stuck = turning && ((w->held && long_enough && begun) || (w->stuck && l->travel < freely));
     if (w->stuck) w->sinking = 0;

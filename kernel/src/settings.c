@@ -25,7 +25,7 @@ static tg_watch_settings default_watch(void)
     w.usual = 12;
     w.level = (tg_real)0.05;
     w.ahead = (tg_real)0.2;
-    w.warn = (tg_real)3.3;
+    w.warn = (tg_real)3.5;
     w.most = 3;
     w.rise = (tg_real)0.035;
     w.high_slip = (tg_real)0.25;

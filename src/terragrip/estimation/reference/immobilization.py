@@ -252,7 +252,7 @@ class Watch:
         may_stand = row.travel - unsure < hardly
         spinning = min(max(self.spinning + (dt if may_stand else -dt), 0.0), limits["stuck_duration"])
         self.spinning = spinning if turning else 0.0
-        self.held = turning and row.travel < hardly and row.travel + unsure < freely
+        self.held = turning and row.travel < hardly and max(row.travel, 0.0) + unsure < freely
         sure = (
             self.held
             and self.spinning + dt / 2 >= limits["stuck_duration"]
