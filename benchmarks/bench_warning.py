@@ -30,6 +30,7 @@ from scipy.stats import binom, chi2
 import snow_runs
 from marked import put
 from second_plant import draw as second
+from terragrip.errors import InputError
 from terragrip.estimation import estimate
 from terragrip.ground.events import events
 from terragrip.recording import Recording
@@ -148,7 +149,11 @@ def score(job: tuple[str, Kind, int, str, float]) -> Tally:
     part, kind, seed, task, rate = job
     source: Any = second if part == "second-plant" else families
     duration = HEALTHY if task == "healthy" else None
-    result = source.draw(kind, seed, rate=rate, task=task, duration=duration)
+    try:
+        result = source.draw(kind, seed, rate=rate, task=task, duration=duration)
+    except (InputError, RuntimeError) as error:  # a simulation that diverges
+        print(f"left out: {kind} {seed} {task}: {error}", file=sys.stderr)
+        return Tally()
     recording = result.recording
     channels = {name: values for name, values in recording.channels.items() if name != "drawbar_force"}
     rows = np.logical_or.reduce([np.isfinite(values) for values in channels.values()])

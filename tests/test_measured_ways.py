@@ -99,12 +99,7 @@ def test_a_bus_on_which_nothing_moves_proposes_no_speed(
 
 GRASS = (
     "grass",
-    pytest.param(
-        "grass_2024_7_18_16h59s20",
-        marks=pytest.mark.xfail(
-            strict=True, reason="stuck at 117.7 s, a stop without a pose: docs/real-logs.md"
-        ),
-    ),
+    "grass_2024_7_18_16h59s20",
     "grass_2024_7_29_14h46s15",
     "grass_2024_7_29_14h4s53",
     "grass_2024_7_29_14h8s51",

@@ -52,14 +52,16 @@ def test_a_soft_spot_is_warned_of_before_the_vehicle_stands(curve, rate):
 
 
 def test_hills_hits_and_stops_are_not_called_stuck_and_rarely_warned_of():
-    """The rate of false warnings is benchmarks/bench_warning.py's; in 12 minutes more than two would be out of order."""
+    """The rate of false warnings is benchmarks/bench_warning.py's. These drives are full of hits, some of them to more than half
+    of slip: 8 warnings in the 48 minutes of seeds 1004 to 1053, as many as by the numbers before. In 12 minutes more than five (the
+    95 % bound of that rate) would be out of order."""
     warned = 0
     for seed in range(1004, 1016):
         result = simulate(healthy_drive(seed, duration=60.0, drawbar=False))
         kinds = [e.kind for e in events(estimate(result.recording, result.vehicle))]
         assert ("stuck" in kinds) == bool(result.truth["stuck"].any())
         warned += kinds.count("immobilization") if "stuck" not in kinds else 0
-    assert warned <= 2
+    assert warned <= 5
 
 
 def warned_by(drive, unit=1.0):
@@ -92,6 +94,59 @@ def test_a_larger_vehicle_is_given_more_time():
 def test_a_steady_drive_and_a_short_hit_are_no_warning():
     assert warned_by(lambda t: (0.06, 1.0)) == []
     assert warned_by(lambda t: (0.06 + 0.12 * (25 < t < 25.3), 1.0)) == []
+
+
+def test_noise_of_slip_is_no_warning():
+    """A slow, rounded ground speed: slip has an SD of .12, and says so."""
+    rng, watch = np.random.default_rng(5), Watch(watch_limits(), 1.0)
+    for k in range(3000):
+        slip = 0.06 + rng.normal(0, 0.12)
+        row = Row(0.2 * k, slip, 0.12, 0.3, 0.25, 0.25, 0.1, 0.3, 0.3 * (1 - slip), travel_deviation=0.036)
+        assert watch.update(row) == ""
+
+
+def test_rims_that_gain_while_the_vehicle_loses_speed_are_no_command():
+    """One driven axle: slip alone. The motors run up as the wheels lose their hold."""
+    watch, warned = Watch(watch_limits(), 0.66), []
+    for k in range(2500):
+        t = 0.01 * k
+        slip = 0.1 + 0.8 * np.clip(t - 24, 0, 1)
+        rim = 0.22 * (1 + 0.15 * np.clip(t - 24, 0, 1))
+        if watch.update(Row(t, slip, 0.02, rim, 0.3, 0.3, 0.1, rim, rim * (1 - slip))) == "immobilization":
+            warned.append(t)
+    assert warned
+    assert 24 < warned[0] < 24.8
+
+
+def stuck_by(rows, radius=0.2):
+    """First time at which the twin says stuck of (time, rim, ground speed, its SD), or None."""
+    watch = Watch(watch_limits(), 1.0, radius)
+    for t, rim, travel, deviation in rows:
+        slip = 1 - travel / rim if rim else 0.0
+        if (
+            watch.update(Row(t, slip, 0.02, rim, 0.2, 0.2, 0.1, rim, travel, travel_deviation=deviation))
+            == "stuck"
+        ):
+            return t
+    return None
+
+
+def test_a_start_is_not_stuck_before_the_wheels_made_half_a_turn():
+    starting = [(0.1 * k, 0.2, 0.0, 0.01) for k in range(100)]  # half a turn after 3.1 s
+    assert stuck_by(starting[:30]) is None
+    assert 3.1 < stuck_by(starting) < 3.5
+
+
+def test_a_ground_speed_too_coarse_to_show_going_shows_no_stuck():
+    slow = [(0.4 * k, 0.12, 0.12 if k < 20 else -0.15, 0.09) for k in range(30)]
+    assert stuck_by(slow) is None
+    assert stuck_by([(t, rim, v, 0.01) for t, rim, v, _ in slow]) is not None
+
+
+def test_stuck_comes_in_time_though_the_estimate_lags():
+    """It loses its speed from 9.6 to 10 s; the estimate shows that .1 s later, within two of its SDs."""
+    lagging = [(0.01 * k, 0.45, float(np.clip(10.1 - 0.01 * k, 0, 0.4)), 0.03) for k in range(1200)]
+    assert 10.3 < stuck_by(lagging) <= 10.5
 
 
 def test_a_vehicle_that_stands_at_once_is_stuck_without_a_warning():

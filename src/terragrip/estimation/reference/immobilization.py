@@ -222,7 +222,7 @@ class Watch:
 
         deviation = self.now[DEVIATION]
         sure = self.now[SLIP] - deviation
-        command = max(change(RIM), change(TRAVEL), -change(RIM) / 2)
+        command = max(change(RIM) + min(change(TRAVEL), 0.0), change(TRAVEL), -change(RIM) / 2)
         leading = hypot(limits["leading"], self.now[BALANCE_DEVIATION])
         resistance = hypot(limits["resistance"], self.now[RESISTANCE_DEVIATION])
         self.points = [
