@@ -13,7 +13,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from terragrip.errors import InputError
-from terragrip.vehicle import Axle, Calibration, Sensors, Uncertainty, Vehicle, Wheel
+from terragrip.vehicle import Vehicle
+from terragrip.vehicle_parts import Axle, Calibration, Sensors, Uncertainty, Wheel
 
 GOOD = """\
 name: Innok Heros 444

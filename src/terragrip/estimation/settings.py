@@ -15,7 +15,8 @@ from terragrip.errors import InputError
 from terragrip.estimation.methods import Method
 from terragrip.physics.loads import GRAVITY, load_levers, wheel_shares
 from terragrip.physics.radius import biderman_deflection, hadekel_deflection, loaded_radius, rolling_radius
-from terragrip.vehicle import BidermanRadius, HadekelRadius, Vehicle, Wheel
+from terragrip.vehicle import Vehicle
+from terragrip.vehicle_parts import BidermanRadius, HadekelRadius, Wheel
 
 Floats = npt.NDArray[np.float64]
 
