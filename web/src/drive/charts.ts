@@ -2,13 +2,15 @@
 
 import uPlot from "uplot";
 import "uplot/dist/uPlot.min.css";
-import { brush, brushed, onBrush } from "../ui/brush";
+import { brush, brushed, onBrush, onPoint, point } from "../ui/brush";
 import { columns } from "../ui/columns";
 import { digits, fill, h } from "../ui/dom";
 import { tried } from "../ui/notes";
 import { color, onTheme } from "../ui/theme";
+import { alone, beyond, levels, limits, line, shown, type Values } from "./axes";
 import { bands, columnsOfBuckets, isDense } from "./buckets";
-import { hearKeys, hearPointers, type Range } from "./gestures";
+import { hearKeys, hearPointers, hearUpright, zoomed, type Range } from "./gestures";
+import { Readout } from "./readout";
 import { EVENT_COLORS, soilColor, soilsOf, type Panel, type Run } from "./run";
 
 const SYNC = "drive";
@@ -18,8 +20,6 @@ const MARGIN = 0.5;
 /** Rows fetched for more than so many times what is shown are too coarse. */
 const COARSE = 3;
 const SOON = 40; // ms
-const LINE = uPlot.paths.linear?.() as uPlot.Series.PathBuilder;
-const MANY = 300; // points of a line
 const MARKS = [0.05, 0.2, 1, 5, 50]; // of a logarithmic axis
 
 interface Fetched {
@@ -34,10 +34,18 @@ export class Charts {
   range: Range = [0, 1];
   onCursor: ((time: number | null) => void) | null = null;
   onPick: ((time: number) => void) | null = null;
+  /** An upright axis was set, or follows its values again. */
+  onUpright: (() => void) | null = null;
   onRange: ((range: Range) => void) | null = null;
   /** The file was replaced while it was open. */
   onReplaced: (() => void) | null = null;
-  private plots: { panel: Panel; plot: uPlot; box: HTMLElement }[] = [];
+  /** Ends of upright axes that the user set, by the panel's key; the others follow their values. */
+  uprights: Record<string, Range> = {};
+  /** The time of the sample that was picked. */
+  picked: number | null = null;
+  private plots: { panel: Panel; plot: uPlot; box: HTMLElement; readout: Readout }[] = [];
+  private pointed: { time: number | null; here: boolean } | null = null;
+  private pointing = 0;
   private count = 0;
   private run: Run | null = null;
   private path = "";
@@ -50,7 +58,11 @@ export class Charts {
   private watcher: ResizeObserver;
 
   constructor() {
-    const forgets = [onTheme(() => this.rebuild()), onBrush(() => this.follow())];
+    const forgets = [
+      onTheme(() => this.rebuild()),
+      onBrush(() => this.follow()),
+      onPoint((path, time) => path === this.path && this.point(time)),
+    ];
     this.forget = () => forgets.forEach((one) => one());
     this.watcher = new ResizeObserver(() => {
       for (const { plot, box } of this.plots) if (box.clientWidth > 80) plot.setSize({ width: box.clientWidth, height: this.height() });
@@ -77,6 +89,7 @@ export class Charts {
     this.pending?.abort();
     clearTimeout(this.timer);
     cancelAnimationFrame(this.frame);
+    cancelAnimationFrame(this.pointing);
     for (const { plot } of this.plots) plot.destroy();
   }
 
@@ -84,7 +97,10 @@ export class Charts {
     const same = path === this.path && run.version === this.run?.version;
     this.path = path;
     this.run = run;
-    if (!same) this.range = this.whole;
+    if (!same) {
+      this.range = this.whole;
+      this.picked = null;
+    }
     this.build(panels);
   }
 
@@ -130,6 +146,45 @@ export class Charts {
     });
   }
 
+  /** Put the cursor at a time: by the map or the plane (`here`, so that other tabs follow), or by another tab. */
+  point(time: number | null, here = false): void {
+    for (const { plot } of this.plots) plot.setCursor({ left: time === null ? -10 : plot.valToPos(time, "x"), top: 1 }, false);
+    this.cursorAt(time, here);
+  }
+
+  /** Mark the sample that was picked. */
+  mark(time: number | null): void {
+    this.picked = time;
+    for (const { plot } of this.plots) plot.redraw(false);
+  }
+
+  /** Set an upright axis; null lets it follow its values. */
+  setUpright(key: string, range: Range | null): void {
+    if (range && !(range[1] > range[0])) return;
+    if (range) this.uprights[key] = range;
+    else delete this.uprights[key];
+    for (const { panel, plot, box } of this.plots) {
+      if (panel.key !== key) continue;
+      box.classList.toggle("fixed", range !== null);
+      plot.setScale("x", { min: this.range[0], max: this.range[1] });
+    }
+    this.onUpright?.();
+  }
+
+  /** The values under the cursor, once a frame; `here`: by this page's pointer, so that other pages follow. */
+  private cursorAt(time: number | null, here: boolean): void {
+    this.pointed = { time, here };
+    this.pointing ||= requestAnimationFrame(() => {
+      this.pointing = 0;
+      const now = this.pointed;
+      if (!now || !this.run) return;
+      const near = 0.01 * (this.range[1] - this.range[0]);
+      for (const { plot, readout } of this.plots) readout.show(plot.data, now.time, this.fetched?.cut ?? false, near);
+      this.onCursor?.(now.time);
+      if (now.here) point(this.path, now.time);
+    });
+  }
+
   private rebuild(): void {
     this.build(this.plots.map(({ panel }) => panel));
   }
@@ -142,13 +197,28 @@ export class Charts {
     this.arrived.clear();
     this.count = panels.length;
     this.plots = panels.map((panel, i) => {
-      const legend = h("div", { class: "legend" }, panel.traces.map((t) => h("span", {}, h("i", { class: `swatch ${t.color}${t.dash ? " dashed" : ""}` }), t.label)));
+      const readout = new Readout(panel);
       const about = panel.about ? h("span", { class: "hint about", title: panel.about }, panel.about) : null;
-      const box = h("div", { class: "chart", role: "img", "aria-label": `${panel.title} over time` }, h("div", { class: "chart-head" }, h("h3", {}, `${panel.title} [${panel.unit}]`), legend, about));
+      const upright = (text: string, title: string, change: () => Range | null): HTMLElement =>
+        h("button", { type: "button", class: "quiet", title, "aria-label": `${title}: ${panel.title}`, click: () => this.setUpright(panel.key, change()) }, text);
+      const now = (): Range => this.scale(i) ?? [0, 1];
+      const middle = (): number => (now()[0] + now()[1]) / 2;
+      const buttons = panel.log
+        ? null
+        : h(
+            "span",
+            { class: "upright" },
+            upright("y+", "Stretch the upright axis", () => zoomed(now(), middle(), 0.6)),
+            upright("y−", "Shrink the upright axis", () => zoomed(now(), middle(), 1 / 0.6)),
+            upright("auto", "Let the upright axis follow its values", () => null),
+          );
+      const box = h("div", { class: "chart", role: "group", "aria-label": `${panel.title} over time` }, h("div", { class: "chart-head" }, h("h3", {}, `${panel.title} [${panel.unit}]`), readout.element, about, buttons));
+      box.classList.toggle("fixed", panel.key in this.uprights);
       this.element.append(box);
       const plot = new uPlot(this.options(panel, box.clientWidth || 700, i === panels.length - 1), [[]], box);
       this.hear(plot);
-      return { panel, plot, box };
+      if (!panel.log) hearUpright(plot.root, plot.over, now, (range) => this.setUpright(panel.key, range));
+      return { panel, plot, box, readout };
     });
     void this.fetch();
   }
@@ -244,7 +314,7 @@ export class Charts {
       padding: [6, 20, 0, 0],
       legend: { show: false },
       cursor: { sync: { key: SYNC }, drag: { x: true, y: false, setScale: false }, points: { show: false }, y: false },
-      scales: { x: { time: false, range: () => this.range }, y: log ? { distr: 3, range: () => panel.log as Range } : { range: (plot, low, high) => limits(plot, low, high, panel) } },
+      scales: { x: { time: false, range: () => this.range }, y: log ? { distr: 3, range: () => panel.log as Range } : { range: (plot, low, high) => this.uprights[panel.key] ?? limits(plot, low, high, panel) } },
       axes: [
         { ...axis, size: 24, ticks: { ...axis.ticks, size: 4 }, gap: 3, values: (_, ticks) => ticks.map((v) => `${digits(v, 6)}${last ? " s" : ""}`) },
         { ...axis, size: 52, space: 24, ...(log ? { splits: () => MARKS, filter: (_: uPlot, at: number[]) => at } : {}), values: (_, ticks) => ticks.map((v) => digits(v, 4)) },
@@ -253,8 +323,8 @@ export class Charts {
       hooks: {
         drawClear: [(plot) => this.spans(plot)],
         drawAxes: [(plot) => (this.isDense(plot) ? columnsOfBuckets(plot, panel.traces, this.fetched?.cut ? 2 : 1) : bands(plot, panel.traces))],
-        draw: [(plot) => levels(plot, panel), (plot) => beyond(plot, panel)],
-        setCursor: [(plot) => plot.cursor.left !== undefined && this.onCursor?.(plot.cursor.left >= 0 ? plot.posToVal(plot.cursor.left, "x") : null)],
+        draw: [(plot) => levels(plot, panel), (plot) => beyond(plot, panel), (plot) => this.drawPicked(plot)],
+        setCursor: [(plot) => plot.cursor.left !== undefined && this.cursorAt(plot.cursor.left >= 0 ? plot.posToVal(plot.cursor.left, "x") : null, true)],
         setSelect: [
           (plot) => {
             if (plot.select.width < 4) return;
@@ -271,6 +341,28 @@ export class Charts {
     hearPointers(plot.over, this);
     plot.over.addEventListener("dblclick", () => this.zoom(this.whole));
     plot.over.addEventListener("click", (event) => this.onPick?.(plot.posToVal(event.offsetX, "x")));
+  }
+
+  /** An upright line with a head at the picked sample. */
+  private drawPicked(plot: uPlot): void {
+    if (this.picked === null) return;
+    const { ctx, bbox } = plot;
+    const x = plot.valToPos(this.picked, "x", true);
+    if (x < bbox.left || x > bbox.left + bbox.width) return;
+    const size = 5 * devicePixelRatio;
+    ctx.save();
+    ctx.strokeStyle = ctx.fillStyle = color("accent");
+    ctx.lineWidth = 1.5 * devicePixelRatio;
+    ctx.beginPath();
+    ctx.moveTo(x, bbox.top);
+    ctx.lineTo(x, bbox.top + bbox.height);
+    ctx.stroke();
+    ctx.beginPath();
+    ctx.moveTo(x - size, bbox.top);
+    ctx.lineTo(x + size, bbox.top);
+    ctx.lineTo(x, bbox.top + 1.5 * size);
+    ctx.fill();
+    ctx.restore();
   }
 
   /** Soils as a tint behind, events as a strong strip at the foot. */
@@ -293,97 +385,6 @@ export class Charts {
       ctx.fillStyle = color(EVENT_COLORS[event.kind] ?? "ink");
       ctx.fillRect(from, bbox.top + bbox.height - strip, Math.max(to - from, devicePixelRatio), strip);
     }
-    ctx.restore();
-  }
-}
-
-/** A line through all points; of many, a pixel of the screen wide: wider ones cost twenty times as much without a graphics processor. */
-function line(...of: Parameters<uPlot.Series.PathBuilder>): uPlot.Series.Paths | null {
-  const [plot, number, from, to] = of;
-  (plot.series[number] as uPlot.Series).width = to - from > MANY ? 1 / devicePixelRatio : 1.4;
-  return LINE(...of);
-}
-
-/** Values in the unit that is shown; where one is unknown, an array with null for it, as uPlot has it. */
-function shown(values: Float64Array | undefined, scale: number): Float64Array | (number | null)[] {
-  if (!values) return [];
-  const scaled = scale === 1 ? values : values.map((v) => v * scale);
-  return scaled.some(Number.isNaN) ? Array.from(scaled, (v) => (Number.isNaN(v) ? null : v)) : scaled;
-}
-
-type Values = ArrayLike<number | null>;
-
-/** Samples with none on either side: no line reaches them, so each is a point. */
-export function alone(values: Values): number[] {
-  const found: number[] = [];
-  const known = (i: number): boolean => typeof values[i] === "number";
-  for (let i = 0; i < values.length; i++) if (known(i) && !known(i - 1) && !known(i + 1)) found.push(i);
-  return found;
-}
-
-/** Smallest and largest value of the shown traces, and of their intervals, by uPlot's own extremes of each series. */
-function extent(plot: uPlot, panel: Panel): { values: Range; bands: Range } {
-  const values: Range = [Infinity, -Infinity];
-  const bands: Range = [Infinity, -Infinity];
-  let at = 1;
-  const take = (into: Range): void => {
-    const one = plot.series[at++];
-    const [low, high] = [one?.min, one?.max];
-    if (typeof low === "number" && typeof high === "number" && low <= high) [into[0], into[1]] = [Math.min(into[0], low), Math.max(into[1], high)];
-  };
-  for (const t of panel.traces) {
-    if (t.band) {
-      take(bands);
-      take(bands);
-    }
-    take(values);
-  }
-  return { values, bands };
-}
-
-/** The range of the data: intervals inside what the panel shows by custom, values inside the most it can sensibly show. */
-function limits(plot: uPlot, low: number | null, high: number | null, panel: Panel): Range {
-  const { values, bands } = extent(plot, panel);
-  const [soft, hard]: Range[] = [
-    [panel.low ?? -Infinity, panel.high ?? Infinity],
-    [panel.least ?? panel.low ?? -Infinity, panel.most ?? panel.high ?? Infinity],
-  ];
-  const within = (v: number, [from, to]: Range): number => Math.min(Math.max(v, from), to);
-  const ends = [...values.map((v) => within(v, hard as Range)), ...bands.map((v) => within(v, soft as Range))].filter(Number.isFinite);
-  let [from, to] = ends.length && values[0] <= values[1] ? [Math.min(...ends), Math.max(...ends)] : [Math.max(low ?? 0, panel.low ?? -Infinity), Math.min(high ?? 1, panel.high ?? Infinity)];
-  if (!(to > from)) [from, to] = [from - 0.5, from + 0.5];
-  const room = 0.06 * (to - from);
-  return [from - room, to + room];
-}
-
-/** Values that lie outside the axis are listed in its corner: nothing is left out in silence. */
-function beyond(plot: uPlot, panel: Panel): void {
-  const { min, max } = plot.scales["y"] ?? {};
-  if (panel.log || typeof min !== "number" || typeof max !== "number") return;
-  const { values } = extent(plot, panel);
-  const { ctx, bbox } = plot;
-  ctx.save();
-  ctx.fillStyle = color("bad");
-  ctx.font = `${11 * devicePixelRatio}px system-ui, sans-serif`;
-  ctx.textAlign = "right";
-  const x = bbox.left + bbox.width - 4 * devicePixelRatio;
-  if (values[1] > max) ctx.fillText(`▲ up to ${digits(values[1])} ${panel.unit}`, x, bbox.top + 12 * devicePixelRatio);
-  if (values[0] < min) ctx.fillText(`▼ down to ${digits(values[0])} ${panel.unit}`, x, bbox.top + bbox.height - 6 * devicePixelRatio);
-  ctx.restore();
-}
-
-function levels(plot: uPlot, panel: Panel): void {
-  const { ctx, bbox } = plot;
-  for (const level of panel.levels ?? []) {
-    const y = plot.valToPos(level, "y", true);
-    if (!(y > bbox.top && y < bbox.top + bbox.height)) continue;
-    ctx.save();
-    ctx.strokeStyle = color("muted");
-    ctx.setLineDash([5 * devicePixelRatio, 4 * devicePixelRatio]);
-    ctx.beginPath();
-    ctx.moveTo(bbox.left, y);
-    ctx.lineTo(bbox.left + bbox.width, y);
-    ctx.stroke();
     ctx.restore();
   }
 }

@@ -31,13 +31,14 @@ export interface Moved {
   zoom(range: Range): void;
 }
 
-/** Ctrl, shift or alt with the wheel zooms, a sideways wheel pans; one finger pans, two zoom. `over` is a chart's drawing area. */
+/** Ctrl or shift with the wheel zooms, a sideways wheel pans; one finger pans, two zoom. `over` is a chart's drawing area. */
 export function hearPointers(over: HTMLElement, moved: Moved): void {
   over.addEventListener(
     "wheel",
     (event) => {
       const { range, whole } = moved;
-      if (event.ctrlKey || event.shiftKey || event.altKey) {
+      if (event.altKey) return; // the upright axis
+      if (event.ctrlKey || event.shiftKey) {
         event.preventDefault();
         const at = range[0] + (event.offsetX / over.clientWidth) * (range[1] - range[0]);
         moved.zoom(zoomed(range, at, Math.exp((event.deltaY || event.deltaX) * 0.0015)));
@@ -63,6 +64,40 @@ export function hearPointers(over: HTMLElement, moved: Moved): void {
     else if (fingers.size === 2) moved.zoom(pinched(moved.range, before as Range, now as Range));
   });
   for (const end of ["pointerup", "pointercancel", "pointerleave"] as const) over.addEventListener(end, (event) => fingers.delete(event.pointerId));
+}
+
+/** The wheel on an upright axis (with alt also over the chart) zooms it, a drag along it moves it, a double click lets it follow. */
+export function hearUpright(root: HTMLElement, over: HTMLElement, now: () => Range, set: (range: Range | null) => void): void {
+  const place = (event: MouseEvent): { share: number; axis: boolean } => {
+    const box = over.getBoundingClientRect();
+    return { share: 1 - (event.clientY - box.top) / box.height, axis: event.clientX < box.left && event.clientY <= box.bottom };
+  };
+  root.addEventListener(
+    "wheel",
+    (event) => {
+      const { share, axis } = place(event);
+      if (!axis && !event.altKey) return;
+      event.preventDefault();
+      const [low, high] = now();
+      set(zoomed([low, high], low + share * (high - low), Math.exp((event.deltaY || event.deltaX) * 0.0015)));
+    },
+    { passive: false },
+  );
+  let held: { share: number; range: Range } | null = null;
+  root.addEventListener("pointerdown", (event) => {
+    const { share, axis } = place(event);
+    if (!axis) return;
+    held = { share, range: now() };
+    root.setPointerCapture(event.pointerId);
+  });
+  root.addEventListener("pointermove", (event) => {
+    if (!held) return;
+    const [low, high] = held.range;
+    const by = (place(event).share - held.share) * (high - low);
+    if (by) set([low - by, high - by]);
+  });
+  for (const end of ["pointerup", "pointercancel"] as const) root.addEventListener(end, () => (held = null));
+  root.addEventListener("dblclick", (event) => place(event).axis && set(null));
 }
 
 /** Arrows pan by a tenth, + and - zoom, Home shows all. */

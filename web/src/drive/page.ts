@@ -8,23 +8,20 @@ import { note, tried } from "../ui/notes";
 import type { Page } from "../ui/page";
 import { notHere, options, runsOf } from "../ui/runs";
 import { Charts } from "./charts";
-import { Plane } from "./plane";
+import { EventList } from "./events";
 import { zoomed } from "./gestures";
+import { layouts, type Layout } from "./layouts";
+import { address, read, written, type View } from "./link";
+import { Plane, type Points } from "./plane";
+import { described, type Sample } from "./sample";
+import { Views } from "./views";
 import { during, EVENT_COLORS, panelsOf, soilColor, soilsOf, type Run } from "./run";
 
 const FIRST = ["adhesion", "slip", "resistance", "speed"];
 const KEY = "terragrip-drive-panels";
-const HINT = "Drag, shift+wheel or two fingers zoom; arrow keys, sideways wheel or one finger pan; double click shows the whole run.";
+const HINT = "Drag, shift+wheel or two fingers zoom; arrow keys, sideways wheel or one finger pan; wheel or drag on an upright axis for that; double click shows the whole run.";
 
-interface Sample {
-  row: number;
-  time: number;
-  values: Record<string, number | null>;
-  measured: Record<string, number | null>;
-  labels: Record<string, string>;
-  event: string;
-  why: string[];
-}
+const CLICK = "Click a chart to see everything known of that moment, and why µ moved. ◀ ▶ step through samples.";
 
 export const page: Page = (main, { notices, query }) => {
   const charts = new Charts();
@@ -35,14 +32,24 @@ export const page: Page = (main, { notices, query }) => {
   const panels = h("details", { class: "chooser" }, h("summary", {}, "Panels"));
   const legend = h("div", { class: "chips legend-row" });
   const readout = h("output", { class: "line", "aria-live": "off" });
+  const asked = read(query);
+  const list = new EventList((event) => void goTo(event));
+  const views = new Views((range) => charts.zoom(range), () => {
+    back.disabled = !views.canBack;
+    forward.disabled = !views.canForward;
+  });
+  const back = h("button", { type: "button", id: "back", disabled: true, click: () => views.back(), title: "The times shown before (Backspace)" }, "Back");
+  const forward = h("button", { type: "button", id: "forward", disabled: true, click: () => views.forward(), "aria-label": "Forward again" }, "↷");
   const details = h("section", { class: "sample", "aria-label": "Sample", "aria-live": "polite" });
   const planeWheel = h("select", { "aria-label": "Wheel of the plane" });
   let run: Run | null = null;
   let path = "";
   let seen = ""; // size and time of change of what is open
   let chosen: string[] = [];
-  let shown: string[] = JSON.parse(localStorage.getItem(KEY) ?? "null") ?? FIRST;
-  let picked = 0;
+  let shown: string[] = asked.panels ?? JSON.parse(localStorage.getItem(KEY) ?? "null") ?? FIRST;
+  let picked: number | null = null;
+  let linked: View | null = asked; // until its run is open
+  charts.uprights = { ...asked.uprights };
   let asking = false;
 
   const tools = h(
@@ -51,18 +58,22 @@ export const page: Page = (main, { notices, query }) => {
     choice,
     wheels,
     panels,
+    layouts(layout, takeUp),
     h("span", { class: "spring" }),
+    back,
+    forward,
     h("button", { type: "button", id: "zoom-in", click: () => zoom(0.5), "aria-label": "Zoom in" }, "+"),
     h("button", { type: "button", click: () => zoom(2), "aria-label": "Zoom out" }, "−"),
     h("button", { type: "button", click: () => charts.zoom(charts.whole) }, "Whole run"),
   );
   main.append(
-    h("section", { class: "middle", "aria-label": "Charts" }, tools, legend, charts.element, readout),
+    h("section", { class: "middle", "aria-label": "Charts" }, tools, legend, charts.element, h("div", { class: "foot" }, readout)),
     h(
       "aside",
       { class: "panel", "aria-label": "Plane and sample" },
       h("div", { class: "row" }, h("h2", {}, "µ–s plane"), planeWheel),
       plane.element,
+      list.element,
       h(
         "div",
         { class: "row" },
@@ -74,15 +85,45 @@ export const page: Page = (main, { notices, query }) => {
       details,
     ),
   );
-  fill(details, h("p", { class: "hint" }, "Click a chart to see everything known of that moment, and why µ moved. ◀ ▶ step through samples."));
+  fill(details, h("p", { class: "hint" }, CLICK));
 
   function zoom(factor: number): void {
     const [low, high] = charts.range;
-    charts.zoom(zoomed(charts.range, picked > low && picked < high ? picked : (low + high) / 2, factor));
+    charts.zoom(zoomed(charts.range, picked !== null && picked > low && picked < high ? picked : (low + high) / 2, factor));
+  }
+
+  /** What is shown, in the address. */
+  function remember(): void {
+    address("drive", () => {
+      const [low, high] = charts.range;
+      const whole = low <= charts.whole[0] && high >= charts.whole[1];
+      return written({ path, range: whole ? null : charts.range, wheels: chosen, panels: shown, at: picked, uprights: charts.uprights });
+    });
+  }
+
+  function layout(): Layout {
+    return { panels: shown, wheels: chosen, uprights: { ...charts.uprights } };
+  }
+
+  function takeUp(wanted: Layout): void {
+    shown = wanted.panels;
+    charts.uprights = { ...wanted.uprights };
+    const there = wanted.wheels.filter((wheel) => run?.wheels.includes(wheel));
+    if (there.length) chosen = there;
+    drawWheels();
+    draw();
+  }
+
+  /** Show an event with some time about it, and its first sample. */
+  async function goTo(event: { start: number; end: number }): Promise<void> {
+    const about = Math.max(event.end - event.start, 4);
+    charts.zoom([event.start - 0.5 * about, event.end + 0.5 * about]);
+    await pick(event.start);
   }
 
   function draw(): void {
     if (!run) return;
+    remember();
     const all = panelsOf(run, chosen);
     fill(
       panels,
@@ -96,6 +137,7 @@ export const page: Page = (main, { notices, query }) => {
             shown = box.checked ? [...shown, panel.key] : shown.filter((key) => key !== panel.key);
             localStorage.setItem(KEY, JSON.stringify(shown));
             charts.show(path, run as Run, all.filter((p) => shown.includes(p.key)));
+            remember();
           });
           return h("label", { class: "check" }, box, panel.title);
         }),
@@ -144,15 +186,31 @@ export const page: Page = (main, { notices, query }) => {
     path = wanted;
     run = found;
     if (!again) chosen = found.wheels.slice(-2);
+    const link = linked?.path === wanted ? linked : null;
+    linked = null;
+    const named = link?.wheels?.filter((wheel) => found.wheels.includes(wheel)) ?? [];
+    if (named.length) chosen = named;
     choice.value = wanted;
     history.replaceState(null, "", `#/drive?path=${encodeURIComponent(wanted)}`);
+    list.show(found.events);
     fill(planeWheel, found.wheels.map((wheel) => h("option", { value: wheel, selected: wheel === found.wheels.at(-1) }, wheel)));
     drawWheels();
     drawLegend();
     hover(null);
     draw();
-    charts.follow();
+    if (link?.range) charts.zoom(link.range);
+    else charts.follow();
+    if (!again) views.start(charts.range);
+    if (link?.at !== null && link?.at !== undefined) void pick(link.at);
+    else if (!again) forgetSample();
     void drawPlane();
+  }
+
+  function forgetSample(): void {
+    picked = null;
+    charts.mark(null);
+    plane.at(null);
+    fill(details, h("p", { class: "hint" }, CLICK));
   }
 
   /** No run is shown, and why. */
@@ -160,15 +218,17 @@ export const page: Page = (main, { notices, query }) => {
     path = wanted;
     run = null;
     charts.clear(why);
-    for (const one of [legend, wheels, details]) fill(one);
-    plane.show({ slip: [], adhesion: [] });
+    forgetSample();
+    list.show([]);
+    for (const one of [legend, wheels]) fill(one);
+    plane.show({ slip: [], adhesion: [], time: [] });
     readout.value = "";
   }
 
   async function drawPlane(): Promise<void> {
     if (!run || !planeWheel.value) return;
     const [start, end] = charts.range;
-    const points = await tried(() => get<{ slip: number[]; adhesion: number[] }>("drive/plane", { path, wheel: planeWheel.value, start, end, version: run?.version }));
+    const points = await tried(() => get<Points>("drive/plane", { path, wheel: planeWheel.value, start, end, version: run?.version }));
     if (points) plane.show(points);
   }
 
@@ -179,13 +239,15 @@ export const page: Page = (main, { notices, query }) => {
     asking = false;
     if (!found) return;
     picked = found.time;
+    charts.mark(picked);
+    remember();
     showSample(found);
   }
 
   function stepSample(by: number): void {
     if (!run) return;
     const period = (run.end - run.start) / Math.max(run.rows - 1, 1);
-    void pick((picked || charts.range[0]) + by * period);
+    void pick((picked ?? charts.range[0]) + by * period);
   }
 
   function showSample(sample: Sample): void {
@@ -199,33 +261,11 @@ export const page: Page = (main, { notices, query }) => {
       a: of("curve_a"),
       a_std: of("curve_a_std"),
     });
-    const names = Object.keys(sample.values).filter((name) => !name.endsWith("_std"));
-    const event = during(run?.events, sample.time);
-    fill(
-      details,
-      h("p", {}, h("strong", {}, `t = ${sample.time.toFixed(3)} s`), ` (row ${sample.row})`, sample.labels["soil"] ? `, ${sample.labels["soil"]}` : ""),
-      sample.event ? h("p", { class: "bad" }, `${sample.event}${event?.why ? `: ${event.why}` : ""}`) : null,
-      h("h3", {}, "Why µ moved"),
-      sample.why.map((text) => h("p", { class: "why" }, text)),
-      h("h3", {}, "Estimated"),
-      h(
-        "table",
-        {},
-        h(
-          "tbody",
-          {},
-          names.map((name) => {
-            const spread = sample.values[`${name}_std`];
-            return h("tr", {}, h("th", { scope: "row" }, name), h("td", {}, digits(sample.values[name], 4)), h("td", {}, spread === undefined || spread === null ? "" : `± ${digits(1.96 * spread, 2)}`));
-          }),
-        ),
-      ),
-      Object.keys(sample.measured).length ? h("h3", {}, "Measured") : null,
-      h("table", {}, h("tbody", {}, Object.entries(sample.measured).map(([name, v]) => h("tr", {}, h("th", { scope: "row" }, name), h("td", {}, digits(v, 5)), h("td", {}))))),
-    );
+    fill(details, described(sample, during(run?.events, sample.time)));
   }
 
   function hover(time: number | null): void {
+    plane.point(time);
     if (time === null || !run) {
       readout.value = run ? HINT : "";
       return;
@@ -240,7 +280,11 @@ export const page: Page = (main, { notices, query }) => {
   charts.onCursor = hover;
   charts.onPick = (time) => void pick(time);
   let soon = 0;
-  charts.onRange = () => {
+  charts.onUpright = remember;
+  plane.onPoint = (time) => charts.point(time, true);
+  charts.onRange = (range) => {
+    views.seen(range);
+    remember();
     clearTimeout(soon);
     soon = window.setTimeout(() => void drawPlane(), 150);
   };
@@ -248,12 +292,13 @@ export const page: Page = (main, { notices, query }) => {
     seen = "";
     path = choice.value;
     run = null;
+    charts.uprights = {};
     void reload();
   });
   charts.onReplaced = () => void reload();
   planeWheel.addEventListener("change", () => {
     void drawPlane();
-    if (picked) void pick(picked);
+    if (picked !== null) void pick(picked);
   });
 
   async function reload(): Promise<void> {
@@ -272,11 +317,19 @@ export const page: Page = (main, { notices, query }) => {
     }
   }
 
+  const key = (event: KeyboardEvent): void => {
+    if (event.key !== "Backspace" || event.target instanceof HTMLInputElement) return;
+    event.preventDefault();
+    views.back();
+  };
+  main.addEventListener("keydown", key);
   const forget = notices.on((notice) => notice.kind === "folder" && void reload());
   void reload();
   Object.assign(window, { terragripDrive: { charts } });
   return () => {
     forget();
+    main.removeEventListener("keydown", key);
+    views.close();
     charts.close();
     plane.close();
   };

@@ -5,6 +5,7 @@ import type { Samples } from "../fit/samples";
 import { View, ticks } from "../fit/view";
 import { digits, h } from "../ui/dom";
 import { color, onTheme } from "../ui/theme";
+import { nearestKnown } from "./readout";
 
 export interface Now {
   slip: number;
@@ -18,11 +19,25 @@ export interface Now {
 const USELESS = 1.0;
 /** SD of a beyond which the online curve says nothing and is not drawn. */
 
+/** Pairs of one wheel and their times; unknown ones are null. */
+export interface Points {
+  slip: number[];
+  adhesion: number[];
+  time: number[];
+}
+
+/** Pixels within which the pointer finds a pair. */
+const REACH = 12;
+
 export class Plane {
+  /** The time of the pair under the pointer; null where it has left. */
+  onPoint: ((time: number | null) => void) | null = null;
   readonly element = h("div", { class: "plane", role: "img", "aria-label": "Adhesion over slip of one wheel, with the online curve" });
   private canvas = h("canvas", { "aria-hidden": "true" });
   private view = new View({ low: -0.05, high: 0.7 }, { low: -0.1, high: 0.8 }, 300, 260);
-  private points = { slip: [] as number[], adhesion: [] as number[] };
+  private points: Points = { slip: [], adhesion: [], time: [] };
+  private pointed = -1;
+  private readout = h("output", { class: "readout", "aria-live": "off" });
   private now: Now | null = null;
   private shape: Samples | null = null;
   private asked = false;
@@ -30,7 +45,12 @@ export class Plane {
   private watcher: ResizeObserver;
 
   constructor() {
-    this.element.append(this.canvas);
+    this.element.append(this.canvas, this.readout);
+    this.canvas.addEventListener("pointermove", (event) => this.hover(event.offsetX, event.offsetY));
+    this.canvas.addEventListener("pointerleave", () => {
+      this.onPoint?.(null);
+      this.point(null);
+    });
     this.view.left = 46;
     this.view.bottom = 36;
     this.forget = onTheme(() => this.draw());
@@ -43,8 +63,10 @@ export class Plane {
     this.watcher.disconnect();
   }
 
-  show(points: { slip: number[]; adhesion: number[] }): void {
+  show(points: Points): void {
     this.points = points;
+    this.pointed = -1;
+    this.readout.value = "";
     const most = (values: number[], share: number): number => {
       const known = values.filter((v) => v !== null && Number.isFinite(v)).sort((a, b) => a - b);
       return known[Math.floor((known.length - 1) * share)] ?? 0;
@@ -62,6 +84,34 @@ export class Plane {
 
   at(now: Now | null): void {
     this.now = now;
+    this.later();
+  }
+
+  /** Ring the pair nearest to a time, where one is known there. */
+  point(time: number | null): void {
+    const { time: times, slip, adhesion } = this.points;
+    const known = (i: number): boolean => typeof slip[i] === "number" && typeof adhesion[i] === "number";
+    const apart = times.length > 1 ? ((times[times.length - 1] as number) - (times[0] as number)) / (times.length - 1) : 0;
+    this.set(time === null ? -1 : nearestKnown(times, known, time, 2 * apart));
+  }
+
+  private hover(x: number, y: number): void {
+    const { slip, adhesion, time } = this.points;
+    let [best, least] = [-1, REACH];
+    slip.forEach((s, i) => {
+      if (s === null || adhesion[i] === null) return;
+      const away = Math.hypot(this.view.px(s) - x, this.view.py(adhesion[i] as number) - y);
+      if (away < least) [best, least] = [i, away];
+    });
+    if (best < 0) return;
+    this.onPoint?.(time[best] ?? null);
+    this.set(best);
+  }
+
+  private set(i: number): void {
+    if (i === this.pointed) return;
+    this.pointed = i;
+    this.readout.value = i < 0 ? "" : `s ${digits(100 * (this.points.slip[i] as number))} %   µ ${digits(this.points.adhesion[i])}   t ${(this.points.time[i] ?? NaN).toFixed(2)} s`;
     this.later();
   }
 
@@ -106,6 +156,8 @@ export class Plane {
     const points: number[] = [];
     this.points.slip.forEach((s, i) => points.push(view.px(s), view.py(this.points.adhesion[i] as number)));
     ink.dots(points, 1.1, color("muted"), 0.45);
+    const [s, mu] = [this.points.slip[this.pointed], this.points.adhesion[this.pointed]];
+    if (typeof s === "number" && typeof mu === "number") ink.dots([view.px(s), view.py(mu)], 5, color("accent"), 1);
     if (this.now) this.drawNow(ink, this.now);
     pen.restore();
   }

@@ -5,7 +5,8 @@ import * as maplibre from "maplibre-gl";
 import workerUrl from "maplibre-gl/dist/maplibre-gl-worker.mjs?worker&url";
 import { during, EVENT_COLORS, panelsOf, soilColor, type Run } from "../drive/run";
 import { Charts } from "../drive/charts";
-import { address, get, type Item } from "../ui/api";
+import { address, read, written, type View } from "../drive/link";
+import { address as server, get, type Item } from "../ui/api";
 import { brushed } from "../ui/brush";
 import { columns, type Columns } from "../ui/columns";
 import { digits, fill, h } from "../ui/dom";
@@ -43,7 +44,7 @@ export const page: Page = (main, { notices, query }) => {
     legend,
     box,
     charts.element,
-    readout,
+    h("div", { class: "foot" }, readout),
   );
   const map = new maplibre.Map({
     container: box,
@@ -58,6 +59,9 @@ export const page: Page = (main, { notices, query }) => {
   let path = "";
   let seen = ""; // size and time of change of what is open
   let track: Columns | null = null;
+  let here: number | null = null; // the time under the cursor
+  let picked: number | null = null;
+  let linked: View | null = read(query); // until its run is open
 
   const forgetTheme = onTheme(() => {
     if (map.isStyleLoaded()) map.setPaintProperty("paper", "background-color", color("panel"));
@@ -83,13 +87,19 @@ export const page: Page = (main, { notices, query }) => {
     run = found;
     choice.value = wanted;
     history.replaceState(null, "", `#/map?path=${encodeURIComponent(wanted)}`);
-    const before = quantity.value;
+    const link = linked?.path === wanted ? linked : null;
+    const before = (link && query.get("quantity")) || quantity.value;
+    linked = null;
+    picked = link?.at ?? null;
+    if (link) charts.uprights = { ...link.uprights };
     fill(quantity, names().map((n) => h("option", { value: n.value }, n.title)));
     quantity.value = names().some((n) => n.value === before) ? before : `slip_${found.wheels.at(-1)}`;
     charts.show(path, found, panelsOf(found, found.wheels.slice(-1)).filter((p) => p.key === "slip"));
+    charts.mark(picked);
     await draw();
     frame();
-    charts.follow();
+    if (link?.range) charts.zoom(link.range);
+    else charts.follow();
   }
 
   /** No run is shown, and why. */
@@ -137,6 +147,7 @@ export const page: Page = (main, { notices, query }) => {
       from = i;
     }
     replace("track", features, "line");
+    drawPicked();
     drawLegend(asked, low, high);
   }
 
@@ -189,8 +200,38 @@ export const page: Page = (main, { notices, query }) => {
     map.fitBounds(bounds, { padding: 40, duration: 0, maxZoom: 24 });
   }
 
+  /** Mark a time on the track and in the chart, for Drive too: the address holds it. */
+  function pick(time: number): void {
+    picked = time;
+    charts.mark(time);
+    drawPicked();
+    remember();
+  }
+
+  function drawPicked(): void {
+    if (!map.isStyleLoaded()) return;
+    const at = track?.count && picked !== null ? placeOf(picked) : null;
+    replace("picked", at ? [{ type: "Feature", properties: {}, geometry: { type: "Point", coordinates: at } }] : [], "circle");
+    map.setPaintProperty("picked", "circle-color", color("accent"));
+  }
+
+  function placeOf(time: number): [number, number] {
+    const [times, lon, lat] = (track as Columns).data as [Float64Array, Float64Array, Float64Array];
+    const i = nearest(times, time);
+    return [lon[i] as number, lat[i] as number];
+  }
+
+  function remember(): void {
+    address("map", () => {
+      const [low, high] = charts.range;
+      const whole = low <= charts.whole[0] && high >= charts.whole[1];
+      return `${written({ path, range: whole ? null : charts.range, wheels: null, panels: null, at: picked, uprights: charts.uprights })}&quantity=${encodeURIComponent(quantity.value)}`;
+    });
+  }
+
   function mark(time: number | null): void {
-    if (!track || time === null || !map.isStyleLoaded()) return;
+    here = time;
+    if (!track?.count || time === null || !map.isStyleLoaded()) return;
     const i = nearest(track.data[0] as Float64Array, time);
     const [lon, lat] = [(track.data[1] as Float64Array)[i] as number, (track.data[2] as Float64Array)[i] as number];
     replace("here", [{ type: "Feature", properties: {}, geometry: { type: "Point", coordinates: [lon, lat] } }], "circle");
@@ -207,7 +248,9 @@ export const page: Page = (main, { notices, query }) => {
   }
 
   charts.onCursor = mark;
+  charts.onUpright = remember;
   charts.onRange = ([start, end]) => {
+    remember();
     if (!track?.count || !run) return;
     if (start <= run.start && end >= run.end) return frame();
     const time = track.data[0] as Float64Array;
@@ -225,8 +268,11 @@ export const page: Page = (main, { notices, query }) => {
       const away = Math.hypot((lon[i] as number) - event.lngLat.lng, (lat[i] as number) - event.lngLat.lat);
       if (away < least) [least, best] = [away, i];
     }
-    if (best >= 0) mark((track.data[0] as Float64Array)[best] as number);
+    if (best >= 0) charts.point((track.data[0] as Float64Array)[best] as number, true);
+    else here = null;
   });
+  map.on("click", () => here !== null && pick(here));
+  charts.onPick = pick;
 
   choice.addEventListener("change", () => {
     seen = "";
@@ -235,7 +281,10 @@ export const page: Page = (main, { notices, query }) => {
     void reload();
   });
   charts.onReplaced = () => void reload();
-  quantity.addEventListener("change", () => void draw());
+  quantity.addEventListener("change", () => {
+    remember();
+    void draw();
+  });
   base.addEventListener("change", () => void lay(base.value));
 
   async function lay(picture: string): Promise<void> {
@@ -247,7 +296,7 @@ export const page: Page = (main, { notices, query }) => {
     if (!placed) return;
     const at = placed.corners ?? (await corners(picture, map.getBounds()));
     if (!at) return;
-    map.addSource("base", { type: "image", url: new URL(address("basemap/picture", { path: picture }), location.href).href, coordinates: at });
+    map.addSource("base", { type: "image", url: new URL(server("basemap/picture", { path: picture }), location.href).href, coordinates: at });
     map.addLayer({ id: "base", type: "raster", source: "base" }, map.getLayer("track-rim") ? "track-rim" : undefined);
   }
 

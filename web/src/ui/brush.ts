@@ -31,3 +31,24 @@ channel.addEventListener("message", (event: MessageEvent<Brush>) => {
   now = event.data;
   for (const listener of listeners) listener(event.data);
 });
+
+/** The time under the cursor, null where it has left; of a run. */
+type Pointed = { path: string; time: number | null };
+
+const cursor = new BroadcastChannel("terragrip-cursor");
+const followers = new Set<(path: string, time: number | null) => void>();
+
+/** The cursor is at a time here. */
+export function point(path: string, time: number | null): void {
+  cursor.postMessage({ path, time } satisfies Pointed);
+}
+
+/** Told of the cursor in other tabs, until the returned function is called. */
+export function onPoint(follower: (path: string, time: number | null) => void): () => void {
+  followers.add(follower);
+  return () => followers.delete(follower);
+}
+
+cursor.addEventListener("message", ({ data }: MessageEvent<Pointed>) => {
+  for (const follower of followers) follower(data.path, data.time);
+});

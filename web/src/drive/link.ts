@@ -1,0 +1,51 @@
+/** What is shown, as the part of an address after "?": a link opens the same view. */
+
+import type { Range } from "./gestures";
+
+export interface View {
+  path: string;
+  /** Null: the whole run. */
+  range: Range | null;
+  wheels: string[] | null;
+  panels: string[] | null;
+  /** The picked sample's time. */
+  at: number | null;
+  uprights: Record<string, Range>;
+}
+
+const UPRIGHT = "y.";
+const round = (value: number): string => String(Number(value.toPrecision(9)));
+
+export function written(view: View): string {
+  const query = new URLSearchParams({ path: view.path });
+  if (view.range) query.set("from", round(view.range[0])), query.set("to", round(view.range[1]));
+  if (view.wheels) query.set("wheels", view.wheels.join());
+  if (view.panels) query.set("panels", view.panels.join());
+  if (view.at !== null) query.set("at", round(view.at));
+  for (const [key, [low, high]] of Object.entries(view.uprights)) query.set(UPRIGHT + key, `${round(low)},${round(high)}`);
+  return query.toString().replaceAll("%2C", ",");
+}
+
+export function read(query: URLSearchParams): View {
+  const list = (name: string): string[] | null => query.get(name)?.split(",").filter(Boolean) ?? null;
+  const number = (text: string | null): number => (text ? Number(text) : NaN);
+  const range = (low: number, high: number): Range | null => (high > low ? [low, high] : null);
+  const at = number(query.get("at"));
+  const uprights: Record<string, Range> = {};
+  for (const [name, text] of query) {
+    const [low, high] = text.split(",").map(Number);
+    const ends = name.startsWith(UPRIGHT) ? range(low ?? NaN, high ?? NaN) : null;
+    if (ends) uprights[name.slice(UPRIGHT.length)] = ends;
+  }
+  return { path: query.get("path") ?? "", range: range(number(query.get("from")), number(query.get("to"))), wheels: list("wheels"), panels: list("panels"), at: Number.isFinite(at) ? at : null, uprights };
+}
+
+let timer = 0;
+
+/** Put a page's view into the address, a moment later: browsers refuse a change a frame. */
+export function address(page: string, query: () => string): void {
+  clearTimeout(timer);
+  timer = window.setTimeout(() => {
+    if (location.hash.startsWith(`#/${page}`)) history.replaceState(null, "", `#/${page}?${query()}`);
+  }, 250);
+}

@@ -1,0 +1,77 @@
+/** The legend of a chart, with each trace's value under the cursor. */
+
+import { digits, h } from "../ui/dom";
+import type { Values } from "./axes";
+import type { Panel } from "./run";
+
+export class Readout {
+  readonly element: HTMLElement;
+  private values: HTMLOutputElement[];
+
+  constructor(private panel: Panel) {
+    this.values = panel.traces.map(() => h("output", { class: "value", "aria-live": "off" }));
+    this.element = h(
+      "div",
+      { class: "legend" },
+      panel.traces.map((t, i) => h("span", {}, h("i", { class: `swatch ${t.color}${t.dash ? " dashed" : ""}` }), t.label, this.values[i])),
+    );
+  }
+
+  /** Show the values of `data` (time, then each trace's limits and itself) nearest to a time, at most `near` seconds away; of rows that
+   * were cut, the smallest and the largest of the bucket. Null: none. */
+  show(data: ArrayLike<Values>, time: number | null, cut: boolean, near: number): void {
+    const times = data[0] as ArrayLike<number>;
+    let at = 1;
+    this.panel.traces.forEach((trace, i) => {
+      const [low, high] = trace.band ? [data[at++], data[at++]] : [];
+      const values = data[at++];
+      const output = this.values[i];
+      if (!output) return;
+      const text = time === null || !values ? "" : valueAt(times, values, low, high, time, cut, near);
+      if (output.value !== text) output.value = text;
+    });
+  }
+}
+
+/** A value with half the width of its interval; of a bucket its smallest and largest value; "–" where nothing is known nearby. */
+export function valueAt(times: ArrayLike<number>, values: Values, low: Values | undefined, high: Values | undefined, time: number, cut: boolean, near: number): string {
+  const known = (k: number): boolean => typeof values[k] === "number" && !Number.isNaN(values[k]);
+  const i = nearestKnown(times, known, time, near);
+  if (i < 0) return "–";
+  const v = values[i] as number;
+  if (cut) {
+    const first = i - (i % 2);
+    const [least, most] = [values[first] ?? v, values[first + 1] ?? v];
+    return digits(least) === digits(most) ? digits(v) : `${digits(least)} … ${digits(most)}`;
+  }
+  const [from, to] = [low?.[i], high?.[i]];
+  return typeof from === "number" && typeof to === "number" ? `${digits(v)} ± ${digits((to - from) / 2, 2)}` : digits(v);
+}
+
+/** The place of the known sample nearest to a time, -1 where none is within `near`. */
+export function nearestKnown(times: ArrayLike<number>, known: (i: number) => boolean, time: number, near: number): number {
+  let [low, high] = [0, times.length];
+  while (low < high) {
+    const middle = (low + high) >> 1;
+    if ((times[middle] as number) < time) low = middle + 1;
+    else high = middle;
+  }
+  let best = -1;
+  let away = Infinity;
+  for (const step of [-1, 1]) {
+    for (let i = step < 0 ? low - 1 : low; i >= 0 && i < times.length; i += step) {
+      const apart = Math.abs((times[i] as number) - time);
+      if (apart > Math.max(near, spacing(times, low)) || apart >= away) break;
+      if (!known(i)) continue;
+      [best, away] = [i, apart];
+      break;
+    }
+  }
+  return best;
+}
+
+/** Seconds between the samples about a place. */
+function spacing(times: ArrayLike<number>, i: number): number {
+  const k = Math.min(Math.max(i, 1), times.length - 1);
+  return times.length > 1 ? (times[k] as number) - (times[k - 1] as number) : 0;
+}

@@ -1,0 +1,33 @@
+/** Everything known of one sample, in words and tables. */
+
+import { digits, h } from "../ui/dom";
+import type { Event } from "./run";
+
+export interface Sample {
+  row: number;
+  time: number;
+  values: Record<string, number | null>;
+  measured: Record<string, number | null>;
+  labels: Record<string, string>;
+  event: string;
+  why: string[];
+}
+
+export function described(sample: Sample, event: Event | undefined): (HTMLElement | null)[] {
+  const names = Object.keys(sample.values).filter((name) => !name.endsWith("_std"));
+  const measured = Object.entries(sample.measured);
+  const spread = (name: string): string => {
+    const std = sample.values[`${name}_std`];
+    return std === undefined || std === null ? "" : `± ${digits(1.96 * std, 2)}`;
+  };
+  return [
+    h("p", {}, h("strong", {}, `t = ${sample.time.toFixed(3)} s`), ` (row ${sample.row})`, sample.labels["soil"] ? `, ${sample.labels["soil"]}` : ""),
+    sample.event ? h("p", { class: "bad" }, `${sample.event}${event?.why ? `: ${event.why}` : ""}`) : null,
+    h("h3", {}, "Why µ moved"),
+    ...sample.why.map((text) => h("p", { class: "why" }, text)),
+    h("h3", {}, "Estimated"),
+    h("table", {}, h("tbody", {}, names.map((name) => h("tr", {}, h("th", { scope: "row" }, name), h("td", {}, digits(sample.values[name], 4)), h("td", {}, spread(name)))))),
+    measured.length ? h("h3", {}, "Measured") : null,
+    measured.length ? h("table", {}, h("tbody", {}, measured.map(([name, v]) => h("tr", {}, h("th", { scope: "row" }, name), h("td", {}, digits(v, 5)), h("td", {}))))) : null,
+  ];
+}
