@@ -320,6 +320,12 @@ typedef struct {
     tg_real shock_samples;          /* samples that a shock lasts */
     tg_real longest_walk;           /* s of random walk that a gap adds at most: beyond it the ground is simply unknown */
     tg_real standstill;             /* V: below it a machine counts as standing */
+    tg_real settle;                 /* s: low-pass of the speeds that tell standstill */
+    tg_real leap;                   /* s that a ground speed above it must last to end a standstill while no wheel turns */
+    tg_real unknown_torque;         /* adhesion: SD of a torque never seen or long silent */
+    tg_real unknown_pull;           /* of the weight: SD of such a drawbar force */
+    tg_real least_load;             /* of a wheel's load at rest: it is never taken for less */
+    tg_real first_slip;             /* until the first ground speed */
     tg_real slow_share;             /* of the ground speed's noise: SD of an error that stays alike for long, */
     tg_real slow_stops;             /* as if so many stops had shown it */
     tg_real uneven_length;          /* wheel radii: shorter changes of adhesion and resistance are the ground's unevenness */

@@ -1,8 +1,6 @@
 /* What a raw sample is worth: calibration, impossible and held values; standstill and the direction of travel. */
 #include "estimator.h"
 
-#define TG_LEAP 0.5 /* s */
-
 /* A held channel repeats its last value until it is measured anew. A repetition counts as a measurement only after 1.5 periods, and
  * then only of an input (constant torque is common) or of 0 (standstill): a speed that stays the same to the last bit is a silent
  * sensor. */
@@ -100,7 +98,7 @@ void tgi_track_turn(tg_estimator *e, const tg_row *row)
 static int32_t moves(tg_estimator *e, tg_real ground, double time)
 {
     if (tgi_fabs(ground) < 2 * e->settings.standstill_speed) e->slow_time = time;
-    return !e->standing || time - e->slow_time > TG_LEAP;
+    return !e->standing || time - e->slow_time > (double)e->settings.tuned.leap;
 }
 
 /* First-order low-pass, exact also where samples are further apart than tau. */
@@ -132,7 +130,7 @@ static tg_real soon(tg_lowpass *f, tg_real x, double time, tg_real tau, tg_real 
 int32_t tgi_track_motion(tg_estimator *e, const tg_row *row)
 {
     const tg_settings *s = &e->settings;
-    const tg_real tau = (tg_real)0.2, age = 1;
+    const tg_real tau = s->tuned.settle, age = 1;
     int32_t n = s->machine.wheels, seen = 0;
     const tg_real seen_ground = row->doubt[n] > 0 ? (tg_real)NAN : row->value[TG_GROUND_SPEED];
     tg_real fastest = 0, soonest = 0, over = 0, rim = 0, ground = settle(&e->ground_speed, seen_ground, row->time, tau);

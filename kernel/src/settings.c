@@ -67,6 +67,12 @@ static tg_tuned default_tuned(void)
     k.shock_samples = 2;
     k.longest_walk = 30;
     k.standstill = (tg_real)0.01;
+    k.settle = (tg_real)0.2;
+    k.leap = (tg_real)0.5;
+    k.unknown_torque = (tg_real)0.5;
+    k.unknown_pull = (tg_real)0.3;
+    k.least_load = (tg_real)0.02;
+    k.first_slip = (tg_real)0.08;
     k.slow_share = (tg_real)0.2;
     k.slow_stops = 1;
     k.uneven_length = 4;
@@ -239,8 +245,8 @@ static void work_out_constants(const tg_settings *s, tgi_constants *c)
         c->inverse_inertia[i] = 1 / m->inertia[i];
         c->spin_inertia += m->inertia[i] / s->rolling_radius[i];
         c->mean_radius += s->rolling_radius[i] / (tg_real)m->wheels;
-        c->unknown_torque[i] = tgi_square((tg_real)0.5 * m->radius[i] * load);
-        c->least_load[i] = (tg_real)0.02 * load;
+        c->unknown_torque[i] = tgi_square(s->tuned.unknown_torque * m->radius[i] * load);
+        c->least_load[i] = s->tuned.least_load * load;
     }
     const tg_real T = natural_time(m);
     c->force_walk = force_walk(s);
@@ -250,7 +256,7 @@ static void work_out_constants(const tg_settings *s, tgi_constants *c)
     c->inverse_weight = 1 / weight;
     c->pace = tgi_pace(s);
     place_wheels(s, c);
-    c->unknown_pull = tgi_square((tg_real)0.3 * weight);
+    c->unknown_pull = tgi_square(s->tuned.unknown_pull * weight);
     c->least_shock = c->variance[TG_ACCELERATION_X] + c->variance[TG_DRAWBAR_FORCE] * tgi_square(c->inverse_mass);
     tg_real low = s->tuning.scales[0], high = low;
     for (int32_t b = 1; b < TG_MODES; b++) {
@@ -320,7 +326,7 @@ tg_status tg_estimator_init(tg_estimator *e, const tg_settings *settings)
     work_out_constants(settings, &e->constants);
     e->shock = e->constants.least_shock;
     e->slope.error_variance = tgi_square(settings->slope_spread);
-    e->slip_memory.slip = (tg_real)0.08; /* a guess until the first ground speed */
+    e->slip_memory.slip = settings->tuned.first_slip;
     e->slip_memory.adhesion = settings->prior_adhesion;
     for (int32_t k = 0; k < TG_SLOTS; k++) e->last_raw[k] = (tg_real)NAN;
     tgi_no_curves(e);
