@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -14,6 +16,7 @@ from lane_drives import EARTH, REFERENCE, drive, lanes, local_east
 from terragrip.errors import InputError
 from terragrip.maps import MapMaker, MapSettings, map_of, write_map
 from terragrip.maps.layers import cell_table, layer
+from terragrip.maps.places import places_of
 
 if TYPE_CHECKING:
     import geopandas
@@ -114,6 +117,22 @@ def test_outages_and_jumps_are_cut_not_smeared() -> None:
     assert ((x > 80) & (x < 99)).sum() > 15
     assert any("outage" in note for note in made.notes)
     assert any("jump" in note for note in made.notes)
+
+
+def test_positions_behind_the_wheels_are_moved_back() -> None:
+    estimates = drive(*lanes(4, 60, 3))
+    time = estimates.time
+    pace = 1 + 0.6 * np.sin(0.5 * time) * (time > 5)  # a drive whose speed varies, or no lag could be seen
+    scaled = np.r_[0.0, np.cumsum(np.diff(time) / pace[1:])]
+    for wheel in estimates.wheels:
+        estimates.columns[f"wheel_speed_{wheel}"] = estimates[f"wheel_speed_{wheel}"] * pace
+    estimates.columns["ground_speed"] = pace
+    late = {n: np.interp(scaled - 0.4, scaled, estimates[n]) for n in ("latitude", "longitude")}
+    estimates.columns.update(late)
+    places = places_of(replace(estimates, time=scaled), 32633)
+    assert any(
+        re.match(r"The positions are 0\.(3[5-9]|4[0-5]) .* behind the wheels", note) for note in places.notes
+    )
 
 
 def test_kriging_fills_between_lanes_with_a_wider_interval() -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -15,6 +15,8 @@ if TYPE_CHECKING:
 
 WIDTH = 9.0
 """Inches."""
+DRAWN = 4000
+"""Cells up to which each is drawn; more are one image."""
 QUANTILES = (0.02, 0.98)
 """What the colours span; beyond, the colour bar's ends are pointed."""
 
@@ -77,16 +79,36 @@ def _panel(
     colours: str,
     title: str,
 ) -> None:
-    west, south = int(column.min()), int(row.min())
-    image = np.full((int(row.max()) - south + 1, int(column.max()) - west + 1), np.nan)
-    image[row - south, column - west] = values
+    from matplotlib.collections import PolyCollection
+    from matplotlib.colors import Normalize
+    from matplotlib.ticker import MaxNLocator
+
     low, high = np.quantile(values, QUANTILES)
-    left, bottom = west * made.cell - corner[0], south * made.cell - corner[1]
-    shown = ax.imshow(
-        image, origin="lower", cmap=colours, vmin=low, vmax=max(high, low + 1e-9), interpolation="nearest",
-        extent=(left, left + image.shape[1] * made.cell, bottom, bottom + image.shape[0] * made.cell),
-    )  # fmt: skip
-    ax.figure.colorbar(shown, ax=ax, extend="both", shrink=0.85)
+    scale = Normalize(low, max(high, low + 1e-9))
+    if len(values) <= DRAWN:
+        x, y = column * made.cell - corner[0], row * made.cell - corner[1]
+        sides = np.array([(0, 0), (1, 0), (1, 1), (0, 1)]) * made.cell
+        shown: Any = PolyCollection(
+            list(np.column_stack([x, y])[:, None, :] + sides), array=values, cmap=colours, norm=scale, linewidths=0.1, edgecolors="face"
+        )  # fmt: skip
+        ax.add_collection(shown)
+        ax.autoscale_view()
+        ax.set_aspect("equal")
+    else:
+        west, south = int(column.min()), int(row.min())
+        image = np.full((int(row.max()) - south + 1, int(column.max()) - west + 1), np.nan)
+        image[row - south, column - west] = values
+        left, bottom = west * made.cell - corner[0], south * made.cell - corner[1]
+        box = (left, left + image.shape[1] * made.cell, bottom, bottom + image.shape[0] * made.cell)
+        shown = ax.imshow(
+            image, origin="lower", cmap=colours, norm=scale, interpolation="nearest", extent=box
+        )
+    bar = ax.figure.colorbar(shown, ax=ax, extend="both", shrink=0.85, format="%.3g")
+    if bar.solids is not None:
+        bar.solids.set(rasterized=False, edgecolor="face")  # drawn, not painted, and without seams
+    bar.locator = MaxNLocator(4)
+    bar.update_ticks()
+    ax.grid(False)  # lines would cut the cells
     ax.set_title(title, fontsize=9)
 
 

@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from terragrip.errors import InputError
+from terragrip.formats.clocks import lag_between, speed_of, wheels_of
 from terragrip.maps.plausible import refuse_impossible
 
 if TYPE_CHECKING:
@@ -24,6 +25,8 @@ OUTAGE_WAY = 1.0
 JUMP = 0.5
 """Metres by which a step of the positions may differ from the way driven, beside eight times its usual scatter and `JUMP_SHARE`."""
 JUMP_SHARE = 0.3
+LATEST = 2.0
+"""Seconds by which positions are looked for behind the wheels at most."""
 LEAST_FIXES = 5
 """Fixes between two jumps or outages; fewer are taken for strays."""
 TURNED = np.radians(25.0)
@@ -71,7 +74,8 @@ def places_of(estimates: Estimates, epsg: int, datum: str = "EPSG:4326", file: s
     """Where the vehicle is at each row.
 
     `epsg`: the grid; `datum`: the coordinate reference system of latitude and longitude. The antenna stands where the vehicle file says
-    (``antenna``), over the rear axle's centre if it does not. Between fixes the place is interpolated; outages and jumps are cut. Raises
+    (``antenna``), over the rear axle's centre if it does not. Between fixes the place is interpolated; outages and
+    jumps are cut, and positions that are certainly behind the wheels are moved back. Raises
     InputError where there are no positions, or where speed or turns contradict them (:mod:`terragrip.maps.plausible`).
     """
     if not has_positions(estimates):
@@ -81,8 +85,11 @@ def places_of(estimates: Estimates, epsg: int, datum: str = "EPSG:4326", file: s
     fixes = _fixes(latitude, longitude)
     refuse_impossible(estimates, fixes, file)
     east, north = _projected(latitude[fixes], longitude[fixes], epsg, datum)
-    piece, notes = _pieces(estimates.time[fixes], way[fixes], east, north)
-    x, y = _between(estimates.time, fixes, east, piece), _between(estimates.time, fixes, north, piece)
+    late, notes = _late(estimates, estimates.time[fixes], east, north)
+    when = estimates.time[fixes] - late
+    piece, cut = _pieces(when, np.interp(when, estimates.time, way), east, north)
+    notes += cut
+    x, y = _between(estimates.time, when, east, piece), _between(estimates.time, when, north, piece)
     heading = _heading(x, y, way, _base(vehicle), np.nan_to_num(estimates["ground_speed"]))
     antenna = vehicle.antenna
     if antenna is not None:
@@ -117,6 +124,24 @@ def _projected(latitude: Floats, longitude: Floats, epsg: int, datum: str) -> tu
     return np.asarray(east), np.asarray(north)
 
 
+def _late(estimates: Estimates, time: Floats, east: Floats, north: Floats) -> tuple[float, tuple[str, ...]]:
+    """Seconds by which the positions are behind the wheels, 0 where it is not certain, and a sentence on it."""
+    names = [
+        name for name in estimates.columns if name.startswith("wheel_speed_") and not name.endswith("_std")
+    ]
+    wait = np.diff(time)
+    if not names or len(time) < LEAST_FIXES:
+        return 0.0, ()
+    speed = np.hypot(np.diff(east), np.diff(north)) / np.maximum(wait, 1e-9)
+    wheels = wheels_of(estimates.time, {name: estimates[name] for name in names})
+    fixes = speed_of(time[1:] - 0.5 * wait, {"ground_speed": speed})
+    lag = None if wheels is None or fixes is None else lag_between(wheels, fixes, reach=LATEST)
+    if lag is None or not lag.is_of_the_clock or lag.seconds < 0:
+        return 0.0, ()
+    word = f"The positions are {lag.seconds:.2f} ± {lag.std:.2f} s behind the wheels and are shifted by it."
+    return lag.seconds, (word,)
+
+
 def _pieces(
     time: Floats, way: Floats, east: Floats, north: Floats
 ) -> tuple[npt.NDArray[np.intp], tuple[str, ...]]:
@@ -144,15 +169,13 @@ def _pieces(
     return np.where(stray, -1, piece), tuple(notes)
 
 
-def _between(
-    time: Floats, fixes: npt.NDArray[np.intp], values: Floats, piece: npt.NDArray[np.intp]
-) -> Floats:
+def _between(time: Floats, fixed: Floats, values: Floats, piece: npt.NDArray[np.intp]) -> Floats:
     """Values at the fixes interpolated to all rows (n,), NaN outside the pieces."""
     out = np.full(len(time), np.nan)
     good = np.flatnonzero(piece >= 0)
     if not len(good):
         return out
-    when = time[fixes[good]]
+    when = fixed[good]
     after = np.clip(np.searchsorted(when, time, side="left"), 0, len(good) - 1)
     before = np.clip(np.searchsorted(when, time, side="right") - 1, 0, len(good) - 1)
     inside = (time >= when[0]) & (time <= when[-1]) & (piece[good[after]] == piece[good[before]])

@@ -93,10 +93,11 @@ def readings_of(
                 counted,
                 (value, slope * slip_constant, slope * slip_std),
             )
+        if f"efficiency_{wheel}" in estimates.columns:
             eta, eta_std = estimates[f"efficiency_{wheel}"], estimates[f"efficiency_{wheel}_std"]
             yield _reading("efficiency", place, eta, eta_std, eta_std, counted)
         yield _reading("slip", place, slip, slip_constant, slip_std, counted)
-    if estimates.has_adhesion:
+    if estimates.has_adhesion and "soil_resistance" in estimates.columns:
         rho = estimates["soil_resistance"]
         centre = places.of(float(np.mean(vehicle.axle_to_rear[vehicle.wheel_axle])), 0.0)
         constant = _resistance_constant(vehicle, estimates)

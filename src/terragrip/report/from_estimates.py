@@ -18,6 +18,7 @@ from terragrip.estimation import Estimates
 from terragrip.ground.events import Event, events
 from terragrip.report import (
     ground_sections,
+    map_sections,
     path,
     residuals,
     sections,
@@ -78,6 +79,7 @@ class _Gathered:
     events: dict[str, tuple[Event, ...]] = field(default_factory=dict)
     blocks: list[Blocks] = field(default_factory=list)
     missing: list[str] = field(default_factory=list)
+    map: map_sections.GatheredMap = field(default_factory=map_sections.GatheredMap)
 
 
 def report_of(
@@ -126,6 +128,7 @@ def report_of(
             _summarised(read, main, grounds, campaign),
             path.section(together, [_labels(run) for run in together]),
             *(_sections(main, together, campaign) if main.has_adhesion else _of_slip(together)),
+            read.map.section(),
             *_worked(read.blocks),
             ground_sections.recognised(grounds),
             ground_sections.section_points(grounds),
@@ -162,6 +165,7 @@ def _read(paths: Sequence[Path], grounds: Sequence[Ground], step: Callable[[int]
             raise InputError("holds fewer than two rows", file=file, hint="leave it out")
         if estimates.has_adhesion:
             read.gathered.add(estimates, file.stem, file=str(file))
+        read.map.add(estimates, file.stem)
         read.events[file.stem] = events(estimates)
         run = _run(estimates, file.stem, grounds, read.events[file.stem])
         read.summaries.append(_summary(run))
