@@ -21,14 +21,17 @@ from terragrip.vehicle_parts import (
     Axle,
     Bearing,
     Calibration,
+    FuelPerEnergy,
     Height,
     Length,
     Mass,
     Overhang,
+    Power,
     Sensors,
     ToolLength,
     Uncertainty,
     Wheel,
+    Width,
     quantity_of,
 )
 
@@ -62,6 +65,9 @@ class Vehicle(Part):
     tire_rolling_resistance: Annotated[float, *quantity_of("1", 0, 0.5, likely=("%",))] = 0.0
     bearing_resistance: Bearing = 0.0
     antenna: Antenna | None = None
+    power: Power | None = None
+    working_width: Width | None = None
+    fuel: FuelPerEnergy | None = None
     sensors: Sensors = Field(default_factory=Sensors)
     uncertainty: Uncertainty = Field(default_factory=Uncertainty)
     calibration: Calibration = Field(default_factory=Calibration)

@@ -11,6 +11,7 @@ from typing import Annotated, Any
 
 import typer
 
+from terragrip.cli.advise import command as advise
 from terragrip.cli.calibrate import command as calibrate
 from terragrip.cli.convert import command as convert
 from terragrip.cli.demo import command as demo
@@ -48,6 +49,7 @@ app.command("soils")(soils)
 app.command("ground")(ground)
 app.add_typer(ground_classifier, name="ground-classifier")
 app.command("map")(map_command)
+app.command("advise")(advise)
 app.command("report")(report_command)
 app.command("simulate")(simulate)
 app.command("live")(live)

@@ -1,0 +1,217 @@
+"""Advice from estimates: soil by soil, the best slip where the data bear one, what to do, and what is missing."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from terragrip.advice.actions import Work, actions_for
+from terragrip.advice.optimum import Best, OverSlip, best_of
+from terragrip.advice.result import Advice
+from terragrip.advice.samples import Samples, driven_wheels, samples_by_soil
+from terragrip.advice.slip_only import advise_slip
+from terragrip.advice.soil_curves import SoilCurves, of_drives, of_library
+from terragrip.errors import InputError
+from terragrip.estimation import Estimates
+from terragrip.soil.library import Soil
+from terragrip.units import STANDARD_GRAVITY
+from terragrip.vehicle import Vehicle
+
+Array = NDArray[np.float64]
+
+LEAST_REACH = 0.03
+"""Mean slip that the hardest pulls must reach: below it, slip's own error and the curve cannot be told apart."""
+WIDEST = 0.12
+"""A best slip whose interval is wider is not given."""
+FARTHEST = 2.0
+"""A best slip beyond this many times the data's reach rests on what soils are like in general, which is said."""
+FRONT_POINTS = 21
+
+
+def advise(
+    tables: Sequence[Estimates], vehicle: Vehicle, soils: Mapping[str, Soil] | None = None
+) -> tuple[dict[str, Advice], dict[str, float]]:
+    """Advice by soil name ("" where rows have no label), and metres driven by soil.
+
+    ``soils``: known curves (a library), which are taken for soils of their name, the one of them where rows have no label; others
+    are learned from the estimates. Raises InputError where no table is given, or torques are in some tables only.
+    """
+    if not tables:
+        raise InputError("no estimates are given", hint="name at least one file")
+    if not any(one.has_adhesion for one in tables):
+        return {"": advise_slip(tables, vehicle)}, {"": 0.0}
+    if not all(one.has_adhesion for one in tables):
+        raise InputError(
+            "some of the estimates hold slip alone, others adhesion too", hint="advise on each kind by itself"
+        )
+    for one in tables:
+        _refuse_other_vehicle(one, vehicle)
+    wheels = driven_wheels(tables[0], vehicle)
+    samples = samples_by_soil(tables, vehicle)
+    found = {name: _of_soil(name, part, vehicle, wheels, soils or {}) for name, part in samples.items()}
+    if not found:
+        nothing = "no row moves, unflagged, with vehicle and tool on one soil: drive some tens of metres"
+        return {"": Advice("", missing=(nothing,))}, {"": 0.0}
+    return found, {name: part.way for name, part in samples.items()}
+
+
+def _refuse_other_vehicle(estimates: Estimates, vehicle: Vehicle) -> None:
+    """InputError unless the table has the vehicle's wheels and axles, and one of them is driven."""
+    columns = [f"adhesion_{w}" for w in vehicle.wheels] + [f"vertical_load_{a}" for a in vehicle.axle_names]
+    lacking = next((name for name in columns if name not in estimates.names), None)
+    if lacking or not vehicle.driven.any():
+        problem = f"the estimates have no {lacking}" if lacking else "the vehicle drives no wheel"
+        raise InputError(problem, hint="give the vehicle file that the log was estimated with")
+
+
+def _of_soil(
+    name: str, samples: Samples, vehicle: Vehicle, wheels: Sequence[str], soils: Mapping[str, Soil]
+) -> Advice:
+    known = soils.get(name) or (next(iter(soils.values())) if not name and len(soils) == 1 else None)
+    drive = _drive(samples)
+    curves = of_library(known, samples, vehicle) if known else of_drives(samples, vehicle)
+    if curves is None:
+        return Advice(
+            name, drive=drive,
+            missing=(f"{samples.way:.0f} m of usable way are too short for a curve: drive 50 wheel radii or more on it",),
+        )  # fmt: skip
+    if curves.reach < LEAST_REACH:
+        return Advice(
+            name, drive=drive,
+            missing=(
+                f"the hardest pulls slip by {curves.reach:.1%} on average, too little for a curve: pull until slip is 5 to 10 %, "
+                "on level ground "
+                "and at several loads",
+            ),
+        )  # fmt: skip
+    over = curves.over
+    best = best_of(over, over.efficiency)
+    power = best_of(over, over.productivity)
+    missing = _missing(best, power, curves, vehicle)
+    if soils and known is None:
+        lacking = (
+            f"the library has no soil named {name!r}"
+            if name
+            else "the rows name no soil, and the library has several"
+        )
+        missing.append(f"{lacking}: the curve is learned from these estimates")
+    given = best.interval[1] - best.interval[0] <= WIDEST and best.net_traction > 0
+    if not given:
+        return Advice(name, missing=tuple(missing), drive=drive, reserve=_reserve(samples, curves, wheels))
+    slip, pull = samples.levels()
+    work = Work(over, best, slip, pull, drive["ground_speed"], drive["soil_resistance"])
+    return Advice(
+        name, best,
+        power if power.interval[1] - power.interval[0] <= 2 * WIDEST else None,
+        _front(over, best, power),
+        tuple(actions_for(work, vehicle)), tuple(missing), {**drive, "efficiency": float(work.efficiency[0])},
+        _reserve(samples, curves, wheels), _field_work(work, vehicle), _limits(work, drive),
+    )  # fmt: skip
+
+
+def _missing(best: Best, power: Best, curves: SoilCurves, vehicle: Vehicle) -> list[str]:
+    missing = []
+    low, high = best.interval
+    if high - low > WIDEST or best.net_traction <= 0:
+        missing.append(
+            f"the best slip is only known as {low:.0%} to {high:.0%}: drive longer, at pulls that slip up to 15 %, "
+            "and calibrate the wheel radius"
+        )
+    elif best.slip > FARTHEST * curves.reach:
+        missing.append(
+            f"the drive reaches {curves.reach:.0%} of slip; the best slip of {best.slip:.0%} rests on how soils behave in "
+            "general: pull harder "
+            f"to see it"
+        )
+    if power.interval[1] - power.interval[0] > 2 * WIDEST:
+        missing.append(
+            f"where most pull power lies is only known as {power.interval[0]:.0%} to {power.interval[1]:.0%} of slip: a drive with "
+            f"pulls up to about {power.slip:.0%} of slip would tell"
+        )
+    for key, unit in (
+        ("working_width", "ha/h"),
+        ("fuel", "l/ha"),
+        ("power", "the speed that the power allows"),
+    ):
+        if getattr(vehicle, key) is None:
+            missing.append(f"{key} in the vehicle file, for {unit}")
+    return missing
+
+
+def _drive(samples: Samples) -> dict[str, float]:
+    """What was driven, means by way."""
+    names = {"slip": samples.slip, "adhesion": samples.adhesion, "soil_resistance": samples.resistance, "net_traction": samples.pull,
+             "ground_speed": np.abs(samples.speed)}  # fmt: skip
+    means = {name: float(np.average(values, weights=samples.metres)) for name, values in names.items()}
+    return {"metres": samples.way, **means}
+
+
+def _reserve(
+    samples: Samples, curves: SoilCurves, wheels: Sequence[str]
+) -> dict[str, tuple[float, float, float]]:
+    """Of each wheel: 1 - its mean adhesion over the curve's top up to 60 % of slip, with its 95 % interval."""
+    top = curves.adhesion.max(axis=1)
+    out = {}
+    for k, wheel in enumerate(wheels):
+        used = float(np.average(samples.wheel_adhesion[:, k], weights=samples.metres))
+        left = 1 - used / np.maximum(top, 1e-6)
+        low, high = np.percentile(left, [2.5, 97.5])
+        out[wheel] = (float(left[0]), float(low), float(high))
+    return out
+
+
+def _front(over: OverSlip, best: Best, power: Best) -> tuple[Mapping[str, float], ...]:
+    """From the slip of best efficiency to that of most pull power: more pull for less efficiency."""
+    slips = np.linspace(best.slip, max(power.slip, best.slip), FRONT_POINTS)
+    rows = {
+        "efficiency": over.efficiency[0],
+        "net_traction": over.net_traction[0],
+        "productivity": over.productivity[0],
+    }
+    return tuple(
+        {"slip": float(s), **{name: float(np.interp(s, over.slip, row)) for name, row in rows.items()}}
+        for s in (slips if slips[-1] > slips[0] else slips[:1])
+    )
+
+
+def _limits(work: Work, drive: Mapping[str, float]) -> tuple[str, ...]:
+    """What holds this drive back: which of the two losses is the larger."""
+    slipping = drive["slip"]
+    eta = float(work.efficiency[0])
+    rolling = 1 - eta / max(1 - slipping, 1e-6)
+    larger, cure = (
+        ("rolling resistance", "more load or less weight")
+        if rolling > slipping
+        else ("slip", "less load, more weight or better grip")
+    )
+    shares = f"of the wheels' power {max(slipping, 0):.0%} is lost in slip and {rolling:.0%} in rolling"
+    return (f"{shares}; {larger} is the larger: {cure} helps.",)
+
+
+def _field_work(work: Work, vehicle: Vehicle) -> dict[str, float]:
+    """ha/h now and at the best slip at the same wheel speed; l/ha for the drive's pull at either efficiency."""
+    if vehicle.working_width is None:
+        return {}
+    slip = float(np.mean(work.slip))
+    best_speed = work.speed * (1 - work.best.slip) / max(1 - slip, 0.05)
+    out = {
+        "hectares_per_hour": work.speed * vehicle.working_width * 0.36,
+        "hectares_per_hour_at_best": best_speed * vehicle.working_width * 0.36,
+    }
+    if vehicle.fuel is not None:
+        for name, pull, eta in (
+            ("litres_per_hectare", float(np.mean(work.pull)), float(work.efficiency[0])),
+            ("litres_per_hectare_same_pull_at_best", float(np.mean(work.pull)), work.best.efficiency),
+        ):
+            energy = (
+                max(pull, 0.0)
+                * vehicle.mass
+                * STANDARD_GRAVITY
+                * 1e4
+                / vehicle.working_width
+                / max(eta, 1e-3)
+            )
+            out[name] = energy * vehicle.fuel * 1e3
+    return out

@@ -1,0 +1,181 @@
+"""Adhesion and resistance of one soil over slip as a set of drawn curves: what the data say, what is known of soils, and the rest open.
+
+Model: mu(s) = A (1 - e^{-k (s - s_0)}) - d (s - s_0) (physics.md 5), rho_s(s) = r_0 + r_1 s (Brixius' manner). s_0 is
+the slip that a wrong rolling radius shows without pull. Each curve is fitted to bins drawn anew by stretches of way,
+to constants (torque scale, drawbar and slope) drawn by their stated spread, and to a prior drawn by its spread
+(randomised maximum a posteriori; Bardsley et al. 2014): with much data the curves agree, with little they spread as far as soils do.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from terragrip.advice.samples import Samples
+
+Array = NDArray[np.float64]
+
+DRAWS = 300
+BINS = 12
+LEAST_STRETCHES = 4
+LEAST_BINS = 3
+NAMES = ("ln A", "ln k", "d/A", "s_0", "r_0", "r_1")
+CENTRE = np.array([np.log(0.55), np.log(11.0), 0.1, 0.0, 0.07, 0.06])
+SPREAD = np.array([0.4, 0.45, 0.15, 0.01, 0.06, 0.05])
+"""What soils are like before any data: A about .55, k about 11 (Brixius 7.5, the paper 11.4, Burckhardt's up to 30), a fall of a tenth,
+resistance .07 that grows by .06 over all of slip (Brixius: .5/sqrt(Bn)); s_0 by the radius's spread."""
+SLIP_FLOOR = 0.006
+"""SD of a bin's mean slip beyond its scatter: curves of the way, unequal radii."""
+MISFIT = 0.02
+"""Relative error of a bin's mean beyond its scatter: the form is not the soil."""
+
+
+@dataclass(frozen=True)
+class CurveDraws:
+    """Curves of one soil: ``parameters`` (draws, 6) in the order of NAMES, the first row the best fit; ``reach``: slip that the data reach;
+    ``slip``, ``adhesion``, ``resistance`` (bins,): what was fitted; ``stretches`` of way behind it."""
+
+    parameters: Array
+    reach: float
+    slip: Array
+    adhesion: Array
+    resistance: Array
+    stretches: int
+    driven: float
+
+    def adhesion_at(self, slip: Array) -> Array:
+        """mu (draws, slips)."""
+        return adhesion(self.parameters, np.broadcast_to(slip, (len(self.parameters), len(slip))))
+
+    def resistance_at(self, slip: Array) -> Array:
+        """rho_s (draws, slips)."""
+        return resistance(self.parameters, np.broadcast_to(slip, (len(self.parameters), len(slip))))
+
+
+def adhesion(parameters: Array, slip: Array) -> Array:
+    """mu (draws, slips) of parameters (draws, 6) at slips (draws, slips)."""
+    height, rate, fall, zero = (parameters[:, i, None] for i in range(4))
+    s = slip - zero
+    return np.asarray(np.exp(height) * (np.sign(s) * -np.expm1(-np.exp(rate) * np.abs(s)) - fall * s))
+
+
+def resistance(parameters: Array, slip: Array) -> Array:
+    """rho_s (draws, slips); never below 0."""
+    return np.asarray(
+        np.maximum(
+            parameters[:, 4, None] + parameters[:, 5, None] * np.maximum(slip - parameters[:, 3, None], 0),
+            0.0,
+        )
+    )
+
+
+def draw_curves(
+    samples: Samples,
+    *,
+    common_sd: float,
+    radius_sd: float,
+    offset_sd: float,
+    draws: int = DRAWS,
+    seed: int = 0,
+) -> CurveDraws | None:
+    """Curves of one soil; None with fewer than LEAST_STRETCHES stretches or LEAST_BINS bins.
+
+    common_sd: relative SD of the torque scale; radius_sd: relative, of the rolling radius; offset_sd: of rho_s by drawbar offset and slope.
+    """
+    _, label = np.unique(samples.stretch, return_inverse=True)
+    stretches = int(label.max()) + 1 if label.size else 0
+    if stretches < LEAST_STRETCHES:
+        return None
+    order = np.argsort(samples.pull, kind="stable")
+    bins = int(np.clip(stretches, LEAST_BINS, BINS))
+    share = np.cumsum(samples.metres[order]) / samples.way
+    cell = np.empty(order.size, dtype=np.int64)
+    cell[order] = np.minimum((share * bins).astype(np.int64), bins - 1)
+    flat = label * bins + cell
+
+    def sums(values: Array) -> Array:
+        summed = np.bincount(flat, weights=values * samples.metres, minlength=stretches * bins)
+        return np.asarray(summed, dtype=float).reshape(stretches, bins)
+
+    way = sums(np.ones_like(samples.metres))
+    totals = [sums(x) for x in (samples.slip, samples.adhesion, samples.resistance)]
+    rng = np.random.default_rng(seed)
+    times = rng.multinomial(stretches, np.full(stretches, 1 / stretches), size=draws).astype(float)
+    times = np.vstack([np.ones(stretches), times])
+    weight = times @ way
+    enough = weight > 0.2 * samples.way / bins
+    slip, mu, rho = (times @ total / np.where(enough, weight, 1.0) for total in totals)
+    if np.count_nonzero(enough[0]) < LEAST_BINS:
+        return None
+    spread = np.sqrt(stretches / (stretches - 1))
+    sd = [np.where(enough, x, np.nan) for x in (slip, mu, rho)]
+    slip_sd, mu_sd, rho_sd = (spread * _pooled(np.nanstd(x[1:], axis=0)) for x in sd)
+    slip_sd = np.hypot(slip_sd, SLIP_FLOOR)
+    prior_sd = SPREAD.copy()
+    prior_sd[3] = np.hypot(radius_sd, 0.003)
+    prior = CENTRE + prior_sd * rng.standard_normal((draws + 1, len(CENTRE)))
+    prior[0] = CENTRE
+    scale = 1 + common_sd * rng.standard_normal((draws + 1, 1))
+    shift = offset_sd * rng.standard_normal((draws + 1, 1))
+    scale[0], shift[0] = 1.0, 0.0
+    mu, rho = mu * scale, rho + shift
+    x = _fit(slip, mu, rho, enough, (slip_sd, mu_sd, rho_sd), prior, prior_sd)
+    return CurveDraws(x, float(np.max(slip[0][enough[0]])), slip[0], mu[0], rho[0], stretches, samples.driven)
+
+
+def _pooled(sd: Array) -> Array:
+    """Each bin's SD (bins,), not under that of all: few stretches tell a bin's own badly."""
+    known = np.isfinite(sd)
+    usual = float(np.sqrt(np.mean(sd[known] ** 2))) if known.any() else 0.1
+    return np.where(known, np.maximum(sd, usual), usual)
+
+
+def _fit(
+    slip: Array,
+    mu: Array,
+    rho: Array,
+    enough: NDArray[np.bool_],
+    sd: tuple[Array, Array, Array],
+    prior: Array,
+    prior_sd: Array,
+) -> Array:
+    """The curve of each draw by Levenberg-Marquardt on bins and prior together, (draws, 6)."""
+    slip_sd, mu_sd, rho_sd = (np.maximum(np.nan_to_num(x, nan=0.1), 1e-4) for x in sd)
+    slip = np.where(enough, slip, 0.0)
+    lower = np.array([-4.0, np.log(2.0), -0.5, -0.1, 0.0, 0.0])
+    upper = np.array([1.5, np.log(100.0), 1.5, 0.1, 0.6, 0.5])
+    steepness = np.zeros_like(mu)
+
+    def residual(p: Array) -> Array:
+        of_mu = np.sqrt(mu_sd**2 + (steepness * slip_sd) ** 2 + (MISFIT * mu) ** 2 + 1e-6)
+        of_rho = np.sqrt(rho_sd**2 + (0.05 * rho) ** 2 + 1e-6)
+        a = np.where(enough, (adhesion(p, slip) - mu) / of_mu, 0.0)
+        b = np.where(enough, (resistance(p, slip) - rho) / of_rho, 0.0)
+        return np.concatenate([a, b, (p - prior) / prior_sd], axis=1)
+
+    x = np.clip(prior, lower, upper)
+    x[:, 0] = np.log(np.maximum(1.3 * np.where(enough, mu, 0).max(axis=1), 0.02))
+    damping = np.full(len(x), 1e-2)
+    for turn in range(40):
+        if turn in (0, 8, 16):
+            h = 1e-3
+            steepness = (adhesion(x, slip + h) - adhesion(x, slip - h)) / (2 * h)
+        now = residual(x)
+        cost = (now**2).sum(axis=1)
+        columns = []
+        for i in range(x.shape[1]):
+            moved = x.copy()
+            moved[:, i] += 1e-5
+            columns.append((residual(moved) - now) / 1e-5)
+        jacobian = np.stack(columns, axis=-1)
+        gradient = np.einsum("bjk,bj->bk", jacobian, now)
+        normal = np.einsum("bjk,bjl->bkl", jacobian, jacobian)
+        diagonal = np.einsum("bkk->bk", normal)
+        damped = normal + (damping[:, None] * diagonal)[:, :, None] * np.eye(x.shape[1])
+        trial = np.clip(x - np.linalg.solve(damped, gradient[..., None])[..., 0], lower, upper)
+        better = (residual(trial) ** 2).sum(axis=1) < cost
+        x = np.where(better[:, None], trial, x)
+        damping = np.clip(np.where(better, damping / 4, damping * 6), 1e-8, 1e8)
+    return x

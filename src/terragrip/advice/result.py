@@ -1,0 +1,120 @@
+"""Advice as records and as advice.json (architecture.md, contracts)."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field
+from typing import Any
+
+from terragrip.advice.optimum import Best
+from terragrip.files import replacing
+
+VERSION = 1
+
+
+@dataclass(frozen=True)
+class Action:
+    """One thing to do: ``what`` and ``why`` in words; ``gain``: efficiency gained with its 95 % ``interval``, None for a direction."""
+
+    what: str
+    why: str
+    gain: float | None = None
+    interval: tuple[float, float] | None = None
+
+
+@dataclass(frozen=True)
+class Advice:
+    """Advice on one soil. ``drive``: what was driven (numbers by name, SI); ``reserve``: of each driven wheel, the share of the ground's
+    grip that is left on average, with its interval; ``field``: ha/h and l/ha now and at best, where known; ``missing``: what is not
+    known and which drive would tell it."""
+
+    soil: str
+    best_efficiency: Best | None = None
+    best_productivity: Best | None = None
+    front: tuple[Mapping[str, float], ...] = ()
+    actions: tuple[Action, ...] = ()
+    missing: tuple[str, ...] = ()
+    drive: Mapping[str, float] = field(default_factory=dict)
+    reserve: Mapping[str, tuple[float, float, float]] = field(default_factory=dict)
+    field_work: Mapping[str, float] = field(default_factory=dict)
+    limits: tuple[str, ...] = ()
+
+    def to_dict(self) -> dict[str, Any]:
+        """As advice.json holds one soil."""
+        return {
+            "best_efficiency": None if self.best_efficiency is None else _best(self.best_efficiency),
+            "best_productivity": None if self.best_productivity is None else _best(self.best_productivity),
+            "front": [dict(point) for point in self.front],
+            "actions": [
+                {**asdict(one), "interval": None if one.interval is None else list(one.interval)}
+                for one in self.actions
+            ],
+            "missing": list(self.missing),
+            "limits": list(self.limits),
+            "drive": dict(self.drive),
+            "grip_reserve": {w: {"mean": m, "interval": [lo, hi]} for w, (m, lo, hi) in self.reserve.items()},
+            "field_work": dict(self.field_work),
+        }
+
+
+def _best(best: Best) -> dict[str, Any]:
+    return {key: list(value) if isinstance(value, tuple) else value for key, value in asdict(best).items()}
+
+
+def to_dict(advice: Mapping[str, Advice], way: Mapping[str, float]) -> dict[str, Any]:
+    """advice.json: the advice on the soil with the most way; with several, its name as ``soil`` and all in ``soils``."""
+    first = max(advice, key=lambda name: way.get(name, 0.0))
+    whole: dict[str, Any] = {"version": VERSION, **advice[first].to_dict()}
+    if len(advice) > 1:
+        whole |= {"soil": first, "soils": {name: one.to_dict() for name, one in advice.items()}}
+    elif first:
+        whole["soil"] = first
+    return _finite(whole)
+
+
+def write(advice: Mapping[str, Advice], way: Mapping[str, float], path: str | os.PathLike[str]) -> None:
+    """Write advice.json, whole or not at all. InputError where it cannot be written."""
+    text = json.dumps(to_dict(advice, way), indent=1, allow_nan=False, ensure_ascii=False)
+    with replacing(path) as temporary:
+        temporary.write_text(text + "\n", encoding="utf-8")
+
+
+def _finite(value: Any) -> Any:
+    """The same with null for numbers that JSON does not know, others to six digits."""
+    if isinstance(value, dict):
+        return {key: _finite(one) for key, one in value.items()}
+    if isinstance(value, list):
+        return [_finite(one) for one in value]
+    if isinstance(value, float):
+        return float(f"{value:.6g}") if math.isfinite(value) else None
+    return value
+
+
+def words(advice: Mapping[str, Advice]) -> str:
+    """The advice as lines of text."""
+    lines: list[str] = []
+    for name, one in advice.items():
+        if len(advice) > 1:
+            lines.append(f"{name}:")
+        for title, best in (
+            ("best efficiency", one.best_efficiency),
+            ("most pull power", one.best_productivity),
+        ):
+            if best is not None:
+                low, high = best.interval
+                lines.append(
+                    f"  {title}: {best.slip:.1%} slip ({low:.1%} to {high:.1%}), efficiency {best.efficiency:.2f}, "
+                    f"pull {best.net_traction:.2f} of the weight"
+                )
+        lines += [f"  held back: {sentence}" for sentence in one.limits]
+        for action in one.actions:
+            gain = ""
+            if action.gain is not None and action.interval is not None:
+                low, high = action.interval
+                gain = f" Gains {100 * action.gain:.1f} points of efficiency ({100 * low:.1f} to {100 * high:.1f})."
+            lines.append(f"  do: {action.what}{gain} {action.why}")
+        lines += [f"  missing: {sentence}" for sentence in one.missing]
+    return "\n".join(lines)

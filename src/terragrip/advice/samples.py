@@ -1,0 +1,138 @@
+"""What one soil's advice is worked out from: the vehicle's own slip, adhesion, resistance and pull, row by row of its drives."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from terragrip.estimation import Estimates
+from terragrip.soil.estimates import whole_length
+from terragrip.soil.transitions import settled
+from terragrip.vehicle import Vehicle
+
+Array = NDArray[np.float64]
+
+RADII = 10.0
+"""Wheel radii of way that count as one draw: several times the length over which ground varies (2 m of the paper's robot)."""
+
+
+@dataclass(frozen=True)
+class Samples:
+    """Rows of one soil, arrays (rows,), where vehicle and tool are on it and nothing is flagged.
+
+    ``slip``, ``adhesion``: the driven wheels' mean by load; ``resistance`` rho_s; ``pull``: net pull over weight, driven share times mu
+    less all resistances; ``metres`` of way that each stands for; ``stretch``: run and `RADII` wheel radii of it; ``speed`` [m/s];
+    ``slip_std``, ``adhesion_std``, ``resistance_std``: the estimates' own SD; ``wheel_adhesion``
+    (rows, driven wheels). ``driven``: the driven wheels' share of the weight, the mean.
+    """
+
+    slip: Array
+    adhesion: Array
+    resistance: Array
+    pull: Array
+    metres: Array
+    stretch: NDArray[np.int64]
+    speed: Array
+    slip_std: Array
+    adhesion_std: Array
+    resistance_std: Array
+    wheel_adhesion: Array
+    driven: float
+
+    def levels(self, count: int = 12) -> tuple[Array, Array]:
+        """(slip, pull): means (count,) over equal ways from the lowest pull to the highest."""
+        order = np.argsort(self.pull, kind="stable")
+        share = np.cumsum(self.metres[order]) / self.way
+        cell = np.minimum((share * count).astype(np.int64), count - 1)
+        way = np.bincount(cell, weights=self.metres[order], minlength=count)
+        slip, pull = (
+            np.bincount(cell, weights=(x * self.metres)[order], minlength=count)[way > 0] / way[way > 0]
+            for x in (self.slip, self.pull)
+        )
+        return slip, pull
+
+    @property
+    def way(self) -> float:
+        """Metres of all rows."""
+        return float(self.metres.sum())
+
+
+def driven_wheels(estimates: Estimates, vehicle: Vehicle) -> list[str]:
+    """The driven wheels that the table has."""
+    return [
+        w
+        for w, drives in zip(vehicle.wheels, vehicle.driven, strict=True)
+        if drives and w in estimates.wheels
+    ]
+
+
+def wheel_loads(estimates: Estimates, vehicle: Vehicle, wheels: Sequence[str]) -> Array:
+    """Vertical load of each wheel by row, (rows, wheels) [N]: its part of its axle's."""
+    axle = dict(zip(vehicle.wheels, vehicle.wheel_axle, strict=True))
+    count = np.bincount(vehicle.wheel_axle)
+    columns = [estimates[f"vertical_load_{vehicle.axle_names[axle[w]]}"] / count[axle[w]] for w in wheels]
+    return np.stack(columns, axis=1)
+
+
+def samples_by_soil(
+    tables: Iterable[Estimates], vehicle: Vehicle, soil: str | None = None
+) -> dict[str, Samples]:
+    """The usable rows of all tables by soil label; rows without a label are all of one soil, named "" (or ``soil``)."""
+    parts: dict[str, list[Samples]] = {}
+    for number, estimates in enumerate(tables):
+        for name, part in _of_table(estimates, vehicle, soil, number):
+            parts.setdefault(name, []).append(part)
+    return {name: _joined(several) for name, several in sorted(parts.items())}
+
+
+def _of_table(
+    estimates: Estimates, vehicle: Vehicle, soil: str | None, number: int
+) -> Iterable[tuple[str, Samples]]:
+    distance = np.asarray(estimates["distance"], dtype=float)
+    labels = np.full(len(estimates), soil or "", dtype=object)
+    if soil is None and "soil" in estimates.names:
+        labels = np.asarray(estimates["soil"], dtype=object)
+    good = np.asarray(estimates["event"] == "")
+    if (labels != labels[:1]).any():
+        good &= settled(distance, labels, whole_length(vehicle)) | (labels == "")
+    wheels = driven_wheels(estimates, vehicle)
+    load = wheel_loads(estimates, vehicle, wheels)
+    every = wheel_loads(estimates, vehicle, [w for w in vehicle.wheels if w in estimates.wheels]).sum(axis=1)
+    share = load / load.sum(axis=1, keepdims=True)
+
+    def mean(quantity: str) -> Array:
+        return np.asarray(
+            (np.stack([estimates[quantity.format(w)] for w in wheels], axis=1) * share).sum(axis=1)
+        )
+
+    slip, adhesion = mean("slip_{}"), mean("adhesion_{}")
+    resistance, driven = estimates["soil_resistance"], load.sum(axis=1) / every
+    pull = driven * adhesion - (1 - driven) * vehicle.tire_rolling_resistance - resistance
+    metres = np.diff(distance, prepend=distance[:1])
+    length = RADII * float(vehicle.wheel_radius.max())
+    good &= np.isfinite([slip, adhesion, resistance, metres]).all(axis=0) & (metres > 0)
+    stretch = number * 1_000_000 + np.floor(np.nan_to_num(distance) / length).astype(np.int64)
+    each = np.stack([estimates[f"adhesion_{w}"] for w in wheels], axis=1)
+    slip_std, adhesion_std = mean("slip_{}_std"), mean("adhesion_{}_std")
+    for name in sorted(set(labels[good])):
+        rows = good & (labels == name)
+        yield (
+            str(name),
+            Samples(
+                slip[rows], adhesion[rows], resistance[rows], pull[rows], metres[rows], stretch[rows],
+                np.asarray(estimates["ground_speed"])[rows], slip_std[rows], adhesion_std[rows],
+                np.asarray(estimates["soil_resistance_std"])[rows], each[rows], float(driven[rows].mean()),
+            ),
+        )  # fmt: skip
+
+
+def _joined(parts: Sequence[Samples]) -> Samples:
+    columns = [name for name in Samples.__dataclass_fields__ if name != "driven"]
+    way = [part.way for part in parts]
+    driven = float(np.average([part.driven for part in parts], weights=way))
+    return Samples(
+        **{name: np.concatenate([getattr(part, name) for part in parts]) for name in columns}, driven=driven
+    )

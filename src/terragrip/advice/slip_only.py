@@ -1,0 +1,89 @@
+"""Advice for a machine that tells slip alone: shares of time against the usual band, and what they cost."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from terragrip.advice.result import Action, Advice
+from terragrip.estimation import Estimates
+from terragrip.vehicle import Vehicle
+
+BAND = (0.08, 0.15)
+"""The usual band of slip of tractors at heavy draught work (ASABE EP496: 8 to 15 %, from firm to soft ground)."""
+OFTEN = 0.1
+"""Share of time outside the band from which something is advised."""
+LEAST_SPEED = 0.2
+"""m/s: slower rows count as standing."""
+LEAST_SECONDS = 60.0
+WHY_NO_CURVE = (
+    "no torque was measured, so what this ground bears, its best slip and the efficiency are not known: log wheel torque, "
+    "or engine torque with a driveline in the vehicle file"
+)
+
+
+def advise_slip(tables: Sequence[Estimates], vehicle: Vehicle) -> Advice:
+    """Shares of driving time below, within and above the usual band; what slip above it costs in time."""
+    slip, seconds, speed = (np.concatenate(x) for x in zip(*(_rows(one) for one in tables), strict=True))
+    total = float(seconds.sum())
+    if total < LEAST_SECONDS:
+        return Advice(
+            "",
+            missing=(
+                f"slip is known for {total:.0f} s of driving; give at least {LEAST_SECONDS:.0f} s",
+                WHY_NO_CURVE,
+            ),
+        )
+    low, high = BAND
+    below, above = (float(seconds[mask].sum() / total) for mask in (slip < low, slip > high))
+    lost = float((seconds * np.maximum(1 - (1 - slip) / (1 - high), 0)).sum() / total)
+    drive = {
+        "seconds": total, "slip_mean": float(np.average(slip, weights=seconds)), "band_low": low, "band_high": high,
+        "share_below": below, "share_within": 1 - below - above, "share_above": above, "time_lost": lost,
+    }  # fmt: skip
+    work = {}
+    if vehicle.working_width:
+        rate = float(np.average(speed, weights=seconds)) * vehicle.working_width * 0.36
+        work = {"hectares_per_hour": rate, "hectares_per_hour_at_band": rate / (1 - lost)}
+    cost = f", {work['hectares_per_hour_at_band'] - work['hectares_per_hour']:.2g} ha/h" if work else ""
+    actions = []
+    if above > OFTEN:
+        actions.append(
+            Action(
+                "Load less, or add ballast, where slip is high: work shallower or narrower there, or with less tyre pressure within the "
+                "tyre maker's table.",
+                f"Slip is above {high:.0%} in {above:.0%} of the driving time; at {high:.0%} the same wheel speed would save {lost:.1%} of "
+                f"the time{cost}.",
+            )
+        )
+    if below > 0.5:
+        actions.append(
+            Action(
+                "If this was heavy draught work: take ballast off, or load more (deeper, wider).",
+                f"Slip is below {low:.0%} in {below:.0%} of the driving time: it is heavier than its pull needs. On light work, on "
+                "the road and in transport low slip is right.",
+            )
+        )
+    if not actions:
+        actions.append(
+            Action(
+                "Keep load and ballast.",
+                f"Slip is above {high:.0%} in {above:.0%}, below {low:.0%} in {below:.0%} of the time.",
+            )
+        )
+    missing = (
+        WHY_NO_CURVE,
+        *(() if vehicle.working_width else ("working_width in the vehicle file, for ha/h",)),
+    )
+    return Advice("", actions=tuple(actions), missing=missing, drive=drive, field_work=work)
+
+
+def _rows(estimates: Estimates) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Slip (the wheels' mean), seconds and speed of the rows that drive and are not flagged."""
+    slip = np.mean([estimates[f"slip_{w}"] for w in estimates.wheels], axis=0)
+    step = np.diff(estimates.time, append=estimates.time[-1:])
+    usual = float(np.median(step[step > 0])) if (step > 0).any() else 0.0
+    speed = np.abs(estimates["ground_speed"])
+    good = np.isfinite(slip) & (estimates["event"] == "") & (speed > LEAST_SPEED)
+    return slip[good], np.minimum(step, 5 * usual)[good], speed[good]

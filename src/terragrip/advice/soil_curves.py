@@ -1,0 +1,101 @@
+"""Efficiency and net traction of one soil over slip, from the drives themselves or from a soil library."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from terragrip.advice.curves import DRAWS, draw_curves
+from terragrip.advice.optimum import GRID, OverSlip, over_slip
+from terragrip.advice.samples import Samples
+from terragrip.soil.estimates import torque_scale_sd
+from terragrip.soil.library import Soil
+from terragrip.units import STANDARD_GRAVITY
+from terragrip.vehicle import Vehicle
+
+Array = NDArray[np.float64]
+
+RADIUS_SD = 0.02
+"""Of the rolling radius where the vehicle file does not say (docs/vehicle.md)."""
+SHARE_OF_VARIATION = 0.5
+"""Relative SD of a library's resistance where it does not say."""
+GROWTH = (0.06, 0.05)
+"""Mean and SD of what resistance grows by over all of slip, where only its mean is known (Brixius: .5/sqrt(Bn))."""
+NORMAL_95 = 1.959964
+
+
+@dataclass(frozen=True)
+class SoilCurves:
+    """What is known of one soil: ``over`` its curves; ``adhesion`` (draws, slips) behind them; ``reach``: highest mean slip in the data."""
+
+    over: OverSlip
+    adhesion: Array
+    reach: float
+
+
+def of_drives(samples: Samples, vehicle: Vehicle) -> SoilCurves | None:
+    """From the drives' own rows; None where they hold too little way."""
+    known = vehicle.uncertainty
+    stated = np.hypot((known.drawbar_offset or 0.0) / (vehicle.mass * STANDARD_GRAVITY), known.slope or 0.0)
+    draws = draw_curves(
+        samples,
+        common_sd=torque_scale_sd(vehicle),
+        radius_sd=RADIUS_SD if known.wheel_radius is None else known.wheel_radius,
+        offset_sd=float(max(np.nanmedian(samples.resistance_std), stated)),
+    )
+    if draws is None:
+        return None
+    mu, rho = draws.adhesion_at(GRID), draws.resistance_at(GRID)
+    return SoilCurves(
+        over_slip(mu, rho, GRID, vehicle.tire_rolling_resistance, samples.driven), mu, draws.reach
+    )
+
+
+def of_library(soil: Soil, samples: Samples | None, vehicle: Vehicle, seed: int = 0) -> SoilCurves | None:
+    """From a library's curve with its interval; resistance from the rows where there are some. None where neither tells the resistance."""
+    rng = np.random.default_rng(seed)
+    low, high = _band(soil)
+    width = rng.standard_normal((DRAWS + 1, 1)) / (2 * NORMAL_95)
+    growth = np.maximum(GROWTH[0] + GROWTH[1] * rng.standard_normal((DRAWS + 1, 1)), 0.0)
+    shift = rng.standard_normal((DRAWS + 1, 1))
+    width[0], growth[0], shift[0] = 0.0, GROWTH[0], 0.0
+    if samples is not None:
+        level = float(np.average(samples.resistance, weights=samples.metres))
+        at = max(float(np.average(samples.slip, weights=samples.metres)), 0.0)
+        spread = float(np.nanmedian(samples.resistance_std))
+        driven = samples.driven
+    elif soil.resistance is not None:
+        level, at, driven = soil.resistance[0], 0.05, _driven_share(vehicle)
+        spread = soil.resistance[1] if np.isfinite(soil.resistance[1]) else SHARE_OF_VARIATION * level
+    else:
+        return None
+    mu = soil.value(GRID) + width * (high - low)
+    rho = np.maximum(level + spread * shift + growth * (GRID - at), 0.0)
+    reach = max((float(one["slip"]) for one in soil.bins), default=float(GRID[-1]))
+    return SoilCurves(over_slip(mu, rho, GRID, vehicle.tire_rolling_resistance, driven), mu, reach)
+
+
+def _band(soil: Soil) -> tuple[Array, Array]:
+    """The 95 % band of a library's curve over GRID: written with the fit, or by the interval of its one free parameter, else none."""
+    written = soil.fit.get("band")
+    if written:
+        return (np.interp(GRID, written["slip"], written[key]) for key in ("low", "high"))  # type: ignore[return-value]
+    free = list(soil.fit.get("free", ()))
+    if len(free) == 1 and free[0] in soil.interval:
+        from dataclasses import replace
+
+        ends = [
+            replace(soil, parameters={**soil.parameters, free[0]: x}).value(GRID)
+            for x in soil.interval[free[0]]
+        ]
+        return np.minimum(*ends), np.maximum(*ends)
+    value = soil.value(GRID)
+    return value, value
+
+
+def _driven_share(vehicle: Vehicle) -> float:
+    """The driven axles' share of the weight at rest."""
+    drives = np.array([axle.driven for axle in vehicle.axles.values()])
+    return float(vehicle.axle_mass[drives].sum() / vehicle.axle_mass.sum())

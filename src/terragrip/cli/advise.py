@@ -1,0 +1,59 @@
+"""``terragrip advise``: which slip, load, speed and ballast are best, from estimates."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from terragrip.cli.options import Quiet, VehicleFile
+from terragrip.cli.output import check_file
+from terragrip.cli.progress import progress
+
+
+def command(
+    estimates: Annotated[
+        list[Path], typer.Argument(metavar="ESTIMATES", help="Files written by 'terragrip estimate'.")
+    ],
+    vehicle: VehicleFile,
+    soils: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE", help="Known soils, soils.json; without it curves are learned from the estimates."
+        ),
+    ] = None,
+    output: Annotated[
+        Path | None, typer.Option("--output", "-o", metavar="FILE", help="The advice, advice.json.")
+    ] = None,
+    quiet: Quiet = False,
+) -> None:
+    """Say which slip is best, and what to do for it.
+
+    By soil: the slip of best efficiency and of most pull power with intervals, the front between them, grip in reserve, what to do about
+    load, speed, ballast and tyre pressure, and what is missing. Without torques: slip against the usual band of 8 to 15 %.
+    """
+    from terragrip.advice.analysis import advise
+    from terragrip.advice.result import words, write
+    from terragrip.estimation import Estimates
+    from terragrip.soil.estimates import distinct
+    from terragrip.soil.library import SoilLibrary
+    from terragrip.vehicle import Vehicle
+
+    inputs = [*estimates, vehicle, *([soils] if soils else [])]
+    target = check_file(output, inputs, suffixes=(".json",)) if output else None
+    machine = Vehicle.load(vehicle)
+    library = SoilLibrary.load(soils) if soils else None
+    tables = []
+    with progress("advise", quiet) as step:
+        for number, path in enumerate(distinct(estimates), 1):
+            tables.append(Estimates.read(path))
+            step(number, len(estimates) + 1)
+        advice, way = advise(tables, machine, library)
+        step(len(estimates) + 1, len(estimates) + 1)
+    if target:
+        write(advice, way, target)
+    if not quiet:
+        print(words(advice))
+        if target:
+            print(f"Written to {output}")

@@ -1,0 +1,149 @@
+"""Advice on drives whose ground is known exactly."""
+
+import json
+
+import numpy as np
+import pytest
+
+from advice_drives import VEHICLE, drive, slip_only
+from terragrip.advice.analysis import advise
+from terragrip.advice.optimum import GRID, best_of, over_slip
+from terragrip.advice.result import to_dict, write
+from terragrip.errors import InputError
+from terragrip.soil.library import Soil
+from terragrip.vehicle import Vehicle
+
+
+def truth(a=0.9, k=11.36, resistance=0.07, growth=0.0):
+    mu = 0.48 * a * -np.expm1(-k * GRID)
+    curves = over_slip(mu[None], (resistance + growth * GRID)[None], GRID, 0.02)
+    return best_of(curves, curves.efficiency), best_of(curves, curves.productivity)
+
+
+def only(tables, vehicle=VEHICLE, soils=None):
+    advice, _ = advise(tables, vehicle, soils)
+    (one,) = advice.values()
+    return one
+
+
+@pytest.mark.parametrize(
+    "ground",
+    [{"a": 0.9}, {"a": 1.3, "resistance": 0.05}, {"a": 0.7, "k": 18.0}, {"a": 1.1, "k": 7.0, "growth": 0.1}],
+)
+def test_intervals_of_the_best_slip_hold_the_truth_over_seeds(ground):
+    best, _ = truth(**ground)
+    given = [only([drive(seed=seed, **ground)]).best_efficiency for seed in range(12)]
+    held = [one.interval[0] <= best.slip <= one.interval[1] for one in given]
+    off = [abs(one.slip - best.slip) for one in given]
+    assert sum(held) >= 10
+    assert np.median(off) <= 0.02
+
+
+def test_a_short_drive_knows_less_than_a_long_one():
+    short, long = (
+        np.median(
+            [np.ptp(only([drive(seed=s, metres=m, top=0.12)]).best_efficiency.interval) for s in range(6)]
+        )
+        for m in (80, 1500)
+    )
+    assert long < short
+
+
+def test_the_front_trades_efficiency_for_pull_and_holds_no_point_that_another_beats():
+    one = only([drive()])
+    eta, pull = (np.array([p[key] for p in one.front]) for key in ("efficiency", "net_traction"))
+    assert (np.diff(eta) <= 1e-9).all()
+    assert (np.diff(pull) > 0).all()
+    assert one.front[0]["slip"] == pytest.approx(one.best_efficiency.slip)
+    assert one.front[-1]["slip"] == pytest.approx(one.best_productivity.slip)
+
+
+def test_light_work_is_told_to_load_more_and_heavy_work_less():
+    light = only([drive(top=0.06)]).actions[0]
+    assert any("Load more" in action.what for action in only([drive(top=0.06)]).actions)
+    assert any("Load less" in action.what for action in only([drive(top=0.6, metres=1500)]).actions)
+    assert light.gain > 0
+    assert light.interval[0] <= light.gain <= light.interval[1]
+
+
+def test_load_advised_is_the_pull_of_the_best_slip():
+    one = only([drive(top=0.06)])
+    action = next(a for a in one.actions if "Load more" in a.what)
+    kilonewton = float(action.what.split("about ")[1].split(" kN")[0])
+    assert kilonewton == pytest.approx(one.best_efficiency.net_traction * 6000 * 9.80665 / 1e3, rel=0.01)
+
+
+def test_the_reserve_is_what_the_mean_adhesion_leaves_of_the_curves_top():
+    one = only([drive(a=0.9)])
+    used = one.drive["adhesion"]
+    for mean, low, high in one.reserve.values():
+        assert low <= mean <= high
+        assert low <= 1 - used / (0.48 * 0.9) <= high
+
+
+def test_without_enough_slip_no_best_slip_is_given_and_the_drive_that_would_tell_is_named():
+    one = only([drive(top=0.02)])
+    assert one.best_efficiency is None
+    assert one.actions == ()
+    assert any("5 to 10 %" in sentence for sentence in one.missing)
+
+
+def test_a_few_metres_are_refused():
+    one = only([drive(metres=12.0)])
+    assert one.best_efficiency is None
+    assert "too short" in one.missing[0]
+
+
+def test_hectares_and_litres_by_hand():
+    vehicle = Vehicle.from_dict(
+        VEHICLE.to_dict() | {"working_width": 3.0, "fuel": "0.3 l/kWh", "power": 80e3}
+    )
+    one = only([drive(vehicle=vehicle)], vehicle)
+    assert one.field_work["hectares_per_hour"] == pytest.approx(1.5 * 3.0 * 3600 / 1e4)
+    joules = (
+        one.drive["net_traction"] * 6000 * 9.80665 * 1e4 / 3.0 / one.drive["efficiency"]
+    )  # a hectare is 10 000 m2 of way x width
+    assert one.field_work["litres_per_hectare"] == pytest.approx(joules / 3.6e6 * 0.3, rel=0.02)
+    assert not any(key in sentence for sentence in one.missing for key in ("working_width", "fuel", "power"))
+
+
+def test_several_soils_are_advised_apart_and_a_library_stands_in_for_learning():
+    tables = [drive(a=1.3, soil="hard", seed=1), drive(a=0.7, soil="wet", seed=2, metres=300)]
+    advice, way = advise(tables, VEHICLE)
+    assert set(advice) == {"hard", "wet"}
+    whole = to_dict(advice, way)
+    assert whole["soil"] == "hard"
+    assert whole["best_efficiency"] == whole["soils"]["hard"]["best_efficiency"]
+    library = {"hard": Soil("hard", "effective", {"A": 0.3, "k": 6.0, "d": 0.0})}
+    other, _ = advise(tables, VEHICLE, library)
+    assert other["wet"].best_efficiency == advice["wet"].best_efficiency
+    mu = 0.3 * -np.expm1(-6.0 * GRID)
+    best = best_of(
+        *(lambda c: (c, c.efficiency))(over_slip(mu[None], np.full((1, GRID.size), 0.07), GRID, 0.02))
+    )
+    low, high = other["hard"].best_efficiency.interval
+    assert low <= best.slip <= high
+
+
+def test_a_stock_tractor_is_held_against_the_usual_band_by_shares_of_time():
+    slip = np.concatenate([np.full(100, 0.05), np.full(60, 0.10), np.full(40, 0.30)])
+    one = only([slip_only(slip)])
+    assert one.best_efficiency is None
+    assert one.drive["share_below"] == pytest.approx(0.5, abs=0.01)
+    assert one.drive["share_above"] == pytest.approx(0.2, abs=0.01)
+    assert one.drive["time_lost"] == pytest.approx(0.2 * (1 - 0.70 / 0.85), abs=0.002)
+    assert "Load less" in one.actions[0].what
+    assert any("torque" in sentence for sentence in one.missing)
+
+
+def test_slip_and_torque_logs_are_not_mixed():
+    with pytest.raises(InputError, match="slip alone"):
+        advise([drive(), slip_only(np.full(100, 0.1))], VEHICLE)
+
+
+def test_what_is_written_is_json_without_nan(tmp_path):
+    advice, way = advise([drive(soil="hard")], VEHICLE)
+    write(advice, way, tmp_path / "advice.json")
+    data = json.loads((tmp_path / "advice.json").read_text(), parse_constant=lambda text: pytest.fail(text))
+    assert {"best_efficiency", "best_productivity", "front", "actions", "missing"} <= set(data)
+    assert all({"what", "why", "gain", "interval"} <= set(action) for action in data["actions"])

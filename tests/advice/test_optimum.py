@@ -1,0 +1,60 @@
+"""The best slips of curves whose optimum is known by calculus."""
+
+import numpy as np
+import pytest
+
+from terragrip.advice.optimum import GRID, best_of, over_slip
+from terragrip.physics.adhesion import CURVES, efficiency_peak
+
+
+def straight(slope: float, resistance: float, tire: float, driven: float = 1.0):
+    """mu = slope s with constant resistance: everything has a closed form."""
+    return over_slip(slope * GRID[None], np.full((1, GRID.size), resistance), GRID, tire, driven)
+
+
+def test_best_efficiency_of_a_straight_curve_is_the_root_by_calculus():
+    # eta = (k s - r)(1 - s)/(k s + t): d/ds = 0 where k^2 s^2 + 2 k t s - (k r + k t + r t) = 0... solved here by its own quadratic
+    k, r, t = 4.0, 0.06, 0.02
+    # numerator N = (k s - r)(1 - s), N' (k s + t) = N k  ->  -k^2 s^2 - 2 k t s + (k t + r t + r k) = 0
+    s = (-2 * k * t + np.sqrt(4 * k**2 * t**2 + 4 * k**2 * (k * t + r * t + r * k))) / (2 * k**2)
+    curves = straight(k, r, t)
+    best = best_of(curves, curves.efficiency)
+    assert best.slip == pytest.approx(s, abs=2e-5)
+    assert best.efficiency == pytest.approx((k * s - r) * (1 - s) / (k * s + t), abs=1e-4)
+
+
+def test_most_pull_power_of_a_straight_curve_is_half_way_to_full_slip():
+    # (k s - r)(1 - s) is largest at s = (1 + r/k)/2
+    k, r = 1.0, 0.1
+    curves = straight(k, r, 0.0)
+    assert best_of(curves, curves.productivity).slip == pytest.approx((1 + r / k) / 2, abs=1e-5)
+
+
+def test_with_all_wheels_driven_it_is_the_papers_efficiency():
+    parameters = {"a": 0.91}
+    mu = CURVES["exponential"].value(GRID, parameters)
+    curves = over_slip(mu[None], np.full((1, GRID.size), 0.07), GRID, 0.02)
+    slip, eta = efficiency_peak(CURVES["exponential"], parameters, 0.07, 0.02)
+    best = best_of(curves, curves.efficiency)
+    assert best.slip == pytest.approx(slip, abs=1e-4)
+    assert best.efficiency == pytest.approx(eta, abs=1e-4)
+
+
+def test_an_axle_that_only_rolls_costs_efficiency_and_asks_for_more_slip():
+    mu = CURVES["exponential"].value(GRID, {"a": 0.91})[None]
+    rho = np.full((1, GRID.size), 0.07)
+    whole, part = over_slip(mu, rho, GRID, 0.02), over_slip(mu, rho, GRID, 0.02, driven=0.6)
+    all_driven, rear = best_of(whole, whole.efficiency), best_of(part, part.efficiency)
+    assert rear.efficiency < all_driven.efficiency
+    assert rear.slip > all_driven.slip
+    # power balance at that slip: pull x travel over wheel power, by forces on a machine of weight 1
+    s = GRID[np.searchsorted(GRID, rear.slip)]
+    grip = float(np.interp(s, GRID, mu[0]))
+    pull = 0.6 * grip - 0.4 * 0.02 - 0.07
+    power_in = 0.6 * (grip + 0.02) / (1 - s)
+    assert np.interp(s, GRID, part.efficiency[0]) == pytest.approx(pull / power_in, rel=1e-9)
+
+
+def test_nothing_is_pulled_where_resistance_exceeds_the_grip():
+    curves = straight(0.1, 0.2, 0.02)
+    assert best_of(curves, curves.efficiency).efficiency == 0.0
