@@ -52,10 +52,11 @@ def test_the_intervals_hold_for_machines_of_the_class(name: str) -> None:
         true |= {"wheel_radius": known["wheel_radius"] * (1 + 0.02 * draws.standard_normal())}
         vehicle = vehicle_of(machine, "torque", true, (), is_calibrated=True)
         log = drive(vehicle, machine.speed, "torque", tows=True)
-        told, truth = tg.estimate(log, made.vehicle), tg.estimate(log, vehicle)
+        made_estimates, truth = tg.estimate(log, made.vehicle), tg.estimate(log, vehicle)
         row = -100  # at work
         for column, found in held.items():
-            found.append(abs(told[column][row] - truth[column][row]) < 1.96 * told[f"{column}_std"][row])
+            error = made_estimates[column][row] - truth[column][row]
+            found.append(abs(error) < 1.96 * made_estimates[f"{column}_std"][row])
     assert {column: np.mean(found) >= 0.85 for column, found in held.items()} == dict.fromkeys(held, True)
 
 

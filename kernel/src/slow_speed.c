@@ -1,6 +1,6 @@
 /* The part of the ground speed's noise that does not average out (R): receivers filter, so that their errors stay alike for seconds to minutes.
- * No drive tells it from slip, but at rest the speed is 0, and what the sensor reads there on the average, beyond its white noise, is such an
- * error: one sample of it a stop. Until stops have told, a share of the noise is taken for slow. */
+ * While driving it cannot be separated from slip, but at rest the speed is 0, and the mean of what the sensor reads there, beyond its white noise, is
+ * one sample of that error a stop. Before the first stops a share of the noise is assumed to be slow. */
 #include "estimator.h"
 
 /* At rest: `row` may hold one more reading. */

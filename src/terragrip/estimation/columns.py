@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from typing import NamedTuple
 
 from terragrip.recording.schema import REFERENCE, unit_of
@@ -63,11 +62,6 @@ def column_named(name: str) -> Column:
         if inner.description:
             return Column(inner.unit, f"one standard deviation of {name.removesuffix('_std')}")
     return Column(unit_of(name) or "", "")
-
-
-def units_of(names: Iterable[str]) -> dict[str, str]:
-    """The unit of each column."""
-    return {name: column_named(name).unit for name in names}
 
 
 def _of_a_part(name: str) -> Column | None:

@@ -1,4 +1,4 @@
-"""Estimates told by label: a row a soil (or an event), with what was driven there and the medians."""
+"""Estimates summed up by label: a row a soil (or an event), with what was driven there and the medians."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 
 def quantities(estimates: Estimates) -> list[str]:
-    """The columns that a summary tells: speed and resistance of the vehicle, slip, adhesion, traction and efficiency of each wheel."""
+    """The columns that a summary reports: speed and resistance of the vehicle, slip, adhesion, traction and efficiency of each wheel."""
     named = ["ground_speed", "soil_resistance"]
     named += [
         f"{q}_{w}" for q in ("slip", "adhesion", "net_traction", "efficiency") for w in estimates.wheels
@@ -54,11 +54,11 @@ def summary_by(estimates: Estimates, by: str) -> pd.DataFrame:
     metres = (
         np.diff(estimates["distance"], append=estimates["distance"][-1:]) if "distance" in estimates else None
     )
-    found = {}
+    result = {}
     for label in sorted(set(labels.tolist())):
         rows = labels == label
-        told = {"rows": int(rows.sum()), "seconds": float(seconds[rows].sum())}
+        one = {"rows": int(rows.sum()), "seconds": float(seconds[rows].sum())}
         if metres is not None:
-            told["metres"] = float(np.nansum(metres[rows]))
-        found[label] = told | medians(estimates, rows if by == "event" else rows & calm)
-    return pd.DataFrame.from_dict(found, orient="index").rename_axis(by)
+            one["metres"] = float(np.nansum(metres[rows]))
+        result[label] = one | medians(estimates, rows if by == "event" else rows & calm)
+    return pd.DataFrame.from_dict(result, orient="index").rename_axis(by)

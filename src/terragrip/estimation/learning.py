@@ -1,7 +1,7 @@
-"""Noise and held channels told while the rows come in, by the functions that tell them from a whole log.
+"""Noise and held channels learned while the rows come in, by the functions that learn them from a whole log.
 
 As a log's survey (`terragrip.recording.survey`) takes every 2^k-th chunk of its rows, so does this of the rows so far, with shorter
-chunks: after 1, 2, 3, 4, 5, 7, 9, 13, 17 ... chunks the kept ones stand for the whole drive, and what they tell is given out.
+chunks: after 1, 2, 3, 4, 5, 7, 9, 13, 17 ... chunks the kept ones stand for the whole drive, and what they show is reported.
 """
 
 from __future__ import annotations
@@ -31,15 +31,15 @@ WORTH = 0.1
 
 @dataclass(frozen=True)
 class Learned:
-    """SDs [SI] by channel and update periods [s], as told from ``seconds`` of rows that were kept of the drive so far."""
+    """SDs [SI] by channel and update periods [s], as learned from ``seconds`` of kept rows of the drive so far."""
 
     noise: Mapping[str, float]
     held: Mapping[str, float]
     seconds: float
 
     def changes(self, estimator: TractionEstimator) -> list[str]:
-        """What is another than the estimator uses, in words; empty where nothing is worth a change."""
-        found = [
+        """What differs from what the estimator uses, in words; empty where nothing is worth a change."""
+        changes = [
             f"noise of {name} {sd:.3g} (was {estimator.noise[name]:.3g})"
             for name, sd in self.noise.items()
             if abs(sd / estimator.noise[name] - 1) > WORTH
@@ -47,19 +47,19 @@ class Learned:
         for name, period in self.held.items():
             before = estimator.held.get(name)
             if before is None or abs(period / before - 1) > WORTH:
-                found.append(f"{name} is held, one value in {period:.3g} s")
-        return found
+                changes.append(f"{name} is held, one value in {period:.3g} s")
+        return changes
 
     def apply(self, estimator: TractionEstimator) -> None:
-        """From the next sample on. What was known before stays where this tells nothing: a machine that stands shows no noise."""
+        """From the next sample on. What was known before stays where this says nothing: a machine that stands shows no noise."""
         known = {name: sd for name, sd in estimator.noise.items() if name not in estimator.guessed}
         estimator.set_noise({**known, **self.noise}, {**estimator.held, **self.held})
 
 
 class SettingsLearner:
-    """Tells noise and held channels of the rows so far, at set moments.
+    """Learns noise and held channels from the rows so far, at set moments.
 
-    ``channels``: the columns that the estimator looks at. ``noise`` and ``held``: what is given and not to be told anew.
+    ``channels``: the columns that the estimator looks at. ``noise`` and ``held``: what is given and not to be learned anew.
     """
 
     def __init__(

@@ -297,7 +297,7 @@ def _kept(rows: Rows, log: LogTable) -> npt.NDArray[np.bool_]:
                 f"no row equals {rows.equals!r}", file=log.source, place=f"column {rows.column}", hint=hint
             )
     if not keep.any():
-        hint = "hint 'rows:' in the profile"
+        hint = "correct 'rows:' in the profile"
         raise InputError(
             f"no row equals {rows.equals!r}", file=log.source, place=f"column {rows.column}", hint=hint
         )

@@ -46,7 +46,7 @@ class Settings:
     ``window`` [s]: how long a row waits for what is due. ``channels``: columns the samples carry; empty: those seen by the
     first row. ``sources``: their URIs without options. ``held`` [s]: update periods of channels that are repeated between
     updates. ``noise``: SDs [SI] by channel, over the vehicle file's. ``ground``: whether ground changes and soils are followed. ``learn``:
-    whether noise and held channels that are not given are told from the rows as they come (`terragrip.estimation.learning`).
+    whether noise and held channels that are not given are learned from the rows as they come (`terragrip.estimation.learning`).
     """
 
     sources: tuple[str, ...]

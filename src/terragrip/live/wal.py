@@ -80,11 +80,6 @@ class WriteAhead:
         """Which segment this is."""
         self._frame(b"B" + json.dumps(about).encode())
 
-    @property
-    def dirty(self) -> bool:
-        """Whether frames wait to be written."""
-        return bool(self._buffer)
-
     def write(self) -> None:
         """Hand the frames to the system; raises OSError."""
         if self._buffer:

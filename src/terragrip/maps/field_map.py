@@ -27,13 +27,13 @@ if TYPE_CHECKING:
 Floats = npt.NDArray[np.float64]
 
 REFERENCE_SLIP = 0.2
-"""Slip that adhesion is mapped at unless told otherwise."""
+"""Slip that adhesion is mapped at by default."""
 GROUND = ("adhesion", "soil_resistance")
 """What is the ground's own, and searched for anomalies; slip and efficiency answer to the load too, and slip stands in where it is all."""
 MOST_CELLS = 50_000_000
 """Cells of the box around all runs beyond which a raster of them would not fit a common machine's memory."""
 LARGE_MACHINE = 1000.0
-"""kg: heavier machines are mapped by `LARGE_CELL` unless told otherwise, lighter ones by `SMALL_CELL`."""
+"""kg: by default heavier machines are mapped by `LARGE_CELL`, lighter ones by `SMALL_CELL`."""
 LARGE_CELL, SMALL_CELL = 3.0, 1.0
 
 

@@ -71,7 +71,7 @@ def check_time(time: Floats, source: str | None, *, first_row: int = 0, after: f
     if len(unknown):
         where = place(TIME, unknown[0], first_row=first_row)
         raise InputError(
-            "time is not a finite number", file=source, place=where, hint="drop the row, or hint it"
+            "time is not a finite number", file=source, place=where, hint="drop the row, or correct it"
         )
     row = int(np.argmin(forward))
     last = before if row == 0 else time[row - 1]

@@ -161,8 +161,8 @@ class Recording:
         rows = []
         for name, values in self.channels.items():
             known = values[np.isfinite(values)]
-            told = (known.min(), np.median(known), known.max()) if len(known) else (None, None, None)
-            rows.append((name, unit_of(name) or "", len(known), *map(figure_of, told)))
+            figures = (known.min(), np.median(known), known.max()) if len(known) else (None, None, None)
+            rows.append((name, unit_of(name) or "", len(known), *map(figure_of, figures)))
         head = ("channel", "unit", "values", "min", "median", "max")
         return html_table(head, rows, f"{self.source or 'recording'}: {span}") + html_notes(self.notes)
 

@@ -68,11 +68,6 @@ class Trace:
         return Trace(rows, self.vehicle, self.radius, self.terrain, self.wheel_mass, self.tool_count)
 
     @cached_property
-    def normal_force(self) -> Floats:
-        """m g cosθ [N], θ the large-scale slope (n,)."""
-        return self.vehicle.mass * STANDARD_GRAVITY * np.cos(self["slope"])
-
-    @cached_property
     def rolling_force(self) -> Floats:
         """Rolling resistance force of each axle [N], signed against forward (n, axles)."""
         return self["resistance"] * self["axle_load"]

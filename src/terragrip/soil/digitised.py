@@ -88,7 +88,7 @@ def _numbers(body: list[list[str]], column: int, first: int, file: str) -> Array
         if value is None or np.isinf(value):
             place = f"row {first + i + 1}, column {column + 1}"
             raise InputError(
-                f"{cell!r} is not a number", file=file, place=place, hint="hint or delete that row"
+                f"{cell!r} is not a number", file=file, place=place, hint="correct or delete that row"
             )
         out.append(value)
     return np.array(out)

@@ -40,7 +40,7 @@ def html_of(soils: Mapping[str, Soil], not_fitted: Mapping[str, str]) -> str:
     """Curves by soil with their intervals, and what was not fitted."""
     rows = []
     for name, soil in soils.items():
-        told = [
+        parameters = [
             f"{key} {value:.3g}"
             + (
                 f" ({soil.interval[key][0]:.3g} to {soil.interval[key][1]:.3g})"
@@ -51,7 +51,7 @@ def html_of(soils: Mapping[str, Soil], not_fitted: Mapping[str, str]) -> str:
             if key in soil.interval or not soil.interval
         ]
         rows.append(
-            (name, soil.model, ", ".join(told), figure_of(soil.r2), figure_of(soil.nrmse), figure_of(*(soil.resistance or (None,))))
+            (name, soil.model, ", ".join(parameters), figure_of(soil.r2), figure_of(soil.nrmse), figure_of(*(soil.resistance or (None,))))
         )  # fmt: skip
     head = ("soil", "model", "parameters (95 %)", "R²", "NRMSE", "resistance")
     return html_table(head, rows) + html_notes(f"{name}: {why}" for name, why in not_fitted.items())

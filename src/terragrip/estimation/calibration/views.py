@@ -30,7 +30,7 @@ def table_of(calibration: Calibration) -> pd.DataFrame:
 
 
 def html_of(calibration: Calibration) -> str:
-    """Quantities with their intervals, what could not be told and why, notes."""
+    """Quantities with their intervals, what could not be determined and why, notes."""
     rows = [
         (one.name, f"{one.value:.4g}", f"{one.interval[0]:.4g} to {one.interval[1]:.4g}", "" if one.unit == "1" else one.unit, one.samples)
         for one in calibration.quantities
