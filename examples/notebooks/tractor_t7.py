@@ -3,7 +3,7 @@
 # %% [markdown]
 # # A stock tractor: slip from its bus
 #
-# An hour of field work at 1 Hz (CC BY-NC 4.0): wheel-based speed and GNSS speed, no torque. Slip, and where it occurred, is all that this log shows.
+# An hour of field work at 1 Hz (CC BY-NC 4.0): wheel-based speed and GNSS speed, no torque. It shows slip, and where, and no more.
 
 # %%
 import os
