@@ -12,14 +12,23 @@ Step = Callable[..., None]
 """Called with what is done, what there is in all, and perhaps what was just done."""
 
 _PATIENCE = 0.5  # s without a bar
+_watchers: list[Step] = []
+
+
+def watch(watcher: Step) -> None:
+    """From now on progress goes to ``watcher`` in place of a bar."""
+    _watchers[:] = [watcher]
 
 
 @contextmanager
 def progress(title: str, quiet: bool = False) -> Iterator[Step]:
     """A function to call with (done, total) or (done, total, text), which draws a bar on standard error.
 
-    Nothing is drawn where standard error is no terminal, with ``quiet``, or in the first half second.
+    Nothing is drawn where standard error is no terminal, with ``quiet``, or in the first half second; see `watch`, too.
     """
+    if _watchers:
+        yield _watchers[0]
+        return
     if quiet or not sys.stderr.isatty():
         yield _nothing
         return

@@ -104,6 +104,8 @@ def command(
         )
     library = SoilLibrary({})
     words: list[str] = []
+    estimates, left = _with_adhesion(estimates)
+    words += [f"{path}: left out, it holds slip without adhesion." for path in left]
     if estimates:
         with progress("soils", quiet) as step:
             campaign = soils_of(estimates, curve, special, soil, step)
@@ -129,6 +131,24 @@ def command(
         if other is not None:
             print(comparison(library, other, compare))
         print(f"Written to {output}")
+
+
+def _with_adhesion(estimates: list[Path]) -> tuple[list[Path], list[Path]]:
+    """The files that hold adhesion, and those of several that hold slip alone; where none holds any, all, for the reader to name."""
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    from terragrip.estimation.estimates import wheels_with
+
+    def has_adhesion(path: Path) -> bool:
+        try:
+            return bool(wheels_with("adhesion", pq.read_schema(path).names))
+        except (pa.ArrowException, OSError):
+            return True  # whoever learns from it says why it is unusable
+
+    left = [path for path in estimates if not has_adhesion(path)]
+    learning = [path for path in estimates if path not in left]
+    return (learning, left) if learning else (estimates, [])
 
 
 def _joined(library: SoilLibrary, other: SoilLibrary, path: Path) -> SoilLibrary:

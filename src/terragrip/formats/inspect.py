@@ -120,12 +120,10 @@ def inspect(
     machine = vehicle if isinstance(vehicle, Vehicle) or vehicle is None else Vehicle.load(vehicle)
     databases = tuple(dbc)
     chosen = profile if isinstance(profile, Profile) or profile is None else Profile.load(profile)
-    size = _size(path)
-    every = max(1, round(size / _ENOUGH)) if size > _LONG else 1
-    log = read_log(path, Sparse(every) if every > 1 else None, (*databases, *(chosen.dbc if chosen else ())))
+    log, every = look_into(path, (*databases, *(chosen.dbc if chosen else ())))
     warnings, recording = list(log.notes), None
     if every > 1:
-        warnings.insert(0, _SPARSE.format(size / 1e9, every))
+        warnings.insert(0, _SPARSE.format(_size(path) / 1e9, every))
     fits = Fit()
     try:
         # A long log is not read a second time.
@@ -175,6 +173,15 @@ def inspect(
             os.path.basename(str(log.source)), stamp, proposals, since_1970=seen.since_1970, dbc=databases
         ),
     )
+
+
+def look_into(
+    path: str | os.PathLike[str], dbc: Sequence[str | os.PathLike[str]] = ()
+) -> tuple[LogTable | SignalLog, int]:
+    """A log as its columns, and of a long one which blocks: one of every so many, all over it (1: all of it). Raises as `read_log`."""
+    size = _size(path)
+    every = max(1, round(size / _ENOUGH)) if size > _LONG else 1
+    return read_log(path, Sparse(every) if every > 1 else None, tuple(dbc)), every
 
 
 @dataclass(frozen=True)

@@ -78,9 +78,10 @@ def profile_text(
     *,
     since_1970: bool,
     dbc: Sequence[str | os.PathLike[str]] = (),
+    head: str = "Proposed by 'terragrip inspect' for {}. Check every line; '?' marks a doubt.",
 ) -> str:
-    """A profile as YAML: loads as it stands, with a question mark at every line that was guessed."""
-    lines = [f"# Proposed by 'terragrip inspect' for {file}. Check every line; '?' marks a doubt."]
+    """A profile as YAML: loads as it stands, with a question mark at every line that was guessed; ``head`` is its first line."""
+    lines = [f"# {head.format(file)}"]
     if stamp is None:
         lines.append("# time: {from: ???, unit: s}   # needed: no column looked like time")
     else:

@@ -33,8 +33,8 @@ class Proposal:
     """What a channel may be made of: the keys of its entry in a profile, and what to look at.
 
     ``doubt`` is why it carries a question mark (empty: none), ``give`` what only the user can add (a gear ratio, a torque constant),
-    ``confidence`` (0 to 1) how well name and data agree, ``evidence`` what speaks for it, ``alternatives`` other columns, best first,
-    ``unit`` the column's own unit, as far as it is known.
+    ``confidence`` (0 to 1) how well name and data agree, ``evidence`` what speaks for it, ``others`` proposals of other columns, best
+    first, ``unit`` the column's own unit, as far as it is known.
     """
 
     entry: dict[str, object]
@@ -42,8 +42,13 @@ class Proposal:
     give: str = ""
     confidence: float = 0.0
     evidence: tuple[str, ...] = ()
-    alternatives: tuple[str, ...] = ()
+    others: tuple[Proposal, ...] = ()
     unit: str | None = None
+
+    @property
+    def alternatives(self) -> tuple[str, ...]:
+        """The columns of the other proposals."""
+        return tuple(column for other in self.others for column in other.columns)
 
     @property
     def columns(self) -> tuple[str, ...]:
@@ -149,7 +154,7 @@ def _proposal(channel: str, guess: Guess, ranked: list[Guess]) -> Proposal:
         give,
         round(guess.confidence, 2),
         guess.evidence,
-        tuple(g.column.column for g in others[:3]),
+        tuple(_proposal(channel, g, []) for g in others[:3]),
         unit or None,
     )
 

@@ -70,7 +70,9 @@ class Access:
 
         async def guarded(message: Any) -> None:
             if message["type"] == "http.response.start":
-                message = {**message, "headers": [*message.get("headers", []), *_HEADERS]}
+                own = message.get("headers", [])
+                named = {name for name, _ in own}  # a report has a stricter policy of its own
+                message = {**message, "headers": [*own, *(one for one in _HEADERS if one[0] not in named)]}
             await send(message)
 
         await self._app(scope, receive, guarded)

@@ -80,6 +80,12 @@ class Folder:
             raise InputError("no such file in this folder", file=path, hint="reload the list")
         return target
 
+    def profile(self, name: str) -> str:
+        """What reads a log by a profile: a file of the folder as its path on disk, or one that comes with Terragrip by its name."""
+        from terragrip.formats.profile import SHIPPED
+
+        return name if name in SHIPPED and not self.resolve(name).exists() else str(self.file(name))
+
     def new_file(self, path: str, suffixes: tuple[str, ...]) -> Path:
         """As `resolve`, for a file to be written: its folder exists, its name ends as `suffixes` say."""
         target = self.resolve(path)

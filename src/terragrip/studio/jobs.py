@@ -1,4 +1,7 @@
-"""Long work in processes of its own: queued, one at a time, with progress, and cancelled on request."""
+"""Long work: command lines of Terragrip in processes of their own, queued, one at a time, with progress, and cancelled on request.
+
+A job is its command line and nothing else, so that what the page shows for the next time is what was run.
+"""
 
 from __future__ import annotations
 
@@ -6,8 +9,10 @@ import asyncio
 import contextlib
 import json
 import secrets
+import shlex
 import sys
-from dataclasses import dataclass, field
+from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -22,7 +27,8 @@ DEFECT = "a defect of Terragrip; run the same with 'terragrip --debug' on the co
 
 @dataclass
 class Job:
-    """One job: `state` is queued, running, done, failed or cancelled; `done` of `total` rows; `text` is the summary or the reason."""
+    """One job: `state` is queued, running, done, failed or cancelled; `done` of `total` steps; `text` is the summary or the reason;
+    `words` are its command line after "terragrip", with paths from the studio's folder."""
 
     id: str
     kind: str
@@ -32,11 +38,16 @@ class Job:
     done: int = 0
     total: int = 0
     text: str = ""
-    request: dict[str, Any] = field(default_factory=dict, repr=False)
+    words: tuple[str, ...] = ()
+
+    @property
+    def command(self) -> str:
+        """The command line as a shell takes it, in the studio's folder."""
+        return shlex.join(("terragrip", *self.words))
 
     def to_dict(self) -> dict[str, Any]:
         """What a page may see of it."""
-        names = ("id", "kind", "title", "output", "state", "done", "total", "text")
+        names = ("id", "kind", "title", "output", "state", "done", "total", "text", "command")
         return {name: getattr(self, name) for name in names}
 
 
@@ -50,9 +61,9 @@ class Jobs:
         self._runner: asyncio.Task[None] | None = None
         self._process: asyncio.subprocess.Process | None = None
 
-    def add(self, kind: str, title: str, output: str, request: dict[str, Any]) -> Job:
-        """Queue a job; `request` is what the worker gets, `output` the path that it will write."""
-        job = Job(secrets.token_hex(8), kind, title, output, request={"kind": kind, **request})
+    def add(self, kind: str, title: str, output: str, words: Sequence[str]) -> Job:
+        """Queue a job; `words` is its command line after "terragrip", `output` the path that it will write."""
+        job = Job(secrets.token_hex(8), kind, title, output, words=tuple(words))
         self._jobs[job.id] = job
         over = [old.id for old in self._jobs.values() if old.state in ("done", "failed", "cancelled")][:-KEEP]
         for old in over:
@@ -76,7 +87,7 @@ class Jobs:
         if job.state == "queued":
             self._end(job, "cancelled", "cancelled before it began")
         elif job.state == "running":
-            self._end(job, "cancelled", "cancelled; nothing was written")
+            self._end(job, "cancelled", "cancelled; what was not finished is removed")
             await self._stop()
 
     async def close(self) -> None:
@@ -107,35 +118,35 @@ class Jobs:
         job.state = "running"
         self._tell(job)
         process = await asyncio.create_subprocess_exec(
-            sys.executable, "-m", "terragrip.studio.worker", stdin=asyncio.subprocess.PIPE, stdout=asyncio.subprocess.PIPE,
-            stderr=asyncio.subprocess.DEVNULL, limit=1 << 22, cwd=self._folder,
+            sys.executable, "-m", "terragrip.cli.job", *job.words, stdin=asyncio.subprocess.DEVNULL, stdout=asyncio.subprocess.PIPE,
+            stderr=asyncio.subprocess.PIPE, limit=1 << 22, cwd=self._folder,
         )  # fmt: skip
         self._process = process
-        assert process.stdin is not None
         assert process.stdout is not None
-        with contextlib.suppress(BrokenPipeError, ConnectionResetError):
-            process.stdin.write(json.dumps(job.request).encode())
-            await process.stdin.drain()
-            process.stdin.close()
-        async for line in process.stdout:
-            self._read_message(job, line)
-        await process.wait()
+        text, problem = await asyncio.gather(process.stdout.read(), self._follow(job, process.stderr))
+        code = await process.wait()
         self._process = None
         if job.state == "running":
-            self._end(job, "failed", DEFECT)
+            done = text.decode(errors="replace").strip()
+            self._end(
+                job,
+                "failed" if code else "done",
+                "\n".join([problem or DEFECT, done]).strip() if code else done,
+            )
 
-    def _read_message(self, job: Job, line: bytes) -> None:
-        try:
-            message = json.loads(line)
-        except ValueError:  # a library that prints
-            return
-        if job.state != "running" or not isinstance(message, dict):
-            return
-        if message.get("state") == "running":
-            job.done, job.total = int(message["done"]), int(message["total"])
-            self._tell(job)
-        elif message.get("state") in ("done", "failed"):
-            self._end(job, message["state"], str(message.get("text", "")))
+    async def _follow(self, job: Job, stream: asyncio.StreamReader | None) -> str:
+        """Report progress until a process ends; what it wrote beside that, the reason where it failed."""
+        assert stream is not None
+        lines = []
+        async for raw in stream:
+            line = raw.decode(errors="replace").strip()
+            if not line.startswith('{"done"'):
+                lines.append(line.removeprefix("terragrip: "))
+            elif job.state == "running":
+                step = json.loads(line)
+                job.done, job.total = int(step["done"]), int(step["total"])
+                self._tell(job)
+        return "\n".join(lines).strip()
 
     def _end(self, job: Job, state: str, text: str) -> None:
         root = f"{self._folder}/"

@@ -12,6 +12,7 @@ from fastapi.requests import HTTPConnection
 from terragrip.files import sha256
 from terragrip.studio.folder import MOST, Folder
 from terragrip.studio.jobs import Jobs
+from terragrip.studio.log_look import LogLook, look_at
 from terragrip.studio.notices import Notices
 from terragrip.studio.shown import Shown
 from terragrip.studio.tables import Tables
@@ -55,6 +56,7 @@ class Studio:
         self.estimates: Tables[Estimates] = Tables(_estimates)
         self.shown: Tables[Shown] = Tables(lambda path: Shown(self.estimates.get(path)))
         self.recordings: Tables[Recording] = Tables(_recording)
+        self.logs: Tables[LogLook] = Tables(look_at)
         self.fingerprints: Tables[str] = Tables(sha256, MOST)
         # by SHA-256: the recording and the profile that reads it, None where the folder does not hold it
         self.origins: dict[str, tuple[Path, str] | None] = {}

@@ -1,25 +1,54 @@
-/** The start page: what the folder holds, new logs by drop, work under way. */
+/** The start page: what the folder holds, new logs by drop, commands over chosen files; a log on its way to estimates. */
 
-import { address, get, send, upload, type Item, type Job } from "../ui/api";
+import "./start.css";
+import { address, get, send, upload, type Item } from "../ui/api";
 import { fill, h } from "../ui/dom";
 import { note, tried } from "../ui/notes";
-import type { Page } from "../ui/page";
-import { Wizard } from "./wizard";
+import type { Context, Page } from "../ui/page";
+import { ACTIONS, ask } from "./commands";
+import { focusOn, refill } from "./focus";
+import { freeName, JobList, viewOf } from "./jobs";
+import { LogPage } from "./log";
+import { MachineMaker } from "./machine";
 
 const KINDS: [string, string, string][] = [
   ["recording", "Recordings", "Drop a log here: CSV, Parquet, MAT, bag, MCAP, MF4, CAN …"],
   ["estimates", "Estimates", "None yet: open a recording and estimate it."],
   ["library", "Soil libraries", "None yet: learn one from estimates, or save a curve on the fit page."],
-  ["ground", "Ground", "None yet: terragrip ground writes them."],
-  ["report", "Reports", "None yet: terragrip report writes them."],
-  ["vehicle", "Vehicles", "A vehicle file is needed to estimate; see the tutorial."],
-  ["profile", "Profiles", "Only needed for logs with names of their own."],
+  ["ground", "Ground", "None yet: find changes of the ground from estimates."],
+  ["report", "Reports", "None yet: write one from estimates."],
+  ["vehicle", "Vehicles", "None yet: an estimate needs one."],
+  ["profile", "Profiles", "Only needed for logs with names of their own; choosing a log's columns makes one."],
   ["picture", "Pictures", "Scans of printed curves, for the fit page."],
 ];
 
-export const page: Page = (main, { notices }) => {
+export const page: Page = (main, context) => {
+  const log = context.query.get("log");
+  const leave = log ? openLog(main, context, log) : context.query.has("machine") ? openMaker(main) : openFolder(main, context);
+  if (document.activeElement === document.body) focusOn(main.querySelector("h1"));
+  return leave;
+};
+
+function openLog(main: HTMLElement, context: Context, log: string): () => void {
+  const opened = new LogPage(main, context, log);
+  return () => opened.jobs.leave();
+}
+
+/** The vehicle maker on a page of its own, without a log. */
+function openMaker(main: HTMLElement): void {
+  const body = h("div");
+  main.append(h("p", { class: "back" }, h("a", { href: "#/start" }, "← Folder")), h("h1", {}, "A vehicle file from what you know"), body);
+  void tried(async () => {
+    const { items } = await get<{ items: Item[] }>("folder");
+    const maker = new MachineMaker(freeName(items, "vehicle", ".yaml"), "torque", (path) => note(`${path} saved`));
+    maker.element.addEventListener("kept", (event) => fill(body, h("p", { class: "good" }, "Saved in the folder. The command line that makes it again:"), (event as CustomEvent<HTMLElement>).detail));
+    fill(body, maker.element);
+  });
+}
+
+function openFolder(main: HTMLElement, { notices }: Context): () => void {
   const lists = h("div", { class: "kinds" });
-  const jobs = h("div", { id: "jobs" });
+  const jobs = new JobList(notices);
   const input = h("input", { type: "file", multiple: true, id: "new-file", class: "visually-hidden" });
   const drop = h(
     "div",
@@ -29,9 +58,9 @@ export const page: Page = (main, { notices }) => {
   );
   const title = h("h1", {}, "Folder");
   const dialog = h("dialog", { class: "wizard" });
-  main.append(title, drop, jobs, lists, dialog);
+  main.append(title, drop, jobs.element, lists, dialog);
   let items: Item[] = [];
-  const known = new Map<string, Job>();
+  const ticked = new Set<string>();
 
   input.addEventListener("change", () => {
     take(input.files ?? []);
@@ -39,10 +68,11 @@ export const page: Page = (main, { notices }) => {
   });
 
   function take(files: Iterable<File>): void {
-    for (const file of files) void add(file);
+    const all = [...files];
+    for (const file of all) void add(file, all.length === 1);
   }
 
-  async function add(file: File): Promise<void> {
+  async function add(file: File, alone: boolean): Promise<void> {
     const exists = items.some((item) => item.path === file.name);
     if (exists && !confirm(`${file.name} is there already. Replace it?`)) return;
     const bar = h("progress", { max: 1, value: 0, "aria-label": `sending ${file.name}` });
@@ -52,99 +82,91 @@ export const page: Page = (main, { notices }) => {
     line.remove();
     if (!taken) return;
     note(`${taken.path} taken`);
-    await reload();
-    if (taken.kind === "recording") open(taken.path);
-  }
-
-  function open(recording: string): void {
-    const wizard = new Wizard(recording, items, () => dialog.close());
-    fill(dialog, wizard.element);
-    dialog.showModal();
-    void wizard.look();
+    if (taken.kind === "recording" && alone) location.hash = pageOf(taken.path);
+    else await reload();
   }
 
   async function reload(): Promise<void> {
     const folder = await tried(() => get<{ name: string; items: Item[] }>("folder"));
     if (!folder) return;
     items = folder.items;
+    const there = new Set(items.map((item) => item.path));
+    for (const path of ticked) if (!there.has(path)) ticked.delete(path);
     title.textContent = folder.name || "Folder";
-    fill(lists, KINDS.map(([kind, name, none]) => section(kind, name, none)));
+    refill(lists, KINDS.map(([kind, name, none]) => section(kind, name, none)));
   }
 
   function section(kind: string, name: string, none: string): HTMLElement {
     const of = items.filter((item) => item.kind === kind);
+    const actions = of.length ? (ACTIONS[kind] ?? []) : [];
     const rows = of.map((item) =>
       h(
         "tr",
         {},
-        h("td", {}, main_action(item)),
+        actions.length ? h("td", {}, tick(item)) : null,
+        h("td", { class: "name" }, main_action(item)),
         h("td", { class: "number" }, bytes(item.size)),
-        h("td", {}, new Date(item.modified * 1000).toLocaleString([], { dateStyle: "short", timeStyle: "short" })),
-        h("td", {}, other_actions(item)),
+        h("td", { class: "when" }, new Date(item.modified * 1000).toLocaleString([], { dateStyle: "short", timeStyle: "short" })),
+        h("td", {}, remove_button(item)),
       ),
     );
-    const learn =
-      kind === "estimates" && of.length
-        ? h("button", { type: "button", click: () => void learnSoils(of) }, "Learn soils from all")
-        : null;
     return h(
       "section",
       { "aria-label": name },
-      h("h2", {}, `${name}`, learn),
+      h("h2", {}, name),
+      actions.length ? h("div", { class: "row actions" }, actions.map(([command, text]) => h("button", { type: "button", "data-key": `do ${command}`, click: () => begin(command, of) }, text)), h("span", { class: "hint", "data-count": kind }, counted(of))) : null,
+      kind === "vehicle" ? h("div", { class: "row actions" }, h("a", { href: "#/start?machine", class: "button", "data-key": "make" }, "Make a vehicle file")) : null,
       of.length ? h("table", { class: "files" }, h("tbody", {}, rows)) : h("p", { class: "hint" }, none),
     );
   }
 
-  function main_action(item: Item): HTMLElement {
-    if (item.kind === "recording") return h("button", { type: "button", class: "link", click: () => open(item.path) }, item.path);
-    if (item.kind === "estimates" || item.kind === "library") {
-      const to = item.kind === "estimates" ? "drive" : "fit";
-      return h("a", { href: `#/${to}?path=${encodeURIComponent(item.path)}` }, item.path);
-    }
-    return h("a", { href: address("file", { path: item.path }), download: item.path.split("/").at(-1) ?? "" }, item.path);
+  function chosen(of: Item[]): string[] {
+    const some = of.filter((item) => ticked.has(item.path));
+    return (some.length ? some : of).map((item) => item.path);
   }
 
-  function other_actions(item: Item): HTMLElement {
+  function counted(of: Item[]): string {
+    const count = of.filter((item) => ticked.has(item.path)).length;
+    if (of.length === 1) return "";
+    return count ? `the ${count} that ${count === 1 ? "is" : "are"} ticked` : `all ${of.length}; tick some for fewer`;
+  }
+
+  function begin(command: string, of: Item[]): void {
+    const files = chosen(of);
+    if (command === "batch" && files.length === 1) location.hash = pageOf(files[0] as string);
+    else ask(dialog, command, files, items);
+  }
+
+  function tick(item: Item): HTMLElement {
+    const box = h("input", { type: "checkbox", checked: ticked.has(item.path), "aria-label": `choose ${item.path}`, "data-key": `tick ${item.path}` });
+    box.addEventListener("change", () => {
+      if (box.checked) ticked.add(item.path);
+      else ticked.delete(item.path);
+      const count = lists.querySelector(`[data-count="${item.kind}"]`);
+      if (count) count.textContent = counted(items.filter((one) => one.kind === item.kind));
+    });
+    return box;
+  }
+
+  function main_action(item: Item): HTMLElement {
+    const key = `open ${item.path}`;
+    if (item.kind === "recording") return h("a", { href: pageOf(item.path), "data-key": key }, item.path);
+    const view = viewOf(item.kind, item.path);
+    if (view) return h("a", { href: view, target: view.startsWith("#") ? null : "_blank", "data-key": key }, item.path);
+    return h("a", { href: address("file", { path: item.path }), download: item.path.split("/").at(-1) ?? "", "data-key": key }, item.path);
+  }
+
+  function remove_button(item: Item): HTMLElement {
     const remove = async (): Promise<void> => {
       if (!confirm(`Remove ${item.path} from the folder?`)) return;
       await tried(() => send("DELETE", "file", undefined, { path: item.path }));
       await reload();
     };
-    return h("button", { type: "button", class: "quiet", "aria-label": `remove ${item.path}`, click: () => void remove() }, "×");
-  }
-
-  async function learnSoils(of: Item[]): Promise<void> {
-    const output = prompt("Soil library to write:", "soils.json");
-    if (!output) return;
-    const replace = items.some((item) => item.path === output);
-    if (replace && !confirm(`Replace ${output}?`)) return;
-    await tried(() => send("POST", "jobs/soils", { estimates: of.map((item) => item.path), output, replace }));
-  }
-
-  function drawJobs(): void {
-    const shown = [...known.values()].slice(-8);
-    fill(jobs, shown.length ? h("section", { "aria-label": "Work" }, h("h2", {}, "Work"), shown.map(job_line)) : null);
-  }
-
-  function job_line(job: Job): HTMLElement {
-    const going = job.state === "running" || job.state === "queued";
-    const text = going
-      ? h("progress", { max: job.total || 1, value: job.total ? job.done : null, "aria-label": `${job.kind} of ${job.title}` })
-      : h("span", { class: `state ${job.state}` }, job.state);
-    const cancel = going
-      ? h("button", { type: "button", click: () => void tried(() => send("DELETE", `jobs/${job.id}`, undefined)) }, "Cancel")
-      : null;
-    const details = !going && job.text ? h("details", { open: job.state === "failed" }, h("summary", {}, job.state === "failed" ? "Why" : "Summary"), h("pre", {}, job.text)) : null;
-    return h("div", { class: "job" }, h("span", {}, `${job.kind} ${job.title} → ${job.output}`), text, cancel, details);
+    return h("button", { type: "button", class: "quiet", "aria-label": `remove ${item.path}`, "data-key": `remove ${item.path}`, click: () => void remove() }, "×");
   }
 
   const forget = notices.on((notice) => {
     if (notice.kind === "folder") void reload();
-    if (notice.kind === "job") {
-      known.set(notice.job.id, notice.job);
-      drawJobs();
-      if (notice.job.state === "failed") note(notice.job.text, "error");
-    }
   });
   const over = (event: DragEvent): void => {
     event.preventDefault();
@@ -160,17 +182,18 @@ export const page: Page = (main, { notices }) => {
   main.addEventListener("dragleave", out);
   main.addEventListener("drop", dropped);
   void reload();
-  void tried(async () => {
-    for (const job of await get<Job[]>("jobs")) known.set(job.id, job);
-    drawJobs();
-  });
   return () => {
     forget();
+    jobs.leave();
     main.removeEventListener("dragover", over);
     main.removeEventListener("dragleave", out);
     main.removeEventListener("drop", dropped);
   };
-};
+}
+
+function pageOf(log: string): string {
+  return `#/start?log=${encodeURIComponent(log)}`;
+}
 
 function bytes(size: number): string {
   if (size < 1000) return `${size} B`;

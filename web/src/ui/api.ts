@@ -16,6 +16,8 @@ export interface Job {
   done: number;
   total: number;
   text: string;
+  /** What would do the same on a command line in the folder. */
+  command: string;
 }
 
 export type Query = Record<string, string | number | boolean | undefined>;

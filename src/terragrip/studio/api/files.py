@@ -22,6 +22,7 @@ router = APIRouter(tags=["folder"])
 
 Named = Annotated[str, Query(description="Path relative to the folder, with slashes.")]
 
+_REPORT_POLICY = "sandbox; default-src 'none'; style-src 'unsafe-inline'; img-src data:; font-src data:; frame-ancestors 'none'"
 _SHOWN = {".png": "image/png", ".jpg": "image/jpeg", ".jpeg": "image/jpeg", ".webp": "image/webp"}
 
 
@@ -69,6 +70,15 @@ def get_file(studio: Here, path: Named) -> Response:
     return FileResponse(target, media_type=shown)
 
 
+@router.get("/report")
+def show_report(studio: Here, path: Named) -> Response:
+    """A report as a page of its own: no script runs in it, it loads nothing, and it counts as of another site."""
+    target = studio.folder.file(path)
+    if target.suffix.lower() not in (".html", ".htm"):
+        raise InputError("is no page", file=path, hint="download it")
+    return FileResponse(target, media_type="text/html", headers={"content-security-policy": _REPORT_POLICY})
+
+
 @router.put("/file", status_code=201)
 async def upload(request: Request, studio: Here, path: Named, replace: bool = False) -> dict[str, Any]:
     """Take a file into the folder, whole or not at all; its content must be what its name says."""
@@ -100,7 +110,7 @@ def inspect_log(
     from terragrip.formats import inspect
 
     log = studio.folder.file(path)
-    chosen = studio.folder.file(profile) if profile else None
+    chosen = studio.folder.profile(profile) if profile else None
     machine = studio.folder.file(vehicle) if vehicle else None
     inspection = inspect(log, chosen, machine)
     problem = _begun(log, chosen, machine, method) if inspection.ready and machine is not None else None
@@ -115,7 +125,7 @@ def inspect_log(
     return plain
 
 
-def _begun(log: Path, profile: Path | None, vehicle: Path, method: str) -> str | None:
+def _begun(log: Path, profile: str | None, vehicle: Path, method: str) -> str | None:
     """Begin to estimate a log: all checks, the pass over all rows, the first rows through the filter; why it fails, or None."""
     from terragrip.estimation import DEFAULT, estimated
     from terragrip.formats.log_blocks import log_in_blocks

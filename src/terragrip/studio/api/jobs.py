@@ -1,7 +1,8 @@
-"""Long work: estimates and soil libraries, with progress and cancel."""
+"""Long work: every command that makes a file of chosen files, as a job with progress and cancel."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 from fastapi import APIRouter, HTTPException
@@ -15,24 +16,62 @@ from terragrip.studio.state import Here
 router = APIRouter(tags=["jobs"])
 
 
-class EstimateRequest(BaseModel):
-    """Estimate one recording. Paths are relative to the folder."""
+class Request(BaseModel):
+    """What every job is asked for. Paths are relative to the folder."""
+
+    output: str = Field(description="What to write.")
+    replace: bool = False
+
+
+class EstimateRequest(Request):
+    """Estimate one recording into a Parquet file."""
 
     recording: str
     vehicle: str
     profile: str | None = None
     method: str = DEFAULT
     smooth: bool = False
-    output: str = Field(description="Parquet file to write.")
-    replace: bool = False
 
 
-class SoilsRequest(BaseModel):
-    """Learn a soil library from estimates."""
+class BatchRequest(Request):
+    """Estimate several recordings into a folder, which is made if need be."""
+
+    recordings: list[str] = Field(min_length=2)
+    vehicle: str
+    profile: str | None = None
+    method: str = DEFAULT
+    smooth: bool = False
+
+
+class CalibrateRequest(Request):
+    """Calibrate a vehicle from recordings into a new vehicle file."""
+
+    recordings: list[str] = Field(min_length=1)
+    vehicle: str
+    profile: str | None = None
+
+
+class SoilsRequest(Request):
+    """Learn a soil library (JSON) from estimates."""
 
     estimates: list[str] = Field(min_length=1)
-    output: str = Field(description="JSON file to write.")
-    replace: bool = False
+    soil: str | None = Field(None, description="The soil of all rows, for logs without labels.")
+
+
+class GroundRequest(Request):
+    """Find changes, soils and events of drives (JSON)."""
+
+    estimates: list[str] = Field(min_length=1)
+    library: str | None = None
+
+
+class ReportRequest(Request):
+    """A report of drives, as a page (HTML) and a PDF beside it."""
+
+    estimates: list[str] = Field(min_length=1)
+    library: str | None = None
+    ground: str | None = None
+    title: str = "Traction report"
 
 
 @router.get("/methods")
@@ -66,38 +105,111 @@ async def cancel_job(studio: Here, identity: str) -> dict[str, Any]:
 @router.post("/jobs/estimate", status_code=202)
 async def add_estimate(studio: Here, wanted: EstimateRequest) -> dict[str, Any]:
     """Queue an estimate."""
-    folder = studio.folder
-    if not method_named(wanted.method).can_smooth and wanted.smooth:
-        raise InputError(f"the method {wanted.method} cannot smooth", hint="choose another method")
-    output = _output(studio, wanted.output, ".parquet", wanted.replace)
-    request = {
-        "recording": str(folder.file(wanted.recording)),
-        "vehicle": str(folder.file(wanted.vehicle)),
-        "profile": str(folder.file(wanted.profile)) if wanted.profile else None,
-        "method": wanted.method,
-        "smooth": wanted.smooth,
-        "output": output,
-    }
-    if output in (request["recording"], request["vehicle"], request["profile"]):
-        raise InputError("is an input of this job", file=wanted.output, hint="choose another name")
-    job = studio.jobs.add("estimate", wanted.recording, wanted.output, request)
-    return job.to_dict()
+    return _queue(studio, "estimate", [wanted.recording], wanted, (".parquet",), _estimation(studio, wanted))
+
+
+@router.post("/jobs/batch", status_code=202)
+async def add_batch(studio: Here, wanted: BatchRequest) -> dict[str, Any]:
+    """Queue the estimates of several recordings; those that cannot be read do not stop the others."""
+    options = _estimation(studio, wanted)
+    folder = studio.folder.resolve(wanted.output)
+    if folder.is_file() or not folder.parent.is_dir():
+        raise InputError(
+            "is no place for several files", file=wanted.output, hint="name a folder, new or there"
+        )
+    if folder.is_dir() and any(folder.iterdir()) and not wanted.replace:
+        raise InputError("exists already", file=wanted.output, hint="choose another name, or replace it")
+    logs = _files(studio, wanted.recordings)
+    words = ["estimate", *logs, *options, "--output", _safe(wanted.output)]
+    return studio.jobs.add("batch", _title(wanted.recordings, "logs"), wanted.output, words).to_dict()
+
+
+@router.post("/jobs/calibrate", status_code=202)
+async def add_calibrate(studio: Here, wanted: CalibrateRequest) -> dict[str, Any]:
+    """Queue a calibration."""
+    options = _options(studio, vehicle=wanted.vehicle, profile=wanted.profile)
+    return _queue(studio, "calibrate", wanted.recordings, wanted, (".yaml", ".yml"), options)
 
 
 @router.post("/jobs/soils", status_code=202)
 async def add_soils(studio: Here, wanted: SoilsRequest) -> dict[str, Any]:
     """Queue the learning of a soil library."""
-    files = [str(studio.folder.file(path)) for path in wanted.estimates]
-    output = _output(studio, wanted.output, ".json", wanted.replace)
-    title = wanted.estimates[0] if len(files) == 1 else f"{len(files)} runs"
-    return studio.jobs.add("soils", title, wanted.output, {"estimates": files, "output": output}).to_dict()
+    options = [f"--soil={wanted.soil.strip()}"] if wanted.soil and wanted.soil.strip() else []
+    return _queue(studio, "soils", wanted.estimates, wanted, (".json",), options)
 
 
-def _output(studio: Here, path: str, suffix: str, replace: bool) -> str:
-    target = studio.folder.new_file(path, (suffix,))
-    if target.exists() and not replace:
-        raise InputError("exists already", file=path, hint="choose another name, or replace it")
-    return str(target)
+@router.post("/jobs/ground", status_code=202)
+async def add_ground(studio: Here, wanted: GroundRequest) -> dict[str, Any]:
+    """Queue the search for changes, soils and events."""
+    options = _options(studio, library=wanted.library)
+    return _queue(studio, "ground", wanted.estimates, wanted, (".json",), options)
+
+
+@router.post("/jobs/report", status_code=202)
+async def add_report(studio: Here, wanted: ReportRequest) -> dict[str, Any]:
+    """Queue a report."""
+    options = [
+        *_options(studio, library=wanted.library, ground=wanted.ground),
+        f"--title={wanted.title.strip()}",
+    ]
+    return _queue(studio, "report", wanted.estimates, wanted, (".html",), options)
+
+
+def _estimation(studio: Here, wanted: EstimateRequest | BatchRequest) -> list[str]:
+    """The options of an estimate; InputError where they do not go together."""
+    if not method_named(wanted.method).can_smooth and wanted.smooth:
+        raise InputError(f"the method {wanted.method} cannot smooth", hint="choose another method")
+    options = _options(studio, vehicle=wanted.vehicle, profile=wanted.profile)
+    options += [f"--method={wanted.method}"] if wanted.method != DEFAULT else []
+    return [*options, *(["--smooth"] if wanted.smooth else [])]
+
+
+def _queue(
+    studio: Here,
+    kind: str,
+    inputs: Sequence[str],
+    wanted: Request,
+    suffixes: tuple[str, ...],
+    options: Sequence[str],
+) -> dict[str, Any]:
+    """Queue one command over files; InputError on an output that cannot be written, or is an input."""
+    files = _files(studio, inputs)
+    target = studio.folder.new_file(wanted.output, suffixes)
+    if any(target == (studio.folder.root / word).resolve() for word in (*files, *options)):
+        raise InputError("is an input of this job", file=wanted.output, hint="choose another name")
+    if target.exists() and not wanted.replace:
+        raise InputError("exists already", file=wanted.output, hint="choose another name, or replace it")
+    words = [kind, *files, *options, "--output", _safe(wanted.output)]
+    noun = "logs" if kind == "calibrate" else "runs"
+    return studio.jobs.add(kind, _title(inputs, noun), wanted.output, words).to_dict()
+
+
+def _title(files: Sequence[str], noun: str) -> str:
+    return files[0] if len(files) == 1 else f"{len(files)} {noun}"
+
+
+def _files(studio: Here, paths: Sequence[str]) -> list[str]:
+    """Files of the folder as words of a command line."""
+    for path in paths:
+        studio.folder.file(path)
+    return [_safe(path) for path in paths]
+
+
+def _options(studio: Here, **files: str | None) -> list[str]:
+    """Options that name a file each, those of no file left out."""
+    words = []
+    for name, path in files.items():
+        if path and name == "profile":
+            studio.folder.profile(path)
+            words += ["--profile", _safe(path)]
+        elif path:
+            words += [f"--{name}", *_files(studio, [path])]
+    return words
+
+
+def _safe(path: str) -> str:
+    """A path that no command line takes for an option."""
+    return f"./{path}" if path.startswith("-") else path
 
 
 def _job(studio: Here, identity: str) -> Job:

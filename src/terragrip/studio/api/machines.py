@@ -1,0 +1,96 @@
+"""The vehicle maker: what is asked of a machine, what is typical of its class, what each missing number costs, the file."""
+
+from __future__ import annotations
+
+import shlex
+from typing import Any
+
+from fastapi import APIRouter
+from pydantic import BaseModel, Field
+
+from terragrip.errors import InputError
+from terragrip.studio.api.files import finite
+from terragrip.studio.state import Here
+from terragrip.vehicle_maker import SIGNALS, Made, classes, fields, interval_costs, make
+
+router = APIRouter(tags=["machines"])
+
+
+class Machine(BaseModel):
+    """A machine by its class, what its log measures, and what is known of it: numbers or texts with a unit by field."""
+
+    machine: str
+    signals: str = "torque"
+    known: dict[str, str | float] = {}
+    name: str = Field("", max_length=200)
+
+    def make(self) -> Made:
+        """The vehicle; InputError on what is impossible. An empty answer is not known."""
+        known = {name: value for name, value in self.known.items() if str(value).strip()}
+        return make(self.machine, self.signals, known, name=self.name.strip())  # type: ignore[arg-type]  # make checks it
+
+
+class MachineFile(Machine):
+    """A machine, and the vehicle file to write."""
+
+    output: str
+    replace: bool = False
+
+
+@router.get("/machines")
+def list_machines() -> dict[str, Any]:
+    """The classes of machine, and what a log may measure."""
+    return {"classes": [{"name": one.name, "title": one.title} for one in classes()], "signals": SIGNALS}
+
+
+@router.post("/machines/made")
+def make_machine(wanted: Machine) -> dict[str, Any]:
+    """What is asked for, with what is typical and from where; the vehicle for its sketch; the file as text."""
+    made = wanted.make()
+    asked = fields(made.machine, made.signals, made.known)
+    plain: dict[str, Any] = finite(
+        {
+            "fields": [
+                {
+                    "name": field.name,
+                    "title": field.title,
+                    "unit": field.unit,
+                    "value": field.typical.value,
+                    "spread": field.typical.spread,
+                    "source": field.typical.source,
+                    "needed": field.needed,
+                    "is_spread": field.is_spread,
+                    "known": made.known.get(field.name),
+                }
+                for field in asked
+            ],
+            "vehicle": made.vehicle.to_dict(),
+            "text": made.to_yaml(),
+        }
+    )
+    return plain
+
+
+@router.post("/machines/costs")
+def costs_of_machine(wanted: Machine) -> list[dict[str, Any]]:
+    """Half the width of the 95 % intervals where all is known, without each number that is not known, and as the file stands."""
+    plain: list[dict[str, Any]] = finite(
+        [
+            {"what": cost.what, "field": cost.field, "half_width": cost.half_width}
+            for cost in interval_costs(wanted.make())
+        ]
+    )
+    return plain
+
+
+@router.post("/machines/file", status_code=201)
+def save_machine(studio: Here, wanted: MachineFile) -> dict[str, str]:
+    """Write the vehicle file; with the command line that makes it again."""
+    target = studio.folder.new_file(wanted.output, (".yaml", ".yml"))
+    if target.exists() and not wanted.replace:
+        raise InputError("exists already", file=wanted.output, hint="choose another name, or replace it")
+    wanted.make().save(target)
+    words = ["terragrip", "new", "vehicle", "--class", wanted.machine, "--signals", wanted.signals]
+    words += [f"--name={wanted.name.strip()}"] if wanted.name.strip() else []
+    words += [f"--{k.replace('_', '-')}={v}" for k, v in wanted.known.items() if str(v).strip()]
+    return {"path": wanted.output, "command": shlex.join([*words, "-o", wanted.output])}

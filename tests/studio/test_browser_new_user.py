@@ -1,0 +1,230 @@
+"""A new user's way in a real browser: a log with foreign names, a machine without a vehicle file, no terminal."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from served import AXE, NEEDS, Served
+
+pytest.importorskip("playwright.sync_api", reason="SKIPPED LOUDLY: the browser tests need playwright")
+
+pytestmark = NEEDS
+
+WHEELS = {"fl": "Front Left", "fr": "Front Right", "rl": "Rear Left", "rr": "Rear Right"}
+WIDTHS = (1280, 768, 390)
+
+
+@pytest.fixture
+def foreign(made: Path, tmp_path: Path) -> Path:
+    """A CSV of the simulated drive with another logger's names and units, and without the soil's label."""
+    table = pd.read_parquet(made / "recording.parquet")
+    other = pd.DataFrame({"Stamp [ms]": np.round(1000 * table["time"]).astype(int)})
+    for wheel, words in WHEELS.items():
+        other[f"Wheel Speed {words} [rpm]"] = table[f"wheel_speed_{wheel}"] * 30 / np.pi
+        other[f"Wheel Torque {words} [Nm]"] = table[f"drive_torque_{wheel}"]
+    other["Radar Speed [km/h]"] = 3.6 * table["ground_speed"]
+    other["Drawbar Pull [kN]"] = table["drawbar_force"] / 1000
+    other["Pitch [deg]"] = np.degrees(table["pitch"])
+    other.to_csv(tmp_path / "day1.csv", index=False, float_format="%.8g")
+    return tmp_path / "day1.csv"
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    """An empty folder."""
+    target = tmp_path / "work"
+    target.mkdir()
+    return target
+
+
+class Hand:
+    """A user's hand: what it clicks is counted; a choice from a list or of a file is two clicks, a field to type in is one."""
+
+    def __init__(self, page: Any) -> None:
+        self.page, self.clicks = page, 0
+
+    def click(self, what: str) -> None:
+        self.clicks += 1
+        self.page.click(what)
+
+    def choose(self, what: str, value: str) -> None:
+        self.clicks += 2
+        self.page.select_option(what, value)
+
+    def write(self, what: str, text: str) -> None:
+        self.clicks += 1
+        self.page.fill(what, text)
+
+    def give(self, what: str, file: Path) -> None:
+        self.clicks += 2
+        with self.page.expect_file_chooser() as chooser:
+            self.page.click(what)
+        chooser.value.set_files(file)
+
+
+def choose_columns(hand: Hand, log: Path) -> None:
+    hand.give("text=choose files", log)
+    hand.page.wait_for_selector("#column-ground_speed")
+
+
+def make_robot(hand: Hand) -> None:
+    hand.choose("#machine-class", "field-robot")
+    hand.write("#machine-mass", "139 kg")
+    hand.write("#machine-wheel_radius", "20 cm")
+    hand.page.wait_for_selector("text=not known: mass on the front axle")
+
+
+def test_from_a_strangers_log_to_a_report_in_25_clicks(
+    page: Any, served: Served, folder: Path, foreign: Path, made: Path
+) -> None:
+    import terragrip as tg
+    from terragrip.soil.library import SoilLibrary
+
+    page.set_default_timeout(60_000)
+    hand = Hand(page)
+    page.goto(served.url)
+    choose_columns(hand, foreign)
+    hand.click("#use-columns")
+    make_robot(hand)
+    hand.click("#save-machine")
+    page.wait_for_selector("text=ready to estimate")
+    hand.click("#wizard-go")
+    page.wait_for_selector("#next-soils")
+    hand.click("#next-soils")
+    page.wait_for_selector("#see-soils")
+    hand.click("#next-report")
+    page.wait_for_selector("#see-report")
+    with page.context.expect_page() as opened:
+        hand.click("#see-report")
+    opened.value.wait_for_load_state()
+    assert "Traction report" in opened.value.inner_text("h1")
+    opened.value.close()
+    hand.click("#see-soils")
+    page.wait_for_selector("#slider-a")
+    assert hand.clicks <= 25
+    names = {path.name for path in folder.iterdir()}
+    assert names >= {
+        "day1.csv",
+        "day1-profile.yaml",
+        "day1-vehicle.yaml",
+        "day1-estimates.parquet",
+        "day1-soils.json",
+        "day1-report.html",
+    }
+    # the log became what it was made from, and the estimates are those of that log and that vehicle
+    truth = tg.read(made / "recording.parquet")
+    log = tg.read(folder / "day1.csv", folder / "day1-profile.yaml")
+    for channel in ("wheel_speed_rr", "drive_torque_fl", "ground_speed", "drawbar_force", "pitch"):
+        np.testing.assert_allclose(log[channel], truth[channel], rtol=1e-6, atol=1e-5)
+    estimates = tg.estimate(log, tg.Vehicle.load(folder / "day1-vehicle.yaml"))
+    np.testing.assert_array_equal(
+        tg.Estimates.read(folder / "day1-estimates.parquet")["slip_rr"], estimates["slip_rr"]
+    )
+    assert list(SoilLibrary.load(folder / "day1-soils.json")) == ["field"]
+
+
+def test_a_job_shows_the_command_line_that_does_the_same(
+    page: Any, served: Served, folder: Path, foreign: Path
+) -> None:
+    hand = Hand(page)
+    page.goto(served.url)
+    choose_columns(hand, foreign)
+    hand.click("#use-columns")
+    make_robot(hand)
+    hand.click("#save-machine")
+    page.wait_for_selector("text=ready to estimate")
+    assert page.evaluate("() => document.activeElement.id") == "step-estimate"
+    hand.click("#wizard-go")
+    page.wait_for_selector(".state.done")
+    page.click("#jobs >> text=Command line")
+    assert page.inner_text("#jobs code") == (
+        "terragrip estimate day1.csv --vehicle day1-vehicle.yaml --profile day1-profile.yaml --output day1-estimates.parquet"
+    )
+
+
+def test_a_columns_choice_unit_and_sign_reach_the_profile(
+    page: Any, served: Served, folder: Path, foreign: Path
+) -> None:
+    import yaml
+
+    hand = Hand(page)
+    page.goto(served.url)
+    choose_columns(hand, foreign)
+    row = page.locator('[data-channel="ground_speed"]')
+    assert "a speed over ground" in row.inner_text()
+    assert row.locator(".outline path").get_attribute("d")
+    page.click("button[aria-label='Turn the sign of ground_speed']")
+    assert (
+        page.evaluate("() => document.activeElement.getAttribute('aria-label')")
+        == "Turn the sign of ground_speed"
+    )
+    page.fill("input[aria-label='Unit of ground_speed']", "m/s")
+    page.select_option("#column-pitch", "")
+    page.select_option("#column-drawbar_force", "Pitch")
+    page.fill("input[aria-label='Unit of drawbar_force']", "N")
+    page.fill("#profile-output", "mine.yaml")
+    page.click("#use-columns")
+    page.wait_for_function("() => document.getElementById('wizard-profile').value === 'mine.yaml'")
+    channels = yaml.safe_load((folder / "mine.yaml").read_text())["channels"]
+    assert channels["ground_speed"] == {"from": "Radar Speed", "unit": "m/s", "sign": -1}
+    assert channels["drawbar_force"] == {"from": "Pitch", "unit": "N"}
+    assert "pitch" not in channels
+
+
+def test_an_impossible_number_is_said_and_nothing_is_saved(
+    page: Any, served: Served, folder: Path, foreign: Path
+) -> None:
+    page.goto(f"{served.url}/#/start?machine")
+    page.wait_for_selector("#machine-class option[value='rover']", state="attached")
+    page.select_option("#machine-class", "rover")
+    page.fill("#machine-mass", "50 kg")
+    page.wait_for_selector(".sketch")
+    page.fill("#machine-wheel_radius", "-3 cm")
+    page.wait_for_selector("#machine-problem:has-text('impossible')")
+    assert page.is_disabled("#save-machine")
+    assert list(folder.glob("*.yaml")) == []
+
+
+@pytest.mark.parametrize("theme", ["light", "dark"])
+def test_the_pages_fit_every_width_and_axe_finds_nothing_serious(
+    browser: Any, served: Served, folder: Path, foreign: Path, theme: str
+) -> None:
+    (folder / "day1.csv").write_bytes(foreign.read_bytes())
+    context = browser.new_context(color_scheme=theme, bypass_csp=True)
+    tab = context.new_page()
+    faults = []
+    for where, ready in (
+        ("start", "text=day1.csv"),
+        ("start?log=day1.csv", "#use-columns"),
+        ("start?machine", "#machine-class"),
+    ):
+        for width in WIDTHS:
+            tab.set_viewport_size({"width": width, "height": 800})
+            tab.goto(f"{served.url}/#/{where}")
+            tab.wait_for_selector(ready)
+            if "start?" in where:
+                tab.wait_for_selector("#machine-class option[value='tractor-4wd']", state="attached")
+                tab.select_option("#machine-class", "tractor-4wd")
+                tab.wait_for_selector(".costs table")
+            wide = tab.evaluate(
+                "() => { const m = document.querySelector('main'); return m.scrollWidth - m.clientWidth; }"
+            )
+            faults += [f"{where} at {width}: {wide} px too wide"] if wide > 0 else []
+            tab.goto("about:blank")
+        tab.goto(f"{served.url}/#/{where}")
+        tab.wait_for_selector(ready)
+        tab.add_script_tag(path=str(AXE))
+        result = tab.evaluate("() => axe.run(document, { resultTypes: ['violations'] })")
+        faults += [
+            f"{where}: {v['id']} {v['nodes'][0]['html'][:100]}"
+            for v in result["violations"]
+            if v["impact"] in ("serious", "critical")
+        ]
+        tab.goto("about:blank")
+    context.close()
+    assert faults == []

@@ -1,0 +1,123 @@
+/** Work under way and done: progress, cancel, how it ended, its command line for the next time. */
+
+import { get, send, type Item, type Job, type Notice, type Notices } from "../ui/api";
+import { fill, h } from "../ui/dom";
+import { note, tried } from "../ui/notes";
+import { focusOn } from "./focus";
+
+const SHOWN = 8;
+const NAMES: Record<string, string> = { estimate: "Estimate", batch: "Estimate", calibrate: "Calibrate", soils: "Learn soils", ground: "Ground", report: "Report" };
+
+/** A file that does not exist yet: `stem + ending`, or numbered. */
+export function freeName(items: Item[], stem: string, ending: string): string {
+  const taken = new Set(items.map((item) => item.path));
+  for (let i = 1; ; i++) {
+    const name = `${stem}${i === 1 ? "" : `-${i}`}${ending}`;
+    if (!taken.has(name)) return name;
+  }
+}
+
+/** A log's name without what tells its format. */
+export function stemOf(path: string): string {
+  return path.replace(/(\.\w{1,8}){1,2}$/, "");
+}
+
+/** Where a file of the folder is looked at; null where it is only kept. */
+export function viewOf(kind: string, path: string): string | null {
+  const query = `path=${encodeURIComponent(path)}`;
+  if (kind === "estimates" || kind === "estimate") return `#/drive?${query}`;
+  if (kind === "library" || kind === "soils") return `#/fit?${query}`;
+  if (kind === "report" && path.endsWith(".html")) return `./api/report?${query}`;
+  return null;
+}
+
+export class JobList {
+  readonly element = h("section", { id: "jobs", "aria-label": "Work", hidden: true });
+  private list = h("div");
+  private jobs = new Map<string, Job>();
+  private lines = new Map<string, { state: string; element: HTMLElement; bar: HTMLProgressElement }>();
+  readonly leave: () => void;
+
+  /** `ended` is called when a job ends while the page is open. */
+  constructor(
+    notices: Notices,
+    private ended: (job: Job) => void = () => {},
+  ) {
+    this.element.append(h("h2", {}, "Work"), this.list);
+    this.leave = notices.on((notice) => this.hear(notice));
+    void tried(async () => {
+      for (const job of await get<Job[]>("jobs")) if (!this.jobs.has(job.id)) this.jobs.set(job.id, job);
+      this.draw();
+    });
+  }
+
+  private hear(notice: Notice): void {
+    if (notice.kind !== "job") return;
+    const { job } = notice;
+    const before = this.jobs.get(job.id)?.state;
+    this.jobs.set(job.id, job);
+    this.draw();
+    if (job.state === before || job.state === "queued" || job.state === "running") return;
+    if (job.state === "failed") note(job.text, "error");
+    this.ended(job);
+  }
+
+  private draw(): void {
+    const shown = [...this.jobs.values()].slice(-SHOWN).reverse();
+    this.element.hidden = !shown.length;
+    const elements = shown.map((job) => this.line(job));
+    const known = new Set(shown.map((job) => job.id));
+    for (const id of this.lines.keys()) if (!known.has(id)) this.lines.delete(id);
+    if (elements.length !== this.list.children.length || elements.some((element, i) => this.list.children[i] !== element)) {
+      const active = document.activeElement;
+      const inside = this.list.contains(active);
+      const key = inside && active instanceof HTMLElement ? active.dataset.key : undefined;
+      fill(this.list, elements);
+      const same = key ? this.list.querySelector<HTMLElement>(`[data-key="${CSS.escape(key)}"]`) : null;
+      if (inside) focusOn(same ?? this.element.querySelector("h2"));
+    }
+  }
+
+  /** A job's line; while it runs only its bar moves, so that the button to cancel it keeps the focus. */
+  private line(job: Job): HTMLElement {
+    const old = this.lines.get(job.id);
+    if (old && old.state === job.state) {
+      progress(old.bar, job);
+      return old.element;
+    }
+    const bar = h("progress", { max: 1, "aria-label": `${NAMES[job.kind] ?? job.kind} of ${job.title}` });
+    progress(bar, job);
+    const element = h("div", { class: "job" }, this.parts(job, bar));
+    this.lines.set(job.id, { state: job.state, element, bar });
+    return element;
+  }
+
+  private parts(job: Job, bar: HTMLProgressElement): (HTMLElement | null)[] {
+    const going = job.state === "running" || job.state === "queued";
+    const cancel = (): void => void tried(() => send("DELETE", `jobs/${job.id}`, undefined));
+    const view = job.state === "done" ? viewOf(job.kind, job.output) : null;
+    const outside = view !== null && !view.startsWith("#");
+    const output = view ? h("a", { href: view, target: outside ? "_blank" : null, "data-key": `view ${job.id}` }, job.output) : h("span", {}, job.output);
+    const failed = job.state === "failed";
+    return [
+      h("span", { class: "what" }, `${NAMES[job.kind] ?? job.kind}: ${job.title} → `, output),
+      going ? bar : h("span", { class: `state ${job.state}` }, job.state),
+      going ? h("button", { type: "button", "data-key": `cancel ${job.id}`, click: cancel }, "Cancel") : null,
+      !going && job.text ? h("details", { open: failed }, h("summary", {}, failed ? "Why" : "Summary"), h("pre", { tabindex: "0" }, job.text)) : null,
+      h("details", {}, h("summary", {}, "Command line"), commandLine(job.command)),
+    ];
+  }
+}
+
+function progress(bar: HTMLProgressElement, job: Job): void {
+  if (job.total) {
+    bar.max = job.total;
+    bar.value = job.done;
+  } else bar.removeAttribute("value");
+}
+
+/** A command line, and a button that copies it. */
+export function commandLine(command: string): HTMLElement {
+  const copy = h("button", { type: "button", click: () => void navigator.clipboard?.writeText(command).then(() => note("copied")) }, "Copy");
+  return h("div", { class: "command" }, h("code", { tabindex: "0" }, command), copy);
+}

@@ -1,0 +1,265 @@
+/** From a stranger's log to estimates, a curve and a report: columns, machine, estimate, and what follows from it. */
+
+import { get, send, type Item, type Job } from "../ui/api";
+import { fill, h } from "../ui/dom";
+import { tried } from "../ui/notes";
+import type { Context } from "../ui/page";
+import { focusOn, refill } from "./focus";
+import { freeName, JobList, stemOf, viewOf } from "./jobs";
+import { MachineMaker } from "./machine";
+import { Mapping, type Look } from "./mapping";
+
+interface Inspection {
+  rows: number;
+  ready: boolean;
+  /** Why an estimate cannot run, though the log is whole; null where nothing is known against it. */
+  problem: string | null;
+  missing: string[];
+  warnings: string[];
+  recognised: Record<string, string[]>;
+  text: string;
+}
+
+interface Methods {
+  default: string;
+  methods: Record<string, { smooth: boolean }>;
+}
+
+export class LogPage {
+  private columns = h("div");
+  private machine = h("div");
+  private estimate = h("div");
+  private next = h("div");
+  private profile = "";
+  private vehicle = "";
+  private look: Look | undefined;
+  private mapping: Mapping | undefined;
+  private maker: MachineMaker | undefined;
+  private methods: Methods | undefined;
+  private items: Item[] = [];
+  private looks = 0;
+  private hasLabels = false;
+  private estimates = "";
+  private made = new Map<string, string>(); // by kind of job, what this page had made
+  readonly jobs: JobList;
+
+  constructor(
+    main: HTMLElement,
+    { notices }: Context,
+    private log: string,
+  ) {
+    this.jobs = new JobList(notices, (job) => void this.ended(job));
+    const section = (id: string, title: string, body: HTMLElement): HTMLElement => h("section", { class: "step", "aria-labelledby": id }, h("h2", { id }, title), body);
+    main.append(
+      h("p", { class: "back" }, h("a", { href: "#/start" }, "← Folder")),
+      h("h1", {}, log),
+      section("step-columns", "1  Columns", this.columns),
+      section("step-machine", "2  Machine", this.machine),
+      section("step-estimate", "3  Estimates", this.estimate),
+      section("step-next", "4  Curve, ground, report", this.next),
+      this.jobs.element,
+    );
+    void this.open();
+  }
+
+  private async open(): Promise<void> {
+    await this.reload();
+    this.methods = await tried(() => get<Methods>("methods"));
+    const first = this.of("profile");
+    const named = `${stemOf(this.log)}-profile.yaml`;
+    this.profile = first.includes(named) ? named : "";
+    this.vehicle = this.of("vehicle")[0] ?? "";
+    this.mapping = new Mapping(this.log, (profile) => void this.keptProfile(profile));
+    this.look = await this.mapping.open(freeName(this.items, `${stemOf(this.log)}-profile`, ".yaml"));
+    this.drawColumns(!this.profile && !this.look?.ready);
+    this.drawMachine();
+    this.drawEstimate();
+    this.drawNext();
+    await this.inspect();
+  }
+
+  private of(kind: string): string[] {
+    return this.items.filter((item) => item.kind === kind).map((item) => item.path);
+  }
+
+  private async reload(): Promise<void> {
+    const folder = await tried(() => get<{ items: Item[] }>("folder"));
+    if (folder) this.items = folder.items;
+  }
+
+  /** Columns: whoever has a profile, or a log with our names, sees one line; else the choice. */
+  private drawColumns(choosing: boolean): void {
+    if (!this.look || !this.mapping) {
+      fill(this.columns, this.mapping?.element ?? null);
+      return;
+    }
+    const none = this.look.ready ? "no profile: the columns have our names" : "no profile yet: choose the columns below";
+    const profile = choice("wizard-profile", [...new Set([...this.of("profile"), ...this.look.fitting])], this.profile, none);
+    profile.addEventListener("change", () => {
+      this.profile = profile.value;
+      void this.inspect();
+    });
+    refill(this.columns, [
+      row("Read by", profile),
+      h("details", { open: choosing, id: "choose-columns" }, h("summary", {}, "Choose the columns"), this.mapping.element),
+    ]);
+  }
+
+  private async keptProfile(profile: string): Promise<void> {
+    await this.reload();
+    this.profile = profile;
+    this.drawColumns(false);
+    this.maker?.measures(this.mapping?.signals ?? "torque");
+    focusOn(document.getElementById(this.vehicle ? "step-estimate" : "step-machine"));
+    await this.inspect();
+  }
+
+  private drawMachine(): void {
+    const vehicles = this.of("vehicle");
+    const select = choice("wizard-vehicle", vehicles, this.vehicle, "no vehicle file yet: make one below");
+    select.addEventListener("change", () => {
+      this.vehicle = select.value;
+      void this.inspect();
+    });
+    const maker = (this.maker = new MachineMaker(freeName(this.items, `${stemOf(this.log)}-vehicle`, ".yaml"), this.mapping?.signals ?? "torque", (path) => void this.keptVehicle(path)));
+    const command = h("div");
+    maker.element.addEventListener("kept", (event) => fill(command, h("details", {}, h("summary", {}, "Command line that makes this vehicle file"), (event as CustomEvent<HTMLElement>).detail)));
+    refill(this.machine, [
+      row("Vehicle", select),
+      h("details", { open: !vehicles.length, id: "make-machine" }, h("summary", {}, "Make a vehicle file from what you know"), maker.element),
+      command,
+    ]);
+  }
+
+  private async keptVehicle(path: string): Promise<void> {
+    await this.reload();
+    this.vehicle = path;
+    const select = document.getElementById("wizard-vehicle") as HTMLSelectElement;
+    fill(select, this.of("vehicle").map((name) => h("option", { value: name, selected: name === path }, name)));
+    (document.getElementById("make-machine") as HTMLDetailsElement).open = false;
+    focusOn(document.getElementById("step-estimate"));
+    await this.inspect();
+  }
+
+  private drawEstimate(): void {
+    const method = h("select", { id: "wizard-method" });
+    for (const name of Object.keys(this.methods?.methods ?? {})) method.append(h("option", { value: name, selected: name === this.methods?.default }, name));
+    const smooth = h("input", { type: "checkbox", id: "wizard-smooth" });
+    const limits = (): void => {
+      const able = this.methods?.methods[method.value]?.smooth ?? false;
+      smooth.disabled = !able;
+      if (!able) smooth.checked = false;
+    };
+    limits();
+    method.addEventListener("change", () => {
+      limits();
+      void this.inspect();
+    });
+    const output = h("input", { type: "text", id: "wizard-output", value: freeName(this.items, `${stemOf(this.log)}-estimates`, ".parquet"), required: true });
+    const go = h("button", { type: "submit", class: "primary", id: "wizard-go", disabled: true }, "Estimate");
+    const form = h(
+      "form",
+      {},
+      h("div", { id: "wizard-found", "aria-live": "polite" }),
+      h("details", {}, h("summary", {}, "Method and file"), row("Method", method), h("label", { class: "check" }, smooth, "smooth (run it backwards too)"), row("Write to", output)),
+      h("div", { class: "row" }, go),
+    );
+    form.addEventListener("submit", (event) => {
+      event.preventDefault();
+      const wanted = { recording: this.log, vehicle: this.vehicle, profile: this.profile || null, method: method.value, smooth: smooth.checked };
+      void this.queue("estimate", wanted, output.value.trim());
+    });
+    fill(this.estimate, form);
+  }
+
+  /** Begin an estimate with what is chosen, without keeping it: "ready" is said only where it ran. */
+  private async inspect(): Promise<void> {
+    const found = document.getElementById("wizard-found");
+    const go = document.getElementById("wizard-go") as HTMLButtonElement | null;
+    if (!found || !go) return;
+    const turn = ++this.looks;
+    const method = (document.getElementById("wizard-method") as HTMLSelectElement).value || undefined;
+    go.disabled = true;
+    const nothing = !this.profile && !this.look?.ready;
+    if (nothing) {
+      fill(found, h("p", { class: "hint" }, "Not ready: choose the columns first."));
+      return;
+    }
+    try {
+      const result = await get<Inspection>("inspect", { path: this.log, profile: this.profile || undefined, vehicle: this.vehicle || undefined, method });
+      if (turn !== this.looks) return;
+      const ready = result.ready && this.vehicle !== "";
+      this.hasLabels = "soil" in result.recognised;
+      fill(
+        found,
+        h("p", { class: ready ? "good" : "bad" }, this.verdict(result)),
+        result.warnings.map((text) => h("p", { class: "hint" }, text)),
+        h("details", {}, h("summary", {}, "What is in it"), h("pre", { tabindex: "0" }, result.text)),
+      );
+      go.disabled = !ready;
+      this.drawNext();
+    } catch (error) {
+      if (turn === this.looks) fill(found, h("p", { class: "bad", role: "alert" }, error instanceof Error ? error.message : String(error)));
+    }
+  }
+
+  private verdict(found: Inspection): string {
+    const rows = `${found.rows.toLocaleString()} rows`;
+    if (found.ready) return this.vehicle ? `${rows}, ready to estimate.` : `${rows}; a vehicle file is missing.`;
+    return found.problem ? `Not ready: ${found.problem}` : `Not ready: ${found.missing.join("; ") || "choose the columns"}.`;
+  }
+
+  private async queue(kind: string, wanted: Record<string, unknown>, output: string): Promise<void> {
+    const replace = this.items.some((item) => item.path === output);
+    if (replace && !confirm(`Replace ${output}?`)) return;
+    await tried(() => send<Job>("POST", `jobs/${kind}`, { ...wanted, output, replace }));
+  }
+
+  /** What follows from the estimates; until there are any, what would. */
+  private drawNext(): void {
+    if (!this.estimates) {
+      fill(this.next, h("p", { class: "hint" }, "Once there are estimates: the drive on a page, the adhesion curve of the ground, where the ground changes, and a report."));
+      return;
+    }
+    const old = document.getElementById("next-soil") as HTMLInputElement | null;
+    const soil = h("input", { type: "text", id: "next-soil", value: old?.value ?? (this.hasLabels ? "" : "field"), placeholder: this.hasLabels ? "as the log's labels say" : "" });
+    const stem = stemOf(this.log);
+    const library = this.made.get("soils") ?? null;
+    const ground = this.made.get("ground") ?? null;
+    const runs = { estimates: [this.estimates] };
+    const button = (kind: string, text: string, work: () => void): HTMLElement => {
+      const path = this.made.get(kind);
+      const view = path ? viewOf(kind, path) : null;
+      const outside = view !== null && !view.startsWith("#");
+      return h("li", {}, h("button", { type: "button", id: `next-${kind}`, click: work }, text), path ? (view ? h("a", { href: view, id: `see-${kind}`, target: outside ? "_blank" : null }, `See ${path}`) : h("span", { class: "good" }, path)) : null);
+    };
+    refill(this.next, [
+      h("ul", { class: "next" },
+        h("li", {}, h("a", { href: viewOf("estimates", this.estimates), id: "see-estimate" }, `See the drive: ${this.estimates}`)),
+        button("soils", "Learn the curve", () => void this.queue("soils", { ...runs, soil: soil.value.trim() || null }, freeName(this.items, `${stem}-soils`, ".json"))),
+        h("li", { class: "of" }, h("label", { for: soil.id }, "of the ground named"), soil),
+        button("ground", "Find changes of the ground", () => void this.queue("ground", { ...runs, library }, freeName(this.items, `${stem}-ground`, ".json"))),
+        button("report", "Write the report", () => void this.queue("report", { ...runs, library, ground }, freeName(this.items, `${stem}-report`, ".html"))),
+      ),
+    ]);
+  }
+
+  private async ended(job: Job): Promise<void> {
+    await this.reload();
+    if (job.state !== "done") return;
+    if (job.kind === "estimate" && job.title === this.log) this.estimates = job.output;
+    else if (this.estimates && job.command.includes(this.estimates)) this.made.set(job.kind, job.output);
+    else return;
+    this.drawNext();
+    const output = document.getElementById("wizard-output") as HTMLInputElement | null;
+    if (output) output.value = freeName(this.items, `${stemOf(this.log)}-estimates`, ".parquet");
+  }
+}
+
+function choice(id: string, paths: string[], chosen: string, none: string): HTMLSelectElement {
+  return h("select", { id }, h("option", { value: "" }, none), paths.map((path) => h("option", { value: path, selected: path === chosen }, path)));
+}
+
+function row(label: string, field: HTMLElement): HTMLElement {
+  return h("div", { class: "field" }, h("label", { for: field.id }, label), field);
+}

@@ -1,0 +1,254 @@
+/** The columns of a foreign log, and which channel each becomes: proposals with their reason, unit, sign and a small plot. */
+
+import { get, send } from "../ui/api";
+import { digits, fill, h } from "../ui/dom";
+import { tried } from "../ui/notes";
+import { svg } from "./sketch";
+
+type Entry = Record<string, unknown>;
+
+interface Proposal {
+  entry: Entry;
+  columns: string[];
+  unit: string | null;
+  confidence: number;
+  evidence: string[];
+  doubt: string;
+  give: string;
+}
+
+interface Channel {
+  name: string;
+  title: string;
+  wheel: string;
+  unit: string | null;
+  proposals: Proposal[];
+}
+
+interface Column {
+  name: string;
+  kind: string;
+  unit: string | null;
+  missing: number;
+  minimum: number | null;
+  median: number | null;
+  maximum: number | null;
+  examples: string[];
+  outline: ([number, number] | null)[] | null;
+}
+
+export interface Look {
+  rows: number;
+  ready: boolean;
+  fitting: string[];
+  refused: string;
+  time: Entry | null;
+  columns: Column[];
+  channels: Channel[];
+}
+
+/** What a channel is made of now; `column` "" is nothing. A proposal of several columns has its own entry. */
+interface Choice {
+  column: string;
+  entry: Entry;
+}
+
+export const SIGNALS = { torque: "drive_torque_", wheels: "wheel_speed_" };
+
+export class Mapping {
+  readonly element = h("div", { class: "mapping" });
+  private look: Look | undefined;
+  private chosen = new Map<string, Choice>();
+  private rows = new Map<string, HTMLElement>();
+  private wheels: string[] = [];
+
+  constructor(
+    private log: string,
+    private saved: (profile: string) => void,
+  ) {}
+
+  /** Look into the log; `output` is the profile to write. */
+  async open(output: string): Promise<Look | undefined> {
+    fill(this.element, h("p", { class: "hint" }, "Looking into the log …"));
+    try {
+      this.look = await get<Look>("columns", { path: this.log });
+    } catch (error) {
+      fill(this.element, h("p", { class: "bad", role: "alert" }, error instanceof Error ? error.message : String(error)));
+      return undefined;
+    }
+    for (const channel of this.look.channels) {
+      const best = channel.proposals[0];
+      if (best) this.chosen.set(channel.name, { column: keyOf(best), entry: { ...best.entry } });
+    }
+    this.wheels = [...new Set(this.look.channels.map((channel) => channel.wheel).filter(Boolean))];
+    if (!this.wheels.length && !this.chosen.has("wheel_based_speed")) this.addWheels(["fl", "fr", "rl", "rr"]);
+    this.draw(output);
+    return this.look;
+  }
+
+  /** What the chosen channels measure, as the vehicle maker asks it. */
+  get signals(): string {
+    const names = [...this.chosen.keys()];
+    if (names.some((name) => name.startsWith(SIGNALS.torque))) return "torque";
+    return names.some((name) => name.startsWith(SIGNALS.wheels)) ? "wheel-speeds" : "bus-speed";
+  }
+
+  private addWheels(wheels: string[]): void {
+    const extra = wheels.flatMap((wheel) => [
+      { name: `wheel_speed_${wheel}`, title: "turning speed", wheel, unit: "rad/s", proposals: [] },
+      { name: `drive_torque_${wheel}`, title: "drive torque, at the wheel", wheel, unit: "N m", proposals: [] },
+    ]);
+    this.look?.channels.unshift(...extra);
+    this.wheels.push(...wheels);
+  }
+
+  private draw(output: string): void {
+    const look = this.look as Look;
+    const name = h("input", { type: "text", id: "profile-output", value: output });
+    const use = h("button", { type: "button", class: "primary", id: "use-columns", click: () => void this.save(name.value.trim()) }, "Use these columns");
+    const needed = look.channels.filter((channel) => channel.wheel || this.chosen.has(channel.name) || ["ground_speed", "wheel_based_speed", "drawbar_force"].includes(channel.name));
+    const other = look.channels.filter((channel) => !needed.includes(channel));
+    fill(
+      this.element,
+      look.refused ? h("p", { class: "bad" }, `This log ${look.refused}.`) : null,
+      h("p", { class: "hint" }, "Which column is what. The likeliest is chosen; its reason stands beside it, and “?” is a doubt to look at."),
+      this.timeRow(look),
+      h("div", { class: "map-rows", role: "group", "aria-label": "Channels" }, needed.map((channel) => this.row(channel))),
+      h("details", {}, h("summary", {}, `${other.length} more channels that help, where the log has them`), h("div", { class: "map-rows" }, other.map((channel) => this.row(channel)))),
+      h("div", { class: "row" }, h("label", { for: name.id }, "Keep as"), name, use),
+    );
+  }
+
+  private timeRow(look: Look): HTMLElement {
+    const time = look.time ?? { from: "" };
+    const select = h("select", { id: "time-column" }, h("option", { value: "" }, "– choose –"), look.columns.filter((column) => column.kind !== "text").map((column) => h("option", { value: column.name, selected: column.name === time.from }, column.name)));
+    const unit = h("input", { type: "text", id: "time-unit", class: "unit", value: String(time.unit ?? "s"), "aria-label": "Unit of the time" });
+    const update = (): void => {
+      look.time = { ...(look.time ?? {}), from: select.value };
+      if (unit.value.trim() && unit.value.trim() !== "s") look.time.unit = unit.value.trim();
+      else delete look.time.unit;
+    };
+    select.addEventListener("change", update);
+    unit.addEventListener("change", update);
+    return h("div", { class: "map-row" }, h("label", { for: select.id, class: "channel" }, "time"), select, unit, h("span"), h("span"), h("p", { class: "why hint" }, look.time ? "runs forward" : "No column looks like time: choose it."));
+  }
+
+  private row(channel: Channel): HTMLElement {
+    const box = h("div", { class: "map-row", "data-channel": channel.name });
+    this.rows.set(channel.name, box);
+    this.fillRow(channel, box);
+    return box;
+  }
+
+  private fillRow(channel: Channel, box: HTMLElement): void {
+    const look = this.look as Look;
+    const choice = this.chosen.get(channel.name);
+    const proposal = channel.proposals.find((one) => keyOf(one) === choice?.column);
+    const select = h("select", { id: `column-${channel.name}` }, h("option", { value: "" }, "– none –"));
+    if (channel.proposals.length) {
+      const group = h("optgroup", { label: "Likely" });
+      for (const one of channel.proposals) group.append(option(keyOf(one), `${one.doubt ? "? " : ""}${keyOf(one)}`, keyOf(one) === choice?.column));
+      select.append(group);
+    }
+    const likely = new Set(channel.proposals.map(keyOf));
+    const rest = look.columns.filter((column) => !likely.has(column.name) && column.kind === (channel.name === "soil" ? "text" : "number"));
+    const group = h("optgroup", { label: "Any other column" });
+    for (const column of rest) group.append(option(column.name, column.name, column.name === choice?.column));
+    select.append(group);
+    select.addEventListener("change", () => {
+      this.choose(channel, select.value);
+      this.fillRow(channel, box);
+      document.getElementById(select.id)?.focus();
+    });
+    const column = look.columns.find((one) => one.name === (proposal?.columns[0] ?? choice?.column));
+    fill(
+      box,
+      h("label", { for: select.id, class: "channel" }, channel.wheel ? `${channel.wheel}: ` : "", channel.title),
+      select,
+      choice && channel.unit ? this.unit(channel, choice, proposal, column) : h("span"),
+      choice && channel.unit ? this.sign(channel, choice) : h("span"),
+      column ? plot(column, choice?.entry.sign === -1) : h("span"),
+      h("p", { class: "why hint" }, reason(choice, proposal, column)),
+    );
+  }
+
+  private unit(channel: Channel, choice: Choice, proposal: Proposal | undefined, column: Column | undefined): HTMLElement {
+    const field = h("input", { type: "text", class: "unit", value: String(choice.entry.unit ?? proposal?.unit ?? column?.unit ?? channel.unit ?? ""), "aria-label": `Unit of ${channel.name}` });
+    field.addEventListener("change", () => {
+      if (field.value.trim()) choice.entry.unit = field.value.trim();
+      else delete choice.entry.unit;
+    });
+    if (!proposal?.give) return field;
+    const scale = h("input", { type: "number", step: "any", class: "unit", value: String(choice.entry.scale ?? 1), "aria-label": `Scale of ${channel.name}` });
+    scale.addEventListener("change", () => (choice.entry.scale = Number(scale.value) || 1));
+    return h("span", { class: "two" }, h("span", {}, "×"), scale, field);
+  }
+
+  private sign(channel: Channel, choice: Choice): HTMLElement {
+    const turned = choice.entry.sign === -1;
+    const button = h("button", { type: "button", class: "sign", "aria-pressed": String(turned), "aria-label": `Turn the sign of ${channel.name}`, title: "Turn the sign" }, turned ? "−" : "+");
+    button.addEventListener("click", () => {
+      if (choice.entry.sign === -1) delete choice.entry.sign;
+      else choice.entry.sign = -1;
+      const box = this.rows.get(channel.name) as HTMLElement;
+      this.fillRow(channel, box);
+      box.querySelector<HTMLElement>(".sign")?.focus();
+    });
+    return button;
+  }
+
+  private choose(channel: Channel, column: string): void {
+    if (!column) {
+      this.chosen.delete(channel.name);
+      return;
+    }
+    const proposal = channel.proposals.find((one) => keyOf(one) === column);
+    const unit = this.look?.columns.find((one) => one.name === column)?.unit;
+    const entry = proposal ? { ...proposal.entry } : { from: column, ...(unit && channel.unit ? { unit } : {}) };
+    this.chosen.set(channel.name, { column, entry });
+  }
+
+  private async save(output: string): Promise<void> {
+    const channels = Object.fromEntries([...this.chosen].map(([name, choice]) => [name, choice.entry]));
+    const kept = await tried(() => send<{ path: string }>("POST", "profile", { log: this.log, output, time: this.look?.time ?? { from: "time" }, channels }));
+    if (kept) this.saved(kept.path);
+  }
+}
+
+function option(value: string, text: string, selected: boolean): HTMLElement {
+  return h("option", { value, selected }, text);
+}
+
+/** What a proposal is called: its column, or what is made of several. */
+function keyOf(proposal: Proposal): string {
+  return proposal.columns.length === 1 && "from" in proposal.entry ? (proposal.columns[0] as string) : `from ${proposal.columns.join(", ")}`;
+}
+
+function reason(choice: Choice | undefined, proposal: Proposal | undefined, column: Column | undefined): string {
+  if (!choice) return "";
+  const range = column && column.minimum !== null ? `${digits(column.minimum)} to ${digits(column.maximum)}, median ${digits(column.median)}${column.unit ? ` ${column.unit}` : ""}` : (column?.examples ?? []).slice(0, 3).join(", ");
+  if (!proposal) return `chosen by you; ${range}`;
+  const words = [...proposal.evidence, ...(proposal.doubt && !proposal.evidence.includes(proposal.doubt) ? [`? ${proposal.doubt}`] : []), ...(proposal.give ? [proposal.give] : [])];
+  return `${Math.round(100 * proposal.confidence)} %: ${words.join("; ")}. ${range}`;
+}
+
+/** How a column runs: the range of each stretch of the log, with zero as a line where it is crossed. */
+function plot(column: Column, turned: boolean): Element {
+  const outline = column.outline;
+  if (!outline) return h("span");
+  const known = outline.filter((one) => one !== null);
+  const low = Math.min(...known.map((one) => one[0]));
+  const high = Math.max(...known.map((one) => one[1]));
+  const span = high - low || 1;
+  const y = (value: number): number => (turned ? 2 + (28 * (value - low)) / span : 30 - (28 * (value - low)) / span);
+  const width = 120 / outline.length;
+  const path = outline
+    .map((one, i) => (one ? `M${((i + 0.5) * width).toFixed(1)} ${(y(one[0]) + 0.6).toFixed(1)}V${(y(one[1]) - 0.6).toFixed(1)}` : ""))
+    .join("");
+  return svg(
+    "svg",
+    { viewBox: "0 0 120 32", class: "outline", role: "img", "aria-label": `${column.name} over the log, ${digits(low)} to ${digits(high)}` },
+    low < 0 && high > 0 ? svg("line", { x1: 0, x2: 120, y1: y(0), y2: y(0), class: "zero" }) : null,
+    svg("path", { d: path, "stroke-width": Math.max(1.2, width) }),
+  );
+}
