@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 
 import numpy as np
 import pandas as pd
@@ -100,3 +101,11 @@ def test_nothing_considered_is_said_and_doubtful_units_come_first() -> None:
     text = tg.estimate(pd.DataFrame(columns), tg.Vehicle.from_dict(vehicle)).summary()
     assert "the intervals hold the sensors' noise alone" in text
     assert text.splitlines()[-1].startswith("Next: settle what the notes doubt")
+
+
+def test_an_efficiency_that_could_be_anything_is_not_printed(drive: tuple[tg.Estimates, str]) -> None:
+    estimates, _ = drive
+    vague = {f"efficiency_{wheel}_std": np.full(len(estimates), 0.6) for wheel in estimates.wheels}
+    text = replace(estimates, columns={**estimates.columns, **vague}).summary()
+    line = next(line for line in text.splitlines() if line.lstrip().startswith("all "))
+    assert line.count("not known") == 1

@@ -114,11 +114,13 @@ def _names(tally: Tally, quantity: str, columns: Columns) -> list[str]:
 
 
 def _mean_cell(columns: Columns, names: list[str], chosen: npt.NDArray[np.bool_]) -> str:
-    """Mean over columns of their medians and of their median standard deviations, over the chosen rows."""
+    """Mean over columns of their medians and of their median standard deviations, over the chosen rows; an efficiency only where known."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", RuntimeWarning)  # a column may be all NaN, or no row chosen
         value = np.mean([np.nanmedian(columns[name][chosen]) for name in names])
         spread = np.mean([np.nanmedian(columns[f"{name}_std"][chosen]) for name in names])
+    if names[0].startswith("efficiency_") and NORMAL_95 * spread > 0.5:
+        return "not known"  # the interval holds all that an efficiency can be
     return f"{value:.3f} ± {NORMAL_95 * spread:.3f}" if np.isfinite(value) else "-"
 
 
