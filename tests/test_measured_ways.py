@@ -121,7 +121,8 @@ def test_nobody_is_stuck_on_the_grass(shared: Located, name: str) -> None:
 
 
 @pytest.mark.xfail(
-    strict=True, reason="a pose's derivative flattens what its noise does not hold: 4.1 of 4: docs/real-logs.md"
+    strict=True,
+    reason="a pose's derivative flattens what its noise does not hold: 4.1 of 4: docs/real-logs.md",
 )
 def test_innovations_on_grass_are_of_the_right_order(shared: Located) -> None:
     """Warthog, bank. The accelerometer's NIS is near 1; a pose's derivative has errors that its scatter does
@@ -141,7 +142,8 @@ def test_innovations_on_grass_are_of_the_right_order(shared: Located) -> None:
 
 
 @pytest.mark.xfail(
-    strict=True, reason="neighbouring steps share a torque's noise, so that wheels err less: .46: docs/real-logs.md"
+    strict=True,
+    reason="neighbouring steps share a torque's noise, so that wheels err less: .46: docs/real-logs.md",
 )
 def test_wheels_of_a_turning_robot_are_expected_too_sure(shared: Located) -> None:
     """Alostar, bank: straight ahead wheel speeds fit; in turns, where sides slip alternately, they do not."""
