@@ -21,6 +21,7 @@ from terragrip.vehicle_parts import (
     Axle,
     Bearing,
     Calibration,
+    Driveline,
     FuelPerEnergy,
     Height,
     Length,
@@ -68,6 +69,7 @@ class Vehicle(Part):
     power: Power | None = None
     working_width: Width | None = None
     fuel: FuelPerEnergy | None = None
+    driveline: Driveline | None = None
     sensors: Sensors = Field(default_factory=Sensors)
     uncertainty: Uncertainty = Field(default_factory=Uncertainty)
     calibration: Calibration = Field(default_factory=Calibration)
@@ -129,6 +131,8 @@ class Vehicle(Part):
                 "make the axles' masses add up to the mass",
                 ("axles",),
             )
+        if self.driveline is not None and not self.knows_wheels:
+            raise Fault("needs the wheels' radius and inertia", _ADD_WHEELS, ("driveline",))
         for key in ("wheelbase", "center_of_gravity_height") if len(self.axles) > 1 else ():
             if getattr(self, key) is None or key not in self.model_fields_set:
                 raise Fault("is missing", f"two or more axles need it: add e.g. '{key}: 0.6 m'", (key,))

@@ -157,6 +157,24 @@ class Antenna(Part):
     z: _Offset = 0.0
 
 
+class Driveline(Part):
+    """From the engine to the driven wheels, for machines that tell the engine's torque and not the wheels' (docs/vehicle.md).
+
+    Wheel torque = ``efficiency`` x ratio x (engine torque - ``accessory_power``/engine speed - ``engine_inertia`` x its
+    acceleration), summed over the driven wheels. The ratio is ``ratio`` where the gear is fixed, else engine speed over wheel
+    speed. Each ``_std`` is the spread of what is not known.
+    """
+
+    efficiency: Annotated[float, *quantity_of("1", 0.2, 1, likely=("%",))]
+    efficiency_std: Annotated[float, *quantity_of("1", 0, 0.5, likely=("%",))] = 0.05
+    accessory_power: Annotated[float, *quantity_of("W", 0, 1e6, likely=("kW",))]
+    accessory_power_std: Annotated[float, *quantity_of("W", 0, 1e6, likely=("kW",))] | None = None
+    engine_torque_std: Annotated[float, *quantity_of("N m", 0, 1e5)] | None = None
+    reference_torque: Annotated[float, *quantity_of("N m", 0, 1e5, above=True)] | None = None
+    engine_inertia: Annotated[float, *quantity_of("kg m^2", 0, 1e3)] = 0.0
+    ratio: Annotated[float, *quantity_of("1", 0, 1e4, above=True)] | None = None
+
+
 class Sensors(Part):
     """Standard deviations of the sensors' white noise; absent: estimated from the log."""
 

@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from terragrip.errors import InputError
+from terragrip.estimation.driveline import ByEngine, by_engine
 from terragrip.estimation.engine import EVENTS
 from terragrip.estimation.estimates import Estimates
 from terragrip.estimation.estimator import TractionEstimator
@@ -88,16 +89,36 @@ def estimated(
     beside: str | os.PathLike[str] | None = None,
     planned: Callable[[int, tuple[str, ...]], None] | None = None,
     progress: Progress | None = None,
+    together: int = 1,
 ) -> Iterator[Estimates]:
     """The estimates of a log in blocks, a table a block, in the order of time; arguments as for :func:`estimate`.
 
     A first pass over the log finds the noise and the held channels (`terragrip.recording.survey`), so that the blocks' size
     changes no digit. ``beside``: the folder in whose neighbourhood blocks wait for the backward pass of ``smooth``, where the log
     has more than one; None: the system's. ``planned`` is called with the rows and the columns that there will be, before any row is
-    estimated. Raises InputError as :func:`estimate` does, each when its block is reached.
+    estimated. ``together``: see :class:`TractionEstimator`. Raises InputError as :func:`estimate` does, each when its block is reached.
     """
     if smooth and not method_named(method).can_smooth:
         raise InputError(f"the method {method} cannot smooth", hint="use another method, or leave out smooth")
+    if vehicle.driveline is not None and by_engine(whole := log.whole(), vehicle):
+        machine = ByEngine(whole, vehicle)
+        yield from machine.completed(
+            estimated(
+                machine.log(log),
+                machine.vehicle,
+                method,
+                smooth=smooth,
+                sensors=sensors,
+                held=held,
+                gap=gap,
+                standstill_speed=standstill_speed,
+                beside=beside,
+                planned=planned,
+                progress=progress,
+                together=machine.together,
+            )
+        )
+        return
     passes = _Passes(progress, log.rows, log.from_disk + 1 + smooth)
     known = survey_of(log, passes.first if log.from_disk else None)
     passes.rows = known.rows
@@ -115,6 +136,7 @@ def estimated(
         gap=gap,
         standstill_speed=standstill_speed,
         slip_reference=reference,
+        together=together,
     )
     if planned is not None:
         beside_them = (*passed_on(known.sample, estimator), *known.sample.labels)

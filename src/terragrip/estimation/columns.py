@@ -32,6 +32,16 @@ _WHOLE = {
     "altitude": Column("m", "measured altitude"),
     "drawbar_force": Column("N", "measured drawbar force, backward pull positive"),
 }  # fmt: skip
+_WHOLE |= {
+    "wheel_speed_driven": Column("rad/s", "mean angular velocity of the driven wheels"),
+    "adhesion_driven": Column(
+        "1", "mean adhesion (mu) of the driven wheels together, by the engine's torque"
+    ),
+    "slip_driven": Column("1", "slip of the driven wheels as one"),
+    "net_traction_driven": Column("1", "net traction ratio of the driven wheels together"),
+    "efficiency_driven": Column("1", "tractive efficiency of the driven wheels together"),
+    "vertical_load_driven": Column("N", "vertical load of the driven axles together"),
+}
 _BY_WHEEL = {
     "wheel_speed": Column("rad/s", "angular velocity of wheel {}"),
     "adhesion": Column(

@@ -96,6 +96,7 @@ class TractionEstimator:
         ``wheel_based_speed``) make it estimate slip alone, whatever the ``method``: docs/methods.md.
     gap: s without any wheel or ground speed after which the motion starts anew.
     standstill_speed: m/s under which vehicle and wheels count as standing.
+    together: how many wheels each wheel of ``vehicle`` stands for (`terragrip.estimation.driveline`).
 
     Raises InputError on an unknown method or sensor, or a vehicle that the kernel cannot work with.
 
@@ -112,12 +113,13 @@ class TractionEstimator:
         channels: Collection[str] | None = None,
         gap: float | None = None,
         standstill_speed: float | None = None,
+        together: int = 1,
     ) -> None:
         self.vehicle = vehicle
         self.method = method_named(method).name
         self.held = dict(held or {})
         self.channels = default_channels(vehicle) if channels is None else tuple(channels)
-        self.thresholds = Thresholds(gap=gap, standstill_speed=standstill_speed)
+        self.thresholds = Thresholds(gap=gap, standstill_speed=standstill_speed, together=together)
         self.slip_reference: SlipReference | None = None
         self.rims: tuple[Rim, ...] = ()
         if speeds_alone(self.channels, vehicle):
@@ -155,6 +157,7 @@ class TractionEstimator:
         gap: float | None = None,
         standstill_speed: float | None = None,
         slip_reference: SlipReference | None = None,
+        together: int = 1,
     ) -> Self:
         """An estimator set up as :func:`estimate` does it: noise and held channels found in the log where not given; where it holds
         no torque, also what slip counts from (``slip_reference``; None finds it)."""
@@ -176,6 +179,7 @@ class TractionEstimator:
             channels=tuple(recording.channels),
             gap=gap,
             standstill_speed=standstill_speed,
+            together=together,
         )
         if slip_reference is not None:
             made.slip_reference, made.rims = slip_reference, slip_reference.rims
@@ -269,6 +273,7 @@ class TractionEstimator:
             "channels": self.channels,
             "gap": self.thresholds.gap,
             "standstill_speed": self.thresholds.standstill_speed,
+            "together": self.thresholds.together,
             "rims": [asdict(rim) for rim in self.rims],
             "dead_band": self.dead_band,
         }
@@ -292,6 +297,7 @@ class TractionEstimator:
             channels=about["channels"],
             gap=about["gap"],
             standstill_speed=about["standstill_speed"],
+            together=about.get("together", 1),
         )
         if about["rims"]:
             restored.rims = tuple(Rim(**rim) for rim in about["rims"])

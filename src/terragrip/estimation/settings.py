@@ -28,6 +28,7 @@ class Thresholds:
     gap: float | None = None
     standstill_speed: float | None = None
     max_step: float | None = None
+    together: int = 1  # wheels that each wheel of the vehicle stands for
 
     def put(self, settings: Any) -> None:
         """Write what the user set into a tg_settings."""
@@ -35,6 +36,11 @@ class Thresholds:
             value = getattr(self, name)
             if value is not None:
                 setattr(settings, name, value)
+        if (
+            self.together > 1
+        ):  # bumps come and go under single wheels; what all do together is the pull, not a load unseen
+            settings.tuned.uneven_memory = 1e9
+            settings.tuned.least_load_spread /= math.sqrt(self.together)
 
 
 def watch_limits(wheel_radius: float = 0.2) -> dict[str, float]:

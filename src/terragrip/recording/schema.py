@@ -10,6 +10,11 @@ AXLE_CHANNELS = {"vertical_load": "N"}
 CHANNELS = {
     "ground_speed": "m/s",
     "wheel_based_speed": "m/s",  # what the drive train says of all driven wheels as one, by the machine's own radius
+    "engine_speed": "rad/s",
+    "engine_torque": "N m",  # at the flywheel
+    "engine_torque_share": "1",  # of the reference torque, friction included: J1939's actual engine percent torque
+    "engine_friction_share": "1",  # of the reference torque: J1939's nominal friction percent torque
+    "engine_reference_torque": "N m",
     "drawbar_force": "N",
     "acceleration_x": "m/s^2",
     "acceleration_y": "m/s^2",

@@ -1,0 +1,145 @@
+"""Row by row from engine torque and speed to the driveline's torque at the wheels; rows of a gear shift are set aside."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from terragrip.errors import InputError
+from terragrip.physics.driveline import torque_into_gears, torque_spread, wheel_torque
+from terragrip.physics.loads import GRAVITY
+from terragrip.recording import Recording
+from terragrip.vehicle_parts import Driveline
+
+Floats = npt.NDArray[np.float64]
+Flags = npt.NDArray[np.bool_]
+
+_HOLD = 2.0  # s that a value stands for
+_LAGS = (0.5, 1.0)  # s: over them the ratio is compared
+_REACH = 3.0  # s: no older value is compared with
+TAIL = 2 * _HOLD + _REACH
+"""s of the rows before that a row's torque depends on."""
+_SHIFT = (
+    0.08  # change of the ratio that makes a shift: a step of a gearbox is 15 to 25 %, slip and noise less
+)
+_SLOWEST = 0.07  # of √(g r): slower rims tell no ratio
+_SHARE_STD = 0.02  # of the reference torque: a controller's torque is a model's
+_FRICTION = (0.08, 0.04)  # of the reference torque, where the bus does not say (ours)
+_TORQUES = ("engine_torque", "engine_torque_share")
+
+
+def tells_engine_torque(channels: Mapping[str, Floats]) -> bool:
+    """Whether a log's channels hold the engine's speed and torque."""
+    return "engine_speed" in channels and any(name in channels for name in _TORQUES)
+
+
+@dataclass(frozen=True)
+class EngineTorque:
+    """How a log tells its engine's torque: ``reference`` [N m] of its shares (None: in N m), ``std`` [N m] of its error as a constant,
+    sentences for the user."""
+
+    reference: float | None
+    std: float
+    notes: tuple[str, ...] = ()
+
+    @classmethod
+    def of(cls, log: Recording, driveline: Driveline) -> EngineTorque:
+        """As the whole log has it; raises InputError where shares have no reference torque."""
+        given = driveline.engine_torque_std
+        if "engine_torque" in log.channels:
+            return cls(None, given or 0.0)
+        reference, notes = driveline.reference_torque, []
+        if "engine_reference_torque" in log.channels:
+            reference = float(np.nanmedian(log.channels["engine_reference_torque"]))
+        if reference is None or not reference > 0:
+            raise InputError(
+                "is a share of a reference torque that neither the log nor the vehicle file gives",
+                file=log.source,
+                place="column engine_torque_share",
+                hint="add 'reference_torque: 800 N m' under 'driveline', from the engine's data sheet",
+            )
+        share = _SHARE_STD
+        if "engine_friction_share" not in log.channels:
+            share = float(np.hypot(share, _FRICTION[1]))
+            notes.append(
+                f"The engine's own friction is not in the log: {_FRICTION[0]:.0%} ± {_FRICTION[1]:.0%} of the reference torque is assumed."
+            )
+        return cls(reference, share * reference if given is None else given, tuple(notes))
+
+    def at(self, channels: Mapping[str, Floats], time: Floats) -> Floats:
+        """The engine's torque (n,) [N m] at the flywheel, NaN where it was not measured."""
+        if self.reference is None:
+            return channels["engine_torque"]
+        friction = channels.get("engine_friction_share")
+        lost = _FRICTION[0] if friction is None else held(time, friction)
+        return self.reference * (channels["engine_torque_share"] - lost)
+
+
+@dataclass(frozen=True)
+class DrivelineTorque:
+    """``torque`` (n,) [N m]: the sum over the driven wheels, NaN where it was not measured or is set aside; ``std`` (n,) [N m]: of what
+    stands in that row, NaN where nothing does; ``shift`` (n,): rows of a gear shift."""
+
+    torque: Floats
+    std: Floats
+    shift: Flags
+
+
+def driveline_torque(
+    driveline: Driveline,
+    engine: EngineTorque,
+    time: Floats,
+    channels: Mapping[str, Floats],
+    wheel_speed: Floats,
+    radius: float,
+) -> DrivelineTorque:
+    """The torque of a driveline to the wheels (n,), of which ``wheel_speed`` (n,) [rad/s] is the mean and ``radius`` [m]."""
+    speed, wheels = held(time, channels["engine_speed"]), held(time, wheel_speed)
+    known = np.abs(wheels) * radius > _SLOWEST * np.sqrt(GRAVITY * radius)
+    known &= speed > 0
+    ratio = np.divide(speed, wheels, out=np.full(len(time), np.nan), where=known)
+    shift = np.zeros(len(time), dtype=bool)
+    if driveline.ratio is not None:
+        ratio = np.where(speed > 0, driveline.ratio * np.sign(np.where(known, wheels, 1.0)), np.nan)
+    else:
+        for lag in _LAGS:
+            before = earlier(time, ratio, lag)
+            shift |= np.isfinite(before) & ~(np.abs(ratio / before - 1) <= _SHIFT)
+        shift &= known
+    acceleration = (speed - earlier(time, speed, _LAGS[0])) / (
+        time - earlier(time, np.where(np.isfinite(speed), time, np.nan), _LAGS[0])
+    )
+    into = torque_into_gears(
+        engine.at(channels, time),
+        speed,
+        np.nan_to_num(acceleration),
+        accessory_power=driveline.accessory_power,
+        engine_inertia=driveline.engine_inertia,
+    )
+    torque = np.where(shift, np.nan, wheel_torque(into, ratio, driveline.efficiency))
+    power_std = driveline.accessory_power_std
+    if power_std is None:
+        power_std = driveline.accessory_power / 2
+    std = torque_spread(speed, ratio, driveline.efficiency, engine.std, power_std)
+    stands = held(time, np.where(np.isfinite(torque), std, np.nan))
+    return DrivelineTorque(torque, np.where(shift | ~np.isfinite(ratio), np.nan, stands), shift)
+
+
+def held(time: Floats, values: Floats) -> Floats:
+    """The last value (n,) at each row, NaN where it is too old."""
+    last = np.maximum.accumulate(np.where(np.isfinite(values), np.arange(len(time)), -1))
+    stands = (last >= 0) & (time - time[last] <= _HOLD)
+    return np.where(stands, values[last], np.nan)
+
+
+def earlier(time: Floats, values: Floats, lag: float) -> Floats:
+    """The last value (n,) at least ``lag`` [s] before each row, NaN where it is too old."""
+    known = np.flatnonzero(np.isfinite(values))
+    if not len(known):
+        return np.full(len(time), np.nan)
+    place = np.searchsorted(time[known], time - lag + 1e-9, side="right") - 1
+    rows = known[np.maximum(place, 0)]
+    return np.where((place >= 0) & (time - time[rows] <= _REACH), values[rows], np.nan)

@@ -1,0 +1,43 @@
+"""From an engine's torque to the sum of its wheels' torques: power through gears, less what else takes power (R)."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+Floats = npt.NDArray[np.float64]
+
+
+def wheel_torque(engine_torque: Floats, ratio: Floats, efficiency: float) -> Floats:
+    """Sum of the driven wheels' torques (n,) [N m] of the torque (n,) [N m] that goes into the gears.
+
+    ``ratio`` (n,): engine speed over wheel speed. Power is lost whichever way it goes: when the ground drives the engine, the wheels give
+    more than the engine takes.
+    """
+    return ratio * engine_torque * np.where(engine_torque * ratio > 0, efficiency, 1 / efficiency)
+
+
+def torque_into_gears(
+    engine_torque: Floats,
+    engine_speed: Floats,
+    engine_acceleration: Floats,
+    *,
+    accessory_power: float,
+    engine_inertia: float,
+) -> Floats:
+    """Torque (n,) [N m] left for the gears: the engine's, less that of accessories and of its own acceleration (n,) [rad/s²].
+
+    ``accessory_power`` [W] is divided by ``engine_speed`` (n,) [rad/s], NaN where that is not positive.
+    """
+    speed = np.where(engine_speed > 0, engine_speed, np.nan)
+    left: Floats = engine_torque - accessory_power / speed - engine_inertia * engine_acceleration
+    return left
+
+
+def torque_spread(
+    engine_speed: Floats, ratio: Floats, efficiency: float, torque_std: float, power_std: float
+) -> Floats:
+    """SD (n,) [N m] of the sum of wheel torques by the engine torque's [N m] and the accessories' [W], taken as constants."""
+    speed = np.where(engine_speed > 0, engine_speed, np.nan)
+    spread: Floats = efficiency * np.abs(ratio) * np.hypot(torque_std, power_std / speed)
+    return spread

@@ -1,0 +1,169 @@
+"""Stock machines: engine torque through the driveline gives the sum of drive torques, and intervals that say how little that is."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import terragrip as tg
+from stock_tractor import StockMachine, stock_machine
+from terragrip.errors import InputError
+from terragrip.estimation.batch import estimated
+from terragrip.recording import LogBlocks, Recording
+from terragrip.simulation.families import Kind, draw
+
+DRAWN = [
+    ("tractor", "saturating", "even", 301),
+    ("tractor", "brixius", "plain", 302),
+    ("tractor", "sinkage", "uncoupled", 303),
+    ("robot", "brixius", "multirate", 304),
+    ("tractor", "saturating", "plain", 305),
+    ("robot", "sinkage", "even", 306),
+    ("tractor", "brixius", "uncoupled", 307),
+    ("robot", "saturating", "plain", 308),
+]
+
+
+@cache
+def drawn(mass: str, curve: str, sensors: str, seed: int) -> StockMachine:
+    return stock_machine(draw(Kind(mass, curve, sensors), seed), seed)
+
+
+def covered(estimates: tg.Estimates, machine: StockMachine) -> np.ndarray:
+    """Rows (n, 2) of a moving machine in which 1.96 SD hold the true adhesion and resistance."""
+    rows = machine.moving & np.isfinite(estimates["adhesion_driven"]) & (estimates.event_codes == 0)
+    pairs = (("adhesion_driven", machine.adhesion), ("soil_resistance", machine.resistance))
+    inside = [np.abs(estimates[name] - true) < 1.96 * estimates[f"{name}_std"] for name, true in pairs]
+    return np.stack(inside, axis=1)[rows]
+
+
+def test_intervals_hold_the_truth_of_drawn_machines() -> None:
+    inside = np.concatenate(
+        [covered(tg.estimate((m := drawn(*one)).recording, m.vehicle), m) for one in DRAWN]
+    )
+    assert len(inside) > 4000
+    assert (inside.mean(axis=0) > 0.92).all()
+
+
+def test_without_the_spreads_of_the_driveline_intervals_do_not_hold() -> None:
+    inside = []
+    for one in DRAWN[:5]:
+        machine = drawn(*one)
+        data = machine.vehicle.to_dict()
+        data["driveline"] |= {"efficiency_std": 0.0, "accessory_power_std": 0.0, "engine_torque_std": 0.0}
+        inside.append(covered(tg.estimate(machine.recording, tg.Vehicle.from_dict(data)), machine))
+    assert (np.concatenate(inside).mean(axis=0) < 0.9).all()
+
+
+def test_columns_are_those_of_a_sum() -> None:
+    machine = drawn(*DRAWN[0])
+    estimates = tg.estimate(machine.recording, machine.vehicle)
+    assert estimates.wheels == ("driven",)
+    single = [f"adhesion_{wheel}" for wheel in machine.vehicle.wheels]
+    assert not set(single) & set(estimates.names)
+    assert any("single wheels' adhesion cannot be had" in note for note in estimates.notes)
+    assert estimates.about["driveline"]["vehicle"]["axles"] == machine.vehicle.to_dict()["axles"]
+
+
+@pytest.mark.parametrize("smooth", [False, True])
+def test_blocks_change_no_digit(smooth: bool) -> None:
+    machine = drawn(*DRAWN[1])
+    whole = tg.estimate(machine.recording, machine.vehicle, smooth=smooth)
+    parts = list(estimated(LogBlocks.of(machine.recording, 97), machine.vehicle, smooth=smooth))
+    for name in whole.columns:
+        np.testing.assert_array_equal(np.concatenate([part[name] for part in parts]), whole[name], name)
+
+
+STEADY = """name: tractor
+mass: 6000 kg
+wheelbase: 2.6 m
+center_of_gravity_height: 0.9 m
+hitch_height: 0.5 m
+axles:
+  front: {mass: 2500 kg, wheels: [fl, fr]}
+  rear: {mass: 3500 kg, wheels: [rl, rr]}
+wheel: {radius: 0.8 m, inertia: 50 kg m^2}
+driveline: {efficiency: 0.85, accessory_power: 8 kW}
+"""
+
+
+def steady(seconds: float = 60.0, ratio: float = 80.0) -> Recording:
+    """At 2 m/s by 100 kW at the flywheel, no slip."""
+    rows = int(10 * seconds)
+    noise = 1e-3 * np.random.default_rng(0).standard_normal((3, rows))
+    engine = 2.0 / 0.8 * ratio
+    return Recording(
+        0.1 * np.arange(rows),
+        {
+            "ground_speed": 2.0 + noise[0],
+            "wheel_based_speed": 2.0 + noise[1],
+            "engine_speed": np.full(rows, engine),
+            "engine_torque": 100e3 / engine + noise[2],
+            "drawbar_force": np.full(rows, 30e3) + noise[2],
+        },
+    )
+
+
+@pytest.fixture
+def tractor(tmp_path: Path) -> tg.Vehicle:
+    (tmp_path / "tractor.yaml").write_text(STEADY)
+    return tg.Vehicle.load(tmp_path / "tractor.yaml")
+
+
+def test_power_over_speed_is_the_force(tractor: tg.Vehicle) -> None:
+    """.85 of 92 kW at 2 m/s push with 39.1 kN, of which 30 kN pull; whatever the gear."""
+    for ratio in (60.0, 90.0):
+        estimates = tg.estimate(steady(ratio=ratio), tractor)
+        weight = 6000 * 9.80665
+        assert estimates["adhesion_driven"][-1] == pytest.approx(39100 / weight, rel=5e-3)
+        assert estimates["soil_resistance"][-1] == pytest.approx(9100 / weight, rel=0.03)
+        # 5 of 85 % of efficiency and half the accessories, both of the force of 46 kN.
+        least = np.hypot(39100 * 0.05 / 0.85, 0.85 * 4000 / 2) / weight
+        assert estimates["adhesion_driven_std"][-1] == pytest.approx(least, rel=0.2)
+
+
+def test_a_gear_shift_is_set_aside(tractor: tg.Vehicle) -> None:
+    log = steady()
+    faster = log.time > 30.0
+    speed, torque = log["engine_speed"], log["engine_torque"]
+    shifted = log.with_channels(
+        engine_speed=np.where(faster, speed / 1.2, speed),
+        engine_torque=np.where(faster, 1.2 * torque, torque),
+    )
+    estimates = tg.estimate(shifted, tractor)
+    missing = estimates.time[np.isnan(estimates["adhesion_driven"])]
+    assert len(missing)
+    assert ((missing > 29.9) & (missing < 31.5)).all()
+    assert np.isfinite(estimates["slip_driven"]).all()
+    assert estimates["adhesion_driven"][-1] == pytest.approx(39100 / 6000 / 9.80665, rel=5e-3)
+
+
+def test_a_share_needs_its_reference(tractor: tg.Vehicle) -> None:
+    log = steady()
+    channels = {n: v for n, v in log.channels.items() if n != "engine_torque"}
+    shares = replace(log, channels={**channels, "engine_torque_share": log["engine_torque"] / 800 + 0.08})
+    with pytest.raises(InputError, match="neither the log nor the vehicle file") as caught:
+        tg.estimate(shares, tractor)
+    assert "reference_torque" in str(caught.value.hint)
+    told = shares.with_channels(engine_reference_torque=np.full(len(log), 800.0))
+    result = tg.estimate(told, tractor)
+    assert result["adhesion_driven"][-1] == pytest.approx(39100 / 6000 / 9.80665, rel=5e-3)
+    assert any("own friction is not in the log" in note for note in result.notes)
+
+
+def test_without_a_driveline_slip_alone(tractor: tg.Vehicle) -> None:
+    data = tractor.to_dict()
+    del data["driveline"]
+    estimates = tg.estimate(steady(), tg.Vehicle.from_dict(data))
+    assert not estimates.has_adhesion
+
+
+def test_a_driveline_needs_wheels(tmp_path: Path) -> None:
+    path = tmp_path / "v.yaml"
+    path.write_text("\n".join(line for line in STEADY.splitlines() if not line.startswith("wheel:")))
+    with pytest.raises(InputError, match="radius"):
+        tg.Vehicle.load(path)

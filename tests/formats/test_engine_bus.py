@@ -1,0 +1,43 @@
+"""Engine torque on a J1939 bus: EEC1, EEC3 and the engine configuration, through the shipped tractor profile."""
+
+from __future__ import annotations
+
+import struct
+from pathlib import Path
+
+import numpy as np
+
+import terragrip as tg
+from can_frames import START, WHEEL_BASED, payload, write_log
+
+EEC1, EEC3, GROUND_BASED = 0x0CF00400, 0x18FEDF00, 0x0CFE4980
+VEHICLE = {
+    "mass": 6000.0,
+    "wheelbase": 2.6,
+    "center_of_gravity_height": 0.9,
+    "hitch_height": 0.5,
+    "axles": {
+        "front": {"mass": 2500.0, "wheels": ["fl", "fr"]},
+        "rear": {"mass": 3500.0, "wheels": ["rl", "rr"]},
+    },
+    "wheel": {"radius": 0.8, "inertia": 50.0},
+    "driveline": {"efficiency": 0.85, "accessory_power": 8000.0, "reference_torque": 800.0},
+}
+
+
+def test_the_shipped_profile_knows_the_engine(tmp_path: Path) -> None:
+    frames = []
+    for k in range(600):
+        time = START + 0.1 * k
+        # 70 % of 800 N m, 8 % of it the engine's own friction, at 1600 rpm.
+        frames.append((time, EEC1, struct.pack("<BBBHBBB", 0xF0, 195, 195, 12800, 255, 255, 255)))
+        frames.append((time, EEC3, bytes([133]) + b"\xff" * 7))
+        frames.append((time + 0.002, WHEEL_BASED, payload(2.0 + 0.001 * (k % 3))))
+        frames.append((time + 0.004, GROUND_BASED, payload(2.0 + 0.001 * (k % 2))))
+    recording = tg.read(write_log(tmp_path / "log.blf", frames), "tractor-isobus")
+    assert np.nanmax(np.abs(recording["engine_speed"] - 1600 * np.pi / 30)) < 1e-9
+    assert np.nanmax(np.abs(recording["engine_torque_share"] - 0.70)) < 1e-12
+    assert np.nanmax(np.abs(recording["engine_friction_share"] - 0.08)) < 1e-12
+    estimates = tg.estimate(recording, tg.Vehicle.from_dict(VEHICLE))
+    force = 0.85 * (0.62 * 800 * 1600 * np.pi / 30 - 8000) / 2.001
+    assert abs(estimates["adhesion_driven"][-1] - force / (6000 * 9.80665)) < 5e-3
