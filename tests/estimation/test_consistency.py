@@ -98,6 +98,7 @@ def test_whiteness_of_white_and_of_coloured_noise() -> None:
     rng = np.random.default_rng(4)
     white = rng.normal(size=5000)
     assert whiteness(white).p_value > 0.01
+    assert whiteness(white).bound == pytest.approx(0.0277, abs=1e-4)  # 1.96/sqrt(5000)
     coloured = np.convolve(white, [1.0, 0.5], mode="valid")
     got = whiteness(coloured, lags=5)
     # MA(1) with 0.5: autocorrelation 0.4 at lag 1, none beyond

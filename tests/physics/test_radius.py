@@ -3,7 +3,10 @@
 import numpy as np
 import pytest
 
+from terragrip.errors import InputError
+from terragrip.estimation.settings import wheel_radii
 from terragrip.physics.radius import biderman_deflection, hadekel_deflection, loaded_radius, rolling_radius
+from terragrip.vehicle import Vehicle
 
 
 def test_hadekel_by_hand():
@@ -31,3 +34,30 @@ def test_rolling_radius_lies_between_loaded_and_free():
     assert rolling_radius(0.5, arm) == pytest.approx(2.5 * 0.5 * 0.48 / (0.75 + 0.48))
     assert arm < rolling_radius(0.5, arm) < 0.5
     assert rolling_radius(0.5, 0.5) == pytest.approx(0.5)
+
+
+def test_a_wheels_radii_follow_its_load_and_a_tire_that_caves_in_is_refused():
+    tire = {"radius": 0.5, "inertia": 1.0, "width": 0.5}
+    data = {
+        "mass": 2000.0,
+        "wheelbase": 2.0,
+        "track": 1.5,
+        "center_of_gravity_height": 0.5,
+        "hitch_height": 0.4,
+    }
+    data["axles"] = {
+        "front": {"mass": 1000.0, "wheels": ["fl", "fr"]},
+        "rear": {"mass": 1000.0, "wheels": ["rl", "rr"]},
+    }
+
+    def vehicle(pressure: float) -> Vehicle:
+        return Vehicle.from_dict(
+            {**data, "wheel": {**tire, "radius_model": {"name": "hadekel", "pressure": pressure}}}
+        )
+
+    arms, rolling = wheel_radii(vehicle(1e5))
+    sunk = 500 * 9.80665 / 222144.1  # as above
+    np.testing.assert_allclose(arms, 0.5 - sunk, rtol=1e-6)
+    np.testing.assert_allclose(rolling, rolling_radius(0.5, 0.5 - sunk), rtol=1e-6)
+    with pytest.raises(InputError, match=r"deflects a tire of 0\.5 m"):
+        wheel_radii(vehicle(5e3))

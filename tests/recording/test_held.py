@@ -159,3 +159,10 @@ def test_noise_of_a_held_channel_comes_from_its_updates() -> None:
 def test_one_step_in_a_hundred_may_miss_the_resolution(strays: int, expected: float) -> None:
     steps = np.concatenate([0.1 * np.arange(1, 201), 0.1 * np.arange(1, strays + 1) + 0.05])
     assert quantum(np.cumsum(np.r_[0.0, steps])) == pytest.approx(expected, rel=1e-6)
+
+
+def test_a_value_held_at_zero_counts_once_a_period_and_any_other_once() -> None:
+    time = np.arange(0.0, 5.0, 0.125) + 100.0
+    at_rest = fresh_samples(time, np.zeros(40), 1.0)
+    np.testing.assert_array_equal(time[at_rest] - 100.0, [0.0, 1.5, 2.5, 3.5, 4.5])
+    np.testing.assert_array_equal(np.flatnonzero(fresh_samples(time, np.ones(40), 1.0)), [0])

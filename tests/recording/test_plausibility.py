@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from terragrip.recording import Recording, unit_warnings
+from terragrip.recording.plausibility import _filled, _pairs
 from terragrip.vehicle import Vehicle
 
 Columns = dict[str, np.ndarray]
@@ -93,3 +94,23 @@ def test_angles_acceleration_and_time(columns: Columns, vehicle: Vehicle) -> Non
         assert expected in notes
     upside_down = {**columns, "acceleration_z": np.full(n, -9.8)}
     assert "other way" in unit_warnings(Recording.from_frame(upside_down), vehicle)[0]
+
+
+def test_speeds_of_two_rates_are_compared_at_one_time() -> None:
+    time = np.arange(0.0, 20.0, 0.1)
+    speed, turning = 1.0 + 0.1 * time, 5.0 + 0.5 * time
+    sparse = np.where(np.arange(200) % 10 == 0, speed, np.nan)
+    ground, rim = _pairs(time, sparse, np.where(np.arange(200) % 7 == 3, turning, np.nan))
+    assert len(ground) == 29
+    known = rim < 5.0 + 0.5 * 19.0  # behind the last sample of the ground speed it is held
+    np.testing.assert_allclose(5.0 * ground[known], rim[known])
+    assert _pairs(time[:1], speed[:1], turning[:1]) is None
+    assert _pairs(time, np.full(200, np.nan), turning) is None
+
+
+def test_gaps_of_a_turn_are_bridged_and_nothing_stays_nothing() -> None:
+    time = np.arange(5.0)
+    np.testing.assert_allclose(
+        _filled(time, np.array([0.0, np.nan, 2.0, 3.0, np.nan])), [0.0, 1.0, 2.0, 3.0, 3.0]
+    )
+    assert np.isnan(_filled(time, np.full(5, np.nan))).all()

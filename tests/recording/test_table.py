@@ -15,6 +15,7 @@ from hypothesis import strategies as st
 
 from terragrip.errors import InputError
 from terragrip.recording import Recording, unit_of, wheel_names_in
+from terragrip.recording.checks import remarks
 from terragrip.recording.clock import LATEST
 from terragrip.vehicle import Vehicle
 
@@ -239,3 +240,11 @@ def test_a_clock_that_would_leave_its_range_within_the_recording_has_no_zero() -
     assert zero(LATEST - 10.0, 0.0, 15.0) is None
     assert zero(-4.0, 5.0, 6.0) == -4.0  # its first row is after 1970
     assert zero(-4.0, 3.0, 6.0) is None
+
+
+@pytest.mark.parametrize(("count", "expected"), [(8, "h."), (9, "h and 1 more."), (12, "h and 4 more.")])
+def test_columns_without_use_are_named_up_to_eight(count: int, expected: str) -> None:
+    (note,) = [
+        one for one in remarks(["time", "drawbar_force", *"abcdefghijkl"[:count]]) if "not used" in one
+    ]
+    assert note == f"Columns that are not used: a, b, c, d, e, f, g, {expected}"

@@ -44,7 +44,9 @@ def test_the_papers_range_has_55_bins():
     assert BinSettings().edges[-1] == pytest.approx(0.60)
 
 
-@pytest.mark.parametrize("bad", [{"width": 0.0}, {"lower": 0.6, "upper": 0.6}, {"minimum": 0}])
+@pytest.mark.parametrize(
+    "bad", [{"width": 0.0}, {"lower": 0.6, "upper": 0.6}, {"minimum": 0}, {"metres": 0.0}, {"runs": 0}]
+)
 def test_settings_that_are_no_bins(bad):
     with pytest.raises(ValueError, match="no bins"):
         BinSettings(**bad)

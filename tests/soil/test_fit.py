@@ -77,7 +77,9 @@ def test_one_run_gives_no_interval_and_says_so():
     slip, mu, _ = pairs(4, a=0.85)
     curve = AdhesionCurve().fit(slip, mu)
     assert curve.interval_ == {}
-    assert "no interval" in curve.notes_[0]
+    assert curve.notes_[0].startswith("All samples come from 1 run: no interval")
+    two = AdhesionCurve().fit(slip, mu, np.arange(slip.size) % 2)
+    assert two.notes_[0].startswith("All samples come from 2 runs: no interval")
     with pytest.raises(ValueError, match="without a bootstrap"):
         curve.band([0.1])
 
@@ -162,3 +164,14 @@ def test_grass_has_its_own_range():
     curve = AdhesionCurve(bins=BinSettings(upper=0.40)).fit(slip, mu, run)
     assert np.nanmax(curve.bins_.slip) < 0.40
     assert curve.to_dict()["settings"]["upper"] == 0.40
+
+
+def test_a_band_holds_the_middle_share_of_the_bootstrap_curves():
+    curve = AdhesionCurve().fit(*pairs(8, a=0.85))
+    slip = np.linspace(0.05, 0.6, 5)
+    curves = [CURVES["exponential"].value(slip, {**curve.parameters_, "a": a}) for a in curve.samples_[:, 0]]
+    assert curve.free_ == ("a",)
+    for level in (0.5, 0.95):
+        np.testing.assert_allclose(
+            curve.band(slip, level), np.quantile(curves, [0.5 - level / 2, 0.5 + level / 2], axis=0)
+        )

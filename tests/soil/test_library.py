@@ -133,3 +133,8 @@ def test_digitised_points_that_are_none(tmp_path, text, expected):
     (tmp_path / "p.csv").write_text(text)
     with pytest.raises(InputError, match=expected):
         read_points(tmp_path / "p.csv")
+
+
+def test_digitised_curves_without_a_name_are_counted(tmp_path):
+    (tmp_path / "q.csv").write_text("0.05,0.1,0.07,0.2\n0.6,0.5,0.3,0.4\n0.2,0.3,,\n")
+    assert [curve.name for curve in read_points(tmp_path / "q.csv")] == ["curve 1", "curve 2"]

@@ -34,7 +34,7 @@ def require_columns(columns: Collection[str], source: str | None) -> None:
     if not missing:
         return
     near = {name: nearest(name.replace("_<wheel>", ""), columns) for name in missing}
-    # The name with a likely cousin in the table is the one to hint first.
+    # The name with a likely cousin in the table is the one to name first.
     name = next((n for n in missing if near[n]), missing[0])
     hint = f"the nearest column is {near[name]!r}: rename it, or map it in a profile"
     if near[name] is None:

@@ -40,6 +40,13 @@ def test_a_drive_that_holds_the_vehicle_is_no_zero(drive: Make, vehicle: Vehicle
     assert any("seems to hold the vehicle" in u.why for u in result.unknown)
 
 
+def test_what_counts_as_a_zero_goes_by_the_torque_of_driving(drive: Make, vehicle: Vehicle) -> None:
+    unknown_zero = Vehicle.from_dict({**vehicle.to_dict(), "uncertainty": {"drive_torque_gain": 0.02}})
+    log = drive(60, offset=OFFSET, standing=10)  # driving takes some 40 N m, the zeros are 0.1 to 0.5
+    for wheel, offset in zip(WHEELS, OFFSET, strict=True):
+        assert calibrate(log, unknown_zero)[f"drive_torque_offset {wheel}"].value == pytest.approx(offset)
+
+
 def test_stops_that_read_alike_outvote_stops_that_hold(drive: Make, vehicle: Vehicle) -> None:
     idle = [drive(40, offset=OFFSET, standing=5, noise=1.0, seed=k) for k in range(4)]
     holding = [
