@@ -3,10 +3,11 @@ import { fill, h } from "./ui/dom";
 import { startTheme, switchTheme } from "./ui/theme";
 import type { Page } from "./ui/page";
 
-const PAGES: Record<string, { title: string; load: () => Promise<{ page: Page }> }> = {
+const PAGES: Record<string, { title: string; load: () => Promise<{ page: Page }>; unlisted?: true }> = {
   start: { title: "Folder", load: () => import("./start/page") },
   drive: { title: "Drive", load: () => import("./drive/page") },
   live: { title: "Live", load: () => import("./live/page") },
+  cab: { title: "Cab", load: () => import("./live/cab"), unlisted: true },
   map: { title: "Map", load: () => import("./map/page") },
   fit: { title: "Fit", load: () => import("./fit/page") },
 };
@@ -38,7 +39,7 @@ async function open(): Promise<void> {
 }
 
 function drawBar(current: string): void {
-  const links = Object.entries(PAGES).map(([name, { title }]) =>
+  const links = Object.entries(PAGES).filter(([, { unlisted }]) => !unlisted).map(([name, { title }]) =>
     h("a", { href: `#/${name}`, "aria-current": name === current ? "page" : null }, title),
   );
   const state = h("span", { id: "connection", role: "status" });

@@ -34,7 +34,7 @@ export class CurvesPanel {
 
   constructor(
     private state: State,
-    private actions: { fit: () => void; save: () => void },
+    private actions: { fit: () => void; each: () => void; save: () => void },
   ) {
     state.on((change) => {
       if (change === "all") this.draw();
@@ -67,10 +67,30 @@ export class CurvesPanel {
         "div",
         { class: "row" },
         h("button", { type: "button", class: "primary", id: "fit-button", click: this.actions.fit }, "Fit to points"),
+        h("button", { type: "button", id: "fit-each", click: this.actions.each, title: "A curve for each soil that is shown, by this model, its held parameters and ends" }, "Fit each soil"),
         h("button", { type: "button", click: this.actions.save }, "Save to library"),
       ),
       this.result(curve),
+      this.fitted(),
       this.adder(),
+    );
+  }
+
+  /** The fits of all curves side by side, where there are two or more. */
+  private fitted(): HTMLElement | null {
+    const curves = this.state.kept.curves.filter((one) => one.fit && sameCurve(one));
+    if (curves.length < 2) return null;
+    const names = [...new Set(curves.flatMap((one) => one.fit?.free ?? []))];
+    const cell = (one: Curve, name: string): string => {
+      const [low, high] = one.fit?.interval[name] ?? [NaN, NaN];
+      return name in one.parameters ? `${digits(one.parameters[name])}${high > low ? ` (${digits(low)} to ${digits(high)})` : ""}` : "";
+    };
+    return h(
+      "table",
+      { class: "fits", id: "fits" },
+      h("caption", {}, "Fits, with 95 % intervals"),
+      h("thead", {}, h("tr", {}, h("th", { scope: "col" }, "Soil"), names.map((name) => h("th", { scope: "col" }, SYMBOLS[name] ?? name)), h("th", { scope: "col" }, "R²"), h("th", { scope: "col" }, "identified"))),
+      h("tbody", {}, curves.map((one) => h("tr", {}, h("th", { scope: "row" }, one.name), names.map((name) => h("td", {}, cell(one, name))), h("td", {}, digits(one.fit?.r2)), h("td", {}, one.fit?.identifiability.identifiable && !one.fit.at_bound.length ? "yes" : "no")))),
     );
   }
 

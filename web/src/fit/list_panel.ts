@@ -51,6 +51,7 @@ export class ListPanel {
         ? h("ul", { class: "list", id: "soil-list" }, this.state.soils.map((soil) => this.soil(soil)))
         : h("p", { class: "hint" }, "Choose a file of estimates, a soil library or digitised points."),
       this.fileChoice(),
+      this.binChoice(),
       this.pictures,
     );
   }
@@ -138,9 +139,33 @@ export class ListPanel {
     return choice;
   }
 
+  private binChoice(): HTMLElement {
+    const choice = h(
+      "select",
+      { id: "bins-by", title: "By pull, as terragrip soils does: noise of slip does not move a sample into another bin. By slip: what most papers print." },
+      (["pull", "slip"] as const).map((by) => h("option", { value: by, selected: by === this.state.by }, by === "pull" ? "the vehicle's pull" : "slip")),
+    );
+    choice.addEventListener("change", () => void this.rebin(choice.value === "slip" ? "slip" : "pull"));
+    return h("div", { class: "field" }, h("label", { for: "bins-by" }, "Bins by"), choice);
+  }
+
+  /** Lay the bins of all estimates anew. */
+  private async rebin(by: "pull" | "slip"): Promise<void> {
+    this.state.by = by;
+    for (const path of new Set(this.state.soils.map((soil) => soil.path).filter((one) => one.endsWith(".parquet")))) {
+      const served = await tried(() => get<Served[]>("soils", { path, by }));
+      for (const one of served ?? []) {
+        const soil = this.state.soils.find((other) => other.key === `${path}#${one.name}`);
+        if (soil) Object.assign(soil, { bins: one.bins ?? [], note: one.note ?? "" });
+      }
+    }
+    this.state.changed("all");
+    document.getElementById("bins-by")?.focus();
+  }
+
   async open(path: string): Promise<void> {
     if (!path) return;
-    const served = await tried(() => get<Served[]>("soils", { path }));
+    const served = await tried(() => get<Served[]>("soils", { path, by: this.state.by }));
     for (const one of served ?? []) {
       const key = `${path}#${one.name}`;
       this.state.soils = this.state.soils.filter((soil) => soil.key !== key);

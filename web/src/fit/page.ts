@@ -5,20 +5,26 @@ import { h, save } from "../ui/dom";
 import { note, tried } from "../ui/notes";
 import type { Page } from "../ui/page";
 import { CurvesPanel } from "./curves_panel";
+import { fit, fitEach } from "./fitting";
 import { ListPanel } from "./list_panel";
 import { mapOf } from "./picture";
 import { PicturesPanel } from "./pictures_panel";
 import { Plot } from "./plot";
-import { at, sampled } from "./samples";
+import { Loupe } from "./loupe";
+import { Residuals } from "./residuals";
+import { at } from "./samples";
 import { sameCurve } from "./scene";
-import { State, type Curve, type FitResult, type Model } from "./state";
+import { State, type Model } from "./state";
+import { curveTable, pointTable } from "./tables";
 
 export const page: Page = (main, { notices, query }) => {
   const state = new State();
   const plot = new Plot(state);
   const pictures = new PicturesPanel(state, () => plot.fit());
   const list = new ListPanel(state, () => plot.fit(), pictures.element);
-  const curves = new CurvesPanel(state, { fit: () => void fit(state), save: () => void keep(state) });
+  const curves = new CurvesPanel(state, { fit: () => void fit(state), each: () => void fitEach(state), save: () => void keep(state) });
+  const residuals = new Residuals(state, plot.view);
+  const loupe = new Loupe(plot.element, state, plot.view);
   const undo = h("button", { type: "button", click: () => step("undo"), title: "Ctrl+Z" }, "Undo");
   const redo = h("button", { type: "button", click: () => step("redo"), title: "Ctrl+Shift+Z" }, "Redo");
   const tools = h(
@@ -27,12 +33,16 @@ export const page: Page = (main, { notices, query }) => {
     undo,
     redo,
     h("button", { type: "button", click: () => plot.fit() }, "Show all"),
+    residuals.button,
     h("span", { class: "spring" }),
     h("button", { type: "button", click: () => void png(plot) }, "PNG"),
     h("button", { type: "button", click: () => save("adhesion-slip.svg", new Blob([plot.svg()], { type: "image/svg+xml" })) }, "SVG"),
-    h("button", { type: "button", click: () => void table(state) }, "CSV"),
+    h("button", { type: "button", click: () => void curveTable(state), title: "The curves that are shown, every per cent of slip" }, "Curves CSV"),
+    h("button", { type: "button", id: "points-csv", click: () => pointTable(state), title: "Points, bins and digitised points that are shown" }, "Points CSV"),
   );
-  main.append(list.element, h("section", { class: "middle", "aria-label": "Plot" }, tools, plot.element), curves.element);
+  main.append(list.element, h("section", { class: "middle", "aria-label": "Plot" }, tools, plot.element, residuals.element), curves.element);
+  plot.onView = () => residuals.later();
+  loupe.wanted = () => pictures.isDigitising;
   plot.onClick = (at, shift) => pictures.click(at, shift);
   state.on(() => {
     undo.disabled = !state.canUndo;
@@ -93,58 +103,18 @@ export const page: Page = (main, { notices, query }) => {
   main.addEventListener("dragover", hover);
   void start();
   // For the browser tests: how often the plot was drawn, and what is on it.
-  Object.assign(window, { terragripFit: { plot, state, at, mapOf } });
+  Object.assign(window, { terragripFit: { plot, state, at, mapOf, residuals } });
   return () => {
     state.leave();
     forget();
     plot.close();
+    residuals.close();
     removeEventListener("keydown", key);
     removeEventListener("paste", paste);
     main.removeEventListener("drop", drop);
     main.removeEventListener("dragover", hover);
   };
 };
-
-async function fit(state: State): Promise<void> {
-  const curve = state.active;
-  if (!curve) return;
-  const data = points(state);
-  if (!data) {
-    note("Choose a soil, or digitise a line of a picture, first.", "error");
-    return;
-  }
-  const wanted = { model: curve.model, intercept: "intercept" in curve.parameters, fixed: held(curve), bounds: curve.bounds, ...data };
-  const found = await tried(() => send<FitResult>("POST", "fit", wanted));
-  if (!found) return;
-  curve.fit = found;
-  curve.parameters = { ...found.parameters };
-  curve.source = `fitted to ${state.target.replace(/^picture:/, "")}`;
-  state.commit();
-  state.changed("all");
-}
-
-/** The parameters that the fit leaves alone, with their values; "free" where it may move all. */
-function held(curve: Curve): Record<string, number> | "free" {
-  const values = Object.fromEntries(curve.held.filter((name) => name in curve.parameters).map((name) => [name, curve.parameters[name] as number]));
-  return Object.keys(values).length ? values : "free";
-}
-
-/** What the fit takes: a soil of estimates by name, else points. */
-function points(state: State): Record<string, unknown> | null {
-  const picture = /^picture:(.*)#(\d+)$/.exec(state.target);
-  if (picture) {
-    const line = state.kept.pictures[picture[1] ?? ""]?.lines[Number(picture[2])];
-    return line ? { slip: line.points.map((p) => p[0]), adhesion: line.points.map((p) => p[1]) } : null;
-  }
-  const soil = state.soils.find((one) => one.key === state.target) ?? state.soils[0];
-  if (!soil) return null;
-  if (soil.path.endsWith(".parquet")) return { path: soil.path, soil: soil.soil };
-  const bins = soil.bins.length > 0;
-  return {
-    slip: bins ? soil.bins.map((b) => b.slip) : soil.points.slip,
-    adhesion: bins ? soil.bins.map((b) => b.mean) : soil.points.adhesion,
-  };
-}
 
 async function keep(state: State): Promise<void> {
   const curve = state.active;
@@ -178,18 +148,4 @@ async function keep(state: State): Promise<void> {
 async function png(plot: Plot): Promise<void> {
   const picture = await plot.png();
   if (picture) save("adhesion-slip.png", picture);
-}
-
-/** The shown curves on a grid of 1 % of slip, a column a curve. */
-async function table(state: State): Promise<void> {
-  const shown = state.kept.curves.filter((curve) => curve.shown);
-  const quoted = (text: string): string => (/[",\n]/.test(text) ? `"${text.replace(/"/g, '""')}"` : text);
-  const samples = await tried(() => Promise.all(shown.map(sampled)));
-  if (!samples) return;
-  const rows = [["slip", ...shown.map((curve) => quoted(curve.name))].join(",")];
-  for (let i = 0; i <= 100; i++) {
-    const s = i / 100;
-    rows.push([s, ...samples.map((one) => Number(at(one, s).toPrecision(8)))].join(","));
-  }
-  save("adhesion-slip.csv", new Blob([`${rows.join("\n")}\n`], { type: "text/csv" }));
 }

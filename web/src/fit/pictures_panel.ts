@@ -25,6 +25,11 @@ export class PicturesPanel {
     });
   }
 
+  /** Whether clicks on the plot are points of a line. */
+  get isDigitising(): boolean {
+    return this.digitising !== null;
+  }
+
   load(items: Item[]): void {
     this.files = items.filter((item) => item.kind === "picture" && !item.path.endsWith(".svg")).map((item) => item.path);
     this.draw();

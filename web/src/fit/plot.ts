@@ -13,6 +13,8 @@ export class Plot {
   readonly view = new View();
   /** Called with slip and adhesion under a click, and the pixel of the screen. */
   onClick: ((value: Pixel, shift: boolean) => void) | null = null;
+  /** Another part of the plane is shown. */
+  onView: (() => void) | null = null;
   redraws = 0;
   private layers: HTMLCanvasElement[];
   private stale = new Set<number>([0, 1, 2]);
@@ -79,6 +81,7 @@ export class Plot {
     this.asked = false;
     this.redraws++;
     const drawers = [this.drawPictures, this.drawData, this.drawCurves];
+    if (this.stale.has(0)) this.onView?.();
     for (const layer of this.stale) {
       const canvas = this.layers[layer];
       const pen = canvas?.getContext("2d");

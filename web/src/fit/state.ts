@@ -86,6 +86,7 @@ interface Left {
   soils: Soil[];
   images: Map<string, HTMLImageElement>;
   target: string;
+  by: "pull" | "slip";
   past: string[];
   future: string[];
   settled: string;
@@ -100,6 +101,8 @@ export class State {
   images = new Map<string, HTMLImageElement>();
   /** The soil, or "picture:path#line", that a fit takes. */
   target = "";
+  /** What bins of estimates are laid over: the vehicle's pull, or the wheel's slip. */
+  by: "pull" | "slip" = "pull";
   /** Samples of curves by their id, and of what their fits found by `fit <id>`. */
   samples = new Sampler(() => this.changed("curve"));
   kept: Kept = { curves: [], active: 0, pictures: {} };
@@ -148,8 +151,8 @@ export class State {
 
   /** Keep what is shown for the next time that the page opens. */
   leave(): void {
-    const { kept, soils, images, target, past, future, settled, colors } = this;
-    left = { kept, soils, images, target, past, future, settled, colors };
+    const { kept, soils, images, target, by, past, future, settled, colors } = this;
+    left = { kept, soils, images, target, by, past, future, settled, colors };
   }
 
   /** Take up what was left; false where nothing was. */

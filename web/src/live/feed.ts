@@ -27,8 +27,8 @@ export interface Said {
 
 export type State = "connecting" | "connected" | "lost" | "ended";
 
-/** Rows that the ring holds: 100 s at 100 Hz. */
-const RING = 10_000;
+/** Rows that the ring holds: 10 minutes at 100 Hz, to look back on while it records. */
+export const RING = 60_000;
 const HEAD = 3;
 
 /** The last rows, column by column. */
@@ -76,6 +76,11 @@ export class Ring {
   last(name: string): number {
     const column = this.columns[this.names.indexOf(name)];
     return column && this.taken ? (column[(this.taken - 1) % RING] as number) : NaN;
+  }
+
+  /** The time of the oldest row held. */
+  get oldest(): number {
+    return this.taken ? (this.time[this.place(0)] as number) : NaN;
   }
 
   get now(): number {

@@ -6,19 +6,17 @@ import { get, type Item } from "../ui/api";
 import { digits, fill, h } from "../ui/dom";
 import { tried } from "../ui/notes";
 import type { Page } from "../ui/page";
-import { Feed, LEAST_AGE, oldAfter, type Said } from "./feed";
+import { Alarms } from "./alarms";
+import { Feed, type Said } from "./feed";
+import { ageOf, brief, eventNow, LINGER, oldSaid, reading, seconds, WARNING } from "./numbers";
 import { Traces, type Trace } from "./traces";
 
-const WARNING: Record<string, string> = {
-  immobilization: "About to dig in",
-  stuck: "Stuck",
-  push: "The tool pushes",
-};
-const LINGER = 2;
-const STANDING = 0.05; // m/s
 /** Seconds between looks at how old the last row is, and after which a status says nothing of now (one comes every second). */
 const LOOK = 0.1;
 const STATUS_AGE = 2.5;
+
+/** Seconds that the traces can show. */
+const SPANS = [10, 30, 60, 120, 300];
 
 export const page: Page = (main, { notices, query }) => {
   const source = h("select", { id: "live-source", "aria-label": "Source" });
@@ -41,25 +39,65 @@ export const page: Page = (main, { notices, query }) => {
   let delay = 0; // of the estimates against their samples, by the last status [s]
   let heldAt = NaN; // when what is shown was held [ms]
 
+  let begin: number | null = null; // where the replay begins [s]
+
   const feed = new Feed(() => {
     const replay = source.value;
-    return new URLSearchParams(replay ? { replay, speed: speed.value } : {}).toString();
+    return new URLSearchParams(replay ? { replay, speed: speed.value, ...(begin === null ? {} : { start: String(begin) }) } : {}).toString();
   });
   const traces = new Traces(feed.ring, () => feed.hello?.events ?? []);
+  const alarms = new Alarms();
+  const span = h("select", { id: "live-span", "aria-label": "Time shown" }, SPANS.map((x) => h("option", { value: x, selected: x === traces.span }, x < 60 ? `${x} s` : `${x / 60} min`)));
+  span.addEventListener("change", () => {
+    traces.span = Number(span.value);
+    traces.lookBack(traces.back);
+  });
+  const seek = h("input", { type: "range", id: "seek", step: "any", "aria-label": "Place in the replay", hidden: true });
+  seek.addEventListener("change", () => {
+    begin = Number(seek.value);
+    feed.again();
+  });
+  const past = h("input", { type: "range", id: "live-back", step: "any", "aria-label": "Look back while it records" });
+  past.addEventListener("input", () => traces.lookBack(Number(past.value)));
+  const follow = h("button", { type: "button", id: "follow", hidden: true, click: () => traces.lookBack(null) }, "Now");
+  const place = h("output", { class: "hint" });
+  traces.onBack = drawPast;
+  const cab = h("a", { class: "button", href: "#/cab" }, "Cab");
   main.append(
-    h("div", { class: "tools" }, source, speed, pause, state, h("span", { class: "spring" }), health),
+    h("div", { class: "tools" }, source, speed, seek, pause, span, alarms.settings, cab, state, h("span", { class: "spring" }), health),
     warning,
+    alarms.element,
     old,
     h("div", { class: "tiles" }, slip.element, grip.element, soil.element, speedTile.element),
     traces.element,
+    h("div", { class: "past" }, past, place, follow),
     said,
   );
+
+  /** Where the traces stand among the rows held. */
+  function drawPast(): void {
+    const { ring } = feed;
+    if (!ring.taken) return;
+    past.min = String(Math.min(ring.oldest + traces.span, ring.now));
+    past.max = String(ring.now);
+    past.value = String(traces.back ?? ring.now);
+    past.disabled = ring.now - ring.oldest <= traces.span;
+    follow.hidden = traces.back === null;
+    place.value = traces.back === null ? "" : `looking back ${(ring.now - traces.back).toFixed(0)} s; the numbers above are of now`;
+    if (feed.hello?.replay && document.activeElement !== seek) seek.value = String(ring.now);
+  }
+
 
   let why = "";
   feed.onState = (now, reason) => {
     why = reason;
     if (now === "connected" && feed.hello) {
       traces.show(tracesOf(feed.hello.wheels, feed.hello.columns));
+      traces.lookBack(null);
+      const { replay } = feed.hello;
+      seek.hidden = !replay;
+      if (replay) [seek.min, seek.max, seek.value] = [String(replay.start), String(replay.end), String(begin ?? replay.start)];
+      cab.href = `#/cab${replay ? `?${new URLSearchParams({ replay: source.value, speed: speed.value })}` : ""}`;
       warnedAt = -Infinity;
       warning.hidden = true;
       for (const one of [slip, grip, soil, speedTile]) one.set("–", "");
@@ -72,30 +110,18 @@ export const page: Page = (main, { notices, query }) => {
 
   /** Whether what is shown is what is: else the numbers fade, and how old they are is said in their place. */
   function freshness(): void {
-    const played = feed.hello?.replay ? Number(speed.value) : 1;
-    const limit = oldAfter(feed.ring.period / played);
-    const silent = feed.age("row");
-    const unmeasured = feed.age("measured") + (feed.age("status") < STATUS_AGE ? delay : 0);
+    const { limit, silent, played, unmeasured, waiting, isOld, predicted } = ageOf(feed, delay, Number(speed.value), traces.held !== null);
     const connected = feed.state === "connected";
-    const waiting = connected && !feed.ring.taken;
-    const isOld = feed.ring.taken > 0 && (!connected || traces.held !== null || !(unmeasured <= limit));
     const heard = connected && !isOld && !waiting;
     state.className = `state ${heard ? "done" : feed.state === "lost" || (connected && isOld && traces.held === null) ? "failed" : ""}`;
     state.textContent = { connecting: "connecting …", connected: heard ? "connected" : waiting ? "connected, no rows yet" : traces.held !== null ? "paused" : "no measurements", lost: `connection lost: ${why}`, ended: "the run has ended" }[feed.state];
     main.classList.toggle("stale", isOld);
-    const predicted = connected && traces.held === null && feed.ring.isPredicted && silent <= LEAST_AGE;
     main.classList.toggle("predicted", predicted);
     traces.late = connected && traces.held === null && silent > limit ? silent * played : 0;
     old.hidden = !isOld;
     if (!isOld) return;
-    const seconds = traces.held === null ? unmeasured : (performance.now() - heldAt) / 1000;
-    const age = Number.isFinite(seconds) ? `${seconds.toFixed(1)} s` : "ages";
     old.textContent =
-      traces.held !== null
-        ? `Paused: these numbers are ${age} old.`
-        : predicted
-          ? `Predicted: nothing was measured for ${age}; the filter goes on alone, with growing intervals.`
-          : `These numbers are ${age} old${feed.state === "ended" ? ": the run has ended" : ": no rows come"}.`;
+      traces.held !== null ? `Paused: these numbers are ${seconds((performance.now() - heldAt) / 1000)} old.` : oldSaid(predicted, unmeasured, feed.state === "ended");
     if (traces.late) traces.redraw();
   }
   feed.onRows = () => {
@@ -133,23 +159,15 @@ export const page: Page = (main, { notices, query }) => {
   function numbers(): void {
     const { ring, hello } = feed;
     if (!hello) return;
-    const code = ring.event[(ring.taken - 1) % ring.event.length] ?? 0;
-    const event = hello.events[code] ?? "";
+    const event = eventNow(ring, hello);
     if (event in WARNING && warning.hidden) warn(event, "");
     if (event in WARNING) warnedAt = ring.now;
     else if (!warning.hidden && !(ring.now - warnedAt < LINGER)) warning.hidden = true;
-    const wheels = hello.wheels;
-    const slips = wheels.map((wheel) => ring.last(`slip_${wheel}`)).filter(Number.isFinite);
-    const most = Math.max(...slips);
-    const wheel = wheels.find((name) => ring.last(`slip_${name}`) === most) ?? "";
-    const spread = 196 * ring.last(`slip_${wheel}_std`);
-    slip.set(slips.length ? (100 * most).toFixed(0) : "–", slips.length ? `${wheel}, ± ${spread.toFixed(0)}` : Math.abs(ring.last("ground_speed")) < STANDING ? "standing" : "not known");
-    const offered = peak * ring.last("curve_a");
-    const used = Math.max(...wheels.map((name) => ring.last(`adhesion_${name}`)));
-    const known = peak > 0 && ring.last("curve_a_std") < 0.35 * ring.last("curve_a");
-    grip.set(known ? Math.min((100 * used) / offered, 100).toFixed(0) : "–", known ? `µ ${digits(used, 2)} of ${digits(offered, 2)}` : `µ ${digits(used, 2)}; what the soil offers is not known yet`);
-    const v = ring.last("ground_speed");
-    speedTile.set(Number.isFinite(v) ? v.toFixed(2) : "–", Number.isFinite(v) ? `± ${(1.96 * ring.last("ground_speed_std")).toFixed(2)}` : "not known");
+    const now = reading(ring, hello, peak);
+    slip.set(...now.slip.shown);
+    grip.set(...now.grip.shown);
+    speedTile.set(...now.speed.shown);
+    alarms.check(now, event);
   }
 
   pause.addEventListener("click", () => {
@@ -162,6 +180,7 @@ export const page: Page = (main, { notices, query }) => {
     traces.redraw();
   });
   source.addEventListener("change", () => {
+    begin = null;
     speed.hidden = source.value === "";
     feed.again();
   });
@@ -188,27 +207,27 @@ export const page: Page = (main, { notices, query }) => {
   const clock = window.setInterval(() => {
     rate = updates;
     updates = 0;
+    drawPast();
     const drops = feed.age("status") < STATUS_AGE ? (health.dataset["drops"] ?? "") : "";
     health.textContent = feed.state === "connected" && rate && !main.classList.contains("stale") ? [`${rate} updates/s`, drops].filter(Boolean).join(", ") : "";
   }, 1000);
-  const watch = window.setInterval(freshness, 1000 * LOOK);
+  const watch = window.setInterval(() => {
+    freshness();
+    alarms.silent(feed.ring.taken > 0 && main.classList.contains("stale") && traces.held === null && feed.state !== "ended");
+  }, 1000 * LOOK);
   const forget = notices.on((notice) => notice.kind === "folder" && void reload(false));
   void reload(true);
-  Object.assign(window, { terragripLive: { feed, traces } });
+  Object.assign(window, { terragripLive: { feed, traces, alarms } });
   return () => {
     clearInterval(clock);
     clearInterval(watch);
     main.classList.remove("stale", "predicted");
     forget();
     feed.close();
+    alarms.close();
     traces.close();
   };
 };
-
-/** What a driver can read at a glance: what happens, without the figures and the rule after it, which the list of events tells. */
-function brief(text: string): string {
-  return text.split(": ")[0] ?? text;
-}
 
 function tile(title: string, unit: string): { element: HTMLElement; set: (value: string, more: string) => void } {
   const number = h("span", { class: "big" }, "–");

@@ -18,6 +18,8 @@ export interface Trace {
 
 /** Pixels under which the charts stand below each other (as in the style sheet). */
 const NARROW = 560;
+/** Seconds between the marks of the time axis. */
+const STEPS = [5, 10, 15, 30, 60, 120, 300];
 const [LEFT, RIGHT, GAP, FOOT] = [50, 10, 24, 24];
 
 export class Traces {
@@ -26,6 +28,10 @@ export class Traces {
   span = 30;
   /** The time at the right edge while paused; null follows. */
   held: number | null = null;
+  /** The time at the right edge while looking back; null follows. */
+  back: number | null = null;
+  /** Dragged to another time. */
+  onBack: (() => void) | null = null;
   /** Seconds by which the last row lies back, where none comes: the lines then move away from the right edge. */
   late = 0;
   redraws = 0;
@@ -48,6 +54,35 @@ export class Traces {
       this.draw(); // at once: the new size has emptied the canvas
     });
     this.watcher.observe(this.element);
+    let grip: { x: number; end: number } | null = null;
+    this.element.addEventListener("pointerdown", (event) => {
+      if (event.pointerType === "touch") return; // a finger scrolls the page
+      grip = { x: event.clientX, end: this.end };
+      this.element.setPointerCapture(event.pointerId);
+    });
+    this.element.addEventListener("pointermove", (event) => {
+      if (grip && Math.abs(event.clientX - grip.x) > 3) this.lookBack(grip.end - ((event.clientX - grip.x) / this.wide()) * this.span);
+    });
+    for (const end of ["pointerup", "pointercancel"] as const) this.element.addEventListener(end, () => (grip = null));
+  }
+
+  /** The time at the right edge. */
+  get end(): number {
+    return this.held ?? this.back ?? this.ring.now + this.late;
+  }
+
+  /** Put a time at the right edge while rows go on coming; null, or the newest, follows again. */
+  lookBack(time: number | null): void {
+    const least = Math.min(this.ring.oldest + this.span, this.ring.now);
+    this.back = time === null || !(time < this.ring.now) ? null : Math.max(time, least);
+    this.onBack?.();
+    this.redraw();
+  }
+
+  /** Pixels of one chart's time axis. */
+  private wide(): number {
+    const width = this.element.clientWidth;
+    return (width < NARROW ? width : (width - GAP) / 2) - LEFT - RIGHT;
   }
 
   close(): void {
@@ -77,7 +112,7 @@ export class Traces {
     this.redraws++;
     pen.setTransform(devicePixelRatio, 0, 0, devicePixelRatio, 0, 0);
     pen.clearRect(0, 0, width, height);
-    const end = this.held ?? this.ring.now + this.late;
+    const { end } = this;
     if (Number.isNaN(end)) return;
     const first = this.firstSince(end - this.span);
     const across = width < NARROW ? 1 : 2;
@@ -104,7 +139,7 @@ export class Traces {
   private drawOne(pen: CanvasRenderingContext2D, trace: Trace, x0: number, y0: number, width: number, height: number, first: number, end: number, last: boolean): void {
     const { ring } = this;
     const [left, right, top, bottom] = [x0 + LEFT, x0 + width - RIGHT, y0 + 24, y0 + height - 6];
-    const [low, high] = this.range(trace, first);
+    const [low, high] = this.range(trace, first, end);
     const px = (time: number): number => right - ((end - time) / this.span) * (right - left);
     const py = (v: number): number => bottom - ((v - low) / (high - low)) * (bottom - top);
     pen.font = "600 13px system-ui, sans-serif";
@@ -134,7 +169,9 @@ export class Traces {
     }
     if (last) {
       pen.textAlign = "center";
-      for (let back = 0; back <= this.span; back += 10) pen.fillText(back ? `−${back} s` : "now", px(end - back) - (back ? 0 : 10), bottom + 14);
+      const step = STEPS.find((one) => one * 4 >= this.span) ?? 300;
+      const edge = this.back === null ? "now" : `${end.toFixed(0)} s`;
+      for (let back = 0; back < this.span; back += step) pen.fillText(back ? `−${back} s` : edge, px(end - back) - (back ? 0 : 10), bottom + 14);
     }
     const names = this.events();
     const count = ring.count;
@@ -166,31 +203,45 @@ export class Traces {
   private path(pen: CanvasRenderingContext2D, values: Float64Array, predicted: number, first: number, end: number, px: (time: number) => number, py: (v: number) => number): void {
     const { ring } = this;
     pen.beginPath();
-    let on = false;
+    let [on, column, least, most] = [false, NaN, 0, 0];
+    // Rows of one column of pixels are one upright stroke: minutes at 100 Hz would cost a frame.
+    const flush = (): void => {
+      if (on && most !== least) pen.lineTo(column, least), pen.lineTo(column, most);
+    };
     for (let i = first; i < ring.count; i++) {
       const at = ring.place(i);
       const time = ring.time[at] as number;
       if (time > end) break;
       const v = values[at] as number;
       if (Number.isNaN(v) || ring.predicted[at] !== predicted) {
+        flush();
         on = false;
         continue;
       }
-      if (on) pen.lineTo(px(time), py(v));
-      else pen.moveTo(px(time), py(v));
-      on = true;
+      const [x, y] = [Math.round(2 * px(time)) / 2, py(v)];
+      if (on && x === column) {
+        [least, most] = [Math.min(least, y), Math.max(most, y)];
+        continue;
+      }
+      flush();
+      if (on) pen.lineTo(x, y);
+      else pen.moveTo(x, y);
+      [on, column, least, most] = [true, x, y, y];
     }
+    flush();
     pen.stroke();
   }
 
   /** A range that grows at once and shrinks slowly, so that the lines do not dance. */
-  private range(trace: Trace, first: number): [number, number] {
+  private range(trace: Trace, first: number, end: number): [number, number] {
     let [low, high] = [Infinity, -Infinity];
     for (const line of trace.lines) {
       const values = this.ring.columns[this.ring.names.indexOf(line.column)];
       if (!values) continue;
       for (let i = first; i < this.ring.count; i++) {
-        const v = (values[this.ring.place(i)] as number) * trace.scale;
+        const at = this.ring.place(i);
+        if ((this.ring.time[at] as number) > end) break;
+        const v = (values[at] as number) * trace.scale;
         if (v < low) low = v;
         if (v > high) high = v;
       }

@@ -130,13 +130,13 @@ def literature() -> list[dict[str, Any]]:
 
 
 @router.get("/soils")
-def soils(studio: Here, path: Named) -> list[dict[str, Any]]:
-    """The soils of a library, of estimates (points and bins by soil), or of digitised points."""
+def soils(studio: Here, path: Named, by: Literal["pull", "slip"] = "pull") -> list[dict[str, Any]]:
+    """The soils of a library, of estimates (points and bins by soil; bins by pull or by slip), or of digitised points."""
     target = studio.folder.file(path)
     if target.suffix.lower() == ".json":
         return [_plain(soil) for soil in SoilLibrary.load(target).values()]
     if target.suffix.lower() == ".parquet":
-        return [_shown(name, studio, target) for name in _soils_of(studio, target)]
+        return [_shown(name, studio, target, by) for name in _soils_of(studio, target)]
     from terragrip.soil.digitised import read_points
 
     return [
@@ -250,14 +250,15 @@ def _gathered(studio: Studio, target: Path, soil: str) -> GatheredRuns:
     return result
 
 
-def _shown(name: str, studio: Studio, target: Path) -> dict[str, Any]:
-    """One soil of estimates: the bins that `terragrip soils` fits (by slip where it cannot fit any), and points thinned evenly."""
+def _shown(name: str, studio: Studio, target: Path, by: Literal["pull", "slip"]) -> dict[str, Any]:
+    """One soil of estimates: the bins that a fit takes (by slip where none can be fitted), and points thinned evenly."""
     entry: dict[str, Any] = {"name": name or "unlabelled", "soil": name, "path": studio.folder.name(target)}
     try:
         parts = _gathered(studio, target, name).pairs
     except InputError as error:
         return {**entry, "note": error.problem, "points": {"slip": [], "adhesion": []}, "bins": []}
-    wanted = FitRequest(model="exponential", path=str(target), soil=name, bootstrap=0)
+    choice = BinChoice(by="slip") if by == "slip" else None
+    wanted = FitRequest(model="exponential", path=str(target), soil=name, bins=choice, bootstrap=0)
     try:
         bins, note = _learned(studio, target, wanted).curve.bins_, ""
     except InputError as error:

@@ -1,0 +1,138 @@
+"""The fit page in a real browser: bins by slip or pull, residuals, several soils at once, points as CSV, the loupe."""
+
+from __future__ import annotations
+
+import csv
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import terragrip as tg
+from served import NEEDS, Served
+from terragrip.physics.adhesion import CURVES
+from terragrip.simulation import Scenario
+from terragrip.soil.bins import BY_SLIP, BinSettings
+from terragrip.soil.estimates import soils_of
+from terragrip.soil.fit import AdhesionCurve
+
+pytest.importorskip("playwright.sync_api", reason="SKIPPED LOUDLY: the browser tests need playwright")
+pytestmark = NEEDS
+
+BINS = "() => window.terragripFit.state.soils[0].bins"
+RIGHT = "() => { const r = window.terragripFit.residuals.summary; return r.count ? r : null; }"
+
+
+def open_fit(page: Any, served: Served) -> None:
+    page.goto(f"{served.url}/#/fit?path=estimates.parquet")
+    page.wait_for_selector("#soil-list li")
+
+
+def test_bins_by_slip_are_those_of_terragrip_soils_by_slip(page: Any, served: Served, folder: Path) -> None:
+    tg.simulate(Scenario.load("multi1"), 0).save(folder / "many")
+    recording, vehicle = tg.read(folder / "many/recording.parquet"), tg.Vehicle.load(folder / "vehicle.yaml")
+    tg.estimate(recording, vehicle).write(folder / "many.parquet")
+    page.goto(f"{served.url}/#/fit?path=many.parquet")
+    page.wait_for_selector("#soil-list li")
+    by_pull = page.evaluate(BINS)
+    page.select_option("#bins-by", "slip")
+    page.wait_for_function(f"n => ({BINS})().length !== n", arg=len(by_pull))
+    name = page.evaluate("() => window.terragripFit.state.soils[0].name")
+    curve = AdhesionCurve(bins=BinSettings(0.01, 0.05, 0.60, 10, BY_SLIP))
+    soils = soils_of([folder / "many.parquet"], curve, bins={}).soils
+    wanted = [one["mean"] for one in soils[name].curve.bins_.to_list()]
+    np.testing.assert_allclose([one["mean"] for one in page.evaluate(BINS)], wanted, rtol=1e-9)
+    page.click("#fit-button")
+    page.wait_for_selector(".badge")
+    fitted = page.evaluate("() => window.terragripFit.state.active.fit.bins.map((b) => b.mean)")
+    np.testing.assert_allclose(fitted, wanted, rtol=1e-9)  # the fit takes what is shown
+    page.select_option("#bins-by", "pull")
+    page.wait_for_function(f"n => ({BINS})().length === n", arg=len(by_pull))
+
+
+def test_residuals_are_bins_less_the_curve(page: Any, served: Served) -> None:
+    open_fit(page, served)
+    page.fill("#field-a", "0.7")
+    page.press("#field-a", "Tab")
+    page.click("#residuals")
+    page.wait_for_function(
+        "() => { const s = window.terragripFit.state; return s.samples.isCurrent(s.active.id, s.active); }"
+    )
+    page.wait_for_function(RIGHT)
+    page.wait_for_timeout(300)
+    bins = page.evaluate(BINS)
+    left = [b["mean"] - CURVES["exponential"].value(b["slip"], {"a": 0.7}) for b in bins]
+    found = page.evaluate(RIGHT)
+    assert found["count"] == len(bins)
+    assert found["rms"] == pytest.approx(float(np.sqrt(np.mean(np.square(left)))), rel=0.01)
+    assert found["largest"] == pytest.approx(float(np.max(np.abs(left))), rel=0.01)
+
+
+def test_each_shown_soil_gets_its_curve(page: Any, served: Served, folder: Path) -> None:
+    recording, vehicle = tg.read(folder / "recording.parquet"), tg.Vehicle.load(folder / "vehicle.yaml")
+    half = len(recording) // 2
+    tg.estimate(recording.select(slice(half)), vehicle).write(folder / "half.parquet")
+    open_fit(page, served)
+    page.wait_for_selector("#soil-file option[value='half.parquet']", state="attached")
+    page.select_option("#soil-file", "half.parquet")
+    page.wait_for_function("() => window.terragripFit.state.soils.length === 2")
+    page.click("#fit-each")
+    page.wait_for_selector("#fits tbody tr >> nth=1")
+    scales = page.evaluate(
+        "() => window.terragripFit.state.kept.curves.filter((c) => c.fit).map((c) => c.parameters.a)"
+    )
+    wanted = [
+        soils_of([folder / name]).soils["grass"].curve.parameters_["a"]
+        for name in ("estimates.parquet", "half.parquet")
+    ]
+    np.testing.assert_allclose(scales, wanted, rtol=1e-6)
+    page.keyboard.press("Control+z")  # one step
+    assert page.evaluate("() => window.terragripFit.state.kept.curves.length") == 1
+
+
+def test_points_are_exported_as_they_are_shown(page: Any, served: Served, tmp_path: Path) -> None:
+    open_fit(page, served)
+    with page.expect_download() as waiting:
+        page.click("#points-csv")
+    waiting.value.save_as(tmp_path / "points.csv")
+    rows = list(csv.DictReader((tmp_path / "points.csv").open()))
+    bins = [row for row in rows if row["kind"] == "bin"]
+    shown = page.evaluate(BINS)
+    np.testing.assert_allclose([float(r["adhesion"]) for r in bins], [b["mean"] for b in shown])
+    points = page.evaluate("() => window.terragripFit.state.soils[0].points.slip.length")
+    assert sum(row["kind"] == "point" for row in rows) == points
+
+
+def test_the_loupe_shows_the_picture_while_a_line_is_digitised(
+    page: Any, served: Served, folder: Path
+) -> None:
+    from PIL import Image
+
+    picture = np.full((400, 600, 3), 255, np.uint8)
+    picture[:, 300:] = (200, 30, 30)  # red from the middle on
+    Image.fromarray(picture).save(folder / "scan.png")
+    (folder / "scan.png.picture.json").write_text(
+        '{"slip": {"marks": [{"pixel": [0, 400], "value": 0}, {"pixel": [600, 400], "value": 0.6}], "log": false},'
+        '"adhesion": {"marks": [{"pixel": [0, 400], "value": 0}, {"pixel": [0, 0], "value": 0.8}], "log": false},'
+        '"opacity": 0.5, "shown": true, "lines": []}'
+    )
+    open_fit(page, served)
+    page.wait_for_selector("option[value='scan.png']", state="attached")
+    page.select_option("select[aria-label='Open a picture of the folder']", "scan.png")
+    page.wait_for_selector("text=Digitise a line")
+    at = page.evaluate(
+        "() => { const { plot } = window.terragripFit; const b = plot.element.getBoundingClientRect();"
+        "return [b.x + plot.view.px(0.31), b.y + plot.view.py((plot.view.y.low + plot.view.y.high) / 2)]; }"
+    )
+    page.mouse.move(*at)
+    assert page.is_hidden(".loupe")
+    page.click("text=Digitise a line")
+    page.mouse.move(at[0] + 1, at[1])
+    page.wait_for_selector(".loupe", state="visible")
+    sides = page.evaluate(
+        """() => { const c = document.querySelector('.loupe'), pen = c.getContext('2d');
+        return [0.02, 0.9].map((x) => [...pen.getImageData(x * c.width, 0.4 * c.height, 1, 1).data]); }"""
+    )
+    assert sides[0][1] > 200  # white on the left
+    assert sides[1][0] > 150 > sides[1][1]  # red on the right

@@ -1,0 +1,82 @@
+/** Fits by the server, and which points they take. */
+
+import { send } from "../ui/api";
+import { note, tried } from "../ui/notes";
+import type { Curve, FitResult, Soil, State } from "./state";
+
+/** Fit the active curve to the chosen points. */
+export async function fit(state: State): Promise<void> {
+  const curve = state.active;
+  if (!curve) return;
+  const data = points(state);
+  if (!data) {
+    note("Choose a soil, or digitise a line of a picture, first.", "error");
+    return;
+  }
+  if (!(await fitTo(curve, data, state.target.replace(/^picture:/, "")))) return;
+  state.commit();
+  state.changed("all");
+}
+
+/** Fit a curve to each soil that is shown, by the active curve's model, held parameters and ends; each soil has a curve of its own name. */
+export async function fitEach(state: State): Promise<void> {
+  const form = state.active;
+  const soils = state.soils.filter((soil) => soil.shown && (soil.bins.length || soil.points.slip.length));
+  if (!form || !soils.length) {
+    note("Show a soil first: choose a file of estimates or digitised points.", "error");
+    return;
+  }
+  const { model, held, bounds, parameters } = structuredClone(form);
+  for (const soil of soils) {
+    let curve = state.kept.curves.find((one) => one.source === `${FITTED}${soil.key}`);
+    const before = structuredClone(curve);
+    const taken = state.kept.curves.some((one) => one.name === soil.name);
+    curve ??= state.addCurve(model, parameters, taken ? `${soil.name} (${soil.path})` : soil.name);
+    Object.assign(curve, { model, held: [...held], bounds: structuredClone(bounds), parameters: { ...parameters }, color: soil.color, shown: true });
+    if (await fitTo(curve, pointsOf(state, soil), soil.key)) continue;
+    if (before) Object.assign(curve, before);
+    else state.kept.curves = state.kept.curves.filter((one) => one !== curve);
+  }
+  state.kept.active = form.id;
+  state.commit();
+  state.changed("all");
+}
+
+const FITTED = "fitted to ";
+
+/** Fit and take over what was found; false where it failed, which is said. */
+async function fitTo(curve: Curve, data: Record<string, unknown>, source: string): Promise<boolean> {
+  const wanted = { model: curve.model, intercept: "intercept" in curve.parameters, fixed: held(curve), bounds: curve.bounds, ...data };
+  const found = await tried(() => send<FitResult>("POST", "fit", wanted));
+  if (!found) return false;
+  curve.fit = found;
+  curve.parameters = { ...found.parameters };
+  curve.source = `${FITTED}${source}`;
+  return true;
+}
+
+/** The parameters that the fit leaves alone, with their values; "free" where it may move all. */
+function held(curve: Curve): Record<string, number> | "free" {
+  const values = Object.fromEntries(curve.held.filter((name) => name in curve.parameters).map((name) => [name, curve.parameters[name] as number]));
+  return Object.keys(values).length ? values : "free";
+}
+
+/** What the fit takes: a soil of estimates by name, else points. */
+function points(state: State): Record<string, unknown> | null {
+  const picture = /^picture:(.*)#(\d+)$/.exec(state.target);
+  if (picture) {
+    const line = state.kept.pictures[picture[1] ?? ""]?.lines[Number(picture[2])];
+    return line ? { slip: line.points.map((p) => p[0]), adhesion: line.points.map((p) => p[1]) } : null;
+  }
+  const soil = state.soils.find((one) => one.key === state.target) ?? state.soils[0];
+  return soil ? pointsOf(state, soil) : null;
+}
+
+function pointsOf(state: State, soil: Soil): Record<string, unknown> {
+  if (soil.path.endsWith(".parquet")) return { path: soil.path, soil: soil.soil, ...(state.by === "slip" ? { bins: { by: "slip" } } : {}) };
+  const bins = soil.bins.length > 0;
+  return {
+    slip: bins ? soil.bins.map((b) => b.slip) : soil.points.slip,
+    adhesion: bins ? soil.bins.map((b) => b.mean) : soil.points.adhesion,
+  };
+}

@@ -1,0 +1,98 @@
+/** What the active curve leaves: points and bins of the chosen soil less the curve, over slip, under the plot. */
+
+import { digits, h } from "../ui/dom";
+import { color, onTheme } from "../ui/theme";
+import { CanvasInk } from "./ink";
+import { at } from "./samples";
+import type { Soil, State } from "./state";
+import { ticks, View } from "./view";
+
+export class Residuals {
+  readonly element = h("div", { class: "residuals", role: "img", "aria-label": "Residuals: bins less the active curve, over slip", hidden: true });
+  readonly button = h("button", { type: "button", id: "residuals", "aria-pressed": "false" }, "Residuals");
+  /** Of the bins shown last: their number, root mean square and largest; for the tests too. */
+  summary = { count: 0, rms: NaN, largest: NaN };
+  private canvas = h("canvas", { "aria-hidden": "true" });
+  private view = new View();
+  private asked = false;
+  private forget: () => void;
+  private watcher: ResizeObserver;
+
+  constructor(
+    private state: State,
+    private above: View,
+  ) {
+    this.element.append(this.canvas);
+    this.button.addEventListener("click", () => {
+      this.element.hidden = !this.element.hidden;
+      this.button.setAttribute("aria-pressed", String(!this.element.hidden));
+      this.later();
+    });
+    state.on(() => this.later());
+    this.forget = onTheme(() => this.later());
+    this.watcher = new ResizeObserver(() => this.later());
+    this.watcher.observe(this.element);
+  }
+
+  close(): void {
+    this.forget();
+    this.watcher.disconnect();
+  }
+
+  later(): void {
+    if (this.asked || this.element.hidden) return;
+    this.asked = true;
+    requestAnimationFrame(() => {
+      this.asked = false;
+      this.draw();
+    });
+  }
+
+  private draw(): void {
+    const pen = this.canvas.getContext("2d");
+    const [width, height] = [this.element.clientWidth, this.element.clientHeight];
+    if (!pen || width < 100) return;
+    this.canvas.width = width * devicePixelRatio;
+    this.canvas.height = height * devicePixelRatio;
+    pen.setTransform(devicePixelRatio, 0, 0, devicePixelRatio, 0, 0);
+    const ink = new CanvasInk(pen);
+    const curve = this.state.active;
+    const soil = this.state.soils.find((one) => one.key === this.state.target) ?? this.state.soils[0];
+    const samples = curve && this.state.samples.of(curve.id, curve);
+    if (!curve || !soil || !samples) {
+      ink.text("Residuals need a curve and a soil with bins.", width / 2, height / 2, color("muted"), "middle");
+      return;
+    }
+    const left = (s: number, mu: number): number => mu - at(samples, s);
+    const bins = binsOf(soil);
+    const known = bins.map((bin) => left(bin.slip, bin.mean)).filter(Number.isFinite);
+    const largest = Math.max(...known.map(Math.abs), 0);
+    this.summary = { count: known.length, rms: Math.sqrt(known.reduce((sum, r) => sum + r * r, 0) / known.length), largest };
+    const most = Math.max(...bins.map((bin) => Math.abs(left(bin.slip, bin.mean)) + bin.std).filter(Number.isFinite), 0.01) * 1.1;
+    Object.assign(this.view, { x: { ...this.above.x }, y: { low: -most, high: most }, width, height, top: 22, bottom: 8 });
+    const { view } = this;
+    for (const y of ticks(view.y, 4)) {
+      ink.line([view.left, view.py(y), width - view.right, view.py(y)], { color: color(y === 0 ? "muted" : "grid") });
+      ink.text(digits(y), view.left - 8, view.py(y), color("muted"), "end");
+    }
+    ink.text(`Residual µ of ${soil.name} less ${curve.name}: ${known.length} bins, RMS ${digits(this.summary.rms, 2)}, largest ${digits(largest, 2)}`, view.left, 10, color("ink"), "start");
+    const shade = color(soil.color);
+    pen.save();
+    pen.beginPath();
+    pen.rect(view.left, view.top, width - view.left - view.right, height - view.top - view.bottom);
+    pen.clip();
+    const cloud = soil.points.slip.flatMap((s, i) => [view.px(s), view.py(left(s, soil.points.adhesion[i] ?? NaN))]);
+    if (soil.bins.length) ink.dots(cloud, 1, shade, 0.25);
+    for (const bin of bins) {
+      const r = left(bin.slip, bin.mean);
+      ink.line([view.px(bin.slip), view.py(r - bin.std), view.px(bin.slip), view.py(r + bin.std)], { color: shade, width: 1.2 });
+    }
+    ink.dots(bins.flatMap((bin) => [view.px(bin.slip), view.py(left(bin.slip, bin.mean))]), 4, shade, 1);
+    pen.restore();
+  }
+}
+
+/** The bins of a soil; of digitised points each point. */
+function binsOf(soil: Soil): { slip: number; mean: number; std: number }[] {
+  return soil.bins.length ? soil.bins : soil.points.slip.map((slip, i) => ({ slip, mean: soil.points.adhesion[i] ?? NaN, std: 0 }));
+}

@@ -1,0 +1,132 @@
+/** Thresholds that ring: slip and grip over a limit, a warning, a source that falls silent. Set once in a browser. */
+
+import { fill, h } from "../ui/dom";
+import { WARNING, type Reading } from "./numbers";
+
+const KEY = "terragrip-alarms";
+/** Seconds between two rings while it lasts; and of one ring. */
+const [EVERY, LENGTH] = [1, 0.25];
+
+interface Settings {
+  slip: number | null;
+  grip: number | null;
+  sound: boolean;
+}
+
+function kept(): Settings {
+  const none = { slip: null, grip: null, sound: false };
+  try {
+    return { ...none, ...(JSON.parse(localStorage.getItem(KEY) ?? "{}") as Partial<Settings>) };
+  } catch {
+    return none; // written by something else
+  }
+}
+
+export class Alarms {
+  /** What is over its limit now. */
+  readonly element = h("p", { class: "alarm", role: "alert", hidden: true });
+  readonly settings = h("details", { class: "chooser", id: "alarms" });
+  /** Rings so far. */
+  rings = 0;
+  private set = kept();
+  private audio: AudioContext | null = null;
+  private rang = -Infinity;
+  private causes = "";
+  private isSilent = false;
+  private mute = h("span", { class: "bad" });
+
+  constructor() {
+    this.draw();
+    if (this.set.sound) void this.open();
+  }
+
+  close(): void {
+    void this.audio?.close();
+  }
+
+  /** Look at the newest row. */
+  check(now: Reading, event: string): void {
+    const over = (name: string, value: number, limit: number | null): string | false => limit !== null && value > limit && `${name} ${value.toFixed(0)} % is over ${limit} %`;
+    const causes = [over("Slip", now.slip.value, this.set.slip), over("Grip in use", now.grip.value, this.set.grip)].filter((one) => one !== false);
+    const text = causes.join("; ");
+    if (text !== this.causes) {
+      this.causes = text;
+      this.element.hidden = !text;
+      fill(this.element, text);
+    }
+    if (text || event in WARNING) this.ring(880);
+  }
+
+  /** The source has fallen silent, or speaks again. */
+  silent(is: boolean): void {
+    if (is) {
+      this.causes = "";
+      this.element.hidden = true; // of a row that is old
+      this.ring(440);
+    }
+    this.isSilent = is;
+  }
+
+  private ring(pitch: number): void {
+    const now = performance.now() / 1000;
+    if (now - this.rang < EVERY && !(pitch === 440 && !this.isSilent)) return;
+    this.rang = now;
+    this.rings++;
+    this.told();
+    if (!this.set.sound || !this.audio || this.audio.state !== "running") return;
+    const tone = this.audio.createOscillator();
+    const volume = this.audio.createGain();
+    tone.frequency.value = pitch;
+    volume.gain.value = 0.3;
+    tone.connect(volume).connect(this.audio.destination);
+    tone.start();
+    tone.stop(this.audio.currentTime + LENGTH);
+  }
+
+  private async open(): Promise<void> {
+    this.audio ??= new AudioContext();
+    this.audio.onstatechange = () => this.told();
+    this.told();
+    await this.audio.resume(); // waits for a click where the browser wants one
+  }
+
+  /** A browser is mute until someone has clicked the page: that is said, so that nobody relies on it. */
+  private told(): void {
+    this.mute.textContent = this.set.sound && this.audio?.state !== "running" ? "No sound yet: click or tap anywhere." : "";
+    if (this.mute.textContent) addEventListener("pointerdown", () => void this.audio?.resume(), { once: true });
+  }
+
+  private draw(): void {
+    const limit = (name: "slip" | "grip", label: string): HTMLElement => {
+      const field = h("input", { type: "number", id: `alarm-${name}`, min: 0, max: 1000, step: "any", value: this.set[name] ?? "" });
+      field.addEventListener("change", () => {
+        this.set[name] = Number.isFinite(field.valueAsNumber) ? field.valueAsNumber : null;
+        this.keep();
+      });
+      return h("label", { class: "field" }, label, field);
+    };
+    const sound = h("input", { type: "checkbox", id: "alarm-sound", checked: this.set.sound });
+    sound.addEventListener("change", () => {
+      this.set.sound = sound.checked;
+      this.keep();
+      if (sound.checked) void this.open();
+      else this.told();
+    });
+    fill(
+      this.settings,
+      h("summary", {}, "Alarms"),
+      h(
+        "div",
+        { class: "menu" },
+        limit("slip", "Slip over [%]"),
+        limit("grip", "Grip over [%]"),
+        h("label", { class: "check" }, sound, "Ring (also on warnings, and when the source falls silent)"),
+        this.mute,
+      ),
+    );
+  }
+
+  private keep(): void {
+    localStorage.setItem(KEY, JSON.stringify(this.set));
+  }
+}

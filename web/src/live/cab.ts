@@ -1,0 +1,105 @@
+/** A page for a tablet in the cab: three big numbers, the warning, and how old they are. It fails visibly. */
+
+import { sampled } from "../fit/samples";
+import { fill, h } from "../ui/dom";
+import { tried } from "../ui/notes";
+import type { Page } from "../ui/page";
+import { Alarms } from "./alarms";
+import { Feed, type Said } from "./feed";
+import { ageOf, brief, eventNow, LINGER, reading, seconds, WARNING, type Figure } from "./numbers";
+
+const LOOK = 100; // ms
+
+export const page: Page = (main, { query }) => {
+  const replay = query.get("replay");
+  const speed = Number(query.get("speed")) || 1;
+  const alarms = new Alarms();
+  const tiles = { slip: tile("Slip", "%"), grip: tile("Grip in use", "%"), speed: tile("Speed", "m/s") };
+  const warning = h("div", { class: "cab-warning", role: "alert" });
+  const age = h("p", { class: "cab-age", id: "cab-age", role: "status" }, "connecting …");
+  main.append(
+    h("h1", { class: "visually-hidden" }, "Cab"),
+    h("div", { class: "cab-numbers" }, tiles.slip.element, tiles.grip.element, tiles.speed.element),
+    warning,
+    alarms.element,
+    h("div", { class: "cab-foot" }, age, h("span", { class: "spring" }), alarms.settings, h("button", { type: "button", click: () => void tried(() => document.documentElement.requestFullscreen()) }, "Full screen"), h("a", { class: "button", href: "#/live" }, "Leave")),
+  );
+  let peak = NaN; // largest adhesion of the online curve over its scale
+  let delay = 0;
+  let warnedAt = -Infinity;
+  let why = "";
+  void tried(() => sampled({ model: "exponential", parameters: { a: 1 } })).then((shape) => shape && (peak = shape.peak[1]));
+  const feed = new Feed(() => new URLSearchParams(replay ? { replay, speed: String(speed) } : {}).toString());
+
+  function warn(kind: string, text: string): void {
+    warnedAt = feed.ring.now;
+    fill(warning, h("strong", {}, WARNING[kind] ?? kind), text ? ` ${brief(text)}` : "");
+  }
+
+  feed.onSaid = (said: Said) => {
+    if (said.kind === "status") delay = said.delay ?? 0;
+    else if (said.kind in WARNING && said.source !== undefined) warn(said.kind, said.text ?? "");
+  };
+  feed.onState = (_, reason) => {
+    why = reason;
+    look();
+  };
+  let asked = false;
+  feed.onRows = () => {
+    if (asked) return;
+    asked = true;
+    requestAnimationFrame(() => {
+      asked = false;
+      const { ring, hello } = feed;
+      if (!hello || !ring.taken) return;
+      const event = eventNow(ring, hello);
+      if (event in WARNING && !warning.textContent) warn(event, "");
+      if (event in WARNING) warnedAt = ring.now;
+      else if (!(ring.now - warnedAt < LINGER)) fill(warning);
+      const now = reading(ring, hello, peak);
+      for (const name of ["slip", "grip", "speed"] as const) tiles[name].set(now[name]);
+      alarms.check(now, event);
+      look();
+    });
+  };
+
+  /** How old the numbers are; what is old is struck out and says so in the largest letters of the page. */
+  function look(): void {
+    const { isOld, predicted, waiting, unmeasured } = ageOf(feed, delay, speed, false);
+    const dead = isOld || waiting || feed.state !== "connected";
+    main.classList.toggle("dead", dead && !predicted);
+    main.classList.toggle("predicted", predicted);
+    const said = !feed.ring.taken ? "NO DATA YET" : predicted ? `PREDICTED ONLY, nothing measured for ${seconds(unmeasured)}` : `NO DATA for ${seconds(unmeasured)}`;
+    age.textContent = dead || predicted ? `${said}${feed.state === "lost" ? ` (${why})` : feed.state === "ended" ? " (the run has ended)" : ""}` : `measured ${seconds(unmeasured)} ago`;
+    alarms.silent(feed.ring.taken > 0 && isOld && feed.state !== "ended");
+  }
+  const watch = window.setInterval(look, LOOK);
+  // A tablet that goes dark shows nothing at all; where the browser has no such lock, its own settings must keep it awake.
+  let lock: WakeLockSentinel | null = null;
+  const wake = (): void => {
+    if (document.visibilityState === "visible") void navigator.wakeLock?.request("screen").then((one) => (lock = one), () => undefined);
+  };
+  wake();
+  document.addEventListener("visibilitychange", wake);
+  Object.assign(window, { terragripCab: { feed, alarms } });
+  return () => {
+    clearInterval(watch);
+    document.removeEventListener("visibilitychange", wake);
+    void lock?.release();
+    main.classList.remove("dead", "predicted");
+    alarms.close();
+    feed.close();
+  };
+};
+
+function tile(title: string, unit: string): { element: HTMLElement; set: (figure: Figure) => void } {
+  const number = h("span", { class: "cab-number" }, "–");
+  const more = h("p", { class: "cab-more" });
+  return {
+    element: h("section", { class: "cab-tile", "aria-label": title }, h("h2", {}, `${title} [${unit}]`), number, more),
+    set({ shown: [value, text] }) {
+      if (number.textContent !== value) number.textContent = value;
+      if (more.textContent !== text) more.textContent = text;
+    },
+  };
+}

@@ -1,0 +1,86 @@
+/** What the live page and the cab page say: the numbers of the newest row, and how old they are. */
+
+import { digits } from "../ui/dom";
+import { LEAST_AGE, oldAfter, type Feed, type Hello, type Ring } from "./feed";
+
+export const WARNING: Record<string, string> = {
+  immobilization: "About to dig in",
+  stuck: "Stuck",
+  push: "The tool pushes",
+};
+/** Seconds that a warning stands after its last row. */
+export const LINGER = 2;
+/** Seconds after which a status says nothing of now (one comes every second). */
+export const STATUS_AGE = 2.5;
+const STANDING = 0.05; // m/s
+
+/** A number for alarms, NaN where it is not known; and as it is shown: its digits, and what stands below. */
+export interface Figure {
+  value: number;
+  shown: [string, string];
+}
+
+/** Slip of the wheel that slips most [%], share of the soil's offer in use [%], ground speed [m/s]. */
+export interface Reading {
+  slip: Figure;
+  grip: Figure;
+  speed: Figure;
+}
+
+/** `peak`: the largest adhesion of the online curve over its scale. */
+export function reading(ring: Ring, { wheels }: Hello, peak: number): Reading {
+  const slips = wheels.map((wheel) => ring.last(`slip_${wheel}`)).filter(Number.isFinite);
+  const most = Math.max(...slips);
+  const wheel = wheels.find((name) => ring.last(`slip_${name}`) === most) ?? "";
+  const spread = 196 * ring.last(`slip_${wheel}_std`);
+  const offered = peak * ring.last("curve_a");
+  const used = Math.max(...wheels.map((name) => ring.last(`adhesion_${name}`)));
+  const known = peak > 0 && ring.last("curve_a_std") < 0.35 * ring.last("curve_a");
+  const grip = known ? Math.min((100 * used) / offered, 100) : NaN;
+  const v = ring.last("ground_speed");
+  const moves = Number.isFinite(v);
+  return {
+    slip: {
+      value: slips.length ? 100 * most : NaN,
+      shown: [slips.length ? (100 * most).toFixed(0) : "–", slips.length ? `${wheel}, ± ${spread.toFixed(0)}` : Math.abs(v) < STANDING ? "standing" : "not known"],
+    },
+    grip: { value: grip, shown: [known ? grip.toFixed(0) : "–", known ? `µ ${digits(used, 2)} of ${digits(offered, 2)}` : `µ ${digits(used, 2)}; what the soil offers is not known yet`] },
+    speed: { value: v, shown: [moves ? v.toFixed(2) : "–", moves ? `± ${(1.96 * ring.last("ground_speed_std")).toFixed(2)}` : "not known"] },
+  };
+}
+
+/** The event of the newest row, empty for none. */
+export function eventNow(ring: Ring, hello: Hello): string {
+  return hello.events[ring.event[(ring.taken - 1) % ring.event.length] ?? 0] ?? "";
+}
+
+/** How old the newest row is. `delay`: of estimates against their samples [s]; `speed`: of a replay; `held`: paused by the user. */
+export function ageOf(feed: Feed, delay: number, speed: number, held: boolean) {
+  const played = feed.hello?.replay ? speed : 1;
+  const limit = oldAfter(feed.ring.period / played);
+  const silent = feed.age("row");
+  const unmeasured = feed.age("measured") + (feed.age("status") < STATUS_AGE ? delay : 0);
+  const connected = feed.state === "connected";
+  return {
+    played,
+    limit,
+    silent,
+    unmeasured,
+    waiting: connected && !feed.ring.taken,
+    isOld: feed.ring.taken > 0 && (!connected || held || !(unmeasured <= limit)),
+    predicted: connected && !held && feed.ring.isPredicted && silent <= LEAST_AGE,
+  };
+}
+
+export const seconds = (age: number): string => (Number.isFinite(age) ? `${age.toFixed(1)} s` : "ages");
+
+export function oldSaid(predicted: boolean, age: number, ended: boolean): string {
+  return predicted
+    ? `Predicted: nothing was measured for ${seconds(age)}; the filter goes on alone, with growing intervals.`
+    : `These numbers are ${seconds(age)} old${ended ? ": the run has ended" : ": no rows come"}.`;
+}
+
+/** What a driver can read at a glance: what happens, without the figures and the rule after it, which the list of events tells. */
+export function brief(text: string): string {
+  return text.split(": ")[0] ?? text;
+}
