@@ -190,3 +190,9 @@ def test_estimates_and_views_load_no_drawing_library_until_they_draw() -> None:
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "[]"
+
+
+def test_the_time_axis_says_which_clock_its_0_is(estimates: Estimates) -> None:
+    labels = [axes.get_xlabel() for axes in estimates.plot().axes]
+    assert labels[-1] == "time [s], from 0 at 2023-11-14 22:13:20 UTC"
+    assert set(labels[:-1]) == {""}

@@ -109,3 +109,11 @@ def test_an_efficiency_that_could_be_anything_is_not_printed(drive: tuple[tg.Est
     text = replace(estimates, columns={**estimates.columns, **vague}).summary()
     line = next(line for line in text.splitlines() if line.lstrip().startswith("all "))
     assert line.count("not known") == 1
+
+
+def test_one_label_on_every_row_makes_one_line() -> None:
+    result = tg.simulate("constant", 7)
+    text = tg.estimate(result.recording.to_pandas().assign(soil="loam"), result.vehicle).summary()
+    lines = [line.strip() for line in text.splitlines()]
+    assert sum(line.startswith("all: loam  ") for line in lines) == 1
+    assert not any(line.startswith(("loam  ", "all  ")) for line in lines)

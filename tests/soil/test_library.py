@@ -138,3 +138,11 @@ def test_digitised_points_that_are_none(tmp_path, text, expected):
 def test_digitised_curves_without_a_name_are_counted(tmp_path):
     (tmp_path / "q.csv").write_text("0.05,0.1,0.07,0.2\n0.6,0.5,0.3,0.4\n0.2,0.3,,\n")
     assert [curve.name for curve in read_points(tmp_path / "q.csv")] == ["curve 1", "curve 2"]
+
+
+def test_a_soil_shows_each_parameter_with_its_interval():
+    soil = fitted()
+    low, high = soil.interval["a"]
+    shown = SoilLibrary({"fine": soil}, {}, {})._repr_html_()
+    assert low < soil.parameters["a"] < high
+    assert f"a {soil.parameters['a']:.3g} ({low:.3g} to {high:.3g})" in shown
