@@ -1,4 +1,7 @@
-"""Make docs/images/studio-*.png: every page of the studio, light and dark, on a simulated run. Needs chromium and the built pages."""
+"""Make docs/images/studio-*.png: every page of the studio, light and dark, on a simulated run; given names, only those.
+
+Needs chromium and the built pages.
+"""
 
 from __future__ import annotations
 
@@ -50,6 +53,16 @@ def start(page: Any) -> None:
     page.wait_for_selector("h1")
 
 
+def machine(page: Any) -> None:
+    page.set_viewport_size({"width": 1280, "height": 900})
+    page.wait_for_selector("#machine-class option[value='tractor-4wd']", state="attached")
+    page.select_option("#machine-class", "tractor-4wd")
+    page.wait_for_selector("#machine-mass")
+    page.fill("#machine-mass", "6.2 t")
+    page.fill("#machine-wheel_radius", "0.83 m")
+    page.wait_for_selector("text=by tape, not calibrated")
+
+
 def shrink(picture: bytes, target: Path) -> None:
     """A palette of 256 colours is enough for a page, at a third of the size; chosen so that small patches keep theirs."""
     whole = Image.open(io.BytesIO(picture)).convert("RGB")
@@ -58,6 +71,7 @@ def shrink(picture: bytes, target: Path) -> None:
 
 PAGES = {
     "start": ("", start),
+    "machine": ("#/start?machine", machine),
     "drive": ("#/drive?path={run}", drive),
     "honesty": ("#/drive?path=multi2-aukf-fs.parquet", honesty),
     "live": ("#/live?replay={run}&speed=5", live),
@@ -76,7 +90,8 @@ def main() -> None:
         run = next(folder.glob("*-estimates.parquet")).name
         with studio(folder) as (url, _):
             for theme in ("light", "dark"):
-                for name, (place, work) in PAGES.items():
+                for name in sys.argv[1:] or PAGES:
+                    place, work = PAGES[name]
                     page = chromium.new_page(viewport={"width": 1280, "height": 720}, color_scheme=theme)
                     page.goto(url + place.format(run=run))
                     work(page)

@@ -27,12 +27,12 @@ export interface Vehicle {
 }
 
 const WIDTH = 420;
-const HEIGHT = 216;
+const TALL = 150; // what a machine may be high
 
 export function sketch(vehicle: Vehicle, known: Set<string>): HTMLElement {
   const axles = Object.values(vehicle.axles);
   const side = axles.every((axle) => axle.wheel ?? vehicle.wheel);
-  return h("figure", { class: "sketch" }, side ? sideView(vehicle, known) : null, vehicle.track ? topView(vehicle, known) : null, h("figcaption", { class: "hint" }, side ? "To scale. Dashed: typical of the class, not yet known." : "Of a bus speed no number of the machine counts."));
+  return h("figure", { class: "sketch" }, side ? sideView(vehicle, known) : null, side && vehicle.track ? topView(vehicle, known) : null, h("figcaption", { class: "hint" }, side ? "To scale. Dashed: typical of the class, not yet known." : "Of a bus speed no number of the machine counts."));
 }
 
 /** Rear to the left, front to the right, ground below. */
@@ -45,9 +45,11 @@ function sideView(vehicle: Vehicle, known: Set<string>): SVGElement {
   const gravity = vehicle.center_of_gravity_height ?? 0;
   const tall = Math.max(2 * Math.max(front, rear), gravity * 1.25, 0.01);
   const long = base + front + rear;
-  const scale = Math.min((WIDTH - 210) / long, (HEIGHT - 66) / tall);
-  const ground = HEIGHT - 40;
-  const left = (WIDTH - scale * long) / 2 + scale * rear;
+  const beside = vehicle.hitch_height ? 112 : 30; // room for the hitch's label
+  const scale = Math.min((WIDTH - beside - 30) / long, TALL / tall);
+  const ground = 24 + scale * tall;
+  const height = ground + (base ? 56 : 26);
+  const left = beside + (WIDTH - beside - 30 - scale * long) / 2 + scale * rear;
   const right = left + scale * base;
   const up = (height: number): number => ground - scale * height;
   const style = (...names: string[]): string => (names.every((name) => known.has(name)) ? "known" : "typical");
@@ -66,21 +68,21 @@ function sideView(vehicle: Vehicle, known: Set<string>): SVGElement {
   const label = (x: number, y: number, text: string, anchor: string, name: string): SVGElement => svg("text", { x, y, "text-anchor": anchor, class: style(name) }, text);
   return svg(
     "svg",
-    { viewBox: `0 0 ${WIDTH} ${HEIGHT}`, role: "img", "aria-label": "The machine from the side" },
+    { viewBox: `0 0 ${WIDTH} ${height}`, role: "img", "aria-label": "The machine from the side" },
     svg("line", { x1: 12, x2: WIDTH - 12, y1: ground, y2: ground, class: "ground" }),
     body,
     wheels,
     base ? dimension(left, right, ground + 20, `wheelbase ${digits(vehicle.wheelbase)} m`, style("wheelbase")) : null,
-    label(left, up(rear) + 18, `r ${digits(rear)} m`, "middle", "wheel_radius"),
-    base ? label(right, up(front) + 18, `r ${digits(front)} m`, "middle", front !== rear ? radiusNames : "wheel_radius") : null,
+    label(left, ground + (base ? 36 : 18), `r ${digits(rear)} m`, "middle", "wheel_radius"),
+    base ? label(right, ground + 36, `r ${digits(front)} m`, "middle", front !== rear ? radiusNames : "wheel_radius") : null,
     base && gravity
       ? svg("g", { class: style("center_of_gravity_height", "front_mass") }, svg("circle", { cx: middle, cy: up(gravity), r: 6, class: "gravity" }), svg("path", { d: `M${middle} ${up(gravity)}v-6a6 6 0 0 1 6 6zv6a6 6 0 0 1 -6 -6z`, class: "dot" }), svg("line", { x1: middle, x2: middle, y1: up(gravity) + 6, y2: ground, class: "thin" }))
       : null,
     base && gravity ? label(middle, up(tall) - 8, `${digits(vehicle.mass)} kg, its centre ${digits(gravity)} m high`, "middle", "mass") : label(left, up(tall) - 8, `${digits(vehicle.mass)} kg`, "middle", "mass"),
     vehicle.hitch_height ? svg("g", { class: style("hitch_height") }, svg("path", { d: `M${left} ${up(vehicle.hitch_height)}H${left - scale * rear - 14}m0 -4v8`, class: "thin" })) : null,
     vehicle.hitch_height ? label(left - scale * rear - 18, up(vehicle.hitch_height) + 4, `hitch ${digits(vehicle.hitch_height)} m`, "end", "hitch_height") : null,
-    base ? label(right, ground + 37, `front ${digits(axles[0]?.mass)} kg`, "middle", "front_mass") : null,
-    base ? label(left, ground + 37, `rear ${digits(axles[axles.length - 1]?.mass)} kg`, "middle", "front_mass") : null,
+    base ? label(right, ground + 51, `front ${digits(axles[0]?.mass)} kg`, "middle", "front_mass") : null,
+    base ? label(left, ground + 51, `rear ${digits(axles[axles.length - 1]?.mass)} kg`, "middle", "front_mass") : null,
   );
 }
 
