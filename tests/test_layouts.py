@@ -1,4 +1,4 @@
-"""Machines of other layouts than a four-wheel robot run through every command: estimate, soils, ground, map, report."""
+"""Machines of other layouts than a four-wheel robot run through every command: estimate, soils, ground, map, advise, report."""
 
 from __future__ import annotations
 
@@ -63,6 +63,7 @@ def test_every_command_works(layout: str, tmp_path: Path, capsys: pytest.Capture
         ["soils", out, "-o", soils],
         ["ground", out, "-o", ground],
         ["map", out, "-o", field],
+        ["advise", out, "--vehicle", file, "-o", tmp_path / "advice.json"],
         ["report", out, "-o", page],
         ["convert", out, "-o", tmp_path / "estimates.csv"],
     ):

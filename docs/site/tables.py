@@ -75,6 +75,11 @@ _TITLES = {
 SIGNS = {
     "ground_speed": "speed over ground, forward positive",
     "wheel_based_speed": "what the drive train says of all driven wheels as one, by the machine's own radius, forward positive",
+    "engine_speed": "of the crankshaft, running positive; for a `driveline` of the vehicle file, as all of the engine",
+    "engine_torque": "at the flywheel, driving positive",
+    "engine_torque_share": "of the reference torque, friction included (J1939: actual engine percent torque), driving positive",
+    "engine_friction_share": "of the reference torque (J1939: nominal friction percent torque), positive",
+    "engine_reference_torque": "what the shares are of (J1939: engine reference torque)",
     "drawbar_force": "horizontal force of the tool on the machine, backward positive; absent: nothing is towed",
     "acceleration_x": "specific force along the body, forward positive",
     "acceleration_y": "specific force across the body, to the left positive",

@@ -41,6 +41,7 @@ def ramp(size: float) -> np.ndarray:
         ("ax", 2, "acceleration_x", None),
         ("gyro_z", 2, "angular_velocity_z", None),
         ("pitch", 12, "pitch", "deg"),
+        ("engine_speed", 200, "engine_speed", None),
         ("lat_rad", 0.7, "latitude", "rad"),
     ],
 )
@@ -52,7 +53,7 @@ def test_names_are_recognised(name: str, size: float, channel: str, unit: str | 
 
 
 @pytest.mark.parametrize(
-    "name", ["cmd_vel_x", "left_wheel_voltage", "odom_wz_std", "engine_speed", "calib_step", "temp_l", "x"]
+    "name", ["cmd_vel_x", "left_wheel_voltage", "odom_wz_std", "fan_speed", "calib_step", "temp_l", "x"]
 )
 def test_other_names_are_left_alone(name: str) -> None:
     assert set(propose({name: ramp(3)}, (), {})) <= {"angular_velocity_z"} - (

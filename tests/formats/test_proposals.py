@@ -37,7 +37,8 @@ def _place() -> dict[str, np.ndarray]:
     ("name", "unit"),
     [
         ("CAN1.TSC1.EngnRqstdTrqTrqLmt", "%"),  # an engine's torque limit, on bus 1
-        ("CAN1.EEC1.ActualEnginePercentTorque", "%"),
+        ("CAN1.EEC1.EngineDemandPercentTorque", "%"),
+        ("engineTorquePercent", "%"),  # of what, with friction or without?
         ("wheel_torque_fl", "%"),  # no dimension of a torque
         ("velocity_down", "m/s"),
         ("vert-vel", "m/s"),
@@ -52,6 +53,11 @@ def _place() -> dict[str, np.ndarray]:
 )
 def test_what_is_not_a_channel_is_not_proposed(name: str, unit: str) -> None:
     assert _propose({name: SPEED}, {name: unit}) == {}
+
+
+def test_an_engines_torque_is_no_wheels() -> None:
+    name = "CAN1.EEC1.ActualEnginePercentTorque"
+    assert set(_propose({name: SPEED}, {name: "%"})) == {"engine_torque_share"}
 
 
 def test_a_gnss_speed_is_no_wheel_and_prefixes_are_seen_through() -> None:

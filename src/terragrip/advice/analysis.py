@@ -15,6 +15,7 @@ from terragrip.advice.slip_only import advise_slip
 from terragrip.advice.soil_curves import SoilCurves, of_drives, of_library
 from terragrip.errors import InputError
 from terragrip.estimation import Estimates
+from terragrip.estimation.driveline import machine_of
 from terragrip.soil.library import Soil
 from terragrip.units import STANDARD_GRAVITY
 from terragrip.vehicle import Vehicle
@@ -46,6 +47,7 @@ def advise(
         raise InputError(
             "some of the estimates hold slip alone, others adhesion too", hint="advise on each kind by itself"
         )
+    vehicle = machine_of(tables[0], vehicle)
     for one in tables:
         _refuse_other_vehicle(one, vehicle)
     wheels = driven_wheels(tables[0], vehicle)
@@ -58,8 +60,9 @@ def advise(
 
 
 def _refuse_other_vehicle(estimates: Estimates, vehicle: Vehicle) -> None:
-    """InputError unless the table has the vehicle's wheels and axles, and one of them is driven."""
-    columns = [f"adhesion_{w}" for w in vehicle.wheels] + [f"vertical_load_{a}" for a in vehicle.axle_names]
+    """InputError unless the table has the vehicle's driven wheels and axles, and one of them is driven."""
+    driven = [w for w, on in zip(vehicle.wheels, vehicle.driven, strict=True) if on]
+    columns = [f"adhesion_{w}" for w in driven] + [f"vertical_load_{a}" for a in vehicle.axle_names]
     lacking = next((name for name in columns if name not in estimates.names), None)
     if lacking or not vehicle.driven.any():
         problem = f"the estimates have no {lacking}" if lacking else "the vehicle drives no wheel"

@@ -40,7 +40,10 @@ _NOTE = (
     "The drive torque is the engine's through the driveline: adhesion_driven, net_traction_driven and efficiency_driven are of all driven "
     "wheels together; single wheels' adhesion cannot be had. Rows without a torque (standstill, gear shifts) hold none."
 )
-_TOWING = "There is no drawbar_force: what a tool pulls is in soil_resistance."
+_TOWING = (
+    "There is no drawbar_force: what a tool pulls is in soil_resistance, "
+    "so net traction and efficiency are as if there were no tool."
+)
 
 
 def by_engine(log: Recording, vehicle: Vehicle) -> bool:
@@ -190,6 +193,15 @@ class ByEngine:
         about = {**part.about, "driveline": {"vehicle": self.original.to_dict()}}
         notes = tuple(n for n in part.notes if not n.startswith("There is no drawbar_force"))
         return replace(part, columns=columns, about=about, notes=tuple(dict.fromkeys((*notes, *self.notes))))
+
+
+def machine_of(estimates: Estimates, vehicle: Vehicle) -> Vehicle:
+    """The vehicle that the columns of the estimates speak of: ``vehicle`` (as its file has it) or, of a driveline, its wheels as one."""
+    if "driveline" not in estimates.about or vehicle.driveline is None:
+        return vehicle
+    made = estimates.vehicle
+    radius = float(made.wheel_radius[made.wheels.index(DRIVEN)])
+    return Vehicle.from_dict(lumped(vehicle, (radius, made.uncertainty.wheel_radius or 0.0)))
 
 
 _REPLACED = ("wheel_speed_", "wheel_based_speed", "vertical_load_", "engine_")

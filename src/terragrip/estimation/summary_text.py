@@ -40,7 +40,7 @@ def _driven(tally: Tally) -> str:
     machine = tally.about.get("vehicle", {}).get("name") or "the vehicle"
     wheels = (
         "its drive as one wheel"
-        if tally.wheels == ("drive",)
+        if tally.wheels == ("drive",) or "driveline" in tally.about
         else f"{len(tally.wheels)} wheel{'s' * (len(tally.wheels) != 1)}"
     )
     return (
