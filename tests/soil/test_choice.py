@@ -40,3 +40,11 @@ def test_too_few_bins():
         compare_forms(bin_pairs(np.repeat([0.1, 0.2], 50), np.repeat([0.1, 0.2], 50)))
     with pytest.raises(InputError, match="no curve form"):
         compare_forms(bin_pairs(*pairs(1, a=0.8)), asked="cubic")
+
+
+@pytest.mark.parametrize(("candidates", "expected"), [(["effective"], 2), (["effective", "exponential"], 2)])
+def test_the_form_in_question_takes_part_once_whatever_the_candidates(candidates, expected):
+    verdict = compare_forms(bin_pairs(*pairs(1, a=0.85)), candidates=candidates)
+    forms = [score.form for score in verdict.ranking]
+    assert len(forms) == expected
+    assert set(forms) == {"effective", "exponential"}
