@@ -109,6 +109,12 @@ def words(advice: Mapping[str, Advice]) -> str:
                     f"  {title}: {best.slip:.1%} slip ({low:.1%} to {high:.1%}), efficiency {best.efficiency:.2f}, "
                     f"pull {best.net_traction:.2f} of the weight"
                 )
+        lines += _shares(one.drive)
+        if one.reserve:
+            each = ", ".join(
+                f"{w} {m:.0%} ({low:.0%} to {high:.0%})" for w, (m, low, high) in one.reserve.items()
+            )
+            lines.append(f"  grip in reserve: {each}")
         lines += [f"  held back: {sentence}" for sentence in one.limits]
         for action in one.actions:
             gain = ""
@@ -118,3 +124,14 @@ def words(advice: Mapping[str, Advice]) -> str:
             lines.append(f"  do: {action.what}{gain} {action.why}")
         lines += [f"  missing: {sentence}" for sentence in one.missing]
     return "\n".join(lines)
+
+
+def _shares(drive: Mapping[str, float]) -> list[str]:
+    """Shares of driving time about the usual band, of a drive with slip alone."""
+    if "share_below" not in drive:
+        return []
+    band = f"{drive['band_low']:.0%} to {drive['band_high']:.0%}"
+    below, within, above = (f"{drive[f'share_{name}']:.0%}" for name in ("below", "within", "above"))
+    return [
+        f"  slip within the usual {band} in {within} of the driving time, below in {below}, above in {above}"
+    ]

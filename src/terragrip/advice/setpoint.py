@@ -29,8 +29,9 @@ class Limits:
     """What a set-point may do and when estimates are trusted; SI.
 
     speed_up, slow_down: the rim speed's change [m/s²]; crawl: share of the wanted speed that it goes with when it is not led by
-    slip (starting, untrusted, warned); hold: seconds that a lapse of trust is bridged by the last speed; widest_slip: SD of slip, and
-    widest_nis: NIS a channel, from which an estimate is not trusted; longest_step: seconds between estimates from which there was a gap.
+    slip (starting, untrusted, warned); hold: seconds that a lapse of trust is bridged by the last speed; widest_slip: SD of slip at the
+    wanted speed, and widest_nis: NIS a channel, from which an estimate is not trusted; longest_step: seconds between estimates from
+    which there was a gap.
     """
 
     speed_up: float = 0.5
@@ -115,7 +116,10 @@ class SlipSetpoint:
         )
         if not np.isfinite([*slips, *spreads, float(estimates["ground_speed"])]).all():
             return "no slip"
-        if max(spreads) > self.limits.widest_slip:
+        pace = (
+            abs(float(estimates["ground_speed"])) / self.speed
+        )  # slip's SD goes with 1/speed: it is judged as it would be at the wanted one
+        if max(spreads) * min(pace, 1.0) > self.limits.widest_slip:
             return "slip not known well enough"
         channels = float(estimates["channels"])
         if channels > 0 and float(estimates["nis"]) / channels > self.limits.widest_nis:

@@ -142,25 +142,54 @@ plant_status plant_derivative(const plant_machine *m, const plant_ground *g, dou
     return PLANT_OK;
 }
 
-plant_status plant_run(const plant_machine *m, const plant_ground *g, double position, double step, int32_t steps,
-                       int32_t stride, double *trace, int32_t *rows) {
+plant_status plant_begin(const plant_machine *m, const plant_ground *g, double position, plant_memory *memory) {
     conduct c;
-    double y[PLANT_STATES];
-    if (!usable(m, g) || !trace || !rows || !(step > 0) || steps < 0 || stride < 1) return PLANT_BAD_ARGUMENT;
-    const int n = m->wheels, columns = plant_columns(m), states = TOOL + 6;
+    if (!usable(m, g) || !memory) return PLANT_BAD_ARGUMENT;
+    memset(memory, 0, sizeof *memory);
     plant_settle(m, &c);
-    plant_start(m, g, position, y);
+    memcpy(memory->conduct, &c, sizeof c);
+    return plant_start(m, g, position, memory->state);
+}
+
+plant_status plant_continue(const plant_machine *m, const plant_ground *g, plant_memory *memory, double step, int32_t steps,
+                            int32_t stride, double *trace, int32_t *rows) {
+    conduct c;
+    if (!usable(m, g) || !memory || !trace || !rows || !(step > 0) || steps < 0 || stride < 1) return PLANT_BAD_ARGUMENT;
+    const int n = m->wheels, columns = plant_columns(m), states = TOOL + 6;
+    double *y = memory->state;
     const double end = g->start + (g->count - 1) * g->spacing - m->axle_position[0];
+    plant_status status = PLANT_OK;
+    memcpy(&c, memory->conduct, sizeof c);
     *rows = 0;
-    for (int32_t k = 0;; k++) {
-        const double time = k * step;
+    for (int32_t k = 0; k < steps && !memory->ended; k++) {
+        const double time = (double)memory->steps * step;
         plant_conduct(m, &c, time, step, y);
-        if (k % stride == 0) record(m, g, &c, time, y, trace + (int64_t)columns * (*rows)++);
-        if (k == steps || y[X] >= end) break;
+        if (memory->steps % stride == 0) record(m, g, &c, time, y, trace + (int64_t)columns * (*rows)++);
+        memory->ended = y[X] >= end;
+        if (memory->ended) break;
         advance(m, g, &c, time, step, y);
+        memory->steps++;
         double sum = 0.0;
         for (int j = 0; j < states; j++) sum += y[j];
-        if (!isfinite(sum)) return PLANT_NOT_FINITE;
+        if (!isfinite(sum)) {
+            status = PLANT_NOT_FINITE;
+            break;
+        }
     }
+    memcpy(memory->conduct, &c, sizeof c);
+    return status;
+}
+
+plant_status plant_run(const plant_machine *m, const plant_ground *g, double position, double step, int32_t steps,
+                       int32_t stride, double *trace, int32_t *rows) {
+    plant_memory memory;
+    conduct c;
+    plant_status status = plant_begin(m, g, position, &memory);
+    if (status == PLANT_OK) status = plant_continue(m, g, &memory, step, steps, stride, trace, rows);
+    if (status != PLANT_OK || memory.ended) return status;
+    memcpy(&c, memory.conduct, sizeof c);
+    plant_conduct(m, &c, (double)memory.steps * step, step, memory.state);
+    if (memory.steps % stride == 0)
+        record(m, g, &c, (double)memory.steps * step, memory.state, trace + (int64_t)plant_columns(m) * (*rows)++);
     return PLANT_OK;
 }

@@ -154,11 +154,23 @@ typedef struct {
     const double *command;     /* rad/s; NaN at a point: motors off until the next point */
 } plant_machine;
 
+typedef struct { /* a drive between two pieces of it */
+    double state[PLANT_STATES];
+    double conduct[64]; /* the plant's own: what changes seldom */
+    int64_t steps;      /* done */
+    int32_t ended;      /* 1: the path ended */
+} plant_memory;
+
 /* Integrate from rest at `position` (rear axle) for `steps` steps of `step` s; every `stride` steps, first at time 0, a row
  * of plant_columns() values goes to `trace` (steps / stride + 1 rows). Stops where the path ends: `rows` tells how many. */
 int32_t plant_columns(const plant_machine *machine);
 plant_status plant_run(const plant_machine *machine, const plant_ground *ground, double position, double step, int32_t steps,
                        int32_t stride, double *trace, int32_t *rows);
+/* The same in pieces, for a controller that sets `command` between them: begin, then continue by `steps` at a time; rows are
+ * written at the instants before a step. */
+plant_status plant_begin(const plant_machine *machine, const plant_ground *ground, double position, plant_memory *memory);
+plant_status plant_continue(const plant_machine *machine, const plant_ground *ground, plant_memory *memory, double step,
+                            int32_t steps, int32_t stride, double *trace, int32_t *rows);
 /* d state / dt with the driver passive and the command at `time`: for tests against another integrator. State, packed (n
  * wheels): n wheel speeds, v, n torques, n controller sums, n corner displacements and their n rates, position, the rolling
  * resistance ratio of each axle, and of each of two tools position, speed and draught. */

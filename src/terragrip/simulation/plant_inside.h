@@ -26,6 +26,9 @@ typedef struct { /* what changes seldom: the driver and where soft spots came to
     int32_t command_index;
 } conduct;
 
+/* It fits where plant_memory keeps it. */
+typedef char conduct_fits[sizeof(conduct) <= sizeof(((plant_memory *)0)->conduct) ? 1 : -1];
+
 typedef struct { /* what one evaluation found, besides the derivative */
     double acceleration, bar[2], slope, gradient_force, curvature, lift;
     double command;

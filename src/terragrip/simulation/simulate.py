@@ -83,7 +83,7 @@ def simulate(
     machine_seed = seed if machine_seed is None else machine_seed
     vehicle = scenario.nominal_vehicle()
     plant.check_layout(vehicle)
-    radius = _true_radius(scenario, vehicle, machine_seed)
+    radius = true_radius(scenario, vehicle, machine_seed)
     trace = _drive(scenario, vehicle, radius, seed)
     known = cache(lambda name: signals(name, trace))
     errors = draw_errors(scenario.sensors, known, vehicle.wheels, machine_seed)
@@ -103,7 +103,8 @@ def simulate(
     return SimulationResult(recording, truth_frame(seen, trace), vehicle, parameters, scenario, seed)
 
 
-def _true_radius(scenario: Scenario, vehicle: Vehicle, seed: int) -> Floats:
+def true_radius(scenario: Scenario, vehicle: Vehicle, seed: int) -> Floats:
+    """Each wheel's true radius (wheels,) [m]: the file's with the error that the scenario draws."""
     error = scenario.robot.wheel_radius_sd * stream(seed, "wheel radius").standard_normal()
     return vehicle.wheel_radius * (1.0 + error)
 
