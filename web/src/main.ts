@@ -1,5 +1,6 @@
 import { Notices } from "./ui/api";
 import { fill, h } from "./ui/dom";
+import { keepFocus } from "./ui/focus";
 import { startTheme, switchTheme } from "./ui/theme";
 import type { Page } from "./ui/page";
 
@@ -36,6 +37,7 @@ async function open(): Promise<void> {
   main.className = `page-${name}`;
   fill(main);
   leave = page(main, { notices, query });
+  if (!main.querySelector("h1")) main.prepend(h("h1", { class: "visually-hidden" }, chosen.title));
 }
 
 function drawBar(current: string): void {
@@ -59,5 +61,6 @@ notices.on((notice) => {
 });
 
 startTheme();
+keepFocus();
 addEventListener("hashchange", () => void open());
 void open();

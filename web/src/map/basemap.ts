@@ -16,10 +16,10 @@ interface Bounds {
 }
 
 /** Ask for the edges of a picture without coordinates; null where the user gives up. */
-export function corners(name: string, bounds: Bounds): Promise<Corners | null> {
+export function corners(name: string, bounds: Bounds, before: Corners | null = null): Promise<Corners | null> {
   return new Promise((resolve) => {
     const field = (label: string, value: number): HTMLInputElement => h("input", { type: "number", step: "any", id: `edge-${label}`, value: value.toFixed(6), required: true });
-    const fields = { north: field("north", bounds.getNorth()), south: field("south", bounds.getSouth()), west: field("west", bounds.getWest()), east: field("east", bounds.getEast()) };
+    const fields = { north: field("north", before?.[0][1] ?? bounds.getNorth()), south: field("south", before?.[2][1] ?? bounds.getSouth()), west: field("west", before?.[0][0] ?? bounds.getWest()), east: field("east", before?.[1][0] ?? bounds.getEast()) };
     const dialog = h("dialog", { class: "wizard", "aria-labelledby": "edges" });
     const form = h(
       "form",
@@ -45,3 +45,27 @@ export function corners(name: string, bounds: Bounds): Promise<Corners | null> {
     dialog.showModal();
   });
 }
+
+const KEY = "terragrip-basemap";
+
+interface Kept {
+  picture: string;
+  placed: Record<string, Corners>;
+}
+
+function kept(): Kept {
+  const none = { picture: "", placed: {} };
+  try {
+    return { ...none, ...(JSON.parse(localStorage.getItem(KEY) ?? "{}") as Partial<Kept>) };
+  } catch {
+    return none; // written by something else
+  }
+}
+
+const keep = (change: Partial<Kept>): void => localStorage.setItem(KEY, JSON.stringify({ ...kept(), ...change }));
+
+/** The basemap shown last in this browser, and where pictures that do not say it themselves were laid. */
+export const keptBasemap = (): string => kept().picture;
+export const keepBasemap = (picture: string): void => keep({ picture });
+export const keptCorners = (picture: string): Corners | null => kept().placed[picture] ?? null;
+export const keepCorners = (picture: string, corners: Corners): void => keep({ placed: { ...kept().placed, [picture]: corners } });

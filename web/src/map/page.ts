@@ -15,7 +15,8 @@ import type { Page } from "../ui/page";
 import { notHere, options, runsOf } from "../ui/runs";
 import { color, onTheme } from "../ui/theme";
 import { shade, SCALE } from "./shade";
-import { corners, type Placed } from "./basemap";
+import { corners, keepBasemap, keepCorners, keptBasemap, keptCorners, type Placed } from "./basemap";
+import { opacity, outliers, outside, spread, UNLABELLED } from "./scale";
 
 maplibre.setWorkerUrl(workerUrl);
 
@@ -35,12 +36,14 @@ export const page: Page = (main, { notices, query }) => {
   const choice = h("select", { id: "map-run", "aria-label": "Run" });
   const quantity = h("select", { id: "map-quantity", "aria-label": "Coloured by" });
   const base = h("select", { "aria-label": "Basemap" });
+  const again = h("button", { type: "button", id: "map-edges", hidden: true, click: () => void replaceEdges(), title: "Give the picture other edges" }, "Edges");
+  const doubt = h("input", { type: "checkbox", id: "map-doubt" });
   const legend = h("div", { class: "legend-row chips" });
   const box = h("div", { class: "map", id: "map" });
   const charts = new Charts();
   const readout = h("output", { class: "line" });
   main.append(
-    h("div", { class: "tools" }, choice, quantity, base, h("span", { class: "spring" }), h("button", { type: "button", click: () => frame() }, "Whole track")),
+    h("div", { class: "tools" }, choice, quantity, h("label", { class: "check", title: "The wider the 95 % interval, the paler" }, doubt, "fade what is uncertain"), base, again, h("span", { class: "spring" }), h("button", { type: "button", click: () => frame() }, "Whole track")),
     legend,
     box,
     charts.element,
@@ -54,7 +57,8 @@ export const page: Page = (main, { notices, query }) => {
   });
   map.addControl(new maplibre.ScaleControl({ unit: "metric" }));
   map.addControl(new maplibre.NavigationControl({ showCompass: false }));
-  const ready = new Promise<void>((resolve) => map.on("load", () => resolve()));
+  let loaded = false;
+  const ready = new Promise<void>((resolve) => map.on("load", () => resolve())).then(() => void (loaded = true));
   let run: Run | null = null;
   let path = "";
   let seen = ""; // size and time of change of what is open
@@ -65,6 +69,7 @@ export const page: Page = (main, { notices, query }) => {
 
   const forgetTheme = onTheme(() => {
     if (map.isStyleLoaded()) map.setPaintProperty("paper", "background-color", color("panel"));
+    if (map.getLayer("brushed")) map.setPaintProperty("brushed", "line-color", color("accent"));
     if (map.getLayer("track-rim")) map.setPaintProperty("track-rim", "line-color", color("muted"));
     void draw();
   });
@@ -113,42 +118,51 @@ export const page: Page = (main, { notices, query }) => {
     void ready.then(() => run ?? replace("track", [], "line"));
   }
 
+  /** Whether the quantity has an interval and is to fade by it. */
+  function fades(): boolean {
+    return doubt.checked && (run?.columns.includes(`${quantity.value}_std`) ?? false);
+  }
+
   async function draw(): Promise<void> {
     if (!run) return;
+    doubt.disabled = !run.columns.includes(`${quantity.value}_std`);
     const asked = names().find((n) => n.value === quantity.value);
     const named = quantity.value === "soil" || quantity.value === "event";
-    track = (await tried(() => columns("drive/track", { path, version: run?.version }, named ? [] : [quantity.value]))) ?? null;
+    track = (await tried(() => columns("drive/track", { path, version: run?.version }, named ? [] : [quantity.value, ...(fades() ? [`${quantity.value}_std`] : [])]))) ?? null;
     await ready;
     if (!track || !track.count) {
       if (track) note("This run has no positions: the map needs latitude and longitude.", "error");
       replace("track", [], "line");
       return;
     }
-    const [time, lon, lat, values] = track.data as [Float64Array, Float64Array, Float64Array, Float64Array | undefined];
+    const [time, lon, lat, values, stds] = track.data as [Float64Array, Float64Array, Float64Array, Float64Array | undefined, Float64Array | undefined];
     // A stuck wheel's slip must not wash out the rest of the scale.
     const [low, high] = values ? spread(values.filter((_, i) => !eventAt(time[i] as number))) : [0, 1];
+    const beyond = outliers(values, low, high);
     const paint = (i: number): string => {
       const t = time[i] as number;
-      if (quantity.value === "soil") return color(soilColor(soilAt(t)));
+      if (quantity.value === "soil") return color(soilAt(t) ? soilColor(soilAt(t)) : UNLABELLED);
       if (quantity.value === "event") return color(EVENT_COLORS[eventAt(t)?.kind ?? ""] ?? "line");
       const v = values?.[i] ?? NaN;
       return Number.isNaN(v) ? color("line") : shade((v - low) / (high - low));
     };
+    const ink = (i: number): number => (stds ? opacity(1.96 * (stds[i] as number), high - low) : 1);
     // Stretches of one shade are one line: a map of 20 000 features would stutter.
     const features: GeoJSON.Feature[] = [];
     let from = 0;
     for (let i = 1; i <= time.length; i++) {
-      const broken = i === time.length || paint(i) !== paint(from) || (time[i] as number) - (time[i - 1] as number) > 5;
+      const broken = i === time.length || paint(i) !== paint(from) || ink(i) !== ink(from) || (time[i] as number) - (time[i - 1] as number) > 5;
       if (!broken) continue;
       const until = Math.min(i, time.length - 1);
       const line: number[][] = [];
       for (let k = from; k <= until; k++) line.push([lon[k] as number, lat[k] as number]);
-      if (line.length > 1) features.push({ type: "Feature", properties: { shade: paint(from) }, geometry: { type: "LineString", coordinates: line } });
+      if (line.length > 1) features.push({ type: "Feature", properties: { shade: paint(from), ink: ink(from) }, geometry: { type: "LineString", coordinates: line } });
       from = i;
     }
     replace("track", features, "line");
     drawPicked();
-    drawLegend(asked, low, high);
+    drawBrushed();
+    drawLegend(asked, low, high, beyond);
   }
 
   function soilAt(t: number): string {
@@ -159,11 +173,12 @@ export const page: Page = (main, { notices, query }) => {
     return during(run?.events, t);
   }
 
-  function drawLegend(asked: { title: string; unit: string; scale: number } | undefined, low: number, high: number): void {
+  function drawLegend(asked: { title: string; unit: string; scale: number } | undefined, low: number, high: number, beyond: { under: number; over: number; least: number; most: number }): void {
     if (!run) return;
     if (quantity.value === "soil" || quantity.value === "event") {
       const kinds = quantity.value === "soil" ? [...new Set([...run.soils.map((s) => s.name), ...(run.ground?.sections ?? []).map((s) => s.soil)])] : [...new Set(run.events.map((e) => e.kind))];
-      fill(legend, kinds.length ? kinds.map((k) => h("span", {}, h("i", { class: `strip ${quantity.value === "soil" ? soilColor(k) : (EVENT_COLORS[k] ?? "ink")}` }), k)) : h("span", { class: "hint" }, "none in this run"));
+      const blank = quantity.value === "soil" && track && Array.from(track.data[0] as Float64Array).some((t) => !soilAt(t));
+      fill(legend, kinds.length ? kinds.map((k) => h("span", {}, h("i", { class: `strip ${quantity.value === "soil" ? soilColor(k) : (EVENT_COLORS[k] ?? "ink")}` }), k)) : h("span", { class: "hint" }, "none in this run"), blank ? h("span", {}, h("i", { class: `strip ${UNLABELLED}` }), "unlabelled") : null);
       return;
     }
     const scale = asked?.scale ?? 1;
@@ -173,7 +188,7 @@ export const page: Page = (main, { notices, query }) => {
       pen.fillStyle = SCALE(i / 179);
       pen.fillRect(i, 0, 1, 10);
     }
-    fill(legend, h("span", {}, asked?.title ?? ""), h("span", {}, digits(low * scale), bar, `${digits(high * scale)} ${asked?.unit ?? ""}`), h("span", { class: "hint" }, "5 % to 95 % of the run, rows with events left out"));
+    fill(legend, h("span", {}, asked?.title ?? ""), h("span", {}, digits(low * scale), bar, `${digits(high * scale)} ${asked?.unit ?? ""}`), h("span", { class: "hint" }, `5 % to 95 % of the run, rows with events left out${outside(beyond, scale, asked?.unit ?? "")}${fades() ? "; paler where the 95 % interval is wider, palest where it is as wide as the scale" : ""}`));
   }
 
   function replace(id: string, features: GeoJSON.Feature[], type: "line" | "circle"): void {
@@ -188,7 +203,7 @@ export const page: Page = (main, { notices, query }) => {
       // A rim, so that the dark end of the scale stands out on a dark ground too.
       map.addLayer({ id: `${id}-rim`, source: id, type: "line", layout: { "line-cap": "round", "line-join": "round" }, paint: { "line-color": color("muted"), "line-width": 8 } });
     }
-    if (type === "line") map.addLayer({ id, source: id, type: "line", layout: { "line-cap": "round", "line-join": "round" }, paint: { "line-color": ["get", "shade"], "line-width": 5 } });
+    if (type === "line") map.addLayer({ id, source: id, type: "line", layout: { "line-cap": "round", "line-join": "round" }, paint: { "line-color": ["get", "shade"], "line-opacity": ["coalesce", ["get", "ink"], 1], "line-width": 5 } });
     else map.addLayer({ id, source: id, type: "circle", paint: { "circle-radius": 7, "circle-color": color("paper"), "circle-stroke-width": 3, "circle-stroke-color": color("ink") } });
   }
 
@@ -209,7 +224,7 @@ export const page: Page = (main, { notices, query }) => {
   }
 
   function drawPicked(): void {
-    if (!map.isStyleLoaded()) return;
+    if (!loaded) return;
     const at = track?.count && picked !== null ? placeOf(picked) : null;
     replace("picked", at ? [{ type: "Feature", properties: {}, geometry: { type: "Point", coordinates: at } }] : [], "circle");
     map.setPaintProperty("picked", "circle-color", color("accent"));
@@ -231,7 +246,7 @@ export const page: Page = (main, { notices, query }) => {
 
   function mark(time: number | null): void {
     here = time;
-    if (!track?.count || time === null || !map.isStyleLoaded()) return;
+    if (!track?.count || time === null || !loaded) return;
     const i = nearest(track.data[0] as Float64Array, time);
     const [lon, lat] = [(track.data[1] as Float64Array)[i] as number, (track.data[2] as Float64Array)[i] as number];
     replace("here", [{ type: "Feature", properties: {}, geometry: { type: "Point", coordinates: [lon, lat] } }], "circle");
@@ -248,9 +263,25 @@ export const page: Page = (main, { notices, query }) => {
   }
 
   charts.onCursor = mark;
+  /** A wide rim about the stretch whose times are shown. */
+  function drawBrushed(): void {
+    if (!loaded || !track || !run) return;
+    const [start, end] = charts.range;
+    const whole = start <= run.start && end >= run.end;
+    const [time, lon, lat] = track.data as [Float64Array, Float64Array, Float64Array];
+    const line: number[][] = [];
+    if (!whole && track.count) for (let i = nearest(time, start); i <= nearest(time, end); i++) line.push([lon[i] as number, lat[i] as number]);
+    const features: GeoJSON.Feature[] = line.length > 1 ? [{ type: "Feature", properties: {}, geometry: { type: "LineString", coordinates: line } }] : [];
+    const source = map.getSource("brushed") as maplibre.GeoJSONSource | undefined;
+    if (source) return void source.setData({ type: "FeatureCollection", features });
+    map.addSource("brushed", { type: "geojson", data: { type: "FeatureCollection", features } });
+    map.addLayer({ id: "brushed", source: "brushed", type: "line", layout: { "line-cap": "round", "line-join": "round" }, paint: { "line-color": color("accent"), "line-width": 16, "line-opacity": 0.45 } }, map.getLayer("track-rim") ? "track-rim" : undefined);
+  }
+
   charts.onUpright = remember;
   charts.onRange = ([start, end]) => {
     remember();
+    drawBrushed();
     if (!track?.count || !run) return;
     if (start <= run.start && end >= run.end) return frame();
     const time = track.data[0] as Float64Array;
@@ -285,19 +316,37 @@ export const page: Page = (main, { notices, query }) => {
     remember();
     void draw();
   });
-  base.addEventListener("change", () => void lay(base.value));
+  doubt.addEventListener("change", () => void draw());
+  base.addEventListener("change", () => void lay(base.value, true));
 
-  async function lay(picture: string): Promise<void> {
+  /** Lay a picture below the track; `ask`: for its edges, where neither it nor this browser knows them. */
+  async function lay(picture: string, ask: boolean): Promise<void> {
     await ready;
+    again.hidden = true;
     if (map.getLayer("base")) map.removeLayer("base");
     if (map.getSource("base")) map.removeSource("base");
+    keepBasemap(picture);
     if (!picture) return;
     const placed = await tried(() => get<Placed>("basemap", { path: picture }));
     if (!placed) return;
-    const at = placed.corners ?? (await corners(picture, map.getBounds()));
-    if (!at) return;
+    const known = placed.corners ?? keptCorners(picture);
+    const at = known ?? (ask ? await corners(picture, map.getBounds()) : null);
+    if (!at) {
+      base.value = "";
+      keepBasemap("");
+      return;
+    }
+    if (!placed.corners) keepCorners(picture, at);
+    again.hidden = placed.corners !== null;
     map.addSource("base", { type: "image", url: new URL(server("basemap/picture", { path: picture }), location.href).href, coordinates: at });
     map.addLayer({ id: "base", type: "raster", source: "base" }, map.getLayer("track-rim") ? "track-rim" : undefined);
+  }
+
+  async function replaceEdges(): Promise<void> {
+    const at = await corners(base.value, map.getBounds(), keptCorners(base.value));
+    if (!at) return;
+    keepCorners(base.value, at);
+    await lay(base.value, false);
   }
 
   async function reload(): Promise<void> {
@@ -309,8 +358,11 @@ export const page: Page = (main, { notices, query }) => {
     const now = runs.get(wanted) ?? "";
     const pictures = items.filter((item) => item.kind === "basemap" || (item.kind === "picture" && !item.path.endsWith(".svg"))).map((item) => item.path);
     fill(choice, options(runs, wanted));
-    const before = base.value;
+    const first = !base.options.length;
+    const kept = first ? keptBasemap() : base.value;
+    const before = pictures.includes(kept) ? kept : "";
     fill(base, h("option", { value: "" }, "No basemap"), pictures.map((name) => h("option", { value: name, selected: name === before }, name)));
+    if (first && before) void lay(before, false);
     if (!wanted) charts.clear("Nothing to show yet: open a recording on the folder page and estimate it.");
     else if (!now) leave(wanted, path && run ? `${wanted} was removed from the folder. Choose another run.` : notHere(wanted));
     else if (now !== seen || !run) {
@@ -330,14 +382,6 @@ export const page: Page = (main, { notices, query }) => {
     map.remove();
   };
 };
-
-/** 5 % and 95 % of the values: one spike must not wash out the rest. */
-function spread(values: Float64Array): [number, number] {
-  const known = Array.from(values).filter((v) => !Number.isNaN(v)).sort((a, b) => a - b);
-  const low = known[Math.floor(0.05 * known.length)] ?? 0;
-  const high = known[Math.floor(0.95 * known.length)] ?? 1;
-  return high > low ? [low, high] : [low - 0.5, low + 0.5];
-}
 
 function nearest(time: Float64Array, wanted: number): number {
   let [low, high] = [0, time.length - 1];

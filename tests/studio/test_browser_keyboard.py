@@ -1,0 +1,53 @@
+"""Focus and headings in a real browser: the keyboard's place is kept while controls are drawn anew."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+from served import NEEDS, Served
+
+pytest.importorskip("playwright.sync_api", reason="SKIPPED LOUDLY: the browser tests need playwright")
+pytestmark = NEEDS
+
+FOCUSED = "() => document.activeElement === document.body ? 'body' : document.activeElement.textContent"
+
+
+@pytest.mark.parametrize("where", ["start", "drive", "live", "cab", "map", "fit"])
+def test_each_page_has_one_heading(page: Any, served: Served, where: str) -> None:
+    page.goto(f"{served.url}/#/{where}")
+    page.wait_for_selector("main h1", state="attached")
+    assert page.locator("h1").count() == 1
+    assert page.inner_text("h1").strip()
+
+
+def test_focus_stays_on_what_is_drawn_anew(page: Any, served: Served) -> None:
+    page.goto(f"{served.url}/#/drive?path=estimates.parquet")
+    page.wait_for_selector(".charts[data-rows]")
+    page.focus(".chip:text-is('rl')")
+    page.keyboard.press("Enter")  # the wheels are drawn anew
+    page.wait_for_selector(".chip:text-is('rl')[aria-pressed='false']")
+    page.wait_for_timeout(100)
+    assert page.evaluate(FOCUSED) == "rl"
+
+
+def test_focus_leaves_a_button_that_has_nothing_more_to_do(page: Any, served: Served) -> None:
+    page.goto(f"{served.url}/#/drive?path=estimates.parquet")
+    page.wait_for_selector(".charts[data-rows]")
+    page.evaluate("() => window.terragripDrive.charts.zoom([10, 20])")
+    page.wait_for_selector("#back:not([disabled])")
+    page.focus("#back")
+    page.keyboard.press("Enter")
+    page.wait_for_selector("#back[disabled]")
+    page.wait_for_timeout(100)
+    assert page.evaluate(FOCUSED) != "body"
+
+
+def test_focus_stays_in_the_bar_from_page_to_page(page: Any, served: Served) -> None:
+    page.goto(f"{served.url}/#/drive?path=estimates.parquet")
+    page.wait_for_selector(".charts[data-rows]")
+    page.focus("nav >> text=Fit")
+    page.keyboard.press("Enter")
+    page.wait_for_selector("#fit-button")
+    assert page.evaluate(FOCUSED) == "Fit"
