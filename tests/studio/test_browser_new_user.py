@@ -176,6 +176,23 @@ def test_a_columns_choice_unit_and_sign_reach_the_profile(
     assert "pitch" not in channels
 
 
+def test_a_command_over_ticked_files_and_the_focus_stays_at_its_button(
+    page: Any, served: Served, folder: Path, made: Path
+) -> None:
+    for name in ("a.parquet", "b.parquet", "c.parquet"):
+        (folder / name).write_bytes((made / "recording.parquet").read_bytes())
+    (folder / "vehicle.yaml").write_bytes((made / "vehicle.yaml").read_bytes())
+    page.goto(served.url)
+    page.check("[aria-label='choose a.parquet']")
+    page.check("[aria-label='choose c.parquet']")
+    page.click("[data-key='do batch']")
+    page.click("#job-go")
+    page.wait_for_selector(".state.done")
+    page.wait_for_selector("text=estimates/c.parquet")
+    assert sorted(path.name for path in (folder / "estimates").iterdir()) == ["a.parquet", "c.parquet"]
+    assert page.evaluate("() => document.activeElement.dataset.key") == "do batch"
+
+
 def test_an_impossible_number_is_said_and_nothing_is_saved(
     page: Any, served: Served, folder: Path, foreign: Path
 ) -> None:

@@ -18,7 +18,7 @@ interface Command {
 }
 
 const COMMANDS: Record<string, Command> = {
-  batch: { kind: "batch", title: "Estimate", files: "recordings", asks: ["vehicle", "profile", "smooth"], ending: "", about: "Every log into a folder of its own estimates; one that cannot be read does not stop the others." },
+  batch: { kind: "batch", title: "Estimate", files: "recordings", asks: ["vehicle", "profile", "smooth"], ending: "", about: "The estimates of each log, all into one folder; one that cannot be read does not stop the others." },
   calibrate: { kind: "calibrate", title: "Calibrate a vehicle", files: "recordings", asks: ["vehicle", "profile"], ending: ".yaml", about: "Zeros from standstill, radii from straight passes without load, torque gains from the wheels against each other." },
   soils: { kind: "soils", title: "Learn soils", files: "estimates", asks: ["soil"], ending: ".json", about: "The adhesion curve of each soil that the logs name, with its interval." },
   ground: { kind: "ground", title: "Find changes of the ground", files: "estimates", asks: ["library"], ending: ".json", about: "Where the ground changes, which soil it is, and what happened on it." },
