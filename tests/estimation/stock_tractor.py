@@ -36,7 +36,7 @@ def stock_machine(drive: SimulationResult, seed: int, *, period: float = 0.1) ->
     """A drive as the bus of a stock machine tells it every ``period`` [s].
 
     The wheels' true torques go back through gears (engine speed between three quarters and all of its rated one) and losses drawn from the
-    spreads that the vehicle file states; torque is told in shares of 1 % of the reference torque.
+    spreads that the vehicle file states; torque is logged in steps of 1 % of the reference torque.
     """
     rng = np.random.default_rng((seed, 17))
     rows = np.unique(np.searchsorted(drive.recording.time, np.arange(0, drive.recording.time[-1], period)))

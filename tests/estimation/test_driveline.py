@@ -149,8 +149,8 @@ def test_a_share_needs_its_reference(tractor: tg.Vehicle) -> None:
     with pytest.raises(InputError, match="neither the log nor the vehicle file") as caught:
         tg.estimate(shares, tractor)
     assert "reference_torque" in str(caught.value.hint)
-    told = shares.with_channels(engine_reference_torque=np.full(len(log), 800.0))
-    result = tg.estimate(told, tractor)
+    with_reference = shares.with_channels(engine_reference_torque=np.full(len(log), 800.0))
+    result = tg.estimate(with_reference, tractor)
     assert result["adhesion_driven"][-1] == pytest.approx(39100 / 6000 / 9.80665, rel=5e-3)
     assert any("own friction is not in the log" in note for note in result.notes)
 
