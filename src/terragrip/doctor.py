@@ -22,6 +22,7 @@ EXTRAS = {
     "studio": "the pages in the browser",
     "live": "the service on a machine",
     "ground": "changes of the ground, the classifier",
+    "fleet": "many logs on Dask",
     "geo": "maps, GeoPackage, a map's background from a GeoTIFF",
 }
 """What each extra is for, in the order of the list."""

@@ -4,8 +4,11 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
+
+import numpy as np
 
 from terragrip.estimation import DEFAULT, Estimates, estimated
 from terragrip.estimation.export import require_room, require_suffix
@@ -34,6 +37,8 @@ def estimate_file(
     held: Mapping[str, float] | None = None,
     gap: float | None = None,
     standstill_speed: float | None = None,
+    labels: Mapping[str, str] | None = None,
+    observe: Callable[[Estimates], None] | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> str:
     """Estimate a log into a file, Parquet or another by its suffix (docs/export.md); returns the summary as text.
@@ -47,6 +52,8 @@ def estimate_file(
     log: the path of a log, those of several sources of one drive, or a Recording.
     vehicle, method, smooth, sensors, held, gap, standstill_speed: as for :func:`terragrip.estimate`.
     profile, dbc: as for :func:`terragrip.read`.
+    labels: text columns that are one and the same in every row, such as ``log``.
+    observe: called with each block of estimates, in the order of time, before it is written.
     progress: called with the rows done and those to do; a pass over the log counts all its rows.
 
     Raises
@@ -74,12 +81,25 @@ def estimate_file(
         progress=progress,
     )
     tally, notes = Tally(), dict[str, None]()
-    write_parts(_counted(parts, tally, notes), output)
+    write_parts(_counted(_labelled(parts, labels or {}), tally, notes, observe), output)
     return tally.text(notes, os.fspath(output))
 
 
-def _counted(parts: Iterator[Estimates], tally: Tally, notes: dict[str, None]) -> Iterator[Estimates]:
+def _labelled(parts: Iterator[Estimates], labels: Mapping[str, str]) -> Iterator[Estimates]:
+    for part in parts:
+        same = {name: np.full(len(part), text, dtype=object) for name, text in labels.items()}
+        yield replace(part, labels={**part.labels, **same}) if same else part
+
+
+def _counted(
+    parts: Iterator[Estimates],
+    tally: Tally,
+    notes: dict[str, None],
+    observe: Callable[[Estimates], None] | None,
+) -> Iterator[Estimates]:
     for part in parts:
         tally.add(part)
         notes.update(dict.fromkeys(part.notes))
+        if observe is not None:
+            observe(part)
         yield part

@@ -109,34 +109,13 @@ def drives_in(table: Path) -> list[Drive]:
 
     Paths are from the table's folder. Raises InputError where it is no such table.
     """
-    import csv
+    from terragrip.listing import listed_logs, profile_in
 
-    from terragrip.files import refuse_missing
-
-    refuse_missing(table)
-    try:
-        with table.open(encoding="utf-8-sig", newline="") as stream:
-            rows = csv.DictReader(stream)
-            names = [name.strip() for name in rows.fieldnames or ()]
-            odd = next((name for name in names if name not in _COLUMNS), None)
-            if "log" not in names or odd is not None:
-                problem = "has no column log" if "log" not in names else f"has an unknown column {odd!r}"
-                raise InputError(
-                    problem, file=table, place="line 1", hint=f"its columns are {', '.join(_COLUMNS)}"
-                )
-            listed = [{k.strip(): (v or "").strip() for k, v in row.items() if k} for row in rows]
-    except (UnicodeDecodeError, csv.Error) as error:
-        raise InputError(f"is no table ({error})", file=table, hint="write it as CSV, in UTF-8") from error
-    listed = [row for row in listed if any(row.values())]
-    if not listed:
-        raise InputError("names no log", file=table, hint="write a log in each line")
     groups: dict[str, list[tuple[Path, Path | None]]] = {}
-    for number, row in enumerate(listed, 2):
-        if not row["log"]:
-            raise InputError("names no log", file=table, place=f"row {number}", hint="write its path")
+    for row in listed_logs(table, _COLUMNS):
         log = table.parent / row["log"]
         groups.setdefault(row.get("drive") or f"{row['log']}", []).append(
-            (log, _profile(table, row.get("profile", "")))
+            (log, profile_in(table, row.get("profile", "")))
         )
     return [
         Drive(
@@ -146,10 +125,3 @@ def drives_in(table: Path) -> list[Drive]:
         )
         for name, parts in groups.items()
     ]
-
-
-def _profile(table: Path, name: str) -> Path | None:
-    """A profile by its path from the table's folder, or one that comes with Terragrip by its name."""
-    if not name:
-        return None
-    return table.parent / name if Path(name).suffix or (table.parent / name).exists() else Path(name)

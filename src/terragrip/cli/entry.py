@@ -18,6 +18,7 @@ from terragrip.cli.demo import command as demo
 from terragrip.cli.doctor import command as doctor
 from terragrip.cli.estimate import command as estimate
 from terragrip.cli.failure import INTERRUPTED, report
+from terragrip.cli.fleet import command as fleet
 from terragrip.cli.ground import command as ground
 from terragrip.cli.ground_classifier import app as ground_classifier
 from terragrip.cli.inspect import command as inspect
@@ -54,6 +55,7 @@ app.command("report")(report_command)
 app.command("simulate")(simulate)
 app.command("live")(live)
 app.command("studio")(studio)
+app.command("fleet")(fleet)
 app.command("doctor")(doctor)
 
 

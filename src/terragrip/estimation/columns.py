@@ -27,6 +27,7 @@ _WHOLE = {
     "supervisor": Column("1", "supervisor gamma: how far the noise is adapted, 0 to 1"),
     "event": Column("", "what happened: empty, or a word of docs/events.md"),
     "soil": Column("", "the log's own name of the ground, empty where it has none"),
+    "log": Column("", "the log that the row is of, where one table holds several"),
     "latitude": Column("deg", "measured latitude, WGS 84"),
     "longitude": Column("deg", "measured longitude, WGS 84"),
     "altitude": Column("m", "measured altitude"),

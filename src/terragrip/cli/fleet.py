@@ -1,0 +1,114 @@
+"""``terragrip fleet``: many logs, on many processors, into one data set."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from terragrip.cli.drives import logs_in
+from terragrip.cli.options import DbcFiles, ProfileFile, Quiet
+from terragrip.cli.progress import progress
+from terragrip.errors import InputError
+from terragrip.estimation.methods import DEFAULT, METHODS
+
+if TYPE_CHECKING:
+    from terragrip.fleet.run import FleetResult
+
+
+def command(
+    patterns: Annotated[
+        list[str],
+        typer.Argument(
+            metavar="PATTERN", help="Logs, folders or patterns ('DIR/**/*.mcap'), also of a store (s3://...)."
+        ),
+    ],
+    output: Annotated[
+        str,
+        typer.Option(
+            "--output", "-o", metavar="OUT", help="Folder of the data set, also of a store (s3://...)."
+        ),
+    ],
+    vehicle: Annotated[
+        Path | None,
+        typer.Option(
+            "--vehicle", metavar="FILE", help="The vehicle file (YAML) of every log that --index gives none."
+        ),
+    ] = None,
+    profile: ProfileFile = None,
+    index: Annotated[
+        Path | None,
+        typer.Option(
+            "--index",
+            metavar="TABLE",
+            help="A CSV with the columns log, vehicle, profile, name: a row a log; all but log may be empty.",
+        ),
+    ] = None,
+    dbc: DbcFiles = None,
+    method: Annotated[str, typer.Option(metavar="NAME", help=f"One of {', '.join(METHODS)}.")] = DEFAULT,
+    smooth: Annotated[bool, typer.Option("--smooth", help="Run each log backwards too.")] = False,
+    scheduler: Annotated[
+        str | None,
+        typer.Option(
+            metavar="ADDRESS", help="A Dask scheduler (tcp://host:8786); else workers on this machine."
+        ),
+    ] = None,
+    workers: Annotated[
+        int | None,
+        typer.Option(metavar="COUNT", min=1, help="Workers on this machine; as many as processors."),
+    ] = None,
+    memory: Annotated[
+        str | None,
+        typer.Option(metavar="AMOUNT", help="Most memory of a worker here, e.g. 2GB; its share by default."),
+    ] = None,
+    quiet: Quiet = False,
+) -> None:
+    """Estimate any number of logs into one data set.
+
+    A second call does only what is new or changed. Every log ends in the data set or, with its reason, in failures.parquet.
+    """
+    from terragrip.estimation.methods import method_named
+    from terragrip.fleet.logs import fleet_logs, matching, on_disk
+    from terragrip.fleet.store import is_remote
+    from terragrip.report.page import require_drawing
+
+    if not method_named(method).can_smooth and smooth:
+        raise InputError(f"the method {method} cannot smooth", place="--smooth", hint="choose another method")
+    if scheduler is not None and (workers or memory):
+        raise InputError(
+            "is for workers on this machine",
+            place="--workers" if workers else "--memory",
+            hint="leave it out with --scheduler",
+        )
+    require_drawing()
+    here = [Path(one) for one in patterns if not is_remote(one)]
+    files = on_disk(logs_in(here), output) if here else []
+    files += [file for one in patterns if is_remote(one) for file in matching(one)]
+    logs = fleet_logs(files, vehicle, profile, index)
+    from terragrip.fleet.run import run_fleet
+
+    with progress("fleet", quiet) as step:
+        done = run_fleet(
+            logs,
+            output,
+            method,
+            smooth=smooth,
+            dbc=dbc or (),
+            scheduler=scheduler,
+            workers=workers,
+            memory=memory,
+            progress=step,
+        )
+    if not quiet:
+        print("\n".join(_lines(done, output)))
+
+
+def _lines(done: FleetResult, output: str) -> list[str]:
+    said = [f"Logs: {done.estimated} estimated, {done.unchanged} unchanged, {len(done.failed)} failed."]
+    said += [f"  {log}: {reason}" for log, reason in list(done.failed.items())[:10]]
+    if len(done.failed) > 10:
+        said.append(f"  and {len(done.failed) - 10} more in failures.parquet")
+    if done.kept:
+        said.append(f"{done.kept} logs of earlier calls are kept beside them.")
+    return [*said, f"Written to {output}; read {output}/report.html"]

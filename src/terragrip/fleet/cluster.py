@@ -1,0 +1,226 @@
+"""Batches of logs on Dask workers, of this machine or of a scheduler elsewhere; lost workers and schedulers are no loss of logs."""
+
+from __future__ import annotations
+
+import logging
+import os
+import time
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import CancelledError
+from contextlib import contextmanager
+from typing import Any
+
+from terragrip.errors import InputError
+from terragrip.fleet.logs import FleetLog
+from terragrip.fleet.store import Store
+from terragrip.fleet.task import Outcome, Settings, estimate_logs
+
+BATCH_BYTES, BATCH_LOGS = 8_000_000, 16
+"""Small logs go together up to so many bytes and logs,"""
+SHARES = 8
+"""but in at least so many batches a worker, so that all end at about one time."""
+PATIENCE = 60.0
+"""Seconds that a lost scheduler is waited for."""
+REACH = 10.0
+"""Seconds in which a scheduler must answer at the start."""
+_LOOK = 0.05
+
+_CONFIG = {
+    # A worker that nears its memory is ended and its log named; spilling and pausing would only hold the others up.
+    "distributed.worker.memory.target": False,
+    "distributed.worker.memory.spill": False,
+    "distributed.worker.memory.pause": False,
+    "distributed.worker.memory.terminate": 0.95,
+    "distributed.scheduler.allowed-failures": 1,
+    "distributed.admin.tick.limit": "60 s",
+}
+
+
+def batches_of(logs: Sequence[FleetLog], workers: int) -> list[list[FleetLog]]:
+    """Largest first, small ones together."""
+    share = sum(log.size for log in logs) / max(1, SHARES * workers)
+    most = min(BATCH_BYTES, share)
+    count = max(1, min(BATCH_LOGS, len(logs) // max(1, SHARES * workers)))
+    batches: list[list[FleetLog]] = []
+    held = 0
+    for log in sorted(logs, key=lambda one: (-one.size, one.name)):
+        if not batches or len(batches[-1]) >= count or held + log.size > most:
+            batches.append([])
+            held = 0
+        batches[-1].append(log)
+        held += log.size
+    return batches
+
+
+@contextmanager
+def workers_at(scheduler: str | None, workers: int, memory: str | None) -> Iterator[Pool]:
+    """Workers of an existing ``scheduler``, or else so many of this machine, each with ``memory`` ("2 GB"; None: its share).
+
+    Raises InputError where Dask is not installed, or the scheduler does not answer or has no worker.
+    """
+    try:
+        import dask
+        import distributed
+    except ImportError:
+        raise InputError(
+            "Dask is not installed", hint="pip install 'terragrip[fleet]'", page="install"
+        ) from None
+    # A lost worker or scheduler is told by the failures or by one line, not by Dask's log.
+    for name in [*logging.root.manager.loggerDict]:
+        if name.split(".")[0] in ("distributed", "tornado", "asyncio"):
+            logging.getLogger(name).setLevel(logging.CRITICAL + 1)
+    with dask.config.set(_CONFIG):
+        if scheduler is not None:
+            pool = Pool(lambda: _client(scheduler), scheduler)
+            try:
+                pool.connect(REACH)
+                yield pool
+            finally:
+                pool.close()
+            return
+        limit: Any = "auto" if memory is None else _bytes(memory)
+        with distributed.LocalCluster(  # type: ignore[no-untyped-call]
+            n_workers=workers,
+            threads_per_worker=1,
+            memory_limit=limit,
+            dashboard_address=None,
+            silence_logs=logging.CRITICAL,
+        ) as cluster:
+            pool = Pool(lambda: distributed.Client(cluster, set_as_default=False), "this machine")  # type: ignore[no-untyped-call]
+            try:
+                pool.connect(REACH)
+                yield pool
+            finally:
+                pool.close()
+
+
+def _client(address: str) -> Any:
+    from distributed import Client
+
+    return Client(address, timeout=5, set_as_default=False)  # type: ignore[no-untyped-call]
+
+
+def _bytes(text: str) -> int:
+    from dask.utils import parse_bytes
+
+    try:
+        amount = int(parse_bytes(text))
+    except ValueError:
+        amount = 0
+    if amount < 1_000_000:
+        raise InputError(f"{text!r} is no amount of memory", place="--memory", hint="write e.g. 2GB")
+    return amount
+
+
+class Pool:
+    """A connection to workers that is made anew when it breaks."""
+
+    def __init__(self, connect: Callable[[], Any], address: str) -> None:
+        self._make, self._address = connect, address
+        self._client: Any = None
+
+    def connect(self, patience: float) -> None:
+        """Connect, trying for ``patience`` seconds. Raises InputError where nobody answers, or no worker comes."""
+        self.close()
+        end = time.monotonic() + patience
+        while True:
+            try:
+                self._client = self._make()
+                break
+            except (OSError, ValueError) as error:
+                if isinstance(error, ValueError) or time.monotonic() > end:
+                    raise InputError(
+                        f"no scheduler answers at {self._address}",
+                        place="--scheduler",
+                        hint="start one with `dask scheduler`, or leave --scheduler out; what is done is kept",
+                    ) from None
+                time.sleep(0.5)
+        try:
+            self._client.wait_for_workers(1, timeout=max(patience, REACH))
+        except TimeoutError:
+            self.close()
+            raise InputError(
+                f"the scheduler at {self._address} has no worker",
+                place="--scheduler",
+                hint="start some with `dask worker ADDRESS`",
+            ) from None
+
+    def close(self) -> None:
+        """Leave the workers; a local cluster's end with it."""
+        client, self._client = self._client, None
+        if client is not None:
+            client.close(timeout=2)
+
+    @property
+    def count(self) -> int:
+        """How many workers there are now."""
+        return max(1, len(self._client.scheduler_info(n_workers=-1)["workers"]))
+
+    def run(self, logs: Sequence[FleetLog], settings: Settings, store: Store) -> Iterator[Outcome]:
+        """One outcome a log, as they come.
+
+        Logs of a batch whose worker was lost twice are run again at the end, one at a time: who is then lost twice is the one.
+        """
+        suspects: list[FleetLog] = []
+        yield from self._all(batches_of(logs, self.count), settings, store, suspects)
+        for log in suspects:
+            alone: list[FleetLog] = []
+            yield from self._all([[log]], settings, store, alone)
+            if alone:
+                yield Outcome(
+                    log.name,
+                    reason="its worker was lost twice while it alone was estimated: most likely it needs more memory than a worker "
+                    "has; give more with --memory, or fewer --workers",
+                )
+
+    def _all(
+        self, batches: list[list[FleetLog]], settings: Settings, store: Store, suspects: list[FleetLog]
+    ) -> Iterator[Outcome]:
+        """Outcomes of batches; logs whose worker was lost twice are put to ``suspects``."""
+        open_batches = self._submit(batches, settings, store)
+        while open_batches:
+            lost = self._client.status != "running"
+            for future, batch in list(open_batches.items()):
+                if future.status == "pending":
+                    continue
+                try:
+                    outcomes = _outcomes_of(future, batch, suspects)
+                except (CancelledError, OSError):  # the scheduler went, and its results with it
+                    lost = True
+                    break
+                del open_batches[future]
+                yield from outcomes
+            if lost:
+                left = list(open_batches.values())
+                self.connect(PATIENCE)
+                open_batches = self._submit(left, settings, store)
+            time.sleep(_LOOK)
+
+    def _submit(
+        self, batches: list[list[FleetLog]], settings: Settings, store: Store
+    ) -> dict[Any, list[FleetLog]]:
+        submit = self._client.submit
+        return {
+            submit(estimate_logs, batch, settings, store, pure=False, priority=-number): batch
+            for number, batch in enumerate(batches)
+        }
+
+
+def _outcomes_of(future: Any, batch: list[FleetLog], suspects: list[FleetLog]) -> list[Outcome]:
+    """Of a batch that is no longer pending. Raises CancelledError or OSError where its scheduler was lost."""
+    from distributed import KilledWorker
+
+    if future.status != "error":
+        result: list[Outcome] = future.result()
+        return result
+    error = future.exception()
+    if isinstance(error, KilledWorker):
+        suspects += batch
+        return []
+    reason = " ".join(f"the worker could not run it ({type(error).__name__}: {error})".split())
+    return [Outcome(log.name, reason=reason) for log in batch]
+
+
+def default_workers() -> int:
+    """As many as this process may use processors."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1

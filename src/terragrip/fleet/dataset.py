@@ -1,0 +1,139 @@
+"""A fleet's tables: which logs are in the data set, which failed, and no file of a log that is told of twice."""
+
+from __future__ import annotations
+
+import io
+import json
+import tempfile
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from terragrip.errors import InputError
+from terragrip.fleet.store import Store
+from terragrip.fleet.tally import COUNTED, MEANS
+from terragrip.fleet.task import NOTES, SAMPLES, Outcome
+
+SUMMARY, FAILURES, BY_SOIL = "summary.parquet", "failures.parquet", "soils.parquet"
+
+Note = dict[str, Any]
+
+
+def known_notes(store: Store) -> tuple[dict[str, Note], dict[str, str]]:
+    """What earlier calls left: the note of each log of the summary by the log's name, and the reasons of those that failed.
+
+    Raises InputError where there are tables that are none of a fleet's.
+    """
+    keys = {row["key"] for row in _read(store, SUMMARY)}
+    by_name: dict[str, Note] = {}
+    # A call that was cut off may have left two notes of a log: the one that no summary tells of yet is the newer.
+    for note in sorted(map(json.loads, store.read_all(NOTES)), key=lambda one: one["key"] not in keys):
+        old = by_name.get(note["log"])
+        if old is not None:
+            _drop(store, old, keep=note)
+        by_name[note["log"]] = note
+    return by_name, {row["log"]: row["reason"] for row in _read(store, FAILURES)}
+
+
+def settled(
+    store: Store, before: Mapping[str, Note], failed: Mapping[str, str], outcomes: Sequence[Outcome]
+) -> tuple[list[Note], dict[str, str]]:
+    """The logs that the data set holds from now on, and the failures; files that are of neither any more are removed.
+
+    Logs of earlier calls that this one did not name stay. Of a log that is estimated anew otherwise, or fails now, the old estimates go.
+    """
+    notes, reasons = dict(before), dict(failed)
+    for one in outcomes:
+        old = notes.pop(one.log, None)
+        reasons.pop(one.log, None)
+        if one.note is not None:
+            notes[one.log] = one.note
+        else:
+            reasons[one.log] = one.reason or "unknown"
+        if old is not None and (one.note is None or old["key"] != one.note["key"]):
+            _drop(store, old, keep=one.note)
+    return [notes[name] for name in sorted(notes)], dict(sorted(reasons.items()))
+
+
+def _drop(store: Store, old: Note, keep: Note | None) -> None:
+    if keep is None or keep["file"] != old["file"]:
+        store.remove(old["file"])
+    store.remove(f"{NOTES}/{old['key']}.json")
+    store.remove(f"{SAMPLES}/{old['key']}.parquet")
+
+
+def write_tables(store: Store, notes: Sequence[Note], reasons: Mapping[str, str]) -> None:
+    """Write summary, soils and failures, each whole or not at all. Raises OSError where the store refuses."""
+    import pyarrow as pa
+
+    means = [(name, pa.float64()) for name in ("moving_time", "moving_distance", *MEANS)]
+    texts = [
+        (name, pa.string()) for name in ("log", "key", "vehicle", "day", "start", "source", "file", "method")
+    ]
+    summary = pa.schema(
+        [
+            *texts,
+            ("smooth", pa.bool_()),
+            ("version", pa.string()),
+            ("rows", pa.int64()),
+            ("duration", pa.float64()),
+            ("distance", pa.float64()),
+            *means,
+            *[(f"{name}_events", pa.int64()) for name in COUNTED],
+            ("soils", pa.string()),
+            ("notes", pa.string()),
+        ]
+    )
+    rows = [{"log": n["log"], "key": n["key"], "file": n["file"], **n["summary"]} for n in notes]
+    _write(store, SUMMARY, pa.Table.from_pylist(rows, summary))
+    of_soils = pa.schema([*[(name, pa.string()) for name in ("log", "vehicle", "day", "soil")], *means])
+    _write(store, BY_SOIL, pa.Table.from_pylist(soil_rows(notes), of_soils))
+    failures = pa.schema([("log", pa.string()), ("reason", pa.string())])
+    listed = [{"log": log, "reason": reason} for log, reason in reasons.items()]
+    _write(store, FAILURES, pa.Table.from_pylist(listed, failures))
+
+
+def soil_rows(notes: Sequence[Note]) -> list[dict[str, Any]]:
+    """A row a log and label of the ground."""
+    return [
+        {"log": n["log"], "vehicle": n["summary"]["vehicle"], "day": n["summary"]["day"], **row}
+        for n in notes
+        for row in n["soils"]
+    ]
+
+
+def write_text(store: Store, name: str, text: str) -> None:
+    """Write a text file, whole or not at all."""
+    with tempfile.TemporaryDirectory(prefix="terragrip-fleet-") as folder:
+        local = Path(folder) / "text"
+        local.write_text(text, encoding="utf-8")
+        store.put(local, name)
+
+
+def _write(store: Store, name: str, table: Any) -> None:
+    import pyarrow.parquet as pq
+
+    with tempfile.TemporaryDirectory(prefix="terragrip-fleet-") as folder:
+        local = Path(folder) / "table.parquet"
+        pq.write_table(table, local)
+        store.put(local, name)
+
+
+def _read(store: Store, name: str) -> list[dict[str, Any]]:
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    content = store.read(name)
+    if content is None:
+        return []
+    try:
+        rows: list[dict[str, Any]] = pq.read_table(io.BytesIO(content)).to_pylist()
+        if rows and not ({"log", "key"} <= set(rows[0]) or {"log", "reason"} <= set(rows[0])):
+            raise pa.ArrowInvalid("other columns")
+    except pa.ArrowException as error:
+        raise InputError(
+            f"is no table of a fleet ({error})",
+            file=f"{store.url}/{name}",
+            hint="name another folder with -o",
+        ) from error
+    return rows

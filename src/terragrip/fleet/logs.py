@@ -1,0 +1,200 @@
+"""Which logs a fleet has, and the vehicle and profile of each: by a pattern, and by an index table."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from terragrip.errors import InputError, nearest
+from terragrip.fleet.store import is_remote
+from terragrip.listing import listed_logs, profile_in
+
+if TYPE_CHECKING:
+    from terragrip.formats import Profile
+    from terragrip.vehicle import Vehicle
+
+COLUMNS = ("log", "vehicle", "profile", "name")
+"""Of an index table."""
+
+
+@dataclass(frozen=True)
+class FleetLog:
+    """One log: its ``name`` in the data set, where it is, its size [bytes], its machine and how it is read."""
+
+    name: str
+    url: str
+    size: int
+    machine: str
+    vehicle: Vehicle
+    profile: Profile | None
+
+
+@dataclass(frozen=True)
+class _Entry:
+    vehicle: Path | None
+    profile: Path | None
+    name: str
+
+
+def matching(pattern: str) -> list[tuple[str, int]]:
+    """Files of a store that a pattern with an address matches, with their sizes.
+
+    Raises InputError where the store cannot be reached, or nothing matches.
+    """
+    try:
+        from fsspec.core import url_to_fs
+
+        system, path = url_to_fs(pattern)
+        found = system.glob(path, detail=True)
+    except Exception as error:
+        # each store has its own errors; whatever it says is the reason
+        raise InputError(
+            f"cannot be reached ({str(error) or type(error).__name__})",
+            file=pattern,
+            hint="check the address, the network and the access",
+        ) from error
+    files = [
+        (system.unstrip_protocol(p), int(i.get("size") or 0)) for p, i in found.items() if i["type"] == "file"
+    ]
+    if not files:
+        raise InputError("no file matches", file=pattern, hint="check the pattern and the folder")
+    return sorted(files)
+
+
+def on_disk(paths: Iterable[Path], output: str) -> list[tuple[str, int]]:
+    """Logs of this machine with their sizes; without folders that are no bag, and without what lies in ``output``.
+
+    Raises InputError where none is left.
+    """
+    from terragrip.formats.registry import is_bag
+
+    paths, own = list(paths), Path(os.path.abspath(output))
+    kept = []
+    for path in paths:
+        whole = Path(os.path.abspath(path))
+        if (own in whole.parents and not is_remote(output)) or (whole.is_dir() and not is_bag(whole)):
+            continue
+        if not whole.exists():
+            raise InputError("no such file", file=path, hint="check the path")
+        inside = [whole] if whole.is_file() else [one for one in whole.rglob("*") if one.is_file()]
+        kept.append((str(whole), sum(one.stat().st_size for one in inside)))
+    if not kept:
+        raise InputError(
+            "no file matches", file=paths[0] if paths else None, hint="check the pattern and the folder"
+        )
+    return kept
+
+
+def fleet_logs(
+    files: Sequence[tuple[str, int]],
+    vehicle: Path | None,
+    profile: Path | None = None,
+    index: Path | None = None,
+) -> list[FleetLog]:
+    """The logs with their vehicles and profiles, in the order of ``files``.
+
+    ``index``: a CSV with the columns `log` (a path from the table's folder, an address, or a file's name), `vehicle`, `profile` and `name`;
+    what a row leaves out is ``vehicle``, ``profile`` and the file's name.
+
+    Raises
+    ------
+    InputError: two logs have one name; a log has no vehicle; a row of the index names no log; two vehicle files hold one name; a vehicle or
+        profile cannot be used.
+    """
+    entries = {} if index is None else _entries(index, [url for url, _ in files])
+    machines, profiles = _Machines(), _Profiles()
+    names: dict[str, str] = {}
+    logs = []
+    for url, size in files:
+        entry = entries.get(url, _Entry(None, None, ""))
+        path = entry.vehicle or vehicle
+        if path is None:
+            raise InputError(
+                f"names no vehicle for {url}" if index else "no vehicle is named",
+                file=index,
+                place=None if index else "--vehicle",
+                hint="add its row, or give --vehicle for all others"
+                if index
+                else "name a vehicle file, or an --index",
+            )
+        name = entry.name or os.path.basename(url.rstrip("/"))
+        if name in names:
+            raise InputError(
+                f"has the name of {names[name]}",
+                file=url,
+                hint="rename one, or give names in the column `name` of an --index",
+            )
+        names[name] = url
+        machine, loaded = machines.of(path)
+        logs.append(FleetLog(name, url, size, machine, loaded, profiles.of(entry.profile or profile)))
+    return logs
+
+
+def _entries(index: Path, urls: Sequence[str]) -> dict[str, _Entry]:
+    """The index's rows by the address of their log; rows of logs that exist and were not asked for are left out."""
+    known = set(urls)
+    by_name: dict[str, list[str]] = {}
+    for url in urls:
+        by_name.setdefault(os.path.basename(url), []).append(url)
+    entries: dict[str, _Entry] = {}
+    for number, row in enumerate(listed_logs(index, COLUMNS), 2):
+        given, place = row["log"], f"row {number}"
+        whole = given if is_remote(given) else os.path.abspath(index.parent / given)
+        alike = [] if "/" in given else by_name.get(given, [])
+        if whole not in known and len(alike) == 1:
+            whole = alike[0]
+        if whole not in known:
+            if not is_remote(whole) and os.path.exists(whole):
+                continue
+            close = nearest(given, by_name)
+            hint = f"did you mean {close}?" if close else "write its path from the table's folder"
+            raise InputError(f"no log is {given}", file=index, place=place, hint=hint)
+        if whole in entries:
+            raise InputError(f"{given} stands here twice", file=index, place=place, hint="keep one row")
+        vehicle = index.parent / row["vehicle"] if row.get("vehicle") else None
+        entries[whole] = _Entry(vehicle, profile_in(index, row.get("profile", "")), row.get("name", ""))
+    return entries
+
+
+class _Machines:
+    """Vehicles by their files, each loaded once."""
+
+    def __init__(self) -> None:
+        self._loaded: dict[Path, tuple[str, Vehicle]] = {}
+        self._files: dict[str, Path] = {}
+
+    def of(self, path: Path) -> tuple[str, Vehicle]:
+        from terragrip.vehicle import Vehicle
+
+        if path not in self._loaded:
+            vehicle = Vehicle.load(path)
+            name = vehicle.name or path.stem
+            other = self._files.setdefault(name, path)
+            if other != path and self._loaded[other][1] != vehicle:
+                raise InputError(
+                    f"another vehicle than {other} has its name {name!r}",
+                    file=path,
+                    place="name",
+                    hint="give each its own",
+                )
+            self._loaded[path] = (name, vehicle)
+        return self._loaded[path]
+
+
+class _Profiles:
+    """Profiles by their files, each loaded once."""
+
+    def __init__(self) -> None:
+        self._loaded: dict[Path, Profile] = {}
+
+    def of(self, path: Path | None) -> Profile | None:
+        from terragrip.formats import Profile
+
+        if path is None:
+            return None
+        if path not in self._loaded:
+            self._loaded[path] = Profile.load(path)
+        return self._loaded[path]

@@ -1,0 +1,91 @@
+"""A fleet from its logs to its data set."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from terragrip.errors import InputError
+from terragrip.estimation.methods import DEFAULT
+from terragrip.fleet.cluster import default_workers, workers_at
+from terragrip.fleet.curves import learn_curves
+from terragrip.fleet.dataset import known_notes, settled, write_tables, write_text
+from terragrip.fleet.logs import FleetLog
+from terragrip.fleet.page import report_of
+from terragrip.fleet.store import TEMPORARY, Store
+from terragrip.fleet.task import Outcome, Settings
+
+SOILS, REPORT = "soils.json", "report.html"
+
+
+@dataclass(frozen=True)
+class FleetResult:
+    """What a call did: logs estimated now, those that an earlier call had estimated alike, and of this call's logs the failures with
+    their reasons; ``kept``: logs of earlier calls that this one did not name."""
+
+    estimated: int
+    unchanged: int
+    failed: dict[str, str]
+    kept: int
+
+
+def run_fleet(
+    logs: Sequence[FleetLog],
+    output: str,
+    method: str = DEFAULT,
+    *,
+    smooth: bool = False,
+    dbc: Sequence[Path] = (),
+    scheduler: str | None = None,
+    workers: int | None = None,
+    memory: str | None = None,
+    progress: Callable[[int, int], None] | None = None,
+) -> FleetResult:
+    """Estimate logs into a data set (docs/fleet.md); what it holds already by the same log, vehicle, profile, method and version stays.
+
+    Parameters
+    ----------
+    logs: of `fleet_logs`.
+    output: a folder, or an address of a store that fsspec knows.
+    method, smooth, dbc: as for :func:`terragrip.from_log.estimate_file`.
+    scheduler: address of a Dask scheduler; None: ``workers`` processes here, each with ``memory`` ("2GB"; None: its share).
+    progress: called with logs done and logs in all.
+
+    Raises
+    ------
+    InputError: the output cannot be written, or the scheduler cannot be reached. A log that cannot be estimated raises nothing: it stands
+        among the failures.
+    """
+    from terragrip import __version__
+
+    store = Store.at(output)
+    store.check()
+    before, failed = known_notes(store)
+    settings = Settings(method, smooth, tuple(str(path.absolute()) for path in dbc), __version__)
+    outcomes: list[Outcome] = []
+    with workers_at(scheduler, workers or default_workers(), memory) as pool:
+        for outcome in pool.run(logs, settings, store):
+            outcomes.append(outcome)
+            if progress:
+                progress(len(outcomes), len(logs) + 1)
+    notes, reasons = settled(store, before, failed, outcomes)
+    curves = learn_curves(store, notes)
+    try:
+        write_tables(store, notes, reasons)
+        write_text(store, REPORT, report_of(notes, reasons, curves))
+        library = curves.pooled.library({"files": [note["file"] for note in notes if note["sample"]]})
+        write_text(store, SOILS, json.dumps(library.to_dict(), indent=1, allow_nan=False) + "\n")
+        store.remove(TEMPORARY)
+    except OSError as error:
+        raise InputError(
+            f"cannot be written ({error})", file=output, hint="run again: what was estimated is kept"
+        ) from error
+    named = {one.log for one in outcomes}
+    return FleetResult(
+        estimated=sum(one.fresh for one in outcomes),
+        unchanged=sum(one.note is not None and not one.fresh for one in outcomes),
+        failed={one.log: one.reason or "" for one in outcomes if one.note is None},
+        kept=sum(note["log"] not in named for note in notes),
+    )

@@ -1,0 +1,179 @@
+"""Where a fleet's files are: a folder, or any store that fsspec knows, by its address."""
+
+from __future__ import annotations
+
+import os
+import secrets
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any, TypeVar
+from urllib.parse import quote
+
+from terragrip.errors import InputError
+
+Result = TypeVar("Result")
+
+WAITS = (0.2, 0.5, 1.0, 2.0, 4.0)
+"""Seconds between the tries of a store that refuses."""
+TEMPORARY = ".tmp"
+_WHOLE = frozenset({"s3", "s3a", "gs", "gcs", "abfs", "az", "adl", "memory"})
+"""Stores that show an object only when all of it is there; elsewhere a file is written beside and renamed."""
+_FINAL = (FileNotFoundError, PermissionError, IsADirectoryError, NotADirectoryError)
+
+
+def is_remote(path: str) -> bool:
+    """Whether a path is an address (`s3://bucket/x`), not a place on this machine."""
+    return "://" in path
+
+
+def safe_name(text: str) -> str:
+    """A text as the name of one file or folder, on any store and to readers of Hive partitions."""
+    return quote(text, safe=" ()+,@") or "_"
+
+
+@dataclass(frozen=True)
+class Store:
+    """A folder by its address; names within it are relative, with `/`. Travels to workers."""
+
+    url: str
+
+    @classmethod
+    def at(cls, url: str) -> Store:
+        """The store of a path or an address. Raises InputError where fsspec does not know its kind, or lacks its package."""
+        store = cls(url if is_remote(url) else os.path.abspath(url))
+        try:
+            _ = store._place
+        except (ImportError, ValueError) as error:
+            raise InputError(
+                f"is no store that can be reached ({error})",
+                file=url,
+                hint="name a folder, or install what fsspec needs for it",
+            ) from None
+        return store
+
+    @cached_property
+    def _place(self) -> tuple[Any, str]:
+        from fsspec.core import url_to_fs
+
+        system, root = url_to_fs(self.url)
+        return system, str(root).rstrip("/")
+
+    def __getstate__(self) -> dict[str, str]:
+        return {"url": self.url}
+
+    def __setstate__(self, state: dict[str, str]) -> None:
+        self.__dict__.update(state)
+
+    @property
+    def is_local(self) -> bool:
+        """Whether it is a folder of this machine."""
+        return not is_remote(self.url)
+
+    def _path(self, name: str) -> str:
+        return f"{self._place[1]}/{name}"
+
+    def put(self, local: Path, name: str) -> None:
+        """Copy a file to ``name``: whole or not at all. Raises OSError where the store keeps refusing."""
+        system, protocol = self._place[0], self._place[0].protocol
+        whole = bool({protocol} & _WHOLE if isinstance(protocol, str) else _WHOLE.intersection(protocol))
+        target = self._path(name)
+
+        def copy() -> None:
+            system.makedirs(os.path.dirname(target), exist_ok=True)
+            if whole:
+                system.put_file(os.fspath(local), target)
+                return
+            beside = self._path(f"{TEMPORARY}/{secrets.token_hex(8)}")
+            system.makedirs(os.path.dirname(beside), exist_ok=True)
+            system.put_file(os.fspath(local), beside)
+            if self.is_local:
+                os.replace(beside, target)
+            else:
+                system.mv(beside, target)
+
+        patiently(copy)
+
+    def read(self, name: str) -> bytes | None:
+        """The content of a file; None where there is none."""
+
+        def content() -> bytes | None:
+            try:
+                return bytes(self._place[0].cat_file(self._path(name)))
+            except FileNotFoundError:
+                return None
+
+        return patiently(content)
+
+    def remove(self, name: str) -> None:
+        """Remove a file or a folder with all in it; nothing where there is none."""
+        system = self._place[0]
+
+        def gone() -> None:
+            if system.exists(self._path(name)):
+                system.rm(self._path(name), recursive=True)
+
+        patiently(gone)
+
+    def read_all(self, folder: str) -> list[bytes]:
+        """The content of all files right in a folder, in the order of their names."""
+        system = self._place[0]
+        system.invalidate_cache()
+        if not system.exists(self._path(folder)):
+            return []
+        paths = sorted(patiently(lambda: system.ls(self._path(folder), detail=False)))
+        content = patiently(lambda: system.cat(paths)) if paths else {}
+        # of one path some stores give its content alone
+        return [content] if isinstance(content, bytes) else [content[path] for path in content]
+
+    def check(self) -> None:
+        """Try to write and to remove. Raises InputError where it cannot be, in one try."""
+        system, name = self._place[0], self._path(f"{TEMPORARY}/{secrets.token_hex(8)}")
+        try:
+            if self.is_local and os.path.exists(self.url) and not os.path.isdir(self.url):
+                raise InputError(
+                    "is a file, and a folder is needed", file=self.url, place="--output", hint="name a folder"
+                )
+            system.makedirs(os.path.dirname(name), exist_ok=True)
+            system.pipe_file(name, b"")
+            system.rm(name)
+        except InputError:
+            raise
+        except Exception as error:
+            # each store has its own errors (botocore's are no OSError): whatever it says is the reason
+            raise InputError(
+                f"cannot be written ({_said(error)})",
+                file=self.url,
+                place="--output",
+                hint="choose another place, or give access to it",
+            ) from error
+
+
+def fetched(url: str, folder: Path) -> Path:
+    """A log on this machine: itself, or a copy of one of a store in ``folder``. Raises OSError, also where there is none."""
+    if not is_remote(url):
+        return Path(url)
+    from fsspec.core import url_to_fs
+
+    system, path = url_to_fs(url)
+    local = folder / os.path.basename(path)
+    patiently(lambda: system.get_file(path, os.fspath(local)))
+    return local
+
+
+def patiently(function: Callable[[], Result]) -> Result:
+    """The function's result, tried again after each of `WAITS` while the store refuses. Raises what it raised last."""
+    for wait in WAITS:
+        try:
+            return function()
+        except _FINAL:
+            raise
+        except OSError:
+            time.sleep(wait)
+    return function()
+
+
+def _said(error: Exception) -> str:
+    return getattr(error, "strerror", None) or str(error) or type(error).__name__

@@ -1,0 +1,140 @@
+"""The numbers of one log for the fleet's tables, and the rows that soils are learned from, block by block."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from terragrip.estimation.engine import EVENTS
+from terragrip.estimation.estimates import wheels_with
+
+if TYPE_CHECKING:
+    from terragrip.estimation import Estimates
+
+Array = NDArray[np.float64]
+
+PERIOD = 0.2
+"""Seconds between the rows that soils are learned from: estimates of neighbouring rows tell the same."""
+MEANS = ("ground_speed", "slip", "adhesion", "soil_resistance", "net_traction", "efficiency")
+"""Of which a log has a mean over its time without an event; of wheels' columns, over the wheels."""
+COUNTED = tuple(name for name in EVENTS if name)
+
+
+class LogTally:
+    """Adds up the blocks of one log."""
+
+    def __init__(self) -> None:
+        self.rows = 0
+        self.about: dict[str, Any] = {}
+        self.notes: dict[str, None] = {}
+        self.starts = dict.fromkeys(COUNTED, 0)
+        self._sums: dict[str, dict[str, Array]] = {}
+        self._first = self._last = self._way = 0.0
+        self._code = 0
+        self._sampled = -np.inf
+        self._samples: list[Estimates] = []
+
+    def add(self, block: Estimates) -> None:
+        """Count a block that follows the ones before it."""
+        time, way = block.time, block["distance"] if "distance" in block else np.zeros(len(block))
+        if not self.rows:
+            self._first, self._last, self.about = float(time[0]), float(time[0]), block.about
+        self.notes.update(dict.fromkeys(block.notes))
+        self.rows += len(block)
+        changed = np.flatnonzero(np.diff(block.event_codes, prepend=np.uint8(self._code)))
+        for code in block.event_codes[changed]:
+            if EVENTS[code]:
+                self.starts[EVENTS[code]] += 1
+        self._add_means(block, way)
+        self._sample(block)
+        self._code, self._last = int(block.event_codes[-1]), float(time[-1])
+        self._way = float(np.nanmax(way, initial=self._way))
+
+    def _add_means(self, block: Estimates, way: Array) -> None:
+        """Each row stands for the time since the row before it, at most for as long as a gap is none."""
+        longest = block.about.get("settings", {}).get("gap") or 1.0
+        lasts = np.clip(np.diff(block.time, prepend=self._last), 0.0, longest)
+        metres = np.diff(way, prepend=self._way)
+        usable = block.event_codes == 0
+        soil = block.labels.get("soil", np.full(len(block), "", dtype=object))
+        columns = {name: _mean_of(block, name) for name in MEANS}
+        for label in dict.fromkeys(soil.tolist()):
+            rows = usable & (soil == label)
+            sums = self._sums.setdefault(str(label), {name: np.zeros(2) for name in ("moving", *MEANS)})
+            sums["moving"] += (lasts[rows].sum(), metres[rows].sum())
+            for name, values in columns.items():
+                known = rows & np.isfinite(values)
+                sums[name] += ((values * lasts)[known].sum(), lasts[known].sum())
+
+    def _sample(self, block: Estimates) -> None:
+        """Keep a row a `PERIOD` of a log with labels and adhesion."""
+        if "soil" not in block.labels or not block.has_adhesion:
+            return
+        count = np.floor(block.time / PERIOD)
+        rows = np.flatnonzero(np.diff(count, prepend=self._sampled) > 0)
+        self._sampled = float(count[-1])
+        wheels = wheels_with("adhesion", block.columns)
+        names = ["distance", "soil_resistance", "ground_speed"]
+        names += [name for w in wheels for name in (f"slip_{w}", f"slip_{w}_std", f"adhesion_{w}")]
+        thin = block.select(rows)
+        columns = {name: thin.columns[name].copy() for name in names}
+        self._samples.append(replace(thin, columns=columns, labels={"soil": thin.labels["soil"]}))
+
+    @property
+    def sample(self) -> list[Estimates]:
+        """A table of estimates, in parts, with some of the rows and of the columns; empty where nothing is labelled."""
+        labelled = any((part.labels["soil"] != "").any() for part in self._samples)
+        return self._samples if labelled else []
+
+    def row(self) -> dict[str, Any]:
+        """The log's numbers: times [s], metres, means over its time without an event, how often each event began."""
+        whole = {
+            name: sum((one[name] for one in self._sums.values()), np.zeros(2)) for name in ("moving", *MEANS)
+        }
+        channels = self.about.get("recording", {})
+        return {
+            "start": channels.get("start"),
+            "rows": self.rows,
+            "duration": self._last - self._first,
+            "distance": self._way,
+            **_means(whole),
+            **{f"{name}_events": count for name, count in self.starts.items()},
+            "soils": ", ".join(sorted(name for name in self._sums if name)),
+            "notes": " ".join(self.notes),
+        }
+
+    def soil_rows(self) -> list[dict[str, Any]]:
+        """The same means by label of the ground, a row a label; empty where there are no labels."""
+        return [{"soil": name, **_means(sums)} for name, sums in sorted(self._sums.items()) if name]
+
+
+def _means(sums: dict[str, Array]) -> dict[str, Any]:
+    means = {name: float(sums[name][0] / sums[name][1]) if sums[name][1] > 0 else None for name in MEANS}
+    return {"moving_time": float(sums["moving"][0]), "moving_distance": float(sums["moving"][1]), **means}
+
+
+def _mean_of(block: Estimates, name: str) -> Array:
+    """A column, or the mean over the wheels that have it; NaN where there is none."""
+    if name in block.columns:
+        return block.columns[name]
+    each = [block.columns[f"{name}_{wheel}"] for wheel in wheels_with(name, block.columns)]
+    return np.mean(each, axis=0) if each else np.full(len(block), np.nan)
+
+
+def weighted(rows: Iterable[dict[str, Any]], name: str) -> tuple[float, float]:
+    """Mean of a column over rows by their moving time, and the SD between them (NaN under two)."""
+    pairs = [
+        (one[name], one["moving_time"]) for one in rows if one[name] is not None and one["moving_time"] > 0
+    ]
+    if not pairs:
+        return float("nan"), float("nan")
+    values, weights = np.array(pairs).T
+    mean = float(np.average(values, weights=weights))
+    spread = (
+        float(np.sqrt(np.average((values - mean) ** 2, weights=weights))) if len(values) > 1 else float("nan")
+    )
+    return mean, spread

@@ -1,0 +1,167 @@
+"""What a worker does with logs: each into its files of the data set, or a reason why not."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import tempfile
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from terragrip.errors import InputError
+from terragrip.fleet.logs import FleetLog
+from terragrip.fleet.store import Store, fetched, safe_name
+
+if TYPE_CHECKING:
+    from terragrip.fleet.tally import LogTally
+
+NO_DAY = "__HIVE_DEFAULT_PARTITION__"
+"""The partition of logs that do not say when they were written: null to readers of Hive partitions."""
+NOTES, SAMPLES, ESTIMATES = "state/logs", "state/samples", "estimates"
+"""Folders of a data set."""
+
+
+@dataclass(frozen=True)
+class Settings:
+    """What all logs of a call share. ``version``: of the Terragrip that was called; workers must have the same."""
+
+    method: str
+    smooth: bool
+    dbc: tuple[str, ...]
+    version: str
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What became of a log: its ``note`` (`make_note`), or the ``reason`` why it has none. ``fresh``: it was estimated by this call."""
+
+    log: str
+    note: dict[str, Any] | None = None
+    reason: str | None = None
+    fresh: bool = False
+
+
+def estimate_logs(logs: Sequence[FleetLog], settings: Settings, store: Store) -> list[Outcome]:
+    """One outcome a log. A log that cannot be estimated does not stop the others. Raises nothing that a log can cause."""
+    return [_outcome(log, settings, store) for log in logs]
+
+
+def _outcome(log: FleetLog, settings: Settings, store: Store) -> Outcome:
+    try:
+        return _estimate(log, settings, store)
+    except InputError as error:
+        reason = str(error)
+    except MemoryError:
+        reason = "not enough memory; give --memory, or use a shorter log"
+    except OSError as error:
+        reason = f"could not be read, or its estimates not be written ({error})"
+    except Exception as error:  # noqa: BLE001 - whatever it is, it is this log's reason and no other's
+        reason = f"a defect of Terragrip ({type(error).__name__}: {error})"
+    return Outcome(log.name, reason=" ".join(reason.split()))
+
+
+def _estimate(log: FleetLog, settings: Settings, store: Store) -> Outcome:
+    from terragrip import __version__
+    from terragrip.fleet.tally import LogTally
+    from terragrip.from_log import estimate_file
+
+    if __version__ != settings.version:
+        raise InputError(
+            f"the worker has Terragrip {__version__}, the call {settings.version}",
+            hint="install one version on all workers",
+        )
+    with tempfile.TemporaryDirectory(prefix="terragrip-fleet-", dir=_scratch()) as folder:
+        source = fetched(log.url, Path(folder))
+        key = key_of(log, source, settings)
+        known = store.read(f"{NOTES}/{key}.json")
+        if known is not None:
+            return Outcome(log.name, json.loads(known))
+        local = Path(folder) / "estimates.parquet"
+        tally = LogTally()
+        estimate_file(
+            source,
+            log.vehicle,
+            local,
+            settings.method,
+            profile=log.profile,
+            dbc=settings.dbc,
+            smooth=settings.smooth,
+            labels={"log": log.name},
+            observe=tally.add,
+        )
+        note = make_note(log, key, settings, tally)
+        if tally.sample:
+            from terragrip.estimation.writing import write_parts
+
+            thin = Path(folder) / "sample.parquet"
+            write_parts(tally.sample, thin)
+            store.put(thin, f"{SAMPLES}/{key}.parquet")
+        store.put(local, note["file"])
+        # Last of all: only what a note tells of belongs to the data set.
+        told = Path(folder) / "note.json"
+        told.write_text(json.dumps(note), encoding="utf-8")
+        store.put(told, f"{NOTES}/{key}.json")
+    return Outcome(log.name, note, fresh=True)
+
+
+def make_note(log: FleetLog, key: str, settings: Settings, tally: LogTally) -> dict[str, Any]:
+    """What the data set keeps of a log beside its estimates, ready for JSON: its row of the summary and those of its soils."""
+    row = tally.row()
+    day = str(row["start"])[:10] if row["start"] else None
+    folder = f"{ESTIMATES}/vehicle={safe_name(log.machine)}/day={day or NO_DAY}"
+    return {
+        "log": log.name,
+        "key": key,
+        "file": f"{folder}/{safe_name(log.name)}.parquet",
+        "sample": bool(tally.sample),
+        "summary": {
+            "vehicle": log.machine,
+            "day": day,
+            "source": log.url,
+            "method": str(tally.about.get("method", settings.method)),
+            "smooth": settings.smooth,
+            "version": settings.version,
+            **row,
+        },
+        "soils": tally.soil_rows(),
+    }
+
+
+def key_of(log: FleetLog, source: Path, settings: Settings) -> str:
+    """SHA-256 of all that the log's estimates depend on: content and name of the log, vehicle, profile, DBC, method and version."""
+    parts = {
+        "name": log.name,
+        "log": _content(source),
+        "machine": log.machine,
+        "vehicle": log.vehicle.model_dump(mode="json", exclude_unset=True),
+        "profile": None if log.profile is None else log.profile.to_dict(),
+        "dbc": [_content(Path(one)) for one in (*settings.dbc, *(log.profile.dbc if log.profile else ()))],
+        "method": settings.method,
+        "smooth": settings.smooth,
+        "version": settings.version,
+    }
+    return hashlib.sha256(json.dumps(parts, sort_keys=True).encode()).hexdigest()
+
+
+def _content(path: Path) -> str:
+    """Of a file, or of a folder's files by their names."""
+    from terragrip.files import sha256
+
+    if not path.is_dir():
+        return sha256(path)
+    inside = sorted(one for one in path.rglob("*") if one.is_file())
+    listed = [(os.fspath(one.relative_to(path)), sha256(one)) for one in inside]
+    return hashlib.sha256(json.dumps(listed).encode()).hexdigest()
+
+
+def _scratch() -> str | None:
+    """The worker's own folder, which goes when it does; None: the system's, outside a worker."""
+    from distributed import get_worker
+
+    try:
+        return str(get_worker().local_directory)
+    except ValueError:
+        return None

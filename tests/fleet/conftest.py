@@ -1,0 +1,12 @@
+"""Makes small_fleet.py, which tests import from, and its fixture known."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).parent))
+
+from small_fleet import place
+
+__all__ = ["place"]

@@ -1,0 +1,112 @@
+"""Logs of small fleets, and the command in a process of its own, as a user starts it."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+VEHICLE = """\
+name: {name}
+mass: 100 kg
+axles: {{only: {{mass: 100 kg, wheels: [l, r]}}}}
+wheel: {{radius: 0.2 m, inertia: 0.1 kg m^2}}
+tire_rolling_resistance: 0.02
+sensors: {{wheel_speed: 0.02, ground_speed: 0.01, drive_torque: 0.3, drawbar_force: 2.0}}
+"""
+
+
+def write_log(path: Path, seed: int, day: str = "2026-05-01", seconds: float = 20.0) -> Path:
+    """A drive on one ground whose pull rises by steps, in closed form (physics.md 1), with noise; a CSV at 50 Hz with clock times."""
+    draws = np.random.default_rng(seed)
+    time = np.arange(0.0, seconds, 0.02)
+    weight, radius, soil, tire = 100.0 * 9.80665, 0.2, 0.08, 0.02
+    slip = np.interp(time, np.linspace(0, seconds, 9), np.repeat([0.06, 0.12, 0.2], 3))
+    adhesion = 0.5 * (1 - np.exp(-12 * slip))
+    table = {
+        "time": pd.Timestamp(f"{day}T08:00:00Z") + pd.to_timedelta(time, unit="s"),
+        "ground_speed": 1.0 + 0.01 * draws.standard_normal(time.size),
+        "drawbar_force": (adhesion - soil) * weight + 2.0 * draws.standard_normal(time.size),
+        "soil": "clay" if seed % 2 else "sand",
+    }
+    for wheel in "lr":
+        turning = 1.0 / (radius * (1 - slip))
+        table[f"wheel_speed_{wheel}"] = turning + 0.02 * draws.standard_normal(time.size)
+        table[f"drive_torque_{wheel}"] = (
+            adhesion + tire
+        ) * radius * weight / 2 + 0.3 * draws.standard_normal(time.size)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    pd.DataFrame(table).to_csv(path, index=False)
+    return path
+
+
+@pytest.fixture
+def place(tmp_path: Path) -> Path:
+    """Two vehicle files and six logs of three days in two folders."""
+    for name in ("Heros", "Thorvald"):
+        (tmp_path / f"{name}.yaml").write_text(VEHICLE.format(name=name))
+    for number in range(6):
+        folder = tmp_path / "logs" / ("a" if number < 3 else "b")
+        write_log(folder / f"drive{number}.csv", number, f"2026-05-0{1 + number // 2}")
+    return tmp_path
+
+
+def environment(place: Path) -> dict[str, str]:
+    """The workers' folders lie where the test can see them."""
+    return {**os.environ, "DASK_TEMPORARY_DIRECTORY": str(place / "scratch"), "PYTHONWARNINGS": "ignore"}
+
+
+def call(place: Path, *words: object) -> list[str]:
+    """The command line of `terragrip fleet`: of the logs, with the first vehicle, into `out`, unless words say otherwise.
+
+    A pattern stands first among the words.
+    """
+    given = [str(word) for word in words]
+    given = given if given and not given[0].startswith("-") else [str(place / "logs/**/*.csv"), *given]
+    given += [] if {"--vehicle", "--index"} & set(given) else ["--vehicle", str(place / "Heros.yaml")]
+    given += [] if "-o" in given else ["-o", str(place / "out")]
+    given += [] if {"--scheduler", "--workers"} & set(given) else ["--workers", "2"]
+    return ["fleet", *given]
+
+
+def start(place: Path, *words: object, env: dict[str, str] | None = None) -> subprocess.Popen[str]:
+    """The command in a process of its own."""
+    return subprocess.Popen(
+        [sys.executable, "-m", "terragrip", *call(place, *words)],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        env=env or environment(place),
+    )
+
+
+def fleet(place: Path, *words: object, env: dict[str, str] | None = None) -> tuple[int, str, str]:
+    """Exit code, output and errors."""
+    process = start(place, *words, env=env)
+    output, errors = process.communicate(timeout=300)
+    return process.returncode, output, errors
+
+
+def whole(out: Path) -> tuple[dict[str, int], dict[str, str]]:
+    """Rows of each log in the data set, and the reasons of those that failed; checks what must hold after any fault."""
+    import pyarrow.parquet as pq
+
+    summary = pd.read_parquet(out / "summary.parquet")
+    failures = pd.read_parquet(out / "failures.parquet")
+    assert not set(summary["log"]) & set(failures["log"])
+    assert summary["log"].is_unique
+    files = sorted(str(path.relative_to(out)) for path in (out / "estimates").rglob("*") if path.is_file())
+    assert files == sorted(summary["file"])
+    rows = {}
+    for log, file, count in zip(summary["log"], summary["file"], summary["rows"], strict=True):
+        table = pq.ParquetFile(out / file).read(["log", "time"])
+        assert set(table["log"].to_pylist()) == {log}
+        assert table.num_rows == count
+        rows[log] = count
+    assert not (out / ".tmp").exists()
+    return rows, dict(zip(failures["log"], failures["reason"], strict=True))

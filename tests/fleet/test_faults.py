@@ -1,0 +1,195 @@
+"""What a fleet stands: workers killed, too much memory, a scheduler lost, a store that refuses; real schedulers and workers in processes.
+
+After each fault every healthy log is in the data set once, whole, and every other among the failures with its reason (`whole`).
+"""
+
+from __future__ import annotations
+
+import os
+import signal
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import numpy as np
+import psutil
+import pytest
+import scipy.io
+
+from small_fleet import environment, fleet, start, whole, write_log
+
+PATIENCE = 120.0
+
+
+def until(condition: Callable[[], object]) -> None:
+    """Wait for something that another process does."""
+    end = time.monotonic() + PATIENCE
+    while not condition():
+        assert time.monotonic() < end, "it never happened"
+        time.sleep(0.02)
+
+
+def at_work(place: Path, parent: int) -> list[psutil.Process]:
+    """Descendants of a process that are writing estimates in this very moment."""
+    busy = []
+    for child in psutil.Process(parent).children(recursive=True):
+        try:
+            if any("terragrip-fleet-" in one.path for one in child.open_files()):
+                busy.append(child)
+        except psutil.Error:
+            continue
+    return busy
+
+
+def test_a_worker_that_is_killed_in_mid_task(place: Path) -> None:
+    write_log(place / "logs/a/long.csv", 7, seconds=1500.0)
+    process = start(place)
+    until(lambda: at_work(place, process.pid) or process.poll() is not None)
+    (victim, *_) = at_work(place, process.pid)
+    victim.send_signal(signal.SIGKILL)
+    output, errors = process.communicate(timeout=PATIENCE)
+    assert (process.returncode, errors) == (0, "")
+    assert "0 failed" in output
+    rows, reasons = whole(place / "out")
+    assert (len(rows), reasons) == (7, {})
+
+
+def test_a_log_that_needs_more_memory_than_a_worker_has(place: Path) -> None:
+    rows = 12_000_000  # 0.4 GB of numbers in a file of few
+    ones = np.ones(rows, dtype=np.uint8)
+    channels = dict.fromkeys(("ground_speed", "wheel_speed_l", "wheel_speed_r"), ones)
+    time_column = np.arange(rows, dtype=np.int32)
+    scipy.io.savemat(place / "logs/a/bomb.mat", {"time": time_column, **channels}, do_compression=True)
+    code, output, errors = fleet(
+        place, place / "logs/**/*.*", "--vehicle", place / "Heros.yaml", "--workers", 2, "--memory", "420MB"
+    )
+    assert (code, errors) == (0, "")
+    assert "6 estimated, 0 unchanged, 1 failed" in output
+    data, reasons = whole(place / "out")
+    assert len(data) == 6
+    assert list(reasons) == ["bomb.mat"]
+    assert "memory" in reasons["bomb.mat"]
+
+
+def test_a_call_that_is_killed_goes_on(place: Path) -> None:
+    write_log(place / "logs/a/long.csv", 7, seconds=1500.0)
+    process = start(place, env=environment(place))
+    notes = place / "out/state/logs"
+    until(lambda: notes.is_dir() and len(list(notes.iterdir())) >= 1)
+    family = [*psutil.Process(process.pid).children(recursive=True), psutil.Process(process.pid)]
+    for one in family:
+        one.kill()
+    process.communicate()
+    psutil.wait_procs(family)
+    done = len(list(notes.iterdir()))
+    code, output, _ = fleet(place)
+    assert code == 0
+    assert f"{7 - done} estimated, {done} unchanged, 0 failed" in output
+    rows, reasons = whole(place / "out")
+    assert (len(rows), reasons) == (7, {})
+
+
+def dask(*words: object, env: dict[str, str]) -> subprocess.Popen[bytes]:
+    return subprocess.Popen(
+        [sys.executable, "-m", "dask", *map(str, words)],
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+        env=env,
+    )
+
+
+@pytest.fixture
+def port() -> int:
+    with socket.socket() as one:
+        one.bind(("127.0.0.1", 0))
+        return int(one.getsockname()[1])
+
+
+@pytest.fixture
+def started() -> Iterator[list[subprocess.Popen[bytes]]]:
+    """Processes that end with the test."""
+    processes: list[subprocess.Popen[bytes]] = []
+    yield processes
+    for process in processes:
+        process.kill()
+        process.wait()
+
+
+def serve(place: Path, port: int, env: dict[str, str] | None = None) -> list[subprocess.Popen[bytes]]:
+    """A scheduler and a worker."""
+    env = env or environment(place)
+    scheduler = dask("scheduler", "--host", "127.0.0.1", "--port", port, "--no-dashboard", env=env)
+    worker = dask(
+        "worker", f"tcp://127.0.0.1:{port}", "--nthreads", 1, "--no-dashboard", "--no-nanny", env=env
+    )
+    return [scheduler, worker]
+
+
+def test_a_scheduler_that_is_lost_and_restarted(
+    place: Path, port: int, started: list[subprocess.Popen[bytes]]
+) -> None:
+    write_log(place / "logs/a/long.csv", 7, seconds=1500.0)
+    started += serve(place, port)
+    process = start(place, "--scheduler", f"tcp://127.0.0.1:{port}")
+    until(lambda: at_work(place, os.getpid()) or process.poll() is not None)
+    for one in started:
+        one.kill()
+        one.wait()
+    started += serve(place, port)
+    output, errors = process.communicate(timeout=PATIENCE)
+    assert (process.returncode, errors) == (0, "")
+    assert "0 failed" in output
+    rows, reasons = whole(place / "out")
+    assert (len(rows), reasons) == (7, {})
+
+
+STORE = '''
+"""A store whose every first write of a file is refused; each refusal leaves a mark."""
+import os
+from pathlib import Path
+
+import fsspec
+from fsspec.implementations.local import LocalFileSystem
+
+
+class Moody(LocalFileSystem):
+    protocol = "moody"
+
+    @classmethod
+    def _strip_protocol(cls, path):
+        return super()._strip_protocol(str(path).removeprefix("moody://"))
+
+    def put_file(self, lpath, rpath, **kwargs):
+        marks = Path(os.environ["MOODY"])
+        mark = marks / Path(lpath).name
+        if not mark.exists():
+            mark.touch()
+            raise ConnectionError("the store is busy")
+        super().put_file(lpath, rpath, **kwargs)
+
+
+fsspec.register_implementation("moody", Moody, clobber=True)
+'''
+
+
+def test_a_store_that_refuses_for_a_while(place: Path) -> None:
+    (place / "site").mkdir()
+    (place / "marks").mkdir()
+    (place / "site/sitecustomize.py").write_text(STORE)
+    env = environment(place) | {
+        "MOODY": str(place / "marks"),
+        "PYTHONPATH": os.pathsep.join([str(place / "site"), os.environ.get("PYTHONPATH", "")]),
+    }
+    source, target = f"moody://{place}/logs/**/*.csv", f"moody://{place}/out"
+    for estimated in (6, 0):
+        code, output, errors = fleet(
+            place, source, "--vehicle", place / "Heros.yaml", "-o", target, "--workers", 2, env=env
+        )
+        assert (code, errors) == (0, "")
+        assert f"{estimated} estimated, {6 - estimated} unchanged, 0 failed" in output
+    assert len(list((place / "marks").iterdir())) >= 3
+    rows, reasons = whole(place / "out")
+    assert (len(rows), reasons) == (6, {})

@@ -1,0 +1,198 @@
+"""`terragrip fleet`: many logs into one data set, which grows by what is new."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import polars as pl
+import pytest
+
+import terragrip as tg
+from small_fleet import VEHICLE, call, fleet, whole, write_log
+from terragrip.cli import main
+
+
+def written(out: Path) -> dict[str, int]:
+    """When each file of estimates was written."""
+    return {path.name: path.stat().st_mtime_ns for path in (out / "estimates").rglob("*.parquet")}
+
+
+def test_a_fleet_of_two_machines_and_three_days(place: Path) -> None:
+    index = place / "index.csv"
+    index.write_text("log,vehicle\n" + "".join(f"drive{n}.csv,Thorvald.yaml\n" for n in (1, 4)))
+    code, said, errors = fleet(place, "--index", index, "--vehicle", place / "Heros.yaml")
+    assert (code, errors) == (0, "")
+    assert "6 estimated, 0 unchanged, 0 failed" in said
+    rows, reasons = whole(place / "out")
+    assert (len(rows), reasons) == (6, {})
+
+    # each log's rows are those of one log estimated alone, to the last digit
+    alone = tg.estimate(tg.read(place / "logs/b/drive4.csv"), tg.Vehicle.load(place / "Thorvald.yaml"))
+    (path,) = (place / "out/estimates/vehicle=Thorvald/day=2026-05-03").glob("*.parquet")
+    table = pd.read_parquet(path, partitioning=None)
+    for name in ("slip_l", "adhesion_r_std", "soil_resistance"):
+        np.testing.assert_array_equal(table[name], alone[name])
+
+    summary = pd.read_parquet(place / "out/summary.parquet").set_index("log")
+    assert summary["vehicle"]["drive4.csv"] == "Thorvald"
+    assert summary["day"].to_dict() == {f"drive{n}.csv": f"2026-05-0{1 + n // 2}" for n in range(6)}
+    usable = alone["event"] == ""
+    mean = np.mean([alone["slip_l"][usable], alone["slip_r"][usable]])
+    assert summary["slip"]["drive4.csv"] == pytest.approx(mean, abs=1e-3)
+    assert summary["distance"]["drive4.csv"] == pytest.approx(20.0, abs=0.2)
+
+    # the line of docs/fleet.md
+    every = pl.scan_parquet(
+        place / "out/estimates/**/*.parquet",
+        hive_partitioning=True,
+        missing_columns="insert",
+        extra_columns="ignore",
+    )
+    by_log = every.group_by("vehicle", "log").len().collect()
+    assert by_log["len"].sum() == sum(rows.values())
+    assert set(by_log.filter(pl.col("vehicle") == "Thorvald")["log"]) == {"drive1.csv", "drive4.csv"}
+
+    soils = json.loads((place / "out/soils.json").read_text())["soils"]
+    for soil in ("clay", "sand"):  # the drive's own curve, 0.5 (1 - exp(-12 s)), at the slips driven
+        bins = [b for b in soils[soil]["bins"] if 0.05 < b["slip"] < 0.21]
+        assert bins
+        for one in bins:
+            assert one["mean"] == pytest.approx(0.5 * (1 - np.exp(-12 * one["slip"])), abs=0.03)
+    page = (place / "out/report.html").read_text()
+    assert "6 logs of 2 vehicles on 3 days" in page
+    assert "src=" not in page.replace('src="data:', "")
+
+
+def test_a_second_call_does_what_is_new_or_changed_and_no_more(place: Path) -> None:
+    assert fleet(place)[0] == 0
+    first = written(place / "out")
+    write_log(place / "logs/b/drive6.csv", 6)
+    write_log(place / "logs/a/drive0.csv", 60)
+    code, said, _ = fleet(place)
+    assert code == 0
+    assert "2 estimated, 5 unchanged, 0 failed" in said
+    second = written(place / "out")
+    assert {name for name in second if second[name] != first.get(name)} == {
+        "drive0.csv.parquet",
+        "drive6.csv.parquet",
+    }
+    # a machine that is another: all its logs anew, under its new name alone; a log that went is kept
+    (place / "logs/b/drive6.csv").unlink()
+    (place / "Heros.yaml").write_text(VEHICLE.format(name="Heros 2"))
+    code, said, _ = fleet(place)
+    assert "6 estimated, 0 unchanged, 0 failed" in said
+    assert "1 logs of earlier calls are kept" in said
+    rows, _ = whole(place / "out")
+    assert len(rows) == 7
+    vehicles = pd.read_parquet(place / "out/summary.parquet").set_index("log")["vehicle"]
+    assert vehicles.pop("drive6.csv") == "Heros"
+    assert set(vehicles) == {"Heros 2"}
+
+
+def test_a_log_that_cannot_be_read_stops_no_other_and_leaves_when_it_is_whole_again(place: Path) -> None:
+    broken = place / "logs/a/drive1.csv"
+    content = broken.read_bytes()
+    assert fleet(place)[0] == 0
+    broken.write_bytes(b"\x00\xff" * 500)
+    code, said, errors = fleet(place)
+    assert (code, errors) == (0, "")
+    assert "0 estimated, 5 unchanged, 1 failed" in said
+    rows, reasons = whole(place / "out")
+    assert len(rows) == 5
+    assert list(reasons) == ["drive1.csv"]
+    assert "drive1.csv" in reasons["drive1.csv"]
+    broken.write_bytes(content)
+    assert fleet(place)[0] == 0
+    rows, reasons = whole(place / "out")
+    assert (len(rows), reasons) == (6, {})
+
+
+def test_estimates_of_the_fleet_are_no_logs_of_it(place: Path) -> None:
+    (place / "logs/b/note.txt").write_text("no log")
+    out = place / "logs/out"
+    for estimated in (6, 0):
+        code, said, _ = fleet(place, place / "logs/**/*", "--vehicle", place / "Heros.yaml", "-o", out)
+        assert code == 0
+        assert f"{estimated} estimated, {6 - estimated} unchanged, 1 failed" in said
+    rows, reasons = whole(out)
+    assert (len(rows), list(reasons)) == (6, ["note.txt"])
+
+
+Refused = Callable[..., str]
+
+
+@pytest.fixture
+def refused(place: Path, capsys: pytest.CaptureFixture[str]) -> Refused:
+    """The one line of a call that exits with 2 and leaves nothing behind."""
+
+    def line(*words: object) -> str:
+        assert main(call(place, *words)) == 2
+        errors = capsys.readouterr().err
+        assert errors.count("\n") == 1
+        assert not (place / "out").exists()
+        return errors
+
+    return line
+
+
+def test_nothing_matches(place: Path, refused: Refused) -> None:
+    assert "no file matches" in refused(place / "logs/**/*.mcap")
+
+
+def test_two_logs_of_one_name(place: Path, refused: Refused) -> None:
+    write_log(place / "logs/b/drive0.csv", 9)
+    said = refused()
+    assert "a/drive0.csv" in said
+    assert "b/drive0.csv" in said
+    index = place / "index.csv"
+    index.write_text("log,name\nlogs/b/drive0.csv,drive0 of b\n")
+    assert fleet(place, "--index", index, "--vehicle", place / "Heros.yaml")[0] == 0
+    assert {"drive0.csv", "drive0 of b"} <= set(whole(place / "out")[0])
+
+
+@pytest.mark.parametrize(
+    ("table", "said"),
+    [
+        ("log,vehicle\ndrive0.csv,Heros.yaml\n", "names no vehicle for"),
+        ("log,vehicle\ndrive9.csv,Heros.yaml\n", "no log is drive9.csv; did you mean drive"),
+        ("log,machine\ndrive0.csv,Heros.yaml\n", "unknown column 'machine'"),
+        ("log,vehicle\ndrive0.csv,Heroes.yaml\n", "did you mean Heros.yaml"),
+        ("log,vehicle\ndrive0.csv,Heros.yaml\ndrive0.csv,Thorvald.yaml\n", "stands here twice"),
+    ],
+)
+def test_an_index_that_does_not_fit(place: Path, refused: Refused, table: str, said: str) -> None:
+    index = place / "index.csv"
+    index.write_text(table)
+    assert said in refused("--index", index)
+
+
+def test_two_vehicles_of_one_name(place: Path, refused: Refused) -> None:
+    (place / "Thorvald.yaml").write_text(VEHICLE.format(name="Heros").replace("100 kg", "120 kg"))
+    index = place / "index.csv"
+    index.write_text("log,vehicle\ndrive0.csv,Thorvald.yaml\n")
+    assert "has its name 'Heros'" in refused("--index", index, "--vehicle", place / "Heros.yaml")
+
+
+def test_a_scheduler_that_does_not_answer(place: Path) -> None:
+    code, _, errors = fleet(place, "--scheduler", "tcp://127.0.0.1:9")
+    assert (code, errors.count("\n")) == (2, 1)
+    assert "no scheduler answers at tcp://127.0.0.1:9" in errors
+    assert not list((place / "out").rglob("*.parquet"))
+
+
+def test_a_store_that_cannot_be_reached(place: Path, refused: Refused) -> None:
+    assert "cannot be reached" in refused("nosuchstore://bucket/*.csv")
+    assert "no store" in refused("-o", "nosuchstore://bucket/out")
+    (place / "file").write_text("")
+    assert "is a file, and a folder is needed" in refused("-o", place / "file")
+
+
+@pytest.mark.skipif(os.geteuid() == 0, reason="NOT TESTED: root may write anywhere")
+def test_a_folder_that_cannot_be_written(place: Path, refused: Refused) -> None:
+    (place / "shut").mkdir(mode=0o500)
+    assert "cannot be written" in refused("-o", place / "shut/out")
