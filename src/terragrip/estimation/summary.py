@@ -37,6 +37,7 @@ class Tally:
     sample: dict[str, list[npt.NDArray[Any]]] = field(default_factory=dict)
     _first: float | None = None
     _last_event: int = 0
+    _last_moving: tuple[str, float] | None = None
     _every: int = 1
     _sampled: int = 0
 
@@ -70,12 +71,19 @@ class Tally:
             self._every, self._sampled = 2 * self._every, (self._sampled + 1) // 2
 
     def _count_time(self, block: Estimates) -> None:
-        """Add up the time [s] of rows without an event, by label; a row lasts until the next one, at most as long as a gap is not one."""
+        """Add up the time [s] of rows without an event, by label; a row lasts until the next one, at most as long as a gap is not one.
+
+        The last row waits for the next block to say how long it lasted.
+        """
         longest = self.about.get("settings", {}).get("gap") or 1.0
+        if self._last_moving is not None:
+            name, begun = self._last_moving
+            self.moving[name] = self.moving.get(name, 0.0) + min(float(block.time[0]) - begun, longest)
         lasts = np.minimum(np.diff(block.time, append=block.time[-1]), longest)
         moving = block.event_codes == 0
         soil = block.labels.get("soil")
         names = np.full(len(block), "", dtype=object) if soil is None else soil
+        self._last_moving = (str(names[-1]), float(block.time[-1])) if moving[-1] else None
         for name in dict.fromkeys(names.tolist()):
             self.moving[str(name)] = self.moving.get(str(name), 0.0) + float(
                 lasts[moving & (names == name)].sum()
