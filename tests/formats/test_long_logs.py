@@ -280,7 +280,7 @@ def test_estimates_in_parts_are_the_estimates(
     target = tmp_path / "estimates.parquet"
     monkeypatch.setattr("terragrip.from_log.ROWS", 437)
     summary = tg.estimate_file(recording, robot(), target)
-    assert summary == whole.summary()
+    assert summary.replace(str(target), "ESTIMATES") == whole.summary()
     parts = pq.read_table(target).to_pandas()
     expected = whole.to_pandas()
     assert list(parts) == list(expected)
