@@ -47,7 +47,7 @@ def failing(failure: BaseException) -> Callable[..., None]:
     [
         (["nope"], "No such command 'nope'"),
         (["--nope"], "No such option"),
-        (["estimate"], "LOG"),
+        (["estimate"], "--vehicle"),
         (["estimate", "a.csv"], "--vehicle"),
         (["estimate", "a.csv", "--vehicle"], "requires an argument"),
         (["estimate", "a.csv", "--vehicle", "v", "-o", "o", "--metod", "x"], "--metod"),
