@@ -19,7 +19,6 @@ from terragrip.recording.chunks import CHUNK, CHUNKS, sampled_rows
 from terragrip.recording.survey import LogBlocks, survey_of
 from terragrip.report import campaign
 from terragrip.simulation import simulate
-from terragrip.studio import worker
 from terragrip.vehicle import Vehicle
 
 RUN = "grass-01"
@@ -82,8 +81,10 @@ def by_file_of_a_recording(folder: Path, drive: Any, patch: pytest.MonkeyPatch) 
 
 
 def by_studio(folder: Path, drive: Any, patch: pytest.MonkeyPatch) -> Estimates:
-    request = {"kind": "estimate", "recording": folder / "log.csv", "vehicle": folder / "vehicle.yaml"}
-    worker.run({**request, "output": folder / "out.parquet", "method": "bank"})
+    words = ["estimate", "log.csv", "--vehicle", "vehicle.yaml", "-o", "out.parquet"]
+    subprocess.run(
+        [sys.executable, "-m", "terragrip.cli.job", *words], check=True, timeout=120, cwd=folder
+    )  # as a job runs
     return Estimates.read(folder / "out.parquet")
 
 
