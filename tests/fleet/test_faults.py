@@ -47,9 +47,12 @@ def at_work(place: Path, parent: int) -> list[psutil.Process]:
 def test_a_worker_that_is_killed_in_mid_task(place: Path) -> None:
     write_log(place / "logs/a/long.csv", 7, seconds=1500.0)
     process = start(place)
-    until(lambda: at_work(place, process.pid) or process.poll() is not None)
-    (victim, *_) = at_work(place, process.pid)
-    victim.send_signal(signal.SIGKILL)
+    seen: list[
+        psutil.Process
+    ] = []  # what was at work in the moment of looking: a task may end before the next look
+    until(lambda: seen.extend(at_work(place, process.pid)) or seen or process.poll() is not None)
+    assert seen, "no task was seen at work"
+    seen[0].send_signal(signal.SIGKILL)
     output, errors = process.communicate(timeout=PATIENCE)
     assert (process.returncode, errors) == (0, "")
     assert "0 failed" in output

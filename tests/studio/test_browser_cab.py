@@ -70,13 +70,13 @@ def test_a_threshold_rings_and_is_kept(page: Any, served: Served, service: LiveS
     page.wait_for_function("() => window.terragripLive?.feed.ring.taken > 10")
     assert page.is_hidden(".alarm")
     rings = "() => window.terragripLive.alarms.rings"
-    assert page.evaluate(rings) == 0
+    quiet = page.evaluate(rings)  # a first row that is late rings as a dead source does
     page.click("summary:text-is('Alarms')")
     page.check("#alarm-sound")
     page.fill("#alarm-slip", "15")
     page.press("#alarm-slip", "Tab")
     page.wait_for_selector(".alarm:has-text('Slip 20 % is over 15 %')")
-    page.wait_for_function(f"() => ({rings})() >= 2")  # as long as it lasts
+    page.wait_for_function(f"n => ({rings})() >= n + 2", arg=quiet)  # as long as it lasts
     page.fill("#alarm-slip", "25")
     page.press("#alarm-slip", "Tab")
     page.wait_for_selector(".alarm", state="hidden")
