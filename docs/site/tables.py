@@ -10,7 +10,8 @@ from pydantic import BaseModel
 from pydantic_core import PydanticUndefined
 
 from terragrip.formats.payload import Payload
-from terragrip.formats.profile import SHIPPED, Forward, Profile, Rows, Source, TimeSource
+from terragrip.formats.profile import SHIPPED, Profile
+from terragrip.formats.profile_parts import Forward, Rows, Source, TimeSource
 from terragrip.recording.schema import AXLE_CHANNELS, CHANNELS, WHEEL_CHANNELS
 
 KEYS: dict[type[BaseModel], dict[str, str]] = {

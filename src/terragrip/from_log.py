@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from terragrip.estimation import DEFAULT, Estimates, estimated
+from terragrip.estimation import DEFAULT, Estimates, RunOptions, estimated
 from terragrip.estimation.export import require_room, require_suffix
 from terragrip.estimation.summary import Tally
 from terragrip.estimation.writing import write_parts
@@ -60,6 +60,7 @@ def estimate_file(
     ------
     InputError: the log, the vehicle or the call is unusable, or the file cannot be written.
     """
+    options = RunOptions(method, smooth, sensors, held, gap, standstill_speed)
     require_suffix(output)
     if isinstance(log, Recording):
         blocks = LogBlocks.of(log, ROWS)
@@ -70,12 +71,7 @@ def estimate_file(
     parts = estimated(
         blocks,
         vehicle,
-        method,
-        smooth=smooth,
-        sensors=sensors,
-        held=held,
-        gap=gap,
-        standstill_speed=standstill_speed,
+        options,
         beside=Path(output).parent,
         planned=lambda rows, names: require_room(output, rows, names),
         progress=progress,

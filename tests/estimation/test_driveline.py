@@ -12,7 +12,7 @@ import pytest
 import terragrip as tg
 from stock_tractor import StockMachine, stock_machine
 from terragrip.errors import InputError
-from terragrip.estimation.batch import estimated
+from terragrip.estimation.batch import RunOptions, estimated
 from terragrip.recording import LogBlocks, Recording
 from terragrip.simulation.families import Kind, draw
 
@@ -73,7 +73,7 @@ def test_columns_are_those_of_a_sum() -> None:
 def test_blocks_change_no_digit(smooth: bool) -> None:
     machine = drawn(*DRAWN[1])
     whole = tg.estimate(machine.recording, machine.vehicle, smooth=smooth)
-    parts = list(estimated(LogBlocks.of(machine.recording, 97), machine.vehicle, smooth=smooth))
+    parts = list(estimated(LogBlocks.of(machine.recording, 97), machine.vehicle, RunOptions(smooth=smooth)))
     for name in whole.columns:
         np.testing.assert_array_equal(np.concatenate([part[name] for part in parts]), whole[name], name)
 

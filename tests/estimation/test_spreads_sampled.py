@@ -11,7 +11,7 @@ import pytest
 from drives import GRAVITY, MASS, RADIUS, TIRE, WHEELS, drive, robot
 from terragrip import _kernel
 from terragrip.estimation import TractionEstimator
-from terragrip.estimation.batch import prepared
+from terragrip.estimation.forward import prepared
 from terragrip.physics.slip import slip as slip_of
 
 DRAWS = 100_000

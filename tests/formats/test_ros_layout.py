@@ -16,7 +16,7 @@ from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from terragrip.errors import InputError
 from terragrip.formats.reading import read_table
-from terragrip.formats.ros import Types, bag_topic, ros_topic
+from terragrip.formats.ros_types import Types, bag_topic, ros_topic
 from test_logs import COUNT, fill, write_ros1
 
 DEFINITION = """std_msgs/Header header

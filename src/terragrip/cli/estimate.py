@@ -60,8 +60,7 @@ def command(
     from terragrip.from_log import estimate_file
     from terragrip.vehicle import Vehicle
 
-    if not method_named(method).can_smooth and smooth:
-        raise InputError(f"the method {method} cannot smooth", place="--smooth", hint="choose another method")
+    method_named(method, smooth=smooth)
     machine = Vehicle.load(vehicle)
     drives = _drives(logs or [], profile or [], others or [], table)
     used = [p for drive in drives for p in drive.profiles if p is not None]

@@ -73,8 +73,7 @@ def command(
     from terragrip.fleet.store import is_remote
     from terragrip.report.page import require_drawing
 
-    if not method_named(method).can_smooth and smooth:
-        raise InputError(f"the method {method} cannot smooth", place="--smooth", hint="choose another method")
+    method_named(method, smooth=smooth)
     if scheduler is not None and (workers or memory):
         raise InputError(
             "is for workers on this machine",

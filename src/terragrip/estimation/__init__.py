@@ -8,6 +8,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from terragrip.estimation.batch import RunOptions as RunOptions
     from terragrip.estimation.batch import estimate as estimate
     from terragrip.estimation.batch import estimated as estimated
     from terragrip.estimation.calibration import Calibration as Calibration
@@ -23,6 +24,7 @@ if TYPE_CHECKING:
 _HOME = {
     "estimate": "batch",
     "estimated": "batch",
+    "RunOptions": "batch",
     "Estimates": "estimates",
     "Estimate": "estimator",
     "TractionEstimator": "estimator",

@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from terragrip._kernel import lib
-from terragrip.estimation.batch import finished, notes_of, prepared, table_of
 from terragrip.estimation.estimator import TractionEstimator
+from terragrip.estimation.forward import finished, prepared, table_of
 from terragrip.estimation.methods import DEFAULT
+from terragrip.estimation.provenance import notes_of
 from terragrip.recording import Recording
 
 if TYPE_CHECKING:

@@ -241,7 +241,7 @@ class TractionEstimator:
 
     def update_block(self, recording: Recording) -> Estimates:
         """Take all rows of a recording; the same as `update` row by row. Raises InputError as `update` does."""
-        from terragrip.estimation.batch import run
+        from terragrip.estimation.forward import run
 
         return run(self, recording)
 

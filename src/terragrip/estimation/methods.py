@@ -66,9 +66,12 @@ SLIP_ONLY = Method("slip-only", "slip from speeds, where no torque is measured; 
 """No choice among `METHODS`: what the channels hold decides."""
 
 
-def method_named(name: str) -> Method:
-    """The method of that name; raises InputError, which names the nearest one."""
+def method_named(name: str, *, smooth: bool = False) -> Method:
+    """The method of that name; raises InputError, which names the nearest one, or where it is to ``smooth`` and cannot."""
     if name in METHODS:
+        if smooth and not METHODS[name].can_smooth:
+            hint = "use another method, or leave out smooth"
+            raise InputError(f"the method {name} cannot smooth", hint=hint)
         return METHODS[name]
     near = nearest(name, METHODS)
     raise InputError(

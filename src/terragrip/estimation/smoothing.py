@@ -15,14 +15,14 @@ import numpy as np
 import numpy.typing as npt
 
 from terragrip.estimation.arrow import floats, texts
-from terragrip.estimation.batch import (
+from terragrip.estimation.estimates import Estimates
+from terragrip.estimation.forward import (
     finished,
     flag_before_gaps,
     passed_on,
     prepared,
     table_of,
 )
-from terragrip.estimation.estimates import Estimates
 from terragrip.estimation.put_aside import TablesAside
 
 if TYPE_CHECKING:

@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from terragrip.errors import InputError, nearest
-from terragrip.formats.profile import Profile, Source, TimeSource, matching
+from terragrip.formats.profile_parts import Source, TimeSource, matching
 from terragrip.formats.table import LogTable
 from terragrip.recording.schema import TIME
 from terragrip.units import UnitError, factor_to
+
+if TYPE_CHECKING:
+    from terragrip.formats.profile import Profile
 
 
 def bound(profile: Profile, log: LogTable, *, partial: bool = False) -> tuple[Profile, list[str]]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
@@ -18,7 +18,7 @@ from terragrip.formats.derivation import (
     roll_of,
     yaw_of,
 )
-from terragrip.formats.profile import Profile, Rows, Source, TimeSource, matching, rate_unit
+from terragrip.formats.profile_parts import Rows, Source, TimeSource, matching, rate_unit
 from terragrip.formats.table import LogTable, since_clock_was_set
 from terragrip.formats.timebase import spread, union
 from terragrip.physics.geodesy import metres_of
@@ -26,6 +26,9 @@ from terragrip.recording import Recording
 from terragrip.recording.columns import SINCE_1970, columns_of, numbers, seconds, start_of, texts
 from terragrip.recording.schema import LABELS, TIME, unit_of
 from terragrip.units import UnitError, factor_to, quantity
+
+if TYPE_CHECKING:
+    from terragrip.formats.profile import Profile
 
 Floats = npt.NDArray[np.float64]
 Column = npt.NDArray[Any]

@@ -5,7 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 from terragrip.errors import InputError
-from terragrip.formats.profile import SHIPPED, Profile, Source, matching
+from terragrip.formats.profile import SHIPPED, Profile
+from terragrip.formats.profile_parts import Source, matching
 from terragrip.formats.proposal import is_ready
 from terragrip.formats.signals import SignalLog
 from terragrip.formats.table import LogTable

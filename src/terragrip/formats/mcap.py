@@ -8,9 +8,9 @@ from pathlib import Path
 from typing import Any, BinaryIO
 
 from terragrip.formats.boundary import DAMAGE, LARGEST, as_far_as_it_goes, needed
-from terragrip.formats.messages import Parts, Topic
+from terragrip.formats.messages import Parts, Topic, log_of
 from terragrip.formats.registry import Databases, Format
-from terragrip.formats.ros import Types, bag_topic, log_of, unpacked
+from terragrip.formats.ros_types import Types, bag_topic, unpacked
 from terragrip.formats.signals import SignalLog
 from terragrip.formats.table import Wanted
 

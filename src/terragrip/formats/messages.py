@@ -9,11 +9,14 @@ from __future__ import annotations
 from array import array
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
+from pathlib import Path as FilePath
 from typing import Any
 
 import numpy as np
 
-from terragrip.formats.signals import Signal
+from terragrip.errors import InputError
+from terragrip.files import sha256
+from terragrip.formats.signals import Signal, SignalLog
 from terragrip.formats.table import Wanted, skips
 
 LONGEST_ARRAY = 16
@@ -219,3 +222,23 @@ def _shown(path: Path) -> str:
     for step in path:
         text += f"[{step}]" if isinstance(step, int) else f".{step}" if text else step
     return text
+
+
+def log_of(topics: Iterable[Topic], path: str, notes: list[str], files: Iterable[FilePath] = ()) -> SignalLog:
+    """The signals of all topics; raises InputError if no message could be read."""
+    result: dict[str, Signal] = {}
+    names: dict[str, None] = {}
+    topics, remarks = list(topics), list(notes)
+    for topic in topics:
+        signals, own = topic.signals()
+        result |= signals
+        remarks += own
+        names |= dict.fromkeys(topic.names)
+    if not any(topic.count for topic in topics):
+        bad = sum(topic.bad for topic in topics)
+        problem = f"holds no message that can be read ({bad} cannot)" if bad else "holds no message"
+        raise InputError(
+            f"{problem}{'; ' + remarks[0] if remarks else ''}", file=path, hint="check how it was recorded"
+        )
+    digest = "+".join(sha256(file) for file in files) or sha256(path)
+    return SignalLog(tuple(names), result, path, digest, tuple(remarks))

@@ -25,16 +25,17 @@ from __future__ import annotations
 
 import fnmatch
 import os
-from collections.abc import Iterable
 from functools import cached_property
 from pathlib import Path
-from typing import Annotated, Any, ClassVar, Literal, Self
+from typing import Any, ClassVar, Self
 
-from pydantic import BeforeValidator, Field, field_validator, model_validator
+from pydantic import Field, field_validator, model_validator
 
 from terragrip.document import Fault, Part, read_yaml, validate
 from terragrip.errors import InputError, nearest
+from terragrip.formats.conversion import convert
 from terragrip.formats.payload import Payload
+from terragrip.formats.profile_parts import Rows, Source, TimeSource, as_pattern, rate_unit
 from terragrip.recording import Recording
 from terragrip.recording.schema import (
     AXLE_CHANNELS,
@@ -47,131 +48,8 @@ from terragrip.recording.schema import (
 )
 from terragrip.units import UnitError, factor_to, quantity
 
-Seconds = Annotated[float, BeforeValidator(lambda value: quantity(value, "s"))]
-Quaternion = tuple[str, str, str, str]
-
 SHIPPED = ("tractor-isobus", "ros2-4wd", "simulink")
 """Profiles that come with Terragrip: give the name in place of a file."""
-
-
-class Forward(Part):
-    """What tells forward from backward: a yaw column and its unit, or the columns of a quaternion x, y, z, w."""
-
-    yaw: str | None = None
-    unit: str = "rad"
-    quaternion: Quaternion | None = None
-
-    @model_validator(mode="after")
-    def _one_of_them(self) -> Self:
-        if (self.yaw is None) == (self.quaternion is None):
-            raise Fault("needs a yaw or a quaternion", "write e.g. 'forward: {yaw: heading, unit: deg}'")
-        unit_factor(self.unit, "rad")
-        return self
-
-
-class Source(Part):
-    """Where one channel comes from, and what is done to it."""
-
-    column: str | Annotated[tuple[str, ...], Field(min_length=1)] | None = Field(None, alias="from")
-    optional: bool = False
-    over: str | None = None
-    over_minimum: float = Field(0.0, ge=0.0, allow_inf_nan=False)
-    derivative_of: Annotated[tuple[str, ...], Field(min_length=1, max_length=3)] | None = None
-    norm_of: Annotated[tuple[str, ...], Field(min_length=2, max_length=3)] | None = None
-    pitch_of: Quaternion | None = None
-    roll_of: Quaternion | None = None
-    constant: str | float | None = None
-    unit: str | None = None
-    scale: float = Field(1.0, allow_inf_nan=False)
-    offset: float = Field(0.0, allow_inf_nan=False)
-    sign: Literal[1, -1] = 1
-    delay: Seconds = 0.0
-    invalid: tuple[float | tuple[float, float], ...] = ()
-    window: Seconds = 0.5
-    forward: Forward | None = None
-    otherwise: Source | None = Field(None, alias="else")
-
-    @model_validator(mode="after")
-    def _one_source(self) -> Self:
-        given = [
-            k
-            for k in ("column", "derivative_of", "norm_of", "pitch_of", "roll_of", "constant")
-            if getattr(self, k) is not None
-        ]
-        if len(given) != 1:
-            hint = "write one of from, derivative_of, norm_of, pitch_of, roll_of, constant"
-            raise Fault("needs exactly one source", hint)
-        for key in ("window", "forward"):
-            if key in self.model_fields_set and self.derivative_of is None:
-                raise Fault("serves derivative_of only", "leave it out", (key,))
-        if self.over is not None and self.column is None:
-            raise Fault("serves from only", "leave it out", ("over",))
-        if self.over is not None and self.over_minimum <= 0:
-            hint = "write e.g. 'over_minimum: 0.3', in the divisor's unit"
-            raise Fault(
-                "needs a positive over_minimum, since a quotient over next to nothing is noise",
-                hint,
-                ("over",),
-            )
-        if self.over is None and "over_minimum" in self.model_fields_set:
-            raise Fault("serves over only", "leave it out", ("over_minimum",))
-        if self.forward is not None and len(self.derivative_of or ()) != 2:
-            raise Fault("needs derivative_of two columns, x and y", "leave it out", ("forward",))
-        if self.window <= 0:
-            raise Fault("is not a span of time", "write e.g. '0.5 s'", ("window",))
-        return self
-
-    @property
-    def is_geographic(self) -> bool:
-        """Whether it is the derivative of a latitude and a longitude."""
-        angles = ("deg", "degree", "degrees", "°")
-        return self.derivative_of is not None and len(self.derivative_of) == 2 and self.unit in angles
-
-    @property
-    def chain(self) -> tuple[Source, ...]:
-        """Itself, and what may take its place, in turn."""
-        return (self,) if self.otherwise is None else (self, *self.otherwise.chain)
-
-    @property
-    def candidates(self) -> tuple[str, ...]:
-        """The names, or patterns of names, of which the first counts."""
-        return (self.column,) if isinstance(self.column, str) else self.column or ()
-
-    @property
-    def columns(self) -> tuple[str, ...]:
-        """The log's columns that it may read, or patterns of them; those of `otherwise` are its own."""
-        heading = () if self.forward is None else (self.forward.yaw, *(self.forward.quaternion or ()))
-        every = (
-            *self.candidates,
-            self.over,
-            *(self.derivative_of or ()),
-            *(self.norm_of or ()),
-            *(self.pitch_of or ()),
-            *(self.roll_of or ()),
-            *heading,
-        )
-        return tuple(name for name in every if name is not None)
-
-
-class TimeSource(Part):
-    """The column of the stamps, its unit, and whether time begins with 0 at the first row."""
-
-    column: str = Field(TIME, alias="from")
-    unit: str = "s"
-    zero: Literal["first"] | None = None
-
-    @field_validator("unit")
-    @classmethod
-    def _is_a_time(cls, value: str) -> str:
-        unit_factor(value, "s")
-        return value
-
-
-class Rows(Part):
-    """The rows to keep: those whose ``column`` equals a value."""
-
-    column: str
-    equals: str | float | bool
 
 
 class Profile(Part):
@@ -272,30 +150,7 @@ class Profile(Part):
         Raises InputError where a column is missing (and names the nearest), where it holds text, where no row
         is left, and for whatever `Recording.from_frame` refuses. ``source`` is the file that errors name.
         """
-        from terragrip.formats.conversion import convert
-
         return convert(self, log, source)
-
-
-def as_pattern(name: str) -> str:
-    """A name with ``*`` as a pattern of `fnmatch`, in which nothing else is special."""
-    return "".join(f"[{c}]" if c in "[?" else c for c in name)
-
-
-def matching(name: str, names: Iterable[str]) -> list[str]:
-    """The names that a profile's name stands for: itself, or all that its ``*`` allows."""
-    if "*" not in name:
-        return [name] if name in names else []
-    pattern = as_pattern(name)
-    return [result for result in names if fnmatch.fnmatchcase(result, pattern)]
-
-
-def unit_factor(unit: str, target: str) -> float:
-    """Factor from a profile's unit to the schema's; raises Fault, for a validator to place."""
-    try:
-        return factor_to(unit, target)
-    except UnitError as error:
-        raise Fault(error.problem, error.hint or "") from error
 
 
 def _check_unit(name: str, origin: Source) -> None:
@@ -308,8 +163,3 @@ def _check_unit(name: str, origin: Source) -> None:
             quantity(origin.constant, target or "1")
     except UnitError as error:
         raise Fault(error.problem, error.hint or "write an SI unit", ("channels", name)) from error
-
-
-def rate_unit(unit: str) -> str:
-    """The unit of the time derivative of what is measured in ``unit``."""
-    return f"{unit} s^-1"

@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 from terragrip.errors import InputError
 from terragrip.estimation.rims import speeds_alone
-from terragrip.formats.profile import Profile, Source, matching
+from terragrip.formats.profile import Profile
+from terragrip.formats.profile_parts import Source, matching
 from terragrip.recording.schema import LABELS, REFERENCE, TIME, is_channel, unit_of
 from terragrip.units import factor_to, quantity
 

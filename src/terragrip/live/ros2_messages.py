@@ -12,7 +12,7 @@ from typing import Any
 
 from terragrip.errors import InputError
 from terragrip.formats.boundary import DAMAGE
-from terragrip.formats.ros import Types, ros_topic
+from terragrip.formats.ros_types import Types, ros_topic
 from terragrip.live.decode import Decoder
 from terragrip.live.payload import Fields, Unreadable
 from terragrip.live.uri import Uri

@@ -134,8 +134,8 @@ class Segment:
         """The rows' estimates as a table."""
         import numpy as np
 
-        from terragrip.estimation.batch import about_run
         from terragrip.estimation.estimates import Estimates
+        from terragrip.estimation.provenance import about_run
 
         table = np.frombuffer(self.estimates).reshape(len(self), -1)
         columns = {name: np.ascontiguousarray(table[:, place]) for name, place in estimator.places.items()}

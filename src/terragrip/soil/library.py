@@ -16,11 +16,12 @@ from terragrip.document import read_json
 from terragrip.errors import InputError
 from terragrip.files import replacing
 from terragrip.physics.adhesion import CURVES
-from terragrip.soil.fit import AdhesionCurve
 
 if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.figure import Figure
+
+    from terragrip.soil.fit import AdhesionCurve
 
 VERSION = 1
 

@@ -185,7 +185,7 @@ class GroundClassifier:
         """Read a classifier that `save` wrote; raises InputError on a foreign, damaged or newer file."""
         from terragrip.ground.classification.storage import load
 
-        return load(path)
+        return load(path, cls.restored)
 
     @classmethod
     def restored(cls, parameters: Mapping[str, Any], learnt: Learnt) -> Self:

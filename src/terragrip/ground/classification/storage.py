@@ -7,16 +7,15 @@ import json
 import os
 import zipfile
 import zlib
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
 import terragrip
 from terragrip.errors import InputError
 from terragrip.files import refuse_missing, replacing, unreadable
-from terragrip.ground.classification.classifier import GroundClassifier
 from terragrip.ground.classification.discriminants import Discriminants
 from terragrip.ground.classification.expert import Expert, Parts
 from terragrip.ground.classification.features import Layout
@@ -27,6 +26,8 @@ from terragrip.ground.classification.motion_law import MotionLaw
 from terragrip.ground.classification.novelty import LEVELS, SPANS, Strangeness
 from terragrip.ground.classification.roles import roles_of
 from terragrip.ground.classification.standardization import Standardization
+
+Made = TypeVar("Made")
 
 FORMAT = "terragrip ground classifier"
 VERSION = 3
@@ -89,8 +90,11 @@ def save(parameters: Mapping[str, Any], learnt: Learnt, path: str | os.PathLike[
         np.savez_compressed(stream, **arrays)
 
 
-def load(path: str | os.PathLike[str]) -> GroundClassifier:
-    """Read a classifier that `save` wrote. Raises InputError on a missing, foreign, damaged or newer file."""
+def load(path: str | os.PathLike[str], make: Callable[[Mapping[str, Any], Learnt], Made]) -> Made:
+    """What ``make`` makes of the parameters and of what was learnt in a file that `save` wrote.
+
+    Raises InputError on a missing, foreign, damaged or newer file; one whose parameters ``make`` refuses is damaged.
+    """
     refuse_missing(path, suffixes=(".npz",))
     try:
         content = Path(path).read_bytes()
@@ -109,7 +113,7 @@ def load(path: str | os.PathLike[str]) -> GroundClassifier:
                 )
             learnt = _learnt(header, archive)
             try:
-                return GroundClassifier.restored(header["parameters"], learnt)
+                return make(header["parameters"], learnt)
             except InputError as error:
                 raise ValueError(error) from error
     except InputError:

@@ -127,12 +127,13 @@ def inspect_log(
 
 def _begun(log: Path, profile: str | None, vehicle: Path, method: str) -> str | None:
     """Begin to estimate a log: all checks, the pass over all rows, the first rows through the filter; why it fails, or None."""
-    from terragrip.estimation import DEFAULT, estimated
+    from terragrip.estimation import DEFAULT, RunOptions, estimated
     from terragrip.formats.log_blocks import log_in_blocks
     from terragrip.vehicle import Vehicle
 
     try:
-        next(estimated(log_in_blocks(log, profile), Vehicle.load(vehicle), method or DEFAULT), None)
+        options = RunOptions(method or DEFAULT)
+        next(estimated(log_in_blocks(log, profile), Vehicle.load(vehicle), options), None)
     except InputError as error:
         return str(error)
     return None

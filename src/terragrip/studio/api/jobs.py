@@ -23,24 +23,25 @@ class Request(BaseModel):
     replace: bool = False
 
 
-class EstimateRequest(Request):
+class EstimationRequest(Request):
+    """What every estimation is asked for."""
+
+    vehicle: str
+    profile: str | None = None
+    method: str = DEFAULT
+    smooth: bool = False
+
+
+class EstimateRequest(EstimationRequest):
     """Estimate one recording into a Parquet file."""
 
     recording: str
-    vehicle: str
-    profile: str | None = None
-    method: str = DEFAULT
-    smooth: bool = False
 
 
-class BatchRequest(Request):
+class BatchRequest(EstimationRequest):
     """Estimate several recordings into a folder, which is made if need be."""
 
     recordings: list[str] = Field(min_length=2)
-    vehicle: str
-    profile: str | None = None
-    method: str = DEFAULT
-    smooth: bool = False
 
 
 class CalibrateRequest(Request):
@@ -155,10 +156,9 @@ async def add_report(studio: Here, wanted: ReportRequest) -> dict[str, Any]:
     return _queue(studio, "report", wanted.estimates, wanted, (".html",), options)
 
 
-def _estimation(studio: Here, wanted: EstimateRequest | BatchRequest) -> list[str]:
+def _estimation(studio: Here, wanted: EstimationRequest) -> list[str]:
     """The options of an estimate; InputError where they do not go together."""
-    if not method_named(wanted.method).can_smooth and wanted.smooth:
-        raise InputError(f"the method {wanted.method} cannot smooth", hint="choose another method")
+    method_named(wanted.method, smooth=wanted.smooth)
     options = _options(studio, vehicle=wanted.vehicle, profile=wanted.profile)
     options += [f"--method={wanted.method}"] if wanted.method != DEFAULT else []
     return [*options, *(["--smooth"] if wanted.smooth else [])]

@@ -1,0 +1,65 @@
+"""What a table of estimates was made from, as its metadata hold it, and the sentences that go with it."""
+
+from __future__ import annotations
+
+import json
+from typing import TYPE_CHECKING, Any
+
+from terragrip.recording import unit_warnings
+from terragrip.recording.clock import clock_text
+
+if TYPE_CHECKING:
+    from terragrip.estimation.estimator import TractionEstimator
+    from terragrip.recording import Recording
+
+
+def about_recording(recording: Recording) -> dict[str, Any]:
+    """The log of a table: source and SHA-256, the clock time of its first row (``start``) and of its time 0 (``time_zero``) where
+    it says them, and the profile that it was read by (a list, of several)."""
+    about: dict[str, Any] = {"source": recording.source, "sha256": recording.sha256}
+    zero = recording.clock_zero
+    if zero is not None:
+        about |= {"start": clock_text(zero + float(recording.time[0])), "time_zero": clock_text(zero)}
+    if recording.profiles:
+        profiles = [dict(profile) for profile in recording.profiles]
+        about["profile"] = profiles[0] if len(profiles) == 1 else profiles
+    return about
+
+
+def about_run(estimator: TractionEstimator, recording: dict[str, Any], *, smooth: bool) -> dict[str, Any]:
+    """What the table was made from, ready for JSON."""
+    from terragrip import __version__
+
+    about = {
+        "version": __version__,
+        "method": estimator.method,
+        "smooth": smooth,
+        "vehicle": estimator.vehicle.to_dict(),
+        "recording": recording,
+        "settings": {
+            "noise": estimator.noise,
+            "held": estimator.held,
+            "gap": estimator.thresholds.gap,
+            "standstill_speed": estimator.engine.standstill_speed,
+        },
+    }
+    if estimator.slip_reference is not None:
+        about["zero_slip"] = {
+            wheel: {"ratio": zero.ratio, "std": zero.std, "windows": zero.windows, "doubt": zero.doubt}
+            for wheel, zero in estimator.slip_reference.zero.items()
+        }
+    plain: dict[str, Any] = json.loads(json.dumps(about))
+    return plain
+
+
+def notes_of(estimator: TractionEstimator, recording: Recording) -> tuple[str, ...]:
+    """Sentences of the reader, on units that are likely wrong, and on what the estimator had to assume."""
+    notes = [*recording.notes, *unit_warnings(recording, estimator.vehicle)]
+    guessed = [name for name in estimator.guessed if name in recording.channels]
+    if guessed:
+        shown = ", ".join(f"{name} ({estimator.noise[name]:.3g})" for name in guessed)
+        notes.append(f"The noise of {shown} is a guess from the vehicle's size: give it under 'sensors'.")
+    if estimator.slip_reference is not None:
+        notes = [note for note in notes if not note.startswith("There is no drawbar_force")]
+        notes += estimator.slip_reference.notes
+    return tuple(dict.fromkeys(notes))
