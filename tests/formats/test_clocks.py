@@ -11,9 +11,9 @@ import pytest
 import terragrip as tg
 from terragrip.errors import InputError
 from terragrip.formats import Profile, inspect
-from terragrip.formats.clocks import Speed, lag_between
 from terragrip.formats.csv import csv_on_disk
 from terragrip.formats.log_blocks import recordings_of
+from terragrip.recording.lag import Speed, lag_between
 from test_sources import nmea
 
 TIME = np.round(np.arange(0, 200, 0.05), 2)

@@ -14,7 +14,7 @@ import terragrip as tg
 from can_frames import GROUND_BASED, START, drive, write_log
 from terragrip.cli import main
 from terragrip.errors import InputError
-from terragrip.formats.clocks import offset_between
+from terragrip.recording.lag import offset_between
 
 
 def speed_at(time: np.ndarray) -> np.ndarray:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -61,8 +61,9 @@ def command(
     """
     from terragrip.errors import InputError
     from terragrip.estimation import Estimates
-    from terragrip.maps import MapMaker, MapSettings, write_map
+    from terragrip.maps import MapSettings, map_of, write_map
     from terragrip.maps.layers import LAYERS
+    from terragrip.maps.soils import sections_by_run
     from terragrip.maps.writing import require_suffix
     from terragrip.soil.estimates import distinct
     from terragrip.soil.library import SoilLibrary
@@ -80,31 +81,18 @@ def command(
         raise InputError(f"there is no layer {layer!r}", place="--layer", hint=f"take {', '.join(LAYERS)}")
     library = SoilLibrary.load(soils) if soils else None
     files = distinct(inputs)
-    maker = MapMaker(
-        MapSettings(cell, slip, datum, fill), library, _sections(ground, [path.stem for path in files])
-    )
+    sections = sections_by_run(ground, [path.stem for path in files]) if ground else {}
+    runs = ((path.stem, Estimates.read(path), str(path)) for path in files)
+    steps = len(files) + 2
     with progress("map", quiet) as step:
-        for number, path in enumerate(files, 1):
-            maker.add(Estimates.read(path), path.stem, str(path))
-            step(number, len(files) + 2)
-        made = maker.finish()
-        step(len(files) + 1, len(files) + 2)
+        made = map_of(
+            runs, MapSettings(cell, slip, datum, fill), library, lambda done: step(done, steps), sections
+        )
+        step(steps - 1, steps)
         write_map(made, target, layer)
     if not quiet:
         print(summary(made))
         print(f"Written to {output}")
-
-
-def _sections(ground: Path | None, runs: list[str]) -> dict[str, list[Any]]:
-    """Sections of ground.json by run; those of one drive alone are the only run's."""
-    if ground is None:
-        return {}
-    from terragrip.document import read_json
-
-    found: dict[str, list[Any]] = {}
-    for one in read_json(str(ground), "sections", 1, "'terragrip ground'")["sections"]:
-        found.setdefault(str(one.get("run", runs[0])), []).append(one)
-    return found
 
 
 def summary(made: FieldMap) -> str:

@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 
 from terragrip.errors import InputError
-from terragrip.formats.clocks import lag_within
 from terragrip.formats.conversion import converted_block, first_start, settled
 from terragrip.formats.profile import Profile
 from terragrip.formats.registry import format_of
@@ -18,6 +17,7 @@ from terragrip.formats.table import LogTable, in_si, since_clock_was_set
 from terragrip.formats.table_on_disk import Columns, TableOnDisk
 from terragrip.recording import LogBlocks, Recording, checks
 from terragrip.recording.columns import numbers, seconds, start_of, texts
+from terragrip.recording.lag import lag_within
 from terragrip.recording.schema import LABELS, TIME, is_own
 from terragrip.recording.survey import ROWS
 

@@ -9,7 +9,6 @@ from dataclasses import replace
 import numpy as np
 
 from terragrip.errors import InputError
-from terragrip.formats.clocks import lag_within
 from terragrip.formats.conversion import Part
 from terragrip.formats.profile import SHIPPED, Profile
 from terragrip.formats.registry import Databases, format_of
@@ -17,6 +16,7 @@ from terragrip.formats.signals import SignalLog
 from terragrip.formats.table import LogTable, Wanted, in_si, since_clock_was_set
 from terragrip.recording import Recording, checks
 from terragrip.recording.columns import seconds, start_of
+from terragrip.recording.lag import lag_within
 from terragrip.recording.schema import TIME, is_own
 
 PathLike = str | os.PathLike[str]

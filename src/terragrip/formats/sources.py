@@ -11,10 +11,10 @@ import numpy as np
 import numpy.typing as npt
 
 from terragrip.errors import InputError
-from terragrip.formats.clocks import lag_between, speed_of
 from terragrip.formats.conversion import Part
 from terragrip.formats.signals import Signal, SignalLog
 from terragrip.recording import Recording
+from terragrip.recording.lag import lag_between, speed_of
 from terragrip.recording.schema import TIME, unit_of
 
 Floats = npt.NDArray[np.float64]

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from terragrip.maps.columns import Columns
 from terragrip.maps.values import Reading
 
 Floats = npt.NDArray[np.float64]
@@ -29,7 +30,7 @@ VAGUE_X = 0.35
 
 
 @dataclass(frozen=True)
-class Pieces:
+class Pieces(Columns):
     """Consecutive rows of one reading in one part of a cell, many of them (m,).
 
     ``column``, ``row``: the cell; ``run``: number of the run; ``time`` [s] of the first row; ``metres`` of way; ``x``, ``y`` and their
@@ -53,7 +54,7 @@ class Pieces:
 
 
 @dataclass(frozen=True)
-class Cells:
+class Cells(Columns):
     """Cells of one quantity (k,), or of its passes: grid ``column`` and ``row``, ``value``, ``std``, ``constant`` (the part of ``std`` that
     all cells share), ``count`` of rows, ``passes``; ``run``, ``time`` of the first pass; ``headland`` share of the way."""
 
@@ -67,9 +68,6 @@ class Cells:
     run: Ints
     time: Floats
     headland: Floats
-
-    def __len__(self) -> int:
-        return len(self.value)
 
 
 def pieces_of(
@@ -94,11 +92,7 @@ def pieces_of(
         column[begin], line[begin], np.full(len(begin), run), time[rows][begin], total(np.ones(len(time))), turned * total(reading.x),
         turned * y, spreads[0], spreads[1], spreads[2], spreads[3], np.diff(np.r_[begin, len(rows)]), headland[rows][begin],
     )  # fmt: skip
-    return _where(pieces, pieces.metres > 0)
-
-
-def _where(pieces: Pieces, keep: npt.NDArray[np.bool_] | npt.NDArray[np.intp]) -> Pieces:
-    return Pieces(*(getattr(pieces, name)[keep] for name in Pieces.__dataclass_fields__))
+    return pieces.where(pieces.metres > 0)
 
 
 def cells_of(parts: Sequence[Pieces], correlated: float) -> tuple[Cells, Cells]:
@@ -109,10 +103,8 @@ def cells_of(parts: Sequence[Pieces], correlated: float) -> tuple[Cells, Cells]:
     map: how the ground varies within a cell, and random errors over a piece), and the estimator's own random variance, once for every
     `correlated` metres of wheel way.
     """
-    joined = Pieces(
-        *(np.concatenate([getattr(p, name) for p in parts]) for name in Pieces.__dataclass_fields__)
-    )
-    joined = _where(joined, np.lexsort((joined.time, joined.run, joined.row, joined.column)))
+    joined = Pieces.joined(parts)
+    joined = joined.where(np.lexsort((joined.time, joined.run, joined.row, joined.column)))
     new_cell = _starts(joined.column, joined.row)
     new_pass = new_cell | _starts(joined.run) | (np.diff(joined.time, prepend=-np.inf) > PASS_TIME)
     cell = np.cumsum(new_cell) - 1
@@ -165,4 +157,4 @@ def _summed(
         pieces.column[begin], pieces.row[begin], value, std, constant, rows, passes, pieces.run[begin], pieces.time[begin], headland
     )  # fmt: skip
     known = (metres > LEAST_WAY) & (x > LEAST_X * metres) & (x_share * np.sqrt(once) < VAGUE_X)
-    return Cells(*(getattr(cells, name)[known] for name in Cells.__dataclass_fields__))
+    return cells.where(known)

@@ -9,13 +9,14 @@ import numpy.typing as npt
 
 from terragrip.maps.anomalies import FALSE_DISCOVERIES, significant
 from terragrip.maps.cells import Cells
+from terragrip.maps.columns import Columns
 
 Floats = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
 
 
 @dataclass(frozen=True)
-class Changes:
+class Changes(Columns):
     """Cells (k,) that were driven more than once: ``first`` and ``last`` value, ``difference`` with ``std``, ``p``, ``significant``; the
     runs of both (numbers) and the seconds between them where both are of one run, else NaN."""
 
@@ -30,9 +31,6 @@ class Changes:
     first_run: Ints
     last_run: Ints
     seconds: Floats
-
-    def __len__(self) -> int:
-        return len(self.difference)
 
 
 def changes_of(passes: Cells, share: float = FALSE_DISCOVERIES, *, same_machine: bool = True) -> Changes:

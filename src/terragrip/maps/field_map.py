@@ -160,15 +160,19 @@ class MapMaker:
 
 
 def map_of(
-    runs: Iterable[tuple[str, Estimates]],
+    runs: Iterable[tuple[str, Estimates] | tuple[str, Estimates, str]],
     settings: MapSettings | None = None,
     library: SoilLibrary | None = None,
     progress: Callable[[int], None] | None = None,
+    ground: Mapping[str, list[Mapping[str, object]]] | None = None,
 ) -> FieldMap:
-    """The map of runs (name, estimates); raises as `MapMaker`."""
-    maker = MapMaker(settings or MapSettings(), library)
-    for number, (run, estimates) in enumerate(runs, 1):
-        maker.add(estimates, run)
+    """The map of runs (name, estimates, and the file that errors name), of which one at a time is held in memory.
+
+    ``ground``: sections of ground.json by run; ``progress`` is called with the runs done. Raises as `MapMaker`.
+    """
+    maker = MapMaker(settings or MapSettings(), library, ground or {})
+    for number, (run, estimates, *file) in enumerate(runs, 1):
+        maker.add(estimates, run, *file)
         if progress:
             progress(number)
     return maker.finish()

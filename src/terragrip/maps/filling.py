@@ -54,7 +54,7 @@ def filled(cells: Cells, reach: float) -> Cells:
         wanted[:, 0], wanted[:, 1], value, np.sqrt(variance + constant**2), constant, none, none, cells.run[nearest],
         np.full(len(wanted), np.nan), cells.headland[nearest],
     )  # fmt: skip
-    return Cells(*(np.concatenate([getattr(cells, n), getattr(new, n)]) for n in Cells.__dataclass_fields__))
+    return Cells.joined([cells, new])
 
 
 def _near(

@@ -9,8 +9,8 @@ import numpy as np
 import numpy.typing as npt
 
 from terragrip.errors import InputError
-from terragrip.formats.clocks import lag_between, speed_of, wheels_of
 from terragrip.maps.plausible import refuse_impossible
+from terragrip.recording.lag import lag_between, speed_of, wheels_of
 
 if TYPE_CHECKING:
     from terragrip.estimation import Estimates

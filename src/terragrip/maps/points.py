@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from dataclasses import dataclass, fields
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
@@ -48,14 +48,10 @@ class Points:
             name: np.concatenate([part.values.get(name, np.full(len(part), np.nan)) for part in parts])
             for name in names
         }
-
-        def whole(name: str) -> npt.NDArray[Any]:
-            return np.concatenate([getattr(part, name) for part in parts])
-
+        plain = [one.name for one in fields(cls) if one.name != "values"]
         return cls(
-            whole("run"), whole("time"), whole("east"), whole("north"), whole("heading"), whole("headland"), values,
-            whole("soil"), whole("event"),
-        )  # fmt: skip
+            values=values, **{name: np.concatenate([getattr(part, name) for part in parts]) for name in plain}
+        )
 
 
 def points_of(estimates: Estimates, places: Places, way: Floats, size: float, run: int) -> Points:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
@@ -9,6 +10,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
+from terragrip.document import read_json
+from terragrip.maps.columns import Columns
 from terragrip.maps.places import Places
 
 if TYPE_CHECKING:
@@ -19,13 +22,23 @@ Ints = npt.NDArray[np.int64]
 
 
 @dataclass(frozen=True)
-class SoilWay:
+class SoilWay(Columns):
     """Metres of way by cell and soil (m,): ``column``, ``row``, ``soil``, ``metres``; a section's soils share its metres."""
 
     column: Ints
     row: Ints
     soil: npt.NDArray[np.object_]
     metres: Floats
+
+
+def sections_by_run(
+    ground: str | os.PathLike[str], runs: Sequence[str]
+) -> dict[str, list[Mapping[str, Any]]]:
+    """Sections of a ground.json by run; those of one drive alone are the first run's. Raises InputError where it is none."""
+    result: dict[str, list[Mapping[str, Any]]] = {}
+    for one in read_json(os.fspath(ground), "sections", 1, "'terragrip ground'")["sections"]:
+        result.setdefault(str(one.get("run", runs[0])), []).append(one)
+    return result
 
 
 def soil_way(
