@@ -99,7 +99,7 @@ def test_points_are_exported_as_they_are_shown(page: Any, served: Served, tmp_pa
     rows = list(csv.DictReader((tmp_path / "points.csv").open()))
     bins = [row for row in rows if row["kind"] == "bin"]
     shown = page.evaluate(BINS)
-    np.testing.assert_allclose([float(r["adhesion"]) for r in bins], [b["mean"] for b in shown])
+    np.testing.assert_allclose([float(r["adhesion [-]"]) for r in bins], [b["mean"] for b in shown])
     points = page.evaluate("() => window.terragripFit.state.soils[0].points.slip.length")
     assert sum(row["kind"] == "point" for row in rows) == points
 

@@ -51,3 +51,24 @@ def test_focus_stays_in_the_bar_from_page_to_page(page: Any, served: Served) -> 
     page.keyboard.press("Enter")
     page.wait_for_selector("#fit-button")
     assert page.evaluate(FOCUSED) == "Fit"
+
+
+def test_the_skip_link_goes_into_the_page_and_stays_on_it(page: Any, served: Served) -> None:
+    page.goto(f"{served.url}/#/drive?path=estimates.parquet")
+    page.wait_for_selector(".charts[data-rows]")
+    page.focus(".skip")
+    page.keyboard.press("Enter")
+    page.wait_for_timeout(300)
+    assert page.evaluate("() => document.activeElement.id") == "main"
+    assert page.title().startswith("Drive")
+    page.keyboard.press("Tab")
+    assert page.evaluate("() => document.activeElement.id") == "run"
+
+
+def test_no_control_hides_below_the_cab_page(page: Any, served: Served) -> None:
+    page.goto(f"{served.url}/#/cab")
+    page.wait_for_selector("#cab-age")
+    inside = "() => document.activeElement.closest('#main') !== null || document.activeElement.matches('.skip, body')"
+    for _ in range(12):
+        page.keyboard.press("Tab")
+        assert page.evaluate(inside)

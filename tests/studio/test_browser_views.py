@@ -111,10 +111,10 @@ def test_a_link_opens_the_same_view(page: Any, served: Served) -> None:
     page.click("summary:text-is('Panels')")
     page.uncheck("label:has-text('Adhesion')")
     page.evaluate(
-        "() => { const { charts } = window.terragripDrive; charts.zoom([10, 20]); charts.setUpright('slip', [-5, 40]); }"
+        "() => { const { charts } = window.terragripDrive; charts.zoom([10, 20]); charts.setUpright('slip', [-0.05, 0.4]); }"
     )
     page.wait_for_function(
-        "() => location.hash.includes('y.slip=-5,40') && location.hash.includes('from=10')"
+        "() => location.hash.includes('y.slip=-0.05,0.4') && location.hash.includes('from=10')"
     )
     link = page.url
     page.evaluate("() => localStorage.clear()")
@@ -122,7 +122,7 @@ def test_a_link_opens_the_same_view(page: Any, served: Served) -> None:
     page.goto(link)
     page.wait_for_function(f"() => ({RANGE})().join() === '10,20'")
     assert page.locator(".chip[aria-pressed='true']").all_inner_texts() == ["rr"]
-    assert "Adhesion" not in " ".join(page.locator(".chart h3").all_inner_texts())
+    assert "Adhesion" not in " ".join(page.locator(".chart h2").all_inner_texts())
     assert page.evaluate("() => window.terragripDrive.charts.scale(0)") == [-5, 40]
 
 
@@ -197,5 +197,5 @@ def test_a_layout_is_kept_by_name(page: Any, served: Served) -> None:
     page.click("summary:text-is('Layouts')")
     page.click("#layouts button:text-is('honesty')")
     page.wait_for_function("() => document.querySelectorAll('.chart').length === 1")
-    assert "NIS" in page.inner_text(".chart h3")
+    assert "NIS" in page.inner_text(".chart h2")
     assert page.locator(".chip[aria-pressed='true']").all_inner_texts() == ["rl"]

@@ -1,7 +1,9 @@
 import { Notices } from "./ui/api";
+import { foldChoosers } from "./ui/choosers";
 import { fill, h } from "./ui/dom";
 import { keepFocus } from "./ui/focus";
 import { startTheme, switchTheme } from "./ui/theme";
+import { startUnits, unitsChooser } from "./ui/units";
 import type { Page } from "./ui/page";
 
 const PAGES: Record<string, { title: string; load: () => Promise<{ page: Page }>; unlisted?: true }> = {
@@ -29,7 +31,8 @@ async function open(): Promise<void> {
   const turn = ++opened;
   const chosen = PAGES[name];
   if (!chosen) return;
-  drawBar(name);
+  if (chosen.unlisted) fill(bar); // such a page lies over it, and its links would still be reached by Tab
+  else drawBar(name);
   document.title = `${chosen.title} · Terragrip studio`;
   const { page } = await chosen.load();
   if (turn !== opened) return;
@@ -50,6 +53,7 @@ function drawBar(current: string): void {
     h("a", { href: "#/start", class: "brand" }, "Terragrip"),
     h("nav", { "aria-label": "Pages" }, links),
     state,
+    unitsChooser(),
     h("button", { type: "button", class: "quiet", click: switchTheme, "aria-label": "Switch between light and dark" }, "◐"),
   );
 }
@@ -60,7 +64,13 @@ notices.on((notice) => {
   if (state) state.textContent = notice.up ? "" : "The studio does not answer; trying again …";
 });
 
+document.querySelector(".skip")?.addEventListener("click", (event) => {
+  event.preventDefault(); // the part of the address after "#" names the page
+  main.focus();
+});
 startTheme();
+startUnits();
 keepFocus();
+foldChoosers();
 addEventListener("hashchange", () => void open());
 void open();

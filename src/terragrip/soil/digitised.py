@@ -96,8 +96,9 @@ def _numbers(body: list[list[str]], column: int, first: int, file: str) -> Array
 
 def _title(head: list[list[str]], column: int) -> str:
     for row in head:
-        if column < len(row) and row[column] and row[column].casefold() not in ("x", "slip", "s"):
-            return row[column]
+        name = row[column] if column < len(row) else ""
+        if name and name.split("[")[0].strip().casefold() not in ("x", "slip", "s"):
+            return name
     return f"curve {column // 2 + 1}"
 
 

@@ -39,7 +39,7 @@ export class Charts {
   onRange: ((range: Range) => void) | null = null;
   /** The file was replaced while it was open. */
   onReplaced: (() => void) | null = null;
-  /** Ends of upright axes that the user set, by the panel's key; the others follow their values. */
+  /** Ends of upright axes that the user set, in SI, by the panel's key; the others follow their values. */
   uprights: Record<string, Range> = {};
   /** The time of the sample that was picked. */
   picked: number | null = null;
@@ -158,7 +158,7 @@ export class Charts {
     for (const { plot } of this.plots) plot.redraw(false);
   }
 
-  /** Set an upright axis; null lets it follow its values. */
+  /** Set an upright axis, in SI; null lets it follow its values. */
   setUpright(key: string, range: Range | null): void {
     if (range && !(range[1] > range[0])) return;
     if (range) this.uprights[key] = range;
@@ -169,6 +169,12 @@ export class Charts {
       plot.setScale("x", { min: this.range[0], max: this.range[1] });
     }
     this.onUpright?.();
+  }
+
+  /** The ends that the user set, in the panel's unit. */
+  private upright({ key, scale }: Panel): Range | null {
+    const set = this.uprights[key];
+    return set ? [set[0] * scale, set[1] * scale] : null;
   }
 
   /** The values under the cursor, once a frame; `here`: by this page's pointer, so that other pages follow. */
@@ -199,8 +205,9 @@ export class Charts {
     this.plots = panels.map((panel, i) => {
       const readout = new Readout(panel);
       const about = panel.about ? h("span", { class: "hint about", title: panel.about }, panel.about) : null;
+      const setShown = (range: Range | null): void => this.setUpright(panel.key, range && [range[0] / panel.scale, range[1] / panel.scale]);
       const upright = (text: string, title: string, change: () => Range | null): HTMLElement =>
-        h("button", { type: "button", class: "quiet", title, "aria-label": `${title}: ${panel.title}`, click: () => this.setUpright(panel.key, change()) }, text);
+        h("button", { type: "button", class: "quiet", title, "aria-label": `${title}: ${panel.title}`, click: () => setShown(change()) }, text);
       const now = (): Range => this.scale(i) ?? [0, 1];
       const middle = (): number => (now()[0] + now()[1]) / 2;
       const buttons = panel.log
@@ -212,12 +219,12 @@ export class Charts {
             upright("y−", "Shrink the upright axis", () => zoomed(now(), middle(), 1 / 0.6)),
             upright("auto", "Let the upright axis follow its values", () => null),
           );
-      const box = h("div", { class: "chart", role: "group", "aria-label": `${panel.title} over time` }, h("div", { class: "chart-head" }, h("h3", {}, `${panel.title} [${panel.unit}]`), readout.element, about, buttons));
+      const box = h("div", { class: "chart", role: "group", "aria-label": `${panel.title} over time` }, h("div", { class: "chart-head" }, h("h2", {}, `${panel.title} [${panel.unit}]`), readout.element, about, buttons));
       box.classList.toggle("fixed", panel.key in this.uprights);
       this.element.append(box);
       const plot = new uPlot(this.options(panel, box.clientWidth || 700, i === panels.length - 1), [[]], box);
       this.hear(plot);
-      if (!panel.log) hearUpright(plot.root, plot.over, now, (range) => this.setUpright(panel.key, range));
+      if (!panel.log) hearUpright(plot.root, plot.over, now, setShown);
       return { panel, plot, box, readout };
     });
     void this.fetch();
@@ -314,7 +321,7 @@ export class Charts {
       padding: [6, 20, 0, 0],
       legend: { show: false },
       cursor: { sync: { key: SYNC }, drag: { x: true, y: false, setScale: false }, points: { show: false }, y: false },
-      scales: { x: { time: false, range: () => this.range }, y: log ? { distr: 3, range: () => panel.log as Range } : { range: (plot, low, high) => this.uprights[panel.key] ?? limits(plot, low, high, panel) } },
+      scales: { x: { time: false, range: () => this.range }, y: log ? { distr: 3, range: () => panel.log as Range } : { range: (plot, low, high) => this.upright(panel) ?? limits(plot, low, high, panel) } },
       axes: [
         { ...axis, size: 24, ticks: { ...axis.ticks, size: 4 }, gap: 3, values: (_, ticks) => ticks.map((v) => `${digits(v, 6)}${last ? " s" : ""}`) },
         { ...axis, size: 52, space: 24, ...(log ? { splits: () => MARKS, filter: (_: uPlot, at: number[]) => at } : {}), values: (_, ticks) => ticks.map((v) => digits(v, 4)) },

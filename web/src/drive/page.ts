@@ -7,6 +7,7 @@ import { digits, fill, h } from "../ui/dom";
 import { note, tried } from "../ui/notes";
 import type { Page } from "../ui/page";
 import { notHere, options, runsOf } from "../ui/runs";
+import { onUnits } from "../ui/units";
 import { Charts } from "./charts";
 import { EventList } from "./events";
 import { zoomed } from "./gestures";
@@ -51,6 +52,7 @@ export const page: Page = (main, { notices, query }) => {
   let linked: View | null = asked; // until its run is open
   charts.uprights = { ...asked.uprights };
   let asking = false;
+  let sample: Sample | null = null; // the picked one
 
   const tools = h(
     "div",
@@ -191,7 +193,6 @@ export const page: Page = (main, { notices, query }) => {
     const named = link?.wheels?.filter((wheel) => found.wheels.includes(wheel)) ?? [];
     if (named.length) chosen = named;
     choice.value = wanted;
-    history.replaceState(null, "", `#/drive?path=${encodeURIComponent(wanted)}`);
     list.show(found.events);
     fill(planeWheel, found.wheels.map((wheel) => h("option", { value: wheel, selected: wheel === found.wheels.at(-1) }, wheel)));
     drawWheels();
@@ -207,7 +208,7 @@ export const page: Page = (main, { notices, query }) => {
   }
 
   function forgetSample(): void {
-    picked = null;
+    picked = sample = null;
     charts.mark(null);
     plane.at(null);
     fill(details, h("p", { class: "hint" }, CLICK));
@@ -241,6 +242,7 @@ export const page: Page = (main, { notices, query }) => {
     picked = found.time;
     charts.mark(picked);
     remember();
+    sample = found;
     showSample(found);
   }
 
@@ -250,9 +252,9 @@ export const page: Page = (main, { notices, query }) => {
     void pick((picked ?? charts.range[0]) + by * period);
   }
 
-  function showSample(sample: Sample): void {
+  function showSample(found: Sample): void {
     const wheel = planeWheel.value;
-    const of = (name: string): number => sample.values[name] ?? NaN;
+    const of = (name: string): number => found.values[name] ?? NaN;
     plane.at({
       slip: of(`slip_${wheel}`),
       adhesion: of(`adhesion_${wheel}`),
@@ -261,7 +263,7 @@ export const page: Page = (main, { notices, query }) => {
       a: of("curve_a"),
       a_std: of("curve_a_std"),
     });
-    fill(details, described(sample, during(run?.events, sample.time)));
+    fill(details, described(found, during(run?.events, found.time)));
   }
 
   function hover(time: number | null): void {
@@ -323,11 +325,17 @@ export const page: Page = (main, { notices, query }) => {
     views.back();
   };
   main.addEventListener("keydown", key);
-  const forget = notices.on((notice) => notice.kind === "folder" && void reload());
+  const forgets = [
+    notices.on((notice) => notice.kind === "folder" && void reload()),
+    onUnits(() => {
+      draw();
+      if (sample) showSample(sample);
+    }),
+  ];
   void reload();
   Object.assign(window, { terragripDrive: { charts } });
   return () => {
-    forget();
+    forgets.forEach((forget) => forget());
     main.removeEventListener("keydown", key);
     views.close();
     charts.close();

@@ -5,6 +5,7 @@ import type { Samples } from "../fit/samples";
 import { View, ticks } from "../fit/view";
 import { digits, h } from "../ui/dom";
 import { color, onTheme } from "../ui/theme";
+import { onUnits, unitFor, withUnit } from "../ui/units";
 import { nearestKnown } from "./readout";
 
 export interface Now {
@@ -41,7 +42,7 @@ export class Plane {
   private now: Now | null = null;
   private shape: Samples | null = null;
   private asked = false;
-  private forget: () => void;
+  private forgets: (() => void)[];
   private watcher: ResizeObserver;
 
   constructor() {
@@ -53,13 +54,13 @@ export class Plane {
     });
     this.view.left = 46;
     this.view.bottom = 36;
-    this.forget = onTheme(() => this.draw());
+    this.forgets = [onTheme(() => this.draw()), onUnits(() => this.draw())];
     this.watcher = new ResizeObserver(() => this.resize());
     this.watcher.observe(this.element);
   }
 
   close(): void {
-    this.forget();
+    this.forgets.forEach((forget) => forget());
     this.watcher.disconnect();
   }
 
@@ -111,7 +112,8 @@ export class Plane {
   private set(i: number): void {
     if (i === this.pointed) return;
     this.pointed = i;
-    this.readout.value = i < 0 ? "" : `s ${digits(100 * (this.points.slip[i] as number))} %   µ ${digits(this.points.adhesion[i])}   t ${(this.points.time[i] ?? NaN).toFixed(2)} s`;
+    const unit = unitFor("share");
+    this.readout.value = i < 0 ? "" : `s ${withUnit(digits(unit.scale * (this.points.slip[i] as number)), unit)}   µ ${digits(this.points.adhesion[i])}   t ${(this.points.time[i] ?? NaN).toFixed(2)} s`;
     this.later();
   }
 
@@ -139,15 +141,16 @@ export class Plane {
     pen.setTransform(devicePixelRatio, 0, 0, devicePixelRatio, 0, 0);
     pen.clearRect(0, 0, view.width, view.height);
     const ink = new CanvasInk(pen);
+    const share = unitFor("share");
     for (const x of ticks(view.x, 5)) {
       ink.line([view.px(x), view.top, view.px(x), view.height - view.bottom], { color: color("grid") });
-      ink.text(digits(100 * x), view.px(x), view.height - view.bottom + 12, color("muted"), "middle");
+      ink.text(digits(share.scale * x), view.px(x), view.height - view.bottom + 12, color("muted"), "middle");
     }
     for (const y of ticks(view.y, 5)) {
       ink.line([view.left, view.py(y), view.width - view.right, view.py(y)], { color: color("grid") });
       ink.text(digits(y), view.left - 6, view.py(y), color("muted"), "end");
     }
-    ink.text("slip [%]", (view.left + view.width - view.right) / 2, view.height - 8, color("ink"), "middle");
+    ink.text(`slip [${share.name}]`, (view.left + view.width - view.right) / 2, view.height - 8, color("ink"), "middle");
     ink.text("adhesion µ [–]", 10, view.height / 2, color("ink"), "middle", true);
     pen.save();
     pen.beginPath();

@@ -1,5 +1,7 @@
 /** A run as the server describes it, and the panels that can be drawn of it. */
 
+import { unitNamed, type Kind } from "../ui/units";
+
 export interface Span {
   name: string;
   start: number;
@@ -48,14 +50,17 @@ export interface Trace {
   band: string;
   bandColor?: string;
   dash?: number[];
-  /** From SI to what is shown. */
+  /** To what is shown, from the column. */
   scale: number;
 }
 
+/** A panel as it is shown: `unit` names the unit, and the other numbers are in it. */
 export interface Panel {
   key: string;
   title: string;
   unit: string;
+  /** To what is shown, from SI. */
+  scale: number;
   traces: Trace[];
   /** Values at which lines cross the panel, such as the expected NIS. */
   levels?: number[];
@@ -74,19 +79,22 @@ export interface Panel {
 export const WHEEL_COLORS = ["blue", "vermillion", "green", "purple", "orange", "sky", "muted", "ink"];
 const DASH = [4, 4];
 
-/** All panels that the run has columns for; `wheels` are the chosen ones. */
+/** A panel in SI; its unit is a kind of quantity, where the user chooses one, else a name. */
+type InSI = Omit<Panel, "scale" | "unit"> & { unit: Kind | "–" | "×Q₀" };
+
+/** All panels that the run has columns for, in the units that are shown; `wheels` are the chosen ones. */
 export function panelsOf(run: Run, wheels: string[]): Panel[] {
   const has = (name: string): boolean => run.columns.includes(name);
   const meant = (name: string): boolean => run.measured.includes(name);
   const color = (wheel: string): string => WHEEL_COLORS[run.wheels.indexOf(wheel) % WHEEL_COLORS.length] ?? "blue";
-  const each = (name: string, scale = 1): Trace[] =>
+  const each = (name: string): Trace[] =>
     wheels
       .filter((wheel) => has(`${name}_${wheel}`))
-      .map((wheel) => ({ column: `${name}_${wheel}`, label: wheel, color: color(wheel), band: has(`${name}_${wheel}_std`) ? `${name}_${wheel}` : "", scale }));
-  const measured = (name: string, label: string, shade: string, scale = 1): Trace[] =>
-    meant(name) ? [{ column: `measured:${name}`, label, color: shade, band: "", dash: DASH, scale }] : [];
-  const one = (column: string, label: string, shade = "blue", scale = 1): Trace[] =>
-    has(column) ? [{ column, label, color: shade, band: has(`${column}_std`) ? column : "", scale }] : [];
+      .map((wheel) => ({ column: `${name}_${wheel}`, label: wheel, color: color(wheel), band: has(`${name}_${wheel}_std`) ? `${name}_${wheel}` : "", scale: 1 }));
+  const measured = (name: string, label: string, shade: string): Trace[] =>
+    meant(name) ? [{ column: `measured:${name}`, label, color: shade, band: "", dash: DASH, scale: 1 }] : [];
+  const one = (column: string, label: string, shade = "blue"): Trace[] =>
+    has(column) ? [{ column, label, color: shade, band: has(`${column}_std`) ? column : "", scale: 1 }] : [];
   const speeds = wheels.flatMap((wheel): Trace[] => {
     const scale = run.radius[wheel] ?? NaN; // without a radius there is no speed in m/s
     const own = has(`wheel_speed_${wheel}`) && scale > 0
@@ -94,20 +102,20 @@ export function panelsOf(run: Run, wheels: string[]): Panel[] {
       : [];
     return own;
   });
-  const panels: Panel[] = [
+  const panels: InSI[] = [
     { key: "adhesion", title: "Adhesion µ", unit: "–", traces: each("adhesion") },
-    { key: "slip", title: "Slip s", unit: "%", traces: each("slip", 100), low: -20, high: 100, least: -150, most: 200 },
+    { key: "slip", title: "Slip s", unit: "share", traces: each("slip"), low: -0.2, high: 1, least: -1.5, most: 2 },
     { key: "resistance", title: "Soil resistance ρs", unit: "–", traces: one("soil_resistance", "ρs", "purple") },
-    { key: "efficiency", title: "Tractive efficiency η", unit: "%", traces: each("efficiency", 100), low: 0, high: 100, least: -100, most: 120 },
+    { key: "efficiency", title: "Tractive efficiency η", unit: "share", traces: each("efficiency"), low: 0, high: 1, least: -1, most: 1.2 },
     { key: "traction", title: "Net traction κ", unit: "–", traces: each("net_traction") },
     {
       key: "speed",
       title: "Speeds",
-      unit: "m/s",
+      unit: "speed",
       traces: [...one("ground_speed", "v", "ink"), ...measured("ground_speed", "v measured", "muted"), ...speeds],
     },
-    { key: "torque", title: "Drive torque, measured", unit: "N m", traces: wheels.flatMap((w) => measured(`drive_torque_${w}`, w, color(w)).map(solid)) },
-    { key: "drawbar", title: "Drawbar force, measured", unit: "N", traces: measured("drawbar_force", "pull", "green").map(solid) },
+    { key: "torque", title: "Drive torque, measured", unit: "torque", traces: wheels.flatMap((w) => measured(`drive_torque_${w}`, w, color(w)).map(solid)) },
+    { key: "drawbar", title: "Drawbar force, measured", unit: "force", traces: measured("drawbar_force", "pull", "green").map(solid) },
     { key: "curve", title: "Online curve: a", unit: "–", traces: one("curve_a", "a", "green"), low: 0, high: 2.5 },
     { key: "nis", title: "Filter's honesty: NIS", unit: "–", ...nis(run) },
     {
@@ -128,9 +136,15 @@ export function panelsOf(run: Run, wheels: string[]): Panel[] {
       log: [0.03, 80],
       about: "The diagonal of A: by how much innovations ask for more (above 1) or less process noise of each state. Q = [I + γ (A − I)] Q₀.",
     },
-    { key: "load", title: "Vertical load", unit: "N", traces: run.columns.filter((c) => c.startsWith("vertical_load_")).map((column, i) => ({ column, label: column.slice(14), color: WHEEL_COLORS[i] ?? "blue", band: "", scale: 1 })) },
+    { key: "load", title: "Vertical load", unit: "force", traces: run.columns.filter((c) => c.startsWith("vertical_load_")).map((column, i) => ({ column, label: column.slice(14), color: WHEEL_COLORS[i] ?? "blue", band: "", scale: 1 })) },
   ];
-  return panels.filter((panel) => panel.traces.length > 0);
+  return panels.filter((panel) => panel.traces.length > 0).map(inChosenUnit);
+}
+
+function inChosenUnit(panel: InSI): Panel {
+  const { name, scale } = unitNamed(panel.unit);
+  const scaled = (key: "low" | "high" | "least" | "most"): Partial<Panel> => (panel[key] === undefined ? {} : { [key]: panel[key] * scale });
+  return { ...panel, unit: name, scale, traces: panel.traces.map((t) => ({ ...t, scale: t.scale * scale })), ...scaled("low"), ...scaled("high"), ...scaled("least"), ...scaled("most") };
 }
 
 /** NIS over the channels taken, a mean of a second, with its limits. */

@@ -1,6 +1,7 @@
 /** The panel on the right: the active curve's model, a slider and a number field for each parameter, its fit. */
 
 import { digits, fill, h } from "../ui/dom";
+import { unitFor, withUnit } from "../ui/units";
 import { farthest } from "./samples";
 import { sameCurve } from "./scene";
 import type { Curve, FitResult, Parameter, State } from "./state";
@@ -240,7 +241,9 @@ export class CurvesPanel {
     const [mine, fitted] = [samples.of(curve.id, curve), samples.of(`fit ${curve.id}`, fit)];
     if (!mine || !fitted || !samples.isCurrent(curve.id, curve)) return "The sliders have left this fit.";
     const [slip, off] = farthest(mine, fitted);
-    return Number.isFinite(slip) ? `By hand: µ is ${off > 0 ? "+" : "−"}${digits(Math.abs(off), 2)} off this fit at ${digits(100 * slip, 3)} % slip, the most from 5 to 60 %.` : "";
+    const unit = unitFor("share");
+    const said = (share: number): string => withUnit(digits(unit.scale * share, 3), unit);
+    return Number.isFinite(slip) ? `By hand: µ is ${off > 0 ? "+" : "−"}${digits(Math.abs(off), 2)} off this fit at ${said(slip)} slip, the most from ${digits(0.05 * unit.scale)} to ${said(0.6)}.` : "";
   }
 
   private tellApart(): void {

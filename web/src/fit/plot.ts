@@ -2,6 +2,7 @@
 
 import { h } from "../ui/dom";
 import { color, onTheme } from "../ui/theme";
+import { onUnits, unitFor, withUnit } from "../ui/units";
 import { CanvasInk, SvgInk, type Ink } from "./ink";
 import { mapOf, type Calibration, type Pixel } from "./picture";
 import { drawAxes, drawCurve, drawLegend, drawSoil } from "./scene";
@@ -20,7 +21,7 @@ export class Plot {
   private stale = new Set<number>([0, 1, 2]);
   private asked = false;
   private readout = h("output", { class: "readout", "aria-hidden": "true" });
-  private forget: () => void;
+  private forgets: (() => void)[];
   private watcher: ResizeObserver;
 
   constructor(private state: State) {
@@ -33,13 +34,13 @@ export class Plot {
     );
     this.watcher = new ResizeObserver(() => this.resize());
     this.watcher.observe(this.element);
-    this.forget = onTheme(() => this.redraw("all"));
+    this.forgets = [onTheme(() => this.redraw("all")), onUnits(() => this.redraw("all"))];
     state.on((change) => this.redraw(change));
     this.listen();
   }
 
   close(): void {
-    this.forget();
+    this.forgets.forEach((forget) => forget());
     this.watcher.disconnect();
   }
 
@@ -181,7 +182,8 @@ export class Plot {
     });
     this.element.addEventListener("pointermove", (event) => {
       const [x, y] = at(event);
-      this.readout.value = this.view.inside(x, y) ? `s ${(this.view.x_of(x) * 100).toFixed(1)} %   µ ${this.view.y_of(y).toFixed(3)}` : "";
+      const unit = unitFor("share");
+      this.readout.value = this.view.inside(x, y) ? `s ${withUnit((this.view.x_of(x) * unit.scale).toFixed(unit.decimals + 1), unit)}   µ ${this.view.y_of(y).toFixed(3)}` : "";
       if (!drag) return;
       if (!drag.moved && Math.hypot(x - drag.x, y - drag.y) < 4) return;
       this.view.pan(x - drag.x, y - drag.y);

@@ -1,6 +1,7 @@
 /** What is drawn where: axes, points, bins, curves, on any ink. */
 
 import { color } from "../ui/theme";
+import { unitFor } from "../ui/units";
 import { digits } from "../ui/dom";
 import type { Ink } from "./ink";
 import type { Samples } from "./samples";
@@ -9,11 +10,12 @@ import { ticks, type View } from "./view";
 
 export function drawAxes(ink: Ink, view: View): void {
   const { width, height, left, right, top, bottom } = view;
+  const share = unitFor("share");
   const [ink_, muted, grid] = [color("ink"), color("muted"), color("grid")];
   for (const x of ticks(view.x, (width - left - right) / 90)) {
     const px = view.px(x);
     ink.line([px, top, px, height - bottom], { color: grid });
-    ink.text(digits(x * 100), px, height - bottom + 14, muted, "middle");
+    ink.text(digits(x * share.scale), px, height - bottom + 14, muted, "middle");
   }
   for (const y of ticks(view.y, (height - top - bottom) / 60)) {
     const py = view.py(y);
@@ -22,7 +24,7 @@ export function drawAxes(ink: Ink, view: View): void {
   }
   ink.line([left, top, left, height - bottom, width - right, height - bottom], { color: muted });
   if (view.y.low < 0 && view.y.high > 0) ink.line([left, view.py(0), width - right, view.py(0)], { color: muted });
-  ink.text("slip s [%]", (left + width - right) / 2, height - 10, ink_, "middle");
+  ink.text(`slip s [${share.name}]`, (left + width - right) / 2, height - 10, ink_, "middle");
   ink.text("adhesion µ (gross traction ratio less ρt) [–]", 14, (top + height - bottom) / 2, ink_, "middle", true);
 }
 

@@ -12,7 +12,7 @@ export async function curveTable(state: State): Promise<void> {
   const shown = state.kept.curves.filter((curve) => curve.shown);
   const samples = await tried(() => Promise.all(shown.map(sampled)));
   if (!samples) return;
-  const rows = [["slip", ...shown.map((curve) => quoted(curve.name))].join(",")];
+  const rows = [["slip [-]", ...shown.map((curve) => quoted(`${curve.name} [-]`))].join(",")];
   for (let i = 0; i <= 100; i++) {
     const s = i / 100;
     rows.push([s, ...samples.map((one) => Number(at(one, s).toPrecision(8)))].join(","));
@@ -37,7 +37,7 @@ export function pointTable(state: State): void {
     note("No points are shown.", "error");
     return;
   }
-  const text = [["curve", "kind", "slip", "adhesion", "std", "count"], ...rows].map((row) => row.join(",")).join("\n");
+  const text = [["curve", "kind", "slip [-]", "adhesion [-]", "std [-]", "count"], ...rows].map((row) => row.join(",")).join("\n");
   save("points.csv", new Blob([`${text}\n`], { type: "text/csv" }));
   if (thinned) note(`Points are thinned as on the plot;${thinned} Bins are of all.`);
 }

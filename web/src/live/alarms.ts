@@ -1,12 +1,14 @@
 /** Thresholds that ring: slip and grip over a limit, a warning, a source that falls silent. Set once in a browser. */
 
-import { fill, h } from "../ui/dom";
+import { digits, fill, h } from "../ui/dom";
+import { fixed, onUnits, unitFor, withUnit } from "../ui/units";
 import { WARNING, type Reading } from "./numbers";
 
 const KEY = "terragrip-alarms";
 /** Seconds between two rings while it lasts; and of one ring. */
 const [EVERY, LENGTH] = [1, 0.25];
 
+/** Limits in per cent, whatever unit is shown. */
 interface Settings {
   slip: number | null;
   grip: number | null;
@@ -34,6 +36,7 @@ export class Alarms {
   private causes = "";
   private isSilent = false;
   private mute = h("span", { class: "bad" });
+  private forget = onUnits(() => this.draw());
 
   constructor() {
     this.draw();
@@ -41,12 +44,15 @@ export class Alarms {
   }
 
   close(): void {
+    this.forget();
     void this.audio?.close();
   }
 
   /** Look at the newest row. */
   check(now: Reading, event: string): void {
-    const over = (name: string, value: number, limit: number | null): string | false => limit !== null && value > limit && `${name} ${value.toFixed(0)} % is over ${limit} %`;
+    const unit = unitFor("share");
+    const over = (name: string, value: number, limit: number | null): string | false =>
+      limit !== null && 100 * value > limit && `${name} ${withUnit(fixed(value, unit), unit)} is over ${withUnit(digits((limit / 100) * unit.scale), unit)}`;
     const causes = [over("Slip", now.slip.value, this.set.slip), over("Grip in use", now.grip.value, this.set.grip)].filter((one) => one !== false);
     const text = causes.join("; ");
     if (text !== this.causes) {
@@ -97,13 +103,15 @@ export class Alarms {
   }
 
   private draw(): void {
+    const unit = unitFor("share");
+    const shown = unit.scale / 100;
     const limit = (name: "slip" | "grip", label: string): HTMLElement => {
-      const field = h("input", { type: "number", id: `alarm-${name}`, min: 0, max: 1000, step: "any", value: this.set[name] ?? "" });
+      const field = h("input", { type: "number", id: `alarm-${name}`, min: 0, max: 1000 * shown, step: "any", value: this.set[name] === null ? "" : digits(this.set[name] * shown, 6) });
       field.addEventListener("change", () => {
-        this.set[name] = Number.isFinite(field.valueAsNumber) ? field.valueAsNumber : null;
+        this.set[name] = Number.isFinite(field.valueAsNumber) ? field.valueAsNumber / shown : null;
         this.keep();
       });
-      return h("label", { class: "field" }, label, field);
+      return h("label", { class: "field" }, `${label} [${unit.name}]`, field);
     };
     const sound = h("input", { type: "checkbox", id: "alarm-sound", checked: this.set.sound });
     sound.addEventListener("change", () => {
@@ -118,8 +126,8 @@ export class Alarms {
       h(
         "div",
         { class: "menu" },
-        limit("slip", "Slip over [%]"),
-        limit("grip", "Grip over [%]"),
+        limit("slip", "Slip over"),
+        limit("grip", "Grip over"),
         h("label", { class: "check" }, sound, "Ring (also on warnings, and when the source falls silent)"),
         this.mute,
       ),

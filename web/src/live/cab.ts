@@ -4,6 +4,7 @@ import { sampled } from "../fit/samples";
 import { fill, h } from "../ui/dom";
 import { tried } from "../ui/notes";
 import type { Page } from "../ui/page";
+import { onUnits, unitFor, unitsChooser, type Kind } from "../ui/units";
 import { Alarms } from "./alarms";
 import { Feed, type Said } from "./feed";
 import { ageOf, brief, eventNow, LINGER, reading, seconds, WARNING, type Figure } from "./numbers";
@@ -14,7 +15,7 @@ export const page: Page = (main, { query }) => {
   const replay = query.get("replay");
   const speed = Number(query.get("speed")) || 1;
   const alarms = new Alarms();
-  const tiles = { slip: tile("Slip", "%"), grip: tile("Grip in use", "%"), speed: tile("Speed", "m/s") };
+  const tiles = { slip: tile("Slip", "share"), grip: tile("Grip in use", "share"), speed: tile("Speed", "speed") };
   const warning = h("div", { class: "cab-warning", role: "alert" });
   const age = h("p", { class: "cab-age", id: "cab-age", role: "status" }, "connecting …");
   main.append(
@@ -22,7 +23,7 @@ export const page: Page = (main, { query }) => {
     h("div", { class: "cab-numbers" }, tiles.slip.element, tiles.grip.element, tiles.speed.element),
     warning,
     alarms.element,
-    h("div", { class: "cab-foot" }, age, h("span", { class: "spring" }), alarms.settings, h("button", { type: "button", click: () => void tried(() => document.documentElement.requestFullscreen()) }, "Full screen"), h("a", { class: "button", href: "#/live" }, "Leave")),
+    h("div", { class: "cab-foot" }, age, h("span", { class: "spring" }), unitsChooser(), alarms.settings, h("button", { type: "button", click: () => void tried(() => document.documentElement.requestFullscreen()) }, "Full screen"), h("a", { class: "button", href: "#/live" }, "Leave")),
   );
   let peak = NaN; // largest adhesion of the online curve over its scale
   let delay = 0;
@@ -44,8 +45,12 @@ export const page: Page = (main, { query }) => {
     why = reason;
     look();
   };
+  const forget = onUnits(() => show());
   let asked = false;
-  feed.onRows = () => {
+  feed.onRows = show;
+
+  /** The newest row, at the next frame. */
+  function show(): void {
     if (asked) return;
     asked = true;
     requestAnimationFrame(() => {
@@ -61,7 +66,7 @@ export const page: Page = (main, { query }) => {
       alarms.check(now, event);
       look();
     });
-  };
+  }
 
   /** How old the numbers are; what is old is struck out and says so in the largest letters of the page. */
   function look(): void {
@@ -84,6 +89,7 @@ export const page: Page = (main, { query }) => {
   Object.assign(window, { terragripCab: { feed, alarms } });
   return () => {
     clearInterval(watch);
+    forget();
     document.removeEventListener("visibilitychange", wake);
     void lock?.release();
     main.classList.remove("dead", "predicted");
@@ -92,12 +98,15 @@ export const page: Page = (main, { query }) => {
   };
 };
 
-function tile(title: string, unit: string): { element: HTMLElement; set: (figure: Figure) => void } {
+function tile(title: string, kind: Kind): { element: HTMLElement; set: (figure: Figure) => void } {
   const number = h("span", { class: "cab-number" }, "–");
   const more = h("p", { class: "cab-more" });
+  const name = h("h2", {}, `${title} [${unitFor(kind).name}]`);
   return {
-    element: h("section", { class: "cab-tile", "aria-label": title }, h("h2", {}, `${title} [${unit}]`), number, more),
+    element: h("section", { class: "cab-tile", "aria-label": title }, name, number, more),
     set({ shown: [value, text] }) {
+      const said = `${title} [${unitFor(kind).name}]`;
+      if (name.textContent !== said) name.textContent = said;
       if (number.textContent !== value) number.textContent = value;
       if (more.textContent !== text) more.textContent = text;
     },

@@ -1,6 +1,7 @@
 /** What the live page and the cab page say: the numbers of the newest row, and how old they are. */
 
 import { digits } from "../ui/dom";
+import { fixed, unitFor } from "../ui/units";
 import { LEAST_AGE, oldAfter, type Feed, type Hello, type Ring } from "./feed";
 
 export const WARNING: Record<string, string> = {
@@ -20,7 +21,7 @@ export interface Figure {
   shown: [string, string];
 }
 
-/** Slip of the wheel that slips most [%], share of the soil's offer in use [%], ground speed [m/s]. */
+/** Slip of the wheel that slips most, share of the soil's offer in use, ground speed [m/s]. */
 export interface Reading {
   slip: Figure;
   grip: Figure;
@@ -32,20 +33,20 @@ export function reading(ring: Ring, { wheels }: Hello, peak: number): Reading {
   const slips = wheels.map((wheel) => ring.last(`slip_${wheel}`)).filter(Number.isFinite);
   const most = Math.max(...slips);
   const wheel = wheels.find((name) => ring.last(`slip_${name}`) === most) ?? "";
-  const spread = 196 * ring.last(`slip_${wheel}_std`);
+  const [share, pace] = [unitFor("share"), unitFor("speed")];
+  const spread = 1.96 * ring.last(`slip_${wheel}_std`);
   const offered = peak * ring.last("curve_a");
   const used = Math.max(...wheels.map((name) => ring.last(`adhesion_${name}`)));
   const known = peak > 0 && ring.last("curve_a_std") < 0.35 * ring.last("curve_a");
-  const grip = known ? Math.min((100 * used) / offered, 100) : NaN;
+  const grip = known ? Math.min(used / offered, 1) : NaN;
   const v = ring.last("ground_speed");
-  const moves = Number.isFinite(v);
   return {
     slip: {
-      value: slips.length ? 100 * most : NaN,
-      shown: [slips.length ? (100 * most).toFixed(0) : "–", slips.length ? `${wheel}, ± ${spread.toFixed(0)}` : Math.abs(v) < STANDING ? "standing" : "not known"],
+      value: slips.length ? most : NaN,
+      shown: [fixed(most, share), slips.length ? `${wheel}, ± ${fixed(spread, share)}` : Math.abs(v) < STANDING ? "standing" : "not known"],
     },
-    grip: { value: grip, shown: [known ? grip.toFixed(0) : "–", known ? `µ ${digits(used, 2)} of ${digits(offered, 2)}` : `µ ${digits(used, 2)}; what the soil offers is not known yet`] },
-    speed: { value: v, shown: [moves ? v.toFixed(2) : "–", moves ? `± ${(1.96 * ring.last("ground_speed_std")).toFixed(2)}` : "not known"] },
+    grip: { value: grip, shown: [fixed(grip, share), known ? `µ ${digits(used, 2)} of ${digits(offered, 2)}` : `µ ${digits(used, 2)}; what the soil offers is not known yet`] },
+    speed: { value: v, shown: [fixed(v, pace), Number.isFinite(v) ? `± ${fixed(1.96 * ring.last("ground_speed_std"), pace)}` : "not known"] },
   };
 }
 

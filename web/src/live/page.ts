@@ -6,6 +6,7 @@ import { get, type Item } from "../ui/api";
 import { digits, fill, h } from "../ui/dom";
 import { tried } from "../ui/notes";
 import type { Page } from "../ui/page";
+import { onUnits, unitFor, unitNamed, type Kind } from "../ui/units";
 import { Alarms } from "./alarms";
 import { Feed, type Said } from "./feed";
 import { ageOf, brief, eventNow, LINGER, oldSaid, reading, seconds, WARNING } from "./numbers";
@@ -25,12 +26,12 @@ export const page: Page = (main, { notices, query }) => {
   const state = h("span", { id: "live-state", class: "state", role: "status" }, "…");
   const health = h("span", { class: "hint", id: "health" });
   const warning = h("div", { class: "warning", role: "alert", hidden: true });
-  const slip = tile("Slip", "%");
-  const grip = tile("Grip in use", "%");
-  const soil = tile("Soil", "");
-  const speedTile = tile("Speed", "m/s");
+  const slip = tile("Slip", "share");
+  const grip = tile("Grip in use", "share");
+  const soil = tile("Soil", null);
+  const speedTile = tile("Speed", "speed");
   const old = h("p", { class: "old", id: "live-age", hidden: true });
-  const said = h("ul", { class: "said", "aria-label": "Events" });
+  const said = h("ul", { class: "said", "aria-label": "Events", tabindex: "0" });
   let warnedAt = -Infinity;
   let peak = NaN; // largest adhesion of the online curve over its scale
   void tried(() => sampled({ model: "exponential", parameters: { a: 1 } })).then((shape) => shape && (peak = shape.peak[1]));
@@ -215,29 +216,39 @@ export const page: Page = (main, { notices, query }) => {
     freshness();
     alarms.silent(feed.ring.taken > 0 && main.classList.contains("stale") && traces.held === null && feed.state !== "ended");
   }, 1000 * LOOK);
-  const forget = notices.on((notice) => notice.kind === "folder" && void reload(false));
+  const forgets = [
+    notices.on((notice) => notice.kind === "folder" && void reload(false)),
+    onUnits(() => {
+      if (feed.hello) traces.show(tracesOf(feed.hello.wheels, feed.hello.columns));
+      for (const one of [slip, grip, speedTile]) one.set("–", "");
+      if (feed.ring.taken) numbers();
+    }),
+  ];
   void reload(true);
   Object.assign(window, { terragripLive: { feed, traces, alarms } });
   return () => {
     clearInterval(clock);
     clearInterval(watch);
     main.classList.remove("stale", "predicted");
-    forget();
+    forgets.forEach((forget) => forget());
     feed.close();
     alarms.close();
     traces.close();
   };
 };
 
-function tile(title: string, unit: string): { element: HTMLElement; set: (value: string, more: string) => void } {
+function tile(title: string, kind: Kind | null): { element: HTMLElement; set: (value: string, more: string) => void } {
   const number = h("span", { class: "big" }, "–");
   const more = h("span", { class: "more" }, "");
-  const element = h("div", { class: "tile" }, h("h2", {}, title), h("div", {}, number, h("span", { class: "unit" }, unit)), more);
+  const unit = h("span", { class: "unit" }, kind && unitFor(kind).name);
+  const element = h("div", { class: "tile" }, h("h2", {}, title), h("div", {}, number, unit), more);
   return {
     element,
     set(value, text) {
       if (number.textContent !== value) number.textContent = value;
       if (more.textContent !== text) more.textContent = text;
+      const name = kind ? unitFor(kind).name : "";
+      if (unit.textContent !== name) unit.textContent = name;
     },
   };
 }
@@ -248,12 +259,16 @@ function tracesOf(wheels: string[], columns: string[]): Trace[] {
       .map((wheel, i) => ({ column: `${name}_${wheel}`, color: WHEEL_COLORS[i % WHEEL_COLORS.length] ?? "blue", label: wheel }))
       .filter((line) => columns.includes(line.column));
   const one = (column: string, color: string): Trace["lines"] => (columns.includes(column) ? [{ column, color, label: column }] : []);
+  const trace = (title: string, kind: Kind | "–", lines: Trace["lines"], low: number, high: number): Trace => {
+    const { name, scale } = unitNamed(kind);
+    return { title, unit: name, scale, lines, low: low * scale, high: high * scale };
+  };
   return [
-    { title: "Slip", unit: "%", scale: 100, lines: each("slip"), low: -150, high: 200 },
-    { title: "Adhesion µ", unit: "–", scale: 1, lines: each("adhesion"), low: -0.5, high: 1.5 },
-    { title: "Ground speed", unit: "m/s", scale: 1, lines: one("ground_speed", "blue"), low: 0, high: 20 },
-    { title: "Soil resistance ρs", unit: "–", scale: 1, lines: one("soil_resistance", "purple"), low: -0.3, high: 1 },
-    { title: "Efficiency η", unit: "%", scale: 100, lines: each("efficiency"), low: 0, high: 100 },
-    { title: "Online curve a", unit: "–", scale: 1, lines: one("curve_a", "green"), low: 0, high: 3 },
+    trace("Slip", "share", each("slip"), -1.5, 2),
+    trace("Adhesion µ", "–", each("adhesion"), -0.5, 1.5),
+    trace("Ground speed", "speed", one("ground_speed", "blue"), 0, 20),
+    trace("Soil resistance ρs", "–", one("soil_resistance", "purple"), -0.3, 1),
+    trace("Efficiency η", "share", each("efficiency"), 0, 1),
+    trace("Online curve a", "–", one("curve_a", "green"), 0, 3),
   ];
 }

@@ -14,22 +14,23 @@ import { note, tried } from "../ui/notes";
 import type { Page } from "../ui/page";
 import { notHere, options, runsOf } from "../ui/runs";
 import { color, onTheme } from "../ui/theme";
+import { onUnits, unitOf, type Unit } from "../ui/units";
 import { shade, SCALE } from "./shade";
 import { corners, keepBasemap, keepCorners, keptBasemap, keptCorners, type Placed } from "./basemap";
 import { opacity, outliers, outside, spread, UNLABELLED } from "./scale";
 
 maplibre.setWorkerUrl(workerUrl);
 
-const QUANTITIES: [string, string, string, number][] = [
-  ["slip", "Slip", "%", 100],
-  ["adhesion", "Adhesion µ", "–", 1],
-  ["soil_resistance", "Soil resistance ρs", "–", 1],
-  ["net_traction", "Net traction κ", "–", 1],
-  ["efficiency", "Efficiency η", "%", 100],
-  ["ground_speed", "Ground speed", "m/s", 1],
-  ["curve_a", "Curve a", "–", 1],
-  ["nis", "NIS", "–", 1],
-  ["altitude", "Altitude", "m", 1],
+const QUANTITIES: [string, string][] = [
+  ["slip", "Slip"],
+  ["adhesion", "Adhesion µ"],
+  ["soil_resistance", "Soil resistance ρs"],
+  ["net_traction", "Net traction κ"],
+  ["efficiency", "Efficiency η"],
+  ["ground_speed", "Ground speed"],
+  ["curve_a", "Curve a"],
+  ["nis", "NIS"],
+  ["altitude", "Altitude"],
 ];
 
 export const page: Page = (main, { notices, query }) => {
@@ -74,14 +75,14 @@ export const page: Page = (main, { notices, query }) => {
     void draw();
   });
 
-  function names(): { value: string; title: string; unit: string; scale: number }[] {
+  function names(): { value: string; title: string }[] {
     if (!run) return [];
-    const out: { value: string; title: string; unit: string; scale: number }[] = [];
-    for (const [name, title, unit, scale] of QUANTITIES) {
-      if (run.columns.includes(name)) out.push({ value: name, title, unit, scale });
-      for (const wheel of run.wheels) if (run.columns.includes(`${name}_${wheel}`)) out.push({ value: `${name}_${wheel}`, title: `${title} ${wheel}`, unit, scale });
+    const out: { value: string; title: string }[] = [];
+    for (const [name, title] of QUANTITIES) {
+      if (run.columns.includes(name)) out.push({ value: name, title });
+      for (const wheel of run.wheels) if (run.columns.includes(`${name}_${wheel}`)) out.push({ value: `${name}_${wheel}`, title: `${title} ${wheel}` });
     }
-    out.push({ value: "soil", title: "Soil", unit: "", scale: 1 }, { value: "event", title: "Events", unit: "", scale: 1 });
+    out.push({ value: "soil", title: "Soil" }, { value: "event", title: "Events" });
     return out;
   }
 
@@ -91,7 +92,6 @@ export const page: Page = (main, { notices, query }) => {
     path = wanted;
     run = found;
     choice.value = wanted;
-    history.replaceState(null, "", `#/map?path=${encodeURIComponent(wanted)}`);
     const link = linked?.path === wanted ? linked : null;
     const before = (link && query.get("quantity")) || quantity.value;
     linked = null;
@@ -99,12 +99,17 @@ export const page: Page = (main, { notices, query }) => {
     if (link) charts.uprights = { ...link.uprights };
     fill(quantity, names().map((n) => h("option", { value: n.value }, n.title)));
     quantity.value = names().some((n) => n.value === before) ? before : `slip_${found.wheels.at(-1)}`;
-    charts.show(path, found, panelsOf(found, found.wheels.slice(-1)).filter((p) => p.key === "slip"));
+    showChart(found);
     charts.mark(picked);
     await draw();
     frame();
     if (link?.range) charts.zoom(link.range);
     else charts.follow();
+    remember();
+  }
+
+  function showChart(of: Run): void {
+    charts.show(path, of, panelsOf(of, of.wheels.slice(-1)).filter((p) => p.key === "slip"));
   }
 
   /** No run is shown, and why. */
@@ -162,7 +167,7 @@ export const page: Page = (main, { notices, query }) => {
     replace("track", features, "line");
     drawPicked();
     drawBrushed();
-    drawLegend(asked, low, high, beyond);
+    drawLegend(asked?.title ?? "", unitOf(quantity.value), low, high, beyond);
   }
 
   function soilAt(t: number): string {
@@ -173,7 +178,7 @@ export const page: Page = (main, { notices, query }) => {
     return during(run?.events, t);
   }
 
-  function drawLegend(asked: { title: string; unit: string; scale: number } | undefined, low: number, high: number, beyond: { under: number; over: number; least: number; most: number }): void {
+  function drawLegend(title: string, { name, scale }: Unit, low: number, high: number, beyond: { under: number; over: number; least: number; most: number }): void {
     if (!run) return;
     if (quantity.value === "soil" || quantity.value === "event") {
       const kinds = quantity.value === "soil" ? [...new Set([...run.soils.map((s) => s.name), ...(run.ground?.sections ?? []).map((s) => s.soil)])] : [...new Set(run.events.map((e) => e.kind))];
@@ -181,14 +186,13 @@ export const page: Page = (main, { notices, query }) => {
       fill(legend, kinds.length ? kinds.map((k) => h("span", {}, h("i", { class: `strip ${quantity.value === "soil" ? soilColor(k) : (EVENT_COLORS[k] ?? "ink")}` }), k)) : h("span", { class: "hint" }, "none in this run"), blank ? h("span", {}, h("i", { class: `strip ${UNLABELLED}` }), "unlabelled") : null);
       return;
     }
-    const scale = asked?.scale ?? 1;
     const bar = h("canvas", { width: 180, height: 10, class: "bar", "aria-hidden": "true" });
     const pen = bar.getContext("2d");
     for (let i = 0; pen && i < 180; i++) {
       pen.fillStyle = SCALE(i / 179);
       pen.fillRect(i, 0, 1, 10);
     }
-    fill(legend, h("span", {}, asked?.title ?? ""), h("span", {}, digits(low * scale), bar, `${digits(high * scale)} ${asked?.unit ?? ""}`), h("span", { class: "hint" }, `5 % to 95 % of the run, rows with events left out${outside(beyond, scale, asked?.unit ?? "")}${fades() ? "; paler where the 95 % interval is wider, palest where it is as wide as the scale" : ""}`));
+    fill(legend, h("span", {}, title), h("span", {}, digits(low * scale), bar, `${digits(high * scale)} ${name}`), h("span", { class: "hint" }, `5 % to 95 % of the run, rows with events left out${outside(beyond, scale, name)}${fades() ? "; paler where the 95 % interval is wider, palest where it is as wide as the scale" : ""}`));
   }
 
   function replace(id: string, features: GeoJSON.Feature[], type: "line" | "circle"): void {
@@ -256,10 +260,11 @@ export const page: Page = (main, { notices, query }) => {
   function tell(i: number): void {
     if (!track) return;
     const asked = names().find((n) => n.value === quantity.value);
+    const unit = unitOf(quantity.value);
     const t = (track.data[0] as Float64Array)[i] as number;
     const v = track.data[3]?.[i];
     const event = eventAt(t);
-    readout.value = [`t ${t.toFixed(2)} s`, v === undefined ? "" : `${asked?.title} ${digits(v * (asked?.scale ?? 1))} ${asked?.unit}`, soilAt(t), event ? `${event.kind}${event.why ? `: ${event.why}` : ""}` : ""].filter(Boolean).join("   ");
+    readout.value = [`t ${t.toFixed(2)} s`, v === undefined ? "" : `${asked?.title} ${digits(v * unit.scale)} ${unit.name}`, soilAt(t), event ? `${event.kind}${event.why ? `: ${event.why}` : ""}` : ""].filter(Boolean).join("   ");
   }
 
   charts.onCursor = mark;
@@ -372,12 +377,19 @@ export const page: Page = (main, { notices, query }) => {
     }
   }
 
-  const forget = notices.on((notice) => notice.kind === "folder" && void reload());
+  const forgets = [
+    notices.on((notice) => notice.kind === "folder" && void reload()),
+    onUnits(() => {
+      if (!run) return;
+      showChart(run);
+      void draw();
+    }),
+    forgetTheme,
+  ];
   void reload();
   Object.assign(window, { terragripMap: { map, charts } });
   return () => {
-    forget();
-    forgetTheme();
+    forgets.forEach((forget) => forget());
     charts.close();
     map.remove();
   };
