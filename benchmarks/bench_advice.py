@@ -1,15 +1,16 @@
 """How good the advised slip is on simulated machines with known truth: efficiency lost there, error of the best slip, its interval.
 
-    python benchmarks/bench_advice.py [--part development|held-out] [--machines 24] [--seed 0] [--write]
+    python benchmarks/bench_advice.py [--part development|held-out|second-plant] [--machines 24] [--seed 0] [--write]
 
-Machines of terragrip.simulation.families, split by kind (docs/decisions/0095); a drive of 50 to 150 s each at 50 Hz, estimated with the
-default method and the vehicle file as its user wrote it. The true optimum is that of the soil's own curve and resistance, sinkage
-included. The peer is one slip for all grounds: the middle of the usual band, 11.5 %. --write puts the table into docs/advice.md.
+Machines of terragrip.simulation.families, split by kind, or of the second plant (docs/decisions/0095); a drive of 50 to 150 s each at
+50 Hz, estimated with the default method and the vehicle file as its user wrote it. The true optimum is that of the soil's own curve and
+resistance, sinkage included; on the second plant by its stresses in steady motion, loads as at rest. The peer is one slip for all grounds: the middle of the usual band, 11.5 %. --write puts the table into docs/advice.md.
 """
 
 from __future__ import annotations
 
 import argparse
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -17,19 +18,23 @@ import numpy as np
 from numpy.typing import NDArray
 
 from marked import put
+from second_plant import draw as second
+from second_plant.plant import curves as second_curves
+from second_plant.result import result_of
 from terragrip.advice.analysis import advise
 from terragrip.advice.optimum import GRID, OverSlip, best_of, over_slip
 from terragrip.advice.samples import samples_by_soil
 from terragrip.advice.slip_only import BAND
 from terragrip.estimation import estimate
 from terragrip.physics.adhesion import CURVES
-from terragrip.simulation import families
+from terragrip.simulation import SimulationResult, families
 from terragrip.simulation.families import Kind
 from terragrip.simulation.scenario import Scenario
 from terragrip.vehicle import Vehicle
 
 Floats = NDArray[np.float64]
 RATE = 50.0
+PARTS = ("development", "held-out", "second-plant")
 DOCUMENT = Path(__file__).resolve().parents[1] / "docs/advice.md"
 BEGIN = "<!-- made by benchmarks/bench_advice.py --write: {part} -->"
 
@@ -58,14 +63,14 @@ class Row:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
-    parser.add_argument("--part", default="development", choices=["development", "held-out"])
+    parser.add_argument("--part", default="development", choices=PARTS)
     parser.add_argument("--machines", type=int, default=24)
     parser.add_argument("--seed", type=int, default=0, help="of the first machine")
     parser.add_argument("--write", action="store_true", help="put the table into docs/advice.md")
     arguments = parser.parse_args()
     rows: list[Row] = []
-    for kind, seed in families.machines(arguments.part, arguments.machines, arguments.seed):
-        rows += score(kind, seed)
+    for kind, seed in machines(arguments.part, arguments.machines, arguments.seed):
+        rows += score(kind, seed, arguments.part)
         print(f"{kind} {seed}: {len(rows)} soils so far", flush=True)
     text = table(rows, arguments)
     print(f"\n{text}\n")
@@ -74,9 +79,14 @@ def main() -> None:
         print(f"written to {DOCUMENT}")
 
 
-def score(kind: Kind, seed: int) -> list[Row]:
+def machines(part: str, count: int, first: int) -> Iterator[tuple[Kind, int]]:
+    """Kinds and seeds of a part."""
+    return second.machines(count, first) if part == "second-plant" else families.machines(part, count, first)  # type: ignore[arg-type]
+
+
+def score(kind: Kind, seed: int, part: str) -> list[Row]:
     """Every soil of one machine's drive that holds usable rows."""
-    result = families.draw(kind, seed, rate=RATE)
+    result, truths = drawn(kind, seed, part)
     vehicle = result.vehicle
     estimates = estimate(result.recording, vehicle)
     advice, _ = advise([estimates], vehicle)
@@ -85,7 +95,7 @@ def score(kind: Kind, seed: int) -> list[Row]:
     for soil, one in advice.items():
         if soil not in samples:
             continue
-        truth = true_curves(result.scenario, soil, vehicle, samples[soil].driven)
+        truth = truths(soil, samples[soil].driven)
         best, power = best_of(truth, truth.efficiency), best_of(truth, truth.productivity)
 
         def lost(slip: float, truth: OverSlip = truth, top: float = best.efficiency) -> float:
@@ -98,6 +108,21 @@ def score(kind: Kind, seed: int) -> list[Row]:
             Row(kind, seed, soil, best.slip, slip, *interval, lost(slip), lost(float(np.mean(BAND))), held)
         )
     return rows
+
+
+def drawn(kind: Kind, seed: int, part: str) -> tuple[SimulationResult, Callable[[str, float], OverSlip]]:
+    """A machine's drive, and its true curves by the soil's name and the driven wheels' share of the weight."""
+    if part != "second-plant":
+        result = families.draw(kind, seed, rate=RATE)
+        return result, lambda soil, driven: true_curves(result.scenario, soil, result.vehicle, driven)
+    run, scenario, vehicle, seed = second.drive(kind, seed, rate=RATE)
+
+    def truth(soil: str, driven: float) -> OverSlip:
+        ground = run.ground.soils[-1 if soil == "second" else 0]
+        mu, rho, _ = second_curves(vehicle, ground, GRID)
+        return over_slip(mu[None], rho[None], GRID, vehicle.tire_rolling_resistance, driven)
+
+    return result_of(run, scenario, vehicle, seed), truth
 
 
 def true_curves(scenario: Scenario, soil: str, vehicle: Vehicle, driven: float) -> OverSlip:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -17,7 +17,7 @@ from terragrip.simulation.families import LOAD_VARIATION, MASSES, WORK, Kind, dr
 from terragrip.simulation.family_machines import Machine, draw_machine
 from terragrip.simulation.family_sensors import SENSORS, draw_faults, draw_sensors, uncertainty
 from terragrip.simulation.fields import stream
-from terragrip.simulation.scenario import Scenario
+from terragrip.simulation.scenario import Robot, Scenario
 from terragrip.units import STANDARD_GRAVITY
 from terragrip.vehicle import Vehicle
 
@@ -58,11 +58,71 @@ def draw(
     task: str = "work",
     duration: float | None = None,
 ) -> SimulationResult:
-    """One machine on its drive, as terragrip.simulation.families.draw gives it.
+    """One machine on its drive, as terragrip.simulation.families.draw gives it; arguments and errors as `drive`'s."""
+    return result_of(*drive(kind, seed, rate=rate, faults=faults, task=task, duration=duration))
+
+
+def drive(
+    kind: Kind,
+    seed: int,
+    *,
+    rate: float | None = None,
+    faults: bool = False,
+    task: str = "work",
+    duration: float | None = None,
+) -> tuple[Run, Scenario, Vehicle, int]:
+    """What each channel truly was on a drive, the scenario, the vehicle as its user wrote it, and the seed of its sensors.
+    Arguments and errors as `plan`'s. One that tips over is drawn anew."""
+    planned = plan(kind, seed, rate=rate, faults=faults, task=task, duration=duration)
+    which = (kind, seed, task, planned.scenario.duration)  # sensors and rate change nothing of it
+    if which not in _last:
+        _last.clear()
+        _last[which] = run(*planned.drive)
+    done = _last[which]
+    if max(np.abs(done["pitch"]).max(), np.abs(done["roll"]).max()) > TIPPED:
+        return drive(
+            kind,
+            seed + 1_000_000,
+            rate=rate,
+            faults=faults,
+            task=task,
+            duration=planned.scenario.duration if task == "healthy" else None,
+        )
+    return done, planned.scenario, planned.scenario.nominal_vehicle(), seed
+
+
+@dataclass(frozen=True)
+class Plan:
+    """A drive before it is driven: machine, sensors and speeds as a scenario holds them; ``vehicle`` that is driven, with its true ``radius``;
+    the ground, the work, the time step [s]."""
+
+    scenario: Scenario
+    vehicle: Vehicle
+    radius: Floats
+    ground: Ground
+    work: Work
+    step: float
+
+    @property
+    def drive(self) -> tuple[Vehicle, Floats, Robot, Ground, Work, float]:
+        """As `second_plant.plant.run` takes it."""
+        return self.vehicle, self.radius, self.scenario.robot, self.ground, self.work, self.step
+
+
+def plan(
+    kind: Kind,
+    seed: int,
+    *,
+    rate: float | None = None,
+    faults: bool = False,
+    task: str = "work",
+    duration: float | None = None,
+) -> Plan:
+    """One machine, its ground and its work.
 
     ``task``: work (speeds, pulls, curves, stops and starts), healthy (the same, rougher, for warnings) or digging (a steady command
     into soft ground, in which slip digs the wheels in). ``duration`` [s], where not drawn. Its scenario holds machine, sensors and
-    drive; the ground is this plant's own. One that tips over is drawn anew.
+    drive; the ground is this plant's own.
     Raises ValueError on a kind or task that there is not.
     """
     if kind not in kinds() or task not in TASKS:
@@ -115,21 +175,7 @@ def draw(
     error = scenario.robot.wheel_radius_sd * stream(seed, "wheel radius").standard_normal()
     radius = vehicle.wheel_radius * (1.0 + error)
     step = 1.0 / (200.0 * np.ceil(0.005 / (0.002 * beat)))
-    drive = (kind, seed, task, duration)  # sensors and rate change nothing of it
-    if drive not in _last:
-        _last.clear()
-        _last[drive] = run(vehicle, radius, scenario.robot, ground, work, float(step))
-    done = _last[drive]
-    if max(np.abs(done["pitch"]).max(), np.abs(done["roll"]).max()) > TIPPED:
-        return draw(
-            kind,
-            seed + 1_000_000,
-            rate=rate,
-            faults=faults,
-            task=task,
-            duration=duration if task == "healthy" else None,
-        )
-    return result_of(done, scenario, scenario.nominal_vehicle(), seed)
+    return Plan(scenario, vehicle, radius, ground, work, float(step))
 
 
 def _machine(rng: np.random.Generator, mass: str) -> Machine:

@@ -5,11 +5,7 @@
 #include <mujoco/mujoco.h>
 #include <string.h>
 
-typedef struct {
-    double torque[SP_WHEELS], sum[SP_WHEELS], slip[SP_WHEELS], dug[SP_WHEELS], aside[SP_WHEELS], pushed[SP_WHEELS];
-    double pull, travel, steer;
-    int32_t at_command, at_draught, at_mix;
-} memory;
+typedef sp_memory memory;
 
 typedef struct {
     double mu, load, resistance, hub, sinkage;
@@ -177,17 +173,13 @@ static void tow(const sp_machine *m, memory *o, mjData *d, double speed, double 
     }
 }
 
-int32_t sp_run(void *model_pointer, void *data_pointer, const sp_machine *m, double settle, int32_t steps, int32_t stride,
-               double *trace) {
-    const mjModel *model = (const mjModel *)model_pointer;
-    mjData *d = (mjData *)data_pointer;
+/* Steps `first` to `last`; steps before 0 settle the machine on the ground, motors off. */
+static int32_t advance(const mjModel *model, mjData *d, const sp_machine *m, memory *o, int32_t first, int32_t last, int32_t stride,
+                       double *trace) {
     const double dt = model->opt.timestep;
     const int n = m->wheels, width = SP_SCALARS + n * SP_PER_WHEEL, base = m->base_dofs;
-    const int32_t before = (int32_t)(settle / dt);
-    memory o;
-    memset(&o, 0, sizeof o);
     int32_t rows = 0;
-    for (int32_t step = -before; step <= steps; step++) {
+    for (int32_t step = first; step <= last; step++) {
         const double time = step * dt;
         mj_step1(model, d);
         const double *frame = d->xmat + 9 * m->chassis_body;
@@ -195,22 +187,22 @@ int32_t sp_run(void *model_pointer, void *data_pointer, const sp_machine *m, dou
         mj_objectVelocity(model, d, mjOBJ_BODY, m->chassis_body, velocity, 0);
         mj_objectVelocity(model, d, mjOBJ_BODY, m->chassis_body, body_velocity, 1);
         const double speed = body_velocity[3];
-        if (step > 0) o.travel += dt * fabs(speed);
+        if (step > 0) o->travel += dt * fabs(speed);
         double off = 1.0, shares[SP_SOILS] = {0.0}, forward_normal = 0.0;
         contact c[SP_WHEELS];
         memset(d->xfrc_applied, 0, 6 * (size_t)model->nbody * sizeof(double));
-        if (step >= 0) off = control(m, &o, d, time, dt);
-        for (int i = 0; i < n; i++) d->qfrc_applied[base + i] = o.torque[i];
-        o.at_mix = after(m->mix_at, m->mixes, o.at_mix, o.travel);
+        if (step >= 0) off = control(m, o, d, time, dt);
+        for (int i = 0; i < n; i++) d->qfrc_applied[base + i] = o->torque[i];
+        o->at_mix = after(m->mix_at, m->mixes, o->at_mix, o->travel);
         for (int i = 0; i < n; i++) {
-            const double at = o.travel + m->ahead[i];
-            const int32_t k = after(m->mix_at, m->mixes, o.at_mix, at);
+            const double at = o->travel + m->ahead[i];
+            const int32_t k = after(m->mix_at, m->mixes, o->at_mix, at);
             const double w = k + 1 < m->mixes ? clamp((at - m->mix_at[k]) / (m->mix_at[k + 1] - m->mix_at[k]), 0.0, 1.0) : 0.0;
             const int32_t next = k + 1 < m->mixes ? k + 1 : k;
             for (int s = 0; s < m->soils; s++) shares[s] = (1.0 - w) * m->mix[k * m->soils + s] + w * m->mix[next * m->soils + s];
-            stand(m, &o, model, d, shares, i, dt, &c[i], &forward_normal);
+            stand(m, o, model, d, shares, i, dt, &c[i], &forward_normal);
         }
-        tow(m, &o, d, speed, dt);
+        tow(m, o, d, speed, dt);
         if (step >= 0 && step % stride == 0) {
             double *row = trace + (int64_t)width * rows++, outside[3] = {0.0}, load = 0.0, resisting = 0.0;
             for (int b = 1; b < model->nbody; b++)
@@ -227,7 +219,7 @@ int32_t sp_run(void *model_pointer, void *data_pointer, const sp_machine *m, dou
             row[2] = d->xipos[3 * m->chassis_body + 1];
             row[3] = speed;
             row[4] = specific[0] - 9.80665 * frame[6] + body_velocity[2] * body_velocity[4] - body_velocity[1] * body_velocity[5];
-            row[5] = o.pull;
+            row[5] = o->pull;
             for (int k = 0; k < 3; k++) {
                 row[6 + k] = specific[k];
                 row[9 + k] = body_velocity[k];
@@ -235,7 +227,7 @@ int32_t sp_run(void *model_pointer, void *data_pointer, const sp_machine *m, dou
             row[12] = asin(clamp(frame[6], -1.0, 1.0));
             row[13] = asin(clamp(frame[7], -1.0, 1.0));
             row[14] = atan2(frame[3], frame[0]);
-            row[15] = o.travel;
+            row[15] = o->travel;
             row[16] = shares[m->soils - 1];
             row[17] = load;
             row[18] = resisting;
@@ -245,14 +237,14 @@ int32_t sp_run(void *model_pointer, void *data_pointer, const sp_machine *m, dou
             for (int i = 0; i < n; i++) {
                 double *wheel = row + SP_SCALARS + i * SP_PER_WHEEL;
                 wheel[0] = d->qvel[base + i];
-                wheel[1] = o.torque[i];
+                wheel[1] = o->torque[i];
                 wheel[2] = c[i].mu;
                 wheel[3] = c[i].load;
                 wheel[4] = c[i].resistance;
                 wheel[5] = c[i].hub;
                 wheel[6] = c[i].sinkage;
-                wheel[7] = o.slip[i];
-                wheel[8] = o.dug[i];
+                wheel[7] = o->slip[i];
+                wheel[8] = o->dug[i];
             }
         }
         mj_step2(model, d);
@@ -261,4 +253,23 @@ int32_t sp_run(void *model_pointer, void *data_pointer, const sp_machine *m, dou
         if (!isfinite(sum) || fabs(sum) > 1e6) return -rows - 1;
     }
     return rows;
+}
+
+int32_t sp_run(void *model, void *data, const sp_machine *m, double settle, int32_t steps, int32_t stride, double *trace) {
+    memory o;
+    memset(&o, 0, sizeof o);
+    const int32_t before = (int32_t)(settle / ((const mjModel *)model)->opt.timestep);
+    return advance((const mjModel *)model, (mjData *)data, m, &o, -before, steps, stride, trace);
+}
+
+int32_t sp_begin(void *model, void *data, const sp_machine *m, double settle, sp_memory *o) {
+    memset(o, 0, sizeof *o);
+    const int32_t before = (int32_t)(settle / ((const mjModel *)model)->opt.timestep);
+    return advance((const mjModel *)model, (mjData *)data, m, o, -before, -1, 1, 0);
+}
+
+int32_t sp_continue(void *model, void *data, const sp_machine *m, sp_memory *o, int32_t steps, int32_t stride, double *trace) {
+    const int32_t first = o->step;
+    o->step += steps;
+    return advance((const mjModel *)model, (mjData *)data, m, o, first, first + steps - 1, stride, trace);
 }

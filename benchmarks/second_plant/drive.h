@@ -49,12 +49,22 @@ typedef struct {
     sp_field roughness, hills, stiffness, strength; /* m; m; relative; relative */
 } sp_machine;
 
+typedef struct { /* what a drive carries from step to step beside the model's own state */
+    double torque[SP_WHEELS], sum[SP_WHEELS], slip[SP_WHEELS], dug[SP_WHEELS], aside[SP_WHEELS], pushed[SP_WHEELS];
+    double pull, travel, steer;
+    int32_t at_command, at_draught, at_mix, step;
+} sp_memory;
+
 /* Run `steps` steps of the model; every `stride` of them a row of SP_SCALARS + wheels * SP_PER_WHEEL values. Returns rows
  * written; negative: the state left the finite numbers after that many rows (less one). Scalars: time, x, y, forward speed, its
  * rate, hitch force, specific force (3, body), rates (3, body), pitch (nose up), roll, heading, travel, share of the last soil,
  * sum of normal forces, sum of resistances, forward part of normal forces, motors off, lateral speed. Per wheel: speed, motor
  * torque, tangential over normal force, normal force, resistance, hub speed, sinkage, slip felt, dug-in slip. */
 int32_t sp_run(void *model, void *data, const sp_machine *machine, double settle, int32_t steps, int32_t stride, double *trace);
+/* The same drive in pieces, so that a controller can set command and limits between them: settle it, then steps as often as
+ * wanted. Both return as sp_run does. */
+int32_t sp_begin(void *model, void *data, const sp_machine *machine, double settle, sp_memory *memory);
+int32_t sp_continue(void *model, void *data, const sp_machine *machine, sp_memory *memory, int32_t steps, int32_t stride, double *trace);
 /* Height and gradient (3 values) of the ground at a place: for tests. */
 void sp_ground(const sp_machine *machine, double x, double y, double *height_and_gradient);
 /* cdef end */

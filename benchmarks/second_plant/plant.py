@@ -80,10 +80,11 @@ class Work:
 
 @dataclass(frozen=True)
 class Run:
-    """A drive's rows at LOG_RATE; ``radius`` (wheels,) [m] is the true one."""
+    """A drive's rows at LOG_RATE; ``radius`` (wheels,) [m] is the true one; ``ground``: what it drove on."""
 
     rows: Floats
     radius: Floats
+    ground: Ground
 
     def __getitem__(self, name: str) -> Floats:
         """A single column (n,) or one a wheel (n, wheels), by the names of SCALARS and PER_WHEEL."""
@@ -107,7 +108,14 @@ def tyres(vehicle: Vehicle, radius: Floats) -> tuple[Wheel, ...]:
 
 def pull_over_weight(vehicle: Vehicle, soil: Soil, slip: Floats) -> Floats:
     """What the whole machine can pull on level ground at a slip (n,), over its weight; free wheels only resist."""
-    total = np.zeros(len(slip))
+    adhesion, resistance, driven = curves(vehicle, soil, slip)
+    return driven * adhesion - (1 - driven) * vehicle.tire_rolling_resistance - resistance
+
+
+def curves(vehicle: Vehicle, soil: Soil, slip: Floats) -> tuple[Floats, Floats, float]:
+    """In steady motion at a slip (n,) on level ground: the driven wheels' adhesion by load (n,), what the soil holds all wheels back with over
+    the weight (n,), free wheels rolling without slip, and the driven wheels' share of the weight. Loads are those at rest."""
+    pulling, resisting, carried = np.zeros(len(slip)), np.zeros(len(slip)), 0.0
     same = Counter(
         zip(
             tyres(vehicle, vehicle.wheel_radius),
@@ -118,19 +126,52 @@ def pull_over_weight(vehicle: Vehicle, soil: Soil, slip: Floats) -> Floats:
     )
     for (wheel, load, driven), count in same.items():
         adhesion, resistance, _ = steady(soil, wheel, load, slip if driven else np.zeros(len(slip)))
-        total += count * load * ((adhesion if driven else -vehicle.tire_rolling_resistance) - resistance)
-    return total / (vehicle.mass * STANDARD_GRAVITY)
+        resisting += count * load * resistance
+        if driven:
+            pulling += count * load * adhesion
+            carried += count * load
+    weight = vehicle.mass * STANDARD_GRAVITY
+    return pulling / carried, resisting / weight, carried / weight
 
 
 def run(vehicle: Vehicle, radius: Floats, robot: Robot, ground: Ground, work: Work, step: float) -> Run:
     """Drive it. ``radius`` (n,) [m] is the true one; ``robot`` holds motors and control. Raises RuntimeError where the motion
     diverges."""
+    ffi, lib = native()
+    there = stood(vehicle, radius, robot, ground, work, step)
+    stride = round(1.0 / (LOG_RATE * step))
+    steps = round(work.duration / step)
+    rows = np.empty((steps // stride + 1, len(SCALARS) + len(vehicle.wheels) * len(PER_WHEEL)))
+    count = lib.sp_run(
+        there.model, there.state, there.machine, there.settle, steps, stride,
+        ffi.cast("double *", ffi.from_buffer("double[]", rows)),
+    )  # fmt: skip
+    if count < 0:
+        raise RuntimeError(f"the motion diverges after {(-count - 1) / LOG_RATE:.2f} s")
+    return Run(rows[:count], radius, ground)
+
+
+@dataclass(frozen=True)
+class Stood:
+    """A machine put on its ground, as drive.h takes it: C pointers, seconds to ``settle``, and ``kept``, what must live as long."""
+
+    model: Any
+    state: Any
+    machine: Any
+    settle: float
+    kept: list[Any]
+
+
+def stood(
+    vehicle: Vehicle, radius: Floats, robot: Robot, ground: Ground, work: Work, step: float
+) -> Stood:
+    """The machine at the start of its way; arguments as `run` has them."""
     import mujoco
 
     ffi, lib = native()
     body = make_body(vehicle, radius, step)
     data = mujoco.MjData(body.model)
-    kept: list[Any] = []
+    kept: list[Any] = [body, data]
     machine = ffi.new("sp_machine *")
     _fill(ffi, machine, vehicle, radius, robot, body, kept)
     _lay(ffi, machine, vehicle, radius, ground, kept)
@@ -145,17 +186,9 @@ def run(vehicle: Vehicle, radius: Floats, robot: Robot, ground: Ground, work: Wo
             - float(sinkage_under(ground.soils[0], wheel, float(static_loads(vehicle)[i]), np.zeros(1))[0])
         )
     data.qpos[2] = body.height + float(np.mean(heights))
-    stride = round(1.0 / (LOG_RATE * step))
-    steps = round(work.duration / step)
-    rows = np.empty((steps // stride + 1, len(SCALARS) + len(vehicle.wheels) * len(PER_WHEEL)))
     settle = 3.0 * np.sqrt(radius.mean() / 0.2)
     model, state = (ffi.cast("void *", one._address) for one in (body.model, data))
-    count = lib.sp_run(
-        model, state, machine, settle, steps, stride, ffi.cast("double *", ffi.from_buffer("double[]", rows))
-    )
-    if count < 0:
-        raise RuntimeError(f"the motion diverges after {(-count - 1) / LOG_RATE:.2f} s")
-    return Run(rows[:count], radius)
+    return Stood(model, state, machine, float(settle), kept)
 
 
 def _pointer(ffi: Any, kept: list[Any], values: Any) -> Any:

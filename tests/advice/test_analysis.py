@@ -82,7 +82,7 @@ def test_the_reserve_is_what_the_mean_adhesion_leaves_of_the_curves_top():
 
 
 def test_without_enough_slip_no_best_slip_is_given_and_the_drive_that_would_tell_is_named():
-    one = only([drive(top=0.02)])
+    one = only([drive(top=0.01)])
     assert one.best_efficiency is None
     assert one.actions == ()
     assert any("5 to 10 %" in sentence for sentence in one.missing)

@@ -22,7 +22,7 @@ from terragrip.vehicle import Vehicle
 
 Array = NDArray[np.float64]
 
-LEAST_REACH = 0.03
+LEAST_REACH = 0.02
 """Mean slip that the hardest pulls must reach: below it, slip's own error and the curve cannot be distinguished."""
 WIDEST = 0.12
 """A best slip whose interval is wider is not given."""

@@ -23,9 +23,10 @@ LEAST_STRETCHES = 4
 LEAST_BINS = 3
 NAMES = ("ln A", "ln k", "d/A", "s_0", "r_0", "r_1")
 CENTRE = np.array([np.log(0.55), np.log(11.0), 0.1, 0.0, 0.07, 0.06])
-SPREAD = np.array([0.4, 0.45, 0.15, 0.01, 0.06, 0.05])
+SPREAD = np.array([0.4, 0.7, 0.3, 0.01, 0.06, 0.12])
 """What soils are like before any data: A about .55, k about 11 (Brixius 7.5, the paper 11.4, Burckhardt's up to 30), a fall of a tenth,
-resistance .07 that grows by .06 over all of slip (Brixius: .5/sqrt(Bn)); s_0 by the radius's spread."""
+resistance .07 that grows by .06 over all of slip (Brixius: .5/sqrt(Bn); where slip digs wheels in, several times that); s_0 by the
+radius's spread. Wide on purpose: narrower ones (.45, .15, .05 for k, d/A, r_1) bring development machines nothing."""
 SLIP_FLOOR = 0.006
 """SD of a bin's mean slip beyond its scatter: curves of the way, unequal radii."""
 MISFIT = 0.02

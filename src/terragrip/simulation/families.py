@@ -7,8 +7,8 @@ scale L = (mass/139 kg)^(1/3), forces grow as L³, torques as L⁴, inertia as L
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
 from itertools import pairwise, product
 from typing import Any, Literal
 
@@ -102,6 +102,7 @@ def draw(
     faults: bool = False,
     task: Task = "work",
     duration: float | None = None,
+    known: Mapping[str, Any] | None = None,
 ) -> SimulationResult:
     """One machine of a kind on its drive: the recording, the truth, and the vehicle as its user wrote it.
 
@@ -109,9 +110,11 @@ def draw(
     ground speed, all in one log) change what is recorded, not the machine, its ground and its drive. ``task``: work (speeds,
     pulls, curves, stops and starts), healthy (the same, rougher and with hits, for warnings) or digging (a steady command
     into a soft spot that bears less than is asked, in which slip digs the wheels in). ``duration`` [s] of work and healthy drives,
-    where not drawn. Raises InputError on a kind that there is not.
+    where not drawn. ``known``: fields of the `Machine` that are not drawn, as those of a certain tractor. Raises InputError on a kind
+    that there is not.
     """
-    return simulate(scenario(kind, seed, rate=rate, faults=faults, task=task, duration=duration), seed)
+    made = scenario(kind, seed, rate=rate, faults=faults, task=task, duration=duration, known=known)
+    return simulate(made, seed)
 
 
 def scenario(
@@ -122,12 +125,13 @@ def scenario(
     faults: bool = False,
     task: Task = "work",
     duration: float | None = None,
+    known: Mapping[str, Any] | None = None,
 ) -> Scenario:
     """The scenario that :func:`draw` simulates. Raises as it does."""
     if kind not in kinds():
         raise InputError(f"no such kind {kind}", hint="choose one of families.kinds()")
     rng = stream(seed, f"family {kind}")
-    machine = draw_machine(rng, MASSES[kind.mass])
+    machine = replace(draw_machine(rng, MASSES[kind.mass]), **(known or {}))
     soils, spots = draw_soils(rng, kind.curve, machine)
     towing = kind.sensors != "uncoupled" or task != "work"
     turning = kind.sensors != "plain" and rng.uniform() < 0.5 and task != "digging"
