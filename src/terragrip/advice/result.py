@@ -7,9 +7,11 @@ import math
 import os
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
+from pathlib import Path
 from typing import Any
 
 from terragrip.advice.optimum import Best
+from terragrip.errors import InputError
 from terragrip.files import replacing
 
 VERSION = 1
@@ -80,6 +82,24 @@ def write(advice: Mapping[str, Advice], way: Mapping[str, float], path: str | os
     text = json.dumps(to_dict(advice, way), indent=1, allow_nan=False, ensure_ascii=False)
     with replacing(path) as temporary:
         temporary.write_text(text + "\n", encoding="utf-8")
+
+
+def advised_slip(path: str | os.PathLike[str]) -> float:
+    """The slip of best efficiency of an advice.json, on the soil with the most way. InputError where it holds none."""
+    try:
+        best = json.loads(Path(path).read_text(encoding="utf-8"))["best_efficiency"]
+        slip = None if best is None else float(best["slip"])
+    except OSError as error:
+        raise InputError(
+            f"cannot be read ({error.strerror})", file=path, hint="terragrip advise writes it"
+        ) from None
+    except (ValueError, TypeError, LookupError):
+        raise InputError("is no advice.json", file=path, hint="terragrip advise writes it") from None
+    if slip is None:
+        raise InputError(
+            "advises no slip", file=path, place="best_efficiency", hint="its 'missing' says which drive would tell"
+        )
+    return slip
 
 
 def _finite(value: Any) -> Any:

@@ -102,14 +102,14 @@ class SlipSetpoint:
         elif event == "standstill":
             self.state, self.why = SLOW, "standstill"
         else:
-            doubt = lapse or event or self._doubt(estimates)
+            doubt = lapse or event or self.doubt(estimates)
             if not doubt:
                 self.state, self.why, self._trusted_at = FOLLOW, "", time
             else:
                 bridged = self._trusted_at is not None and 0 <= time - self._trusted_at <= self.limits.hold
                 self.state, self.why = (FOLLOW if bridged else SLOW), doubt
 
-    def _doubt(self, estimates: Estimated) -> str:
+    def doubt(self, estimates: Estimated) -> str:
         """Why a row without an event is not trusted; "" where it is."""
         slips, spreads = (
             [float(estimates[f"slip_{w}{tail}"]) for w in self._wheels] for tail in ("", "_std")

@@ -66,6 +66,17 @@ def command(
         Path | None,
         typer.Option("--library", metavar="FILE", help="Known soils (terragrip soils): tell which it is."),
     ] = None,
+    setpoint: Annotated[
+        str | None,
+        typer.Option(
+            "--setpoint",
+            metavar="SLIP|FILE",
+            help="Publish wheel speeds for this slip (0.11, or advice.json), as advice only; with --speed.",
+        ),
+    ] = None,
+    speed: Annotated[
+        float | None, typer.Option(metavar="M/S", help="The ground speed wanted, for --setpoint.")
+    ] = None,
     duration: Annotated[
         float | None, typer.Option(metavar="S", min=0.0, help="Stop after so many seconds.")
     ] = None,
@@ -100,6 +111,7 @@ def command(
         learn=settings is None,
         ground=ground,
         library=_library(library),
+        setpoint=_setpoint(setpoint, speed),
     )
     with asyncio.Runner(loop_factory=_loop_factory()) as runner:
         runner.run(_run(service, duration, quiet))
@@ -140,6 +152,26 @@ def _held(pairs: list[str]) -> dict[str, float]:
             )
         result[name] = period
     return result
+
+
+def _setpoint(text: str | None, speed: float | None) -> tuple[float, float] | None:
+    """Slip and ground speed wanted; raises InputError where one of them is missing or no number."""
+    if text is None and speed is None:
+        return None
+    if text is None or speed is None:
+        raise InputError(
+            "one is of no use without the other", place="--setpoint, --speed", hint="--setpoint 0.11 --speed 1.5"
+        )
+    if text.endswith(".json"):
+        from terragrip.advice.result import advised_slip
+
+        return advised_slip(text), speed
+    try:
+        return (float(text[:-1]) / 100 if text.endswith("%") else float(text)), speed
+    except ValueError:
+        raise InputError(
+            f"{text!r} is no slip and no file of advice", place="--setpoint", hint="write 0.11, 11% or advice.json"
+        ) from None
 
 
 def _library(path: Path | None) -> SoilLibrary | None:

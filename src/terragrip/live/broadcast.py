@@ -1,7 +1,7 @@
 """Messages to any number of WebSocket clients, each with a queue of its own; the studio mounts this.
 
 First comes a JSON text: ``{"kind": "hello", "version", "vehicle", "columns", "events"}``. Then JSON texts
-``{"kind": "estimate", …}``, ``event``, ``status``, ``soil``, ``ground``. A client that asks for binary gets estimates as
+``{"kind": "estimate", …}``, ``event``, ``status``, ``soil``, ``ground``, ``setpoint``. A client that asks for binary gets estimates as
 little-endian doubles instead: time [s], 1 if predicted, the event's place in ``events``, then ``columns`` in order.
 """
 

@@ -10,14 +10,14 @@ from typing import Any
 from terragrip.live.core import Row
 from terragrip.live.event import Event
 
-ESTIMATE, EVENT, STATUS, SOIL, GROUND = "estimate", "event", "status", "soil", "ground"
+ESTIMATE, EVENT, STATUS, SOIL, GROUND, SETPOINT = "estimate", "event", "status", "soil", "ground", "setpoint"
 
 
 _NOT_FINITE = re.compile(":(nan|-?inf)")
 
 
 class Message:
-    """``kind`` is `ESTIMATE`, `EVENT`, `STATUS`, `SOIL` or `GROUND`; ``row`` is there for an estimate, ``data`` for the others."""
+    """``kind`` is `ESTIMATE`, `EVENT`, `STATUS`, `SOIL`, `GROUND` or `SETPOINT`; ``row`` is there for an estimate, ``data`` for the others."""
 
     __slots__ = ("_json", "data", "kind", "row", "time")
 

@@ -6,14 +6,15 @@ import asyncio
 from collections import deque
 
 from terragrip.live.inbox import Inbox
-from terragrip.live.message import ESTIMATE, Columns, Message
+from terragrip.live.message import ESTIMATE, SETPOINT, Columns, Message
 from terragrip.live.uri import Uri
 
 CAPACITY = 1000  # messages
 
 
 class Outbox:
-    """``rate`` [Hz] and ``columns`` of the sink's URI thin out estimates; events and predictions always pass.
+    """``rate`` [Hz] and ``columns`` of the sink's URI thin out estimates, and with them the set-points that go by them; events and
+    predictions always pass.
 
     ``inbox``: where it is reported that the sink is lost, or back.
     """
@@ -28,17 +29,21 @@ class Outbox:
         self._queue: deque[Message] = deque()
         self._filled = asyncio.Event()
         self._next = float("-inf")
+        self._passed = True  # the last estimate
 
     def put(self, message: Message) -> None:
         """Add a message, or leave it out where the sink wants fewer."""
         if self.step and message.kind == ESTIMATE and message.row is not None and not message.row.predicted:
-            if self._next - self.step < message.time < self._next:
+            self._passed = not self._next - self.step < message.time < self._next
+            if not self._passed:
                 return
             # On a grid, so that 10 Hz out of 100 Hz is every tenth; anew after a pause.
             late = message.time - self._next > self.step
             self._next = (
                 message.time + self.step * (1 - 1e-6) if late or self._next < 0 else self._next + self.step
             )
+        if self.step and message.kind == SETPOINT and not self._passed:
+            return
         if len(self._queue) >= self.capacity:
             self._queue.popleft()
             self.dropped += 1

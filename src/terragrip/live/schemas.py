@@ -1,4 +1,4 @@
-"""JSON schemas of the messages, for Foxglove and MCAP: traction estimate, ground change, soil, event, status."""
+"""JSON schemas of the messages, for Foxglove and MCAP: traction estimate, ground change, soil, set-point of slip, event, status."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from typing import Any
 
 from terragrip.live.event import KINDS
-from terragrip.live.message import ESTIMATE, EVENT, GROUND, SOIL, STATUS
+from terragrip.live.message import ESTIMATE, EVENT, GROUND, SETPOINT, SOIL, STATUS
 
 _NUMBER = {"type": ["number", "null"]}
 _TEXT = {"type": "string"}
@@ -18,6 +18,7 @@ NAMES = {
     GROUND: "terragrip.GroundChange",
     SOIL: "terragrip.Soil",
     EVENT: "terragrip.Event",
+    SETPOINT: "terragrip.SlipSetpoint",
     STATUS: "terragrip.Status",
 }
 
@@ -44,6 +45,18 @@ _PROPERTIES: dict[str, dict[str, Any]] = {
         "soil": _TEXT,
         "probability": _NUMBER,
         "probabilities": {"type": "object", "additionalProperties": {"type": "number"}},
+    },
+    SETPOINT: {
+        "time": _TIME,
+        "state": {"type": "string", "enum": ["follow", "slow", "stop"]},
+        "why": _TEXT,
+        "slip": _NUMBER,
+        "speed": _NUMBER,
+        "wheel_speed": {
+            "type": "object",
+            "description": "rad/s by driven wheel; advice, no command",
+            "additionalProperties": {"type": "number"},
+        },
     },
     EVENT: {"time": _TIME, "kind": {"type": "string", "enum": list(KINDS)}, "source": _TEXT, "text": _TEXT},
     STATUS: {

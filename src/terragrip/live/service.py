@@ -16,11 +16,12 @@ from terragrip.live.decode import Decoder, check_channels
 from terragrip.live.event import Event
 from terragrip.live.feed import Feed
 from terragrip.live.inbox import CAPACITY, Inbox
-from terragrip.live.message import ESTIMATE, GROUND, SOIL, STATUS, Message
+from terragrip.live.message import ESTIMATE, GROUND, SETPOINT, SOIL, STATUS, Message
 from terragrip.live.outbox import Outbox
 from terragrip.live.payload import unpacker
 from terragrip.live.pipeline import Pipeline
 from terragrip.live.prediction import Prediction
+from terragrip.live.setpoint import LiveSetpoint
 from terragrip.live.sinks import open_sink
 from terragrip.live.sources import Source, open_source
 from terragrip.live.statistics import Statistics
@@ -53,6 +54,7 @@ class Service:
     noise: SDs [SI] by channel, as estimates of a log hold them; they win over the vehicle file's.
     learn: tell noise and held channels that are not given from the rows as they come.
     ground: report ground changes while driving; library: and which of these soils it is.
+    setpoint: slip and ground speed wanted [m/s] of the set-point to publish beside the estimates; None: none is.
     capacity: samples that may wait for the estimator before they are dropped.
 
     Raises InputError on a URI, profile, vehicle or folder that cannot be used.
@@ -73,6 +75,7 @@ class Service:
         learn: bool = True,
         ground: bool = False,
         library: SoilLibrary | None = None,
+        setpoint: tuple[float, float] | None = None,
         capacity: int = CAPACITY,
     ) -> None:
         method_named(method)
@@ -106,6 +109,12 @@ class Service:
             raise InputError(
                 "ground changes show in adhesion and soil resistance, which need drive torques",
                 place="--ground", hint="leave it out: the sources give speeds alone",
+            )  # fmt: skip
+        self.setpoint = None if setpoint is None else LiveSetpoint(vehicle, *setpoint)
+        if self.setpoint is not None and core.estimator is not None and core.estimator.rims:
+            raise InputError(
+                "a set-point of slip needs the slip of each driven wheel",
+                place="--setpoint", hint="leave it out: the sources give the drive train's speed alone",
             )  # fmt: skip
         self.sinks = [open_sink(text, vehicle, core.columns) for text in sinks]
         self.inbox = Inbox(capacity)
@@ -213,6 +222,7 @@ class Service:
             if isinstance(output, Row):
                 self.statistics.row(output, self.inbox.clock())
                 self._send(Message(ESTIMATE, output.estimate.time, output))
+                self._advise(output)
             elif isinstance(output, Ground):
                 self.statistics.ground = output
                 data = output.to_dict()
@@ -224,6 +234,11 @@ class Service:
                 self.statistics.event(output)
                 logger.info("%s: %s: %s", output.source, output.kind, output.text)
                 self._send(Message.of_event(output))
+
+    def _advise(self, row: Row) -> None:
+        """Publish the set-point, where one is wanted and the estimates hold the wheels' slips."""
+        if self.setpoint is not None and self.core.estimator is not None and not self.core.estimator.rims:
+            self._send(Message(SETPOINT, row.estimate.time, data=self.setpoint.message(row)))
 
     def _send(self, message: Message) -> None:
         for listener in self.listeners:

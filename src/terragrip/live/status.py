@@ -104,6 +104,11 @@ def head(service: Service) -> list[str]:
     if s.ground is not None:
         likely = sorted(s.ground.probabilities.items(), key=lambda one: -one[1])[:3]
         lines.append("ground: " + ", ".join(f"{name} {probability:.0%}" for name, probability in likely))
+    if service.setpoint is not None and service.setpoint.last is not None:
+        advised = service.setpoint.last
+        speeds = ", ".join(f"{wheel} {speed:.2f}" for wheel, speed in advised["wheel_speed"].items())
+        why = f" ({advised['why']})" if advised["why"] else ""
+        lines.append(f"set-point, advice only: {advised['state']}{why}   {speeds} rad/s")
     return lines
 
 

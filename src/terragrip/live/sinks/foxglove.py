@@ -25,7 +25,7 @@ _SEGMENT = 600.0  # s in one MCAP file
 
 
 class FoxgloveSink:
-    """``foxglove://127.0.0.1:8765?mcap=FOLDER``: topics /terragrip/estimate, /ground, /soil, /event, /status."""
+    """``foxglove://127.0.0.1:8765?mcap=FOLDER``: topics /terragrip/estimate, /ground, /soil, /setpoint, /event, /status."""
 
     def __init__(self, uri: Uri, vehicle: Vehicle, columns: Sequence[str]) -> None:
         import foxglove

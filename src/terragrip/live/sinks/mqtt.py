@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 
 class MqttSink:
-    """``mqtt://HOST/terragrip``: to ``terragrip/estimate``, ``terragrip/event``, ``/status``, ``/soil`` and ``/ground``."""
+    """``mqtt://HOST/terragrip``: to ``terragrip/estimate``, ``terragrip/event``, ``/status``, ``/soil``, ``/ground`` and ``/setpoint``."""
 
     def __init__(self, uri: Uri) -> None:
         self.uri = uri
