@@ -1,7 +1,7 @@
 """Adhesion and resistance of one soil over slip as a set of drawn curves: what the data say, what is known of soils, and the rest open.
 
 Model: mu(s) = A (1 - e^{-k (s - s_0)}) - d (s - s_0) (physics.md 5), rho_s(s) = r_0 + r_1 s (Brixius' manner). s_0 is
-the slip that a wrong rolling radius shows without pull. Each curve is fitted to bins drawn anew by stretches of way,
+the slip that a wrong rolling radius, or soil that yields, shows without pull. Each curve is fitted to bins drawn anew by stretches of way,
 to constants (torque scale, drawbar and slope) drawn by their stated spread, and to a prior drawn by its spread
 (randomised maximum a posteriori; Bardsley et al. 2014): with much data the curves agree, with little they spread as far as soils do.
 """
@@ -27,6 +27,9 @@ SPREAD = np.array([0.4, 0.7, 0.3, 0.01, 0.06, 0.12])
 """What soils are like before any data: A about .55, k about 11 (Brixius 7.5, the paper 11.4, Burckhardt's up to 30), a fall of a tenth,
 resistance .07 that grows by .06 over all of slip (Brixius: .5/sqrt(Bn); where slip digs wheels in, several times that); s_0 by the
 radius's spread. Wide on purpose: narrower ones (.45, .15, .05 for k, d/A, r_1) bring development machines nothing."""
+INTERCEPT = 0.02
+"""SD of s_0 beside the radius's: on soil that yields, a wheel needs adhesion before it slips (Wong and Reece's stresses; a measured wheel
+in sand pulls -.055 at no slip, cmu_single_wheel_sand)."""
 SLIP_FLOOR = 0.006
 """SD of a bin's mean slip beyond its scatter: curves of the way, unequal radii."""
 MISFIT = 0.02
@@ -115,7 +118,7 @@ def draw_curves(
     slip_sd, mu_sd, rho_sd = (spread * _pooled(np.nanstd(x[1:], axis=0)) for x in sd)
     slip_sd = np.hypot(slip_sd, SLIP_FLOOR)
     prior_sd = SPREAD.copy()
-    prior_sd[3] = np.hypot(radius_sd, 0.003)
+    prior_sd[3] = np.hypot(radius_sd, INTERCEPT)
     prior = CENTRE + prior_sd * rng.standard_normal((draws + 1, len(CENTRE)))
     prior[0] = CENTRE
     scale = 1 + common_sd * rng.standard_normal((draws + 1, 1))
