@@ -4,7 +4,8 @@
 
 Machines of terragrip.simulation.families, split by kind, or of the second plant (docs/decisions/0095); a drive of 50 to 150 s each at
 50 Hz, estimated with the default method and the vehicle file as its user wrote it. The true optimum is that of the soil's own curve and
-resistance, sinkage included; on the second plant by its stresses in steady motion, loads as at rest. The peer is one slip for all grounds: the middle of the usual band, 11.5 %. --write puts the table into docs/advice.md.
+resistance, sinkage included; on the second plant by its stresses in steady motion, loads as at rest. The peer is one slip for all
+grounds: the middle of the usual band, 11.5 %. --write puts the table into docs/advice.md.
 """
 
 from __future__ import annotations

@@ -2,12 +2,13 @@
 
     python benchmarks/bench_slip_control.py [--part development|held-out|second-plant|tractor] [--seeds 20] [--first 0] [--write]
 
-Each seed is a machine of terragrip.simulation.families, of the second plant, or a mid-size tractor (control_machines.py) on two tasks: work (several soils, hills, draught that comes and goes) and
-digging (into a soft spot that bears less than is asked, where slip digs the wheels in). The same machine and ground three times, with
-the same wanted ground speed: wheels at a fixed speed; wheels at a fixed torque (1.3 of the fixed speed's mean, rim speed up to 1.5 of
-it); `SlipSetpoint` on estimates at 50 Hz from white sensor noise of the vehicle file's size. Its slip is what `advise` gives for a
-work drive of that machine before, else 11.5 %. A drive lasts as its scenario says or to the end of its way. Intervals: 95 %,
-bootstrap over seeds. --write puts the table into docs/advice.md and the figures into the file that reports show it from.
+Each seed is a machine of terragrip.simulation.families, of the second plant, or a mid-size tractor (control_machines.py) on two tasks:
+work (several soils, hills, draught that comes and goes) and digging (into a soft spot that bears less than is asked, where slip digs
+the wheels in). The same machine and ground three times, with the same wanted ground speed: wheels at a fixed speed; wheels at a fixed
+torque (1.3 of the fixed speed's mean, rim speed up to 1.5 of it); `SlipSetpoint` on estimates at 50 Hz from white sensor noise of the
+vehicle file's size. Its slip is what `advise` gives for a work drive of that machine before, else 11.5 %. A drive lasts as its scenario
+says or to the end of its way. Intervals: 95 %, bootstrap over seeds. --write puts the table into docs/advice.md and the figures into
+the file that reports show it from.
 """
 
 from __future__ import annotations

@@ -31,8 +31,8 @@ TRACTOR: Mapping[str, Any] = {
     "driven": (True, True),
     "wheelbase": 1.89 * float(np.cbrt(MASS / 1844.0)),
 }
-"""John Deere 6900: 5.4 t (southernstar.ie, 7 July 2021), tyres 420/70R24 and 520/70R38 (John Deere manual OMAL161979), the radii as the sizes
-say; 35 to 40 % on the front axle (manual OMAR178078, University of Wisconsin Extension). The wheelbase is that of a Massey Ferguson
+"""John Deere 6900: 5.4 t (southernstar.ie, 7 July 2021), tyres 420/70R24 and 520/70R38 (John Deere manual OMAL161979), the radii as the
+sizes say; 35 to 40 % on the front axle (manual OMAR178078, University of Wisconsin Extension). The wheelbase is that of a Massey Ferguson
 20B by similarity; what is not here is drawn as for any tractor of the families."""
 
 

@@ -93,8 +93,8 @@ def drive(
 
 @dataclass(frozen=True)
 class Plan:
-    """A drive before it is driven: machine, sensors and speeds as a scenario holds them; ``vehicle`` that is driven, with its true ``radius``;
-    the ground, the work, the time step [s]."""
+    """A drive before it is driven: machine, sensors and speeds as a scenario holds them;
+    ``vehicle`` that is driven, with its true ``radius``; the ground, the work, the time step [s]."""
 
     scenario: Scenario
     vehicle: Vehicle

@@ -113,8 +113,8 @@ def pull_over_weight(vehicle: Vehicle, soil: Soil, slip: Floats) -> Floats:
 
 
 def curves(vehicle: Vehicle, soil: Soil, slip: Floats) -> tuple[Floats, Floats, float]:
-    """In steady motion at a slip (n,) on level ground: the driven wheels' adhesion by load (n,), what the soil holds all wheels back with over
-    the weight (n,), free wheels rolling without slip, and the driven wheels' share of the weight. Loads are those at rest."""
+    """In steady motion at a slip (n,) on level ground: the driven wheels' adhesion by load (n,), what the soil holds all wheels back with
+    over the weight (n,), free wheels rolling without slip, and the driven wheels' share of the weight. Loads are those at rest."""
     pulling, resisting, carried = np.zeros(len(slip)), np.zeros(len(slip)), 0.0
     same = Counter(
         zip(
@@ -162,9 +162,7 @@ class Stood:
     kept: list[Any]
 
 
-def stood(
-    vehicle: Vehicle, radius: Floats, robot: Robot, ground: Ground, work: Work, step: float
-) -> Stood:
+def stood(vehicle: Vehicle, radius: Floats, robot: Robot, ground: Ground, work: Work, step: float) -> Stood:
     """The machine at the start of its way; arguments as `run` has them."""
     import mujoco
 

@@ -56,5 +56,3 @@ class SteppedDrive:
         if count < 0:
             raise RuntimeError("the motion diverges")
         return Piece(rows[:count], self._radius, self._ground)
-
-

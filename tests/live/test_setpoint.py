@@ -39,7 +39,14 @@ class Stated:
 
     def __init__(self, time: float, event: str = "", speed: float = 0.8, **columns: float) -> None:
         self.time, self.event, self.ground_speed = time, event, speed
-        self._columns = {"time": time, "event": event, "ground_speed": speed, "nis": 4.0, "channels": 4.0, **columns}
+        self._columns = {
+            "time": time,
+            "event": event,
+            "ground_speed": speed,
+            "nis": 4.0,
+            "channels": 4.0,
+            **columns,
+        }
 
     def __getitem__(self, name: str):
         if name in self._columns:
@@ -87,7 +94,9 @@ def test_predictions_of_a_silence_lead_nothing(vehicle):
         advised = live.message(Stated(4.0 + k / 10).row(predicted=True))
     assert advised["state"] == "slow"
     assert advised["why"] == "predicted"
-    assert max(advised["wheel_speed"].values()) * 0.2 <= 0.4 * 0.8 + 1e-9  # the crawl; the robot's radius is .2 m
+    assert (
+        max(advised["wheel_speed"].values()) * 0.2 <= 0.4 * 0.8 + 1e-9
+    )  # the crawl; the robot's radius is .2 m
 
 
 def test_stuck_stops_and_only_driving_ends_the_stop(vehicle):

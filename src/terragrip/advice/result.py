@@ -97,7 +97,10 @@ def advised_slip(path: str | os.PathLike[str]) -> float:
         raise InputError("is no advice.json", file=path, hint="terragrip advise writes it") from None
     if slip is None:
         raise InputError(
-            "advises no slip", file=path, place="best_efficiency", hint="its 'missing' says which drive would tell"
+            "advises no slip",
+            file=path,
+            place="best_efficiency",
+            hint="its 'missing' says which drive would tell",
         )
     return slip
 

@@ -160,7 +160,9 @@ def _setpoint(text: str | None, speed: float | None) -> tuple[float, float] | No
         return None
     if text is None or speed is None:
         raise InputError(
-            "one is of no use without the other", place="--setpoint, --speed", hint="--setpoint 0.11 --speed 1.5"
+            "one is of no use without the other",
+            place="--setpoint, --speed",
+            hint="--setpoint 0.11 --speed 1.5",
         )
     if text.endswith(".json"):
         from terragrip.advice.result import advised_slip
@@ -170,7 +172,9 @@ def _setpoint(text: str | None, speed: float | None) -> tuple[float, float] | No
         return (float(text[:-1]) / 100 if text.endswith("%") else float(text)), speed
     except ValueError:
         raise InputError(
-            f"{text!r} is no slip and no file of advice", place="--setpoint", hint="write 0.11, 11% or advice.json"
+            f"{text!r} is no slip and no file of advice",
+            place="--setpoint",
+            hint="write 0.11, 11% or advice.json",
         ) from None
 
 

@@ -17,7 +17,7 @@ _NOT_FINITE = re.compile(":(nan|-?inf)")
 
 
 class Message:
-    """``kind`` is `ESTIMATE`, `EVENT`, `STATUS`, `SOIL`, `GROUND` or `SETPOINT`; ``row`` is there for an estimate, ``data`` for the others."""
+    """``kind`` is `ESTIMATE`, `EVENT`, `STATUS`, `SOIL`, `GROUND` or `SETPOINT`; ``row`` is there for an estimate, ``data`` for others."""
 
     __slots__ = ("_json", "data", "kind", "row", "time")
 

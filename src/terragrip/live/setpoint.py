@@ -29,8 +29,8 @@ class _Predicted:
 class LiveSetpoint:
     """Messages of the set-point, one a row.
 
-    Parameters and errors as `SlipSetpoint` has them. It starts anew with the service, from its safe state; after a stop it goes on where the
-    machine is seen driving again for `FREED` seconds, for somebody else has freed it.
+    Parameters and errors as `SlipSetpoint` has them. It starts anew with the service, from its safe state; after a stop it goes on where
+    the machine is seen driving again for `FREED` seconds, for somebody else has freed it.
     """
 
     def __init__(self, vehicle: Vehicle, slip: float, speed: float) -> None:
