@@ -4,7 +4,7 @@
 
 Every logger is judged by the vocabulary without the words that it alone contributed: those of its headers that stand in no other
 logger's, nor in Terragrip's channels and units, the table of J1939, ISO 11783 and NMEA 2000, or the shipped profiles. ``--write`` puts
-the table into docs/inspect.md. Logs: the folder shared/data beside the project.
+the table into docs/inspect.md. Logs: the folder shared/data beside the project, and the headers that made_up_loggers.py makes up.
 """
 
 from __future__ import annotations
@@ -13,12 +13,14 @@ import json
 import os
 import re
 import sys
+import tempfile
 from collections import Counter
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
 
+import made_up_loggers
 from marked import put
 from terragrip.errors import InputError
 from terragrip.formats.inspect import Seen
@@ -70,7 +72,9 @@ OTHERS: dict[str, dict[str, tuple[object, str | None]]] = {
     "tractor_t7/session2_hour.csv.gz": {
         "time": ("timestamps", None), "wheel_based_speed": ("CAN1.CCVS1.WheelBasedVehicleSpeed", "km/h"),
         "ground_speed": ("CAN2.gnss_speed.Speed", "m/s"), "latitude": ("CAN2.gnss_pos.Latitude", "deg"),
-        "longitude": ("CAN2.gnss_pos.Longitude", "deg"),
+        "longitude": ("CAN2.gnss_pos.Longitude", "deg"), "engine_speed": ("CAN1.EEC1.EngineSpeed", "rpm"),
+        "engine_torque_share": ("CAN1.EEC1.ActualEnginePercentTorque", "%"),
+        "engine_friction_share": ("CAN1.EEC3.NominalFrictionPercentTorque", "%"),
     },
 }  # fmt: skip
 
@@ -92,7 +96,9 @@ class Case:
 def main() -> None:
     """Judge every log, print the table, and what is not right."""
     cases = _cases()
-    table = _table(cases)
+    made_up = made_up_cases()
+    table = "\n".join([*_table(cases), *_made_up_table(made_up)])
+    cases += made_up
     print(table)
     for case in cases:
         for line in case.lines:
@@ -114,6 +120,17 @@ def _cases() -> list[Case]:
     for case in cases:
         _judge(case, _vocabulary(case, cases))
     return cases
+
+
+def made_up_cases() -> list[Case]:
+    """The loggers of made_up_loggers.py, judged with all words: nothing in them showed us any."""
+    result = []
+    with tempfile.TemporaryDirectory() as folder:
+        for logger in made_up_loggers.loggers():
+            case = Case(logger, logger, made_up_loggers.truth(logger))
+            _judge(case, GENERAL, made_up_loggers.write(logger, Path(folder)))
+            result.append(case)
+    return result
 
 
 def _headers() -> list[Case]:
@@ -157,12 +174,12 @@ def _open(case: Case) -> None:
     case.columns = tuple(case.seen.columns)
 
 
-def _judge(case: Case, vocabulary: Vocabulary) -> None:
-    if case.seen is None:
+def _judge(case: Case, vocabulary: Vocabulary, path: Path | None = None) -> None:
+    if path is None and case.seen is None:
         case.counts["left open"] += len(case.truth)
         case.lines.append(f"refused: {case.refused.split(': ', 1)[-1]}")
         return
-    seen = Seen.of(read_log(DATA / case.file), vocabulary=vocabulary)
+    seen = Seen.of(read_log(path or DATA / case.file), vocabulary=vocabulary)
     proposals = dict(seen.proposals(vocabulary))
     if seen.stamp is not None:
         proposals[TIME] = Proposal({"from": seen.stamp[0]}, unit=seen.stamp[1])
@@ -261,25 +278,36 @@ def _bare(column: str) -> str:
     )
 
 
-def _table(cases: list[Case]) -> str:
+def _made_up_table(cases: list[Case]) -> list[str]:
+    lines = []
+    for held in (False, True):
+        chosen = [c for c in cases if made_up_loggers.is_held_out(c.file) == held]
+        title = "made up, looked at once" if held else "made up, looked at while mending"
+        lines += _total(f"{len(chosen)} headers {title}", chosen)
+    return lines
+
+
+def _total(title: str, cases: list[Case]) -> list[str]:
+    total = sum((c.counts for c in cases), Counter())
+    channels = sum(len(c.truth) for c in cases)
+    share = (total["right"] + total["right, with a ?"]) / channels
+    counts = " | ".join(f"**{total[k]}**" for k in ORDER)
+    return [
+        f"| **{title}: {channels} channels** | {counts} |",
+        f"| right of {channels}: {100 * share:.0f} %, without a ? {100 * total['right'] / channels:.0f} % |"
+        + " |" * len(ORDER),
+    ]
+
+
+def _table(cases: list[Case]) -> list[str]:
     lines = ["| log | " + " | ".join(ORDER) + " |", "|---|" + "---:|" * len(ORDER)]
     for folder in ("headers", ""):
         chosen = [c for c in cases if c.file.startswith("headers/") == bool(folder)]
         for case in chosen:
             name = case.file.removeprefix("headers/") + (" (refused)" if case.refused else "")
             lines.append(f"| {name} | " + " | ".join(str(case.counts[k] or "") for k in ORDER) + " |")
-        total = sum((c.counts for c in chosen), Counter())
-        channels = sum(len(c.truth) for c in chosen)
-        title = "24 headers" if folder else "the other folders"
-        lines.append(
-            f"| **{title}: {channels} channels** | " + " | ".join(f"**{total[k]}**" for k in ORDER) + " |"
-        )
-        share = (total["right"] + total["right, with a ?"]) / channels
-        lines.append(
-            f"| right of {channels}: {100 * share:.0f} %, without a ? {100 * total['right'] / channels:.0f} % |"
-            + " |" * len(ORDER)
-        )
-    return "\n".join(lines)
+        lines += _total("24 headers" if folder else "the other folders", chosen)
+    return lines
 
 
 if __name__ == "__main__":

@@ -21,6 +21,8 @@ _BASE: dict[str, tuple[float, Dimension]] = {
     "m": (1.0, (0, 1, 0, 0)), "km": (1e3, (0, 1, 0, 0)),
     "cm": (1e-2, (0, 1, 0, 0)), "mm": (1e-3, (0, 1, 0, 0)),
     "in": (0.0254, (0, 1, 0, 0)), "ft": (0.3048, (0, 1, 0, 0)), "mi": (1609.344, (0, 1, 0, 0)),
+    "meter": (1.0, (0, 1, 0, 0)), "meters": (1.0, (0, 1, 0, 0)), "metre": (1.0, (0, 1, 0, 0)), "metres": (1.0, (0, 1, 0, 0)),
+    "sec": (1.0, (0, 0, 1, 0)), "second": (1.0, (0, 0, 1, 0)), "seconds": (1.0, (0, 0, 1, 0)), "hr": (3600.0, (0, 0, 1, 0)),
     "s": (1.0, (0, 0, 1, 0)), "ms": (1e-3, (0, 0, 1, 0)),
     "us": (1e-6, (0, 0, 1, 0)), "µs": (1e-6, (0, 0, 1, 0)),
     "ns": (1e-9, (0, 0, 1, 0)), "min": (60.0, (0, 0, 1, 0)), "h": (3600.0, (0, 0, 1, 0)),
@@ -45,9 +47,12 @@ _SUPERSCRIPTS = str.maketrans(
     {"²": "^2", "³": "^3", "¹": "^1", "⁻": "^-", "·": "*", "⋅": "*", "×": "*", "μ": "µ"}
 )
 _TURNS_A_MINUTE = re.compile(
-    r"(?:1|rev|r|U)?\s*/\s*min|min\s*\^?\s*-\s*1|r\.?p\.?m\.?|U\.?p\.?m\.?", re.IGNORECASE
+    r"(?:1|rev|r|U|tr|Umdr\.?|ot|obr|giri|vueltas)?\s*/\s*min|min\s*\^?\s*-\s*1|r\.?p\.?m\.?|U\.?p\.?m\.?",
+    re.IGNORECASE,
 )
-"""What speeds of rotation are written in beside rad/s: 1/min is a turn a minute (DIN 1301-2), not a radian."""
+"""What speeds of rotation are written in beside rad/s: 1/min is a turn a minute (DIN 1301-2), not a radian; U, tr, giri are turns."""
+_POWER = re.compile(r"(?<=[a-z°])(-[1-4]|[234])(?![\d.])")
+"""``m/s2``, ``m s-1``: an exponent without its sign of a power."""
 _TOKEN = re.compile(r"\s*(?:(\*\*|\^)\s*\(?([+-]?\d+)\)?|([*/])|([A-Za-z%°µ][A-Za-z0-9_%°µ]*|1))")
 _NUMBER = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(.*?)\s*$", re.DOTALL)
 _HARMLESS = re.compile(r"[A-Za-z0-9_%°µ^*/(). +-]{1,60}$")
@@ -141,15 +146,17 @@ def _short(value: object) -> str:
 
 
 def _plain(text: str) -> str:
-    """A unit without superscripts."""
-    return text.translate(_SUPERSCRIPTS).replace("^-^", "^-").strip()
+    """A unit without superscripts, with a sign at each power and product (``m.s-2``, ``N-m``)."""
+    plain = text.translate(_SUPERSCRIPTS).replace("^-^", "^-").strip()
+    if _TURNS_A_MINUTE.fullmatch(plain):
+        return "rpm"
+    plain = re.sub(r"(?<=[A-Za-z])[.-](?=[A-Za-z])", "*", plain)
+    return plain if plain.startswith("g_") else _POWER.sub(r"^\1", plain)
 
 
 def _from_table(text: str) -> Unit | None:
     """Read ``text`` with the table; None if a symbol or the grammar is beyond it."""
     text = _plain(text)
-    if _TURNS_A_MINUTE.fullmatch(text):
-        text = "rpm"
     factor, powers, sign, last, position = 1.0, [0, 0, 0, 0], 1, None, 0
     while position < len(text):
         match = _TOKEN.match(text, position)
@@ -169,9 +176,11 @@ def _from_table(text: str) -> Unit | None:
                 return None
             sign = -1 if match[3] == "/" else 1
         else:
-            if match[4] not in _BASE:
+            spelt = match[4] == "Km" or (match[4] not in _BASE and len(match[4]) > 2)
+            name = match[4].lower() if spelt else match[4]
+            if name not in _BASE:
                 return None
-            size, dimension = _BASE[match[4]]
+            size, dimension = _BASE[name]
             factor *= size**sign
             powers = [p + sign * d for p, d in zip(powers, dimension, strict=True)]
             last, sign = (size, dimension, sign), 1

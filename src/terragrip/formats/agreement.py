@@ -10,22 +10,17 @@ import numpy.typing as npt
 
 from terragrip.formats.candidates import Column, candidates_of, kind_of
 from terragrip.formats.evidence import (
-    RADII,
     RATE_UNITS,
-    SPEED_UNITS,
     Evidence,
     Finding,
-    Path,
     Series,
     nearest_unit,
 )
 from terragrip.formats.judgement import Guess
+from terragrip.formats.rims import Ranked, Rims, Way
 from terragrip.units import factor_to
 
 Floats = npt.NDArray[np.float64]
-Ranked = dict[str, list[Guess]]
-Way = tuple[str, Path | float]
-"""What was driven: by which columns, and the path, or metres for a count of distance."""
 
 _KNOWN = ("Terragrip", "a signal")
 _SIDEWAYS = 15.0  # m/s^2, the 90 % quantile
@@ -44,9 +39,9 @@ class Agreement:
         for channel in ("ground_speed", "wheel_based_speed"):
             ranked[channel] = [self._speed(g, path) for g in ranked.get(channel, [])]
         self._prefer_ground(ranked)
-        self._rims(ranked, path)
         self._accelerations(ranked)
         self._turning(ranked)
+        Rims(self._evidence).judge(ranked, self._ground(ranked), path, self._turns_of_body(ranked))
         for channel in [c for c, guesses in ranked.items() if not guesses]:
             del ranked[channel]
 
@@ -56,7 +51,9 @@ class Agreement:
         if both and all(self._evidence.size(g.column.column) < 3.2 for g in both):
             for channel in ("latitude", "longitude"):
                 ranked[channel] = [
-                    replace(g, unit="rad", doubt="its size tells radians") if g.column.unit is None else g
+                    replace(g, unit="rad", unit_doubt="its size tells radians")
+                    if g.column.unit is None
+                    else g
                     for g in ranked.get(channel, [])
                 ]
         for channel in ("latitude", "longitude"):
@@ -182,7 +179,9 @@ class Agreement:
                         guess,
                         confidence=0.6,
                         evidence=(*guess.evidence, sentence),
-                        doubt="the wheels' own speed, beside one over ground?",
+                        doubt="the wheels' own speed, beside one over ground?"
+                        if guess.column.name.strange
+                        else "",
                     )
                 )
         ranked["wheel_based_speed"] = kept
@@ -190,84 +189,11 @@ class Agreement:
     def _ground(self, ranked: Mapping[str, list[Guess]]) -> tuple[str, float] | None:
         """The best ground speed and its factor to m/s, where its unit is beyond doubt."""
         best = max(ranked.get("ground_speed", []), key=lambda g: g.confidence, default=None)
-        if best is None or best.unit is None or (best.doubt and best.column.unit is None):
+        if best is None or best.unit is None or best.contradicted:
+            return None
+        if (best.doubt or best.unit_doubt) and best.column.unit is None:
             return None
         return best.column.column, factor_to(best.unit, "m/s")
-
-    def _rims(self, ranked: Ranked, paths: list[Way]) -> None:
-        """Wheel speeds against the ground speed or the positions: the radius that they imply must be a wheel's."""
-        ground = self._ground(ranked)
-        for channel in [c for c in ranked if c.startswith("wheel_speed_")]:
-            judged = []
-            for guess in ranked[channel]:
-                result = None
-                if (
-                    ground is not None
-                    and (ratio := self._evidence.ratio(ground[0], guess.column.column)) is not None
-                ):
-                    result = ratio[0] * ground[1], ground[0]
-                elif ground is None:
-                    result = self._by_path(guess, paths)
-                judged.append(guess if result is None else guess.with_finding(self._rim(guess, *result)))
-            ranked[channel] = judged
-        if ground is not None:
-            ranked["wheel_based_speed"] = [
-                g.with_finding(self._as_fast(g, *ground)) if g.column.column != ground[0] else g
-                for g in ranked.get("wheel_based_speed", [])
-            ]
-
-    def _by_path(self, guess: Guess, paths: list[Way]) -> tuple[float, str] | None:
-        """Metres driven for one count of wheel speed over a second, by positions."""
-        for source, path in paths:
-            if (
-                not isinstance(path, float)
-                and (run := self._evidence.run_over(guess.column.column, path)) is not None
-            ):
-                return 1 / run[0], source
-        return None
-
-    def _rim(self, guess: Guess, metres: float, ground: str) -> Finding | None:
-        """``metres``: of ground speed for one count of wheel speed, by what is called ``ground``."""
-        if guess.column.name.has("motor"):
-            return None
-        if guess.column.unit is not None:
-            if guess.column.kind == "speed":
-                share = metres / factor_to(guess.column.unit, "m/s")
-                return Finding(0.5 < share < 1.6, f"{ground} is {share:.3g} times the rim speed")
-            radius = metres / factor_to(guess.column.unit, "rad/s")
-            return Finding(
-                RADII[0] <= radius <= RADII[1], f"a radius of {radius:.3g} m follows from {ground}"
-            )
-        likely = {}
-        for unit in ("rad/s", "rpm", "deg/s"):
-            radius = metres / factor_to(unit, "rad/s")
-            if RADII[0] <= radius <= RADII[1]:
-                likely[unit] = f"a radius of {radius:.3g} m follows from {ground}"
-        likely |= {
-            u: f"as {ground} in {u}" for u in ("m/s", "km/h") if abs(np.log(metres * SPEED_UNITS[u])) < 0.12
-        }
-        if len(likely) == 1:
-            unit, notes = next(iter(likely.items()))
-            return Finding(True, notes, unit)
-        if not likely:
-            return Finding(False, f"with {ground} no radius of a wheel fits")
-        return Finding(False, f"with {ground} {' or '.join(likely)}?")
-
-    def _as_fast(self, guess: Guess, ground: str, factor: float) -> Finding | None:
-        result = self._evidence.ratio(ground, guess.column.column)
-        if result is None:
-            return None
-        if guess.unit is not None and guess.column.unit is not None:
-            share = result[0] * factor / factor_to(guess.unit, "m/s")
-            return Finding(0.5 < share < 1.6, f"{ground} is {share:.3g} times as fast")
-        unit = nearest_unit(
-            1 / (result[0] * factor), {k: SPEED_UNITS[k] for k in ("m/s", "km/h", "mm/s")}, 0.4
-        )
-        return Finding(
-            unit is not None,
-            f"as fast as {ground}" if unit else f"is not as fast as {ground} in any unit",
-            unit,
-        )
 
     def _accelerations(self, ranked: Ranked) -> None:
         """Accelerations by gravity in the sum of three, and along the vehicle by the derivative of its speed."""
@@ -329,17 +255,17 @@ class Agreement:
             judged.append(guess)
         ranked["angular_velocity_z"] = [g for g in judged if g.confidence > 0.35]
         best = max(ranked["angular_velocity_z"], key=lambda g: g.confidence, default=None)
-        if best is None or best.doubt or best.unit is None:
+        if best is None or best.doubt or best.unit_doubt or best.unit is None:
             return
         for channel in ("angular_velocity_x", "angular_velocity_y"):
             ranked[channel] = [
                 replace(
                     g,
                     unit=best.unit,
-                    doubt="",
+                    unit_doubt="",
                     evidence=(*g.evidence, f"in the unit of {best.column.column}"),
                 )
-                if g.column.unit is None and g.doubt.startswith("no unit")
+                if g.column.unit is None and g.unit_doubt.startswith("no unit")
                 else g
                 for g in ranked.get(channel, [])
             ]
@@ -360,6 +286,17 @@ class Agreement:
             return None
         return Finding(True, f"in rad/s it would be {sideways:.0f} m/s^2 sideways at {ground[0]}", "deg/s")
 
+    def _turns_of_body(self, ranked: Mapping[str, list[Guess]]) -> list[tuple[str, Series]]:
+        """Rates of turn [rad/s] that no wheel made: a gyro's beyond doubt, and those of `_turns`."""
+        best = max(ranked.get("angular_velocity_z", []), key=lambda g: g.confidence, default=None)
+        result = self._turns(ranked)
+        if best is not None and best.unit is not None and not (best.doubt or best.unit_doubt):
+            series = self._evidence.series(best.column.column)
+            if series is not None and not best.column.name.has("odometry"):
+                rate = series[1] * factor_to(best.unit, "rad/s")
+                result.insert(0, (best.column.column, (series[0], rate)))
+        return result
+
     def _turns(self, ranked: Mapping[str, list[Guess]]) -> list[tuple[str, Series]]:
         result: list[tuple[str, Series]] = []
         for name, column in self._columns.items():
@@ -371,7 +308,8 @@ class Agreement:
             if read.has("yaw", "heading") or (
                 column.kind == "angle" and len(read.words) == 1 and not candidates_of(column)
             ):
-                degrees = column.unit in ("deg", "°") if column.unit else self._evidence.size(name) > 7
+                size = self._evidence.size(name)
+                degrees = factor_to(column.unit, "rad") < 0.1 if column.unit else size > 7
                 if (rate := self._evidence.rate_of_angle(name, degrees=degrees)) is not None:
                     result.append((name, rate))
         lateral = max(ranked.get("acceleration_y", []), key=lambda g: g.confidence, default=None)

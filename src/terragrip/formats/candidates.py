@@ -10,25 +10,30 @@ from functools import cache
 from terragrip.formats.profile import Profile
 from terragrip.formats.vocabulary import Name, Vocabulary
 from terragrip.recording.schema import CHANNELS, is_channel, split_channel, unit_of
-from terragrip.units import UnitError, parse_unit
+from terragrip.units import UnitError, factor_to, parse_unit
 
 _KINDS = {
     (0, 1, -1, 0): "speed", (0, 0, -1, 0): "rotation", (1, 2, -2, 0): "torque", (0, 0, 0, 1): "current", (1, 1, -2, 0): "force",
     (0, 1, -2, 0): "acceleration", (0, 1, 0, 0): "length", (0, 0, 0, 0): "angle", (0, 0, 1, 0): "time",
 }  # fmt: skip
-_MISSPELT = re.compile(r"ms(\^?-?2|²)")  # m/s^2, which reads as a square of milliseconds
+_MISSPELT = re.compile(r"ms(\^?-?2|²|\^?-1|⁻[¹²])")  # m/s^2 or m/s, which read as powers of milliseconds
+ON_THE_BUS = "a signal of J1939, ISO 11783 or NMEA 2000"
 _ROS = re.compile(r"\.(twist|linear|angular|angular_velocity|linear_acceleration|velocity|effort)(\.|\d|$)")
 
 
 @dataclass(frozen=True)
 class Column:
-    """A column: its name as read, the unit that is stated or named (None: neither), what that unit measures, and how it is stated."""
+    """A column: its name as read, the unit that is stated or named (None: neither), what that unit measures, and how it is stated.
+
+    ``one_of_several``: another column differs from it by a number alone.
+    """
 
     column: str
     name: Name
     unit: str | None
     kind: str | None
     stated: str | None = None
+    one_of_several: bool = False
 
 
 @dataclass(frozen=True)
@@ -46,7 +51,7 @@ def columns_of(
 ) -> dict[str, Column]:
     """Every numeric column's name as read; ``constants`` are the texts that never change, by column."""
     odometry = {_root(c) for c, text in constants.items() if "odometry" in vocabulary.read(text).concepts}
-    alike = _numbered(numbers)
+    alike, several = _numbered(numbers), _of_several(numbers)
     result = {}
     for column in numbers:
         name = vocabulary.read(column)
@@ -73,8 +78,12 @@ def columns_of(
             name = replace(name, wheel="")
         stated = units.get(column)
         readable = None if stated is not None and _MISSPELT.fullmatch(stated) else stated
+        if readable and name.unit and kind_of(readable) != kind_of(name.unit):
+            name = replace(
+                name, concepts=name.concepts | vocabulary.concepts_of(name.words[-1])
+            )  # ... Rad [km/h]
         unit = readable or name.unit or _unit_of_ros(column)
-        result[column] = Column(column, name, unit, kind_of(unit), stated)
+        result[column] = Column(column, name, unit, kind_of(unit), stated, column in several)
     return result
 
 
@@ -101,7 +110,7 @@ def candidates_of(column: Column) -> list[Candidate]:
         return [Candidate(own, own, 1.0, "Terragrip's own name")]
     standard = _on_the_bus().get(re.split(r"[./]", own)[-1])
     if standard is not None:
-        return [Candidate(standard, own, 0.95, "a signal of J1939, ISO 11783 or NMEA 2000")]
+        return [Candidate(standard, own, 0.95, ON_THE_BUS)]
     if column.name.has("command", "statistic", "change", "other"):
         return []
     for ways in (_of_wheels, _of_motion, _of_place, _of_speed):
@@ -119,7 +128,7 @@ def _of_wheels(column: Column) -> list[Candidate]:
         or name.has("ground", "odometry", "gyro", "acceleration", "position", "rate")
     ):
         return []
-    if name.has("torque"):
+    if name.has("torque") or (name.has("wheel") and column.kind == "torque"):
         return [
             Candidate(
                 f"drive_torque_{name.wheel}", own, 0.9 if name.has("wheel") else 0.8, "a torque and a wheel"
@@ -155,8 +164,11 @@ def _of_motion(column: Column) -> list[Candidate]:
         return [Candidate("acceleration_x", own, 0.4, "an acceleration, along which axis is not said")]
     if name.has("rate") and about and not axis:
         return [Candidate(f"angular_velocity_{about}", own, 0.85, "the rate of an angle")]
+    of_wheels = name.has("odometry")
     angular = name.has("gyro") or (name.has("rate") and (name.has("speed") or "twist" in name.words))
     if angular and axis:
+        if of_wheels:
+            return [Candidate(f"angular_velocity_{axis}", own, 0.6, "odometry's rate of turn and an axis")]
         return [Candidate(f"angular_velocity_{axis}", own, 0.85, "a gyro and an axis")]
     if axis and name.has("rate") and not name.has("position"):
         return [Candidate(f"angular_velocity_{axis}", own, 0.7, "a rate and an axis")]
@@ -170,7 +182,7 @@ def _of_motion(column: Column) -> list[Candidate]:
         column.kind == "rotation"
         and not name.has("wheel", "motor")
         and not name.wheel
-        and column.unit != "rpm"
+        and not _in_turns(column.unit)
     ):
         return [Candidate("angular_velocity_z", own, 0.3, "turns, of what is not said")]
     if name.has("pitch", "roll") and not name.has("rate", "speed", "rotation", "yaw", "position"):
@@ -198,6 +210,8 @@ def _of_speed(column: Column) -> list[Candidate]:
     along = "twist" in name.words and "linear" in name.words
     if not (name.has("speed") or along) or name.wheel:
         return []
+    if column.one_of_several and not name.has("ground", "odometry", "body"):
+        return []
     if name.axis in ("y", "z") or name.has(
         "lateral", "vertical", "east", "north", "rate", "rotation", "gyro", "yaw", "heading"
     ):
@@ -205,6 +219,8 @@ def _of_speed(column: Column) -> list[Candidate]:
     if name.has("pitch", "roll", "acceleration", "position", "motor"):
         return []
     if name.has("odometry"):
+        if not {"filtered", "filter", "fused", "ekf", "ukf"}.isdisjoint(name.words):
+            return []  # of more than the wheels
         return [Candidate("wheel_based_speed", own, 0.8, "odometry, which is made of the wheels")]
     if name.has("ground"):
         return [Candidate("ground_speed", own, 0.85, "a speed over ground")]
@@ -228,11 +244,20 @@ def _fits(kind: str, channel: str) -> bool:
     return kind == target
 
 
+def unit_on_the_bus(channel: str) -> str | None:
+    """The unit in which the standards give a channel's signal, where it is not the recording's own."""
+    return _tractor().channels[channel].unit
+
+
+@cache
+def _tractor() -> Profile:
+    return Profile.load("tractor-isobus")
+
+
 @cache
 def _on_the_bus() -> dict[str, str]:
     """Channels by the names of standard signals, as the shipped profile of tractors knows them."""
-    profile = Profile.load("tractor-isobus")
-    return {name: channel for channel, source in profile.channels.items() for name in source.candidates}
+    return {name: channel for channel, source in _tractor().channels.items() for name in source.candidates}
 
 
 def _root(column: str) -> str:
@@ -254,8 +279,23 @@ def _numbered(columns: Sequence[str]) -> frozenset[str]:
     return frozenset(c for group in counted for c in group)
 
 
+def _of_several(columns: Sequence[str]) -> frozenset[str]:
+    """Columns that differ from another by one number alone, from 0 or 1: there are several of what they speak of."""
+    stems: dict[str, list[str]] = {}
+    for column in columns:
+        for number in re.finditer(r"(?<!\d)(?<!can)(?<!bus)\d(?!\d|d\b)", column, re.IGNORECASE):
+            stems.setdefault(f"{column[: number.start()]}#{column[number.end() :]}", []).append(column)
+    return frozenset(c for group in stems.values() if len(group) > 1 for c in group)
+
+
+def _in_turns(unit: str | None) -> bool:
+    """Whether a unit counts turns a minute or a second: shafts are counted so, a vehicle's turning is not."""
+    return unit is not None and abs(factor_to(unit, "rad/s") - 1.0) > 0.5 and factor_to(unit, "rad/s") > 0.05
+
+
 def _unit_of_ros(column: str) -> str | None:
-    """The unit of a field of ROS's own message types (REP 103: SI), by the path of the field."""
+    """The unit of a field of ROS's own message types (REP 103: SI), by the path of the field, with points or strokes."""
+    column = re.sub(r"\[(\d+)\]", r"\1", column.replace("/", "."))
     match = _ROS.search(column)
     if match is None or "covariance" in column:
         return None
@@ -265,6 +305,7 @@ def _unit_of_ros(column: str) -> str | None:
         return "rad/s"
     if re.search(r"twist\.linear\.[xyz]$", column):
         return "m/s"
-    if re.search(r"(^|\.)velocity(\d|\.)", column):
+    end = r"(\d|\.|$)" if "joint" in column else r"(\d|\.)"
+    if re.search(rf"(^|\.)velocity{end}", column):
         return "rad/s"
-    return "N m" if re.search(r"(^|\.)effort(\d|\.)", column) else None
+    return "N m" if re.search(rf"(^|\.)effort{end}", column) else None

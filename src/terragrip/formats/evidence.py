@@ -202,12 +202,7 @@ class Evidence:
         values = self.at(name, time)
         if values is None:
             return None
-        known = np.isfinite(values) & np.isfinite(reference)
-        x, y = reference[known], values[known]
-        if len(x) < 8 or not float(np.std(x)) > 0 or not float(np.std(y)) > 0:
-            return None
-        x, y = x - x.mean(), y - y.mean()
-        return float(x @ y / (x @ x)), correlation(x, y)
+        return slope_of(reference, values)
 
     def rate_of_angle(self, name: str, *, degrees: bool) -> Series | None:
         """The rate [rad/s] of an angle column that wraps."""
@@ -246,6 +241,16 @@ class Evidence:
         size = np.sqrt(sum(self._columns[n] ** 2 for n in names))
         known = size[np.isfinite(size)]
         return nearest_unit(float(np.median(known)), _ACCELERATION_UNITS, 0.25) if len(known) > 4 else None
+
+
+def slope_of(x: Floats, y: Floats) -> tuple[float, float] | None:
+    """Slope of ``y`` (n,) over ``x`` (n,) and their correlation, NaN left out; None of fewer than eight or of what stands still."""
+    known = np.isfinite(x) & np.isfinite(y)
+    x, y = x[known], y[known]
+    if len(x) < 8 or not float(np.std(x)) > 0 or not float(np.std(y)) > 0:
+        return None
+    x, y = x - x.mean(), y - y.mean()
+    return float(x @ y / (x @ x)), correlation(x, y)
 
 
 def correlation(a: Floats, b: Floats) -> float:

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
-from terragrip.formats.candidates import Candidate, Column, kind_of
+from terragrip.formats.candidates import ON_THE_BUS, Candidate, Column, kind_of, unit_on_the_bus
 from terragrip.formats.evidence import Evidence, Finding
 from terragrip.recording.schema import unit_of
 from terragrip.units import UnitError, factor_to
@@ -30,7 +30,11 @@ _STANDING = 0.5  # m/s, under which wheels may stand still throughout
 
 @dataclass(frozen=True)
 class Guess:
-    """A candidate as judged: ``confidence`` (0 to 1), the column's ``unit`` (None: unknown), what speaks for it and against it."""
+    """A candidate as judged: ``confidence`` (0 to 1), the column's ``unit`` (None: unknown), what speaks for it and against it.
+
+    ``doubt`` stays; ``unit_doubt`` is of the unit alone and goes where a check tells the unit. ``contradicted``: the data tell another
+    unit than the one stated.
+    """
 
     column: Column
     channel: str
@@ -39,6 +43,8 @@ class Guess:
     unit: str | None = None
     evidence: tuple[str, ...] = ()
     doubt: str = ""
+    unit_doubt: str = ""
+    contradicted: bool = False
     sign: int = 1
 
     def with_finding(self, finding: Finding | None) -> Guess:
@@ -50,12 +56,12 @@ class Guess:
         stated = self.column.unit
         if stated is not None and finding.unit is not None and not _same(stated, finding.unit):
             sentence = f"stated in {stated}, but {finding.sentence}"
-            return replace(self, confidence=0.6 * self.confidence, doubt=sentence)
+            return replace(self, confidence=0.6 * self.confidence, doubt=sentence, contradicted=True)
         surer = 1 - 0.45 * (1 - self.confidence)
         unit = stated or finding.unit or self.unit
-        clear = self.doubt if finding.unit is None and stated is None else ""
+        left = self.unit_doubt if finding.unit is None and stated is None else ""
         return replace(
-            self, confidence=surer, unit=unit, evidence=(*self.evidence, finding.sentence), doubt=clear
+            self, confidence=surer, unit=unit, evidence=(*self.evidence, finding.sentence), unit_doubt=left
         )
 
 
@@ -100,7 +106,7 @@ class Judge:
         elif own:
             guess = replace(guess, unit=target)
         if guess.channel.startswith("drive_torque_") and column.name.has("current"):
-            guess = replace(guess, doubt="", unit=column.unit)
+            guess = replace(guess, unit_doubt="", unit=column.unit)
         if (
             target is not None
             and column.unit is not None
@@ -146,21 +152,23 @@ class Judge:
             return replace(guess, unit="deg")
         if guess.channel == "altitude":
             return replace(guess, unit="m")
+        if guess.why == ON_THE_BUS and (usual := unit_on_the_bus(guess.channel)) is not None:
+            return replace(guess, unit=usual, unit_doubt=f"no unit is stated: {usual}?")
         if target == "rad":
             if size > 1.6 or self._in_degrees:
                 sure = size > 7 or self._in_degrees
                 return replace(
                     guess,
                     unit="deg",
-                    doubt="" if sure else "the sizes tell degrees",
+                    unit_doubt="" if sure else "the sizes tell degrees",
                     evidence=(guess.why, "its size tells degrees"),
                 )
-            return replace(guess, unit="rad", doubt="no unit is stated: rad?")
+            return replace(guess, unit="rad", unit_doubt="no unit is stated: rad?")
         if guess.channel.startswith("wheel_speed_") and size > 40:
-            return replace(guess, unit="rad/s", doubt=f"reaches {size:.3g}: rpm or deg/s?")
+            return replace(guess, unit="rad/s", unit_doubt=f"reaches {size:.3g}: rpm or deg/s?")
         if target == "rad/s" and guess.channel.startswith("angular") and size > 12:
             return replace(guess, unit="deg/s", evidence=(guess.why, "its size tells deg/s"))
-        return replace(guess, unit=target, doubt=f"no unit is stated: {target}?")
+        return replace(guess, unit=target, unit_doubt=f"no unit is stated: {target}?")
 
 
 def _known(values: Floats) -> Floats:

@@ -73,16 +73,19 @@ def propose(
     constants = _constants(texts) if isinstance(texts, Mapping) else {}
     columns = columns_of(tuple(numbers), constants, units, vocabulary)
     evidence = Evidence(numbers, clocks or {})
+    plane = _velocity_in_the_plane(columns, evidence)
     judge = Judge(columns, numbers, evidence)
     ranked: dict[str, list[Guess]] = {}
     for column in columns.values():
         for candidate in candidates_of(column):
+            if column.column in plane and candidate.channel == "ground_speed":
+                continue
             if (guess := judge.of(candidate)) is not None:
                 ranked.setdefault(candidate.channel, []).append(guess)
     Agreement(columns, evidence).refine(ranked)
     chosen = _assigned(ranked)
     proposals = {channel: _proposal(channel, guess, ranked[channel]) for channel, guess in chosen.items()}
-    _add_derived(proposals, numbers, columns)
+    _add_derived(proposals, numbers, columns, plane)
     for name in texts:
         if name in LABELS or vocabulary.read(name).has("soil"):
             proposals.setdefault("soil", Proposal({"from": name}, confidence=0.8, evidence=("its name",)))
@@ -125,7 +128,7 @@ def _assigned(ranked: Mapping[str, list[Guess]]) -> dict[str, Guess]:
 
 def _proposal(channel: str, guess: Guess, ranked: list[Guess]) -> Proposal:
     others = sorted((g for g in ranked if g is not guess), key=lambda g: -g.confidence)
-    doubt = guess.doubt
+    doubt = guess.doubt or guess.unit_doubt
     if not doubt and guess.confidence < SURE:
         doubt = guess.why
     rival = next((g for g in others if g.confidence > guess.confidence - 0.02 and g.unit == guess.unit), None)
@@ -160,18 +163,24 @@ def _proposal(channel: str, guess: Guess, ranked: list[Guess]) -> Proposal:
 
 
 def _add_derived(
-    proposals: dict[str, Proposal], numbers: Mapping[str, Floats], columns: Mapping[str, Column]
+    proposals: dict[str, Proposal],
+    numbers: Mapping[str, Floats],
+    columns: Mapping[str, Column],
+    plane: tuple[str, str] | tuple[()],
 ) -> None:
     """Ground speed from two velocities or positions, pitch from a quaternion, where no column is it."""
     pose = _quaternion(tuple(numbers))
     made_of_wheels = any("odometry" in columns[c].name.concepts for c in pose)
-    if "ground_speed" not in proposals and (parts := _east_and_north(columns)) is not None:
+    parts = _east_and_north(columns) or plane
+    if "ground_speed" not in proposals and parts:
         unit = columns[parts[0]].unit
         entry: dict[str, object] = {"norm_of": list(parts)} | (
             {"unit": unit} if unit and unit != "m/s" else {}
         )
         doubt = "" if unit else "no unit is stated: m/s?"
-        proposals["ground_speed"] = Proposal(entry, doubt, "", 0.8, ("velocities east and north",), (), unit)
+        proposals["ground_speed"] = Proposal(
+            entry, doubt, "", 0.8, ("two velocities in the plane",), (), unit
+        )
     pair = _position_pair(numbers, columns)
     if "ground_speed" not in proposals and pair is not None:
         forward = {"quaternion": pose} if pose else _yaw(numbers, columns)
@@ -214,6 +223,22 @@ def _east_and_north(columns: Mapping[str, Column]) -> tuple[str, str] | None:
     if len(parts) == 2 and columns[parts["east"]].unit == columns[parts["north"]].unit:
         return parts["east"], parts["north"]
     return None
+
+
+def _velocity_in_the_plane(columns: Mapping[str, Column], evidence: Evidence) -> tuple[str, str] | tuple[()]:
+    """A receiver's velocities x and y, of which neither is along the vehicle: both are great."""
+    for name, column in columns.items():
+        read = column.name
+        if read.axis != "x" or not (read.has("ground") and read.has("speed")):
+            continue
+        if read.has("statistic", "command", "position", "rate", "gyro"):
+            continue
+        for other, beside in columns.items():
+            if beside.name.axis == "y" and beside.name.words == (*read.words[:-1], "y"):
+                small, great = sorted((evidence.size(name), evidence.size(other)))
+                if small > 0.3 * great and column.kind in (None, "speed") and column.unit == beside.unit:
+                    return name, other
+    return ()
 
 
 def _constants(texts: Texts) -> dict[str, str]:

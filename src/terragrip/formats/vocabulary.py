@@ -7,6 +7,7 @@ Not a list of loggers: a word stands here for what it means everywhere. `Vocabul
 from __future__ import annotations
 
 import re
+import unicodedata
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -15,29 +16,29 @@ from terragrip.units import is_common
 
 MEANINGS: dict[str, str] = {
     # what is measured
-    "speed": "speed velocity vel spd v sog geschwindigkeit vitesse velocidad",
-    "rotation": "rpm rps omega w rotation drehzahl",
-    "torque": "torque effort moment drehmoment tau tq trq md couple",
+    "speed": "speed velocity vel spd v sog geschwindigkeit vitesse velocidad velocita snelheid",
+    "rotation": "rpm rps omega w rotation drehzahl toerental",
+    "torque": "torque effort moment drehmoment tau tq trq md couple par coppia koppel",
     "current": "current curr amps amp ampere strom",
-    "acceleration": "acceleration accelerometer acc accel beschleunigung",
+    "acceleration": "acceleration accelerometer acc accel beschleunigung aceleracion accelerazione versnelling",
     "gyro": "gyroscope gyro gyr",
     "rate": "rate angular turn",
-    "pitch": "pitch",
-    "roll": "roll bank",
-    "yaw": "yaw psi",
+    "pitch": "pitch nick nickwinkel tangage cabeceo beccheggio",
+    "roll": "roll bank wank wankwinkel roulis balanceo rollio",
+    "yaw": "yaw psi gier lacet imbardata",
     "heading": "heading hdg course bearing azimuth cog compass",
-    "latitude": "latitude",
-    "longitude": "longitude",
+    "latitude": "latitude breitengrad",
+    "longitude": "longitude laengengrad",
     "altitude": "altitude alt height elevation hoehe",
     "position": "position pose pos easting northing utm",
-    "pull": "drawbar draft pull traction zugkraft",
+    "pull": "drawbar draft pull traction zugkraft tiro trekkracht",
     "coupling": "hitch towing trailer",
-    "force": "force",
+    "force": "force kraft fuerza forza",
     "distance": "distance odometer",
-    "time": "time timestamp stamp unix epoch clock utc zeit tow",
+    "time": "time timestamp stamp unix epoch clock utc zeit temps tiempo tempo tijd tow",
     # what it is of
-    "wheel": "wheel whl rim tire tyre joint roue axle rad theoretical",
-    "motor": "motor",
+    "wheel": "wheel whl rim tire tyre joint roue rueda ruota wiel axle rad theoretical",
+    "motor": "motor moteur motore",
     "ground": "ground gps gnss radar navigation visual vio lidar icp true location rtk ublox slam",
     "body": "vehicle machine car robot body base ego tractor fahrzeug fzg obd",
     "odometry": "odom odometry",
@@ -45,10 +46,11 @@ MEANINGS: dict[str, str] = {
     "other": "engine pto shaft driveshaft fan pump gearbox transmission battery brake steering steer throttle pedal ignition fuel "
     "oil coolant boost wind magnetometer magnetic mag camshaft injector injection turbo clutch compressor alternator carrier "
     "doppler pseudorange satellite cylinder gear intake exhaust propeller idle encoder limiter bumper cliff charger gravity "
-    "air diff lock limiting ecef hydraulic valve grinder blade reel auger spool lever joystick crank",
+    "air diff lock limiting ecef hydraulic valve grinder blade reel auger spool lever joystick crank zapfwelle zapfwellen lenkwinkel",
     # what is no measurement of it
     "command": "cmd command commanded set setpoint target desired reference ref demand demanded requested request limit max "
-    "maximum min minimum nominal available expected predicted ideal selected soll sollwert planned",
+    "maximum min minimum nominal available expected predicted ideal selected soll sollwert planned "
+    "consigne consigna objetivo obiettivo trgt",
     "statistic": "std stddev var cov covariance variance accuracy error sigma uncertainty quality dop hdop vdop pdop status state "
     "flag id identifier count counter index idx raw mode valid fix number checksum seq ticks pwm voltage volt temperature "
     "temp pressure power load derivative correction offset trim level duty percent pct jerk energy frequency slip confidence "
@@ -59,10 +61,10 @@ MEANINGS: dict[str, str] = {
     "vertical": "vertical vert down up climb sink",
     "east": "east easting",
     "north": "north northing",
-    "left": "left l links gauche",
-    "right": "right r rechts droite",
-    "front": "front vorn vorne avant",
-    "rear": "rear back hinten arriere",
+    "left": "left l links gauche izquierda izquierdo sinistra sinistro",
+    "right": "right r rechts droite derecha derecho destra destro",
+    "front": "front vorn vorne vorder avant delantera delantero anteriore voor",
+    "rear": "rear back hinten hinter arriere trasera trasero posteriore achter",
     "change": "delta d",
 }  # fmt: skip
 _CORNERS = {
@@ -96,18 +98,25 @@ _AXIS_SYMBOLS = {"a": "acceleration", "g": "gyro", "w": "gyro", "v": "speed", "f
 _COMPASS = {"n": "north", "e": "east", "d": "vertical", "u": "vertical"}
 _ORDINAL = re.compile(r"(\d)(st|nd|rd|th)$", re.IGNORECASE)
 _VOWELS = re.compile(r"(?<!^)[aeiou]")
+_UMLAUTS = str.maketrans({"ä": "ae", "ö": "oe", "ü": "ue", "Ä": "Ae", "Ö": "Oe", "Ü": "Ue", "ß": "ss"})
+_OF_MESSAGES = frozenset({"fix", "status", "state", "raw"})
+"""Words that name messages and topics too, and then say nothing of each field in them."""
 _BRACKET = re.compile(r"[\[(]\s*([^\])]*?)\s*[\])]?\s*$")
 
 
 @dataclass(frozen=True)
 class Name:
-    """What a column's name says: concepts of `MEANINGS`, the wheel ("" if none), the axis, and the unit at its end."""
+    """What a column's name says: concepts of `MEANINGS`, the wheel ("" if none), the axis, and the unit at its end.
+
+    ``strange`` are words that mean nothing here, and so may mean anything.
+    """
 
     concepts: frozenset[str]
     wheel: str = ""
     axis: str = ""
     unit: str | None = None
     words: tuple[str, ...] = ()
+    strange: tuple[str, ...] = ()
 
     def has(self, *concepts: str) -> bool:
         """Whether one of the concepts is in the name."""
@@ -187,7 +196,7 @@ class Vocabulary:
         """Read a column's name."""
         bracket = _BRACKET.search(name)
         body = name[: bracket.start()] if bracket and bracket.start() > 0 else name
-        if bracket and body.strip() and not _is_unit(bracket[1]):
+        if bracket and body.strip() and not (_is_unit(bracket[1]) and not self._is_word(bracket[1])):
             body = name  # words, not a unit
         words = words_of(body)
         concepts: set[str] = set()
@@ -196,7 +205,10 @@ class Vocabulary:
         if unit is None and bracket and body != name:
             unit = self._unit_in_bracket(bracket[1])
         unit = unit or next((u for w in words if w in _ALWAYS and (u := self.unit_word(w))), None)
+        last = words_of(re.split(r"[./]", body)[-1])  # numbers before it are those of buses and topics
         text = words[: len(words) - used] or words
+        if len(last) < len(words):
+            text = [w for w in text if w not in _OF_MESSAGES or w in last]
         if text == ["t"]:
             concepts.add("time")
         if len(text) == 2 and text[0] in _AXIS_SYMBOLS and text[1] in ("x", "y", "z"):
@@ -220,8 +232,13 @@ class Vocabulary:
         if "speed" in concepts and words and words[-1] in _COMPASS:
             concepts.add(_COMPASS[words[-1]])  # VelN, vel_d
             unit = None if unit == "N" else unit
-        last = words_of(re.split(r"[./]", body)[-1])  # numbers before it are those of buses and topics
-        return Name(_settled(concepts), _wheel_of(words, last, concepts), axis, unit, tuple(words))
+        strange = tuple(w for w in text if not self.concepts_of(w) and w.isalpha() and w not in "xyz")
+        return Name(_settled(concepts), _wheel_of(words, last, concepts), axis, unit, tuple(words), strange)
+
+    def _is_word(self, text: str) -> bool:
+        """Whether a bracket holds a word of the trade (``Speed (GPS)``) and no unit."""
+        plain = text.lower()
+        return len(plain) > 2 and plain in self._known and plain not in UNIT_WORDS and not is_common(text)
 
     def _unit_at_end(self, words: list[str]) -> tuple[str | None, int]:
         """The unit that a name ends in, and how many of its words say so; a name is not all unit."""
@@ -264,7 +281,7 @@ GENERAL = Vocabulary()
 def words_of(name: str) -> list[str]:
     """The words of a name in their order, in lower case: parts of camel case and between other characters, numbers apart."""
     result: list[str] = []
-    for part in re.split(r"[^A-Za-z0-9]+", _ordinals(name)):
+    for part in re.split(r"[^A-Za-z0-9]+", _ordinals(_without_accents(name))):
         if part.lower() in (
             "nm",
             "kn",
@@ -295,6 +312,13 @@ def _rejoined(words: list[str]) -> list[str]:
         else:
             joined.append(word)
     return joined
+
+
+def _without_accents(name: str) -> str:
+    if name.isascii():
+        return name
+    parted = unicodedata.normalize("NFKD", unicodedata.normalize("NFC", name).translate(_UMLAUTS))
+    return "".join(c for c in parted if not unicodedata.combining(c))
 
 
 def _ordinals(name: str) -> str:

@@ -1,0 +1,168 @@
+"""Hold wheel speeds against the ground, the path and the turning of the vehicle: radius and track must be a vehicle's."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+
+from terragrip.formats.evidence import (
+    RADII,
+    SPEED_UNITS,
+    Evidence,
+    Finding,
+    Path,
+    Series,
+    nearest_unit,
+    slope_of,
+)
+from terragrip.formats.judgement import Guess
+from terragrip.units import factor_to
+
+Ranked = dict[str, list[Guess]]
+Way = tuple[str, Path | float]
+"""What was driven: by which columns, and the path, or metres for a count of distance."""
+Ground = tuple[str, float]
+"""A ground speed's column and its factor to m/s."""
+
+_TRACKS = {"rotation": (1.1, 14.0), "speed": (0.15, 5.0)}
+"""Track over radius, or track in m, that the difference of right and left over the rate of turn may make; skid steering counts double."""
+_TURNING = 0.08  # rad/s: less turns too little to show a track
+_SMALL, _FAST = (
+    0.1,
+    30.0,
+)  # m, rad/s: a wheel this small that turns this fast is rarer than turns a minute called rad/s
+
+
+class Rims:
+    """Judges the guesses of wheel speeds of one log."""
+
+    def __init__(self, evidence: Evidence) -> None:
+        self._evidence = evidence
+
+    def judge(
+        self, ranked: Ranked, ground: Ground | None, paths: list[Way], turns: list[tuple[str, Series]]
+    ) -> None:
+        """Judge by the radius that follows from the ground speed or the path, by the others, and by the track."""
+        channels = [c for c in ranked if c.startswith("wheel_speed_")]
+        for channel in channels:
+            ranked[channel] = [self._against_way(g, ground, paths) for g in ranked[channel]]
+        self._as_the_others(ranked, channels)
+        for left, right in (("l", "r"), ("fl", "fr"), ("rl", "rr")):
+            self._track(ranked, f"wheel_speed_{left}", f"wheel_speed_{right}", turns)
+        if ground is not None:
+            ranked["wheel_based_speed"] = [
+                g.with_finding(self._as_fast(g, *ground)) if g.column.column != ground[0] else g
+                for g in ranked.get("wheel_based_speed", [])
+            ]
+
+    def _against_way(self, guess: Guess, ground: Ground | None, paths: list[Way]) -> Guess:
+        result = None
+        if ground is not None and (ratio := self._evidence.ratio(ground[0], guess.column.column)) is not None:
+            result = ratio[0] * ground[1], ground[0]
+        elif ground is None:
+            result = self._by_path(guess, paths)
+        return guess if result is None else guess.with_finding(self._rim(guess, *result))
+
+    def _by_path(self, guess: Guess, paths: list[Way]) -> tuple[float, str] | None:
+        """Metres driven for one count of wheel speed over a second, by positions."""
+        for source, path in paths:
+            if (
+                not isinstance(path, float)
+                and (run := self._evidence.run_over(guess.column.column, path)) is not None
+            ):
+                return 1 / run[0], source
+        return None
+
+    def _rim(self, guess: Guess, metres: float, ground: str) -> Finding | None:
+        """``metres``: of ground speed for one count of wheel speed, by what is called ``ground``."""
+        if guess.column.name.has("motor"):
+            return None
+        if guess.column.unit is not None:
+            if guess.column.kind == "speed":
+                share = metres / factor_to(guess.column.unit, "m/s")
+                return Finding(0.5 < share < 1.6, f"{ground} is {share:.3g} times the rim speed")
+            factor = factor_to(guess.column.unit, "rad/s")
+            radius = metres / factor
+            sentence = f"a radius of {radius:.3g} m follows from {ground}"
+            if radius < _SMALL and factor == 1.0 and self._evidence.size(guess.column.column) > _FAST:
+                return Finding(False, f"{sentence}: rpm?")
+            return Finding(RADII[0] <= radius <= RADII[1], sentence)
+        likely = {}
+        for unit in ("rad/s", "rpm", "deg/s"):
+            radius = metres / factor_to(unit, "rad/s")
+            if RADII[0] <= radius <= RADII[1]:
+                likely[unit] = f"a radius of {radius:.3g} m follows from {ground}"
+        likely |= {
+            u: f"as {ground} in {u}" for u in ("m/s", "km/h") if abs(np.log(metres * SPEED_UNITS[u])) < 0.12
+        }
+        if len(likely) == 1:
+            unit, notes = next(iter(likely.items()))
+            return Finding(True, notes, unit)
+        if not likely:
+            return Finding(False, f"with {ground} no radius of a wheel fits")
+        return Finding(False, f"with {ground} {' or '.join(likely)}?")
+
+    def _as_the_others(self, ranked: Ranked, channels: list[str]) -> None:
+        """Wheels of one unit stand or fall together: where one of them contradicts its unit, the others are in doubt too."""
+        bad = {
+            g.column.unit: g
+            for c in channels
+            for g in ranked[c][:1]
+            if g.doubt and g.column.unit and not g.column.name.has("motor")
+        }
+        for channel in channels:
+            ranked[channel] = [
+                replace(g, confidence=0.6 * g.confidence, doubt=f"{other.column.column}: {other.doubt}")
+                if (other := bad.get(g.column.unit)) is not None and not g.doubt
+                else g
+                for g in ranked[channel]
+            ]
+
+    def _track(
+        self, ranked: Mapping[str, list[Guess]], left: str, right: str, turns: list[tuple[str, Series]]
+    ) -> None:
+        """Right less left over the rate of turn: the track over the wheel's radius, in any log with turns."""
+        pair = [max(ranked.get(c, []), key=lambda g: g.confidence, default=None) for c in (left, right)]
+        first, second = pair
+        if first is None or second is None or first.unit is None or first.unit != second.unit:
+            return
+        kind = first.column.kind or "rotation"
+        series = self._evidence.series(second.column.column)
+        other = None if series is None else self._evidence.at(first.column.column, series[0])
+        if series is None or other is None or kind not in _TRACKS or first.column.name.has("motor"):
+            return
+        factor = factor_to(first.unit, "rad/s" if kind == "rotation" else "m/s")
+        difference = factor * (series[1] - other)
+        for source, (time, rate) in turns:
+            known = np.isfinite(rate)
+            if not known.any() or float(np.quantile(np.abs(rate[known]), 0.95)) < _TURNING:
+                continue
+            result = slope_of(np.interp(series[0], time, rate, left=np.nan, right=np.nan), difference)
+            if result is None or abs(result[1]) < 0.7:
+                continue
+            low, high = _TRACKS[kind]
+            if low <= abs(result[0]) <= high:
+                return
+            size = f"{abs(result[0]):.2g} " + ("wheel radii" if kind == "rotation" else "m")
+            finding = Finding(False, f"in a turn by {source} they make a track of {size}")
+            for channel, guess in ((left, first), (right, second)):
+                ranked[channel][ranked[channel].index(guess)] = guess.with_finding(finding)
+            return
+
+    def _as_fast(self, guess: Guess, ground: str, factor: float) -> Finding | None:
+        result = self._evidence.ratio(ground, guess.column.column)
+        if result is None:
+            return None
+        if guess.unit is not None and guess.column.unit is not None:
+            share = result[0] * factor / factor_to(guess.unit, "m/s")
+            return Finding(0.5 < share < 1.6, f"{ground} is {share:.3g} times as fast")
+        unit = nearest_unit(
+            1 / (result[0] * factor), {k: SPEED_UNITS[k] for k in ("m/s", "km/h", "mm/s")}, 0.4
+        )
+        return Finding(
+            unit is not None,
+            f"as fast as {ground}" if unit else f"is not as fast as {ground} in any unit",
+            unit,
+        )

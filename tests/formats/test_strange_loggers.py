@@ -1,0 +1,109 @@
+"""inspect on loggers of other makes: headers in five languages, traps beside the signals, units that are stated wrongly."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from terragrip.formats.candidates import candidates_of, columns_of
+from terragrip.formats.recognition import Proposal, propose
+from terragrip.formats.vocabulary import GENERAL
+
+BENCHMARKS = Path(__file__).parents[2] / "benchmarks"
+TIME = np.arange(0.0, 120.0, 0.05)
+SPEED = 2.0 + 0.4 * np.sin(TIME / 7)  # m/s
+TURN = 0.3 * np.sin(TIME / 11)  # rad/s
+HALF_TRACK, RADIUS = 0.9, 0.6  # m
+RIMS = {"left": (SPEED - HALF_TRACK * TURN) / RADIUS, "right": (SPEED + HALF_TRACK * TURN) / RADIUS}
+
+
+def _propose(columns: dict[str, np.ndarray]) -> dict[str, Proposal]:
+    return propose(columns, (), {}, dict.fromkeys(columns, TIME))
+
+
+def test_made_up_loggers_give_nothing_that_is_wrong_and_sure(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.syspath_prepend(str(BENCHMARKS))
+    import bench_inspect
+
+    cases = bench_inspect.made_up_cases()
+    sys.modules.pop("bench_inspect")
+    assert len(cases) == 16
+    assert [(c.file, line) for c in cases for line in c.lines if "wrong and sure" in line] == []
+    right = sum(c.counts["right"] + c.counts["right, with a ?"] for c in cases)
+    assert right >= 0.8 * sum(len(c.truth) for c in cases)
+
+
+@pytest.mark.parametrize(("factor", "sure"), [(1.0, True), (30 / np.pi, False)])
+def test_a_track_tells_wheel_speeds_whose_stated_unit_is_wrong(factor: float, sure: bool) -> None:
+    """Turns a minute called rad/s make wheels of 6 cm, which a robot may have, but not on a track of 1.8 m."""
+    columns = {f"wheel_speed_{side}_rads": factor * rim / 2 for side, rim in RIMS.items()}
+    result = _propose(columns | {"gps_speed_mps": SPEED / 2, "yaw_rate_radps": TURN / 2})
+    for side in ("l", "r"):
+        assert (result[f"wheel_speed_{side}"].doubt == "") == sure
+
+
+def test_rad_per_second_called_rpm_is_in_doubt_by_the_track_of_a_small_robot() -> None:
+    """Wheels of .1 m would be of .95 m, which a wheel may be, but not on a track of .4 m."""
+    columns = {
+        f"wheel_{side}_rpm": rim
+        for side, rim in {"left": SPEED - 0.2 * TURN, "right": SPEED + 0.2 * TURN}.items()
+    }
+    columns = {name: rim / 0.1 for name, rim in columns.items()}
+    result = _propose(columns | {"gps_speed_mps": SPEED, "yaw_rate_radps": TURN})
+    assert "make a track of" in result["wheel_speed_l"].doubt
+    assert "make a track of" in result["wheel_speed_r"].doubt
+
+
+def test_where_the_ground_speeds_unit_is_wrong_no_wheel_leans_on_it() -> None:
+    place = {"lat": 45 + np.cumsum(SPEED) * 0.05 / 111_132, "lon": 11 + 1e-9 * TIME}
+    rims = {f"wheel_speed_{side}_rads": SPEED / RADIUS for side in ("left", "right")}
+    result = _propose(place | rims | {"gps_speed_kmh": SPEED})
+    assert result["ground_speed"].doubt.startswith("stated in km/h, but")
+    assert any("m follows from lat, lon" in line for line in result["wheel_speed_l"].evidence)
+
+
+def test_a_speed_of_strange_words_beside_one_over_ground_keeps_its_question_mark() -> None:
+    """Whatever 'onbekend' means, it may be a set value."""
+    columns = {"gps_speed_kmh": 3.6 * SPEED, "snelheid_onbekend_kmh": 3.6 * SPEED * 1.1}
+    assert _propose(columns)["wheel_based_speed"].doubt != ""
+
+
+def test_speeds_of_numbered_drives_are_not_over_ground() -> None:
+    columns = {"drivers0.measured_velocity": SPEED, "drivers1.measured_velocity": 1.1 * SPEED}
+    assert "ground_speed" not in _propose(columns)
+
+
+def test_a_receivers_velocities_in_the_plane_go_together() -> None:
+    columns = {
+        "gps/vel/twist/linear/x": SPEED * np.cos(TIME / 20),
+        "gps/vel/twist/linear/y": SPEED * np.sin(TIME / 20),
+    }
+    assert _propose(columns)["ground_speed"].entry == {"norm_of": list(columns)}
+
+
+@pytest.mark.parametrize(
+    ("name", "channel"),
+    [
+        ("couple roue arrière gauche (N.m)", "drive_torque_rl"),
+        ("vitesse roue avant droite (tr/min)", "wheel_speed_fr"),
+        ("Raddrehzahl HL [U/min]", "wheel_speed_rl"),
+        ("M_Rad_VR (Nm)", "drive_torque_fr"),
+        ("Höhe ü. NN [m]", "altitude"),
+        ("Längengrad [°]", "longitude"),
+        ("velocidad rueda trasera izquierda (rpm)", "wheel_speed_rl"),
+        ("velocità ruota anteriore destra (giri/min)", "wheel_speed_fr"),
+        ("tangage (deg)", "pitch"),
+        ("vitesse consigne (km/h)", None),
+        ("Sollgeschwindigkeit [km/h]", None),
+        ("Zapfwellendrehzahl [U/min]", None),
+        ("Speed (GPS)", "ground_speed"),
+        ("/gps_0/fix/latitude", "latitude"),
+    ],
+)
+def test_names_in_other_languages_and_paths(name: str, channel: str | None) -> None:
+    column = columns_of((name,), {}, {}, GENERAL)[name]
+    made = [c.channel for c in candidates_of(column)]
+    assert made[:1] == ([channel] if channel else [])
