@@ -115,7 +115,7 @@ class Rims:
         for channel in channels:
             ranked[channel] = [
                 replace(g, confidence=0.6 * g.confidence, doubt=f"{other.column.column}: {other.doubt}")
-                if (other := bad.get(g.column.unit)) is not None and not g.doubt
+                if (other := bad.get(g.column.unit or "")) is not None and not g.doubt
                 else g
                 for g in ranked[channel]
             ]
