@@ -104,7 +104,7 @@ def test_the_page_says_simulated_and_loads_nothing(
     assert "0.848" in html
     assert not re.search(r"""(?:src|href)\s*=\s*["'](?!#)""", html)
     captions = re.findall(r"<figcaption>(.*?)</figcaption>", html, re.DOTALL)
-    assert len(captions) == 20
+    assert len(captions) == 21
     assert sum("imulated" in caption for caption in captions) >= 9
     # the paper's figure of both paths, simulated
     assert any(caption.startswith("Simulated paths of multi1 and multi2") for caption in captions)

@@ -42,6 +42,10 @@ def estimates(seed: int, soils: tuple[str, ...], sensor: bool = False, rows: int
         "curve_a_std": np.full(rows, 0.05),
         "nis": rng.chisquare(5, rows),
         "channels": np.full(rows, 5.0),
+        **{
+            f"vertical_load_{axle}": np.full(rows, 9.8 * one["mass"])
+            for axle, one in VEHICLE["axles"].items()
+        },
     }
     for wheel in WHEELS:
         slip = rng.uniform(0.0, 0.55, rows)

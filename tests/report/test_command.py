@@ -55,6 +55,7 @@ def test_the_page_holds_every_section_and_loads_nothing(report: Path) -> None:
         "trust",
         "missing",
         "soils",
+        "advice",
         "ground",
         "sections",
         "events",

@@ -29,6 +29,7 @@ WIDEST = 0.12
 FARTHEST = 2.0
 """A best slip beyond this many times the data's reach rests on what soils are like in general, which is said."""
 FRONT_POINTS = 21
+CURVE_END, CURVE_POINTS = 0.4, 41
 
 
 def advise(
@@ -49,9 +50,17 @@ def advise(
         )
     vehicle = machine_of(tables[0], vehicle)
     for one in tables:
-        _refuse_other_vehicle(one, vehicle)
-    wheels = driven_wheels(tables[0], vehicle)
-    samples = samples_by_soil(tables, vehicle)
+        refuse_other_vehicle(one, vehicle)
+    return advise_samples(samples_by_soil(tables, vehicle), vehicle, driven_wheels(tables[0], vehicle), soils)
+
+
+def advise_samples(
+    samples: Mapping[str, Samples],
+    vehicle: Vehicle,
+    wheels: Sequence[str],
+    soils: Mapping[str, Soil] | None = None,
+) -> tuple[dict[str, Advice], dict[str, float]]:
+    """As `advise`, of rows gathered by soil; ``wheels``: the driven ones of the tables, in the order of ``Samples.wheel_adhesion``."""
     found = {name: _of_soil(name, part, vehicle, wheels, soils or {}) for name, part in samples.items()}
     if not found:
         nothing = "no row moves, unflagged, with vehicle and tool on one soil: drive some tens of metres"
@@ -59,7 +68,7 @@ def advise(
     return found, {name: part.way for name, part in samples.items()}
 
 
-def _refuse_other_vehicle(estimates: Estimates, vehicle: Vehicle) -> None:
+def refuse_other_vehicle(estimates: Estimates, vehicle: Vehicle) -> None:
     """InputError unless the table has the vehicle's driven wheels and axles, and one of them is driven."""
     driven = [w for w, on in zip(vehicle.wheels, vehicle.driven, strict=True) if on]
     columns = [f"adhesion_{w}" for w in driven] + [f"vertical_load_{a}" for a in vehicle.axle_names]
@@ -110,7 +119,7 @@ def _of_soil(
         power if power.interval[1] - power.interval[0] <= 2 * WIDEST else None,
         _front(over, best, power),
         tuple(actions_for(work, vehicle)), tuple(missing), {**drive, "efficiency": float(work.efficiency[0])},
-        _reserve(samples, curves, wheels), _field_work(work, vehicle), _limits(work, drive),
+        _reserve(samples, curves, wheels), _field_work(work, vehicle), _limits(work, drive), _curve(over),
     )  # fmt: skip
 
 
@@ -176,6 +185,19 @@ def _front(over: OverSlip, best: Best, power: Best) -> tuple[Mapping[str, float]
     return tuple(
         {"slip": float(s), **{name: float(np.interp(s, over.slip, row)) for name, row in rows.items()}}
         for s in (slips if slips[-1] > slips[0] else slips[:1])
+    )
+
+
+def _curve(over: OverSlip) -> tuple[Mapping[str, float], ...]:
+    """Efficiency and pull over slip with their 95 % bands, for a picture."""
+    shown = np.linspace(0, CURVE_END, CURVE_POINTS)
+    rows = {}
+    for name, values in (("efficiency", over.efficiency), ("net_traction", over.net_traction)):
+        low, high = np.percentile(values[1:], [2.5, 97.5], axis=0)
+        for key, row in ((name, values[0]), (f"{name}_low", low), (f"{name}_high", high)):
+            rows[key] = np.interp(shown, over.slip, row)
+    return tuple(
+        {"slip": float(s), **{key: float(row[i]) for key, row in rows.items()}} for i, s in enumerate(shown)
     )
 
 

@@ -31,7 +31,7 @@ class Action:
 class Advice:
     """Advice on one soil. ``drive``: what was driven (numbers by name, SI); ``reserve``: of each driven wheel, the share of the ground's
     grip that is left on average, with its interval; ``field``: ha/h and l/ha now and at best, where known; ``missing``: what is not
-    known and which drive would tell it."""
+    known and which drive would tell it; ``curve``: efficiency and net traction over slip with their 95 % bands, where slip is advised."""
 
     soil: str
     best_efficiency: Best | None = None
@@ -43,6 +43,7 @@ class Advice:
     reserve: Mapping[str, tuple[float, float, float]] = field(default_factory=dict)
     field_work: Mapping[str, float] = field(default_factory=dict)
     limits: tuple[str, ...] = ()
+    curve: tuple[Mapping[str, float], ...] = ()
 
     def to_dict(self) -> dict[str, Any]:
         """As advice.json holds one soil."""
@@ -50,6 +51,7 @@ class Advice:
             "best_efficiency": None if self.best_efficiency is None else _best(self.best_efficiency),
             "best_productivity": None if self.best_productivity is None else _best(self.best_productivity),
             "front": [dict(point) for point in self.front],
+            "curve": [dict(point) for point in self.curve],
             "actions": [
                 {**asdict(one), "interval": None if one.interval is None else list(one.interval)}
                 for one in self.actions

@@ -77,15 +77,32 @@ def wheel_loads(estimates: Estimates, vehicle: Vehicle, wheels: Sequence[str]) -
     return np.stack(columns, axis=1)
 
 
+class GatheredSamples:
+    """The usable rows of drives by soil label, table after table; rows without a label are all of one soil, named "" (or ``soil``)."""
+
+    def __init__(self, vehicle: Vehicle, soil: str | None = None) -> None:
+        self._vehicle, self._soil, self._count = vehicle, soil, 0
+        self._parts: dict[str, list[Samples]] = {}
+
+    def add(self, estimates: Estimates) -> None:
+        """The rows of one more drive."""
+        for name, part in _of_table(estimates, self._vehicle, self._soil, self._count):
+            self._parts.setdefault(name, []).append(part)
+        self._count += 1
+
+    def by_soil(self) -> dict[str, Samples]:
+        """All of them, by soil."""
+        return {name: _joined(several) for name, several in sorted(self._parts.items())}
+
+
 def samples_by_soil(
     tables: Iterable[Estimates], vehicle: Vehicle, soil: str | None = None
 ) -> dict[str, Samples]:
-    """The usable rows of all tables by soil label; rows without a label are all of one soil, named "" (or ``soil``)."""
-    parts: dict[str, list[Samples]] = {}
-    for number, estimates in enumerate(tables):
-        for name, part in _of_table(estimates, vehicle, soil, number):
-            parts.setdefault(name, []).append(part)
-    return {name: _joined(several) for name, several in sorted(parts.items())}
+    """The usable rows of all tables, see `GatheredSamples`."""
+    gathered = GatheredSamples(vehicle, soil)
+    for estimates in tables:
+        gathered.add(estimates)
+    return gathered.by_soil()
 
 
 def _of_table(

@@ -17,6 +17,7 @@ OFTEN = 0.1
 LEAST_SPEED = 0.2
 """m/s: slower rows count as standing."""
 LEAST_SECONDS = 60.0
+Rows = tuple[np.ndarray, np.ndarray, np.ndarray]
 WHY_NO_CURVE = (
     "no torque was measured, so what this ground bears, its best slip and the efficiency are not known: log wheel torque, "
     "or engine torque with a driveline in the vehicle file"
@@ -25,7 +26,12 @@ WHY_NO_CURVE = (
 
 def advise_slip(tables: Sequence[Estimates], vehicle: Vehicle) -> Advice:
     """Shares of driving time below, within and above the usual band; what slip above it costs in time."""
-    slip, seconds, speed = (np.concatenate(x) for x in zip(*(_rows(one) for one in tables), strict=True))
+    return advise_rows([slip_rows(one) for one in tables], vehicle)
+
+
+def advise_rows(rows: Sequence[Rows], vehicle: Vehicle) -> Advice:
+    """As `advise_slip`, of rows gathered drive by drive (`slip_rows`)."""
+    slip, seconds, speed = (np.concatenate(x) for x in zip(*rows, strict=True))
     total = float(seconds.sum())
     if total < LEAST_SECONDS:
         return Advice(
@@ -79,7 +85,7 @@ def advise_slip(tables: Sequence[Estimates], vehicle: Vehicle) -> Advice:
     return Advice("", actions=tuple(actions), missing=missing, drive=drive, field_work=work)
 
 
-def _rows(estimates: Estimates) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def slip_rows(estimates: Estimates) -> Rows:
     """Slip (the wheels' mean), seconds and speed of the rows that drive and are not flagged."""
     slip = np.mean([estimates[f"slip_{w}"] for w in estimates.wheels], axis=0)
     step = np.diff(estimates.time, append=estimates.time[-1:])

@@ -10,6 +10,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeVar
 
+from terragrip.report.advice_sections import GatheredAdvice
 from terragrip.report.blocks import Blocks, blocks_of
 from terragrip.report.ground_sections import WARNINGS
 from terragrip.report.intervals import Coverage, run_coverage
@@ -22,6 +23,7 @@ if TYPE_CHECKING:
     from terragrip.ground.events import Event
     from terragrip.ground.result import Ground
     from terragrip.recording import Recording
+    from terragrip.report.page import Section
     from terragrip.simulation import SimulationResult
     from terragrip.soil.estimates import GatheredRuns
     from terragrip.soil.learn import Campaign, RunPairs
@@ -109,6 +111,16 @@ class EstimatedCampaign:
             for one in self.runs
             if one.run is not None
         )
+
+    @cached_property
+    def advice(self) -> Section:
+        """The chapter of advice from the estimates of all runs."""
+        from terragrip.estimation import Estimates
+
+        gathered = GatheredAdvice()
+        for one in self.runs:
+            gathered.add(Estimates.read(one.path), one.name)
+        return gathered.section()
 
     @property
     def benchmarks(self) -> list[Run]:

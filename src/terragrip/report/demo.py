@@ -13,6 +13,7 @@ from terragrip import __version__
 from terragrip.errors import InputError
 from terragrip.ground.result import write as write_ground
 from terragrip.report import (
+    advice_sections,
     ground_sections,
     path,
     residuals,
@@ -152,6 +153,8 @@ def _page(campaign: EstimatedCampaign, seed: int, seconds: float) -> Page:
             trust_sections.trust(curves, campaign.soils.not_fitted),
             trust_sections.what_is_missing(curves, campaign.soils.not_fitted),
             sections.soils(main, campaign.benchmarks),
+            campaign.advice,
+            advice_sections.control(),
             work_sections.bands([run.blocks for run in runs]),
             ground_sections.recognised(campaign.grounds, simulated=True),
             ground_sections.section_points(campaign.grounds, simulated=True),

@@ -17,6 +17,7 @@ from terragrip.errors import InputError
 from terragrip.estimation import Estimates
 from terragrip.ground.events import Event, events
 from terragrip.report import (
+    advice_sections,
     ground_sections,
     map_sections,
     path,
@@ -79,6 +80,7 @@ class _Gathered:
     events: dict[str, tuple[Event, ...]] = field(default_factory=dict)
     blocks: list[Blocks] = field(default_factory=list)
     missing: list[str] = field(default_factory=list)
+    advice: advice_sections.GatheredAdvice = field(default_factory=advice_sections.GatheredAdvice)
     map: map_sections.GatheredMap = field(default_factory=map_sections.GatheredMap)
 
 
@@ -128,6 +130,7 @@ def report_of(
             _summarised(read, main, grounds, campaign),
             path.section(together, [_labels(run) for run in together]),
             *(_sections(main, together, campaign) if main.has_adhesion else _of_slip(together)),
+            read.advice.section(),
             read.map.section(),
             *_worked(read.blocks),
             ground_sections.recognised(grounds),
@@ -166,6 +169,7 @@ def _read(paths: Sequence[Path], grounds: Sequence[Ground], step: Callable[[int]
         if estimates.has_adhesion:
             read.gathered.add(estimates, file.stem, file=str(file))
         read.map.add(estimates, file.stem)
+        read.advice.add(estimates, file.stem)
         read.events[file.stem] = events(estimates)
         run = _run(estimates, file.stem, grounds, read.events[file.stem])
         read.summaries.append(_summary(run))
