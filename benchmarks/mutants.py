@@ -1,12 +1,15 @@
 """Do the tests notice? Small changes of the Python (mutants), each tried by the tests that run its line.
 
     python benchmarks/mutants.py [--count 400] [--rooms physics recording estimation soil] [--workers 2] [--seed COMMIT]
+    python benchmarks/mutants.py --at src/terragrip/soil/fit.py:120 [--by tests/soil/test_fit.py]
 
 The sample is drawn by the hash of the commit: places (an operator, a comparison, a number, a truth value, a jump) uniformly over the
-source, of each place one change by the operators of cosmic-ray. Annotations and decorators are left out. A first run records which test
-runs which line (coverage with contexts) and how long it takes; a mutant then meets its tests, quickest first, until one fails. Killed: a
-test fails, the module cannot be imported, or the tests take far longer than they did. What lives is printed as a diff. Results are kept
-in build/mutants, and a run that was stopped goes on where it was. A whole run takes about an hour on two cores.
+source, of each place one change by the operators of cosmic-ray. Left out is only what is no behaviour: annotations, decorators and
+`if TYPE_CHECKING`. A first run records which test runs which line (coverage with contexts) and how long it takes, and refuses to go on
+if a test fails or nothing is recorded. Each mutant is a forked process that has the heavy libraries; it meets the tests of its line,
+quickest first, until one fails. Killed: a test fails, the module cannot be imported, or the tests need far more of the processor than
+they did (counted apart). What lives, or no test runs, is printed as a diff. Results are kept in build/mutants, and a run that was
+stopped goes on where it was. A whole run takes about an hour on two cores.
 """
 
 from __future__ import annotations
@@ -21,10 +24,12 @@ import multiprocessing
 import os
 import random
 import re
+import resource
+import signal
 import subprocess
 import sys
 import time
-from collections import defaultdict
+from collections import Counter, defaultdict
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -33,10 +38,25 @@ from typing import Any
 ROOT = Path(__file__).parents[1]
 KEPT = ROOT / "build" / "mutants"
 ROOMS = ("physics", "recording", "estimation", "soil")
-MORE_TESTS = ("ground",)  # rooms whose tests run lines of these
+MORE_TESTS = ("ground", "report", "advice", "maps")  # rooms whose tests run lines of these
+APART = (  # they look at packages, or run the whole project in other processes, which a mutant does not reach
+    "contract",
+    "demo",
+    "docs_site",
+    "doctor",
+    "example_notebooks",
+    "kernel_builds",
+    "layouts",
+    "tutorial",
+    "wheel",
+)
 BUDGET, MOST = 20.0, 120  # s and number of the tests that one mutant meets
 INTERNAL = 3  # exit code of pytest: an error of its own, which would pass for a kill
-PATIENCE = 4.0  # times what its tests took before, and a minute: beyond, a mutant counts as killed
+PATIENCE = (
+    4.0  # times what its tests took before, and a minute [s of processor]: beyond, a mutant counts as killed
+)
+HANGS = 20.0  # times that on the wall's clock, for what waits without working
+TIMED_OUT = -int(signal.SIGXCPU)
 PRELOADED = (
     "numpy",
     "pandas",
@@ -156,12 +176,13 @@ def diff(one: Mutant) -> str:
 
 
 def record(rooms: list[str], data: Path, log: Path, workers: int) -> None:
-    """Run the rooms' tests once, under coverage."""
+    """Run the rooms' tests and those beside the rooms once, under coverage. SystemExit if one fails."""
     words = [
         sys.executable,
         "-m",
         "pytest",
-        *(f"tests/{room}" for room in (*rooms, *MORE_TESTS)),
+        *(f"tests/{room}" for room in (*rooms, *MORE_TESTS) if (ROOT / "tests" / room).is_dir()),
+        *sorted(set(map(str, Path("tests").glob("test_*.py"))) - {f"tests/test_{name}.py" for name in APART}),
         "-q",
         "-vv",
         "-n",
@@ -170,14 +191,17 @@ def record(rooms: list[str], data: Path, log: Path, workers: int) -> None:
     words += [f"--cov=terragrip.{room}" for room in rooms]
     words += ["--cov-context=test", "--cov-report=", "--durations=0", "-p", "no:cacheprovider"]
     with log.open("w", encoding="utf-8") as out:
-        subprocess.run(
+        done = subprocess.run(
             words,
             cwd=ROOT,
             stdout=out,
             stderr=subprocess.STDOUT,
-            env={**os.environ, "COVERAGE_FILE": str(data)},
+            env={**os.environ, "COVERAGE_FILE": f"{data}.new"},
             check=False,
         )
+    if done.returncode != 0:
+        raise SystemExit(f"the tests fail without a mutant, see {log}")
+    os.replace(f"{data}.new", data)
 
 
 @dataclass
@@ -192,44 +216,48 @@ class Coverage:
         from coverage import CoverageData
 
         text = log.read_text(encoding="utf-8")
-        failed = set(re.findall(r"FAILED (tests/\S+)", text))
         seconds: dict[str, float] = defaultdict(float)
         for took, test in re.findall(r"^([\d.]+)s (?:setup|call|teardown) +(tests/.+)$", text, re.MULTILINE):
-            if test not in failed:
-                seconds[test] += float(took)
+            seconds[test] += float(took)
+        beside: dict[str, list[str]] = defaultdict(list)
+        for test in seconds:
+            beside[test.partition("::")[0]].append(test)
         coverage = CoverageData(str(data))
         coverage.read()
         by_line: dict[str, dict[int, list[str]]] = {}
         for path in coverage.measured_files():
-            lines = coverage.contexts_by_lineno(path)
-            by_line["src/" + path.rpartition("/src/")[2]] = {
-                number: [name for context in contexts if (name := context.partition("|")[0]) in seconds]
-                for number, contexts in lines.items()
-            }
+            tests: dict[int, list[str]] = {}
+            by_line["src/" + path.rpartition("/src/")[2]] = tests
+            for number, contexts in coverage.contexts_by_lineno(path).items():
+                names = set()
+                for test, _, phase in (context.partition("|") for context in contexts):
+                    # what a fixture runs stands under the first test that asks for it; the others see it too
+                    names |= {test, *(beside[test.partition("::")[0]] if phase == "setup" else ())}
+                tests[number] = sorted(names & seconds.keys())
+        if not any(any(tests.values()) for tests in by_line.values()):
+            raise SystemExit(f"{data} holds no test: remove it and start again")
         return cls(dict(seconds), by_line)
 
     def tests(self, one: Mutant) -> list[str]:
         """Tests for a mutant. A line that only the import runs is met by the tests of its file."""
         lines = self.by_line.get(one.path, {})
         names = set(lines.get(one.line, ())) or {name for other in lines.values() for name in other}
-        chosen, spent = [], 0.0
-        seen: dict[str, int] = defaultdict(
-            int
-        )  # of each test function the quickest case first, then the second of each
-        turns = []
+        chosen: list[str] = []
+        spent = 0.0
+        seen: dict[str, int] = defaultdict(int)
+        turns = []  # of each test function the quickest case first, then the second of each
         for name in sorted(names, key=lambda name: (self.seconds[name], name)):
             function = name.partition("[")[0]
             turns.append((seen[function], name))
             seen[function] += 1
         for _, name in sorted(turns, key=lambda turn: turn[0]):
-            if len(chosen) == MOST or (chosen and spent + self.seconds[name] > BUDGET):
-                break
-            chosen.append(name)
-            spent += self.seconds[name]
+            if len(chosen) < MOST and (not chosen or spent + self.seconds[name] <= BUDGET):
+                chosen.append(name)
+                spent += self.seconds[name]
         return chosen
 
 
-def attempt(one: Mutant, tests: list[str], changed: bool = True) -> None:
+def attempt(one: Mutant, tests: list[str], seconds: int, changed: bool = True) -> None:
     """In a process of its own: pytest with the mutant in place of its module. The exit code is pytest's."""
     path = str(ROOT / one.path)
     source = mutated(one) if changed else Path(path).read_text(encoding="utf-8")
@@ -239,25 +267,33 @@ def attempt(one: Mutant, tests: list[str], changed: bool = True) -> None:
         return compile(source, path, "exec") if self.path == path else plain(self, fullname)
 
     importlib.machinery.SourceFileLoader.get_code = get_code  # type: ignore[method-assign]
+    resource.setrlimit(resource.RLIMIT_CPU, (seconds, seconds + 5))
     nothing = os.open(os.devnull, os.O_WRONLY)
     os.dup2(nothing, 1)
     os.dup2(nothing, 2)
     import pytest
 
-    os._exit(
-        int(pytest.main([*tests, "-x", "-q", "-p", "no:cacheprovider", "-p", "no:cov", "-p", "no:randomly"]))
-    )
+    os._exit(int(pytest.main([*tests, "-x", "-q", "--tb=no", "-p", "no:cacheprovider", "-p", "no:cov"])))
 
 
-def verdicts(todo: list[Mutant], coverage: Coverage, workers: int) -> Iterator[tuple[Mutant, str]]:
-    """Each mutant and what became of it: killed, lived, untested."""
+def start(one: Mutant, tests: list[str], coverage: Coverage, changed: bool = True) -> tuple[Any, float]:
+    """The process that tries a mutant, and when it is too late by the wall's clock."""
+    seconds = int(60 + PATIENCE * sum(coverage.seconds.get(name, 0.0) for name in tests))
+    process = multiprocessing.get_context("fork").Process(target=attempt, args=(one, tests, seconds, changed))
+    process.start()
+    return process, time.monotonic() + HANGS * seconds
+
+
+def verdicts(
+    todo: list[Mutant], coverage: Coverage, workers: int, by: list[str]
+) -> Iterator[tuple[Mutant, str]]:
+    """Each mutant and what became of it: killed, timed out, lived, untested. by: tests instead of those recorded."""
     for name in PRELOADED:
         importlib.import_module(name)
-    fork, waiting = multiprocessing.get_context("fork"), list(reversed(todo))
-    probe = next((one for one in todo if coverage.tests(one)), None)
+    waiting = list(reversed(todo))
+    probe = next((one for one in todo if by or coverage.tests(one)), None)
     if probe is not None:  # else a broken set-up would kill every mutant
-        process = fork.Process(target=attempt, args=(probe, coverage.tests(probe), False))
-        process.start()
+        process, _ = start(probe, by or coverage.tests(probe), coverage, changed=False)
         process.join()
         if process.exitcode != 0:
             raise SystemExit(f"the tests of {probe.path}:{probe.line} fail without a mutant")
@@ -265,26 +301,38 @@ def verdicts(todo: list[Mutant], coverage: Coverage, workers: int) -> Iterator[t
     while waiting or running:
         while waiting and len(running) < workers:
             one = waiting.pop()
-            tests = coverage.tests(one)
+            tests = by or coverage.tests(one)
             if not tests:
                 yield one, "untested"
                 continue
-            process = fork.Process(target=attempt, args=(one, tests))
-            process.start()
-            limit = 60 + PATIENCE * sum(coverage.seconds[name] for name in tests)
-            running[process] = one, time.monotonic() + limit
+            process, until = start(one, tests, coverage)
+            running[process] = one, until
         for process, (one, until) in list(running.items()):
             if process.exitcode is not None:
                 del running[process]
                 if process.exitcode == INTERNAL:
                     raise RuntimeError(f"pytest itself failed on {one}")
-                yield one, {0: "lived", 5: "untested"}.get(process.exitcode, "killed")
+                endings = {
+                    0: "lived",
+                    5: "untested",
+                    TIMED_OUT: "timed out",
+                    -int(signal.SIGKILL): "timed out",
+                }
+                yield one, endings.get(process.exitcode, "killed")
             elif time.monotonic() > until:
                 process.kill()
-                process.join()
-                del running[process]
-                yield one, "killed"
         time.sleep(0.02)
+
+
+def git(*words: str) -> str:
+    return subprocess.run(["git", *words], capture_output=True, text=True, check=True).stdout.strip()
+
+
+def show(one: Mutant, verdict: str) -> str:
+    """The verdict; what lives is printed."""
+    if verdict in ("lived", "untested"):
+        print(f"{verdict}: {one.path}:{one.line} {one.operator}\n{diff(one)}\n", flush=True)
+    return verdict
 
 
 def main() -> int:
@@ -302,42 +350,46 @@ def main() -> int:
         metavar="FILE:LINE",
         help="every mutant of these lines instead of a sample",
     )
+    parser.add_argument(
+        "--by", nargs="+", default=[], metavar="TEST", help="try these tests, not those recorded"
+    )
     wanted = parser.parse_args()
     os.chdir(ROOT)
-    commit = subprocess.run(
-        ["git", "rev-parse", "HEAD"], capture_output=True, text=True, check=True
-    ).stdout.strip()
     KEPT.mkdir(parents=True, exist_ok=True)
+    if not wanted.at and git("status", "--porcelain", "src", "tests"):
+        raise SystemExit("src or tests have uncommitted changes: a sample belongs to a commit")
+    commit = git("rev-parse", "HEAD")
     data, log = KEPT / f"{commit}.coverage", KEPT / f"{commit}.log"
-    if not data.exists():
+    if not (wanted.by or data.exists()):
         print("Recording which test runs which line ...", flush=True)
         record(wanted.rooms, data, log, wanted.workers)
-    coverage = Coverage.load(data, log)
+    coverage = Coverage({}, {}) if wanted.by else Coverage.load(data, log)
     if wanted.at:
         places = [(name, int(line)) for name, _, line in (text.rpartition(":") for text in wanted.at)]
         drawn = [
             one for name in dict(places) for _, one in mutants(ROOT / name) if (one.path, one.line) in places
         ]
-        seed = "at"
+        kept = Path(os.devnull)
     else:
         seed = wanted.seed or commit
         drawn = sample(wanted.rooms, wanted.count, seed)
-    kept = KEPT / f"{commit}.{seed[:12]}.jsonl"
+        kept = KEPT / f"{commit}.{seed[:12]}.jsonl"
     known = {}
-    if kept.exists():
-        for line in kept.read_text(encoding="utf-8").splitlines():
-            entry = json.loads(line)
-            known[Mutant(**entry["mutant"])] = entry["verdict"]
+    for line in kept.read_text(encoding="utf-8").splitlines() if kept.exists() else ():
+        entry = json.loads(line)
+        known[Mutant(**entry["mutant"])] = show(Mutant(**entry["mutant"]), entry["verdict"])
     todo = [one for one in drawn if one not in known]
     with kept.open("a", encoding="utf-8") as out:
-        for one, verdict in verdicts(todo, coverage, wanted.workers):
-            known[one] = verdict
+        for one, verdict in verdicts(todo, coverage, wanted.workers, wanted.by):
+            known[one] = show(one, verdict)
             out.write(json.dumps({"mutant": asdict(one), "verdict": verdict}) + "\n")
             out.flush()
-            if verdict != "killed":
-                print(f"{verdict}: {one.path}:{one.line} {one.operator}\n{diff(one)}\n", flush=True)
-    killed = sum(known[one] == "killed" for one in drawn)
-    print(f"{killed} of {len(drawn)} mutants killed ({killed / len(drawn):.0%}), drawn by {seed[:12]}")
+    became = Counter(known[one] for one in drawn)
+    killed = became["killed"] + became["timed out"]
+    print(
+        f"{killed} of {len(drawn)} mutants killed ({killed / len(drawn):.0%}; {became['timed out']} of them by the limit of time, "
+        f"{became['untested']} stand where no test runs) at commit {commit[:12]}"
+    )
     return 0
 
 
