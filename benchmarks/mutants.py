@@ -17,6 +17,7 @@ from __future__ import annotations
 import argparse
 import ast
 import difflib
+import gc
 import importlib
 import importlib.machinery
 import json
@@ -50,7 +51,7 @@ APART = (  # they look at packages, or run the whole project in other processes,
     "tutorial",
     "wheel",
 )
-BUDGET, MOST = 20.0, 120  # s and number of the tests that one mutant meets
+BUDGET, MOST = 10.0, 120  # s (under coverage) and number of the tests that one mutant meets
 INTERNAL = 3  # exit code of pytest: an error of its own, which would pass for a kill
 PATIENCE = (
     4.0  # times what its tests took before, and a minute [s of processor]: beyond, a mutant counts as killed
@@ -66,6 +67,11 @@ PRELOADED = (
     "scipy.stats",
     "pint",
     "yaml",
+    "pytest",
+    "pytest_asyncio",
+    "xdist",
+    "anyio.pytest_plugin",
+    "hypothesis.strategies",
 )
 ARITHMETIC = ("Add", "Sub", "Mul", "Div")
 ORDER = ("Lt", "LtE", "Gt", "GtE", "Eq", "NotEq")
@@ -189,7 +195,14 @@ def record(rooms: list[str], data: Path, log: Path, workers: int) -> None:
         str(workers),
     ]
     words += [f"--cov=terragrip.{room}" for room in rooms]
-    words += ["--cov-context=test", "--cov-report=", "--durations=0", "-p", "no:cacheprovider"]
+    words += [
+        "--cov-context=test",
+        "--cov-report=",
+        "--durations=0",
+        "--durations-min=0",
+        "-p",
+        "no:cacheprovider",
+    ]
     with log.open("w", encoding="utf-8") as out:
         done = subprocess.run(
             words,
@@ -206,55 +219,75 @@ def record(rooms: list[str], data: Path, log: Path, workers: int) -> None:
 
 @dataclass
 class Coverage:
-    """Which tests run a line, quickest first, and how long each takes [s]."""
+    """Which tests run a line, and how long each takes without its fixtures, and at most the fixtures of a file [s]."""
 
     seconds: dict[str, float]
+    fixtures: dict[str, float]
     by_line: dict[str, dict[int, list[str]]]
 
     @classmethod
     def load(cls, data: Path, log: Path) -> Coverage:
         from coverage import CoverageData
 
-        text = log.read_text(encoding="utf-8")
-        seconds: dict[str, float] = defaultdict(float)
-        for took, test in re.findall(r"^([\d.]+)s (?:setup|call|teardown) +(tests/.+)$", text, re.MULTILINE):
-            seconds[test] += float(took)
+        coverage = CoverageData(str(data))
+        coverage.read()
+        seconds = {context.partition("|")[0]: 0.0 for context in coverage.measured_contexts() if context}
+        fixtures: dict[str, float] = defaultdict(float)
         beside: dict[str, list[str]] = defaultdict(list)
         for test in seconds:
             beside[test.partition("::")[0]].append(test)
-        coverage = CoverageData(str(data))
-        coverage.read()
+        log_lines = re.findall(
+            r"^([\d.]+)s (setup|call) +(tests/.+)$", log.read_text(encoding="utf-8"), re.MULTILINE
+        )
+        for took, phase, test in log_lines:
+            if phase == "call":
+                seconds[test] = float(took)
+            else:
+                file = test.partition("::")[0]
+                fixtures[file] = max(fixtures[file], float(took))
         by_line: dict[str, dict[int, list[str]]] = {}
         for path in coverage.measured_files():
             tests: dict[int, list[str]] = {}
             by_line["src/" + path.rpartition("/src/")[2]] = tests
             for number, contexts in coverage.contexts_by_lineno(path).items():
-                names = set()
-                for test, _, phase in (context.partition("|") for context in contexts):
+                names: set[str] = set()
+                for test, _, phase in (context.partition("|") for context in contexts if context):
                     # what a fixture runs stands under the first test that asks for it; the others see it too
                     names |= {test, *(beside[test.partition("::")[0]] if phase == "setup" else ())}
-                tests[number] = sorted(names & seconds.keys())
+                tests[number] = sorted(names)
         if not any(any(tests.values()) for tests in by_line.values()):
             raise SystemExit(f"{data} holds no test: remove it and start again")
-        return cls(dict(seconds), by_line)
+        return cls(seconds, fixtures, by_line)
 
-    def tests(self, one: Mutant) -> list[str]:
+    def tests(self, one: Mutant, budget: float) -> list[str]:
         """Tests for a mutant. A line that only the import runs is met by the tests of its file."""
         lines = self.by_line.get(one.path, {})
         names = set(lines.get(one.line, ())) or {name for other in lines.values() for name in other}
+        cost = {name: self.seconds[name] + self.fixtures[name.partition("::")[0]] for name in names}
         chosen: list[str] = []
         spent = 0.0
-        seen: dict[str, int] = defaultdict(int)
+        cases: dict[str, int] = defaultdict(int)
         turns = []  # of each test function the quickest case first, then the second of each
-        for name in sorted(names, key=lambda name: (self.seconds[name], name)):
+        for name in sorted(names, key=lambda name: (cost[name], name)):
             function = name.partition("[")[0]
-            turns.append((seen[function], name))
-            seen[function] += 1
+            turns.append((cases[function], name))
+            cases[function] += 1
+        files: set[str] = set()
         for _, name in sorted(turns, key=lambda turn: turn[0]):
-            if len(chosen) < MOST and (not chosen or spent + self.seconds[name] <= BUDGET):
+            file = name.partition("::")[0]
+            needed = self.seconds[name] + (0.0 if file in files else self.fixtures[file])
+            if len(chosen) < MOST and (not chosen or spent + needed <= budget):
                 chosen.append(name)
-                spent += self.seconds[name]
+                files.add(file)
+                spent += needed
         return chosen
+
+    def time(self, tests: list[str]) -> float:
+        """What these tests take with their fixtures [s]; of a test that is not recorded, nothing."""
+        files = {name.partition("::")[0] for name in tests}
+        return sum(self.seconds.get(name, 0.0) for name in tests) + sum(
+            self.fixtures.get(f, 0.0) for f in files
+        )
 
 
 def attempt(one: Mutant, tests: list[str], seconds: int, changed: bool = True) -> None:
@@ -273,27 +306,29 @@ def attempt(one: Mutant, tests: list[str], seconds: int, changed: bool = True) -
     os.dup2(nothing, 2)
     import pytest
 
-    os._exit(int(pytest.main([*tests, "-x", "-q", "--tb=no", "-p", "no:cacheprovider", "-p", "no:cov"])))
+    plain_and_quick = ["-x", "-q", "--tb=no", "--assert=plain", "-p", "no:cacheprovider", "-p", "no:cov"]
+    os._exit(int(pytest.main([*tests, *plain_and_quick])))
 
 
 def start(one: Mutant, tests: list[str], coverage: Coverage, changed: bool = True) -> tuple[Any, float]:
     """The process that tries a mutant, and when it is too late by the wall's clock."""
-    seconds = int(60 + PATIENCE * sum(coverage.seconds.get(name, 0.0) for name in tests))
+    seconds = int(60 + PATIENCE * coverage.time(tests))
     process = multiprocessing.get_context("fork").Process(target=attempt, args=(one, tests, seconds, changed))
     process.start()
     return process, time.monotonic() + HANGS * seconds
 
 
 def verdicts(
-    todo: list[Mutant], coverage: Coverage, workers: int, by: list[str]
+    todo: list[Mutant], coverage: Coverage, workers: int, by: list[str], budget: float
 ) -> Iterator[tuple[Mutant, str]]:
     """Each mutant and what became of it: killed, timed out, lived, untested. by: tests instead of those recorded."""
     for name in PRELOADED:
         importlib.import_module(name)
+    gc.freeze()  # a child that collects would copy all of it
     waiting = list(reversed(todo))
-    probe = next((one for one in todo if by or coverage.tests(one)), None)
+    probe = next((one for one in todo if by or coverage.tests(one, 0.0)), None)
     if probe is not None:  # else a broken set-up would kill every mutant
-        process, _ = start(probe, by or coverage.tests(probe), coverage, changed=False)
+        process, _ = start(probe, by or coverage.tests(probe, 0.0), coverage, changed=False)
         process.join()
         if process.exitcode != 0:
             raise SystemExit(f"the tests of {probe.path}:{probe.line} fail without a mutant")
@@ -301,7 +336,7 @@ def verdicts(
     while waiting or running:
         while waiting and len(running) < workers:
             one = waiting.pop()
-            tests = by or coverage.tests(one)
+            tests = by or coverage.tests(one, budget)
             if not tests:
                 yield one, "untested"
                 continue
@@ -353,6 +388,12 @@ def main() -> int:
     parser.add_argument(
         "--by", nargs="+", default=[], metavar="TEST", help="try these tests, not those recorded"
     )
+    parser.add_argument(
+        "--budget",
+        type=float,
+        default=BUDGET,
+        help="s of tests that a mutant meets; what lived under less is tried again",
+    )
     wanted = parser.parse_args()
     os.chdir(ROOT)
     KEPT.mkdir(parents=True, exist_ok=True)
@@ -363,7 +404,7 @@ def main() -> int:
     if not (wanted.by or data.exists()):
         print("Recording which test runs which line ...", flush=True)
         record(wanted.rooms, data, log, wanted.workers)
-    coverage = Coverage({}, {}) if wanted.by else Coverage.load(data, log)
+    coverage = Coverage({}, {}, {}) if wanted.by else Coverage.load(data, log)
     if wanted.at:
         places = [(name, int(line)) for name, _, line in (text.rpartition(":") for text in wanted.at)]
         drawn = [
@@ -377,12 +418,14 @@ def main() -> int:
     known = {}
     for line in kept.read_text(encoding="utf-8").splitlines() if kept.exists() else ():
         entry = json.loads(line)
-        known[Mutant(**entry["mutant"])] = show(Mutant(**entry["mutant"]), entry["verdict"])
+        if entry["verdict"] != "lived" or entry["budget"] >= wanted.budget:
+            known[Mutant(**entry["mutant"])] = show(Mutant(**entry["mutant"]), entry["verdict"])
     todo = [one for one in drawn if one not in known]
     with kept.open("a", encoding="utf-8") as out:
-        for one, verdict in verdicts(todo, coverage, wanted.workers, wanted.by):
+        for one, verdict in verdicts(todo, coverage, wanted.workers, wanted.by, wanted.budget):
             known[one] = show(one, verdict)
-            out.write(json.dumps({"mutant": asdict(one), "verdict": verdict}) + "\n")
+            entry = {"mutant": asdict(one), "verdict": verdict, "budget": wanted.budget}
+            out.write(json.dumps(entry) + "\n")
             out.flush()
     became = Counter(known[one] for one in drawn)
     killed = became["killed"] + became["timed out"]

@@ -28,6 +28,36 @@ def test_slope_is_the_derivative_of_the_value(name):
 
 
 @pytest.mark.parametrize("name", list(CURVES))
+def test_the_slope_holds_over_all_of_the_parameters_range(name):
+    model, rng = CURVES[name], np.random.default_rng(7)
+    slip, h = np.linspace(0.01, 0.99, 99), 1e-6
+    for _ in range(20):
+        parameters = {p.name: rng.uniform(0.8 * p.lower + 0.2 * p.upper, p.upper) for p in model.parameters}
+        numeric = (model.value(slip + h, parameters) - model.value(slip - h, parameters)) / (2 * h)
+        np.testing.assert_allclose(model.slope(slip, parameters), numeric, rtol=1e-5, atol=1e-6)
+
+
+def test_values_are_the_formulas_of_their_authors():
+    """Written out as the books print them, at parameters of no model's start."""
+    s = 0.17
+    printed = {
+        "exponential": ({"a": 0.7, "p": 0.4, "alpha_1": 0.3, "alpha_2": -9.0}, 0.7 * (1 - 0.4 * np.exp(0.3 * s) - 0.6 * np.exp(-9 * s))),
+        "effective": ({"A": 0.6, "k": 9.0, "d": 0.2}, 0.6 * (1 - np.exp(-9 * s)) - 0.2 * s),
+        "burckhardt": ({"c1": 1.1, "c2": 25.0, "c3": 0.5}, 1.1 * (1 - np.exp(-25 * s)) - 0.5 * s),
+        "schreiber_kutzbach": ({"a": 0.5, "b": 0.6, "c": 8.0, "d": 0.15}, 0.5 - 0.6 * np.exp(-8 * s) - 0.15 * s),
+        "pacejka": (
+            {"B": 9.0, "C": 1.5, "D": 0.8, "E": -0.7},
+            0.8 * np.sin(1.5 * np.arctan(9 * s + 0.7 * (9 * s - np.arctan(9 * s)))),
+        ),
+        "brixius": ({"mobility": 20.0}, 0.88 * (1 - np.exp(-0.1 * 20)) * (1 - np.exp(-7.5 * s))),
+        "wismer_luth": ({"wheel_numeric": 35.0}, 0.75 * (1 - np.exp(-0.3 * 35 * s))),
+    }  # fmt: skip
+    assert set(printed) == set(CURVES)
+    for name, (parameters, value) in printed.items():
+        assert CURVES[name].value(s, parameters) == pytest.approx(value, rel=1e-12), name
+
+
+@pytest.mark.parametrize("name", list(CURVES))
 def test_curves_are_odd_about_their_intercept(name):
     model = CURVES[name]
     parameters = {p.name: p.start for p in model.parameters}
@@ -75,9 +105,18 @@ def test_brixius_against_hand_figures():
         0.88 * (1 - np.exp(-3.75)) * (1 - np.exp(-0.75))
     )
     assert brixius_resistance(number, 0.1) == pytest.approx(1 / 37.5 + 0.05 / np.sqrt(37.5))
+    assert brixius_resistance(number) == pytest.approx(1 / 37.5)  # at no slip
     assert wismer_luth_resistance(40.0) == pytest.approx(0.07)
     with pytest.raises(ValueError, match="positive"):
         brixius_mobility_number(-1.0, 0.5, 1.5, 20e3, 0.2, 1.0)
+    for place in range(6):
+        sizes = [1e6, 0.5, 1.5, 20e3, 0.2, 1.0]
+        sizes[place] = 0.0
+        if place == 4:  # a tyre that does not bend is one
+            assert brixius_mobility_number(*sizes) == pytest.approx(18.75)
+            continue
+        with pytest.raises(ValueError, match="positive"):
+            brixius_mobility_number(*sizes)
 
 
 def test_efficiency_peaks_before_adhesion():
@@ -89,7 +128,9 @@ def test_efficiency_peaks_before_adhesion():
     assert eta == pytest.approx(brute.max(), abs=1e-6)
     assert slip == pytest.approx(grid[brute.argmax()], abs=1e-3)
     assert slip < CURVES["exponential"].peak(parameters)[0]
-    assert efficiency_peak(CURVES["exponential"], parameters, 0.9, 0.02)[1] == 0.0
+    nothing = efficiency_peak(CURVES["exponential"], parameters, 0.9, 0.02)
+    assert np.isnan(nothing[0])
+    assert nothing[1] == 0.0
 
 
 def test_unknown_parameter_is_named():

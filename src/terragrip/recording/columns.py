@@ -118,7 +118,8 @@ def texts(name: str, column: npt.NDArray[Any], rows: int, source: str | None) ->
 
 
 def _label(value: Any) -> str:
-    missing = value is None or value != value or type(value).__name__ == "NAType"
+    # pandas' NA first: it is neither equal nor unequal to anything
+    missing = value is None or type(value).__name__ == "NAType" or value != value
     return "" if missing else str(value).strip()
 
 
