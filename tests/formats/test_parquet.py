@@ -124,3 +124,18 @@ def test_a_damaged_file_is_a_recording_or_refused(
         assert np.all(np.diff(recording.time) > 0)
         return
     assert "\n" not in message
+
+
+def test_one_long_row_group_is_not_held_in_memory(tmp_path: Path) -> None:
+    """A writer that cuts no row groups (polars, Spark) puts all rows into one; its column chunks are read a piece at a time."""
+    rows, draw = 400_000, np.random.default_rng(0)
+    columns = {"time": 0.01 * np.arange(rows), **{f"c{k}": draw.standard_normal(rows) for k in range(8)}}
+    path = tmp_path / "log.parquet"
+    pq.write_table(pa.table(columns), path, row_group_size=rows, use_dictionary=False, data_page_size=1 << 16)
+    before, most = pa.total_allocated_bytes(), 0
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(parquet, "ROWS", 10_000)
+        for block in parquet.parquet_on_disk(str(path)).blocks(list(columns), 1):
+            assert len(block["time"]) == 10_000
+            most = max(most, pa.total_allocated_bytes() - before)
+    assert most < 0.6 * path.stat().st_size  # all of it, or more, where a group is read at once

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     import pyarrow.parquet as pq
 
 _LONG = 100_000_000  # bytes; ten times as much in memory
+_BUFFER = 1 << 20  # bytes of a column that are read at once
 _BLOCK = 20_000  # rows that are read or left out together, where a log is looked at in parts
 
 
@@ -57,8 +58,8 @@ def _opened(source: str) -> pq.ParquetFile:
     import pyarrow.parquet as pq
 
     refuse_missing(source, suffixes=(".parquet", ".pq"))
-    # Read ahead, the whole file would stay in memory until it is closed.
-    return _guarded(source, lambda: pq.ParquetFile(source, pre_buffer=False))
+    # Read ahead, the whole file would stay in memory until it is closed; without a buffer, all of a row group.
+    return _guarded(source, lambda: pq.ParquetFile(source, pre_buffer=False, buffer_size=_BUFFER))
 
 
 def _guarded(source: str, work: Callable[[], Any]) -> Any:
