@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from terragrip._kernel import ffi, lib
 from terragrip.estimation import TractionEstimator
-from terragrip.estimation.consistency import r_squared
+from terragrip.estimation.consistency import agreement
 from terragrip.estimation.engine import Engine
 from terragrip.recording import Recording
 from terragrip.simulation import SimulationResult
@@ -40,7 +40,7 @@ def oracle(result: SimulationResult, wheel: str, rows: NDArray[np.bool_]) -> Ora
     out = []
     for adhesion, resistance in itertools.product(ADHESION_SCALES, RESISTANCE_SCALES):
         estimate = _adhesion(result.recording, vehicle, wheel, adhesion, resistance)
-        out.append(Oracle(r_squared(truth, estimate, rows), adhesion, resistance))
+        out.append(Oracle(agreement(truth, estimate, rows).r2, adhesion, resistance))
     return max(out, key=lambda item: item.r2)
 
 

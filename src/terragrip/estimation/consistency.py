@@ -77,16 +77,6 @@ def agreement(observed: ArrayLike, predicted: ArrayLike, mask: ArrayLike | None 
     return Agreement(len(seen), r2, rmse / spread, rmse, float(error.mean()))
 
 
-def r_squared(observed: ArrayLike, predicted: ArrayLike, mask: ArrayLike | None = None) -> float:
-    """R² = 1 - SSE/SST, arrays (n,) (physics.md 5). Raises as :func:`agreement`."""
-    return agreement(observed, predicted, mask).r2
-
-
-def nrmse(observed: ArrayLike, predicted: ArrayLike, mask: ArrayLike | None = None) -> float:
-    """RMSE over (max - min) of the observations, arrays (n,) (physics.md 5). Raises as :func:`agreement`."""
-    return agreement(observed, predicted, mask).nrmse
-
-
 def mean_absolute_error(truth: ArrayLike, estimate: ArrayLike, mask: ArrayLike | None = None) -> float:
     """Mean |estimate - truth| over the finite rows of `mask`. Raises InputError when there is none."""
     true, estimated = _finite_rows((truth, estimate), mask, least=1)
@@ -113,21 +103,6 @@ def coverage(
     true, estimated, sd = _finite_rows((truth, estimate, std), mask, least=1)
     half = float(ndtri(0.5 + probability / 2.0)) * sd
     return float(np.mean(np.abs(estimated - true) <= half))
-
-
-def nis_bounds(channels: int, probability: float = 0.95, count: int = 1) -> tuple[float, float]:
-    """Two-sided bounds of the mean NIS of `count` independent updates with `channels` channels each.
-
-    NIS is chi-square with `channels` degrees of freedom, so count * mean is chi-square with
-    count * channels (Bar-Shalom, Li, Kirubarajan 2001, section 5.4).
-    """
-    from scipy.stats import chi2
-
-    if channels < 1 or count < 1:
-        raise InputError("NIS bounds need at least one channel and one update")
-    tail = (1.0 - probability) / 2.0
-    low, high = chi2.ppf([tail, 1.0 - tail], channels * count) / count
-    return float(low), float(high)
 
 
 def nis_consistency(

@@ -27,12 +27,11 @@ class Thresholds:
 
     gap: float | None = None
     standstill_speed: float | None = None
-    max_step: float | None = None
     together: int = 1  # wheels that each wheel of the vehicle stands for
 
     def put(self, settings: Any) -> None:
         """Write what the user set into a tg_settings."""
-        for name in ("gap", "standstill_speed", "max_step"):
+        for name in ("gap", "standstill_speed"):
             value = getattr(self, name)
             if value is not None:
                 setattr(settings, name, value)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -17,16 +16,14 @@ Outline = list[tuple[float, float] | None]
 """Of each stretch of a column the smallest and the largest value, in the log's own unit; None where it holds none."""
 
 
-def outlines(
-    path: str | os.PathLike[str], dbc: Sequence[str | os.PathLike[str]] = (), width: int = WIDTH
-) -> dict[str, Outline]:
+def outlines(path: str | os.PathLike[str]) -> dict[str, Outline]:
     """The outlines of a log's numeric columns, by name: stretches of equal time, or of equally many rows where there is no time.
 
     A long log is looked at in parts, as `inspect` does. Raises InputError where it cannot be read.
     """
-    log, every = look_into(path, dbc)
+    log, every = look_into(path)
     seen = Seen.of(log, whole=every == 1)
-    return {name: outline(column, seen.clock_of(name), width) for name, column in seen.numbers().items()}
+    return {name: outline(column, seen.clock_of(name)) for name, column in seen.numbers().items()}
 
 
 def outline(values: npt.NDArray[Any], time: npt.NDArray[np.float64] | None, width: int = WIDTH) -> Outline:

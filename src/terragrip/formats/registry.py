@@ -70,9 +70,7 @@ def _own() -> dict[str, Format]:
 @cache
 def formats() -> dict[str, Format]:
     """The registered formats by name, ours first; raises InputError where one of another package cannot be loaded, or takes a name."""
-    result = {
-        one.name: one for module in _OWN for one in import_module(f"terragrip.formats.{module}").FORMATS
-    }
+    result = dict(_own())
     for entry in entry_points(group=GROUP):
         place, hint = f"format {entry.name}", f"update or remove the package that brings {entry.value}"
         try:

@@ -71,7 +71,7 @@ def analyse(
         sections,
         events(estimates),
         timeline,
-        _notes(blocks, emissions, timeline, len(stretches) - len(sections), library is not None),
+        _notes(emissions, timeline, len(stretches) - len(sections), library is not None),
         {"recording": estimates.about.get("recording", {}), "online": chosen.online},
     )
     return ground, with_columns(estimates, blocks, timeline, chosen.online)
@@ -137,9 +137,7 @@ def _stretches(estimates: Estimates, changes: Sequence[Change], timeline: Timeli
     return result
 
 
-def _notes(
-    blocks: Blocks, emissions: Emissions, timeline: Timeline, short: int, library: bool
-) -> tuple[str, ...]:
+def _notes(emissions: Emissions, timeline: Timeline, short: int, library: bool) -> tuple[str, ...]:
     notes = list(emissions.notes)
     known = timeline.known
     if not known.any():

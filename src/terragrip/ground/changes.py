@@ -60,20 +60,18 @@ class Change:
         return cls(**{"reported" if name == "told" else name: value for name, value in data.items()})
 
 
-def changes_of(
-    blocks: Blocks, names: Sequence[str] = GROUND, length: float = LENGTH, penalty: float | None = None
-) -> tuple[Change, ...]:
+def changes_of(blocks: Blocks, names: Sequence[str] = GROUND, length: float = LENGTH) -> tuple[Change, ...]:
     """The changes of a whole drive.
 
-    `names`: which of `SIGNALS` to look at. `length` [m]: mean way on one ground before the data speak. `penalty`: price of a change as
-    twice a log likelihood; None takes it from `length` and the drive's own speed. Raises InputError where ruptures is not installed.
+    `names`: which of `SIGNALS` to look at. `length` [m]: mean way on one ground before the data speak, which with
+    the drive's own speed is the price of a change. Raises InputError where ruptures is not installed.
     """
     signals, model, measured = _prepared(blocks, names)
     if len(signals) < 2 * LEAST:
         return ()
     driven = float(np.diff(blocks.travelled[measured]).clip(0).sum())
     chance = float(np.clip(driven / len(signals) / length, 1e-6, 0.5))
-    price = -2 * np.log(chance) if penalty is None else penalty
+    price = -2 * np.log(chance)
     cost = _Cost(signals, model)
     borders = _pelt(cost, price)
     where, ends = blocks[measured], [0, *borders, len(signals)]

@@ -15,7 +15,7 @@ import numpy as np
 from terragrip.errors import InputError
 from terragrip.ground.changes import Change
 from terragrip.ground.emissions import Emissions
-from terragrip.ground.online_changes import OnlineChanges, OnlineSettings
+from terragrip.ground.online_changes import OnlineChanges
 from terragrip.ground.recognition import ForwardFilter, by_soil
 from terragrip.soil.blocks import PERIOD, Blocks, blocks_of, driven_wheels, needed_columns
 from terragrip.soil.library import SoilLibrary
@@ -51,7 +51,6 @@ class LiveGround:
         self,
         estimator: TractionEstimator,
         library: SoilLibrary | None = None,
-        changes: OnlineSettings | None = None,
     ) -> None:
         self.estimator = estimator
         self._axle_of = driven_wheels(estimator.vehicle)
@@ -62,7 +61,7 @@ class LiveGround:
         self._columns = tuple(name for name in every if name in there)
         self._emissions = Emissions(dict(library.soils) if library else {}, estimator.method)
         self._filter = ForwardFilter.begin(self._emissions)
-        self._changes = OnlineChanges(changes)
+        self._changes = OnlineChanges()
         self._origin: float | None = None
         self._number = 0
         self._before: tuple[int, int] | None = None
@@ -128,10 +127,9 @@ class LiveGround:
         data: bytes,
         estimator: TractionEstimator,
         library: SoilLibrary | None = None,
-        changes: OnlineSettings | None = None,
     ) -> Self:
         """Go on from a snapshot with the same estimator and library; raises InputError where it is damaged or of others."""
-        result = cls(estimator, library, changes)
+        result = cls(estimator, library)
         try:
             state = json.loads(data)
             same = (

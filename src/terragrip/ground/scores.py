@@ -12,6 +12,8 @@ from terragrip.ground.result import Timeline
 
 Array = NDArray[np.float64]
 
+_EDGES = (0, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 0.97, 1.0)  # of the bins of probability
+
 
 @dataclass(frozen=True)
 class Confusion:
@@ -68,9 +70,7 @@ def confusion(timelines: Iterable[Timeline]) -> Confusion:
     return Confusion(labels, tuple(s for s, u in zip(soils, used, strict=True) if u), counts[:, used])
 
 
-def reliability(
-    timelines: Iterable[Timeline], edges: Sequence[float] = (0, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 0.97, 1.0)
-) -> tuple[ReliabilityBin, ...]:
+def reliability(timelines: Iterable[Timeline]) -> tuple[ReliabilityBin, ...]:
     """The most probable soil's probability against how often it was right, over labelled blocks that tell of the ground.
 
     Empty bins are left out.
@@ -81,21 +81,14 @@ def reliability(
         stated.append(one.probabilities[rows].max(axis=1))
         right.append((one.soil == one.label)[rows])
     p, r = (np.concatenate(x) if x else np.zeros(0) for x in (stated, right))
-    place = np.clip(np.searchsorted(np.asarray(edges), p, side="right") - 1, 0, len(edges) - 2)
-    result = []
-    for k in range(len(edges) - 1):
-        inside = place == k
-        if inside.any():
-            result.append(
-                ReliabilityBin(
-                    edges[k],
-                    edges[k + 1],
-                    float(p[inside].mean()),
-                    float(r[inside].mean()),
-                    int(inside.sum()),
-                )
-            )
-    return tuple(result)
+    place = np.clip(np.searchsorted(np.asarray(_EDGES), p, side="right") - 1, 0, len(_EDGES) - 2)
+    return tuple(
+        ReliabilityBin(
+            _EDGES[k], _EDGES[k + 1], float(p[rows].mean()), float(r[rows].mean()), int(rows.sum())
+        )
+        for k in range(len(_EDGES) - 1)
+        if (rows := place == k).any()
+    )
 
 
 def calibration_error(bins: Sequence[ReliabilityBin]) -> float:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import base64
 from collections.abc import Collection, Mapping
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from terragrip.errors import InputError
@@ -60,16 +60,7 @@ class Settings:
 
     def to_dict(self) -> dict[str, Any]:
         """As JSON holds it."""
-        return {
-            "sources": list(self.sources),
-            "method": self.method,
-            "window": self.window,
-            "channels": list(self.channels),
-            "held": dict(self.held),
-            "ground": self.ground,
-            "noise": dict(self.noise),
-            "learn": self.learn,
-        }
+        return {**asdict(self), "sources": list(self.sources), "channels": list(self.channels)}
 
     @classmethod
     def from_dict(cls, data: Mapping[str, Any]) -> Settings:

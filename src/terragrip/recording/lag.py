@@ -7,7 +7,7 @@ slip, a = g K s for small slip, hence v = w (1 - v'/(g K)): the ground speed lag
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -114,7 +114,7 @@ def lag_between(first: Speed, second: Speed, *, reach: float | None = None) -> L
         high = second.pace / (STANDARD_GRAVITY * _STIFFNESS)
     elif second.pace is None and first.pace is not None:
         low = -first.pace / (STANDARD_GRAVITY * _STIFFNESS)
-    return Lag(result.seconds, result.std, result.correlation, (low, high))
+    return replace(result, explained=(low, high))
 
 
 def lag_within(time: Floats, columns: Mapping[str, npt.NDArray[Any]]) -> list[str]:
@@ -141,19 +141,10 @@ def lag_within(time: Floats, columns: Mapping[str, npt.NDArray[Any]]) -> list[st
     ]
 
 
-@dataclass(frozen=True)
-class Offset:
-    """``seconds`` that the second clock is ahead, its standard deviation, and the correlation of the speeds there."""
-
-    seconds: float
-    std: float
-    correlation: float
-
-
 def offset_between(
     reference: tuple[Floats, Floats], other: tuple[Floats, Floats], *, reach: float | None = None
-) -> Offset | None:
-    """How far the clock of ``other`` is ahead of that of ``reference``; each is (time [s], speed), of any scale.
+) -> Lag | None:
+    """How far the clock of ``other`` is ahead of that of ``reference``; each is (time [s], speed), of any scale. Nothing is explained.
 
     The correlation of both speeds over their common part is largest at the true offset (Padfield 2012, for records
     that overlap in part). ``reach``: the largest offset looked for [s]; None: any. None comes back where the common part
@@ -173,7 +164,7 @@ def offset_between(
     if elsewhere.any() and correlation[elsewhere].max() > correlation[best] - _WORSE:
         return None
     seconds, deviation = _refined(first, second, float(shift[best]))
-    return Offset(seconds, deviation, float(min(correlation[best], 1.0)))
+    return Lag(seconds, deviation, float(min(correlation[best], 1.0)), (0.0, 0.0))
 
 
 def _regular(time: Floats, speed: Floats) -> tuple[float, Floats] | None:

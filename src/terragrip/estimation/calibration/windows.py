@@ -94,8 +94,8 @@ def _windows_of(index: int, recording: Recording, vehicle: Vehicle, length: floa
         known = np.zeros(0, dtype=np.intp) if values is None else bin_of[np.isfinite(values)]
         return np.bincount(known, minlength=n).astype(np.float64)
 
-    def per_wheel(quantity: str, absent: float = np.nan) -> Floats:
-        return np.stack([mean(f"{quantity}_{wheel}", absent) for wheel in wheels], axis=1)
+    def per_wheel(quantity: str) -> Floats:
+        return np.stack([mean(f"{quantity}_{wheel}") for wheel in wheels], axis=1)
 
     speed, wheel_speed = mean("ground_speed"), per_wheel("wheel_speed")
     pitch, measured = mean("pitch"), mean("acceleration_x")

@@ -31,6 +31,7 @@ from terragrip.formats.registry import Databases, Format
 from terragrip.formats.signals import SignalLog
 from terragrip.formats.table import Wanted
 
+_LONGEST = 4096  # characters of a line
 _MOST_BAD = 0.5  # share of lines without a frame from which a file is none of its kind
 _BUSY = 20.0  # frames a second: a bus that speaks less is one whose stamps are taken for seconds by mistake
 
@@ -173,9 +174,9 @@ def _from_lines(
     return finished(frames, path, notes, databases, scale)
 
 
-def _bounded(lines: io.TextIOBase, most: int = 4096) -> Iterator[str]:
-    """Lines of no more than ``most`` characters, since a damaged file may have no line ends at all."""
-    while line := lines.readline(most):
+def _bounded(lines: io.TextIOBase) -> Iterator[str]:
+    """Lines of no more than `_LONGEST` characters, since a damaged file may have no line ends at all."""
+    while line := lines.readline(_LONGEST):
         yield line
 
 

@@ -14,9 +14,10 @@ if TYPE_CHECKING:
     from terragrip.vehicle import Vehicle
 
 _HOMES: dict[str, str] = {
-    "udp": "udp", "mqtt": "mqtt", "mqtts": "mqtt", "zenoh": "zenoh", "foxglove": "foxglove", "studio": "studio", "can": "can",
-    "ros2": "ros2",
+    "udp": "udp.UdpSink", "mqtt": "mqtt.MqttSink", "mqtts": "mqtt.MqttSink", "zenoh": "zenoh.ZenohSink",
+    "foxglove": "foxglove.FoxgloveSink", "studio": "studio.StudioSink", "can": "can.CanSink", "ros2": "ros2.Ros2Sink",
 }  # fmt: skip
+"""Module and class of each scheme; the class is called with the URI, the vehicle and the estimates' columns."""
 _ALL = ("rate", "columns")
 OPTIONS: dict[str, Collection[str]] = {
     "udp": (*_ALL, "format"),
@@ -41,5 +42,6 @@ def open_sink(text: str, vehicle: Vehicle, columns: Sequence[str]) -> tuple[Uri,
     """The sink of a URI for estimates of these columns; raises InputError if it names none, or the package it needs is missing."""
     uri = Uri.parse(text, OPTIONS, "sink")
     with packages_of(uri):
-        sink: Sink = import_module(f"{__name__}.{_HOMES[uri.scheme]}").open_sink(uri, vehicle, columns)
+        module, name = _HOMES[uri.scheme].split(".")
+        sink: Sink = getattr(import_module(f"{__name__}.{module}"), name)(uri, vehicle, columns)
     return uri, sink

@@ -20,8 +20,6 @@ from terragrip.live.outbox import Outbox
 from terragrip.live.uri import Uri
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
     from terragrip.vehicle import Vehicle
 
 DBC = Path(__file__).parents[1] / "terragrip.dbc"
@@ -43,7 +41,7 @@ _WHEEL = {
 class CanSink:
     """``can:can0?interface=socketcan&rate=10``; wheels in the order of the vehicle file."""
 
-    def __init__(self, uri: Uri, vehicle: Vehicle) -> None:
+    def __init__(self, uri: Uri, vehicle: Vehicle, *_: object) -> None:
         import cantools
 
         self.uri = uri
@@ -133,8 +131,3 @@ def _raw(signal: Any, value: float) -> int:
     raw = round((value - signal.offset) / signal.scale)
     most = round((signal.maximum - signal.offset) / signal.scale)
     return min(max(raw, 0), most)
-
-
-def open_sink(uri: Uri, vehicle: Vehicle, columns: Sequence[str]) -> CanSink:
-    """See `terragrip.live.sinks.open_sink`."""
-    return CanSink(uri, vehicle)

@@ -114,8 +114,3 @@ def _nanoseconds(message: Message) -> int:
     if message.kind in (EVENT, STATUS) or message.time != message.time:
         return time.time_ns()
     return max(0, round(1e9 * message.time))
-
-
-def open_sink(uri: Uri, vehicle: Vehicle, columns: Sequence[str]) -> FoxgloveSink:
-    """See `terragrip.live.sinks.open_sink`."""
-    return FoxgloveSink(uri, vehicle, columns)

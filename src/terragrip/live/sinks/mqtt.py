@@ -2,23 +2,16 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 from terragrip.live.feed import Lost
 from terragrip.live.mqtt_client import check, client, quality
 from terragrip.live.outbox import Outbox
 from terragrip.live.uri import Uri
 
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from terragrip.vehicle import Vehicle
-
 
 class MqttSink:
     """``mqtt://HOST/terragrip``: to ``terragrip/estimate``, ``terragrip/event``, ``/status``, ``/soil``, ``/ground`` and ``/setpoint``."""
 
-    def __init__(self, uri: Uri) -> None:
+    def __init__(self, uri: Uri, *_: object) -> None:
         self.uri = uri
         self.qos = quality(uri)
         check(uri)
@@ -40,8 +33,3 @@ class MqttSink:
             raise Lost(f"the broker: {error}") from error
         except OSError as error:
             raise Lost(f"the broker: {error.strerror or error}") from error
-
-
-def open_sink(uri: Uri, vehicle: Vehicle, columns: Sequence[str]) -> MqttSink:
-    """See `terragrip.live.sinks.open_sink`."""
-    return MqttSink(uri)

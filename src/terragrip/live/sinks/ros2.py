@@ -6,7 +6,7 @@ import asyncio
 import secrets
 import struct
 import time
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from terragrip.errors import InputError
 from terragrip.live.feed import Lost
@@ -15,16 +15,11 @@ from terragrip.live.outbox import Outbox
 from terragrip.live.ros2_messages import STRING, STRING_HASH, dds_name, domain_of, has_rclpy
 from terragrip.live.uri import Uri
 
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from terragrip.vehicle import Vehicle
-
 
 class Ros2Sink:
     """``ros2:/terragrip``: to ``/terragrip/estimate``, ``/terragrip/event`` and so on."""
 
-    def __init__(self, uri: Uri) -> None:
+    def __init__(self, uri: Uri, *_: object) -> None:
         self.uri = uri
         self.domain = domain_of(uri)
         self.name = uri.path.strip("/")
@@ -90,8 +85,3 @@ class Ros2Sink:
 def cdr_string(text: bytes) -> bytes:
     """A std_msgs/String in CDR, little-endian: encapsulation, length with the NUL, text, NUL."""
     return struct.pack("<BBHI", 0, 1, 0, len(text) + 1) + text + b"\0"
-
-
-def open_sink(uri: Uri, vehicle: Vehicle, columns: Sequence[str]) -> Ros2Sink:
-    """See `terragrip.live.sinks.open_sink`."""
-    return Ros2Sink(uri)

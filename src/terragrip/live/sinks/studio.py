@@ -87,8 +87,3 @@ class StudioSink:
             await connection.close(1008, str(error)[:120])
         except ConnectionClosed:
             return
-
-
-def open_sink(uri: Uri, vehicle: Vehicle, columns: Sequence[str]) -> StudioSink:
-    """See `terragrip.live.sinks.open_sink`."""
-    return StudioSink(uri, vehicle, columns)

@@ -6,19 +6,12 @@ import asyncio
 import errno
 import socket
 import struct
-from typing import TYPE_CHECKING
 
 from terragrip.errors import InputError
 from terragrip.live.feed import Lost
 from terragrip.live.message import ESTIMATE, Message
 from terragrip.live.outbox import Outbox
 from terragrip.live.uri import Uri
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from terragrip.vehicle import Vehicle
-
 
 _PASSING = {errno.EAGAIN, errno.ENOBUFS, errno.EMSGSIZE}
 """What concerns one message, not the way."""
@@ -27,7 +20,7 @@ _PASSING = {errno.EAGAIN, errno.ENOBUFS, errno.EMSGSIZE}
 class UdpSink:
     """``udp://HOST:PORT?format=json|doubles``. Doubles are little-endian: time, then the columns; events are left out."""
 
-    def __init__(self, uri: Uri) -> None:
+    def __init__(self, uri: Uri, *_: object) -> None:
         self.uri = uri
         self.packed = uri.options.get("format", "json") == "doubles"
         self.port = uri.port or 0
@@ -81,8 +74,3 @@ class UdpSink:
         values = row.estimate.values
         numbers = [values[place] for place in places.values()]
         return struct.pack(f"<{1 + len(numbers)}d", row.estimate.time, *numbers)
-
-
-def open_sink(uri: Uri, vehicle: Vehicle, columns: Sequence[str]) -> UdpSink:
-    """See `terragrip.live.sinks.open_sink`."""
-    return UdpSink(uri)

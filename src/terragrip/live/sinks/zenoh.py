@@ -3,23 +3,17 @@
 from __future__ import annotations
 
 import asyncio
-from typing import TYPE_CHECKING
 
 from terragrip.live.feed import Lost
 from terragrip.live.outbox import Outbox
 from terragrip.live.uri import Uri
 from terragrip.live.zenoh_session import config, key_of, open_session
 
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from terragrip.vehicle import Vehicle
-
 
 class ZenohSink:
     """``zenoh:terragrip?listen=tcp/127.0.0.1:7447``: to ``terragrip/estimate`` and so on."""
 
-    def __init__(self, uri: Uri) -> None:
+    def __init__(self, uri: Uri, *_: object) -> None:
         self.uri = uri
         self.key = key_of(uri, "terragrip")
         config(uri)
@@ -42,8 +36,3 @@ class ZenohSink:
             raise Lost(f"Zenoh: {error}") from error
         finally:
             await asyncio.to_thread(session.close)
-
-
-def open_sink(uri: Uri, vehicle: Vehicle, columns: Sequence[str]) -> ZenohSink:
-    """See `terragrip.live.sinks.open_sink`."""
-    return ZenohSink(uri)

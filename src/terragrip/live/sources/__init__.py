@@ -13,9 +13,10 @@ from terragrip.live.feed import Feed
 from terragrip.live.uri import Uri
 
 _HOMES: dict[str, str] = {
-    "udp": "udp", "replay": "replay", "mqtt": "mqtt", "mqtts": "mqtt", "serial": "serial", "zenoh": "zenoh",
-    "can": "can", "ros2": "ros2",
+    "udp": "udp.UdpSource", "replay": "replay.ReplaySource", "mqtt": "mqtt.MqttSource", "mqtts": "mqtt.MqttSource",
+    "serial": "serial.SerialSource", "zenoh": "zenoh.ZenohSource", "can": "can.CanSource", "ros2": "ros2.Ros2Source",
 }  # fmt: skip
+"""Module and class of each scheme; the class is called with the URI and the decoder of its profile."""
 OPTIONS: dict[str, Collection[str]] = {
     "udp": ("allow",),
     "replay": ("speed",),
@@ -44,7 +45,8 @@ def open_source(text: str, decoder: Decoder) -> tuple[Uri, Source]:
     """The source of a URI; raises InputError if it names none, or the package it needs is missing."""
     uri = Uri.parse(text, OPTIONS, "source")
     with packages_of(uri):
-        source: Source = import_module(f"{__name__}.{_HOMES[uri.scheme]}").open_source(uri, decoder)
+        module, name = _HOMES[uri.scheme].split(".")
+        source: Source = getattr(import_module(f"{__name__}.{module}"), name)(uri, decoder)
     return uri, source
 
 

@@ -72,8 +72,3 @@ class CanSource:
                 feed.fields({**fields, "time": frame.timestamp} if frame.timestamp > 0 else fields)
             else:
                 feed.messages += 1
-
-
-def open_source(uri: Uri, decoder: Decoder) -> CanSource:
-    """See `terragrip.live.sources.open_source`."""
-    return CanSource(uri, decoder)

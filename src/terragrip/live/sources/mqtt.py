@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from terragrip.live.decode import Decoder
 from terragrip.live.feed import Feed, Lost
 from terragrip.live.mqtt_client import check, client, quality
 from terragrip.live.uri import Uri
@@ -13,7 +12,7 @@ class MqttSource:
 
     real_time = True
 
-    def __init__(self, uri: Uri) -> None:
+    def __init__(self, uri: Uri, *_: object) -> None:
         self.uri = uri
         self.qos = quality(uri)
         check(uri)
@@ -34,8 +33,3 @@ class MqttSource:
             raise Lost(f"the broker: {error}") from error
         except OSError as error:  # TLS failures come through as they are
             raise Lost(f"the broker: {error.strerror or error}") from error
-
-
-def open_source(uri: Uri, decoder: Decoder) -> MqttSource:
-    """See `terragrip.live.sources.open_source`."""
-    return MqttSource(uri)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 import math
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -13,23 +12,26 @@ from terragrip.live.decode import Decoder
 from terragrip.live.feed import Feed
 from terragrip.live.uri import Uri
 
-if TYPE_CHECKING:
-    from terragrip.recording import Recording
-
 _AT_ONCE = 256  # rows
 
 
 class ReplaySource:
     """``replay:LOG?speed=10``: any log that ``terragrip estimate`` reads, through the same profile; ``speed=max`` does not wait.
 
-    Rows arrive at their own stamps, so that a replay gives the same at any speed, and goes on after a kill where it was.
+    Rows arrive at their own stamps, so that a replay gives the same at any speed, and goes on after a kill where it was. Raises
+    InputError where the log cannot be read.
     """
 
     real_time = False
 
-    def __init__(self, recording: Recording, speed: float) -> None:
-        self.recording, self.speed = recording, speed
-        self.channels = tuple(n for n in recording.channels if n not in recording.references)
+    def __init__(self, uri: Uri, decoder: Decoder) -> None:
+        from terragrip.formats import read
+
+        if not uri.path:
+            raise InputError("names no log", place=uri.text, hint="write replay:drive.csv")
+        self.speed = math.inf if uri.options.get("speed") == "max" else uri.number("speed", 1.0)
+        self.recording = read(uri.path, decoder.profile)
+        self.channels = tuple(n for n in self.recording.channels if n not in self.recording.references)
 
     async def run(self, feed: Feed) -> None:
         """Feed the rows behind the newest that the record holds."""
@@ -54,14 +56,3 @@ class ReplaySource:
                 if values:
                     feed.sample(stamp, values, arrival=stamp)
             first = last
-
-
-def open_source(uri: Uri, decoder: Decoder) -> ReplaySource:
-    """See `terragrip.live.sources.open_source`; reads the log, and raises InputError where that is not possible."""
-    from terragrip.formats import read
-
-    if not uri.path:
-        raise InputError("names no log", place=uri.text, hint="write replay:drive.csv")
-    text = uri.options.get("speed", "1")
-    speed = math.inf if text == "max" else uri.number("speed", 1.0)
-    return ReplaySource(read(uri.path, decoder.profile), speed)

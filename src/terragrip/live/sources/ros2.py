@@ -120,8 +120,3 @@ class Ros2Source:
             raise Lost(f"ROS 2: {error}") from error
         finally:
             done.set()
-
-
-def open_source(uri: Uri, decoder: Decoder) -> Ros2Source:
-    """See `terragrip.live.sources.open_source`."""
-    return Ros2Source(uri, decoder)

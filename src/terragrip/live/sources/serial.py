@@ -9,7 +9,6 @@ from pathlib import Path
 
 from terragrip.errors import InputError
 from terragrip.formats.nmea_sentences import sentences
-from terragrip.live.decode import Decoder
 from terragrip.live.feed import Feed, Lost
 from terragrip.live.thread_bridge import ThreadBridge
 from terragrip.live.uri import Uri
@@ -23,7 +22,7 @@ class SerialSource:
 
     real_time = True
 
-    def __init__(self, uri: Uri) -> None:
+    def __init__(self, uri: Uri, *_: object) -> None:
         import pynmea2  # noqa: F401  # so that a missing package is reported at once
         import serial  # noqa: F401
 
@@ -73,8 +72,3 @@ class SerialSource:
             self._has_rmc |= sentence.kind == "RMC" and "ground_speed" in sentence.fields
             if sentence.fields:
                 feed.fields(sentence.fields)
-
-
-def open_source(uri: Uri, decoder: Decoder) -> SerialSource:
-    """See `terragrip.live.sources.open_source`."""
-    return SerialSource(uri)

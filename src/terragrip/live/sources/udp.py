@@ -8,7 +8,6 @@ import struct
 import sys
 
 from terragrip.errors import InputError
-from terragrip.live.decode import Decoder
 from terragrip.live.feed import Feed, Lost
 from terragrip.live.uri import Uri
 
@@ -23,7 +22,7 @@ class UdpSource:
 
     real_time = True
 
-    def __init__(self, uri: Uri) -> None:
+    def __init__(self, uri: Uri, *_: object) -> None:
         self.uri = uri
         self.allowed = frozenset(filter(None, uri.options.get("allow", "").split(",")))
         if uri.port is None:
@@ -104,8 +103,3 @@ def _dropped_by_system(link: socket.socket) -> int:
     except OSError:
         return 0
     return struct.unpack(f"={len(numbers) // 4}I", numbers)[_DROPS]
-
-
-def open_source(uri: Uri, decoder: Decoder) -> UdpSource:
-    """See `terragrip.live.sources.open_source`."""
-    return UdpSource(uri)

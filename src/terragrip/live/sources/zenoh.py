@@ -5,7 +5,6 @@ from __future__ import annotations
 import asyncio
 from typing import Any
 
-from terragrip.live.decode import Decoder
 from terragrip.live.feed import Feed
 from terragrip.live.thread_bridge import ThreadBridge
 from terragrip.live.uri import Uri
@@ -17,7 +16,7 @@ class ZenohSource:
 
     real_time = True
 
-    def __init__(self, uri: Uri) -> None:
+    def __init__(self, uri: Uri, *_: object) -> None:
         self.uri = uri
         self.key = key_of(uri, "machine/**")
         config(uri)
@@ -39,8 +38,3 @@ class ZenohSource:
 
     def _feed(self, feed: Feed, data: bytes, key: str) -> None:
         feed.message(data, topic=key)
-
-
-def open_source(uri: Uri, decoder: Decoder) -> ZenohSource:
-    """See `terragrip.live.sources.open_source`."""
-    return ZenohSource(uri)
