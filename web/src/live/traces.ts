@@ -4,6 +4,7 @@ import { EVENT_COLORS } from "../drive/run";
 import { ticks } from "../fit/view";
 import { digits, h } from "../ui/dom";
 import { color, onTheme } from "../ui/theme";
+import { Columns, type Window } from "./columns";
 import type { Ring } from "./feed";
 
 export interface Trace {
@@ -20,6 +21,8 @@ export interface Trace {
 const NARROW = 560;
 /** Seconds between the marks of the time axis. */
 const STEPS = [5, 10, 15, 30, 60, 120, 300];
+/** Pixels of a dot of what is predicted. */
+const DOTS = 2;
 const [LEFT, RIGHT, GAP, FOOT] = [50, 10, 24, 24];
 
 export class Traces {
@@ -38,6 +41,7 @@ export class Traces {
   private canvas = h("canvas", { "aria-hidden": "true" });
   private traces: Trace[] = [];
   private asked = false;
+  private pool: Columns[] = [];
   private ranges = new Map<string, [number, number]>();
   private forget: () => void;
   private watcher: ResizeObserver;
@@ -137,24 +141,13 @@ export class Traces {
   }
 
   private drawOne(pen: CanvasRenderingContext2D, trace: Trace, x0: number, y0: number, width: number, height: number, first: number, end: number, last: boolean): void {
-    const { ring } = this;
     const [left, right, top, bottom] = [x0 + LEFT, x0 + width - RIGHT, y0 + 24, y0 + height - 6];
-    const [low, high] = this.range(trace, first, end);
+    const window = { first, begin: end - this.span, end, pixels: Math.round((right - left) * devicePixelRatio) };
+    const lines = this.gather(trace, window);
+    const [low, high] = this.range(trace, lines.map(({ columns }) => columns));
     const px = (time: number): number => right - ((end - time) / this.span) * (right - left);
     const py = (v: number): number => bottom - ((v - low) / (high - low)) * (bottom - top);
-    pen.font = "600 13px system-ui, sans-serif";
-    pen.fillStyle = color("ink");
-    pen.textBaseline = "alphabetic";
-    pen.textAlign = "left";
-    pen.fillText(`${trace.title} [${trace.unit}]`, left, y0 + 16);
-    pen.font = "12px system-ui, sans-serif";
-    let x = left + pen.measureText(`${trace.title} [${trace.unit}]`).width + 34;
-    for (const line of trace.lines.length > 1 ? trace.lines : []) {
-      pen.fillStyle = color(line.color);
-      pen.fillRect(x, y0 + 10, 12, 3);
-      pen.fillText(line.label, x + 16, y0 + 16);
-      x += 26 + pen.measureText(line.label).width;
-    }
+    this.drawHead(pen, trace, left, y0);
     pen.lineWidth = 1;
     pen.textAlign = "right";
     pen.textBaseline = "middle";
@@ -173,79 +166,105 @@ export class Traces {
       const edge = this.back === null ? "now" : `${end.toFixed(0)} s`;
       for (let back = 0; back < this.span; back += step) pen.fillText(back ? `−${back} s` : edge, px(end - back) - (back ? 0 : 10), bottom + 14);
     }
-    const names = this.events();
-    const count = ring.count;
     pen.save();
     pen.beginPath();
     pen.rect(left, top - 2, right - left, bottom - top + 4);
     pen.clip();
-    for (let i = first; i < count; i++) {
-      const at = ring.place(i);
-      const code = ring.event[at] as number;
-      if (!code || (ring.time[at] as number) > end) continue;
-      pen.fillStyle = color(EVENT_COLORS[names[code] ?? ""] ?? "ink");
-      pen.fillRect(px(ring.time[at] as number) - 1, bottom - 3, 2, 5);
-    }
-    for (const line of trace.lines) {
-      const values = ring.columns[ring.names.indexOf(line.column)];
-      if (!values) continue;
-      for (const predicted of [0, 1]) {
-        pen.strokeStyle = color(predicted ? "muted" : line.color);
-        pen.lineWidth = predicted ? 1.2 : 1.6;
-        pen.setLineDash(predicted ? [2, 4] : []);
-        this.path(pen, values, predicted, first, end, px, (v) => py(v * trace.scale));
+    this.drawEvents(pen, first, end, px, bottom);
+    for (const { columns, values, shade, predicted } of lines) {
+      if (columns.rows > window.pixels) {
+        pen.fillStyle = shade;
+        pen.setTransform(1, 0, 0, 1, 0, 0); // whole pixels: plain fills
+        columns.draw(pen, Math.round(left * devicePixelRatio), (v) => py(v * trace.scale) * devicePixelRatio, 1.6 * devicePixelRatio, predicted * DOTS);
+        pen.setTransform(devicePixelRatio, 0, 0, devicePixelRatio, 0, 0);
+        continue;
       }
+      pen.strokeStyle = shade;
+      pen.lineWidth = predicted ? 1.2 : 1.6;
+      pen.setLineDash(predicted ? [2, 4] : []);
+      this.path(pen, values, predicted, first, end, px, (v) => py(v * trace.scale));
     }
     pen.restore();
   }
 
-  /** One line's rows, those measured or those predicted, from `first` to the time `end`. */
+  /** The lines of a chart, by columns of pixels; those predicted after those measured, where there are any. */
+  private gather(trace: Trace, window: Window): { columns: Columns; values: Float64Array; shade: string; predicted: 0 | 1 }[] {
+    const { ring } = this;
+    let used = 0;
+    return trace.lines.flatMap((line) => {
+      const values = ring.columns[ring.names.indexOf(line.column)];
+      if (!values) return [];
+      return ([0, 1] as const).flatMap((predicted) => {
+        const columns = (this.pool[used] ??= new Columns());
+        columns.take(ring, values, predicted, window);
+        if (columns.least > columns.most) return [];
+        used++;
+        return [{ columns, values, shade: color(predicted ? "muted" : line.color), predicted }];
+      });
+    });
+  }
+
+  private drawHead(pen: CanvasRenderingContext2D, trace: Trace, left: number, y0: number): void {
+    const title = `${trace.title} [${trace.unit}]`;
+    pen.font = "600 13px system-ui, sans-serif";
+    pen.fillStyle = color("ink");
+    pen.textBaseline = "alphabetic";
+    pen.textAlign = "left";
+    pen.fillText(title, left, y0 + 16);
+    let x = left + pen.measureText(title).width + 20;
+    pen.font = "12px system-ui, sans-serif";
+    for (const line of trace.lines.length > 1 ? trace.lines : []) {
+      pen.fillStyle = color(line.color);
+      pen.fillRect(x, y0 + 10, 12, 3);
+      pen.fillText(line.label, x + 16, y0 + 16);
+      x += 26 + pen.measureText(line.label).width;
+    }
+  }
+
+  /** Events at the foot, one mark a pixel. */
+  private drawEvents(pen: CanvasRenderingContext2D, first: number, end: number, px: (time: number) => number, bottom: number): void {
+    const { ring } = this;
+    const names = this.events();
+    let [before, kind] = [NaN, 0];
+    for (let i = first; i < ring.count; i++) {
+      const at = ring.place(i);
+      const code = ring.event[at] as number;
+      const time = ring.time[at] as number;
+      if (time > end) break;
+      if (!code) continue;
+      const x = Math.round(px(time));
+      if (x === before && code === kind) continue;
+      [before, kind] = [x, code];
+      pen.fillStyle = color(EVENT_COLORS[names[code] ?? ""] ?? "ink");
+      pen.fillRect(x - 1, bottom - 3, 2, 5);
+    }
+  }
+
+  /** One line's rows, where there are fewer than pixels: those measured or those predicted, from `first` to the time `end`. */
   private path(pen: CanvasRenderingContext2D, values: Float64Array, predicted: number, first: number, end: number, px: (time: number) => number, py: (v: number) => number): void {
     const { ring } = this;
     pen.beginPath();
-    let [on, column, least, most] = [false, NaN, 0, 0];
-    // Rows of one column of pixels are one upright stroke: minutes at 100 Hz would cost a frame.
-    const flush = (): void => {
-      if (on && most !== least) pen.lineTo(column, least), pen.lineTo(column, most);
-    };
+    let on = false;
     for (let i = first; i < ring.count; i++) {
       const at = ring.place(i);
       const time = ring.time[at] as number;
       if (time > end) break;
       const v = values[at] as number;
       if (Number.isNaN(v) || ring.predicted[at] !== predicted) {
-        flush();
         on = false;
         continue;
       }
-      const [x, y] = [Math.round(2 * px(time)) / 2, py(v)];
-      if (on && x === column) {
-        [least, most] = [Math.min(least, y), Math.max(most, y)];
-        continue;
-      }
-      flush();
-      if (on) pen.lineTo(x, y);
-      else pen.moveTo(x, y);
-      [on, column, least, most] = [true, x, y, y];
+      if (on) pen.lineTo(px(time), py(v));
+      else pen.moveTo(px(time), py(v));
+      on = true;
     }
-    flush();
     pen.stroke();
   }
 
   /** A range that grows at once and shrinks slowly, so that the lines do not dance. */
-  private range(trace: Trace, first: number, end: number): [number, number] {
-    let [low, high] = [Infinity, -Infinity];
-    for (const line of trace.lines) {
-      const values = this.ring.columns[this.ring.names.indexOf(line.column)];
-      if (!values) continue;
-      for (let i = first; i < this.ring.count; i++) {
-        const at = this.ring.place(i);
-        if ((this.ring.time[at] as number) > end) break;
-        const v = (values[at] as number) * trace.scale;
-        if (v < low) low = v;
-        if (v > high) high = v;
-      }
-    }
+  private range(trace: Trace, lines: Columns[]): [number, number] {
+    let low = Math.min(...lines.map(({ least }) => least)) * trace.scale;
+    let high = Math.max(...lines.map(({ most }) => most)) * trace.scale;
     low = Math.max(Math.min(low, trace.low === 0 ? 0 : low), trace.low);
     high = Math.min(high, trace.high);
     if (low > high) [low, high] = [Math.max(trace.low, 0), Math.min(trace.high, Math.max(trace.low, 0) + 1)]; // nothing is known

@@ -8,6 +8,7 @@ import { focusOn, refill } from "./focus";
 import { freeName, JobList, stemOf, viewOf } from "./jobs";
 import { MachineMaker } from "./machine";
 import { Mapping, type Look } from "./mapping";
+import type { Parts } from "./wheels";
 
 interface Inspection {
   rows: number;
@@ -75,7 +76,14 @@ export class LogPage {
     this.drawMachine();
     this.drawEstimate();
     this.drawNext();
+    await this.parts();
     await this.inspect();
+  }
+
+  /** The names of the vehicle's wheels and axles, for the columns. */
+  private async parts(): Promise<void> {
+    const parts = this.vehicle ? await tried(() => get<Parts>("machines/parts", { path: this.vehicle })) : undefined;
+    this.mapping?.names.offer(parts ?? { wheels: [], axles: [] });
   }
 
   private of(kind: string): string[] {
@@ -119,7 +127,7 @@ export class LogPage {
     const select = choice("wizard-vehicle", vehicles, this.vehicle, "no vehicle file yet: make one below");
     select.addEventListener("change", () => {
       this.vehicle = select.value;
-      void this.inspect();
+      void this.parts().then(() => this.inspect());
     });
     const maker = (this.maker = new MachineMaker(freeName(this.items, `${stemOf(this.log)}-vehicle`, ".yaml"), this.mapping?.signals ?? "torque", (path) => void this.keptVehicle(path)));
     const command = h("div");
@@ -138,6 +146,7 @@ export class LogPage {
     fill(select, this.of("vehicle").map((name) => h("option", { value: name, selected: name === path }, name)));
     (document.getElementById("make-machine") as HTMLDetailsElement).open = false;
     focusOn(document.getElementById("step-estimate"));
+    await this.parts();
     await this.inspect();
   }
 
@@ -193,6 +202,7 @@ export class LogPage {
       fill(
         found,
         h("p", { class: ready ? "good" : "bad" }, this.verdict(result)),
+        ready ? null : this.namesMissing(),
         result.warnings.map((text) => h("p", { class: "hint" }, text)),
         h("details", {}, h("summary", {}, "What is in it"), h("pre", { tabindex: "0" }, result.text)),
       );
@@ -201,6 +211,17 @@ export class LogPage {
     } catch (error) {
       if (turn === this.looks) fill(found, h("p", { class: "bad", role: "alert" }, error instanceof Error ? error.message : String(error)));
     }
+  }
+
+  /** A way to the names, where the log's wheels are not the vehicle's. */
+  private namesMissing(): HTMLElement | null {
+    const [first] = this.mapping?.strangers ?? [];
+    if (first === undefined) return null;
+    const go = (): void => {
+      (document.getElementById("choose-columns") as HTMLDetailsElement).open = true;
+      this.mapping?.names.focus(first);
+    };
+    return h("p", {}, h("button", { type: "button", id: "name-wheels", click: go }, "Say which wheel is which"));
   }
 
   private verdict(found: Inspection): string {

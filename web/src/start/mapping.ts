@@ -2,8 +2,9 @@
 
 import { get, send } from "../ui/api";
 import { digits, fill, h } from "../ui/dom";
-import { tried } from "../ui/notes";
+import { note, tried } from "../ui/notes";
 import { svg } from "./sketch";
+import { WheelNames } from "./wheels";
 
 type Entry = Record<string, unknown>;
 
@@ -61,6 +62,8 @@ export class Mapping {
   private chosen = new Map<string, Choice>();
   private rows = new Map<string, HTMLElement>();
   private wheels: string[] = [];
+  private own = ""; // the profile written by this page, which it may write anew
+  readonly names = new WheelNames(() => this.nameRows());
 
   constructor(
     private log: string,
@@ -82,8 +85,25 @@ export class Mapping {
     }
     this.wheels = [...new Set(this.look.channels.map((channel) => channel.wheel).filter(Boolean))];
     if (!this.wheels.length && !this.chosen.has("wheel_based_speed")) this.addWheels(["fl", "fr", "rl", "rr"]);
+    this.names.of(this.look.channels);
     this.draw(output);
     return this.look;
+  }
+
+  /** Wheels and axles of the log that the vehicle does not know. */
+  get strangers(): string[] {
+    return this.names.strangers((channel) => this.chosen.has(channel));
+  }
+
+  private nameRows(): void {
+    for (const channel of this.look?.channels ?? []) {
+      const label = this.rows.get(channel.name)?.querySelector(".channel");
+      if (label) label.textContent = this.titleOf(channel);
+    }
+  }
+
+  private titleOf(channel: Channel): string {
+    return channel.wheel ? `${this.names.nameOf(channel.wheel)}: ${channel.title}` : channel.title;
   }
 
   /** What the chosen channels measure, as the vehicle maker asks it. */
@@ -112,6 +132,7 @@ export class Mapping {
       this.element,
       look.refused ? h("p", { class: "bad" }, `This log ${look.refused}.`) : null,
       h("p", { class: "hint" }, "Which column is what. The likeliest is chosen; its reason stands beside it, and “?” is a doubt to look at."),
+      this.names.element,
       this.timeRow(look),
       h("div", { class: "map-rows", role: "group", "aria-label": "Channels" }, needed.map((channel) => this.row(channel))),
       h("details", {}, h("summary", {}, `${other.length} more channels that help, where the log has them`), h("div", { class: "map-rows" }, other.map((channel) => this.row(channel)))),
@@ -163,7 +184,7 @@ export class Mapping {
     const column = look.columns.find((one) => one.name === (proposal?.columns[0] ?? choice?.column));
     fill(
       box,
-      h("label", { for: select.id, class: "channel" }, channel.wheel ? `${channel.wheel}: ` : "", channel.title),
+      h("label", { for: select.id, class: "channel" }, this.titleOf(channel)),
       select,
       choice && channel.unit ? this.unit(channel, choice, proposal, column) : h("span"),
       choice && channel.unit ? this.sign(channel, choice) : h("span"),
@@ -209,9 +230,19 @@ export class Mapping {
   }
 
   private async save(output: string): Promise<void> {
-    const channels = Object.fromEntries([...this.chosen].map(([name, choice]) => [name, choice.entry]));
-    const kept = await tried(() => send<{ path: string }>("POST", "profile", { log: this.log, output, time: this.look?.time ?? { from: "time" }, channels }));
-    if (kept) this.saved(kept.path);
+    const twice = this.names.twice();
+    if (twice) {
+      note(`${twice.join(" and ")} have been given one name: ${this.names.nameOf(twice[0])}. Each is another wheel or axle.`, "error");
+      this.names.focus(twice[1]);
+      return;
+    }
+    const named = new Map(this.look?.channels.map((channel) => [channel.name, this.names.channel(channel)]));
+    const channels = Object.fromEntries([...this.chosen].map(([name, choice]) => [named.get(name) ?? name, choice.entry]));
+    const wanted = { log: this.log, output, time: this.look?.time ?? { from: "time" }, channels, replace: output === this.own };
+    const kept = await tried(() => send<{ path: string }>("POST", "profile", wanted));
+    if (!kept) return;
+    this.own = kept.path;
+    this.saved(kept.path);
   }
 }
 

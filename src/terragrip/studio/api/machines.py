@@ -9,7 +9,7 @@ from fastapi import APIRouter
 from pydantic import BaseModel, Field
 
 from terragrip.errors import InputError
-from terragrip.studio.api.files import finite
+from terragrip.studio.api.files import Named, finite
 from terragrip.studio.state import Here
 from terragrip.vehicle_maker import SIGNALS, Made, classes, fields, interval_costs, make
 
@@ -41,6 +41,15 @@ class MachineFile(Machine):
 def list_machines() -> dict[str, Any]:
     """The classes of machine, and what a log may measure."""
     return {"classes": [{"name": one.name, "title": one.title} for one in classes()], "signals": SIGNALS}
+
+
+@router.get("/machines/parts")
+def parts_of_machine(studio: Here, path: Named) -> dict[str, list[str]]:
+    """The names of a vehicle file's wheels and axles."""
+    from terragrip.vehicle import Vehicle
+
+    vehicle = Vehicle.load(studio.folder.file(path))
+    return {"wheels": list(vehicle.wheels), "axles": list(vehicle.axles)}
 
 
 @router.post("/machines/made")
