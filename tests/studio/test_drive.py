@@ -245,15 +245,6 @@ def test_the_track_holds_every_position(client: TestClient, folder: Path) -> Non
     np.testing.assert_array_equal(track["slip_rr"], table["slip_rr"][known])
 
 
-def test_the_plane_is_thinned_and_holds_pairs(client: TestClient) -> None:
-    pairs = client.get("/api/drive/plane", params={"path": RUN, "wheel": "rr", "start": 0, "end": 1e9}).json()
-    assert 100 < len(pairs["slip"]) == len(pairs["adhesion"]) <= 6000
-    assert (
-        client.get("/api/drive/plane", params={"path": RUN, "wheel": "zz", "start": 0, "end": 1}).status_code
-        == 422
-    )
-
-
 def test_ground_of_the_run_is_shown_where_it_lies_beside_it(client: TestClient, folder: Path) -> None:
     assert client.get("/api/drive", params={"path": RUN}).json()["ground"] is None
     ground = {
@@ -368,8 +359,8 @@ def test_estimates_of_slip_alone_open_as_any(client: TestClient, folder: Path) -
     }
     shown = client.get("/api/drive/window", params=query)
     assert np.isfinite(unpack(shown.content)[f"slip_{wheel}"]).any()
-    plane = client.get("/api/drive/plane", params={"path": "slip.parquet", "wheel": wheel, **ends})
-    assert plane.json() == {"slip": [], "adhesion": [], "time": []}
+    plane = {"path": "slip.parquet", "x": f"slip_{wheel}", "y": f"adhesion_{wheel}", **ends}
+    assert "is not in the estimates" in client.get("/api/drive/pairs", params=plane).json()["detail"]
     sample = client.get("/api/drive/sample", params={"path": "slip.parquet", "time": middle}).json()
     assert sample["why"]
     assert all("Without a torque there is no adhesion." in one or "undefined" in one for one in sample["why"])

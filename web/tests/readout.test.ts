@@ -21,11 +21,11 @@ describe("the value under the cursor", () => {
 
 describe("a link", () => {
   it("gives back the view that it was written from", () => {
-    const view = { path: "a b/c&d.parquet", range: [1.25, 7.5] as [number, number], wheels: ["rl"], panels: ["slip", "nis"], at: 3.125, uprights: { slip: [-5, 40] as [number, number] } };
+    const view = { path: "a b/c&d.parquet", range: [1.25, 7.5] as [number, number], wheels: ["rl"], panels: ["slip", "nis"], at: 3.125, uprights: { slip: [-5, 40] as [number, number] }, axis: "distance" as const, others: ["d/b.parquet", "c.parquet"], formulas: [{ name: "Slip difference", unit: "%", text: "100 * (slip_rl - slip_rr)" }, { name: "µ sum", unit: "", text: "a + b" }], pair: ["=a + b", "slip_rl"] as [string, string] };
     expect(read(new URLSearchParams(written(view)))).toEqual(view);
   });
   it("with nonsense in it is the whole run", () => {
     const view = read(new URLSearchParams("path=a.parquet&from=9&to=2&at=x&y.slip=3"));
-    expect(view).toEqual({ path: "a.parquet", range: null, wheels: null, panels: null, at: null, uprights: {} });
+    expect(view).toEqual({ path: "a.parquet", range: null, wheels: null, panels: null, at: null, uprights: {}, axis: "time", others: [], formulas: [], pair: null });
   });
 });

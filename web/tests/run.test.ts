@@ -6,7 +6,7 @@ const STATES = [...WHEELS.map((w) => `wheel_speed_${w}`), "ground_speed", ...WHE
 
 function run(method: string, columns: string[]): Run {
   const nothing = { notes: [], version: "1-1", events: [], soils: [], ground: null, recording: null, measured: [] };
-  return { ...nothing, rows: 9, start: 0, end: 1, columns, wheels: WHEELS, method, vehicle: "robot", radius: { rl: 0.2, rr: 0.2 } };
+  return { ...nothing, rows: 9, start: 0, end: 1, distance: 2, columns, wheels: WHEELS, method, vehicle: "robot", radius: { rl: 0.2, rr: 0.2 } };
 }
 
 it("shows the filter's honesty: NIS against its band, gamma, and each factor of A of the chosen wheels", () => {

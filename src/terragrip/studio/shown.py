@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from collections import OrderedDict
 from collections.abc import Callable
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 import numpy.typing as npt
 
-from terragrip.errors import InputError
+from terragrip.errors import InputError, nearest
+from terragrip.studio.formulas import evaluate, names
 from terragrip.studio.tables import Extremes, are_long, buckets, extremes
 
 if TYPE_CHECKING:
@@ -20,14 +22,25 @@ Floats = npt.NDArray[np.float64]
 LEVEL = 1.959964
 """Standard deviations of a 95 % interval."""
 MEASURED = "measured:"
+FORMULA = "="
+"""What a name begins with that is worked out, and of what: ``=slip_rl - slip_rr``."""
 MEAN = 1.0
 """Seconds over which NIS is averaged."""
+HELD = 8
+"""Formulas of a run whose rows are held."""
+APART = 1e-9
+"""Metres by which rows at a standstill are kept apart, so that each has a place of its own: a millimetre in a million rows."""
+
+Axis = Literal["time", "elapsed", "distance"]
+"""What a run is drawn over: time as recorded [s], time since its start [s], distance driven [m]."""
+PLACES: dict[str, Axis] = {"axis:time": "time", "axis:elapsed": "elapsed", "axis:distance": "distance"}
 
 
 class Shown:
     """What can be drawn of a table; keeps what long windows need from one to the next.
 
-    A name is a column, its 95 % limit (``slip_rl:low``, ``slip_rl:high``) or a channel of the recording (``measured:ground_speed``).
+    A name is a column, its 95 % limit (``slip_rl:low``, ``slip_rl:high``), a channel of the recording (``measured:ground_speed``), the
+    place on an axis (``axis:time``, ``axis:elapsed``, ``axis:distance``) or a formula (``=slip_rl - slip_rr``; see `formulas`).
     Of the filter's consistency: ``nis:mean`` is the sum of NIS over that of the channels within `MEAN` seconds, 1 of an honest filter;
     ``nis:low`` and ``nis:high`` are the 95 % limits of that mean by chi-squared, were the rows independent.
     """
@@ -36,16 +49,72 @@ class Shown:
         self._table = table
         self._extremes: dict[str, Extremes] = {}
         self._nis: dict[str, Floats] = {}
+        self._distance: Floats | None = None
+        self._worked_out: OrderedDict[str, Floats] = OrderedDict()
+
+    def along(self, axis: Axis) -> Floats:
+        """The place of each row on an axis, (n,), ascending. Raises InputError where there is no ground speed to give a distance.
+
+        The distance is the integral of the estimated ground speed's size (trapezoids; where it is unknown, between its known
+        neighbours).
+        """
+        time = self._table.time
+        if axis == "time":
+            return time
+        if axis == "elapsed":
+            return time - time[:1]
+        if self._distance is None:
+            speed = self._table.columns.get("ground_speed")
+            known = np.flatnonzero(np.isfinite(speed)) if speed is not None else np.empty(0, np.intp)
+            if speed is None or not known.size:
+                raise InputError("has no ground speed, so no distance", hint="choose time since start")
+            size = np.interp(time, time[known], np.abs(speed[known]))
+            driven = np.cumsum(np.diff(time) * (size[1:] + size[:-1]) / 2)
+            self._distance = np.concatenate(([0.0], driven)) + APART * np.arange(len(time))
+        return self._distance
+
+    def missing(self, recording: Recording | None, formula: str) -> str | None:
+        """Why a formula cannot be worked out of this run, in one line; None where it can."""
+        try:
+            for name in names(formula):
+                self._column(recording, name)
+        except InputError as error:
+            return str(error)
+        return None
+
+    def rows(
+        self, recording: Recording | None, wanted: list[str], axis: Axis, start: float, end: float
+    ) -> tuple[Floats, list[Floats]]:
+        """All rows between two places on an axis, whole: (places, columns). Raises InputError on a name that is not there."""
+        place = self.along(axis)
+        first, last = np.searchsorted(place, start, "left"), np.searchsorted(place, end, "right")
+        part = slice(int(first), int(last))
+        return place[part], [self._values(recording, name)(part).astype(np.float64) for name in wanted]
+
+    def labels(self, name: str, axis: Axis, start: float, end: float) -> npt.NDArray[np.str_]:
+        """As `rows`, of a column of words: ``event`` or a label such as ``soil``; empty where the run has no such label."""
+        place = self.along(axis)
+        part = slice(int(np.searchsorted(place, start, "left")), int(np.searchsorted(place, end, "right")))
+        words = (
+            self._table[name] if name == "event" or name in self._table.labels else np.full(len(place), "")
+        )
+        return words[part].astype(str)
 
     def window(
-        self, recording: Recording | None, names: list[str], start: float, end: float, width: int
+        self,
+        recording: Recording | None,
+        names: list[str],
+        start: float,
+        end: float,
+        width: int,
+        axis: Axis = "time",
     ) -> tuple[bool, Floats, list[Floats]]:
-        """Columns between two times, cut to `width` buckets: (whether cut, time, columns), all of one length.
+        """Columns between two places on an axis, cut to `width` buckets: (whether cut, places, columns), all of one length.
 
         Where it is cut, a bucket is two points: its smallest and its largest value, so that no spike is lost. Raises InputError on a
         name that is not there.
         """
-        time = self._table.time
+        time = self.along(axis)
         starts = buckets(time, start, end, width)
         first, last = int(starts[0]), int(starts[-1])
         cut = len(starts) - 1 < last - first
@@ -59,9 +128,7 @@ class Shown:
             if not long:
                 low, high = extremes(values(slice(first, last)), starts - first)
             else:
-                if name not in self._extremes:
-                    self._extremes[name] = Extremes(values(slice(None)))
-                low, high = self._extremes[name].of(values, starts)
+                low, high = self._blocks(name, values).of(values, starts)
             pair = {"low": (low, low), "high": (high, high)}.get(name.rpartition(":")[2], (low, high))
             result.append(np.stack(pair, axis=1).ravel())
         if not cut:
@@ -70,8 +137,47 @@ class Shown:
         following = np.r_[begin[1:], time[last - 1]]
         return True, np.stack((begin, (begin + following) / 2), axis=1).ravel(), result
 
+    def _blocks(self, name: str, values: Callable[[slice], Floats]) -> Extremes:
+        """Those of a formula are not kept: what is typed has no end."""
+        if name.startswith(FORMULA):
+            return Extremes(values(slice(None)))
+        if name not in self._extremes:
+            self._extremes[name] = Extremes(values(slice(None)))
+        return self._extremes[name]
+
+    def _of_formula(self, recording: Recording | None, formula: str) -> Floats:
+        rows = self._worked_out.get(formula)
+        if rows is None:
+            rows = evaluate(formula, self._table.time, lambda name: self._column(recording, name))
+            self._worked_out[formula] = rows
+            while len(self._worked_out) > HELD:
+                self._worked_out.popitem(last=False)
+        return rows
+
+    def _column(self, recording: Recording | None, name: str) -> Floats:
+        """A column by the name that a formula gives it: of the estimates, else of the recording; ``measured_NAME`` is the recording's
+        where both have it. Raises InputError where there is none."""
+        channels = {} if recording is None else recording.channels
+        known = {**{f"measured_{channel}": rows for channel, rows in channels.items()}, **channels}
+        known.update(self._table.columns)
+        if name in known:
+            return known[name]
+        if f"axis:{name}" in PLACES:
+            return self.along(PLACES[f"axis:{name}"])
+        like = nearest(name, [*known, "time", "elapsed", "distance"])
+        absent = "" if recording is not None else "the recording is not in this folder"
+        raise InputError(
+            f"{name} is no column of this run",
+            place="formula",
+            hint=f"did you mean {like}?" if like else absent,
+        )
+
     def _values(self, recording: Recording | None, name: str) -> Callable[[slice], Floats]:
         """Gives rows of what a name means."""
+        if name.startswith(FORMULA):
+            return self._of_formula(recording, name.removeprefix(FORMULA)).__getitem__
+        if name in PLACES:
+            return self.along(PLACES[name]).__getitem__
         if name.startswith(MEASURED):
             channel = name.removeprefix(MEASURED)
             if recording is None or channel not in recording.channels:

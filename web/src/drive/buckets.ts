@@ -1,23 +1,17 @@
-/** Intervals as areas; and, where there are more points than pixels, a column of pixels each from its smallest to its largest value: a
- * line through them would cost a frame. */
+/** Traces with their intervals: lines, and, where there are more points than pixels, a column of pixels each from its smallest to its
+ * largest value: a line through them would cost a frame. */
 
 import type uPlot from "uplot";
 import { color } from "../ui/theme";
+import { within, type Drawn, type Values } from "./rows";
 import type { Trace } from "./run";
 
-type Values = ArrayLike<number | null>;
 const LEAST = 1.4; // pixels of a column's height
-const DASH = 4;
+const MANY = 300; // points of a line
+const DOT = 4; // pixels of a sample without neighbours
 
-/** Which of a chart's series hold a trace: its limits (where it has any), then itself. */
-function* seriesOf(plot: uPlot, traces: Trace[]): Generator<{ trace: Trace; low?: Values; high?: Values; values: Values }> {
-  let at = 1;
-  for (const trace of traces) {
-    const limits = trace.band ? { low: plot.data[at++] as Values, high: plot.data[at++] as Values } : {};
-    const values = plot.data[at++] as Values | undefined;
-    if (values) yield { trace, ...limits, values };
-  }
-}
+/** A number is known. */
+export const isKnown = (v: number | null | undefined): v is number => typeof v === "number" && !Number.isNaN(v);
 
 function clipped(plot: uPlot, draw: (pen: CanvasRenderingContext2D) => void): void {
   const { ctx, bbox } = plot;
@@ -29,75 +23,111 @@ function clipped(plot: uPlot, draw: (pen: CanvasRenderingContext2D) => void): vo
   ctx.restore();
 }
 
-const tint = (trace: Trace): string => `color-mix(in srgb, ${color(trace.bandColor ?? trace.color)} 22%, transparent)`;
-
-/** Whether a chart's points are so many that they are drawn as columns. */
-export function isDense(plot: uPlot): boolean {
+/** Intervals first, then values over them. */
+export function draw(plot: uPlot, drawn: Drawn[]): void {
   const { min, max } = plot.scales["x"] ?? {};
-  return plot.valToIdx(max ?? 1) - plot.valToIdx(min ?? 0) > plot.bbox.width / devicePixelRatio;
-}
-
-/** Rows as they are: each trace's interval as one area; where it is unknown it breaks. */
-export function bands(plot: uPlot, traces: Trace[]): void {
-  const time = plot.data[0];
-  const { min, max } = plot.scales["x"] ?? {};
-  const first = Math.max(plot.valToIdx(min ?? 0) - 1, 0);
-  const last = Math.min(plot.valToIdx(max ?? 1) + 2, time.length);
+  const rows = drawn.map((one): [number, number] => within(one.x, [min ?? 0, max ?? 1]));
+  const dense = drawn.map((one, i) => one.cut || (rows[i] as [number, number])[1] - (rows[i] as [number, number])[0] > plot.bbox.width / devicePixelRatio);
   clipped(plot, (pen) => {
-    for (const { trace, low, high } of seriesOf(plot, traces)) {
-      if (!low || !high) continue;
-      pen.fillStyle = tint(trace);
-      for (let i = first; i < last; i++) {
-        if (low[i] === null || high[i] === null) continue;
-        const from = i;
-        pen.beginPath();
-        for (; i < last && low[i] !== null && high[i] !== null; i++) pen.lineTo(plot.valToPos(time[i] as number, "x", true), plot.valToPos(high[i] as number, "y", true));
-        for (let k = i - 1; k >= from; k--) pen.lineTo(plot.valToPos(time[k] as number, "x", true), plot.valToPos(low[k] as number, "y", true));
-        pen.fill();
-      }
-    }
+    drawn.forEach((one, i) => {
+      pen.fillStyle = `color-mix(in srgb, ${color(one.trace.bandColor ?? one.trace.color)} 22%, transparent)`;
+      if (dense[i]) columnsOfBand(plot, pen, one);
+      else band(plot, pen, one, rows[i] as [number, number]);
+    });
+    drawn.forEach((one, i) => {
+      pen.fillStyle = pen.strokeStyle = color(one.trace.color);
+      if (dense[i]) columnsOfBuckets(plot, pen, one);
+      else line(plot, pen, one, rows[i] as [number, number]);
+    });
   });
 }
 
-/** Intervals, then values over them; `points` of each bucket: 2 where rows were cut, 1 where they are as they were. */
-export function columnsOfBuckets(plot: uPlot, traces: Trace[], points: 1 | 2): void {
-  clipped(plot, (pen) => {
-    for (const { trace, low, high, values } of seriesOf(plot, traces)) {
-      if (low && high) {
-        pen.fillStyle = tint(trace);
-        for (const [x, width, top, bottom] of pixels(plot, low, high, points, 0)) pen.fillRect(x, top, width, bottom - top);
-      }
-      pen.fillStyle = color(trace.color);
-      const least = LEAST * devicePixelRatio;
-      let [before, after] = [NaN, NaN]; // the last column's top and bottom
-      for (const [x, width, top, bottom] of pixels(plot, values, values, points, points - 1)) {
-        const from = top > after ? after : top;
-        const to = bottom < before ? before : bottom;
-        [before, after] = [top, bottom];
-        if (trace.dash && x % (2 * DASH * devicePixelRatio) >= DASH * devicePixelRatio) continue;
-        const more = Math.max(least - (to - from), 0);
-        pen.fillRect(x, from - more / 2, width, to - from + more);
-      }
+/** The interval of rows as they are: one area; where it is unknown it breaks. */
+function band(plot: uPlot, pen: CanvasRenderingContext2D, { x, low, high }: Drawn, [first, last]: [number, number]): void {
+  if (!low || !high) return;
+  const known = (i: number): boolean => isKnown(low[i]) && isKnown(high[i]);
+  for (let i = first; i < last; i++) {
+    if (!known(i)) continue;
+    const from = i;
+    pen.beginPath();
+    for (; i < last && known(i); i++) pen.lineTo(plot.valToPos(x[i] as number, "x", true), plot.valToPos(high[i] as number, "y", true));
+    for (let k = i - 1; k >= from; k--) pen.lineTo(plot.valToPos(x[k] as number, "x", true), plot.valToPos(low[k] as number, "y", true));
+    pen.fill();
+  }
+}
+
+/** A line through rows as they are; a sample without known neighbours is a point. Of many, the line is a pixel of the screen wide: wider
+ * ones cost twenty times as much without a graphics processor. */
+function line(plot: uPlot, pen: CanvasRenderingContext2D, { x, values, trace }: Drawn, [first, last]: [number, number]): void {
+  pen.lineWidth = (last - first > MANY ? 1 / devicePixelRatio : 1.4) * devicePixelRatio;
+  pen.lineJoin = "round";
+  pen.setLineDash((trace.dash ?? []).map((length) => length * devicePixelRatio));
+  pen.beginPath();
+  let on = false;
+  for (let i = first; i < last; i++) {
+    const v = values[i];
+    if (!isKnown(v)) {
+      on = false;
+      continue;
     }
-  });
+    const [px, py] = [plot.valToPos(x[i] as number, "x", true), plot.valToPos(v, "y", true)];
+    if (on) pen.lineTo(px, py);
+    else pen.moveTo(px, py);
+    if (!on && !isKnown(values[i + 1])) {
+      const size = DOT * devicePixelRatio;
+      pen.fillRect(px - size / 2, py - size / 2, size, size);
+    }
+    on = true;
+  }
+  pen.stroke();
+  pen.setLineDash([]);
+}
+
+function columnsOfBand(plot: uPlot, pen: CanvasRenderingContext2D, one: Drawn): void {
+  if (!one.low || !one.high) return;
+  for (const [x, width, top, bottom] of pixels(plot, one, one.low, one.high, 0)) pen.fillRect(x, top, width, bottom - top);
+}
+
+function columnsOfBuckets(plot: uPlot, pen: CanvasRenderingContext2D, one: Drawn): void {
+  const least = LEAST * devicePixelRatio;
+  let [before, after] = [NaN, NaN]; // the last column's top and bottom
+  for (const [x, width, top, bottom] of pixels(plot, one, one.values, one.values, one.cut ? 1 : 0)) {
+    const from = top > after ? after : top;
+    const to = bottom < before ? before : bottom;
+    [before, after] = [top, bottom];
+    if (!inked(one.trace, x / devicePixelRatio)) continue;
+    const more = Math.max(least - (to - from), 0);
+    pen.fillRect(x, from - more / 2, width, to - from + more);
+  }
+}
+
+/** Whether a dashed trace has ink at a pixel. */
+function inked({ dash }: Trace, x: number): boolean {
+  if (!dash?.length) return true;
+  let left = x % dash.reduce((sum, length) => sum + length, 0);
+  for (const [i, length] of dash.entries()) {
+    if (left < length) return i % 2 === 0;
+    left -= length;
+  }
+  return false;
 }
 
 /** Left, width, top and bottom of each column of pixels; `high` is read `later` points after `low`. A column
  * of what is unknown is left out, and NaN ends what the next one joins on to. */
-function* pixels(plot: uPlot, low: Values, high: Values, points: number, later: number): Generator<[number, number, number, number]> {
-  const time = plot.data[0];
+function* pixels(plot: uPlot, { x: place, cut }: Drawn, low: Values, high: Values, later: number): Generator<[number, number, number, number]> {
+  const points = cut ? 2 : 1;
   const { left, width } = plot.bbox;
   const { min, max } = plot.scales["x"] ?? {};
   const [begin, end] = [min ?? 0, max ?? 1];
   const scale = width / (end - begin);
   const x = (t: number): number => Math.round(left + (t - begin) * scale);
   let [at, top, bottom] = [-Infinity, Infinity, -Infinity];
-  for (let i = 0; i + points <= time.length; i += points) {
-    const [from, to] = [x(time[i] as number), x(time[i + points] ?? (time[i + points - 1] as number))];
+  for (let i = 0; i + points <= place.length; i += points) {
+    const [from, to] = [x(place[i] as number), x(place[i + points] ?? (place[i + points - 1] as number))];
     if (to < left || from > left + width) continue;
     if (from !== at) [at, top, bottom] = [from, Infinity, -Infinity];
     const [least, most] = [low[i], high[i + later]];
-    if (typeof least === "number" && typeof most === "number") {
+    if (isKnown(least) && isKnown(most)) {
       top = Math.min(top, plot.valToPos(most, "y", true));
       bottom = Math.max(bottom, plot.valToPos(least, "y", true));
     }

@@ -3,55 +3,51 @@
 import uPlot from "uplot";
 import "uplot/dist/uPlot.min.css";
 import { brush, brushed, onBrush, onPoint, point } from "../ui/brush";
-import { columns } from "../ui/columns";
 import { digits, fill, h } from "../ui/dom";
-import { tried } from "../ui/notes";
 import { color, onTheme } from "../ui/theme";
-import { alone, beyond, levels, limits, line, shown, type Values } from "./axes";
-import { bands, columnsOfBuckets, isDense } from "./buckets";
+import { AXES, type Axis, type Layer } from "./along";
+import { beyond, extent, levels, limits } from "./axes";
+import { draw } from "./buckets";
 import { hearKeys, hearPointers, hearUpright, zoomed, type Range } from "./gestures";
+import { pick, spans } from "./marks";
 import { Readout } from "./readout";
-import { EVENT_COLORS, soilColor, soilsOf, type Panel, type Run } from "./run";
+import { Rows, type Drawn } from "./rows";
+import type { Panel } from "./run";
 
 const SYNC = "drive";
 const [LOWEST, HEAD] = [116, 26];
-/** Rows are fetched for more than is shown, this share of it on either side, so that a pan finds them there. */
-const MARGIN = 0.5;
-/** Rows fetched for more than so many times what is shown are too coarse. */
-const COARSE = 3;
 const SOON = 40; // ms
 const MARKS = [0.05, 0.2, 1, 5, 50]; // of a logarithmic axis
+/** uPlot draws axes and has the cursor; traces are drawn by `buckets.ts`, so it is given no rows. */
+const NO_ROWS: uPlot.AlignedData = [[0, 1], [0, 1]];
 
-interface Fetched {
-  range: Range;
-  cut: boolean;
-  width: number;
+export interface Chart {
+  panel: Panel;
+  plot: uPlot;
+  box: HTMLElement;
+  readout: Readout;
+  drawn: Drawn[];
 }
 
 export class Charts {
   readonly element = h("div", { class: "charts" });
-  /** The times shown. */
+  /** What is shown of the axis: times, or places along the way. */
   range: Range = [0, 1];
   onCursor: ((time: number | null) => void) | null = null;
   onPick: ((time: number) => void) | null = null;
   /** An upright axis was set, or follows its values again. */
   onUpright: (() => void) | null = null;
   onRange: ((range: Range) => void) | null = null;
-  /** The file was replaced while it was open. */
-  onReplaced: (() => void) | null = null;
   /** Ends of upright axes that the user set, in SI, by the panel's key; the others follow their values. */
   uprights: Record<string, Range> = {};
   /** The time of the sample that was picked. */
   picked: number | null = null;
-  private plots: { panel: Panel; plot: uPlot; box: HTMLElement; readout: Readout }[] = [];
+  private plots: Chart[] = [];
   private pointed: { time: number | null; here: boolean } | null = null;
   private pointing = 0;
   private count = 0;
-  private run: Run | null = null;
-  private path = "";
-  private pending: AbortController | null = null;
-  private fetched: Fetched | null = null;
-  private arrived = new Map<uPlot, uPlot.AlignedData>();
+  private layers: Layer[] = [];
+  private rows = new Rows(() => this.arrive());
   private frame = 0;
   private timer = 0;
   private forget: () => void;
@@ -72,9 +68,39 @@ export class Charts {
     hearKeys(this.element, this);
   }
 
-  /** All times of the run. */
+  /** The first run, whose soils, events and picked sample are marked. */
+  private get main(): Layer | undefined {
+    return this.layers[0];
+  }
+
+  private get path(): string {
+    return this.main?.path ?? "";
+  }
+
+  get axis(): Axis {
+    return this.main?.way.axis ?? "time";
+  }
+
+  /** The file was replaced while it was open. */
+  set onReplaced(listener: () => void) {
+    this.rows.onReplaced = listener;
+  }
+
+  /** What is drawn, chart by chart. */
+  get shown(): readonly Chart[] {
+    return this.plots;
+  }
+
+  /** All of the axis that a run is on. */
   get whole(): Range {
-    return this.run ? [this.run.start, this.run.end] : [0, 1];
+    const ends = this.layers.map(({ way }) => way.whole);
+    return ends.length ? [Math.min(...ends.map(([low]) => low)), Math.max(...ends.map(([, high]) => high))] : [0, 1];
+  }
+
+  /** Whether all of it is shown. */
+  get isWhole(): boolean {
+    const [low, high] = this.whole;
+    return this.range[0] <= low && this.range[1] >= high;
   }
 
   /** The ends of a chart's upright axis. */
@@ -86,28 +112,26 @@ export class Charts {
   close(): void {
     this.forget();
     this.watcher.disconnect();
-    this.pending?.abort();
+    this.rows.close();
     clearTimeout(this.timer);
     cancelAnimationFrame(this.frame);
     cancelAnimationFrame(this.pointing);
     for (const { plot } of this.plots) plot.destroy();
   }
 
-  show(path: string, run: Run, panels: Panel[]): void {
-    const same = path === this.path && run.version === this.run?.version;
-    this.path = path;
-    this.run = run;
-    if (!same) {
-      this.range = this.whole;
-      this.picked = null;
-    }
+  /** Show panels of runs over an axis, the main run first. */
+  show(layers: Layer[], panels: Panel[]): void {
+    const [before, now] = [this.main, layers[0]];
+    const same = before?.path === now?.path && before?.run.version === now?.run.version && this.axis === (now?.way.axis ?? "time");
+    this.layers = layers;
+    if (!same) this.picked = null;
+    if (!same || this.range[1] <= this.whole[0] || this.range[0] >= this.whole[1]) this.range = this.whole;
     this.build(panels);
   }
 
   /** Show no run, but why. */
   clear(why: string): void {
-    this.run = null;
-    this.path = "";
+    this.layers = [];
     this.build([]);
     delete this.element.dataset["rows"];
     fill(this.element, h("p", { class: "hint empty" }, why));
@@ -116,19 +140,22 @@ export class Charts {
   /** Show the times brushed last, on another page or in another tab, where they are of this run. */
   follow(): void {
     const other = brushed();
-    if (other?.path === this.path) this.zoom(other.range);
+    const way = this.main?.way;
+    if (way && other?.path === this.path) this.zoom(other.range.map((time) => way.place(time)) as Range);
   }
 
-  /** Show other times, here and wherever this run is shown; the rows come from the server a moment later. */
+  /** Show another part of the axis, here and wherever this run is shown; the rows come from the server a moment later. */
   zoom(range: Range): void {
-    const run = this.run;
-    if (!run) return;
-    const least = Math.min(0.05, run.end - run.start);
+    const way = this.main?.way;
+    if (!way) return;
+    const whole = this.whole;
+    const least = Math.min(0.05, whole[1] - whole[0]);
     let [low, high] = range;
-    if (high - low < least) [low, high] = [(low + high - least) / 2, (low + high + least) / 2];
-    this.range = [Math.max(low, run.start), Math.min(high, run.end)];
+    if (!(high - low >= least)) [low, high] = [(low + high - least) / 2, (low + high + least) / 2];
+    if (!(high > whole[0] && low < whole[1])) [low, high] = whole;
+    this.range = [Math.max(low, whole[0]), Math.min(high, whole[1])];
     this.redraw();
-    brush(this.path, this.range);
+    brush(this.path, this.range.map((place) => way.time(place)) as Range);
     this.onRange?.(this.range);
     this.later();
   }
@@ -137,18 +164,14 @@ export class Charts {
   private redraw(): void {
     this.frame ||= requestAnimationFrame(() => {
       this.frame = 0;
-      for (const { plot } of this.plots) {
-        const data = this.arrived.get(plot);
-        if (data) plot.setData(data, false);
-        plot.setScale("x", { min: this.range[0], max: this.range[1] });
-      }
-      this.arrived.clear();
+      for (const { plot } of this.plots) plot.setScale("x", { min: this.range[0], max: this.range[1] });
     });
   }
 
-  /** Put the cursor at a time: by the map or the plane (`here`, so that other tabs follow), or by another tab. */
+  /** Put the cursor at a time of the main run: by the map or the plane (`here`, so that other tabs follow), or by another tab. */
   point(time: number | null, here = false): void {
-    for (const { plot } of this.plots) plot.setCursor({ left: time === null ? -10 : plot.valToPos(time, "x"), top: 1 }, false);
+    const place = time === null ? null : this.main?.way.place(time);
+    for (const { plot } of this.plots) plot.setCursor({ left: place === null || place === undefined ? -10 : plot.valToPos(place, "x"), top: 1 }, false);
     this.cursorAt(time, here);
   }
 
@@ -183,9 +206,10 @@ export class Charts {
     this.pointing ||= requestAnimationFrame(() => {
       this.pointing = 0;
       const now = this.pointed;
-      if (!now || !this.run) return;
+      const way = this.main?.way;
+      if (!now || !way) return;
       const near = 0.01 * (this.range[1] - this.range[0]);
-      for (const { plot, readout } of this.plots) readout.show(plot.data, now.time, this.fetched?.cut ?? false, near);
+      for (const { drawn, readout } of this.plots) readout.show(drawn, now.time === null ? null : way.place(now.time), near);
       this.onCursor?.(now.time);
       if (now.here) point(this.path, now.time);
     });
@@ -198,9 +222,8 @@ export class Charts {
   private build(panels: Panel[]): void {
     for (const { plot } of this.plots) plot.destroy();
     fill(this.element);
-    this.pending?.abort();
-    this.pending = this.fetched = null;
-    this.arrived.clear();
+    this.rows.show(this.layers, panels);
+    this.element.classList.toggle("several", this.layers.length > 1);
     this.count = panels.length;
     this.plots = panels.map((panel, i) => {
       const readout = new Readout(panel);
@@ -219,13 +242,13 @@ export class Charts {
             upright("y−", "Shrink the upright axis", () => zoomed(now(), middle(), 1 / 0.6)),
             upright("auto", "Let the upright axis follow its values", () => null),
           );
-      const box = h("div", { class: "chart", role: "group", "aria-label": `${panel.title} over time` }, h("div", { class: "chart-head" }, h("h2", {}, `${panel.title} [${panel.unit}]`), readout.element, about, buttons));
+      const box = h("div", { class: "chart", role: "group", "aria-label": `${panel.title} over ${AXES[this.axis].title}` }, h("div", { class: "chart-head" }, h("h2", {}, `${panel.title} [${panel.unit}]`), readout.element, about, buttons));
       box.classList.toggle("fixed", panel.key in this.uprights);
       this.element.append(box);
-      const plot = new uPlot(this.options(panel, box.clientWidth || 700, i === panels.length - 1), [[]], box);
+      const plot = new uPlot(this.options(panel, box.clientWidth || 700, i === panels.length - 1), NO_ROWS, box);
       this.hear(plot);
       if (!panel.log) hearUpright(plot.root, plot.over, now, setShown);
-      return { panel, plot, box, readout };
+      return { panel, plot, box, readout, drawn: [] };
     });
     void this.fetch();
   }
@@ -240,80 +263,24 @@ export class Charts {
     if (!this.timer) this.timer = window.setTimeout(() => void this.fetch(), SOON);
   }
 
-  /** Whether the rows at hand are enough for what is shown. */
-  private served(width: number): boolean {
-    const has = this.fetched;
-    if (!has || has.width !== width) return false;
-    const [low, high] = this.range;
-    const [start, end] = this.whole;
-    const inside = has.range[0] <= Math.max(low, start) && has.range[1] >= Math.min(high, end);
-    return inside && (!has.cut || has.range[1] - has.range[0] <= COARSE * (high - low));
-  }
-
   /** Fetch rows where those at hand do not do; again, where the range has moved on meanwhile. */
   private async fetch(): Promise<void> {
     this.timer = 0;
-    if (!this.run || !this.plots.length || this.pending) return;
-    const width = Math.max(this.plots[0]?.box.clientWidth ?? 700, 100);
-    if (this.served(width)) return;
-    const names = new Set<string>();
-    for (const { panel } of this.plots) {
-      for (const t of panel.traces) {
-        names.add(t.column);
-        if (t.band) names.add(`${t.band}:low`).add(`${t.band}:high`);
-      }
-    }
-    const [low, high] = this.range;
-    const [first, last] = this.whole;
-    const [start, end] = [Math.max(low - MARGIN * (high - low), first), Math.min(high + MARGIN * (high - low), last)];
-    const buckets = Math.min(Math.ceil((width * (end - start)) / (high - low)), 5000);
-    const pending = (this.pending = new AbortController());
-    const found = await tried(async () => {
-      try {
-        return await columns("drive/window", { path: this.path, start, end, width: buckets, version: this.run?.version }, [...names], pending.signal);
-      } catch (error) {
-        if (error instanceof DOMException && error.name === "AbortError") return undefined;
-        if (this.onReplaced && error instanceof Error && error.message.includes("was replaced since")) {
-          this.onReplaced();
-          return undefined;
-        }
-        throw error;
-      }
-    });
-    if (this.pending !== pending) return; // other charts by now
-    this.pending = null;
-    if (!found) return;
-    this.fetched = { range: [start, end], cut: found.cut, width };
-    const at = new Map(found.names.map((name, i) => [name, found.data[i] as Float64Array]));
-    const time = found.data[0] as Float64Array;
-    for (const { panel, plot } of this.plots) {
-      const data: (Float64Array | (number | null)[])[] = [time];
-      for (const t of panel.traces) {
-        if (t.band) data.push(shown(at.get(`${t.band}:low`), t.scale), shown(at.get(`${t.band}:high`), t.scale));
-        data.push(shown(at.get(t.column), t.scale));
-      }
-      this.arrived.set(plot, data as uPlot.AlignedData);
-    }
-    this.element.dataset["rows"] = String(found.count);
+    if (!this.plots.length) return;
+    await this.rows.need(this.range, this.whole, Math.max(this.plots[0]?.box.clientWidth ?? 700, 100));
+  }
+
+  private arrive(): void {
+    for (const chart of this.plots) chart.drawn = this.rows.of(chart.panel);
+    this.element.dataset["rows"] = String(this.rows.count);
     this.redraw();
     this.later();
   }
 
-  private isDense(plot: uPlot): boolean {
-    return this.fetched?.cut || isDense(plot);
-  }
-
   private options(panel: Panel, width: number, last: boolean): uPlot.Options {
-    const series: uPlot.Series[] = [{}];
     const log = panel.log !== undefined;
-    for (const t of panel.traces) {
-      const shade = color(t.color);
-      if (t.band) {
-        const unseen = { paths: () => null, points: { show: false } }; // they count for the scale
-        series.push({ ...unseen }, { ...unseen });
-      }
-      series.push({ label: t.label, stroke: shade, width: 1.4, paths: (...of) => (this.isDense(of[0]) ? null : line(...of)), points: { show: false, size: 4, width: 0, fill: shade, filter: (...of) => (this.isDense(of[0]) ? [] : alone(of[0].data[of[1]] as Values)) }, ...(t.dash ? { dash: t.dash } : {}) });
-    }
+    const { unit } = AXES[this.axis];
+    const drawn = (plot: uPlot): Drawn[] => this.plots.find((one) => one.plot === plot)?.drawn ?? [];
     const axis = { stroke: color("muted"), grid: { stroke: color("grid"), width: 1 }, ticks: { stroke: color("grid"), width: 1 }, font: "11px system-ui, sans-serif" };
     return {
       width,
@@ -321,17 +288,21 @@ export class Charts {
       padding: [6, 20, 0, 0],
       legend: { show: false },
       cursor: { sync: { key: SYNC }, drag: { x: true, y: false, setScale: false }, points: { show: false }, y: false },
-      scales: { x: { time: false, range: () => this.range }, y: log ? { distr: 3, range: () => panel.log as Range } : { range: (plot, low, high) => this.upright(panel) ?? limits(plot, low, high, panel) } },
+      scales: { x: { time: false, range: () => this.range }, y: log ? { distr: 3, range: () => panel.log as Range } : { range: (plot) => this.upright(panel) ?? limits(extent(drawn(plot), this.range), panel) } },
       axes: [
-        { ...axis, size: 24, ticks: { ...axis.ticks, size: 4 }, gap: 3, values: (_, ticks) => ticks.map((v) => `${digits(v, 6)}${last ? " s" : ""}`) },
+        { ...axis, size: 24, ticks: { ...axis.ticks, size: 4 }, gap: 3, values: (_, ticks) => ticks.map((v) => `${digits(v, 6)}${last ? ` ${unit}` : ""}`) },
         { ...axis, size: 52, space: 24, ...(log ? { splits: () => MARKS, filter: (_: uPlot, at: number[]) => at } : {}), values: (_, ticks) => ticks.map((v) => digits(v, 4)) },
       ],
-      series,
+      series: [{}, { paths: () => null, points: { show: false } }],
       hooks: {
-        drawClear: [(plot) => this.spans(plot)],
-        drawAxes: [(plot) => (this.isDense(plot) ? columnsOfBuckets(plot, panel.traces, this.fetched?.cut ? 2 : 1) : bands(plot, panel.traces))],
-        draw: [(plot) => levels(plot, panel), (plot) => beyond(plot, panel), (plot) => this.drawPicked(plot)],
-        setCursor: [(plot) => plot.cursor.left !== undefined && this.cursorAt(plot.cursor.left >= 0 ? plot.posToVal(plot.cursor.left, "x") : null, true)],
+        drawClear: [(plot) => this.main && spans(plot, this.main.run, this.main.way)],
+        drawAxes: [(plot) => draw(plot, drawn(plot))],
+        draw: [
+          (plot) => levels(plot, panel),
+          (plot) => beyond(plot, panel, extent(drawn(plot), this.range)),
+          (plot) => this.picked !== null && this.main && pick(plot, this.main.way.place(this.picked)),
+        ],
+        setCursor: [(plot) => plot.cursor.left !== undefined && this.cursorAt(plot.cursor.left >= 0 ? this.timeAt(plot, plot.cursor.left) : null, true)],
         setSelect: [
           (plot) => {
             if (plot.select.width < 4) return;
@@ -347,51 +318,11 @@ export class Charts {
   private hear(plot: uPlot): void {
     hearPointers(plot.over, this);
     plot.over.addEventListener("dblclick", () => this.zoom(this.whole));
-    plot.over.addEventListener("click", (event) => this.onPick?.(plot.posToVal(event.offsetX, "x")));
+    plot.over.addEventListener("click", (event) => this.onPick?.(this.timeAt(plot, event.offsetX)));
   }
 
-  /** An upright line with a head at the picked sample. */
-  private drawPicked(plot: uPlot): void {
-    if (this.picked === null) return;
-    const { ctx, bbox } = plot;
-    const x = plot.valToPos(this.picked, "x", true);
-    if (x < bbox.left || x > bbox.left + bbox.width) return;
-    const size = 5 * devicePixelRatio;
-    ctx.save();
-    ctx.strokeStyle = ctx.fillStyle = color("accent");
-    ctx.lineWidth = 1.5 * devicePixelRatio;
-    ctx.beginPath();
-    ctx.moveTo(x, bbox.top);
-    ctx.lineTo(x, bbox.top + bbox.height);
-    ctx.stroke();
-    ctx.beginPath();
-    ctx.moveTo(x - size, bbox.top);
-    ctx.lineTo(x + size, bbox.top);
-    ctx.lineTo(x, bbox.top + 1.5 * size);
-    ctx.fill();
-    ctx.restore();
-  }
-
-  /** Soils as a tint behind, events as a strong strip at the foot. */
-  private spans(plot: uPlot): void {
-    const run = this.run;
-    if (!run) return;
-    const { ctx, bbox } = plot;
-    const x = (time: number): number => Math.min(Math.max(plot.valToPos(time, "x", true), bbox.left), bbox.left + bbox.width);
-    ctx.save();
-    for (const span of soilsOf(run)) {
-      const [from, to] = [x(span.start), x(span.end)];
-      if (to <= from) continue;
-      ctx.fillStyle = `color-mix(in srgb, ${color(soilColor(span.name))} 12%, transparent)`;
-      ctx.fillRect(from, bbox.top, to - from, bbox.height);
-    }
-    const strip = 5 * devicePixelRatio;
-    for (const event of run.events) {
-      const [from, to] = [x(event.start), x(event.end)];
-      if (to <= bbox.left || from >= bbox.left + bbox.width) continue;
-      ctx.fillStyle = color(EVENT_COLORS[event.kind] ?? "ink");
-      ctx.fillRect(from, bbox.top + bbox.height - strip, Math.max(to - from, devicePixelRatio), strip);
-    }
-    ctx.restore();
+  /** The main run's time at a pixel of a chart. */
+  private timeAt(plot: uPlot, pixel: number): number {
+    return this.main?.way.time(plot.posToVal(pixel, "x")) ?? NaN;
   }
 }

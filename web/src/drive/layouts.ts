@@ -1,13 +1,20 @@
-/** Layouts by name: which panels and wheels are shown and where upright axes end. Kept by this browser. */
+/** Layouts by name: which panels, wheels and formulas are shown, what is plotted over what and where upright axes end. Kept by this browser. */
 
 import { fill, h } from "../ui/dom";
 import { note } from "../ui/notes";
+import type { Pair } from "./across";
+import type { Axis } from "./along";
+import type { Formula } from "./formulas";
 import type { Range } from "./gestures";
 
 export interface Layout {
   panels: string[];
   wheels: string[];
   uprights: Record<string, Range>;
+  /** Layouts of older versions lack these. */
+  formulas?: Formula[];
+  pair?: Pair | null;
+  axis?: Axis;
 }
 
 const KEY = "terragrip-layouts";

@@ -8,15 +8,20 @@ import { note, tried } from "../ui/notes";
 import type { Page } from "../ui/page";
 import { notHere, options, runsOf } from "../ui/runs";
 import { onUnits } from "../ui/units";
+import { Across } from "./across";
+import { AXES, layerOf, shortNames, type Axis, type Layer } from "./along";
 import { Charts } from "./charts";
+import { panelMenu, wheelChips } from "./choices";
 import { EventList } from "./events";
-import { zoomed } from "./gestures";
+import { check, FormulaList, keptFormulas, keyOf } from "./formulas";
+import { zoomed, type Range } from "./gestures";
 import { layouts, type Layout } from "./layouts";
+import { legendOf } from "./legend";
 import { address, read, written, type View } from "./link";
-import { Plane, type Points } from "./plane";
+import { OTHERS, overlayChooser, panelsOfAll } from "./overlay";
 import { described, type Sample } from "./sample";
 import { Views } from "./views";
-import { during, EVENT_COLORS, panelsOf, soilColor, soilsOf, type Run } from "./run";
+import { during, type Run } from "./run";
 
 const FIRST = ["adhesion", "slip", "resistance", "speed"];
 const KEY = "terragrip-drive-panels";
@@ -26,7 +31,8 @@ const CLICK = "Click a chart to see everything known of that moment, and why µ 
 
 export const page: Page = (main, { notices, query }) => {
   const charts = new Charts();
-  const plane = new Plane();
+  const across = new Across();
+  const { plane } = across;
   void tried(() => sampled({ model: "exponential", parameters: { a: 1 } })).then((shape) => shape && plane.shaped(shape));
   const choice = h("select", { id: "run", "aria-label": "Run" });
   const wheels = h("div", { class: "chips", role: "group", "aria-label": "Wheels" });
@@ -42,13 +48,23 @@ export const page: Page = (main, { notices, query }) => {
   const back = h("button", { type: "button", id: "back", disabled: true, click: () => views.back(), title: "The times shown before (Backspace)" }, "Back");
   const forward = h("button", { type: "button", id: "forward", disabled: true, click: () => views.forward(), "aria-label": "Forward again" }, "↷");
   const details = h("section", { class: "sample", "aria-label": "Sample", "aria-live": "polite" });
-  const planeWheel = h("select", { "aria-label": "Wheel of the plane" });
+  const over = h("select", { id: "over", "aria-label": "Drawn over" }, (Object.keys(AXES) as Axis[]).map((name) => h("option", { value: name }, `Over ${AXES[name].title}`)));
+  const overlay = overlayChooser((paths) => void lay(paths));
+  let layers: Layer[] = []; // the run and those over it
   let run: Run | null = null;
   let path = "";
-  let seen = ""; // size and time of change of what is open
+  let axis: Axis = asked.axis;
+  let others: string[] = asked.others.slice(0, OTHERS);
+  let seen = new Map<string, string>(); // size and time of change of what is open
+  let runs = new Map<string, string>(); // and of all estimates
   let chosen: string[] = [];
   let shown: string[] = asked.panels ?? JSON.parse(localStorage.getItem(KEY) ?? "null") ?? FIRST;
   let picked: number | null = null;
+  const kept = keptFormulas();
+  const formulas = new FormulaList([...kept.filter(({ name }) => !asked.formulas.some((one) => one.name === name)), ...asked.formulas], () => layers[0], (made) => {
+    if (made && !shown.includes(keyOf(made))) shown = [...shown, keyOf(made)];
+    void known().then(draw);
+  });
   let linked: View | null = asked; // until its run is open
   charts.uprights = { ...asked.uprights };
   let asking = false;
@@ -58,8 +74,11 @@ export const page: Page = (main, { notices, query }) => {
     "div",
     { class: "tools" },
     choice,
+    overlay.element,
+    over,
     wheels,
     panels,
+    formulas.element,
     layouts(layout, takeUp),
     h("span", { class: "spring" }),
     back,
@@ -73,8 +92,7 @@ export const page: Page = (main, { notices, query }) => {
     h(
       "aside",
       { class: "panel", "aria-label": "Plane and sample" },
-      h("div", { class: "row" }, h("h2", {}, "µ–s plane"), planeWheel),
-      plane.element,
+      across.element,
       list.element,
       h(
         "div",
@@ -91,20 +109,22 @@ export const page: Page = (main, { notices, query }) => {
 
   function zoom(factor: number): void {
     const [low, high] = charts.range;
-    charts.zoom(zoomed(charts.range, picked !== null && picked > low && picked < high ? picked : (low + high) / 2, factor));
+    const at = picked === null ? NaN : (layers[0]?.way.place(picked) ?? NaN);
+    charts.zoom(zoomed(charts.range, at > low && at < high ? at : (low + high) / 2, factor));
   }
 
   /** What is shown, in the address. */
   function remember(): void {
     address("drive", () => {
-      const [low, high] = charts.range;
-      const whole = low <= charts.whole[0] && high >= charts.whole[1];
-      return written({ path, range: whole ? null : charts.range, wheels: chosen, panels: shown, at: picked, uprights: charts.uprights });
+      const { pair } = across;
+      const used = formulas.all.filter((one) => shown.includes(keyOf(one)) || pair?.includes(`=${one.text}`));
+      return written({ path, range: charts.isWhole ? null : charts.range, wheels: chosen, panels: shown, at: picked, uprights: charts.uprights, axis, others, formulas: used, pair });
     });
   }
 
   function layout(): Layout {
-    return { panels: shown, wheels: chosen, uprights: { ...charts.uprights } };
+    const used = formulas.all.filter((one) => shown.includes(keyOf(one)));
+    return { panels: shown, wheels: chosen, uprights: { ...charts.uprights }, formulas: used, pair: across.pair, axis };
   }
 
   function takeUp(wanted: Layout): void {
@@ -112,81 +132,115 @@ export const page: Page = (main, { notices, query }) => {
     charts.uprights = { ...wanted.uprights };
     const there = wanted.wheels.filter((wheel) => run?.wheels.includes(wheel));
     if (there.length) chosen = there;
+    const own = wanted.formulas ?? [];
+    formulas.keep([...formulas.all.filter(({ name }) => !own.some((one) => one.name === name)), ...own], null);
     drawWheels();
+    void known().then(async () => {
+      across.show(layers, formulas.all, wanted.pair ?? null);
+      if (wanted.axis && (wanted.axis !== "time" || !others.length)) await along(wanted.axis);
+      draw();
+    });
+  }
+
+  /** Ask which formulas the runs can be given. */
+  async function known(): Promise<void> {
+    const texts = formulas.all.map(({ text }) => text);
+    await tried(() => Promise.all(layers.map((layer) => check(layer, texts))));
+    formulas.draw();
+    across.show(layers, formulas.all, null);
+  }
+
+  /** Draw over another axis; the stretch that is shown stays. */
+  async function along(wanted: Axis): Promise<void> {
+    if (!layers.length || wanted === axis) return;
+    const way = layers[0]?.way;
+    const times = charts.isWhole || !way ? null : (charts.range.map((place) => way.time(place)) as Range);
+    const found = await tried(() => Promise.all(layers.map((layer) => moved(layer, wanted))));
+    if (found) {
+      [layers, axis] = [found, wanted];
+      draw();
+      const now = found[0]?.way;
+      charts.zoom(times && now ? (times.map((time) => now.place(time)) as Range) : charts.whole);
+      views.start(charts.range);
+    }
+    over.value = axis;
+  }
+
+  async function moved(layer: Layer, wanted: Axis): Promise<Layer> {
+    if (wanted === "distance" && layer.run.distance === null) throw new Error(`${layer.path} has no ground speed, so no distance`);
+    return { ...(await layerOf(layer.path, wanted, layer.run)), label: layer.label, ...(layer.faults ? { faults: layer.faults } : {}) };
+  }
+
+  /** Lay other runs over the main one; those that cannot be read are left out with a message. */
+  async function lay(paths: string[]): Promise<void> {
+    const [main] = layers;
+    if (!main) return;
+    const whole = charts.isWhole;
+    if (paths.length && axis === "time") await along("elapsed");
+    const found: Layer[] = [];
+    for (const other of paths) {
+      const layer = layers.slice(1).find((one) => one.path === other && runs.get(other) === seen.get(other)) ?? (await tried(async () => moved(await layerOf(other, "time"), axis)));
+      if (layer) found.push(layer);
+    }
+    others = found.map((layer) => layer.path);
+    for (const other of others) seen.set(other, runs.get(other) ?? "");
+    layers = [layers[0] ?? main, ...found];
+    const names = shortNames(layers.map((layer) => layer.path));
+    layers.forEach((layer, i) => (layer.label = names[i] ?? layer.path));
+    overlay.draw([...runs.keys()], path, others);
+    for (const option of over.options) option.disabled = option.value === "time" && others.length > 0;
+    over.value = axis;
+    fill(legend, legendOf(layers));
+    await known();
     draw();
+    if (whole) charts.zoom(charts.whole);
   }
 
   /** Show an event with some time about it, and its first sample. */
   async function goTo(event: { start: number; end: number }): Promise<void> {
     const about = Math.max(event.end - event.start, 4);
-    charts.zoom([event.start - 0.5 * about, event.end + 0.5 * about]);
+    const way = layers[0]?.way;
+    if (way) charts.zoom([way.place(event.start - 0.5 * about), way.place(event.end + 0.5 * about)]);
     await pick(event.start);
   }
 
   function draw(): void {
     if (!run) return;
     remember();
-    const all = panelsOf(run, chosen);
-    fill(
-      panels,
-      h("summary", {}, "Panels"),
-      h(
-        "div",
-        { class: "menu" },
-        all.map((panel) => {
-          const box = h("input", { type: "checkbox", checked: shown.includes(panel.key) });
-          box.addEventListener("change", () => {
-            shown = box.checked ? [...shown, panel.key] : shown.filter((key) => key !== panel.key);
-            localStorage.setItem(KEY, JSON.stringify(shown));
-            charts.show(path, run as Run, all.filter((p) => shown.includes(p.key)));
-            remember();
-          });
-          return h("label", { class: "check" }, box, panel.title);
-        }),
-      ),
-    );
-    charts.show(path, run, all.filter((panel) => shown.includes(panel.key)));
+    const all = panelsOfAll(layers, chosen, formulas.all);
+    panelMenu(panels, all, shown, (keys) => {
+      shown = keys;
+      localStorage.setItem(KEY, JSON.stringify(shown));
+      charts.show(layers, all.filter((panel) => shown.includes(panel.key)));
+      remember();
+    });
+    charts.show(layers, all.filter((panel) => shown.includes(panel.key)));
   }
 
   function drawWheels(): void {
-    fill(
-      wheels,
-      (run?.wheels ?? []).map((wheel) => {
-        const button = h("button", { type: "button", class: "chip", "aria-pressed": String(chosen.includes(wheel)) }, wheel);
-        button.addEventListener("click", () => {
-          chosen = chosen.includes(wheel) ? chosen.filter((w) => w !== wheel) : (run?.wheels ?? []).filter((w) => w === wheel || chosen.includes(w));
-          drawWheels();
-          draw();
-        });
-        return button;
-      }),
-    );
-  }
-
-  function drawLegend(): void {
-    if (!run) return;
-    const soils = [...new Set(soilsOf(run).map((s) => s.name))];
-    const kinds = [...new Set(run.events.map((event) => event.kind))];
-    fill(
-      legend,
-      soils.map((name) => h("span", {}, h("i", { class: `patch ${soilColor(name)}` }), name)),
-      kinds.map((kind) => h("span", {}, h("i", { class: `strip ${EVENT_COLORS[kind] ?? "ink"}` }), kind)),
-      run.recording ? null : h("span", { class: "hint" }, "The recording is not in this folder: measured channels are left out."),
-      run.notes.length ? h("details", { class: "chooser run-notes" }, h("summary", {}, `${run.notes.length} ${run.notes.length === 1 ? "note" : "notes"}`), h("ul", { class: "menu" }, run.notes.map((text) => h("li", {}, text)))) : null,
-    );
+    wheelChips(wheels, run?.wheels ?? [], chosen, (names) => {
+      chosen = names;
+      drawWheels();
+      draw();
+    });
   }
 
   async function open(wanted: string): Promise<void> {
     const reading = window.setTimeout(() => fill(legend, h("span", { class: "hint" }, `Reading ${wanted} …`)), 200);
-    const found = await tried(() => get<Run>("drive", { path: wanted }));
+    const layer = await tried(() => layerOf(wanted, "time"));
+    const placed = layer && axis !== "time" ? ((await tried(() => moved(layer, axis))) ?? layer) : layer;
     clearTimeout(reading);
-    if (!found) {
+    if (!placed) {
       if (wanted !== path) leave(wanted, notHere(wanted));
       return;
     }
+    const found = placed.run;
     const again = wanted === path && run?.wheels.join() === found.wheels.join();
     path = wanted;
     run = found;
+    axis = placed.way.axis;
+    layers = [placed];
+    others = others.filter((other) => other !== wanted);
     if (!again) chosen = found.wheels.slice(-2);
     const link = linked?.path === wanted ? linked : null;
     linked = null;
@@ -194,17 +248,16 @@ export const page: Page = (main, { notices, query }) => {
     if (named.length) chosen = named;
     choice.value = wanted;
     list.show(found.events);
-    fill(planeWheel, found.wheels.map((wheel) => h("option", { value: wheel, selected: wheel === found.wheels.at(-1) }, wheel)));
     drawWheels();
-    drawLegend();
     hover(null);
-    draw();
+    await lay(others);
+    if (link?.pair) across.show(layers, formulas.all, link.pair);
     if (link?.range) charts.zoom(link.range);
     else charts.follow();
     if (!again) views.start(charts.range);
     if (link?.at !== null && link?.at !== undefined) void pick(link.at);
     else if (!again) forgetSample();
-    void drawPlane();
+    across.draw(charts.range);
   }
 
   function forgetSample(): void {
@@ -218,19 +271,13 @@ export const page: Page = (main, { notices, query }) => {
   function leave(wanted: string, why: string): void {
     path = wanted;
     run = null;
+    layers = [];
     charts.clear(why);
     forgetSample();
     list.show([]);
     for (const one of [legend, wheels]) fill(one);
-    plane.show({ slip: [], adhesion: [], time: [] });
+    across.show([], [], null);
     readout.value = "";
-  }
-
-  async function drawPlane(): Promise<void> {
-    if (!run || !planeWheel.value) return;
-    const [start, end] = charts.range;
-    const points = await tried(() => get<Points>("drive/plane", { path, wheel: planeWheel.value, start, end, version: run?.version }));
-    if (points) plane.show(points);
   }
 
   async function pick(time: number): Promise<void> {
@@ -249,11 +296,11 @@ export const page: Page = (main, { notices, query }) => {
   function stepSample(by: number): void {
     if (!run) return;
     const period = (run.end - run.start) / Math.max(run.rows - 1, 1);
-    void pick((picked ?? charts.range[0]) + by * period);
+    void pick((picked ?? layers[0]?.way.time(charts.range[0]) ?? run.start) + by * period);
   }
 
   function showSample(found: Sample): void {
-    const wheel = planeWheel.value;
+    const { wheel } = across;
     const of = (name: string): number => found.values[name] ?? NaN;
     plane.at({
       slip: of(`slip_${wheel}`),
@@ -276,47 +323,52 @@ export const page: Page = (main, { notices, query }) => {
     const section = during(run.ground?.sections, time);
     const event = during(run.events, time);
     const recognised = section ? `recognised: ${section.soil} (${digits(100 * (section.probabilities[section.soil] ?? 0), 2)} %)` : "";
-    readout.value = [`t ${time.toFixed(2)} s`, soil, recognised, event && `${event.kind}${event.why ? `: ${event.why}` : ""}`].filter(Boolean).join("   ");
+    const far = axis === "time" ? "" : `${AXES[axis].title} ${(layers[0]?.way.place(time) ?? NaN).toFixed(2)} ${AXES[axis].unit}`;
+    readout.value = [`t ${time.toFixed(2)} s`, far, soil, recognised, event && `${event.kind}${event.why ? `: ${event.why}` : ""}`].filter(Boolean).join("   ");
   }
 
   charts.onCursor = hover;
   charts.onPick = (time) => void pick(time);
-  let soon = 0;
   charts.onUpright = remember;
   plane.onPoint = (time) => charts.point(time, true);
   charts.onRange = (range) => {
     views.seen(range);
     remember();
-    clearTimeout(soon);
-    soon = window.setTimeout(() => void drawPlane(), 150);
+    across.draw(range);
   };
   choice.addEventListener("change", () => {
-    seen = "";
+    seen = new Map();
     path = choice.value;
     run = null;
     charts.uprights = {};
     void reload();
   });
   charts.onReplaced = () => void reload();
-  planeWheel.addEventListener("change", () => {
-    void drawPlane();
+  across.onPair = () => {
+    remember();
     if (picked !== null) void pick(picked);
-  });
+  };
+  over.addEventListener("change", () => void along(over.value as Axis).then(remember));
 
   async function reload(): Promise<void> {
     const folder = await tried(() => get<{ items: Item[] }>("folder"));
     if (!folder) return;
-    const runs = runsOf(folder.items);
+    runs = runsOf(folder.items);
     const wanted = path || query.get("path") || brushed()?.path || [...runs.keys()][0] || "";
     const now = runs.get(wanted) ?? "";
     fill(choice, options(runs, wanted));
     if (!wanted) charts.clear("Nothing to show yet: open a recording on the folder page and estimate it.");
     else if (!now) leave(wanted, path && run ? `${wanted} was removed from the folder. Choose another run.` : notHere(wanted));
-    else if (now !== seen || !run) {
-      if (run && seen) note(`${wanted} was replaced: shown anew`);
-      seen = now;
+    else if (now !== seen.get(wanted) || !run) {
+      if (run && seen.has(wanted)) note(`${wanted} was replaced: shown anew`);
+      seen.set(wanted, now);
       await open(wanted);
-    }
+    } else if (others.some((other) => runs.get(other) !== seen.get(other))) {
+      const [there, gone] = [others.filter((other) => runs.has(other)), others.filter((other) => !runs.has(other))];
+      for (const other of gone) note(`${other} was removed from the folder`);
+      for (const other of there) if (runs.get(other) !== seen.get(other)) note(`${other} was replaced: shown anew`);
+      await lay(there);
+    } else overlay.draw([...runs.keys()], path, others);
   }
 
   const key = (event: KeyboardEvent): void => {
@@ -329,16 +381,17 @@ export const page: Page = (main, { notices, query }) => {
     notices.on((notice) => notice.kind === "folder" && void reload()),
     onUnits(() => {
       draw();
+      across.show(layers, formulas.all, null);
       if (sample) showSample(sample);
     }),
   ];
   void reload();
-  Object.assign(window, { terragripDrive: { charts } });
+  Object.assign(window, { terragripDrive: { charts, across } });
   return () => {
     forgets.forEach((forget) => forget());
     main.removeEventListener("keydown", key);
     views.close();
     charts.close();
-    plane.close();
+    across.close();
   };
 };

@@ -1,11 +1,11 @@
-/** The mu-s plane of one wheel: the shown time's pairs, the pair under the cursor, the online curve known by then. */
+/** One quantity over another: the pairs of what the charts show, the pair under the cursor; of the mu-s plane the online curve too. */
 
-import { CanvasInk } from "../fit/ink";
+import { CanvasInk, type Ink } from "../fit/ink";
 import type { Samples } from "../fit/samples";
-import { View, ticks } from "../fit/view";
+import { View, ticks, type Range } from "../fit/view";
 import { digits, h } from "../ui/dom";
 import { color, onTheme } from "../ui/theme";
-import { onUnits, unitFor, withUnit } from "../ui/units";
+import { withUnit } from "../ui/units";
 import { nearestKnown } from "./readout";
 
 export interface Now {
@@ -17,14 +17,32 @@ export interface Now {
   a_std: number;
 }
 
-const USELESS = 1.0;
 /** SD of a beyond which the online curve says nothing and is not drawn. */
+const USELESS = 1.0;
 
-/** Pairs of one wheel and their times; unknown ones are null. */
-export interface Points {
-  slip: number[];
-  adhesion: number[];
-  time: number[];
+/** A quantity as it is shown: its column, title and unit, and the factor from the column to that unit. */
+export interface Quantity {
+  column: string;
+  title: string;
+  unit: string;
+  scale: number;
+}
+
+/** Pairs of one run and their times, out of so many. */
+export interface Pairs {
+  time: ArrayLike<number>;
+  x: ArrayLike<number>;
+  y: ArrayLike<number>;
+  of: number;
+  color: string;
+  label: string;
+}
+
+/** What the axes are; `curve`: they are slip and adhesion, over which the online curve can be drawn. */
+export interface Axes {
+  x: Quantity;
+  y: Quantity;
+  curve: boolean;
 }
 
 /** Pixels within which the pointer finds a pair. */
@@ -33,16 +51,17 @@ const REACH = 12;
 export class Plane {
   /** The time of the pair under the pointer; null where it has left. */
   onPoint: ((time: number | null) => void) | null = null;
-  readonly element = h("div", { class: "plane", role: "img", "aria-label": "Adhesion over slip of one wheel, with the online curve" });
+  readonly element = h("div", { class: "plane", role: "img", "aria-label": "One quantity over another" });
   private canvas = h("canvas", { "aria-hidden": "true" });
   private view = new View({ low: -0.05, high: 0.7 }, { low: -0.1, high: 0.8 }, 300, 260);
-  private points: Points = { slip: [], adhesion: [], time: [] };
+  private all: Pairs[] = [];
+  private axes: Axes | null = null;
   private pointed = -1;
   private readout = h("output", { class: "readout", "aria-live": "off" });
   private now: Now | null = null;
   private shape: Samples | null = null;
   private asked = false;
-  private forgets: (() => void)[];
+  private forget: () => void;
   private watcher: ResizeObserver;
 
   constructor() {
@@ -52,29 +71,37 @@ export class Plane {
       this.onPoint?.(null);
       this.point(null);
     });
-    this.view.left = 46;
+    this.view.left = 52;
     this.view.bottom = 36;
-    this.forgets = [onTheme(() => this.draw()), onUnits(() => this.draw())];
+    this.forget = onTheme(() => this.draw());
     this.watcher = new ResizeObserver(() => this.resize());
     this.watcher.observe(this.element);
   }
 
   close(): void {
-    this.forgets.forEach((forget) => forget());
+    this.forget();
     this.watcher.disconnect();
   }
 
-  show(points: Points): void {
-    this.points = points;
+  /** Draw pairs of runs, the main one first; gives how many of them lie beyond the axes. */
+  show(all: Pairs[], axes: Axes | null): number {
+    [this.all, this.axes] = [all, axes];
     this.pointed = -1;
     this.readout.value = "";
-    const most = (values: number[], share: number): number => {
-      const known = values.filter((v) => v !== null && Number.isFinite(v)).sort((a, b) => a - b);
-      return known[Math.floor((known.length - 1) * share)] ?? 0;
+    this.element.setAttribute("aria-label", axes ? `${axes.y.title} over ${axes.x.title}` : "One quantity over another");
+    const sorted = (of: "x" | "y"): Float64Array => Float64Array.from(all.flatMap((one) => Array.from(one[of]))).sort();
+    const [xs, ys] = [sorted("x"), sorted("y")];
+    const at = (values: Float64Array, share: number): number => values[Math.round((values.length - 1) * share)] ?? 0;
+    const free = (values: Float64Array): { low: number; high: number } => {
+      const [low, high] = [at(values, 0.005), at(values, 0.995)];
+      const room = 0.08 * (high - low) || 0.1 * Math.abs(high) || 0.5;
+      return { low: low - room, high: high + room };
     };
-    this.view.x = { low: Math.min(-0.02, most(points.slip, 0.01)), high: Math.max(0.3, most(points.slip, 0.99) * 1.1) };
-    this.view.y = { low: Math.min(-0.02, most(points.adhesion, 0.01)), high: Math.max(0.3, most(points.adhesion, 0.99) * 1.2) };
+    const custom = (values: Float64Array, room: number): { low: number; high: number } => ({ low: Math.min(-0.02, at(values, 0.01)), high: Math.max(0.3, at(values, 0.99) * room) });
+    [this.view.x, this.view.y] = axes?.curve ? [custom(xs, 1.1), custom(ys, 1.2)] : [free(xs), free(ys)];
     this.later();
+    const { x, y } = this.view;
+    return all.reduce((sum, one) => sum + Array.from(one.x).filter((v, i) => v < x.low || v > x.high || (one.y[i] as number) < y.low || (one.y[i] as number) > y.high).length, 0);
   }
 
   /** The online curve's shape: the curve of scale 1. */
@@ -88,22 +115,20 @@ export class Plane {
     this.later();
   }
 
-  /** Ring the pair nearest to a time, where one is known there. */
+  /** Ring the main run's pair nearest to a time, where one is known there. */
   point(time: number | null): void {
-    const { time: times, slip, adhesion } = this.points;
-    const known = (i: number): boolean => typeof slip[i] === "number" && typeof adhesion[i] === "number";
+    const times = this.all[0]?.time ?? [];
     const apart = times.length > 1 ? ((times[times.length - 1] as number) - (times[0] as number)) / (times.length - 1) : 0;
-    this.set(time === null ? -1 : nearestKnown(times, known, time, 2 * apart));
+    this.set(time === null ? -1 : nearestKnown(times, () => true, time, 2 * apart));
   }
 
-  private hover(x: number, y: number): void {
-    const { slip, adhesion, time } = this.points;
+  private hover(px: number, py: number): void {
+    const { x, y, time } = this.all[0] ?? { x: [], y: [], time: [] };
     let [best, least] = [-1, REACH];
-    slip.forEach((s, i) => {
-      if (s === null || adhesion[i] === null) return;
-      const away = Math.hypot(this.view.px(s) - x, this.view.py(adhesion[i] as number) - y);
+    for (let i = 0; i < x.length; i++) {
+      const away = Math.hypot(this.view.px(x[i] as number) - px, this.view.py(y[i] as number) - py);
       if (away < least) [best, least] = [i, away];
-    });
+    }
     if (best < 0) return;
     this.onPoint?.(time[best] ?? null);
     this.set(best);
@@ -112,8 +137,10 @@ export class Plane {
   private set(i: number): void {
     if (i === this.pointed) return;
     this.pointed = i;
-    const unit = unitFor("share");
-    this.readout.value = i < 0 ? "" : `s ${withUnit(digits(unit.scale * (this.points.slip[i] as number)), unit)}   µ ${digits(this.points.adhesion[i])}   t ${(this.points.time[i] ?? NaN).toFixed(2)} s`;
+    const { axes } = this;
+    const [one] = this.all;
+    const said = (short: string, { scale, unit }: Quantity, value: number | undefined): string => `${short} ${withUnit(digits((value ?? NaN) * scale), { name: unit })}`;
+    this.readout.value = i < 0 || !one || !axes ? "" : [said(axes.curve ? "s" : "→", axes.x, one.x[i]), said(axes.curve ? "µ" : "↑", axes.y, one.y[i]), `t ${(one.time[i] ?? NaN).toFixed(2)} s`].join("   ");
     this.later();
   }
 
@@ -140,32 +167,47 @@ export class Plane {
     const { view } = this;
     pen.setTransform(devicePixelRatio, 0, 0, devicePixelRatio, 0, 0);
     pen.clearRect(0, 0, view.width, view.height);
-    const ink = new CanvasInk(pen);
-    const share = unitFor("share");
-    for (const x of ticks(view.x, 5)) {
-      ink.line([view.px(x), view.top, view.px(x), view.height - view.bottom], { color: color("grid") });
-      ink.text(digits(share.scale * x), view.px(x), view.height - view.bottom + 12, color("muted"), "middle");
-    }
-    for (const y of ticks(view.y, 5)) {
-      ink.line([view.left, view.py(y), view.width - view.right, view.py(y)], { color: color("grid") });
-      ink.text(digits(y), view.left - 6, view.py(y), color("muted"), "end");
-    }
-    ink.text(`slip [${share.name}]`, (view.left + view.width - view.right) / 2, view.height - 8, color("ink"), "middle");
-    ink.text("adhesion µ [–]", 10, view.height / 2, color("ink"), "middle", true);
-    pen.save();
-    pen.beginPath();
-    pen.rect(view.left, view.top, view.width - view.left - view.right, view.height - view.top - view.bottom);
-    pen.clip();
-    const points: number[] = [];
-    this.points.slip.forEach((s, i) => points.push(view.px(s), view.py(this.points.adhesion[i] as number)));
-    ink.dots(points, 1.1, color("muted"), 0.45);
-    const [s, mu] = [this.points.slip[this.pointed], this.points.adhesion[this.pointed]];
-    if (typeof s === "number" && typeof mu === "number") ink.dots([view.px(s), view.py(mu)], 5, color("accent"), 1);
-    if (this.now) this.drawNow(ink, this.now);
-    pen.restore();
+    this.ink(new CanvasInk(pen), (work) => {
+      pen.save();
+      pen.beginPath();
+      pen.rect(view.left, view.top, view.width - view.left - view.right, view.height - view.top - view.bottom);
+      pen.clip();
+      work();
+      pen.restore();
+    });
   }
 
-  private drawNow(ink: CanvasInk, now: Now): void {
+  private ink(ink: Ink, clipped: (work: () => void) => void): void {
+    const { view, axes } = this;
+    if (!axes) return;
+    const [right, foot] = [view.width - view.right, view.height - view.bottom];
+    const scaled = ({ low, high }: Range, scale: number): Range => ({ low: low * scale, high: high * scale });
+    for (const x of ticks(scaled(view.x, axes.x.scale), 4)) {
+      const px = view.px(x / axes.x.scale);
+      ink.line([px, view.top, px, foot], { color: color("grid") });
+      ink.text(digits(x), px, foot + 12, color("muted"), "middle");
+    }
+    for (const y of ticks(scaled(view.y, axes.y.scale), 5)) {
+      const py = view.py(y / axes.y.scale);
+      ink.line([view.left, py, right, py], { color: color("grid") });
+      ink.text(digits(y), view.left - 6, py, color("muted"), "end");
+    }
+    const named = ({ title, unit }: Quantity): string => `${title} [${unit}]`;
+    ink.text(named(axes.x), (view.left + right) / 2, view.height - 8, color("ink"), "middle");
+    ink.text(named(axes.y), 10, (view.top + foot) / 2, color("ink"), "middle", true);
+    clipped(() => {
+      for (const one of [...this.all].reverse()) {
+        const points = new Float64Array(2 * one.x.length);
+        for (let i = 0; i < one.x.length; i++) [points[2 * i], points[2 * i + 1]] = [view.px(one.x[i] as number), view.py(one.y[i] as number)];
+        ink.dots(points, 1.1, color(one.color), 0.45);
+      }
+      const [main] = this.all;
+      if (main && this.pointed >= 0) ink.dots([view.px(main.x[this.pointed] as number), view.py(main.y[this.pointed] as number)], 5, color("accent"), 1);
+      if (this.now && axes.curve) this.drawNow(ink, this.now);
+    });
+  }
+
+  private drawNow(ink: Ink, now: Now): void {
     const { view } = this;
     const { shape } = this;
     if (shape && now.a_std < USELESS) {

@@ -1,7 +1,8 @@
 /** The legend of a chart, with each trace's value under the cursor. */
 
 import { digits, h } from "../ui/dom";
-import type { Values } from "./axes";
+import { isKnown } from "./buckets";
+import { firstFrom, type Drawn, type Values } from "./rows";
 import type { Panel } from "./run";
 
 export class Readout {
@@ -13,21 +14,18 @@ export class Readout {
     this.element = h(
       "div",
       { class: "legend" },
-      panel.traces.map((t, i) => h("span", {}, h("i", { class: `swatch ${t.color}${t.dash ? " dashed" : ""}` }), t.label, this.values[i])),
+      panel.traces.map((t, i) => h("span", {}, h("i", { class: `swatch ${t.color}${t.dashed ? ` dash-${t.dashed}` : t.dash?.length ? " dashed" : ""}` }), t.label, this.values[i])),
     );
   }
 
-  /** Show the values of `data` (time, then each trace's limits and itself) nearest to a time, at most `near` seconds away; of rows that
-   * were cut, the smallest and the largest of the bucket. Null: none. */
-  show(data: ArrayLike<Values>, time: number | null, cut: boolean, near: number): void {
-    const times = data[0] as ArrayLike<number>;
-    let at = 1;
+  /** Show the values nearest to a place, at most `near` away on the axis; of rows that were cut, the smallest and the largest of the
+   * bucket. Null: none. */
+  show(drawn: Drawn[], place: number | null, near: number): void {
     this.panel.traces.forEach((trace, i) => {
-      const [low, high] = trace.band ? [data[at++], data[at++]] : [];
-      const values = data[at++];
+      const rows = drawn.find((one) => one.trace === trace);
       const output = this.values[i];
       if (!output) return;
-      const text = time === null || !values ? "" : valueAt(times, values, low, high, time, cut, near);
+      const text = place === null || !rows ? "" : valueAt(rows.x, rows.values, rows.low, rows.high, place, rows.cut, near);
       if (output.value !== text) output.value = text;
     });
   }
@@ -35,7 +33,7 @@ export class Readout {
 
 /** A value with half the width of its interval; of a bucket its smallest and largest value; "–" where nothing is known nearby. */
 export function valueAt(times: ArrayLike<number>, values: Values, low: Values | undefined, high: Values | undefined, time: number, cut: boolean, near: number): string {
-  const known = (k: number): boolean => typeof values[k] === "number" && !Number.isNaN(values[k]);
+  const known = (k: number): boolean => isKnown(values[k]);
   const i = nearestKnown(times, known, time, near);
   if (i < 0) return "–";
   const v = values[i] as number;
@@ -45,17 +43,12 @@ export function valueAt(times: ArrayLike<number>, values: Values, low: Values | 
     return digits(least) === digits(most) ? digits(v) : `${digits(least)} … ${digits(most)}`;
   }
   const [from, to] = [low?.[i], high?.[i]];
-  return typeof from === "number" && typeof to === "number" ? `${digits(v)} ± ${digits((to - from) / 2, 2)}` : digits(v);
+  return isKnown(from) && isKnown(to) ? `${digits(v)} ± ${digits((to - from) / 2, 2)}` : digits(v);
 }
 
 /** The place of the known sample nearest to a time, -1 where none is within `near`. */
 export function nearestKnown(times: ArrayLike<number>, known: (i: number) => boolean, time: number, near: number): number {
-  let [low, high] = [0, times.length];
-  while (low < high) {
-    const middle = (low + high) >> 1;
-    if ((times[middle] as number) < time) low = middle + 1;
-    else high = middle;
-  }
+  const low = firstFrom(times, time);
   let best = -1;
   let away = Infinity;
   for (const step of [-1, 1]) {

@@ -26,6 +26,8 @@ export interface Run {
   rows: number;
   start: number;
   end: number;
+  /** How far it went [m]; null where it has no ground speed. */
+  distance: number | null;
   columns: string[];
   measured: string[];
   recording: string | null;
@@ -42,6 +44,8 @@ export interface Run {
 }
 
 export interface Trace {
+  /** Which of the runs shown it is of; the main one unless it says. */
+  layer?: number;
   /** The column asked of the server. */
   column: string;
   label: string;
@@ -50,6 +54,8 @@ export interface Trace {
   band: string;
   bandColor?: string;
   dash?: number[];
+  /** Which of the dashes it is, for its sample in the legend. */
+  dashed?: number;
   /** To what is shown, from the column. */
   scale: number;
 }

@@ -4,6 +4,7 @@ import "maplibre-gl/dist/maplibre-gl.css";
 import * as maplibre from "maplibre-gl";
 import workerUrl from "maplibre-gl/dist/maplibre-gl-worker.mjs?worker&url";
 import { during, EVENT_COLORS, panelsOf, soilColor, type Run } from "../drive/run";
+import { Way } from "../drive/along";
 import { Charts } from "../drive/charts";
 import { address, read, written, type View } from "../drive/link";
 import { address as server, get, type Item } from "../ui/api";
@@ -109,7 +110,7 @@ export const page: Page = (main, { notices, query }) => {
   }
 
   function showChart(of: Run): void {
-    charts.show(path, of, panelsOf(of, of.wheels.slice(-1)).filter((p) => p.key === "slip"));
+    charts.show([{ path, run: of, label: path, way: new Way("time", of) }], panelsOf(of, of.wheels.slice(-1)).filter((p) => p.key === "slip"));
   }
 
   /** No run is shown, and why. */
@@ -242,9 +243,7 @@ export const page: Page = (main, { notices, query }) => {
 
   function remember(): void {
     address("map", () => {
-      const [low, high] = charts.range;
-      const whole = low <= charts.whole[0] && high >= charts.whole[1];
-      return `${written({ path, range: whole ? null : charts.range, wheels: null, panels: null, at: picked, uprights: charts.uprights })}&quantity=${encodeURIComponent(quantity.value)}`;
+      return `${written({ path, range: charts.isWhole ? null : charts.range, at: picked, uprights: charts.uprights })}&quantity=${encodeURIComponent(quantity.value)}`;
     });
   }
 

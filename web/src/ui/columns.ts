@@ -7,6 +7,8 @@ export interface Columns {
   count: number;
   cut: boolean;
   data: Float64Array[];
+  /** How many rows there are, where the server says it. */
+  of?: number;
 }
 
 export async function columns(path: string, query: Query, many: string[], signal?: AbortSignal): Promise<Columns> {
@@ -17,7 +19,7 @@ export async function columns(path: string, query: Query, many: string[], signal
 
 export function unpack(buffer: ArrayBuffer): Columns {
   const size = new DataView(buffer).getUint32(0, true);
-  const head = JSON.parse(new TextDecoder().decode(new Uint8Array(buffer, 4, size))) as { columns: string[]; count: number; cut: boolean };
+  const head = JSON.parse(new TextDecoder().decode(new Uint8Array(buffer, 4, size))) as { columns: string[]; count: number; cut: boolean; of?: number };
   const data = head.columns.map((_, i) => new Float64Array(buffer, 4 + size + 8 * i * head.count, head.count));
-  return { names: head.columns, count: head.count, cut: head.cut, data };
+  return { names: head.columns, count: head.count, cut: head.cut, data, ...(head.of === undefined ? {} : { of: head.of }) };
 }

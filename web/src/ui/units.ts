@@ -77,7 +77,7 @@ export function fixed(value: number, { scale, decimals }: Unit): string {
 }
 
 /** A number with its unit in a sentence; a ratio has none. */
-export function withUnit(number: string, { name }: Unit): string {
+export function withUnit(number: string, { name }: Pick<Unit, "name">): string {
   return name === "–" || !name ? number : `${number} ${name}`;
 }
 

@@ -1,4 +1,4 @@
-"""The drive and map pages: a run over time, the mu-s plane, a sample explained, the track."""
+"""The drive and map pages: a run over time, a sample explained, the track."""
 
 from __future__ import annotations
 
@@ -11,17 +11,16 @@ from fastapi import APIRouter, Query, Response
 from terragrip.errors import InputError
 from terragrip.estimation.estimates import Estimates
 from terragrip.ground.events import events
+from terragrip.recording import Recording
 from terragrip.studio import drive
 from terragrip.studio.api.files import Named, finite
-from terragrip.studio.shown import MEASURED
+from terragrip.studio.shown import FORMULA, MEASURED, Axis
 from terragrip.studio.state import Here, Studio
 from terragrip.studio.tables import packed
 
 router = APIRouter(tags=["drive"])
 
 BINARY = "application/octet-stream"
-PLANE = 3000
-"""Points of the mu-s plane."""
 TRACK = 20_000
 """Points of a track."""
 
@@ -31,7 +30,7 @@ Width = Annotated[int, Query(ge=10, le=5000)]
 Time = Annotated[float, Query(allow_inf_nan=False)]
 
 
-def _table(studio: Studio, path: str, version: str = "") -> Estimates:
+def table_of(studio: Studio, path: str, version: str = "") -> Estimates:
     """Estimates of the folder. Raises InputError where the file is no longer the `version` that the page was given: what it draws
     would be a mixture of two runs."""
     if version and studio.folder.version(path) != version:
@@ -39,16 +38,25 @@ def _table(studio: Studio, path: str, version: str = "") -> Estimates:
     return studio.estimates.get(studio.folder.file(path))
 
 
+def recording_for(studio: Studio, table: Estimates, columns: list[str]) -> Recording | None:
+    """The run's recording, where a column may need it and the folder has it."""
+    if not any(name.startswith((MEASURED, FORMULA)) for name in columns):
+        return None
+    result = drive.recording_of(studio, table)
+    return None if result is None else result[1]
+
+
 @router.get("/drive")
 def about(studio: Here, path: Named) -> dict[str, Any]:
     """What a run holds: columns, wheels, time, events with their reasons, soils, the recording it came from, the ground where known."""
-    table = _table(studio, path)
+    table = table_of(studio, path)
     result = drive.recording_of(studio, table, search=True)
     plain: dict[str, Any] = finite(
         {
             "rows": len(table),
             "start": float(table.time[0]) if len(table) else 0.0,
             "end": float(table.time[-1]) if len(table) else 0.0,
+            "distance": _distance(studio, path),
             "columns": list(table.columns),
             "measured": [] if result is None else sorted(result[1].channels),
             "recording": None if result is None else studio.folder.name(result[0]),
@@ -68,40 +76,34 @@ def about(studio: Here, path: Named) -> dict[str, Any]:
 
 @router.get("/drive/window")
 def window(
-    studio: Here, path: Named, column: Columns, start: Time, end: Time, width: Width = 1000, version: str = ""
+    studio: Here,
+    path: Named,
+    column: Columns,
+    start: Time,
+    end: Time,
+    width: Width = 1000,
+    version: str = "",
+    axis: Axis = "time",
 ) -> Response:
-    """Columns between two times as float64 arrays behind a JSON head (see `packed`): min and max of every bucket are kept."""
-    table = _table(studio, path, version)
+    """Columns between two places on an axis as float64 arrays behind a JSON head (see `packed`): min and max of every bucket are kept.
+
+    A column is one of the estimates, its limit (``slip_rl:low``), ``measured:NAME`` of the recording, ``axis:time`` or a formula
+    (``=slip_rl - slip_rr``).
+    """
+    table = table_of(studio, path, version)
     if not len(table) or end <= start:
         raise InputError("holds nothing between these times", file=path)
-    result = drive.recording_of(studio, table) if any(c.startswith(MEASURED) for c in column) else None
-    recording = None if result is None else result[1]
     shown = studio.shown.get(studio.folder.file(path))
-    cut, time, columns = shown.window(recording, column, start, end, width)
-    head = {"columns": ["time", *column], "count": len(time), "cut": cut}
-    return Response(packed(head, [time, *columns]), media_type=BINARY)
-
-
-@router.get("/drive/plane")
-def plane(studio: Here, path: Named, wheel: str, start: Time, end: Time, version: str = "") -> dict[str, Any]:
-    """Adhesion over slip of one wheel between two times, thinned evenly; no point where slip alone is known."""
-    table = _table(studio, path, version)
-    _known(table, wheel)
-    if f"adhesion_{wheel}" not in table.columns:
-        return {"slip": [], "adhesion": [], "time": []}
-    first, last = np.searchsorted(table.time, [start, end], "left")
-    rows = slice(int(first), max(int(last), int(first) + 1), max(int(last - first) // PLANE, 1))
-    plain: dict[str, Any] = finite(
-        {name: table[f"{name}_{wheel}"][rows].round(5).tolist() for name in ("slip", "adhesion")}
-        | {"time": table.time[rows].tolist()}
-    )
-    return plain
+    recording = recording_for(studio, table, column)
+    cut, place, columns = shown.window(recording, column, start, end, width, axis)
+    head = {"columns": [axis, *column], "count": len(place), "cut": cut}
+    return Response(packed(head, [place, *columns]), media_type=BINARY)
 
 
 @router.get("/drive/sample")
 def sample(studio: Here, path: Named, time: Time, version: str = "") -> dict[str, Any]:
     """Everything known of one sample, and what moved the adhesion there."""
-    table = _table(studio, path, version)
+    table = table_of(studio, path, version)
     if not len(table):
         raise InputError("holds no rows", file=path)
     result = drive.recording_of(studio, table)
@@ -117,7 +119,7 @@ def track(
     version: str = "",
 ) -> Response:
     """Time, longitude, latitude and columns along the way, thinned evenly, rows without a position left out."""
-    table = _table(studio, path, version)
+    table = table_of(studio, path, version)
     if "latitude" not in table.columns or "longitude" not in table.columns:
         raise InputError("holds no positions", file=path, hint="estimate a log with latitude and longitude")
     for name in column:
@@ -130,9 +132,12 @@ def track(
     return Response(packed({"columns": names, "count": len(rows), "cut": False}, columns), media_type=BINARY)
 
 
-def _known(table: Estimates, wheel: str) -> None:
-    if wheel not in table.wheels:
-        raise InputError(f"there is no wheel {wheel!r}", hint=f"choose one of {', '.join(table.wheels)}")
+def _distance(studio: Studio, path: str) -> float | None:
+    """How far the run went [m]; None where it has no ground speed."""
+    try:
+        return float(studio.shown.get(studio.folder.file(path)).along("distance")[-1])
+    except InputError:
+        return None
 
 
 def _ground(studio: Studio, path: str) -> dict[str, Any] | None:
