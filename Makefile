@@ -23,7 +23,7 @@ BUILD_INPUTS := pyproject.toml setup.py cffi_build.py $(KERNEL_SOURCES) $(KERNEL
 	$(wildcard kernel/python/*.[ch] src/terragrip/*/*.c src/terragrip/*/*.h)
 
 .PHONY: notebooks help demo test lint kernel-test web-test pytest studio wheel docs system bench lock clean \
-	kernel-aarch64 kernel-others
+	kernel-aarch64 kernel-others test-long kernel-sanitized fuzz system-fuzz fuzz-kernel fuzz-kernel-run fuzz-parsers
 
 help: ## show this list
 	@sed -n 's/^\([a-z-]*\):[^#]*## /  make \1\t/p' $(MAKEFILE_LIST)
@@ -133,16 +133,57 @@ build/kernel/$(1)/%: kernel/tests/%.c $$(patsubst kernel/src/%.c,build/kernel/$(
 	@mkdir -p $$(@D)
 	$$(CC) $$(KERNEL_FLAGS) $(2) -o $$@ $$(filter %.c %.o,$$^) -lm
 endef
-# Restoring from damaged snapshots is tried under the sanitizers too, where the compiler has them.
-SANITIZERS := -g -fsanitize=address,undefined -fno-sanitize-recover=all
+# Restoring from damaged snapshots is tried under the sanitizers too, where the compiler has them; `make test-long` runs all tests so.
+SANITIZERS := -g -fsanitize=address,undefined,float-cast-overflow -fno-sanitize-recover=all
 SANITIZED := $(shell echo 'int main(void) { return 0; }' | $(CC) $(SANITIZERS) -x c - -o /dev/null 2>/dev/null && echo build/kernel/sanitized/restore)
 .SECONDARY:
 $(eval $(call kernel_rules,sanitized,-O1 $(SANITIZERS)))
+$(eval $(call kernel_rules,sanitized-float,-O1 -DTG_FLOAT $(SANITIZERS)))
 $(eval $(call kernel_rules,double,))
 $(eval $(call kernel_rules,float,-DTG_FLOAT))
 
 kernel-test: $(foreach real,double float,$(KERNEL_TESTS:%=build/kernel/$(real)/%)) $(SANITIZED) ## compile the kernel with every warning an error, run its C tests
 	@for program in $^; do echo "$$program"; ./$$program || exit 1; done
+
+# --- what takes long: sanitizers, fuzzers, soak ---------------------------------------------------------------------------
+FUZZ_SECONDS ?= 5
+FUZZERS := $(patsubst fuzz/kernel/%.c,build/fuzz/kernel-%,$(wildcard fuzz/kernel/*.c))
+FUZZ_CC := clang
+
+test-long: kernel-sanitized fuzz ## every C test under the address and undefined-behaviour sanitizers, and each fuzzer for FUZZ_SECONDS
+
+kernel-sanitized: $(foreach real,sanitized sanitized-float,$(KERNEL_TESTS:%=build/kernel/$(real)/%))
+	@for program in $^; do echo "$$program"; ./$$program > /dev/null || exit 1; done
+
+fuzz: system-fuzz fuzz-kernel fuzz-parsers ## fuzz the kernel (libFuzzer) and every parser (atheris); longer: make fuzz FUZZ_SECONDS=600
+
+system-fuzz:
+	@if ! command -v $(FUZZ_CC) >/dev/null 2>&1 && [ "$$(id -u)" = 0 ] && command -v apt-get >/dev/null 2>&1; then \
+	  echo "Installing $(FUZZ_CC) for the kernel's fuzzers"; \
+	  { apt-get update -qq && DEBIAN_FRONTEND=noninteractive apt-get install -qq -y --no-install-recommends clang libclang-rt-dev; } >/dev/null 2>&1 || true; fi
+
+FUZZ_FLAGS := -std=c99 -O1 $(SANITIZERS) -fsanitize=fuzzer-no-link -Wall -Wextra -Wno-psabi -Wno-bitwise-instead-of-logical -Werror \
+	-Ikernel/include -Ikernel/src -Ikernel/tests
+build/fuzz/objects/%.o: kernel/src/%.c $(KERNEL_HEADERS) Makefile
+	@mkdir -p $(@D)
+	$(FUZZ_CC) $(FUZZ_FLAGS) -c -o $@ $<
+
+build/fuzz/kernel-%: fuzz/kernel/%.c fuzz/kernel/bytes.h $(patsubst kernel/src/%.c,build/fuzz/objects/%.o,$(KERNEL_SOURCES))
+	$(FUZZ_CC) $(FUZZ_FLAGS) -fsanitize=fuzzer -o $@ $(filter %.c %.o,$^) -lm
+
+fuzz-kernel:
+	@if echo 'int LLVMFuzzerTestOneInput(const char *d, unsigned long n) { return d && n > 9 ? 0 : 0; }' \
+	    | $(FUZZ_CC) -fsanitize=fuzzer -x c - -o /dev/null 2>/dev/null; then $(MAKE) --no-print-directory fuzz-kernel-run; \
+	else echo "SKIPPED: the kernel's fuzzers need clang with libFuzzer; on Debian and Ubuntu: apt-get install clang libclang-rt-dev" >&2; fi
+
+fuzz-kernel-run: $(FUZZERS)
+	@for program in $^; do name=$${program##*kernel-}; mkdir -p build/fuzz/corpus-$$name build/fuzz/found; echo "$$program"; \
+	  $$program -max_total_time=$(FUZZ_SECONDS) -max_len=4096 -timeout=20 -rss_limit_mb=1000 -print_final_stats=1 \
+	    -artifact_prefix=build/fuzz/found/$$name- build/fuzz/corpus-$$name fuzz/corpus/kernel-$$name > build/fuzz/$$name.log 2>&1 \
+	    || { tail -40 build/fuzz/$$name.log; exit 1; }; grep number_of_executed_units build/fuzz/$$name.log; done
+
+fuzz-parsers: $(VENV)/package $(VENV)/dev
+	@$(BIN)/python fuzz/parsers.py --each $(FUZZ_SECONDS)
 
 # The same tests built for a 64-bit ARM machine (a Raspberry Pi, a Jetson) and run by qemu. Not part of `make test`: see docs/install.md.
 AARCH64_CC ?= aarch64-linux-gnu-gcc
