@@ -3,7 +3,7 @@
     python fuzz/parsers.py --each SECONDS [TARGET ...]     every target, each in a process of its own
     python fuzz/parsers.py TARGET [libFuzzer's options]    one target, e.g. -max_total_time=60, or a file that was found
 
-A target's corpus is fuzz/corpus/TARGET (committed, small) and build/fuzz/TARGET (what earlier runs found, and files by the writers of the tests).
+A target's corpus is fuzz/corpus/TARGET (committed, small) and build/fuzz/TARGET (what earlier runs found, and files by the tests' writers).
 What fails is written to build/fuzz/found and named.
 """
 
