@@ -7,7 +7,8 @@ import pytest
 
 from soil_campaign import pairs
 from terragrip.errors import InputError
-from terragrip.soil.bins import bin_pairs
+from terragrip.physics.adhesion import CURVES
+from terragrip.soil.bins import BinSettings, bin_pairs
 from terragrip.soil.choice import compare_forms
 
 
@@ -48,3 +49,32 @@ def test_the_form_in_question_takes_part_once_whatever_the_candidates(candidates
     forms = [score.form for score in verdict.ranking]
     assert len(forms) == expected
     assert set(forms) == {"effective", "exponential"}
+
+
+@pytest.mark.parametrize(("samples", "compared"), [(5, True), (4, False)])
+def test_a_bin_counts_where_the_runs_that_are_left_fill_it(samples, compared):
+    """Three runs and least ten samples a bin: two runs of five fill a bin, two of four do not, though all three do."""
+    slip = np.tile(np.repeat(0.055 + 0.05 * np.arange(8), samples), 3)
+    mu = 0.5 * (1 - np.exp(-9 * slip))
+    bins = bin_pairs(slip, mu, np.repeat([0, 1, 2], 8 * samples), BinSettings(minimum=10))
+    assert bins.used.sum() == 8
+    if compared:
+        assert "leaving runs out" in compare_forms(bins).sentence
+    else:
+        with pytest.raises(InputError, match="too unlike"):
+            compare_forms(bins)
+
+
+def test_the_error_is_that_of_the_runs_left_out():
+    """Each run on a level of its own: the form's free scale takes the level of the others, so the error is known."""
+    slip = np.tile(np.repeat(0.105 + 0.05 * np.arange(8), 20), 2)
+    level = np.repeat([0.8, 1.0], 8 * 20)
+    height = CURVES["exponential"].value(slip, {"a": 1.0})
+    bins = bin_pairs(slip, level * height, np.repeat([0, 1], 8 * 20))
+    verdict = compare_forms(bins, candidates=["exponential"])
+    expected = 0.2 * np.sqrt(
+        np.mean(CURVES["exponential"].value(0.105 + 0.05 * np.arange(8), {"a": 1.0}) ** 2)
+    )
+    assert verdict.ranking[0].error == pytest.approx(expected, rel=1e-6)
+    assert verdict.ranking[0].standard_error == pytest.approx(0.0, abs=1e-9)
+    assert verdict.ranking[0].parameters == 1

@@ -47,6 +47,34 @@ def test_literature_is_as_printed():
         brixius_soil(-1, 0.1, 0.4, 340)
 
 
+def test_burckhardts_roads_peak_where_the_literature_says():
+    """Largest friction of each road, and full slip, as printed with his constants (Kiencke and Nielsen, Automotive Control Systems)."""
+    peaks = {
+        "dry asphalt": (0.17, 1.17, 0.76), "wet asphalt": (0.13, 0.80, 0.51), "dry concrete": (0.16, 1.09, 0.66),
+        "dry cobble": (0.40, 1.00, 0.70), "wet cobble": (0.14, 0.38, 0.28), "snow": (0.06, 0.19, 0.13),
+    }  # fmt: skip
+    slip = np.linspace(0, 1, 10_001)
+    for name, (at, most, sliding) in peaks.items():
+        mu = literature_soils()[name].value(slip)
+        assert slip[mu.argmax()] == pytest.approx(at, abs=0.006), name
+        assert mu.max() == pytest.approx(most, abs=0.006), name
+        assert mu[-1] == pytest.approx(sliding, abs=0.006), name
+
+
+def test_the_spread_is_the_scatter_of_all_samples_about_the_curve():
+    """Of the samples in the bins: each bin's own variance, and its mean's distance from the curve, weighted by their number."""
+    slip, mu, run = pairs(4, "effective", A=0.6, k=12.0, d=0.5)  # a curve that the one fitted cannot follow
+    curve = AdhesionCurve(bootstrap=0).fit(slip, mu, run)
+    total = samples = 0.0
+    for low in curve.bins_.settings.edges[:-1]:
+        inside = (slip >= low) & (slip < low + 0.01)
+        off = mu[inside] - curve.predict(np.array([slip[inside].mean()]))
+        total, samples = total + float((off**2).sum()), samples + inside.sum()
+    assert Soil.from_curve("x", curve).spread == pytest.approx(
+        np.sqrt(total / samples), rel=5e-3
+    )  # n for n - 1
+
+
 def test_merge_refuses_twins_unless_told():
     with pytest.raises(InputError, match="both libraries hold a soil 'fine'"):
         paper_soils().merge(SoilLibrary({"fine": fitted()}))
@@ -100,6 +128,18 @@ def test_bad_libraries_are_named_in_one_line(tmp_path, text):
         SoilLibrary.load(tmp_path / "s.json")
     assert "\n" not in str(caught.value)
     assert "s.json" in str(caught.value)
+
+
+@pytest.mark.parametrize("parameters", [{"p": 1.0}, ["a"], None])
+def test_a_fit_by_slip_needs_the_soils_parameters(tmp_path, parameters):
+    entry = {
+        "model": "exponential",
+        "parameters": {"a": 1.0},
+        "by_slip": {"parameters": parameters, "r2": 0.9},
+    }
+    (tmp_path / "s.json").write_text(json.dumps({"soils": {"a": entry}}))
+    with pytest.raises(InputError, match=r"soils\.a\.by_slip.*has not the soil's parameters"):
+        SoilLibrary.load(tmp_path / "s.json")
 
 
 @given(st.recursive(st.none() | st.booleans() | st.floats(allow_nan=False) | st.text(max_size=5), lambda x: st.lists(x, max_size=3)
