@@ -12,6 +12,7 @@ from terragrip.cli.options import DbcFiles, Logs, ProfileFile, Quiet, VehicleFil
 from terragrip.cli.output import check_file
 from terragrip.cli.progress import progress
 from terragrip.errors import InputError
+from terragrip.note_pages import with_page
 
 
 def command(
@@ -54,7 +55,7 @@ def command(
     calibration = calibrate(recordings, machine, light=spans)
     if not any(quantity.applies for quantity in calibration.quantities):
         for note in calibration.notes:
-            print(f"Note: {note}")
+            print(f"Note: {with_page(note)}")
         reasons = "; ".join(f"{unknown.name}: {unknown.why}" for unknown in calibration.unknown)
         raise InputError(
             f"nothing can be calibrated ({reasons})",

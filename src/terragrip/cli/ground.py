@@ -11,6 +11,7 @@ from terragrip.cli.options import Quiet
 from terragrip.cli.output import check_file, check_folder, files_in
 from terragrip.cli.progress import progress
 from terragrip.errors import InputError, nearest
+from terragrip.note_pages import with_page
 
 if TYPE_CHECKING:
     from terragrip.ground.result import Ground
@@ -138,7 +139,7 @@ def summary(grounds: list[Ground]) -> str:
         lines.append(f"{ground.run}: {', '.join(counted)}{seen}")
         if len(grounds) == 1:
             lines += _sections(ground)
-        lines += [f"  {note}" for note in ground.notes]
+        lines += [f"  {with_page(note)}" for note in ground.notes]
     return "\n".join(lines)
 
 

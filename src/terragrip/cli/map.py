@@ -10,6 +10,7 @@ import typer
 from terragrip.cli.options import Quiet
 from terragrip.cli.output import check_file
 from terragrip.cli.progress import progress
+from terragrip.note_pages import with_page
 
 if TYPE_CHECKING:
     from terragrip.maps import FieldMap
@@ -115,4 +116,4 @@ def summary(made: FieldMap) -> str:
         if changes is not None:
             line += f"; {int(changes.significant.sum())} of {len(changes)} cells driven again changed"
         lines.append(line)
-    return "\n".join([*lines, *made.notes])
+    return "\n".join([*lines, *map(with_page, made.notes)])

@@ -11,6 +11,7 @@ import typer
 from terragrip.cli.options import Quiet
 from terragrip.cli.output import check_file
 from terragrip.cli.progress import progress
+from terragrip.note_pages import with_page
 
 if TYPE_CHECKING:
     from terragrip.soil.library import Soil, SoilLibrary
@@ -117,7 +118,11 @@ def command(
         elif path.suffix.lower() == ".csv":
             points = soils_of_points(path, curve, soil)
             words += [f"{name}: not fitted, {why}." for name, why in points.not_fitted.items()]
-            words += [f"{name}: {note}" for name, one in points.items() for note in one.fit.get("notes", ())]
+            words += [
+                f"{name}: {with_page(note)}"
+                for name, one in points.items()
+                for note in one.fit.get("notes", ())
+            ]
             library = _joined(library, points, path)
     if base is not None:
         library = base.merge(library, "replace")

@@ -168,9 +168,8 @@ class TractionEstimator:
         mine = dict(sensors or {})
         if slip_reference is None and speeds_alone(recording.channels, vehicle):
             slip_reference = slip_reference_in(recording, vehicle)
-        if slip_reference is not None:
-            used = speeds.slots_in(slip_reference.rims)
-            logged = {name: sd for name, sd in logged.items() if name in used}
+        used = sample_slots(vehicle) if slip_reference is None else speeds.slots_in(slip_reference.rims)
+        logged = {name: sd for name, sd in logged.items() if name in used}
         made = cls(
             vehicle,
             method,

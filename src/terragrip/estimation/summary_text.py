@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from terragrip.estimation.engine import EVENTS
+from terragrip.note_pages import with_page
 
 if TYPE_CHECKING:
     from terragrip.estimation.summary import Tally
@@ -31,7 +32,7 @@ def summary_text(tally: Tally, notes: tuple[str, ...], output: str | None) -> st
     else:
         lines.append("There is no row without an event: no medians.")
     lines += [*_consistency(tally), *_assumed(tally)]
-    lines += [f"Note: {note}" for note in notes]
+    lines += [f"Note: {with_page(note)}" for note in notes]
     return "\n".join([*lines, f"Next: {_next(tally, notes, output)}"])
 
 
@@ -60,7 +61,7 @@ def _events(tally: Tally) -> str:
         for code, event in enumerate(EVENTS)
         if event and tally.event_rows[code]
     ]
-    return f"Events: {', '.join(met) if met else 'none'}"
+    return f"Events: {', '.join(met)} (docs: events)" if met else "Events: none"
 
 
 def _by_label(tally: Tally, columns: Columns) -> list[str]:
@@ -130,7 +131,8 @@ def _consistency(tally: Tally) -> list[str]:
     ratio, (low, high) = tally.nis / tally.channels, _EXPECTED
     verdict = "as expected"
     if not low < ratio < high:
-        verdict = "the noise may be set too high" if ratio < 1 else "the noise may be set too low"
+        way = "high" if ratio < 1 else "low"
+        verdict = f"the noise may be set too {way}; docs: vehicle#noise-of-the-sensors"
     return [f"Normalised innovation squared a channel: {ratio:.2f}, expected 1 ({verdict})"]
 
 

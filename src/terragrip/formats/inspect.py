@@ -133,7 +133,7 @@ def inspect(
         if profile is not None:
             raise
         fits = fit_of(log)
-        warnings += [] if fits.names else [_cause(error)]
+        warnings += [] if fits.names else [f"Without a profile: {_cause(error)}"]
     if recording is not None:
         warnings += unit_warnings(recording, machine)
     if recording is not None and machine is not None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
+from terragrip.note_pages import with_page
 from terragrip.recording.schema import wheel_names_in
 
 if TYPE_CHECKING:
@@ -24,9 +25,9 @@ def text_of(inspection: Inspection) -> str:
         result = [_proposal_text(channel, own) for channel, own in inspection.proposals.items()]
         parts.append("Recognised, with confidence and evidence\n" + "\n".join(result))
     if inspection.missing:
-        parts.append("Missing\n" + "\n".join(f"  {sentence}" for sentence in inspection.missing))
+        parts.append("Missing\n" + "\n".join(f"  {with_page(sentence)}" for sentence in inspection.missing))
     if inspection.warnings:
-        parts.append("Remarks\n" + "\n".join(f"  {sentence}" for sentence in inspection.warnings))
+        parts.append("Remarks\n" + "\n".join(f"  {with_page(sentence)}" for sentence in inspection.warnings))
     if inspection.fitting:
         named = " or ".join(f"--profile {name}" for name in inspection.fitting)
         parts.append(f"A profile that comes with Terragrip fits: {named}")

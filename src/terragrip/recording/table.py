@@ -182,20 +182,23 @@ class Recording:
                 raise self._unfit(name, f"the vehicle has no wheel {owner}", f"its wheels are {known}")
         for wheel, driven in zip(vehicle.wheels, vehicle.driven, strict=True):
             if wheel not in self.wheels:
-                hint = (
+                seen = (
                     f"the log has wheel speeds for {', '.join(self.wheels)}; the vehicle has wheels {known}"
                 )
-                raise self._unfit(f"wheel_speed_{wheel}", "is missing", hint)
+                fix = (
+                    "name them alike" if driven else "map the ground speed over the radius of this free wheel"
+                )
+                page = "vehicle#signals-that-are-missing"
+                raise self._unfit(f"wheel_speed_{wheel}", "is missing", f"{seen}; {fix}", page)
             if driven and f"drive_torque_{wheel}" not in self.channels:
                 hint = "add it, or say 'driven: false' for its axle in the vehicle file"
-                raise self._unfit(
-                    f"drive_torque_{wheel}", f"is missing, but the wheel {wheel} is driven", hint
-                )
+                problem = f"is missing, but the wheel {wheel} is driven"
+                raise self._unfit(f"drive_torque_{wheel}", problem, hint, "vehicle#signals-that-are-missing")
         towing = "drawbar_force" in self.channels and len(vehicle.axles) > 1
         if towing and "hitch_height" not in vehicle.model_fields_set:
             hint = "add e.g. 'hitch_height: 0.25 m' to the vehicle file"
             problem = "the pull moves load between the axles, but the vehicle has no hitch_height"
-            raise self._unfit("drawbar_force", problem, hint)
+            raise self._unfit("drawbar_force", problem, hint, "vehicle#all-keys")
 
-    def _unfit(self, column: str, problem: str, hint: str) -> InputError:
-        return InputError(problem, file=self.source, place=f"column {column}", hint=hint)
+    def _unfit(self, column: str, problem: str, hint: str, page: str | None = None) -> InputError:
+        return InputError(problem, file=self.source, place=f"column {column}", hint=hint, page=page)
