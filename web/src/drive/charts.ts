@@ -253,9 +253,11 @@ export class Charts {
     void this.fetch();
   }
 
-  /** The charts share the room, down to what can be read; then they scroll. */
+  /** What the style sheet says; else the charts share the room, down to what can be read; then they scroll. */
   private height(): number {
     const many = Math.max(this.plots.length, this.count, 1);
+    const set = parseFloat(getComputedStyle(this.element).getPropertyValue("--chart-height"));
+    if (set > 0) return set; // the page scrolls, not the charts
     return Math.max(Math.floor((this.element.clientHeight - 12) / many) - HEAD, LOWEST);
   }
 

@@ -25,7 +25,9 @@ import { during, type Run } from "./run";
 
 const FIRST = ["adhesion", "slip", "resistance", "speed"];
 const KEY = "terragrip-drive-panels";
-const HINT = "Drag, shift+wheel or two fingers zoom; arrow keys, sideways wheel or one finger pan; wheel or drag on an upright axis for that; double click shows the whole run.";
+const HINT = "Drag or shift+wheel zooms, arrow keys pan, double click shows all.";
+const HINT_NARROW = "Two fingers zoom, one pans.";
+const NARROW = matchMedia("(max-width: 600px)"); // as in the style sheet
 
 const CLICK = "Click a chart to see everything known of that moment, and why µ moved. ◀ ▶ step through samples.";
 
@@ -316,7 +318,7 @@ export const page: Page = (main, { notices, query }) => {
   function hover(time: number | null): void {
     plane.point(time);
     if (time === null || !run) {
-      readout.value = run ? HINT : "";
+      readout.value = run ? (NARROW.matches ? HINT_NARROW : HINT) : "";
       return;
     }
     const soil = during(run.soils, time)?.name;
