@@ -1,6 +1,7 @@
-"""Code on the pages of docs/ is right: each command line is one that the program takes, each Python block runs or at least compiles.
+"""Code on the pages of docs/ is right: each command line is one that the program takes, each Python block runs.
 
-Tutorials run as a whole in tests/test_tutorial.py, the format of docs/formats.md in tests/formats.
+Those of README, vehicle, export and ground-classifier run here, tutorials as a whole in tests/test_tutorial.py, the format of
+docs/formats.md in tests/formats/test_registry.py.
 """
 
 from __future__ import annotations
@@ -10,6 +11,8 @@ import shlex
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+import pandas as pd
 import pytest
 import typer
 
@@ -68,6 +71,60 @@ def python_blocks(page: Path) -> list[str]:
 def test_every_python_block_compiles(page: Path) -> None:
     for text in python_blocks(page):
         compile(text, str(page), "exec")
+
+
+RUN_HERE = {"README", "vehicle", "export", "ground-classifier"}
+RUN_ELSEWHERE = {page.stem for page in ROOT.glob("docs/tutorial*.md")} | {"formats"}
+
+
+def test_every_page_with_python_is_run_by_some_test() -> None:
+    """test_tutorial.py takes every docs/tutorial*.md; of docs/formats.md it is the reader for a format of one's own."""
+    assert {page.stem for page in PAGES if python_blocks(page)} == RUN_HERE | RUN_ELSEWHERE
+
+
+def run_blocks(page: str, **names: Any) -> dict[str, Any]:
+    """Run a page's Python blocks one after another in the present folder; what they and ``names`` define."""
+    for text in python_blocks(ROOT / f"docs/{page}.md"):
+        exec(compile(text, page, "exec"), names)
+    return names
+
+
+def test_the_block_of_the_export_page_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    drive = tg.simulate("fine-10", seed=1)
+    table = drive.recording.to_pandas().iloc[:3000]
+    instants = pd.Timestamp("2019-06-12 08:00:00", tz="UTC") + pd.to_timedelta(table["time"], unit="s")
+    table.assign(time=instants.dt.strftime("%Y-%m-%dT%H:%M:%S.%fZ")).to_csv("log.csv", index=False)
+    estimates = tg.estimate(tg.read("log.csv"), drive.vehicle)
+    frame = run_blocks("export", estimates=estimates)["frame"]
+    assert frame.attrs["units"]["wheel_speed_fl"] == "rad/s"
+    inside = frame.loc["2019-06-12 08:00":"2019-06-12 08:05", "slip_fl"]  # type: ignore[misc]
+    assert len(inside) == len(frame)
+
+
+def test_the_block_of_the_ground_classifier_page_runs(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    rng = np.random.default_rng(2)
+    time = np.arange(0, 60, 0.02)
+    for name, rough in {
+        "asphalt_1": 0.2,
+        "asphalt_2": 0.2,
+        "snow_1": 1.5,
+        "snow_2": 1.5,
+        "monday": 1.5,
+    }.items():
+        shake = {f"a{axis}": rough * rng.standard_normal(time.size) for axis in "xyz"}
+        wheels = {f"rpm_{side}": 60 + rough * rng.standard_normal(time.size) for side in ("left", "right")}
+        pd.DataFrame({"t": time, "v": 1.2, **wheels, **shake}).to_csv(f"{name}.csv", index=False)
+    Path("robot.yaml").write_text(
+        "time: {from: t}\nchannels:\n  ground_speed: {from: v}\n"
+        + "".join(f"  wheel_speed_{s}: {{from: rpm_{s}, unit: rpm}}\n" for s in ("left", "right"))
+        + "".join(f"  acceleration_{a}: {{from: a{a}}}\n" for a in "xyz")
+    )
+    names = run_blocks("ground-classifier")
+    assert (names["grounds"].predict([names["drive"]]) == "snow").mean() > 0.8
 
 
 def test_the_blocks_of_readme_and_of_the_vehicle_file_run(
