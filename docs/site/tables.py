@@ -76,6 +76,7 @@ _TITLES = {
 SIGNS = {
     "ground_speed": "speed over ground, forward positive",
     "wheel_based_speed": "what the drive train says of all driven wheels as one, by the machine's own radius, forward positive",
+    "fuel_rate": "burnt by the engine; it is passed on and gives l/h and l/ha in the advice",
     "engine_speed": "of the crankshaft, running positive; for a `driveline` of the vehicle file, as all of the engine",
     "engine_torque": "at the flywheel, driving positive",
     "engine_torque_share": "of the reference torque, friction included (J1939: actual engine percent torque), driving positive",

@@ -20,6 +20,7 @@ _BASE: dict[str, tuple[float, Dimension]] = {
     "lb": (0.45359237, (1, 0, 0, 0)),
     "m": (1.0, (0, 1, 0, 0)), "km": (1e3, (0, 1, 0, 0)),
     "cm": (1e-2, (0, 1, 0, 0)), "mm": (1e-3, (0, 1, 0, 0)),
+    "l": (1e-3, (0, 3, 0, 0)), "L": (1e-3, (0, 3, 0, 0)),
     "in": (0.0254, (0, 1, 0, 0)), "ft": (0.3048, (0, 1, 0, 0)), "mi": (1609.344, (0, 1, 0, 0)),
     "meter": (1.0, (0, 1, 0, 0)), "meters": (1.0, (0, 1, 0, 0)), "metre": (1.0, (0, 1, 0, 0)), "metres": (1.0, (0, 1, 0, 0)),
     "sec": (1.0, (0, 0, 1, 0)), "second": (1.0, (0, 0, 1, 0)), "seconds": (1.0, (0, 0, 1, 0)), "hr": (3600.0, (0, 0, 1, 0)),
@@ -61,7 +62,7 @@ _KINDS: dict[Dimension, str] = {
     (0, 1, -2, 0): "an acceleration", (1, 1, -2, 0): "a force", (1, 2, -2, 0): "a torque",
     (1, -1, -2, 0): "a pressure", (0, 0, -1, 0): "an angular velocity", (1, 2, 0, 0): "a moment of inertia",
     (1, 1, -1, 0): "a bearing resistance", _ONE: "an angle or plain number", (0, 0, 0, 1): "a current",
-    (1, 2, -3, 0): "a power", (1, 2, -3, -1): "a voltage",
+    (1, 2, -3, 0): "a power", (0, 3, -1, 0): "a flow", (0, 3, 0, 0): "a volume", (1, 2, -3, -1): "a voltage",
 }  # fmt: skip
 
 

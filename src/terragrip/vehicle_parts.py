@@ -9,6 +9,7 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import BeforeValidator, Field, PlainSerializer, field_validator, model_validator
 
 from terragrip.document import Fault, Part
+from terragrip.tire_size import tire_size
 from terragrip.units import UnitError, factor_to, quantity
 
 NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_]*$")
@@ -105,6 +106,8 @@ class Wheel(Part):
     """A wheel: ``radius`` [m] (unloaded, given a ``radius_model``), ``inertia`` [kg m²], ``width`` [m].
 
     ``mass`` [kg]: of what hangs outside a force sensor in its axle; only a comparison with that sensor asks for it.
+    ``size`` of a tyre (``520/70R38``) gives width and radius where they are not given: with its inflation ``pressure`` [Pa] the unloaded
+    radius and Hadekel's model, without it the rolling radius of a radial tyre.
     """
 
     radius: _Radius
@@ -112,6 +115,33 @@ class Wheel(Part):
     width: Annotated[float, *quantity_of("m", 0.005, 3, likely=("mm", "cm"))] | None = None
     mass: Mass | None = None
     radius_model: RadiusModel | None = None
+    size: str | None = None
+    pressure: _Pressure | None = None
+
+    @model_validator(mode="before")
+    @classmethod
+    def _by_size(cls, data: Any) -> Any:
+        if not isinstance(data, dict) or data.get("size") is None:
+            return data
+        size = tire_size(str(data["size"]))
+        if size is None:
+            if "radius" in data:
+                return data
+            raise Fault(
+                f"{data['size']!r} does not say the tyre's height",
+                "write a size such as 520/70R38, or add the radius",
+                ("size",),
+            )
+        data = {"width": size.width, **data}
+        if "radius" in data:
+            return data
+        if data.get("pressure") is None or "radius_model" in data:
+            return {**data, "radius": size.radius if "radius_model" in data else size.rolling_radius}
+        return {
+            **data,
+            "radius": size.radius,
+            "radius_model": {"name": "hadekel", "pressure": data["pressure"]},
+        }
 
     @model_validator(mode="after")
     def _hadekel_needs_a_width(self) -> Self:

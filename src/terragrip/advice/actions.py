@@ -78,7 +78,7 @@ def actions_for(work: Work, vehicle: Vehicle) -> list[Action]:
     """All that is worth doing, the most gain first."""
     found = [*_load(work, vehicle), *_ballast(work, vehicle), *_drive_more_axles(work, vehicle)]
     found.sort(key=lambda one: -(one.gain or 0.0))
-    return [*found, *_speed(work, vehicle), *_split(work, vehicle), *_pressure(work)]
+    return [*found, *_speed(work, vehicle), *_split(work, vehicle), *_pressure(work, vehicle)]
 
 
 def _load(work: Work, vehicle: Vehicle) -> list[Action]:
@@ -183,8 +183,12 @@ def _split(work: Work, vehicle: Vehicle) -> list[Action]:
     ]
 
 
-def _pressure(work: Work) -> list[Action]:
-    return [Action(*PRESSURE)] if work.resistance > SOFT else []
+def _pressure(work: Work, vehicle: Vehicle) -> list[Action]:
+    if work.resistance <= SOFT:
+        return []
+    what, why = PRESSURE
+    known = dict.fromkeys(f"{one.pressure / 1e5:.2g} bar" for one in vehicle.wheel_data if one.pressure)
+    return [Action(f"{what} The vehicle file has {' and '.join(known)}." if known else what, why)]
 
 
 def _round(mass: float) -> str:

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from terragrip.advice.actions import Work, actions_for
+from terragrip.advice.fuel import burnt
 from terragrip.advice.optimum import Best, OverSlip, best_of
 from terragrip.advice.result import Advice
 from terragrip.advice.samples import Samples, driven_wheels, samples_by_soil
@@ -101,7 +102,7 @@ def _of_soil(
     over = curves.over
     best = best_of(over, over.efficiency)
     power = best_of(over, over.productivity)
-    missing = _missing(best, power, curves, vehicle)
+    missing = _missing(best, power, curves, vehicle, measured="litres_per_hour" in _burnt(samples, vehicle))
     if soils and known is None:
         lacking = (
             f"the library has no soil named {name!r}"
@@ -113,17 +114,19 @@ def _of_soil(
     if not given:
         return Advice(name, missing=tuple(missing), drive=drive, reserve=_reserve(samples, curves, wheels))
     slip, pull = samples.levels()
+    fuel = _burnt(samples, vehicle)
     work = Work(over, best, slip, pull, drive["ground_speed"], drive["soil_resistance"])
     return Advice(
         name, best,
         power if power.interval[1] - power.interval[0] <= 2 * WIDEST else None,
         _front(over, best, power),
         tuple(actions_for(work, vehicle)), tuple(missing), {**drive, "efficiency": float(work.efficiency[0])},
-        _reserve(samples, curves, wheels), _field_work(work, vehicle), _limits(work, drive), _curve(over),
+        _reserve(samples, curves, wheels), {**_field_work(work, vehicle), **fuel}, _limits(work, drive), _curve(over),
     )  # fmt: skip
 
 
-def _missing(best: Best, power: Best, curves: SoilCurves, vehicle: Vehicle) -> list[str]:
+def _missing(best: Best, power: Best, curves: SoilCurves, vehicle: Vehicle, *, measured: bool) -> list[str]:
+    """What is not known and what would tell it; ``measured``: the fuel was."""
     missing = []
     low, high = best.interval
     if high - low > WIDEST or best.net_traction <= 0:
@@ -144,10 +147,10 @@ def _missing(best: Best, power: Best, curves: SoilCurves, vehicle: Vehicle) -> l
         )
     for key, unit in (
         ("working_width", "ha/h"),
-        ("fuel", "l/ha"),
+        ("fuel", "l/ha, or a log with the fuel rate"),
         ("power", "the speed that the power allows"),
     ):
-        if getattr(vehicle, key) is None:
+        if getattr(vehicle, key) is None and not (key == "fuel" and measured):
             missing.append(f"{key} in the vehicle file, for {unit}")
     return missing
 
@@ -213,6 +216,15 @@ def _limits(work: Work, drive: Mapping[str, float]) -> tuple[str, ...]:
     )
     shares = f"of the wheels' power {max(slipping, 0):.0%} is lost in slip and {rolling:.0%} in rolling"
     return (f"{shares}; {larger} is the larger: {cure} helps.",)
+
+
+def _burnt(samples: Samples, vehicle: Vehicle) -> dict[str, float]:
+    """Litres per hour and per hectare as measured."""
+    seconds = samples.metres / np.maximum(np.abs(samples.speed), 1e-3)
+    return burnt(
+        samples.fuel, seconds, samples.metres, vehicle.working_width,
+        ("litres_per_hour", "litres_per_hectare_measured"),
+    )  # fmt: skip
 
 
 def _field_work(work: Work, vehicle: Vehicle) -> dict[str, float]:

@@ -140,6 +140,7 @@ def words(advice: Mapping[str, Advice]) -> str:
                 f"{w} {m:.0%} ({low:.0%} to {high:.0%})" for w, (m, low, high) in one.reserve.items()
             )
             lines.append(f"  grip in reserve: {each}")
+        lines += _field(one.field_work)
         lines += [f"  held back: {sentence}" for sentence in one.limits]
         for action in one.actions:
             gain = ""
@@ -149,6 +150,16 @@ def words(advice: Mapping[str, Advice]) -> str:
             lines.append(f"  do: {action.what}{gain} {action.why}")
         lines += [f"  missing: {sentence}" for sentence in one.missing]
     return "\n".join(lines)
+
+
+def _field(work: Mapping[str, float]) -> list[str]:
+    """ha/h, l/h and l/ha as they were driven."""
+    units = {
+        "hectares_per_hour": "ha/h", "litres_per_hour": "l/h", "litres_per_hectare_measured": "l/ha measured",
+        "litres_per_hectare": "l/ha reckoned from the pull",
+    }  # fmt: skip
+    said = [f"{work[key]:.3g} {unit}" for key, unit in units.items() if key in work]
+    return [f"  field work: {', '.join(said)}"] if said else []
 
 
 def _shares(drive: Mapping[str, float]) -> list[str]:

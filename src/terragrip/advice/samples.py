@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from terragrip.advice.fuel import fuel_rate_of
 from terragrip.estimation import Estimates
 from terragrip.soil.estimates import whole_length
 from terragrip.soil.transitions import settled
@@ -26,7 +27,7 @@ class Samples:
     ``slip``, ``adhesion``: the driven wheels' mean by load; ``resistance`` rho_s; ``pull``: net pull over weight, driven share times mu
     less all resistances; ``metres`` of way that each stands for; ``stretch``: run and `RADII` wheel radii of it; ``speed`` [m/s];
     ``slip_std``, ``adhesion_std``, ``resistance_std``: the estimates' own SD; ``wheel_adhesion``
-    (rows, driven wheels). ``driven``: the driven wheels' share of the weight, the mean.
+    (rows, driven wheels); ``fuel`` [m³/s], NaN where not measured. ``driven``: the driven wheels' share of the weight, the mean.
     """
 
     slip: Array
@@ -40,6 +41,7 @@ class Samples:
     adhesion_std: Array
     resistance_std: Array
     wheel_adhesion: Array
+    fuel: Array
     driven: float
 
     def levels(self, count: int = 12) -> tuple[Array, Array]:
@@ -133,6 +135,7 @@ def _of_table(
     good &= np.isfinite([slip, adhesion, resistance, metres]).all(axis=0) & (metres > 0)
     stretch = number * 1_000_000 + np.floor(np.nan_to_num(distance) / length).astype(np.int64)
     each = np.stack([estimates[f"adhesion_{w}"] for w in wheels], axis=1)
+    fuel = fuel_rate_of(estimates)
     slip_std, adhesion_std = mean("slip_{}_std"), mean("adhesion_{}_std")
     for name in sorted(set(labels[good])):
         rows = good & (labels == name)
@@ -141,7 +144,7 @@ def _of_table(
             Samples(
                 slip[rows], adhesion[rows], resistance[rows], pull[rows], metres[rows], stretch[rows],
                 np.asarray(estimates["ground_speed"])[rows], slip_std[rows], adhesion_std[rows],
-                np.asarray(estimates["soil_resistance_std"])[rows], each[rows], float(driven[rows].mean()),
+                np.asarray(estimates["soil_resistance_std"])[rows], each[rows], fuel[rows], float(driven[rows].mean()),
             ),
         )  # fmt: skip
 

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from terragrip.advice.fuel import burnt, fuel_rate_of
 from terragrip.advice.result import Action, Advice
 from terragrip.estimation import Estimates
 from terragrip.vehicle import Vehicle
@@ -17,7 +18,8 @@ OFTEN = 0.1
 LEAST_SPEED = 0.2
 """m/s: slower rows count as standing."""
 LEAST_SECONDS = 60.0
-Rows = tuple[np.ndarray, np.ndarray, np.ndarray]
+Rows = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]
+"""Slip, seconds, ground speed [m/s] and fuel [m³/s] of rows (n,)."""
 WHY_NO_CURVE = (
     "no torque was measured, so what this ground bears, its best slip and the efficiency are not known: log wheel torque, "
     "or engine torque with a driveline in the vehicle file"
@@ -31,7 +33,7 @@ def advise_slip(tables: Sequence[Estimates], vehicle: Vehicle) -> Advice:
 
 def advise_rows(rows: Sequence[Rows], vehicle: Vehicle) -> Advice:
     """As `advise_slip`, of rows gathered drive by drive (`slip_rows`)."""
-    slip, seconds, speed = (np.concatenate(x) for x in zip(*rows, strict=True))
+    slip, seconds, speed, fuel = (np.concatenate(x) for x in zip(*rows, strict=True))
     total = float(seconds.sum())
     if total < LEAST_SECONDS:
         return Advice(
@@ -48,11 +50,24 @@ def advise_rows(rows: Sequence[Rows], vehicle: Vehicle) -> Advice:
         "seconds": total, "slip_mean": float(np.average(slip, weights=seconds)), "band_low": low, "band_high": high,
         "share_below": below, "share_within": 1 - below - above, "share_above": above, "time_lost": lost,
     }  # fmt: skip
-    work = {}
+    work: dict[str, float] = {}
     if vehicle.working_width:
         rate = float(np.average(speed, weights=seconds)) * vehicle.working_width * 0.36
         work = {"hectares_per_hour": rate, "hectares_per_hour_at_band": rate / (1 - lost)}
-    cost = f", {work['hectares_per_hour_at_band'] - work['hectares_per_hour']:.2g} ha/h" if work else ""
+    work |= burnt(
+        fuel,
+        seconds,
+        seconds * speed,
+        vehicle.working_width,
+        ("litres_per_hour", "litres_per_hectare_measured"),
+    )
+    cost = (
+        f", {work['hectares_per_hour_at_band'] - work['hectares_per_hour']:.2g} ha/h"
+        if vehicle.working_width
+        else ""
+    )
+    if "litres_per_hour" in work:
+        cost += f", {lost * work['litres_per_hour']:.2g} l of fuel an hour at most"
     actions = []
     if above > OFTEN:
         actions.append(
@@ -86,10 +101,11 @@ def advise_rows(rows: Sequence[Rows], vehicle: Vehicle) -> Advice:
 
 
 def slip_rows(estimates: Estimates) -> Rows:
-    """Slip (the wheels' mean), seconds and speed of the rows that drive and are not flagged."""
+    """Slip (the wheels' mean), seconds, speed and fuel of the rows that drive and are not flagged."""
     slip = np.mean([estimates[f"slip_{w}"] for w in estimates.wheels], axis=0)
     step = np.diff(estimates.time, append=estimates.time[-1:])
-    usual = float(np.median(step[step > 0])) if (step > 0).any() else 0.0
+    # not the median: channels on clocks of their own put several rows close together
+    usual = float(np.quantile(step[step > 0], 0.9)) if (step > 0).any() else 0.0
     speed = np.abs(estimates["ground_speed"])
     good = np.isfinite(slip) & (estimates["event"] == "") & (speed > LEAST_SPEED)
-    return slip[good], np.minimum(step, 5 * usual)[good], speed[good]
+    return slip[good], np.minimum(step, 5 * usual)[good], speed[good], fuel_rate_of(estimates)[good]

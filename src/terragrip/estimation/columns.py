@@ -31,6 +31,7 @@ _WHOLE = {
     "latitude": Column("deg", "measured latitude, WGS 84"),
     "longitude": Column("deg", "measured longitude, WGS 84"),
     "altitude": Column("m", "measured altitude"),
+    "fuel_rate": Column("m^3/s", "measured fuel rate of the engine"),
     "drawbar_force": Column("N", "measured drawbar force, backward pull positive"),
 }  # fmt: skip
 _WHOLE |= {

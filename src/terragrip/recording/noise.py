@@ -18,7 +18,7 @@ Floats = npt.NDArray[np.float64]
 _FEWEST = 20
 _ENOUGH = 20_000  # third differences: their median is then known to a per cent
 _MAD_TO_SD = 1.482602218505602  # of a normal distribution
-_NOT_SENSED = ("latitude", "longitude", "altitude")
+_NOT_SENSED = ("latitude", "longitude", "altitude", "fuel_rate")
 
 
 def sensor_noise(recording: Recording, held: dict[str, float] | None = None) -> dict[str, float]:

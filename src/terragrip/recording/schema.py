@@ -15,6 +15,7 @@ CHANNELS = {
     "engine_torque_share": "1",  # of the reference torque, friction included: J1939's actual engine percent torque
     "engine_friction_share": "1",  # of the reference torque: J1939's nominal friction percent torque
     "engine_reference_torque": "N m",
+    "fuel_rate": "m^3/s",
     "drawbar_force": "N",
     "acceleration_x": "m/s^2",
     "acceleration_y": "m/s^2",
