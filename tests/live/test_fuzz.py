@@ -82,9 +82,9 @@ def test_any_damage_to_a_write_ahead_file(tmp_path_factory, data):
     path = tmp_path_factory.mktemp("wal") / "wal.log"
     wal = WriteAhead(path)
     for k in range(20):
-        wal.sample(float(k), 0, float(k), {"ground_speed": 1.0, f"wheel_speed_{k % 3}": 2.0})
-        wal.tick(float(k))
-        wal.note({"k": k})
+        wal.add("S", (float(k), 0, float(k), {"ground_speed": 1.0, f"wheel_speed_{k % 3}": 2.0}))
+        wal.add("T", float(k))
+        wal.add("N", {"k": k})
     wal.close()
     whole = list(Reading(path))
     assert len(whole) == 60

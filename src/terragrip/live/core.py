@@ -157,6 +157,16 @@ class Core:
         """Instant [s] of the last row; -inf before the first."""
         return self.reorder.released
 
+    def handle(self, kind: str, content: Any) -> list[Output]:
+        """An input as the record holds it: ``S`` a sample, ``T`` a tick, ``N`` a note, ``F`` a flush; another is none."""
+        if kind == "S":
+            return self.process(*content)
+        if kind == "T":
+            return self.tick(content)
+        if kind == "N":
+            return self.note(content)
+        return self.flush() if kind == "F" else []
+
     def process(self, arrival: float, source: int, stamp: float, values: Values) -> list[Output]:
         """A sample of ``source`` (its place in the settings), stamped by its own clock [s]; SI values by column."""
         self.counts.add("received", values)

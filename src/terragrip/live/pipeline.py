@@ -36,16 +36,14 @@ class Pipeline:
 
     def process(self, arrival: float, source: int, stamp: float, values: Values) -> list[Output]:
         """See `Core.process`."""
-        outputs = self.core.process(arrival, source, stamp, values)
-        return self._keep(outputs, lambda recorder: recorder.sample(outputs, arrival, source, stamp, values))
+        return self._handle("S", (arrival, source, stamp, values))
 
     def tick(self, now: float) -> list[Output]:
         """See `Core.tick`; nothing, and nothing recorded, where it would do nothing."""
         until = self.waiting_until
         if until is None or now < until:
             return []
-        outputs = self.core.tick(now)
-        return self._keep(outputs, lambda recorder: recorder.tick(outputs, now))
+        return self._handle("T", now)
 
     @property
     def waiting_until(self) -> float | None:
@@ -55,13 +53,15 @@ class Pipeline:
 
     def note(self, note: dict[str, Any]) -> list[Output]:
         """See `Core.note`."""
-        outputs = self.core.note(note)
-        return self._keep(outputs, lambda recorder: recorder.note(outputs, note))
+        return self._handle("N", note)
 
     def flush(self) -> list[Output]:
         """See `Core.flush`."""
-        outputs = self.core.flush()
-        return self._keep(outputs, lambda recorder: recorder.flush(outputs))
+        return self._handle("F", None)
+
+    def _handle(self, kind: str, content: Any) -> list[Output]:
+        outputs = self.core.handle(kind, content)
+        return self._keep(outputs, lambda recorder: recorder.keep(outputs, kind, content))
 
     def write(self) -> list[Output]:
         """Hand what came in to the system, after which a kill cannot lose it."""

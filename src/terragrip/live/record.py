@@ -16,7 +16,7 @@ from typing import Any
 
 from terragrip.errors import InputError
 from terragrip.files import unwritable
-from terragrip.live.core import Core, Output, Values
+from terragrip.live.core import Core, Output
 from terragrip.live.record_folder import (
     SOILS,
     clear,
@@ -106,39 +106,20 @@ class Recorder:
                 text += f"; the last {torn} bytes were torn and are left out"
             note = {"event": {"time": None, "kind": "resumed", "source": "record", "text": text}}
             self.opening = self.core.note(note)
-            self.note(self.opening, note)
+            self.keep(self.opening, "N", note)
 
     def _open_wal(self) -> WriteAhead:
         wal = WriteAhead(wal_path(self.folder, self.segment.number))
-        wal.beginning({"segment": self.segment.number})
+        wal.add("B", {"segment": self.segment.number})
         return wal
 
-    def sample(
-        self, outputs: list[Output], arrival: float, source: int, stamp: float, values: Values
-    ) -> None:
-        """An input of `Core.process`; raises OSError where a segment cannot be begun."""
-        self._ahead.sample(arrival, source, stamp, values)
-        self._keep(outputs, arrival)
-
-    def tick(self, outputs: list[Output], now: float) -> None:
-        """An input of `Core.tick`; raises OSError as `sample` does."""
-        self._ahead.tick(now)
-        self._keep(outputs, now)
-
-    def flush(self, outputs: list[Output]) -> None:
-        """`Core.flush`."""
-        self._ahead.flush_core()
-        self._keep(outputs, None)
-
-    def note(self, outputs: list[Output], note: dict[str, Any]) -> None:
-        """An input of `Core.note`."""
-        self._ahead.note(note)
-        self._keep(outputs, None)
-
-    def _keep(self, outputs: list[Output], now: float | None) -> None:
+    def keep(self, outputs: list[Output], kind: str, content: Any) -> None:
+        """An input of `Core.handle`, and what came of it; raises OSError where a segment cannot be begun."""
+        self._ahead.add(kind, content)
         segment = self.segment
         for output in outputs:
             segment.add(output)
+        now = content[0] if kind == "S" else content if kind == "T" else None
         if now is not None and segment.size:
             if self._opened is None:
                 self._opened = now

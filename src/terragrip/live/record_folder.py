@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 from terragrip.errors import InputError
 from terragrip.files import unwritable
-from terragrip.live.core import Core, Output
+from terragrip.live.core import Core
 from terragrip.live.segment import ESTIMATES, RECORDING, Segment, durable, sync_folder
 from terragrip.live.wal import Reading
 
@@ -66,20 +66,10 @@ def replay(folder: Path, number: int, core: Core) -> Iterator[tuple[Segment, Rea
     while wal_path(folder, number).exists():
         reading, segment = Reading(wal_path(folder, number)), Segment(number)
         for kind, content in reading:
-            for output in _apply(core, kind, content):
+            for output in core.handle(kind, content):
                 segment.add(output)
         number += 1
         yield segment, reading, wal_path(folder, number).exists()
-
-
-def _apply(core: Core, kind: str, content: Any) -> list[Output]:
-    if kind == "S":
-        return core.process(*content)
-    if kind == "T":
-        return core.tick(content)
-    if kind == "N":
-        return core.note(content)
-    return core.flush() if kind == "F" else []
 
 
 def locked(folder: Path) -> int:

@@ -46,8 +46,16 @@ class WriteAhead:
         self._buffer.append(_HEAD.pack(len(content), zlib.crc32(content)))
         self._buffer.append(content)
 
-    def sample(self, arrival: float, source: int, stamp: float, values: dict[str, float]) -> None:
-        """An input of `Core.process`."""
+    def add(self, kind: str, content: Any = None) -> None:
+        """A frame of a kind, as `Reading` gives it back; ``C`` is added where a sample needs it."""
+        if kind == "S":
+            self._sample(*content)
+        elif kind == "T":
+            self._frame(_TICK.pack(b"T", content))
+        else:
+            self._frame(kind.encode() + (b"" if content is None else json.dumps(content).encode()))
+
+    def _sample(self, arrival: float, source: int, stamp: float, values: dict[str, float]) -> None:
         names = tuple(values)
         packer, numbers = self._packers.get(names) or self._packer(names)
         self._frame(packer.pack(b"S", arrival, source, stamp, len(numbers), *numbers, *values.values()))
@@ -63,22 +71,6 @@ class WriteAhead:
         )
         self._packers[names] = result
         return result
-
-    def tick(self, now: float) -> None:
-        """An input of `Core.tick`."""
-        self._frame(_TICK.pack(b"T", now))
-
-    def note(self, note: dict[str, Any]) -> None:
-        """An input of `Core.note`."""
-        self._frame(b"N" + json.dumps(note).encode())
-
-    def flush_core(self) -> None:
-        """`Core.flush`."""
-        self._frame(b"F")
-
-    def beginning(self, about: dict[str, Any]) -> None:
-        """Which segment this is."""
-        self._frame(b"B" + json.dumps(about).encode())
 
     def write(self) -> None:
         """Hand the frames to the system; raises OSError."""
