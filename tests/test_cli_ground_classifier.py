@@ -107,7 +107,7 @@ def test_labels_may_be_a_column_of_the_logs(tmp_path: Path, capsys: pytest.Captu
         ("file,label\nhard1.csv,hard\nlose1.csv,loose\n", [], "row 3: there is no run"),
         ("file,label\nhard1.csv,hard\nloose1.csv,\n", [], "row 3: the label is empty"),
         ("file,label\nhard1.csv,hard\nhard1.csv,loose\n", [], "row 3: hard1.csv is labelled in row 2 too"),
-        ("file,ground\nhard1.csv,hard\n", [], "column label: is missing"),
+        ("file,ground\nhard1.csv,hard\n", [], "line 1: has no column label"),
         ("file,label\nhard1.csv,hard,dry\n", [], "row 2: has 3 cells for 2 columns"),
         ("file,label\n", [], "holds no run"),
         ("file;label\nhard1.csv;unknown\nloose1.csv;loose\n", [], "'unknown' is no ground to learn"),

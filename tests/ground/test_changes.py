@@ -17,7 +17,7 @@ from ground_drives import COARSE, FINE, GRASS, drive
 from terragrip.errors import InputError
 from terragrip.ground.changes import LEAST, _Cost, _pelt, changes_of, weights
 from terragrip.ground.conjugate import Model
-from terragrip.ground.online_changes import OnlineChanges, OnlineSettings, online_changes
+from terragrip.ground.online_changes import OnlineChanges, OnlineSettings
 from terragrip.ground.signals import GROUND, curve_scale, signals_of
 from terragrip.physics.adhesion import CURVES
 from terragrip.soil.blocks import estimates_blocks
@@ -78,7 +78,7 @@ def test_pull_alone_is_no_change():
     for seed in range(6):
         blocks = estimates_blocks(drive(seed, [("fine", FINE, 60), ("fine", replace(FINE, slip=0.3), 60)]))
         assert changes_of(blocks) == ()
-        assert online_changes(blocks) == []
+        assert OnlineChanges().update(blocks) == []
         assert changes_of(blocks, ("slip", "adhesion"))
 
 
@@ -101,8 +101,8 @@ def test_standing_still_changes_nothing():
         estimates, columns={**estimates.columns, "distance": np.minimum(estimates.columns["distance"], 33.0)}
     )
     settings = OnlineSettings(threshold=0.3, recent=6)
-    assert len(online_changes(estimates_blocks(estimates), settings)) == 1
-    assert online_changes(estimates_blocks(still), settings) == []
+    assert len(OnlineChanges(settings).update(estimates_blocks(estimates))) == 1
+    assert OnlineChanges(settings).update(estimates_blocks(still)) == []
 
 
 def plain_probabilities(x: np.ndarray, hazard: float, model: Model) -> np.ndarray:
@@ -132,7 +132,7 @@ def test_the_detector_is_the_plain_recursion(monkeypatch):
 
 
 def test_a_change_is_told_soon_and_once():
-    changes = online_changes(estimates_blocks(drive(4, [("grass", GRASS, 40), ("fine", FINE, 40)])))
+    changes = OnlineChanges().update(estimates_blocks(drive(4, [("grass", GRASS, 40), ("fine", FINE, 40)])))
     assert len(changes) == 1
     assert 40 < changes[0].reported < 43.5
     assert changes[0].time == pytest.approx(40, abs=1)
@@ -141,7 +141,7 @@ def test_a_change_is_told_soon_and_once():
 
 def test_block_by_block_and_with_a_break_it_tells_the_same():
     blocks = estimates_blocks(drive(5, [("grass", GRASS, 30), ("coarse", COARSE, 30)]))
-    whole = online_changes(blocks)
+    whole = OnlineChanges().update(blocks)
     first = OnlineChanges()
     result = [reported for k in range(50) for reported in first.update(blocks[k : k + 1])]
     second = OnlineChanges()
@@ -168,7 +168,7 @@ def test_slow_roughness_lets_levels_speak():
 def test_short_and_empty_drives_have_none():
     blocks = estimates_blocks(drive(7, [("fine", FINE, 3)]))
     assert changes_of(blocks) == ()
-    assert online_changes(blocks) == []
+    assert OnlineChanges().update(blocks) == []
 
 
 def test_the_curve_scale_is_the_one_that_made_the_pair():

@@ -112,7 +112,7 @@ def drives_in(table: Path) -> list[Drive]:
     from terragrip.listing import listed_logs, profile_in
 
     groups: dict[str, list[tuple[Path, Path | None]]] = {}
-    for row in listed_logs(table, _COLUMNS):
+    for _, row in listed_logs(table, _COLUMNS):
         log = table.parent / row["log"]
         groups.setdefault(row.get("drive") or f"{row['log']}", []).append(
             (log, profile_in(table, row.get("profile", "")))

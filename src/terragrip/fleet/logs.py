@@ -140,7 +140,7 @@ def _entries(index: Path, urls: Sequence[str]) -> dict[str, _Entry]:
     for url in urls:
         by_name.setdefault(os.path.basename(url), []).append(url)
     entries: dict[str, _Entry] = {}
-    for number, row in enumerate(listed_logs(index, COLUMNS), 2):
+    for number, row in listed_logs(index, COLUMNS):
         given, place = row["log"], f"row {number}"
         whole = given if is_remote(given) else os.path.abspath(index.parent / given)
         alike = [] if "/" in given else by_name.get(given, [])

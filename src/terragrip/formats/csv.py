@@ -10,11 +10,12 @@ import numpy as np
 from terragrip.errors import InputError
 from terragrip.files import refuse_missing
 from terragrip.formats.csv_cells import body_of, chosen_of, parse
-from terragrip.formats.dialect import HEAD, detect, in_utf8, to_text
+from terragrip.formats.dialect import detect
 from terragrip.formats.registry import Format
 from terragrip.formats.table_on_disk import Columns, TableOnDisk
 from terragrip.formats.text_file import is_packed, length_of, opened, read
 from terragrip.recording.survey import ROWS
+from terragrip.text import HEAD, in_utf8, to_text
 
 SUFFIXES = (".csv", ".txt", ".tsv", ".dat", ".csv.gz", ".txt.gz", ".tsv.gz")
 _LONG = 256 << 20  # bytes

@@ -8,9 +8,9 @@ import re
 from dataclasses import dataclass
 
 from terragrip.errors import InputError
+from terragrip.text import HEAD
 from terragrip.units import is_common
 
-HEAD = 1 << 16  # bytes that are looked at
 _SEPARATORS = (",", ";", "\t", "|")
 _COMMENTS = (b"#", b"%", b"//")
 _LONGEST_PREAMBLE = 30  # lines
@@ -18,20 +18,6 @@ _NUMBER = re.compile(r"[+-]?(\d+[.,]?\d*|[.,]\d+)([eE][+-]?\d+)?$")
 _NAME = re.compile(r"[^\W\d]|[/\[]")
 _EMPTY = ("", "nan", "na", "n/a", "null", "none", "-", "--", "inf", "-inf")
 _WITH_UNIT = re.compile(r"(.+?)\s*(?:\[\s*([^\]]*?)\s*\]|\(\s*([^)]*?)\s*\))$")
-_BINARY = bytes(range(9)) + bytes(range(14, 32)) + b"\x7f"
-_MAGIC = (
-    (b"PK\x03\x04", "is a zip or an Excel workbook", "save the sheet as CSV"),
-    (b"\xd0\xcf\x11\xe0", "is an old Excel workbook", "save the sheet as CSV"),
-    (b"MDF ", "is an MDF measurement", "export it as CSV or Parquet"),
-    (b"UnFinMF ", "is an unfinished MDF measurement", "export it as CSV or Parquet"),
-    (b"#ROSBAG", "is a ROS bag", "export its topics as CSV or Parquet"),
-    (b"\x89MCAP0", "is an MCAP log", "export its topics as CSV or Parquet"),
-    (b"\x89HDF", "is an HDF5 or MATLAB 7.3 file", "export it as CSV or Parquet"),
-    (b"MATLAB 5.0", "is a MATLAB file", "export it as CSV or Parquet"),
-    (b"SQLite format 3", "is an SQLite database", "export it as CSV or Parquet"),
-    (b"ARROW1", "is an Arrow or Feather file", "save it as Parquet"),
-    (b"\x93NUMPY", "is a NumPy array without column names", "save it as CSV or Parquet with a header"),
-)
 
 
 @dataclass(frozen=True)
@@ -43,43 +29,6 @@ class Dialect:
     names: tuple[str, ...]
     units: dict[str, str]
     start: int
-
-
-def to_text(data: bytes, source: str) -> bytes:
-    """The content as UTF-8 without a byte order mark; raises InputError if it is no text."""
-    if data.startswith(b"\xef\xbb\xbf"):
-        return data[3:]
-    for magic, problem, hint in _MAGIC:
-        if data.startswith(magic):
-            raise InputError(problem, file=source, hint=hint)
-    head = data[:HEAD]
-    encoding = None
-    if data.startswith((b"\xff\xfe", b"\xfe\xff")):
-        encoding = "utf-16"
-    elif len(head) >= 4 and head.count(0) > 0.2 * len(head):
-        encoding = "utf-16-le" if head[1::2].count(0) > head[::2].count(0) else "utf-16-be"
-    if encoding is not None:
-        try:
-            data = data.decode(encoding).encode()
-            head = data[:HEAD]
-        except (UnicodeDecodeError, UnicodeEncodeError) as error:
-            raise _binary(source) from error
-    if head.translate(None, _BINARY) != head:
-        raise _binary(source)
-    if b"\n" not in data:
-        data = data.replace(b"\r", b"\n")
-    return in_utf8(data)
-
-
-def in_utf8(data: bytes) -> bytes:
-    """Text as UTF-8; what is not UTF-8 is taken for Latin-1."""
-    if data.isascii():
-        return data
-    try:
-        data.decode("utf-8")
-    except UnicodeDecodeError:
-        return data.decode("latin-1").encode()
-    return data
 
 
 def detect(data: bytes, source: str) -> Dialect:
@@ -263,7 +212,3 @@ def _after_lines(data: bytes, start: int, count: int) -> int:
         count -= bool(data[start:end].strip())
         start = end
     return start
-
-
-def _binary(source: str) -> InputError:
-    return InputError("is not a table of text", file=source, hint="give a CSV or Parquet file")

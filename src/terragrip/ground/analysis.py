@@ -13,7 +13,7 @@ from terragrip.estimation import Estimates
 from terragrip.ground.changes import LENGTH, Change, changes_of
 from terragrip.ground.emissions import Emissions
 from terragrip.ground.events import events
-from terragrip.ground.online_changes import OnlineSettings, online_changes
+from terragrip.ground.online_changes import OnlineChanges, OnlineSettings
 from terragrip.ground.recognition import Chain, ForwardFilter, by_soil
 from terragrip.ground.result import Ground, Timeline
 from terragrip.ground.sections import Stretch, sections_of
@@ -114,8 +114,8 @@ def _soils(timeline: Timeline) -> tuple[str, ...]:
 def _changes(blocks: Blocks, settings: Settings) -> tuple[Change, ...]:
     if not settings.online:
         return changes_of(blocks, settings.signals, settings.length)
-    changes = online_changes(blocks, OnlineSettings(length=settings.length, names=settings.signals))
-    return tuple(Change(one.time, one.std, one.probability, {}, one.reported) for one in changes)
+    online = OnlineChanges(OnlineSettings(length=settings.length, names=settings.signals))
+    return tuple(online.update(blocks))
 
 
 def _stretches(estimates: Estimates, changes: Sequence[Change], timeline: Timeline) -> list[Stretch]:

@@ -88,12 +88,7 @@ class LiveGround:
         self._before = (int(block.number[0]), int(block.streak[0]))
         self._rows.clear()
         probabilities = by_soil(self._filter.update(block).filtered, self._emissions.states)[0]
-        changes = self._changes.update(block)
-        change = (
-            Change(changes[0].time, changes[0].std, changes[0].probability, {}, changes[0].reported)
-            if changes
-            else None
-        )
+        change = next(iter(self._changes.update(block)), None)
         if change is not None:
             self.estimator.new_ground()
         names = self._emissions.names

@@ -6,7 +6,7 @@ changes nothing.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import gammaln
 
+from terragrip.ground.changes import Change
 from terragrip.ground.conjugate import Model
 from terragrip.ground.signals import GROUND, signals_of
 from terragrip.soil.blocks import PERIOD, Blocks
@@ -36,16 +37,6 @@ class OnlineSettings:
     names: tuple[str, ...] = GROUND
 
 
-@dataclass(frozen=True)
-class ReportedChange:
-    """A change as it is reported while driving: when it was reported, when it was, its SD and probability. Times in s."""
-
-    reported: float
-    time: float
-    std: float
-    probability: float
-
-
 class OnlineChanges:
     """Takes blocks in order and tells of changes; `probability` is that of a change within the last `recent` seconds."""
 
@@ -61,7 +52,7 @@ class OnlineChanges:
         self._quiet_until = -np.inf
         self.probability = 0.0
 
-    def update(self, blocks: Blocks) -> list[ReportedChange]:
+    def update(self, blocks: Blocks) -> list[Change]:
         """Take blocks, one or many; returns the changes that they tell of."""
         result = []
         signals = signals_of(blocks, self.settings.names)
@@ -94,7 +85,7 @@ class OnlineChanges:
         self._travelled, self.probability = state["travelled"], float(state["probability"])
         self._quiet_until = -np.inf if state["quiet"] is None else float(state["quiet"])
 
-    def _add(self, x: Array, start: float, end: float, travelled: float) -> ReportedChange | None:
+    def _add(self, x: Array, start: float, end: float, travelled: float) -> Change | None:
         driven = 0.0 if self._travelled is None else max(travelled - self._travelled, 0.0)
         self._travelled = travelled
         hazard = -np.expm1(-driven / self.settings.length)
@@ -134,7 +125,7 @@ class OnlineChanges:
             setattr(self, name, getattr(self, name)[keep])
         self._probability = self._probability / self._probability.sum()
 
-    def _report(self, now: float) -> ReportedChange | None:
+    def _report(self, now: float) -> Change | None:
         recent = self._begin > max(now - self.settings.recent, self._quiet_until)
         self.probability = float(self._probability[recent].sum())
         if self.probability < self.settings.threshold:
@@ -142,11 +133,5 @@ class OnlineChanges:
         weight, at = self._probability[recent] / self.probability, self._begin[recent]
         time = float((weight * at).sum())
         self._quiet_until = now
-        return ReportedChange(
-            now, time, float(np.sqrt((weight * (at - time) ** 2).sum() + PERIOD**2 / 12)), self.probability
-        )
-
-
-def online_changes(blocks: Blocks, settings: OnlineSettings | None = None) -> Sequence[ReportedChange]:
-    """All changes of a drive as they would have been reported while driving."""
-    return OnlineChanges(settings).update(blocks)
+        std = float(np.sqrt((weight * (at - time) ** 2).sum() + PERIOD**2 / 12))
+        return Change(time, std, self.probability, reported=now)

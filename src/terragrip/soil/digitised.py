@@ -13,11 +13,11 @@ from numpy.typing import NDArray
 
 from terragrip.errors import InputError
 from terragrip.files import refuse_missing, unreadable
-from terragrip.formats.dialect import to_text
 from terragrip.soil.bins import BinSettings
 from terragrip.soil.fit import AdhesionCurve
 from terragrip.soil.learn import explaining
 from terragrip.soil.library import Soil, SoilLibrary
+from terragrip.text import to_text
 
 Array = NDArray[np.float64]
 

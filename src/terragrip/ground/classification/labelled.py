@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -13,8 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from terragrip.errors import InputError, nearest
-from terragrip.files import refuse_missing, unreadable
-from terragrip.formats.dialect import to_text
+from terragrip.listing import listed
 
 Columns = Mapping[str, npt.NDArray[Any]]
 
@@ -37,7 +35,7 @@ def read_labels(path: str | os.PathLike[str], logs: Sequence[Path] = ()) -> list
     result: list[LabelledDrive] = []
     taken: dict[Path, int] = {}
     folder = Path(path).parent
-    for row, cells in _rows(path):
+    for row, cells in listed(path, ("file", "label")):
         place = f"row {row}"
         name, label = cells["file"], cells["label"]
         if not name or not label:
@@ -83,35 +81,6 @@ def stretches(columns: Columns, labels: npt.NDArray[Any], shortest: float) -> li
             rows = slice(int(part[0]), int(part[-1]) + 1)
             result.append(({name: values[rows] for name, values in columns.items()}, str(text[part[0]])))
     return result
-
-
-def _rows(path: str | os.PathLike[str]) -> list[tuple[int, dict[str, str]]]:
-    """The rows of the table by their number in the file, cells stripped."""
-    refuse_missing(path, suffixes=(".csv",))
-    try:
-        text = to_text(Path(path).read_bytes(), str(path)).decode()
-    except OSError as error:
-        raise unreadable(path, error) from error
-    head = text.partition("\n")[0]
-    separator = max(",;\t", key=head.count)
-    try:
-        listed = list(csv.reader(text.splitlines(), delimiter=separator))
-    except csv.Error as error:
-        raise InputError(f"is no table ({error})", file=path, hint="write a CSV: file,label") from None
-    names = [cell.strip().lower() for cell in listed[0]] if listed else []
-    for name in ("file", "label"):
-        if name not in names:
-            raise InputError("is missing", file=path, place=f"column {name}", hint="write a CSV: file,label")
-    rows = []
-    for number, cells in enumerate(listed[1:], 2):
-        if any(cell.strip() for cell in cells):
-            if len(cells) != len(names):
-                problem = f"has {len(cells)} cells for {len(names)} columns"
-                raise InputError(
-                    problem, file=path, place=f"row {number}", hint="put texts with separators in quotes"
-                )
-            rows.append((number, dict(zip(names, (cell.strip() for cell in cells), strict=True))))
-    return rows
 
 
 def _named(name: str, logs: Sequence[Path], path: str | os.PathLike[str], place: str) -> Path:
