@@ -290,10 +290,8 @@ class Coverage:
         )
 
 
-def attempt(one: Mutant, tests: list[str], seconds: int, changed: bool = True) -> None:
-    """In a process of its own: pytest with the mutant in place of its module. The exit code is pytest's."""
-    path = str(ROOT / one.path)
-    source = mutated(one) if changed else Path(path).read_text(encoding="utf-8")
+def attempt(path: str, source: str, tests: list[str], seconds: int) -> None:
+    """In a process of its own: pytest with a source in place of that of a module. The exit code is pytest's."""
     plain = importlib.machinery.SourceFileLoader.get_code
 
     def get_code(self: Any, fullname: str) -> Any:
@@ -313,7 +311,10 @@ def attempt(one: Mutant, tests: list[str], seconds: int, changed: bool = True) -
 def start(one: Mutant, tests: list[str], coverage: Coverage, changed: bool = True) -> tuple[Any, float]:
     """The process that tries a mutant, and when it is too late by the wall's clock."""
     seconds = int(60 + PATIENCE * coverage.time(tests))
-    process = multiprocessing.get_context("fork").Process(target=attempt, args=(one, tests, seconds, changed))
+    path = ROOT / one.path
+    source = mutated(one) if changed else path.read_text(encoding="utf-8")
+    arguments = (str(path), source, tests, seconds)
+    process = multiprocessing.get_context("fork").Process(target=attempt, args=arguments)
     process.start()
     return process, time.monotonic() + HANGS * seconds
 

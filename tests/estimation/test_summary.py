@@ -10,6 +10,7 @@ import pandas as pd
 import pytest
 
 import terragrip as tg
+from terragrip.estimation.engine import EVENTS
 from terragrip.estimation.summary import Tally
 
 
@@ -115,3 +116,68 @@ def test_one_label_on_every_row_makes_one_line() -> None:
     lines = [line.strip() for line in text.splitlines()]
     assert sum(line.startswith("all: loam  ") for line in lines) == 1
     assert not any(line.startswith(("loam  ", "all  ")) for line in lines)
+
+
+def test_a_tally_counts_rows_times_and_events_as_a_table_does(drive: tuple[tg.Estimates, str]) -> None:
+    estimates, _ = drive
+    tally = Tally()
+    tally.add(estimates)
+    assert tally.duration == estimates.time[-1] - estimates.time[0]
+    assert tally.distance == estimates["distance"].max()
+    assert tally.rows == len(estimates)
+    events = pd.Series(estimates["event"])
+    begins = events[events != events.shift(fill_value="")]
+    for code, name in enumerate(EVENTS):
+        assert tally.event_rows[code] == (events == name).sum(), name
+        assert tally.event_starts[code] == (begins == name).sum(), name
+    still = (events == "standstill").to_numpy()
+    assert tally.nis == pytest.approx(np.nansum(estimates["nis"][~still]))
+    assert tally.channels == pytest.approx(np.nansum(estimates["channels"][~still]))
+    lasts = np.diff(estimates.time, append=estimates.time[-1])
+    for label in ("loam", "sand", ""):
+        rows = (estimates.labels["soil"] == label) & (events == "").to_numpy()
+        assert tally.moving[label] == pytest.approx(lasts[rows].sum()), label
+
+
+def test_words_of_a_summary_that_no_drive_above_needs() -> None:
+    """A driveline as one wheel, held channels, spreads with units, noise far from what was expected, ten labels, minutes."""
+    time = np.arange(0.0, 700.0, 0.5)
+    rows = len(time)
+    labels = np.array([f"field {k}" for k in range(10)], dtype=object)[np.arange(rows) * 10 // rows]
+    columns = {name: np.full(rows, value) for name, value in {
+        "distance": 900.0, "ground_speed": 1.25, "ground_speed_std": 0.01, "slip_drive": 0.125, "slip_drive_std": 0.02,
+        "nis": 4.0, "channels": 2.0,
+    }.items()}  # fmt: skip
+    about = {
+        "method": "slip-only",
+        "vehicle": {"name": "tractor", "uncertainty": {"slope": 0.01, "drawbar_offset": 120.0, "drawbar_gain": 0.015, "wheel_radius": 0.0}},
+        "settings": {"held": {"ground_speed": 0.2}},
+    }  # fmt: skip
+    codes = np.zeros(rows, dtype=np.uint8)
+    codes[10:14] = codes[20:21] = EVENTS.index("outlier")
+    text = tg.Estimates(time, columns, codes, {"soil": labels}, about).summary()
+    lines = text.splitlines()
+    assert lines[0].startswith("tractor (its drive as one wheel): 900.0 m in 11.7 min, 11.6 min of it moving")
+    assert lines[1] == "Events: outlier 2 (5 rows)"
+    assert "Normalised innovation squared a channel: 2.00, expected 1 (the noise may be set too low)" in lines
+    assert "  and 2 more labels" in lines
+    assert sum(line.startswith("  field ") for line in lines) == 8
+    whole = next(line for line in lines if line.startswith("  all "))
+    assert cells(whole) == [pytest.approx((1.25, 0.02), abs=5e-4), pytest.approx((0.125, 0.039), abs=5e-4)]
+    assert "considered as unknown slope ±0.57 deg, drawbar_offset ±1.2e+02 N, drawbar_gain ±1.5 %;" in text
+    assert "repeated values are missing ones, of ground_speed (5 Hz)" in text
+    assert "the vehicle is not calibrated" in text
+    assert "'terragrip calibrate' on a pass without load makes slip absolute; " in lines[-1]
+    quiet = {**columns, "nis": np.full(rows, 0.5)}
+    calibrated = {**about, "vehicle": {**about["vehicle"], "calibration": {"wheel_based_speed_gain": 1.01}}}
+    tally = Tally()
+    some = {name: values[:1000] for name, values in quiet.items()}
+    tally.add(tg.Estimates(time[:1000], some, codes[:1000], {}, calibrated))
+    text = tally.text(output="out.parquet")
+    assert "a channel: 0.25, expected 1 (the noise may be set too high)" in text
+    assert "499.5 s, 497.0 s of it moving" in text
+    assert "not calibrated" not in text
+    assert (
+        text.splitlines()[-1]
+        == "Next: 'terragrip report out.parquet -o report.html' shows slip over time and place."
+    )
