@@ -126,6 +126,16 @@ def test_power_over_speed_is_the_force(tractor: tg.Vehicle) -> None:
         assert estimates["adhesion_driven_std"][-1] == pytest.approx(least, rel=0.2)
 
 
+def test_backward_is_as_forward(tractor: tg.Vehicle) -> None:
+    """In reverse gear the same power makes the same force: the gears take no less, and give none."""
+    log = steady()
+    signed = ("ground_speed", "wheel_based_speed", "drawbar_force")
+    back = log.with_channels(**{name: -log[name] for name in signed})
+    forward, backward = tg.estimate(log, tractor), tg.estimate(back, tractor)
+    for name in ("adhesion_driven", "soil_resistance", "efficiency_driven", "slip_driven"):
+        assert backward[name][-1] == pytest.approx(forward[name][-1], abs=2e-3), name
+
+
 def test_a_gear_shift_is_set_aside(tractor: tg.Vehicle) -> None:
     log = steady()
     faster = log.time > 30.0

@@ -11,14 +11,14 @@ from terragrip.physics.driveline import torque_into_gears, torque_spread, wheel_
 @pytest.mark.parametrize("torque", [300.0, 0.4, -0.4, -90.0])
 @pytest.mark.parametrize("ratio", [25.0, -18.0])
 def test_power_is_lost_whichever_way_it_goes(torque: float, ratio: float) -> None:
-    """The wheels turn at 1/ratio of the engine: the smaller of both powers is 0.9 of the larger."""
+    """Forward and in reverse gear: of the power that goes in at one end, nine tenths come out at the other."""
     speed = 150.0
-    power_in = torque * speed
-    power_out = float(wheel_torque(np.array([torque]), np.array([ratio]), 0.9)[0]) * speed / ratio
-    if torque * ratio > 0:
-        assert power_out == pytest.approx(0.9 * power_in)
+    engine = torque * speed
+    wheels = float(wheel_torque(np.array([torque]), np.array([ratio]), 0.9)[0]) * speed / ratio
+    if torque > 0:
+        assert wheels == pytest.approx(0.9 * engine)
     else:
-        assert power_in == pytest.approx(0.9 * power_out)
+        assert engine == pytest.approx(0.9 * wheels)
 
 
 def test_what_is_left_for_the_gears() -> None:

@@ -11,10 +11,10 @@ Floats = npt.NDArray[np.float64]
 def wheel_torque(engine_torque: Floats, ratio: Floats, efficiency: float) -> Floats:
     """Sum of the driven wheels' torques (n,) [N m] of the torque (n,) [N m] that goes into the gears.
 
-    ``ratio`` (n,): engine speed over wheel speed. Power is lost whichever way it goes: when the ground drives the engine, the wheels give
-    more than the engine takes.
+    ``ratio`` (n,): engine speed over wheel speed, negative in reverse. Power is lost whichever way it goes: when the ground drives the
+    engine, the wheels give more than the engine takes. The engine turns one way, so that its torque's sign says which way power goes.
     """
-    return ratio * engine_torque * np.where(engine_torque * ratio > 0, efficiency, 1 / efficiency)
+    return ratio * engine_torque * np.where(engine_torque > 0, efficiency, 1 / efficiency)
 
 
 def torque_into_gears(
