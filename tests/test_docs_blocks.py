@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import re
 import shlex
+import textwrap
 from pathlib import Path
 from typing import Any
 
@@ -15,9 +16,11 @@ import numpy as np
 import pandas as pd
 import pytest
 import typer
+import yaml
 
 import terragrip as tg
 from terragrip.cli.entry import app
+from terragrip.formats.profile import Profile, Source
 
 ROOT = Path(__file__).resolve().parents[1]
 PAGES = sorted([*ROOT.glob("docs/*.md"), ROOT / "README.md"])
@@ -80,6 +83,23 @@ RUN_ELSEWHERE = {page.stem for page in ROOT.glob("docs/tutorial*.md")} | {"forma
 def test_every_page_with_python_is_run_by_some_test() -> None:
     """test_tutorial.py takes every docs/tutorial*.md; of docs/formats.md it is the reader for a format of one's own."""
     assert {page.stem for page in PAGES if python_blocks(page)} == RUN_HERE | RUN_ELSEWHERE
+
+
+def test_the_profiles_and_vehicles_on_the_pages_load(tmp_path: Path) -> None:
+    blocks = [
+        (page, textwrap.dedent(text))
+        for page in PAGES
+        for text in re.findall(
+            r"(?:^ {4}.*\n|^ *\n(?= {4}))+", page.read_text(encoding="utf-8"), re.MULTILINE
+        )
+        if re.search(r"^ {4}channels:$", text, re.MULTILINE)
+    ]
+    assert len(blocks) >= 2
+    for _, text in blocks:
+        assert Profile.from_dict(yaml.safe_load(text)).channels
+    keys = (ROOT / "docs/formats.md").read_text(encoding="utf-8")
+    fields = {field.alias or name for name, field in Source.model_fields.items()}
+    assert {key for key in fields if f"`{key}`" not in keys} == set()
 
 
 def run_blocks(page: str, **names: Any) -> dict[str, Any]:
