@@ -202,3 +202,18 @@ def test_a_cell_too_small_for_the_memory_is_refused_with_one_that_would_do() -> 
     maker = MapMaker(MapSettings(cell=0.001))
     with pytest.raises(InputError, match=r"--cell.*take [\d.]+ m or more"):
         maker.add(drive(*lanes(4, 60, 3)), "a")
+
+
+def test_a_drive_trains_speed_alone_gives_a_map_of_slip_in_the_middle_of_the_driven_wheels() -> None:
+    """A stock tractor tells one slip for all driven wheels; its estimates have no column of a wheel."""
+    wheels = drive(*lanes(2, 60, 6), slip=0.12)
+    columns = {
+        n: v
+        for n, v in wheels.columns.items()
+        if not n.startswith(("slip_", "adhesion_", "efficiency_", "net_", "soil_"))
+    }
+    columns |= {"slip_drive": np.full(len(wheels), 0.12), "slip_drive_std": np.full(len(wheels), 0.02)}
+    made = map_of([("a", replace(wheels, columns=columns))])
+    assert set(made.cells) == {"slip"}
+    np.testing.assert_allclose(made.cells["slip"].value, 0.12)
+    assert len(made.cells["slip"]) > 0.8 * len(map_of([("a", wheels)]).cells["slip"]) / 2

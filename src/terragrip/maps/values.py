@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
+from terragrip.estimation.rims import DRIVE
 from terragrip.physics.adhesion import CURVES
 from terragrip.units import STANDARD_GRAVITY
 
@@ -67,17 +68,11 @@ def readings_of(
 ) -> Iterator[Reading]:
     """The readings of one run: adhesion, slip, efficiency of each driven wheel where it stands, soil resistance in the wheels' middle."""
     vehicle = estimates.vehicle
-    driven = [
-        i
-        for i in range(len(vehicle.wheels))
-        if vehicle.driven[i] and f"slip_{vehicle.wheels[i]}" in estimates.columns
-    ]
     counted = np.isin(estimates["event"].astype(str), COUNTED)
     form = _form(estimates, reference_slip, library)
     radius = vehicle.uncertainty.wheel_radius or (0.0 if estimates.has_adhesion else UNSTATED_RADIUS)
-    for i in driven:
-        wheel = vehicle.wheels[i]
-        place = places.of(float(vehicle.axle_to_rear[vehicle.wheel_axle[i]]), float(vehicle.wheel_side[i]))
+    for i, wheel, forward, left in _driven(estimates, vehicle):
+        place = places.of(forward, left)
         slip, slip_std = estimates[f"slip_{wheel}"], estimates[f"slip_{wheel}_std"]
         slip_constant = radius * (1 - np.abs(slip))
         if f"adhesion_{wheel}" in estimates.columns:
@@ -102,6 +97,18 @@ def readings_of(
         centre = places.of(float(np.mean(vehicle.axle_to_rear[vehicle.wheel_axle])), 0.0)
         constant = _resistance_constant(vehicle, estimates)
         yield _reading("soil_resistance", centre, rho, constant, estimates["soil_resistance_std"], counted)
+
+
+def _driven(estimates: Estimates, vehicle: Vehicle) -> Iterator[tuple[int, str, float, float]]:
+    """Of each driven wheel with estimates its number, name and place ahead and to the left of the rear axle [m]; of a machine that
+    tells its drive train's speed alone the middle of the driven wheels."""
+    driven = np.flatnonzero(vehicle.driven)
+    ahead = vehicle.axle_to_rear[vehicle.wheel_axle]
+    for i in driven:
+        if f"slip_{vehicle.wheels[i]}" in estimates.columns:
+            yield int(i), vehicle.wheels[i], float(ahead[i]), float(vehicle.wheel_side[i])
+    if f"slip_{DRIVE}" in estimates.columns and len(driven):
+        yield int(driven[0]), DRIVE, float(ahead[driven].mean()), 0.0
 
 
 def _reading(
