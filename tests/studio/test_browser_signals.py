@@ -219,7 +219,7 @@ def test_any_quantity_over_any_other_of_what_the_charts_show(page: Any, served: 
     page.wait_for_selector("#across-caption:has-text('thinned evenly')")
     both = np.isfinite(table["slip_rr"]) & np.isfinite(table["adhesion_rr"])
     count = f"{both.sum():,}".replace(",", " ")
-    assert f"of {count} samples" in page.inner_text("#across-caption")
+    assert f"of the {count} samples" in page.inner_text("#across-caption")
     page.select_option("select[aria-label='Wheel of the plane']", label="any two quantities")
     assert page.input_value("#across-y") == "adhesion_rr"  # what was shown
     page.select_option("#across-y", "measured:drawbar_force")
@@ -227,7 +227,7 @@ def test_any_quantity_over_any_other_of_what_the_charts_show(page: Any, served: 
     page.evaluate("() => window.terragripDrive.charts.zoom([10, 12])")
     pull = pl.read_parquet(folder / "recording.parquet")["drawbar_force"].fill_null(np.nan).to_numpy()
     rows = (table.time >= 10) & (table.time <= 12) & np.isfinite(pull)
-    page.wait_for_selector(f"#across-caption:has-text('{rows.sum()} samples of what the charts show')")
+    page.wait_for_selector(f"#across-caption:has-text('The {rows.sum()} samples that the charts show')")
     assert "Drawbar force" in page.get_attribute(".plane", "aria-label")
     # A point of the plot is an instant of the charts.
     place = page.evaluate(

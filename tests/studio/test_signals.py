@@ -158,6 +158,18 @@ def test_a_table_of_several_runs_leaves_blank_what_one_has_not(client: TestClien
     assert (answer.status_code, "slip_rl" in answer.json()["detail"]) == (422, True)
 
 
+def test_a_shifted_run_of_a_recording_leaves_the_others_their_channels(
+    client: TestClient, folder: Path
+) -> None:
+    """Two runs name one recording by its SHA-256; the second has other times, so the recording is not its own."""
+    table = Estimates.read(folder / RUN)
+    shifted = Estimates(table.time + 60, table.columns, table.event_codes, table.labels, table.about)
+    shifted.write(folder / "shifted.parquet")
+    assert "drawbar_force" in client.get("/api/drive", params={"path": RUN}).json()["measured"]
+    assert client.get("/api/drive", params={"path": "shifted.parquet"}).json()["measured"] == []
+    assert len(window(client, column=["measured:drawbar_force"], start=10, end=11)["time"]) > 100
+
+
 def test_a_table_beyond_measure_is_refused_in_a_line(client: TestClient, monkeypatch: Any) -> None:
     monkeypatch.setattr("terragrip.studio.api.signals.CELLS", 100)
     body = {

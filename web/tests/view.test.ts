@@ -1,5 +1,5 @@
 import { expect, it } from "vitest";
-import { View, ticks } from "../src/fit/view";
+import { View, ticks } from "../src/ui/view";
 
 it("keeps the point under the pointer where it is while zooming", () => {
   const view = new View({ low: 0, high: 1 }, { low: -1, high: 2 }, 900, 500);

@@ -67,7 +67,9 @@ def recording_of(studio: Studio, table: Estimates, *, search: bool = False) -> t
     wanted, name = about.get("sha256"), Path(str(about.get("source") or "")).name
     if not wanted:
         return None
-    origin = studio.origins.get(wanted)
+    # Estimates of a part of a recording are not those of the whole.
+    key = (wanted, len(table), *(table.time[[0, -1]].tolist() if len(table) else ()))
+    origin = studio.origins.get(key)
     if origin is not None:
         path, profile = origin
         if path.is_file() and studio.fingerprints.get(path) == wanted:
@@ -75,15 +77,15 @@ def recording_of(studio: Studio, table: Estimates, *, search: bool = False) -> t
                 recording = studio.recordings.get(path, profile)
                 if _is_of(recording, table):
                     return path, recording
-    elif wanted in studio.origins and not search:
+    elif key in studio.origins and not search:
         return None
     items = studio.folder.items()
     place = _find(studio, items, name, wanted)
     result = None if place is None else _read(studio, items, place, table)
     if place is None or result is None:
-        studio.origins[wanted] = None
+        studio.origins[key] = None
         return None
-    studio.origins[wanted] = (place, result[0])
+    studio.origins[key] = (place, result[0])
     return place, result[1]
 
 

@@ -58,8 +58,8 @@ class Studio:
         self.recordings: Tables[Recording] = Tables(_recording)
         self.logs: Tables[LogLook] = Tables(look_at)
         self.fingerprints: Tables[str] = Tables(sha256, MOST)
-        # by SHA-256: the recording and the profile that reads it, None where the folder does not hold it
-        self.origins: dict[str, tuple[Path, str] | None] = {}
+        # by SHA-256, rows and times: the recording and the profile that reads it, None where the folder does not hold it
+        self.origins: dict[tuple[str | float, ...], tuple[Path, str] | None] = {}
         self.upload_limit, self.live = upload_limit, live
 
 

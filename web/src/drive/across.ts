@@ -60,6 +60,16 @@ export class Across {
     this.plane.close();
   }
 
+  /** Whether there is anything in the plot. */
+  get drawn(): boolean {
+    return Number(this.element.dataset["pairs"] ?? 0) > 0;
+  }
+
+  /** What is said below it. */
+  get said(): string {
+    return this.caption.textContent ?? "";
+  }
+
   /** The wheel whose plane is shown; empty where it is of other quantities. */
   get wheel(): string {
     return this.which.value;
@@ -117,7 +127,11 @@ export class Across {
   private async fetch(): Promise<void> {
     const turn = ++this.turn;
     const [x, y] = this.columns.map((column) => this.quantities.find((one) => one.column === column));
-    if (!x || !y) return void this.plane.show([], null);
+    if (!x || !y) {
+      this.plane.show([], null);
+      this.element.dataset["pairs"] = "0";
+      return;
+    }
     const [start, end] = this.shown;
     const all: Pairs[] = [];
     for (const [i, layer] of this.layers.entries()) {
@@ -140,5 +154,5 @@ function captionOf(all: Pairs[], beyond: number): string {
   const [drawn, there] = [all.reduce((sum, one) => sum + one.time.length, 0), all.reduce((sum, one) => sum + one.of, 0)];
   if (!there) return "Nothing is known of both in what the charts show.";
   const count = (n: number): string => n.toLocaleString("en").replaceAll(",", " ");
-  return `${drawn < there ? `${count(drawn)} of ${count(there)} samples, thinned evenly` : `${count(there)} samples`} of what the charts show${beyond ? `; ${count(beyond)} of those drawn lie beyond the axes` : ""}.`;
+  return `${drawn < there ? `${count(drawn)} of the ${count(there)} samples that the charts show, thinned evenly` : `The ${count(there)} samples that the charts show`}${beyond ? `; ${count(beyond)} of those drawn lie beyond the axes` : ""}.`;
 }

@@ -17,7 +17,8 @@ import type { Panel } from "./run";
 const SYNC = "drive";
 const [LOWEST, HEAD] = [116, 26];
 const SOON = 40; // ms
-const MARKS = [0.05, 0.2, 1, 5, 50]; // of a logarithmic axis
+/** Of a logarithmic axis. */
+export const MARKS = [0.05, 0.2, 1, 5, 50];
 /** uPlot draws axes and has the cursor; traces are drawn by `buckets.ts`, so it is given no rows. */
 const NO_ROWS: uPlot.AlignedData = [[0, 1], [0, 1]];
 

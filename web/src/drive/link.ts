@@ -64,7 +64,7 @@ export function read(query: URLSearchParams): View {
     at: Number.isFinite(at) ? at : null,
     uprights,
     axis: over in AXES ? (over as Axis) : "time",
-    others: query.getAll("with"),
+    others: query.getAll("with").filter(Boolean),
     formulas,
     pair: x && y ? [x, y] : null,
   };

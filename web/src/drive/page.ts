@@ -7,12 +7,14 @@ import { digits, fill, h } from "../ui/dom";
 import { note, tried } from "../ui/notes";
 import type { Page } from "../ui/page";
 import { notHere, options, runsOf } from "../ui/runs";
+import { saveMenu } from "../ui/sheet";
 import { onUnits } from "../ui/units";
 import { Across } from "./across";
 import { AXES, layerOf, shortNames, type Axis, type Layer } from "./along";
 import { Charts } from "./charts";
 import { panelMenu, wheelChips } from "./choices";
 import { EventList } from "./events";
+import { sheetOf } from "./figure";
 import { check, FormulaList, keptFormulas, keyOf } from "./formulas";
 import { zoomed, type Range } from "./gestures";
 import { layouts, type Layout } from "./layouts";
@@ -20,6 +22,7 @@ import { legendOf } from "./legend";
 import { address, read, written, type View } from "./link";
 import { OTHERS, overlayChooser, panelsOfAll } from "./overlay";
 import { described, type Sample } from "./sample";
+import { tableOf } from "./table";
 import { Views } from "./views";
 import { during, type Run } from "./run";
 
@@ -59,7 +62,7 @@ export const page: Page = (main, { notices, query }) => {
   let others: string[] = asked.others.slice(0, OTHERS);
   let seen = new Map<string, string>(); // size and time of change of what is open
   let runs = new Map<string, string>(); // and of all estimates
-  let chosen: string[] = [];
+  let chosen: string[] = []; // wheels
   let shown: string[] = asked.panels ?? JSON.parse(localStorage.getItem(KEY) ?? "null") ?? FIRST;
   let picked: number | null = null;
   const kept = keptFormulas();
@@ -75,13 +78,9 @@ export const page: Page = (main, { notices, query }) => {
   const tools = h(
     "div",
     { class: "tools" },
-    choice,
-    overlay.element,
-    over,
-    wheels,
-    panels,
-    formulas.element,
+    [choice, overlay.element, over, wheels, panels, formulas.element],
     layouts(layout, takeUp),
+    saveMenu(() => ["drive", ...layers.map(({ label }) => label)].join("-"), async () => (layers.length ? sheetOf(charts, layers, across) : undefined), () => tableOf(charts, layers)),
     h("span", { class: "spring" }),
     back,
     forward,

@@ -1,8 +1,8 @@
 /** One quantity over another: the pairs of what the charts show, the pair under the cursor; of the mu-s plane the online curve too. */
 
-import { CanvasInk, type Ink } from "../fit/ink";
+import { CanvasInk, type Ink } from "../ui/ink";
 import type { Samples } from "../fit/samples";
-import { View, ticks, type Range } from "../fit/view";
+import { View, ticks, type Range } from "../ui/view";
 import { digits, h } from "../ui/dom";
 import { color, onTheme } from "../ui/theme";
 import { withUnit } from "../ui/units";
@@ -167,18 +167,13 @@ export class Plane {
     const { view } = this;
     pen.setTransform(devicePixelRatio, 0, 0, devicePixelRatio, 0, 0);
     pen.clearRect(0, 0, view.width, view.height);
-    this.ink(new CanvasInk(pen), (work) => {
-      pen.save();
-      pen.beginPath();
-      pen.rect(view.left, view.top, view.width - view.left - view.right, view.height - view.top - view.bottom);
-      pen.clip();
-      work();
-      pen.restore();
-    });
+    this.ink(new CanvasInk(pen));
   }
 
-  private ink(ink: Ink, clipped: (work: () => void) => void): void {
-    const { view, axes } = this;
+  /** Draw the plot where its view lies; `at`: another place, of a sheet. */
+  ink(ink: Ink, at?: View): void {
+    const { axes } = this;
+    const view = at ? Object.assign(at, { x: this.view.x, y: this.view.y }) : this.view;
     if (!axes) return;
     const [right, foot] = [view.width - view.right, view.height - view.bottom];
     const scaled = ({ low, high }: Range, scale: number): Range => ({ low: low * scale, high: high * scale });
@@ -193,9 +188,9 @@ export class Plane {
       ink.text(digits(y), view.left - 6, py, color("muted"), "end");
     }
     const named = ({ title, unit }: Quantity): string => `${title} [${unit}]`;
-    ink.text(named(axes.x), (view.left + right) / 2, view.height - 8, color("ink"), "middle");
-    ink.text(named(axes.y), 10, (view.top + foot) / 2, color("ink"), "middle", true);
-    clipped(() => {
+    ink.text(named(axes.x), (view.left + right) / 2, foot + 28, color("ink"), "middle");
+    ink.text(named(axes.y), view.left - 42, (view.top + foot) / 2, color("ink"), "middle", { turn: true });
+    ink.clipped(view.box, () => {
       for (const one of [...this.all].reverse()) {
         const points = new Float64Array(2 * one.x.length);
         for (let i = 0; i < one.x.length; i++) [points[2 * i], points[2 * i + 1]] = [view.px(one.x[i] as number), view.py(one.y[i] as number)];
@@ -203,12 +198,11 @@ export class Plane {
       }
       const [main] = this.all;
       if (main && this.pointed >= 0) ink.dots([view.px(main.x[this.pointed] as number), view.py(main.y[this.pointed] as number)], 5, color("accent"), 1);
-      if (this.now && axes.curve) this.drawNow(ink, this.now);
+      if (this.now && axes.curve) this.drawNow(ink, view, this.now);
     });
   }
 
-  private drawNow(ink: Ink, now: Now): void {
-    const { view } = this;
+  private drawNow(ink: Ink, view: View, now: Now): void {
     const { shape } = this;
     if (shape && now.a_std < USELESS) {
       const curve = (a: number): number[] => shape.slip.flatMap((s, i) => [view.px(s), view.py(a * (shape.value[i] ?? NaN))]);

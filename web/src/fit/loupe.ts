@@ -2,10 +2,10 @@
 
 import { h } from "../ui/dom";
 import { color } from "../ui/theme";
-import { CanvasInk } from "./ink";
+import { CanvasInk } from "../ui/ink";
 import { drawPicture } from "./plot";
 import type { State } from "./state";
-import { View } from "./view";
+import { View } from "../ui/view";
 
 const [SIZE, TIMES, APART] = [150, 5, 24];
 

@@ -3,11 +3,11 @@
 import { h } from "../ui/dom";
 import { color, onTheme } from "../ui/theme";
 import { onUnits, unitFor, withUnit } from "../ui/units";
-import { CanvasInk, SvgInk, type Ink } from "./ink";
+import { CanvasInk, SvgInk, type Ink } from "../ui/ink";
 import { mapOf, type Calibration, type Pixel } from "./picture";
 import { drawAxes, drawCurve, drawLegend, drawSoil } from "./scene";
 import type { Change, State } from "./state";
-import { View } from "./view";
+import { View } from "../ui/view";
 
 export class Plot {
   readonly element: HTMLElement;
@@ -94,18 +94,8 @@ export class Plot {
     this.stale.clear();
   }
 
-  private clipped(pen: CanvasRenderingContext2D, work: () => void): void {
-    const { left, right, top, bottom, width, height } = this.view;
-    pen.save();
-    pen.beginPath();
-    pen.rect(left, top, width - left - right, height - top - bottom);
-    pen.clip();
-    work();
-    pen.restore();
-  }
-
   private drawPictures(pen: CanvasRenderingContext2D): void {
-    this.clipped(pen, () => {
+    new CanvasInk(pen).clipped(this.view.box, () => {
       for (const [path, calibration] of Object.entries(this.state.kept.pictures)) {
         const image = this.state.images.get(path);
         if (image && calibration.shown) drawPicture(pen, this.view, image, calibration);
@@ -116,7 +106,7 @@ export class Plot {
   private drawData(pen: CanvasRenderingContext2D): void {
     const ink = new CanvasInk(pen);
     drawAxes(ink, this.view);
-    this.clipped(pen, () => this.inkData(ink));
+    ink.clipped(this.view.box, () => this.inkData(ink));
   }
 
   private inkData(ink: Ink): void {
@@ -130,7 +120,7 @@ export class Plot {
 
   private drawCurves(pen: CanvasRenderingContext2D): void {
     const ink = new CanvasInk(pen);
-    this.clipped(pen, () => this.inkCurves(ink));
+    ink.clipped(this.view.box, () => this.inkCurves(ink));
     this.inkLegend(ink);
   }
 
@@ -152,8 +142,10 @@ export class Plot {
   svg(): string {
     const ink = new SvgInk();
     drawAxes(ink, this.view);
-    this.inkData(ink);
-    this.inkCurves(ink);
+    ink.clipped(this.view.box, () => {
+      this.inkData(ink);
+      this.inkCurves(ink);
+    });
     this.inkLegend(ink);
     return ink.toString(this.view.width, this.view.height, color("paper"));
   }

@@ -2,10 +2,10 @@
 
 import { digits, h } from "../ui/dom";
 import { color, onTheme } from "../ui/theme";
-import { CanvasInk } from "./ink";
+import { CanvasInk } from "../ui/ink";
 import { at } from "./samples";
 import type { Soil, State } from "./state";
-import { ticks, View } from "./view";
+import { ticks, View } from "../ui/view";
 
 export class Residuals {
   readonly element = h("div", { class: "residuals", role: "img", "aria-label": "Residuals: bins less the active curve, over slip", hidden: true });
@@ -76,11 +76,13 @@ export class Residuals {
       ink.text(digits(y), view.left - 8, view.py(y), color("muted"), "end");
     }
     ink.text(`Residual µ of ${soil.name} less ${curve.name}: ${known.length} bins, RMS ${digits(this.summary.rms, 2)}, largest ${digits(largest, 2)}`, view.left, 10, color("ink"), "start");
+    ink.clipped(view.box, () => this.drawBins(ink, soil, left));
+  }
+
+  private drawBins(ink: CanvasInk, soil: Soil, left: (s: number, mu: number) => number): void {
+    const { view } = this;
+    const bins = binsOf(soil);
     const shade = color(soil.color);
-    pen.save();
-    pen.beginPath();
-    pen.rect(view.left, view.top, width - view.left - view.right, height - view.top - view.bottom);
-    pen.clip();
     const cloud = soil.points.slip.flatMap((s, i) => [view.px(s), view.py(left(s, soil.points.adhesion[i] ?? NaN))]);
     if (soil.bins.length) ink.dots(cloud, 1, shade, 0.25);
     for (const bin of bins) {
@@ -88,7 +90,6 @@ export class Residuals {
       ink.line([view.px(bin.slip), view.py(r - bin.std), view.px(bin.slip), view.py(r + bin.std)], { color: shade, width: 1.2 });
     }
     ink.dots(bins.flatMap((bin) => [view.px(bin.slip), view.py(left(bin.slip, bin.mean))]), 4, shade, 1);
-    pen.restore();
   }
 }
 

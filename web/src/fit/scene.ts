@@ -3,10 +3,10 @@
 import { color } from "../ui/theme";
 import { unitFor } from "../ui/units";
 import { digits } from "../ui/dom";
-import type { Ink } from "./ink";
+import type { Ink } from "../ui/ink";
 import type { Samples } from "./samples";
 import type { Curve, Soil } from "./state";
-import { ticks, type View } from "./view";
+import { ticks, type View } from "../ui/view";
 
 export function drawAxes(ink: Ink, view: View): void {
   const { width, height, left, right, top, bottom } = view;
@@ -25,7 +25,7 @@ export function drawAxes(ink: Ink, view: View): void {
   ink.line([left, top, left, height - bottom, width - right, height - bottom], { color: muted });
   if (view.y.low < 0 && view.y.high > 0) ink.line([left, view.py(0), width - right, view.py(0)], { color: muted });
   ink.text(`slip s [${share.name}]`, (left + width - right) / 2, height - 10, ink_, "middle");
-  ink.text("adhesion µ (gross traction ratio less ρt) [–]", 14, (top + height - bottom) / 2, ink_, "middle", true);
+  ink.text("adhesion µ (gross traction ratio less ρt) [–]", 14, (top + height - bottom) / 2, ink_, "middle", { turn: true });
 }
 
 export function drawSoil(ink: Ink, view: View, soil: Soil): void {

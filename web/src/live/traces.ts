@@ -1,7 +1,7 @@
 /** Six traces of the last half minute, drawn straight from the ring on one canvas each frame that brought rows. */
 
 import { EVENT_COLORS } from "../drive/run";
-import { ticks } from "../fit/view";
+import { ticks } from "../ui/view";
 import { digits, h } from "../ui/dom";
 import { color, onTheme } from "../ui/theme";
 import { Columns, type Window } from "./columns";

@@ -3,10 +3,10 @@
 import "maplibre-gl/dist/maplibre-gl.css";
 import * as maplibre from "maplibre-gl";
 import workerUrl from "maplibre-gl/dist/maplibre-gl-worker.mjs?worker&url";
-import { during, EVENT_COLORS, panelsOf, soilColor, type Run } from "../drive/run";
 import { Way } from "../drive/along";
 import { Charts } from "../drive/charts";
 import { address, read, written, type View } from "../drive/link";
+import { during, EVENT_COLORS, panelsOf, soilColor, type Run } from "../drive/run";
 import { address as server, get, type Item } from "../ui/api";
 import { brushed } from "../ui/brush";
 import { columns, type Columns } from "../ui/columns";
@@ -15,24 +15,16 @@ import { note, tried } from "../ui/notes";
 import type { Page } from "../ui/page";
 import { notHere, options, runsOf } from "../ui/runs";
 import { color, onTheme } from "../ui/theme";
-import { onUnits, unitOf, type Unit } from "../ui/units";
-import { shade, SCALE } from "./shade";
-import { corners, keepBasemap, keepCorners, keptBasemap, keptCorners, type Placed } from "./basemap";
+import { saveMenu, type Sheet } from "../ui/sheet";
+import { onUnits, unitOf } from "../ui/units";
+import { pictureOf, sheetOf } from "./figure";
+import { isNamed, quantitiesOf, showLegend, soilAt, wordsOf, type Legend, type Quantity } from "./quantities";
+import { shade } from "./shade";
+import { corners, type Corners, keepBasemap, keepCorners, keptBasemap, keptCorners, type Placed } from "./basemap";
 import { opacity, outliers, outside, spread, UNLABELLED } from "./scale";
+import { linesOf, tableOf } from "./track";
 
 maplibre.setWorkerUrl(workerUrl);
-
-const QUANTITIES: [string, string][] = [
-  ["slip", "Slip"],
-  ["adhesion", "Adhesion µ"],
-  ["soil_resistance", "Soil resistance ρs"],
-  ["net_traction", "Net traction κ"],
-  ["efficiency", "Efficiency η"],
-  ["ground_speed", "Ground speed"],
-  ["curve_a", "Curve a"],
-  ["nis", "NIS"],
-  ["altitude", "Altitude"],
-];
 
 export const page: Page = (main, { notices, query }) => {
   const choice = h("select", { id: "map-run", "aria-label": "Run" });
@@ -45,7 +37,7 @@ export const page: Page = (main, { notices, query }) => {
   const charts = new Charts();
   const readout = h("output", { class: "line" });
   main.append(
-    h("div", { class: "tools" }, choice, quantity, h("label", { class: "check", title: "The wider the 95 % interval, the paler" }, doubt, "fade what is uncertain"), base, again, h("span", { class: "spring" }), h("button", { type: "button", click: () => frame() }, "Whole track")),
+    h("div", { class: "tools" }, choice, quantity, h("label", { class: "check", title: "The wider the 95 % interval, the paler" }, doubt, "fade what is uncertain"), base, again, h("span", { class: "spring" }), saveMenu(() => `map-${path.replace(/\.parquet$/, "")}-${quantity.value}`, sheet, table), h("button", { type: "button", click: () => frame() }, "Whole track")),
     legend,
     box,
     charts.element,
@@ -65,6 +57,7 @@ export const page: Page = (main, { notices, query }) => {
   let path = "";
   let seen = ""; // size and time of change of what is open
   let track: Columns | null = null;
+  let key: Legend | null = null; // of the colours
   let here: number | null = null; // the time under the cursor
   let picked: number | null = null;
   let linked: View | null = read(query); // until its run is open
@@ -76,16 +69,7 @@ export const page: Page = (main, { notices, query }) => {
     void draw();
   });
 
-  function names(): { value: string; title: string }[] {
-    if (!run) return [];
-    const out: { value: string; title: string }[] = [];
-    for (const [name, title] of QUANTITIES) {
-      if (run.columns.includes(name)) out.push({ value: name, title });
-      for (const wheel of run.wheels) if (run.columns.includes(`${name}_${wheel}`)) out.push({ value: `${name}_${wheel}`, title: `${title} ${wheel}` });
-    }
-    out.push({ value: "soil", title: "Soil" }, { value: "event", title: "Events" });
-    return out;
-  }
+  const names = (): Quantity[] => (run ? quantitiesOf(run) : []);
 
   async function open(wanted: string): Promise<void> {
     const found = await tried(() => get<Run>("drive", { path: wanted }));
@@ -133,7 +117,7 @@ export const page: Page = (main, { notices, query }) => {
     if (!run) return;
     doubt.disabled = !run.columns.includes(`${quantity.value}_std`);
     const asked = names().find((n) => n.value === quantity.value);
-    const named = quantity.value === "soil" || quantity.value === "event";
+    const named = isNamed(quantity.value);
     track = (await tried(() => columns("drive/track", { path, version: run?.version }, named ? [] : [quantity.value, ...(fades() ? [`${quantity.value}_std`] : [])]))) ?? null;
     await ready;
     if (!track || !track.count) {
@@ -141,59 +125,46 @@ export const page: Page = (main, { notices, query }) => {
       replace("track", [], "line");
       return;
     }
-    const [time, lon, lat, values, stds] = track.data as [Float64Array, Float64Array, Float64Array, Float64Array | undefined, Float64Array | undefined];
+    const [time, , , values, stds] = track.data as [Float64Array, Float64Array, Float64Array, Float64Array | undefined, Float64Array | undefined];
     // A stuck wheel's slip must not wash out the rest of the scale.
     const [low, high] = values ? spread(values.filter((_, i) => !eventAt(time[i] as number))) : [0, 1];
     const beyond = outliers(values, low, high);
     const paint = (i: number): string => {
       const t = time[i] as number;
-      if (quantity.value === "soil") return color(soilAt(t) ? soilColor(soilAt(t)) : UNLABELLED);
+      if (quantity.value === "soil") return color(soilAt(run, t) ? soilColor(soilAt(run, t)) : UNLABELLED);
       if (quantity.value === "event") return color(EVENT_COLORS[eventAt(t)?.kind ?? ""] ?? "line");
       const v = values?.[i] ?? NaN;
       return Number.isNaN(v) ? color("line") : shade((v - low) / (high - low));
     };
-    const ink = (i: number): number => (stds ? opacity(1.96 * (stds[i] as number), high - low) : 1);
-    // Stretches of one shade are one line: a map of 20 000 features would stutter.
-    const features: GeoJSON.Feature[] = [];
-    let from = 0;
-    for (let i = 1; i <= time.length; i++) {
-      const broken = i === time.length || paint(i) !== paint(from) || ink(i) !== ink(from) || (time[i] as number) - (time[i - 1] as number) > 5;
-      if (!broken) continue;
-      const until = Math.min(i, time.length - 1);
-      const line: number[][] = [];
-      for (let k = from; k <= until; k++) line.push([lon[k] as number, lat[k] as number]);
-      if (line.length > 1) features.push({ type: "Feature", properties: { shade: paint(from), ink: ink(from) }, geometry: { type: "LineString", coordinates: line } });
-      from = i;
-    }
+    const features = linesOf(track, paint, (i) => (stds ? opacity(1.96 * (stds[i] as number), high - low) : 1));
     replace("track", features, "line");
     drawPicked();
     drawBrushed();
-    drawLegend(asked?.title ?? "", unitOf(quantity.value), low, high, beyond);
-  }
-
-  function soilAt(t: number): string {
-    return during(run?.soils, t)?.name ?? during(run?.ground?.sections, t)?.soil ?? "";
+    const unit = unitOf(quantity.value);
+    const about = `5 % to 95 % of the run, rows with events left out${outside(beyond, unit.scale, unit.name)}${fades() ? "; paler where the 95 % interval is wider, palest where it is as wide as the scale" : ""}`;
+    key = named && asked ? wordsOf(run, asked, time) : { title: asked?.title ?? "", unit, low, high, about };
+    showLegend(legend, key);
   }
 
   function eventAt(t: number) {
     return during(run?.events, t);
   }
 
-  function drawLegend(title: string, { name, scale }: Unit, low: number, high: number, beyond: { under: number; over: number; least: number; most: number }): void {
-    if (!run) return;
-    if (quantity.value === "soil" || quantity.value === "event") {
-      const kinds = quantity.value === "soil" ? [...new Set([...run.soils.map((s) => s.name), ...(run.ground?.sections ?? []).map((s) => s.soil)])] : [...new Set(run.events.map((e) => e.kind))];
-      const blank = quantity.value === "soil" && track && Array.from(track.data[0] as Float64Array).some((t) => !soilAt(t));
-      fill(legend, kinds.length ? kinds.map((k) => h("span", {}, h("i", { class: `strip ${quantity.value === "soil" ? soilColor(k) : (EVENT_COLORS[k] ?? "ink")}` }), k)) : h("span", { class: "hint" }, "none in this run"), blank ? h("span", {}, h("i", { class: `strip ${UNLABELLED}` }), "unlabelled") : null);
-      return;
-    }
-    const bar = h("canvas", { width: 180, height: 10, class: "bar", "aria-hidden": "true" });
-    const pen = bar.getContext("2d");
-    for (let i = 0; pen && i < 180; i++) {
-      pen.fillStyle = SCALE(i / 179);
-      pen.fillRect(i, 0, 1, 10);
-    }
-    fill(legend, h("span", {}, title), h("span", {}, digits(low * scale), bar, `${digits(high * scale)} ${name}`), h("span", { class: "hint" }, `5 % to 95 % of the run, rows with events left out${outside(beyond, scale, name)}${fades() ? "; paler where the 95 % interval is wider, palest where it is as wide as the scale" : ""}`));
+  /** The map that is shown, as a sheet. */
+  async function sheet(): Promise<Sheet | undefined> {
+    if (!track?.count || !key) return undefined;
+    const at = base.value ? (map.getSource("base") as maplibre.ImageSource | undefined)?.coordinates : undefined;
+    const under = at ? { image: await pictureOf(server("basemap/picture", { path: base.value })), corners: at as Corners } : null;
+    return sheetOf({ map, title: path, legend: key, track: featuresOf("track"), brushed: featuresOf("brushed"), picked: picked === null ? null : placeOf(picked), base: under });
+  }
+
+  function featuresOf(id: string): GeoJSON.Feature[] {
+    const data = (map.getSource(id) as maplibre.GeoJSONSource | undefined)?.serialize().data;
+    return typeof data === "object" && data.type === "FeatureCollection" ? data.features : [];
+  }
+
+  async function table(): Promise<Blob | undefined> {
+    return track?.count && run && key ? tableOf(track, run, key, charts.isWhole ? null : charts.range) : undefined;
   }
 
   function replace(id: string, features: GeoJSON.Feature[], type: "line" | "circle"): void {
@@ -263,7 +234,7 @@ export const page: Page = (main, { notices, query }) => {
     const t = (track.data[0] as Float64Array)[i] as number;
     const v = track.data[3]?.[i];
     const event = eventAt(t);
-    readout.value = [`t ${t.toFixed(2)} s`, v === undefined ? "" : `${asked?.title} ${digits(v * unit.scale)} ${unit.name}`, soilAt(t), event ? `${event.kind}${event.why ? `: ${event.why}` : ""}` : ""].filter(Boolean).join("   ");
+    readout.value = [`t ${t.toFixed(2)} s`, v === undefined ? "" : `${asked?.title} ${digits(v * unit.scale)} ${unit.name}`, soilAt(run, t), event ? `${event.kind}${event.why ? `: ${event.why}` : ""}` : ""].filter(Boolean).join("   ");
   }
 
   charts.onCursor = mark;

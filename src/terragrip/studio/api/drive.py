@@ -118,7 +118,8 @@ def track(
     column: Columns = [],  # noqa: B006  (FastAPI copies it)
     version: str = "",
 ) -> Response:
-    """Time, longitude, latitude and columns along the way, thinned evenly, rows without a position left out."""
+    """Time, longitude, latitude and columns along the way, thinned evenly, rows without a position left out. The head's ``of``
+    says how many rows have one."""
     table = table_of(studio, path, version)
     if "latitude" not in table.columns or "longitude" not in table.columns:
         raise InputError("holds no positions", file=path, hint="estimate a log with latitude and longitude")
@@ -126,10 +127,11 @@ def track(
         if name not in table.columns:
             raise InputError("is not in the estimates", place=f"column {name}")
     placed = np.flatnonzero(np.isfinite(table.columns["latitude"]) & np.isfinite(table.columns["longitude"]))
-    rows = placed[:: max(len(placed) // TRACK, 1)]
+    rows = placed[:: -(-len(placed) // TRACK) or 1]
     names = ["time", "longitude", "latitude", *column]
     columns = [table[name][rows].astype(np.float64) for name in names]
-    return Response(packed({"columns": names, "count": len(rows), "cut": False}, columns), media_type=BINARY)
+    head = {"columns": names, "count": len(rows), "cut": len(rows) < len(placed), "of": len(placed)}
+    return Response(packed(head, columns), media_type=BINARY)
 
 
 def _distance(studio: Studio, path: str) -> float | None:

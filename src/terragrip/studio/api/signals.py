@@ -132,7 +132,7 @@ def table(studio: Here, wanted: TableRequest) -> Response:
             pl.DataFrame(
                 {
                     **({"run": [run.label] * len(place)} if several else {}),
-                    wanted.heading: place,
+                    wanted.heading: place.round(6) if wanted.axis == "distance" else place,
                     **{c.heading: values for c, values in zip(wanted.columns, columns, strict=True)},
                     **words,
                 }

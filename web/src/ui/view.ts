@@ -18,6 +18,11 @@ export class View {
     public height = 500,
   ) {}
 
+  /** The part of the screen inside the axes. */
+  get box(): { x: number; y: number; width: number; height: number } {
+    return { x: this.left, y: this.top, width: this.width - this.left - this.right, height: this.height - this.top - this.bottom };
+  }
+
   px(x: number): number {
     return this.left + ((x - this.x.low) / (this.x.high - this.x.low)) * (this.width - this.left - this.right);
   }

@@ -1,0 +1,42 @@
+/** The track: as lines of one shade each, and as a table. */
+
+import { during, type Run } from "../drive/run";
+import type { Columns } from "../ui/columns";
+import { note } from "../ui/notes";
+import { csvOf } from "../ui/sheet";
+import { soilAt, type Legend } from "./quantities";
+
+/** Seconds without a position that part a track. */
+const APART = 5;
+
+/** Stretches of one shade and one ink are one line: a map of 20 000 features would stutter. A gap in time is not bridged. */
+export function linesOf({ data }: Columns, shade: (i: number) => string, ink: (i: number) => number): GeoJSON.Feature[] {
+  const [time, lon, lat] = data as [Float64Array, Float64Array, Float64Array];
+  const features: GeoJSON.Feature[] = [];
+  let from = 0;
+  for (let i = 1; i <= time.length; i++) {
+    const gap = i === time.length || (time[i] as number) - (time[i - 1] as number) > APART;
+    if (!gap && shade(i) === shade(from) && ink(i) === ink(from)) continue;
+    const line: number[][] = [];
+    for (let k = from; k <= (gap ? i - 1 : i); k++) line.push([lon[k] as number, lat[k] as number]);
+    if (line.length > 1) features.push({ type: "Feature", properties: { shade: shade(from), ink: ink(from) }, geometry: { type: "LineString", coordinates: line } });
+    from = i;
+  }
+  return features;
+}
+
+/** The points of the track between two times (null: all) as CSV: time, place, the quantity in the unit that is shown, soil, event. */
+export function tableOf({ data, names, of, count }: Columns, run: Run, legend: Legend, range: [number, number] | null): Blob {
+  const [time, lon, lat, values] = data as [Float64Array, Float64Array, Float64Array, Float64Array | undefined];
+  const measured = "words" in legend ? null : legend.unit;
+  const unit = measured?.name === "–" ? "-" : (measured?.name ?? "");
+  const head = ["time [s]", "longitude [deg]", "latitude [deg]", ...(measured ? [`${names[3] ?? ""} [${unit}]`] : []), "soil", "event"];
+  const rows: (string | number)[][] = [];
+  time.forEach((t, i) => {
+    if (range && (t < range[0] || t > range[1])) return;
+    const value = measured ? [Number(((values?.[i] ?? NaN) * measured.scale).toPrecision(12))] : [];
+    rows.push([t, lon[i] ?? NaN, lat[i] ?? NaN, ...value, soilAt(run, t), during(run.events, t)?.kind ?? ""]);
+  });
+  if (of && of > count) note(`The track is thinned to ${count} of ${of} positions, and so is the table; Drive saves every row.`);
+  return csvOf([head, ...rows]);
+}
