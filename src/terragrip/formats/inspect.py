@@ -138,7 +138,7 @@ def inspect(
         warnings += unit_warnings(recording, machine)
     if recording is not None and machine is not None:
         try:
-            if not _without_torque(recording):
+            if has_torque(recording.channels):
                 recording.check_against(machine)
         except InputError as error:
             warnings.append(_cause(error))
@@ -269,10 +269,6 @@ def _recording(log: LogTable | SignalLog, profile: Profile | None) -> Recording:
     return recording_of(
         replace(log, signals={n: s for n, s in log.signals.items() if wants(n)}).table(), profile
     )
-
-
-def _without_torque(recording: Recording) -> bool:
-    return not has_torque(recording.channels)
 
 
 def _is_large(column: npt.NDArray[Any], unit: str) -> bool:

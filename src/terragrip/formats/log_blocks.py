@@ -16,9 +16,9 @@ from terragrip.formats.registry import format_of
 from terragrip.formats.table import LogTable, in_si, since_clock_was_set
 from terragrip.formats.table_on_disk import Columns, TableOnDisk
 from terragrip.recording import LogBlocks, Recording, checks
-from terragrip.recording.columns import numbers, seconds, start_of, texts
+from terragrip.recording.columns import seconds, start_of
 from terragrip.recording.lag import lag_within
-from terragrip.recording.schema import LABELS, TIME, is_own
+from terragrip.recording.schema import TIME, is_own
 from terragrip.recording.survey import ROWS
 
 PathLike = str | os.PathLike[str]
@@ -151,12 +151,14 @@ def _checked(
             raise InputError(
                 "holds dates and numbers", file=source, place=f"column {TIME}", hint="give one of them"
             )
-        block = _block(
-            columns, source, first, after, silent, tuple(dict.fromkeys((*notes, *more_notes))), digest
-        )
+        block, _ = Recording.of_block(columns, source, first_row=first, after=after)
+        silent -= {
+            name for name in silent & block.channels.keys() if not np.isnan(block.channels[name]).all()
+        }
         if first == 0 and about.start is None:
             about.start = start_of(time, block.time)
-        block = replace(block, start=about.start, profiles=about.profiles)
+        said = tuple(dict.fromkeys((*notes, *more_notes)))
+        block = replace(block, sha256=digest, notes=said, start=about.start, profiles=about.profiles)
         if first == 0 and (late := lag_within(block.time, block.channels)):
             notes += late
             block = replace(block, notes=(*block.notes, *late))
@@ -166,28 +168,3 @@ def _checked(
         checks.check_time(np.empty(0), source)
     for name in silent:
         checks.refuse_empty(name, source)
-
-
-def _block(
-    columns: Columns,
-    source: str,
-    first_row: int,
-    after: float | None,
-    silent: set[str],
-    notes: tuple[str, ...],
-    digest: str,
-) -> Recording:
-    """One checked block; takes the channels that hold a value out of ``silent``."""
-    time, _ = seconds(columns[TIME], source)
-    checks.check_time(time, source, first_row=first_row, after=after)
-    channels, labels = {}, {}
-    for name, column in columns.items():
-        if name in LABELS:
-            labels[name] = texts(name, column, len(time), source)
-        elif name != TIME:
-            values = numbers(name, column, time, source)
-            checks.refuse_infinite(name, values, time, source, first_row=first_row)
-            channels[name] = values
-            if name in silent and not np.isnan(values).all():
-                silent.discard(name)
-    return Recording(time, channels, labels, source, digest, notes)

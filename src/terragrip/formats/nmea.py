@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from terragrip.errors import InputError
-from terragrip.files import sha256, unreadable
+from terragrip.files import sha256
 from terragrip.formats.can.text_logs import lines_are_like
 from terragrip.formats.nmea_sentences import UNITS, Sentence, sentences
 from terragrip.formats.registry import Databases, Format
@@ -65,16 +65,13 @@ def read_nmea(path: str, wanted: Wanted | None, databases: Databases) -> SignalL
     sentence is readable.
     """
     track = _Track()
-    try:
-        with Path(path).open(encoding="ascii", errors="replace", newline="\n") as stream:
-            for number, line in enumerate(iter(lambda: stream.readline(_LONGEST), "")):
-                if not skips(number, _BLOCK, wanted):
-                    good, bad = sentences(line)
-                    track.bad += bad
-                    for sentence in good:
-                        _add(sentence, track)
-    except OSError as error:
-        raise unreadable(path, error) from error
+    with Path(path).open(encoding="ascii", errors="replace", newline="\n") as stream:
+        for number, line in enumerate(iter(lambda: stream.readline(_LONGEST), "")):
+            if not skips(number, _BLOCK, wanted):
+                good, bad = sentences(line)
+                track.bad += bad
+                for sentence in good:
+                    _add(sentence, track)
     if not track.columns:
         problem = (
             f"holds no usable RMC, VTG or GGA sentence ({track.bad} damaged, {track.no_fix} without a fix)"

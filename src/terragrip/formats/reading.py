@@ -9,6 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from terragrip.errors import InputError
+from terragrip.files import unreadable
 from terragrip.formats.conversion import Part
 from terragrip.formats.profile import SHIPPED, Profile
 from terragrip.formats.registry import Databases, format_of
@@ -109,7 +110,10 @@ def read_log(path: PathLike, wanted: Wanted | None = None, databases: Databases 
         hint = "leave out --dbc, or 'dbc:' in the profile"
         raise InputError(f"is a {own.title}, which needs no DBC", file=path, hint=hint)
     if own.read is not None:
-        return own.read(os.fspath(path), wanted, databases)
+        try:
+            return own.read(os.fspath(path), wanted, databases)
+        except OSError as error:
+            raise unreadable(path, error) from error
     table = None if own.in_blocks is None else own.in_blocks(os.fspath(path))
     if table is None:
         raise InputError(

@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from terragrip.errors import InputError
-from terragrip.files import sha256, unreadable
+from terragrip.files import sha256
 from terragrip.formats.registry import Databases, Format
 from terragrip.formats.table import LogTable, Wanted
 
@@ -30,10 +30,7 @@ def read_vbo(path: str, wanted: Wanted | None, databases: Databases = ()) -> Log
 
     ``wanted`` says which columns to read (None: all). Raises InputError where the sections are missing or a row does not fit.
     """
-    try:
-        text = Path(path).read_bytes().decode("latin-1")
-    except OSError as error:
-        raise unreadable(path, error) from error
+    text = Path(path).read_bytes().decode("latin-1")
     sections = _sections(text)
     names = _distinct(sections.get("column names", "").split())
     rows = [line.split() for line in sections.get("data", "").splitlines() if line.strip()]

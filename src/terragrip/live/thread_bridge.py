@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import threading
 from collections.abc import Callable
 from typing import Any
 
@@ -35,3 +36,22 @@ class ThreadBridge:
             self._reported += dropped
             self._feed.dropped(dropped)
         function(*arguments)
+
+
+async def repeated_in_thread(work: Callable[[], None]) -> None:
+    """Call ``work`` again and again in a thread, until it raises or this is cancelled; the thread has ended when this does.
+
+    So what it reads from can be closed behind it; a call may last as long as a cancelled source may.
+    """
+    done = threading.Event()
+
+    def repeat() -> None:
+        while not done.is_set():
+            work()
+
+    reader = asyncio.ensure_future(asyncio.to_thread(repeat))
+    try:
+        await asyncio.shield(reader)
+    finally:
+        done.set()
+        await asyncio.wait([reader])

@@ -73,26 +73,45 @@ class Recording:
         """
         columns = columns_of(frame, source)
         checks.require_columns(columns, source)
-        time, remark = seconds(columns[TIME], source)
+        result, remark = cls.of_block(columns, source)
         remarks = [*notes, *remark, *checks.remarks(columns)]
-        checks.check_time(time, source)
         if start is None:
-            start = start_of(columns[TIME], time)
+            start = start_of(columns[TIME], result.time)
+        channels = {}
+        for name, values in result.channels.items():
+            if np.isnan(values).all():
+                checks.refuse_empty(name, source)
+                remarks.append(f"{name} holds no value and is left out.")
+            else:
+                channels[name] = values
+        notes = tuple(dict.fromkeys(remarks))
+        return cls(result.time, channels, result.labels, source, sha256, notes, dict(noise or {}), start)
+
+    @classmethod
+    def of_block(
+        cls,
+        columns: Mapping[str, npt.NDArray[Any]],
+        source: str | None,
+        *,
+        first_row: int = 0,
+        after: float | None = None,
+    ) -> tuple[Self, list[str]]:
+        """Consecutive rows of a table as they are, channels without a value too, and remarks on their time.
+
+        ``first_row``: how many rows of the table stand before them; ``after``: the time of the last of those. Raises InputError as
+        `from_frame` does of time, texts and infinities.
+        """
+        time, remarks = seconds(columns[TIME], source)
+        checks.check_time(time, source, first_row=first_row, after=after)
         channels: dict[str, Floats] = {}
         labels: dict[str, npt.NDArray[np.object_]] = {}
         for name, column in columns.items():
             if name in LABELS:
                 labels[name] = texts(name, column, len(time), source)
             elif is_channel(name):
-                values = numbers(name, column, time, source)
-                checks.refuse_infinite(name, values, time, source)
-                if np.isnan(values).all():
-                    checks.refuse_empty(name, source)
-                    remarks.append(f"{name} holds no value and is left out.")
-                else:
-                    channels[name] = values
-        notes = tuple(dict.fromkeys(remarks))
-        return cls(time, channels, labels, source, sha256, notes, dict(noise or {}), start)
+                channels[name] = numbers(name, column, time, source)
+                checks.refuse_infinite(name, channels[name], time, source, first_row=first_row)
+        return cls(time, channels, labels, source), remarks
 
     def __len__(self) -> int:
         return len(self.time)

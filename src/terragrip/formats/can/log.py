@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
 from terragrip.errors import InputError
-from terragrip.files import sha256, unreadable
+from terragrip.files import sha256
 from terragrip.formats.boundary import DAMAGE, as_far_as_it_goes, needed
 from terragrip.formats.can.catalog import catalog
 from terragrip.formats.can.decoding import identifier_text, names_of, signals_of
@@ -135,14 +135,11 @@ def _from_lines(
 ) -> SignalLog:
     frames, count = Frames(catalog(databases), wanted), Count()
     last = 0.0
-    try:
-        with Path(path).open("rb") as stream:
-            lines = io.TextIOWrapper(stream, encoding="utf-8", errors="replace", newline="\n")
-            for time, identifier, payload in parse(_bounded(lines), count, frames):
-                frames.add(time, identifier, payload)
-                last = time
-    except OSError as error:
-        raise unreadable(path, error) from error
+    with Path(path).open("rb") as stream:
+        lines = io.TextIOWrapper(stream, encoding="utf-8", errors="replace", newline="\n")
+        for time, identifier, payload in parse(_bounded(lines), count, frames):
+            frames.add(time, identifier, payload)
+            last = time
     if count.bad > _MOST_BAD * (count.bad + frames.count):
         problem, hint = (
             f"is a damaged {kind}, or none: {count.bad} lines hold no frame",

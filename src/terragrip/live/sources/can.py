@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import asyncio
-import threading
 from typing import Any
 
 from terragrip.live.can_bus import check, errors, open_bus
 from terragrip.live.decode import Decoder
 from terragrip.live.feed import Feed, Lost
 from terragrip.live.frame_decoder import FrameDecoder
-from terragrip.live.thread_bridge import ThreadBridge
+from terragrip.live.thread_bridge import ThreadBridge, repeated_in_thread
 from terragrip.live.uri import Uri
 
 _PATIENCE = 0.2  # s
@@ -36,31 +35,27 @@ class CanSource:
 
     async def run(self, feed: Feed) -> None:
         """Feed frames; raises Lost where the bus is not there or goes away."""
-        bridge, done = ThreadBridge(feed, _BATCHES), threading.Event()
+        bridge = ThreadBridge(feed, _BATCHES)
         bus = await asyncio.to_thread(open_bus, self.uri)
         feed.one_layout = False
         feed.connected()
 
         def read() -> None:
-            while not done.is_set():
-                frame = bus.recv(_PATIENCE)
-                batch: list[Any] = []
-                while frame is not None and len(batch) < _AT_ONCE:
-                    batch.append(frame)
-                    frame = bus.recv(0.0)
-                if frame is not None:
-                    batch.append(frame)
-                if batch:
-                    bridge.call(self._feed, feed, batch)
+            frame = bus.recv(_PATIENCE)
+            batch: list[Any] = []
+            while frame is not None and len(batch) < _AT_ONCE:
+                batch.append(frame)
+                frame = bus.recv(0.0)
+            if frame is not None:
+                batch.append(frame)
+            if batch:
+                bridge.call(self._feed, feed, batch)
 
-        reader = asyncio.ensure_future(asyncio.to_thread(read))
         try:
-            await asyncio.shield(reader)
+            await repeated_in_thread(read)
         except errors() as error:
             raise Lost(f"the bus: {error}") from error
         finally:
-            done.set()
-            await asyncio.wait([reader])
             bus.shutdown()
 
     def _feed(self, feed: Feed, batch: list[Any]) -> None:

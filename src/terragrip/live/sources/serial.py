@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-import asyncio
 import re
-import threading
 from pathlib import Path
 
 from terragrip.errors import InputError
 from terragrip.formats.nmea_sentences import sentences
 from terragrip.live.feed import Feed, Lost
-from terragrip.live.thread_bridge import ThreadBridge
+from terragrip.live.thread_bridge import ThreadBridge, repeated_in_thread
 from terragrip.live.uri import Uri
 
 _LONGEST = 512  # bytes of a line
@@ -36,7 +34,7 @@ class SerialSource:
         """Feed sentences; raises Lost where the device is not there or goes away."""
         import serial
 
-        bridge, done = ThreadBridge(feed), threading.Event()
+        bridge, rest = ThreadBridge(feed), b""
         try:
             line = serial.Serial(str(Path(self.uri.path)), self.baud, timeout=0.2)
         except (serial.SerialException, ValueError) as error:
@@ -45,20 +43,18 @@ class SerialSource:
         feed.connected()
 
         def read() -> None:
-            rest = b""
-            while not done.is_set():
-                rest += line.read(max(1, line.in_waiting))
-                *whole, rest = rest.split(b"\n")
-                rest = rest[-_LONGEST:]
-                for sentence in whole:
-                    bridge.call(self._feed, feed, sentence)
+            nonlocal rest
+            rest += line.read(max(1, line.in_waiting))
+            *whole, rest = rest.split(b"\n")
+            rest = rest[-_LONGEST:]
+            for sentence in whole:
+                bridge.call(self._feed, feed, sentence)
 
         try:
-            await asyncio.to_thread(read)
+            await repeated_in_thread(read)
         except (serial.SerialException, OSError) as error:
             raise Lost(f"the device: {error}") from error
         finally:
-            done.set()
             line.close()
 
     def _feed(self, feed: Feed, line: bytes) -> None:
