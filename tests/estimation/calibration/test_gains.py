@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from terragrip.estimation import calibrate
+from terragrip.estimation.calibration.gains import _disagreement
 from terragrip.estimation.calibration.sharing import Sharing, fit_shared_gains
 from terragrip.recording import Recording
 from terragrip.vehicle import Vehicle
@@ -143,3 +145,44 @@ def test_gains_vaguer_than_the_prior_are_left_out(drive: Make, vehicle: Vehicle)
     result = calibrate(drive(gain=GAIN, patches=0.1), sure)
     assert "drive_torque_gain fl" not in result
     assert any("knows it to" in u.why for u in result.unknown)
+
+
+def on_soils(*gains: np.ndarray, windows: int = 400) -> Sharing:
+    """The exact problem on several soils, each with gains of its own, one behind the other."""
+    parts = [rows(seed, gain).select(np.arange(400) < windows) for seed, gain in enumerate(gains)]
+    joined = {
+        name: np.concatenate([getattr(part, name) for part in parts])
+        for name in ("torque", "known", "leverage", "slip")
+    }
+    soil = np.repeat(np.arange(len(gains)), windows)
+    block = np.concatenate([part.block + 1000 * k for k, part in enumerate(parts)])
+    return replace(parts[0], **joined, soil=soil, block=block)
+
+
+def test_soils_that_agree_widen_nothing() -> None:
+    assert _disagreement(on_soils(GAIN)) == 1.0
+    assert _disagreement(on_soils(GAIN, GAIN, GAIN)) == 1.0
+
+
+@pytest.mark.parametrize("count", [2, 3])
+def test_soils_that_disagree_widen_by_birges_ratio(count: int) -> None:
+    """Against the residual of one whitened least-squares problem for the common gains."""
+    others = [GAIN * np.array([1, 1, 1 + 0.05 * k, 1 - 0.03 * k]) for k in range(count)]
+    problem = on_soils(*others)
+    design, target = [], []
+    for k in range(count):
+        fit = fit_shared_gains(problem.select(problem.soil == k))
+        assert fit is not None
+        root = np.linalg.inv(np.linalg.cholesky(fit.covariance[1:4, 1:4]))
+        design.append(root)
+        target.append(root @ fit.log_gain[1:])
+    square = float(np.linalg.lstsq(np.concatenate(design), np.concatenate(target), rcond=None)[1][0])
+    freedom = 3 * (count - 1)
+    assert square > 5 * freedom
+    assert _disagreement(problem) == pytest.approx(np.sqrt(square / freedom), rel=1e-6)
+
+
+def test_a_soil_of_few_stretches_is_not_held_against_another() -> None:
+    other = GAIN * np.array([1, 1, 1.2, 0.9])
+    assert _disagreement(on_soils(GAIN, other, windows=150)) > 2
+    assert _disagreement(on_soils(GAIN, other, windows=140)) == 1.0

@@ -9,6 +9,7 @@ import pytest
 
 from terragrip.errors import InputError
 from terragrip.estimation import identify_torque_scale
+from terragrip.estimation.calibration.torque_scale import _window_length
 from terragrip.physics.loads import GRAVITY
 from terragrip.recording import Recording
 from terragrip.vehicle import Vehicle
@@ -92,3 +93,49 @@ def test_it_refuses_what_tells_nothing(drive: Make, vehicle: Vehicle) -> None:
     shuffled = log.with_channels(pitch=np.roll(log["pitch"], 3000))
     with pytest.raises(InputError, match="vary too little"):
         identify_torque_scale(shuffled, vehicle)
+
+
+def test_a_window_spans_two_updates_of_the_slowest_torque() -> None:
+    """Other channels may be slower: no window waits for them."""
+    time = np.arange(0.0, 60.0, 0.1)
+
+    def every(rows: int) -> np.ndarray:
+        return np.where(np.arange(len(time)) % rows == 0, 1.0, np.nan)
+
+    quick = Recording(time, {"drive_torque_l": every(2), "ground_speed": every(100)})
+    slow = Recording(time, {"drive_torque_l": every(2), "drive_torque_r": every(15)})
+    once = Recording(time, {"drive_torque_l": every(2), "drive_torque_r": every(10_000)})
+    assert _window_length([quick]) == 1.0
+    assert _window_length([quick, slow]) == pytest.approx(3.0)
+    assert _window_length([once]) == 1.0
+    twice = np.full(len(time), np.nan)
+    twice[[0, 40]] = 1.0
+    assert _window_length([Recording(time, {"drive_torque_l": twice})]) == pytest.approx(8.0)
+
+
+def test_a_gain_of_the_drawbar_and_a_slope_that_nothing_measures_widen_the_interval(
+    drive: Make, vehicle: Vehicle
+) -> None:
+    log = drive(gain=0.8, slip=(0.02, 0.18))  # all windows count
+
+    def std(**known: float) -> float:
+        data = vehicle.to_dict()
+        data["uncertainty"] = {**data["uncertainty"], **known}
+        return identify_torque_scale(log, Vehicle.from_dict(data)).std / 0.8
+
+    exact = std(drawbar_gain=0.0, slope=0.0)
+    assert np.sqrt(std(drawbar_gain=0.03, slope=0.0) ** 2 - exact**2) == pytest.approx(0.03, rel=0.02)
+    assert std() == pytest.approx(
+        std(drawbar_gain=0.01, slope=float(np.radians(0.5))), rel=1e-9
+    )  # unless stated
+    one, two = (np.sqrt(std(drawbar_gain=0.0, slope=x) ** 2 - exact**2) for x in (0.01, 0.02))
+    assert two == pytest.approx(2 * one, rel=1e-6)
+    # 0.3 of the slope's force goes with the pull: over the spread of pull and acceleration
+    force = log["drawbar_force"] + 140 * np.gradient(log["ground_speed"], log.time)
+    assert one == pytest.approx(0.3 * 140 * GRAVITY * 0.01 / float(np.std(force)), rel=0.05)
+    level = log.with_channels(pitch=np.zeros(len(log)))
+    data = {
+        **vehicle.to_dict(),
+        "uncertainty": {**vehicle.to_dict()["uncertainty"], "drawbar_gain": 0.0, "slope": 0.1},
+    }
+    assert identify_torque_scale(level, Vehicle.from_dict(data)).std / 0.8 == pytest.approx(exact, rel=0.05)
