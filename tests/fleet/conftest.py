@@ -1,4 +1,4 @@
-"""Makes small_fleet.py, which tests import from, and its fixture known."""
+"""Makes small_fleet.py, which tests import from, and its fixtures known."""
 
 from __future__ import annotations
 
@@ -7,6 +7,6 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parent))
 
-from small_fleet import place
+from small_fleet import place, scheduler
 
-__all__ = ["place"]
+__all__ = ["place", "scheduler"]

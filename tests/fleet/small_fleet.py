@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import os
+import socket
 import subprocess
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -90,6 +92,38 @@ def fleet(place: Path, *words: object, env: dict[str, str] | None = None) -> tup
     process = start(place, *words, env=env)
     output, errors = process.communicate(timeout=300)
     return process.returncode, output, errors
+
+
+def free_port() -> int:
+    with socket.socket() as one:
+        one.bind(("127.0.0.1", 0))
+        return int(one.getsockname()[1])
+
+
+def serve(place: Path, port: int) -> list[subprocess.Popen[bytes]]:
+    """A scheduler of Dask and a worker, each in a process of its own."""
+    worker = ["worker", f"tcp://127.0.0.1:{port}", "--nthreads", "1", "--no-nanny"]
+    scheduler = ["scheduler", "--host", "127.0.0.1", "--port", str(port)]
+    return [
+        subprocess.Popen(
+            [sys.executable, "-m", "dask", *words, "--no-dashboard"],
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+            env=environment(place),
+        )
+        for words in (scheduler, worker)
+    ]
+
+
+@pytest.fixture(scope="session")
+def scheduler(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
+    """The address of a scheduler with a worker, for tests that look at what a call does and not at where it works."""
+    port = free_port()
+    processes = serve(tmp_path_factory.mktemp("fleet"), port)
+    yield f"tcp://127.0.0.1:{port}"
+    for process in processes:
+        process.kill()
+        process.wait()
 
 
 def whole(out: Path) -> tuple[dict[str, int], dict[str, str]]:

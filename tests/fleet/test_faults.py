@@ -7,9 +7,7 @@ from __future__ import annotations
 
 import os
 import signal
-import socket
 import subprocess
-import sys
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -19,7 +17,7 @@ import psutil
 import pytest
 import scipy.io
 
-from small_fleet import environment, fleet, start, whole, write_log
+from small_fleet import environment, fleet, free_port, serve, start, whole, write_log
 
 PATIENCE = 120.0
 
@@ -95,22 +93,6 @@ def test_a_call_that_is_killed_goes_on(place: Path) -> None:
     assert (len(rows), reasons) == (7, {})
 
 
-def dask(*words: object, env: dict[str, str]) -> subprocess.Popen[bytes]:
-    return subprocess.Popen(
-        [sys.executable, "-m", "dask", *map(str, words)],
-        stdout=subprocess.DEVNULL,
-        stderr=subprocess.DEVNULL,
-        env=env,
-    )
-
-
-@pytest.fixture
-def port() -> int:
-    with socket.socket() as one:
-        one.bind(("127.0.0.1", 0))
-        return int(one.getsockname()[1])
-
-
 @pytest.fixture
 def started() -> Iterator[list[subprocess.Popen[bytes]]]:
     """Processes that end with the test."""
@@ -121,20 +103,9 @@ def started() -> Iterator[list[subprocess.Popen[bytes]]]:
         process.wait()
 
 
-def serve(place: Path, port: int, env: dict[str, str] | None = None) -> list[subprocess.Popen[bytes]]:
-    """A scheduler and a worker."""
-    env = env or environment(place)
-    scheduler = dask("scheduler", "--host", "127.0.0.1", "--port", port, "--no-dashboard", env=env)
-    worker = dask(
-        "worker", f"tcp://127.0.0.1:{port}", "--nthreads", 1, "--no-dashboard", "--no-nanny", env=env
-    )
-    return [scheduler, worker]
-
-
-def test_a_scheduler_that_is_lost_and_restarted(
-    place: Path, port: int, started: list[subprocess.Popen[bytes]]
-) -> None:
+def test_a_scheduler_that_is_lost_and_restarted(place: Path, started: list[subprocess.Popen[bytes]]) -> None:
     write_log(place / "logs/a/long.csv", 7, seconds=1500.0)
+    port = free_port()
     started += serve(place, port)
     process = start(place, "--scheduler", f"tcp://127.0.0.1:{port}")
     until(lambda: at_work(place, os.getpid()) or process.poll() is not None)

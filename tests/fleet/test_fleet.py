@@ -16,6 +16,20 @@ import terragrip as tg
 from small_fleet import VEHICLE, call, fleet, whole, write_log
 from terragrip.cli import main
 
+Ran = Callable[..., tuple[int, str, str]]
+
+
+@pytest.fixture
+def ran(place: Path, scheduler: str, capsys: pytest.CaptureFixture[str]) -> Ran:
+    """Exit code, output and errors of a call that works with a scheduler which other tests have already started."""
+
+    def run(*words: object) -> tuple[int, str, str]:
+        code = main(call(place, *words, "--scheduler", scheduler))
+        said = capsys.readouterr()
+        return code, said.out, said.err
+
+    return run
+
 
 def written(out: Path) -> dict[str, int]:
     """When each file of estimates was written."""
@@ -68,12 +82,12 @@ def test_a_fleet_of_two_machines_and_three_days(place: Path) -> None:
     assert "src=" not in page.replace('src="data:', "")
 
 
-def test_a_second_call_does_what_is_new_or_changed_and_no_more(place: Path) -> None:
-    assert fleet(place)[0] == 0
+def test_a_second_call_does_what_is_new_or_changed_and_no_more(place: Path, ran: Ran) -> None:
+    assert ran()[0] == 0
     first = written(place / "out")
     write_log(place / "logs/b/drive6.csv", 6)
     write_log(place / "logs/a/drive0.csv", 60)
-    code, said, _ = fleet(place)
+    code, said, _ = ran()
     assert code == 0
     assert "2 estimated, 5 unchanged, 0 failed" in said
     second = written(place / "out")
@@ -84,7 +98,7 @@ def test_a_second_call_does_what_is_new_or_changed_and_no_more(place: Path) -> N
     # a machine that is another: all its logs anew, under its new name alone; a log that went is kept
     (place / "logs/b/drive6.csv").unlink()
     (place / "Heros.yaml").write_text(VEHICLE.format(name="Heros 2"))
-    code, said, _ = fleet(place)
+    code, said, _ = ran()
     assert "6 estimated, 0 unchanged, 0 failed" in said
     assert "1 logs of earlier calls are kept" in said
     rows, _ = whole(place / "out")
@@ -94,12 +108,14 @@ def test_a_second_call_does_what_is_new_or_changed_and_no_more(place: Path) -> N
     assert set(vehicles) == {"Heros 2"}
 
 
-def test_a_log_that_cannot_be_read_stops_no_other_and_leaves_when_it_is_whole_again(place: Path) -> None:
+def test_a_log_that_cannot_be_read_stops_no_other_and_leaves_when_it_is_whole_again(
+    place: Path, ran: Ran
+) -> None:
     broken = place / "logs/a/drive1.csv"
     content = broken.read_bytes()
-    assert fleet(place)[0] == 0
+    assert ran()[0] == 0
     broken.write_bytes(b"\x00\xff" * 500)
-    code, said, errors = fleet(place)
+    code, said, errors = ran()
     assert (code, errors) == (0, "")
     assert "0 estimated, 5 unchanged, 1 failed" in said
     rows, reasons = whole(place / "out")
@@ -107,16 +123,16 @@ def test_a_log_that_cannot_be_read_stops_no_other_and_leaves_when_it_is_whole_ag
     assert list(reasons) == ["drive1.csv"]
     assert "drive1.csv" in reasons["drive1.csv"]
     broken.write_bytes(content)
-    assert fleet(place)[0] == 0
+    assert ran()[0] == 0
     rows, reasons = whole(place / "out")
     assert (len(rows), reasons) == (6, {})
 
 
-def test_estimates_of_the_fleet_are_no_logs_of_it(place: Path) -> None:
+def test_estimates_of_the_fleet_are_no_logs_of_it(place: Path, ran: Ran) -> None:
     (place / "logs/b/note.txt").write_text("no log")
     out = place / "logs/out"
     for estimated in (6, 0):
-        code, said, _ = fleet(place, place / "logs/**/*", "--vehicle", place / "Heros.yaml", "-o", out)
+        code, said, _ = ran(place / "logs/**/*", "--vehicle", place / "Heros.yaml", "-o", out)
         assert code == 0
         assert f"{estimated} estimated, {6 - estimated} unchanged, 1 failed" in said
     rows, reasons = whole(out)
@@ -144,14 +160,14 @@ def test_nothing_matches(place: Path, refused: Refused) -> None:
     assert "no file matches" in refused(place / "logs/**/*.mcap")
 
 
-def test_two_logs_of_one_name(place: Path, refused: Refused) -> None:
+def test_two_logs_of_one_name(place: Path, refused: Refused, ran: Ran) -> None:
     write_log(place / "logs/b/drive0.csv", 9)
     said = refused()
     assert "a/drive0.csv" in said
     assert "b/drive0.csv" in said
     index = place / "index.csv"
     index.write_text("log,name\nlogs/b/drive0.csv,drive0 of b\n")
-    assert fleet(place, "--index", index, "--vehicle", place / "Heros.yaml")[0] == 0
+    assert ran("--index", index, "--vehicle", place / "Heros.yaml")[0] == 0
     assert {"drive0.csv", "drive0 of b"} <= set(whole(place / "out")[0])
 
 
