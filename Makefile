@@ -22,7 +22,7 @@ KERNEL_TESTS := $(patsubst kernel/tests/%.c,%,$(wildcard kernel/tests/*.c))
 BUILD_INPUTS := pyproject.toml setup.py cffi_build.py $(KERNEL_SOURCES) $(KERNEL_HEADERS) \
 	$(wildcard kernel/python/*.[ch] src/terragrip/*/*.c src/terragrip/*/*.h)
 
-.PHONY: notebooks help demo test lint kernel-test web-test pytest studio wheel docs system bench lock clean \
+.PHONY: notebooks help demo test lint kernel-test web-test pytest studio wheel docs system bench lock clean sbom audit \
 	kernel-aarch64 kernel-others test-long kernel-sanitized fuzz system-fuzz fuzz-kernel fuzz-kernel-run fuzz-parsers
 
 help: ## show this list
@@ -82,11 +82,28 @@ lock: $(VENV)/made ## resolve the dependencies anew into requirements.lock and r
 	$(PIP) install --quiet uv
 	echo 'setuptools>=77' | $(BIN)/uv pip compile $(LOCK_FLAGS) --extra all pyproject.toml - -o requirements.lock
 	$(BIN)/uv pip compile $(LOCK_FLAGS) --extra dev -c requirements.lock pyproject.toml -o requirements-dev.lock
-LOCK_FLAGS := --quiet --upgrade --universal --python-version 3.11 --no-annotate --no-emit-index-url \
+LOCK_FLAGS := --quiet --upgrade --generate-hashes --universal --python-version 3.11 --no-annotate --no-emit-index-url \
 	--no-emit-find-links --fork-strategy fewest --custom-compile-command "make lock"
 
+# Their tools are no part of the development environment: nothing else needs them.
+$(VENV)-supply/made: $(VENV)/made
+	@$(BIN)/python -m venv --clear $(VENV)-supply && $(VENV)-supply/bin/python -m pip --disable-pip-version-check --no-input install --quiet cyclonedx-bom pip-audit
+	@touch $@
+
+sbom: $(VENV)-supply/made ## what Terragrip stands on, as CycloneDX: dist/python.cdx.json and dist/pages.cdx.json
+	@mkdir -p dist
+	@$(VENV)-supply/bin/cyclonedx-py requirements requirements.lock --of JSON -o dist/python.cdx.json
+	@if [ -d web/node_modules ]; then cd web && npm sbom --silent --sbom-format cyclonedx --omit dev > ../dist/pages.cdx.json; \
+	else echo "SKIPPED: the pages' part needs Node.js; run make studio first" >&2; fi
+	@ls -l dist/*.cdx.json
+
+audit: $(VENV)-supply/made ## known vulnerabilities of the locked packages, where their data can be had
+	@$(VENV)-supply/bin/pip-audit --disable-pip -r requirements.lock > build/audit.txt 2>&1; code=$$?; grep -v "could not be audited" build/audit.txt; \
+	missed=$$(grep -c "could not be audited" build/audit.txt); \
+	if [ "$$missed" != 0 ]; then echo "NOT AUDITED: $$missed packages, whose data could not be had from here" >&2; fi; exit $$code
+
 clean: ## remove everything that was built or installed
-	rm -rf $(VENV) build dist web/node_modules src/terragrip/studio/static src/*.egg-info .mypy_cache .pytest_cache .ruff_cache .import_linter_cache .hypothesis
+	rm -rf $(VENV) $(VENV)-supply build dist web/node_modules src/terragrip/studio/static src/*.egg-info .mypy_cache .pytest_cache .ruff_cache .import_linter_cache .hypothesis
 	find src tests -name __pycache__ -prune -exec rm -rf {} +
 	rm -f src/terragrip/*.so src/terragrip/*/*.so src/terragrip/_kernel_*.py src/terragrip/simulation/_plant.py
 
