@@ -23,42 +23,61 @@ function clipped(plot: uPlot, draw: (pen: CanvasRenderingContext2D) => void): vo
   ctx.restore();
 }
 
+/** Pixels of the canvas: uPlot's own way to them costs ten times as much a point. */
+interface Pixels {
+  left: number;
+  width: number;
+  x(place: number): number;
+  y(value: number): number;
+}
+
+function pixelsOf(plot: uPlot): Pixels {
+  const { left, top, width, height } = plot.bbox;
+  const scale = plot.scales["y"] ?? {};
+  const upright = scale.distr === 3 ? Math.log10 : (v: number): number => v;
+  const [begin, end] = [plot.scales["x"]?.min ?? 0, plot.scales["x"]?.max ?? 1];
+  const [low, high] = [upright(scale.min ?? 0), upright(scale.max ?? 1)];
+  const [across, up] = [width / (end - begin), height / (high - low)];
+  return { left, width, x: (place) => left + (place - begin) * across, y: (value) => top + height - (upright(value) - low) * up };
+}
+
 /** Intervals first, then values over them. */
 export function draw(plot: uPlot, drawn: Drawn[]): void {
   const { min, max } = plot.scales["x"] ?? {};
+  const to = pixelsOf(plot);
   const rows = drawn.map((one): [number, number] => within(one.x, [min ?? 0, max ?? 1]));
   const dense = drawn.map((one, i) => one.cut || (rows[i] as [number, number])[1] - (rows[i] as [number, number])[0] > plot.bbox.width / devicePixelRatio);
   clipped(plot, (pen) => {
     drawn.forEach((one, i) => {
       pen.fillStyle = `color-mix(in srgb, ${color(one.trace.bandColor ?? one.trace.color)} 22%, transparent)`;
-      if (dense[i]) columnsOfBand(plot, pen, one);
-      else band(plot, pen, one, rows[i] as [number, number]);
+      if (dense[i]) columnsOfBand(to, pen, one);
+      else band(to, pen, one, rows[i] as [number, number]);
     });
     drawn.forEach((one, i) => {
       pen.fillStyle = pen.strokeStyle = color(one.trace.color);
-      if (dense[i]) columnsOfBuckets(plot, pen, one);
-      else line(plot, pen, one, rows[i] as [number, number]);
+      if (dense[i]) columnsOfBuckets(to, pen, one);
+      else line(to, pen, one, rows[i] as [number, number]);
     });
   });
 }
 
 /** The interval of rows as they are: one area; where it is unknown it breaks. */
-function band(plot: uPlot, pen: CanvasRenderingContext2D, { x, low, high }: Drawn, [first, last]: [number, number]): void {
+function band(to: Pixels, pen: CanvasRenderingContext2D, { x, low, high }: Drawn, [first, last]: [number, number]): void {
   if (!low || !high) return;
   const known = (i: number): boolean => isKnown(low[i]) && isKnown(high[i]);
   for (let i = first; i < last; i++) {
     if (!known(i)) continue;
     const from = i;
     pen.beginPath();
-    for (; i < last && known(i); i++) pen.lineTo(plot.valToPos(x[i] as number, "x", true), plot.valToPos(high[i] as number, "y", true));
-    for (let k = i - 1; k >= from; k--) pen.lineTo(plot.valToPos(x[k] as number, "x", true), plot.valToPos(low[k] as number, "y", true));
+    for (; i < last && known(i); i++) pen.lineTo(to.x(x[i] as number), to.y(high[i] as number));
+    for (let k = i - 1; k >= from; k--) pen.lineTo(to.x(x[k] as number), to.y(low[k] as number));
     pen.fill();
   }
 }
 
 /** A line through rows as they are; a sample without known neighbours is a point. Of many, the line is a pixel of the screen wide: wider
  * ones cost twenty times as much without a graphics processor. */
-function line(plot: uPlot, pen: CanvasRenderingContext2D, { x, values, trace }: Drawn, [first, last]: [number, number]): void {
+function line(to: Pixels, pen: CanvasRenderingContext2D, { x, values, trace }: Drawn, [first, last]: [number, number]): void {
   pen.lineWidth = (last - first > MANY ? 1 / devicePixelRatio : 1.4) * devicePixelRatio;
   pen.lineJoin = "round";
   pen.setLineDash((trace.dash ?? []).map((length) => length * devicePixelRatio));
@@ -70,7 +89,7 @@ function line(plot: uPlot, pen: CanvasRenderingContext2D, { x, values, trace }: 
       on = false;
       continue;
     }
-    const [px, py] = [plot.valToPos(x[i] as number, "x", true), plot.valToPos(v, "y", true)];
+    const [px, py] = [to.x(x[i] as number), to.y(v)];
     if (on) pen.lineTo(px, py);
     else pen.moveTo(px, py);
     if (!on && !isKnown(values[i + 1])) {
@@ -83,15 +102,15 @@ function line(plot: uPlot, pen: CanvasRenderingContext2D, { x, values, trace }: 
   pen.setLineDash([]);
 }
 
-function columnsOfBand(plot: uPlot, pen: CanvasRenderingContext2D, one: Drawn): void {
+function columnsOfBand(to: Pixels, pen: CanvasRenderingContext2D, one: Drawn): void {
   if (!one.low || !one.high) return;
-  for (const [x, width, top, bottom] of pixels(plot, one, one.low, one.high, 0)) pen.fillRect(x, top, width, bottom - top);
+  for (const [x, width, top, bottom] of columnsOf(to, one, one.low, one.high, 0)) pen.fillRect(x, top, width, bottom - top);
 }
 
-function columnsOfBuckets(plot: uPlot, pen: CanvasRenderingContext2D, one: Drawn): void {
+function columnsOfBuckets(to: Pixels, pen: CanvasRenderingContext2D, one: Drawn): void {
   const least = LEAST * devicePixelRatio;
   let [before, after] = [NaN, NaN]; // the last column's top and bottom
-  for (const [x, width, top, bottom] of pixels(plot, one, one.values, one.values, one.cut ? 1 : 0)) {
+  for (const [x, width, top, bottom] of columnsOf(to, one, one.values, one.values, one.cut ? 1 : 0)) {
     const from = top > after ? after : top;
     const to = bottom < before ? before : bottom;
     [before, after] = [top, bottom];
@@ -114,13 +133,10 @@ function inked({ dash }: Trace, x: number): boolean {
 
 /** Left, width, top and bottom of each column of pixels; `high` is read `later` points after `low`. A column
  * of what is unknown is left out, and NaN ends what the next one joins on to. */
-function* pixels(plot: uPlot, { x: place, cut }: Drawn, low: Values, high: Values, later: number): Generator<[number, number, number, number]> {
+function* columnsOf(pixels: Pixels, { x: place, cut }: Drawn, low: Values, high: Values, later: number): Generator<[number, number, number, number]> {
   const points = cut ? 2 : 1;
-  const { left, width } = plot.bbox;
-  const { min, max } = plot.scales["x"] ?? {};
-  const [begin, end] = [min ?? 0, max ?? 1];
-  const scale = width / (end - begin);
-  const x = (t: number): number => Math.round(left + (t - begin) * scale);
+  const { left, width } = pixels;
+  const x = (t: number): number => Math.round(pixels.x(t));
   let [at, top, bottom] = [-Infinity, Infinity, -Infinity];
   for (let i = 0; i + points <= place.length; i += points) {
     const [from, to] = [x(place[i] as number), x(place[i + points] ?? (place[i + points - 1] as number))];
@@ -128,8 +144,8 @@ function* pixels(plot: uPlot, { x: place, cut }: Drawn, low: Values, high: Value
     if (from !== at) [at, top, bottom] = [from, Infinity, -Infinity];
     const [least, most] = [low[i], high[i + later]];
     if (isKnown(least) && isKnown(most)) {
-      top = Math.min(top, plot.valToPos(most, "y", true));
-      bottom = Math.max(bottom, plot.valToPos(least, "y", true));
+      top = Math.min(top, pixels.y(most));
+      bottom = Math.max(bottom, pixels.y(least));
     }
     if (to === from) continue; // the next bucket falls on the same pixels
     if (bottom >= top) yield [from, to - from, top, bottom];
