@@ -6,7 +6,8 @@
 The sample is drawn by the hash of the commit: places (an operator, a comparison, a number, a truth value, a jump) uniformly over the
 source, of each place one change by the operators of cosmic-ray. Left out is only what is no behaviour: annotations, decorators and
 `if TYPE_CHECKING`. A first run records which test runs which line (coverage with contexts) and how long it takes, and refuses to go on
-if a test fails or nothing is recorded. Each mutant is a forked process that has the heavy libraries; it meets the tests of its line,
+if a test fails or nothing is recorded; of a later commit only the test files that changed are run anew
+(`--afresh`: all). Each mutant is a forked process that has the heavy libraries; it meets the tests of its line,
 quickest first, until one fails. Killed: a test fails, the module cannot be imported, or the tests need far more of the processor than
 they did (counted apart). What lives, or no test runs, is printed as a diff. Results are kept in build/mutants, and a run that was
 stopped goes on where it was. A whole run takes about an hour on two cores.
@@ -24,10 +25,8 @@ import json
 import multiprocessing
 import os
 import random
-import re
 import resource
 import signal
-import subprocess
 import sys
 import time
 from collections import Counter, defaultdict
@@ -36,22 +35,10 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-ROOT = Path(__file__).parents[1]
-KEPT = ROOT / "build" / "mutants"
+from which_tests import KEPT, ROOT, Coverage, coverage_at, git
+
 ROOMS = ("physics", "recording", "estimation", "soil")
-MORE_TESTS = ("ground", "report", "advice", "maps")  # rooms whose tests run lines of these
-APART = (  # they look at packages, or run the whole project in other processes, which a mutant does not reach
-    "contract",
-    "demo",
-    "docs_site",
-    "doctor",
-    "example_notebooks",
-    "kernel_builds",
-    "layouts",
-    "tutorial",
-    "wheel",
-)
-BUDGET, MOST = 10.0, 120  # s (under coverage) and number of the tests that one mutant meets
+BUDGET = 10.0  # s (under coverage) of the tests that one mutant meets
 INTERNAL = 3  # exit code of pytest: an error of its own, which would pass for a kill
 PATIENCE = (
     4.0  # times what its tests took before, and a minute [s of processor]: beyond, a mutant counts as killed
@@ -181,115 +168,6 @@ def diff(one: Mutant) -> str:
     return "\n".join(line for line in lines if not line.startswith(("---", "+++", "@@")))
 
 
-def record(rooms: list[str], data: Path, log: Path, workers: int) -> None:
-    """Run the rooms' tests and those beside the rooms once, under coverage. SystemExit if one fails."""
-    words = [
-        sys.executable,
-        "-m",
-        "pytest",
-        *(f"tests/{room}" for room in (*rooms, *MORE_TESTS) if (ROOT / "tests" / room).is_dir()),
-        *sorted(set(map(str, Path("tests").glob("test_*.py"))) - {f"tests/test_{name}.py" for name in APART}),
-        "-q",
-        "-vv",
-        "-n",
-        str(workers),
-    ]
-    words += [f"--cov=terragrip.{room}" for room in rooms]
-    words += [
-        "--cov-context=test",
-        "--cov-report=",
-        "--durations=0",
-        "--durations-min=0",
-        "-p",
-        "no:cacheprovider",
-    ]
-    with log.open("w", encoding="utf-8") as out:
-        done = subprocess.run(
-            words,
-            cwd=ROOT,
-            stdout=out,
-            stderr=subprocess.STDOUT,
-            env={**os.environ, "COVERAGE_FILE": f"{data}.new"},
-            check=False,
-        )
-    if done.returncode != 0:
-        raise SystemExit(f"the tests fail without a mutant, see {log}")
-    os.replace(f"{data}.new", data)
-
-
-@dataclass
-class Coverage:
-    """Which tests run a line, and how long each takes without its fixtures, and at most the fixtures of a file [s]."""
-
-    seconds: dict[str, float]
-    fixtures: dict[str, float]
-    by_line: dict[str, dict[int, list[str]]]
-
-    @classmethod
-    def load(cls, data: Path, log: Path) -> Coverage:
-        from coverage import CoverageData
-
-        coverage = CoverageData(str(data))
-        coverage.read()
-        seconds = {context.partition("|")[0]: 0.0 for context in coverage.measured_contexts() if context}
-        fixtures: dict[str, float] = defaultdict(float)
-        beside: dict[str, list[str]] = defaultdict(list)
-        for test in seconds:
-            beside[test.partition("::")[0]].append(test)
-        log_lines = re.findall(
-            r"^([\d.]+)s (setup|call) +(tests/.+)$", log.read_text(encoding="utf-8"), re.MULTILINE
-        )
-        for took, phase, test in log_lines:
-            if phase == "call":
-                seconds[test] = float(took)
-            else:
-                file = test.partition("::")[0]
-                fixtures[file] = max(fixtures[file], float(took))
-        by_line: dict[str, dict[int, list[str]]] = {}
-        for path in coverage.measured_files():
-            tests: dict[int, list[str]] = {}
-            by_line["src/" + path.rpartition("/src/")[2]] = tests
-            for number, contexts in coverage.contexts_by_lineno(path).items():
-                names: set[str] = set()
-                for test, _, phase in (context.partition("|") for context in contexts if context):
-                    # what a fixture runs stands under the first test that asks for it; the others see it too
-                    names |= {test, *(beside[test.partition("::")[0]] if phase == "setup" else ())}
-                tests[number] = sorted(names)
-        if not any(any(tests.values()) for tests in by_line.values()):
-            raise SystemExit(f"{data} holds no test: remove it and start again")
-        return cls(seconds, fixtures, by_line)
-
-    def tests(self, one: Mutant, budget: float) -> list[str]:
-        """Tests for a mutant. A line that only the import runs is met by the tests of its file."""
-        lines = self.by_line.get(one.path, {})
-        names = set(lines.get(one.line, ())) or {name for other in lines.values() for name in other}
-        cost = {name: self.seconds[name] + self.fixtures[name.partition("::")[0]] for name in names}
-        chosen: list[str] = []
-        spent = 0.0
-        cases: dict[str, int] = defaultdict(int)
-        turns = []  # of each test function the quickest case first, then the second of each
-        for name in sorted(names, key=lambda name: (cost[name], name)):
-            function = name.partition("[")[0]
-            turns.append((cases[function], name))
-            cases[function] += 1
-        files: set[str] = set()
-        for _, name in sorted(turns, key=lambda turn: turn[0]):
-            file = name.partition("::")[0]
-            needed = self.seconds[name] + (0.0 if file in files else self.fixtures[file])
-            if len(chosen) < MOST and (not chosen or spent + needed <= budget):
-                chosen.append(name)
-                files.add(file)
-                spent += needed
-        return chosen
-
-    def time(self, tests: list[str]) -> float:
-        """What these tests take with their fixtures [s]; of a test that is not recorded, nothing."""
-        files = {name.partition("::")[0] for name in tests}
-        return sum(self.seconds.get(name, 0.0) for name in tests) + sum(
-            self.fixtures.get(f, 0.0) for f in files
-        )
-
-
 def attempt(path: str, source: str, tests: list[str], seconds: int) -> None:
     """In a process of its own: pytest with a source in place of that of a module. The exit code is pytest's."""
     plain = importlib.machinery.SourceFileLoader.get_code
@@ -327,9 +205,9 @@ def verdicts(
         importlib.import_module(name)
     gc.freeze()  # a child that collects would copy all of it
     waiting = list(reversed(todo))
-    probe = next((one for one in todo if by or coverage.tests(one, 0.0)), None)
+    probe = next((one for one in todo if by or coverage.tests(one.path, one.line, 0.0)), None)
     if probe is not None:  # else a broken set-up would kill every mutant
-        process, _ = start(probe, by or coverage.tests(probe, 0.0), coverage, changed=False)
+        process, _ = start(probe, by or coverage.tests(probe.path, probe.line, 0.0), coverage, changed=False)
         process.join()
         if process.exitcode != 0:
             raise SystemExit(f"the tests of {probe.path}:{probe.line} fail without a mutant")
@@ -337,7 +215,7 @@ def verdicts(
     while waiting or running:
         while waiting and len(running) < workers:
             one = waiting.pop()
-            tests = by or coverage.tests(one, budget)
+            tests = by or coverage.tests(one.path, one.line, budget)
             if not tests:
                 yield one, "untested"
                 continue
@@ -358,10 +236,6 @@ def verdicts(
             elif time.monotonic() > until:
                 process.kill()
         time.sleep(0.02)
-
-
-def git(*words: str) -> str:
-    return subprocess.run(["git", *words], capture_output=True, text=True, check=True).stdout.strip()
 
 
 def show(one: Mutant, verdict: str) -> str:
@@ -395,17 +269,17 @@ def main() -> int:
         default=BUDGET,
         help="s of tests that a mutant meets; what lived under less is tried again",
     )
+    parser.add_argument(
+        "--afresh", action="store_true", help="record all tests, though an earlier commit is recorded"
+    )
     wanted = parser.parse_args()
     os.chdir(ROOT)
     KEPT.mkdir(parents=True, exist_ok=True)
     if not wanted.at and git("status", "--porcelain", "src", "tests"):
         raise SystemExit("src or tests have uncommitted changes: a sample belongs to a commit")
     commit = git("rev-parse", "HEAD")
-    data, log = KEPT / f"{commit}.coverage", KEPT / f"{commit}.log"
-    if not (wanted.by or data.exists()):
-        print("Recording which test runs which line ...", flush=True)
-        record(wanted.rooms, data, log, wanted.workers)
-    coverage = Coverage({}, {}, {}) if wanted.by else Coverage.load(data, log)
+    recorded = None if wanted.by else coverage_at(commit, wanted.rooms, wanted.workers, wanted.afresh)
+    coverage = recorded or Coverage({}, {}, {})
     if wanted.at:
         places = [(name, int(line)) for name, _, line in (text.rpartition(":") for text in wanted.at)]
         drawn = [
