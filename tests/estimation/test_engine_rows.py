@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from terragrip.estimation.engine_torque import earlier, held
+from terragrip.estimation.engine_torque import EngineTorque, driveline_torque, earlier, held
+from terragrip.vehicle_parts import Driveline
 
 
 def loop(time: np.ndarray, values: np.ndarray, row: int, least: float, most: float) -> float:
@@ -34,3 +35,27 @@ def test_nothing_known_is_nothing() -> None:
     time, nothing = np.arange(4.0), np.full(4, np.nan)
     assert np.isnan(held(time, nothing)).all()
     assert np.isnan(earlier(time, nothing, 0.5)).all()
+
+
+def test_a_fixed_ratio_has_the_sign_of_the_travel_and_needs_no_wheel() -> None:
+    """Forward, in reverse, and at rest, where no wheel says which way; the engine off."""
+    driveline = Driveline.model_validate({"efficiency": 0.8, "accessory_power": 1500.0, "ratio": 20.0})
+    time = np.arange(4.0) * 10
+    channels = {"engine_speed": np.array([150.0, 150.0, 150.0, 0.0]), "engine_torque": np.full(4, 210.0)}
+    wheels = np.array([7.5, -7.5, 0.0, 7.5])
+    got = driveline_torque(driveline, EngineTorque(None, 5.0), time, channels, wheels, 0.8)
+    # 1500 W at 150 rad/s are 10 N m
+    np.testing.assert_allclose(got.torque, [3200.0, -3200.0, 3200.0, np.nan])
+    np.testing.assert_allclose(got.std, [0.8 * 20 * np.hypot(5.0, 5.0)] * 3 + [np.nan])
+    assert not got.shift.any()
+
+
+def test_a_share_is_of_the_reference_less_friction() -> None:
+    time = np.arange(3.0)
+    share = {
+        "engine_torque_share": np.array([0.5, 0.2, 0.0]),
+        "engine_friction_share": np.array([0.1, np.nan, np.nan]),
+    }
+    assert EngineTorque(800.0, 1.0).at(share, time).tolist() == pytest.approx([320.0, 80.0, -80.0])
+    del share["engine_friction_share"]
+    assert EngineTorque(800.0, 1.0).at(share, time).tolist() == pytest.approx([336.0, 96.0, -64.0])
