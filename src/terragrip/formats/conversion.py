@@ -259,19 +259,20 @@ def _rate(origin: Source, log: LogTable, time: Floats) -> tuple[Floats, float | 
     if origin.is_geographic:
         positions = list(metres_of(*positions))
     fresh = fresh_positions(time, positions) & np.isfinite(time)
-    rates, deviations = zip(
-        *(derivative(time[fresh], p[fresh], origin.window) for p in positions), strict=True
-    )
+    when, where = time[fresh], np.stack([p[fresh] for p in positions], axis=1)
     result = np.full(len(time), np.nan)
     if origin.forward is not None:
         heading = _heading(origin, log, time)[fresh]
-        result[fresh] = rates[0] * np.cos(heading) + rates[1] * np.sin(heading)
-    elif len(rates) == 1:
-        result[fresh] = rates[0]
+        along = np.stack([np.cos(heading), np.sin(heading)], axis=1)
+        result[fresh], deviation = derivative(when, where, origin.window, along)
+    elif len(positions) == 1:
+        result[fresh], deviation = derivative(when, where, origin.window)
     else:
-        result[fresh] = np.sqrt(sum(rate**2 for rate in rates))
-    known = [deviation for deviation in deviations if deviation is not None]
-    return result, float(np.mean(known)) if known else None
+        rates = np.stack([derivative(when, p, origin.window)[0] for p in where.T], axis=1)
+        result[fresh] = size = np.sqrt((rates**2).sum(axis=1))
+        along = np.divide(rates, size[:, None], out=np.zeros_like(rates), where=size[:, None] > 0)
+        deviation = derivative(when, where, origin.window, np.nan_to_num(along))[1]
+    return result, deviation
 
 
 def _heading(origin: Source, log: LogTable, time: Floats) -> Floats:

@@ -39,42 +39,57 @@ def quotient(time: Floats, dividend: Floats, divisor: Floats, least: float) -> F
     return np.divide(dividend, divisor, out=np.full(len(time), np.nan), where=known)
 
 
-def derivative(time: Floats, position: Floats, window: float) -> tuple[Floats, float | None]:
-    """Time derivative (n,) of a position (n,) at its own instants, and its median standard deviation.
+def derivative(
+    time: Floats, position: Floats, window: float, along: Floats | None = None
+) -> tuple[Floats, float | None]:
+    """Time derivative (n,) of a position (n,) at its own instants, or of positions (n, d) along a direction of each instant, unit
+    vectors ``along`` (n, d); and its standard deviation.
 
     A parabola is fitted by least squares to the samples within ``window`` [s] around each instant, five or more
     (Savitzky and Golay 1964, on the actual instants); Tukey's biweight keeps jumps of the position out. NaN
-    where fewer than four samples lie within the window, or nearly all to one side (at gaps and ends). The
-    deviation follows from the residuals while moving, or the position's resolution where that is coarser,
-    for white noise; None if it cannot be determined.
+    where fewer than four samples lie within the window, or nearly all to one side (at gaps and ends).
+
+    The deviation is a root of mean squares over rows in motion, and has two parts: white noise, by the residuals or by the
+    position's resolution where that is coarser, one square counting at most nine usual ones; and what the window flattens
+    (`_flattened`). The noise of a position is largest along the path, since an uncertain stamp moves a sample along it: hence ``along``.
+    None if it cannot be determined.
     """
     n = len(time)
-    speed, deviation = np.full(n, np.nan), np.full(n, np.nan)
+    position = position.reshape(n, -1)
+    along = np.ones((n, 1)) if along is None else along
+    speed, deviation, bent = np.full(n, np.nan), np.full(n, np.nan), np.full(n, np.nan)
     spacing = float(np.median(np.diff(time))) if n > 1 else 0.0
     if spacing <= 0.0:
         return speed, None
     half = int(np.clip(round(0.5 * window / spacing), 2, _WIDEST))
-    floor = quantum(position) / np.sqrt(12.0)
+    floor = max(quantum(values) for values in position.T) / np.sqrt(12.0)
     for first in range(0, n, _BLOCK):
         low, high = max(first - half, 0), min(first + _BLOCK + half, n)
-        result = _parabolas(time[low:high], position[low:high], half, (half + 0.5) * spacing, floor)
+        near = slice(low, high)
+        result = _parabolas(time[near], position[near], along[near], half, (half + 0.5) * spacing, floor)
         inner = slice(first - low, min(first + _BLOCK, n) - low)
-        speed[first : first + _BLOCK], deviation[first : first + _BLOCK] = result[0][inner], result[1][inner]
-    known = deviation[_moving(speed, np.isfinite(speed)) & (deviation > 0)]
-    return speed, float(np.median(known)) if len(known) else None
+        for whole, part in zip((speed, deviation, bent), result, strict=True):
+            whole[first : first + _BLOCK] = part[inner]
+    judged = _moving(speed, np.isfinite(speed)) & (deviation > 0)
+    if not judged.any():
+        return speed, None
+    square, bent = deviation[judged] ** 2, bent[judged & np.isfinite(bent)]
+    noise = float(np.mean(np.minimum(square, 9.0 * np.median(square))))
+    return speed, float(np.sqrt(noise + (max(float(np.mean(bent)), 0.0) if len(bent) else 0.0)))
 
 
 def _parabolas(
-    time: Floats, position: Floats, half: int, reach: float, floor: float
-) -> tuple[Floats, Floats]:
-    """Slope (n,) of the parabola around each sample, and its standard deviation (n,), NaN where there is none."""
+    time: Floats, position: Floats, along: Floats, half: int, reach: float, floor: float
+) -> tuple[Floats, Floats, Floats]:
+    """Slope (n,) of the parabola around each sample, its standard deviation (n,), and the square of what the window flattens (n,)
+    in expectation; NaN where there is none."""
     n = len(time)
     index = np.arange(n)[:, None] + np.arange(-half, half + 1)
     inside = (index >= 0) & (index < n)
     index = np.clip(index, 0, n - 1)
     u = (time[index] - time[:, None]) / reach
     inside &= np.abs(u) <= 1.0
-    y = position[index] - position[:, None]
+    y = sum((p[index] - p[:, None]) * a[:, None] for p, a in zip(position.T, along.T, strict=True))
     basis = np.stack([np.ones_like(u), u, u**2], axis=2)
     enough = inside.sum(axis=1) >= _FEWEST
     weight, fit, scale = inside.astype(np.float64), np.zeros((n, 3)), floor
@@ -100,7 +115,24 @@ def _parabolas(
     squares = np.einsum("nk,nk->n", weight, (y - np.einsum("nki,ni->nk", basis, fit)) ** 2)
     own = np.sqrt(squares / np.maximum(weight.sum(axis=1) - 3.0, 0.5))
     deviation = np.maximum(own, floor) * spread / reach
-    return np.where(enough, fit[:, 1] / reach, np.nan), np.where(enough, deviation, np.nan)
+    bent = _flattened(u, y, weight, fit[:, 1], scale**2 * spread**2) / reach**2
+    return tuple(np.where(enough, values, np.nan) for values in (fit[:, 1] / reach, deviation, bent))  # type: ignore[return-value]
+
+
+def _flattened(u: Floats, y: Floats, weight: Floats, slope: Floats, variance: Floats) -> Floats:
+    """The square (n,) of the slope that a parabola loses where the acceleration changes within its window, NaN where a cubic cannot
+    be fitted.
+
+    That slope is the cubic's less the parabola's. Both are of the same samples, so that noise makes the difference's variance the
+    difference of theirs (least squares over nested models), which is taken off: single values may be negative, their mean is meant.
+    """
+    enough = (weight > 0.05).sum(axis=1) >= _FEWEST + 2
+    basis = np.stack([np.ones_like(u), u, u**2, u**3], axis=2)
+    normal = np.einsum("nk,nki,nkj->nij", weight, basis, basis) + 1e-12 * np.eye(4)
+    cubic = np.linalg.solve(normal, np.einsum("nk,nki,nk->ni", weight, basis, y)[:, :, None])[:, 1, 0]
+    own = np.linalg.inv(_normal(basis[:, :, :3], weight + 1e-9))[:, 1, 1]
+    noise = variance * (np.linalg.inv(normal)[:, 1, 1] / own - 1.0)
+    return np.where(enough, (cubic - slope) ** 2 - noise, np.nan)
 
 
 def _moving(speed: Floats, known: npt.NDArray[np.bool_]) -> npt.NDArray[np.bool_]:
