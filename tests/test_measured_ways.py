@@ -120,13 +120,9 @@ def test_nobody_is_stuck_on_the_grass(shared: Located, name: str) -> None:
     assert not set(estimates["event"]) & {"stuck", "immobilization"}
 
 
-@pytest.mark.xfail(
-    strict=True,
-    reason="a pose's derivative flattens what its noise does not hold: 4.1 of 4: docs/real-logs.md",
-)
 def test_innovations_on_grass_are_of_the_right_order(shared: Located) -> None:
-    """Warthog, bank. The accelerometer's NIS is near 1; a pose's derivative has errors that its scatter does
-    not show, and turns drag the tires sideways: above."""
+    """Warthog, bank. The accelerometer's NIS is near 1. The derived ground speed's was 2.2 to 4.1 while its noise lacked what
+    uncertain stamps and the window do to it."""
     logs = sorted(shared("data/drive_warthog/raw20hz").glob("*.csv.gz"))
     assert len(logs) == 5
     vehicle = tg.Vehicle.load(EXAMPLES / "drive_warthog/vehicle.yaml")
@@ -138,7 +134,7 @@ def test_innovations_on_grass_are_of_the_right_order(shared: Located) -> None:
             for name in ("acceleration_x", "ground_speed")
         }
         assert 0.6 < mean["acceleration_x"] < 1.3
-        assert 1.0 < mean["ground_speed"] < 4.0
+        assert 0.8 < mean["ground_speed"] < 2.6
 
 
 @pytest.mark.xfail(

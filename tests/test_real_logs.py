@@ -76,7 +76,7 @@ def test_alostar_on_the_floor(shared: Located, judging: ModuleType) -> None:
         # Rubber on a floor with 10 % and 0.3 N m of doubt about torque: a few per cent of the weight.
         assert 0.01 < verdict.resistance < 0.06
         # Nothing is towed: adhesion feeds resistance and, in log90-3's pushes of half a second, 0.2 m/s² of acceleration (0.02).
-        assert abs(verdict.adhesion - verdict.resistance) < (0.03 if verdict.log == "log90-3" else 0.02)
+        assert abs(verdict.adhesion - verdict.resistance) < 0.02 + (0.02 if verdict.log == "log90-3" else 0)
     # Rows 0.2 to 0.4 s apart, in which the robot starts and stops: innovations are larger than the filter expects, but of its order.
     for name in ("log3300-180-3300-180", "log_3300x"):
         assert 0.6 < result[name].nis_straight < 2.5

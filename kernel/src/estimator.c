@@ -57,7 +57,8 @@ static void watch_consistency(tg_estimator *e, tg_row *row, const tg_step *step,
     tg_real sum = 0;
     for (int32_t c = 0; c < n + 2; c++) {
         if (isnan(step->innovation[c]) || made_up >> c & 1) continue;
-        const tg_real w = step->weight[c], variance = step->innovation_variance[c] + (w < 1 ? r[c] * (1 / w - 1) : 0);
+        const tg_real w = step->weight[c], expected = step->innovation_variance[c], shared = c < n ? row->shared[c] : 0;
+        const tg_real variance = expected - (shared < expected / 2 ? shared : expected / 2) + (w < 1 ? r[c] * (1 / w - 1) : 0);
         sum += row->channel_nis[c] = tgi_square(step->innovation[c]) / variance;
         count++;
     }
@@ -248,7 +249,7 @@ tg_status tg_estimator_update(tg_estimator *e, const tg_sample *sample, tg_estim
     tgi_track_turn(e, &row);
     tg_real q[TG_MAX_STATES];
     tgi_take_inputs(e, &row, dt, &drive);
-    tgi_input_noise(e, row.time, dt, q);
+    tgi_input_noise(e, dt, &row, q);
     tgi_loads(e, &row, &drive);
     tg_course course = course_of(e, &row, was_standing, turned, &gap);
     if (!e->started) e->ground_time = row.time;

@@ -38,6 +38,7 @@ typedef struct { /* one row, calibrated and checked, in the vehicle's own direct
     tg_real wheel_variance[8];
     tg_real ground_variance;
     tg_real doubt[9]; /* of the wheel speeds and the ground speed: variance beside the sensor's, of a spike */
+    tg_real shared[8]; /* of the wheel speeds' expected innovations: variance that neighbouring steps share, and one step does not have */
     tg_real channel_nis[TG_MAX_CHANNELS]; /* NaN: no update took the channel as measured */
 } tg_row;
 
@@ -221,7 +222,7 @@ void tgi_loads(tg_estimator *e, const tg_row *row, tg_drive *drive);
 void tgi_hold_update(tg_hold *h, const tg_tuned *k, tg_real x, double time, tg_real dt, tg_real noise, tg_real rate,
                      int32_t moving);
 void tgi_take_inputs(tg_estimator *e, tg_row *row, tg_real dt, tg_drive *drive);
-void tgi_input_noise(const tg_estimator *e, double time, tg_real dt, tg_real *q);
+void tgi_input_noise(const tg_estimator *e, tg_real dt, tg_row *row, tg_real *q);
 void tgi_along(const tg_estimator *e, const tg_drive *drive, tg_input *u);
 
 /* deviations.c */

