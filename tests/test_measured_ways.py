@@ -139,7 +139,7 @@ def test_innovations_on_grass_are_of_the_right_order(shared: Located) -> None:
 
 @pytest.mark.xfail(
     strict=True,
-    reason="neighbouring steps share a torque's noise, so that wheels err less: .46: docs/real-logs.md",
+    reason="the bank takes its walk's scale from the turns around: .46 straight ahead: docs/real-logs.md",
 )
 def test_wheels_of_a_turning_robot_are_expected_too_sure(shared: Located) -> None:
     """Alostar, bank: straight ahead wheel speeds fit; in turns, where sides slip alternately, they do not."""
