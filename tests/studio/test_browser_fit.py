@@ -104,6 +104,22 @@ def test_points_are_exported_as_they_are_shown(page: Any, served: Served, tmp_pa
     assert sum(row["kind"] == "point" for row in rows) == points
 
 
+def test_a_fit_that_takes_long_says_so(page: Any, served: Served) -> None:
+    page.goto(f"{served.url}/#/fit?path=estimates.parquet")
+    page.wait_for_selector("#soil-list li")
+    page.evaluate(
+        """() => {
+          window.said = [];
+          new MutationObserver(() => window.said.push(document.getElementById("fit-progress")?.textContent ?? ""))
+            .observe(document.querySelector("[aria-label='Curve']"), { subtree: true, childList: true, characterData: true });
+        }"""
+    )
+    page.click("#fit-each")
+    page.wait_for_function("() => window.said.includes('Fitting grass, 1 of 1 …')")
+    page.wait_for_function("() => window.terragripFit.state.kept.curves.some((curve) => curve.fit)")
+    page.wait_for_function("() => document.getElementById('fit-progress').textContent === ''")
+
+
 def test_the_loupe_shows_the_picture_while_a_line_is_digitised(
     page: Any, served: Served, folder: Path
 ) -> None:

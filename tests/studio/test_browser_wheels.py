@@ -39,8 +39,10 @@ def test_wheels_are_named_as_the_vehicle_has_them(page: Any, served: Served, fol
     for mine, theirs in {**GERMAN, "fr": "vl"}.items():
         page.select_option(f"#wheel-{theirs}", mine)
     page.click("#use-columns")  # vr is not named yet
-    page.wait_for_selector("#wizard-found:has-text('the vehicle has no wheel')")
-    page.click("#choose-columns > summary") if not page.is_visible("#wheel-vr") else None
+    page.wait_for_function("() => document.querySelector('#wizard-profile')?.value === 'german-profile.yaml'")
+    page.wait_for_selector("#wizard-found:has-text('no wheel vr')")
+    page.click("#name-wheels")
+    assert page.evaluate("() => document.activeElement.id") == "wheel-vr"
     page.select_option("#wheel-vl", "fl")
     page.select_option("#wheel-vr", "fl")
     page.click("#use-columns")

@@ -120,7 +120,7 @@ def _push(estimates: Estimates, rows: NDArray[np.intp]) -> str:
 def _standstill(estimates: Estimates, rows: NDArray[np.intp]) -> str:
     speed = estimates.about.get("settings", {}).get("standstill_speed") or watch_limits()["standstill_speed"]
     return (
-        f"Neither the wheels' rims nor the vehicle moved faster than about {speed:g} m/s: slip and efficiency are undefined, "
+        f"Neither the wheels' rims nor the vehicle moved faster than about {speed:.2g} m/s: slip and efficiency are undefined, "
         "adhesion and soil resistance are held."
     )
 

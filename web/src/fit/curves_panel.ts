@@ -31,16 +31,30 @@ const WIDE: Record<string, [number, number]> = {
 
 export class CurvesPanel {
   readonly element = h("section", { class: "panel", "aria-label": "Curve" });
+  private working = false;
   private rows = new Map<string, { slider: HTMLInputElement; field: HTMLInputElement; parameter: Parameter }>();
 
   constructor(
     private state: State,
-    private actions: { fit: () => void; each: () => void; save: () => void },
+    private actions: { fit: () => Promise<void>; each: (progress: (text: string) => void) => Promise<void>; save: () => void },
   ) {
     state.on((change) => {
       if (change === "all") this.draw();
       if (change === "curve") this.tellApart();
     });
+  }
+
+  /** Fit, and say so: a bootstrap takes seconds. A second click waits for nothing. */
+  private async work(fit: (progress: (text: string) => void) => Promise<void>): Promise<void> {
+    if (this.working) return;
+    this.working = true;
+    await fit((text) => {
+      const line = document.getElementById("fit-progress");
+      if (line) line.textContent = text;
+    });
+    this.working = false;
+    const line = document.getElementById("fit-progress");
+    if (line) line.textContent = "";
   }
 
   draw(): void {
@@ -67,10 +81,11 @@ export class CurvesPanel {
       h(
         "div",
         { class: "row" },
-        h("button", { type: "button", class: "primary", id: "fit-button", click: this.actions.fit }, "Fit to points"),
-        h("button", { type: "button", id: "fit-each", click: this.actions.each, title: "A curve for each soil that is shown, by this model, its held parameters and ends" }, "Fit each soil"),
+        h("button", { type: "button", class: "primary", id: "fit-button", click: () => void this.work((progress) => (progress("Fitting …"), this.actions.fit())) }, "Fit to points"),
+        h("button", { type: "button", id: "fit-each", click: () => void this.work((progress) => this.actions.each(progress)), title: "A curve for each soil that is shown, by this model, its held parameters and ends" }, "Fit each soil"),
         h("button", { type: "button", click: this.actions.save }, "Save to library"),
       ),
+      h("p", { class: "hint", id: "fit-progress", role: "status" }),
       this.result(curve),
       this.fitted(),
       this.adder(),

@@ -18,8 +18,9 @@ export async function fit(state: State): Promise<void> {
   state.changed("all");
 }
 
-/** Fit a curve to each soil that is shown, by the active curve's model, held parameters and ends; each soil has a curve of its own name. */
-export async function fitEach(state: State): Promise<void> {
+/** Fit a curve to each soil that is shown, by the active curve's model, held parameters and ends; each soil has a curve of its own name.
+ * `progress` hears which one is fitted. */
+export async function fitEach(state: State, progress: (text: string) => void): Promise<void> {
   const form = state.active;
   const soils = state.soils.filter((soil) => soil.shown && (soil.bins.length || soil.points.slip.length));
   if (!form || !soils.length) {
@@ -27,17 +28,18 @@ export async function fitEach(state: State): Promise<void> {
     return;
   }
   const { model, held, bounds, parameters } = structuredClone(form);
-  for (const soil of soils) {
+  for (const [i, soil] of soils.entries()) {
+    progress(`Fitting ${soil.name}, ${i + 1} of ${soils.length} …`);
     let curve = state.kept.curves.find((one) => one.source === `${FITTED}${soil.key}`);
     const before = structuredClone(curve);
     const taken = state.kept.curves.some((one) => one.name === soil.name);
     curve ??= state.addCurve(model, parameters, taken ? `${soil.name} (${soil.path})` : soil.name);
     Object.assign(curve, { model, held: [...held], bounds: structuredClone(bounds), parameters: { ...parameters }, color: soil.color, shown: true });
+    state.kept.active = form.id; // what the panel and the residuals show, also while the fit runs
     if (await fitTo(curve, pointsOf(state, soil), soil.key)) continue;
     if (before) Object.assign(curve, before);
     else state.kept.curves = state.kept.curves.filter((one) => one !== curve);
   }
-  state.kept.active = form.id;
   state.commit();
   state.changed("all");
 }

@@ -22,7 +22,7 @@ export const page: Page = (main, { notices, query }) => {
   const plot = new Plot(state);
   const pictures = new PicturesPanel(state, () => plot.fit());
   const list = new ListPanel(state, () => plot.fit(), pictures.element);
-  const curves = new CurvesPanel(state, { fit: () => void fit(state), each: () => void fitEach(state), save: () => void keep(state) });
+  const curves = new CurvesPanel(state, { fit: () => fit(state), each: (progress) => fitEach(state, progress), save: () => void keep(state) });
   const residuals = new Residuals(state, plot.view);
   const loupe = new Loupe(plot.element, state, plot.view);
   const undo = h("button", { type: "button", click: () => step("undo"), title: "Ctrl+Z" }, "Undo");

@@ -67,6 +67,7 @@ export class WheelNames {
 
   /** Put the cursor where the first name is to be given that the vehicle does not know. */
   focus(wheel: string): void {
+    for (const one of this.element.querySelectorAll("details")) one.open = true;
     document.getElementById(idOf(wheel))?.focus();
   }
 
@@ -80,7 +81,8 @@ export class WheelNames {
 
   private draw(): void {
     const groups = [false, true].flatMap((axle) => this.list(axle).map((wheel) => this.field(wheel, axle ? this.parts.axles : this.parts.wheels)));
-    fill(this.element, groups.length ? [h("p", { class: "hint" }, "The log’s wheels and axles, by the names of the vehicle file:"), h("div", { class: "row" }, groups)] : null);
+    const odd = this.strangers(() => true).length > 0;
+    fill(this.element, groups.length ? h("details", { open: odd }, h("summary", {}, "Which wheel is which"), h("p", { class: "hint" }, "The log’s wheels and axles, by the names of the vehicle file."), h("div", { class: "row" }, groups)) : null);
   }
 
   private field(wheel: string, known: string[]): HTMLElement {
