@@ -64,9 +64,9 @@ def machine(page: Any) -> None:
 
 
 def shrink(picture: bytes, target: Path) -> None:
-    """A palette of 256 colours is enough for a page, at a third of the size; chosen so that small patches keep theirs."""
+    """A palette of 256 colours is enough for a page, at a third of the size; chosen so that small patches and pale tints keep theirs."""
     whole = Image.open(io.BytesIO(picture)).convert("RGB")
-    whole.quantize(256, Image.Quantize.MAXCOVERAGE, dither=0).save(target, optimize=True)
+    whole.quantize(256, Image.Quantize.MAXCOVERAGE, kmeans=3, dither=0).save(target, optimize=True)
 
 
 PAGES = {

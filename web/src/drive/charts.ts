@@ -15,7 +15,7 @@ import { Rows, type Drawn } from "./rows";
 import type { Panel } from "./run";
 
 const SYNC = "drive";
-const [LOWEST, HEAD] = [116, 26];
+const [LOWEST, HEAD] = [104, 26];
 const SOON = 40; // ms
 /** Of a logarithmic axis. */
 export const MARKS = [0.05, 0.2, 1, 5, 50];
