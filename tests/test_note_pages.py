@@ -84,3 +84,15 @@ def test_a_drive_trains_speed_beside_wheel_torques_changes_nothing() -> None:
     alone = tg.estimate(drive.recording, drive.vehicle)
     with_it = tg.estimate(tg.Recording(drive.recording.time, both), drive.vehicle)
     np.testing.assert_array_equal(with_it["slip_rl"], alone["slip_rl"])
+
+
+def test_what_would_help_every_wheel_is_said_once() -> None:
+    """Four wheels that slip alike throughout: the remedy stands in the first note alone."""
+    time = np.arange(0.0, 120.0, 0.1)
+    speed = 2.0 + 0.3 * np.sin(time / 9)
+    drive = tg.simulate("fine-10", seed=1)
+    radius = drive.vehicle.wheel_radius
+    rims = {f"wheel_speed_{w}": 1.15 * speed / r for w, r in zip(drive.vehicle.wheels, radius, strict=True)}
+    notes = tg.estimate(tg.Recording(time, rims | {"ground_speed": speed}), drive.vehicle).notes
+    assert sum("Zero-slip radius of wheel" in note for note in notes) == 4
+    assert sum("record 40 s without load" in note for note in notes) == 1

@@ -26,3 +26,11 @@ if there:
 # %%
 if there:
     display(estimates.plot("time"))  # noqa: F821
+
+# %%
+if there:
+    display(estimates.plot("map"))  # noqa: F821
+
+# %%
+if there:
+    display(estimates.summary())  # noqa: F821

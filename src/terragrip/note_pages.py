@@ -24,6 +24,7 @@ PAGES = (
     ("No wheel speed was found", "vehicle#signals-that-are-missing"),
     ("There is no drive torque", "formats#a-stock-tractor-slip-from-its-bus"),
     ("nothing says how fast the machine turned", "formats#a-stock-tractor-slip-from-its-bus"),
+    ("record 40 s without load too", "formats#a-stock-tractor-slip-from-its-bus"),
     ("too short to tell the zero-slip radius", "formats#a-stock-tractor-slip-from-its-bus"),
     ("The rims read 0 in", "formats#a-stock-tractor-slip-from-its-bus"),
     ("is the engine's through the driveline", "vehicle#engine-torque-in-place-of-wheel-torques"),

@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from terragrip.estimation.rims import DRIVE, Rim, at_zero, calibrated_scale, rims_of
-from terragrip.estimation.zero_slip import Zero, zero_of
+from terragrip.estimation.zero_slip import REMEDY, Zero, zero_of
 from terragrip.recording import Recording
 from terragrip.recording.track import Track, track_of
 from terragrip.vehicle import Vehicle
@@ -63,7 +63,8 @@ def slip_reference_in(log: Recording, vehicle: Vehicle) -> SlipReference:
             zero[rim.wheel] = at
         learns = rim.wheel == DRIVE and calibrated_scale(vehicle) is None
         rims.append(at_zero(rim, at) if learns and at is not None else rim)
-        notes += _said(rim, at, learns)
+        remedied = any(REMEDY in note for note in notes)  # which once is enough for all wheels
+        notes += [one.replace(f": {REMEDY}", "") if remedied else one for one in _said(rim, at, learns)]
     if "wheel_based_speed" in log.channels and not any(rim.wheel == DRIVE for rim in rims):
         notes.append("wheel_based_speed is not used: the wheels have speeds of their own.")
     band, rows = _dead_band(log, rims)

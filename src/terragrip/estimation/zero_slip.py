@@ -29,7 +29,7 @@ FEWEST = 8
 UNTOLD = 0.03
 """Relative SD of a radius that nothing tells but the machine itself: worn or other tires, other pressure."""
 
-_MEND = "record 40 s without load too (headland, road), or say which rows are without load (terragrip calibrate --light FROM:TO)"
+REMEDY = "record 40 s without load too (headland, road), or say which rows are without load (terragrip calibrate --light FROM:TO)"
 _SLOWEST = 0.3  # m/s
 _GOING = 0.5  # of the window's mean speed: slower samples are stops
 _TURNING = 0.05  # rad/s
@@ -91,11 +91,11 @@ def _judged(ratio: Floats, fast: npt.NDArray[np.bool_]) -> Zero:
     if len(modes) > 1 or np.mean(fast) > 0.8:
         return Zero(value, std, count)
     if abs(value - 1) <= _NEAR:
-        why = f"all windows slip alike, so light work cannot be distinguished from field work: {_MEND}"
+        why = f"all windows slip alike, so light work cannot be distinguished from field work: {REMEDY}"
         return Zero(value, float(np.hypot(std, UNTOLD)), count, why)
     why = (
         f"all windows slip alike and run {abs(1 - value):.0%} {'behind' if value < 1 else 'ahead of'} the supposed radius, so that it is "
-        f"field work as likely as another radius: {_MEND}"
+        f"field work as likely as another radius: {REMEDY}"
     )
     return Zero(1.0, UNTOLD, count, why)
 
