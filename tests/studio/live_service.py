@@ -17,6 +17,8 @@ VALUES = [0.2, 0.01, 0.4, 1.5, 0.02, 1.0, 0.05]
 class LiveService:
     """Rows at 20 Hz while `mode` is "measured"; "predicted": predicted ones; "silent": none, but a status a second; "frozen": nothing."""
 
+    setpoint: dict[str, Any] | None = None  # what is published of it, four times a second
+
     def __init__(self) -> None:
         self.mode, self.address = "measured", ""
         self._ready, self._stop = threading.Event(), threading.Event()
@@ -45,6 +47,8 @@ class LiveService:
                 await socket.send(
                     np.array([row / 20, float(self.mode == "predicted"), 0.0, *VALUES]).tobytes()
                 )
+            if row % 5 == 0 and self.setpoint and self.mode == "measured":
+                await socket.send(json.dumps({"kind": "setpoint", "time": row / 20, **self.setpoint}))
             if row % 20 == 0 and self.mode != "frozen":
                 await socket.send(
                     json.dumps({"kind": "status", "time": row / 20, "delay": 0.0, "counts": {}})

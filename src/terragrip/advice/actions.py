@@ -90,8 +90,8 @@ def _load(work: Work, vehicle: Vehicle) -> list[Action]:
         return [
             Action(
                 f"Keep the load: no other is certain to be better; slip is best at {work.best.slip:.1%} ({low:.1%} to {high:.1%}).",
-                "The mean slip lies within the interval of the best one, or what another load would gain is small or not certain.",
-                gain, interval,
+                "The mean slip lies within the interval of the best one, or what another load would gain is small or not certain: "
+                f"{100 * gain:.1f} points of efficiency ({100 * interval[0]:.1f} to {100 * interval[1]:.1f}).",
             )
         ]  # fmt: skip
     weight = vehicle.mass * STANDARD_GRAVITY

@@ -20,7 +20,19 @@ from terragrip.studio.access import Access
 from terragrip.studio.state import UPLOAD_LIMIT, Studio
 
 STATIC = Path(__file__).with_name("static")
-ROUTES = ("files", "columns", "machines", "jobs", "fit", "pictures", "drive", "signals", "live", "basemap")
+ROUTES = (
+    "files",
+    "columns",
+    "machines",
+    "jobs",
+    "fit",
+    "pictures",
+    "drive",
+    "advice",
+    "signals",
+    "live",
+    "basemap",
+)
 NOT_BUILT = (
     "The studio's pages are not built. They need Node.js 20 or newer: install it, then run `make studio` in a clone "
     "(or install a released wheel, which holds them). The interface at /openapi.json works without them."

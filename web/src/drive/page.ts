@@ -10,6 +10,7 @@ import { notHere, options, runsOf } from "../ui/runs";
 import { saveMenu } from "../ui/sheet";
 import { onUnits } from "../ui/units";
 import { Across } from "./across";
+import { AdvicePanel } from "./advice";
 import { AXES, layerOf, shortNames, type Axis, type Layer } from "./along";
 import { Charts } from "./charts";
 import { panelMenu, wheelChips } from "./choices";
@@ -52,6 +53,7 @@ export const page: Page = (main, { notices, query }) => {
   });
   const back = h("button", { type: "button", id: "back", disabled: true, click: () => views.back(), title: "The times shown before (Backspace)" }, "Back");
   const forward = h("button", { type: "button", id: "forward", disabled: true, click: () => views.forward(), "aria-label": "Forward again" }, "↷");
+  const advice = new AdvicePanel();
   const details = h("section", { class: "sample", "aria-label": "Sample", "aria-live": "polite" });
   const over = h("select", { id: "over", "aria-label": "Drawn over" }, (Object.keys(AXES) as Axis[]).map((name) => h("option", { value: name }, `Over ${AXES[name].title}`)));
   const overlay = overlayChooser((paths) => void lay(paths));
@@ -82,8 +84,7 @@ export const page: Page = (main, { notices, query }) => {
     layouts(layout, takeUp),
     saveMenu(() => ["drive", ...layers.map(({ label }) => label)].join("-"), async () => (layers.length ? sheetOf(charts, layers, across) : undefined), () => tableOf(charts, layers)),
     h("span", { class: "spring" }),
-    back,
-    forward,
+    [back, forward],
     h("button", { type: "button", id: "zoom-in", click: () => zoom(0.5), "aria-label": "Zoom in" }, "+"),
     h("button", { type: "button", click: () => zoom(2), "aria-label": "Zoom out" }, "−"),
     h("button", { type: "button", click: () => charts.zoom(charts.whole) }, "Whole run"),
@@ -95,6 +96,7 @@ export const page: Page = (main, { notices, query }) => {
       { class: "panel", "aria-label": "Plane and sample" },
       across.element,
       list.element,
+      advice.element,
       h(
         "div",
         { class: "row" },
@@ -249,6 +251,7 @@ export const page: Page = (main, { notices, query }) => {
     if (named.length) chosen = named;
     choice.value = wanted;
     list.show(found.events);
+    advice.of(wanted, found.version);
     drawWheels();
     hover(null);
     await lay(others);
@@ -276,6 +279,7 @@ export const page: Page = (main, { notices, query }) => {
     charts.clear(why);
     forgetSample();
     list.show([]);
+    advice.of("", "");
     for (const one of [legend, wheels]) fill(one);
     across.show([], [], null);
     readout.value = "";
@@ -391,8 +395,7 @@ export const page: Page = (main, { notices, query }) => {
   return () => {
     forgets.forEach((forget) => forget());
     main.removeEventListener("keydown", key);
-    views.close();
-    charts.close();
+    for (const one of [views, charts, advice]) one.close();
     across.close();
   };
 };

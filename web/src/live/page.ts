@@ -10,6 +10,7 @@ import { onUnits, unitFor, unitNamed, type Kind } from "../ui/units";
 import { Alarms } from "./alarms";
 import { Feed, type Said } from "./feed";
 import { ageOf, brief, eventNow, LINGER, oldSaid, reading, seconds, WARNING } from "./numbers";
+import { SetpointLine, type Setpoint } from "./setpoint";
 import { Traces, type Trace } from "./traces";
 
 /** Seconds between looks at how old the last row is, and after which a status says nothing of now (one comes every second). */
@@ -48,6 +49,7 @@ export const page: Page = (main, { notices, query }) => {
   });
   const traces = new Traces(feed.ring, () => feed.hello?.events ?? []);
   const alarms = new Alarms();
+  const setpoint = new SetpointLine();
   const span = h("select", { id: "live-span", "aria-label": "Time shown" }, SPANS.map((x) => h("option", { value: x, selected: x === traces.span }, x < 60 ? `${x} s` : `${x / 60} min`)));
   span.addEventListener("change", () => {
     traces.span = Number(span.value);
@@ -70,6 +72,7 @@ export const page: Page = (main, { notices, query }) => {
     alarms.element,
     old,
     h("div", { class: "tiles" }, slip.element, grip.element, soil.element, speedTile.element),
+    setpoint.element,
     traces.element,
     h("div", { class: "past" }, past, place, follow),
     said,
@@ -102,6 +105,7 @@ export const page: Page = (main, { notices, query }) => {
       warnedAt = -Infinity;
       warning.hidden = true;
       for (const one of [slip, grip, soil, speedTile]) one.set("–", "");
+      setpoint.show(null);
       delay = 0;
       delete health.dataset["drops"];
       fill(said);
@@ -121,6 +125,7 @@ export const page: Page = (main, { notices, query }) => {
     traces.late = connected && traces.held === null && silent > limit ? silent * played : 0;
     old.hidden = !isOld;
     if (!isOld) return;
+    setpoint.show(null); // an old one is no advice
     old.textContent =
       traces.held !== null ? `Paused: these numbers are ${seconds((performance.now() - heldAt) / 1000)} old.` : oldSaid(predicted, unmeasured, feed.state === "ended");
     if (traces.late) traces.redraw();
@@ -140,6 +145,8 @@ export const page: Page = (main, { notices, query }) => {
       said.prepend(h("li", {}, h("strong", {}, message.kind), message.time === null ? "" : ` ${message.time.toFixed(1)} s`, message.text ? `: ${message.text}` : ""));
       while (said.children.length > 6) said.lastElementChild?.remove();
       if (message.kind in WARNING) warn(message.kind, message.text);
+    } else if (message.kind === "setpoint") {
+      if (traces.held === null) setpoint.show(message as unknown as Setpoint);
     } else if (message.kind === "soil") {
       const sure = message.probability === null || message.probability === undefined ? (message.labelled ? "labelled" : "") : `${digits(100 * message.probability, 2)} % sure`;
       soil.set(message.soil || "–", sure);
@@ -233,6 +240,7 @@ export const page: Page = (main, { notices, query }) => {
     forgets.forEach((forget) => forget());
     feed.close();
     alarms.close();
+    setpoint.close();
     traces.close();
   };
 };

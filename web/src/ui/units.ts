@@ -30,6 +30,7 @@ const COLUMNS: [RegExp, Kind | string][] = [
   [/^(drawbar_force$|vertical_load_|wheel_force_)/, "force"],
   [/^(adhesion_|net_traction_|curve_a$|soil_resistance$|nis$|supervisor$|adaptation_)/, "–"],
   [/^(distance|altitude)$/, "m"],
+  [/^fuel_rate$/, "m³/s"],
   [/^(latitude|longitude)$/, "°"],
   [/^(pitch|roll)$/, "rad"],
   [/^acceleration_/, "m/s²"],
