@@ -32,7 +32,6 @@ const KEY = "terragrip-drive-panels";
 const HINT = "Drag or shift+wheel zooms, arrow keys pan, double click shows all.";
 const HINT_NARROW = "Two fingers zoom, one pans.";
 const NARROW = matchMedia("(max-width: 600px)"); // as in the style sheet
-
 const CLICK = "Click a chart to see everything known of that moment, and why µ moved. ◀ ▶ step through samples.";
 
 export const page: Page = (main, { notices, query }) => {
