@@ -1,9 +1,10 @@
 """Is getting stuck foretold, and how often for nothing? On random machines of both plants, without a drawbar cell.
 
     python benchmarks/bench_warning.py [--families development held-out second-plant snow] [--stops 40] [--hours 2] [--rates 100 10]
-                                       [--workers 2] [--write]
+                                       [--workers 2] [--speeds-alone] [--write]
 
-Closing figures: --families held-out second-plant --stops 300 --hours 20. development and held-out: terragrip.simulation.families;
+Closing figures: --families held-out second-plant --stops 345 --hours 20 --seed 810000 --write.
+development and held-out: terragrip.simulation.families;
 second-plant: MuJoCo (benchmarks/second_plant), held out as a whole. A digging drive goes steadily into ground that cannot bear what is
 asked. Its stop is when, by the truth, the ground speed first stays under STOPPED of the rim's while wheels turn. A warning counts
 from its start, missed: none between the edge of the soft ground and the stop. Lead is also given in vehicle lengths: of way
@@ -20,6 +21,7 @@ import sys
 from collections.abc import Iterable, Iterator
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -44,6 +46,7 @@ SLOW = 1.0  # m/s
 HEALTHY = 600.0  # s a drive
 DOCUMENT = Path(__file__).resolve().parents[1] / "docs/families.md"
 BEGIN = "<!-- made by benchmarks/bench_warning.py --write -->"
+ALONE = "<!-- made by benchmarks/bench_warning.py --speeds-alone --write -->"
 SNOW_DOCUMENT, SNOW_BEGIN = (
     DOCUMENT.with_name("events.md"),
     "<!-- made by benchmarks/bench_warning.py --write: snow -->",
@@ -144,8 +147,8 @@ def judge(course: Course, warnings: list[float], stuck: list[float]) -> Tally:
     return tally
 
 
-def score(job: tuple[str, Kind, int, str, float]) -> Tally:
-    """One drive at one rate."""
+def score(job: tuple[str, Kind, int, str, float], speeds_alone: bool = False) -> Tally:
+    """One drive at one rate, without its drawbar cell; with ``speeds_alone`` without its torques too."""
     part, kind, seed, task, rate = job
     source: Any = second if part == "second-plant" else families
     duration = HEALTHY if task == "healthy" else None
@@ -155,7 +158,8 @@ def score(job: tuple[str, Kind, int, str, float]) -> Tally:
         print(f"left out: {kind} {seed} {task}: {error}", file=sys.stderr)
         return Tally()
     recording = result.recording
-    channels = {name: values for name, values in recording.channels.items() if name != "drawbar_force"}
+    left_out = ("drawbar_force", "drive_torque") if speeds_alone else ("drawbar_force",)
+    channels = {name: x for name, x in recording.channels.items() if not name.startswith(left_out)}
     rows = np.logical_or.reduce([np.isfinite(values) for values in channels.values()])
     seen = type(recording)(recording.time, channels, source=recording.source).select(rows)
     return judge(course_of(result, task == "digging"), *starts(seen, result.vehicle))
@@ -263,6 +267,7 @@ def main() -> None:
     parser.add_argument("--rates", type=float, nargs="+", default=[100.0, 10.0])
     parser.add_argument("--seed", type=int, default=0, help="of the first machine")
     parser.add_argument("--workers", type=int, default=1)
+    parser.add_argument("--speeds-alone", action="store_true", help="without the torques: slip alone")
     parser.add_argument(
         "--write",
         action="store_true",
@@ -276,9 +281,8 @@ def main() -> None:
                 tallies[part, snow_runs.RATE] = score_snow()
                 continue
             listed = list(jobs(part, arguments.stops, arguments.hours, arguments.rates, arguments.seed))
-            scored = pool.map(
-                score, listed, chunksize=len(arguments.rates)
-            )  # a machine's rates in one process
+            one = partial(score, speeds_alone=arguments.speeds_alone)
+            scored = pool.map(one, listed, chunksize=len(arguments.rates))  # a machine's rates in one process
             for k, (job, tally) in enumerate(zip(listed, scored, strict=True)):
                 tallies.setdefault((part, job[-1]), Tally()).add(tally)
                 if k % 100 == 99:
@@ -288,7 +292,8 @@ def main() -> None:
     if arguments.write and arguments.families == ["snow"]:
         put(SNOW_DOCUMENT, SNOW_BEGIN, text)
     elif arguments.write:
-        put(DOCUMENT, BEGIN, f"Machines from seed {arguments.seed}.\n\n{text}")
+        asked = f"Machines from seed {arguments.seed}, `--stops {arguments.stops} --hours {arguments.hours:g}` a part."
+        put(DOCUMENT, ALONE if arguments.speeds_alone else BEGIN, f"{asked}\n\n{text}")
 
 
 if __name__ == "__main__":

@@ -28,7 +28,7 @@ from terragrip.simulation.families import Kind
 from terragrip.vehicle import Vehicle
 
 NUMBERS = (
-    "pace", "memory", "usual", "level", "ahead", "warn", "most", "rise", "high_slip", "leading", "resistance", "command",
+    "pace", "memory", "usual", "sure", "ahead", "warn", "most", "rise", "high_slip", "leading", "resistance", "command",
 )  # fmt: skip
 Variation = tuple[str, float]
 VARIATIONS: tuple[Variation, ...] = (

@@ -99,16 +99,10 @@ def test_a_bus_on_which_nothing_moves_proposes_no_speed(
 
 GRASS = (
     "grass",
-    pytest.param(
-        "grass_2024_7_18_16h59s20",
-        marks=pytest.mark.xfail(strict=True, reason="stuck in one row at 277.3 s: docs/events.md"),
-    ),
+    "grass_2024_7_18_16h59s20",
     "grass_2024_7_29_14h46s15",
     "grass_2024_7_29_14h4s53",
-    pytest.param(
-        "grass_2024_7_29_14h8s51",
-        marks=pytest.mark.xfail(strict=True, reason="a warning in one row at 74.7 s: docs/events.md"),
-    ),
+    "grass_2024_7_29_14h8s51",
 )
 
 

@@ -281,12 +281,12 @@ typedef struct { /* when the estimator warns of immobilization (see src/digging.
     tg_real pace;                   /* the unit of time, over sqrt(length/gravity) */
     tg_real memory;                 /* units of time, low-pass of the points' sum, the score */
     tg_real usual;                  /* units of time over which what is usual is learned */
-    tg_real level;                  /* it warns only of slip that is, less its SD, so much above its usual, */
-    tg_real ahead;                  /* that passes this if it rises as much again in the next unit of time, */
+    tg_real sure;                   /* SDs that are taken off slip where it has to be sure: to be high, and to be warned of, which it is only above its usual, */
+    tg_real ahead;                  /* and where it passes this if it rises as much again in the next unit of time, */
     tg_real warn;                   /* and of a score above this; on until it is half of this */
     tg_real most;                   /* points of a sign at most; of high slip and of the command twice as many */
     tg_real rise;                   /* a point: rise of slip above its mean over a unit of time */
-    tg_real high_slip;              /* slip, less its SD, beyond which points are given, `most` at twice that */
+    tg_real high_slip;              /* sure slip beyond which points are given, `most` at twice that */
     tg_real leading;                /* a point: fall of the leading wheels' share of adhesion (-1 to 1) below its usual */
     tg_real resistance;             /* a point: rise of the soil resistance above its mean over a unit of time */
     tg_real command;                /* a point off: gain of rim or ground speed over that mean, or twice as much loss of rim speed; log */

@@ -111,7 +111,7 @@ int32_t tgi_digging_update(tg_estimator *e, double time, const tgi_view *row)
     const tg_real *const now = d->now, *const mean = d->mean;
     tg_real since;
     if (!add_row(e, time, row, &since)) return 0;
-    const tg_real slip = now[TGI_SLIP], deviation = now[TGI_DEVIATION], sure = slip - deviation, rise = slip - mean[TGI_SLIP];
+    const tg_real slip = now[TGI_SLIP], deviation = now[TGI_DEVIATION], sure = slip - s->sure * deviation, rise = slip - mean[TGI_SLIP];
     const tg_real rim = now[TGI_RIM] - mean[TGI_RIM], gain = now[TGI_TRAVEL] - mean[TGI_TRAVEL];
     /* Rims that gain while the vehicle loses speed spin, by no command. They slow by command and in hits, yet also of a weak drive that digs in. */
     const tg_real command = tgi_max(tgi_max(rim + (gain < 0 ? gain : 0), gain), -rim / 2);
@@ -125,7 +125,7 @@ int32_t tgi_digging_update(tg_estimator *e, double time, const tgi_view *row)
     tg_real sum = 0;
     for (int32_t k = 0; k < TG_SIGNS; k++) sum += d->points[k];
     d->score = low_pass(d->score, since < e->constants.pace ? since : e->constants.pace, s->memory * e->constants.pace, sum);
-    d->slips = sure > d->usual[0] + s->level && sure + rise > s->ahead;
+    d->slips = sure > d->usual[0] && sure + rise > s->ahead;
     return 1;
 }
 

@@ -59,7 +59,8 @@ static tgi_view view_of(const tg_estimator *e, const tg_real *o)
     const tg_real sides = (tg_real)((side[0].count > 0) + (side[1].count > 0));
     l.slip = (side[0].slip + side[1].slip) / sides;
     l.deviation = (side[0].deviation + side[1].deviation) / sides;
-    const int32_t onward = sides < 2 || side[0].sum * side[1].sum > 0; /* sides that turn against each other turn the vehicle on the spot */
+    /* Sides that turn against each other turn the vehicle on the spot; both against the travel reverse it. */
+    const int32_t onward = (sides < 2 || side[0].sum * side[1].sum > 0) && (tg_real)e->direction * l.rim > 0;
     l.fastest = onward ? tgi_fabs(side[0].rim + side[1].rim) / sides : 0;
     l.rim = onward ? tgi_fabs(l.rim) / count : 0;
     l.leading = ahead > 0 && behind > 0 ? l.leading / ahead : adhesion / count;
@@ -67,6 +68,7 @@ static tgi_view view_of(const tg_estimator *e, const tg_real *o)
     l.adhesion_deviation = tgi_sqrt(2 * l.adhesion_deviation) / count;
     l.resistance_deviation = o[TG_OUT_SOIL_RESISTANCE_STD];
     l.resistance = o[TG_OUT_SOIL_RESISTANCE];
+    if (e->settings.method == TG_SPEEDS) l.leading = l.trailing = l.adhesion_deviation = 0; /* no torque, no adhesion: slip and speeds speak alone */
     l.travel = (tg_real)e->direction * o[TG_OUT_GROUND_SPEED];
     l.travel_deviation = o[TG_OUT_GROUND_SPEED_STD];
     if (l.slip < (tg_real)-0.2) l.slip = (tg_real)-0.2;
@@ -145,7 +147,8 @@ static void judge_push(tg_estimator *e, const tg_drive *drive, const tg_real *o,
     w->pushing = w->pushed >= s->push_duration || (w->pushing && w->pushed > 0);
 }
 
-/* After a row's values were worked out; `moving`: the filter went on with it, `anew`: from a new start. */
+/* After a row's values were worked out; `moving`: the filter went on with it, `anew`: from a new start. Without torques there is no
+ * `drive` and no push. */
 void tgi_watch_over(tg_estimator *e, const tg_row *row, const tg_drive *drive, int32_t moving, int32_t anew, tg_real dt, tg_real *o)
 {
     tgi_watch *w = &e->watch;
@@ -155,7 +158,7 @@ void tgi_watch_over(tg_estimator *e, const tg_row *row, const tg_drive *drive, i
         w->pushed = 0;
         w->pushing = 0;
     }
-    if (!rests && moving) judge_push(e, drive, o, dt);
+    if (!rests && moving && drive) judge_push(e, drive, o, dt);
     if (!rests && moving && slips) {
         const tgi_view l = view_of(e, o);
         const int32_t measured = !row->reckoned && !isnan(row->value[TG_GROUND_SPEED]);

@@ -23,15 +23,15 @@ static tg_watch_settings default_watch(void)
     w.pace = 4;
     w.memory = (tg_real)0.4;
     w.usual = 12;
-    w.level = (tg_real)0.05;
+    w.sure = (tg_real)1.5;
     w.ahead = (tg_real)0.2;
-    w.warn = (tg_real)3.5;
+    w.warn = (tg_real)3.3;
     w.most = 3;
     w.rise = (tg_real)0.035;
-    w.high_slip = (tg_real)0.25;
-    w.leading = (tg_real)0.04;
-    w.resistance = (tg_real)0.04;
-    w.command = (tg_real)0.022;
+    w.high_slip = (tg_real)0.28;
+    w.leading = (tg_real)0.08;
+    w.resistance = (tg_real)0.015;
+    w.command = (tg_real)0.03;
     w.stuck_duration = (tg_real)0.5;
     w.stuck_travel = (tg_real)0.1;
     w.free_travel = (tg_real)0.4;
@@ -165,7 +165,7 @@ static tg_status check_numbers(const tg_settings *s)
     const tg_real spreads[] = {u->drive_torque_gain, u->drive_torque_gain_common, u->drive_torque_offset, u->drawbar_gain, u->drawbar_offset, u->slope,
                                u->tire_rolling_resistance, u->vertical_load, u->wheel_radius, u->acceleration_bias,
                                s->slope_spread, s->standstill_speed, s->dead_band, s->outlier_weight, s->load_filter, s->center_of_gravity_height,
-                               s->hitch_height, s->watch.level, s->watch.ahead, s->watch.most, s->watch.high_slip,
+                               s->hitch_height, s->watch.sure, s->watch.ahead, s->watch.most, s->watch.high_slip,
                                s->watch.stuck_duration, s->watch.stuck_travel, s->watch.free_travel, s->watch.push, s->watch.thrust,
                                s->watch.push_duration};
     const tg_real positive[] = {s->watch.pace, s->watch.memory, s->watch.usual, s->watch.rise, s->watch.leading, s->watch.resistance,

@@ -10,6 +10,7 @@
 #define TG_DWELL ((tg_real)2)          /* s, mean time in a pair of densities */
 #define TG_FIRST_RATE ((tg_real)1)     /* m/s^2, SD of the acceleration before it was seen */
 #define TG_SLOWEST ((tg_real)0.1)      /* m/s: slower wheels change their slip speed no less */
+#define TG_TOGETHER ((tg_real)0.9)     /* correlation of what two wheels' slip speeds change by: they stand on one ground and pull one load */
 
 /* (m/s^2)^2/s: a steady drive, driving by hand, sharp starts and stops. */
 static const tg_real manoeuvres[TG_LEVELS] = {(tg_real)1e-3, (tg_real)3e-2, 1};
@@ -34,11 +35,15 @@ static void disturb(const tg_real *x, tg_real (*P)[SIZE], tg_real dt, tg_real ma
     P[0][1] += manoeuvre * dt * dt / 2;
     P[1][0] += manoeuvre * dt * dt / 2;
     P[1][1] += manoeuvre * dt;
+    tg_real fast[TG_MAX_WHEELS];
     for (int32_t i = 0; i < n; i++) {
-        tg_real speed = tgi_fabs(x[0]), rim = tgi_fabs(x[0] + x[2 + i]);
-        if (rim > speed) speed = rim;
-        if (speed < TG_SLOWEST) speed = TG_SLOWEST;
-        P[2 + i][2 + i] += slipping * dt * speed * speed;
+        const tg_real speed = tgi_fabs(x[0]), rim = tgi_fabs(x[0] + x[2 + i]);
+        fast[i] = tgi_max(tgi_max(speed, rim), TG_SLOWEST);
+        for (int32_t j = 0; j <= i; j++) {
+            const tg_real added = (j < i ? TG_TOGETHER : 1) * slipping * dt * fast[i] * fast[j];
+            P[2 + i][2 + j] += added;
+            if (j < i) P[2 + j][2 + i] += added;
+        }
     }
 }
 
@@ -299,7 +304,10 @@ void tgi_speeds_update(tg_estimator *e, tg_row *row, tg_estimate *out)
     e->belief.channels = in.count;
     for (int32_t k = 0; k < in.count; k++) s->seen[in.given[k]] = 1;
     if (!gap && !e->standing) e->distance += (double)((travelled + tgi_fabs(s->x[0])) / 2 * dt);
-    if (row->measured) e->measured_time = row->time;
+    if (row->measured) {
+        e->seen_motion = 1;
+        e->measured_time = row->time;
+    }
     const int32_t first = !e->started;
     e->started = 1;
     e->time = row->time;
@@ -311,10 +319,14 @@ void tgi_speeds_update(tg_estimator *e, tg_row *row, tg_estimate *out)
     out->value[TG_OUT_NIS] = e->belief.nis;
     memcpy(out->value + TG_OUT_CHANNEL_NIS, row->channel_nis, sizeof row->channel_nis);
     out->value[TG_OUT_CHANNELS] = (tg_real)e->belief.channels;
-    out->event = (gap && !first) || is_blind(s, n) ? TG_EVENT_GAP
-               : e->standing                       ? TG_EVENT_STANDSTILL
-               : row->outlier                      ? TG_EVENT_OUTLIER
-                                                   : TG_EVENT_NONE;
+    const int32_t open = is_blind(s, n);
+    tgi_watch_over(e, row, 0, !open, gap || open, dt, out->value);
+    const int32_t watched = tgi_watched(e);
+    out->event = (gap && !first) || open    ? TG_EVENT_GAP
+               : e->standing                ? TG_EVENT_STANDSTILL
+               : watched != TG_EVENT_NONE   ? watched
+               : row->outlier               ? TG_EVENT_OUTLIER
+                                            : TG_EVENT_NONE;
 }
 
 /* ---- smoothing: a row's record is its tgi_speeds ---- */

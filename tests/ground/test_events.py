@@ -337,3 +337,36 @@ def test_an_empty_table_has_no_events(soft):
         table.time[:0], {k: v[:0] for k, v in table.columns.items()}, table.event_codes[:0], {}, table.about
     )
     assert events(none) == ()
+
+
+@pytest.fixture(scope="module")
+def without_torques(soft):
+    """The same drive by one who logs speeds alone."""
+    result, _ = soft
+    log = result.recording
+    speeds = {k: v for k, v in log.channels.items() if not k.startswith("drive_torque")}
+    return result, estimate(Recording(time=log.time, channels=speeds), result.vehicle)
+
+
+def test_without_torques_slip_alone_warns_and_stuck_comes_in_time(without_torques):
+    result, table = without_torques
+    stop = full_stop(result.truth)
+    kinds = {e.kind: e for e in reversed(events(table))}
+    assert not table.has_adhesion
+    assert result.truth["true_distance"][result.truth["time"] >= kinds["immobilization"].start].iloc[0] > 6
+    assert kinds["immobilization"].start < stop
+    assert stop - 1.0 < kinds["stuck"].start <= stop + 0.5
+    assert "torque" not in kinds["stuck"].why
+    assert "warns above" in kinds["immobilization"].why
+    assert not {"warning_leading", "warning_resistance"} & set(table.columns)
+
+
+def test_without_torques_a_healthy_drive_is_quiet():
+    for seed in (1004, 1006):
+        log = simulate(healthy_drive(seed, duration=60.0, drawbar=False))
+        speeds = {k: v for k, v in log.recording.channels.items() if not k.startswith("drive_torque")}
+        kinds = [
+            e.kind for e in events(estimate(Recording(time=log.recording.time, channels=speeds), log.vehicle))
+        ]
+        assert "stuck" not in kinds
+        assert kinds.count("immobilization") <= 1

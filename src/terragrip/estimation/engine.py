@@ -22,6 +22,8 @@ EVENTS = ("", "outlier", "standstill", "gap", "immobilization", "stuck", "push",
 
 SIGNS = ("rise", "high_slip", "leading", "resistance", "command")
 """The signs of the warning, columns ``warning_<sign>``, in the order of tg_sign."""
+OF_FORCES = ("leading", "resistance")
+"""Those of them that need torques."""
 
 _MISSING = (math.nan,) * lib.TG_SLOTS
 _BLOCK = 1 << 18  # rows a call: Ctrl-C and progress get a turn between calls

@@ -10,8 +10,9 @@ import numpy as np
 
 from terragrip._kernel import ffi, lib
 from terragrip.errors import InputError
+from terragrip.estimation.engine import OF_FORCES, SIGNS
 from terragrip.estimation.methods import SLIP_ONLY
-from terragrip.estimation.settings import Thresholds, wheel_radii
+from terragrip.estimation.settings import WITHOUT_TORQUE, Thresholds, put_axles, wheel_radii
 from terragrip.estimation.zero_slip import UNTOLD, Zero
 from terragrip.physics.loads import GRAVITY
 from terragrip.recording.schema import has_torque
@@ -132,6 +133,8 @@ def slots_out(rims: Collection[Rim]) -> dict[str, int]:
                 continue
             slots[f"{quantity}_{rim.wheel}"] = value + i
             slots[f"{quantity}_{rim.wheel}_std"] = std + i
+    slots |= {"warning": lib.TG_OUT_WARNING, "warning_usual_slip": lib.TG_OUT_USUAL_SLIP}
+    slots |= {f"warning_{sign}": lib.TG_OUT_SIGN + k for k, sign in enumerate(SIGNS) if sign not in OF_FORCES}
     return slots | {"nis": lib.TG_OUT_NIS, "channels": lib.TG_OUT_CHANNELS}
 
 
@@ -149,11 +152,18 @@ def speed_settings(
     settings.method = SLIP_ONLY.kind
     machine = settings.machine
     machine.wheels, machine.mass, machine.gravity = len(rims), vehicle.mass, GRAVITY
+    put_axles(settings, vehicle)
     for i, rim in enumerate(rims):
         machine.radius[i] = settings.rolling_radius[i] = rim.radius
         machine.inertia[i] = 1.0  # of no effect without torque
         settings.wheel_share[i] = 1 / len(rims)
         settings.wheel_side[i] = rim.side
+        if rim.wheel in vehicle.wheels:
+            place = vehicle.wheels.index(rim.wheel)
+            settings.wheel_axle[i], settings.powered[i] = (
+                vehicle.wheel_axle[place],
+                bool(vehicle.driven[place]),
+            )
         settings.gain[lib.TG_WHEEL_SPEED + i] = rim.scale
         settings.noise[lib.TG_WHEEL_SPEED + i] = noise[rim.channel] / rim.scale
     lib.tg_tune_walks(settings)
@@ -164,5 +174,6 @@ def speed_settings(
         settings.held_period[slot] = held.get(name, 0.0)
     settings.uncertainty.wheel_radius = max((rim.spread for rim in rims), default=0.0)
     settings.dead_band = dead_band
+    settings.watch.warn *= WITHOUT_TORQUE
     thresholds.put(settings)
     return settings

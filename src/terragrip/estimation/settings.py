@@ -42,6 +42,10 @@ class Thresholds:
             settings.tuned.least_load_spread /= math.sqrt(self.together)
 
 
+WITHOUT_TORQUE = 2 / 3
+"""Where slip alone is estimated, the warning has three of its five signs: its score warns above this share of the whole."""
+
+
 def watch_limits(wheel_radius: float = 0.2) -> dict[str, float]:
     """The thresholds by which the estimator flags rows: tg_watch_settings, ``gap`` [s] and ``standstill_speed`` [m/s].
 
@@ -90,7 +94,7 @@ def settings_of(
     settings.tuning.engine = method.engine
     settings.tuning.policy = method.policy
     settings.tuning.supervisor = method.supervisor
-    settings.axles = len(vehicle.axle_names)
+    put_axles(settings, vehicle)
     settings.towing = "drawbar_force" in channels
     _set_wheels(settings, vehicle, channels)
     lib.tg_tune_walks(settings)
@@ -157,12 +161,17 @@ def _deflection(wheel: Wheel, radius: float, load: float) -> float:
     return float(found)
 
 
-def _set_loads(settings: Any, vehicle: Vehicle) -> None:
-    """Shares and levers of the load formulas (physics.md 3), which physics.loads has."""
+def put_axles(settings: Any, vehicle: Vehicle) -> None:
+    """Into a tg_settings: the axles, what each carries, and their levers, which are the machine's length besides."""
     levers, mass = load_levers(vehicle.axle_to_rear), vehicle.axle_mass
+    settings.axles = len(vehicle.axle_names)
     for k in range(len(mass)):
         settings.load_share[k] = mass[k] / mass.sum()
         settings.load_transfer[k] = levers[k]
+
+
+def _set_loads(settings: Any, vehicle: Vehicle) -> None:
+    """Heights and shares of the load formulas (physics.md 3), which physics.loads has."""
     settings.center_of_gravity_height = vehicle.center_of_gravity_height
     settings.hitch_height = vehicle.hitch_height
     level, leaning = wheel_shares(

@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 
 from terragrip.estimation import Estimates
 from terragrip.estimation.engine import EVENTS, SIGNS
-from terragrip.estimation.settings import watch_limits
+from terragrip.estimation.estimates import wheels_with
+from terragrip.estimation.settings import WITHOUT_TORQUE, watch_limits
 from terragrip.ground.span import Span
 
 Array = NDArray[np.float64]
@@ -73,7 +74,9 @@ def _immobilization(estimates: Estimates, rows: NDArray[np.intp]) -> str:
     text = f"The wheels begin to dig: slip is {slip:.0%} in the mean of the wheels, at {speed:.2f} m/s"
     if "warning" not in estimates:
         return text + "."
-    points = {sign: float(estimates[f"warning_{sign}"][row]) for sign in SIGNS}
+    known = {sign: f"warning_{sign}" for sign in SIGNS if f"warning_{sign}" in estimates}
+    warns = limits["warn"] * (1.0 if estimates.has_adhesion else WITHOUT_TORQUE)
+    points = dict.fromkeys(SIGNS, 0.0) | {sign: float(estimates[name][row]) for sign, name in known.items()}
     change = {sign: points[sign] * limits[sign] for sign in ("rise", "leading", "resistance")}
     most = max(points.values())
     sentence = {
@@ -90,18 +93,24 @@ def _immobilization(estimates: Estimates, rows: NDArray[np.intp]) -> str:
     off = f", less {-points['command']:.1f} for speed gained" if points["command"] < -LEAST_POINTS else ""
     return (
         f"{text}, its usual {estimates['warning_usual_slip'][row]:.0%}; {', '.join(reasons) or 'the signs of just before'}{off}; "
-        f"their sum, low-passed, is {estimates['warning'][row]:.1f} and warns above {limits['warn']:g}."
+        f"their sum, low-passed, is {estimates['warning'][row]:.1f} and warns above {warns:.2g}."
     )
 
 
 def _stuck(estimates: Estimates, rows: NDArray[np.intp]) -> str:
     limits = watch_limits()
     speed = float(np.nanmedian(np.abs(estimates["ground_speed"][rows])))
-    turning = float(np.nanmedian(np.abs(_mean(estimates, "wheel_speed", rows))))
-    adhesion = float(np.nanmedian(_mean(estimates, "adhesion", rows)))
+    turn = "turn"
+    if wheels_with("wheel_speed", estimates.columns):  # of a drive train without a known radius there is none
+        turning = float(np.nanmedian(np.abs(_mean(estimates, "wheel_speed", rows))))
+        turn = f"turn at {turning:.2f} rad/s"
+    by_torque = ""
+    if estimates.has_adhesion:
+        adhesion = float(np.nanmedian(_mean(estimates, "adhesion", rows)))
+        by_torque = f", with adhesion at {adhesion:.2f} from the drive torques"
     return (
-        f"The wheels turn at {turning:.2f} rad/s and the vehicle moves at {speed:.2f} m/s, with adhesion at {adhesion:.2f} "
-        f"from the drive torques: stuck where ground speed stays below {limits['stuck_travel']:.0%} of the wheels' rim speed "
+        f"The wheels {turn} and the vehicle moves at {speed:.2f} m/s{by_torque}: "
+        f"stuck where ground speed stays below {limits['stuck_travel']:.0%} of the wheels' rim speed "
         f"for {limits['stuck_duration']:g} s, free again above {limits['free_travel']:.0%}."
     )
 

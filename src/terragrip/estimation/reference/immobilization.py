@@ -221,7 +221,7 @@ class Watch:
             return min(max(points, least), most)
 
         deviation = self.now[DEVIATION]
-        sure = self.now[SLIP] - deviation
+        sure = self.now[SLIP] - limits["sure"] * deviation
         command = max(change(RIM) + min(change(TRAVEL), 0.0), change(TRAVEL), -change(RIM) / 2)
         leading = hypot(limits["leading"], self.now[BALANCE_DEVIATION])
         resistance = hypot(limits["resistance"], self.now[RESISTANCE_DEVIATION])
@@ -234,8 +234,7 @@ class Watch:
         ]
         tau = limits["memory"] * self.pace
         self.score = _low_pass(self.score, min(since, self.pace), tau, sum(self.points))
-        unusual = sure > self.usual[0] + limits["level"]
-        self.slips = unusual and sure + change(SLIP) > limits["ahead"]
+        self.slips = sure > self.usual[0] and sure + change(SLIP) > limits["ahead"]
 
     def _judge_stuck(self, row: Row) -> None:
         limits, still = self.limits, self.limits["standstill_speed"]

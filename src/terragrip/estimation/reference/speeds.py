@@ -26,6 +26,8 @@ DWELL = 2.0
 HUBER = 4.0
 _FIRST_RATE = 1.0  # SD of a [m/s²] before it was seen
 _SLOWEST = 0.1  # m/s: slower wheels change their slip speed no less
+TOGETHER = 0.9
+"""Correlation of what two wheels' slip speeds change by: they stand on one ground and pull one load."""
 
 
 @dataclass
@@ -148,9 +150,9 @@ def process_noise(x: Floats, dt: float, manoeuvre: float, slipping: float) -> Fl
     """Variance (n, n) that ``dt`` [s] add; ``slipping``: density of relative slip, 1/s."""
     Q = np.zeros((len(x), len(x)))
     Q[:2, :2] = manoeuvre * np.array([[dt**3 / 3, dt**2 / 2], [dt**2 / 2, dt]])
-    for i in range(2, len(x)):
-        speed = max(abs(x[0]), abs(x[0] + x[i]), _SLOWEST)
-        Q[i, i] = slipping * dt * speed**2
+    speed = np.maximum(np.maximum(abs(x[0]), np.abs(x[0] + x[2:])), _SLOWEST)
+    alike = np.where(np.eye(len(speed), dtype=bool), 1.0, TOGETHER)
+    Q[2:, 2:] = slipping * dt * alike * np.outer(speed, speed)
     return Q
 
 
