@@ -21,6 +21,7 @@ import difflib
 import gc
 import importlib
 import importlib.machinery
+import importlib.util
 import json
 import multiprocessing
 import os
@@ -277,6 +278,11 @@ def main() -> int:
     KEPT.mkdir(parents=True, exist_ok=True)
     if not wanted.at and git("status", "--porcelain", "src", "tests"):
         raise SystemExit("src or tests have uncommitted changes: a sample belongs to a commit")
+    where = importlib.util.find_spec("terragrip")
+    if where is None or ROOT not in Path(str(where.origin)).parents:
+        raise SystemExit(
+            f"terragrip is imported from elsewhere, where no mutant is: put {ROOT / 'src'} first in PYTHONPATH"
+        )
     commit = git("rev-parse", "HEAD")
     recorded = None if wanted.by else coverage_at(commit, wanted.rooms, wanted.workers, wanted.afresh)
     coverage = recorded or Coverage({}, {}, {})
