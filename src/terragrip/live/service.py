@@ -17,6 +17,7 @@ from terragrip.live.event import Event
 from terragrip.live.feed import Feed
 from terragrip.live.inbox import CAPACITY, Inbox
 from terragrip.live.message import ESTIMATE, GROUND, SETPOINT, SOIL, STATUS, Message
+from terragrip.live.monitor import Monitor
 from terragrip.live.outbox import Outbox
 from terragrip.live.payload import unpacker
 from terragrip.live.pipeline import Pipeline
@@ -133,6 +134,9 @@ class Service:
         self._stopping = asyncio.Event()
         self.statistics = Statistics(self.core, self.inbox, self.feeds, self.outboxes, self.is_real_time)
         self.prediction = Prediction()
+        for _, sink in self.sinks:
+            if hasattr(sink, "monitor"):
+                sink.monitor = Monitor(self.statistics)
 
     @property
     def core(self) -> Core:

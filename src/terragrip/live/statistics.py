@@ -11,6 +11,7 @@ from terragrip.live.event import Event
 from terragrip.live.feed import Feed
 from terragrip.live.inbox import Inbox
 from terragrip.live.outbox import Outbox
+from terragrip.live.pulse import Pulse
 
 _BEHIND = 1.0  # s
 _SILENT = 1.0  # s, or ten periods
@@ -23,8 +24,8 @@ class Statistics:
     def __init__(
         self, core: Core, inbox: Inbox, feeds: Sequence[Feed], outboxes: Sequence[Outbox], is_real_time: bool
     ) -> None:
-        self._core, self._inbox, self._feeds, self._outboxes = core, inbox, feeds, outboxes
-        self._is_real_time = is_real_time
+        self._core, self._inbox, self._outboxes = core, inbox, outboxes
+        self.is_real_time = is_real_time
         now = inbox.clock()
         self.last_arrival = now
         self.period = 0.0  # s between rows, lately
@@ -33,16 +34,28 @@ class Statistics:
         self.ground: Ground | None = None
         self.events: deque[Event] = deque(maxlen=50)
         self.event_counts: dict[str, int] = {}
-        self._arrivals = [now] * len(feeds)
-        self._messages = [0] * len(feeds)
-        self._silent = [False] * len(feeds)
-        self._began, self._rows, self._samples, self._delays = now, 0, 0, 0.0
+        self.pulses = [Pulse(feed, now) for feed in feeds]
+        # Of this run, measured rows alone; a record's rows of earlier runs are in `Core.rows`.
+        self.rows = self.samples_in = self.predicted_rows = self.filter_restarts = 0
+        self.delays = 0.0  # s, the sum over `rows`
+        self.last_row = now
+        self._began = now  # the second that runs
+        self._before = (0, 0, 0.0)  # rows, samples, delays when it began
         self._synced = self._behind = now - _EVERY
         self._dropped = 0
 
+    def now(self) -> float:
+        """s since 1970, by the clock of arrivals."""
+        return self._inbox.clock()
+
+    @property
+    def window(self) -> float:
+        """s that a row may wait for late samples."""
+        return self._core.settings.window
+
     def samples(self, count: int, arrival: float) -> None:
         """Samples went into the core, the last one of this arrival."""
-        self._samples += count
+        self.samples_in += count
         if arrival > self.last_arrival:
             self.last_arrival = arrival
 
@@ -50,11 +63,15 @@ class Statistics:
         """A row came out of it."""
         before, self.last = self.last, row
         if row.predicted:
+            self.predicted_rows += 1
             return
         if before is not None and not before.predicted:
             self.period += 0.1 * (row.estimate.time - before.estimate.time - self.period)
-        self._rows += 1
-        self._delays += now - row.arrival
+        self.rows += 1
+        self.delays += now - row.arrival
+        self.last_row = now
+        if row.estimate.event == "restart":
+            self.filter_restarts += 1
 
     def event(self, event: Event) -> None:
         """An event was published."""
@@ -63,8 +80,8 @@ class Statistics:
 
     def watch(self, now: float) -> None:
         """Report sources that fall silent or send again, and estimates that are behind."""
-        for feed in self._feeds:
-            self._watch_silence(feed, now)
+        for pulse in self.pulses:
+            self._watch_silence(pulse, now)
         samples = self._inbox.samples
         lag = now - samples[0][0] if samples else 0.0
         dropped, self._dropped = self._inbox.values_dropped - self._dropped, self._inbox.values_dropped
@@ -73,18 +90,16 @@ class Statistics:
             text = f"estimates are {lag:.2g} s behind; {dropped} values dropped just now"
             self._inbox.event("behind", "service", text)
 
-    def _watch_silence(self, feed: Feed, now: float) -> None:
-        messages = feed.messages + feed.unreadable
-        if messages != self._messages[feed.index]:
-            self._messages[feed.index] = messages
-            if self._silent[feed.index]:
-                self._silent[feed.index] = False
+    def _watch_silence(self, pulse: Pulse, now: float) -> None:
+        feed = pulse.feed
+        if pulse.look(now):
+            if pulse.is_silent:
+                pulse.is_silent = False
                 feed.connected("it sends again")
-            self._arrivals[feed.index] = now
-        elif not feed.is_lost and not self._silent[feed.index]:
-            silence = now - self._arrivals[feed.index]
-            if silence > max(_SILENT, 10.0 * self.period):
-                self._silent[feed.index] = True
+        elif not feed.is_lost and not pulse.is_silent:
+            silence = pulse.silence(now)
+            if silence > max(_SILENT, 10.0 * self.period, 2.0 * pulse.period):
+                pulse.is_silent = True
                 feed.lost(f"nothing came for {silence:.1f} s")
 
     def second(self, now: float) -> bool:
@@ -92,9 +107,11 @@ class Statistics:
         span = now - self._began
         if span < 1.0:
             return False
-        self.row_rate, self.sample_rate = self._rows / span, self._samples / span
-        self.delay = self._delays / self._rows if self._rows else 0.0
-        self._began, self._rows, self._samples, self._delays = now, 0, 0, 0.0
+        rows, samples, delays = self._before
+        rows = self.rows - rows
+        self.row_rate, self.sample_rate = rows / span, (self.samples_in - samples) / span
+        self.delay = (self.delays - delays) / rows if rows else 0.0
+        self._began, self._before = now, (self.rows, self.samples_in, self.delays)
         return True
 
     def due_sync(self, now: float, step: float) -> bool:
@@ -118,7 +135,7 @@ class Statistics:
             "sinks": {box.uri.name: {"sent": box.sent, "dropped": box.dropped} for box in self._outboxes},
         }
         # A replay's rows arrive at their own stamps: what they take is no delay.
-        return {**result, "delay": self.delay} if self._is_real_time else result
+        return {**result, "delay": self.delay} if self.is_real_time else result
 
     def summary(self) -> str:
         """The run in a few lines of text."""

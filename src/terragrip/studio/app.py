@@ -73,6 +73,7 @@ def create_app(
     app.state.studio = studio
     for name in ROUTES:
         app.include_router(import_module(f"terragrip.studio.api.{name}").router, prefix="/api")
+    app.include_router(import_module("terragrip.studio.api.monitoring").router)
     app.add_exception_handler(InputError, _unusable)
     app.add_exception_handler(RequestValidationError, _malformed)
     if (STATIC / "index.html").is_file():

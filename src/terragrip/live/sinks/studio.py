@@ -12,6 +12,7 @@ from terragrip.errors import InputError
 from terragrip.live.broadcast import Broadcast
 from terragrip.live.credentials import Credentials
 from terragrip.live.feed import Lost
+from terragrip.live.monitor import Monitor
 from terragrip.live.outbox import Outbox
 from terragrip.live.uri import Uri
 
@@ -22,13 +23,17 @@ if TYPE_CHECKING:
 
 
 class StudioSink:
-    """``studio://127.0.0.1:8766``. Beyond this machine clients must know the token."""
+    """``studio://127.0.0.1:8766``. Beyond this machine clients must know the token.
+
+    ``monitor``: what answers plain HTTP requests for the service's state; the service sets it.
+    """
 
     def __init__(self, uri: Uri, vehicle: Vehicle, columns: Sequence[str]) -> None:
         import websockets.asyncio.server  # noqa: F401  # so that a missing package is said at once
 
         self.uri = uri
         self.broadcast = Broadcast(vehicle.name, columns)
+        self.monitor: Monitor | None = None
         self._credentials = Credentials.find()
         if not uri.is_loopback() and not self._credentials.token:
             raise InputError(
@@ -51,17 +56,25 @@ class StudioSink:
                 self.broadcast.put(await outbox.get())
 
     def _admit(self, connection: Any, request: Any) -> Any:
-        """Refuse who does not know the token, where one is set, and pages of other sites."""
+        """Refuse who may not listen; answer whoever asks for the service's state; let the others have their WebSocket."""
+        refusal = self._refusal(request)
+        if refusal is not None:
+            return connection.respond(*refusal)
+        asked = None if self.monitor is None else self.monitor.answer(urlsplit(request.path).path)
+        return None if asked is None else connection.respond(http.HTTPStatus(asked[0]), asked[1])
+
+    def _refusal(self, request: Any) -> tuple[http.HTTPStatus, str] | None:
+        """Who does not know the token, where one is set, and pages of other sites."""
         origin = request.headers.get("Origin")
         if origin and not Uri("", "", host=urlsplit(origin).hostname or "").is_loopback():
-            return connection.respond(http.HTTPStatus.FORBIDDEN, "Pages of other sites may not listen.\n")
+            return http.HTTPStatus.FORBIDDEN, "Pages of other sites may not listen.\n"
         if self._credentials.token is None:
             return None
         given = request.headers.get("Authorization", "").removeprefix("Bearer ")
         given = given or parse_qs(urlsplit(request.path).query).get("token", [""])[0]
         if self._credentials.grants(given):
             return None
-        return connection.respond(http.HTTPStatus.UNAUTHORIZED, "The token is wrong or missing.\n")
+        return http.HTTPStatus.UNAUTHORIZED, "The token is wrong or missing.\n"
 
     async def _serve(self, connection: Any) -> None:
         """Send one client its frames until it leaves, of which nothing but the connection tells while there are none."""

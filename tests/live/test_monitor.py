@@ -1,0 +1,117 @@
+"""What a monitoring system is told, over HTTP, by a real service with a real source."""
+
+from __future__ import annotations
+
+import asyncio
+import http.client
+
+import pytest
+
+from machine import messages, running, until
+from terragrip.formats import Profile
+from terragrip.live.decode import Decoder
+from terragrip.live.feed import Feed
+from terragrip.live.inbox import Inbox
+from terragrip.live.payload import unpacker
+from terragrip.live.pulse import Pulse
+from terragrip.live.service import Service
+
+pytestmark = pytest.mark.asyncio
+
+
+async def get(port: int, path: str, **headers: str) -> tuple[int, str]:
+    """Status and text of an HTTP request from another thread, as a monitoring system makes it."""
+
+    def ask() -> tuple[int, str]:
+        connection = http.client.HTTPConnection("127.0.0.1", port, timeout=10)
+        connection.request("GET", path, headers=headers)
+        answer = connection.getresponse()
+        text = answer.read().decode()
+        connection.close()
+        return answer.status, text
+
+    return await asyncio.to_thread(ask)
+
+
+async def test_alive_is_not_getting_data(vehicle, short, port, sender):
+    """Before the first message and after the last: alive, not ready, with the source's name; while they come: ready."""
+    service = Service(vehicle, [f"udp://127.0.0.1:{port}"], [f"studio://127.0.0.1:{port}"])
+    good = messages(short.recording, 200)
+    async with running(service):
+        assert await get(port, "/health/live") == (200, "alive\n")
+        status, why = await get(port, "/health/ready")
+        assert (status, why) == (503, f"nothing has come from udp://127.0.0.1:{port} yet\n")
+        for message in good:
+            sender.send(message)
+            await asyncio.sleep(0.005)
+        await until(lambda: service.core.rows == 200)
+        assert await get(port, "/health/ready") == (200, "getting data\n")
+        await asyncio.sleep(0.8)  # 0.5 s, and predictions go on meanwhile
+        status, why = await get(port, "/health/ready")
+        assert status == 503
+        assert why.startswith(f"nothing came from udp://127.0.0.1:{port} for ")
+        assert why.count("\n") == 1
+        assert await get(port, "/health/live") == (200, "alive\n")
+        sender.send(*messages(short.recording, 300)[200:])
+        await until(lambda: service.core.rows == 300)
+        assert (await get(port, "/health/ready"))[0] == 200
+
+
+async def test_messages_that_give_no_row_are_no_data(vehicle, port, sender):
+    service = Service(vehicle, [f"udp://127.0.0.1:{port}"], [f"studio://127.0.0.1:{port}"])
+    async with running(service):
+        sender.send(b"nonsense")
+        await until(lambda: service.feeds[0].unreadable)
+        assert await get(port, "/health/ready") == (503, "no row has been estimated yet\n")
+
+
+async def test_where_a_token_is_set_nothing_is_told_without_it(vehicle, port, monkeypatch):
+    monkeypatch.setenv("TERRAGRIP_TOKEN", "a-token-of-many-characters")
+    service = Service(vehicle, [f"udp://127.0.0.1:{port}"], [f"studio://0.0.0.0:{port}"])
+    async with running(service):
+        assert (await get(port, "/health/live"))[0] == 401
+        assert (await get(port, "/health/live", Authorization="Bearer wrong"))[0] == 401
+        mine = {"Authorization": "Bearer a-token-of-many-characters"}
+        assert (await get(port, "/health/live", **mine))[0] == 200
+        assert (await get(port, "/health/live", Origin="https://elsewhere.example", **mine))[0] == 403
+
+
+def pulse() -> tuple[Pulse, Feed]:
+    profile = Profile.from_dict({"time": {"from": "t"}, "channels": {"ground_speed": "v"}})
+    feed = Feed(0, "serial:x", Decoder(profile), unpacker(None), Inbox(), after=float("-inf"))
+    return Pulse(feed, 0.0), feed
+
+
+async def test_the_period_of_a_source_is_its_own_and_no_silence_becomes_it():
+    one, feed = pulse()
+    for now in (1.0, 2.1, 3.0, 4.0, 5.1, 6.0):
+        feed.sample(now, {"ground_speed": 1.0})
+        assert one.silence(now) == 0.0  # there is a message, though nobody has looked yet
+        assert one.look(now)
+    assert one.period == pytest.approx(1.0, abs=0.11)
+    feed.sample(66.0, {"ground_speed": 1.0})
+    assert one.look(66.0)
+    assert one.period == pytest.approx(1.0, abs=0.11)
+    assert one.silence(67.5) == 1.5
+
+
+async def test_a_slow_source_beside_a_fast_one_is_not_lost_between_its_messages(vehicle, short, port, sender):
+    """A receiver that sends every 0.8 to 1.3 s beside wheels at 100 Hz: its rhythm is no loss once it is known."""
+    service = Service(vehicle, ["udp://127.0.0.1:1", "udp://127.0.0.1:2"])
+    now = 1000.0
+    service.inbox.clock = lambda: now
+    service.statistics = type(service.statistics)(
+        service.core, service.inbox, service.feeds, service.outboxes, True
+    )
+    due, gaps = now, [0.8, 1.3, 0.9, 1.2, 1.1, 1.3, 0.8, 1.3]
+    lost = []
+    for _ in range(100):
+        now += 0.1
+        service.feeds[0].sample(now, {"ground_speed": 1.0})
+        if now >= due and gaps:
+            service.feeds[1].sample(now, {"latitude": 50.0})
+            due = now + gaps.pop(0)
+        service.statistics.watch(now)
+        lost += [note for note in service.inbox.notes() if "event" in note]
+    kinds = [(note["event"]["kind"], note["event"]["source"]) for note in lost]
+    assert kinds.count(("source_lost", "udp://127.0.0.1:2")) == 1, kinds  # once the messages have ended
