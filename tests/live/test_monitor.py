@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import http.client
+import re
 
 import pytest
 
@@ -74,6 +75,71 @@ async def test_where_a_token_is_set_nothing_is_told_without_it(vehicle, port, mo
         mine = {"Authorization": "Bearer a-token-of-many-characters"}
         assert (await get(port, "/health/live", **mine))[0] == 200
         assert (await get(port, "/health/live", Origin="https://elsewhere.example", **mine))[0] == 403
+
+
+LABEL = r'[a-z_]+="(?:[^"\\\\\n]|\\\\["\\\\n])*"'
+SAMPLE = re.compile(rf"([a-z_]+)(?:\{{({LABEL}(?:,{LABEL})*)\}})? (\S+)")
+
+
+def parsed(page: str) -> dict[str, float]:
+    """Samples by name and labels; fails on what is not Prometheus's text format, or against its rules of naming."""
+    assert page.endswith("\n")
+    kinds, result = {}, {}
+    for line in page.splitlines():
+        if line.startswith("# TYPE "):
+            _, _, name, kind = line.split(" ")
+            assert name not in kinds
+            assert name.endswith("_total") == (kind == "counter"), name
+            kinds[name] = kind
+        elif not line.startswith("# HELP "):
+            sample = SAMPLE.fullmatch(line)
+            assert sample, line
+            assert sample[1] in kinds, line
+            key = sample[1] + (f"{{{sample[2]}}}" if sample[2] else "")
+            assert key not in result
+            result[key] = float(sample[3])
+    return result
+
+
+async def test_metrics_are_what_went_in_and_what_came_out(tmp_path, vehicle, short, port, sender):
+    """Against what the test itself sent: 200 messages of which 5 are left out, one is doubled, and one is nonsense."""
+    service = Service(
+        vehicle, [f"udp://127.0.0.1:{port}"], [f"studio://127.0.0.1:{port}"], record=tmp_path / "r"
+    )
+    good = messages(short.recording, 200)
+    sent = [*good[:100], *good[105:], good[-1], b"nonsense"]
+    async with running(service):
+        before = parsed((await get(port, "/metrics"))[1])
+        assert (before["terragrip_live_rows_total"], before["terragrip_live_ready"]) == (0, 0)
+        sender.send(*sent)
+        await until(lambda: service.core.rows == 195 and service.feeds[0].unreadable == 1)
+        await until(lambda: service.core.counts.total("unreadable") == 1)
+        page = parsed((await get(port, "/metrics"))[1])
+    assert page["terragrip_live_ready"] == 1
+    assert page["terragrip_live_samples_total"] == 196
+    assert page["terragrip_live_rows_total"] == 195
+    assert page["terragrip_live_recorded_rows_total"] == 195
+    assert page["terragrip_live_filter_restarts_total"] == 0
+    assert page["terragrip_live_queue_samples"] == 0
+    of_speed = 'terragrip_live_values_total{channel="ground_speed",fate="%s"}'
+    fates = {
+        "received": 196,
+        "missing": 5,
+        "doubled": 1,
+        "late": 0,
+        "dropped": 0,
+        "unreadable": 0,
+        "clock": 0,
+    }
+    assert {fate: page[of_speed % fate] for fate in fates} == fates
+    assert page['terragrip_live_events_total{event="unreadable"}'] == 1
+    assert 0 < page["terragrip_live_delay_seconds_total"] < 195 * 5
+    nis = [m.row.estimate for m in service.seen if m.kind == "estimate" and not m.row.predicted]
+    measured = [one["nis"] for one in nis if one["nis"] == one["nis"]]
+    assert page["terragrip_live_nis_total"] == pytest.approx(sum(measured))
+    assert page["terragrip_live_nis_expected_total"] == sum(
+        one["channels"] for one in nis if one["nis"] == one["nis"]
+    )
 
 
 def pulse() -> tuple[Pulse, Feed]:

@@ -30,9 +30,18 @@ def test_a_studio_whose_folder_is_gone_is_alive_and_not_ready(client: TestClient
 
 def test_where_there_is_a_token_it_is_needed_here_too(folder: Path) -> None:
     with TestClient(create_app(folder, token=TOKEN), base_url="http://192.0.2.7:8750") as client:
-        for path in ("/health/live", "/health/ready"):
+        for path in ("/health/live", "/health/ready", "/metrics"):
             assert client.get(path).status_code == 401
             assert client.get(path, headers={"authorization": f"Bearer {TOKEN}"}).status_code == 200
+
+
+def test_metrics_count_jobs_and_pages(client: TestClient) -> None:
+    answer = client.get("/metrics")
+    assert answer.headers["content-type"] == "text/plain; version=0.0.4; charset=utf-8"
+    assert "# TYPE terragrip_studio_pages gauge\nterragrip_studio_pages 0\n" in answer.text
+    assert 'terragrip_studio_jobs{state="failed"} 0\n' in answer.text
+    with client.websocket_connect("ws://127.0.0.1:8750/api/notices"):
+        assert "terragrip_studio_pages 1\n" in client.get("/metrics").text
 
 
 @pytest.fixture

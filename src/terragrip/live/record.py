@@ -65,6 +65,7 @@ class Recorder:
         )  # now, or it would hold up the estimates when the first segment closes
         self._syncing: Future[None] | None = None
         self.opening: list[Output] = []  # what opening brought: that a run goes on
+        self.rows_kept = 0  # by this process
         self._opened: float | None = None  # arrival of the segment's first row, nearly
         try:
             self._resume(core)
@@ -117,8 +118,10 @@ class Recorder:
         """An input of `Core.handle`, and what came of it; raises OSError where a segment cannot be begun."""
         self._ahead.add(kind, content)
         segment = self.segment
+        before = len(segment)
         for output in outputs:
             segment.add(output)
+        self.rows_kept += len(segment) - before
         now = content[0] if kind == "S" else content if kind == "T" else None
         if now is not None and segment.size:
             if self._opened is None:

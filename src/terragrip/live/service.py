@@ -136,7 +136,7 @@ class Service:
         self.prediction = Prediction()
         for _, sink in self.sinks:
             if hasattr(sink, "monitor"):
-                sink.monitor = Monitor(self.statistics)
+                sink.monitor = Monitor(self.statistics, self.inbox, self.outboxes, self.pipeline)
 
     @property
     def core(self) -> Core:

@@ -38,6 +38,7 @@ class Statistics:
         # Of this run, measured rows alone; a record's rows of earlier runs are in `Core.rows`.
         self.rows = self.samples_in = self.predicted_rows = self.filter_restarts = 0
         self.delays = 0.0  # s, the sum over `rows`
+        self.nis = self.nis_expected = 0.0  # sums over `rows`; expected: as many as channels were taken
         self.last_row = now
         self._began = now  # the second that runs
         self._before = (0, 0, 0.0)  # rows, samples, delays when it began
@@ -70,6 +71,11 @@ class Statistics:
         self.rows += 1
         self.delays += now - row.arrival
         self.last_row = now
+        values, places = row.estimate.values, row.estimate.places
+        nis = values[places["nis"]]
+        if nis == nis:
+            self.nis += nis
+            self.nis_expected += values[places["channels"]]
         if row.estimate.event == "restart":
             self.filter_restarts += 1
 

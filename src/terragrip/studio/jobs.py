@@ -20,6 +20,7 @@ from terragrip.studio.notices import Notices
 
 GRACE = 3.0
 """Seconds that a cancelled job has to clean up."""
+STATES = ("queued", "running", "done", "failed", "cancelled")
 KEEP = 50
 """Finished jobs that the list still shows."""
 DEFECT = "a defect of Terragrip; run the same with 'terragrip --debug' on the command line to see where"
@@ -27,7 +28,7 @@ DEFECT = "a defect of Terragrip; run the same with 'terragrip --debug' on the co
 
 @dataclass
 class Job:
-    """One job: `state` is queued, running, done, failed or cancelled; `done` of `total` steps; `text` is the summary or the reason;
+    """One job: `state` is one of `STATES`; `done` of `total` steps; `text` is the summary or the reason;
     `words` are its command line after "terragrip", with paths from the studio's folder."""
 
     id: str

@@ -36,6 +36,11 @@ class Notices:
             self._watch.cancel()
             self._watch = None
 
+    @property
+    def pages(self) -> int:
+        """How many pages are open."""
+        return len(self._pages)
+
     def publish(self, kind: str, **content: Any) -> None:
         """Send {"kind": kind, ...} to every page."""
         for queue in self._pages:

@@ -15,6 +15,7 @@ from terragrip.live.feed import Lost
 from terragrip.live.monitor import Monitor
 from terragrip.live.outbox import Outbox
 from terragrip.live.uri import Uri
+from terragrip.prometheus_text import CONTENT_TYPE
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -61,7 +62,12 @@ class StudioSink:
         if refusal is not None:
             return connection.respond(*refusal)
         asked = None if self.monitor is None else self.monitor.answer(urlsplit(request.path).path)
-        return None if asked is None else connection.respond(http.HTTPStatus(asked[0]), asked[1])
+        if asked is None:
+            return None
+        answer = connection.respond(http.HTTPStatus(asked[0]), asked[1])
+        del answer.headers["Content-Type"]
+        answer.headers["Content-Type"] = CONTENT_TYPE
+        return answer
 
     def _refusal(self, request: Any) -> tuple[http.HTTPStatus, str] | None:
         """Who does not know the token, where one is set, and pages of other sites."""

@@ -10,7 +10,9 @@ from fastapi import APIRouter
 from fastapi.responses import PlainTextResponse
 
 from terragrip.live.monitor import LIVE, READY
+from terragrip.prometheus_text import CONTENT_TYPE, METRICS, Metrics
 from terragrip.studio.api.live import LIVE_TOKEN
+from terragrip.studio.jobs import STATES
 from terragrip.studio.state import Here, Studio
 
 router = APIRouter(tags=["monitoring"], default_response_class=PlainTextResponse)
@@ -29,6 +31,19 @@ def ready(studio: Here) -> PlainTextResponse:
     """200 where the folder can be used and the live service, if one was named, gets data; else 503 and why, in one line."""
     why = _unready(studio)
     return PlainTextResponse("ready\n") if why is None else PlainTextResponse(f"{why}\n", 503)
+
+
+@router.get(METRICS)
+async def metrics(studio: Here) -> PlainTextResponse:
+    """Jobs and pages, as Prometheus reads them."""
+    page = Metrics()
+    states = [job.state for job in studio.jobs.all()]
+    page.add(
+        "gauge", "terragrip_studio_jobs", "Jobs in the list (the last 50 that ended) by state.",
+        [({"state": state}, states.count(state)) for state in STATES],
+    )  # fmt: skip
+    page.add("gauge", "terragrip_studio_pages", "Pages open.", studio.notices.pages)
+    return PlainTextResponse(str(page), media_type=CONTENT_TYPE)
 
 
 def _unready(studio: Studio) -> str | None:
