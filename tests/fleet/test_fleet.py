@@ -36,6 +36,23 @@ def written(out: Path) -> dict[str, int]:
     return {path.name: path.stat().st_mtime_ns for path in (out / "estimates").rglob("*.parquet")}
 
 
+def test_the_numbers_for_prometheus_are_those_of_the_data_set(place: Path, ran: Ran) -> None:
+    (place / "logs/broken.csv").write_text("nothing of use\n")
+    words = ("--vehicle", place / "Heros.yaml", "--metrics", place / "fleet.prom", "--quiet")
+    code, _, errors = ran(*words)
+    assert (code, errors) == (0, "")
+    rows, reasons = whole(place / "out")
+    page = dict(
+        line.rsplit(" ", 1)
+        for line in (place / "fleet.prom").read_text().splitlines()
+        if not line.startswith("#")
+    )
+    assert int(page['terragrip_fleet_logs{state="estimated"}']) == len(rows)
+    assert int(page['terragrip_fleet_logs{state="failed"}']) == len(reasons) == 1
+    assert int(page["terragrip_fleet_rows"]) == pd.read_parquet(place / "out/summary.parquet")["rows"].sum()
+    assert float(page["terragrip_fleet_duration_seconds"]) > 0
+
+
 def test_a_fleet_of_two_machines_and_three_days(place: Path) -> None:
     index = place / "index.csv"
     index.write_text("log,vehicle\n" + "".join(f"drive{n}.csv,Thorvald.yaml\n" for n in (1, 4)))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import http.client
+import json
 import os
 import re
 import subprocess
@@ -71,3 +72,23 @@ def test_what_is_no_web_address_is_refused_in_one_line(
     assert error.count("\n") == 1
     assert "--public-url" in error
     assert "https://HOST" in error
+
+
+def test_json_alone_is_logged_and_no_token_made_anew(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv("TERRAGRIP_TOKEN", raising=False)
+    command = [sys.executable, "-m", "terragrip", "studio", str(tmp_path), "--port", "0"]
+    with subprocess.Popen(
+        [*command, "--log-format", "json"], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    ) as process:
+        first = json.loads(process.stderr.readline())
+        process.terminate()
+        said, rest = process.communicate(timeout=20)
+    assert first["event"] == "studio_started"
+    assert first["address"].startswith("http://127.0.0.1:")
+    assert said == ""
+    assert all(json.loads(line) for line in rest.splitlines())
+    open_to_all = [*command, "--address", "0.0.0.0", "--log-format", "json"]
+    done = subprocess.run(open_to_all, capture_output=True, text=True, check=False)
+    assert done.returncode == 2
+    assert done.stderr.count("\n") == 1
+    assert "set TERRAGRIP_TOKEN" in done.stderr

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from terragrip.cli.drives import logs_in
+from terragrip.cli.log import LogForm, LogFormat, log_to_stderr
 from terragrip.cli.options import DbcFiles, ProfileFile, Quiet
 from terragrip.cli.progress import progress
 from terragrip.errors import InputError
@@ -62,17 +63,28 @@ def command(
         str | None,
         typer.Option(metavar="AMOUNT", help="Most memory of a worker here, e.g. 2GB; its share by default."),
     ] = None,
+    metrics: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE.prom", help="Write the run's numbers for Prometheus's node exporter."),
+    ] = None,
+    log_format: LogFormat = LogForm.text,
     quiet: Quiet = False,
 ) -> None:
     """Estimate any number of logs into one data set.
 
     A second call does only what is new or changed. Every log ends in the data set or, with its reason, in failures.parquet.
     """
+    import time
+
     from terragrip.estimation.methods import method_named
     from terragrip.fleet.logs import fleet_logs, matching, on_disk
     from terragrip.fleet.store import is_remote
     from terragrip.report.page import require_drawing
 
+    began = time.monotonic()
+    as_json = log_format is LogForm.json
+    if as_json:
+        log_to_stderr(log_format)
     method_named(method, smooth=smooth)
     if scheduler is not None and (workers or memory):
         raise InputError(
@@ -87,7 +99,7 @@ def command(
     logs = fleet_logs(files, vehicle, profile, index)
     from terragrip.fleet.run import run_fleet
 
-    with progress("fleet", quiet) as step:
+    with progress("fleet", quiet or as_json) as step:
         done = run_fleet(
             logs,
             output,
@@ -99,8 +111,34 @@ def command(
             memory=memory,
             progress=step,
         )
-    if not quiet:
+    if metrics is not None:
+        _write_metrics(metrics, done, time.monotonic() - began)
+    if not (quiet or as_json):
         print("\n".join(_lines(done, output)))
+
+
+def _write_metrics(path: Path, done: FleetResult, seconds: float) -> None:
+    """For the node exporter's textfile collector: it shows the last call's, so that all are gauges."""
+    import time
+
+    from terragrip.files import replacing
+    from terragrip.prometheus_text import Metrics
+
+    page = Metrics()
+    states = {"estimated": done.estimated, "unchanged": done.unchanged, "failed": len(done.failed)}
+    logs = [({"state": state}, number) for state, number in {**states, "kept": done.kept}.items()]
+    page.add("gauge", "terragrip_fleet_logs", "Logs of the last call by what became of them.", logs)
+    page.add("gauge", "terragrip_fleet_rows", "Rows estimated by it.", done.rows)
+    page.add(
+        "gauge",
+        "terragrip_fleet_filter_restarts",
+        "Rows of these at which the filter began anew.",
+        done.restarts,
+    )
+    page.add("gauge", "terragrip_fleet_duration_seconds", "How long it took.", seconds)
+    page.add("gauge", "terragrip_fleet_ended_timestamp_seconds", "When it ended.", time.time())
+    with replacing(path) as temporary:
+        temporary.write_text(str(page), encoding="utf-8")
 
 
 def _lines(done: FleetResult, output: str) -> list[str]:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from terragrip.cli.log import LogForm, LogFormat, log_to_stderr
 from terragrip.cli.options import Quiet, VehicleFile
 from terragrip.errors import InputError
 from terragrip.estimation.methods import DEFAULT, METHODS
@@ -80,6 +81,7 @@ def command(
     duration: Annotated[
         float | None, typer.Option(metavar="S", min=0.0, help="Stop after so many seconds.")
     ] = None,
+    log_format: LogFormat = LogForm.text,
     quiet: Quiet = False,
 ) -> None:
     """Estimate while the machine drives.
@@ -87,16 +89,21 @@ def command(
     Samples from any number of sources, estimates to any number of sinks; Ctrl-C ends it with the record whole.
     """
     import asyncio
+    import logging
     import os
 
     # Before pyarrow loads: its own allocator keeps 5 MB more, for a record that writes once a minute.
     os.environ.setdefault("ARROW_DEFAULT_MEMORY_POOL", "system")
     from terragrip.formats import Profile
+    from terragrip.live.counts import FATES
     from terragrip.live.service import Service
     from terragrip.vehicle import Vehicle
 
     if quiet and not sink and record is None:
         raise InputError("estimates would go nowhere", place="--quiet", hint="add --sink or --record")
+    as_json = log_format is LogForm.json
+    if as_json:
+        log_to_stderr(log_format)
     known = _settings(settings)
     service = Service(
         Vehicle.load(vehicle),
@@ -113,9 +120,16 @@ def command(
         library=_library(library),
         setpoint=_setpoint(setpoint, speed),
     )
+    from terragrip.log_events import emit
+
+    logger = logging.getLogger("terragrip.live")
+    sources, sinks = [feed.name for feed in service.feeds], [box.uri.name for box in service.outboxes]
+    emit(logger, "live_started", sources=sources, sinks=sinks)
     with asyncio.Runner(loop_factory=_loop_factory()) as runner:
-        runner.run(_run(service, duration, quiet))
-    if not quiet:
+        runner.run(_run(service, duration, quiet or as_json))
+    totals = {fate: service.core.counts.total(fate) for fate in FATES}
+    emit(logger, "live_stopped", rows=service.core.rows, values=totals)
+    if not (quiet or as_json):
         print(service.statistics.summary())
         if record is not None:
             print(f"Recorded in {record}")

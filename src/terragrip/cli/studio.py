@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from terragrip.cli.log import LogForm, LogFormat, log_to_stderr
 from terragrip.errors import InputError
 
 
@@ -33,6 +34,7 @@ def command(
     upload_limit: Annotated[
         int, typer.Option("--upload-limit", metavar="MB", min=1, help="Largest file taken by drop.")
     ] = 2000,
+    log_format: LogFormat = LogForm.text,
 ) -> None:
     """Open the studio on a folder.
 
@@ -65,8 +67,20 @@ def command(
             hint="pip install 'terragrip[studio]'",
             page="install",
         ) from error
+    as_json = log_format is LogForm.json
+    if as_json:
+        log_to_stderr(log_format)
     limit = upload_limit * 1_000_000
-    serve(folder, address, port, loopback=home, live=live, upload_limit=limit, public=public_url)
+    serve(
+        folder,
+        address,
+        port,
+        loopback=home,
+        live=live,
+        upload_limit=limit,
+        public=public_url,
+        as_json=as_json,
+    )
 
 
 def _is_web_address(text: str) -> bool:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import logging
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,19 +17,24 @@ from terragrip.fleet.logs import FleetLog
 from terragrip.fleet.page import report_of
 from terragrip.fleet.store import TEMPORARY, Store
 from terragrip.fleet.task import Outcome, Settings
+from terragrip.log_events import emit
 
+logger = logging.getLogger("terragrip.fleet")
 SOILS, REPORT = "soils.json", "report.html"
 
 
 @dataclass(frozen=True)
 class FleetResult:
     """What a call did: logs estimated now, those that an earlier call had estimated alike, and of this call's logs the failures with
-    their reasons; ``kept``: logs of earlier calls that this one did not name."""
+    their reasons; ``kept``: logs of earlier calls that this one did not name; ``rows`` and ``restarts`` of the filter in the logs estimated
+    now."""
 
     estimated: int
     unchanged: int
     failed: dict[str, str]
     kept: int
+    rows: int
+    restarts: int
 
 
 def run_fleet(
@@ -65,9 +71,12 @@ def run_fleet(
     before, failed = known_notes(store)
     settings = Settings(method, smooth, tuple(str(path.absolute()) for path in dbc), __version__)
     outcomes: list[Outcome] = []
+    emit(logger, "fleet_started", logs=len(logs))
     with workers_at(scheduler, workers or default_workers(), memory) as pool:
         for outcome in pool.run(logs, settings, store):
             outcomes.append(outcome)
+            if outcome.note is None:
+                emit(logger, "fleet_log_failed", log=outcome.log, reason=outcome.reason)
             if progress:
                 progress(len(outcomes), len(logs) + 1)
     notes, reasons = settled(store, before, failed, outcomes)
@@ -83,9 +92,15 @@ def run_fleet(
             f"cannot be written ({error})", file=output, hint="run again: what was estimated is kept"
         ) from error
     named = {one.log for one in outcomes}
-    return FleetResult(
+    fresh = [one.note["summary"] for one in outcomes if one.fresh and one.note is not None]
+    result = FleetResult(
         estimated=sum(one.fresh for one in outcomes),
         unchanged=sum(one.note is not None and not one.fresh for one in outcomes),
         failed={one.log: one.reason or "" for one in outcomes if one.note is None},
         kept=sum(note["log"] not in named for note in notes),
+        rows=sum(one["rows"] for one in fresh),
+        restarts=sum(one["restart_events"] for one in fresh),
     )
+    counts = {"estimated": result.estimated, "unchanged": result.unchanged, "failed": len(result.failed)}
+    emit(logger, "fleet_ended", **counts, kept=result.kept, rows=result.rows, restarts=result.restarts)
+    return result

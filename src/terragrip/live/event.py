@@ -5,11 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-KINDS = (
-    "source_lost", "source_back", "channel_lost", "channel_back", "clock_jump", "unreadable", "schema",
-    "behind", "refused", "resumed", "sink_lost", "sink_back", "record_failed", "ground_change", "learned",
-    "immobilization", "stuck", "push",
-)  # fmt: skip
+from terragrip.log_events import LIVE
+
+KINDS = LIVE
 
 
 @dataclass(frozen=True, slots=True)

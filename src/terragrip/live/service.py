@@ -27,6 +27,7 @@ from terragrip.live.sinks import open_sink
 from terragrip.live.sources import Source, open_source
 from terragrip.live.statistics import Statistics
 from terragrip.live.supervision import report_unhandled, supervise_sink, supervise_source
+from terragrip.log_events import emit
 
 if TYPE_CHECKING:
     from terragrip.formats import Profile
@@ -236,7 +237,7 @@ class Service:
                     self._send(Message(GROUND, change["time"], data=change))
             elif isinstance(output, Event):
                 self.statistics.event(output)
-                logger.info("%s: %s: %s", output.source, output.kind, output.text)
+                emit(logger, output.kind, **_logged(output))
                 self._send(Message.of_event(output))
 
     def _advise(self, row: Row) -> None:
@@ -269,6 +270,12 @@ class Service:
     def announce(self) -> None:
         """Send the status to whom it concerns."""
         self._send(Message(STATUS, self.core.time, data=self.statistics.to_dict()))
+
+
+def _logged(event: Event) -> dict[str, Any]:
+    fields = event.to_dict()
+    del fields["kind"]
+    return fields
 
 
 async def _cancelled(tasks: Sequence[asyncio.Task[Any]]) -> None:

@@ -8,6 +8,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import json
+import logging
 import secrets
 import shlex
 import sys
@@ -16,6 +17,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from terragrip.log_events import emit
 from terragrip.studio.notices import Notices
 
 GRACE = 3.0
@@ -24,6 +26,9 @@ STATES = ("queued", "running", "done", "failed", "cancelled")
 KEEP = 50
 """Finished jobs that the list still shows."""
 DEFECT = "a defect of Terragrip; run the same with 'terragrip --debug' on the command line to see where"
+
+
+logger = logging.getLogger("terragrip.studio")
 
 
 @dataclass
@@ -117,6 +122,7 @@ class Jobs:
 
     async def _work(self, job: Job) -> None:
         job.state = "running"
+        emit(logger, "job_started", job=job.id, kind=job.kind, output=job.output)
         self._tell(job)
         process = await asyncio.create_subprocess_exec(
             sys.executable, "-m", "terragrip.cli.job", *job.words, stdin=asyncio.subprocess.DEVNULL, stdout=asyncio.subprocess.PIPE,
@@ -152,6 +158,7 @@ class Jobs:
     def _end(self, job: Job, state: str, text: str) -> None:
         root = f"{self._folder}/"
         job.state, job.text = state, text.replace(root, "")
+        emit(logger, "job_ended", job=job.id, kind=job.kind, state=state)
         self._tell(job)
 
     def _tell(self, job: Job) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import os
 import secrets
 import socket
@@ -10,6 +11,7 @@ from pathlib import Path
 import uvicorn
 
 from terragrip.errors import InputError
+from terragrip.log_events import emit
 from terragrip.studio.app import STATIC, create_app
 
 TOKEN = "TERRAGRIP_TOKEN"
@@ -26,12 +28,17 @@ def serve(
     live: str | None,
     upload_limit: int,
     public: str | None = None,
+    as_json: bool = False,
 ) -> None:
     """Bind, say where the pages are, serve. InputError where the folder or the port is not to be had, or the token is too short.
 
     `public`: the address by which a reverse proxy is reached. What comes through it comes from other machines, so a token is needed,
-    though the studio itself stands on loopback.
+    though the studio itself stands on loopback. `as_json`: nothing is printed; events are logged, as are uvicorn's warnings.
     """
+    if as_json and not (loopback and public is None) and TOKEN not in os.environ:
+        raise InputError(
+            "a token made anew would stand in the log", place="--log-format", hint=f"set {TOKEN}"
+        )
     token = None if loopback and public is None else _token()
     app = create_app(
         folder, token=token, hosts=(address,), upload_limit=upload_limit, live=live, public=public
@@ -39,6 +46,30 @@ def serve(
     listener = _bind(address, port)
     own = f"http://{_shown(address)}:{listener.getsockname()[1]}/"
     place = own if public is None else f"{public.rstrip('/')}/"
+    logger = logging.getLogger("terragrip.studio")
+    emit(logger, "studio_started", address=place)
+    if not as_json:
+        _say(place, own, token, loopback=loopback, public=public)
+    # No access log: it would hold the token of the first request.
+    config = uvicorn.Config(
+        app, log_level="warning", access_log=False, ws_max_size=1 << 20, timeout_graceful_shutdown=2
+    )
+    if as_json:  # its own handlers write text
+        for name in ("uvicorn", "uvicorn.error"):
+            logging.getLogger(name).handlers.clear()
+            logging.getLogger(name).propagate = True
+    server = uvicorn.Server(config)
+    try:
+        server.run(sockets=[listener])
+    except KeyboardInterrupt:
+        pass
+    finally:
+        listener.close()
+        emit(logger, "studio_stopped")
+
+
+def _say(place: str, own: str, token: str | None, *, loopback: bool, public: str | None) -> None:
+    """Print how the pages are reached."""
     if not (STATIC / "index.html").is_file():
         print(
             "The pages are not built (Node.js 20 or newer, then `make studio`); only the interface is served."
@@ -54,17 +85,6 @@ def serve(
             "Anyone who knows the token can read and write this folder; the way there is not encrypted.",
             flush=True,
         )
-    # No access log: it would hold the token of the first request.
-    config = uvicorn.Config(
-        app, log_level="warning", access_log=False, ws_max_size=1 << 20, timeout_graceful_shutdown=2
-    )
-    server = uvicorn.Server(config)
-    try:
-        server.run(sockets=[listener])
-    except KeyboardInterrupt:
-        pass
-    finally:
-        listener.close()
 
 
 def _token() -> str:
