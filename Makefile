@@ -23,7 +23,7 @@ BUILD_INPUTS := pyproject.toml setup.py cffi_build.py $(KERNEL_SOURCES) $(KERNEL
 	$(wildcard kernel/python/*.[ch] src/terragrip/*/*.c src/terragrip/*/*.h)
 
 .PHONY: notebooks help demo test lint kernel-test web-test pytest studio wheel docs system bench lock clean sbom audit \
-	kernel-aarch64 kernel-others test-long kernel-sanitized fuzz system-fuzz fuzz-kernel fuzz-kernel-run fuzz-parsers
+	kernel-aarch64 kernel-others test-long kernel-sanitized fuzz system-fuzz fuzz-kernel fuzz-kernel-run fuzz-parsers kills
 
 help: ## show this list
 	@sed -n 's/^\([a-z-]*\):[^#]*## /  make \1\t/p' $(MAKEFILE_LIST)
@@ -164,10 +164,15 @@ kernel-test: $(foreach real,double float,$(KERNEL_TESTS:%=build/kernel/$(real)/%
 
 # --- what takes long: sanitizers, fuzzers, soak ---------------------------------------------------------------------------
 FUZZ_SECONDS ?= 5
+# of each of the four ways of writing
+KILLS ?= 25
 FUZZERS := $(patsubst fuzz/kernel/%.c,build/fuzz/kernel-%,$(wildcard fuzz/kernel/*.c))
 FUZZ_CC := clang
 
-test-long: kernel-sanitized fuzz ## every C test under the address and undefined-behaviour sanitizers, and each fuzzer for FUZZ_SECONDS
+test-long: kernel-sanitized fuzz kills ## every C test under the address and undefined-behaviour sanitizers, each fuzzer for FUZZ_SECONDS, a hundred kills
+
+kills: $(VENV)/package $(VENV)/dev ## kill -9 a hundred times during estimate, soils, a fit saved and an upload
+	TERRAGRIP_KILLS=$(KILLS) $(BIN)/python -m pytest tests/test_kills.py -q -n $(WORKERS) -rP
 
 kernel-sanitized: $(foreach real,sanitized sanitized-float,$(KERNEL_TESTS:%=build/kernel/$(real)/%))
 	@for program in $^; do echo "$$program"; ./$$program > /dev/null || exit 1; done

@@ -5,12 +5,14 @@ from __future__ import annotations
 import errno
 import hashlib
 import os
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
 
 from terragrip.errors import InputError
-from terragrip.files import refuse_missing, replacing, sha256
+from terragrip.files import UNFINISHED, has_ended, lock, refuse_missing, replacing, sha256, this_process
 
 
 def test_the_old_file_stands_until_the_new_one_is_whole(tmp_path: Path) -> None:
@@ -77,3 +79,58 @@ def test_sha256_and_missing_files(tmp_path: Path) -> None:
     for odd in ("\x00", "x" * 5000, "/dev/null"):
         with pytest.raises(InputError):
             refuse_missing(odd)
+
+
+def test_what_a_killed_process_left_is_removed_and_what_a_living_one_writes_is_not(tmp_path: Path) -> None:
+    script = """
+import os, sys
+from terragrip.files import replacing
+with replacing(sys.argv[1]) as temporary:
+    temporary.write_text("half")
+    print("begun", flush=True)
+    sys.stdin.read()
+"""
+    words = [sys.executable, "-c", script, str(tmp_path / "a.csv")]
+    living, killed = (
+        subprocess.Popen(words, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) for _ in "ab"
+    )
+    for process in (living, killed):
+        assert process.stdout is not None
+        assert process.stdout.readline() == "begun\n"
+    killed.kill()
+    killed.wait()
+    assert len([name for name in os.listdir(tmp_path) if name.startswith(UNFINISHED)]) == 2
+    with replacing(tmp_path / "b.csv") as temporary:
+        temporary.write_text("whole")
+    (left,) = (name for name in os.listdir(tmp_path) if name.startswith(UNFINISHED))
+    assert f"-{living.pid}-" in left
+    living.communicate("", timeout=30)
+    killed.communicate(timeout=30)
+    assert sorted(os.listdir(tmp_path)) == ["a.csv", "b.csv"]
+
+
+def test_a_process_elsewhere_is_not_taken_for_ended() -> None:
+    assert not has_ended(this_process())
+    assert not has_ended("00000000-1")
+    assert not has_ended("nonsense")
+
+
+def test_a_lock_goes_with_its_process(tmp_path: Path) -> None:
+    script = """
+import sys
+from pathlib import Path
+from terragrip.files import lock
+lock(Path(sys.argv[1]))
+print(1, flush=True)
+sys.stdin.read()
+"""
+    words = [sys.executable, "-c", script, str(tmp_path / "lock")]
+    holder = subprocess.Popen(words, stdin=subprocess.PIPE, stdout=subprocess.PIPE)
+    assert holder.stdout is not None
+    assert holder.stdout.readline() == b"1\n"
+    assert lock(tmp_path / "lock") is None
+    holder.kill()
+    holder.communicate()
+    held = lock(tmp_path / "lock")
+    assert held is not None
+    os.close(held)

@@ -15,6 +15,7 @@ import pytest
 import terragrip as tg
 from small_fleet import VEHICLE, call, fleet, whole, write_log
 from terragrip.cli import main
+from terragrip.files import lock
 
 Ran = Callable[..., tuple[int, str, str]]
 
@@ -229,3 +230,28 @@ def test_a_store_that_cannot_be_reached(place: Path, refused: Refused) -> None:
 def test_a_folder_that_cannot_be_written(place: Path, refused: Refused) -> None:
     (place / "shut").mkdir(mode=0o500)
     assert "cannot be written" in refused("-o", place / "shut/out")
+
+
+def test_a_second_call_on_one_folder_is_refused_while_the_first_works(place: Path, ran: Ran) -> None:
+    out = place / "out"
+    out.mkdir()
+    held = lock(out / ".lock")
+    assert held is not None
+    code, _, errors = ran()
+    assert (code, errors) == (
+        2, f"terragrip: {out}: --output: another terragrip fleet works on it; wait for its end, or name another folder\n",
+    )  # fmt: skip
+    os.close(held)
+    assert ran()[0] == 0
+    assert len(whole(out)[0]) == 6
+
+
+def test_a_store_that_cannot_be_read_is_one_line(place: Path, ran: Ran) -> None:
+    assert ran()[0] == 0
+    table = place / "out/failures.parquet"
+    table.unlink()
+    table.mkdir()
+    code, _, errors = ran()
+    assert code == 2
+    assert errors.count("\n") == 1
+    assert "cannot be read or written" in errors

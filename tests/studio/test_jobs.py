@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+import sqlite3
+import subprocess
+import sys
 import time
+from contextlib import closing
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +14,9 @@ import numpy as np
 import pandas as pd
 import pytest
 from fastapi.testclient import TestClient
+
+from terragrip.errors import InputError
+from terragrip.studio.app import create_app
 
 NOTICES = "ws://127.0.0.1:8750/api/notices"
 
@@ -67,14 +74,14 @@ def test_a_cancelled_job_leaves_nothing(client: TestClient, folder: Path) -> Non
     span = float(table["time"].iloc[-1] - table["time"].iloc[0]) + 0.01
     long = pd.concat([table.assign(time=table["time"] + i * span) for i in range(150)])
     long.to_parquet(folder / "long.parquet")
-    before = sorted(folder.iterdir())
+    before = sorted(folder.glob("[!.]*"))
     first = ask(client, recording="long.parquet").json()["id"]
     second = ask(client, output="second.parquet").json()["id"]
     wait(client, first, ("running",))
     assert client.delete(f"/api/jobs/{second}").json()["state"] == "cancelled"
     assert client.delete(f"/api/jobs/{first}").json()["state"] == "cancelled"
     time.sleep(0.3)
-    assert sorted(folder.iterdir()) == before
+    assert sorted(folder.iterdir()) == [folder / ".terragrip", *before]  # which keeps the jobs themselves
     assert wait(client, ask(client).json()["id"])["state"] == "done"
 
 
@@ -160,3 +167,52 @@ def test_ready_means_that_the_estimate_will_run(client: TestClient, folder: Path
         assert result["ready"] == (job["state"] == "done")
         if not result["ready"]:
             assert result["problem"] == job["text"]
+
+
+def test_jobs_outlive_the_studio(client: TestClient, folder: Path) -> None:
+    done = wait(client, ask(client).json()["id"])
+    failed = wait(client, ask(client, recording="soils.json", output="other.parquet").json()["id"])
+    with TestClient(create_app(folder), base_url="http://127.0.0.1:8750") as later:
+        assert later.get("/api/jobs").json() == [{**one, "done": 0, "total": 0} for one in (done, failed)]
+        assert all(not item["path"].startswith(".") for item in later.get("/api/folder").json()["items"])
+    with closing(sqlite3.connect(folder / ".terragrip/jobs.sqlite")) as base:
+        assert base.execute("PRAGMA journal_mode").fetchone() == ("wal",)
+
+
+def test_a_job_whose_studio_was_killed_is_interrupted(folder: Path) -> None:
+    script = """
+import sys
+from pathlib import Path
+from terragrip.studio.job_store import Job, JobStore
+from terragrip.studio.own_folder import OwnFolder
+store = JobStore(OwnFolder(Path(sys.argv[1])))
+store.save(Job("a", "estimate", "long.csv", "out.parquet", "running", words=("estimate", "long.csv")))
+print(1, flush=True)
+sys.stdin.read()
+"""
+    words = [sys.executable, "-c", script, str(folder)]
+    other = subprocess.Popen(words, stdin=subprocess.PIPE, stdout=subprocess.PIPE)
+    assert other.stdout is not None
+    assert other.stdout.readline() == b"1\n"
+    with TestClient(create_app(folder), base_url="http://127.0.0.1:8750") as beside:
+        assert beside.get("/api/jobs").json() == []  # it runs in another studio, and is not taken for ended
+    other.kill()
+    other.communicate()
+    with TestClient(create_app(folder), base_url="http://127.0.0.1:8750") as later:
+        (job,) = later.get("/api/jobs").json()
+    assert (job["state"], job["command"]) == ("interrupted", "terragrip estimate long.csv")
+    assert "run the command line again" in job["text"]
+
+
+def test_a_list_of_jobs_of_a_newer_version_or_damaged_is_refused(folder: Path) -> None:
+    (folder / ".terragrip").mkdir()
+    path = folder / ".terragrip/jobs.sqlite"
+    with closing(sqlite3.connect(path)) as base:
+        base.execute("PRAGMA user_version = 2")
+    with pytest.raises(InputError, match=r"jobs\.sqlite: has version 2; update terragrip"):
+        create_app(folder)
+    path.write_bytes(b"nonsense" * 1000)
+    with pytest.raises(
+        InputError, match=r"jobs\.sqlite: cannot be read or written .*; make it writable, or remove it"
+    ):
+        create_app(folder)

@@ -59,7 +59,8 @@ def _logs_of(folder: Path) -> list[Path]:
     inside = sorted(
         entry
         for entry in folder.iterdir()
-        if (entry.is_file() and entry.name.lower().endswith(known)) or (entry.is_dir() and is_bag(entry))
+        if not entry.name.startswith(".")
+        and ((entry.is_file() and entry.name.lower().endswith(known)) or (entry.is_dir() and is_bag(entry)))
     )
     if not inside:
         raise InputError(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import logging
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -12,7 +12,7 @@ from terragrip.errors import InputError
 from terragrip.estimation.methods import DEFAULT
 from terragrip.fleet.cluster import default_workers, workers_at
 from terragrip.fleet.curves import learn_curves
-from terragrip.fleet.dataset import known_notes, settled, write_tables, write_text
+from terragrip.fleet.dataset import Note, known_notes, settled, write_tables, write_text
 from terragrip.fleet.logs import FleetLog
 from terragrip.fleet.page import report_of
 from terragrip.fleet.store import TEMPORARY, Store
@@ -61,35 +61,31 @@ def run_fleet(
 
     Raises
     ------
-    InputError: the output cannot be written, or the scheduler cannot be reached. A log that cannot be estimated raises nothing: it stands
-        among the failures.
+    InputError: the output cannot be read or written, another call works on it, or the scheduler cannot be reached. A log that cannot be
+        estimated raises nothing: it stands among the failures.
     """
     from terragrip import __version__
 
     store = Store.at(output)
     store.check()
-    before, failed = known_notes(store)
     settings = Settings(method, smooth, tuple(str(path.absolute()) for path in dbc), __version__)
     outcomes: list[Outcome] = []
     emit(logger, "fleet_started", logs=len(logs))
-    with workers_at(scheduler, workers or default_workers(), memory) as pool:
-        for outcome in pool.run(logs, settings, store):
-            outcomes.append(outcome)
-            if outcome.note is None:
-                emit(logger, "fleet_log_failed", log=outcome.log, reason=outcome.reason)
-            if progress:
-                progress(len(outcomes), len(logs) + 1)
-    notes, reasons = settled(store, before, failed, outcomes)
-    curves = learn_curves(store, notes)
     try:
-        write_tables(store, notes, reasons)
-        write_text(store, REPORT, report_of(notes, reasons, curves))
-        library = curves.pooled.library({"files": [note["file"] for note in notes if note["sample"]]})
-        write_text(store, SOILS, json.dumps(library.to_dict(), indent=1, allow_nan=False) + "\n")
-        store.remove(TEMPORARY)
+        with store.alone():
+            before, failed = known_notes(store)
+            with workers_at(scheduler, workers or default_workers(), memory) as pool:
+                for outcome in pool.run(logs, settings, store):
+                    outcomes.append(outcome)
+                    if outcome.note is None:
+                        emit(logger, "fleet_log_failed", log=outcome.log, reason=outcome.reason)
+                    if progress:
+                        progress(len(outcomes), len(logs) + 1)
+            notes, reasons = settled(store, before, failed, outcomes)
+            _write(store, notes, reasons)
     except OSError as error:
         raise InputError(
-            f"cannot be written ({error})", file=output, hint="run again: what was estimated is kept"
+            f"cannot be read or written ({error})", file=output, hint="run again: what was estimated is kept"
         ) from error
     named = {one.log for one in outcomes}
     fresh = [one.note["summary"] for one in outcomes if one.fresh and one.note is not None]
@@ -104,3 +100,13 @@ def run_fleet(
     counts = {"estimated": result.estimated, "unchanged": result.unchanged, "failed": len(result.failed)}
     emit(logger, "fleet_ended", **counts, kept=result.kept, rows=result.rows, restarts=result.restarts)
     return result
+
+
+def _write(store: Store, notes: Sequence[Note], reasons: Mapping[str, str]) -> None:
+    """The tables, the report and the curves of all logs. Raises OSError where the store refuses."""
+    curves = learn_curves(store, notes)
+    write_tables(store, notes, reasons)
+    write_text(store, REPORT, report_of(notes, reasons, curves))
+    library = curves.pooled.library({"files": [note["file"] for note in notes if note["sample"]]})
+    write_text(store, SOILS, json.dumps(library.to_dict(), indent=1, allow_nan=False) + "\n")
+    store.remove(TEMPORARY)

@@ -5,7 +5,8 @@ from __future__ import annotations
 import os
 import secrets
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -13,12 +14,13 @@ from typing import Any, TypeVar
 from urllib.parse import quote
 
 from terragrip.errors import InputError
+from terragrip.files import lock, sync, sync_folder
 
 Result = TypeVar("Result")
 
 WAITS = (0.2, 0.5, 1.0, 2.0, 4.0)
 """Seconds between the tries of a store that refuses."""
-TEMPORARY = ".tmp"
+TEMPORARY, LOCK = ".tmp", ".lock"
 _WHOLE = frozenset({"s3", "s3a", "gs", "gcs", "abfs", "az", "adl", "memory"})
 """Stores that show an object only when all of it is there; elsewhere a file is written beside and renamed."""
 _FINAL = (FileNotFoundError, PermissionError, IsADirectoryError, NotADirectoryError)
@@ -72,6 +74,28 @@ class Store:
         """Whether it is a folder of this machine."""
         return not is_remote(self.url)
 
+    @contextmanager
+    def alone(self) -> Iterator[None]:
+        """Keep other calls on this machine from a folder; the lock goes with the process. A store elsewhere has no lock.
+
+        Raises InputError where another call works on the folder, OSError where the lock cannot be made.
+        """
+        if not self.is_local:
+            yield
+            return
+        held = lock(Path(self.url) / LOCK)
+        if held is None:
+            raise InputError(
+                "another terragrip fleet works on it",
+                file=self.url,
+                place="--output",
+                hint="wait for its end, or name another folder",
+            )
+        try:
+            yield
+        finally:
+            os.close(held)
+
     def _path(self, name: str) -> str:
         return f"{self._place[1]}/{name}"
 
@@ -90,7 +114,9 @@ class Store:
             system.makedirs(os.path.dirname(beside), exist_ok=True)
             system.put_file(os.fspath(local), beside)
             if self.is_local:
+                sync(Path(beside))
                 os.replace(beside, target)
+                sync_folder(Path(target).parent)
             else:
                 system.mv(beside, target)
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import fcntl
 import json
 import os
 import zlib
@@ -12,9 +11,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from terragrip.errors import InputError
-from terragrip.files import unwritable
+from terragrip.files import lock, sync_folder, unwritable
 from terragrip.live.core import Core
-from terragrip.live.segment import ESTIMATES, RECORDING, Segment, durable, sync_folder
+from terragrip.live.segment import ESTIMATES, RECORDING, Segment, durable
 from terragrip.live.wal import Reading
 
 if TYPE_CHECKING:
@@ -76,16 +75,13 @@ def locked(folder: Path) -> int:
     """A lock on the folder, which the system lets go of with the process."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        file = os.open(folder / "lock", os.O_RDWR | os.O_CREAT, 0o666)
+        file = lock(folder / "lock")
     except OSError as error:
         raise unwritable(folder, error, "choose another folder, or make it writable") from error
-    try:
-        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except OSError as error:
-        os.close(file)
+    if file is None:
         raise InputError(
             "is in use by another terragrip live", file=folder, place="--record", hint="choose another folder"
-        ) from error
+        )
     return file
 
 

@@ -10,19 +10,17 @@ import contextlib
 import json
 import logging
 import secrets
-import shlex
 import sys
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
+from terragrip.errors import InputError
 from terragrip.log_events import emit
+from terragrip.studio.job_store import ENDED, Job, JobStore
 from terragrip.studio.notices import Notices
 
 GRACE = 3.0
 """Seconds that a cancelled job has to clean up."""
-STATES = ("queued", "running", "done", "failed", "cancelled")
 KEEP = 50
 """Finished jobs that the list still shows."""
 DEFECT = "a defect of Terragrip; run the same with 'terragrip --debug' on the command line to see where"
@@ -31,49 +29,28 @@ DEFECT = "a defect of Terragrip; run the same with 'terragrip --debug' on the co
 logger = logging.getLogger("terragrip.studio")
 
 
-@dataclass
-class Job:
-    """One job: `state` is one of `STATES`; `done` of `total` steps; `text` is the summary or the reason;
-    `words` are its command line after "terragrip", with paths from the studio's folder."""
-
-    id: str
-    kind: str
-    title: str
-    output: str
-    state: str = "queued"
-    done: int = 0
-    total: int = 0
-    text: str = ""
-    words: tuple[str, ...] = ()
-
-    @property
-    def command(self) -> str:
-        """The command line as a shell takes it, in the studio's folder."""
-        return shlex.join(("terragrip", *self.words))
-
-    def to_dict(self) -> dict[str, Any]:
-        """What a page may see of it."""
-        names = ("id", "kind", "title", "output", "state", "done", "total", "text", "command")
-        return {name: getattr(self, name) for name in names}
-
-
 class Jobs:
-    """The queue. Used from one event loop."""
+    """The queue, after the jobs that the folder keeps of earlier studios. Used from one event loop. Raises InputError as `JobStore`."""
 
-    def __init__(self, notices: Notices, folder: Path) -> None:
-        self._notices, self._folder = notices, folder
-        self._jobs: dict[str, Job] = {}
+    def __init__(self, notices: Notices, folder: Path, store: JobStore) -> None:
+        self._notices, self._folder, self._store = notices, folder, store
+        self._jobs: dict[str, Job] = {job.id: job for job in store.load()}
         self._waiting: asyncio.Queue[Job] = asyncio.Queue()
         self._runner: asyncio.Task[None] | None = None
         self._process: asyncio.subprocess.Process | None = None
 
     def add(self, kind: str, title: str, output: str, words: Sequence[str]) -> Job:
-        """Queue a job; `words` is its command line after "terragrip", `output` the path that it will write."""
+        """Queue a job; `words` is its command line after "terragrip", `output` the path that it will write.
+
+        Raises InputError where the folder cannot be written.
+        """
         job = Job(secrets.token_hex(8), kind, title, output, words=tuple(words))
+        self._store.save(job)
         self._jobs[job.id] = job
-        over = [old.id for old in self._jobs.values() if old.state in ("done", "failed", "cancelled")][:-KEEP]
+        over = [old.id for old in self._jobs.values() if old.state in ENDED][:-KEEP]
         for old in over:
             del self._jobs[old]
+        self._store.remove(over)
         self._waiting.put_nowait(job)
         if self._runner is None or self._runner.done():
             self._runner = asyncio.create_task(self._run())
@@ -122,6 +99,7 @@ class Jobs:
 
     async def _work(self, job: Job) -> None:
         job.state = "running"
+        self._keep(job)
         emit(logger, "job_started", job=job.id, kind=job.kind, output=job.output)
         self._tell(job)
         process = await asyncio.create_subprocess_exec(
@@ -158,8 +136,15 @@ class Jobs:
     def _end(self, job: Job, state: str, text: str) -> None:
         root = f"{self._folder}/"
         job.state, job.text = state, text.replace(root, "")
+        self._keep(job)
         emit(logger, "job_ended", job=job.id, kind=job.kind, state=state)
         self._tell(job)
+
+    def _keep(self, job: Job) -> None:
+        with contextlib.suppress(
+            InputError
+        ):  # a full disk ends no job; after a restart this one counts as interrupted
+            self._store.save(job)
 
     def _tell(self, job: Job) -> None:
         self._notices.publish("job", job=job.to_dict())

@@ -11,9 +11,11 @@ from fastapi.requests import HTTPConnection
 
 from terragrip.files import sha256
 from terragrip.studio.folder import MOST, Folder
+from terragrip.studio.job_store import JobStore
 from terragrip.studio.jobs import Jobs
 from terragrip.studio.log_look import LogLook, look_at
 from terragrip.studio.notices import Notices
+from terragrip.studio.own_folder import OwnFolder
 from terragrip.studio.shown import Shown
 from terragrip.studio.tables import Tables
 
@@ -42,7 +44,7 @@ class Studio:
 
     Parameters
     ----------
-    root: the folder. InputError if it is none.
+    root: the folder. InputError if it is none, or its list of jobs is of a newer Terragrip or damaged.
     upload_limit: bytes that one upload may have.
     live: address of a live service's WebSocket (ws://127.0.0.1:...), or None.
     """
@@ -52,7 +54,8 @@ class Studio:
     ) -> None:
         self.folder = Folder(root)
         self.notices = Notices(self.folder)
-        self.jobs = Jobs(self.notices, self.folder.root)
+        self.own = OwnFolder(self.folder.root)
+        self.jobs = Jobs(self.notices, self.folder.root, JobStore(self.own))
         self.estimates: Tables[Estimates] = Tables(_estimates)
         self.shown: Tables[Shown] = Tables(lambda path: Shown(self.estimates.get(path)))
         self.recordings: Tables[Recording] = Tables(_recording)

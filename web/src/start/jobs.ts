@@ -98,7 +98,7 @@ export class JobList {
     const view = job.state === "done" ? viewOf(job.kind, job.output) : null;
     const outside = view !== null && !view.startsWith("#");
     const output = view ? h("a", { href: view, target: outside ? "_blank" : null, "data-key": `view ${job.id}` }, job.output) : h("span", {}, job.output);
-    const failed = job.state === "failed";
+    const failed = job.state === "failed" || job.state === "interrupted";
     return [
       h("span", { class: "what" }, `${NAMES[job.kind] ?? job.kind}: ${job.title} → `, output),
       going ? bar : h("span", { class: `state ${job.state}` }, job.state),

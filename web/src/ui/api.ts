@@ -12,7 +12,7 @@ export interface Job {
   kind: string;
   title: string;
   output: string;
-  state: "queued" | "running" | "done" | "failed" | "cancelled";
+  state: "queued" | "running" | "done" | "failed" | "cancelled" | "interrupted";
   done: number;
   total: number;
   text: string;

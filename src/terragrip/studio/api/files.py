@@ -5,7 +5,6 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import math
-import secrets
 from collections.abc import AsyncIterator
 from dataclasses import asdict
 from pathlib import Path
@@ -15,6 +14,7 @@ from fastapi import APIRouter, Query, Request, Response, WebSocket, WebSocketDis
 from fastapi.responses import FileResponse
 
 from terragrip.errors import InputError
+from terragrip.files import replacing, sync
 from terragrip.studio.folder import PICTURES, Folder, kind_of
 from terragrip.studio.state import Here
 
@@ -83,13 +83,14 @@ def show_report(studio: Here, path: Named) -> Response:
 async def upload(request: Request, studio: Here, path: Named, replace: bool = False) -> dict[str, Any]:
     """Take a file into the folder, whole or not at all; its content must be what its name says."""
     target = _free(studio.folder, path, replace)
-    temporary = target.with_name(f".{secrets.token_hex(8)}{_suffixes(target)}")
     try:
-        await _receive(request.stream(), temporary, studio.upload_limit, path)
-        await asyncio.to_thread(_check, temporary, path)
-        temporary.replace(target)
-    finally:
-        temporary.unlink(missing_ok=True)
+        with replacing(target) as temporary:
+            await _receive(request.stream(), temporary, studio.upload_limit, path)
+            await asyncio.to_thread(_check, temporary, path)
+            await asyncio.to_thread(sync, temporary)  # a large one takes a while, and other requests go on
+            _free(studio.folder, path, replace)  # meanwhile another may have made it
+    except InputError as error:
+        raise InputError(error.problem, file=path, place=error.place, hint=error.hint) from error
     return {"path": studio.folder.name(target), "kind": await asyncio.to_thread(kind_of, target)}
 
 
@@ -159,14 +160,9 @@ def _free(folder: Folder, path: str, replace: bool) -> Path:
     return target
 
 
-def _suffixes(target: Path) -> str:
-    """The last suffix, and the one before it of a compressed file."""
-    return "".join(target.suffixes[-2:]) if target.suffix == ".gz" else target.suffix
-
-
 async def _receive(stream: AsyncIterator[bytes], target: Path, limit: int, path: str) -> None:
     size = 0
-    with target.open("xb") as file:
+    with target.open("wb") as file:
         async for chunk in stream:
             size += len(chunk)
             if size > limit:

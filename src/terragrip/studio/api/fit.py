@@ -176,7 +176,6 @@ def fit(studio: Here, wanted: FitRequest) -> dict[str, Any]:
 def save(studio: Here, wanted: SaveRequest) -> dict[str, Any]:
     """Put a soil into a library, which is made where there is none."""
     target = studio.folder.new_file(wanted.library, (".json",))
-    library = SoilLibrary.load(target) if target.exists() else SoilLibrary({})
     if wanted.model not in CURVES:
         raise InputError(f"there is no curve model {wanted.model!r}")
     try:
@@ -186,8 +185,10 @@ def save(studio: Here, wanted: SaveRequest) -> dict[str, Any]:
     soil = Soil(
         wanted.name, wanted.model, wanted.parameters, wanted.interval, wanted.r2, wanted.nrmse, tuple(wanted.bins), source=wanted.source
     )  # fmt: skip
-    merged = library.merge(SoilLibrary({soil.name: soil}), "replace" if wanted.replace else "refuse")
-    merged.write(target)
+    with studio.own.saving():  # two pages that save at once keep both soils
+        library = SoilLibrary.load(target) if target.exists() else SoilLibrary({})
+        merged = library.merge(SoilLibrary({soil.name: soil}), "replace" if wanted.replace else "refuse")
+        merged.write(target)
     return {"path": wanted.library, "soils": list(merged)}
 
 

@@ -10,7 +10,7 @@ from pydantic import BaseModel, Field
 
 from terragrip.errors import InputError
 from terragrip.estimation.methods import DEFAULT, method_named
-from terragrip.studio.jobs import Job
+from terragrip.studio.job_store import Job
 from terragrip.studio.state import Here
 
 router = APIRouter(tags=["jobs"])

@@ -12,7 +12,7 @@ from fastapi.responses import PlainTextResponse
 from terragrip.live.monitor import LIVE, READY
 from terragrip.prometheus_text import CONTENT_TYPE, METRICS, Metrics
 from terragrip.studio.api.live import LIVE_TOKEN
-from terragrip.studio.jobs import STATES
+from terragrip.studio.job_store import STATES
 from terragrip.studio.state import Here, Studio
 
 router = APIRouter(tags=["monitoring"], default_response_class=PlainTextResponse)
