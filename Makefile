@@ -22,7 +22,7 @@ KERNEL_TESTS := $(patsubst kernel/tests/%.c,%,$(wildcard kernel/tests/*.c))
 BUILD_INPUTS := pyproject.toml setup.py cffi_build.py $(KERNEL_SOURCES) $(KERNEL_HEADERS) \
 	$(wildcard kernel/python/*.[ch] src/terragrip/*/*.c src/terragrip/*/*.h)
 
-.PHONY: notebooks help demo test lint kernel-test web-test pytest studio wheel docs system bench lock clean sbom audit \
+.PHONY: notebooks soak soak-short help demo test lint kernel-test web-test pytest studio wheel docs system bench lock clean sbom audit \
 	kernel-aarch64 kernel-others test-long kernel-sanitized fuzz system-fuzz fuzz-kernel fuzz-kernel-run fuzz-parsers kills
 
 help: ## show this list
@@ -169,10 +169,17 @@ KILLS ?= 25
 FUZZERS := $(patsubst fuzz/kernel/%.c,build/fuzz/kernel-%,$(wildcard fuzz/kernel/*.c))
 FUZZ_CC := clang
 
-test-long: kernel-sanitized fuzz kills ## every C test under the address and undefined-behaviour sanitizers, each fuzzer for FUZZ_SECONDS, a hundred kills
+test-long: kernel-sanitized fuzz kills soak-short ## every C test under the address and undefined-behaviour sanitizers, each fuzzer for FUZZ_SECONDS, a hundred kills, a soak of 60 s
 
 kills: $(VENV)/package $(VENV)/dev ## kill -9 a hundred times during estimate, soils, a fit saved and an upload
 	TERRAGRIP_KILLS=$(KILLS) $(BIN)/python -m pytest tests/test_kills.py -q -n $(WORKERS) -rP
+
+SOAK_SECONDS ?= 3600
+soak: system $(VENV)/package $(VENV)/dev ## the live service at 1 kHz with random faults for SOAK_SECONDS, an hour; then its promises are checked
+	@$(BIN)/python benchmarks/soak.py --seconds $(SOAK_SECONDS)
+
+soak-short:
+	@$(MAKE) --no-print-directory soak SOAK_SECONDS=60
 
 kernel-sanitized: $(foreach real,sanitized sanitized-float,$(KERNEL_TESTS:%=build/kernel/$(real)/%))
 	@for program in $^; do echo "$$program"; ./$$program > /dev/null || exit 1; done
