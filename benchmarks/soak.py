@@ -45,7 +45,7 @@ from priority import prefer
 from soak_checks import checks
 
 MOSQUITTO = shutil.which("mosquitto") or shutil.which("mosquitto", path="/usr/sbin:/usr/local/sbin")
-QUIET = 15.0  # s at the end without faults
+QUIET = 20.0  # s at the end without faults
 PERIOD = 60.0  # s after which the drive repeats
 PATIENCE = 180.0  # s for a start, a backlog, a connection: far more than a loaded machine needs
 BACKLOG = 1000  # samples waiting in the service at which the sender waits, too
@@ -109,12 +109,12 @@ def planned(seconds: float, rate: int, seed: int) -> dict[int, list[str]]:
     result: dict[int, list[str]] = {}
     for kind, mean, last in (
         *((kind, mean, end) for kind, mean in OFTEN.items()),
-        ("clock step", rare, end - 2.0), ("broker restart", rare, end - 2.0), ("kill", rare, seconds / 2),
+        ("clock step", rare, end - 2.0), ("broker restart", max(20.0, rare), end - 5.0), ("kill", rare, seconds / 2),
     ):  # fmt: skip
         at = 5.0 + generator.uniform(0.0, mean)
         while at < last:
             result.setdefault(int(at * rate), []).append(kind)
-            # Rare ones keep a distance: a clock's step is believed after a second.
+            # Rare ones keep a distance: a clock's step is believed after a second, a connection settles in 10 s.
             at += generator.expovariate(1.0 / mean) if mean < rare else mean * generator.uniform(0.7, 1.3)
     return result
 
