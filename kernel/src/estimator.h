@@ -138,6 +138,7 @@ typedef struct { /* see speeds.c; all reals, since a smoother's record is this *
     tg_real anew;                     /* 1: nothing links this row to the one before */
     tg_real yaw, standing;
     tg_real open;                     /* 1: the rims read nothing that slip could be computed from */
+    tg_real off;                      /* 1, -1: the last ground speed lay above, below what was expected, and counted less; 0: neither */
 } tgi_speeds;
 
 typedef struct {
@@ -279,6 +280,9 @@ void tgi_digging_report(const tgi_digging *d, tg_real *o);
 /* immobilization.c */
 void tgi_watch_over(tg_estimator *e, const tg_row *row, const tg_drive *drive, int32_t moving, int32_t anew, tg_real dt, tg_real *o);
 int32_t tgi_watched(const tg_estimator *e); /* tg_event */
+
+/* speeds_report.c */
+void tgi_speeds_report(const tg_settings *set, const tgi_speeds *s, tg_real *o);
 
 /* speeds.c */
 void tgi_speeds_update(tg_estimator *e, tg_row *row, tg_estimate *out);

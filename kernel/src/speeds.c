@@ -22,6 +22,7 @@ static const tg_real slippings[TG_LEVELS] = {(tg_real)2.5e-5, (tg_real)2.5e-3, (
 typedef struct { /* what a row measures [m/s]: ground speed, rims; and which channels there are */
     tg_real y[TG_MAX_WHEELS + 1], variance[TG_MAX_WHEELS + 1];
     int32_t given[TG_MAX_WHEELS + 1], count; /* channels that are measured */
+    int32_t confirmed;                       /* the last ground speed was as far off, to the same side */
 } tgi_speed_samples;
 
 typedef struct { /* how the samples fitted one mode */
@@ -35,7 +36,7 @@ static void disturb(const tg_real *x, tg_real (*P)[SIZE], tg_real dt, tg_real ma
     P[0][1] += manoeuvre * dt * dt / 2;
     P[1][0] += manoeuvre * dt * dt / 2;
     P[1][1] += manoeuvre * dt;
-    tg_real fast[TG_MAX_WHEELS];
+    tg_real fast[TG_MAX_WHEELS], usual = 0;
     for (int32_t i = 0; i < n; i++) {
         const tg_real speed = tgi_fabs(x[0]), rim = tgi_fabs(x[0] + x[2 + i]);
         fast[i] = tgi_max(tgi_max(speed, rim), TG_SLOWEST);
@@ -44,6 +45,15 @@ static void disturb(const tg_real *x, tg_real (*P)[SIZE], tg_real dt, tg_real ma
             P[2 + i][2 + j] += added;
             if (j < i) P[2 + j][2 + i] += added;
         }
+        usual += fast[i] / (tg_real)n;
+    }
+    /* Rims that a motor holds go on where the ground gives way: the vehicle slows, and all slip speeds rise by as much. */
+    const tg_real yielding = TG_TOGETHER * slipping * dt * usual * usual;
+    P[0][0] += yielding;
+    for (int32_t i = 0; i < n; i++) {
+        P[0][2 + i] -= yielding;
+        P[2 + i][0] -= yielding;
+        for (int32_t j = 0; j < n; j++) P[2 + i][2 + j] += yielding;
     }
 }
 
@@ -74,14 +84,16 @@ static tg_real spread(const tg_real (*P)[SIZE], int32_t c)
     return c ? P[0][0] + 2 * P[0][1 + c] + P[1 + c][1 + c] : P[0][0];
 }
 
-/* Take the samples one after another. A sample beyond `huber` SDs of what is expected before any was taken counts less. */
+/* Take the samples one after another. A sample beyond `huber` SDs of what is expected before any was taken counts less, but for a ground speed
+ * that the next one confirms: rims alone would hold the estimate up for ever where all wheels lose hold together. */
 static void update(tgi_speed_mode *m, tgi_speed_fit *fit, const tgi_speed_samples *in, tg_real huber, int32_t size)
 {
     for (int32_t k = 0; k < in->count; k++) {
         const int32_t c = in->given[k];
         const tg_real expected = tgi_sqrt(spread((const tg_real(*)[SIZE])m->P, c) + in->variance[c]);
         const tg_real off = tgi_fabs(in->y[c] - read_of(m->x, c));
-        fit->weight[c] = huber > 0 && off > huber * expected ? huber * expected / off : 1;
+        const int32_t soft = huber > 0 && off > huber * expected && !(c == 0 && in->confirmed);
+        fit->weight[c] = soft ? huber * expected / off : 1;
     }
     for (int32_t k = 0; k < in->count; k++) {
         const int32_t c = in->given[k];
@@ -132,7 +144,7 @@ TG_INLINE void move(tg_real *x, tg_real reach, tg_real keep)
     x[1] *= keep;
 }
 
-static void step(tg_estimator *e, tg_real dt, const tgi_speed_samples *in, tg_row *row)
+static void step(tg_estimator *e, tg_real dt, tgi_speed_samples *in, tg_row *row)
 {
     tgi_speeds *const s = &e->speeds;
     const int32_t n = e->settings.machine.wheels, size = n + 2;
@@ -142,6 +154,8 @@ static void step(tg_estimator *e, tg_real dt, const tgi_speed_samples *in, tg_ro
     passage_of(dt, &reach, &keep);
     memcpy(scale, s->x, sizeof scale);
     move(scale, reach, keep);
+    const tg_real side = in->y[0] > scale[0] ? 1 : -1;
+    in->confirmed = !isnan(in->y[0]) && s->off == side;
     for (int32_t m = 0; m < TG_SPEED_MODES; m++) {
         tgi_speed_mode *const mode = &e->speed_mode[m];
         const tg_real prior = stay * s->probability[m] + leave;
@@ -168,6 +182,7 @@ static void step(tg_estimator *e, tg_real dt, const tgi_speed_samples *in, tg_ro
         }
     }
     for (int32_t k = 0; k < in->count; k++) row->outlier |= weight[k] < e->settings.outlier_weight;
+    if (!isnan(in->y[0])) s->off = in->confirmed || weight[0] < e->settings.outlier_weight ? side : 0; /* the ground speed is taken first */
     merge(s, e->speed_mode, size);
 }
 
@@ -246,31 +261,6 @@ static void samples_of(const tg_estimator *e, const tg_row *row, const tgi_speed
         if (!isnan(in->y[c])) in->given[in->count++] = c;
 }
 
-static tg_real root(tg_real variance) { return tgi_sqrt(variance > 0 ? variance : 0); }
-
-/* The row's values from the state; the radius is considered: it shifts slip, and no sample shows it. */
-static void report(const tg_settings *set, const tgi_speeds *s, tg_real *o)
-{
-    const tg_real error = set->uncertainty.wheel_radius, nan = (tg_real)NAN;
-    const int32_t known = s->begun != 0;
-    o[TG_OUT_GROUND_SPEED] = known ? s->x[0] : nan;
-    o[TG_OUT_GROUND_SPEED_STD] = known ? root(s->P[0][0]) : nan;
-    for (int32_t i = 0; i < set->machine.wheels; i++) {
-        const int32_t k = 2 + i;
-        const tg_real r = set->rolling_radius[i], hub = s->x[0] - set->wheel_side[i] * s->yaw, omega = (hub + s->x[k]) / r;
-        const tg_real vv = s->P[0][0], wv = (vv + s->P[0][k]) / r, ww = (vv + 2 * s->P[0][k] + s->P[k][k]) / (r * r);
-        const tgi_slip g = tgi_slip_of(omega, hub, r, set->standstill_speed);
-        const tg_real variance = g.wheel * (g.wheel * ww + 2 * g.ground * wv) + g.ground * g.ground * vv + tgi_square(g.radius * error);
-        const int32_t slips = known && s->open == 0 && s->standing == 0;
-        o[TG_OUT_WHEEL_SPEED + i] = known ? omega : nan;
-        o[TG_OUT_WHEEL_SPEED_STD + i] = known ? root(ww) : nan;
-        o[TG_OUT_SLIP + i] = slips ? g.slip : nan;
-        o[TG_OUT_SLIP_STD + i] = slips ? root(variance < 1 ? variance : 1) : nan;
-        o[TG_OUT_ZERO_SLIP_RADIUS + i] = r;
-        o[TG_OUT_ZERO_SLIP_RADIUS_STD + i] = r * error;
-    }
-}
-
 /* Whether there is nothing to tell slip from, now or since the motion began. */
 static int32_t is_blind(const tgi_speeds *s, int32_t n)
 {
@@ -312,7 +302,7 @@ void tgi_speeds_update(tg_estimator *e, tg_row *row, tg_estimate *out)
     e->started = 1;
     e->time = row->time;
 
-    report(&e->settings, s, out->value);
+    tgi_speeds_report(&e->settings, s, out->value);
     out->time = row->time;
     out->distance = e->distance;
     out->value[TG_OUT_DISTANCE] = (tg_real)e->distance;
@@ -394,5 +384,5 @@ void tgi_speeds_smooth(const tg_settings *set, const tg_real *record, const tg_r
         if (behind.anew == 0) step_back(&here, &behind, &smoothed, set->machine.wheels);
     }
     memcpy(carry, &here, sizeof here);
-    report(set, &here, o);
+    tgi_speeds_report(set, &here, o);
 }

@@ -24,6 +24,8 @@ LASTING = 3.0
 DWELL = 2.0
 """Mean time [s] in a pair of densities."""
 HUBER = 4.0
+OUTLIER = 0.5
+"""A sample that counts less than this is an outlier."""
 _FIRST_RATE = 1.0  # SD of a [m/s²] before it was seen
 _SLOWEST = 0.1  # m/s: slower wheels change their slip speed no less
 TOGETHER = 0.9
@@ -45,13 +47,15 @@ class SpeedsFilter:
     channels: int = field(init=False, default=0)
     weight: Floats = field(init=False)
     densities: tuple[float, float] = field(init=False, default=(0.0, 0.0))
+    off: float = field(init=False, default=0.0)
+    """1, -1: the last ground speed lay above, below what was expected, and counted less; 0: neither."""
 
     def __post_init__(self) -> None:
         size = len(self.noise) + 1
         self.state, self.covariance = np.zeros(size), np.zeros((size, size))
         self.means, self.spreads = np.zeros((len(PAIRS), size)), np.zeros((len(PAIRS), size, size))
         self.probability = np.full(len(PAIRS), 1 / len(PAIRS))
-        self.begun = False
+        self.begun, self.off = False, 0.0
         self.weight = np.ones(len(self.noise))
 
     def step(self, dt: float, speeds: Floats) -> None:
@@ -65,11 +69,13 @@ class SpeedsFilter:
         scale = move @ self.state  # the noise of slip speeds is in proportion to speed
         stay, leave = np.exp(-dt / DWELL), -np.expm1(-dt / DWELL) / len(PAIRS)
         prior = stay * self.probability + leave
+        side = 1.0 if speeds[0] > scale[0] else -1.0
+        confirmed = bool(usable[0]) and self.off == side
         result = []
         for m, (manoeuvre, slipping) in enumerate(PAIRS):
             x, P = self._mixed(m, stay * self.probability[m] / prior[m])
             Q = process_noise(scale, dt, manoeuvre, slipping**2)
-            result.append(self._update(move @ x, move @ P @ move.T + Q, speeds, usable))
+            result.append(self._update(move @ x, move @ P @ move.T + Q, speeds, usable, confirmed))
         score = np.log(prior) + [one[2] for one in result]
         p = np.exp(score - score.max())
         p /= p.sum()
@@ -77,6 +83,8 @@ class SpeedsFilter:
         self.means, self.spreads = np.stack([one[0] for one in result]), np.stack([one[1] for one in result])
         self.nis = float(p @ [one[3] for one in result])
         self.weight = p @ np.stack([one[4] for one in result])
+        if usable[0]:
+            self.off = side if confirmed or self.weight[0] < OUTLIER else 0.0
         self.channels = int(usable.sum())
         self.densities = float(p @ [q for q, _ in PAIRS]), float(p @ [c * c for _, c in PAIRS])
         self._merge()
@@ -96,7 +104,7 @@ class SpeedsFilter:
         self.covariance += np.einsum("m,mi,mj->ij", self.probability, apart, apart)
 
     def _update(
-        self, x: Floats, P: Floats, speeds: Floats, usable: npt.NDArray[np.bool_]
+        self, x: Floats, P: Floats, speeds: Floats, usable: npt.NDArray[np.bool_], confirmed: bool
     ) -> tuple[Floats, Floats, float, float, Floats]:
         likelihood, nis = 0.0, 0.0
         rows = _rows(len(self.noise))
@@ -104,7 +112,8 @@ class SpeedsFilter:
         for c in np.flatnonzero(usable):
             size = np.sqrt(rows[c] @ P @ rows[c] + self.noise[c] ** 2)
             off = abs(speeds[c] - rows[c] @ x)
-            weight[c] = HUBER * size / off if off > HUBER * size else 1.0
+            soft = off > HUBER * size and not (c == 0 and confirmed)
+            weight[c] = HUBER * size / off if soft else 1.0
         for c in np.flatnonzero(usable):
             column = P @ rows[c]
             variance = rows[c] @ column + self.noise[c] ** 2 / weight[c]
@@ -153,7 +162,9 @@ def process_noise(x: Floats, dt: float, manoeuvre: float, slipping: float) -> Fl
     speed = np.maximum(np.maximum(abs(x[0]), np.abs(x[0] + x[2:])), _SLOWEST)
     alike = np.where(np.eye(len(speed), dtype=bool), 1.0, TOGETHER)
     Q[2:, 2:] = slipping * dt * alike * np.outer(speed, speed)
-    return Q
+    # Rims that a motor holds go on where the ground gives way: the vehicle slows, and all slip speeds rise by as much.
+    giving_way = np.r_[-1.0, 0.0, np.ones(len(speed))]
+    return Q + TOGETHER * slipping * dt * np.mean(speed) ** 2 * np.outer(giving_way, giving_way)
 
 
 def _rows(channels: int) -> Floats:
