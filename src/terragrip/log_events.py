@@ -12,7 +12,7 @@ LIVE = (
 )  # fmt: skip
 """Of the live service; sinks get these too (terragrip.live.event)."""
 EVENTS = (
-    *LIVE, "live_started", "live_stopped", "studio_started", "studio_stopped", "job_started", "job_ended",
+    *LIVE, "live_started", "live_stopped", "studio_started", "studio_stopped", "studio_write", "job_started", "job_ended",
     "fleet_started", "fleet_log_failed", "fleet_ended",
 )  # fmt: skip
 

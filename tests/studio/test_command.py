@@ -6,8 +6,13 @@ import http.client
 import json
 import os
 import re
+import shutil
+import ssl
 import subprocess
 import sys
+import time
+import urllib.error
+import urllib.request
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -59,6 +64,67 @@ def test_behind_a_proxy_the_printed_address_is_the_public_one_and_its_token_is_n
         mine = cookie.partition(";")[0]
         assert get("/api/folder", Cookie=mine).status == 200
         assert get("/api/folder", Cookie=mine, Host="evil.example").status == 403
+
+
+@pytest.fixture
+def certificate(tmp_path: Path) -> tuple[Path, Path]:
+    """A certificate of 127.0.0.1 and its key."""
+    if shutil.which("openssl") is None:
+        pytest.skip("NOT TESTED: there is no openssl; apt-get install openssl")
+    chain, key = tmp_path / "studio.pem", tmp_path / "studio.key"
+    words = "req -x509 -newkey rsa:2048 -nodes -days 2 -subj /CN=studio -addext subjectAltName=IP:127.0.0.1"
+    files = ["-out", str(chain), "-keyout", str(key)]
+    subprocess.run(["openssl", *words.split(), *files], check=True, capture_output=True)
+    return chain, key
+
+
+def test_https_by_a_certificate_and_a_line_for_each_write(
+    certificate: tuple[Path, Path], tmp_path: Path
+) -> None:
+    chain, key = certificate
+    folder, log = tmp_path / "folder", tmp_path / "log"
+    folder.mkdir()
+    words = ["--tls-certificate", str(chain), "--tls-key", str(key), "--log-format", "json"]
+    command = [sys.executable, "-m", "terragrip", "studio", str(folder), "--port", "0", *words]
+    with open(log, "w") as sink, subprocess.Popen(command, stderr=sink) as process:
+        try:
+            place = ""
+            while not place and process.poll() is None:
+                time.sleep(0.1)
+                lines = log.read_text().splitlines()
+                place = json.loads(lines[0])["address"] if lines else ""
+            assert place.startswith("https://127.0.0.1:")
+            trusted = ssl.create_default_context(cafile=str(chain))
+            with urllib.request.urlopen(f"{place}api/folder", context=trusted, timeout=20) as answer:
+                assert answer.status == 200
+            with pytest.raises(urllib.error.URLError, match="CERTIFICATE_VERIFY_FAILED"):
+                urllib.request.urlopen(f"{place}api/folder", timeout=20)
+            wrong = urllib.request.Request(f"{place}api/nothing", method="POST", data=b"")
+            with pytest.raises(urllib.error.HTTPError) as refused:
+                urllib.request.urlopen(wrong, context=trusted, timeout=20)
+        finally:
+            process.terminate()
+            process.wait(20)
+    events = [json.loads(line) for line in log.read_text().splitlines()]
+    writes = [event for event in events if event["event"] == "studio_write"]
+    assert [(one["client"], one["method"], one["path"], one["status"]) for one in writes] == [
+        ("127.0.0.1", "POST", "/api/nothing", refused.value.code)
+    ]
+
+
+def test_a_certificate_that_cannot_be_used_is_refused_in_one_line(
+    certificate: tuple[Path, Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    chain, key = map(str, certificate)
+    for words, said in (
+        ([chain], "--tls-key: a certificate and its key are needed both"),
+        ([chain, "--tls-key", str(tmp_path / "none.key")], "none.key: --tls-certificate: is not there"),
+        ([key, "--tls-key", key], "cannot be used with"),
+    ):
+        assert main(["studio", str(tmp_path), "--tls-certificate", *words]) == 2
+        line = capsys.readouterr().err
+        assert said in line
+        assert line.count("\n") == 1
 
 
 @pytest.mark.parametrize(

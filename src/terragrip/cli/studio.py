@@ -31,6 +31,14 @@ def command(
             help="The address by which browsers reach a reverse proxy in front; a token is then needed.",
         ),
     ] = None,
+    tls_certificate: Annotated[
+        Path | None,
+        typer.Option("--tls-certificate", metavar="PEM", help="Serve https with this certificate (chain)."),
+    ] = None,
+    tls_key: Annotated[
+        Path | None,
+        typer.Option("--tls-key", metavar="PEM", help="The certificate's key, without a password."),
+    ] = None,
     upload_limit: Annotated[
         int, typer.Option("--upload-limit", metavar="MB", min=1, help="Largest file taken by drop.")
     ] = 2000,
@@ -57,8 +65,14 @@ def command(
             place="--public-url",
             hint="give https://HOST, or https://HOST/PATH",
         )
+    if (tls_certificate is None) != (tls_key is None):
+        raise InputError(
+            "a certificate and its key are needed both",
+            place="--tls-key" if tls_key is None else "--tls-certificate",
+            hint="give both as PEM files",
+        )
     try:
-        from terragrip.studio.serve import serve
+        from terragrip.studio.serve import Certificate, serve
     except ModuleNotFoundError as error:
         if (error.name or "").split(".")[0] == "terragrip":
             raise
@@ -80,6 +94,7 @@ def command(
         upload_limit=limit,
         public=public_url,
         as_json=as_json,
+        certificate=Certificate(tls_certificate, tls_key) if tls_certificate and tls_key else None,
     )
 
 

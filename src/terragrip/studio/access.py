@@ -8,12 +8,16 @@ from __future__ import annotations
 
 import hmac
 import ipaddress
+import logging
 from collections.abc import Iterable
 from http.cookies import CookieError, SimpleCookie
 from typing import Any
 from urllib.parse import parse_qs, quote, urlsplit
 
+from terragrip.log_events import emit
+
 COOKIE = "terragrip_token"
+_READING = ("GET", "HEAD", "OPTIONS")
 LOOPBACK = frozenset({"127.0.0.1", "localhost", "::1"})
 POLICY = (
     "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' blob: data:; connect-src 'self'; "
@@ -49,7 +53,7 @@ class Access:
         place = urlsplit(public or "")
         self._public = place.netloc.lower()
         self._path = f"{place.path.rstrip('/')}/"
-        self._tls = "; Secure" if place.scheme == "https" else ""
+        self._tls = place.scheme == "https"
 
     async def __call__(self, scope: Any, receive: Any, send: Any) -> None:
         if scope["type"] not in ("http", "websocket"):
@@ -60,16 +64,18 @@ class Access:
         if problem is None and self._token is not None:
             handed = parse_qs(scope.get("query_string", b"").decode("latin-1")).get("token", [""])[0]
             if scope["type"] == "http" and scope["path"] == "/" and handed:
-                await self._log_in(send, handed)
+                await self._log_in(send, handed, secure=self._tls or scope.get("scheme") == "https")
                 return
             if not self._knows_token(headers):
                 problem = (401, "a token is needed: open the address that 'terragrip studio' printed")
         if problem is not None:
+            _audit(scope, problem[0])
             await _refuse(scope, send, *problem)
             return
 
         async def guarded(message: Any) -> None:
             if message["type"] == "http.response.start":
+                _audit(scope, message["status"])
                 own = message.get("headers", [])
                 named = {name for name, _ in own}  # a report has a stricter policy of its own
                 message = {**message, "headers": [*own, *(one for one in _HEADERS if one[0] not in named)]}
@@ -111,13 +117,28 @@ class Access:
             return False
         return cookie is not None and _same(cookie.value, self._token)
 
-    async def _log_in(self, send: Any, given: str) -> None:
+    async def _log_in(self, send: Any, given: str, *, secure: bool) -> None:
         assert self._token is not None
         if not _same(given, self._token):
             await _answer(send, 401, "this token is not the studio's")
             return
-        cookie = f"{COOKIE}={quote(self._token)}; HttpOnly; SameSite=Strict; Path={self._path}{self._tls}"
+        cookie = f"{COOKIE}={quote(self._token)}; HttpOnly; SameSite=Strict; Path={self._path}"
+        cookie += "; Secure" if secure else ""
         await _answer(send, 303, "", ((b"location", self._path.encode()), (b"set-cookie", cookie.encode())))
+
+
+def _audit(scope: Any, status: int) -> None:
+    """One line for each request that would change something: from where, what, and how it ended."""
+    if scope["type"] == "http" and scope["method"] not in _READING:
+        client = scope.get("client") or ("",)
+        emit(
+            logging.getLogger("terragrip.studio"),
+            "studio_write",
+            client=client[0],
+            method=scope["method"],
+            path=scope["path"],
+            status=status,
+        )
 
 
 def _same(given: str, token: str) -> bool:

@@ -6,6 +6,8 @@ import logging
 import os
 import secrets
 import socket
+import ssl
+from dataclasses import dataclass
 from pathlib import Path
 
 import uvicorn
@@ -19,6 +21,27 @@ SHORTEST = 16
 """Characters that a token of the user's own must have."""
 
 
+@dataclass(frozen=True)
+class Certificate:
+    """Paths of a certificate (chain) and its key, both PEM."""
+
+    chain: Path
+    key: Path
+
+    def check(self) -> None:
+        """InputError where they cannot be read, are no PEM, do not belong together, or the key has a password."""
+        try:
+            ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER).load_cert_chain(self.chain, self.key, password="")
+        except (OSError, ValueError) as error:  # ssl.SSLError is an OSError
+            missing = next((one for one in (self.chain, self.key) if not one.is_file()), None)
+            raise InputError(
+                "is not there" if missing else f"cannot be used with {self.key} ({error})",
+                file=missing or self.chain,
+                place="--tls-certificate",
+                hint="give the certificate with its chain and its key without a password, both as PEM files",
+            ) from None
+
+
 def serve(
     folder: Path,
     address: str,
@@ -29,12 +52,16 @@ def serve(
     upload_limit: int,
     public: str | None = None,
     as_json: bool = False,
+    certificate: Certificate | None = None,
 ) -> None:
     """Bind, say where the pages are, serve. InputError where the folder or the port is not to be had, or the token is too short.
 
     `public`: the address by which a reverse proxy is reached. What comes through it comes from other machines, so a token is needed,
     though the studio itself stands on loopback. `as_json`: nothing is printed; events are logged, as are uvicorn's warnings.
+    `certificate`: https instead of http.
     """
+    if certificate is not None:
+        certificate.check()
     if as_json and not (loopback and public is None) and TOKEN not in os.environ:
         raise InputError(
             "a token made anew would stand in the log", place="--log-format", hint=f"set {TOKEN}"
@@ -44,15 +71,21 @@ def serve(
         folder, token=token, hosts=(address,), upload_limit=upload_limit, live=live, public=public
     )
     listener = _bind(address, port)
-    own = f"http://{_shown(address)}:{listener.getsockname()[1]}/"
+    own = f"http{'' if certificate is None else 's'}://{_shown(address)}:{listener.getsockname()[1]}/"
     place = own if public is None else f"{public.rstrip('/')}/"
     logger = logging.getLogger("terragrip.studio")
     emit(logger, "studio_started", address=place)
     if not as_json:
-        _say(place, own, token, loopback=loopback, public=public)
+        _say(place, own, token, loopback=loopback, public=public, encrypted=certificate is not None)
     # No access log: it would hold the token of the first request.
     config = uvicorn.Config(
-        app, log_level="warning", access_log=False, ws_max_size=1 << 20, timeout_graceful_shutdown=2
+        app,
+        log_level="warning",
+        access_log=False,
+        ws_max_size=1 << 20,
+        timeout_graceful_shutdown=2,
+        ssl_certfile=None if certificate is None else certificate.chain,
+        ssl_keyfile=None if certificate is None else certificate.key,
     )
     if as_json:  # its own handlers write text
         for name in ("uvicorn", "uvicorn.error"):
@@ -68,7 +101,9 @@ def serve(
         emit(logger, "studio_stopped")
 
 
-def _say(place: str, own: str, token: str | None, *, loopback: bool, public: str | None) -> None:
+def _say(
+    place: str, own: str, token: str | None, *, loopback: bool, public: str | None, encrypted: bool
+) -> None:
     """Print how the pages are reached."""
     if not (STATIC / "index.html").is_file():
         print(
@@ -81,10 +116,8 @@ def _say(place: str, own: str, token: str | None, *, loopback: bool, public: str
     if public is not None:
         print(f"The proxy passes on to {own}.", flush=True)
     elif not loopback:
-        print(
-            "Anyone who knows the token can read and write this folder; the way there is not encrypted.",
-            flush=True,
-        )
+        way = "" if encrypted else "; the way there is not encrypted"
+        print(f"Anyone who knows the token can read and write this folder{way}.", flush=True)
 
 
 def _token() -> str:
