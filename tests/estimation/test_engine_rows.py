@@ -59,3 +59,14 @@ def test_a_share_is_of_the_reference_less_friction() -> None:
     assert EngineTorque(800.0, 1.0).at(share, time).tolist() == pytest.approx([320.0, 80.0, -80.0])
     del share["engine_friction_share"]
     assert EngineTorque(800.0, 1.0).at(share, time).tolist() == pytest.approx([336.0, 96.0, -64.0])
+
+
+def test_an_engine_that_gains_speed_keeps_torque_for_itself() -> None:
+    """A ramp of 10 rad/s² at 1.5 kg m² takes 15 N m; what the ramp is, is seen half a second back."""
+    driveline = Driveline(efficiency=0.8, accessory_power=0.0, engine_inertia=1.5, ratio=20.0)
+    time = np.arange(0.0, 5.0, 0.25)
+    speed = 150.0 + 10.0 * np.clip(time - 1.0, 0.0, 2.0)
+    channels = {"engine_speed": speed, "engine_torque": np.full(len(time), 210.0)}
+    got = driveline_torque(driveline, EngineTorque(None, 5.0), time, channels, speed / 20.0, 0.8)
+    gained = np.interp(time, [1.0, 1.5, 3.0, 3.5], [0.0, 10.0, 10.0, 0.0])
+    np.testing.assert_allclose(got.torque, 0.8 * 20.0 * (210.0 - 1.5 * gained), rtol=1e-9)
