@@ -36,7 +36,7 @@ static void disturb(const tg_real *x, tg_real (*P)[SIZE], tg_real dt, tg_real ma
     P[0][1] += manoeuvre * dt * dt / 2;
     P[1][0] += manoeuvre * dt * dt / 2;
     P[1][1] += manoeuvre * dt;
-    tg_real fast[TG_MAX_WHEELS], usual = 0;
+    tg_real fast[TG_MAX_WHEELS];
     for (int32_t i = 0; i < n; i++) {
         const tg_real speed = tgi_fabs(x[0]), rim = tgi_fabs(x[0] + x[2 + i]);
         fast[i] = tgi_max(tgi_max(speed, rim), TG_SLOWEST);
@@ -45,15 +45,6 @@ static void disturb(const tg_real *x, tg_real (*P)[SIZE], tg_real dt, tg_real ma
             P[2 + i][2 + j] += added;
             if (j < i) P[2 + j][2 + i] += added;
         }
-        usual += fast[i] / (tg_real)n;
-    }
-    /* Rims that a motor holds go on where the ground gives way: the vehicle slows, and all slip speeds rise by as much. */
-    const tg_real yielding = TG_TOGETHER * slipping * dt * usual * usual;
-    P[0][0] += yielding;
-    for (int32_t i = 0; i < n; i++) {
-        P[0][2 + i] -= yielding;
-        P[2 + i][0] -= yielding;
-        for (int32_t j = 0; j < n; j++) P[2 + i][2 + j] += yielding;
     }
 }
 

@@ -222,7 +222,7 @@ def test_measured_rover(shared: Callable[[str], Path]) -> None:
     assert any("fl, rl is against the travel" in note for note in estimated.notes)
 
 
-@pytest.mark.parametrize(("noise", "most"), [(0.01, 0.1), (0.003, 0.15)])
+@pytest.mark.parametrize(("noise", "most"), [(0.01, 0.1), (0.003, 0.3)])
 @pytest.mark.parametrize("seed", range(4))
 def test_the_ground_speed_is_followed_where_all_wheels_lose_hold_together(
     seed: int, noise: float, most: float

@@ -162,9 +162,7 @@ def process_noise(x: Floats, dt: float, manoeuvre: float, slipping: float) -> Fl
     speed = np.maximum(np.maximum(abs(x[0]), np.abs(x[0] + x[2:])), _SLOWEST)
     alike = np.where(np.eye(len(speed), dtype=bool), 1.0, TOGETHER)
     Q[2:, 2:] = slipping * dt * alike * np.outer(speed, speed)
-    # Rims that a motor holds go on where the ground gives way: the vehicle slows, and all slip speeds rise by as much.
-    giving_way = np.r_[-1.0, 0.0, np.ones(len(speed))]
-    return Q + TOGETHER * slipping * dt * np.mean(speed) ** 2 * np.outer(giving_way, giving_way)
+    return Q
 
 
 def _rows(channels: int) -> Floats:
