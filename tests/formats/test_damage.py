@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import random
+import re
 import resource
+import struct
 import sys
 from collections.abc import Callable
 from pathlib import Path
 
+import can
 import pytest
 import scipy.io
 from rosbags.rosbag2 import StoragePlugin
@@ -112,3 +115,18 @@ def test_a_missing_package_is_named_with_its_extra(tmp_path: Path, monkeypatch: 
     monkeypatch.setitem(sys.modules, "can", None)
     with pytest.raises(InputError, match=r"pip install 'terragrip\[formats\]'"):
         read_table(path)
+
+
+@pytest.mark.parametrize("version", [1, 9])
+def test_an_object_without_a_size_ends_a_blf_log(tmp_path: Path, version: int) -> None:
+    """python-can read it for ever (found by fuzz/parsers.py)."""
+    path = tmp_path / "log.blf"
+    with can.BLFWriter(path, compression_level=0) as log:
+        for k in range(50):
+            log.on_message_received(can.Message(timestamp=0.1 * k, arbitration_id=0x0CFE49F0, data=bytes(8)))
+    content = bytearray(path.read_bytes())
+    heads = [one.start() for one in re.finditer(b"LOBJ", content)]
+    # behind the container's head and 30 frames
+    content[heads[31] + 6 : heads[31] + 12] = struct.pack("<HI", version, 0)
+    path.write_bytes(content)
+    assert "30 messages before were read" in " ".join(read_table(path).notes)

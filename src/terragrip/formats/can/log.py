@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import io
+import re
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
+from typing import Any
 
 from terragrip.errors import InputError
 from terragrip.files import sha256
@@ -31,6 +33,9 @@ from terragrip.formats.registry import Databases, Format
 from terragrip.formats.signals import SignalLog
 from terragrip.formats.table import Wanted
 
+_TOO_SHORT = re.compile(
+    rb"LOBJ.{4}[\x00-\x0f]\x00{3}", re.DOTALL
+)  # signature, header's size and version, the object's size
 _LONGEST = 4096  # characters of a line
 _MOST_BAD = 0.5  # share of lines without a frame from which a file is none of its kind
 _BUSY = 20.0  # frames a second: a bus that speaks less is one whose stamps are taken for seconds by mistake
@@ -44,10 +49,23 @@ def read_blf(path: str, wanted: Wanted | None, databases: Databases) -> SignalLo
         open(path, "rb") as stream,
         as_far_as_it_goes(path, "BLF log", notes, needed("can.io.blf", "a BLF log").BLFParseError) as seen,
     ):
-        for frame in frames_of(can.BLFReader(stream)):
+        for frame in frames_of(blf_reader(can.BLFReader)(stream)):
             frames.add(*frame)
             seen.messages += 1
     return finished(frames, path, notes, databases)
+
+
+def blf_reader(of: Any) -> Any:
+    """python-can's reader ``of`` BLF, which would read an object that is shorter than its own header for ever."""
+
+    class Reader(of):  # type: ignore[misc]
+        def _parse_data(self, data: bytes) -> Iterator[Any]:
+            short = _TOO_SHORT.search(data)
+            yield from super()._parse_data(data[: short.start()] if short else data)
+            if short:
+                raise needed("can.io.blf", "a BLF log").BLFParseError("an object has no size")
+
+    return Reader
 
 
 def read_asc(path: str, wanted: Wanted | None, databases: Databases) -> SignalLog:
