@@ -7,13 +7,6 @@ static union {
     uint8_t bytes[TG_ESTIMATOR_ROOM];
 } room, snapshot;
 
-static void seal(uint8_t *bytes, size_t size)
-{
-    uint64_t hash = 14695981039346656037u;
-    for (size_t k = 0; k < size - sizeof hash; k++) hash = (hash ^ bytes[k]) * 1099511628211u;
-    memcpy(bytes + size - sizeof hash, &hash, sizeof hash);
-}
-
 static void drive(tg_estimator *e, double from, int rows)
 {
     tg_estimate out;
@@ -38,7 +31,7 @@ static size_t changed_snapshot(bytes_left *b, unsigned kind)
         for (int k = 0; k < 4; k++) word = word << 8 | byte_of(b);
         memcpy(snapshot.bytes + place, &word, sizeof word);
     }
-    seal(snapshot.bytes, size);
+    seal_snapshot(snapshot.bytes, size);
     return size;
 }
 

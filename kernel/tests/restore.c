@@ -20,13 +20,6 @@ static void drive(tg_estimator *e, double from, int rows, int must)
     }
 }
 
-static uint64_t checksum(const uint8_t *bytes, size_t size)
-{
-    uint64_t hash = 14695981039346656037u;
-    for (size_t k = 0; k < size; k++) hash = (hash ^ bytes[k]) * 1099511628211u;
-    return hash;
-}
-
 static uint32_t word(void)
 {
     const double kind = uniform(0, 1);
@@ -42,8 +35,7 @@ static int attack(tg_estimator *e, size_t room, const uint8_t *good, uint8_t *by
         const uint32_t w = word();
         memcpy(bytes + header + 4 * (size_t)uniform(0, (double)(reach / 4 - 1)), &w, sizeof w);
     }
-    const uint64_t hash = checksum(bytes, size - sizeof hash);
-    memcpy(bytes + size - sizeof hash, &hash, sizeof hash);
+    seal_snapshot(bytes, size);
     if (tg_estimator_restore(e, room, bytes, size) != TG_OK) return 0;
     drive(e, 6.01, AFTER, 0);
     drive(e, 1e6, AFTER, 0);

@@ -193,6 +193,29 @@ def test_a_command_over_ticked_files_and_the_focus_stays_at_its_button(
     assert page.evaluate("() => document.activeElement.dataset.key") == "do batch"
 
 
+def test_a_click_on_save_counts_while_the_page_asks_the_server(
+    page: Any, served: Served, folder: Path
+) -> None:
+    """The page asks a little after the last key: a press that begins before that and ends after it is one click."""
+    page.goto(f"{served.url}/#/start?machine")
+    page.wait_for_selector("#machine-class option[value='rover']", state="attached")
+    page.select_option("#machine-class", "rover")
+    page.wait_for_selector("#save-machine:enabled")
+    page.wait_for_selector(".costs table")
+    held: list[Any] = []
+    page.route("**/machines/made", lambda route: held.append(route))
+    with page.expect_request("**/machines/made"):
+        page.fill("#machine-mass", "50 kg")
+        page.hover("#save-machine")
+        page.mouse.down()
+    with page.expect_response("**/machines/file"):
+        page.mouse.up()
+    for route in held:
+        route.continue_()
+    (made,) = folder.glob("*.yaml")
+    assert "50" in made.read_text()
+
+
 def test_an_impossible_number_is_said_and_nothing_is_saved(
     page: Any, served: Served, folder: Path, foreign: Path
 ) -> None:

@@ -86,19 +86,22 @@ class Shown:
         self, recording: Recording | None, wanted: list[str], axis: Axis, start: float, end: float
     ) -> tuple[Floats, list[Floats]]:
         """All rows between two places on an axis, whole: (places, columns). Raises InputError on a name that is not there."""
-        place = self.along(axis)
-        first, last = np.searchsorted(place, start, "left"), np.searchsorted(place, end, "right")
-        part = slice(int(first), int(last))
+        place, part = self._part(axis, start, end)
         return place[part], [self._values(recording, name)(part).astype(np.float64) for name in wanted]
 
     def labels(self, name: str, axis: Axis, start: float, end: float) -> npt.NDArray[np.str_]:
         """As `rows`, of a column of words: ``event`` or a label such as ``soil``; empty where the run has no such label."""
-        place = self.along(axis)
-        part = slice(int(np.searchsorted(place, start, "left")), int(np.searchsorted(place, end, "right")))
+        place, part = self._part(axis, start, end)
         words = (
             self._table[name] if name == "event" or name in self._table.labels else np.full(len(place), "")
         )
         return words[part].astype(str)
+
+    def _part(self, axis: Axis, start: float, end: float) -> tuple[Floats, slice]:
+        """The places of all rows on an axis, and which rows lie between two of them."""
+        place = self.along(axis)
+        first, last = np.searchsorted(place, start, "left"), np.searchsorted(place, end, "right")
+        return place, slice(int(first), int(last))
 
     def window(
         self,

@@ -97,17 +97,15 @@ export class MachineMaker {
     const turn = ++this.turn;
     const now = `${this.kind.value} ${this.signals.value}`;
     if (now !== this.shown) this.inputs.clear();
-    this.save.disabled = true;
     let made: Made;
     try {
       made = await send<Made>("POST", "machines/made", this.wanted);
     } catch (error) {
-      if (turn === this.turn) this.problem.textContent = error instanceof Error ? error.message : String(error);
+      if (turn === this.turn) this.refuse(error instanceof Error ? error.message : String(error));
       return;
     }
     if (turn !== this.turn) return;
-    this.problem.textContent = "";
-    this.save.disabled = false;
+    this.refuse("");
     if (now !== this.shown) this.drawFields(made.fields);
     this.shown = now;
     this.drawTypical(made.fields);
@@ -115,6 +113,12 @@ export class MachineMaker {
     fill(this.picture, sketch(made.vehicle, known), h("details", {}, h("summary", {}, "The file"), h("pre", { tabindex: "0" }, made.text)));
     const costs = await tried(() => send<Cost[]>("POST", "machines/costs", this.wanted));
     if (costs && turn === this.turn) this.drawCosts(costs, made.fields);
+  }
+
+  /** What forbids saving, or "". While the server is still asked, the button stays as it is: else it would swallow a click. */
+  private refuse(problem: string): void {
+    this.problem.textContent = problem;
+    this.save.disabled = problem !== "";
   }
 
   private drawFields(fields: Field[]): void {
