@@ -97,7 +97,7 @@ def _measured(time: Floats, values: npt.NDArray[Any] | None) -> tuple[Floats, Fl
         return None
     known = np.isfinite(values)
     when, kept = time[known], np.asarray(values[known], np.float64)
-    period = held_period(when, kept) if len(kept) > 2 else None
+    period = held_period(when, kept)
     if period is not None:
         fresh = fresh_samples(when, kept, period)
         when, kept = when[fresh], kept[fresh]

@@ -6,9 +6,11 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
+from scipy.stats import sem
 
 from terragrip.errors import InputError
 from terragrip.estimation import calibrate
+from terragrip.estimation.calibration.zeros import Spell, spell_mean
 from terragrip.physics.loads import GRAVITY
 from terragrip.recording import Recording
 from terragrip.vehicle import Vehicle
@@ -27,6 +29,26 @@ def test_torque_zero_is_the_mean_at_standstill(drive: Make, vehicle: Vehicle) ->
         assert quantity.evidence[0].start == 0
         assert quantity.evidence[0].end == pytest.approx(10)
         assert quantity.samples == 500
+
+
+@pytest.mark.parametrize("readings", [[0.2, 0.6], [0.2, 0.6, 0.1], [0.3, 0.6, 0.2, 0.5, 0.2]])
+def test_what_differs_from_stop_to_stop_is_in_the_error(readings: list[float]) -> None:
+    """The standard error of the stops' means, though each stop reads the same all along."""
+    stops = [Spell(100 * k, 100 * k + 49) for k in range(len(readings))]
+    values = np.repeat(readings, 100)
+    value, error = spell_mean(values, stops, np.full(len(values), 25.0), noise=0.1)
+    within = max(
+        np.std(np.repeat(readings, 50), ddof=1) / np.sqrt(50 * len(readings)),
+        0.1 / np.sqrt(50 * 25.0 * len(readings)),
+    )
+    between = float(sem(readings))
+    assert value == pytest.approx(np.mean(readings))
+    assert error == pytest.approx(np.hypot(between, within) if len(readings) == 2 else between)
+
+
+def test_of_one_stop_the_noise_alone_is_in_the_error() -> None:
+    value, error = spell_mean(np.full(50, 0.3), [Spell(0, 49)], np.full(50, 25.0), noise=0.1)
+    assert (value, error) == (pytest.approx(0.3), pytest.approx(0.1 / np.sqrt(50 * 25)))
 
 
 def test_zeros_do_not_disturb_the_gains(drive: Make, vehicle: Vehicle) -> None:

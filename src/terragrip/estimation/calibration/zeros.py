@@ -107,11 +107,10 @@ def spell_mean(values: Floats, stops: Sequence[Spell], count: Floats, noise: flo
     samples = max(1.0, float(sum(count[spell.rows].sum() for spell in stops)))
     within = max(float(np.std(pooled, ddof=1)) / np.sqrt(len(pooled)), noise / np.sqrt(samples))
     means = np.array([np.nanmean(part) for part in inside if np.isfinite(part).any()])
-    if len(means) < 3:
-        # Too few spells to see their scatter: half the difference of two stands for it.
-        between = float(np.ptp(means)) / 2 if len(means) == 2 else 0.0
-        return float(np.mean(means)), float(np.hypot(within, between))
-    return float(np.mean(means)), max(within, float(np.std(means, ddof=1)) / np.sqrt(len(means)))
+    between = float(np.std(means, ddof=1)) / np.sqrt(len(means)) if len(means) > 1 else 0.0
+    # Two spells hardly show their scatter: what is seen of it adds to what is within them.
+    error = max(within, between) if len(means) > 2 else float(np.hypot(within, between))
+    return float(np.mean(means)), error
 
 
 def resting(values: Floats, stops: Sequence[Spell], count: Floats, noise: float) -> list[Spell]:

@@ -1,0 +1,85 @@
+"""The fit behind the relative torque gains, piece by piece, on rows whose curve, scatter and gains are known."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from terragrip.estimation.calibration.sharing import Sharing, _Problem, fit_shared_gains
+
+GAIN = np.array([1.02, 0.97, 1.03, 0.99])
+TRUE = np.r_[np.log(GAIN), np.zeros(8)]
+SCATTER = np.array([0.02, 0.2])  # relative difference of adhesion between wheels, of either soil
+LEVEL = np.array([0.15, 0.6])  # adhesion at much slip, of either soil
+
+
+def rows(scatter: np.ndarray, *, windows: int = 200, seed: int = 14) -> Sharing:
+    """Wheels on curves A (1 - exp(-10 s)), a soil for each scatter; every window is a block of its own."""
+    rng = np.random.default_rng(seed)
+    soil = np.repeat(np.arange(len(scatter)), windows)
+    n = len(soil)
+    slip = rng.uniform(0.03, 0.35, n)[:, None] + 0.01 * rng.standard_normal((n, 4))
+    leverage = 0.2 * np.array([300.0, 300.0, 400.0, 400.0]) * (1 + 0.05 * rng.standard_normal((n, 4)))
+    known = 2.5 + 0.2 * rng.standard_normal((n, 4))
+    local = 1 + scatter[soil, None] * rng.standard_normal((n, 4))
+    adhesion = LEVEL[soil, None] * -np.expm1(-10 * slip) * local
+    torque = GAIN * (known + leverage * adhesion)
+    return Sharing(torque, known, leverage, slip, soil, np.arange(n), 0.02, np.full(4, 0.1))
+
+
+def test_the_steepness_is_the_slope_of_the_curve() -> None:
+    data = rows(np.zeros(2))
+    problem = _Problem.of(data).refined(TRUE)
+    slope = LEVEL[data.soil] * 10 * np.exp(-10 * data.slip.mean(axis=1))
+    np.testing.assert_allclose(problem.steepness, slope, rtol=0.1, atol=0.03)  # a grid of steps of 6 %
+
+
+def test_the_scatter_of_each_soil_is_seen() -> None:
+    data = rows(SCATTER)
+    scatter = _Problem.of(data).refined(TRUE).local
+    expected = np.sqrt(3 / 4) * SCATTER[data.soil]  # of four wheels about their own mean
+    np.testing.assert_allclose(scatter, expected, rtol=0.25)
+
+
+def test_the_jacobian_is_that_of_finite_differences() -> None:
+    """Where the model fits but for next to nothing, so that weights and spreads stand still."""
+    near = replace(_Problem.of(rows(np.zeros(2))).refined(TRUE), local=np.full(400, 0.1))
+    nothing = 1e-9 * np.random.default_rng(1).choice([-1.0, 1.0], near.data.torque.shape)
+    torque = near.data.torque - near._levels(TRUE)[1] + nothing
+    problem = replace(near, data=replace(near.data, torque=torque))
+    fit, spread = problem.fit(TRUE, 1.0), problem._levels(TRUE)[2]
+    plain = np.all(fit.weight == 1.0, axis=1)  # no window's level is moved by a weight
+    assert plain.mean() > 0.5
+    step = 1e-5
+    for unknown in range(12):
+        aside = step * (np.arange(12) == unknown)
+        change = problem._levels(TRUE - aside)[1] - problem._levels(TRUE + aside)[1]
+        expected = (change / (2 * step) / spread)[plain]
+        size = np.abs(expected).max()
+        np.testing.assert_allclose(fit.jacobian[plain, :, unknown], expected, atol=1e-6 * size)
+
+
+def test_a_soil_that_scatters_spoils_nothing() -> None:
+    """Weighed by its scatter, a patchy soil cannot make worse what an even one says."""
+    both = rows(SCATTER)
+    even, joined = fit_shared_gains(both.select(both.soil == 0)), fit_shared_gains(both)
+    assert even is not None
+    assert joined is not None
+    std = [np.sqrt(np.diag(one.covariance)[:4]) for one in (even, joined)]
+    assert np.all(std[1] < 1.1 * std[0])
+    truth = np.log(GAIN) - np.log(GAIN).mean()
+    assert np.all(np.abs(joined.log_gain - truth) < 4 * std[1])
+
+
+def test_windows_that_repeat_each_other_tell_little_new() -> None:
+    """The same windows five times in a block: the priors of the offsets keep their weight, so do the intervals."""
+    once = replace(
+        rows(np.full(1, 0.05)), block=np.arange(200) // 4, radius_std=0.01, offset_std=np.full(4, 0.3)
+    )
+    first, again = fit_shared_gains(once), fit_shared_gains(once.select(np.tile(np.arange(200), 5)))
+    assert first is not None
+    assert again is not None
+    std = np.sqrt(np.diag(first.covariance)[:4])
+    np.testing.assert_allclose(np.sqrt(np.diag(again.covariance)[:4]), std, rtol=0.1)
+    assert np.all(np.abs(again.log_gain - first.log_gain) < std)

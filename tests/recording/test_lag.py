@@ -1,0 +1,55 @@
+"""How far one record of a speed lags behind another, against shifts that are known and NumPy's correlation."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from terragrip.recording.lag import offset_between, speed_of
+
+TIME = np.arange(0.0, 120.0, 0.05)
+
+
+def speed_at(time: np.ndarray) -> np.ndarray:
+    """A speed that never repeats and rises on the whole, so that parts of it differ in mean."""
+    return 1.5 + 0.01 * time + 0.6 * np.sin(time / 9) + 0.3 * np.sin(time / 2.3) + 0.2 * np.sin(time**2 / 500)
+
+
+@pytest.mark.parametrize("ahead", [-31.0, 0.0, 0.4, 31.0])
+def test_a_clock_that_is_ahead_is_seen_whatever_part_is_common(ahead: float) -> None:
+    lag = offset_between((TIME, speed_at(TIME)), (TIME, 3 * speed_at(TIME - ahead)))
+    assert lag is not None
+    assert lag.seconds == pytest.approx(ahead, abs=0.005)
+    assert lag.correlation == pytest.approx(1.0, abs=1e-6)
+
+
+def test_the_correlation_is_that_of_the_common_part() -> None:
+    rows = 600  # 30 s, which only one of both has, at either end
+    noise = np.random.default_rng(14).normal(0, 0.15, len(TIME))
+    first, second = speed_at(TIME), speed_at(TIME) + noise
+    lag = offset_between((TIME[:-rows], first[:-rows]), (TIME[rows:] + 7.0, second[rows:]))
+    assert lag is not None
+    assert lag.seconds == pytest.approx(7.0, abs=0.05)
+    common = slice(rows, len(TIME) - rows - 1)  # a record's last instant is no point of comparison
+    assert lag.correlation == pytest.approx(np.corrcoef(first[common], second[common])[0, 1], abs=1e-4)
+
+
+def test_speeds_that_fit_at_several_offsets_tell_none() -> None:
+    there_and_back = 1.5 + np.sin(2 * np.pi * TIME / 10.0)
+    assert offset_between((TIME, there_and_back), (TIME, there_and_back)) is None
+    assert offset_between((TIME, there_and_back), (TIME, there_and_back), reach=4.0) is not None
+
+
+def test_of_a_held_channel_only_the_updates_count() -> None:
+    """5 Hz held on rows at 20 Hz: taken as it stands, the speed would be late by half a hold."""
+    updates = np.arange(len(TIME)) // 4 * 4
+    held = speed_of(TIME, {"ground_speed": speed_at(TIME)[updates]})
+    assert held is not None
+    assert np.array_equal(held.time, TIME[::4])
+    assert np.array_equal(held.values, speed_at(TIME)[::4])
+
+
+def test_a_channel_of_two_values_tells_no_speed() -> None:
+    for known in (0, 1, 2):
+        ground = np.where(np.arange(len(TIME)) < known, 1.0, np.nan)
+        assert speed_of(TIME, {"ground_speed": ground}) is None
