@@ -43,6 +43,8 @@ PAGES = (
     ("too short for vehicle and tool", "ground#limits"),
     ("s behind the wheels and are shifted by it", "maps#what-a-cell-holds"),
     ("of the positions, ", "maps#what-a-cell-holds"),
+    ("of the positions cut", "maps#what-a-cell-holds"),
+    ("passes over one cell agree better", "maps#what-a-cell-holds"),
     ("Every cell was driven once", "maps#anomalies-and-changes"),
     ("bins of slip gather weak spots", "soils#by-pull-and-by-slip"),
     ("no interval can be determined", "soils#what-is-done"),

@@ -14,6 +14,7 @@ pytest.importorskip("geopandas", reason="needs terragrip[geo]")
 
 from lane_drives import EARTH, REFERENCE, drive, lanes, local_east
 from terragrip.errors import InputError
+from terragrip.estimation import Estimates
 from terragrip.maps import MapMaker, MapSettings, map_of, write_map
 from terragrip.maps.layers import cell_table, layer
 from terragrip.maps.places import places_of
@@ -64,6 +65,33 @@ def test_constants_are_not_averaged_away_by_passes() -> None:
     np.testing.assert_allclose(mu_share, 0.05, rtol=0.02)
     assert np.all(often.std >= often.constant)
     assert np.median(often.std) < np.median(once.std)
+
+
+def repeated(stated: float, passes: int) -> list[tuple[str, Estimates]]:
+    """The same lanes again and again, errors of 0.02 a row of which `stated` is said."""
+    way = lanes(6, 60, 2)
+    return [(f"run {k}", drive(*way, noise=0.02, std=stated, seed=k)) for k in range(passes)]
+
+
+def test_intervals_that_repeated_passes_show_to_be_too_wide_are_narrowed() -> None:
+    made = map_of(repeated(0.2, 3))
+    cells = made.cells["adhesion"]
+    held = np.abs(cells.value - REFERENCE) < 1.645 * cells.std
+    assert 0.8 < held.mean() < 0.96
+    assert any(re.match(r"adhesion: passes over one cell agree better", note) for note in made.notes)
+
+
+def test_intervals_stay_where_no_pass_is_repeated_or_passes_differ_more_than_they_say() -> None:
+    once = map_of(repeated(0.2, 1))
+    assert not any("agree better" in note for note in once.notes)
+    assert np.median(once.cells["soil_resistance"].std) > 0.05  # 0.2 over a few independent metres
+    days = [
+        ("monday", drive(*lanes(6, 60, 2))),
+        ("friday", drive(*lanes(6, 60, 2), a=lambda e, n: 0.5 + 0 * e)),
+    ]
+    changed = map_of(days)
+    assert not any(re.match("adhesion: passes", note) for note in changed.notes)
+    assert changed.changes["adhesion"].significant.mean() > 0.9
 
 
 def test_patches_are_listed_and_borders_are_not() -> None:

@@ -101,7 +101,13 @@ def summary(made: FieldMap) -> str:
     import numpy as np
 
     runs = f"{len(made.runs)} run{'s' * (len(made.runs) != 1)}"
-    lines = [f"{runs}, cells of {made.cell:g} m, EPSG:{made.epsg}"]
+    around = " ".join(
+        f"{abs(degrees):.3f}° {'NE'[k] if degrees >= 0 else 'SW'[k]}" for k, degrees in enumerate(made.middle)
+    )
+    lines = [
+        f"{runs}, cells of {made.cell:g} m, EPSG:{made.epsg}; positions around {around} in {made.datum}"
+        " (--datum names another)"
+    ]
     for name, cells in made.cells.items():
         at = f" at {100 * made.reference_slip:g} % slip" if name == "adhesion" else ""
         driven = cells.count > 0

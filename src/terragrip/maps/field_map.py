@@ -17,6 +17,7 @@ from terragrip.maps.changes import Changes, changes_of
 from terragrip.maps.filling import filled
 from terragrip.maps.places import Places, has_positions, places_of, zone_of
 from terragrip.maps.points import Points, points_of
+from terragrip.maps.repeats import WORTH_A_WORD, scaled, share_of_repeats
 from terragrip.maps.soils import SoilWay, soil_of_cells, soil_way
 from terragrip.maps.values import QUANTITIES, readings_of
 
@@ -35,6 +36,8 @@ MOST_CELLS = 50_000_000
 LARGE_MACHINE = 1000.0
 """kg: by default heavier machines are mapped by `LARGE_CELL`, lighter ones by `SMALL_CELL`."""
 LARGE_CELL, SMALL_CELL = 3.0, 1.0
+FARTHEST = 100_000.0
+"""Metres from the first run beyond which another is no part of its map: the grid would be another zone's."""
 
 
 @dataclass(frozen=True)
@@ -50,8 +53,9 @@ class MapSettings:
 
 @dataclass(frozen=True)
 class FieldMap:
-    """A map: ``epsg`` of its grid and the ``cell`` [m]; by quantity ``cells``, ``passes`` (a row a pass), ``anomalies``, ``changes``; the
-    ``soil`` of cells; the ``points`` along the way; names of the ``runs``; ``notes``: sentences for the user."""
+    """A map: ``epsg`` of its grid and the ``cell`` [m], the ``datum`` that positions were read in, ``middle`` (latitude, longitude [deg]);
+    by quantity ``cells``, ``passes`` (a row a pass), ``anomalies``, ``changes``; the ``soil`` of cells; the ``points`` along the way;
+    names of the ``runs``; ``notes``: sentences for the user."""
 
     epsg: int
     cell: float
@@ -63,6 +67,8 @@ class FieldMap:
     points: Points
     runs: tuple[str, ...]
     reference_slip: float
+    datum: str
+    middle: tuple[float, float]
     notes: tuple[str, ...] = field(default=())
 
 
@@ -78,6 +84,8 @@ class MapMaker:
     _epsg: int = 0
     _cell: float = 0.0
     _correlated: float = 0.0
+    _middle: tuple[float, float] = (0.0, 0.0)
+    _origin: tuple[float, float] = (0.0, 0.0)
     _parts: dict[str, list[Pieces]] = field(default_factory=dict)
     _soil: list[SoilWay] = field(default_factory=list)
     _points: list[Points] = field(default_factory=list)
@@ -90,13 +98,14 @@ class MapMaker:
             raise InputError(
                 "holds no positions", file=file or run, hint="estimate a log with latitude and longitude"
             )
-        if not self._epsg:
-            self._epsg = zone_of(estimates["latitude"], estimates["longitude"])
-            self._cell = self.settings.cell or (LARGE_CELL if vehicle.mass > LARGE_MACHINE else SMALL_CELL)
-            radius = float(vehicle.wheel_radius.mean()) if vehicle.knows_wheels else 0.5
-            self._correlated = CORRELATED * radius
-        places = places_of(estimates, self._epsg, self.settings.datum, file)
-        self._check_extent(places, file or run)
+        epsg = self._epsg or zone_of(estimates["latitude"], estimates["longitude"])
+        cell = (
+            self._cell or self.settings.cell or (LARGE_CELL if vehicle.mass > LARGE_MACHINE else SMALL_CELL)
+        )
+        places = places_of(estimates, epsg, self.settings.datum, file)
+        self._check_extent(places, cell, file or run)
+        if not self.runs:
+            self._begin(estimates, places, epsg, cell)
         number = len(self.runs)
         self.runs.append(run)
         self._machines.add(str(estimates.about.get("vehicle")))
@@ -112,7 +121,18 @@ class MapMaker:
         self._soil.append(soil_way(estimates, places, way, self._cell, self.ground.get(run, [])))
         self._points.append(points_of(estimates, places, way, self._cell, number))
 
-    def _check_extent(self, places: Places, file: str) -> None:
+    def _begin(self, estimates: Estimates, places: Places, epsg: int, cell: float) -> None:
+        """What the first run decides for all."""
+        vehicle = estimates.vehicle
+        radius = float(vehicle.wheel_radius.mean()) if vehicle.knows_wheels else 0.5
+        self._epsg, self._cell, self._correlated = epsg, cell, CORRELATED * radius
+        self._origin = float(np.nanmedian(places.east)), float(np.nanmedian(places.north))
+        self._middle = (
+            float(np.nanmedian(estimates["latitude"])),
+            float(np.nanmedian(estimates["longitude"])),
+        )
+
+    def _check_extent(self, places: Places, cell: float, file: str) -> None:
         known = np.isfinite(places.east)
         if not known.any():
             raise InputError(
@@ -120,12 +140,20 @@ class MapMaker:
                 file=file,
                 hint="look at the positions: too few, or all jumps",
             )
-        east, north = np.ptp(places.east[known]), np.ptp(places.north[known])
-        if (east / self._cell + 1) * (north / self._cell + 1) > MOST_CELLS:
-            enough = math.sqrt(east * north / MOST_CELLS)
+        if self.runs:
+            east, north = np.nanmedian(places.east), np.nanmedian(places.north)
+            away = float(np.hypot(east - self._origin[0], north - self._origin[1]))
+            if away > FARTHEST:
+                raise InputError(
+                    f"lies {away / 1000:.0f} km from the first run",
+                    file=file,
+                    hint="map it by itself, or look at its positions",
+                )
+        long, wide = np.ptp(places.east[known]), np.ptp(places.north[known])
+        if (long / cell + 1) * (wide / cell + 1) > MOST_CELLS:
             raise InputError(
-                f"cells of {self._cell:g} m over {east:.0f} m by {north:.0f} m are more than {MOST_CELLS} cells",
-                file=file, place="--cell", hint=f"take {max(enough, self._cell) * 1.1:.2g} m or more",
+                f"cells of {cell:g} m over {long:.0f} m by {wide:.0f} m are more than {MOST_CELLS} cells",
+                file=file, place="--cell", hint=f"take {_enough(float(long), float(wide)) * 1.1:.2g} m or more",
             )  # fmt: skip
 
     def finish(self) -> FieldMap:
@@ -137,7 +165,13 @@ class MapMaker:
         for quantity in (name for name in QUANTITIES if name in self._parts):
             whole, each = cells_of(self._parts[quantity], self._correlated)
             if len(whole):
-                cells[quantity], passes[quantity] = whole, each
+                share = share_of_repeats(each)
+                cells[quantity], passes[quantity] = scaled(whole, share), scaled(each, share)
+                if share < WORTH_A_WORD:
+                    self.notes.append(
+                        f"{quantity}: passes over one cell agree better than the estimates' intervals say; standard deviations are "
+                        f"{share:.2f} times those."
+                    )
         if not cells:
             raise InputError(
                 "no row of the runs tells of the ground where its place is known",
@@ -155,8 +189,15 @@ class MapMaker:
             cells = {name: filled(one, self.settings.fill) for name, one in cells.items()}
         return FieldMap(
             self._epsg, self._cell, cells, passes, anomalies, changes, soil_of_cells(self._soil), Points.joined(self._points),
-            tuple(self.runs), self.settings.reference_slip, tuple(self.notes),
+            tuple(self.runs), self.settings.reference_slip, self.settings.datum, self._middle, tuple(self.notes),
         )  # fmt: skip
+
+
+def _enough(long: float, wide: float) -> float:
+    """The least size [m] of cells of which `MOST_CELLS` cover a box: (long/size + 1)(wide/size + 1) = MOST_CELLS."""
+    both, rest = long * wide, MOST_CELLS - 1
+    half = 0.5 * (long + wide)
+    return (half + math.sqrt(half**2 + rest * both)) / rest
 
 
 def map_of(

@@ -111,15 +111,22 @@ def _fixes(latitude: Floats, longitude: Floats) -> npt.NDArray[np.intp]:
 
 
 def _projected(latitude: Floats, longitude: Floats, epsg: int, datum: str) -> tuple[Floats, Floats]:
-    from pyproj import Transformer
+    from pyproj import CRS, Transformer
     from pyproj.exceptions import ProjError
 
     try:
-        transformer = Transformer.from_crs(datum, epsg, always_xy=True)
+        system = CRS.from_user_input(datum)
     except ProjError as error:
         raise InputError(
             f"{datum!r} is no coordinate reference system", place="--datum", hint="write e.g. EPSG:4258"
         ) from error
+    if not system.is_geographic:
+        raise InputError(
+            f"{datum!r} ({system.name}) is none of latitude and longitude",
+            place="--datum",
+            hint="name the one that the receiver's degrees are of, e.g. EPSG:4258; metres of a grid: make degrees of them first",
+        )
+    transformer = Transformer.from_crs(system, epsg, always_xy=True)
     east, north = transformer.transform(longitude, latitude)
     return np.asarray(east), np.asarray(north)
 
@@ -159,14 +166,18 @@ def _pieces(
     notes = []
     if outage.any():
         notes.append(
-            f"{int(outage.sum())} outages of the positions, {driven[outage].sum():.0f} m of way, are left blank."
+            f"{counted(outage, 'outage')} of the positions, {driven[outage].sum():.0f} m of way, left blank."
         )
     if (jump & ~outage).any():
         where = time[1:][jump & ~outage][0]
-        notes.append(
-            f"{int((jump & ~outage).sum())} jumps of the positions are cut, the first at {where:.1f} s."
-        )
+        notes.append(f"{counted(jump & ~outage, 'jump')} of the positions cut, the first at {where:.1f} s.")
     return np.where(stray, -1, piece), tuple(notes)
+
+
+def counted(which: npt.NDArray[np.bool_], noun: str) -> str:
+    """How many, with the noun: 1 jump, 2 jumps."""
+    count = int(which.sum())
+    return f"{count} {noun}{'s' * (count != 1)}"
 
 
 def _between(time: Floats, fixed: Floats, values: Floats, piece: npt.NDArray[np.intp]) -> Floats:

@@ -26,6 +26,8 @@ APART = 0.2
 """ln of the ratio of positions' to driven way, in the median of the stretches, that is implausible ..."""
 ALIKE = 0.1
 """... where another reading of the columns comes as near as this."""
+NEVER = np.log(2.0)
+"""... and what no scatter of a receiver's positions explains: on that way there is nothing to map by."""
 MIRRORED = -0.6
 """Correlation of the track's turns with those of the wheels below which the track is a mirror image."""
 
@@ -68,6 +70,13 @@ def refuse_impossible(estimates: Estimates, fixes: npt.NDArray[np.intp], file: s
                     place=place,
                     hint=f"latitude and longitude look {what}: mend the profile",
                 )
+    if given > NEVER:
+        raise InputError(
+            f"positions move {np.exp(given):.3g} times as far as the wheels and the ground speed, or as little",
+            file=file,
+            place=place,
+            hint="look at the units of latitude, longitude and ground_speed in the profile, and at the positions' resolution",
+        )
     turning = _wheel_turns(estimates, fixes, ends)
     if turning is not None and _mirrored(latitude, longitude, ends, turning):
         raise InputError(

@@ -1,0 +1,45 @@
+"""Standard deviations of cells held to what repeated passes show (decision 0151)."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import numpy.typing as npt
+
+from terragrip.maps.cells import Cells
+
+Floats = npt.NDArray[np.float64]
+
+LEAST_REPEATS = 100
+"""Pairs of passes over one cell that a share needs."""
+WORTH_A_WORD = 0.9
+"""A share below which the user is told."""
+
+
+def share_of_repeats(passes: Cells) -> float:
+    """By how much passes over one cell differ, as a share of what their SDs let expect; 1 where it is more, or there are too few.
+
+    `passes`: a row a pass (:func:`terragrip.maps.cells.cells_of`). Consecutive passes over a cell are compared, the constants that both
+    share left out; the share is the robust SD (1.4826 times the median size) of the differences over their stated SDs. More than 1 is
+    no error of the SDs: between two passes the ground may have changed.
+    """
+    order = np.lexsort((passes.time, passes.run, passes.row, passes.column))
+    column, row = passes.column[order], passes.row[order]
+    again = np.flatnonzero((column[1:] == column[:-1]) & (row[1:] == row[:-1]))
+    if len(again) < LEAST_REPEATS:
+        return 1.0
+    first, second = order[again], order[again + 1]
+    own = random_std(passes)
+    size = np.abs(passes.value[second] - passes.value[first]) / np.hypot(own[first], own[second])
+    return float(min(1.4826 * np.median(size), 1.0))
+
+
+def scaled(cells: Cells, share: float) -> Cells:
+    """The cells with their SDs but for the constants times `share`."""
+    return replace(cells, std=np.hypot(share * random_std(cells), cells.constant))
+
+
+def random_std(cells: Cells) -> Floats:
+    """The part of the SDs (k,) that cells do not share."""
+    return np.asarray(np.sqrt(np.maximum(cells.std**2 - cells.constant**2, 1e-18)))
