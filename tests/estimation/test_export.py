@@ -331,9 +331,14 @@ def test_what_is_no_estimates_is_not_converted(tmp_path, capsys):
 
 
 def test_a_write_that_fails_leaves_nothing(estimates, tmp_path):
-    late = replace(estimates, time=estimates.time + 1e12)
-    with pytest.raises(InputError, match=r"x\.mcap.*stamp"):
-        late.write(tmp_path / "x.mcap")
+    latest = 2**63 / 1e9 - START + 0.01  # a stamp's nanoseconds are 64 bits with a sign
+    for shift, wrong in (
+        (latest - estimates.time[-1], r"7\.66305e\+09"),  # the last row alone
+        (-START - 0.01, r"-1\.56033e\+09"),  # the first alone is before 1970
+    ):
+        shifted = replace(estimates, time=estimates.time + shift)
+        with pytest.raises(InputError, match=rf"x\.mcap: a time of {wrong} s .*stamp"):
+            shifted.write(tmp_path / "x.mcap")
     nowhere = replace(estimates, columns={**estimates.columns, "latitude": np.full(len(estimates), np.nan)})
     for suffix in (".gpkg", ".geojson"):
         with pytest.raises(InputError, match=f"x{suffix}.*no row has a position"):

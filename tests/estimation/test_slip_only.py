@@ -10,6 +10,7 @@ import pytest
 
 import terragrip as tg
 from terragrip.errors import InputError
+from terragrip.estimation.slip_only import slip_reference_in
 from terragrip.formats.reading import read_table
 from terragrip.formats.signals import Signal, SignalLog
 
@@ -174,6 +175,16 @@ def test_some_torques_missing_is_an_error_not_slip() -> None:
                 }
             ),
         )
+
+
+@pytest.mark.parametrize(("standing", "said"), [(0.2, True), (0.9, True), (1.0, False)])
+def test_a_wheel_that_turns_against_the_travel_is_named(standing: float, said: bool) -> None:
+    """Rows in which the wheel reads 0 say nothing of its way, however many they are."""
+    log = speeds_of(0.0)
+    turning = np.arange(len(log)) >= standing * len(log)
+    backward = np.where(turning, -log["ground_speed"] / 0.2, 0.0)
+    notes = slip_reference_in(log.with_channels(wheel_speed_fl=backward), robot()).notes
+    assert any("The wheel speed of fl is against the travel" in note for note in notes) == said
 
 
 def test_measured_car_on_a_road_does_not_slip(shared: Callable[[str], Path]) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -93,6 +94,32 @@ def test_one_level_of_slip_is_said_to_be_one() -> None:
     assert "light work cannot be distinguished from field work" in zero.doubt
     assert abs(zero.ratio - 1 / 1.02) < 1.96 * zero.std
     assert zero.std > 0.02
+
+
+def test_a_radius_in_doubt_comes_with_its_doubt_and_what_it_rests_on() -> None:
+    """One level of slip again, the machine's radius too small, the clock at 100 s: 600 s are 119 whole windows of 5 s and a rest."""
+    log = log_of(np.full(3000, 0.0), 0.98, 1003)
+    calibration = calibrate(replace(log, time=log.time + 100.0), tractor())
+    radius = calibration["wheel_radius rl"]
+    assert radius.value == pytest.approx(0.8 / 0.98, rel=0.002)
+    assert radius.std > 0.02 * 0.8
+    assert "light work cannot be distinguished from field work" in radius.sentence
+    (rests_on,) = radius.evidence
+    assert (rests_on.start, rests_on.end) == (100.0, pytest.approx(699.8))
+    assert radius.samples == 119
+
+
+def test_of_a_wheel_only_straight_windows_count() -> None:
+    """A minute straight on and a minute in a bend: the left wheels run slower there, and nothing but their speeds says so."""
+    time = np.arange(0.0, 120.0, 0.2)
+    bend = np.where(time < 60, 0.0, 0.06)
+    columns = {"time": time, "ground_speed": np.full(len(time), 2.0)}
+    for wheel, side in (("fl", 1), ("fr", -1), ("rl", 1), ("rr", -1)):
+        columns[f"wheel_speed_{wheel}"] = 2.0 * (1 - side * bend) / 0.8
+    zero = zero_of([tg.Recording.from_frame(columns)], "wheel_speed_fl", 0.8)
+    assert zero is not None
+    assert zero.windows == 12
+    assert zero.ratio == pytest.approx(1.0, abs=1e-9)
 
 
 def test_a_road_is_light_work() -> None:

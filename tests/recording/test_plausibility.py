@@ -92,6 +92,8 @@ def test_angles_acceleration_and_time(columns: Columns, vehicle: Vehicle) -> Non
         "time may not be in seconds",
     ):
         assert expected in notes
+    free_of_gravity = {**columns, "acceleration_z": np.full(n, 0.02)}
+    assert unit_warnings(Recording.from_frame(free_of_gravity), vehicle) == []
     upside_down = {**columns, "acceleration_z": np.full(n, -9.8)}
     assert "other way" in unit_warnings(Recording.from_frame(upside_down), vehicle)[0]
 

@@ -8,6 +8,8 @@ import numpy as np
 import pytest
 
 from terragrip.estimation import calibrate
+from terragrip.estimation.calibration.radii import WINDOW, Rolling, rolling_radii
+from terragrip.estimation.calibration.windows import windows
 from terragrip.recording import Recording
 from terragrip.vehicle import Vehicle
 
@@ -83,3 +85,24 @@ def test_without_a_zero_pull_pass_there_is_a_reason(drive: Make, vehicle: Vehicl
     result = calibrate(drive(120, slip=(0.1, 0.3)), vehicle)
     assert "wheel_radius fl" not in result
     assert any(u.name == "wheel_radius" and "zero pull" in u.why for u in result.unknown)
+
+
+def test_a_soil_without_a_zero_pull_pass_says_nothing(drive: Make, vehicle: Vehicle) -> None:
+    """Work on a third soil, whose curve no pass at zero pull ties to a radius, moves neither radius nor interval."""
+    logs = []
+    for k, soil in enumerate("ac"):
+        free = free_pass(drive, 0.2, k)
+        logs += [Recording(free.time, free.channels, {"soil": np.full(len(free), soil, dtype=object)})]
+        logs += [drive(40, slip=(0.0, 0.25), soil=soil, seed=k)]
+    worked = drive(40, slip=(0.12, 0.18), radius=0.19, soil="b")
+
+    def rolling(logs: list[Recording]) -> Rolling:
+        table = windows(logs, vehicle, WINDOW)
+        stretch = 1000 * table.recording + np.floor(table.position[:, 0] / 4.0).astype(int)
+        result = rolling_radii(table, vehicle, stretch, [""] * len(logs))
+        assert isinstance(result, Rolling)
+        return result
+
+    alone, beside = rolling(logs), rolling([*logs, worked])
+    np.testing.assert_allclose(beside.radius, alone.radius, rtol=1e-9)
+    np.testing.assert_allclose(beside.std, alone.std, rtol=1e-9)

@@ -9,7 +9,7 @@ import pytest
 
 from terragrip.errors import InputError
 from terragrip.estimation import identify_torque_scale
-from terragrip.estimation.calibration.torque_scale import _window_length
+from terragrip.estimation.calibration.torque_scale import _Balance, _jackknife, _window_length
 from terragrip.physics.loads import GRAVITY
 from terragrip.recording import Recording
 from terragrip.vehicle import Vehicle
@@ -139,3 +139,30 @@ def test_a_gain_of_the_drawbar_and_a_slope_that_nothing_measures_widen_the_inter
         "uncertainty": {**vehicle.to_dict()["uncertainty"], "drawbar_gain": 0.0, "slope": 0.1},
     }
     assert identify_torque_scale(level, Vehicle.from_dict(data)).std / 0.8 == pytest.approx(exact, rel=0.05)
+
+
+def test_the_inertia_of_the_wheels_is_a_loss_by_itself(vehicle: Vehicle) -> None:
+    """Starts and stops on level ground; to spin the wheels up takes as much as to move the vehicle: 4 J/r² = m."""
+    data = vehicle.to_dict()
+    data["wheel"] = {**data["wheel"], "inertia": 140.0 / 4 * 0.2**2}
+    t = np.arange(0.0, 200.0, 0.05)
+    v = 1.5 + 0.8 * np.sin(t / 4)
+    omega = v / 0.2
+    force = 2 * 140 * np.gradient(v, t) + 0.08 * 140 * GRAVITY + 4 * 2.0 * omega
+    channels = {"ground_speed": v}
+    for wheel in ("fl", "fr", "rl", "rr"):
+        channels |= {f"wheel_speed_{wheel}": omega, f"drive_torque_{wheel}": 0.7 * force * 0.2 / 4}
+    scale = identify_torque_scale(Recording(t, channels), Vehicle.from_dict(data))
+    assert scale.value == pytest.approx(0.7, rel=0.02)  # rates of windows of a second
+
+
+def test_of_a_short_log_two_windows_at_a_time_are_left_out() -> None:
+    """24 windows whose errors come in pairs: the jackknife of twelve lines without a pair each."""
+    rng = np.random.default_rng(14)
+    force = rng.normal(0, 100, 24)
+    thrust = 0.8 * force + np.repeat(rng.normal(0, 20, 12), 2)
+    rows = _Balance(thrust, np.zeros(24), force, force, np.ones((24, 1)), np.zeros(24), True)
+    keep = [np.delete(np.arange(24), [2 * k, 2 * k + 1]) for k in range(12)]
+    slopes = [np.polyfit(force[rest], thrust[rest], 1)[0] for rest in keep]
+    expected = np.sqrt(11 / 12 * np.sum((slopes - np.mean(slopes)) ** 2))
+    assert _jackknife(rows, np.ones(24)) == pytest.approx(expected, rel=1e-9)

@@ -5,8 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
+import pytest
 
-from terragrip.estimation.calibration.windows import windows
+from terragrip.estimation.calibration.windows import track_blocks, wheel_loads, windows
+from terragrip.physics.loads import GRAVITY
 from terragrip.recording import Recording
 from terragrip.vehicle import Vehicle
 
@@ -18,3 +20,28 @@ def test_each_axle_is_where_it_is_on_the_track(drive: Callable[..., Recording], 
     front, rear = table.position[:, 0], table.position[:, 2]
     np.testing.assert_allclose(front - rear, vehicle.wheelbase)  # the rear axle follows
     assert abs(front[-1] - travelled) < 0.02 * travelled
+
+
+def test_stretches_of_track_are_of_one_log_and_follow_each_other(
+    drive: Callable[..., Recording], vehicle: Vehicle
+) -> None:
+    """Two logs of some 63 m: 40 stretches in all would be shorter than 4 m, so each log has 16 of 4 m."""
+    table = windows([drive(120.0), drive(120.0, seed=1)], vehicle, 1.0)
+    blocks = track_blocks(table)
+    first, second = blocks[table.recording == 0], blocks[table.recording == 1]
+    way = [table.position[table.recording == k, 0] for k in (0, 1)]
+    assert first.tolist() == np.floor(way[0] / 4.0).astype(int).tolist()
+    assert second.tolist() == (first[-1] + 1 + np.floor(way[1] / 4.0)).astype(int).tolist()
+
+
+@pytest.mark.parametrize("axle", [0, 1])
+def test_where_one_axle_is_measured_the_other_takes_the_rest(axle: int, vehicle: Vehicle) -> None:
+    """In the second row nothing is measured: the static loads of 30, 30, 40 and 40 kg."""
+    none = np.zeros(2)
+    measured = np.full((2, 2), np.nan)
+    measured[0, axle] = 50.0 * GRAVITY
+    load = wheel_loads(
+        vehicle, drawbar=none, push=none, slope=none, spin_torque=none, lateral=none, measured=measured
+    )
+    rest = [25.0, 25.0, 45.0, 45.0] if axle == 0 else [45.0, 45.0, 25.0, 25.0]
+    np.testing.assert_allclose(load / GRAVITY, [rest, [30.0, 30.0, 40.0, 40.0]])

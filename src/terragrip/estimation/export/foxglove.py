@@ -108,9 +108,10 @@ class McapFile:
 
     def _stamps(self, part: Estimates) -> Any:
         """Nanoseconds (n,) of each row's message."""
-        if not (part.time[0] + self._zero >= 0 and part.time[-1] + self._zero < _LATEST):
+        wrong = [float(when) for when in part.time[[0, -1]] if not 0 <= when + self._zero < _LATEST]
+        if wrong:
             raise InputError(
-                f"a time of {part.time[-1]:g} s cannot be a message's stamp",
+                f"a time of {wrong[0]:g} s cannot be a message's stamp",
                 file=self._target, hint="check the unit of the log's time in a profile",
             )  # fmt: skip
         return round(1e9 * self._zero) + np.round(1e9 * part.time).astype(np.int64)

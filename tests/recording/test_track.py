@@ -1,0 +1,46 @@
+"""Grade by positions and altitude, of slopes that are known."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from terragrip.recording import Recording
+from terragrip.recording.track import Track, track_of
+
+UP = 0.03  # rise over way
+
+
+def uphill(step: float, fixes: int = 400, noise: float = 0.0) -> Track:
+    """Straight north at a fix a second, ``step`` metres apart, up a slope of 3 %, the altitude to ``noise`` [m]."""
+    time = np.arange(float(fixes))
+    way = step * time
+    height = 100.0 + UP * way + noise * np.random.default_rng(14).standard_normal(fixes)
+    latitude = 48.0 + way / 111_200.0
+    track = track_of(
+        Recording(time, {"latitude": latitude, "longitude": np.full(fixes, 11.0), "altitude": height})
+    )
+    assert track is not None
+    return track
+
+
+@pytest.mark.parametrize("step", [0.5, 2.0, 4.0, 12.0])
+def test_a_slope_is_the_grade_however_far_apart_the_fixes_are(step: float) -> None:
+    grade = uphill(step).grade
+    known = np.isfinite(grade)
+    assert known.mean() > 0.9
+    np.testing.assert_allclose(grade[known], np.arctan(UP), rtol=0.002)
+
+
+def test_a_grade_is_given_where_it_is_known_to_two_per_cent_and_not_where_it_is_vaguer() -> None:
+    """Of a cubic through many (n) heights over L metres, each to s, the slope is known to s/L (75/n)^(1/2): Legendre's polynomials."""
+    step, length = 0.4, 16.0
+    n = length / step
+    scale = np.sqrt(75 / n) / length  # rad a metre
+    certain, vague = 0.5 * 0.02 / scale, 2 * 0.02 / scale
+    grade = uphill(step, noise=certain).grade
+    known = np.isfinite(grade)
+    assert known.mean() > 0.8
+    assert np.std(grade[known]) == pytest.approx(0.01, rel=0.3)
+    assert certain > 0.02  # the height itself is not known so well
+    assert np.isnan(uphill(step, noise=vague).grade).all()
