@@ -442,3 +442,20 @@ def test_axe_finds_nothing(browser: Any, served: Served, where: str, theme: str,
     context.close()
     assert [(v["id"], v["nodes"][0]["html"][:120]) for v in result["violations"]] == []
     assert wide <= width
+
+
+@pytest.mark.parametrize("theme", ["light", "dark"])
+@pytest.mark.parametrize(("where", "old"), [("live", "main.stale"), ("cab", ".page-cab.dead")])
+def test_axe_finds_nothing_where_the_numbers_are_old(
+    browser: Any, served: Served, where: str, old: str, theme: str
+) -> None:
+    context = browser.new_context(color_scheme=theme, bypass_csp=True)
+    tab = context.new_page()
+    tab.goto(f"{served.url}/#/{where}?replay=estimates.parquet&speed=10")
+    tab.wait_for_function(r"() => /\d/.test(document.querySelector('.big, .cab-number')?.textContent ?? '')")
+    served.stop()
+    tab.wait_for_selector(old, state="attached")
+    tab.add_script_tag(path=str(AXE))
+    result = tab.evaluate("() => axe.run(document, { resultTypes: ['violations'] })")
+    context.close()
+    assert [(v["id"], v["nodes"][0]["html"][:120]) for v in result["violations"]] == []

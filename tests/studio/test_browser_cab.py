@@ -13,7 +13,7 @@ from served import NEEDS, Served
 pytest.importorskip("playwright.sync_api", reason="SKIPPED LOUDLY: the browser tests need playwright")
 pytestmark = NEEDS
 
-OPACITY = "() => Number(getComputedStyle(document.querySelector('.cab-number')).opacity)"
+MARK = "() => getComputedStyle(document.querySelector('.cab-number')).textDecorationLine"
 
 
 @pytest.fixture
@@ -35,34 +35,34 @@ def test_the_cab_shows_three_numbers_and_fails_visibly(
     numbers = page.locator(".cab-number")
     assert numbers.all_inner_texts()[0] == "20"  # % of slip
     assert numbers.all_inner_texts()[2] == "1.50"  # m/s
-    assert page.evaluate(OPACITY) == 1
+    assert page.evaluate(MARK) == "none"
     small = page.evaluate("() => document.querySelector('#cab-age').getBoundingClientRect().height")
     for mode in ("silent", "frozen"):
         service.mode = mode
         page.wait_for_selector("#cab-age:has-text('NO DATA for')")
-        assert page.evaluate(OPACITY) < 0.5
+        assert page.evaluate(MARK) == "line-through"
         assert (
             page.evaluate("() => document.querySelector('#cab-age').getBoundingClientRect().height")
             > 1.5 * small
         )
         service.mode = "measured"
         page.wait_for_selector("#cab-age:has-text('ago')")
-        assert page.evaluate(OPACITY) == 1
+        assert page.evaluate(MARK) == "none"
     service.mode = "predicted"
     page.wait_for_selector("#cab-age:has-text('PREDICTED ONLY')")
-    assert page.evaluate(OPACITY) < 0.5
+    assert page.evaluate(MARK) == "underline"
     service.mode = "measured"
     page.wait_for_selector("#cab-age:has-text('ago')")
     service.stop()
     page.wait_for_selector("#cab-age:has-text('NO DATA for')")
-    assert page.evaluate(OPACITY) < 0.5
+    assert page.evaluate(MARK) == "line-through"
 
 
 def test_the_cab_before_any_row_says_so(page: Any, served: Served, service: LiveService) -> None:
     service.mode = "silent"
     page.goto(f"{served.url}/#/cab")
     page.wait_for_selector("#cab-age:has-text('NO DATA YET')")
-    assert page.evaluate(OPACITY) < 0.5
+    assert page.evaluate(MARK) == "line-through"
 
 
 def test_a_threshold_rings_and_is_kept(page: Any, served: Served, service: LiveService) -> None:

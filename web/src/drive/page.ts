@@ -5,7 +5,7 @@ import { get, type Item } from "../ui/api";
 import { brushed } from "../ui/brush";
 import { digits, fill, h } from "../ui/dom";
 import { note, tried } from "../ui/notes";
-import type { Page } from "../ui/page";
+import { oneAtATime, type Page } from "../ui/page";
 import { notHere, options, runsOf } from "../ui/runs";
 import { saveMenu } from "../ui/sheet";
 import { onUnits } from "../ui/units";
@@ -354,7 +354,7 @@ export const page: Page = (main, { notices, query }) => {
   };
   over.addEventListener("change", () => void along(over.value as Axis).then(remember));
 
-  async function reload(): Promise<void> {
+  const reload = oneAtATime(async () => {
     const folder = await tried(() => get<{ items: Item[] }>("folder"));
     if (!folder) return;
     runs = runsOf(folder.items);
@@ -373,7 +373,7 @@ export const page: Page = (main, { notices, query }) => {
       for (const other of there) if (runs.get(other) !== seen.get(other)) note(`${other} was replaced: shown anew`);
       await lay(there);
     } else overlay.draw([...runs.keys()], path, others);
-  }
+  });
 
   const key = (event: KeyboardEvent): void => {
     if (event.key !== "Backspace" || event.target instanceof HTMLInputElement) return;

@@ -3,7 +3,7 @@
 import { ME, get, send, type Item } from "../ui/api";
 import { h, save } from "../ui/dom";
 import { note, tried } from "../ui/notes";
-import type { Page } from "../ui/page";
+import { oneAtATime, type Page } from "../ui/page";
 import { CurvesPanel } from "./curves_panel";
 import { fit, fitEach } from "./fitting";
 import { ListPanel } from "./list_panel";
@@ -73,12 +73,12 @@ export const page: Page = (main, { notices, query }) => {
 
   const hover = (event: DragEvent): void => event.preventDefault();
 
-  async function reload(): Promise<void> {
+  const reload = oneAtATime(async () => {
     const folder = await tried(() => get<{ items: Item[] }>("folder"));
     if (!folder) return;
     pictures.load(folder.items);
     await list.load(folder.items);
-  }
+  });
 
   async function start(): Promise<void> {
     state.models = (await tried(() => get<Model[]>("models"))) ?? [];

@@ -12,7 +12,7 @@ import { brushed } from "../ui/brush";
 import { columns, type Columns } from "../ui/columns";
 import { digits, fill, h } from "../ui/dom";
 import { note, tried } from "../ui/notes";
-import type { Page } from "../ui/page";
+import { oneAtATime, type Page } from "../ui/page";
 import { notHere, options, runsOf } from "../ui/runs";
 import { color, onTheme } from "../ui/theme";
 import { saveMenu, type Sheet } from "../ui/sheet";
@@ -324,7 +324,7 @@ export const page: Page = (main, { notices, query }) => {
     await lay(base.value, false);
   }
 
-  async function reload(): Promise<void> {
+  const reload = oneAtATime(async () => {
     const folder = await tried(() => get<{ items: Item[] }>("folder"));
     if (!folder) return;
     const { items } = folder;
@@ -345,7 +345,7 @@ export const page: Page = (main, { notices, query }) => {
       seen = now;
       await open(wanted);
     }
-  }
+  });
 
   const forgets = [
     notices.on((notice) => notice.kind === "folder" && void reload()),

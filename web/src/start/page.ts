@@ -60,6 +60,7 @@ function openFolder(main: HTMLElement, { notices }: Context): () => void {
   const dialog = h("dialog", { class: "wizard" });
   main.append(title, drop, jobs.element, lists, dialog);
   let items: Item[] = [];
+  let listed = false;
   const ticked = new Set<string>();
 
   input.addEventListener("change", () => {
@@ -89,10 +90,12 @@ function openFolder(main: HTMLElement, { notices }: Context): () => void {
   async function reload(): Promise<void> {
     const folder = await tried(() => get<{ name: string; items: Item[] }>("folder"));
     if (!folder) return;
+    title.textContent = folder.name || "Folder";
+    if (listed && JSON.stringify(folder.items) === JSON.stringify(items)) return; // a list drawn anew under a click would lose it
+    listed = true;
     items = folder.items;
     const there = new Set(items.map((item) => item.path));
     for (const path of ticked) if (!there.has(path)) ticked.delete(path);
-    title.textContent = folder.name || "Folder";
     refill(lists, KINDS.map(([kind, name, none]) => section(kind, name, none)));
   }
 
