@@ -136,6 +136,9 @@ def test_soils(estimates: Estimates) -> None:
     table = campaign.to_pandas()
     assert list(table.index) == list(campaign.soils)
     name = table.index[0]
+    twice = replace(gathered, makers={"ukf", estimates.method}).learn(tg.AdhesionCurve(bootstrap=0))
+    for made, by in ((campaign, estimates.method), (twice, " and ".join(sorted({"ukf", estimates.method})))):
+        assert made.soils[name].soil.fit["signature"]["made_by"] == by
     assert table.loc[name, "a"] == campaign.soils[name].soil.parameters["a"]
     for shown in (campaign, campaign.library(), campaign.soils[name].curve):
         assert is_drawn(shown.plot())

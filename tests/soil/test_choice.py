@@ -10,6 +10,7 @@ from terragrip.errors import InputError
 from terragrip.physics.adhesion import CURVES
 from terragrip.soil.bins import BinSettings, bin_pairs
 from terragrip.soil.choice import compare_forms
+from terragrip.soil.pull_bins import bin_by_pull
 
 
 @pytest.mark.parametrize("seed", range(5))
@@ -63,6 +64,18 @@ def test_a_bin_counts_where_the_runs_that_are_left_fill_it(samples, compared):
     else:
         with pytest.raises(InputError, match="too unlike"):
             compare_forms(bins)
+
+
+def test_bins_by_pull_count_with_half_of_their_way():
+    """Three runs fill each bin with just the metres that are asked for: two of them are still enough to fit."""
+    slip = np.tile(np.repeat(0.055 + 0.05 * np.arange(8), 5), 3)
+    mu = CURVES["exponential"].value(slip, {"a": 0.9})
+    settings = BinSettings(by="pull", metres=3.0, runs=3)
+    bins = bin_by_pull(slip, mu, mu, np.full(slip.size, 0.2 + 1e-9), np.repeat([0, 1, 2], 40), settings)
+    assert bins.used.size == 8
+    verdict = compare_forms(bins)
+    assert verdict.follows
+    assert "leaving runs out" in verdict.sentence
 
 
 def test_the_error_is_that_of_the_runs_left_out():

@@ -7,10 +7,12 @@ import pytest
 
 from terragrip.errors import InputError
 from terragrip.physics.adhesion import CURVES
-from terragrip.soil.bins import BinSettings
+from terragrip.soil.bins import BinSettings, bin_pairs
+from terragrip.soil.choice import compare_forms
 from terragrip.soil.fit import AdhesionCurve
-from terragrip.soil.learn import learn_soils, usable_pairs
+from terragrip.soil.learn import RunPairs, _falls, learn_soils, usable_pairs
 from terragrip.soil.transitions import settled
+from test_pull_bins import drive
 
 WHEELS = ("l", "r")
 
@@ -100,6 +102,34 @@ def test_a_curve_that_falls_is_sorted_by_slip():
     assert learned.curve is learned.by_slip
     assert learned.curve.parameters_ == pytest.approx(peaked, rel=0.05)
     assert any("falls within the bins" in words for words in campaign.words)
+
+
+@pytest.mark.parametrize(("loss", "falls"), [(0.0, False), (0.05, False), (0.6, True)])
+def test_only_a_curve_that_comes_down_by_a_twentieth_of_its_top_falls(loss, falls):
+    """0.6 (1 - e^(-25 s)) - d s, which the paper's form cannot follow: at 60 % slip it is 0, 3 and 52 % below its top."""
+    slip = np.tile(np.repeat(0.055 + 0.01 * np.arange(55), 12), 2)
+    mu = CURVES["effective"].value(slip, {"A": 0.6, "k": 25.0, "d": loss})
+    bins = bin_pairs(slip, mu, np.repeat([0, 1], slip.size // 2))
+    verdict = compare_forms(bins)
+    assert verdict.proposal is not None
+    assert _falls(bins, verdict) == falls
+
+
+@pytest.mark.parametrize(("variation", "said"), [(0.0, False), (0.15, True)])
+def test_what_sorting_by_pull_changes_is_said_where_it_is_much(variation, said):
+    """On uneven ground bins of slip gather weak spots, and the paper's scale comes out lower."""
+    slip, mu, metres, run = drive(1000, variation, slip_noise=0.02 if said else 0.0)
+    pairs = [
+        RunPairs(f"run {k}", "field", slip[own], mu[own], np.zeros(n), mu[own], np.zeros(n, int), metres[own], np.full(n, 0.1), np.ones(n))
+        for k in range(12)
+        for own, n in [(run == k, int(np.sum(run == k)))]
+    ]  # fmt: skip
+    campaign = learn_soils(pairs, AdhesionCurve(bins=BinSettings(by="pull"), bootstrap=0))
+    learned = campaign.soils["field"]
+    by_pull, by_slip = (one.parameters_["a"] for one in (learned.curve, learned.by_slip))
+    words = f"field: Sorted by pull, a is {by_pull:.3g}; sorted by slip, as the paper does, {by_slip:.3g}"
+    assert (by_pull / by_slip > 1.03) == said
+    assert any(one.startswith(words) for one in campaign.words) == said
 
 
 def test_few_pulls_are_sorted_by_slip():

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import re
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,10 +13,10 @@ from hypothesis import strategies as st
 
 from soil_campaign import pairs
 from terragrip.errors import InputError
-from terragrip.soil.digitised import read_points
+from terragrip.soil.digitised import read_points, soils_of_points
 from terragrip.soil.fit import AdhesionCurve
 from terragrip.soil.library import Soil, SoilLibrary
-from terragrip.soil.literature import brixius_soil, literature_soils, paper_soils
+from terragrip.soil.literature import brixius_soil, burckhardt_grounds, literature_soils, paper_soils
 
 
 def fitted(name="fine", seed=1):
@@ -32,6 +34,35 @@ def test_round_trip(tmp_path):
     raw = json.loads((tmp_path / "soils.json").read_text())["soils"]["fine"]
     assert {"model", "parameters", "interval", "r2", "nrmse", "bins"} <= set(raw)
     assert set(raw["bins"][0]) == {"slip", "mean", "std", "count"}
+
+
+@pytest.mark.parametrize("wrong", [float("nan"), float("inf")])
+def test_a_number_that_is_none_is_not_written(tmp_path, wrong):
+    path = tmp_path / "soils.json"
+    paper_soils().write(path)
+    before = path.read_bytes()
+    for soil in (Soil("x", "exponential", {"a": wrong}), Soil("x", "exponential", {"a": 1.0}, r2=wrong)):
+        with pytest.raises(InputError, match=r"soils\.json: a number of a soil is none"):
+            SoilLibrary({"x": soil}).write(path)
+    assert path.read_bytes() == before
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_each_constant_of_the_literature_is_the_one_printed_in_the_documents():
+    """docs/physics.md states the paper's Table 1 and Burckhardt's constants; as many as there, and none besides."""
+    text = " ".join((Path(__file__).parents[2] / "docs" / "physics.md").read_text(encoding="utf-8").split())
+    (roads,) = re.findall(r"Burckhardt c1 \(1 - e\^\{-c2 s\}\) - c3 s: (.*?)\. - Pacejka", text)
+    printed = {}
+    for words in roads.split("; "):
+        name, constants = re.fullmatch(r"(\D+) (\S+, \S+, \S+)", words).groups()
+        printed[name] = dict(zip(("c1", "c2", "c3"), map(float, constants.split(", ")), strict=True))
+    assert {name: soil.parameters for name, soil in burckhardt_grounds().items()} == printed
+    nrmse, r2, names = re.search(r"Table 1: NRMSE ([\d. ]+), R² ([\d. ]+) for ([a-z, ]+)\.", text).groups()
+    scales = dict(re.findall(r"(\w+) (\d\.\d+)", re.search(r"a by soil: (.*?)\. a is", text)[1]))
+    table = zip(names.split(", "), map(float, nrmse.split()), map(float, r2.split()), strict=True)
+    expected = {name: (float(scales[name]), square, error) for name, error, square in table}
+    assert len(expected) == 5
+    assert {n: (s.parameters["a"], s.r2, s.nrmse) for n, s in paper_soils().items()} == expected
 
 
 def test_literature_is_as_printed():
@@ -173,6 +204,17 @@ def test_digitised_points_that_are_none(tmp_path, text, expected):
     (tmp_path / "p.csv").write_text(text)
     with pytest.raises(InputError, match=expected):
         read_points(tmp_path / "p.csv")
+
+
+def test_each_point_of_a_printed_curve_is_a_bin_however_near_the_next_one(tmp_path):
+    slip = np.arange(0.06, 0.3, 0.004)  # closer than the bins of a campaign
+    mu = 0.9 * (1 - 0.52 * np.exp(0.01 * slip) - 0.48 * np.exp(-11.36 * slip))
+    rows = "".join(f"{s:.6f},{m:.9f}\n" for s, m in zip(slip, mu, strict=True))
+    (tmp_path / "p.csv").write_text("slip,clay\n" + rows)
+    (soil,) = soils_of_points(tmp_path / "p.csv").values()
+    assert [row["count"] for row in soil.bins] == [1] * len(slip)
+    np.testing.assert_allclose([row["mean"] for row in soil.bins], mu, atol=1e-8)
+    assert soil.parameters["a"] == pytest.approx(0.9, rel=1e-6)
 
 
 def test_digitised_curves_without_a_name_are_counted(tmp_path):

@@ -146,6 +146,29 @@ def test_nothing_to_sort_is_no_bin():
         fit(slip, -mu, metres, run)
 
 
+def test_pairs_without_way_are_left_out_and_counted():
+    """A machine that spins on the spot tells nothing of the way, however often it is sampled."""
+    slip, mu, metres, run = drive(1009, 0.1, runs=4, spots=600)
+    spot = np.full(100, 0.2)
+    plain = bin_by_pull(slip, mu, mu, metres, run)
+    spun = bin_by_pull(
+        *(
+            np.r_[x, y]
+            for x, y in ((slip, 0.5 + spot), (mu, spot), (mu, spot), (metres, 0 * spot), (run, 0 * spot))
+        )
+    )
+    assert spun.left_out == plain.left_out + 100
+    np.testing.assert_array_equal(spun.count, plain.count)
+    np.testing.assert_array_equal(spun.mean, plain.mean)
+
+
+def test_too_little_way_for_any_bin_leaves_all_out():
+    slip, mu, metres, run = drive(1010, 0.1, runs=4, spots=600)
+    bins = bin_by_pull(slip, mu, mu, 1e-3 * metres, run)
+    assert bins.used.size == 0
+    assert bins.left_out == slip.size
+
+
 @pytest.mark.parametrize("bad", [{"by": "colour"}, {"metres": 0.0}, {"runs": 0}])
 def test_settings_that_sort_nothing(bad):
     with pytest.raises(ValueError, match=r"sorted by|no bins"):

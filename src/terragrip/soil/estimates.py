@@ -125,8 +125,7 @@ class GatheredRuns:
             common_sd=self.common_sd,
         )
         plain = {name: learned.soil for name, learned in campaign.soils.items()}
-        method = next(iter(self.makers)) if len(self.makers) == 1 else "several methods"
-        signed = with_signatures(plain, self.blocks, method)
+        signed = with_signatures(plain, self.blocks, " and ".join(sorted(self.makers)))
         learned = {name: replace(one, soil=signed[name]) for name, one in campaign.soils.items()}
         return replace(campaign, soils=learned)
 

@@ -118,8 +118,12 @@ class SoilLibrary(Mapping[str, Soil]):
         return cls(soils, data.get("provenance") or {}, data.get("not_fitted") or {})
 
     def write(self, path: str | os.PathLike[str]) -> None:
-        """Write soils.json, whole or not at all. InputError where it cannot be written."""
-        text = json.dumps(self.to_dict(), indent=1, allow_nan=False)
+        """Write soils.json, whole or not at all. InputError where it cannot be written, or a number is NaN or infinite."""
+        try:
+            text = json.dumps(self.to_dict(), indent=1, allow_nan=False)
+        except ValueError as error:
+            hint = "leave out what is not known (None), it is written as null"
+            raise InputError(f"a number of a soil is none ({error})", file=path, hint=hint) from None
         with replacing(path) as temporary, open(temporary, "w", encoding="utf-8") as stream:
             stream.write(text + "\n")
 
