@@ -89,6 +89,23 @@ def test_estimates_are_drawn(estimates: Estimates, kind: Any) -> None:
     assert is_drawn(estimates.plot(kind))
 
 
+def test_each_soil_of_the_plane_has_its_own_points(estimates: Estimates) -> None:
+    axes = estimates.plot("plane").axes[0]
+    calm = (estimates.event_codes == 0) & np.isfinite(estimates["slip_fl"])
+    soils = sorted(set(estimates["soil"][calm]))
+    lines = {line.get_label(): line.get_xydata() for line in axes.get_lines() if line.get_label() in soils}
+    assert len(soils) > 1
+    assert list(lines) == soils
+    for soil, points in lines.items():
+        rows = calm & (estimates["soil"] == soil)
+        own = {
+            pair
+            for w in estimates.wheels
+            for pair in zip(estimates[f"slip_{w}"][rows], estimates[f"adhesion_{w}"][rows], strict=True)
+        }
+        assert {tuple(point) for point in points} <= own
+
+
 def test_what_cannot_be_drawn_is_refused(estimates: Estimates) -> None:
     with pytest.raises(InputError, match="take one of time, plane, map"):
         estimates.plot("pie")  # type: ignore[arg-type]

@@ -81,6 +81,14 @@ def test_nis_consistency_tells_a_right_from_a_too_sure_filter() -> None:
         nis_consistency([0.0, 0.0], [0, 0])
 
 
+def test_the_whiteness_statistic_by_hand() -> None:
+    """Of 1, 2, 4, 1: mean 2, so -1, 0, 2, -1: lag 1 (0 + 0 - 2)/6, lag 2 (-2 + 0)/6; n (n + 2) (r1²/(n - 1) + r2²/(n - 2))."""
+    got = whiteness([1.0, 2.0, 4.0, 1.0], lags=2)
+    assert got.autocorrelation == pytest.approx([-1 / 3, -1 / 3])
+    assert got.statistic == pytest.approx(4 * 6 * (1 / 9 / 3 + 1 / 9 / 2))
+    assert got.p_value == pytest.approx(np.exp(-got.statistic / 2))  # chi² of two degrees
+
+
 def test_whiteness_of_white_and_of_coloured_noise() -> None:
     rng = np.random.default_rng(4)
     white = rng.normal(size=5000)

@@ -11,6 +11,7 @@ import pytest
 from drives import WHEELS, drive, robot
 from terragrip.errors import InputError
 from terragrip.estimation import METHODS, TractionEstimator, estimate
+from terragrip.estimation.forward import run
 from terragrip.recording import Recording
 
 NUMBERS = ("adhesion_rr", "slip_fl", "soil_resistance", "net_traction_rl", "ground_speed", "efficiency_fr")
@@ -62,6 +63,28 @@ def test_blocks_do_not_matter(noisy):
         assert np.array_equal(np.concatenate([part[name] for part in parts]), whole[name], equal_nan=True), (
             name
         )
+
+
+def test_rows_go_to_the_kernel_in_many_calls_as_in_one(noisy, monkeypatch):
+    """A log of more rows than a call takes, and a row that is refused in a later call."""
+    whole, done = estimate(noisy.recording, robot()), []
+    monkeypatch.setattr("terragrip.estimation.engine._BLOCK", 500)
+    parts = run(
+        TractionEstimator.for_recording(noisy.recording, robot()), noisy.recording, progress=done.append
+    )
+    rows = len(noisy.recording)
+    assert done == [*range(500, rows, 500), rows]
+    assert np.array_equal(parts.event_codes, whole.event_codes)
+    for name in whole.columns:
+        assert np.array_equal(parts[name], whole[name], equal_nan=True), name
+    broken = noisy.recording["ground_speed"].copy()
+    broken[900] = np.inf
+    log, estimator = (
+        noisy.recording.with_channels(ground_speed=broken),
+        TractionEstimator.for_recording(noisy.recording, robot()),
+    )
+    with pytest.raises(InputError, match="row 901"):
+        run(estimator, log)
 
 
 def test_a_sample_may_lack_channels_or_hold_none(noisy):

@@ -140,8 +140,17 @@ def test_agrees_for_any_number_of_wheels(wheels, engine, policy, problem):
     assert_agree(case, tuning)
 
 
-def test_agrees_with_the_drive_supervisor(problem):
-    case = problem(77, wheels=4, steps=300, condition=1e6, missing=0.1, steady_rate=True)
+@pytest.mark.parametrize(("torque", "steps"), [(1.0, 300), (0.02, 60)])
+def test_agrees_with_the_drive_supervisor(torque, steps, problem):
+    """Also of torques so small that a change of them is judged by the share of the weight that a wheel bears."""
+    case = problem(77, wheels=4, steps=steps, condition=1e6, missing=0.1, steady_rate=True)
+    instants = [
+        replace(
+            k, **{n: replace(getattr(k, n), torque=torque * getattr(k, n).torque) for n in ("before", "now")}
+        )
+        for k in case.instants
+    ]
+    case = replace(case, instants=instants)
     tuning = Tuning(case.walk, policy="supervised", supervisor="drive", window=0.2)
     assert_agree(case, tuning)
     gammas = list(supervisor_output(case, tuning))

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from drives import drive, robot
+from terragrip.estimation.estimator import TractionEstimator
 from terragrip.estimation.learning import ROWS, SECONDS, Learned, SettingsLearner
 from terragrip.estimation.noise import settings_in
 from terragrip.recording import Recording
@@ -65,6 +66,19 @@ def test_what_is_given_is_not_learned_and_a_channel_that_never_came_is_absent(lo
     assert told.held["ground_speed"] == 0.4
     assert not any(name.startswith("wheel_speed") and sd != 0.5 for name, sd in told.noise.items())
     assert "roll" not in told.noise
+
+
+def test_only_noise_that_differs_by_a_tenth_is_worth_a_word() -> None:
+    vehicle = robot(sensors=UNKNOWN)
+    known = {"ground_speed": 0.02, "wheel_speed": 0.05}
+    estimator = TractionEstimator(vehicle, sensors=known, held={"wheel_speed_fl": 0.2})
+    learned = Learned(
+        {"ground_speed": 0.0215, "wheel_speed_fl": 0.03}, {"wheel_speed_fl": 0.21, "ground_speed": 0.1}, 60.0
+    )
+    assert learned.changes(estimator) == [
+        "noise of wheel_speed_fl 0.03 (was 0.05)",
+        "ground_speed is held, one value in 0.1 s",
+    ]
 
 
 def test_it_goes_on_from_its_state_to_the_last_digit(log: Recording) -> None:

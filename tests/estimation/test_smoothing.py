@@ -8,6 +8,7 @@ import pytest
 from drives import drive, robot
 from terragrip.errors import InputError
 from terragrip.estimation import Estimates, TractionEstimator, estimate
+from terragrip.estimation.methods import method_named
 from terragrip.estimation.smoothing import smoothed
 from terragrip.recording import Recording
 
@@ -94,5 +95,8 @@ def test_nothing_is_smoothed_over_a_gap_in_the_motion():
 
 
 def test_algebraic_cannot_smooth():
+    assert method_named("algebraic").name == "algebraic"
+    with pytest.raises(InputError, match="the method algebraic cannot smooth; use another"):
+        method_named("algebraic", smooth=True)
     with pytest.raises(InputError, match="cannot smooth"):
         estimate(drive(3.0).recording, robot(), "algebraic", smooth=True)

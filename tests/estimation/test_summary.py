@@ -102,6 +102,22 @@ def test_nothing_considered_is_said_and_doubtful_units_come_first() -> None:
     assert text.splitlines()[-1].startswith("Next: settle what the notes doubt")
 
 
+@pytest.mark.parametrize(
+    ("nis", "verdict"),
+    [
+        (30.0, "noise may be set too high"),
+        (90.0, "as expected"),
+        (130.0, "as expected"),
+        (300.0, "noise may be set too low"),
+    ],
+)
+def test_innovations_smaller_than_their_noise_are_of_noise_set_too_high(nis: float, verdict: str) -> None:
+    tally = replace(Tally(), nis=nis, channels=100.0)
+    (line,) = [one for one in tally.text(()).splitlines() if one.startswith("Normalised innovation")]
+    assert f"{nis / 100:.2f}, expected 1" in line
+    assert verdict in line
+
+
 def test_an_efficiency_that_could_be_anything_is_not_printed(drive: tuple[tg.Estimates, str]) -> None:
     estimates, _ = drive
     vague = {f"efficiency_{wheel}_std": np.full(len(estimates), 0.6) for wheel in estimates.wheels}

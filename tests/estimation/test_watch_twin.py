@@ -1,0 +1,85 @@
+"""The warning of immobilization over all that a log can hold: the kernel and its Python twin, row by row."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from drives import RADIUS, WHEELS, drive, robot
+from terragrip.estimation import Estimates, estimate
+from terragrip.estimation.engine import SIGNS
+from terragrip.estimation.reference.immobilization import Watch, pace, rows_of
+from terragrip.estimation.settings import watch_limits
+from terragrip.recording import Recording
+
+
+def slip(t: Any) -> Any:
+    """Up to 76 % from 15 to 18 s, back again from there to 23 s."""
+    return 0.06 + 0.7 * np.clip(np.minimum((t - 15) / 3.0, (23 - t) / 5.0), 0, 1)
+
+
+def eventful() -> Recording:
+    """A soft spot that is left behind, wheels that lock from 25 to 28 s, a stop from 35 s, and wheels that spin from 38 s on."""
+    log = drive(42.0, rate=50.0, noise=0.3, slip=slip, speed=lambda t: 0.55 * (1 - slip(t))).recording
+    time = log.time
+    locked, standing, spinning = (time > 25) & (time < 28), (time > 35) & (time < 38), time >= 38
+    changed = {"ground_speed": np.where(time < 35, log["ground_speed"], 0.0)}
+    for wheel in WHEELS:
+        speed, torque = log[f"wheel_speed_{wheel}"], log[f"drive_torque_{wheel}"]
+        cases = [locked, standing, spinning]
+        changed[f"wheel_speed_{wheel}"] = np.select(cases, [0.67 * speed, 0.0, 2.0 / RADIUS], speed)
+        changed[f"drive_torque_{wheel}"] = np.select(cases, [-torque, 0.0, 30.0], torque)
+    return log.with_channels(**changed)
+
+
+@pytest.fixture(scope="module")
+def table() -> tuple[Recording, Estimates]:
+    log = eventful()
+    return log, estimate(log, robot())
+
+
+def spell(table: Estimates, kind: str) -> tuple[int, int]:
+    """The first row of the one spell of an event and the row behind it."""
+    rows = np.flatnonzero(table["event"] == kind)
+    assert len(rows) == rows[-1] - rows[0] + 1
+    return int(rows[0]), int(rows[-1]) + 1
+
+
+def test_kernel_and_twin_say_the_same_of_every_row(table: tuple[Recording, Estimates]) -> None:
+    log, result = table
+    limits = watch_limits(RADIUS)
+    watch, events, points, score = Watch(limits, pace(result.vehicle, limits), RADIUS), [], [], []
+    rows = rows_of(result, np.isfinite(log["ground_speed"]))
+    for row in rows:
+        events.append(watch.update(row))
+        points.append(watch.points)
+        score.append(watch.score)
+    known = np.array([row.slip for row in rows])
+    assert np.nanmin(known) == -0.2  # as deep as wheels are watched that slip the other way
+    assert np.isnan(known).any()
+    watched = ("immobilization", "stuck")
+    assert events == [one if one in watched else "" for one in result["event"]]
+    np.testing.assert_allclose(score, result["warning"], atol=1e-9)
+    for k, sign in enumerate(SIGNS):
+        np.testing.assert_allclose(np.array(points)[:, k], result[f"warning_{sign}"], atol=1e-9)
+
+
+def test_a_warning_begins_above_its_limit_and_ends_below_half_of_it(
+    table: tuple[Recording, Estimates],
+) -> None:
+    _, result = table
+    first, behind = spell(result, "immobilization")
+    warn = watch_limits(RADIUS)["warn"]
+    assert result["warning"][first - 1] <= warn < result["warning"][first]
+    assert (result["warning"][first:behind] > warn / 2).all()
+    assert result["warning"][behind] <= warn / 2
+
+
+def test_wheels_that_spin_after_a_stop_are_stuck_after_half_a_second(
+    table: tuple[Recording, Estimates],
+) -> None:
+    _, result = table
+    first, _ = spell(result, "stuck")
+    assert result.time[first] == pytest.approx(38.0 + watch_limits(RADIUS)["stuck_duration"], abs=0.03)
