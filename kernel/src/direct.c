@@ -110,16 +110,26 @@ TG_INLINE void block_update(tgi_block *P, const tgi_gain *h, tg_real one_over, t
 
 typedef struct { /* the step on its way */
     tgi_direct *out;
-    tg_real noise; /* product of the channels' weighted R: the second half of the bound */
+    tg_real r[TG_LANES + 2]; /* weighted */
+    tg_real noise; /* their product: the second half of the bound */
 } channel_updates;
 
-/* One channel with h = P H' and the residual after the channels before it; its prior innovation and variance give the weight. */
-TG_INLINE void update_channel(const tg_filter *f, const tgi_plan *plan, channel_updates *t, int o, const tgi_gain *h, tg_real product, tg_real residual,
-                    tg_real innovation, tg_real variance, const int n)
+/* What is expected of a channel before any is taken, and what weight that gives it. */
+TG_INLINE void expect(const tg_filter *f, const tgi_plan *plan, channel_updates *t, int o, tg_real innovation, tg_real product)
+{
+    tgi_result *const result = t->out->result;
+    const tg_real variance = product + plan->r[o], weight = tgi_weight(f->tuning.huber, innovation, variance);
+    result->innovation[o] = innovation;
+    result->variance[o] = variance;
+    result->weight[o] = weight;
+    t->r[o] = weight < 1 ? plan->r[o] / weight : plan->r[o];
+}
+
+/* One channel with h = P H' and the residual after the channels before it. */
+TG_INLINE void update_channel(channel_updates *t, int o, const tgi_gain *h, tg_real product, tg_real residual, const int n)
 {
     tgi_direct *const out = t->out;
-    const tg_real weight = tgi_weight(f->tuning.huber, innovation, variance), r = weight < 1 ? plan->r[o] / weight : plan->r[o];
-    const tg_real S = product + r, inverse = 1 / S;
+    const tg_real r = t->r[o], S = product + r, inverse = 1 / S;
     tgi_gain *const K = &out->gain[out->taken];
     block_update(&out->P, h, inverse, K, n);
     const tg_lanes nu = lanes_all(residual);
@@ -130,10 +140,7 @@ TG_INLINE void update_channel(const tg_filter *f, const tgi_plan *plan, channel_
     result->channel[out->taken] = o;
     result->residual[out->taken] = residual;
     result->residual_variance[out->taken] = S;
-    result->innovation[o] = innovation;
-    result->variance[o] = variance;
-    result->weight[o] = weight;
-    result->nis += residual * residual * inverse;
+    result->square += residual * residual * inverse;
     result->volume *= S;
     t->noise *= r;
     out->taken++;
@@ -141,25 +148,67 @@ TG_INLINE void update_channel(const tg_filter *f, const tgi_plan *plan, channel_
 
 TG_INLINE tg_real dot(tg_lanes a, tg_lanes b) { return lanes_sum(lanes_mul(a, b)); }
 
-TG_INLINE void update_accelerometer(const tg_filter *f, const tgi_plan *plan, channel_updates *t, tg_lanes a, tg_real a_rho, tg_real innovation,
-                                  tg_real variance, const int n)
+typedef struct { /* covariance of a_x with mu, rho_s, v and omega, and its own */
+    tg_lanes mu, omega;
+    tg_real rho, v, own;
+} shock;
+
+TG_INLINE shock shock_of(const tgi_block *P, tg_lanes a, tg_real a_rho, const int n)
 {
-    const tgi_block *const P = &t->out->P;
     const tg_lanes weight = lanes_all(a_rho);
-    tgi_gain h;
-    tg_lanes Y[TG_LANES], mu = lanes_mul(weight, P->rho_mu), omega = lanes_mul(weight, P->rho_omega);
+    shock s;
+    tg_lanes Y[TG_LANES];
     transpose(P->omega_mu, Y, n);
+    s.mu = lanes_mul(weight, P->rho_mu);
+    s.omega = lanes_mul(weight, P->rho_omega);
     for (int i = 0; i < n; i++) {
         const tg_lanes own = lanes_all(lanes_at(a, i));
-        mu = lanes_mul_add(own, P->mu[i], mu);
-        omega = lanes_mul_add(own, Y[i], omega);
+        s.mu = lanes_mul_add(own, P->mu[i], s.mu);
+        s.omega = lanes_mul_add(own, Y[i], s.omega);
     }
-    h.mu = mu;
-    h.omega = omega;
-    h.rest = lanes_mul_add(weight, P->rho_rest, lanes_of(dot(a, P->rho_mu), dot(a, P->v_mu), 0, 0));
-    const tg_real product = dot(a, h.mu) + a_rho * lanes_at(h.rest, 0);
-    const tg_real expected = dot(a, t->out->x.mu) + a_rho * lanes_at(t->out->x.rest, 0);
-    update_channel(f, plan, t, n + 1, &h, product, plan->y[n + 1] - plan->accelerometer_shift - expected, innovation, variance, n);
+    const tg_lanes rest = lanes_mul_add(weight, P->rho_rest, lanes_of(dot(a, P->rho_mu), dot(a, P->v_mu), 0, 0));
+    s.rho = lanes_at(rest, 0);
+    s.v = lanes_at(rest, 1);
+    s.own = dot(a, s.mu) + a_rho * s.rho;
+    return s;
+}
+
+typedef struct { /* S less what neighbouring steps share, of the wheels that are left, and their innovations; the sum of those taken out */
+    tg_lanes W[TG_LANES], nu;
+    tg_real sum;
+} nis_square;
+
+/* Take the row with this pivot, at least `least`, and its innovation out of the wheels up to `last`. */
+TG_INLINE void eliminate(nis_square *s, tg_real pivot, tg_real least, tg_real innovation, tg_lanes row, int last)
+{
+    const tg_real inverse = 1 / (pivot > least ? pivot : least), share = innovation * inverse;
+    s->sum += innovation * share;
+    s->nu = lanes_mul_sub(lanes_all(share), row, s->nu);
+    for (int i = 0; i <= last; i++) s->W[i] = lanes_mul_sub(lanes_all(lanes_at(row, i) * inverse), row, s->W[i]);
+}
+
+/* As tgi_nis has it, but v and a_x first; the wheels, a row at once, are to follow. */
+TG_INLINE void nis_begin(const tgi_plan *plan, const channel_updates *t, const shock *a, nis_square *s, const int n)
+{
+    const tgi_block *const P = &t->out->P;
+    const tg_real *const innovation = t->out->result->innovation;
+    const tg_lanes of_v = P->v_omega;
+    tg_lanes of_a = a->omega;
+    s->sum = 0;
+    s->nu = load_wheels(innovation + 1, n);
+    for (int i = 0; i < n; i++) s->W[i] = lanes_mul_add(lanes_all(t->r[1 + i] - plan->shared[1 + i]), unit(i), P->omega[i]);
+    tg_real own = a->own + t->r[n + 1], nu_a = innovation[n + 1];
+    if (plan->present[0]) {
+        const tg_real v = lanes_at(P->v_rest, 1) + t->r[0] - plan->shared[0];
+        if (plan->present[n + 1]) {
+            const tg_real k = a->v / v;
+            own -= k * a->v;
+            nu_a -= k * innovation[0];
+            of_a = lanes_mul_sub(lanes_all(k), of_v, of_a);
+        }
+        eliminate(s, v, t->r[0], innovation[0], of_v, n - 1);
+    }
+    if (plan->present[n + 1]) eliminate(s, own, t->r[n + 1], nu_a, of_a, n - 1);
 }
 
 /* Channels in the order of the other engine: omega_n..omega_1, v, a_x. */
@@ -167,32 +216,37 @@ TG_INLINE void update_channels(const tg_filter *f, const tgi_plan *plan, channel
 {
     tgi_direct *const out = t->out;
     tgi_block *const P = &out->P;
-    const tgi_gain prior = out->x;
     const tg_lanes a = load_wheels(plan->accelerometer, n);
     const tg_real a_rho = plan->accelerometer[n];
-    tg_real innovation[TG_LANES + 2] = {0}, variance[TG_LANES + 2] = {0};
-    for (int i = 0; i < n; i++) {
-        innovation[1 + i] = plan->y[1 + i] - lanes_at(prior.omega, i);
-        variance[1 + i] = lanes_at(P->omega[i], i) + plan->r[1 + i];
-    }
-    innovation[0] = plan->y[0] - lanes_at(prior.rest, 1);
-    variance[0] = lanes_at(P->v_rest, 1) + plan->r[0];
+    shock s = {lanes_all(0), lanes_all(0), 0, 0, 0};
+    nis_square left = {.sum = 0};
+    for (int i = 0; i < n; i++)
+        if (plan->present[1 + i]) expect(f, plan, t, 1 + i, plan->y[1 + i] - lanes_at(out->x.omega, i), lanes_at(P->omega[i], i));
+    if (plan->present[0]) expect(f, plan, t, 0, plan->y[0] - lanes_at(out->x.rest, 1), lanes_at(P->v_rest, 1));
     if (plan->present[n + 1]) {
-        tg_lanes mu = lanes_mul(lanes_all(a_rho), P->rho_mu);
-        for (int i = 0; i < n; i++) mu = lanes_mul_add(lanes_all(lanes_at(a, i)), P->mu[i], mu);
-        variance[n + 1] = dot(a, mu) + a_rho * (dot(a, P->rho_mu) + a_rho * lanes_at(P->rho_rest, 0)) + plan->r[n + 1];
-        innovation[n + 1] = plan->y[n + 1] - plan->accelerometer_shift - (dot(a, prior.mu) + a_rho * lanes_at(prior.rest, 0));
+        s = shock_of(P, a, a_rho, n);
+        expect(f, plan, t, n + 1, plan->y[n + 1] - plan->accelerometer_shift - (dot(a, out->x.mu) + a_rho * lanes_at(out->x.rest, 0)), s.own);
     }
-    for (int j = n - 1; j >= 0; j--)
-        if (plan->present[1 + j]) {
-            const tgi_gain h = {P->omega_mu[j], P->omega_rest[j], P->omega[j]};
-            update_channel(f, plan, t, 1 + j, &h, lanes_at(h.omega, j), plan->y[1 + j] - lanes_at(out->x.omega, j), innovation[1 + j], variance[1 + j], n);
-        }
+    const int judges = plan->shares && plan->count == n + plan->present[0] + plan->present[n + 1];
+    if (judges) nis_begin(plan, t, &s, &left, n);
+    for (int j = n - 1; j >= 0; j--) {
+        if (!plan->present[1 + j]) continue;
+        const tgi_gain h = {P->omega_mu[j], P->omega_rest[j], P->omega[j]};
+        if (judges) eliminate(&left, lanes_at(left.W[j], j), t->r[1 + j], lanes_at(left.nu, j), left.W[j], j - 1);
+        update_channel(t, 1 + j, &h, lanes_at(h.omega, j), plan->y[1 + j] - lanes_at(out->x.omega, j), n);
+    }
     if (plan->present[0]) {
         const tgi_gain h = {P->v_mu, P->v_rest, P->v_omega};
-        update_channel(f, plan, t, 0, &h, lanes_at(h.rest, 1), plan->y[0] - lanes_at(out->x.rest, 1), innovation[0], variance[0], n);
+        update_channel(t, 0, &h, lanes_at(h.rest, 1), plan->y[0] - lanes_at(out->x.rest, 1), n);
     }
-    if (plan->present[n + 1]) update_accelerometer(f, plan, t, a, a_rho, innovation[n + 1], variance[n + 1], n);
+    if (plan->present[n + 1]) {
+        s = shock_of(P, a, a_rho, n);
+        const tgi_gain h = {s.mu, lanes_of(s.rho, s.v, 0, 0), s.omega};
+        const tg_real expected = dot(a, out->x.mu) + a_rho * lanes_at(out->x.rest, 0);
+        update_channel(t, n + 1, &h, s.own, plan->y[n + 1] - plan->accelerometer_shift - expected, n);
+    }
+    out->judged = judges;
+    out->result->nis = left.sum;
 }
 
 TG_INLINE int is_finite(const tgi_direct *out, const int n)
@@ -231,10 +285,12 @@ TG_INLINE int direct_step(const tg_filter *f, const tg_real *P, const tgi_plan *
     out->x.rest = lanes_of(x[n], (x[n + 1] - m.g * x[n]) + dot(m.c, mu) + shift[n + 1], 0, 0);
     out->x.omega = lanes_add(lanes_mul_add(m.b, mu, lanes_mul(m.phi, omega)), load_wheels(shift + n + 2, n));
     out->x_prior = out->x;
-    out->taken = 0;
-    out->result->nis = 0;
+    out->taken = out->judged = 0;
+    out->result->square = 0;
     out->result->volume = 1;
-    channel_updates t = {out, 1};
+    channel_updates t;
+    t.out = out;
+    t.noise = 1;
     if (plan->count) update_channels(f, plan, &t, n);
     out->result->taken = out->taken;
     return t.noise >= TGI_NOISE_SHARE * out->result->volume && is_finite(out, n);

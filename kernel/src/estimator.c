@@ -57,8 +57,8 @@ static void watch_consistency(tg_estimator *e, tg_row *row, const tg_step *step,
     tg_real sum = 0;
     for (int32_t c = 0; c < n + 2; c++) {
         if (isnan(step->innovation[c]) || made_up >> c & 1) continue;
-        const tg_real w = step->weight[c], expected = step->innovation_variance[c], shared = c < n ? row->shared[c] : 0;
-        const tg_real variance = expected - (shared < expected / 2 ? shared : expected / 2) + (w < 1 ? r[c] * (1 / w - 1) : 0);
+        const tg_real w = step->weight[c], shared = c <= n ? row->shared[c] : 0;
+        const tg_real variance = step->innovation_variance[c] - shared + (w < 1 ? r[c] * (1 / w - 1) : 0);
         sum += row->channel_nis[c] = tgi_square(step->innovation[c]) / variance;
         count++;
     }
@@ -76,6 +76,19 @@ static void inputs_over(const tg_estimator *e, const tg_drive *drive, const tg_i
     }
     over->drawbar = d * drive->mean_drawbar;
     over->slope = (e->held.slope + now->slope) / 2;
+}
+
+/* Of variance that comes in equal parts after each of `pieces` steps, what is left at the end of wheel speeds, which bearings slow down. */
+static void carry_shared(const tg_filter *f, int32_t pieces, tg_real *shared)
+{
+    for (int32_t i = 0; i < f->wheels; i++) {
+        tg_real part = 1, sum = 0;
+        for (int32_t k = 0; k < pieces; k++) {
+            sum += part;
+            part *= tgi_square(f->passage.phi[i]);
+        }
+        shared[i] *= sum / (tg_real)pieces;
+    }
 }
 
 /* Predict over dt, in pieces where it is long, and update. Returns 0 where the filter had to start anew. */
@@ -100,7 +113,8 @@ static int32_t advance(tg_estimator *e, tg_row *row, const tg_drive *drive, tg_r
         status = tg_filter_predict(&e->filter, dt, &over, q);
         if (status == TG_OK) tgi_follow(e, e->deviation);
     }
-    if (status == TG_OK) status = tg_filter_step(&e->filter, dt, &over, &now, q, y, r, &step);
+    if (pieces > 1 && status == TG_OK) carry_shared(&e->filter, pieces, row->shared);
+    if (status == TG_OK) status = tg_filter_step_shared(&e->filter, dt, &over, &now, q, row->shared, y, r, &step);
     if (status != TG_OK) {
         tgi_forget(e);
         tgi_restart_from(e, row, 0);

@@ -53,7 +53,7 @@ TG_INLINE void exact_update(const tg_filter *f, const tgi_plan *plan, tgi_result
     out->channel[taken] = o;
     out->residual[taken] = residual;
     out->residual_variance[taken] = r + sum;
-    out->nis += residual * residual * inverse;
+    out->square += residual * residual * inverse;
     out->volume *= r + sum;
     out->innovation[o] = innovation;
     out->variance[o] = variance;
@@ -95,7 +95,7 @@ void tgi_exact_step(const tg_filter *f, const tgi_factors *from, const tgi_plan 
     for (int i = 0; i < stride; i += TG_LANES) lanes_store(out->x_prior + i, lanes_load(out->x + i));
     for (int j = rows; j < stride; j++) out->d[j] = 0;
     out->taken = 0;
-    out->nis = 0;
+    out->square = 0;
     out->volume = 1;
     tgi_gram gram = tgi_factor_begin(W, weight, rows, stride);
     for (int j = rows - 1; j > 0; j--) {

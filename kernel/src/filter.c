@@ -136,7 +136,7 @@ static tg_real log_likelihood(const tgi_result *result)
         logs = tgi_log(result->volume);
     else
         for (int c = 0; c < result->taken; c++) logs += tgi_log(result->residual_variance[c]);
-    return -(result->nis + logs + (tg_real)result->taken * TG_LN_2PI) / 2;
+    return -(result->square + logs + (tg_real)result->taken * TG_LN_2PI) / 2;
 }
 
 TG_INLINE int result_is_finite(const tgi_result *result, const int n, const int stride)
@@ -234,17 +234,19 @@ TG_INLINE tg_status advance_one(tg_filter *f, const tgi_call *call, tgi_plan *pl
     plan->gamma = gamma_of(f, call, plan);
     noise_scales(f, scale, stride);
     scale_noise(f, scale, plan, n);
-    int formed = 0;
+    int formed = 0, judged = 0;
 #if TGI_DIRECT
     tgi_direct direct;
     direct.result = &result;
     formed = f->tuning.engine == TG_EXACT && n <= TG_LANES && f->factor_steps == 0 && tgi_direct_step(f, plan, &direct);
-    if (formed && policy != TG_FIXED) tgi_direct_gains(&direct, result.gain, n);
+    judged = formed && direct.judged;
+    if (formed && (policy != TG_FIXED || (plan->shares && !judged))) tgi_direct_gains(&direct, result.gain, n);
 #endif
     if (!formed) {
         const tg_status status = step_with_factors(f, plan, &result);
         if (status != TG_OK) return status;
     }
+    if (!judged) result.nis = plan->shares ? tgi_nis(plan, &result, n) : result.square;
     result.log_likelihood = log_likelihood(&result);
     if (!formed && !result_is_finite(&result, n, stride)) return TG_DIVERGED;
     if (policy != TG_FIXED) {
@@ -272,18 +274,24 @@ static tg_status advance(tg_filter *f, const tgi_call *call, tg_step *out)
     return status;
 }
 
+tg_status tg_filter_step_shared(tg_filter *f, tg_real dt, const tg_input *before, const tg_input *now, const tg_real *q_input,
+                                const tg_real *shared, const tg_real *y, const tg_real *r, tg_step *out)
+{
+    if (!f || !before || !now || !y || !r) return TG_BAD_ARGUMENT;
+    const tgi_call call = {dt, before, now, q_input, shared, y, r};
+    return advance(f, &call, out);
+}
+
 tg_status tg_filter_step(tg_filter *f, tg_real dt, const tg_input *before, const tg_input *now, const tg_real *q_input,
                          const tg_real *y, const tg_real *r, tg_step *out)
 {
-    if (!f || !before || !now || !y || !r) return TG_BAD_ARGUMENT;
-    const tgi_call call = {dt, before, now, q_input, y, r};
-    return advance(f, &call, out);
+    return tg_filter_step_shared(f, dt, before, now, q_input, NULL, y, r, out);
 }
 
 tg_status tg_filter_predict(tg_filter *f, tg_real dt, const tg_input *before, const tg_real *q_input)
 {
     if (!f || !before) return TG_BAD_ARGUMENT;
-    const tgi_call call = {dt, before, before, q_input, NULL, NULL};
+    const tgi_call call = {dt, before, before, q_input, NULL, NULL, NULL};
     return advance(f, &call, NULL);
 }
 

@@ -106,10 +106,11 @@ static tg_real held_noise(const tg_estimator *e, const tg_hold *h, double time, 
     return dt * (2 * age - dt) * constant + walk * (age * age * age - since * since * since) / 3;
 }
 
-/* Of held_noise where the step ends with a sample, what one step alone does not have: its mean leans on the last sample too. */
+/* Of held_noise, what one step alone does not have where it ends with a sample: its mean leans on the last sample too. */
 static tg_real shared_noise(const tg_hold *h, tg_real dt, tg_real noise)
 {
     const tg_real part = dt < h->interval ? dt / h->interval : 1;
+    if (!h->fresh || h->count < 2) return 0;
     return tgi_square(dt * noise) * (part - part * part / 2);
 }
 
@@ -151,12 +152,14 @@ void tgi_input_noise(const tg_estimator *e, tg_real dt, tg_row *row, tg_real *q)
     memset(row->shared, 0, sizeof row->shared);
     for (int32_t i = 0; i < n; i++)
         if (s->driven[i]) {
-            if (e->torque[i].fresh) row->shared[i] = shared_noise(&e->torque[i], dt, s->noise[TG_DRIVE_TORQUE + i]) * tgi_square(c->inverse_inertia[i]);
+            row->shared[i] = shared_noise(&e->torque[i], dt, s->noise[TG_DRIVE_TORQUE + i]) * tgi_square(c->inverse_inertia[i]);
             q[i] = held_noise(e, &e->torque[i], time, dt, s->noise[TG_DRIVE_TORQUE + i], c->unknown_torque[i])
                  * tgi_square(c->inverse_inertia[i]);
         }
-    if (e->drawbar.count > 0 || s->towing)
+    if (e->drawbar.count > 0 || s->towing) {
+        row->shared[n] = shared_noise(&e->drawbar, dt, s->noise[TG_DRAWBAR_FORCE]) * tgi_square(c->inverse_mass);
         q[n] += held_noise(e, &e->drawbar, time, dt, s->noise[TG_DRAWBAR_FORCE], c->unknown_pull) * tgi_square(c->inverse_mass);
+    }
     if (e->pitch.count > 0)
         q[n] += held_noise(e, &e->pitch, time, dt, s->noise[TG_PITCH], tgi_square(s->tuned.unknown_slope)) * tgi_square(s->machine.gravity);
 }

@@ -101,11 +101,20 @@ static int32_t moves(tg_estimator *e, tg_real ground, double time)
     return !e->standing || time - e->slow_time > (double)e->settings.tuned.leap;
 }
 
+typedef struct { /* of a low-pass: worked out once for all speeds of a row whose last samples came together */
+    tg_real tau, dt, gain;
+} settling;
+
 /* First-order low-pass, exact also where samples are further apart than tau. */
-static tg_real settle(tg_lowpass *f, tg_real x, double time, tg_real tau)
+static tg_real settle(tg_lowpass *f, tg_real x, double time, settling *pass)
 {
     if (isnan(x)) return f->value;
-    f->value = f->seen ? f->value - tgi_expm1(-(tg_real)(time - f->time) / tau) * (x - f->value) : x;
+    const tg_real dt = (tg_real)(time - f->time);
+    if (dt != pass->dt) {
+        pass->dt = dt;
+        pass->gain = -tgi_expm1(-dt / pass->tau);
+    }
+    f->value = f->seen ? f->value + pass->gain * (x - f->value) : x;
     f->time = time;
     f->seen = 1;
     return f->value;
@@ -131,13 +140,14 @@ int32_t tgi_track_motion(tg_estimator *e, const tg_row *row)
 {
     const tg_settings *s = &e->settings;
     const tg_real tau = s->tuned.settle, age = 1;
+    settling pass = {tau, 0, 0};
     int32_t n = s->machine.wheels, seen = 0;
     const tg_real seen_ground = row->doubt[n] > 0 ? (tg_real)NAN : row->value[TG_GROUND_SPEED];
-    tg_real fastest = 0, soonest = 0, over = 0, rim = 0, ground = settle(&e->ground_speed, seen_ground, row->time, tau);
+    tg_real fastest = 0, soonest = 0, over = 0, rim = 0, ground = settle(&e->ground_speed, seen_ground, row->time, &pass);
     tg_real course = soon(&e->soon_ground, seen_ground, row->time, tau, s->noise[TG_GROUND_SPEED], s->standstill_speed);
     for (int32_t i = 0; i < n; i++) {
         const tg_real measured = row->doubt[i] > 0 ? (tg_real)NAN : row->value[TG_WHEEL_SPEED + i];
-        const tg_real w = s->rolling_radius[i] * settle(&e->wheel_speed[i], measured, row->time, tau);
+        const tg_real w = s->rolling_radius[i] * settle(&e->wheel_speed[i], measured, row->time, &pass);
         const tg_real r = s->rolling_radius[i], noise = s->noise[TG_WHEEL_SPEED + i];
         const tg_real now = r * soon(&e->soon[i], measured, row->time, tau, noise, s->standstill_speed / r);
         if (!recent(&e->wheel_speed[i], row->time, s->gap)) continue;

@@ -125,7 +125,7 @@ TG_INLINE void unscented_update(const tg_filter *f, const tgi_plan *plan, const 
         out->channel[out->taken] = c;
         out->residual[out->taken] = residual[a];
         out->residual_variance[out->taken] = d[a];
-        out->nis += residual[a] * residual[a] / d[a];
+        out->square += residual[a] * residual[a] / d[a];
         out->volume *= d[a];
         for (int i = 0; i < stride; i++) {
             out->gain[out->taken][i] = i < rows ? u[a][i] : 0;
@@ -140,7 +140,7 @@ void tgi_unscented_step(const tg_filter *f, const tgi_plan *plan, tgi_result *ou
     const int n = f->wheels, stride = f->stride, joint = (TG_TWICE(n) + n + 2 + TG_LANES - 1) / TG_LANES * TG_LANES;
     const weights w = unscented_weights(&f->tuning, n);
     out->taken = 0;
-    out->nis = 0;
+    out->square = 0;
     out->volume = 1;
     for (int j = TG_TWICE(n); j < stride; j++) out->d[j] = 0;
     unscented_predict(f, plan, &w, out, n, stride);

@@ -90,12 +90,14 @@ typedef struct {
     wide F[NX][NX], shift[NX]; /* of the last step */
     wide nu[NY], S[NY][NY], weight[NY], K[NX][NY];
     int taken[NY], count;        /* channels, in order */
+    wide shared[NY]; /* the caller's: of S, what neighbouring steps share, which nis is taken without */
     wide nis, log_likelihood;
 } dense;
 
 static inline void dense_moments(dense *d, const tg_machine *m, const tg_real *x, const tg_real *P)
 {
     d->n = m->wheels;
+    for (int c = 0; c < NY; c++) d->shared[c] = 0;
     for (int i = 0; i < 2 * d->n + 2; i++) {
         d->x[i] = x[i];
         for (int j = 0; j < 2 * d->n + 2; j++) d->P[i][j] = P[i * (2 * d->n + 2) + j];
@@ -196,6 +198,14 @@ static inline void invert(int size, wide A[NY][NY], wide *log_determinant)
 }
 
 /* Joint update with the present channels; `huber` as in the kernel; `weights` by channel: used instead, where given. */
+static inline wide dense_square(const dense *d, wide A[NY][NY])
+{
+    wide sum = 0;
+    for (int a = 0; a < d->count; a++)
+        for (int b = 0; b < d->count; b++) sum += d->nu[a] * A[a][b] * d->nu[b];
+    return sum;
+}
+
 static inline void dense_update(dense *d, const tg_machine *m, const tg_input *now, const tg_real *y, const tg_real *r, wide huber,
                                 const wide *weights)
 {
@@ -224,13 +234,14 @@ static inline void dense_update(dense *d, const tg_machine *m, const tg_input *n
         }
     }
     memcpy(inverse, d->S, sizeof inverse);
+    for (int a = 0; a < d->count; a++) inverse[a][a] -= d->shared[d->taken[a]];
     invert(d->count, inverse, &logs);
-    d->nis = 0;
+    d->nis = dense_square(d, inverse);
+    memcpy(inverse, d->S, sizeof inverse);
+    invert(d->count, inverse, &logs);
     wide IKH[NX][NX], T[NX][NX];
     for (int i = 0; i < states; i++)
         for (int k = 0; k < states; k++) IKH[i][k] = i == k;
-    for (int a = 0; a < d->count; a++)
-        for (int b = 0; b < d->count; b++) d->nis += d->nu[a] * inverse[a][b] * d->nu[b];
     for (int i = 0; i < states; i++)
         for (int a = 0; a < d->count; a++) {
             d->K[i][a] = 0;
@@ -249,7 +260,7 @@ static inline void dense_update(dense *d, const tg_machine *m, const tg_input *n
             for (int k = 0; k < states; k++) d->P[i][j] += T[i][k] * IKH[j][k];
             for (int a = 0; a < d->count; a++) d->P[i][j] += d->K[i][a] * R[a] * d->K[j][a];
         }
-    d->log_likelihood = -(d->nis + logs + d->count * 1.8378770664093454836L) / 2;
+    d->log_likelihood = -(dense_square(d, inverse) + logs + d->count * 1.8378770664093454836L) / 2;
 }
 
 /* Largest difference between a filter's moments and dense ones, in SDs and in products of SDs. */

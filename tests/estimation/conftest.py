@@ -30,6 +30,7 @@ class Instant:
     y: NDArray[np.float64]
     r: NDArray[np.float64]
     restart: tuple[float, NDArray[np.float64], NDArray[np.float64]] | None = None
+    shared: NDArray[np.float64] | None = None
 
 
 @dataclass(frozen=True)
@@ -80,6 +81,7 @@ def make_problem(
     spikes: share of values that are 10 to 1000 SDs off. steady_rate: a fixed dt.
     """
     rng = np.random.default_rng(seed)
+    sharing = np.random.default_rng([seed, 1])
     machine = random_machine(rng, wheels)
     model = TractionModel(machine)
     n, nx = wheels, 2 * wheels + 2
@@ -125,7 +127,8 @@ def make_problem(
             truth[: n + 1] += rng.normal(0, 0.3, n + 1)
             walk_time = rng.choice([0.0, 3.0])
             restart = (walk_time, truth[: n + 1] + rng.normal(0, 0.1, n + 1), 10 ** rng.uniform(-4, 0, n + 1))
-        instants.append(Instant(float(dt), before, now, q_input, y, r, restart))
+        shared = sharing.uniform(0, 0.5, n + 1) * q_input[: n + 1]
+        instants.append(Instant(float(dt), before, now, q_input, y, r, restart, shared))
         before = now
     return Problem(machine, walk, x0, P0, instants)
 

@@ -72,10 +72,6 @@ def test_its_intervals_hold_and_the_guesses_do_not_fit(vehicle, long):
         assert np.mean(off < 1.96) > 0.9, name
 
 
-@pytest.mark.xfail(
-    strict=True,
-    reason="the row's NIS holds a torque's noise whole though one step has half of it: .59; each channel's does not: decision 0143",
-)
 def test_its_innovations_are_as_large_as_expected(vehicle, long):
     late = long.recording.time > 30
     learned, _ = played(core_of(vehicle, long.recording), long.recording)

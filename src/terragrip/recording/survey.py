@@ -97,7 +97,13 @@ def survey_of(log: LogBlocks, progress: Progress | None = None) -> Survey:
 
 def _copied(block: Recording, rows: slice) -> Recording:
     """Rows of a block as their own memory, so that the block need not stay."""
-    return block.select(np.arange(rows.start, rows.stop))
+    part = block.select(rows)
+    return replace(
+        part,
+        time=part.time.copy(),
+        channels={name: values.copy() for name, values in part.channels.items()},
+        labels={name: values.copy() for name, values in part.labels.items()},
+    )
 
 
 def _joined(parts: list[Recording], last: Recording) -> Recording:

@@ -37,6 +37,8 @@ class BankUpdate:
     """Of the mixture before weighting, (m,)."""
     weight: Vector
     """Huber weights, the same for all lanes, (m,)."""
+    innovation_covariance: Matrix
+    """S of the present channels, of the mixture with the weighted R, (p, p)."""
     nis: Any
     """Of the mixture, with the weighted R."""
     log_likelihood: Any
@@ -133,7 +135,8 @@ class Bank:
         )
         present = lanes[0].present
         block = np.ix_(present, present)
-        nis, _ = score(innovation[present], spread[block] + lanes[0].noise[block])
+        S = spread[block] + lanes[0].noise[block]
+        nis, _ = score(innovation[present], S)
 
         log_likelihood = np.array([lane.log_likelihood for lane in lanes])
         best = np.max(log_likelihood)
@@ -143,7 +146,15 @@ class Bank:
             floored = np.maximum(weighted / total, SMALLEST_PROBABILITY)
             self.probabilities = floored / np.sum(floored)
         return BankUpdate(
-            lanes, present, innovation, variance, weight, nis, best + np.log(total), self.probabilities.copy()
+            lanes,
+            present,
+            innovation,
+            variance,
+            weight,
+            S,
+            nis,
+            best + np.log(total),
+            self.probabilities.copy(),
         )
 
     def step(self, y: ArrayLike, u: Any = None, dt: float = 1.0) -> BankUpdate:
