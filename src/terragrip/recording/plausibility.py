@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
+from terragrip.recording.mechanics import RATIOS, motion_warnings
 from terragrip.recording.track import Track, track_of
 
 if TYPE_CHECKING:
@@ -29,7 +30,6 @@ _RATIOS = (
     (1e3, "wheel_speed or ground_speed may be off by a factor of 1000"),
 )
 _ENOUGH = 4000  # rows: a median that is to be distinguished from another by a third needs no more
-_PLAUSIBLE = (0.6, 2.2)  # a median ratio within is left to slip
 _OUTRUN = 1.5  # straight line over way: above, the way is too short
 _WAY_WINDOW = 10.0  # s
 _SURE = 0.5  # correlation of two rates of turn
@@ -50,6 +50,7 @@ def unit_warnings(recording: Recording, vehicle: Vehicle | None) -> list[str]:
         *_turn_warnings(recording, vehicle, track),
         *_angle_warnings(recording),
         *_acceleration_warnings(recording),
+        *motion_warnings(recording, vehicle),
         *_time_warnings(recording),
     ]
 
@@ -60,7 +61,7 @@ def _speed_warnings(recording: Recording, vehicle: Vehicle) -> list[str]:
         return []
     for wheel, radius in zip(vehicle.wheels, vehicle.wheel_radius, strict=True):
         ratio = _speed_ratio(recording, wheel, float(radius))
-        if ratio is None or _PLAUSIBLE[0] <= ratio <= _PLAUSIBLE[1]:
+        if ratio is None or RATIOS[0] <= ratio <= RATIOS[1]:
             continue
         reasons = [(radius, "wheel_speed may be the rim's speed in m/s: divide it by the radius"), *_RATIOS]
         reasons.append((3.6 * float(radius), "wheel_speed may be the rim's speed in km/h"))
@@ -79,7 +80,7 @@ def _speed_warnings(recording: Recording, vehicle: Vehicle) -> list[str]:
 def _drive_warnings(recording: Recording) -> list[str]:
     """The drive train's speed against the ground speed: both are in m/s, so that no radius makes a factor of 3.6."""
     ratio = _ratio_of(recording, recording.channels.get("wheel_based_speed"), 1.0)
-    if ratio is None or _PLAUSIBLE[0] <= ratio <= _PLAUSIBLE[1]:
+    if ratio is None or RATIOS[0] <= ratio <= RATIOS[1]:
         return []
     high, low = "wheel_based_speed", "ground_speed"
     if ratio < 1:
@@ -135,6 +136,9 @@ def _turn_warnings(recording: Recording, vehicle: Vehicle | None, track: Track |
         text["the positions"] = _agreement(recording.time, yaw, track.at("turn", recording.time))
     if vehicle is not None:
         text["the wheels' speeds"] = _agreement(recording.time, yaw, _wheel_turn(recording, vehicle))
+    scaled = _turn_scale(recording, yaw, vehicle, track)
+    if scaled:
+        return [scaled]
     against = [who for who, value in text.items() if value < -_SURE]
     agreed = [who for who, value in text.items() if value > _SURE]
     if not against:
@@ -152,13 +156,34 @@ def _turn_warnings(recording: Recording, vehicle: Vehicle | None, track: Track |
     ]
 
 
-def _wheel_turn(recording: Recording, vehicle: Vehicle) -> Floats:
-    """Rate of turn (n,) by right less left rim speeds, up to a factor: it is the sign that counts."""
+def _turn_scale(recording: Recording, yaw: Floats, vehicle: Vehicle | None, track: Track | None) -> str:
+    """Where the rate of turn is larger than others' by what lies between degrees and radians. A skid-steered vehicle turns by as little
+    as a third of what its wheels' speeds say."""
+    others: dict[str, Floats] = {}
+    if vehicle is not None and vehicle.track and vehicle.knows_wheels:
+        rims = _wheel_turn(recording, vehicle, rims=True) / vehicle.track
+        others["the wheels' speeds"] = rims
+    if track is not None:
+        others["the positions"] = track.at("turn", recording.time)
+    for who, turn in others.items():
+        if abs(_agreement(recording.time, yaw, turn)) < _SURE:
+            continue
+        known = np.isfinite(yaw) & np.isfinite(turn)
+        ratio = float(np.sqrt(np.mean(yaw[known] ** 2) / np.mean(turn[known] ** 2)))
+        if 12 < ratio < 100:
+            return f"angular_velocity_z is {ratio:.2g} times the rate of turn of {who}: it may be in deg/s: 1 deg/s is 0.01745 rad/s."
+    return ""
+
+
+def _wheel_turn(recording: Recording, vehicle: Vehicle, *, rims: bool = False) -> Floats:
+    """Rate of turn (n,) by right less left wheel speeds, up to a factor: the track, where ``rims`` asks for rim speeds."""
     parts = []
+    radius = dict(zip(vehicle.wheels, vehicle.wheel_radius, strict=True)) if rims else {}
     for axle in vehicle.axles.values():
         left, right = (recording.channels.get(f"wheel_speed_{axle.wheels[k]}") for k in (0, -1))
         if len(axle.wheels) > 1 and left is not None and right is not None:
-            parts.append(_filled(recording.time, right) - _filled(recording.time, left))
+            part = _filled(recording.time, right) - _filled(recording.time, left)
+            parts.append(part * radius.get(axle.wheels[-1], 1.0))
     return np.mean(parts, axis=0) if parts else np.full(len(recording), np.nan)
 
 

@@ -1,0 +1,313 @@
+"""What the motion itself says against torques, accelerations and angles: sentences for the user, never errors.
+
+Over windows of a second, averaged so that all see the same stretch, an accelerometer along the vehicle reads dv/dt + g sin(pitch), and the
+wheels' thrust Σ M/r less the drawbar force is m times that plus a resistance (physics.md 1). A wrong sign, unit, gear ratio or mass makes
+these proportional by another factor than 1. Thrust and accelerometer agree best, since both see a slope; which of them is wrong is then
+decided by the change of ground speed. Slip must vanish with the torque, so that large slip at small torque is a wrong radius or ratio.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+import numpy.typing as npt
+
+from terragrip.units import STANDARD_GRAVITY
+
+if TYPE_CHECKING:
+    from terragrip.recording.table import Recording
+    from terragrip.vehicle import Vehicle
+
+Floats = npt.NDArray[np.float64]
+Bools = npt.NDArray[np.bool_]
+
+RATIOS = (0.6, 2.2)
+"""Rim speed over ground speed that may still be slip; beyond it is a unit."""
+
+_WINDOW = 1.0  # s, at least, and two samples of the ground speed
+_MOVING = 0.15  # of the speed that a twentieth of the windows reach
+_LEAST = 25  # windows
+_BLOCKS = 10  # of windows that hang together, for the jackknife
+_SURE = 3.0  # standard errors
+_ALIKE = 0.7  # correlation from which two signals are proportional
+_CLEAR = 0.85  # and from which another reading of the channels is the right one
+_FACTOR = 1.8  # more than an uncalibrated torque and an estimated mass make of a force balance
+_LIGHT = 0.12  # adhesion: below, no ground lets a wheel slip by
+_SPIN = 0.3  # (that is a stiffness of .4, where the softest soils have 2)
+_SIGN = "forward is positive: write 'sign: -1' for {} in the profile"
+
+
+@dataclass(frozen=True)
+class _Fit:
+    """Slope with its standard error, and the correlation; a slope of 0 ± inf where there is too little to say."""
+
+    slope: float = 0.0
+    error: float = np.inf
+    alike: float = 0.0
+
+    def is_off(self, value: float = 1.0) -> bool:
+        """Whether the slope is surely another one."""
+        return abs(self.slope - value) > _SURE * self.error
+
+    @property
+    def distance(self) -> float:
+        """How far the slope is from 1, as a factor's logarithm."""
+        return abs(float(np.log(self.slope))) if self.slope > 0 else np.inf
+
+    @property
+    def is_another_scale(self) -> bool:
+        """Proportional, and by a factor that is not 1. What noise flattens of a slope, the squared correlation holds."""
+        if abs(self.alike) < _ALIKE:
+            return False
+        low, high = self.slope - _SURE * self.error, self.slope / self.alike**2 + _SURE * self.error
+        return low > _FACTOR or high < 1 / _FACTOR
+
+
+@dataclass(frozen=True)
+class _Means:
+    """Windows of driving forward (n,): ``place`` of each row of the log among all ``count`` windows, which of them are used (``rows``),
+    and of these the ``change`` of ground speed [m/s²], the ``speed`` [m/s] and g sin(pitch), ``climb`` [m/s²], if the log has it."""
+
+    place: npt.NDArray[np.intp]
+    count: int
+    rows: Bools
+    change: Floats
+    speed: Floats
+    climb: Floats | None = None
+
+    def of(self, values: Floats) -> Floats:
+        """A channel (rows,) as means over the stretch that ``change`` is of (n,)."""
+        plain = _binned(self.place, self.count, values)
+        inner = (plain[:-2] + 2 * plain[1:-1] + plain[2:]) / 4
+        return np.r_[np.nan, inner, np.nan][self.rows]
+
+    def fit(self, y: Floats, x: Floats, *, beside_climb: bool = False) -> _Fit:
+        """y over x (n,), its error by leaving out one block of windows at a time; ``beside_climb``: less what climbs explain of both."""
+        known = np.isfinite(y) & np.isfinite(x)
+        other = self.climb if beside_climb else None
+        if other is not None:
+            known &= np.isfinite(other)
+        if known.sum() < _LEAST or not np.ptp(y[known]) or not np.ptp(x[known]):
+            return _Fit()
+        pair = np.column_stack([y, x])[known]
+        common = np.column_stack([np.ones(len(pair)), *(() if other is None else (other[known],))])
+        pair = pair - common @ np.linalg.lstsq(common, pair, rcond=None)[0]
+        block = np.arange(len(pair)) * _BLOCKS // len(pair)
+        whole = _ratio(pair)
+        without = np.array([_ratio(pair[block != k]) for k in range(_BLOCKS)])
+        error = float(np.sqrt((_BLOCKS - 1) * np.var(without)))
+        return _Fit(whole, error, float(np.corrcoef(pair.T)[0, 1])) if np.isfinite(whole + error) else _Fit()
+
+
+def motion_warnings(recording: Recording, vehicle: Vehicle | None) -> list[str]:
+    """Sentences on accelerations, pitch, torques, radius and mass that the motion contradicts, and on sensors that never change."""
+    means = _means(recording)
+    if means is None:
+        return []
+    forward = (
+        means.of(recording.channels["acceleration_x"]) if "acceleration_x" in recording.channels else None
+    )
+    thrusts: dict[str, Floats] = {}
+    notes: list[str] = []
+    if vehicle is not None and vehicle.knows_wheels:
+        notes = _dead_warnings(recording, vehicle)
+        notes += _radius_warnings(recording, vehicle, means)
+        thrusts = {} if notes else _thrusts(recording, vehicle, means)
+    if forward is not None:
+        found = _balance_warnings(recording, means, forward, thrusts, vehicle)
+        return [*notes, *(found or _pitch_warnings(recording, means, forward))]
+    return [*notes, *_thrust_warnings(means, thrusts, vehicle)]
+
+
+def _ratio(pair: Floats) -> float:
+    """Slope of the first column over the second (n, 2)."""
+    a, b = (pair - pair.mean(axis=0)).T
+    below = float(np.sum(b * b))
+    return float(np.sum(a * b)) / below if below else np.nan
+
+
+def _binned(place: npt.NDArray[np.intp], count: int, values: Floats) -> Floats:
+    known = np.isfinite(values)
+    number = np.bincount(place[known], minlength=count)
+    total = np.bincount(place[known], values[known], count)
+    return np.where(number > 0, total / np.maximum(number, 1), np.nan)
+
+
+def _means(recording: Recording) -> _Means | None:
+    """None where too few windows of driving are left."""
+    speed = recording.channels.get("ground_speed")
+    known = np.flatnonzero(np.isfinite(speed)) if speed is not None else ()
+    if speed is None or len(known) < _LEAST:
+        return None
+    length = max(_WINDOW, 2 * float(np.median(np.diff(recording.time[known]))))
+    place = ((recording.time - recording.time[0]) / length).astype(np.intp)
+    count = int(place[-1]) + 1
+    mean = _binned(place, count, speed)
+    if count < _LEAST or float(np.nansum(mean)) <= 0:
+        return None
+    change = np.r_[np.nan, (mean[2:] - mean[:-2]) / (2 * length), np.nan]
+    rows = np.isfinite(change) & (np.nan_to_num(mean) > _MOVING * float(np.nanquantile(mean, 0.95)))
+    if rows.sum() < _LEAST:
+        return None
+    means = _Means(place, count, rows, change[rows], mean[rows])
+    if "pitch" not in recording.channels:
+        return means
+    climb = STANDARD_GRAVITY * means.of(np.sin(recording.channels["pitch"]))
+    return _Means(place, count, rows, change[rows], mean[rows], climb)
+
+
+def _driven(vehicle: Vehicle) -> dict[str, float]:
+    """Radius of each driven wheel."""
+    wheels = zip(vehicle.wheels, vehicle.wheel_radius, vehicle.driven, strict=True)
+    return {wheel: float(radius) for wheel, radius, driven in wheels if driven}
+
+
+def _thrusts(recording: Recording, vehicle: Vehicle, means: _Means) -> dict[str, Floats]:
+    """Of each driven wheel its thrust less its share of the drawbar force, over the mass (n,) [m/s²]; none where a torque is missing."""
+    radii, channels = _driven(vehicle), recording.channels
+    if not all(f"drive_torque_{wheel}" in channels for wheel in radii):
+        return {}
+    pulled = means.of(channels["drawbar_force"]) / len(radii) if "drawbar_force" in channels else 0.0
+    return {
+        w: (means.of(channels[f"drive_torque_{w}"]) / radius - pulled) / vehicle.mass
+        for w, radius in radii.items()
+    }
+
+
+def _balance_warnings(
+    recording: Recording, means: _Means, forward: Floats, thrusts: dict[str, Floats], vehicle: Vehicle | None
+) -> list[str]:
+    """acceleration_x and the torques against each other, and where they differ, each against the change of ground speed."""
+    moved = means.fit(forward, means.change, beside_climb=True)
+    flat = "acceleration_x is not the change of ground speed"
+    if not thrusts or vehicle is None:
+        backward = moved.is_off() and moved.slope + _SURE * moved.error < 0
+        return [f"{flat} but its opposite: {_SIGN.format('it')}."] if backward else []
+    thrust = np.sum(list(thrusts.values()), axis=0)
+    driven = means.fit(thrust, means.change, beside_climb=True)
+    together = means.fit(thrust, forward)
+    exchanged = _exchanged(recording, means, forward, thrusts)
+    if exchanged:
+        return [exchanged]
+    if not together.is_another_scale:
+        return []
+    if moved.is_off() and moved.distance > driven.distance:
+        if together.slope < 0:
+            return [
+                f"{flat} but its opposite, and the drive torques contradict it too: {_SIGN.format('it')}."
+            ]
+        return [
+            f"{flat} but {1 / together.slope:.2g} times what the drive torques make of {vehicle.mass:.4g} kg: it may be in g (write "
+            "'unit: g' in the profile), or not the axis that points forward."
+        ]
+    if driven.is_off() and driven.distance > moved.distance:
+        return [_scale_sentence(together.slope, vehicle)]
+    wrong = "against each other" if together.slope < 0 else f"{together.slope:.2g} times apart"
+    return [
+        f"The drive torques over radius and mass and acceleration_x go {wrong}, and the ground speed does not show which of them is wrong: "
+        "check their signs and units, the wheel radius and the mass."
+    ]
+
+
+def _exchanged(recording: Recording, means: _Means, forward: Floats, thrusts: dict[str, Floats]) -> str:
+    """Whether some wheels' torques with the other sign, or the accelerometer's other axis, make a balance where there is none."""
+    signs = {wheel: -1 if means.fit(own, forward).slope < 0 else 1 for wheel, own in thrusts.items()}
+    plain = abs(means.fit(np.sum(list(thrusts.values()), axis=0), forward).alike)
+    turned = abs(means.fit(np.sum([signs[w] * own for w, own in thrusts.items()], axis=0), forward).alike)
+    sideways = recording.channels.get("acceleration_y")
+    other = (
+        0.0
+        if sideways is None
+        else abs(means.fit(np.sum(list(thrusts.values()), axis=0), means.of(sideways)).alike)
+    )
+    if plain > _ALIKE or max(turned, other) < _CLEAR:
+        return ""
+    if other > turned:
+        return "acceleration_y goes with the drive torques and acceleration_x does not: the two axes may be exchanged."
+    names = ", ".join(f"drive_torque_{wheel}" for wheel, sign in signs.items() if sign < 0)
+    return f"{names}: the other wheels' torques go with acceleration_x, and these against it; {_SIGN.format('each')}."
+
+
+def _thrust_warnings(means: _Means, thrusts: dict[str, Floats], vehicle: Vehicle | None) -> list[str]:
+    """The torques against the change of ground speed and the climb alone."""
+    if not thrusts or vehicle is None:
+        return []
+    moved = means.change + (0.0 if means.climb is None else means.climb)
+    fit = means.fit(np.sum(list(thrusts.values()), axis=0), moved)
+    return [_scale_sentence(fit.slope, vehicle)] if fit.is_another_scale else []
+
+
+def _scale_sentence(scale: float, vehicle: Vehicle) -> str:
+    if scale < 0:
+        return f"The drive torques fall where the vehicle is driven harder: {_SIGN.format('each')}."
+    return (
+        f"The drive torques over the wheel radius are {scale:.2g} times the force that moves {vehicle.mass:.4g} kg like this: check the "
+        "torques' unit and scale (at the wheel, not at the motor: the gear ratio counts), the wheel radius and the mass."
+    )
+
+
+def _pitch_warnings(recording: Recording, means: _Means, forward: Floats) -> list[str]:
+    """The pitch against what the accelerometer reads beyond the change of ground speed."""
+    if means.climb is None:
+        return []
+    seen = forward - means.change
+    fit = means.fit(seen, means.climb)
+    if fit.alike < -_ALIKE and fit.slope + _SURE * fit.error < 0:
+        return [
+            "pitch falls where the accelerometer shows a climb: nose up is positive; write 'sign: -1' for it in the profile."
+        ]
+    roll = recording.channels.get("roll")
+    if roll is not None and abs(fit.alike) < _ALIKE < abs(means.fit(seen, means.of(np.sin(roll))).alike):
+        return [
+            "The accelerometer shows climbs that go with roll and not with pitch: the two may be exchanged."
+        ]
+    return []
+
+
+def _dead_warnings(recording: Recording, vehicle: Vehicle) -> list[str]:
+    """Wheels' channels that hold one value for the whole drive where other wheels' change."""
+    notes = []
+    for quantity, wheels in (("wheel_speed", vehicle.wheels), ("drive_torque", tuple(_driven(vehicle)))):
+        known = {f"{quantity}_{wheel}": recording.channels.get(f"{quantity}_{wheel}") for wheel in wheels}
+        held = {
+            name: v[np.isfinite(v)] for name, v in known.items() if v is not None and np.isfinite(v).any()
+        }
+        still = {name: float(v[0]) for name, v in held.items() if not np.ptp(v)}
+        if still and len(still) < len(held):
+            shown = " and ".join(f"{name} ({value:.3g})" for name, value in still.items())
+            verb = "change" if len(still) > 1 else "changes"
+            notes.append(
+                f"{shown} never {verb} while the vehicle drives: a sensor that is dead, or a wrong column."
+            )
+    return notes
+
+
+def _radius_warnings(recording: Recording, vehicle: Vehicle, means: _Means) -> list[str]:
+    """Slip where there is hardly a torque; beyond `RATIOS` `unit_warnings` says which unit may be wrong."""
+    load = vehicle.mass * STANDARD_GRAVITY / len(vehicle.wheels)
+    off: dict[str, float] = {}
+    for wheel, radius in _driven(vehicle).items():
+        turning, torque = (
+            recording.channels.get(f"{name}_{wheel}") for name in ("wheel_speed", "drive_torque")
+        )
+        if turning is None or torque is None:
+            continue
+        with np.errstate(invalid="ignore", divide="ignore"):
+            rolled = np.abs(means.speed / _binned(means.place, means.count, turning)[means.rows])
+        light = (np.abs(means.of(torque)) < _LIGHT * radius * load) & np.isfinite(rolled)
+        shown = float(np.median(rolled[light])) if light.sum() >= _LEAST else radius
+        if abs(1 - shown / radius) > _SPIN and RATIOS[0] <= radius / shown <= RATIOS[1]:
+            off[wheel] = shown
+    if not off:
+        return []
+    apparent, stated = (
+        float(np.median(list(off.values()))),
+        float(np.median([_driven(vehicle)[w] for w in off])),
+    )
+    return [
+        f"With hardly a torque the wheels {', '.join(off)} slip by {1 - apparent / stated:.2f}, which no ground lets them: they roll "
+        f"{apparent:.3g} m a radian, and their radius is stated as {stated:.3g} m. Check the radius (not the diameter), the gear ratio and "
+        "the ticks a turn."
+    ]

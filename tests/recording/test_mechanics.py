@@ -1,0 +1,162 @@
+"""What the motion contradicts is reported: signs, units and scales of torque, acceleration, pitch, radius and mass."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from terragrip.recording import Recording, unit_warnings
+from terragrip.vehicle import Vehicle
+
+Columns = dict[str, np.ndarray]
+WHEELS = ("fl", "fr", "rl", "rr")
+MASS, RADIUS, G = 800.0, 0.35, 9.80665
+
+
+def machine(**more: object) -> Vehicle:
+    axles = {"front": {"mass": 350, "wheels": ["fl", "fr"]}, "rear": {"mass": 450, "wheels": ["rl", "rr"]}}
+    base = {"mass": MASS, "wheelbase": 1.3, "track": 1.1, "center_of_gravity_height": 0.5, "axles": axles}
+    return Vehicle.from_dict({**base, "wheel": {"radius": RADIUS, "inertia": 4}, **more})
+
+
+def drive(seed: int = 0, *, hills: float = 0.05) -> Columns:
+    """Five minutes of a mass on hills by Newton's second law (50 Hz): thrust, slip in proportion to it, and what sensors show."""
+    draws = np.random.default_rng(seed)
+    time = np.arange(0, 300, 0.02)
+    speed = 1.2 + 0.4 * np.sin(time / 7) + 0.15 * np.sin(time / 2.3)
+    change = np.gradient(speed, time)
+    yaw, way = 0.2 * np.sin(time / 11), np.cumsum(speed) * 0.02
+    pitch = hills * np.sin(way / 6)
+    roll = hills * np.cos(way / 9)
+    specific = change + G * np.sin(pitch)
+    thrust = MASS * (specific + 0.07 * G)
+    result = {
+        "time": time,
+        "ground_speed": speed + 0.02 * draws.standard_normal(len(time)),
+        "acceleration_x": specific + 0.05 + 0.2 * draws.standard_normal(len(time)),
+        "acceleration_y": speed * yaw + G * np.sin(roll) + 0.2 * draws.standard_normal(len(time)),
+        "acceleration_z": G + 0.2 * draws.standard_normal(len(time)),
+        "angular_velocity_z": yaw + 0.01 * draws.standard_normal(len(time)),
+        "pitch": pitch + 0.005 * draws.standard_normal(len(time)),
+        "roll": roll + 0.005 * draws.standard_normal(len(time)),
+    }
+    for k, wheel in enumerate(WHEELS):
+        side = 0.55 if k % 2 else -0.55
+        hub = speed + side * yaw
+        slip = thrust / (MASS * G) / 6
+        torque = RADIUS * (thrust / 4 + 150 * yaw * np.sign(side)) + 4 / RADIUS * change
+        result[f"wheel_speed_{wheel}"] = hub / (1 - slip) / RADIUS + 0.02 * draws.standard_normal(len(time))
+        result[f"drive_torque_{wheel}"] = torque + 3 * draws.standard_normal(len(time))
+    return result
+
+
+def told(columns: Columns, vehicle: Vehicle | None = None) -> str:
+    return " ".join(unit_warnings(Recording.from_frame(columns), vehicle or machine()))
+
+
+def scaled(columns: Columns, factors: dict[str, float]) -> Columns:
+    return {
+        n: v * next((f for start, f in factors.items() if n.startswith(start)), 1.0)
+        for n, v in columns.items()
+    }
+
+
+def without(columns: Columns, *names: str) -> Columns:
+    return {n: v for n, v in columns.items() if n not in names}
+
+
+def exchanged(columns: Columns, a: str, b: str) -> Columns:
+    return {**columns, a: columns[b], b: columns[a]}
+
+
+SENSORS = {
+    "all": (),
+    "no pitch": ("pitch", "roll"),
+    "no accelerometer": ("acceleration_x", "acceleration_y", "acceleration_z"),
+}
+
+
+@pytest.mark.parametrize("hills", [0.0, 0.05, 0.15])
+@pytest.mark.parametrize("missing", SENSORS)
+def test_a_right_log_is_left_alone(missing: str, hills: float) -> None:
+    for seed in range(3):
+        assert told(without(drive(seed, hills=hills), *SENSORS[missing])) == ""
+
+
+def test_real_doubts_of_mass_and_torque_are_left_alone() -> None:
+    """A mass 30 % off and torques 20 % off are what `uncertainty` and `calibrate` are for."""
+    columns = scaled(drive(), {"drive_torque": 0.8})
+    heavy = machine(
+        mass=1040,
+        axles={"front": {"mass": 455, "wheels": ["fl", "fr"]}, "rear": {"mass": 585, "wheels": ["rl", "rr"]}},
+    )
+    assert told(columns, heavy) == ""
+
+
+@pytest.mark.parametrize(
+    ("factors", "expected"),
+    [
+        ({"drive_torque": 1 / 30}, "torques over the wheel radius are 0.03"),
+        ({"drive_torque": 2.5}, "torques over the wheel radius are 2.5"),
+        ({"drive_torque": -1.0}, "drive torques fall where the vehicle is driven harder"),
+        (
+            {"drive_torque_fl": -1.0, "drive_torque_rl": -1.0},
+            "drive_torque_fl, drive_torque_rl: the other wheels",
+        ),
+        ({"acceleration_x": -1.0}, "acceleration_x is not the change of ground speed but its opposite"),
+        ({"acceleration_x": 1 / G}, "it may be in g"),
+        ({"pitch": -1.0}, "pitch falls where the accelerometer shows a climb"),
+        ({"wheel_speed": 2.0, "drive_torque": 0.5}, "they roll 0.17"),
+        ({"angular_velocity_z": 180 / np.pi}, "it may be in deg/s"),
+        ({"drive_torque_rr": 0.0}, "drive_torque_rr (0) never changes"),
+        ({"wheel_speed_fl": 0.0}, "wheel_speed_fl (0) never changes"),
+    ],
+)
+def test_a_mistake_is_named(factors: dict[str, float], expected: str) -> None:
+    for seed in range(3):
+        assert expected in told(scaled(drive(seed), factors))
+
+
+@pytest.mark.parametrize(
+    ("factors", "expected"),
+    [
+        ({"drive_torque": 1 / 30}, "torques over the wheel radius are 0.03"),
+        ({"drive_torque": -1.0}, "acceleration_x go against each other"),
+        ({"drive_torque_fl": -1.0, "drive_torque_rl": -1.0}, "drive_torque_fl, drive_torque_rl"),
+        ({"acceleration_x": -1.0}, "acceleration_x go against each other"),
+    ],
+)
+def test_a_slope_that_nothing_shows_hides_no_mistake(factors: dict[str, float], expected: str) -> None:
+    assert expected in told(scaled(without(drive(), "pitch", "roll"), factors))
+
+
+def test_without_an_accelerometer_the_ground_speed_tells() -> None:
+    columns = without(drive(hills=0.0), "acceleration_x", "acceleration_y", "acceleration_z", "pitch", "roll")
+    assert "torques over the wheel radius are 0.03" in told(scaled(columns, {"drive_torque": 1 / 30}))
+    assert "drive torques fall" in told(scaled(columns, {"drive_torque": -1.0}))
+
+
+@pytest.mark.parametrize(
+    ("axes", "expected"),
+    [
+        (("acceleration_x", "acceleration_y"), "the two axes may be exchanged"),
+        (("pitch", "roll"), "climbs that go with roll and not with pitch"),
+    ],
+)
+def test_exchanged_axes_are_named(axes: tuple[str, str], expected: str) -> None:
+    assert expected in told(exchanged(drive(), *axes))
+
+
+def test_a_diameter_for_a_radius_is_named() -> None:
+    notes = told(drive(), machine(wheel={"radius": 2 * RADIUS, "inertia": 4}))
+    assert "not the diameter" in notes
+    assert "slip by 0.5" in notes
+
+
+def test_a_mass_in_the_wrong_unit_is_named() -> None:
+    axles = {"front": {"mass": 35, "wheels": ["fl", "fr"]}, "rear": {"mass": 45, "wheels": ["rl", "rr"]}}
+    assert "the force that moves 80 kg" in told(drive(), machine(mass=80, axles=axles))
+
+
+def test_a_short_log_says_nothing() -> None:
+    assert told({n: v[:200] for n, v in scaled(drive(), {"drive_torque": -1.0}).items()}) == ""
