@@ -84,7 +84,7 @@ def studio(folder: Path) -> Iterator[tuple[str, int]]:
         yield match.group(0), process.pid
     finally:
         process.terminate()
-        process.wait(10)
+        process.wait(60)
 
 
 def chromium() -> str | None:

@@ -104,8 +104,8 @@ with replacing(sys.argv[1]) as temporary:
         temporary.write_text("whole")
     (left,) = (name for name in os.listdir(tmp_path) if name.startswith(UNFINISHED))
     assert f"-{living.pid}-" in left
-    living.communicate("", timeout=30)
-    killed.communicate(timeout=30)
+    living.communicate("", timeout=120)
+    killed.communicate(timeout=120)
     assert sorted(os.listdir(tmp_path)) == ["a.csv", "b.csv"]
 
 

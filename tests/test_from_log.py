@@ -83,7 +83,7 @@ def by_file_of_a_recording(folder: Path, drive: Any, patch: pytest.MonkeyPatch) 
 def by_studio(folder: Path, drive: Any, patch: pytest.MonkeyPatch) -> Estimates:
     words = ["estimate", "log.csv", "--vehicle", "vehicle.yaml", "-o", "out.parquet"]
     subprocess.run(
-        [sys.executable, "-m", "terragrip.cli.job", *words], check=True, timeout=120, cwd=folder
+        [sys.executable, "-m", "terragrip.cli.job", *words], check=True, timeout=600, cwd=folder
     )  # as a job runs
     return Estimates.read(folder / "out.parquet")
 
@@ -122,7 +122,7 @@ def by_live(folder: Path, drive: Any, patch: pytest.MonkeyPatch) -> Mapping[str,
     ]
     source = f"replay:{folder / 'log.csv'}?speed=max"
     command_line = [sys.executable, "-m", "terragrip", "live", "--source", source, *map(str, words)]
-    subprocess.run(command_line, check=True, timeout=120)  # a process of its own, as live has
+    subprocess.run(command_line, check=True, timeout=600)  # a process of its own, as live has
     parts = sorted((folder / "live").glob("estimates*.parquet"))
     return pd.concat([pd.read_parquet(part) for part in parts])
 

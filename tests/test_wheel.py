@@ -139,9 +139,9 @@ def served_page(environment: Environment) -> str:
                 line = server.stdout.readline()
                 assert line, "the studio ended before it named its address"
                 address = "".join(re.findall(r"http://\S+", line))
-            for _ in range(50):
+            for _ in range(600):
                 try:
-                    return urllib.request.urlopen(address, timeout=5).read().decode()
+                    return urllib.request.urlopen(address, timeout=60).read().decode()
                 except urllib.error.URLError:
                     time.sleep(0.1)
             raise AssertionError(f"{address} does not answer")

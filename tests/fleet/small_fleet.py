@@ -90,7 +90,7 @@ def start(place: Path, *words: object, env: dict[str, str] | None = None) -> sub
 def fleet(place: Path, *words: object, env: dict[str, str] | None = None) -> tuple[int, str, str]:
     """Exit code, output and errors."""
     process = start(place, *words, env=env)
-    output, errors = process.communicate(timeout=300)
+    output, errors = process.communicate(timeout=600)
     return process.returncode, output, errors
 
 

@@ -19,7 +19,7 @@ import scipy.io
 
 from small_fleet import environment, fleet, free_port, serve, start, whole, write_log
 
-PATIENCE = 120.0
+PATIENCE = 600.0
 
 
 def until(condition: Callable[[], object]) -> None:

@@ -8,12 +8,15 @@ import socket
 import sys
 from contextlib import asynccontextmanager
 from pathlib import Path
+from weakref import WeakSet
 
 import pytest
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "estimation"))  # for drives.py
 
 from drives import Drive, drive, robot
+from terragrip.live.feed import Feed
+from terragrip.live.outbox import Outbox
 from terragrip.live.service import Service
 
 
@@ -42,8 +45,8 @@ def rows_of(recording):
         yield float(time), {n: float(v) for n, v in zip(names, values, strict=True) if v == v}
 
 
-async def until(condition, seconds: float = 10.0) -> None:
-    """Wait for something to become true; fails where it does not."""
+async def until(condition, seconds: float = 60.0) -> None:
+    """Wait for something to become true; fails where it does not, even on a busy machine."""
     async with asyncio.timeout(seconds):
         while not condition():
             await asyncio.sleep(0.005)
@@ -51,16 +54,41 @@ async def until(condition, seconds: float = 10.0) -> None:
 
 @asynccontextmanager
 async def running(service: Service):
-    """The service at work; what it published is in `service.seen`."""
+    """The service at work; what it published is in `service.seen`.
+
+    The block begins when each source and each sink has its other side, or has said that it has not.
+    """
     service.seen = []
     service.listeners.append(service.seen.append)
     service.task = task = asyncio.create_task(service.run())
-    await asyncio.sleep(0.05)
+    await until(lambda: is_settled(service) or task.done())
     try:
         yield service
     finally:
         service.stop()
-        await asyncio.wait_for(task, 20)
+        await asyncio.wait_for(task, 60)
+
+
+_settled: WeakSet[Feed | Outbox] = WeakSet()
+"""Those that have said whether their other side is there."""
+
+
+def is_settled(service: Service) -> bool:
+    """Whether each source and each sink has its other side, or has said that it has not."""
+    return _settled.issuperset([*service.feeds, *service.outboxes])
+
+
+def _noted(say):
+    def noted(self, *arguments):
+        say(self, *arguments)
+        _settled.add(self)
+
+    return noted
+
+
+for _kind in (Feed, Outbox):
+    for _name in ("connected", "lost"):
+        setattr(_kind, _name, _noted(getattr(_kind, _name)))
 
 
 async def estimated(service: Service) -> None:

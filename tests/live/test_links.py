@@ -35,7 +35,7 @@ async def test_a_pair_of_zenoh_sessions(vehicle, short, port):
         at = f"connect=tcp/127.0.0.1:{port}"
         service = Service(vehicle, [f"zenoh:machine/*?{at}"], [f"zenoh:terragrip?{at}&columns=slip_fl"])
         async with running(service):
-            await asyncio.sleep(0.6)
+            await subscribed(other, "machine/all")
             for message in messages(short.recording, 200):
                 other.put("machine/all", json.dumps(message))
             await until(lambda: service.core.rows == 200)
@@ -43,6 +43,13 @@ async def test_a_pair_of_zenoh_sessions(vehicle, short, port):
     measured = [m for m in got if not m["predicted"]]
     assert measured[-1]["time"] == short.recording.time[199]
     assert measured[-1]["slip_fl"] == pytest.approx(short.truth["slip_fl"][199], abs=0.05)
+
+
+async def subscribed(session, key: str) -> None:
+    """Wait until the session knows of a subscriber to a key: what it puts before that goes nowhere."""
+    publisher = session.declare_publisher(key)
+    await until(lambda: publisher.matching_status)
+    publisher.undeclare()
 
 
 async def test_ros_2_by_zenoh(vehicle, short, port):
@@ -76,7 +83,8 @@ async def test_ros_2_by_zenoh(vehicle, short, port):
             vehicle, [f"ros2:/joints,/gnss/vel?{at}"], [f"ros2:/terragrip?{at}"], profile=profile, window=0.5
         )
         async with running(service):
-            await asyncio.sleep(0.6)
+            for topic in ("joints", "gnss/vel"):
+                await subscribed(other, f"7/{topic}/type/hash")
             for time, values in list(rows_of(short.recording))[:100]:
                 for topic, name, message in ros_messages(store, 5.0 + time, values, vehicle.wheels, joints):
                     key = f"7/{topic}/{name.replace('/msg/', '::msg::dds_::')}_/RIHS01_0"
@@ -260,14 +268,12 @@ async def test_a_receiver_on_a_serial_line(vehicle, port):
     name = os.ttyname(device)
     service = Service(vehicle, [f"serial:{name}?baud=9600", f"udp://127.0.0.1:{port}"])
     async with running(service):
-        await asyncio.sleep(0.1)
         for k in range(5):
             os.write(
                 machine, sentence(f"GPRMC,1235{k:02d},A,4807.038,N,01131.000,E,002.0,084.4,230394,003.1,W")
             )
             os.write(machine, sentence("GPVTG,084.4,T,,M,002.0,N,003.7,K"))
             os.write(machine, b"$GPRMC,garbled*00\r\n")
-            await asyncio.sleep(0.03)
         await until(lambda: service.core.rows >= 5)
         counts = service.core.counts.by_channel
         assert (counts["ground_speed"]["received"], counts["latitude"]["received"]) == (5, 5)

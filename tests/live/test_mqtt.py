@@ -61,13 +61,13 @@ def broker(folder, port, *, password=None, tls=False):
         yield
     finally:
         process.terminate()
-        process.wait(10)
+        process.wait(60)
 
 
 def wait_for(port: int) -> None:
     import socket
 
-    end = time.monotonic() + 10
+    end = time.monotonic() + 60
     while time.monotonic() < end:
         with contextlib.suppress(OSError), socket.create_connection(("127.0.0.1", port), 1):
             return
@@ -104,7 +104,6 @@ async def test_by_password_in_and_out(tmp_path, vehicle, short, port, monkeypatc
         service = Service(vehicle, [f"{at}/machine/#"], [f"{at}/terragrip?rate=10"])
         known = {"username": "robot", "password": "kept-well"}
         async with listening(port, "terragrip/#", **known) as (client, got), running(service):
-            await asyncio.sleep(0.2)
             for message in messages(short.recording, 300):
                 await client.publish("machine/all", json.dumps(message))
             await client.publish("machine/all", b"no json")
@@ -131,7 +130,6 @@ async def test_by_tls_and_a_number_a_topic(tmp_path, vehicle, short, port):
         service = Service(vehicle, [f"mqtts://127.0.0.1:{port}/m/#?ca={tmp_path}/cert.pem"], profile=profile)
         trusted = ssl.create_default_context(cafile=tmp_path / "cert.pem")
         async with running(service), aiomqtt.Client("127.0.0.1", port, tls_context=trusted) as client:
-            await asyncio.sleep(0.3)
             for _ in range(20):
                 await client.publish("m/speed", "3.6")
                 await client.publish("m/hubs", json.dumps(dict.fromkeys(vehicle.wheels, 5.0)))
@@ -149,10 +147,10 @@ async def test_a_broker_that_refuses_is_named_and_tried_again(tmp_path, vehicle,
     async with running(service):
         await until(lambda: events(service, "source_lost") and events(service, "sink_lost"))
         with broker(tmp_path, port, password="kept-well"):
-            await until(lambda: any("Not authorized" in text for text in events(service, "source_lost")), 15)
+            await until(lambda: any("Not authorized" in text for text in events(service, "source_lost")))
             monkeypatch.setenv("TERRAGRIP_USERNAME", "robot")
             monkeypatch.setenv("TERRAGRIP_PASSWORD", "kept-well")
-            await until(lambda: events(service, "source_back") and events(service, "sink_back"), 20)
+            await until(lambda: events(service, "source_back") and events(service, "sink_back"))
             async with aiomqtt.Client("127.0.0.1", port, username="robot", password="kept-well") as client:
                 await client.publish("m", json.dumps(messages(short.recording, 1)[0]))
             await until(lambda: service.core.rows == 1)

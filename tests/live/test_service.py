@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from drives import robot
-from machine import Sender, events, messages, rows_of, running, until
+from machine import Sender, events, is_settled, messages, rows_of, running, until
 from terragrip.errors import InputError
 from terragrip.estimation import TractionEstimator
 from terragrip.formats import Profile
@@ -225,7 +225,7 @@ async def test_a_full_disk_stops_the_record_not_the_estimates(
     service = Service(vehicle, [f"udp://127.0.0.1:{port}"], record=tmp_path)
     monkeypatch.setattr("terragrip.live.wal.os.write", _disk_full)
     task = asyncio.create_task(service.run())
-    await asyncio.sleep(0.05)
+    await until(lambda: is_settled(service))
     sender.send(*messages(short.recording, 100))
     await until(lambda: service.core.rows == 100 and events(service, "record_failed"))
     service.stop()
@@ -273,7 +273,6 @@ async def test_sources_with_clocks_of_their_own_share_one_time_base(vehicle, sho
             other.send({"ground_speed": speed, "time": 1.7e9 + 30.0 + now})
             await asyncio.sleep(0.01)
         await until(lambda: service.core.counts.total("received") == 100 * len(short.recording.channels))
-        await asyncio.sleep(0.2)
     other.close()
     rows = [
         message.row for message in service.seen if message.kind == "estimate" and not message.row.predicted

@@ -62,6 +62,10 @@ def browser() -> Iterator[Any]:
         yield running
 
 
+PATIENCE = 60_000
+"""How long [ms] a page may need on a busy machine before a test gives up; no test passes or fails by what it waits less."""
+
+
 @pytest.fixture
 def served(folder: Path) -> Iterator[Served]:
     from served import Served
@@ -75,6 +79,7 @@ def served(folder: Path) -> Iterator[Served]:
 def page(browser: Any, served: Served) -> Iterator[Any]:
     """A tab of 1280 x 720 whose console stays free of errors and whose requests stay on this machine."""
     context = browser.new_context(viewport={"width": 1280, "height": 720}, bypass_csp=False)
+    context.set_default_timeout(PATIENCE)
     tab = context.new_page()
     faults: list[str] = []
     tab.on("console", lambda m: faults.append(m.text) if m.type == "error" else None)
@@ -85,7 +90,6 @@ def page(browser: Any, served: Served) -> Iterator[Any]:
             faults.append(r.url) if served.url not in r.url and r.url[:5] not in ("data:", "blob:") else None
         ),
     )
-    tab.set_default_timeout(15_000)
     yield tab
     context.close()
     assert [f for f in faults if "422" not in f and "WebSocket" not in f and "ERR_CONNECTION" not in f] == []

@@ -24,12 +24,12 @@ class LiveService:
         self._ready, self._stop = threading.Event(), threading.Event()
         self._thread = threading.Thread(target=lambda: asyncio.run(self._run()), daemon=True)
         self._thread.start()
-        assert self._ready.wait(10)
+        assert self._ready.wait(60)
 
     def stop(self) -> None:
         """The service goes."""
         self._stop.set()
-        self._thread.join(10)
+        self._thread.join(60)
 
     async def _answer(self, socket: Any) -> None:
         from websockets.exceptions import ConnectionClosed

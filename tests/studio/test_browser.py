@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from served import AXE, NEEDS, Served
+from served import AXE, NEEDS, Served, until
 from terragrip.physics.adhesion import CURVES
 
 pytest.importorskip("playwright.sync_api", reason="SKIPPED LOUDLY: the browser tests need playwright")
@@ -22,28 +22,27 @@ def open_fit(page: Any, served: Served, path: str = "") -> None:
     page.wait_for_selector("#slider-a")
 
 
-def test_a_slider_redraws_fifty_times_a_second(page: Any, served: Served) -> None:
+def test_a_moved_slider_redraws_once_a_frame(page: Any, served: Served) -> None:
     open_fit(page, served, "estimates.parquet")
     page.wait_for_selector("#soil-list li")
-    rate = page.evaluate(
+    redraws = page.evaluate(
         """async () => {
           const { plot } = window.terragripFit;
           const slider = document.getElementById("slider-a");
-          const before = plot.redraws, begin = performance.now();
-          let i = 0;
-          await new Promise((done) => {
-            const move = () => {
-              slider.value = String(0.3 + 0.7 * ((i++ % 50) / 50));
-              slider.dispatchEvent(new Event("input"));
-              if (performance.now() - begin < 2000) requestAnimationFrame(move); else done();
-            };
-            move();
-          });
-          return (1000 * (plot.redraws - before)) / (performance.now() - begin);
+          const before = plot.redraws;
+          for (let i = 0; i < 40; i++) {
+            slider.value = String(0.3 + 0.7 * (i / 40));
+            slider.dispatchEvent(new Event("input"));
+            slider.dispatchEvent(new Event("input"));
+            await new Promise(requestAnimationFrame);
+          }
+          return plot.redraws - before;
         }"""
     )
-    # The figure itself (50 a second) is benchmarks/bench_studio.py's; here only that each frame draws.
-    assert rate > 10
+    # How many a second (50) is benchmarks/bench_studio.py's to say; here that each frame draws, and each once.
+    assert (
+        40 <= redraws <= 42
+    )  # what else changes meanwhile, such as the samples of the new curve, may draw too
 
 
 def test_the_browsers_curves_are_the_servers(page: Any, served: Served) -> None:
@@ -220,8 +219,9 @@ def test_a_turned_picture_is_calibrated_to_half_a_per_cent_of_the_axis(
         field.fill(str(value))
         field.press("Tab")
     page.click("text=Use these axes")
+    page.wait_for_function("() => window.terragripFit.plot.view.y.high > 0.9")  # the marks are in view
     page.click("text=Digitise a line")
-    page.wait_for_timeout(200)
+    page.wait_for_selector(".pictures li.chosen")
     wanted = [(0.15, 0.2), (0.35, 0.5), (0.55, 0.6)]
     places = page.evaluate(
         """points => {
@@ -237,9 +237,12 @@ def test_a_turned_picture_is_calibrated_to_half_a_per_cent_of_the_axis(
     page.wait_for_function(
         "() => window.terragripFit.state.kept.pictures['scan.png'].lines[0].points.length === 3"
     )
-    page.wait_for_timeout(1000)
-    kept = json.loads((folder / "scan.png.picture.json").read_text())
-    np.testing.assert_allclose(kept["lines"][0]["points"], wanted, atol=0.005)
+
+    def kept() -> Any:
+        return json.loads((folder / "scan.png.picture.json").read_text())
+
+    until(lambda: [len(line["points"]) for line in kept()["lines"]] == [3])
+    np.testing.assert_allclose(kept()["lines"][0]["points"], wanted, atol=0.005)
 
 
 def test_one_origin_is_clicked_for_both_axes(page: Any, served: Served, folder: Path) -> None:
@@ -296,12 +299,12 @@ def test_a_dropped_connection_is_said_and_recovers(page: Any, served: Served, fo
     page.wait_for_selector("text=late.csv")
 
 
-def test_two_browsers_see_each_others_changes(page: Any, browser: Any, served: Served) -> None:
-    other = browser.new_page()
+def test_two_tabs_see_each_others_changes(page: Any, served: Served) -> None:
+    other = page.context.new_page()
     for tab in (page, other):
         tab.goto(served.url)
         tab.wait_for_selector("text=recording.parquet")
-    page.wait_for_timeout(1200)
+        tab.wait_for_load_state("networkidle")  # its own first looks at the folder are over
     page.set_input_files(
         "#new-file",
         files=[{"name": "mine.csv", "mimeType": "", "buffer": b"time,ground_speed\n0,1\n1,1\n2,1\n"}],
@@ -374,8 +377,8 @@ def test_a_live_replay_follows_pauses_and_recovers(page: Any, served: Served) ->
     page.wait_for_function("() => window.terragripLive.traces.redraws > 20")
     page.click("#pause")
     held = page.evaluate("() => window.terragripLive.traces.held")
-    page.wait_for_timeout(300)
-    assert page.evaluate("() => window.terragripLive.feed.ring.now") > held
+    page.wait_for_function("held => window.terragripLive.feed.ring.now > held", arg=held)
+    assert page.evaluate("() => window.terragripLive.traces.held") == held
     page.click("#pause")
     served.stop()
     page.wait_for_selector("#live-state:has-text('connection lost')")
@@ -412,17 +415,18 @@ def test_a_brush_is_the_same_on_drive_and_map_and_in_another_tab(page: Any, serv
     assert page.input_value("#map-run") == "estimates.parquet"
 
 
-EVERYWHERE = [
-    "#/start",
-    "#/start?log=recording.parquet",
-    "#/start?machine",
-    "#/fit?path=estimates.parquet",
-    "#/drive?path=estimates.parquet&at=20",
-    "#/live?replay=estimates.parquet&speed=10",
-    "#/cab?replay=estimates.parquet&speed=10",
-    "#/map?path=estimates.parquet",
-    "#/drive?path=none.parquet",
-]
+EVERYWHERE = {
+    "#/start": ".files",
+    "#/start?log=recording.parquet": "text=ready to estimate",
+    "#/start?machine": "#machine-name",
+    "#/fit?path=estimates.parquet": "#soil-list li",
+    "#/drive?path=estimates.parquet&at=20": ".why",
+    "#/live?replay=estimates.parquet&speed=10": "#live-state:text-is('connected')",
+    "#/cab?replay=estimates.parquet&speed=10": "#cab-age:not(:has-text('connecting'))",
+    "#/map?path=estimates.parquet": ".legend-row .strip",
+    "#/drive?path=none.parquet": ".empty",
+}
+"""Places, and what is there once they are whole."""
 
 
 @pytest.mark.parametrize(("theme", "width"), [("light", 1280), ("dark", 1280), ("light", 390)])
@@ -434,8 +438,7 @@ def test_axe_finds_nothing(browser: Any, served: Served, where: str, theme: str,
     )
     tab = context.new_page()
     tab.goto(f"{served.url}/{where}")
-    tab.wait_for_selector("main select, main h1", state="attached")
-    tab.wait_for_timeout(1000)
+    tab.wait_for_selector(EVERYWHERE[where])
     tab.add_script_tag(path=str(AXE))
     result = tab.evaluate("() => axe.run(document, { resultTypes: ['violations'] })")
     wide = tab.evaluate("() => document.documentElement.scrollWidth")

@@ -62,8 +62,7 @@ def test_samples_between_gaps_are_drawn_as_points(page: Any, served: Served, fol
     open_drive(page, served, "sparse-estimates.parquet", '["drawbar"]')
     page.evaluate("() => window.terragripDrive.charts.zoom([10, 14])")
     page.wait_for_function("() => Number(document.querySelector('.charts').dataset.rows) < 1000")
-    page.wait_for_timeout(300)
-    assert page.evaluate(f"() => ({COUNT})(['green', 0])") > 40  # eight points of 4 px
+    page.wait_for_function(f"() => ({COUNT})(['green', 0]) > 40")  # eight points of 4 px
 
 
 def test_all_panels_of_four_wheels_are_drawn_at_once(page: Any, served: Served, folder: Path) -> None:

@@ -59,10 +59,12 @@ def test_residuals_are_bins_less_the_curve(page: Any, served: Served) -> None:
     page.wait_for_function(
         "() => { const s = window.terragripFit.state; return s.samples.isCurrent(s.active.id, s.active); }"
     )
-    page.wait_for_function(RIGHT)
-    page.wait_for_timeout(300)
     bins = page.evaluate(BINS)
     left = [b["mean"] - CURVES["exponential"].value(b["slip"], {"a": 0.7}) for b in bins]
+    page.wait_for_function(
+        f"w => {{ const r = ({RIGHT})(); return r && Math.abs(r.rms - w) < 0.01 * w; }}",
+        arg=float(np.sqrt(np.mean(np.square(left)))),
+    )
     found = page.evaluate(RIGHT)
     assert found["count"] == len(bins)
     assert found["rms"] == pytest.approx(float(np.sqrt(np.mean(np.square(left)))), rel=0.01)

@@ -28,8 +28,7 @@ def test_focus_stays_on_what_is_drawn_anew(page: Any, served: Served) -> None:
     page.focus(".chip:text-is('rl')")
     page.keyboard.press("Enter")  # the wheels are drawn anew
     page.wait_for_selector(".chip:text-is('rl')[aria-pressed='false']")
-    page.wait_for_timeout(100)
-    assert page.evaluate(FOCUSED) == "rl"
+    page.wait_for_function(f"() => ({FOCUSED})() === 'rl'")
 
 
 def test_focus_leaves_a_button_that_has_nothing_more_to_do(page: Any, served: Served) -> None:
@@ -40,8 +39,7 @@ def test_focus_leaves_a_button_that_has_nothing_more_to_do(page: Any, served: Se
     page.focus("#back")
     page.keyboard.press("Enter")
     page.wait_for_selector("#back[disabled]")
-    page.wait_for_timeout(100)
-    assert page.evaluate(FOCUSED) != "body"
+    page.wait_for_function(f"() => ({FOCUSED})() !== 'body'")
 
 
 def test_focus_stays_in_the_bar_from_page_to_page(page: Any, served: Served) -> None:
@@ -58,8 +56,7 @@ def test_the_skip_link_goes_into_the_page_and_stays_on_it(page: Any, served: Ser
     page.wait_for_selector(".charts[data-rows]")
     page.focus(".skip")
     page.keyboard.press("Enter")
-    page.wait_for_timeout(300)
-    assert page.evaluate("() => document.activeElement.id") == "main"
+    page.wait_for_function("() => document.activeElement.id === 'main'")
     assert page.title().startswith("Drive")
     page.keyboard.press("Tab")
     assert page.evaluate("() => document.activeElement.id") == "run"

@@ -68,7 +68,9 @@ def test_the_charts_are_saved_as_drawings(page: Any, served: Served, folder: Pat
         "panels=slip,speed,f.Sum&f.Sum [m]=slip_rl%2Bslip_rr&with=late.parquet&from=10&to=20&over=elapsed",
     )
     page.wait_for_function("() => document.querySelectorAll('.legend-row .run').length === 2")
-    page.wait_for_timeout(500)
+    page.wait_for_function(
+        "() => new Set(window.terragripDrive.charts.shown[0].drawn.map(({ trace }) => trace.layer ?? 0)).size === 2"
+    )
     words = words_of(saved(page, "svg", tmp_path))
     for wanted in (
         "estimates.parquet, late.parquet",

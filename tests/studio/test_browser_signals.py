@@ -94,7 +94,7 @@ def test_runs_lie_over_each_other_by_distance(page: Any, served: Served, three: 
     assert page.evaluate(WHOLE)[1] == pytest.approx(way[-1], rel=1e-3)
     middle = way[-1] / 4  # the slow one is half as far in all
     page.evaluate("r => window.terragripDrive.charts.zoom(r)", [middle - 0.5, middle + 0.5])
-    page.wait_for_timeout(400)
+    page.wait_for_function("() => Number(document.querySelector('.charts').dataset.rows) < 2000")
     box = page.locator(".u-over").first.bounding_box()
     page.mouse.move(box["x"] + 0.5 * box["width"], box["y"] + 40)
     page.wait_for_selector(".line:has-text('distance')")
@@ -135,7 +135,6 @@ def test_the_stretch_stays_when_the_axis_changes(page: Any, served: Served, thre
     page.evaluate("() => window.terragripDrive.charts.zoom([10, 20])")
     page.select_option("#over", "distance")
     page.wait_for_function(f"() => ({RANGE})()[0] !== 10")
-    page.wait_for_timeout(300)
     page.select_option("#over", "time")
     page.wait_for_function(
         f"() => Math.abs(({RANGE})()[0] - 10) < 0.1 && Math.abs(({RANGE})()[1] - 20) < 0.1"

@@ -95,7 +95,7 @@ def test_the_picked_sample_is_marked_and_is_in_the_link(page: Any, served: Serve
     before = page.evaluate(count)
     page.locator(".u-over").first.click(position={"x": 200, "y": 30})
     page.wait_for_selector(".why")
-    assert page.evaluate(count) > before + 60  # an upright line through the chart
+    page.wait_for_function(f"n => ({count})() > n", arg=before + 60)  # an upright line through the chart
     picked = page.inner_text(".sample strong")
     page.wait_for_function("() => location.hash.includes('at=')")
     link = page.url
@@ -132,7 +132,7 @@ def test_views_are_gone_back_to(page: Any, served: Served) -> None:
     assert page.is_disabled("#back")
     for view in ([10, 30], [15, 20]):
         page.evaluate("v => window.terragripDrive.charts.zoom(v)", view)
-        page.wait_for_timeout(500)
+        page.wait_for_selector("#back:not([disabled])")  # the view has stood for long enough to count
     page.click("#back")
     assert page.evaluate(RANGE) == [10, 30]
     page.focus(".charts")

@@ -35,7 +35,7 @@ def studio(folder: Path, *words: str, lines: int) -> Iterator[list[str]]:
             yield [line for line in printed if not line.startswith("The pages are not built")]
         finally:
             process.terminate()
-            process.wait(20)
+            process.wait(60)
 
 
 def test_behind_a_proxy_the_printed_address_is_the_public_one_and_its_token_is_needed(
@@ -48,7 +48,7 @@ def test_behind_a_proxy_the_printed_address_is_the_public_one_and_its_token_is_n
         assert own, printed
 
         def get(path: str, **headers: str) -> http.client.HTTPResponse:
-            connection = http.client.HTTPConnection("127.0.0.1", int(own[1]), timeout=20)
+            connection = http.client.HTTPConnection("127.0.0.1", int(own[1]), timeout=60)
             proxied = {"Host": "field.example.org", "Origin": "https://field.example.org"}
             connection.request("GET", path, headers={**proxied, **headers})
             answer = connection.getresponse()
@@ -90,21 +90,21 @@ def test_https_by_a_certificate_and_a_line_for_each_write(
         try:
             place = ""
             while not place and process.poll() is None:
-                time.sleep(0.1)
-                lines = log.read_text().splitlines()
-                place = json.loads(lines[0])["address"] if lines else ""
+                time.sleep(0.02)
+                first, end, _ = log.read_text().partition("\n")
+                place = json.loads(first)["address"] if end else ""
             assert place.startswith("https://127.0.0.1:")
             trusted = ssl.create_default_context(cafile=str(chain))
-            with urllib.request.urlopen(f"{place}api/folder", context=trusted, timeout=20) as answer:
+            with urllib.request.urlopen(f"{place}api/folder", context=trusted, timeout=60) as answer:
                 assert answer.status == 200
             with pytest.raises(urllib.error.URLError, match="CERTIFICATE_VERIFY_FAILED"):
-                urllib.request.urlopen(f"{place}api/folder", timeout=20)
+                urllib.request.urlopen(f"{place}api/folder", timeout=60)
             wrong = urllib.request.Request(f"{place}api/nothing", method="POST", data=b"")
             with pytest.raises(urllib.error.HTTPError) as refused:
-                urllib.request.urlopen(wrong, context=trusted, timeout=20)
+                urllib.request.urlopen(wrong, context=trusted, timeout=60)
         finally:
             process.terminate()
-            process.wait(20)
+            process.wait(60)
     events = [json.loads(line) for line in log.read_text().splitlines()]
     writes = [event for event in events if event["event"] == "studio_write"]
     assert [(one["client"], one["method"], one["path"], one["status"]) for one in writes] == [
@@ -148,7 +148,7 @@ def test_json_alone_is_logged_and_no_token_made_anew(tmp_path: Path, monkeypatch
     ) as process:
         first = json.loads(process.stderr.readline())
         process.terminate()
-        said, rest = process.communicate(timeout=20)
+        said, rest = process.communicate(timeout=60)
     assert first["event"] == "studio_started"
     assert first["address"].startswith("http://127.0.0.1:")
     assert said == ""

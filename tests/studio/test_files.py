@@ -79,10 +79,6 @@ def test_replacing_must_be_asked_for(client: TestClient, folder: Path) -> None:
 
 def test_pages_hear_of_a_new_file(client: TestClient, folder: Path) -> None:
     with client.websocket_connect(NOTICES) as one, client.websocket_connect(NOTICES) as two:
-        # The first look at the folder has to be over before the change.
-        import time
-
-        time.sleep(0.5)
         (folder / "another.yaml").write_text("axles: {}")
         assert one.receive_json() == {"kind": "folder"}
         assert two.receive_json() == {"kind": "folder"}

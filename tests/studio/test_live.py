@@ -87,7 +87,7 @@ def service() -> Iterator[str]:
 
     thread = threading.Thread(target=lambda: asyncio.run(run()), daemon=True)
     thread.start()
-    assert ready.wait(10)
+    assert ready.wait(60)
     yield address[0]
     stop.set()
     thread.join(10)

@@ -20,13 +20,20 @@ class Notices:
         self._folder = folder
         self._pages: set[asyncio.Queue[dict[str, Any]]] = set()
         self._watch: asyncio.Task[None] | None = None
+        self._looked = asyncio.Event()
 
-    def join(self) -> asyncio.Queue[dict[str, Any]]:
-        """A queue that receives every notice from now on."""
+    async def join(self) -> asyncio.Queue[dict[str, Any]]:
+        """A queue that receives every notice from now on; the folder has been looked at, so that a change after this is noticed."""
         queue: asyncio.Queue[dict[str, Any]] = asyncio.Queue(BACKLOG)
         self._pages.add(queue)
         if self._watch is None:
+            self._looked.clear()
             self._watch = asyncio.create_task(self._watch_folder())
+        try:
+            await self._looked.wait()
+        except asyncio.CancelledError:
+            self.leave(queue)
+            raise
         return queue
 
     def leave(self, queue: asyncio.Queue[dict[str, Any]]) -> None:
@@ -55,4 +62,5 @@ class Notices:
             if seen is not None and items != seen:
                 self.publish("folder")
             seen = items
+            self._looked.set()
             await asyncio.sleep(PERIOD)

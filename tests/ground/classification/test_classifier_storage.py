@@ -73,7 +73,7 @@ def test_a_stored_classifier_needs_no_scikit_learn(content: bytes, tmp_path: Pat
         "except tg.InputError as error:\n    print(error)\n"
     )
     output = subprocess.run(
-        [sys.executable, "-c", program], capture_output=True, text=True, timeout=120, check=True
+        [sys.executable, "-c", program], capture_output=True, text=True, timeout=600, check=True
     )
     first, second = output.stdout.splitlines()
     assert first.split(",") == GroundClassifier.load(path).predict(SHOWN[:1]).tolist()

@@ -1,6 +1,8 @@
 /** Several runs in one set of charts: a colour a run, a dash a trace, so that no two look alike to any eye. */
 
 import { h, fill } from "../ui/dom";
+import { oneAtATime } from "../ui/page";
+import { onceReleased } from "../ui/press";
 import { CURVE_COLORS } from "../ui/theme";
 import type { Layer } from "./along";
 import { formulaPanels, type Formula } from "./formulas";
@@ -34,26 +36,37 @@ function ofRun({ bandColor: _, dash: __, ...trace }: Trace, layer: number, run: 
   return { ...trace, layer, color: runColor(layer), label: `${run} ${trace.label}`.trim(), dash: DASHES[dash] ?? [], dashed: dash };
 }
 
-/** The chooser of runs to lie over the main one. */
-export function overlayChooser(choose: (paths: string[]) => void): { element: HTMLElement; draw: (runs: string[], main: string, chosen: string[]) => void } {
+/** The chooser of runs to lie over the main one; `choose` shows those, and draws this anew with what could be shown. */
+export function overlayChooser(choose: (paths: string[]) => Promise<void>): { element: HTMLElement; draw: (runs: string[], main: string, chosen: string[]) => void } {
   const element = h("details", { class: "chooser", id: "overlay" }, h("summary", {}, "Overlay"));
   const menu = h("div", { class: "menu" });
   element.append(menu);
+  let ticked = new Set<string>();
+  let asked = 0; // boxes ticked whose runs are not shown yet: their ticks stay
+  const show = oneAtATime(() => choose([...ticked]));
+  const tick = async (path: string, on: boolean): Promise<void> => {
+    if (on) ticked.add(path);
+    else ticked.delete(path);
+    asked++;
+    await show().finally(() => asked--);
+  };
   return {
     element,
-    draw: (runs, main, chosen) => {
-      const summary = element.querySelector("summary");
-      if (summary) summary.textContent = chosen.length ? `Overlay: ${chosen.length}` : "Overlay";
-      const others = runs.filter((path) => path !== main);
-      fill(
-        menu,
-        others.map((path) => {
-          const box = h("input", { type: "checkbox", name: `overlay ${path}`, checked: chosen.includes(path), disabled: !chosen.includes(path) && chosen.length >= OTHERS });
-          box.addEventListener("change", () => choose(box.checked ? [...chosen, path] : chosen.filter((other) => other !== path)));
-          return h("label", { class: "check" }, box, path);
-        }),
-        h("p", { class: "hint" }, others.length ? `Up to ${OTHERS} runs over the one shown, by time since their start or by distance driven.` : "There are no other estimates in this folder."),
-      );
-    },
+    draw: (runs, main, chosen) =>
+      onceReleased(element, () => {
+        const summary = element.querySelector("summary");
+        if (summary) summary.textContent = chosen.length ? `Overlay: ${chosen.length}` : "Overlay";
+        const others = runs.filter((path) => path !== main);
+        if (asked < 2) ticked = new Set(chosen);
+        fill(
+          menu,
+          others.map((path) => {
+            const box = h("input", { type: "checkbox", name: `overlay ${path}`, checked: ticked.has(path), disabled: !ticked.has(path) && ticked.size >= OTHERS });
+            box.addEventListener("change", () => void tick(path, box.checked));
+            return h("label", { class: "check" }, box, path);
+          }),
+          h("p", { class: "hint" }, others.length ? `Up to ${OTHERS} runs over the one shown, by time since their start or by distance driven.` : "There are no other estimates in this folder."),
+        );
+      }),
   };
 }

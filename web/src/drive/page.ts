@@ -55,7 +55,7 @@ export const page: Page = (main, { notices, query }) => {
   const advice = new AdvicePanel();
   const details = h("section", { class: "sample", "aria-label": "Sample", "aria-live": "polite" });
   const over = h("select", { id: "over", "aria-label": "Drawn over" }, (Object.keys(AXES) as Axis[]).map((name) => h("option", { value: name }, `Over ${AXES[name].title}`)));
-  const overlay = overlayChooser((paths) => void lay(paths));
+  const overlay = overlayChooser((paths) => lay(paths));
   let layers: Layer[] = []; // the run and those over it
   let run: Run | null = null;
   let path = "";

@@ -3,6 +3,7 @@
 import { get, type Item } from "../ui/api";
 import { fill, h } from "../ui/dom";
 import { tried } from "../ui/notes";
+import { onceReleased } from "../ui/press";
 import type { Curve, Soil, State } from "./state";
 
 interface Literature {
@@ -37,7 +38,7 @@ export class ListPanel {
   async load(items: Item[]): Promise<void> {
     this.files = items.filter((item) => item.kind === "estimates" || item.kind === "library" || item.path.endsWith(".csv"));
     if (!this.literature.length) this.literature = (await tried(() => get<Literature[]>("literature"))) ?? [];
-    this.draw();
+    onceReleased(this.element, () => this.draw());
   }
 
   draw(): void {

@@ -3,6 +3,7 @@
 import { ME, address, get, send, upload, type Item } from "../ui/api";
 import { fill, h } from "../ui/dom";
 import { note, tried } from "../ui/notes";
+import { onceReleased } from "../ui/press";
 import { calibrate } from "./calibrate";
 import { EMPTY, mapOf, type Calibration, type Pixel } from "./picture";
 import type { State } from "./state";
@@ -32,7 +33,7 @@ export class PicturesPanel {
 
   load(items: Item[]): void {
     this.files = items.filter((item) => item.kind === "picture" && !item.path.endsWith(".svg")).map((item) => item.path);
-    this.draw();
+    onceReleased(this.element, () => this.draw());
   }
 
   /** Take pictures that were dropped or pasted; true if there was one. */

@@ -3,6 +3,7 @@
 import { get, send, type Item, type Job, type Notice, type Notices } from "../ui/api";
 import { fill, h } from "../ui/dom";
 import { note, tried } from "../ui/notes";
+import { onceReleased } from "../ui/press";
 import { focusOn } from "./focus";
 
 const SHOWN = 8;
@@ -56,7 +57,7 @@ export class JobList {
     const { job } = notice;
     const before = this.jobs.get(job.id)?.state;
     this.jobs.set(job.id, job);
-    this.draw();
+    onceReleased(this.list, () => this.draw());
     if (job.state === before || job.state === "queued" || job.state === "running") return;
     if (job.state === "failed") note(job.text, "error");
     this.ended(job);

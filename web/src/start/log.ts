@@ -4,6 +4,7 @@ import { get, send, type Item, type Job } from "../ui/api";
 import { fill, h } from "../ui/dom";
 import { tried } from "../ui/notes";
 import type { Context } from "../ui/page";
+import { onceReleased } from "../ui/press";
 import { focusOn, refill } from "./focus";
 import { freeName, JobList, stemOf, viewOf } from "./jobs";
 import { MachineMaker } from "./machine";
@@ -271,7 +272,7 @@ export class LogPage {
     if (job.kind === "estimate" && job.title === this.log) this.estimates = job.output;
     else if (this.estimates && job.command.includes(this.estimates)) this.made.set(job.kind, job.output);
     else return;
-    this.drawNext();
+    onceReleased(this.next, () => this.drawNext());
     const output = document.getElementById("wizard-output") as HTMLInputElement | null;
     if (output) output.value = freeName(this.items, `${stemOf(this.log)}-estimates`, ".parquet");
   }

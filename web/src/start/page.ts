@@ -4,7 +4,8 @@ import "./start.css";
 import { address, get, send, upload, type Item } from "../ui/api";
 import { fill, h } from "../ui/dom";
 import { note, tried } from "../ui/notes";
-import type { Context, Page } from "../ui/page";
+import { oneAtATime, type Context, type Page } from "../ui/page";
+import { onceReleased } from "../ui/press";
 import { ACTIONS, ask } from "./commands";
 import { focusOn, refill } from "./focus";
 import { freeName, JobList, viewOf } from "./jobs";
@@ -87,17 +88,17 @@ function openFolder(main: HTMLElement, { notices }: Context): () => void {
     else await reload();
   }
 
-  async function reload(): Promise<void> {
+  const reload = oneAtATime(async () => {
     const folder = await tried(() => get<{ name: string; items: Item[] }>("folder"));
     if (!folder) return;
     title.textContent = folder.name || "Folder";
-    if (listed && JSON.stringify(folder.items) === JSON.stringify(items)) return; // a list drawn anew under a click would lose it
+    if (listed && JSON.stringify(folder.items) === JSON.stringify(items)) return;
     listed = true;
     items = folder.items;
     const there = new Set(items.map((item) => item.path));
     for (const path of ticked) if (!there.has(path)) ticked.delete(path);
-    refill(lists, KINDS.map(([kind, name, none]) => section(kind, name, none)));
-  }
+    onceReleased(lists, () => refill(lists, KINDS.map(([kind, name, none]) => section(kind, name, none))));
+  });
 
   function section(kind: string, name: string, none: string): HTMLElement {
     const of = items.filter((item) => item.kind === kind);

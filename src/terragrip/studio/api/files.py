@@ -36,8 +36,8 @@ async def list_folder(studio: Here) -> dict[str, Any]:
 @router.websocket("/notices")
 async def notices(socket: WebSocket, studio: Here) -> None:
     """Changes of the folder and progress of jobs, as they happen."""
+    queue = await studio.notices.join()
     await socket.accept()
-    queue = studio.notices.join()
 
     async def wait_for_end() -> None:
         with contextlib.suppress(WebSocketDisconnect):
