@@ -3,7 +3,10 @@
 SHELL := /bin/sh
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
+# One thing after the other, but for what `beside` starts.
+ifndef BESIDE
 .NOTPARALLEL:
+endif
 
 VENV := .venv
 BIN := $(VENV)/bin
@@ -13,7 +16,8 @@ WORKERS ?= 2
 PYTHON ?=
 CANDIDATES := python3 python3.11 python3.12 python3.13 python3.14
 
-unexport PYTHONPATH PYTHONHOME
+# Byte code is kept even where the machine says not to: each of the hundreds of processes that tests start would compile the package anew.
+unexport PYTHONPATH PYTHONHOME PYTHONDONTWRITEBYTECODE
 export PYTHONNOUSERSITE := 1
 
 KERNEL_SOURCES := $(wildcard kernel/src/*.c)
@@ -22,7 +26,7 @@ KERNEL_TESTS := $(patsubst kernel/tests/%.c,%,$(wildcard kernel/tests/*.c))
 BUILD_INPUTS := pyproject.toml setup.py cffi_build.py $(KERNEL_SOURCES) $(KERNEL_HEADERS) \
 	$(wildcard kernel/python/*.[ch] src/terragrip/*/*.c src/terragrip/*/*.h)
 
-.PHONY: notebooks soak soak-short help demo test lint kernel-test web-test pytest studio wheel docs system bench lock clean sbom audit \
+.PHONY: beside pytest-long notebooks soak soak-short help demo test lint kernel-test web-test pytest studio wheel docs system bench lock clean sbom audit \
 	kernel-aarch64 kernel-others test-long kernel-sanitized fuzz system-fuzz fuzz-kernel fuzz-kernel-run fuzz-parsers kills
 
 help: ## show this list
@@ -31,7 +35,11 @@ help: ## show this list
 demo: $(VENV)/package studio ## set up, simulate the campaign, estimate every run, and say where the report is
 	@$(BIN)/terragrip demo
 
-test: system lint kernel-test web-test pytest ## set up, then lint, type checks, import rules, C tests and Python tests
+test: system beside pytest ## set up, then lint, type checks, import rules, C tests and Python tests
+
+# Lint, C tests and the pages' tests each use one processor: side by side, each with its own output in one piece.
+beside: $(VENV)/package $(VENV)/dev studio
+	@$(MAKE) --no-print-directory BESIDE=1 -j $(WORKERS) $(if $(findstring output-sync,$(.FEATURES)),--output-sync=target) lint kernel-test web-test
 
 lint: $(VENV)/package $(VENV)/dev ## ruff, mypy and import-linter
 	$(BIN)/ruff check
@@ -169,10 +177,13 @@ KILLS ?= 25
 FUZZERS := $(patsubst fuzz/kernel/%.c,build/fuzz/kernel-%,$(wildcard fuzz/kernel/*.c))
 FUZZ_CC := clang
 
-test-long: kernel-sanitized fuzz kills soak-short ## every C test under the address and undefined-behaviour sanitizers, each fuzzer for FUZZ_SECONDS, a hundred kills, a soak of 60 s
+test-long: kernel-sanitized pytest-long fuzz kills soak-short ## every C test under the address and undefined-behaviour sanitizers, tests marked long, each fuzzer for FUZZ_SECONDS, a hundred kills, a soak of 60 s
+
+pytest-long: $(VENV)/package $(VENV)/dev studio ## the Python tests marked long, but for the kills: what shorter tests show too
+	$(BIN)/python -m pytest -m long -n $(WORKERS) --ignore tests/test_kills.py
 
 kills: $(VENV)/package $(VENV)/dev ## kill -9 a hundred times during estimate, soils, a fit saved and an upload
-	TERRAGRIP_KILLS=$(KILLS) $(BIN)/python -m pytest tests/test_kills.py -q -n $(WORKERS) -rP
+	TERRAGRIP_KILLS=$(KILLS) $(BIN)/python -m pytest tests/test_kills.py -m long -q -n $(WORKERS) -rP
 
 SOAK_SECONDS ?= 3600
 soak: system $(VENV)/package $(VENV)/dev ## the live service at 1 kHz with random faults for SOAK_SECONDS, an hour; then its promises are checked

@@ -118,6 +118,7 @@ def test_progress_counts_every_step_once(demo: tuple[DemoResult, Path, list[tupl
     assert {"multi1", "multi2", "fine-03"} <= {what for _, _, what in progress}
 
 
+@pytest.mark.long  # of a command that writes many files: test_cli_output.py
 def test_an_interrupt_leaves_whole_files_only(tmp_path: Path) -> None:
     def stop(done: int, total: int, what: str) -> None:
         if what == "multi1":

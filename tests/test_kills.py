@@ -1,6 +1,7 @@
 """`kill -9` in the midst of a write: every file is whole or absent, and the next run succeeds.
 
-`TERRAGRIP_KILLS=25` (make test-long) kills so often in each of the four ways of writing; a few times without it.
+`make kills`, a part of `make test-long`, sets TERRAGRIP_KILLS: how often in each of the four ways of writing.
+`test_files.py` shows the same of one write.
 """
 
 from __future__ import annotations
@@ -28,7 +29,10 @@ from terragrip.simulation import Scenario
 from terragrip.soil.library import SoilLibrary
 
 pytest.importorskip("fastapi", reason="the studio needs terragrip[studio]")
-pytestmark = pytest.mark.skipif(os.name != "posix", reason="kill -9 is of POSIX systems")
+pytestmark = [
+    pytest.mark.long,
+    pytest.mark.skipif(os.name != "posix", reason="kill -9 is of POSIX systems"),
+]
 
 KILLS = int(os.environ.get("TERRAGRIP_KILLS", "2"))
 FEW = 10

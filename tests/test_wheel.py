@@ -1,14 +1,17 @@
 """The wheel, as a user installs it: no compiler, an empty environment, first without extras, then with report and studio.
 
-One test, so that the workers of a run do not each build a wheel and fill an environment (a minute).
+One test, so that the workers of a run do not each build a wheel and fill an environment (a minute); `make test-long` runs it,
+and `make test` looks at what goes into the source distribution that the wheel is built from.
 """
 
 from __future__ import annotations
 
 import os
 import re
+import shutil
 import subprocess
 import sys
+import tarfile
 import time
 import urllib.error
 import urllib.request
@@ -16,22 +19,34 @@ import zipfile
 from dataclasses import dataclass
 from pathlib import Path
 
+import pytest
+
 ROOT = Path(__file__).resolve().parents[1]
 LARGEST = 6_000_000
 VEHICLE = ("--vehicle", "drive/vehicle.yaml")
 PAGES = ROOT / "src/terragrip/studio/static/index.html"
 
 
-def build_wheel(folder: Path) -> Path:
-    """Built as ``make wheel`` does: from the source distribution, so that what that lacks shows."""
+def run_quietly(*words: str) -> subprocess.CompletedProcess[str]:
+    """Python in the repository's folder."""
+    return subprocess.run([sys.executable, *words], cwd=ROOT, capture_output=True, text=True, check=False)
+
+
+def build_source(folder: Path) -> Path:
+    """The source distribution, as ``make wheel`` builds it."""
     folder.mkdir()
-    quiet = {"cwd": ROOT, "capture_output": True, "text": True, "check": False}
     code = f"from setuptools import build_meta; build_meta.build_sdist({str(folder)!r})"
-    made = subprocess.run([sys.executable, "-c", code], **quiet)  # type: ignore[call-overload]
+    made = run_quietly("-c", code)
     assert made.returncode == 0, made.stderr
     (source,) = folder.glob("*.tar.gz")
+    return source
+
+
+def build_wheel(folder: Path) -> Path:
+    """Built as ``make wheel`` does: from the source distribution, so that what that lacks shows."""
+    source = build_source(folder)
     words = ["-m", "pip", "wheel", "--no-deps", "--no-build-isolation", "-w", str(folder), str(source)]
-    made = subprocess.run([sys.executable, *words], **quiet)  # type: ignore[call-overload]
+    made = run_quietly(*words)
     assert made.returncode == 0, made.stdout + made.stderr
     (built,) = folder.glob("*.whl")
     return built
@@ -78,6 +93,29 @@ class Environment:
         )
 
 
+def test_the_source_distribution_holds_every_source_and_every_file_of_the_package(tmp_path: Path) -> None:
+    with tarfile.open(build_source(tmp_path / "dist")) as archive:
+        names = {name.partition("/")[2] for name in archive.getnames()}
+    tracked = run_git(
+        "ls-files", "src/terragrip", "kernel", "setup.py", "cffi_build.py", "pyproject.toml", "LICENSE"
+    )
+    wanted = {name for name in tracked if not name.startswith("kernel/tests")}
+    assert len(wanted) > 200
+    assert wanted <= names
+    built = {str(path.relative_to(ROOT)) for path in PAGES.parent.rglob("*") if path.is_file()}
+    assert built <= names
+
+
+def run_git(*words: str) -> list[str]:
+    """Lines that git prints; skips the test where this is no clone."""
+    if shutil.which("git") is None or not (ROOT / ".git").exists():
+        pytest.skip("NOT TESTED: this is no clone, or there is no git")
+    return subprocess.run(
+        ["git", *words], cwd=ROOT, capture_output=True, text=True, check=True
+    ).stdout.split()
+
+
+@pytest.mark.long
 def test_the_wheel_installs_without_a_compiler_and_works(tmp_path: Path) -> None:
     wheel = build_wheel(tmp_path / "dist")
     check_contents(wheel)

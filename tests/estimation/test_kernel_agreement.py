@@ -96,6 +96,13 @@ def test_the_bank_has_one_default_of_its_scales():
 
 
 @pytest.mark.parametrize(("engine", "policy"), METHODS)
+def test_agrees_over_700_steps(engine, policy, problem):
+    case = problem(2021, wheels=3, steps=700, condition=1e9, **LONG)
+    assert_agree(case, Tuning(case.walk, engine=engine, policy=policy, huber=3.0))
+
+
+@pytest.mark.long
+@pytest.mark.parametrize(("engine", "policy"), METHODS)
 def test_agrees_over_5000_steps(engine, policy, long_problem):
     assert_agree(long_problem, Tuning(long_problem.walk, engine=engine, policy=policy, huber=3.0))
 

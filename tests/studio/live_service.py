@@ -15,8 +15,9 @@ VALUES = [0.2, 0.01, 0.4, 1.5, 0.02, 1.0, 0.05]
 
 
 class LiveService:
-    """Rows at 20 Hz while `mode` is "measured"; "predicted": predicted ones; "silent": none, but a status a second; "frozen": nothing."""
+    """Rows at 20 Hz, `step` s apart by their stamps, while `mode` is "measured"; "predicted": predicted ones; "silent": none, but a status a second; "frozen": nothing."""
 
+    step = 0.05
     setpoint: dict[str, Any] | None = None  # what is published of it, four times a second
 
     def __init__(self) -> None:
@@ -45,13 +46,13 @@ class LiveService:
             row += 1
             if self.mode in ("measured", "predicted"):
                 await socket.send(
-                    np.array([row / 20, float(self.mode == "predicted"), 0.0, *VALUES]).tobytes()
+                    np.array([row * self.step, float(self.mode == "predicted"), 0.0, *VALUES]).tobytes()
                 )
             if row % 5 == 0 and self.setpoint and self.mode == "measured":
-                await socket.send(json.dumps({"kind": "setpoint", "time": row / 20, **self.setpoint}))
+                await socket.send(json.dumps({"kind": "setpoint", "time": row * self.step, **self.setpoint}))
             if row % 20 == 0 and self.mode != "frozen":
                 await socket.send(
-                    json.dumps({"kind": "status", "time": row / 20, "delay": 0.0, "counts": {}})
+                    json.dumps({"kind": "status", "time": row * self.step, "delay": 0.0, "counts": {}})
                 )
             await asyncio.sleep(0.05)
 

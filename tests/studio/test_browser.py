@@ -421,9 +421,9 @@ EVERYWHERE = {
     "#/start?machine": "#machine-name",
     "#/fit?path=estimates.parquet": "#soil-list li",
     "#/drive?path=estimates.parquet&at=20": ".why",
-    "#/live?replay=estimates.parquet&speed=10": "#live-state:text-is('connected')",
-    "#/cab?replay=estimates.parquet&speed=10": "#cab-age:not(:has-text('connecting'))",
-    "#/map?path=estimates.parquet": ".legend-row .strip",
+    "#/live?replay=estimates.parquet": "#live-state:text-is('connected')",
+    "#/cab?replay=estimates.parquet": "#cab-age:not(:has-text('connecting'))",
+    "#/map?path=estimates.parquet": ".charts[data-rows]",
     "#/drive?path=none.parquet": ".empty",
 }
 """Places, and what is there once they are whole."""
@@ -454,7 +454,7 @@ def test_axe_finds_nothing_where_the_numbers_are_old(
 ) -> None:
     context = browser.new_context(color_scheme=theme, bypass_csp=True)
     tab = context.new_page()
-    tab.goto(f"{served.url}/#/{where}?replay=estimates.parquet&speed=10")
+    tab.goto(f"{served.url}/#/{where}?replay=estimates.parquet")
     tab.wait_for_function(r"() => /\d/.test(document.querySelector('.big, .cab-number')?.textContent ?? '')")
     served.stop()
     tab.wait_for_selector(old, state="attached")

@@ -16,6 +16,11 @@ pytestmark = NEEDS
 MARK = "() => getComputedStyle(document.querySelector('.cab-number')).textDecorationLine"
 
 
+def assert_marked(page: Any, line: str) -> None:
+    """The numbers come to have this line; on a busy machine a row may be late and strike them out for a moment."""
+    page.wait_for_function(f"line => ({MARK})() === line", arg=line)
+
+
 @pytest.fixture
 def service(served: Served) -> Iterator[LiveService]:
     service = LiveService()
@@ -35,34 +40,31 @@ def test_the_cab_shows_three_numbers_and_fails_visibly(
     numbers = page.locator(".cab-number")
     assert numbers.all_inner_texts()[0] == "20"  # % of slip
     assert numbers.all_inner_texts()[2] == "1.50"  # m/s
-    assert page.evaluate(MARK) == "none"
-    small = page.evaluate("() => document.querySelector('#cab-age').getBoundingClientRect().height")
+    height = "document.querySelector('#cab-age').getBoundingClientRect().height"
+    small = page.wait_for_function(f"() => ({MARK})() === 'none' && {height}").json_value()
     for mode in ("silent", "frozen"):
         service.mode = mode
         page.wait_for_selector("#cab-age:has-text('NO DATA for')")
-        assert page.evaluate(MARK) == "line-through"
-        assert (
-            page.evaluate("() => document.querySelector('#cab-age').getBoundingClientRect().height")
-            > 1.5 * small
-        )
+        assert_marked(page, "line-through")
+        page.wait_for_function(f"h => {height} > h", arg=1.5 * small)
         service.mode = "measured"
         page.wait_for_selector("#cab-age:has-text('ago')")
-        assert page.evaluate(MARK) == "none"
+        assert_marked(page, "none")
     service.mode = "predicted"
     page.wait_for_selector("#cab-age:has-text('PREDICTED ONLY')")
-    assert page.evaluate(MARK) == "underline"
+    assert_marked(page, "underline")
     service.mode = "measured"
     page.wait_for_selector("#cab-age:has-text('ago')")
     service.stop()
     page.wait_for_selector("#cab-age:has-text('NO DATA for')")
-    assert page.evaluate(MARK) == "line-through"
+    assert_marked(page, "line-through")
 
 
 def test_the_cab_before_any_row_says_so(page: Any, served: Served, service: LiveService) -> None:
     service.mode = "silent"
     page.goto(f"{served.url}/#/cab")
     page.wait_for_selector("#cab-age:has-text('NO DATA YET')")
-    assert page.evaluate(MARK) == "line-through"
+    assert_marked(page, "line-through")
 
 
 def test_a_threshold_rings_and_is_kept(page: Any, served: Served, service: LiveService) -> None:
@@ -89,8 +91,11 @@ def test_a_threshold_rings_and_is_kept(page: Any, served: Served, service: LiveS
     assert page.input_value("#alarm-slip") == "25"
 
 
-def test_looking_back_leaves_the_numbers_and_the_recording(page: Any, served: Served) -> None:
-    page.goto(f"{served.url}/#/live?replay=estimates.parquet&speed=2")
+def test_looking_back_leaves_the_numbers_and_the_recording(
+    page: Any, served: Served, service: LiveService
+) -> None:
+    service.step = 0.2
+    page.goto(f"{served.url}/#/live")
     page.wait_for_function("() => window.terragripLive?.feed.ring.now > 12")
     page.select_option("#live-span", "10")
     assert page.evaluate("() => window.terragripLive.traces.span") == 10

@@ -37,7 +37,7 @@ def test_drive_scrolls_as_one_on_a_telephone(page: Any, served: Served) -> None:
 @pytest.mark.parametrize(("width", "height"), [(768, 1024), (390, 844), (1280, 800)])
 def test_the_cabs_numbers_use_the_screen(page: Any, served: Served, width: int, height: int) -> None:
     page.set_viewport_size({"width": width, "height": height})
-    page.goto(f"{served.url}/#/cab?replay=estimates.parquet&speed=10")
+    page.goto(f"{served.url}/#/cab?replay=estimates.parquet")
     page.wait_for_selector("#cab-age:has-text('ago')")
     size = page.locator(".cab-number").first.evaluate("e => parseFloat(getComputedStyle(e).fontSize)")
     assert size > 0.08 * max(width, height)
