@@ -15,7 +15,8 @@ VALUES = [0.2, 0.01, 0.4, 1.5, 0.02, 1.0, 0.05]
 
 
 class LiveService:
-    """Rows at 20 Hz, `step` s apart by their stamps, while `mode` is "measured"; "predicted": predicted ones; "silent": none, but a status a second; "frozen": nothing."""
+    """Rows at 20 Hz, `step` s apart by their stamps, while `mode` is "measured"; "predicted": predicted ones; "silent": none, but a
+    status a second; "frozen": nothing."""
 
     step = 0.05
     setpoint: dict[str, Any] | None = None  # what is published of it, four times a second
