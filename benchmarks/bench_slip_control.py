@@ -1,9 +1,10 @@
 """The slip set-point in the loop with the simulated plant: energy a metre, ground covered, time stuck, against fixed speed and torque.
 
-    python benchmarks/bench_slip_control.py [--part development|held-out|second-plant|tractor] [--seeds 20] [--first 0] [--write]
+    python benchmarks/bench_slip_control.py [--part development|held-out|second-plant|tractor|campaign] [--seeds 20] [--first 0] [--write]
 
-Each seed is a machine of terragrip.simulation.families, of the second plant, or a mid-size tractor (control_machines.py) on two tasks:
-work (several soils, hills, draught that comes and goes) and digging (into a soft spot that bears less than is asked, where slip digs
+Each seed is a machine of terragrip.simulation.families, of the second plant, a mid-size tractor or the paper's robot on the fields of its
+campaign (control_machines.py) on two tasks: work (several soils, hills, draught that comes and goes; of the campaign its towing runs, its
+only task) and digging (into a soft spot that bears less than is asked, where slip digs
 the wheels in). The same machine and ground three times, with the same wanted ground speed: wheels at a fixed speed; wheels at a fixed
 torque (1.3 of the fixed speed's mean, rim speed up to 1.5 of it); `SlipSetpoint` on estimates at 50 Hz from white sensor noise of the
 vehicle file's size. Its slip is what `advise` gives for a work drive of that machine before, else 11.5 %. A drive lasts as its scenario
@@ -22,7 +23,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from control_machines import PARTS, Piece, Stepped, Subject, log_of, machines, subject
+from control_machines import PARTS, Piece, Run, Stepped, Subject, log_of, machines, subject, tasks
 from marked import put
 from terragrip.advice.analysis import advise
 from terragrip.advice.setpoint import SlipSetpoint
@@ -39,7 +40,6 @@ SPARE = 1.3  # fixed torque over the mean of the fixed speed: less stalls at eve
 DOCUMENT = Path(__file__).resolve().parents[1] / "docs/advice.md"
 KEPT = Path(__file__).resolve().parents[1] / "src/terragrip/report/slip_control.json"
 BEGIN = "<!-- made by benchmarks/bench_slip_control.py --write: {part} -->"
-TASKS = ("work", "digging")
 WAYS = ("fixed speed", "fixed torque", "slip set-point")
 
 
@@ -60,10 +60,10 @@ def main() -> None:
     parser.add_argument("--first", type=int, default=0, help="the first seed")
     parser.add_argument("--write", action="store_true", help="put the table into docs/advice.md")
     arguments = parser.parse_args()
-    found: dict[str, list[dict[str, Drive]]] = {task: [] for task in TASKS}
+    found: dict[str, list[dict[str, Drive]]] = {task: [] for task in tasks(arguments.part)}
     for kind, seed in machines(arguments.part, arguments.seeds, arguments.first):
         slip = advised_slip(arguments.part, kind, seed)
-        for task in TASKS:
+        for task in found:
             found[task].append(three_ways(subject(arguments.part, kind, seed, task), seed, slip))
             print(f"{kind} {seed} {task} at {slip:.3f}: {found[task][-1]}", flush=True)
     text = table(found, arguments)
@@ -73,7 +73,7 @@ def main() -> None:
         keep(figures(found), arguments)
 
 
-def advised_slip(part: str, kind: Kind, seed: int) -> float:
+def advised_slip(part: str, kind: Kind | Run, seed: int) -> float:
     """The best slip of the soil with the most way on a work drive of the machine; the usual band's middle where none is given."""
     result = log_of(part, kind, seed, 1 / PERIOD)
     advice, way = advise([estimate(result.recording, result.vehicle)], result.vehicle)

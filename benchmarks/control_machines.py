@@ -1,4 +1,4 @@
-"""Machines that benchmarks/bench_slip_control.py drives: families by part, the second plant, and a mid-size tractor."""
+"""Machines that benchmarks/bench_slip_control.py drives: families by part, the second plant, a tractor, the paper's robot."""
 
 from __future__ import annotations
 
@@ -12,15 +12,16 @@ from numpy.typing import NDArray
 from second_plant import draw as second
 from second_plant.result import result_of
 from second_plant.stepped import SteppedDrive as SecondDrive
-from terragrip.simulation import SimulationResult, families
+from terragrip.simulation import SimulationResult, families, simulate
 from terragrip.simulation.families import Kind
 from terragrip.simulation.family_machines import ROBOT_MASS
 from terragrip.simulation.family_sensors import SENSORS
+from terragrip.simulation.library import set_runs
 from terragrip.simulation.scenario import Scenario
 from terragrip.simulation.stepped import SteppedDrive
 from terragrip.vehicle import Vehicle
 
-PARTS = ("development", "held-out", "second-plant", "tractor")
+PARTS = ("development", "held-out", "second-plant", "tractor", "campaign")
 MASS, FRONT, INCH = 5400.0, 0.375, 0.0254
 TRACTOR: Mapping[str, Any] = {
     "mass": MASS,
@@ -56,6 +57,16 @@ class Piece(Protocol):
     def __getitem__(self, name: str) -> NDArray[np.float64]: ...
 
 
+@dataclass(frozen=True, order=True)
+class Run:
+    """A run of the paper's campaign, in the place of a kind."""
+
+    name: str
+
+    def __str__(self) -> str:
+        return self.name
+
+
 @dataclass(frozen=True)
 class Subject:
     """A machine on a task: its scenario, a fresh drive as often as it is called, and how a log of its work is made."""
@@ -64,9 +75,19 @@ class Subject:
     begin: Callable[[], Stepped]
 
 
-def machines(part: str, count: int, first: int) -> Iterator[tuple[Kind, int]]:
-    """Kinds and seeds of a part; of the tractor one kind for each set of sensors in turn, soils by Brixius' cone index."""
-    if part == "second-plant":
+def tasks(part: str) -> tuple[str, ...]:
+    """What the machines of a part do: the campaign's fields have no ground that bears less than is asked."""
+    return ("work",) if part == "campaign" else ("work", "digging")
+
+
+def machines(part: str, count: int, first: int) -> Iterator[tuple[Kind | Run, int]]:
+    """Kinds and seeds of a part; of the tractor one kind for each set of sensors in turn, soils by Brixius' cone index; of the campaign
+    runs that tow, spread over all of them."""
+    if part == "campaign":
+        towing = [name for name in set_runs("campaign") if Scenario.load(name).tools]
+        for k in range(count):
+            yield Run(towing[k * len(towing) // count]), first + k
+    elif part == "second-plant":
         yield from second.machines(count, first)
     elif part == "tractor":
         for k in range(count):
@@ -75,16 +96,21 @@ def machines(part: str, count: int, first: int) -> Iterator[tuple[Kind, int]]:
         yield from families.machines(part, count, first)  # type: ignore[arg-type]
 
 
-def log_of(part: str, kind: Kind, seed: int, rate: float) -> SimulationResult:
-    """A work drive before."""
+def log_of(part: str, kind: Kind | Run, seed: int, rate: float) -> SimulationResult:
+    """A work drive before; of the campaign the same run with another seed's ground and noise, as its scenario records it."""
+    if isinstance(kind, Run):
+        return simulate(Scenario.load(kind.name), seed + 1_000_000, machine_seed=seed)
     if part == "second-plant":
         run, scenario, vehicle, seed = second.drive(kind, seed, rate=rate)
         return result_of(run, scenario, vehicle, seed)
     return families.draw(kind, seed, rate=rate, known=TRACTOR if part == "tractor" else None)
 
 
-def subject(part: str, kind: Kind, seed: int, task: str) -> Subject:
+def subject(part: str, kind: Kind | Run, seed: int, task: str) -> Subject:
     """The machine on its ground."""
+    if isinstance(kind, Run):
+        run = Scenario.load(kind.name)
+        return Subject(run, lambda: SteppedDrive(run, seed))
     if part == "second-plant":
         plan = second.plan(kind, seed, task=task)
         return Subject(plan.scenario, lambda: SecondDrive(plan))

@@ -25,8 +25,10 @@ Array = NDArray[np.float64]
 
 LEAST_REACH = 0.02
 """Mean slip that the hardest pulls must reach: below it, slip's own error and the curve cannot be distinguished."""
-WIDEST = 0.12
-"""A best slip whose interval is wider is not given."""
+MOST_LOST = 0.05
+"""A best slip that may cost more efficiency than this against the true one (95 %) is not given."""
+WIDEST_POWER = 0.24
+"""A slip of most pull power whose interval is wider is not given."""
 FARTHEST = 2.0
 """A best slip beyond this many times the data's reach rests on what soils are like in general, which is said."""
 FRONT_POINTS = 21
@@ -110,7 +112,7 @@ def _of_soil(
             else "the rows name no soil, and the library has several"
         )
         missing.append(f"{lacking}: the curve is learned from these estimates")
-    given = best.interval[1] - best.interval[0] <= WIDEST and best.net_traction > 0
+    given = _known(best, over)
     if not given:
         return Advice(name, missing=tuple(missing), drive=drive, reserve=_reserve(samples, curves, wheels))
     slip, pull = samples.levels()
@@ -118,18 +120,23 @@ def _of_soil(
     work = Work(over, best, slip, pull, drive["ground_speed"], drive["soil_resistance"])
     return Advice(
         name, best,
-        power if power.interval[1] - power.interval[0] <= 2 * WIDEST else None,
+        power if power.interval[1] - power.interval[0] <= WIDEST_POWER else None,
         _front(over, best, power),
         tuple(actions_for(work, vehicle)), tuple(missing), {**drive, "efficiency": float(work.efficiency[0])},
         _reserve(samples, curves, wheels), {**_field_work(work, vehicle), **fuel}, _limits(work, drive), _curve(over),
     )  # fmt: skip
 
 
+def _known(best: Best, over: OverSlip) -> bool:
+    """Whether the slip of best efficiency is known well enough to drive by it."""
+    return best.net_traction > 0 and over.loss(best.slip) <= MOST_LOST
+
+
 def _missing(best: Best, power: Best, curves: SoilCurves, vehicle: Vehicle, *, measured: bool) -> list[str]:
     """What is not known and what would tell it; ``measured``: the fuel was."""
     missing = []
     low, high = best.interval
-    if high - low > WIDEST or best.net_traction <= 0:
+    if not _known(best, curves.over):
         missing.append(
             f"the best slip is only known as {low:.0%} to {high:.0%}: drive longer, at pulls that slip up to 15 %, "
             "and calibrate the wheel radius"
@@ -140,7 +147,7 @@ def _missing(best: Best, power: Best, curves: SoilCurves, vehicle: Vehicle, *, m
             "general: pull harder "
             f"to see it"
         )
-    if power.interval[1] - power.interval[0] > 2 * WIDEST:
+    if power.interval[1] - power.interval[0] > WIDEST_POWER:
         missing.append(
             f"where most pull power lies is only known as {power.interval[0]:.0%} to {power.interval[1]:.0%} of slip: a drive with "
             f"pulls up to about {power.slip:.0%} of slip would tell"

@@ -42,6 +42,12 @@ class OverSlip:
         """kappa (1 - s)."""
         return np.asarray(self.net_traction * (1 - self.slip))
 
+    def loss(self, slip: float, level: float = LEVEL) -> float:
+        """Efficiency that at ``slip`` all but 1 - ``level`` of the curves lose at most against their own best."""
+        at = min(int(np.searchsorted(self.slip, slip)), len(self.slip) - 1)
+        drawn = self.efficiency[1:] if len(self.efficiency) > 1 else self.efficiency
+        return float(np.quantile(drawn.max(axis=1) - drawn[:, at], level))
+
 
 def over_slip(
     adhesion: Array, resistance: Array, slip: Array, tire_resistance: float, driven: float = 1.0
@@ -76,10 +82,14 @@ def best_of(curves: OverSlip, values: Array, level: float = LEVEL) -> Best:
 
 
 def _peaks(slip: Array, values: Array) -> Array:
-    """Slip of the largest value of each row (draws,): the grid's, moved by a parabola through the best three."""
+    """Slip of the largest value of each row (draws,): the grid's, moved by a parabola through the best three.
+
+    Where no value is above 0 there is no best slip: the grid's end stands for it, so that an interval over such rows is wide.
+    """
     i = np.clip(np.argmax(values, axis=1), 1, len(slip) - 2)
     rows = np.arange(len(values))
     left, middle, right = (values[rows, i + k] for k in (-1, 0, 1))
     bend = left - 2 * middle + right
     shift = np.where(bend < 0, 0.5 * (left - right) / np.where(bend < 0, bend, -1.0), 0.0)
-    return np.asarray(slip[i] + np.clip(shift, -1, 1) * (slip[1] - slip[0]))
+    at = slip[i] + np.clip(shift, -1, 1) * (slip[1] - slip[0])
+    return np.asarray(np.where(values.max(axis=1) > 0, at, slip[-1]))
