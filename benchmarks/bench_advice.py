@@ -1,11 +1,12 @@
 """How good the advised slip is on simulated machines with known truth: efficiency lost there, error of the best slip, its interval.
 
-    python benchmarks/bench_advice.py [--part development|held-out|second-plant] [--machines 24] [--seed 0] [--write]
+    python benchmarks/bench_advice.py [--part development|coarse|other-grounds|held-out|second-plant] [--machines 24] [--seed 0] [--write]
 
-Machines of terragrip.simulation.families, split by kind, or of the second plant (docs/decisions/0095); a drive of 50 to 150 s each at
-50 Hz, estimated with the default method and the vehicle file as its user wrote it. The true optimum is that of the soil's own curve and
-resistance, sinkage included; on the second plant by its stresses in steady motion, loads as at rest. The peer is one slip for all
-grounds: the middle of the usual band, 11.5 %. --write puts the table into docs/advice.md.
+Machines of terragrip.simulation.families, split by kind, or of the second plant (docs/decisions/0095). Development has two parts beside its
+own kinds: their masses and curves with coarse sensors, and grounds whose curve is no exponential (other_grounds.py). Each has a drive of
+50 to 150 s at 50 Hz, estimated with the default method and the vehicle file as its user wrote it. The true optimum is that of the soil's
+own curve and resistance, sinkage included; on the second plant by its stresses in steady motion, loads as at rest. The peer is one slip
+for all grounds: the middle of the usual band, 11.5 %. --write puts the table into docs/advice.md.
 """
 
 from __future__ import annotations
@@ -18,6 +19,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+import other_grounds
 from marked import put
 from second_plant import draw as second
 from second_plant.plant import curves as second_curves
@@ -27,7 +29,6 @@ from terragrip.advice.optimum import GRID, OverSlip, best_of, over_slip
 from terragrip.advice.samples import samples_by_soil
 from terragrip.advice.slip_only import BAND
 from terragrip.estimation import estimate
-from terragrip.physics.adhesion import CURVES
 from terragrip.simulation import SimulationResult, families
 from terragrip.simulation.families import Kind
 from terragrip.simulation.scenario import Scenario
@@ -35,7 +36,7 @@ from terragrip.vehicle import Vehicle
 
 Floats = NDArray[np.float64]
 RATE = 50.0
-PARTS = ("development", "held-out", "second-plant")
+PARTS = ("development", "coarse", "other-grounds", "held-out", "second-plant")
 DOCUMENT = Path(__file__).resolve().parents[1] / "docs/advice.md"
 BEGIN = "<!-- made by benchmarks/bench_advice.py --write: {part} -->"
 
@@ -82,7 +83,15 @@ def main() -> None:
 
 def machines(part: str, count: int, first: int) -> Iterator[tuple[Kind, int]]:
     """Kinds and seeds of a part."""
-    return second.machines(count, first) if part == "second-plant" else families.machines(part, count, first)  # type: ignore[arg-type]
+    if part == "second-plant":
+        yield from second.machines(count, first)
+    elif part == "other-grounds":
+        yield from other_grounds.machines(count, first)
+    elif part == "coarse":
+        for kind, seed in families.machines("development", count, first):
+            yield Kind(kind.mass, kind.curve, "coarse"), seed
+    else:
+        yield from families.machines(part, count, first)  # type: ignore[arg-type]
 
 
 def score(kind: Kind, seed: int, part: str) -> list[Row]:
@@ -114,7 +123,8 @@ def score(kind: Kind, seed: int, part: str) -> list[Row]:
 def drawn(kind: Kind, seed: int, part: str) -> tuple[SimulationResult, Callable[[str, float], OverSlip]]:
     """A machine's drive, and its true curves by the soil's name and the driven wheels' share of the weight."""
     if part != "second-plant":
-        result = families.draw(kind, seed, rate=RATE)
+        draw = other_grounds.draw if part == "other-grounds" else families.draw
+        result = draw(kind, seed, rate=RATE)
         return result, lambda soil, driven: true_curves(result.scenario, soil, result.vehicle, driven)
     run, scenario, vehicle, seed = second.drive(kind, seed, rate=RATE)
 
@@ -129,7 +139,7 @@ def drawn(kind: Kind, seed: int, part: str) -> tuple[SimulationResult, Callable[
 def true_curves(scenario: Scenario, soil: str, vehicle: Vehicle, driven: float) -> OverSlip:
     """The plant's own curve and resistance over slip, wheels sunk in as each slip makes them (families.capacity at every slip)."""
     ground = scenario.soils[soil]
-    model = CURVES[ground.curve["name"]]
+    model = other_grounds.EVERY[ground.curve["name"]]
     spots = scenario.soft_spots
     loosening, fall = (spots[0].loosening, spots[0].adhesion_fall) if spots else (0.0, 0.0)
     figures = {key: value for key, value in ground.curve.items() if key != "name"}

@@ -28,8 +28,16 @@ def drive(
     soil: str | None = None,
     vehicle: Vehicle = VEHICLE,
     spread: float = 0.05,
+    hyperbola: bool = False,
+    before_slip: float = 0.0,
+    slip_off: float = 0.0,
+    slip_std: float = 0.004,
 ) -> Estimates:
-    """Pulls that come and go on ground of mu = A(1 - e^{-k s}), A = .48 a, whose strength varies by ``spread`` along the way."""
+    """Pulls that come and go on ground of mu = A(1 - e^{-k s}), A = .48 a, whose strength varies by ``spread`` along the way.
+
+    ``hyperbola``: A k s/(1 + k s) instead; ``before_slip``: adhesion needed before any slip; ``slip_off``: error of slip all the
+    drive, of which ``slip_std`` is the estimates' SD.
+    """
     rng = np.random.default_rng(seed)
     n, speed = int(metres * 5), 1.5
     distance = np.arange(n) * 0.2
@@ -38,8 +46,10 @@ def drive(
     height = 0.48 * a
     pulls = np.repeat(rng.uniform(0.01, 1.0, int(metres / 8) + 1), 40)[:n]
     wanted = pulls * top
-    mu = height * -np.expm1(-k * wanted)
-    slip = -np.log1p(-np.minimum(mu / strength, 0.95)) / k
+    mu = height * (k * wanted / (1 + k * wanted) if hyperbola else -np.expm1(-k * wanted))
+    share = np.minimum(mu / strength, 0.95)
+    slip = (share / (1 - share) if hyperbola else -np.log1p(-share)) / k
+    mu = mu + before_slip
     rho = resistance + growth * slip + 0.005 * np.repeat(rng.standard_normal(int(metres / 3) + 1), 15)[:n]
     columns = {
         "distance": distance, "ground_speed": np.full(n, speed), "soil_resistance": rho, "soil_resistance_std": np.full(n, 0.004),
@@ -48,7 +58,7 @@ def drive(
         noise = 0.004 * rng.standard_normal(n)
         columns |= {
             f"adhesion_{wheel}": mu + 0.01 * rng.standard_normal(n), f"adhesion_{wheel}_std": np.full(n, 0.01),
-            f"slip_{wheel}": slip + noise, f"slip_{wheel}_std": np.full(n, 0.004),
+            f"slip_{wheel}": slip + noise + slip_off, f"slip_{wheel}_std": np.full(n, slip_std),
         }  # fmt: skip
     for axle, mass in zip(vehicle.axle_names, vehicle.axle_mass, strict=True):
         columns[f"vertical_load_{axle}"] = np.full(n, mass * 9.80665)

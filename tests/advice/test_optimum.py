@@ -58,3 +58,20 @@ def test_an_axle_that_only_rolls_costs_efficiency_and_asks_for_more_slip():
 def test_nothing_is_pulled_where_resistance_exceeds_the_grip():
     curves = straight(0.1, 0.2, 0.02)
     assert best_of(curves, curves.efficiency).efficiency == 0.0
+
+
+def test_curves_that_pull_nothing_make_the_interval_wide_instead_of_naming_a_slip():
+    slopes = np.array([4.0] * 20 + [0.1] * 2)
+    curves = over_slip(slopes[:, None] * GRID, np.full((22, GRID.size), 0.07), GRID, 0.02)
+    low, high = best_of(curves, curves.efficiency).interval
+    assert low == pytest.approx(best_of(curves, curves.efficiency).slip, abs=1e-6)
+    assert high == pytest.approx(GRID[-1])
+
+
+def test_the_loss_of_a_slip_is_what_nearly_all_curves_lose_there_at_most():
+    curves = straight(4.0, 0.06, 0.02)
+    best = best_of(curves, curves.efficiency)
+    assert curves.loss(best.slip) == pytest.approx(0.0, abs=1e-5)
+    k, r, t, s = 4.0, 0.06, 0.02, 0.3
+    eta = (k * s - r) * (1 - s) / (k * s + t)
+    assert curves.loss(s) == pytest.approx(best.efficiency - eta, abs=1e-4)

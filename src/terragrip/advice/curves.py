@@ -33,7 +33,7 @@ CENTRE = np.array([np.log(0.55), np.log(11.0), 0.1, 0.0, 0.07, 0.06, 1.2, 0.3])
 SPREAD = np.array([0.4, 0.7, 0.3, np.nan, 0.06, 0.12, 0.5, 0.4])
 """What soils are like before any data: A about .55, k about 11 (Brixius 7.5, the paper 11.4, Burckhardt's up to 30), a fall of a tenth,
 resistance .07 that grows by .06 over all of slip (Brixius: .5/sqrt(Bn); where slip digs wheels in, several times that); p from the brush's
-to the hyperbola's; c 0 on firm ground, mostly .1 to .8 by Wong and Reece's stresses on Wong's soils (benchmarks/wheel_stresses.py). The
+to the hyperbola's; c 0 on firm ground, mostly 0 to 1 by Wong and Reece's stresses on Wong's soils (benchmarks/wheel_stresses.py). The
 spread of e is the drive's own."""
 LOWER = np.array([-4.0, 0.0, -0.5, np.nan, 0.0, 0.0, 0.1, 0.0])
 UPPER = np.array([1.5, np.log(100.0), 1.5, np.nan, 0.6, 0.5, 2.5, 1.5])
