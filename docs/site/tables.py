@@ -83,6 +83,8 @@ SIGNS = {
     "engine_friction_share": "of the reference torque (J1939: nominal friction percent torque), positive",
     "engine_reference_torque": "what the shares are of (J1939: engine reference torque)",
     "drawbar_force": "horizontal force of the tool on the machine, backward positive; absent: nothing is towed",
+    "hitch_load": "vertical force of the tool on the machine's hitch, down positive; absent: nothing hangs there",
+    "mass": "of the whole machine, without what is towed; absent: the vehicle file's throughout",
     "acceleration_x": "specific force along the body, forward positive",
     "acceleration_y": "specific force across the body, to the left positive",
     "acceleration_z": "specific force, up positive: +9.81 at rest",

@@ -24,7 +24,7 @@
 #define TG_MAX_STATES 18
 #define TG_MAX_CHANNELS 10
 #define TG_MODES 4
-#define TG_MAX_CONSIDERED 14
+#define TG_MAX_CONSIDERED 16
 /* Bytes, aligned as a double, that hold a tg_estimator: storage without malloc. Of any policy, of TG_FIXED; of filters: end of this file. */
 #define TG_ESTIMATOR_ROOM 81920
 #define TG_ESTIMATOR_ROOM_FIXED 40960
@@ -73,6 +73,8 @@ typedef struct { /* inputs held over one step */
     tg_real load[8];   /* N, vertical, > 0 */
     tg_real drawbar;   /* N, backward pull positive */
     tg_real slope;     /* rad, uphill positive */
+    tg_real mass;      /* kg; 0: the machine's */
+    tg_real hitch_load; /* N, vertical, down positive: carried by the wheels beside the weight, so that soil resistance counts on it too */
 } tg_input;
 
 typedef struct {
@@ -193,7 +195,9 @@ enum {
     TG_ROLL = 21,            /* rad, left side up positive */
     TG_VERTICAL_LOAD = 22,   /* + axle, N */
     TG_YAW_RATE = 30,        /* rad/s, to the left positive */
-    TG_SLOTS = 32
+    TG_MASS = 31,            /* kg, of the whole machine, where tanks or hoppers change it */
+    TG_HITCH_LOAD = 32,      /* N, what hangs on the hitch presses down on it */
+    TG_SLOTS = 36            /* whole lanes; the last ones are not used */
 };
 
 /* Places of an estimate's values. Each `_STD` holds the considered constants. */
@@ -259,7 +263,7 @@ typedef enum {
 
 typedef struct {
     double time;            /* s, rising */
-    tg_real value[32];      /* NaN = not measured at that instant */
+    tg_real value[36];      /* NaN = not measured at that instant */
 } tg_sample;
 
 typedef struct {
@@ -275,6 +279,9 @@ typedef struct { /* spreads (1 SD) of constants that the data cannot tell; 0 = k
     tg_real drive_torque_offset;    /* N m, each wheel its own */
     tg_real drawbar_gain;           /* relative */
     tg_real drawbar_offset;         /* N */
+    tg_real mass;                   /* relative, of what the loads come from: the machine's, or as it is measured */
+    tg_real hitch_load_gain;        /* relative */
+    tg_real hitch_load_offset;      /* N */
     tg_real slope;                  /* rad: an unmeasured slope, or the pitch sensor's mounting */
     tg_real tire_rolling_resistance;
     tg_real vertical_load;          /* relative: what the front gains, the rear loses */
@@ -343,6 +350,7 @@ typedef struct {
     int32_t method;                 /* tg_method */
     int32_t axles;                  /* 1..8 */
     int32_t towing;                 /* 1: a drawbar force is measured, so it is unknown until its first value; 0: none until then */
+    int32_t weighed, carrying;      /* 1: mass, vertical hitch load are measured, likewise; 0: they are never looked at */
     int32_t wheel_axle[8];          /* which axle a wheel is on */
     int32_t driven[8];              /* 0: its torque is 0 */
     int32_t powered[8];             /* 1: a motor drives it, so the watch looks at it; of no wheel: at all. A driven wheel may be merely measured */
@@ -350,15 +358,18 @@ typedef struct {
     tg_tuning tuning;
     tg_real load_share[8];          /* axle: part of the weight it carries at rest on level ground */
     tg_real load_transfer[8];       /* axle, 1/m: load gained per N m of nose-down moment (two axles: 1/L, -1/L) */
+    tg_real payload_share[8];       /* axle: part that it carries of the mass beyond the machine's, */
+    tg_real payload_height;         /* m: which has its centre of gravity there */
+    tg_real hitch_share[8];         /* axle: part of the vertical hitch load, below 0 where that lifts it */
     tg_real wheel_share[8];         /* wheel: part of its axle's load */
     tg_real wheel_side[8];          /* wheel, m left of the middle: its hub moves at v - side x yaw rate */
     tg_real lateral_share[8];       /* wheel, s^2/m: part of its axle's load it loses per m/s^2 to the left */
     tg_real center_of_gravity_height; /* m */
     tg_real hitch_height;           /* m */
     tg_real rolling_radius[8];      /* wheel, m: travel per radian; machine.radius is the torque arm */
-    tg_real offset[32], gain[32];   /* calibration: value = (raw - offset) / gain */
-    tg_real noise[32];              /* SD of each channel after calibration */
-    tg_real held_period[32];        /* s; > 0: the channel repeats its last value between updates this far apart */
+    tg_real offset[36], gain[36];   /* calibration: value = (raw - offset) / gain */
+    tg_real noise[36];              /* SD of each channel after calibration */
+    tg_real held_period[36];        /* s; > 0: the channel repeats its last value between updates this far apart */
     tg_uncertainty uncertainty;
     tg_real prior_adhesion, prior_adhesion_std;     /* before the first sample */
     tg_real prior_resistance, prior_resistance_std;
@@ -403,7 +414,7 @@ tg_status tg_estimator_snapshot(const tg_estimator *e, uint8_t *bytes);
 /* `room`: bytes of storage at `e`. TG_BAD_ARGUMENT where the snapshot's estimator needs more. */
 tg_status tg_estimator_restore(tg_estimator *e, size_t room, const uint8_t *bytes, size_t size);
 tg_status tg_estimator_settings(const tg_estimator *e, tg_settings *settings);
-/* From the next sample on, these SDs and update periods of the channels (32 each, as in tg_settings); the estimate goes on. */
+/* From the next sample on, these SDs and update periods of the channels (36 each, as in tg_settings); the estimate goes on. */
 tg_status tg_estimator_set_noise(tg_estimator *e, const tg_real *noise, const tg_real *held_period);
 /* cdef end */
 

@@ -35,9 +35,9 @@ static void consider_statically(tg_estimator *e, const tg_drive *drive)
         for (int32_t i = 0; i < n; i++) {
             tg_real torque = m->inertia[i] * deviation[c].wheel_acceleration[i];
             e->consider.s[c][i] = torque / (m->radius[i] * u.load[i]);
-            acceleration += torque / (m->radius[i] * m->mass);
+            acceleration += torque / (m->radius[i] * drive->mass);
         }
-        e->consider.s[c][n] = acceleration / (m->gravity * drive->cosine);
+        e->consider.s[c][n] = acceleration / (m->gravity * drive->cosine + drive->hitch_load * drive->inverse_mass);
     }
 }
 
@@ -48,13 +48,13 @@ static void spread(tg_estimator *e, const tg_drive *drive)
     const tg_machine *m = &s->machine;
     const tg_algebra *a = &e->algebra;
     const int32_t n = m->wheels, stride = tgi_stride(n), rho = n, v = n + 1;
-    const tg_real weight = m->mass * m->gravity, inverse_tau = 1 / s->algebraic_filter;
+    const tg_real weight = drive->mass * m->gravity + drive->hitch_load, inverse_tau = 1 / s->algebraic_filter;
     tg_belief *b = &e->belief;
     memset(b->P, 0, sizeof b->P);
     tg_real ground = smooth_variance(s->noise[TG_GROUND_SPEED], a->gain);
     tg_real rate = s->noise[TG_GROUND_SPEED] * s->noise[TG_GROUND_SPEED] * inverse_tau * inverse_tau;
     tg_real pull = smooth_variance(s->noise[TG_DRAWBAR_FORCE], a->gain);
-    tg_real resistance = (m->mass * m->mass * rate + pull) / (weight * weight);
+    tg_real resistance = (drive->mass * drive->mass * rate + pull) / (weight * weight);
     b->P[v * stride + v] = ground;
     for (int32_t i = 0; i < n; i++) {
         tg_real lever = 1 / (m->radius[i] * drive->load[i]), wheel = s->noise[TG_WHEEL_SPEED + i];
@@ -98,8 +98,8 @@ void tgi_algebraic(tg_estimator *e, const tg_row *row, const tg_drive *drive, in
     tg_real pull = d * follow(&a->drawbar, drive->drawbar, row->time, tau, NULL);
     tg_real slope = d * drive->slope;
     b->x[n + 1] = a->ground.seen ? v : rim;
-    b->x[n] = (thrust - pull - m->mass * (d * a->ground_rate + m->gravity * tgi_sin(slope)))
-                    / (m->mass * m->gravity * tgi_cos(slope));
+    b->x[n] = (thrust - pull - drive->mass * (d * a->ground_rate + m->gravity * tgi_sin(slope)))
+                    / (drive->mass * m->gravity * tgi_cos(slope) + drive->hitch_load);
     spread(e, drive);
     consider_statically(e, drive);
 }

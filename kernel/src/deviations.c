@@ -9,25 +9,62 @@ int32_t tgi_deviation_columns(const tg_settings *s)
     if (u->drive_torque_gain > 0 || u->drive_torque_offset > 0)
         for (int32_t i = 0; i < s->machine.wheels; i++) columns += s->driven[i] != 0;
     return columns + (u->drive_torque_gain_common > 0) + (u->drawbar_gain > 0 || u->drawbar_offset > 0) + (u->slope > 0)
-         + (u->tire_rolling_resistance > 0) + (u->vertical_load > 0) + (u->acceleration_bias > 0);
+         + (u->tire_rolling_resistance > 0) + (u->vertical_load > 0) + (u->mass > 0 || s->weighed) + (s->carrying != 0)
+         + (u->acceleration_bias > 0);
+}
+
+/* Wheel i carries `gain[i]` more. Returns the force that this adds to the vehicle. */
+static tg_real add_loads(const tg_estimator *e, const tg_real *mu, const tg_real *gain, tg_deviation *d)
+{
+    const tg_machine *m = &e->settings.machine;
+    tg_real force = 0;
+    for (int32_t i = 0; i < m->wheels; i++) {
+        d->wheel_acceleration[i] = -m->radius[i] * (mu[i] + m->tire_rolling_resistance) * gain[i] * e->constants.inverse_inertia[i];
+        force += mu[i] * gain[i];
+    }
+    return force;
 }
 
 /* What the front axles gain and the rear axles lose, as a share of the mean axle load. */
-static void shift_loads(const tg_estimator *e, const tg_real *mu, tg_deviation *d)
+static void shift_loads(const tg_estimator *e, tg_real weight, tg_real inverse_mass, const tg_real *mu, tg_deviation *d)
 {
     const tg_settings *s = &e->settings;
-    const tg_machine *m = &s->machine;
-    tg_real largest = 0;
+    tg_real largest = 0, gain[TG_MAX_WHEELS];
     for (int32_t k = 0; k < s->axles; k++)
         if (tgi_fabs(s->load_transfer[k]) > largest) largest = tgi_fabs(s->load_transfer[k]);
     if (!(largest > 0)) return;
-    tg_real mean = s->uncertainty.vertical_load * m->mass * m->gravity / (tg_real)s->axles, force = 0;
-    for (int32_t i = 0; i < m->wheels; i++) {
-        tg_real gain = mean * s->load_transfer[s->wheel_axle[i]] / largest * s->wheel_share[i];
-        d->wheel_acceleration[i] = -m->radius[i] * (mu[i] + m->tire_rolling_resistance) * gain * e->constants.inverse_inertia[i];
-        force += mu[i] * gain;
+    tg_real mean = s->uncertainty.vertical_load * weight / (tg_real)s->axles;
+    for (int32_t i = 0; i < s->machine.wheels; i++) gain[i] = mean * s->load_transfer[s->wheel_axle[i]] / largest * s->wheel_share[i];
+    d->acceleration = d->accelerometer = add_loads(e, mu, gain, d) * inverse_mass;
+}
+
+/* Of the vertical hitch load, wheel i's part. */
+static tg_real hitch_part(const tg_settings *s, int32_t i) { return s->hitch_share[s->wheel_axle[i]] * s->wheel_share[i]; }
+
+/* More mass: the loads grow with it, but for what the hitch does to them, and the forces move the vehicle less. */
+static void add_mass(const tg_estimator *e, const tg_input *u, tg_real inverse_mass, const tg_real *mu, tg_deviation *d)
+{
+    const tg_settings *s = &e->settings;
+    const int32_t n = s->machine.wheels;
+    const tg_real share = tgi_mass_spread(e);
+    const tg_real pull = (tg_real)e->direction * u->drawbar * s->hitch_height; /* the moment that lifts the front */
+    tg_real gain[TG_MAX_WHEELS], balance = -u->drawbar - mu[n] * u->hitch_load;
+    for (int32_t i = 0; i < n; i++) {
+        const tg_real hitch = hitch_part(s, i) * u->hitch_load - s->load_transfer[s->wheel_axle[i]] * s->wheel_share[i] * pull;
+        gain[i] = share * (u->load[i] - hitch);
+        balance += mu[i] * u->load[i];
     }
-    d->acceleration = d->accelerometer = force * e->constants.inverse_mass;
+    d->acceleration = d->accelerometer = (add_loads(e, mu, gain, d) - share * balance) * inverse_mass;
+}
+
+static void add_hitch_load(const tg_estimator *e, tg_real inverse_mass, const tg_real *mu, tg_deviation *d)
+{
+    const tg_settings *s = &e->settings;
+    const int32_t n = s->machine.wheels;
+    const tg_real spread = tgi_hitch_spread(e);
+    tg_real gain[TG_MAX_WHEELS];
+    for (int32_t i = 0; i < n; i++) gain[i] = spread * hitch_part(s, i);
+    d->acceleration = d->accelerometer = (add_loads(e, mu, gain, d) - mu[n] * spread) * inverse_mass;
 }
 
 /* The slope is known better where the motion shows it. */
@@ -37,7 +74,7 @@ static tg_real slope_spread(const tg_estimator *e)
     return e->slope.running && found < given ? found : given;
 }
 
-/* Work out e->deviation, one a constant in the order of tgi_deviation_columns; `u` are the inputs along the travel, `mu` the adhesion.
+/* Work out e->deviation, one a constant in the order of tgi_deviation_columns; `u` are the inputs along the travel, `mu` adhesion and rho_s.
  * What a constant does not touch stays 0 from the start. */
 void tgi_deviations(tg_estimator *e, const tg_input *u, const tg_real *mu)
 {
@@ -45,6 +82,7 @@ void tgi_deviations(tg_estimator *e, const tg_input *u, const tg_real *mu)
     const tg_uncertainty *spread = &s->uncertainty;
     const tg_real *inverse_inertia = e->constants.inverse_inertia;
     const int32_t n = s->machine.wheels;
+    const tg_real mass = u->mass > 0 ? u->mass : s->machine.mass, inverse_mass = u->mass > 0 ? 1 / u->mass : e->constants.inverse_mass;
     tg_deviation *d = e->deviation;
     if (spread->drive_torque_gain > 0 || spread->drive_torque_offset > 0)
         for (int32_t i = 0; i < n; i++) {
@@ -59,7 +97,7 @@ void tgi_deviations(tg_estimator *e, const tg_input *u, const tg_real *mu)
     }
     if (spread->drawbar_gain > 0 || spread->drawbar_offset > 0) {
         tg_real variance = tgi_square(spread->drawbar_gain * u->drawbar) + tgi_square(spread->drawbar_offset);
-        d->acceleration = d->accelerometer = -tgi_sqrt(variance) * e->constants.inverse_mass;
+        d->acceleration = d->accelerometer = -tgi_sqrt(variance) * inverse_mass;
         d++;
     }
     if (spread->slope > 0) (d++)->acceleration = -s->machine.gravity * slope_spread(e); /* cos(slope) moves by its square only */
@@ -68,7 +106,9 @@ void tgi_deviations(tg_estimator *e, const tg_input *u, const tg_real *mu)
             d->wheel_acceleration[i] = -s->machine.radius[i] * spread->tire_rolling_resistance * u->load[i] * inverse_inertia[i];
         d++;
     }
-    if (spread->vertical_load > 0) shift_loads(e, mu, d++);
+    if (spread->vertical_load > 0) shift_loads(e, mass * s->machine.gravity, inverse_mass, mu, d++);
+    if (spread->mass > 0 || s->weighed) add_mass(e, u, inverse_mass, mu, d++);
+    if (s->carrying) add_hitch_load(e, inverse_mass, mu, d++);
     if (spread->acceleration_bias > 0) {
         d->accelerometer = -spread->acceleration_bias;
         d->acceleration = e->slope.running ? -spread->acceleration_bias : 0; /* the slope takes it along, see slope.c */

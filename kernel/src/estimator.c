@@ -76,6 +76,8 @@ static void inputs_over(const tg_estimator *e, const tg_drive *drive, const tg_i
     }
     over->drawbar = d * drive->mean_drawbar;
     over->slope = (e->held.slope + now->slope) / 2;
+    over->mass = now->mass;
+    over->hitch_load = now->hitch_load;
 }
 
 /* Of variance that comes in equal parts after each of `pieces` steps, what is left at the end of wheel speeds, which bearings slow down. */
@@ -147,9 +149,9 @@ static void balance_forces(tg_estimator *e, const tg_drive *drive, double time)
     const tg_machine *m = &e->settings.machine;
     const int32_t n = m->wheels;
     const tg_real d = (tg_real)e->direction;
-    tg_real force = -d * drive->calm_drawbar - e->belief.x[n] * m->mass * m->gravity * drive->cosine;
+    tg_real force = -d * drive->calm_drawbar - e->belief.x[n] * drive->mass * m->gravity * drive->cosine - e->belief.x[n] * drive->hitch_load;
     for (int32_t i = 0; i < n; i++) force += e->belief.x[i] * drive->load[i];
-    tgi_lowpass(&e->balance, e->standing ? 0 : d * force * e->constants.inverse_mass, time, e->settings.load_filter);
+    tgi_lowpass(&e->balance, e->standing ? 0 : d * force * drive->inverse_mass, time, e->settings.load_filter);
 }
 
 static int32_t go_on(tg_estimator *e, tg_row *row, const tg_drive *drive, tg_course course, tg_real dt, tg_real *q)
@@ -193,6 +195,7 @@ static void report(tg_estimator *e, const tg_drive *drive, tg_estimate *out)
     e->scene.standing = (tg_real)(e->standing || wheels_are_silent(e, out->time));
     e->scene.seen_motion = (tg_real)e->seen_motion;
     e->scene.roughness = e->roughness.wander;
+    e->scene.weight = drive->mass * e->settings.machine.gravity + drive->hitch_load;
     e->scene.unseen_load = tgi_unseen_load(e);
     e->scene.slow_speed = tgi_slow_variance(e);
     tgi_traction(&e->settings, &e->belief, (const tg_real(*)[TG_ROWS])e->consider.s, &e->scene, o);
@@ -263,7 +266,7 @@ tg_status tg_estimator_update(tg_estimator *e, const tg_sample *sample, tg_estim
     tgi_track_turn(e, &row);
     tg_real q[TG_MAX_STATES];
     tgi_take_inputs(e, &row, dt, &drive);
-    tgi_input_noise(e, dt, &row, q);
+    tgi_input_noise(e, &drive, dt, &row, q);
     tgi_loads(e, &row, &drive);
     tg_course course = course_of(e, &row, was_standing, turned, &gap);
     if (!e->started) e->ground_time = row.time;

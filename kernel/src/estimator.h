@@ -47,6 +47,7 @@ typedef struct { /* what a row's values need beside the belief; all reals, so th
     tg_real hub[8];  /* wheel, m/s: what its hub is faster than the vehicle, along the travel */
     tg_real direction, standing, seen_motion; /* standing: or else without a slip */
     tg_real roughness; /* mean square of what rho_s wanders over uneven ground, see roughness.c */
+    tg_real weight; /* N, on level ground, with what hangs on the hitch */
     tg_real unseen_load; /* relative variance of a wheel's load */
     tg_real slow_speed; /* variance of the ground speed's slow error, see slow_speed.c */
     tg_real anew; /* the filter was started anew: nothing links this row to the one before */
@@ -58,6 +59,8 @@ typedef struct { /* what drives the model between two rows, in the vehicle's own
     tg_real torque[8], mean_torque[8]; /* now, and over the step that ends now */
     tg_real drawbar, mean_drawbar;
     tg_real calm_drawbar; /* filtered, for the loads, which know no uncertainty */
+    tg_real mass, inverse_mass; /* kg, as measured, else the machine's */
+    tg_real hitch_load;   /* N */
     tg_real slope, cosine, sine;
 } tg_drive;
 
@@ -176,7 +179,7 @@ struct tg_estimator {
     double time, measured_time, distance;
     tg_real last_raw[TG_SLOTS];
     double last_raw_time[TG_SLOTS];
-    tg_hold torque[8], drawbar, pitch, axle_load[8];
+    tg_hold torque[8], drawbar, pitch, axle_load[8], mass, hitch_load;
     tg_hold wheel[8], ground;  /* speeds */
     int32_t sparse_wheels;
     int32_t unseen;            /* since a gap: bit 0 no wheel speed, bit 1 no ground speed was measured */
@@ -217,13 +220,16 @@ void tgi_track_turn(tg_estimator *e, const tg_row *row);
 int32_t tgi_track_motion(tg_estimator *e, const tg_row *row);
 
 /* loads.c */
+void tgi_weigh(tg_estimator *e, tg_row *row, tg_drive *drive);
+tg_real tgi_mass_spread(const tg_estimator *e);
+tg_real tgi_hitch_spread(const tg_estimator *e);
 void tgi_loads(tg_estimator *e, const tg_row *row, tg_drive *drive);
 
 /* inputs.c */
 void tgi_hold_update(tg_hold *h, const tg_tuned *k, tg_real x, double time, tg_real dt, tg_real noise, tg_real rate,
                      int32_t moving);
 void tgi_take_inputs(tg_estimator *e, tg_row *row, tg_real dt, tg_drive *drive);
-void tgi_input_noise(const tg_estimator *e, tg_real dt, tg_row *row, tg_real *q);
+void tgi_input_noise(const tg_estimator *e, const tg_drive *drive, tg_real dt, tg_row *row, tg_real *q);
 void tgi_along(const tg_estimator *e, const tg_drive *drive, tg_input *u);
 
 /* deviations.c */

@@ -22,8 +22,9 @@ static const tgi_field tuning[] = {INTEGERS(T, engine), INTEGERS(T, policy), REA
 #undef T
 #define T tg_settings
 const tgi_field tgi_settings_fields[] = {
-    INTEGERS(T, method), INTEGERS(T, axles), INTEGERS(T, towing), INTEGERS(T, wheel_axle), INTEGERS(T, driven), INTEGERS(T, powered),
+    INTEGERS(T, method), INTEGERS(T, axles), INTEGERS(T, towing), INTEGERS(T, weighed), INTEGERS(T, carrying), INTEGERS(T, wheel_axle), INTEGERS(T, driven), INTEGERS(T, powered),
     INSIDE(T, machine, tg_machine, machine), INSIDE(T, tuning, tg_tuning, tuning), REALS(T, load_share), REALS(T, load_transfer),
+    REALS(T, payload_share), REALS(T, payload_height), REALS(T, hitch_share),
     REALS(T, wheel_share), REALS(T, wheel_side), REALS(T, lateral_share), REALS(T, center_of_gravity_height), REALS(T, hitch_height),
     REALS(T, rolling_radius), REALS(T, offset), REALS(T, gain), REALS(T, noise), REALS(T, held_period), REALS(T, uncertainty),
     REALS(T, prior_adhesion), REALS(T, prior_adhesion_std), REALS(T, prior_resistance), REALS(T, prior_resistance_std), REALS(T, slope_spread),
@@ -89,7 +90,7 @@ const tgi_field tgi_consider_fields[] = {REALS(tg_consider, s), REALS(tg_conside
 const tgi_field tgi_estimator_fields[] = {
     REALS(T, deviation), INTEGERS(T, started), INTEGERS(T, seen_motion), INTEGERS(T, standing), INTEGERS(T, direction), DOUBLES(T, time),
     DOUBLES(T, measured_time), DOUBLES(T, distance), REALS(T, last_raw), DOUBLES(T, last_raw_time), HOLDS(torque), HOLDS(drawbar), HOLDS(pitch),
-    HOLDS(axle_load), HOLDS(wheel), HOLDS(ground), INTEGERS(T, sparse_wheels), INTEGERS(T, unseen), REALS(T, yaw_rate), DOUBLES(T, yaw_time),
+    HOLDS(axle_load), HOLDS(mass), HOLDS(hitch_load), HOLDS(wheel), HOLDS(ground), INTEGERS(T, sparse_wheels), INTEGERS(T, unseen), REALS(T, yaw_rate), DOUBLES(T, yaw_time),
     DOUBLES(T, slow_time), LOWPASS(soon), LOWPASS(soon_ground), LOWPASS(wheel_speed), LOWPASS(ground_speed), LOWPASS(acceleration), LOWPASS(lateral),
     LOWPASS(balance), REALS(T, slip_memory), INSIDE(T, slope, tgi_slope, slope), REALS(T, roughness), REALS(T, slow_speed),
     DOUBLES(T, ground_time), REALS(T, shock),

@@ -50,6 +50,7 @@ TG_INLINE int tgi_channel(int n, int o) { return o == 0 ? n : o <= n ? o - 1 : o
 TG_INLINE int tgi_stride(int n) { return (TG_TWICE(n) + TG_LANES - 1) / TG_LANES * TG_LANES; }
 
 TG_INLINE int tgi_finite(tg_real x) { return x - x == 0; }
+TG_INLINE tg_real tgi_inverse_mass(const tg_filter *f, const tg_input *u) { return u->mass > 0 ? 1 / u->mass : f->inverse_mass; }
 
 /* Innovation weight of physics.md 6 (Huber): 1 within `huber` SDs, then falling. */
 TG_INLINE tg_real tgi_weight(tg_real huber, tg_real innovation, tg_real variance)

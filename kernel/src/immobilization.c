@@ -137,7 +137,7 @@ static void judge_push(tg_estimator *e, const tg_drive *drive, const tg_real *o,
 {
     const tg_watch_settings *s = &e->settings.watch;
     tgi_watch *w = &e->watch;
-    const tg_real weight = e->settings.machine.mass * e->settings.machine.gravity;
+    const tg_real weight = drive->mass * e->settings.machine.gravity;
     tg_real thrust = 0, least = s->push * weight;
     for (int32_t i = 0; i < e->settings.machine.wheels; i++) thrust += o[TG_OUT_ADHESION + i] * drive->load[i];
     if (least < 2 * e->settings.noise[TG_DRAWBAR_FORCE]) least = 2 * e->settings.noise[TG_DRAWBAR_FORCE];

@@ -130,25 +130,25 @@ static tg_real scale_of_walks(const tg_estimator *e, tg_real dt)
 
 /* What adhesion and resistance, walking at random within the step, do to the ground speed in it: a third of the walk times dt^2. The filter
  * itself lets them walk after the step, which at 1 Hz would make an outlier of every start. */
-static tg_real walking_forces(const tg_estimator *e, tg_real dt)
+static tg_real walking_forces(const tg_estimator *e, const tg_drive *drive, tg_real dt)
 {
     const tg_settings *s = &e->settings;
     const int32_t n = s->machine.wheels;
     tg_real walk = s->tuning.walk[2 * n + 1] * tgi_square(s->machine.gravity);
-    for (int32_t i = 0; i < n; i++) walk += s->tuning.walk[n + 1 + i] * tgi_square(e->held.load[i] * e->constants.inverse_mass);
+    for (int32_t i = 0; i < n; i++) walk += s->tuning.walk[n + 1 + i] * tgi_square(e->held.load[i] * drive->inverse_mass);
     return scale_of_walks(e, dt) * walk * dt * dt * dt / 3;
 }
 
 /* Input noise of the step that ends at `time`, from the inputs as they stood over it (physics.md 1: torque moves omega, drawbar
  * force and slope move v). */
-void tgi_input_noise(const tg_estimator *e, tg_real dt, tg_row *row, tg_real *q)
+void tgi_input_noise(const tg_estimator *e, const tg_drive *drive, tg_real dt, tg_row *row, tg_real *q)
 {
     const double time = row->time;
     const tg_settings *s = &e->settings;
     const tgi_constants *c = &e->constants;
     const int32_t n = s->machine.wheels;
     for (int32_t j = 0; j < TG_MAX_STATES; j++) q[j] = 0;
-    q[n] = walking_forces(e, dt);
+    q[n] = walking_forces(e, drive, dt);
     memset(row->shared, 0, sizeof row->shared);
     for (int32_t i = 0; i < n; i++)
         if (s->driven[i]) {
@@ -157,8 +157,8 @@ void tgi_input_noise(const tg_estimator *e, tg_real dt, tg_row *row, tg_real *q)
                  * tgi_square(c->inverse_inertia[i]);
         }
     if (e->drawbar.count > 0 || s->towing) {
-        row->shared[n] = shared_noise(&e->drawbar, dt, s->noise[TG_DRAWBAR_FORCE]) * tgi_square(c->inverse_mass);
-        q[n] += held_noise(e, &e->drawbar, time, dt, s->noise[TG_DRAWBAR_FORCE], c->unknown_pull) * tgi_square(c->inverse_mass);
+        row->shared[n] = shared_noise(&e->drawbar, dt, s->noise[TG_DRAWBAR_FORCE]) * tgi_square(drive->inverse_mass);
+        q[n] += held_noise(e, &e->drawbar, time, dt, s->noise[TG_DRAWBAR_FORCE], c->unknown_pull) * tgi_square(drive->inverse_mass);
     }
     if (e->pitch.count > 0)
         q[n] += held_noise(e, &e->pitch, time, dt, s->noise[TG_PITCH], tgi_square(s->tuned.unknown_slope)) * tgi_square(s->machine.gravity);
@@ -186,6 +186,7 @@ void tgi_take_inputs(tg_estimator *e, tg_row *row, tg_real dt, tg_drive *drive)
     drive->drawbar = e->drawbar.calm;
     drive->mean_drawbar = e->drawbar.mean;
     drive->calm_drawbar = e->drawbar.value;
+    tgi_weigh(e, row, drive);
     drive->slope = tgi_slope_update(e, row, e->pitch.value, dt);
     drive->cosine = tgi_cos(drive->slope);
     drive->sine = tgi_sin(drive->slope);
@@ -200,4 +201,6 @@ void tgi_along(const tg_estimator *e, const tg_drive *drive, tg_input *u)
     }
     u->drawbar = d * drive->drawbar;
     u->slope = d * drive->slope;
+    u->mass = e->mass.count > 0 ? drive->mass : 0;
+    u->hitch_load = drive->hitch_load;
 }

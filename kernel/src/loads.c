@@ -1,6 +1,66 @@
 /* Vertical loads of axles and wheels (physics.md 3), and the inputs of a row. */
 #include "estimator.h"
 
+#define TG_LEAST_MASS ((tg_real)0.2)  /* of the machine's: what a mass or what hangs on the hitch may be, beyond it is a defect of the log */
+#define TG_MOST_MASS 10
+#define TG_LEAST_HITCH ((tg_real)-0.5) /* of the weight */
+#define TG_MOST_HITCH 2
+
+/* Take a sample of mass or hitch load, between limits. */
+static void take(tg_estimator *e, tg_hold *h, tg_row *row, int32_t slot, tg_real least, tg_real most)
+{
+    const tg_real x = row->value[slot];
+    const int32_t defect = x < least || x > most;
+    row->outlier |= defect;
+    tgi_hold_update(h, &e->settings.tuned, defect ? (tg_real)NAN : x, row->time, 0, e->settings.noise[slot], 0, !e->standing);
+    row->outlier |= h->spike > 0 && h->time == row->time;
+}
+
+/* Mass and hitch load of the row: as last measured, else as the machine's file has them. */
+void tgi_weigh(tg_estimator *e, tg_row *row, tg_drive *drive)
+{
+    const tg_settings *s = &e->settings;
+    const tg_real mass = s->machine.mass, weight = mass * s->machine.gravity;
+    drive->mass = mass;
+    drive->inverse_mass = e->constants.inverse_mass;
+    if (s->weighed) take(e, &e->mass, row, TG_MASS, TG_LEAST_MASS * mass, TG_MOST_MASS * mass);
+    if (s->carrying) take(e, &e->hitch_load, row, TG_HITCH_LOAD, TG_LEAST_HITCH * weight, TG_MOST_HITCH * weight);
+    if (e->mass.count > 0) {
+        drive->mass = e->mass.value;
+        drive->inverse_mass = 1 / e->mass.value;
+    }
+    if (e->hitch_load.count > 0) drive->hitch_load = e->hitch_load.value;
+}
+
+/* Variance of such a value: its noise, and what it may have done from its last sample to the row before. */
+static tg_real held_variance(const tg_hold *h, double time, tg_real noise)
+{
+    const tg_real white = 2 * noise * noise, age = time > h->time ? (tg_real)(time - h->time) : 0;
+    const tg_real walk = h->interval > 0 && h->level > white ? (h->level - white) / h->interval : 0;
+    return h->variance + h->spike + walk * age;
+}
+
+/* Relative SD of the mass; before its first sample a payload is as unknown as a pull. */
+tg_real tgi_mass_spread(const tg_estimator *e)
+{
+    const tg_settings *s = &e->settings;
+    tg_real variance = tgi_square(s->uncertainty.mass);
+    if (s->weighed && e->mass.count == 0) variance += tgi_square(s->tuned.unknown_pull);
+    if (e->mass.count > 0) variance += held_variance(&e->mass, e->time, s->noise[TG_MASS]) / tgi_square(e->mass.value);
+    return tgi_sqrt(variance);
+}
+
+/* SD of the vertical hitch load, N. */
+tg_real tgi_hitch_spread(const tg_estimator *e)
+{
+    const tg_settings *s = &e->settings;
+    const tg_hold *const h = &e->hitch_load;
+    tg_real variance = tgi_square(s->uncertainty.hitch_load_gain * h->value) + tgi_square(s->uncertainty.hitch_load_offset);
+    const int32_t silent = h->count == 0 || e->time - h->time > (double)s->gap;
+    if (silent) variance += e->constants.unknown_pull;
+    return tgi_sqrt(h->count > 0 ? variance + held_variance(h, e->time, s->noise[TG_HITCH_LOAD]) : variance);
+}
+
 /* Specific force along the vehicle, dv/dt + g sin(slope): the accelerometer's where it is alive, else the balance of the estimated
  * forces; low-passed, for the loads do not follow a shock. */
 static tg_real specific_force(tg_estimator *e, const tg_row *row)
@@ -35,22 +95,33 @@ static void take_measured(tg_estimator *e, const tg_row *row, tg_real weight, tg
         if (!measured[k]) load[k] += (rest - computed) * s->load_share[k] / share;
 }
 
-/* F_k = share_k m g cos + transfer_k moment, the moment that lifts the front being m h (dv/dt + g sin) + F_dx h_d + sum J dw/dt.
- * A wheel keeps at least 2 % of its static load: the model divides by it. */
+/* F_k = share_k m g cos + transfer_k moment, the moment that lifts the front being m h (dv/dt + g sin) + F_dx h_d + sum J dw/dt; beside
+ * it what the vehicle carries more than the file says, with shares and a height of its own, and what hangs on the hitch. A wheel keeps at least 2 % of its static load: the model divides by it. */
 void tgi_loads(tg_estimator *e, const tg_row *row, tg_drive *drive)
 {
     const tg_settings *s = &e->settings;
     const tg_machine *m = &s->machine;
     tg_real a = specific_force(e, row), g = m->gravity;
-    tg_real weight = m->mass * g * drive->cosine;
+    tg_real weight = m->mass * g * drive->cosine, payload = drive->mass - m->mass;
     tg_real moment = m->mass * s->center_of_gravity_height * a + drive->calm_drawbar * s->hitch_height
                    + e->constants.spin_inertia * (a - g * drive->sine);
-    tg_real load[8];
+    tg_real load[8], lean = 1;
+    if (e->mass.count > 0) {
+        const tg_real height = m->mass * s->center_of_gravity_height + payload * s->payload_height;
+        moment += payload * s->payload_height * a;
+        if (s->center_of_gravity_height > 0) lean = height / (drive->mass * s->center_of_gravity_height);
+    }
     for (int32_t k = 0; k < s->axles; k++) load[k] = s->load_share[k] * weight - s->load_transfer[k] * moment;
+    if (e->mass.count > 0 || e->hitch_load.count > 0) {
+        const tg_real more = payload * g * drive->cosine;
+        for (int32_t k = 0; k < s->axles; k++) load[k] += s->payload_share[k] * more + s->hitch_share[k] * drive->hitch_load;
+        weight += more + drive->hitch_load;
+    }
     take_measured(e, row, weight, load);
 
     tg_real lateral = tgi_lowpass(&e->lateral, row->value[TG_ACCELERATION_Y], row->time, s->load_filter);
     if (!e->lateral.seen && !isnan(row->value[TG_ROLL])) lateral = g * tgi_sin(row->value[TG_ROLL]);
+    lateral *= lean;
     for (int32_t k = 0; k < s->axles; k++) drive->axle_load[k] = load[k];
     for (int32_t i = 0; i < m->wheels; i++) {
         tg_real least = e->constants.least_load[i], wheel = load[s->wheel_axle[i]] * (s->wheel_share[i] - s->lateral_share[i] * lateral);

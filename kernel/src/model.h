@@ -13,7 +13,7 @@ TG_INLINE void model_rates(const tg_filter *f, const tg_input *u, tg_real cosine
         rate[1 + i] = u->torque[i] * f->inverse_inertia[i] - (mu[i] + f->machine.tire_rolling_resistance) * u->load[i] * f->arm[i];
         traction += mu[i] * u->load[i];
     }
-    rate[0] = (traction - u->drawbar) * f->inverse_mass - f->machine.gravity * (rho * cosine + sine);
+    rate[0] = (traction - u->drawbar - rho * u->hitch_load) * tgi_inverse_mass(f, u) - f->machine.gravity * (rho * cosine + sine);
 }
 
 /* One step of the state (paper eq. 9) by Runge-Kutta 4 in equal substeps; mu and rho_s stay, so that v gains alike in every stage. */

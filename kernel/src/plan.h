@@ -25,12 +25,12 @@ TG_INLINE void plan_slope(const tg_filter *f, tg_real slope, tg_real *cosine, tg
 
 TG_INLINE tg_status plan_check_input(const tg_input *u, const int n)
 {
-    tg_real zero = u->drawbar * 0 + u->slope * 0;
+    tg_real zero = u->drawbar * 0 + u->slope * 0 + u->mass * 0 + u->hitch_load * 0;
     for (int i = 0; i < n; i++) zero += u->torque[i] * 0 + u->load[i] * 0;
     if (zero != 0) return TG_NOT_FINITE; /* NaN, from an infinite or NaN term */
     for (int i = 0; i < n; i++)
         if (!(u->load[i] > 0)) return TG_NOT_POSITIVE;
-    return TG_OK;
+    return u->mass < 0 ? TG_NOT_POSITIVE : TG_OK;
 }
 
 /* The one-step map (paper eq. 2 and 3): the closed form of Runge-Kutta 4 on physics.md 1, which is affine, in equal substeps of at most TG_SUBSTEP/stiffness. */
@@ -67,10 +67,10 @@ TG_INLINE tg_status plan_passage(const tg_filter *f, const tg_input *u, tg_real 
             p->psi[i] = whole_psi;
         }
     plan_slope(f, u->slope, &plan->cosine[0], &plan->sine[0]);
-    const tg_real per_mass = dt * f->inverse_mass, g = f->machine.gravity * dt;
+    const tg_real per_mass = dt * tgi_inverse_mass(f, u), g = f->machine.gravity * dt;
     p->dt = dt;
     p->keep = 1;
-    p->g = g * plan->cosine[0];
+    p->g = g * plan->cosine[0] + per_mass * u->hitch_load;
     for (int j = 0; j < TG_ROWS; j += TG_LANES) lanes_store(plan->shift + j, lanes_all(0));
     plan->shift[n + 1] = -per_mass * u->drawbar - g * plan->sine[0];
     for (int i = 0; i < n; i++) {
@@ -113,9 +113,10 @@ TG_INLINE tg_status plan_channels(const tg_filter *f, const tgi_call *call, tgi_
     for (int i = 0; i <= n; i++) plan->accelerometer[i] = 0;
     if (call->y[n + 1] != call->y[n + 1]) return TG_OK;
     plan_slope(f, call->now->slope, &plan->cosine[1], &plan->sine[1]);
-    for (int i = 0; i < n; i++) plan->accelerometer[i] = call->now->load[i] * f->inverse_mass;
-    plan->accelerometer[n] = -f->machine.gravity * plan->cosine[1];
-    plan->accelerometer_shift = -call->now->drawbar * f->inverse_mass;
+    const tg_real inverse_mass = tgi_inverse_mass(f, call->now);
+    for (int i = 0; i < n; i++) plan->accelerometer[i] = call->now->load[i] * inverse_mass;
+    plan->accelerometer[n] = -f->machine.gravity * plan->cosine[1] - call->now->hitch_load * inverse_mass;
+    plan->accelerometer_shift = -call->now->drawbar * inverse_mass;
     return TG_OK;
 }
 

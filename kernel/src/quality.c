@@ -8,7 +8,7 @@ static int is_repetition(const tg_estimator *e, int32_t slot, tg_real raw, doubl
 {
     tg_real period = e->settings.held_period[slot];
     if (!(period > 0) || raw != e->last_raw[slot]) return 0;
-    int may_repeat = raw == 0 || (slot > TG_GROUND_SPEED && slot < TG_ACCELERATION_X);
+    int may_repeat = raw == 0 || (slot > TG_GROUND_SPEED && slot < TG_ACCELERATION_X) || slot >= TG_MASS;
     return !may_repeat || time - e->last_raw_time[slot] < 1.5 * (double)period;
 }
 

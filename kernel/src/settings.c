@@ -154,7 +154,7 @@ static tg_status check_wheels(const tg_settings *s)
     }
     for (int32_t k = 0; k < s->axles; k++) {
         if (!is_positive(s->load_share[k])) return TG_NOT_POSITIVE;
-        if (!is_number(s->load_transfer[k])) return TG_NOT_FINITE;
+        if (!is_number(s->load_transfer[k]) || !is_number(s->payload_share[k]) || !is_number(s->hitch_share[k])) return TG_NOT_FINITE;
     }
     return TG_OK;
 }
@@ -163,7 +163,8 @@ static tg_status check_numbers(const tg_settings *s)
 {
     const tg_uncertainty *u = &s->uncertainty;
     const tg_real spreads[] = {u->drive_torque_gain, u->drive_torque_gain_common, u->drive_torque_offset, u->drawbar_gain, u->drawbar_offset, u->slope,
-                               u->tire_rolling_resistance, u->vertical_load, u->wheel_radius, u->acceleration_bias,
+                               u->tire_rolling_resistance, u->vertical_load, u->wheel_radius, u->acceleration_bias, u->mass, u->hitch_load_gain,
+                               u->hitch_load_offset, s->payload_height,
                                s->slope_spread, s->standstill_speed, s->dead_band, s->outlier_weight, s->load_filter, s->center_of_gravity_height,
                                s->hitch_height, s->watch.sure, s->watch.ahead, s->watch.most, s->watch.high_slip,
                                s->watch.stuck_duration, s->watch.stuck_travel, s->watch.free_travel, s->watch.push, s->watch.thrust,
@@ -203,8 +204,8 @@ static tg_real plausible(int32_t slot)
     if (slot < TG_ACCELERATION_X) return (tg_real)1e7; /* N m, N */
     if (slot < TG_PITCH) return (tg_real)1e3; /* m/s^2 */
     if (slot < TG_VERTICAL_LOAD) return (tg_real)1.5; /* rad */
-    if (slot < TG_YAW_RATE) return (tg_real)1e8; /* N */
-    return 100; /* rad/s */
+    if (slot == TG_YAW_RATE) return 100; /* rad/s */
+    return (tg_real)1e8; /* N, kg */
 }
 
 static int has_channel(const tg_settings *s, int32_t slot)
@@ -212,6 +213,8 @@ static int has_channel(const tg_settings *s, int32_t slot)
     const int32_t torque = slot - TG_DRIVE_TORQUE;
     if (slot < TG_GROUND_SPEED) return slot < s->machine.wheels;
     if (torque >= 0 && torque < TG_MAX_WHEELS) return torque < s->machine.wheels && s->driven[torque];
+    if (slot == TG_MASS) return s->weighed;
+    if (slot == TG_HITCH_LOAD) return s->carrying;
     return slot < TG_YAW_RATE ? slot - TG_VERTICAL_LOAD < s->axles : slot == TG_YAW_RATE;
 }
 

@@ -117,7 +117,7 @@ void tgi_traction(const tg_settings *restrict s, const tg_belief *restrict b, co
     tg_real thrust = 0;
     tgi_moments c;
     for (int32_t i = 0; i < n; i++) thrust += b->x[i] * scene->load[i];
-    thrust /= s->machine.mass * s->machine.gravity;
+    thrust /= scene->weight;
     gather(b, S, n, tgi_stride(n), &c);
     roughen(&c, b->x, scene, n);
     traction(s, b->x, &c, scene->hub, thrust, o, n);

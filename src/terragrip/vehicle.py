@@ -15,6 +15,7 @@ from pydantic import Field, model_validator
 
 from terragrip.document import Fault, Part, read_yaml, validate
 from terragrip.errors import InputError
+from terragrip.physics.loads import point_load_shares
 from terragrip.vehicle_parts import (
     NAME,
     Antenna,
@@ -27,6 +28,7 @@ from terragrip.vehicle_parts import (
     Length,
     Mass,
     Overhang,
+    Payload,
     Power,
     Sensors,
     ToolLength,
@@ -66,6 +68,7 @@ class Vehicle(Part):
     tire_rolling_resistance: Annotated[float, *quantity_of("1", 0, 0.5, likely=("%",))] = 0.0
     bearing_resistance: Bearing = 0.0
     antenna: Antenna | None = None
+    payload: Payload | None = None
     power: Power | None = None
     working_width: Width | None = None
     fuel: FuelPerEnergy | None = None
@@ -130,6 +133,12 @@ class Vehicle(Part):
                 f"the axles carry {carried:g} kg, the vehicle has {self.mass:g} kg",
                 "make the axles' masses add up to the mass",
                 ("axles",),
+            )
+        if self.payload is not None and not -0.5 <= self.payload.x / (self.wheelbase or np.inf) <= 1.5:
+            raise Fault(
+                f"{self.payload.x:g} m is far from between the axles, {self.wheelbase:g} m apart",
+                "count from the rear axle forward",
+                ("payload", "x"),
             )
         if self.driveline is not None and not self.knows_wheels:
             raise Fault("needs the wheels' radius and inertia", _ADD_WHEELS, ("driveline",))
@@ -219,6 +228,40 @@ class Vehicle(Part):
     def center_of_gravity_to_rear(self) -> float:
         """Distance of the centre of gravity to the rear axle [m], from the axles' masses; 0 with one axle."""
         return float(self.axle_mass @ self.axle_to_rear / self.axle_mass.sum())
+
+    @cached_property
+    def payload_share(self) -> Floats:
+        """Part of what is carried beside the file's mass that each axle carries (axles,): by ``payload``, else as the mass itself."""
+        if self.payload is None:
+            return _frozen(self.axle_mass / self.axle_mass.sum())
+        return _frozen(point_load_shares(self.axle_to_rear, self.payload.x))
+
+    @property
+    def payload_height(self) -> float:
+        """Height of its centre of gravity [m]: ``payload``'s, else the vehicle's own."""
+        height = None if self.payload is None else self.payload.z
+        return self.center_of_gravity_height if height is None else height
+
+    @cached_property
+    def hitch_share(self) -> Floats:
+        """Part of a vertical load on the hitch that each axle carries (axles,); below 0 where that lifts it."""
+        return _frozen(point_load_shares(self.axle_to_rear, -self.hitch_overhang))
+
+    def loaded(self, mass: float) -> Self:
+        """The vehicle when it weighs ``mass`` [kg], which `payload` says how to carry; raises InputError where an axle would lift."""
+        more = mass - self.mass
+        axles = {
+            name: axle.model_copy(update={"mass": axle.mass + more * float(share)})
+            for (name, axle), share in zip(self.axles.items(), self.payload_share, strict=True)
+        }
+        height = (self.mass * self.center_of_gravity_height + more * self.payload_height) / mass
+        data = self.to_dict() | {
+            "mass": mass,
+            "axles": {name: a.model_dump(exclude_unset=True) for name, a in axles.items()},
+        }
+        if "center_of_gravity_height" in data:
+            data["center_of_gravity_height"] = height
+        return self.from_dict(data)
 
     @cached_property
     def drive_torque_gain(self) -> Floats:

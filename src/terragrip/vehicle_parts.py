@@ -187,6 +187,13 @@ class Antenna(Part):
     z: _Offset = 0.0
 
 
+class Payload(Part):
+    """Centre of gravity of what is carried beside the file's ``mass``: from the rear axle ``x`` forward, ``z`` above the ground [m]."""
+
+    x: _Offset
+    z: Annotated[float, *quantity_of("m", 0, 6, likely=("mm", "cm"))] | None = None
+
+
 class Driveline(Part):
     """From the engine to the driven wheels, for machines that tell the engine's torque and not the wheels' (docs/vehicle.md).
 
@@ -215,6 +222,8 @@ class Sensors(Part):
     acceleration: _AccelerationSD | None = None
     pitch: _AngleSD | None = None
     vertical_load: _ForceSD | None = None
+    mass: Mass | None = None
+    hitch_load: _ForceSD | None = None
 
 
 class Uncertainty(Part):
@@ -229,6 +238,9 @@ class Uncertainty(Part):
     wheel_radius: _Ratio | None = None
     tire_rolling_resistance: _Ratio | None = None
     vertical_load: _Ratio | None = None
+    mass: _Ratio | None = None
+    hitch_load_gain: _Ratio | None = None
+    hitch_load_offset: _Force | None = None
     acceleration_bias: _Acceleration | None = None
 
 

@@ -74,11 +74,13 @@ def make_problem(
     accelerometer: bool = False,
     restarts: bool = False,
     steady_rate: bool = False,
+    loaded: bool = False,
 ) -> Problem:
     """Measurements that the model itself could have given, from a random start, with random inputs.
 
     condition: of P0. scale: P0 is multiplied by it. missing: share of values, and of whole instants.
-    spikes: share of values that are 10 to 1000 SDs off. steady_rate: a fixed dt.
+    spikes: share of values that are 10 to 1000 SDs off. steady_rate: a fixed dt. loaded: a mass that grows by
+    half, and a load on the hitch that comes and goes.
     """
     rng = np.random.default_rng(seed)
     sharing = np.random.default_rng([seed, 1])
@@ -100,9 +102,11 @@ def make_problem(
         spin = 2 * (8 * np.sin(phase + np.arange(n)) - wheel_speed)
         acceleration = 2 * (1.5 * np.cos(phase) - ground_speed) + 9.81 * np.sin(slope)
         drag = (adhesion + machine.tire_rolling_resistance) * load + machine.bearing_resistance * wheel_speed
-        thrust = adhesion @ load - resistance * machine.mass * 9.81 * np.cos(slope)
+        mass = machine.mass * (1.5 - 0.5 * np.cos(phase)) if loaded else machine.mass
+        hitch = 0.3 * machine.mass * 9.81 * np.sin(3 * phase) if loaded else 0.0
+        thrust = adhesion @ load - resistance * (mass * 9.81 * np.cos(slope) + hitch)
         torque = machine.inertia * spin + machine.radius * drag
-        return Input(torque, load, thrust - machine.mass * acceleration, slope)
+        return Input(torque, load, thrust - mass * acceleration, slope, mass if loaded else 0.0, hitch)
 
     instants = []
     before = driven(truth, 0.0)

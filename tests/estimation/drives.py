@@ -60,8 +60,16 @@ def drive(
     direction: int = 1,
     imu: bool = False,
     slope: Any = lambda t: 0.0 * t,
+    payload: Any = lambda t: 0.0 * t,
+    payload_at: tuple[float, float] = (0.0, 0.0),
+    hitch: Any = lambda t: 0.0 * t,
+    hitch_overhang: float = 0.0,
 ) -> Drive:
-    """``noise`` scales the sensors' white noise (0: exact). Backwards, ``direction`` -1, every signed signal is mirrored."""
+    """``noise`` scales the sensors' white noise (0: exact). Backwards, ``direction`` -1, every signed signal is mirrored.
+
+    ``payload`` [kg] at ``payload_at`` (m ahead of the rear axle, m high) and ``hitch``, what hangs on the hitch [N], make channels ``mass``
+    and ``hitch_load`` where they are not 0.
+    """
     rng = np.random.default_rng(seed)
     t = np.arange(0, seconds, 1 / rate)
     v, s, rho, theta = speed(t), slip(t), resistance(t), slope(t)
@@ -69,14 +77,21 @@ def drive(
     rim = v / (1 - s)
     spin = np.gradient(rim / RADIUS, t)
     mu = 0.5 * (1 - np.exp(-10 * s))
-    weight = MASS * GRAVITY * np.cos(theta)
+    more, hanging = payload(t), hitch(t)
+    mass = MASS + more
+    weight = mass * GRAVITY * np.cos(theta) + hanging  # what the wheels carry
     # loads sum to the weight whatever the transfer, and all wheels share one adhesion: the pull follows at once
-    pull = mu * weight - rho * weight - MASS * (acceleration + GRAVITY * np.sin(theta))
+    pull = mu * weight - rho * weight - mass * (acceleration + GRAVITY * np.sin(theta))
     axles = axle_loads(
         (54.0, 85.0), (0.638, 0.0), center_of_gravity_height=0.30, hitch_height=0.25,
         drawbar=direction * pull, acceleration=direction * acceleration, slope=direction * theta,
         spin_torque=direction * 4 * INERTIA * acceleration / RADIUS,
     )  # fmt: skip
+    ahead, height = payload_at
+    moment = more * GRAVITY * np.cos(theta) * ahead - hanging * hitch_overhang
+    moment -= more * direction * (acceleration + GRAVITY * np.sin(theta)) * height
+    front = moment / 0.638  # about the rear axle
+    axles += np.stack([front, more * GRAVITY * np.cos(theta) + hanging - front], axis=1)
     loads = np.repeat(axles / 2, 2, axis=1)
     channels = {"ground_speed": direction * v + 0.02 * noise * rng.standard_normal(len(t))}
     truth = {"ground_speed": direction * v, "soil_resistance": rho}
@@ -93,6 +108,10 @@ def drive(
         force = direction * (acceleration + GRAVITY * np.sin(theta))
         channels["acceleration_x"] = force + 0.1 * noise * rng.standard_normal(len(t))
         channels["pitch"] = direction * theta + 0.002 * noise * rng.standard_normal(len(t))
+    if more.any():
+        channels["mass"] = mass + 0.5 * noise * rng.standard_normal(len(t))
+    if hanging.any():
+        channels["hitch_load"] = hanging + 4 * noise * rng.standard_normal(len(t))
     truth |= {"vertical_load_front": axles[:, 0], "vertical_load_rear": axles[:, 1]}
     return Drive(Recording(t, channels), truth)
 

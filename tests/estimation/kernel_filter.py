@@ -123,6 +123,7 @@ def kernel_input(u: Any) -> Any:
     out.torque[0 : len(u.torque)] = u.torque.tolist()
     out.load[0 : len(u.load)] = u.load.tolist()
     out.drawbar, out.slope = float(u.drawbar), float(u.slope)
+    out.mass, out.hitch_load = float(u.mass), float(u.hitch_load)
     return out
 
 

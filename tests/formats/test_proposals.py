@@ -376,3 +376,25 @@ def test_measured_headers_leaving_one_logger_out(shared: Callable[[str], Path]) 
     right = total["right"] + total["right, with a ?"]
     assert right >= 0.85 * (right + total["left open"] + total["wrong, with a ?"] + total["wrong and sure"])
     assert total["wrong and sure"] <= 2
+
+
+@pytest.mark.parametrize(
+    ("column", "channel"),
+    [
+        ("Machine weight [t]", "mass"),
+        ("vehicle_mass_kg", "mass"),
+        ("Fahrzeugmasse", "mass"),
+        ("Hitch vertical force [kN]", "hitch_load"),
+        ("Hitch draft [kN]", "drawbar_force"),
+        ("Tank weight [kg]", None),
+        ("Air mass flow", None),
+        ("Weight front axle", None),
+        ("Payload mass", None),
+    ],
+)
+def test_masses_and_hitch_forces_by_their_names(column, channel):
+    from terragrip.formats.candidates import candidates_of, columns_of
+    from terragrip.formats.vocabulary import GENERAL
+
+    found = candidates_of(columns_of([column], {}, {}, GENERAL)[column])
+    assert [one.channel for one in found] == ([] if channel is None else [channel])

@@ -33,6 +33,8 @@ _WHOLE = {
     "altitude": Column("m", "measured altitude"),
     "fuel_rate": Column("m^3/s", "measured fuel rate of the engine"),
     "drawbar_force": Column("N", "measured drawbar force, backward pull positive"),
+    "mass": Column("kg", "measured mass of the whole machine"),
+    "hitch_load": Column("N", "measured vertical load on the hitch, down positive"),
 }  # fmt: skip
 _WHOLE |= {
     "wheel_speed_driven": Column("rad/s", "mean angular velocity of the driven wheels"),

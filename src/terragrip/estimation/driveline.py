@@ -160,15 +160,19 @@ class ByEngine:
         kept = {n: v for n, v in given.items() if not n.startswith(_REPLACED)}
         return replace(log, channels={**own, **kept}).select(slice(before, None)), drive
 
+    def _weight(self, columns: dict[str, Floats]) -> Floats | float:
+        """What the wheels carry (n,) [N]: the machine's weight, unless the log says that it changes."""
+        if not {"mass", "hitch_load"} & set(self.whole.channels):
+            return self.vehicle.mass * GRAVITY
+        loads = [columns[f"vertical_load_{axle}"] for axle in self.vehicle.axle_names]
+        return np.asarray(np.sum(loads, axis=0))
+
     def _completed(self, part: Estimates, drive: DrivelineTorque) -> Estimates:
         columns = dict(part.columns)
         machine = self.vehicle
         radius = float(machine.wheel_radius[list(machine.wheels).index(DRIVEN)])
         force = drive.std / radius
-        by_adhesion, by_resistance = (
-            force / columns[f"vertical_load_{DRIVEN}"],
-            force / (machine.mass * GRAVITY),
-        )
+        by_adhesion, by_resistance = force / columns[f"vertical_load_{DRIVEN}"], force / self._weight(columns)
         mu, rho = columns["adhesion_driven"], columns["soil_resistance"]
         widen = {
             "adhesion_driven": by_adhesion,
@@ -253,8 +257,9 @@ def lumped(vehicle: Vehicle, zero: tuple[float, float] | None) -> dict[str, Any]
         },
         "uncertainty": _uncertainty(vehicle, zero),
     }
-    if vehicle.antenna is not None:
-        data["antenna"] = {**data["antenna"], "x": vehicle.antenna.x - rear}
+    for key, point in (("antenna", vehicle.antenna), ("payload", vehicle.payload)):
+        if point is not None:
+            data[key] = {**data[key], "x": point.x - rear}
     if len(groups) > 1:
         data["wheelbase"] = groups[0][0] - rear
         if data["wheelbase"] < 0.1 * float(

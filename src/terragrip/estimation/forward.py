@@ -21,7 +21,7 @@ Floats = npt.NDArray[np.float64]
 Codes = npt.NDArray[np.uint8]
 
 GAP = EVENTS.index("gap")
-_PASSED_ON = ("latitude", "longitude", "altitude", "fuel_rate")
+_PASSED_ON = ("latitude", "longitude", "altitude", "fuel_rate", "mass", "hitch_load")
 
 
 def run(

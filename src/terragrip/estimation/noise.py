@@ -117,4 +117,6 @@ def _guesses(vehicle: Vehicle) -> dict[str, float]:
         "pitch": 0.01,
         "yaw_rate": 0.01,
         "vertical_load": 0.02 * weight,
+        "hitch_load": 0.02 * weight,
+        "mass": 0.01 * vehicle.mass,
     }

@@ -15,6 +15,7 @@ from terragrip.errors import InputError
 from terragrip.estimation.methods import Method
 from terragrip.physics.loads import GRAVITY, load_levers, wheel_shares
 from terragrip.physics.radius import biderman_deflection, hadekel_deflection, loaded_radius, rolling_radius
+from terragrip.recording.checks import require_hitch
 from terragrip.vehicle import Vehicle
 from terragrip.vehicle_parts import BidermanRadius, HadekelRadius, Wheel
 
@@ -71,6 +72,8 @@ def sample_slots(vehicle: Vehicle) -> dict[str, int]:
         "roll": lib.TG_ROLL,
         "angular_velocity_z": lib.TG_YAW_RATE,
         **{f"vertical_load_{a}": lib.TG_VERTICAL_LOAD + k for k, a in enumerate(vehicle.axle_names)},
+        "mass": lib.TG_MASS,
+        "hitch_load": lib.TG_HITCH_LOAD,
     }
 
 
@@ -86,9 +89,10 @@ def settings_of(
     """A tg_settings for the vehicle.
 
     ``noise``: SD of each channel the estimator looks at, SI. ``held``: update period [s] of held channels.
-    ``channels``: the columns that samples will carry, which tells whether a drawbar force and the torque of an
-    undriven wheel are measured.
+    ``channels``: the columns that samples will carry, which tells whether drawbar force, mass, hitch load and the torque of an
+    undriven wheel are measured. Raises InputError where the vehicle lacks what one of them needs.
     """
+    require_hitch(vehicle, channels)
     settings = ffi.new("tg_settings *", lib.tg_default_settings())
     settings.method = method.kind
     settings.tuning.engine = method.engine
@@ -96,6 +100,7 @@ def settings_of(
     settings.tuning.supervisor = method.supervisor
     put_axles(settings, vehicle)
     settings.towing = "drawbar_force" in channels
+    settings.weighed, settings.carrying = "mass" in channels, "hitch_load" in channels
     _set_wheels(settings, vehicle, channels)
     lib.tg_tune_walks(settings)
     _set_loads(settings, vehicle)
@@ -174,6 +179,9 @@ def _set_loads(settings: Any, vehicle: Vehicle) -> None:
     """Heights and shares of the load formulas (physics.md 3), which physics.loads has."""
     settings.center_of_gravity_height = vehicle.center_of_gravity_height
     settings.hitch_height = vehicle.hitch_height
+    settings.payload_height = vehicle.payload_height
+    for k in range(len(vehicle.axle_names)):
+        settings.payload_share[k], settings.hitch_share[k] = vehicle.payload_share[k], vehicle.hitch_share[k]
     level, leaning = wheel_shares(
         [len(axle.wheels) for axle in vehicle.axles.values()],
         center_of_gravity_height=vehicle.center_of_gravity_height,
@@ -208,6 +216,9 @@ def _set_uncertainty(settings: Any, vehicle: Vehicle, pitch_measured: bool) -> N
         "drawbar_offset",
         "tire_rolling_resistance",
         "vertical_load",
+        "mass",
+        "hitch_load_gain",
+        "hitch_load_offset",
         "wheel_radius",
         "acceleration_bias",
     ):

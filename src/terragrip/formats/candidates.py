@@ -15,6 +15,7 @@ from terragrip.units import UnitError, factor_to, parse_unit
 _KINDS = {
     (0, 1, -1, 0): "speed", (0, 0, -1, 0): "rotation", (1, 2, -2, 0): "torque", (0, 0, 0, 1): "current", (1, 1, -2, 0): "force",
     (0, 1, -2, 0): "acceleration", (0, 1, 0, 0): "length", (0, 0, 0, 0): "angle", (0, 0, 1, 0): "time",
+    (1, 0, 0, 0): "mass",
 }  # fmt: skip
 _MISSPELT = re.compile(r"ms(\^?-?2|²|\^?-1|⁻[¹²])")  # m/s^2 or m/s, which read as powers of milliseconds
 ON_THE_BUS = "a signal of J1939, ISO 11783 or NMEA 2000"
@@ -200,6 +201,16 @@ def _of_place(column: Column) -> list[Candidate]:
             return [Candidate(channel, own, 0.85 if whole else 0.75, "its name")]
     if name.has("altitude"):
         return [Candidate("altitude", own, 0.85, "its name")]
+    if name.has("coupling") and name.has("vertical") and (name.has("force") or column.kind == "force"):
+        return [Candidate("hitch_load", own, 0.75, "a vertical force at the hitch")]
+    if name.has("mass") and not (
+        name.strange or name.wheel or name.has("wheel", "front", "rear", "motor", "coupling")
+    ):
+        return [
+            Candidate(
+                "mass", own, 0.85 if name.has("body") else 0.6, "a mass, of nothing less than the machine"
+            )
+        ]
     if name.has("pull") or (name.has("force") and (name.has("coupling") or "tow" in name.words)):
         return [Candidate("drawbar_force", own, 0.85, "a pull")]
     return []

@@ -34,6 +34,7 @@ MEANINGS: dict[str, str] = {
     "pull": "drawbar draft pull traction zugkraft tiro trekkracht",
     "coupling": "hitch towing trailer",
     "force": "force kraft fuerza forza",
+    "mass": "mass weight masse gewicht poids peso massa",
     "distance": "distance odometer",
     "time": "time timestamp stamp unix epoch clock utc zeit temps tiempo tempo tijd tow",
     # what it is of
@@ -79,7 +80,7 @@ UNIT_WORDS = {
     "millisecond": "ms", "microsecond": "us", "nanosecond": "ns",
     "millis": "ms", "ms": "ms", "milliseconds": "ms", "micros": "us", "us": "us", "microseconds": "us", "nanos": "ns",
     "ns": "ns", "nanoseconds": "ns", "nsec": "ns", "usec": "us", "msec": "ms", "a": "A", "amps": "A", "ma": "mA",
-    "percent": "%", "pct": "%",
+    "percent": "%", "pct": "%", "kg": "kg",
 }  # fmt: skip
 _ALWAYS = ("rpm", "rps", "kmh", "kph", "kmph", "mph", "mps")  # mean a unit wherever they stand
 _PER = re.compile(r"(km|m|mm|cm|mi|rad|deg|rev|ft)p(s|h|hr|min)(2?)$")

@@ -137,7 +137,7 @@ def _torque_constant(vehicle: Vehicle, mu: Floats, wheel: int) -> Floats:
     known = vehicle.uncertainty
     share = np.hypot.reduce([
         known.drive_torque_gain or 0.0, known.drive_torque_gain_common or 0.0,
-        known.vertical_load or 0.0, known.wheel_radius or 0.0,
+        known.vertical_load or 0.0, known.mass or 0.0, known.wheel_radius or 0.0,
     ])  # fmt: skip
     load = vehicle.axle_mass[vehicle.wheel_axle[wheel]] / np.sum(
         vehicle.wheel_axle == vehicle.wheel_axle[wheel]

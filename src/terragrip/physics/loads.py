@@ -74,18 +74,28 @@ def axle_loads(
         for value in (drawbar, hitch_load, acceleration, slope, spin_torque)
     )
     static = mass * gravity * np.cos(slope)
+    hanging = hitch_load * point_load_shares(position, -hitch_overhang)
     if mass.size == 1:
         shape = np.broadcast_shapes(
             *(v.shape for v in (drawbar, hitch_load, acceleration, slope, spin_torque))
         )
-        return np.broadcast_to(static + hitch_load, shape).copy()
+        return np.broadcast_to(static + hanging, shape).copy()
     moment = (  # about the rear contact, nose down positive, of all that is added to the static weight
         -np.sum(mass) * (acceleration + gravity * np.sin(slope)) * center_of_gravity_height
         - drawbar * hitch_height
-        - hitch_load * hitch_overhang
         - spin_torque
     )
-    return static + hitch_load / mass.size + (moment - hitch_load * np.mean(position)) * load_levers(position)
+    return static + hanging + moment * load_levers(position)
+
+
+def point_load_shares(axle_position: ArrayLike, position: float) -> NDArray[Any]:
+    """Part of a vertical force that each axle carries (axles,): x/L and 1 - x/L of two (physics.md 3).
+
+    Of any number 1/n + lever (x - mean position). ``axle_position``: (axles,) m ahead of the rear axle. ``position``: x, where the
+    force acts, likewise: behind the rear axle it is negative, and so is the front axle's part. A single axle carries all.
+    """
+    axles = np.asarray(axle_position, dtype=float)
+    return 1 / axles.size + load_levers(axles) * (position - np.mean(axles))
 
 
 def load_levers(axle_position: ArrayLike) -> NDArray[Any]:

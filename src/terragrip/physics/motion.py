@@ -44,14 +44,15 @@ def ground_acceleration(
     *,
     mass: ArrayLike,
     gravity: ArrayLike,
+    hitch_load: ArrayLike = 0.0,
 ) -> NDArray[Any]:
-    """dv/dt = Σ μ_i F_zi/m - F_dx/m - ρ_s g cosθ - g sinθ, m/s² (paper eq. 3, where θ = 0).
+    """dv/dt = Σ μ_i F_zi/m - F_dx/m - ρ_s (g cosθ + F_dz/m) - g sinθ, m/s² (paper eq. 3, where θ and F_dz are 0).
 
     adhesion and load (..., wheels), load in N; drawbar F_dx N, backward pull positive; soil_resistance ρ_s;
-    slope θ rad, uphill positive; mass kg; gravity m/s². Returns (...).
+    slope θ rad, uphill positive; mass kg; gravity m/s²; hitch_load F_dz N, what hangs on the hitch, down positive. Returns (...).
     """
     return specific_force(
-        adhesion, load, drawbar, soil_resistance, slope, mass=mass, gravity=gravity
+        adhesion, load, drawbar, soil_resistance, slope, mass=mass, gravity=gravity, hitch_load=hitch_load
     ) - np.asarray(gravity) * np.sin(slope)
 
 
@@ -64,15 +65,18 @@ def specific_force(
     *,
     mass: ArrayLike,
     gravity: ArrayLike,
+    hitch_load: ArrayLike = 0.0,
 ) -> NDArray[Any]:
-    """What an accelerometer along the vehicle reads: a_x = (Σ μ_i F_zi - F_dx)/m - ρ_s g cosθ, m/s²
+    """What an accelerometer along the vehicle reads: a_x = (Σ μ_i F_zi - F_dx)/m - ρ_s (g cosθ + F_dz/m), m/s²
     (physics.md 1).
 
     It is dv/dt + g sinθ, so it does not see the slope but through cosθ. Arguments and shape as in
     :func:`ground_acceleration`; a bias of the sensor is not in it.
     """
     thrust = np.sum(np.asarray(adhesion) * np.asarray(load), axis=-1)
-    resistance = np.asarray(soil_resistance) * gravity * np.cos(slope)
+    resistance = np.asarray(soil_resistance) * (
+        gravity * np.cos(slope) + np.asarray(hitch_load) / np.asarray(mass)
+    )
     return (thrust - np.asarray(drawbar)) / np.asarray(mass) - resistance
 
 
@@ -106,11 +110,13 @@ def algebraic_soil_resistance(
     *,
     mass: ArrayLike,
     gravity: ArrayLike,
+    hitch_load: ArrayLike = 0.0,
 ) -> NDArray[Any]:
-    """ρ_s = (Σ μ_i F_zi - F_dx - m dv/dt - m g sinθ)/(m g cosθ): eq. 3 solved for the resistance (physics.md 1).
+    """ρ_s = (Σ μ_i F_zi - F_dx - m dv/dt - m g sinθ)/(m g cosθ + F_dz): eq. 3 solved for the resistance (physics.md 1).
 
     acceleration dv/dt in m/s², not the specific force; the others as in :func:`ground_acceleration`.
     Returns (...).
     """
     without_resistance = ground_acceleration(adhesion, load, drawbar, 0.0, slope, mass=mass, gravity=gravity)
-    return (without_resistance - np.asarray(acceleration)) / (np.asarray(gravity) * np.cos(slope))
+    normal = np.asarray(gravity) * np.cos(slope) + np.asarray(hitch_load) / np.asarray(mass)
+    return (without_resistance - np.asarray(acceleration)) / normal

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
@@ -10,7 +11,13 @@ import numpy.typing as npt
 from terragrip.errors import InputError, nearest
 from terragrip.recording.schema import LABELS, TIME, is_channel
 
+if TYPE_CHECKING:
+    from terragrip.vehicle import Vehicle
+
 Floats = npt.NDArray[np.float64]
+
+MASSES = (0.2, 10.0)
+"""What a measured mass may be of the vehicle file's; the kernel passes over others (loads.c)."""
 
 _ESSENTIAL = ("wheel_speed_", "wheel_based_speed", "drive_torque_", "ground_speed", "drawbar_force")
 
@@ -53,6 +60,54 @@ def remarks(columns: Collection[str]) -> list[str]:
     if "drawbar_force" not in columns:
         notes.append("There is no drawbar_force: the vehicle is taken to tow nothing.")
     return notes
+
+
+def require_hitch_height(vehicle: Vehicle, channels: Collection[str], source: str | None = None) -> None:
+    """Raise InputError where a pull moves load between axles and the vehicle does not say at what height."""
+    if (
+        "drawbar_force" in channels
+        and len(vehicle.axles) > 1
+        and "hitch_height" not in vehicle.model_fields_set
+    ):
+        hint = "add e.g. 'hitch_height: 0.25 m' to the vehicle file"
+        problem = "the pull moves load between the axles, but the vehicle has no hitch_height"
+        raise InputError(
+            problem, file=source, place="column drawbar_force", hint=hint, page="vehicle#all-keys"
+        )
+
+
+def require_hitch(vehicle: Vehicle, channels: Collection[str], source: str | None = None) -> None:
+    """Raise InputError where a load on the hitch moves load between axles and the vehicle does not say where it acts."""
+    if (
+        "hitch_load" in channels
+        and len(vehicle.axles) > 1
+        and "hitch_overhang" not in vehicle.model_fields_set
+    ):
+        hint = (
+            "add e.g. 'hitch_overhang: 1.1 m', from the last axle back to where it hangs, to the vehicle file"
+        )
+        problem = "it moves load between the axles, but the vehicle has no hitch_overhang"
+        raise InputError(problem, file=source, place="column hitch_load", hint=hint, page="vehicle#all-keys")
+
+
+def refuse_other_mass(vehicle: Vehicle, channels: Mapping[str, Floats], source: str | None = None) -> None:
+    """Raise InputError where most of a measured mass cannot be this vehicle's."""
+    known = channels.get("mass", np.empty(0))
+    known = known[np.isfinite(known)]
+    if not len(known):
+        return
+    middle = float(np.median(known))
+    if MASSES[0] * vehicle.mass <= middle <= MASSES[1] * vehicle.mass:
+        return
+    hint = (
+        "it is of the whole machine, in kg: give its unit in the profile, or correct the vehicle file's mass"
+    )
+    for unit, factor in (("t", 1e3), ("lb", 0.45359237), ("g", 1e-3)):
+        if 0.7 < middle * factor / vehicle.mass < 4:
+            hint = f"in {unit}? write 'unit: {unit}' for it in the profile"
+            break
+    problem = f"reads {middle:.4g} kg, the vehicle file has {vehicle.mass:.4g} kg"
+    raise InputError(problem, file=source, place="column mass", hint=hint, page="vehicle#a-mass-that-changes")
 
 
 def check_time(time: Floats, source: str | None, *, first_row: int = 0, after: float | None = None) -> None:

@@ -17,6 +17,8 @@ CHANNELS = {
     "engine_reference_torque": "N m",
     "fuel_rate": "m^3/s",
     "drawbar_force": "N",
+    "hitch_load": "N",  # what hangs on the hitch presses down on it: the vertical force, down positive
+    "mass": "kg",  # of the whole machine, without what is towed
     "acceleration_x": "m/s^2",
     "acceleration_y": "m/s^2",
     "acceleration_z": "m/s^2",

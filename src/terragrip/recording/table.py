@@ -213,11 +213,9 @@ class Recording:
                 hint = "add it, or say 'driven: false' for its axle in the vehicle file"
                 problem = f"is missing, but the wheel {wheel} is driven"
                 raise self._unfit(f"drive_torque_{wheel}", problem, hint, "vehicle#signals-that-are-missing")
-        towing = "drawbar_force" in self.channels and len(vehicle.axles) > 1
-        if towing and "hitch_height" not in vehicle.model_fields_set:
-            hint = "add e.g. 'hitch_height: 0.25 m' to the vehicle file"
-            problem = "the pull moves load between the axles, but the vehicle has no hitch_height"
-            raise self._unfit("drawbar_force", problem, hint, "vehicle#all-keys")
+        checks.require_hitch_height(vehicle, self.channels, self.source)
+        checks.require_hitch(vehicle, self.channels, self.source)
+        checks.refuse_other_mass(vehicle, self.channels, self.source)
 
     def _unfit(self, column: str, problem: str, hint: str, page: str | None = None) -> InputError:
         return InputError(problem, file=self.source, place=f"column {column}", hint=hint, page=page)

@@ -17,6 +17,8 @@ TITLES = {
     "ground_speed": "speed over ground",
     "wheel_based_speed": "speed of the drive train, the wheels as one",
     "drawbar_force": "pull at the hitch, backward positive",
+    "hitch_load": "vertical load on the hitch, down positive",
+    "mass": "mass of the whole machine, where it changes",
     "acceleration_x": "acceleration forward",
     "pitch": "pitch, nose up positive",
     "roll": "roll",

@@ -32,7 +32,24 @@ from terragrip.vehicle import Vehicle
 
 _SLOPE, _PITCH_ZERO = float(np.radians(0.5)), float(np.radians(0.2))  # priors where the vehicle states none
 _UNSTATED_RADIUS = 0.02  # relative, likewise
+_OTHER_LOAD = 0.02  # of the mass, by which the load may differ
 _SENSOR_BIAS = 0.03  # m/s^2, likewise, of an accelerometer
+
+
+def _refuse_other_load(log: Recording, vehicle: Vehicle) -> None:
+    """Raise InputError where a log's machine is not loaded as the vehicle file has it: torque gains are told by its weight."""
+    for name, usual in (("mass", vehicle.mass), ("hitch_load", 0.0)):
+        values = log.channels.get(name, np.empty(0))
+        known = values[np.isfinite(values)]
+        weight = vehicle.mass * (1.0 if name == "mass" else GRAVITY)
+        if len(known) and np.quantile(np.abs(known - usual), 0.9) > _OTHER_LOAD * weight:
+            unit = "kg" if name == "mass" else "N"
+            raise InputError(
+                f"calibrate needs the load of the vehicle file, {usual:.4g} {unit}; here it is up to {np.max(known):.4g}",
+                file=log.source,
+                place=f"column {name}",
+                hint="drive with tanks as the file has them and no tool on the hitch, or give a vehicle file of that load",
+            )
 
 
 def calibrate(
@@ -68,6 +85,7 @@ def calibrate(
         return replace(calibrate_radii(logs, vehicle, sources, light), notes=doubts)
     for log in logs:
         log.check_against(vehicle)
+        _refuse_other_load(log, vehicle)
     logs = [without_held(log) for log in logs]
     quantities, unknown, yaw_zero = _zeros(logs, vehicle, sources)
     zeroed = Calibration(tuple(quantities), ()).apply(vehicle)

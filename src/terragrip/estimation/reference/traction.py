@@ -49,6 +49,10 @@ class Input:
     """F_dx, N, backward pull positive."""
     slope: Any = 0.0
     """θ, rad, uphill positive."""
+    mass: Any = 0.0
+    """m, kg; 0: the machine's."""
+    hitch_load: Any = 0.0
+    """F_dz, N, what hangs on the hitch, down positive."""
 
     def in_precision(self, dtype: Any) -> Input:
         """The same input in numbers of another dtype."""
@@ -76,6 +80,10 @@ class TractionModel:
         n = self.wheels
         return x[..., :n], x[..., n], x[..., n + 1 : 2 * n + 1], x[..., 2 * n + 1]
 
+    def mass(self, u: Input) -> Any:
+        """m of the moment, kg."""
+        return u.mass if u.mass != 0 else self.machine.mass
+
     def derivative(self, x: Vector, u: Input) -> Vector:
         """dx/dt (..., 2n+2) by paper eq. 2 and 3; μ and ρ_s stay (they walk by the process noise)."""
         wheel_speed, _, adhesion, soil_resistance = self.split(x)
@@ -91,7 +99,14 @@ class TractionModel:
             bearing_resistance=machine.bearing_resistance,
         )
         acceleration = ground_acceleration(
-            adhesion, u.load, u.drawbar, soil_resistance, u.slope, mass=machine.mass, gravity=machine.gravity
+            adhesion,
+            u.load,
+            u.drawbar,
+            soil_resistance,
+            u.slope,
+            mass=self.mass(u),
+            gravity=machine.gravity,
+            hitch_load=u.hitch_load,
         )
         still = np.zeros((*x.shape[:-1], self.wheels + 1), spin.dtype)
         return np.concatenate([spin, acceleration[..., np.newaxis], still], axis=-1)
@@ -112,8 +127,8 @@ class TractionModel:
         wheel = np.arange(n)
         A[wheel, wheel] = -machine.radius * machine.bearing_resistance / machine.inertia
         A[wheel, n + 1 + wheel] = -machine.radius * u.load / machine.inertia
-        A[n, n + 1 : 2 * n + 1] = u.load / machine.mass
-        A[n, 2 * n + 1] = -machine.gravity * np.cos(u.slope)
+        A[n, n + 1 : 2 * n + 1] = u.load / self.mass(u)
+        A[n, 2 * n + 1] = -machine.gravity * np.cos(u.slope) - u.hitch_load / self.mass(u)
         return A
 
     def transition_matrix(self, x: Vector, u: Input, dt: Any) -> Matrix:
@@ -136,8 +151,9 @@ class TractionModel:
             u.drawbar,
             soil_resistance,
             u.slope,
-            mass=self.machine.mass,
+            mass=self.mass(u),
             gravity=self.machine.gravity,
+            hitch_load=u.hitch_load,
         )
         return np.concatenate([x[..., : self.wheels + 1], force[..., np.newaxis]], axis=-1)
 
