@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -119,6 +119,7 @@ def command(
         ground=ground,
         library=_library(library),
         setpoint=_setpoint(setpoint, speed),
+        driveline=known["driveline"],
     )
     from terragrip.log_events import emit
 
@@ -135,18 +136,22 @@ def command(
             print(f"Recorded in {record}")
 
 
-def _settings(path: Path | None) -> dict[str, dict[str, float]]:
-    """Noise and update periods that estimates were made with; raises InputError where the file does not hold them."""
+def _settings(path: Path | None) -> dict[str, Any]:
+    """Noise, update periods and driveline that estimates were made with; raises InputError where the file does not hold them."""
     if path is None:
-        return {"noise": {}, "held": {}}
+        return {"noise": {}, "held": {}, "driveline": None}
     from terragrip.estimation import Estimates
 
-    known = Estimates.read_about(path).get("settings", {})
+    about = Estimates.read_about(path)
+    known = about.get("settings", {})
     if not {"noise", "held"} <= set(known):
         raise InputError(
             "holds no settings", file=path, place="--settings", hint="estimate the log anew with this version"
         )
-    return {"noise": known["noise"], "held": known["held"]}
+    driveline = about.get("driveline")
+    if driveline is not None and "engine" not in driveline:
+        driveline = None  # of an earlier version
+    return {"noise": known["noise"], "held": known["held"], "driveline": driveline}
 
 
 def _held(pairs: list[str]) -> dict[str, float]:

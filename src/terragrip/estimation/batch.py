@@ -6,7 +6,8 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from terragrip.estimation.driveline import ByEngine, by_engine
+from terragrip.estimation.by_engine import ByEngine
+from terragrip.estimation.driveline import by_engine
 from terragrip.estimation.estimates import Estimates
 from terragrip.estimation.estimator import TractionEstimator
 from terragrip.estimation.forward import flag_before_gaps, passed_on, run
@@ -91,17 +92,17 @@ def estimated(
     estimated. ``together``: see :class:`TractionEstimator`. Raises InputError as :func:`estimate` does, each when its block is reached.
     """
     options = options or RunOptions()
-    if vehicle.driveline is not None and by_engine(whole := log.whole(), vehicle):
-        machine = ByEngine(whole, vehicle)
-        yield from machine.completed(
+    if vehicle.driveline is not None and by_engine((whole := log.whole()).channels, vehicle):
+        driven = ByEngine(whole, vehicle)
+        yield from driven.completed(
             estimated(
-                machine.log(log),
-                machine.vehicle,
+                driven.log(log),
+                driven.machine.vehicle,
                 options,
                 beside=beside,
                 planned=planned,
                 progress=progress,
-                together=machine.together,
+                together=driven.machine.together,
             )
         )
         return

@@ -6,9 +6,8 @@ The driven wheels become one wheel, ``driven``, and the free ones another, ``und
 
 from __future__ import annotations
 
-from collections import deque
-from collections.abc import Iterator
-from dataclasses import dataclass, field, replace
+from collections.abc import Collection, Mapping
+from dataclasses import asdict, dataclass
 from functools import cached_property
 from typing import Any
 
@@ -16,18 +15,17 @@ import numpy as np
 import numpy.typing as npt
 
 from terragrip.estimation.engine_torque import (
-    TAIL,
     DrivelineTorque,
     EngineTorque,
     driveline_torque,
     tells_engine_torque,
 )
 from terragrip.estimation.estimates import Estimates
-from terragrip.estimation.rims import DRIVE, speeds_alone
+from terragrip.estimation.rims import DRIVE, Rim, rims_of, speeds_alone
 from terragrip.estimation.settings import wheel_radii
-from terragrip.estimation.slip_only import WHAT_IS_MISSING, slip_reference_in
+from terragrip.estimation.slip_only import SlipReference
 from terragrip.physics.loads import GRAVITY
-from terragrip.recording import LogBlocks, Recording
+from terragrip.recording import Recording
 from terragrip.vehicle import Vehicle
 
 Floats = npt.NDArray[np.float64]
@@ -46,32 +44,63 @@ _TOWING = (
 )
 
 
-def by_engine(log: Recording, vehicle: Vehicle) -> bool:
-    """Whether the sum of drive torques is to be had from the engine's, and no wheel's torque is measured."""
-    return (
-        vehicle.driveline is not None
-        and speeds_alone(log.channels, vehicle)
-        and tells_engine_torque(log.channels)
-    )
+def by_engine(channels: Collection[str], vehicle: Vehicle) -> bool:
+    """Whether columns give the sum of drive torques by the engine's, and no wheel's torque."""
+    return vehicle.driveline is not None and speeds_alone(channels, vehicle) and tells_engine_torque(channels)
 
 
-@dataclass
-class ByEngine:
-    """A log and a vehicle whose driven wheels are one; its estimates are made by the estimator as of any machine, then `completed`."""
+@dataclass(frozen=True)
+class DrivenMachine:
+    """How a machine becomes one of driven wheels: ``original``, the ``channels`` of its log, how these tell the ``engine``'s torque.
 
-    whole: Recording
+    Where the drive train's speed alone is measured also that ``rim`` and the speed [m/s] below which it reads 0 (``dead_band``)."""
+
     original: Vehicle
-    _waiting: deque[DrivelineTorque] = field(default_factory=deque)
+    channels: tuple[str, ...]
+    engine: EngineTorque
+    rim: Rim | None
+    dead_band: float = 0.0
 
-    @cached_property
-    def _reference(self) -> Any:
-        return slip_reference_in(self.whole, self.original)
+    @classmethod
+    def of_log(cls, whole: Recording, vehicle: Vehicle, reference: SlipReference) -> DrivenMachine:
+        """As a whole log tells; raises InputError where it lacks what its engine's torque is a share of."""
+        assert vehicle.driveline is not None
+        measured = whole.channels.get("engine_reference_torque")
+        engine = EngineTorque.of(
+            whole.channels,
+            vehicle.driveline,
+            None if measured is None else float(np.nanmedian(measured)),
+            source=whole.source,
+        )
+        return cls(vehicle, tuple(whole.channels), engine, _drive(reference.rims), reference.dead_band)
 
-    @cached_property
-    def engine(self) -> EngineTorque:
-        """How the log tells the engine's torque."""
-        assert self.original.driveline is not None
-        return EngineTorque.of(self.whole, self.original.driveline)
+    @classmethod
+    def of_file(
+        cls, vehicle: Vehicle, channels: Collection[str], known: Mapping[str, Any] | None = None
+    ) -> DrivenMachine:
+        """While samples of these ``channels`` come in: as the vehicle file has it, or an earlier log (``known``, by `to_dict`).
+
+        What a bus may tell or not (drawbar force, the engine's friction) is as if it did not, until it does. Raises InputError as `of_log`.
+        """
+        assert vehicle.driveline is not None
+        if known is not None:
+            rim = None if known["rim"] is None else Rim(**known["rim"])
+            there = tuple(name for name in known["channels"] if name in channels)
+            return cls(vehicle, there, EngineTorque.from_dict(known["engine"]), rim, known["dead_band"])
+        there = tuple(n for n in channels if n not in ("drawbar_force", "engine_friction_share"))
+        waits = "engine_reference_torque" in channels
+        engine = EngineTorque.of(there, vehicle.driveline, None, waits=waits)
+        return cls(vehicle, there, engine, _drive(rims_of(vehicle, channels)))
+
+    def to_dict(self) -> dict[str, Any]:
+        """As JSON holds it, the vehicle too."""
+        return {
+            "vehicle": self.original.to_dict(),
+            "channels": list(self.channels),
+            "engine": self.engine.to_dict(),
+            "rim": None if self.rim is None else asdict(self.rim),
+            "dead_band": self.dead_band,
+        }
 
     @cached_property
     def _wheels(self) -> tuple[tuple[str, ...], tuple[str, ...]]:
@@ -87,91 +116,77 @@ class ByEngine:
     def frees_measured(self) -> bool:
         """Whether all free wheels' speeds are in the log."""
         free = self._wheels[1]
-        return bool(free) and all(f"wheel_speed_{w}" in self.whole.channels for w in free)
+        return bool(free) and all(f"wheel_speed_{w}" in self.channels for w in free)
 
     @cached_property
     def vehicle(self) -> Vehicle:
         """The machine with its driven wheels as one, its free ones as another."""
-        return Vehicle.from_dict(lumped(self.original, self._zero))
+        zero = None if self.rim is None else (self.rim.radius, self.rim.spread)
+        return Vehicle.from_dict(lumped(self.original, zero))
 
-    @property
-    def _zero(self) -> tuple[float, float] | None:
-        """Radius [m] at zero slip of the drive train, and its relative SD, where its speed alone is measured."""
-        rim = next((rim for rim in self._reference.rims if rim.wheel == DRIVE), None)
-        return None if rim is None else (rim.radius, rim.spread)
+    @cached_property
+    def own_channels(self) -> tuple[str, ...]:
+        """The channels of `vehicle` that the log's become."""
+        own = [f"wheel_speed_{DRIVEN}", f"drive_torque_{DRIVEN}"]
+        own += [f"wheel_speed_{UNDRIVEN}"] * bool(self._wheels[1])
+        return (*own, *(n for n in self.channels if not n.startswith(_REPLACED)))
 
     @property
     def notes(self) -> tuple[str, ...]:
         """Sentences for the user."""
-        own = [_NOTE, *self.engine.notes, *(n for n in self._reference.notes if n != WHAT_IS_MISSING)]
-        return (*own, *(() if "drawbar_force" in self.whole.channels else (_TOWING,)))
+        return (_NOTE, *self.engine.notes, *(() if "drawbar_force" in self.channels else (_TOWING,)))
 
-    def log(self, log: LogBlocks) -> LogBlocks:
-        """The log as that of `vehicle`."""
-
-        def blocks() -> Iterator[Recording]:
-            self._waiting.clear()
-            tail = None
-            for block in log.blocks():
-                whole = block if tail is None else _behind(tail, block)
-                converted, drive = self._converted(whole, len(whole) - len(block))
-                self._waiting.append(drive)
-                yield converted
-                tail = _tail(whole)
-
-        return LogBlocks(log.rows, blocks, lambda: self._converted(self.whole, 0)[0], log.from_disk)
-
-    def completed(self, parts: Iterator[Estimates]) -> Iterator[Estimates]:
-        """Estimates of `vehicle` with the spread of what the driveline takes, and open where no torque stands."""
-        for part in parts:
-            yield self._completed(part, self._waiting.popleft())
-
-    def _speed(self, channels: dict[str, Floats], wheels: tuple[str, ...], radius: float) -> Floats:
+    def _speed(self, channels: Mapping[str, Floats], wheels: tuple[str, ...], radius: float) -> Floats:
         """Mean speed (n,) [rad/s] of some wheels as one of a ``radius``."""
         radii = dict(zip(self.original.wheels, wheel_radii(self.original)[1], strict=True))
         known = [w for w in wheels if f"wheel_speed_{w}" in channels]
         mean: Floats = np.mean([radii[w] * channels[f"wheel_speed_{w}"] for w in known], axis=0) / radius
         return mean
 
-    def _converted(self, log: Recording, before: int) -> tuple[Recording, DrivelineTorque]:
-        """The rows of a log from ``before`` on as channels of `vehicle`, and the driveline's torque in them."""
+    def radius(self, wheel: str) -> float:
+        """Radius [m] of ``driven`` or ``undriven``."""
+        return float(self.vehicle.wheel_radius[self.vehicle.wheels.index(wheel)])
+
+    def converted(
+        self, time: Floats, given: Mapping[str, Floats], before: int
+    ) -> tuple[dict[str, Floats], DrivelineTorque]:
+        """Channels of `vehicle`, and the driveline's torque, in the rows (n,) from ``before`` on of channels (before + n,) at ``time``."""
         driveline = self.original.driveline
         assert driveline is not None
         driven, free = self._wheels
-        given, radius = (
-            log.channels,
-            float(self.vehicle.wheel_radius[list(self.vehicle.wheels).index(DRIVEN)]),
-        )
         if any(f"wheel_speed_{w}" in given for w in driven):
-            speed = self._speed(given, driven, radius)
+            speed = self._speed(given, driven, self.radius(DRIVEN))
         else:
-            rim = next(rim for rim in self._reference.rims if rim.wheel == DRIVE)
-            speed = given["wheel_based_speed"] / rim.scale
-            if self._reference.dead_band > 0:
+            assert self.rim is not None
+            speed = given["wheel_based_speed"] / self.rim.scale
+            if self.dead_band > 0:
                 speed = np.where(speed == 0, np.nan, speed)
-        result = driveline_torque(driveline, self.engine, log.time, given, speed, radius)
+        result = driveline_torque(driveline, self.engine, time, given, speed, self.radius(DRIVEN))
         drive = DrivelineTorque(result.torque[before:], result.std[before:], result.shift[before:])
         own = {f"wheel_speed_{DRIVEN}": speed, f"drive_torque_{DRIVEN}": result.torque}
         if free:
-            place = float(self.vehicle.wheel_radius[list(self.vehicle.wheels).index(UNDRIVEN)])
+            place = self.radius(UNDRIVEN)
             own[f"wheel_speed_{UNDRIVEN}"] = (
                 self._speed(given, free, place) if self.frees_measured else given["ground_speed"] / place
             )
         kept = {n: v for n, v in given.items() if not n.startswith(_REPLACED)}
-        return replace(log, channels={**own, **kept}).select(slice(before, None)), drive
+        return {n: v[before:] for n, v in {**own, **kept}.items()}, drive
 
-    def _weight(self, columns: dict[str, Floats]) -> Floats | float:
+    def shows(self, name: str) -> bool:
+        """Whether a column of estimates of `vehicle` says what was measured: of free wheels their load alone, unless their speeds are."""
+        return self.frees_measured or UNDRIVEN not in name or name.startswith("vertical_load")
+
+    def _weight(self, columns: Mapping[str, Floats]) -> Floats | float:
         """What the wheels carry (n,) [N]: the machine's weight, unless the log says that it changes."""
-        if not {"mass", "hitch_load"} & set(self.whole.channels):
+        if not {"mass", "hitch_load"} & set(self.channels):
             return self.vehicle.mass * GRAVITY
         loads = [columns[f"vertical_load_{axle}"] for axle in self.vehicle.axle_names]
         return np.asarray(np.sum(loads, axis=0))
 
-    def _completed(self, part: Estimates, drive: DrivelineTorque) -> Estimates:
-        columns = dict(part.columns)
+    def completed(self, columns: Mapping[str, Floats], std: Floats) -> dict[str, Floats]:
+        """The columns (n,) that change by the spread ``std`` (n,) [N m] of what the driveline takes; open where no torque stands."""
         machine = self.vehicle
-        radius = float(machine.wheel_radius[list(machine.wheels).index(DRIVEN)])
-        force = drive.std / radius
+        force = std / self.radius(DRIVEN)
         by_adhesion, by_resistance = force / columns[f"vertical_load_{DRIVEN}"], force / self._weight(columns)
         mu, rho = columns["adhesion_driven"], columns["soil_resistance"]
         widen = {
@@ -184,19 +199,21 @@ class ByEngine:
             "curve_a": columns["curve_a"] * by_adhesion / np.maximum(np.abs(mu), 0.1),
             "curve_a_driven": columns["curve_a_driven"] * by_adhesion / np.maximum(np.abs(mu), 0.1),
         }
+        result = {}
         for name, spread in widen.items():
             spread = np.where(np.isfinite(spread), spread, 0.0) if name.startswith("curve") else spread
-            columns[f"{name}_std"] = np.hypot(columns[f"{name}_std"], spread)
-        columns["efficiency_driven_std"] = np.minimum(columns["efficiency_driven_std"], 1.0)
-        none = ~np.isfinite(drive.std)
+            result[f"{name}_std"] = np.hypot(columns[f"{name}_std"], spread)
+        result["efficiency_driven_std"] = np.minimum(result["efficiency_driven_std"], 1.0)
+        none = ~np.isfinite(std)
         for name in _SUMS:
-            columns[name] = np.where(none, np.nan, columns[name])
-            columns[f"{name}_std"] = np.where(none, np.nan, columns[f"{name}_std"])
-        if not self.frees_measured:
-            columns = {n: v for n, v in columns.items() if UNDRIVEN not in n or n.startswith("vertical_load")}
-        about = {**part.about, "driveline": {"vehicle": self.original.to_dict()}}
-        notes = tuple(n for n in part.notes if not n.startswith("There is no drawbar_force"))
-        return replace(part, columns=columns, about=about, notes=tuple(dict.fromkeys((*notes, *self.notes))))
+            result[name] = np.where(none, np.nan, columns[name])
+            result[f"{name}_std"] = np.where(none, np.nan, result[f"{name}_std"])
+        return result
+
+
+def _drive(rims: Collection[Rim]) -> Rim | None:
+    """The drive train as one wheel, where its speed alone is measured."""
+    return next((rim for rim in rims if rim.wheel == DRIVE), None)
 
 
 def machine_of(estimates: Estimates, vehicle: Vehicle) -> Vehicle:
@@ -294,18 +311,3 @@ def _by_efficiency(
     share = np.maximum(mu - rho, 0) / gross
     change: Floats = (1 - slip) / gross * ((1 - share) * by_mu - by_rho)
     return change
-
-
-def _tail(block: Recording) -> Recording:
-    """The last rows of a block, on which those behind it depend."""
-    return block.select(np.arange(np.searchsorted(block.time, block.time[-1] - TAIL), len(block)))
-
-
-def _behind(tail: Recording, block: Recording) -> Recording:
-    """A block behind the tail of the one before."""
-    return replace(
-        block,
-        time=np.concatenate([tail.time, block.time]),
-        channels={n: np.concatenate([tail.channels[n], v]) for n, v in block.channels.items()},
-        labels={n: np.concatenate([tail.labels[n], v]) for n, v in block.labels.items()},
-    )

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -11,7 +12,6 @@ import numpy.typing as npt
 from terragrip.errors import InputError
 from terragrip.physics.driveline import torque_into_gears, torque_spread, wheel_torque
 from terragrip.physics.loads import GRAVITY
-from terragrip.recording import Recording
 from terragrip.vehicle_parts import Driveline
 
 Floats = npt.NDArray[np.float64]
@@ -26,48 +26,73 @@ _SHIFT = (
     0.08  # change of the ratio that makes a shift: a step of a gearbox is 15 to 25 %, slip and noise less
 )
 _SLOWEST = 0.07  # of √(g r): slower rims tell no ratio
-_SHARE_STD = 0.02  # of the reference torque: a controller's torque is a model's
+SHARE_STD = 0.02
+"""SD of a controller's torque, which is a model's, of the reference torque."""
 _FRICTION = (0.08, 0.04)  # of the reference torque, where the bus does not say (ours)
 _TORQUES = ("engine_torque", "engine_torque_share")
 
 
-def tells_engine_torque(channels: Mapping[str, Floats]) -> bool:
+def tells_engine_torque(channels: Collection[str]) -> bool:
     """Whether a log's channels hold the engine's speed and torque."""
     return "engine_speed" in channels and any(name in channels for name in _TORQUES)
 
 
 @dataclass(frozen=True)
 class EngineTorque:
-    """How a log tells its engine's torque: ``reference`` [N m] of its shares (None: in N m), ``std`` [N m] of its error as a constant,
-    sentences for the user."""
+    """How a log tells its engine's torque: ``reference`` [N m] of its shares (None: it is in N m; NaN: nobody has told yet).
+
+    ``stated`` [N m]: SD of its error as a constant; None: the ``share`` of the reference. ``notes``: sentences for the user."""
 
     reference: float | None
-    std: float
+    stated: float | None
+    share: float = 0.0
     notes: tuple[str, ...] = ()
 
     @classmethod
-    def of(cls, log: Recording, driveline: Driveline) -> EngineTorque:
-        """As the whole log has it; raises InputError where shares have no reference torque."""
+    def of(
+        cls,
+        channels: Collection[str],
+        driveline: Driveline,
+        measured: float | None,
+        *,
+        waits: bool = False,
+        source: str | None = None,
+    ) -> EngineTorque:
+        """As columns have it, with the ``measured`` reference torque [N m], if any; ``waits``: it may come yet.
+
+        Raises InputError where shares have none.
+        """
         given = driveline.engine_torque_std
-        if "engine_torque" in log.channels:
+        if "engine_torque" in channels:
             return cls(None, given or 0.0)
-        reference, notes = driveline.reference_torque, []
-        if "engine_reference_torque" in log.channels:
-            reference = float(np.nanmedian(log.channels["engine_reference_torque"]))
-        if reference is None or not reference > 0:
+        reference = driveline.reference_torque if measured is None else measured
+        if reference is None and waits:
+            reference = np.nan
+        elif reference is None or not reference > 0:
             raise InputError(
                 "is a share of a reference torque that neither the log nor the vehicle file gives",
-                file=log.source,
+                file=source,
                 place="column engine_torque_share",
                 hint="add 'reference_torque: 800 N m' under 'driveline', from the engine's data sheet",
             )
-        share = _SHARE_STD
-        if "engine_friction_share" not in log.channels:
-            share = float(np.hypot(share, _FRICTION[1]))
-            notes.append(
-                f"The engine's own friction is not in the log: {_FRICTION[0]:.0%} ± {_FRICTION[1]:.0%} of the reference torque is assumed."
-            )
-        return cls(reference, share * reference if given is None else given, tuple(notes))
+        if "engine_friction_share" in channels:
+            return cls(reference, given, SHARE_STD)
+        note = f"The engine's own friction is not in the log: {_FRICTION[0]:.0%} ± {_FRICTION[1]:.0%} of the reference torque is assumed."
+        return cls(reference, given, float(np.hypot(SHARE_STD, _FRICTION[1])), (note,))
+
+    @property
+    def std(self) -> float:
+        """SD [N m] of its error as a constant."""
+        return self.share * (self.reference or 0.0) if self.stated is None else self.stated
+
+    def to_dict(self) -> dict[str, Any]:
+        """As JSON holds it, without the sentences."""
+        return {"reference": self.reference, "stated": self.stated, "share": self.share}
+
+    @classmethod
+    def from_dict(cls, data: Mapping[str, Any]) -> EngineTorque:
+        """The inverse of `to_dict`."""
+        return cls(data["reference"], data["stated"], data["share"])
 
     def at(self, channels: Mapping[str, Floats], time: Floats) -> Floats:
         """The engine's torque (n,) [N m] at the flywheel, NaN where it was not measured."""

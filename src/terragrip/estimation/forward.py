@@ -21,7 +21,8 @@ Floats = npt.NDArray[np.float64]
 Codes = npt.NDArray[np.uint8]
 
 GAP = EVENTS.index("gap")
-_PASSED_ON = ("latitude", "longitude", "altitude", "fuel_rate", "mass", "hitch_load")
+PASSED_ON = ("latitude", "longitude", "altitude", "fuel_rate", "mass", "hitch_load")
+"""Channels that stand beside the estimates as they were measured."""
 
 
 def run(
@@ -79,7 +80,7 @@ def finished(
 def passed_on(recording: Recording, estimator: TractionEstimator) -> tuple[str, ...]:
     """The channels that stand beside the estimates as they were measured."""
     own = ("drawbar_force",) if estimator.method == SLIP_ONLY.name else ()
-    return tuple(n for n in (*own, *_PASSED_ON, *recording.references) if n in recording.channels)
+    return tuple(n for n in (*own, *PASSED_ON, *recording.references) if n in recording.channels)
 
 
 def flag_before_gaps(event: Codes, before: Codes | None = None) -> None:

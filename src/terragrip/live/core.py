@@ -12,7 +12,10 @@ from dataclasses import asdict, dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from terragrip.errors import InputError
+from terragrip.estimation.driveline import by_engine
 from terragrip.estimation.engine import estimate_slots
+from terragrip.estimation.engine_estimator import EngineEstimator, live_estimator, restored
+from terragrip.estimation.estimates import wheels_with
 from terragrip.estimation.estimator import Estimate, TractionEstimator, default_channels
 from terragrip.estimation.learning import SettingsLearner
 from terragrip.estimation.methods import DEFAULT
@@ -47,6 +50,7 @@ class Settings:
     first row. ``sources``: their URIs without options. ``held`` [s]: update periods of channels that are repeated between
     updates. ``noise``: SDs [SI] by channel, over the vehicle file's. ``ground``: whether ground changes and soils are followed. ``learn``:
     whether noise and held channels that are not given are learned from the rows as they come (`terragrip.estimation.learning`).
+    ``driveline``: what an earlier log told of a machine that tells engine torque (`terragrip.estimation.engine_estimator`).
     """
 
     sources: tuple[str, ...]
@@ -57,6 +61,7 @@ class Settings:
     ground: bool = False
     noise: Mapping[str, float] = field(default_factory=dict)
     learn: bool = True
+    driveline: Mapping[str, Any] | None = None
 
     def to_dict(self) -> dict[str, Any]:
         """As JSON holds it."""
@@ -133,7 +138,9 @@ class Core:
 
     def _begin(self, channels: Collection[str]) -> TractionEstimator:
         method, held, noise = self.settings.method, self.settings.held, self.settings.noise
-        estimator = TractionEstimator(self.vehicle, method, channels=channels, held=held, sensors=noise)
+        estimator = live_estimator(
+            self.vehicle, method, channels, held=held, sensors=noise, driveline=self.settings.driveline
+        )
         self.estimator = estimator
         self.learner = self._learner(estimator)
         if self.settings.ground and not estimator.rims:
@@ -145,7 +152,8 @@ class Core:
     def _learner(self, estimator: TractionEstimator) -> SettingsLearner | None:
         if not self.settings.learn:
             return None
-        return SettingsLearner(self.vehicle, estimator.engine.inputs, self.settings.noise, self.settings.held)
+        inputs = estimator.engine.inputs
+        return SettingsLearner(estimator.vehicle, inputs, self.settings.noise, self.settings.held)
 
     @property
     def columns(self) -> tuple[str, ...]:
@@ -223,6 +231,8 @@ class Core:
                 out.append(Refusal(row.arrival, row.time, source, str(error), row.values))
                 out.append(Event(row.time, "refused", self.settings.sources[source], str(error)))
                 continue
+            if not self.rows and isinstance(estimator, EngineEstimator):
+                out += [Event(row.time, "schema", "estimator", note) for note in estimator.machine.notes]
             self.rows += 1
             out.append(Row(row.arrival, row.values, estimate))
             self._watch(estimate, out)
@@ -240,7 +250,8 @@ class Core:
         self, estimator: TractionEstimator, learner: SettingsLearner, row: Pending, out: list[Output]
     ) -> None:
         """Noise and held channels by the rows so far, from the next row on, with an event."""
-        learned = learner.add(row.time, row.values)
+        taken = estimator.converted if isinstance(estimator, EngineEstimator) else row.values
+        learned = learner.add(row.time, taken)
         changes = learned.changes(estimator) if learned is not None else []
         if learned is None or not changes:
             return
@@ -264,7 +275,7 @@ class Core:
 
     def _warning(self, estimate: Estimate) -> Event:
         """The estimator's event as one of ours, with what the machine did."""
-        slips = {w: estimate[f"slip_{w}"] for w in self.vehicle.wheels}
+        slips = {w: estimate[f"slip_{w}"] for w in wheels_with("slip", estimate.places)}
         known = {wheel: slip for wheel, slip in slips.items() if slip == slip}
         most = max(known, key=lambda wheel: abs(known[wheel]), default=None)
         text = f"{_WARNINGS[estimate.event]}: ground speed {estimate.ground_speed:.2f} m/s"
@@ -274,6 +285,8 @@ class Core:
 
     def _lacking(self, first: Pending) -> list[Output]:
         """An event where the first rows lack a wheel's speed, or bear wheels that the vehicle has not."""
+        if isinstance(self.estimator, EngineEstimator):
+            return []
         seen = {name for row in (first, *self.reorder.pending) for name in row.values}
         wheels = [name.removeprefix("wheel_speed_") for name in seen if name.startswith("wheel_speed_")]
         absent = [wheel for wheel in self.vehicle.wheels if wheel not in wheels]
@@ -290,7 +303,8 @@ class Core:
     def _seen(self, first: Pending) -> Collection[str]:
         pending = [name for row in self.reorder.pending for name in row.values]
         seen = dict.fromkeys([*first.values, *pending])
-        if "wheel_based_speed" in seen and speeds_alone(seen, self.vehicle):
+        drive = "wheel_based_speed" in seen and speeds_alone(seen, self.vehicle)
+        if drive or by_engine(seen, self.vehicle):
             return tuple(seen)
         return tuple(dict.fromkeys([*default_channels(self.vehicle), *seen]))
 
@@ -323,7 +337,7 @@ class Core:
             raise ValueError(f"a state of format {state['format']}, not {FORMAT}")
         result = cls(Vehicle.from_dict(state["vehicle"]), Settings.from_dict(state["settings"]), library)
         snapshot = base64.b64decode(state["estimator"])
-        result.estimator = TractionEstimator.restore(snapshot) if snapshot else None
+        result.estimator = restored(snapshot) if snapshot else None
         if result.estimator is not None and state["learner"] is not None:
             result.learner = result._learner(result.estimator)
             if result.learner is not None:

@@ -1,4 +1,4 @@
-"""One CAN frame into named fields, by the same table and DBC files as logs (terragrip.formats.can)."""
+"""CAN frames into named fields, by the same table and DBC files as logs (terragrip.formats.can)."""
 
 from __future__ import annotations
 
@@ -6,8 +6,9 @@ import struct
 from collections.abc import Callable, Sequence
 
 from terragrip.formats.can.bits import Field
-from terragrip.formats.can.catalog import EXTENDED, Message, catalog, source_of
+from terragrip.formats.can.catalog import EXTENDED, Message, catalog, group_of, source_of
 from terragrip.formats.can.frames import of_sender
+from terragrip.formats.can.transport import CONNECTION, DATA, Transport, is_fast
 from terragrip.live.payload import Fields
 
 _FLOATS = {16: "<e", 32: "<f", 64: "<d"}
@@ -24,6 +25,7 @@ class FrameDecoder:
         self._catalog = catalog(databases)
         self._wants = wants
         self._plans: dict[int, list[tuple[Field, tuple[str, ...]]] | None] = {}
+        self._transport = Transport()
         self.unknown: dict[int, int] = {}
         self.units = {
             self._catalog.name(message, field): field.unit
@@ -33,8 +35,22 @@ class FrameDecoder:
         }
 
     def fields(self, identifier: int, extended: bool, data: bytes) -> Fields:
-        """The fields of a data frame; empty where no table holds it. "Not available" and "error" are left out."""
+        """The fields of a data frame, or of the message that it completes; empty where no table holds it.
+
+        "Not available" and "error" are left out.
+        """
         key = identifier | EXTENDED if extended else identifier
+        if extended and (group := group_of(key)) in (CONNECTION, DATA):
+            whole = self._transport.add(group, source_of(key), (identifier >> 8) & 0xFF, data)
+            return {} if whole is None else self._fields(_identifier(whole[0], source_of(key)), whole[1])
+        message = self._catalog.message_of(key) if extended else None
+        if message is not None and message.by_group and is_fast(message.key, message.length):
+            whole = self._transport.add_fast(message.key, source_of(key), data)
+            return {} if whole is None else self._fields(key, whole[1])
+        return self._fields(key, data)
+
+    def _fields(self, key: int, data: bytes) -> Fields:
+        """The fields of a whole payload."""
         if key not in self._plans:
             self._plans[key] = self._plan(key)
         plan = self._plans[key]
@@ -68,6 +84,11 @@ class FrameDecoder:
         name = self._catalog.name(message, field)
         sender = of_sender(name, source_of(key)) if message.by_group else name
         return (name, sender) if sender != name and self._wants(sender) else (name,)
+
+
+def _identifier(group: int, source: int) -> int:
+    """The identifier that a message of several frames would have in one."""
+    return EXTENDED | group << 8 | source
 
 
 def _raw(field: Field, data: bytes) -> int | None:

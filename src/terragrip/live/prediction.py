@@ -5,6 +5,7 @@ The filter itself does not move: samples that were only delayed find it as if no
 
 from __future__ import annotations
 
+from terragrip.estimation.engine_estimator import restored
 from terragrip.estimation.estimator import TractionEstimator
 from terragrip.live.core import Core, Row
 
@@ -25,7 +26,7 @@ class Prediction:
         if core.estimator is None or not core.rows or silence < max(_PATIENCE, _PERIODS * period):
             return None
         if self._copy is None or self._rows != core.rows:
-            self._copy, self._rows = TractionEstimator.restore(core.estimator.snapshot()), core.rows
+            self._copy, self._rows = restored(core.estimator.snapshot()), core.rows
             self._time = core.time
         time = core.time + silence
         if time <= self._time:  # what came meanwhile was no row: the silence counts anew

@@ -134,16 +134,18 @@ class Segment:
         """The rows' estimates as a table."""
         import numpy as np
 
+        from terragrip.estimation.engine_estimator import EngineEstimator
         from terragrip.estimation.estimates import Estimates
+        from terragrip.estimation.forward import PASSED_ON
         from terragrip.estimation.provenance import about_run
 
         table = np.frombuffer(self.estimates).reshape(len(self), -1)
         columns = {name: np.ascontiguousarray(table[:, place]) for name, place in estimator.places.items()}
         measured = self.channels()
-        columns |= {
-            name: measured[name] for name in ("latitude", "longitude", "altitude") if name in measured
-        }
+        columns |= {name: measured[name] for name in PASSED_ON if name in measured}
         about = about_run(estimator, {"source": None, "sha256": None}, smooth=False)
+        if isinstance(estimator, EngineEstimator):
+            about["driveline"] = estimator.machine.to_dict()
         stamps = self._stamps()
         time, codes = (np.ascontiguousarray(stamps[name]) for name in ("time", "code"))
         return Estimates(time, columns, codes, {}, about)

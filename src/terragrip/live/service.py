@@ -10,6 +10,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from terragrip.errors import InputError
+from terragrip.estimation.engine_estimator import EngineEstimator
+from terragrip.estimation.estimator import TractionEstimator
 from terragrip.estimation.methods import DEFAULT, method_named
 from terragrip.live.core import WINDOW, Core, Ground, Output, Row, Settings
 from terragrip.live.decode import Decoder, check_channels
@@ -56,6 +58,7 @@ class Service:
     noise: SDs [SI] by channel, as estimates of a log hold them; they win over the vehicle file's.
     learn: tell noise and held channels that are not given from the rows as they come.
     ground: report ground changes while driving; library: and which of these soils it is.
+    driveline: what an earlier log told of a machine that tells engine torque (``about["driveline"]`` of its estimates).
     setpoint: slip and ground speed wanted [m/s] of the set-point to publish beside the estimates; None: none is.
     capacity: samples that may wait for the estimator before they are dropped.
 
@@ -78,6 +81,7 @@ class Service:
         ground: bool = False,
         library: SoilLibrary | None = None,
         setpoint: tuple[float, float] | None = None,
+        driveline: Mapping[str, Any] | None = None,
         capacity: int = CAPACITY,
     ) -> None:
         method_named(method)
@@ -93,7 +97,7 @@ class Service:
         channels = dict.fromkeys(
             name
             for decoder, source in zip(decoders, self.sources, strict=True)
-            for name in (*decoder.channels, *getattr(source, "channels", ()))
+            for name in (*_promised(decoder, vehicle, driveline), *getattr(source, "channels", ()))
         )
         names = tuple(uri.name for uri, _ in opened)
         settings = Settings(
@@ -105,6 +109,7 @@ class Service:
             ground or library is not None,
             dict(noise or {}),
             learn,
+            driveline,
         )
         core = Core(vehicle, settings, library)
         if settings.ground and core.estimator is not None and core.estimator.rims:
@@ -113,7 +118,7 @@ class Service:
                 place="--ground", hint="leave it out: the sources give speeds alone",
             )  # fmt: skip
         self.setpoint = None if setpoint is None else LiveSetpoint(vehicle, *setpoint)
-        if self.setpoint is not None and core.estimator is not None and core.estimator.rims:
+        if self.setpoint is not None and core.estimator is not None and not _has_slips(core.estimator):
             raise InputError(
                 "a set-point of slip needs the slip of each driven wheel",
                 place="--setpoint", hint="leave it out: the sources give the drive train's speed alone",
@@ -242,7 +247,9 @@ class Service:
 
     def _advise(self, row: Row) -> None:
         """Publish the set-point, where one is wanted and the estimates hold the wheels' slips."""
-        if self.setpoint is not None and self.core.estimator is not None and not self.core.estimator.rims:
+        if self.setpoint is None or self.core.estimator is None:
+            return
+        if _has_slips(self.core.estimator):
             self._send(Message(SETPOINT, row.estimate.time, data=self.setpoint.message(row)))
 
     def _send(self, message: Message) -> None:
@@ -270,6 +277,21 @@ class Service:
     def announce(self) -> None:
         """Send the status to whom it concerns."""
         self._send(Message(STATUS, self.core.time, data=self.statistics.to_dict()))
+
+
+def _promised(decoder: Decoder, vehicle: Vehicle, driveline: Mapping[str, Any] | None) -> tuple[str, ...]:
+    """The columns that a source's profile promises; of a vehicle with a driveline also what of its engine is optional, and what an
+    earlier log of it had."""
+    if vehicle.driveline is None or decoder.profile is None:
+        return decoder.channels
+    had = () if driveline is None else driveline["channels"]
+    more = (name for name in decoder.profile.channels if name.startswith("engine_") or name in had)
+    return tuple(dict.fromkeys((*decoder.channels, *more)))
+
+
+def _has_slips(estimator: TractionEstimator) -> bool:
+    """Whether its estimates hold the slip of each wheel, and what shows whether they can be trusted."""
+    return not estimator.rims and not isinstance(estimator, EngineEstimator)
 
 
 def _logged(event: Event) -> dict[str, Any]:

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from terragrip.errors import InputError
+from terragrip.estimation.driveline import DRIVEN
 from terragrip.estimation.engine import EVENTS
 from terragrip.estimation.estimator import Estimate
 from terragrip.estimation.rims import DRIVE
@@ -106,8 +107,12 @@ class CanSink:
                 values = {}
                 for ours, quantity in quantities.items():
                     own = f"{quantity}_{wheel}"
-                    if own not in estimate.places and wheel in self._driven:
-                        own = f"{quantity}_{DRIVE}"  # the drive train's speed stands for all driven wheels
+                    if quantity == "slip" and own not in estimate.places and wheel in self._driven:
+                        # the drive train's speed stands for all driven wheels, a sum of their forces does not
+                        own = next(
+                            (f"slip_{one}" for one in (DRIVE, DRIVEN) if f"slip_{one}" in estimate.places),
+                            own,
+                        )
                     values[f"{ours}{number}"] = _of(estimate, own)
                     values[f"{ours}Std{number}"] = _of(estimate, f"{own}_std")
                 result.append(self._frame(f"{message}{number}", values))

@@ -1,0 +1,74 @@
+"""A log whose machine tells its engine's torque: block by block as that of a machine of driven wheels, and its estimates completed."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+
+from terragrip.estimation.driveline import DrivenMachine
+from terragrip.estimation.engine_torque import TAIL, DrivelineTorque
+from terragrip.estimation.estimates import Estimates
+from terragrip.estimation.slip_only import WHAT_IS_MISSING, slip_reference_in
+from terragrip.recording import LogBlocks, Recording
+from terragrip.vehicle import Vehicle
+
+
+class ByEngine:
+    """A log and a vehicle whose driven wheels are one; its estimates are made by the estimator as of any machine, then `completed`."""
+
+    def __init__(self, whole: Recording, original: Vehicle) -> None:
+        reference = slip_reference_in(whole, original)
+        self._whole = whole
+        self.machine = DrivenMachine.of_log(whole, original, reference)
+        beside = tuple(note for note in reference.notes if note != WHAT_IS_MISSING)
+        self.notes = (*self.machine.notes, *beside)
+        self._waiting: deque[DrivelineTorque] = deque()
+
+    def log(self, log: LogBlocks) -> LogBlocks:
+        """The log as that of the machine of driven wheels."""
+
+        def blocks() -> Iterator[Recording]:
+            self._waiting.clear()
+            tail = None
+            for block in log.blocks():
+                whole = block if tail is None else _behind(tail, block)
+                converted, drive = self._converted(whole, len(whole) - len(block))
+                self._waiting.append(drive)
+                yield converted
+                tail = _tail(whole)
+
+        return LogBlocks(log.rows, blocks, lambda: self._converted(self._whole, 0)[0], log.from_disk)
+
+    def completed(self, parts: Iterator[Estimates]) -> Iterator[Estimates]:
+        """Estimates of that machine with the spread of what the driveline takes, and open where no torque stands."""
+        for part in parts:
+            columns = {**part.columns, **self.machine.completed(part.columns, self._waiting.popleft().std)}
+            columns = {name: values for name, values in columns.items() if self.machine.shows(name)}
+            about = {**part.about, "driveline": self.machine.to_dict()}
+            notes = tuple(n for n in part.notes if not n.startswith("There is no drawbar_force"))
+            yield replace(
+                part, columns=columns, about=about, notes=tuple(dict.fromkeys((*notes, *self.notes)))
+            )
+
+    def _converted(self, log: Recording, before: int) -> tuple[Recording, DrivelineTorque]:
+        """The rows of a log from ``before`` on as those of the machine of driven wheels, and the driveline's torque in them."""
+        channels, drive = self.machine.converted(log.time, log.channels, before)
+        return replace(log.select(slice(before, None)), channels=channels), drive
+
+
+def _tail(block: Recording) -> Recording:
+    """The last rows of a block, on which those behind it depend."""
+    return block.select(np.arange(np.searchsorted(block.time, block.time[-1] - TAIL), len(block)))
+
+
+def _behind(tail: Recording, block: Recording) -> Recording:
+    """A block behind the tail of the one before."""
+    return replace(
+        block,
+        time=np.concatenate([tail.time, block.time]),
+        channels={n: np.concatenate([tail.channels[n], v]) for n, v in block.channels.items()},
+        labels={n: np.concatenate([tail.labels[n], v]) for n, v in block.labels.items()},
+    )

@@ -1,0 +1,239 @@
+"""Sample by sample on a machine that tells its engine's torque: `DrivenMachine` on the last seconds, the digits of a whole log."""
+
+from __future__ import annotations
+
+import json
+import math
+import struct
+from base64 import b64decode, b64encode
+from collections.abc import Collection, Mapping
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any, Self
+
+import numpy as np
+import numpy.typing as npt
+
+from terragrip.errors import InputError
+from terragrip.estimation.driveline import DrivenMachine, by_engine
+from terragrip.estimation.engine import refusal
+from terragrip.estimation.engine_torque import SHARE_STD, TAIL
+from terragrip.estimation.estimator import Estimate, TractionEstimator, unusable
+from terragrip.estimation.methods import DEFAULT
+from terragrip.estimation.sealed import seal, unseal
+
+if TYPE_CHECKING:
+    from terragrip.estimation.estimates import Estimates
+    from terragrip.recording import Recording
+    from terragrip.vehicle import Vehicle
+
+Floats = npt.NDArray[np.float64]
+
+_MAGIC = b"TGRIPEN1"
+_ROOM = 1024  # rows that the tail has room for at first
+_NEEDED = (
+    "adhesion_driven", "soil_resistance", "net_traction_driven", "efficiency_driven", "slip_driven", "curve_a", "curve_a_driven",
+)  # fmt: skip
+
+
+class EngineEstimator(TractionEstimator):
+    """As `TractionEstimator`, of samples with engine torque and no wheel's: the sum of the drive torques by the vehicle's ``driveline``.
+
+    ``machine`` says how (`DrivenMachine`); ``vehicle`` is its machine of driven wheels, whose columns the estimates have. ``fixed``: what
+    the bus tells of its engine later changes nothing.
+    """
+
+    def __init__(
+        self,
+        machine: DrivenMachine,
+        channels: Collection[str],
+        method: str = DEFAULT,
+        *,
+        sensors: Mapping[str, float] | None = None,
+        held: Mapping[str, float] | None = None,
+        gap: float | None = None,
+        standstill_speed: float | None = None,
+        fixed: bool = False,
+    ) -> None:
+        super().__init__(
+            machine.vehicle,
+            method,
+            sensors=sensors,
+            held=held,
+            channels=machine.own_channels,
+            gap=gap,
+            standstill_speed=standstill_speed,
+            together=machine.together,
+        )
+        self.machine = machine
+        self.fixed = fixed
+        self.given = tuple(channels)
+        self.converted: dict[str, float] = {}
+        self._tail = _Tail(self.given)
+        self._places = {name: place for name, place in super().places.items() if machine.shows(name)}
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """Names of an estimate's columns besides ``time`` and ``event``."""
+        return tuple(self._places)
+
+    @property
+    def places(self) -> dict[str, int]:
+        """Where in an estimate's values each column stands."""
+        return self._places
+
+    def update_at(self, time: float, sample: Mapping[str, float | None]) -> Estimate:
+        """As of any machine; the sample has the bus's channels. ``converted`` then holds those of the machine of driven wheels."""
+        row = [_number(sample.get(name)) for name in self.given]
+        if not (math.isfinite(time) and time > self._tail.last) or any(map(math.isinf, row)):
+            if any(map(math.isinf, row)):
+                raise unusable({**sample, "time": time}, self.given)
+            return super().update_at(time, {})  # which says what is wrong with the time
+        if not self.fixed:
+            self._learn_engine(sample)
+        self._tail.add(time, row)
+        channels = {name: self._tail[name] for name in self.machine.channels if name in self.given}
+        values, drive = self.machine.converted(self._tail.time, channels, len(self._tail.time) - 1)
+        self.converted = {name: float(value[0]) for name, value in values.items() if value[0] == value[0]}
+        return self._completed(super().update_at(time, self.converted), drive.std)
+
+    def _learn_engine(self, sample: Mapping[str, float | None]) -> None:
+        """Take what the bus tells of its engine once: the reference torque, and that its friction is told."""
+        machine, engine = self.machine, self.machine.engine
+        reference = _number(sample.get("engine_reference_torque"))
+        if engine.reference is not None and reference > 0 and reference != engine.reference:
+            engine = replace(engine, reference=reference)
+        channels = machine.channels
+        if "engine_friction_share" not in channels and not math.isnan(
+            _number(sample.get("engine_friction_share"))
+        ):
+            channels = (*channels, "engine_friction_share")
+            engine = replace(engine, share=SHARE_STD, notes=())
+        if engine is not machine.engine:
+            self.machine = replace(machine, channels=channels, engine=engine)
+
+    def _completed(self, estimate: Estimate, std: Floats) -> Estimate:
+        values, places = list(estimate.values), estimate.places
+        names = [n for name in _NEEDED for n in (name, f"{name}_std")]
+        names += [f"vertical_load_{axle}" for axle in self.vehicle.axle_names]
+        columns = {name: np.array([values[places[name]]]) for name in names}
+        for name, value in self.machine.completed(columns, std).items():
+            values[places[name]] = float(value[0])
+        packed = struct.pack(f"={len(values)}d", *values)
+        return Estimate(estimate.time, estimate.event, packed, self._places)
+
+    def update_block(self, recording: Recording) -> Estimates:
+        """Not for this one: a whole log knows more, see :func:`terragrip.estimate`."""
+        raise InputError(
+            "estimates of a bus come sample by sample", hint="estimate the whole log with terragrip.estimate"
+        )
+
+    def snapshot(self) -> bytes:
+        """Everything needed to go on later, bit for bit."""
+        about = {
+            "machine": self.machine.to_dict(),
+            "given": self.given,
+            "fixed": self.fixed,
+            "tail": self._tail.state(),
+            "inner": b64encode(super().snapshot()).decode(),
+        }
+        return seal(_MAGIC, json.dumps(about).encode())
+
+    @classmethod
+    def restore(cls, data: bytes) -> Self:
+        """The estimator of a snapshot; raises InputError if the bytes are damaged or of another version."""
+        from terragrip.vehicle import Vehicle
+
+        about = json.loads(unseal(_MAGIC, data))
+        inner = TractionEstimator.restore(b64decode(about["inner"]))
+        known = about["machine"]
+        machine = DrivenMachine.of_file(Vehicle.from_dict(known["vehicle"]), known["channels"], known)
+        result = cls(
+            machine,
+            about["given"],
+            inner.method,
+            sensors=inner.noise,
+            held=inner.held,
+            gap=inner.thresholds.gap,
+            standstill_speed=inner.thresholds.standstill_speed,
+            fixed=about["fixed"],
+        )
+        result.guessed, result._engine = inner.guessed, inner._engine
+        result._tail.restore(about["tail"])
+        return result
+
+
+class _Tail:
+    """The last rows of the bus, on which the torque of one depends."""
+
+    def __init__(self, names: tuple[str, ...]) -> None:
+        self._place = {name: 1 + k for k, name in enumerate(names)}
+        self._rows = np.empty((1 + len(names), _ROOM))
+        self._first = self._end = 0
+
+    @property
+    def last(self) -> float:
+        """Time [s] of the last row; -inf before the first."""
+        return float(self._rows[0, self._end - 1]) if self._end > self._first else -math.inf
+
+    @property
+    def time(self) -> Floats:
+        """Times (n,) [s]."""
+        return self._rows[0, self._first : self._end]
+
+    def __getitem__(self, name: str) -> Floats:
+        return self._rows[self._place[name], self._first : self._end]
+
+    def add(self, time: float, values: list[float]) -> None:
+        """Behind the others, of which the too old ones go."""
+        if self._end == self._rows.shape[1]:
+            kept = self._rows[:, self._first : self._end]
+            rows = self._rows if 2 * kept.shape[1] <= self._end else np.empty((len(kept), 2 * self._end))
+            rows[:, : kept.shape[1]] = kept.copy()
+            self._rows, self._first, self._end = rows, 0, kept.shape[1]
+        self._rows[:, self._end] = time, *values
+        self._end += 1
+        self._first += int(np.searchsorted(self.time, time - TAIL))
+
+    def state(self) -> str:
+        """To the last bit, as JSON holds it."""
+        return b64encode(np.ascontiguousarray(self._rows[:, self._first : self._end]).tobytes()).decode()
+
+    def restore(self, state: str) -> None:
+        """The rows of `state`, made by one of the same channels; raises InputError where it is none."""
+        rows = np.frombuffer(b64decode(state))
+        if rows.size % len(self._rows):
+            raise refusal(6, None)
+        rows = rows.reshape(len(self._rows), -1)
+        self._rows = np.empty((len(rows), max(_ROOM, 2 * rows.shape[1])))
+        self._rows[:, : rows.shape[1]] = rows
+        self._first, self._end = 0, rows.shape[1]
+
+
+def _number(value: Any) -> float:
+    return math.nan if value is None else float(value)
+
+
+def live_estimator(
+    vehicle: Vehicle,
+    method: str,
+    channels: Collection[str],
+    *,
+    sensors: Mapping[str, float],
+    held: Mapping[str, float],
+    driveline: Mapping[str, Any] | None = None,
+) -> TractionEstimator:
+    """The estimator for samples of these ``channels`` as they come in; arguments as of `TractionEstimator`.
+
+    ``driveline``: what an earlier log of a machine that tells engine torque told of it, as its estimates hold it (``about["driveline"]``).
+    Raises InputError as making an estimator does.
+    """
+    if not by_engine(channels, vehicle):
+        return TractionEstimator(vehicle, method, channels=channels, held=held, sensors=sensors)
+    machine = DrivenMachine.of_file(vehicle, channels, driveline)
+    return EngineEstimator(machine, channels, method, sensors=sensors, held=held, fixed=driveline is not None)
+
+
+def restored(snapshot: bytes) -> TractionEstimator:
+    """The estimator of a snapshot, of either kind; raises InputError as `TractionEstimator.restore`."""
+    kind = EngineEstimator if snapshot.startswith(_MAGIC) else TractionEstimator
+    return kind.restore(snapshot)
