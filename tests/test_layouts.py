@@ -87,6 +87,9 @@ def test_every_command_works(layout: str, tmp_path: Path, capsys: pytest.Capture
         for quantity in QUANTITIES:
             assert np.isfinite(estimates[f"{quantity}_{wheel}"]).mean() > 0.3
     assert json.loads(ground.read_text())["sections"]
+    advice = json.loads((tmp_path / "advice.json").read_text())
+    best = advice["best_efficiency"]
+    assert advice["missing"] if best is None else best["interval"][0] <= best["slip"] <= best["interval"][1]
     cells = geopandas.read_file(field, layer="cells")
     for quantity in ("slip", "soil_resistance"):
         assert cells[quantity].notna().mean() > 0.3

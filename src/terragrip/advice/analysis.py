@@ -11,7 +11,7 @@ from terragrip.advice.actions import Work, actions_for
 from terragrip.advice.fuel import burnt
 from terragrip.advice.optimum import Best, OverSlip, best_of
 from terragrip.advice.result import Advice
-from terragrip.advice.samples import Samples, driven_wheels, samples_by_soil
+from terragrip.advice.samples import GatheredSamples, Samples, driven_wheels
 from terragrip.advice.slip_only import advise_slip
 from terragrip.advice.soil_curves import SoilCurves, of_drives, of_library
 from terragrip.errors import InputError
@@ -54,7 +54,10 @@ def advise(
     vehicle = machine_of(tables[0], vehicle)
     for one in tables:
         refuse_other_vehicle(one, vehicle)
-    return advise_samples(samples_by_soil(tables, vehicle), vehicle, driven_wheels(tables[0], vehicle), soils)
+    gathered = GatheredSamples(vehicle)
+    for one in tables:
+        gathered.add(one)
+    return advise_samples(gathered.by_soil(), gathered.vehicle, driven_wheels(tables[0], vehicle), soils)
 
 
 def advise_samples(

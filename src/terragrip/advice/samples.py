@@ -85,12 +85,20 @@ class GatheredSamples:
     def __init__(self, vehicle: Vehicle, soil: str | None = None) -> None:
         self._vehicle, self._soil, self._count = vehicle, soil, 0
         self._parts: dict[str, list[Samples]] = {}
+        self._masses: list[float] = []
+
+    @property
+    def vehicle(self) -> Vehicle:
+        """The vehicle with what it carried on average, where its mass was measured."""
+        return self._vehicle.loaded(float(np.mean(self._masses))) if self._masses else self._vehicle
 
     def add(self, estimates: Estimates) -> None:
         """The rows of one more drive."""
         for name, part in _of_table(estimates, self._vehicle, self._soil, self._count):
             self._parts.setdefault(name, []).append(part)
         self._count += 1
+        if "mass" in estimates.names and np.isfinite(estimates["mass"]).any():
+            self._masses.append(float(np.nanmean(estimates["mass"])))
 
     def by_soil(self) -> dict[str, Samples]:
         """All of them, by soil."""

@@ -82,13 +82,14 @@ class GatheredAdvice:
         if self.rows and self.known is not None:
             return of_slip(advise_rows(self.rows, self.known), missed)
         by_soil = {} if self.samples is None else self.samples.by_soil()
-        if self.vehicle is None or not by_soil:
+        if self.samples is None or not by_soil:
             why = next(
                 iter(self.left_out.values()), "no row moves, unflagged, with vehicle and tool on one soil"
             )
             return Section("advice", TITLE, omitted=f"Left out: {why}.")
-        advice, way = advise_samples(by_soil, self.vehicle, self.wheels)
-        return of_soils(advice, way, self.vehicle.mass, missed)
+        vehicle = self.samples.vehicle
+        advice, way = advise_samples(by_soil, vehicle, self.wheels)
+        return of_soils(advice, way, vehicle.mass, missed)
 
 
 def of_soils(
