@@ -152,7 +152,7 @@ def test_agrees_for_any_number_of_wheels(wheels, engine, policy, problem):
 @pytest.mark.parametrize(("engine", "policy"), METHODS)
 def test_agrees_where_mass_and_hitch_load_change(engine, policy, problem):
     case = problem(32, wheels=4, steps=120, condition=1e6, accelerometer=True, missing=0.1, loaded=True)
-    assert np.ptp([k.now.mass for k in case.instants]) > 0.1 * case.machine.mass
+    assert np.ptp([k.now.mass for k in case.instants]) > 0.05 * case.machine.mass
     assert_agree(case, Tuning(case.walk, engine=engine, policy=policy, huber=3.0))
 
 
