@@ -95,7 +95,7 @@ def test_of_a_bus_speed_the_zero_of_slip_alone_counts() -> None:
     assert made.assumed == ()
     calibrated, light, none = (cost.half_width["slip"] for cost in interval_costs(made))
     assert calibrated < 0.02
-    assert light < 0.02
+    assert light < 0.03  # the slip of wheels that carry the vehicle alone
     assert none > 0.05
 
 

@@ -24,7 +24,7 @@ def tractor(**more: object) -> tg.Vehicle:
     return tg.Vehicle.from_dict({**base, "wheel": {"radius": 0.8, "inertia": 50}, **more})
 
 
-def log_of(slip: np.ndarray, scale: float, seed: int, speed: float = 2.0) -> tg.Recording:
+def log_of(slip: np.ndarray, scale: float, seed: int, speed: float | np.ndarray = 2.0) -> tg.Recording:
     """A drive at 5 Hz whose machine supposes a radius ``scale`` times the true one (simulated)."""
     draws, time = np.random.default_rng(seed), np.arange(len(slip)) / 5
     v = speed * (1 + 0.1 * np.sin(time / 9))
@@ -53,7 +53,35 @@ def test_light_work_is_found_in_a_field_day(seed: int, light: float) -> None:
     assert zero is not None
     assert not zero.doubt
     assert zero.ratio == pytest.approx((1 - 0.004) / scale, abs=3 * zero.std)
-    assert zero.std < 0.006
+    assert zero.std < 0.013
+
+
+def slip_of_its_own(mobility: float) -> float:
+    """Slip at zero net traction by ASABE D497's gross traction and motion resistance ratios."""
+    slip = np.linspace(0, 0.2, 20001)
+    gross = 0.88 * (1 - np.exp(-0.1 * mobility)) * (1 - np.exp(-7.5 * slip)) + 0.04
+    return float(slip[np.argmax(gross >= 1 / mobility + 0.04 + 0.5 * slip / np.sqrt(mobility))])
+
+
+@pytest.mark.parametrize("mobility", [13, 20, 30, 55])
+def test_headlands_where_wheels_slip_to_carry_the_vehicle_alone(mobility: float) -> None:
+    slip = np.where(field_day(1000) == 0.004, slip_of_its_own(mobility), field_day(1000) + 0.03)
+    estimates = tg.estimate(log_of(slip, 1.02, 1000), tractor())
+    moving = estimates["event"] == ""
+    error = estimates["slip_drive"][moving] - slip[moving]
+    assert np.mean(np.abs(error) < 1.96 * estimates["slip_drive_std"][moving]) > 0.92
+
+
+def test_a_road_counts_before_the_field() -> None:
+    """A minute and a half on the road beside hours on soft ground."""
+    headland, road = slip_of_its_own(13), slip_of_its_own(80)
+    slip = np.where(field_day(1000) == 0.004, headland, field_day(1000) + 0.03)
+    speed = np.r_[np.full(450, 6.0), np.full(len(slip), 2.0)]
+    zero = zero_of([log_of(np.r_[np.full(450, road), slip], 1.03, 1000, speed)], "wheel_based_speed", 1.0)
+    assert zero is not None
+    assert not zero.doubt
+    assert zero.ratio == pytest.approx(1 / 1.03, abs=2 * zero.std)
+    assert zero.std < 0.005
 
 
 def test_estimate_and_calibrate_give_one_answer() -> None:

