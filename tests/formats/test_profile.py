@@ -194,6 +194,21 @@ def test_speed_from_one_coordinate_and_without_heading() -> None:
     np.testing.assert_allclose(unsigned["ground_speed"][inner], np.abs(speed)[inner], atol=0.01)
 
 
+def test_counts_of_an_encoder_become_a_wheel_speed() -> None:
+    """1200 counts a turn at 10 Hz, forward, at rest and backward; one column needs no list."""
+    time = np.arange(0, 30, 0.1)
+    turned = np.interp(time, [0, 10, 20, 30], [0, 50, 50, 20])
+    frame = {"t": time, "v": np.full(len(time), 0.3), "ticks": np.floor(turned * 1200 / (2 * np.pi))}
+    source = {"derivative_of": "ticks", "scale": 2 * np.pi / 1200, "unit": "rad"}
+    speed = Profile.from_dict(
+        {"time": {"from": "t"}, "channels": {"ground_speed": "v", "wheel_speed_rl": source}}
+    )
+    recording = speed.apply(frame)
+    for middle, expected in ((5.0, 5.0), (15.0, 0.0), (25.0, -3.0)):
+        near = np.abs(recording.time - middle) < 3
+        assert np.allclose(recording.channels["wheel_speed_rl"][near], expected, atol=0.05)
+
+
 @pytest.mark.parametrize("seed", range(3))
 def test_jumps_of_the_pose_gaps_and_held_poses(seed: int) -> None:
     frame, speed = drive(20, seed=seed, noise=0.002)

@@ -13,6 +13,13 @@ from terragrip.recording.schema import TIME
 from terragrip.units import UnitError, factor_to, quantity
 
 Seconds = Annotated[float, BeforeValidator(lambda value: quantity(value, "s"))]
+
+
+def _one_or_several(value: object) -> object:
+    """``derivative_of: ticks`` is short for ``derivative_of: [ticks]``."""
+    return (value,) if isinstance(value, str) else value
+
+
 Quaternion = tuple[str, str, str, str]
 
 
@@ -38,7 +45,9 @@ class Source(Part):
     optional: bool = False
     over: str | None = None
     over_minimum: float = Field(0.0, ge=0.0, allow_inf_nan=False)
-    derivative_of: Annotated[tuple[str, ...], Field(min_length=1, max_length=3)] | None = None
+    derivative_of: (
+        Annotated[tuple[str, ...], BeforeValidator(_one_or_several), Field(min_length=1, max_length=3)] | None
+    ) = None
     norm_of: Annotated[tuple[str, ...], Field(min_length=2, max_length=3)] | None = None
     pitch_of: Quaternion | None = None
     roll_of: Quaternion | None = None

@@ -21,7 +21,8 @@ def missing_channels(proposals: Collection[str], has_time: bool) -> list[str]:
     wheels = [w for w in wheel_names_in(proposals) if f"wheel_speed_{w}" in proposals]
     if not wheels and "wheel_based_speed" not in proposals:
         notes.append(
-            "No wheel speed was found, nor a drive train's (wheel_based_speed): nothing can be estimated without."
+            "No wheel speed was found, nor a drive train's (wheel_based_speed): nothing can be estimated without. A motor's speed "
+            "becomes one by 'scale' (1/gear ratio), an encoder's count by 'derivative_of' (docs: formats#in-a-profile)."
         )
     if "ground_speed" not in proposals:
         notes.append(
