@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from terragrip.recording.lag import offset_between, speed_of
+from terragrip.recording.lag import Speed, lag_between, lag_within, offset_between, speed_of
 
 TIME = np.arange(0.0, 120.0, 0.05)
 
@@ -21,6 +21,7 @@ def test_a_clock_that_is_ahead_is_seen_whatever_part_is_common(ahead: float) -> 
     assert lag is not None
     assert lag.seconds == pytest.approx(ahead, abs=0.005)
     assert lag.correlation == pytest.approx(1.0, abs=1e-6)
+    assert lag.explained == (0.0, 0.0)
 
 
 def test_the_correlation_is_that_of_the_common_part() -> None:
@@ -53,3 +54,25 @@ def test_a_channel_of_two_values_tells_no_speed() -> None:
     for known in (0, 1, 2):
         ground = np.where(np.arange(len(TIME)) < known, 1.0, np.nan)
         assert speed_of(TIME, {"ground_speed": ground}) is None
+
+
+@pytest.mark.parametrize(
+    ("late", "words"), [("ground_speed", "'delay: 0.60 s' for it"), ("wheels", "'delay: 0.60 s' for each")]
+)
+def test_whichever_sensor_is_late_is_named_with_its_remedy(late: str, words: str) -> None:
+    ground, wheels = (speed_at(TIME - 0.6 * (name == late)) for name in ("ground_speed", "wheels"))
+    (note,) = lag_within(
+        TIME, {"ground_speed": ground, "wheel_speed_l": 5 * wheels, "wheel_speed_r": 5 * wheels}
+    )
+    name = "ground_speed is" if late == "ground_speed" else "The wheel speeds are"
+    assert note.startswith(f"{name} 0.6")
+    assert words in note
+
+
+def test_between_two_speeds_of_one_kind_the_vehicle_explains_nothing() -> None:
+    for pace in (None, 1.5):
+        first, second = Speed(TIME, speed_at(TIME), pace), Speed(TIME, speed_at(TIME + 0.3), pace)
+        lag = lag_between(first, second)
+        assert lag is not None
+        assert lag.explained == (0.0, 0.0)
+        assert lag.is_of_the_clock

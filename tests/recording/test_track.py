@@ -44,3 +44,13 @@ def test_a_grade_is_given_where_it_is_known_to_two_per_cent_and_not_where_it_is_
     assert np.std(grade[known]) == pytest.approx(0.01, rel=0.3)
     assert certain > 0.02  # the height itself is not known so well
     assert np.isnan(uphill(step, noise=vague).grade).all()
+
+
+def test_between_fixes_a_track_is_known_for_two_seconds_on_either_side() -> None:
+    time = np.r_[0.0:11.0, 20.0:31.0]
+    nothing = np.zeros(len(time))
+    track = Track(time, nothing, nothing, 1.0 + 0.1 * time, nothing, nothing, nothing.astype(bool))
+    when = np.array([-3.0, -1.0, 5.5, 11.9, 12.1, 17.9, 18.1, 31.0, 33.0])
+    speed = track.at("speed", when)
+    assert np.isnan(speed).tolist() == [True, False, False, False, True, True, False, False, True]
+    np.testing.assert_allclose(speed[[2, 3, 6]], 1.0 + 0.1 * when[[2, 3, 6]])

@@ -66,6 +66,14 @@ def test_a_bin_counts_where_the_runs_that_are_left_fill_it(samples, compared):
             compare_forms(bins)
 
 
+def test_each_form_fits_the_parameters_of_its_own():
+    """The paper's scale; A, k, d; B, C, D, E less what is held; and one more where there is an intercept."""
+    verdict = compare_forms(bin_pairs(*pairs(1, a=0.85)))
+    fitted = {score.form: score.parameters for score in verdict.ranking}
+    assert (fitted["exponential"], fitted["exponential with intercept"]) == (1, 2)
+    assert (fitted["effective"], fitted["effective with intercept"]) == (3, 4)
+
+
 def test_bins_by_pull_count_with_half_of_their_way():
     """Three runs fill each bin with just the metres that are asked for: two of them are still enough to fit."""
     slip = np.tile(np.repeat(0.055 + 0.05 * np.arange(8), 5), 3)

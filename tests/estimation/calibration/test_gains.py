@@ -10,7 +10,9 @@ import pytest
 
 from terragrip.estimation import calibrate
 from terragrip.estimation.calibration.gains import _disagreement
+from terragrip.estimation.calibration.procedure import _channel_errors
 from terragrip.estimation.calibration.sharing import Sharing, fit_shared_gains
+from terragrip.physics.loads import GRAVITY
 from terragrip.recording import Recording
 from terragrip.vehicle import Vehicle
 
@@ -145,6 +147,16 @@ def test_gains_vaguer_than_the_prior_are_left_out(drive: Make, vehicle: Vehicle)
     result = calibrate(drive(gain=GAIN, patches=0.1), sure)
     assert "drive_torque_gain fl" not in result
     assert any("knows it to" in u.why for u in result.unknown)
+
+
+def test_a_slope_that_nothing_measures_moves_load_by_its_weight(drive: Make, vehicle: Vehicle) -> None:
+    """Of two logs on slopes of SD .01 the mean's is .01/2^(1/2); along the track it acts where there is neither accelerometer nor pitch."""
+    sloping = Vehicle.from_dict({**vehicle.to_dict(), "uncertainty": {"slope": 0.01, "drawbar_offset": 7.0}})
+    logs = [drive(5.0), drive(5.0)]
+    errors = _channel_errors((), sloping, logs)
+    expected = GRAVITY * 0.01 / np.sqrt(2)
+    assert (errors.push, errors.lateral) == (pytest.approx(expected), pytest.approx(expected))
+    assert errors.drawbar == 7.0
 
 
 def on_soils(*gains: np.ndarray, windows: int = 400) -> Sharing:
