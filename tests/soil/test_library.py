@@ -34,6 +34,7 @@ def test_round_trip(tmp_path):
     raw = json.loads((tmp_path / "soils.json").read_text())["soils"]["fine"]
     assert {"model", "parameters", "interval", "r2", "nrmse", "bins"} <= set(raw)
     assert set(raw["bins"][0]) == {"slip", "mean", "std", "count"}
+    assert raw["resistance"] == {"mean": 0.12, "std": 0.01}
 
 
 @pytest.mark.parametrize("wrong", [float("nan"), float("inf")])
