@@ -14,6 +14,7 @@ from mcap.exceptions import EndOfFile
 from mcap.reader import NonSeekingReader, make_reader
 from websockets.asyncio.client import connect
 
+from drives import drive
 from machine import events, messages, rows_of, running, until
 from terragrip.errors import InputError
 from terragrip.formats import Profile
@@ -196,10 +197,10 @@ async def test_foxglove_stays_on_this_machine(vehicle):
         Service(vehicle, ["udp://127.0.0.1:9870"], ["foxglove://0.0.0.0:8765"])
 
 
-async def test_the_studios_websocket_in_json_and_in_doubles(tmp_path, vehicle, short, port):
+async def test_the_studios_websocket_in_json_and_in_doubles(tmp_path, vehicle, port):
     log = tmp_path / "drive.parquet"
-    short.recording.to_pandas().to_parquet(log)
-    service = Service(vehicle, [f"replay:{log}?speed=6"], [f"studio://127.0.0.1:{port}"])
+    drive(60.0).recording.to_pandas().to_parquet(log)  # goes on until the last client has had its turn
+    service = Service(vehicle, [f"replay:{log}"], [f"studio://127.0.0.1:{port}"])
     async with running(service):
         async with connect(f"ws://127.0.0.1:{port}/?columns=slip_fl") as text:
             hello, first = json.loads(await text.recv()), json.loads(await text.recv())
