@@ -22,6 +22,7 @@ from terragrip.estimation.estimates import Estimates
 from terragrip.formats import Profile
 from terragrip.live import read_record
 from terragrip.live.core import Core, Row, Settings
+from terragrip.live.options import Options
 from terragrip.live.service import Service
 from terragrip.simulation.families import Kind, draw
 
@@ -181,7 +182,7 @@ def test_a_set_point_of_slip_is_refused(tmp_path: Path) -> None:
     log = tmp_path / "log.parquet"
     tractor().recording.to_pandas().to_parquet(log, index=False)
     with pytest.raises(InputError, match="each driven wheel"):
-        Service(tractor().vehicle, [f"replay:{log}"], setpoint=(0.11, 2.0))
+        Service(tractor().vehicle, [f"replay:{log}"], options=Options(setpoint=(0.11, 2.0)))
 
 
 def test_what_cannot_be_used_leaves_it_as_it_was() -> None:

@@ -13,6 +13,7 @@ from terragrip.estimation import TractionEstimator
 from terragrip.ground.live import LiveGround
 from terragrip.live import read_record
 from terragrip.live.core import Core, Ground, Settings
+from terragrip.live.options import Options
 from terragrip.live.pipeline import Pipeline
 from terragrip.live.service import Service
 from terragrip.soil.library import Soil, SoilLibrary
@@ -74,7 +75,7 @@ def test_a_restart_goes_on_with_the_same_ground(tmp_path, recording, library, ve
 async def test_soils_and_changes_are_published(tmp_path, recording, library, vehicle, by_hand):
     log = tmp_path / "drive.parquet"
     recording.to_pandas().to_parquet(log)
-    service = Service(vehicle, [f"replay:{log}?speed=max"], library=library)
+    service = Service(vehicle, [f"replay:{log}?speed=max"], options=Options(library=library))
     seen = []
     service.listeners.append(seen.append)
     await service.run()

@@ -18,6 +18,7 @@ from drives import drive
 from machine import events, messages, rows_of, running, until
 from terragrip.errors import InputError
 from terragrip.formats import Profile
+from terragrip.live.options import Options
 from terragrip.live.schemas import NAMES
 from terragrip.live.service import Service
 
@@ -81,7 +82,11 @@ async def test_ros_2_by_zenoh(vehicle, short, port):
         other.declare_subscriber("7/terragrip/estimate/*/*", hear)
         at = f"connect=tcp/127.0.0.1:{port}&domain=7"
         service = Service(
-            vehicle, [f"ros2:/joints,/gnss/vel?{at}"], [f"ros2:/terragrip?{at}"], profile=profile, window=0.5
+            vehicle,
+            [f"ros2:/joints,/gnss/vel?{at}"],
+            [f"ros2:/terragrip?{at}"],
+            profile=profile,
+            options=Options(window=0.5),
         )
         async with running(service):
             for topic in ("joints", "gnss/vel"):

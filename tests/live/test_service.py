@@ -18,6 +18,7 @@ from terragrip.errors import InputError
 from terragrip.estimation import TractionEstimator
 from terragrip.formats import Profile
 from terragrip.live import read_record
+from terragrip.live.options import Options
 from terragrip.live.service import Service
 
 pytestmark = pytest.mark.asyncio
@@ -139,7 +140,7 @@ async def test_a_payload_that_is_no_json_or_no_number_is_named_counted_survived(
 
 
 async def test_late_doubled_and_missing_are_counted_by_channel(vehicle, short, port, sender):
-    service = Service(vehicle, [f"udp://127.0.0.1:{port}"], window=0.05)
+    service = Service(vehicle, [f"udp://127.0.0.1:{port}"], options=Options(window=0.05))
     good = messages(short.recording, 200)
     swapped = [*good[:60], good[61], good[60], *good[62:100], good[99], *good[105:150]]
     async with running(service):
@@ -263,7 +264,9 @@ async def test_sources_with_clocks_of_their_own_share_one_time_base(vehicle, sho
         probe.bind(("127.0.0.1", 0))
         other_port = probe.getsockname()[1]
     other = Sender(other_port)
-    service = Service(vehicle, [f"udp://127.0.0.1:{port}", f"udp://127.0.0.1:{other_port}"], window=0.1)
+    service = Service(
+        vehicle, [f"udp://127.0.0.1:{port}", f"udp://127.0.0.1:{other_port}"], options=Options(window=0.1)
+    )
     began = asyncio.get_running_loop().time()
     async with running(service):
         for message in messages(short.recording, 100):

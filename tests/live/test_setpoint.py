@@ -16,6 +16,7 @@ from terragrip.errors import InputError
 from terragrip.estimation import TractionEstimator
 from terragrip.live.core import Row
 from terragrip.live.message import ESTIMATE, SETPOINT, Message
+from terragrip.live.options import Options
 from terragrip.live.outbox import Outbox
 from terragrip.live.service import Service
 from terragrip.live.setpoint import FREED, LiveSetpoint
@@ -59,7 +60,7 @@ class Stated:
 
 @pytest.mark.asyncio
 async def test_each_row_has_the_set_point_that_the_block_gives_by_hand(log, vehicle, recording):
-    service = Service(vehicle, [f"replay:{log}?speed=max"], setpoint=(0.1, 0.8), learn=False)
+    service = Service(vehicle, [f"replay:{log}?speed=max"], options=Options(setpoint=(0.1, 0.8), learn=False))
     seen = []
     service.listeners.append(seen.append)
     await service.run()
@@ -78,7 +79,9 @@ async def test_each_row_has_the_set_point_that_the_block_gives_by_hand(log, vehi
 async def test_the_estimates_and_the_record_are_the_same_with_and_without(tmp_path, log, vehicle):
     rows = {}
     for name, setpoint in (("with", (0.1, 0.8)), ("without", None)):
-        service = Service(vehicle, [f"replay:{log}?speed=max"], record=tmp_path / name, setpoint=setpoint)
+        service = Service(
+            vehicle, [f"replay:{log}?speed=max"], record=tmp_path / name, options=Options(setpoint=setpoint)
+        )
         await service.run()
         rows[name] = (tmp_path / name / "estimates-000001.parquet").read_bytes()
         assert not list((tmp_path / name).glob("*setpoint*"))
@@ -164,7 +167,12 @@ def test_slip_alone_has_no_set_point(vehicle, tmp_path):
     path = tmp_path / "p.yaml"
     path.write_text("time: {from: t}\nchannels: {wheel_based_speed: w, ground_speed: g}\n")
     with pytest.raises(InputError, match="slip of each driven wheel"):
-        Service(vehicle, ["udp://127.0.0.1:9871"], profile=Profile.load(path), setpoint=(0.1, 0.8))
+        Service(
+            vehicle,
+            ["udp://127.0.0.1:9871"],
+            profile=Profile.load(path),
+            options=Options(setpoint=(0.1, 0.8)),
+        )
 
 
 def test_no_number_of_a_set_point_is_ever_missing(vehicle):

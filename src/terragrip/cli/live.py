@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -95,7 +96,7 @@ def command(
     # Before pyarrow loads: its own allocator keeps 5 MB more, for a record that writes once a minute.
     os.environ.setdefault("ARROW_DEFAULT_MEMORY_POOL", "system")
     from terragrip.formats import Profile
-    from terragrip.live.counts import FATES
+    from terragrip.live.options import Options
     from terragrip.live.service import Service
     from terragrip.vehicle import Vehicle
 
@@ -111,27 +112,28 @@ def command(
         sink or [],
         profile=None if profile is None else Profile.load(profile),
         record=record,
-        method=method,
-        window=window / 1000.0,
-        held={**known["held"], **_held(held or [])},
-        noise=known["noise"],
-        learn=settings is None,
-        ground=ground,
-        library=_library(library),
-        setpoint=_setpoint(setpoint, speed),
-        driveline=known["driveline"],
+        options=Options(
+            method,
+            window / 1000.0,
+            {**known["held"], **_held(held or [])},
+            known["noise"],
+            learn=settings is None,
+            ground=ground,
+            library=_library(library),
+            setpoint=_setpoint(setpoint, speed),
+            driveline=known["driveline"],
+        ),
     )
     from terragrip.log_events import emit
 
     logger = logging.getLogger("terragrip.live")
-    sources, sinks = [feed.name for feed in service.feeds], [box.uri.name for box in service.outboxes]
-    emit(logger, "live_started", sources=sources, sinks=sinks)
+    sinks = [box.uri.name for box in service.outboxes]
+    emit(logger, "live_started", sources=service.source_names, sinks=sinks)
     with asyncio.Runner(loop_factory=_loop_factory()) as runner:
         runner.run(_run(service, duration, quiet or as_json))
-    totals = {fate: service.core.counts.total(fate) for fate in FATES}
-    emit(logger, "live_stopped", rows=service.core.rows, values=totals)
+    emit(logger, "live_stopped", **service.totals())
     if not (quiet or as_json):
-        print(service.statistics.summary())
+        print(service.summary())
         if record is not None:
             print(f"Recorded in {record}")
 
@@ -218,12 +220,12 @@ async def _run(service: Service, duration: float | None, quiet: bool) -> None:
     import asyncio
     import signal
 
-    from terragrip.live.status import shown
+    from terragrip.live.status import shown, table
 
     loop = asyncio.get_running_loop()
     for number in (signal.SIGINT, signal.SIGTERM):
         loop.add_signal_handler(number, service.stop)
     if duration is not None:
         loop.call_later(duration, service.stop)
-    async with shown(service, quiet):
+    async with shown(partial(table, service), service.listeners, quiet):
         await service.run()

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, Protocol
 
 from terragrip.live.decode import Decoder
 from terragrip.live.inbox import Inbox, Values
@@ -16,6 +16,18 @@ _LAYOUTS = 64
 
 class Lost(Exception):
     """A source or sink lost its other side; the text says why. It is connected anew after a while."""
+
+
+class Receiver(Protocol):
+    """What a source of topics needs of a `Feed`; that of many vehicles is another."""
+
+    def message(self, data: bytes, arrival: float | None = None, *, topic: str | None = None) -> None: ...
+
+    def dropped(self, number: int) -> None: ...
+
+    def connected(self) -> None: ...
+
+    def lost(self, why: str) -> None: ...
 
 
 class Feed:

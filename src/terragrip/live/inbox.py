@@ -40,6 +40,11 @@ class Inbox:
         self.samples.append((now, source, now if stamp is None else stamp, values))
         self._filled.set()
 
+    @property
+    def is_empty(self) -> bool:
+        """Whether there is neither a sample nor a count nor an event."""
+        return not (self.samples or self._counts or self._events)
+
     def count(self, fate: str, channels: Iterable[str], number: int = 1, source: int | None = None) -> None:
         """Count what happened beside the samples (`terragrip.live.counts.FATES`)."""
         key = (fate, source, tuple(channels))
@@ -72,7 +77,7 @@ class Inbox:
 
     async def filled(self, until: float | None = None) -> None:
         """Wait until something is there, at most up to ``until`` on the clock [s]; lets others have their turn in any case."""
-        if self.samples or self._counts or self._events:
+        if not self.is_empty:
             await asyncio.sleep(0)
             return
         self._filled.clear()

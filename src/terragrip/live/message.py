@@ -13,24 +13,33 @@ from terragrip.live.event import Event
 ESTIMATE, EVENT, STATUS, SOIL, GROUND, SETPOINT = "estimate", "event", "status", "soil", "ground", "setpoint"
 
 
+_ESTIMATORS = 1024  # whose columns are kept
 _NOT_FINITE = re.compile(":(nan|-?inf)")
 
 
 class Message:
-    """``kind`` is `ESTIMATE`, `EVENT`, `STATUS`, `SOIL`, `GROUND` or `SETPOINT`; ``row`` is there for an estimate, ``data`` for others."""
+    """``kind`` is `ESTIMATE`, `EVENT`, `STATUS`, `SOIL`, `GROUND` or `SETPOINT`; ``row`` is there for an estimate, ``data`` for others.
 
-    __slots__ = ("_json", "data", "kind", "row", "time")
+    ``vehicle``: its name where many are served, else empty.
+    """
+
+    __slots__ = ("_json", "data", "kind", "row", "time", "vehicle")
 
     def __init__(
-        self, kind: str, time: float, row: Row | None = None, data: dict[str, Any] | None = None
+        self,
+        kind: str,
+        time: float,
+        row: Row | None = None,
+        data: dict[str, Any] | None = None,
+        vehicle: str = "",
     ) -> None:
-        self.kind, self.time, self.row, self.data = kind, time, row, data
+        self.kind, self.time, self.row, self.data, self.vehicle = kind, time, row, data, vehicle
         self._json: dict[Columns | None, bytes] = {}
 
     @classmethod
-    def of_event(cls, event: Event) -> Message:
+    def of_event(cls, event: Event, vehicle: str = "") -> Message:
         """An event's message."""
-        return cls(EVENT, event.time, data=event.to_dict())
+        return cls(EVENT, event.time, data=event.to_dict(), vehicle=vehicle)
 
     def json(self, columns: Columns | None = None) -> bytes:
         """The message as a JSON object; of an estimate, ``columns`` or all of them. Missing numbers are null."""
@@ -48,9 +57,7 @@ class Columns:
 
     def __init__(self, text: str = "") -> None:
         self._patterns = [part.strip() for part in text.split(",") if part.strip()]
-        self._of: object = None
-        self._places: dict[str, int] = {}
-        self._template = ""
+        self._known: dict[int, tuple[dict[str, int], dict[str, int], str]] = {}
 
     def wants(self, name: str) -> bool:
         """Whether a column is wanted."""
@@ -58,17 +65,24 @@ class Columns:
 
     def places(self, row: Row) -> dict[str, int]:
         """Name and place of each wanted column."""
-        every = row.estimate.places
-        if self._of is not every:
-            self._of = every
-            self._places = {name: place for name, place in every.items() if self.wants(name)}
-            self._template = "".join(f',"{name}":%.9g' for name in self._places) + "}"
-        return self._places
+        return self._of(row.estimate.places)[1]
+
+    def _of(self, every: dict[str, int]) -> tuple[dict[str, int], dict[str, int], str]:
+        """All columns, those wanted, and the JSON of these; kept by estimator, whose dictionary of places is always the same."""
+        known = self._known.get(id(every))
+        if known is None or known[0] is not every:
+            wanted = {name: place for name, place in every.items() if self.wants(name)}
+            template = "".join(f',"{name}":%.9g' for name in wanted) + "}"
+            if len(self._known) >= _ESTIMATORS:
+                self._known.clear()
+            known = self._known[id(every)] = (every, wanted, template)
+        return known
 
     def json(self, row: Row) -> bytes:
         """The row as a JSON object, numbers to nine digits; a missing one is null."""
-        estimate, places = row.estimate, self.places(row)
-        numbers = self._template % tuple(map(estimate.values.__getitem__, places.values()))
+        estimate = row.estimate
+        _, places, template = self._of(estimate.places)
+        numbers = template % tuple(map(estimate.values.__getitem__, places.values()))
         if ":n" in numbers or "inf" in numbers:
             numbers = _NOT_FINITE.sub(":null", numbers)
         head = f'{{"time":{estimate.time!r},"arrival":{row.arrival!r},"event":"{estimate.event}"'

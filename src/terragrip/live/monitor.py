@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 from terragrip.live.counts import FATES
 from terragrip.live.inbox import Inbox
@@ -10,8 +10,10 @@ from terragrip.live.outbox import Outbox
 from terragrip.live.pipeline import Pipeline
 from terragrip.live.pulse import FLOOR, Pulse
 from terragrip.live.statistics import Statistics
-from terragrip.prometheus_text import METRICS, Metrics
+from terragrip.prometheus_text import METRICS, Labels, Metrics
 
+Family = tuple[str, str, str, list[tuple[Labels, float]]]
+"""Kind, name, help and samples of a metric."""
 LIVE, READY = "/health/live", "/health/ready"
 
 
@@ -37,48 +39,47 @@ class Monitor:
 
     def metrics(self) -> str:
         """Everything counted, as Prometheus reads it (docs/live.md)."""
-        s, page = self._statistics, Metrics()
-        core, recorder = self._pipeline.core, self._pipeline.recorder
-        counter = "terragrip_live_{}_total".format
+        page = Metrics()
         page.add(
             "gauge", "terragrip_live_ready", "1 where /health/ready says so.", int(self.unready() is None)
         )
-        page.add("counter", counter("samples"), "Samples processed by this process.", s.samples_in)
-        by_channel = core.counts.by_channel
-        page.add(
-            "counter", counter("values"), "Values by channel and what became of them, restarts of a record included.",
-            [({"channel": c, "fate": f}, by_channel[c][f]) for c in by_channel for f in FATES],
-        )  # fmt: skip
-        page.add("counter", counter("rows"), "Rows estimated by this process.", s.rows)
-        page.add("counter", counter("rows_predicted"), "Rows predicted in silence.", s.predicted_rows)
-        page.add(
-            "counter", counter("filter_restarts"), "Rows at which the filter began anew.", s.filter_restarts
-        )
-        page.add("counter", counter("nis"), "Sum of NIS over rows.", s.nis)
-        page.add("counter", counter("nis_expected"), "Sum of what NIS should be on average.", s.nis_expected)
+        for kind, name, text, samples in self.families():
+            page.add(kind, name, text, samples)
+        add_sinks(page, self._outboxes)
+        return str(page)
+
+    def families(self, *, by_channel: bool = True) -> Iterator[Family]:
+        """The numbers of one vehicle; values of all channels together unless ``by_channel``."""
+        s, core, recorder = self._statistics, self._pipeline.core, self._pipeline.recorder
+
+        def counter(name: str, text: str, value: float) -> Family:
+            return "counter", f"terragrip_live_{name}_total", text, [({}, value)]
+
+        yield counter("samples", "Samples processed by this process.", s.samples_in)
+        values: list[tuple[Labels, float]] = [({"fate": fate}, core.counts.total(fate)) for fate in FATES]
+        if by_channel:
+            mine = core.counts.by_channel
+            values = [({"channel": c, "fate": f}, mine[c][f]) for c in mine for f in FATES]
+        text = "Values by channel and what became of them, restarts of a record included."
+        yield "counter", "terragrip_live_values_total", text, values
+        yield counter("rows", "Rows estimated by this process.", s.rows)
+        yield counter("rows_predicted", "Rows predicted in silence.", s.predicted_rows)
+        yield counter("filter_restarts", "Rows at which the filter began anew.", s.filter_restarts)
+        yield counter("nis", "Sum of NIS over rows.", s.nis)
+        yield counter("nis_expected", "Sum of what NIS should be on average.", s.nis_expected)
         if s.is_real_time:
-            page.add(
-                "counter", counter("delay_seconds"), "Sum over rows of first sample to estimate.", s.delays
-            )
-        page.add("gauge", "terragrip_live_queue_samples", "Samples waiting.", len(self._inbox.samples))
-        boxes = [({"sink": f"{k} {box.uri.name}"}, box) for k, box in enumerate(self._outboxes)]
-        page.add(
-            "gauge", "terragrip_live_sink_queue_messages", "Messages waiting for a sink.",
-            [(label, len(box)) for label, box in boxes],
-        )  # fmt: skip
-        page.add("counter", counter("sink_sent"), "Messages to a sink.", [(n, b.sent) for n, b in boxes])
-        lost = [(label, box.dropped) for label, box in boxes]
-        page.add("counter", counter("sink_dropped"), "Messages that a sink was too slow for.", lost)
-        kinds = [({"event": kind}, number) for kind, number in s.event_counts.items()]
-        page.add("counter", counter("events"), "Events by name.", kinds)
+            yield counter("delay_seconds", "Sum over rows of first sample to estimate.", s.delays)
+        waiting = len(self._inbox.samples)
+        yield "gauge", "terragrip_live_queue_samples", "Samples waiting.", [({}, waiting)]
+        kinds: list[tuple[Labels, float]] = [({"event": kind}, n) for kind, n in s.event_counts.items()]
+        yield "counter", "terragrip_live_events_total", "Events by name.", kinds
         if recorder is not None:
-            page.add("counter", counter("recorded_rows"), "Rows given to the record.", recorder.rows_kept)
-        now = s.now()
-        silences = [
+            yield counter("recorded_rows", "Rows given to the record.", recorder.rows_kept)
+        now, text = s.now(), "Since a source's last message."
+        silences: list[tuple[Labels, float]] = [
             ({"source": f"{k} {pulse.feed.name}"}, pulse.silence(now)) for k, pulse in enumerate(s.pulses)
         ]
-        page.add("gauge", "terragrip_live_source_silence_seconds", "Since a source's last message.", silences)
-        return str(page)
+        yield "gauge", "terragrip_live_source_silence_seconds", text, silences
 
     def unready(self) -> str | None:
         """Why the service has no data to give, in one line; None where it has.
@@ -102,6 +103,17 @@ class Monitor:
         if age > max(FLOOR, 2.0 * max(periods)) + statistics.window:
             return f"messages come, but no row was estimated for {age:.1f} s"
         return None
+
+
+def add_sinks(page: Metrics, outboxes: Sequence[Outbox]) -> None:
+    """The numbers of the sinks."""
+    boxes = [({"sink": f"{k} {box.uri.name}"}, box) for k, box in enumerate(outboxes)]
+    name = "terragrip_live_sink_{}".format
+    waiting = [(label, len(box)) for label, box in boxes]
+    page.add("gauge", name("queue_messages"), "Messages waiting for a sink.", waiting)
+    page.add("counter", name("sent_total"), "Messages to a sink.", [(n, box.sent) for n, box in boxes])
+    lost = [(label, box.dropped) for label, box in boxes]
+    page.add("counter", name("dropped_total"), "Messages that a sink was too slow for.", lost)
 
 
 def _silent(pulse: Pulse, now: float) -> str | None:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Callable
+from concurrent.futures import Executor
 from pathlib import Path
 from typing import Any
 
@@ -21,15 +23,23 @@ class Pipeline:
     core: one that has processed nothing yet; a record's own takes its place, which must be of the same vehicle, settings
         and library.
     folder: of the record, which goes on from its end where it holds one; None: none is kept.
-    rows, seconds: when a segment of it is closed.
+    rows, seconds: when a segment of it is closed. thread: that its work for the disk is done in; None: one of its own.
 
     Raises InputError if the folder cannot be used, is in use, or holds the record of another vehicle or other settings.
     """
 
     def __init__(
-        self, core: Core, folder: Path | None = None, *, rows: int = ROWS, seconds: float = SECONDS
+        self,
+        core: Core,
+        folder: Path | None = None,
+        *,
+        rows: int = ROWS,
+        seconds: float = SECONDS,
+        thread: Executor | None = None,
     ) -> None:
-        self.recorder = None if folder is None else Recorder(folder, core, rows=rows, seconds=seconds)
+        self.recorder = (
+            None if folder is None else Recorder(folder, core, rows=rows, seconds=seconds, thread=thread)
+        )
         self.core = core if self.recorder is None else self.recorder.core
         self.opening: list[Output] = [] if self.recorder is None else self.recorder.opening
         self.failure: str | None = None
@@ -79,6 +89,14 @@ class Pipeline:
             self.recorder.close()
         except OSError as error:
             self.failure = f"the record's last segment could not be closed ({error.strerror or error})"
+
+    def abandon(self) -> None:
+        """Let go of the record, with what came in so far, after a failure that is not the record's."""
+        if self.recorder is not None:
+            with contextlib.suppress(OSError):
+                self.recorder.write()
+            self.recorder.abandon()
+            self.recorder = None
 
     def _keep(self, outputs: list[Output], keep: Callable[[Recorder], None]) -> list[Output]:
         """Record it; where that is not possible, say so and go on without."""

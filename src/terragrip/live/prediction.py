@@ -14,9 +14,10 @@ _PERIODS = 5.0  # rows' periods
 
 
 class Prediction:
-    """Predicted rows, at most one a call."""
+    """Predicted rows, at most one a call, and none after ``longest`` s of silence."""
 
-    def __init__(self) -> None:
+    def __init__(self, longest: float = float("inf")) -> None:
+        self._longest = longest
         self._copy: TractionEstimator | None = None
         self._rows, self._time = -1, float("-inf")
 
@@ -24,6 +25,9 @@ class Prediction:
         """The row at the arrival clock's ``now``, or None: nothing came yet, or something came just now."""
         silence = now - last_arrival
         if core.estimator is None or not core.rows or silence < max(_PATIENCE, _PERIODS * period):
+            return None
+        if silence > self._longest:
+            self._copy = None
             return None
         if self._copy is None or self._rows != core.rows:
             self._copy, self._rows = restored(core.estimator.snapshot()), core.rows

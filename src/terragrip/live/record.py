@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import json
 import os
-from concurrent.futures import Future, ThreadPoolExecutor
+from concurrent.futures import Executor, Future, ThreadPoolExecutor, wait
 from pathlib import Path
 from typing import Any
 
@@ -43,6 +43,7 @@ class Recorder:
     folder: made if absent. If it holds a record, the run goes on from its end.
     core: one that has processed nothing yet. The record's takes its place; vehicle, settings and library must be the same.
     rows, seconds: when a segment is closed.
+    thread: one thread, shared with other records, that does what waits for the disk; None: one of its own.
 
     Raises InputError if the folder cannot be used, is in use, or holds the record of another vehicle or other settings.
     """
@@ -54,11 +55,13 @@ class Recorder:
         *,
         rows: int = ROWS,
         seconds: float = SECONDS,
+        thread: Executor | None = None,
     ) -> None:
         self.folder = folder
         self._rows, self._seconds = rows, seconds
         self._lock = locked(folder)
-        self._thread = ThreadPoolExecutor(1, thread_name_prefix="record")
+        self._thread = thread or record_thread()
+        self._is_shared = thread is not None
         self._closing: list[Future[None]] = []
         self._thread.submit(
             _load_parquet
@@ -165,17 +168,32 @@ class Recorder:
         try:
             if self.segment.size:
                 self._rotate()
-            self._thread.shutdown()  # the last sync is behind it
-            for closing in self._closing:
-                closing.result()
+            for work in self._work():
+                work.result()
             self._ahead.close()
         finally:
-            os.close(self._lock)
+            self._let_go()
 
     def abandon(self) -> None:
         """Let go of the folder after a failure, leaving what is there."""
-        self._thread.shutdown(cancel_futures=True)
+        for work in self._work():
+            work.cancel()
+        wait(self._work())
+        self._let_go()
+
+    def _work(self) -> list[Future[None]]:
+        """What was given to the thread and is not known to be done."""
+        return self._closing if self._syncing is None else [self._syncing, *self._closing]
+
+    def _let_go(self) -> None:
+        if not self._is_shared:
+            self._thread.shutdown()
         os.close(self._lock)
+
+
+def record_thread() -> ThreadPoolExecutor:
+    """A thread for records: what one of them gives it is done in that order."""
+    return ThreadPoolExecutor(1, thread_name_prefix="record")
 
 
 def _load_parquet() -> None:

@@ -6,7 +6,7 @@ import asyncio
 import logging
 import math
 import sys
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
 from typing import TYPE_CHECKING, Any
 
@@ -22,10 +22,12 @@ _TROUBLE = ("late", "doubled", "missing", "dropped", "unreadable", "clock")
 
 
 @asynccontextmanager
-async def shown(service: Service, quiet: bool) -> AsyncIterator[None]:
-    """Show the status on standard error while the block runs: on a terminal a live table, elsewhere one line an event."""
+async def shown(
+    screen: Callable[[], Any], listeners: list[Callable[[Message], None]], quiet: bool
+) -> AsyncIterator[None]:
+    """Show the status on standard error while the block runs: on a terminal ``screen`` as rich shows it, elsewhere one line an event."""
     if not quiet and sys.stderr.isatty():
-        task = asyncio.create_task(_refresh(service))
+        task = asyncio.create_task(_refresh(screen))
         try:
             yield
         finally:
@@ -33,24 +35,24 @@ async def shown(service: Service, quiet: bool) -> AsyncIterator[None]:
             await asyncio.gather(task, return_exceptions=True)
         return
     if not quiet and not logging.getLogger("terragrip").isEnabledFor(logging.INFO):  # else the log says it
-        service.listeners.append(_print_event)
+        listeners.append(_print_event)
     yield
 
 
-async def _refresh(service: Service) -> None:
+async def _refresh(screen: Callable[[], Any]) -> None:
     from rich.console import Console
     from rich.live import Live
 
     with Live(console=Console(stderr=True), auto_refresh=False, transient=True) as live:
         while True:
-            live.update(table(service), refresh=True)
+            live.update(screen(), refresh=True)
             await asyncio.sleep(_STEP)
 
 
 def _print_event(message: Message) -> None:
     if message.kind == EVENT and message.data is not None:
-        event = message.data
-        print(f"{event['kind']}: {event['source']}: {event['text']}", file=sys.stderr)
+        event, whose = message.data, f"{message.vehicle}: " if message.vehicle else ""
+        print(f"{whose}{event['kind']}: {event['source']}: {event['text']}", file=sys.stderr)
 
 
 def table(service: Service) -> Any:

@@ -4,23 +4,25 @@ from __future__ import annotations
 
 import asyncio
 import logging
-from collections.abc import Awaitable, Callable
+from collections.abc import Awaitable, Callable, Sequence
 from typing import Any
 
-from terragrip.live.feed import Feed, Lost
+from terragrip.live.feed import Lost
 from terragrip.live.outbox import Outbox
 from terragrip.live.sinks import Sink
-from terragrip.live.sources import Source
 
 _BACKOFF = (0.5, 30.0)  # s, doubled from the first to the last
 _SETTLED = 10.0  # s connected, after which the back-off begins anew
 
+Task = asyncio.Task[Any]
+Run = Callable[[], Awaitable[None]]
+
 logger = logging.getLogger("terragrip.live")
 
 
-async def supervise_source(source: Source, feed: Feed) -> None:
+async def supervise_source(run: Run, lost: Callable[[str], None]) -> None:
     """Run a source until it ends; raises InputError where it cannot be used at all."""
-    await _again_and_again(lambda: source.run(feed), feed.lost)
+    await _again_and_again(run, lost)
 
 
 async def supervise_sink(sink: Sink, outbox: Outbox) -> None:
@@ -28,7 +30,7 @@ async def supervise_sink(sink: Sink, outbox: Outbox) -> None:
     await _again_and_again(lambda: sink.run(outbox), outbox.lost)
 
 
-async def _again_and_again(run: Callable[[], Awaitable[None]], lost: Callable[[str], None]) -> None:
+async def _again_and_again(run: Run, lost: Callable[[str], None]) -> None:
     loop = asyncio.get_running_loop()
     pause = _BACKOFF[0]
     while True:
@@ -42,6 +44,22 @@ async def _again_and_again(run: Callable[[], Awaitable[None]], lost: Callable[[s
             pause = _BACKOFF[0]
         await asyncio.sleep(pause)
         pause = min(2 * pause, _BACKOFF[1])
+
+
+async def ended(sources: Sequence[Task], sinks: Sequence[Task], until_end: Sequence[Task]) -> None:
+    """Wait until one of ``until_end`` is done, or a sink fails; then end all but the sinks. Raises what one of them raised."""
+    await asyncio.wait([*until_end, *sinks], return_when=asyncio.FIRST_COMPLETED)
+    await cancelled([*sources, *until_end])
+    for task in (*sources, *sinks, *until_end):
+        if task.done() and not task.cancelled() and (failure := task.exception()) is not None:
+            raise failure
+
+
+async def cancelled(tasks: Sequence[Task]) -> None:
+    """Cancel tasks and wait for their end."""
+    for task in tasks:
+        task.cancel()
+    await asyncio.gather(*tasks, return_exceptions=True)
 
 
 def report_unhandled(loop: asyncio.AbstractEventLoop, context: dict[str, Any]) -> None:

@@ -7,7 +7,7 @@ import threading
 from collections.abc import Callable
 from typing import Any
 
-from terragrip.live.feed import Feed
+from terragrip.live.feed import Receiver
 
 _MOST = 4096  # calls on their way
 
@@ -15,7 +15,7 @@ _MOST = 4096  # calls on their way
 class ThreadBridge:
     """`call` is used in another thread; what it is given runs in the loop's."""
 
-    def __init__(self, feed: Feed, most: int = _MOST) -> None:
+    def __init__(self, feed: Receiver, most: int = _MOST) -> None:
         self._feed, self._most = feed, most
         self._loop = asyncio.get_running_loop()
         self._sent = self._done = self._dropped = 0  # each counted by one thread only

@@ -38,8 +38,10 @@ class Sink(Protocol):
         """Take messages for ever; raises Lost where the other side went away."""
 
 
-def open_sink(text: str, vehicle: Vehicle, columns: Sequence[str]) -> tuple[Uri, Sink]:
-    """The sink of a URI for estimates of these columns; raises InputError if it names none, or the package it needs is missing."""
+def open_sink(text: str, vehicle: Vehicle | None, columns: Sequence[str]) -> tuple[Uri, Sink]:
+    """The sink of a URI for estimates of these columns; ``vehicle`` None: of many. Raises InputError if it names none, or the package
+    it needs is missing.
+    """
     uri = Uri.parse(text, OPTIONS, "sink")
     with packages_of(uri):
         module, name = _HOMES[uri.scheme].split(".")

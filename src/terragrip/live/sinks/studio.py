@@ -5,36 +5,51 @@ from __future__ import annotations
 import asyncio
 import http
 from contextlib import aclosing
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Protocol
 from urllib.parse import parse_qs, urlsplit
 
 from terragrip.errors import InputError
 from terragrip.live.broadcast import Broadcast
 from terragrip.live.credentials import Credentials
 from terragrip.live.feed import Lost
-from terragrip.live.monitor import Monitor
 from terragrip.live.outbox import Outbox
 from terragrip.live.uri import Uri
 from terragrip.prometheus_text import CONTENT_TYPE
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import AsyncGenerator, Sequence
 
+    from terragrip.live.message import Message
     from terragrip.vehicle import Vehicle
+
+
+class Stream(Protocol):
+    """What clients subscribe to (`Broadcast`)."""
+
+    def put(self, message: Message) -> None: ...
+
+    def subscribe(self, request: str) -> AsyncGenerator[str | bytes]: ...
+
+
+class Answers(Protocol):
+    """What tells of the service's state (`terragrip.live.monitor.Monitor`)."""
+
+    def answer(self, path: str) -> tuple[int, str] | None: ...
 
 
 class StudioSink:
     """``studio://127.0.0.1:8766``. Beyond this machine clients must know the token.
 
-    ``monitor``: what answers plain HTTP requests for the service's state; the service sets it.
+    ``monitor``: what answers plain HTTP requests for the service's state; ``broadcast``: where clients subscribe, of one vehicle unless
+    the service sets another. It sets the monitor too.
     """
 
-    def __init__(self, uri: Uri, vehicle: Vehicle, columns: Sequence[str]) -> None:
+    def __init__(self, uri: Uri, vehicle: Vehicle | None, columns: Sequence[str]) -> None:
         import websockets.asyncio.server  # noqa: F401  # so that a missing package is said at once
 
         self.uri = uri
-        self.broadcast = Broadcast(vehicle.name, columns)
-        self.monitor: Monitor | None = None
+        self.broadcast: Stream = Broadcast(vehicle.name if vehicle else "", columns)
+        self.monitor: Answers | None = None
         self._credentials = Credentials.find()
         if not uri.is_loopback() and not self._credentials.token:
             raise InputError(

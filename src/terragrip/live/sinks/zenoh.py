@@ -6,12 +6,13 @@ import asyncio
 
 from terragrip.live.feed import Lost
 from terragrip.live.outbox import Outbox
+from terragrip.live.topics import of_vehicle
 from terragrip.live.uri import Uri
 from terragrip.live.zenoh_session import config, key_of, open_session
 
 
 class ZenohSink:
-    """``zenoh:terragrip?listen=tcp/127.0.0.1:7447``: to ``terragrip/estimate`` and so on."""
+    """``zenoh:terragrip?listen=tcp/127.0.0.1:7447``: to ``terragrip/estimate`` and so on; ``{vehicle}`` as of MQTT."""
 
     def __init__(self, uri: Uri, *_: object) -> None:
         self.uri = uri
@@ -28,7 +29,7 @@ class ZenohSink:
             while True:
                 message = await outbox.get()
                 session.put(
-                    f"{self.key}/{message.kind}",
+                    f"{of_vehicle(self.key, message.vehicle)}/{message.kind}",
                     message.json(outbox.columns),
                     encoding=zenoh.Encoding.APPLICATION_JSON,
                 )

@@ -9,7 +9,7 @@ from typing import Protocol
 
 from terragrip.errors import InputError
 from terragrip.live.decode import Decoder
-from terragrip.live.feed import Feed
+from terragrip.live.feed import Feed, Receiver
 from terragrip.live.uri import Uri
 
 _HOMES: dict[str, str] = {
@@ -39,6 +39,13 @@ class Source(Protocol):
 
     async def run(self, feed: Feed) -> None:
         """Feed messages until there are no more; raises Lost where the other side went away, InputError for good."""
+
+
+class TopicSource(Protocol):
+    """A source whose messages bear a topic: MQTT and Zenoh."""
+
+    async def run(self, feed: Receiver) -> None:
+        """As of `Source`."""
 
 
 def open_source(text: str, decoder: Decoder) -> tuple[Uri, Source]:

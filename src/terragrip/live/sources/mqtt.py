@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from terragrip.live.feed import Feed, Lost
+from terragrip.live.feed import Lost, Receiver
 from terragrip.live.mqtt_client import check, client, quality
 from terragrip.live.uri import Uri
 
@@ -17,7 +17,7 @@ class MqttSource:
         self.qos = quality(uri)
         check(uri)
 
-    async def run(self, feed: Feed) -> None:
+    async def run(self, feed: Receiver) -> None:
         """Feed messages; raises Lost where the broker refuses or goes away."""
         import aiomqtt
 

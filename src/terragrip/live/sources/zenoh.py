@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 from typing import Any
 
-from terragrip.live.feed import Feed
+from terragrip.live.feed import Receiver
 from terragrip.live.thread_bridge import ThreadBridge
 from terragrip.live.uri import Uri
 from terragrip.live.zenoh_session import config, key_of, open_session
@@ -21,7 +21,7 @@ class ZenohSource:
         self.key = key_of(uri, "machine/**")
         config(uri)
 
-    async def run(self, feed: Feed) -> None:
+    async def run(self, feed: Receiver) -> None:
         """Feed samples; raises Lost where the other side is not there. Zenoh itself connects again later."""
         bridge = ThreadBridge(feed)
         session = await asyncio.to_thread(open_session, self.uri)
@@ -36,5 +36,5 @@ class ZenohSource:
         finally:
             await asyncio.to_thread(session.close)
 
-    def _feed(self, feed: Feed, data: bytes, key: str) -> None:
+    def _feed(self, feed: Receiver, data: bytes, key: str) -> None:
         feed.message(data, topic=key)

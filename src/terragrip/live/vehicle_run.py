@@ -1,0 +1,162 @@
+"""One vehicle's way from samples to messages: inbox, pipeline, and the numbers that it shows of itself. No tasks, no links."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Callable, Sequence
+from concurrent.futures import Executor
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from terragrip.live.core import Core, Ground, Output, Row
+from terragrip.live.decode import Decoder
+from terragrip.live.event import Event
+from terragrip.live.feed import Feed
+from terragrip.live.inbox import Inbox
+from terragrip.live.message import ESTIMATE, GROUND, SETPOINT, SOIL, STATUS, Message
+from terragrip.live.options import has_slips
+from terragrip.live.outbox import Outbox
+from terragrip.live.payload import unpacker
+from terragrip.live.pipeline import Pipeline
+from terragrip.live.prediction import Prediction
+from terragrip.live.statistics import Statistics
+from terragrip.log_events import emit
+
+if TYPE_CHECKING:
+    from terragrip.formats import Profile
+    from terragrip.live.setpoint import LiveSetpoint
+
+AT_ONCE = 64  # samples between two turns of sources and sinks
+_SYNC = 0.7  # s: with writing, under a second
+
+logger = logging.getLogger("terragrip.live")
+
+
+class VehicleRun:
+    """Whoever runs it fills the inbox by ``feeds``, and calls `open`, then `turn` and `keep_house`, then `finish`.
+
+    Parameters
+    ----------
+    core: one that has processed nothing yet; a record's own takes its place.
+    inbox: where the feeds put samples. decoders: of each of the core's sources; profile: theirs.
+    outboxes: of the sinks that everything published goes to, besides ``listeners``.
+    record: folder of the record; None: none is kept.
+    setpoint: that is published beside the estimates; None: none is.
+    is_real_time: samples come when they come, and silence means something.
+    name: of the vehicle, where many are served. thread: of the record (`Recorder`). predict: s of silence that predictions go on for.
+
+    Raises InputError where the record cannot be used.
+    """
+
+    def __init__(
+        self,
+        core: Core,
+        inbox: Inbox,
+        decoders: Sequence[Decoder],
+        outboxes: Sequence[Outbox],
+        *,
+        profile: Profile | None = None,
+        record: Path | None = None,
+        setpoint: LiveSetpoint | None = None,
+        is_real_time: bool = True,
+        name: str = "",
+        thread: Executor | None = None,
+        predict: float = float("inf"),
+    ) -> None:
+        self.name = name
+        self.inbox, self.setpoint, self.is_real_time = inbox, setpoint, is_real_time
+        self.pipeline = Pipeline(core, record, thread=thread)
+        unpack = unpacker(None if profile is None else profile.payload)
+        self.feeds = [
+            Feed(k, name, decoders[k], unpack, inbox, after=self.core.clocks[k].newest)
+            for k, name in enumerate(core.settings.sources)
+        ]
+        self.listeners: list[Callable[[Message], None]] = [outbox.put for outbox in outboxes]
+        self.statistics = Statistics(self.core, inbox, self.feeds, outboxes, is_real_time)
+        self._prediction = Prediction(predict)
+
+    @property
+    def core(self) -> Core:
+        """What is known of the run so far."""
+        return self.pipeline.core
+
+    def open(self) -> None:
+        """Publish what opening the record brought: that the run goes on."""
+        self._publish(self.pipeline.opening)
+
+    def turn(self) -> None:
+        """Estimate and publish what has come in, some of it where that is much."""
+        for note in self.inbox.notes():  # first: they tell of samples lost before those that are here
+            self._publish(self.pipeline.note(note))
+        samples = self.inbox.pop(AT_ONCE)
+        for sample in samples:
+            self._publish(self.pipeline.process(*sample))
+        if samples:
+            self.statistics.samples(len(samples), samples[-1][0])
+        elif self.is_real_time:
+            self._publish(self.pipeline.tick(self.inbox.clock()))
+
+    def keep_house(self) -> None:
+        """What is done ten times a second: the record written, silences and backlogs noticed, the status sent."""
+        now = self.inbox.clock()
+        self._publish(self.pipeline.write())
+        if self.is_real_time:
+            self.statistics.watch(now)
+            predicted = self._prediction.at(
+                self.core, now, self.statistics.last_arrival, self.statistics.period
+            )
+            if predicted is not None:
+                self._publish([predicted])
+        if self.statistics.second(now):
+            self.announce()
+        if self.statistics.due_sync(now, _SYNC):
+            self._publish(self.pipeline.sync())
+
+    def finish(self) -> None:
+        """The sources have ended: estimate and publish what is left of what they brought."""
+        while self.is_real_time and self.inbox.samples:
+            self.turn()
+        self.turn()
+        self._publish(self.pipeline.flush())
+        self.announce()
+
+    def announce(self) -> None:
+        """Send the status to whom it concerns."""
+        self._send(Message(STATUS, self.core.time, data=self.statistics.to_dict(), vehicle=self.name))
+
+    def _publish(self, outputs: list[Output]) -> None:
+        """Give what came out of the pipeline to every listener."""
+        for output in outputs:
+            if isinstance(output, Row):
+                self.statistics.row(output, self.inbox.clock())
+                self._send(Message(ESTIMATE, output.estimate.time, output, vehicle=self.name))
+                self._advise(output)
+            elif isinstance(output, Ground):
+                self.statistics.ground = output
+                data = output.to_dict()
+                change = data.pop("change")
+                self._send(Message(SOIL, output.time, data=data, vehicle=self.name))
+                if change is not None:
+                    self._send(Message(GROUND, change["time"], data=change, vehicle=self.name))
+            elif isinstance(output, Event):
+                self.statistics.event(output)
+                emit(logger, output.kind, **self._logged(output))
+                self._send(Message.of_event(output, self.name))
+
+    def _advise(self, row: Row) -> None:
+        """Publish the set-point, where one is wanted and the estimates hold the wheels' slips."""
+        if self.setpoint is None or self.core.estimator is None:
+            return
+        if has_slips(self.core.estimator):
+            self._send(
+                Message(SETPOINT, row.estimate.time, data=self.setpoint.message(row), vehicle=self.name)
+            )
+
+    def _send(self, message: Message) -> None:
+        for listener in self.listeners:
+            listener(message)
+
+    def _logged(self, event: Event) -> dict[str, Any]:
+        fields = event.to_dict()
+        del fields["kind"]
+        return {"vehicle": self.name, **fields} if self.name else fields
