@@ -51,7 +51,19 @@ def test_the_numbers_for_prometheus_are_those_of_the_data_set(place: Path, ran: 
     assert int(page['terragrip_fleet_logs{state="estimated"}']) == len(rows)
     assert int(page['terragrip_fleet_logs{state="failed"}']) == len(reasons) == 1
     assert int(page["terragrip_fleet_rows"]) == pd.read_parquet(place / "out/summary.parquet")["rows"].sum()
-    assert float(page["terragrip_fleet_duration_seconds"]) > 0
+    duration = float(page["terragrip_fleet_duration_seconds"])
+    assert duration > 0
+    of_log = []  # from the files of estimates themselves
+    for path in (place / "out/estimates").rglob("*.parquet"):
+        table = pd.read_parquet(path, partitioning=None)
+        moves = table[table["event"] != "standstill"]
+        of_log.append(moves["nis"].sum() / moves["channels"].sum())
+    for quantile, name in ((0, "0"), (0.5, "0.5"), (0.9, "0.9"), (1, "1")):
+        seen = float(page[f'terragrip_fleet_nis{{quantile="{name}"}}'])
+        assert seen == pytest.approx(np.quantile(of_log, quantile))
+    least, most = (float(page[f'terragrip_fleet_log_seconds{{quantile="{q}"}}']) for q in (0, 1))
+    assert 0 < least <= most < duration
+    assert sorted(pd.read_parquet(place / "out/summary.parquet")["nis"]) == pytest.approx(sorted(of_log))
 
 
 def test_a_fleet_of_two_machines_and_three_days(place: Path) -> None:

@@ -15,6 +15,8 @@ from terragrip.errors import InputError
 from terragrip.estimation.methods import DEFAULT, METHODS
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from terragrip.fleet.run import FleetResult
 
 
@@ -135,10 +137,24 @@ def _write_metrics(path: Path, done: FleetResult, seconds: float) -> None:
         "Rows of these at which the filter began anew.",
         done.restarts,
     )
+    for name, text, values in (
+        ("nis", "NIS over what is expected (1: right about its noise), over the logs estimated.", done.nis),
+        ("log_seconds", "What a log took a worker, over the logs estimated.", done.seconds),
+    ):
+        page.add("gauge", f"terragrip_fleet_{name}", text, _quantiles(values))
     page.add("gauge", "terragrip_fleet_duration_seconds", "How long it took.", seconds)
     page.add("gauge", "terragrip_fleet_ended_timestamp_seconds", "When it ended.", time.time())
     with replacing(path) as temporary:
         temporary.write_text(str(page), encoding="utf-8")
+
+
+def _quantiles(values: Sequence[float]) -> list[tuple[dict[str, str], float]]:
+    """Least, median, 90 % and most over logs; none where there is no log."""
+    import numpy as np
+
+    if not values:
+        return []
+    return [({"quantile": str(q)}, float(np.quantile(values, q))) for q in (0, 0.5, 0.9, 1)]
 
 
 def _lines(done: FleetResult, output: str) -> list[str]:

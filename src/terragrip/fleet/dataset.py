@@ -79,6 +79,7 @@ def write_tables(store: Store, notes: Sequence[Note], reasons: Mapping[str, str]
             ("duration", pa.float64()),
             ("distance", pa.float64()),
             *means,
+            ("nis", pa.float64()),
             *[(f"{name}_events", pa.int64()) for name in COUNTED],
             ("soils", pa.string()),
             ("notes", pa.string()),

@@ -27,7 +27,7 @@ SOILS, REPORT = "soils.json", "report.html"
 class FleetResult:
     """What a call did: logs estimated now, those that an earlier call had estimated alike, and of this call's logs the failures with
     their reasons; ``kept``: logs of earlier calls that this one did not name; ``rows`` and ``restarts`` of the filter in the logs estimated
-    now."""
+    now, and of each of these its ``nis`` over what is expected and the ``seconds`` that it took a worker."""
 
     estimated: int
     unchanged: int
@@ -35,6 +35,8 @@ class FleetResult:
     kept: int
     rows: int
     restarts: int
+    nis: tuple[float, ...]
+    seconds: tuple[float, ...]
 
 
 def run_fleet(
@@ -96,6 +98,8 @@ def run_fleet(
         kept=sum(note["log"] not in named for note in notes),
         rows=sum(one["rows"] for one in fresh),
         restarts=sum(one["restart_events"] for one in fresh),
+        nis=tuple(one["nis"] for one in fresh if one["nis"] is not None),
+        seconds=tuple(one.seconds for one in outcomes if one.fresh),
     )
     counts = {"estimated": result.estimated, "unchanged": result.unchanged, "failed": len(result.failed)}
     emit(logger, "fleet_ended", **counts, kept=result.kept, rows=result.rows, restarts=result.restarts)

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from terragrip.estimation.engine import EVENTS
 from terragrip.estimation.estimates import wheels_with
+from terragrip.estimation.summary import STANDSTILL
 
 if TYPE_CHECKING:
     from terragrip.estimation import Estimates
@@ -37,6 +38,7 @@ class LogTally:
         self._code = 0
         self._sampled = -np.inf
         self._samples: list[Estimates] = []
+        self._nis = self._channels = 0.0
 
     def add(self, block: Estimates) -> None:
         """Count a block that follows the ones before it."""
@@ -49,6 +51,12 @@ class LogTally:
         for code in block.event_codes[changed]:
             if EVENTS[code]:
                 self.starts[EVENTS[code]] += 1
+        if "nis" in block and "channels" in block:
+            moves = (
+                block.event_codes != STANDSTILL
+            )  # as the summary of one log: at rest it is quieter than its noise
+            self._nis += float(np.nansum(block["nis"][moves]))
+            self._channels += float(np.nansum(block["channels"][moves]))
         self._add_means(block, way)
         self._sample(block)
         self._code, self._last = int(block.event_codes[-1]), float(time[-1])
@@ -91,7 +99,9 @@ class LogTally:
         return self._samples if labelled else []
 
     def row(self) -> dict[str, Any]:
-        """The log's numbers: times [s], metres, means over its time without an event, how often each event began."""
+        """The log's numbers: times [s], metres, means over its time without an event, NIS over what is expected (1: the filter is right
+        about its noise), how often each event began.
+        """
         whole = {
             name: sum((one[name] for one in self._sums.values()), np.zeros(2)) for name in ("moving", *MEANS)
         }
@@ -102,6 +112,7 @@ class LogTally:
             "duration": self._last - self._first,
             "distance": self._way,
             **_means(whole),
+            "nis": self._nis / self._channels if self._channels else None,
             **{f"{name}_events": count for name, count in self.starts.items()},
             "soils": ", ".join(sorted(name for name in self._sums if name)),
             "notes": " ".join(self.notes),

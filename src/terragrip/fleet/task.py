@@ -6,6 +6,7 @@ import hashlib
 import json
 import os
 import tempfile
+import time
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -36,12 +37,15 @@ class Settings:
 
 @dataclass(frozen=True)
 class Outcome:
-    """What became of a log: its ``note`` (`make_note`), or the ``reason`` why it has none. ``fresh``: it was estimated by this call."""
+    """What became of a log: its ``note`` (`make_note`), or the ``reason`` why it has none. ``fresh``: it was estimated by this call, in
+    ``seconds``, reading and writing included.
+    """
 
     log: str
     note: dict[str, Any] | None = None
     reason: str | None = None
     fresh: bool = False
+    seconds: float = 0.0
 
 
 def estimate_logs(logs: Sequence[FleetLog], settings: Settings, store: Store) -> list[Outcome]:
@@ -73,6 +77,7 @@ def _estimate(log: FleetLog, settings: Settings, store: Store) -> Outcome:
             f"the worker has Terragrip {__version__}, the call {settings.version}",
             hint="install one version on all workers",
         )
+    began = time.monotonic()
     with tempfile.TemporaryDirectory(prefix="terragrip-fleet-", dir=_scratch()) as folder:
         source = fetched(log.url, Path(folder))
         key = key_of(log, source, settings)
@@ -104,7 +109,7 @@ def _estimate(log: FleetLog, settings: Settings, store: Store) -> Outcome:
         told = Path(folder) / "note.json"
         told.write_text(json.dumps(note), encoding="utf-8")
         store.put(told, f"{NOTES}/{key}.json")
-    return Outcome(log.name, note, fresh=True)
+    return Outcome(log.name, note, fresh=True, seconds=time.monotonic() - began)
 
 
 def make_note(log: FleetLog, key: str, settings: Settings, tally: LogTally) -> dict[str, Any]:
