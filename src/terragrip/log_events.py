@@ -13,7 +13,7 @@ LIVE = (
 """Of the live service; sinks get these too (terragrip.live.event)."""
 EVENTS = (
     *LIVE, "live_started", "live_stopped", "studio_started", "studio_stopped", "studio_write", "job_started", "job_ended",
-    "fleet_started", "fleet_log_failed", "fleet_ended",
+    "fleet_started", "fleet_log_failed", "fleet_ended", "vehicle_started", "vehicle_refused", "vehicle_failed",
 )  # fmt: skip
 
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from terragrip.cli.log import LogForm, LogFormat, log_to_stderr
-from terragrip.cli.options import Quiet, VehicleFile
+from terragrip.cli.options import Quiet
 from terragrip.errors import InputError
 from terragrip.estimation.methods import DEFAULT, METHODS
 
@@ -17,6 +17,8 @@ if TYPE_CHECKING:
     import asyncio
     from collections.abc import Callable
 
+    from terragrip.live.many.service import ManyService
+    from terragrip.live.options import Options
     from terragrip.live.service import Service
     from terragrip.soil.library import SoilLibrary
 
@@ -28,7 +30,14 @@ def command(
             "--source", metavar="URI", help="udp: mqtt: can: ros2: zenoh: serial: replay: (docs/live.md)."
         ),
     ],
-    vehicle: VehicleFile,
+    vehicle: Annotated[
+        Path | None,
+        typer.Option(
+            "--vehicle",
+            metavar="FILE",
+            help="The vehicle file (YAML); of many: of each that --index gives none.",
+        ),
+    ] = None,
     sink: Annotated[
         list[str] | None,
         typer.Option("--sink", metavar="URI", help="udp: mqtt: can: ros2: zenoh: foxglove: studio:."),
@@ -79,6 +88,20 @@ def command(
     speed: Annotated[
         float | None, typer.Option(metavar="M/S", help="The ground speed wanted, for --setpoint.")
     ] = None,
+    index: Annotated[
+        Path | None,
+        typer.Option(
+            "--index",
+            metavar="TABLE",
+            help="Of many vehicles: a CSV with the columns name, vehicle, profile.",
+        ),
+    ] = None,
+    max_vehicles: Annotated[
+        int, typer.Option(metavar="COUNT", min=1, help="Of many vehicles: most at once.")
+    ] = 256,
+    memory: Annotated[
+        str, typer.Option(metavar="AMOUNT", help="Of many vehicles: no other is begun above so much.")
+    ] = "4GB",
     duration: Annotated[
         float | None, typer.Option(metavar="S", min=0.0, help="Stop after so many seconds.")
     ] = None,
@@ -88,6 +111,9 @@ def command(
     """Estimate while the machine drives.
 
     Samples from any number of sources, estimates to any number of sinks; Ctrl-C ends it with the record whole.
+
+    Many vehicles in one process: --source 'mqtt://HOST/field/{vehicle}/sample' --sink 'mqtt://HOST/field/{vehicle}', with --index or
+    --vehicle; each has its estimator, and its record DIR/NAME.
     """
     import asyncio
     import logging
@@ -95,10 +121,8 @@ def command(
 
     # Before pyarrow loads: its own allocator keeps 5 MB more, for a record that writes once a minute.
     os.environ.setdefault("ARROW_DEFAULT_MEMORY_POOL", "system")
-    from terragrip.formats import Profile
     from terragrip.live.options import Options
-    from terragrip.live.service import Service
-    from terragrip.vehicle import Vehicle
+    from terragrip.live.topics import VEHICLE
 
     if quiet and not sink and record is None:
         raise InputError("estimates would go nowhere", place="--quiet", hint="add --sink or --record")
@@ -106,36 +130,84 @@ def command(
     if as_json:
         log_to_stderr(log_format)
     known = _settings(settings)
-    service = Service(
-        Vehicle.load(vehicle),
-        source,
-        sink or [],
-        profile=None if profile is None else Profile.load(profile),
-        record=record,
-        options=Options(
-            method,
-            window / 1000.0,
-            {**known["held"], **_held(held or [])},
-            known["noise"],
-            learn=settings is None,
-            ground=ground,
-            library=_library(library),
-            setpoint=_setpoint(setpoint, speed),
-            driveline=known["driveline"],
-        ),
+    options = Options(
+        method,
+        window / 1000.0,
+        {**known["held"], **_held(held or [])},
+        known["noise"],
+        learn=settings is None,
+        ground=ground,
+        library=_library(library),
+        setpoint=_setpoint(setpoint, speed),
+        driveline=known["driveline"],
     )
+    many = any(VEHICLE in uri for uri in (*source, *(sink or ()))) or index is not None
+    service: Service | ManyService
+    screen: Callable[[], Any]
+    if not many:
+        from terragrip.live.status import table
+
+        service = _one(source, sink or [], vehicle, profile, record, options)
+        screen = partial(table, service)
+    elif settings is not None:
+        raise InputError("are one machine's", place="--settings", hint="put noise into the vehicle files")
+    else:
+        from terragrip.live.many.status import table as table_of_many
+
+        service = _many(source, sink or [], vehicle, profile, index, record, options, (max_vehicles, memory))
+        screen = partial(table_of_many, service)
     from terragrip.log_events import emit
 
     logger = logging.getLogger("terragrip.live")
-    sinks = [box.uri.name for box in service.outboxes]
-    emit(logger, "live_started", sources=service.source_names, sinks=sinks)
+    emit(
+        logger, "live_started", sources=service.source_names, sinks=[box.uri.name for box in service.outboxes]
+    )
     with asyncio.Runner(loop_factory=_loop_factory()) as runner:
-        runner.run(_run(service, duration, quiet or as_json))
+        runner.run(_run(service, screen, duration, quiet or as_json))
     emit(logger, "live_stopped", **service.totals())
     if not (quiet or as_json):
         print(service.summary())
         if record is not None:
             print(f"Recorded in {record}")
+
+
+def _one(
+    source: list[str],
+    sink: list[str],
+    vehicle: Path | None,
+    profile: str | None,
+    record: Path | None,
+    options: Options,
+) -> Service:
+    from terragrip.formats import Profile
+    from terragrip.live.service import Service
+    from terragrip.vehicle import Vehicle
+
+    if vehicle is None:
+        raise InputError("no vehicle is named", place="--vehicle", hint="name a vehicle file")
+    read = None if profile is None else Profile.load(profile)
+    return Service(Vehicle.load(vehicle), source, sink, profile=read, record=record, options=options)
+
+
+def _many(
+    source: list[str],
+    sink: list[str],
+    vehicle: Path | None,
+    profile: str | None,
+    index: Path | None,
+    record: Path | None,
+    options: Options,
+    limits: tuple[int, str],
+) -> ManyService:
+    from terragrip.live.many.memory import amount
+    from terragrip.live.many.roster import Roster
+    from terragrip.live.many.service import ManyService
+    from terragrip.live.many.vehicles import Limits
+
+    roster = Roster(vehicle, None if profile is None else Path(profile), index)
+    return ManyService(
+        roster, source, sink, record=record, options=options, limits=Limits(limits[0], amount(limits[1]))
+    )
 
 
 def _settings(path: Path | None) -> dict[str, Any]:
@@ -216,16 +288,18 @@ def _loop_factory() -> Callable[[], asyncio.AbstractEventLoop] | None:
     return uvloop.new_event_loop
 
 
-async def _run(service: Service, duration: float | None, quiet: bool) -> None:
+async def _run(
+    service: Service | ManyService, screen: Callable[[], Any], duration: float | None, quiet: bool
+) -> None:
     import asyncio
     import signal
 
-    from terragrip.live.status import shown, table
+    from terragrip.live.status import shown
 
     loop = asyncio.get_running_loop()
     for number in (signal.SIGINT, signal.SIGTERM):
         loop.add_signal_handler(number, service.stop)
     if duration is not None:
         loop.call_later(duration, service.stop)
-    async with shown(partial(table, service), service.listeners, quiet):
+    async with shown(screen, service.listeners, quiet):
         await service.run()

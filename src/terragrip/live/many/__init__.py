@@ -1,0 +1,1 @@
+"""Many vehicles in one process: one connection, an estimator each."""

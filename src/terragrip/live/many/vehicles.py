@@ -1,0 +1,244 @@
+"""The vehicles that send: a run each, opened by its first message; what goes wrong with one stays with it."""
+
+from __future__ import annotations
+
+import asyncio
+import time
+from collections import deque
+from collections.abc import Callable, Sequence
+from contextlib import ExitStack
+from dataclasses import dataclass
+from itertools import cycle
+from pathlib import Path
+
+from terragrip.errors import InputError
+from terragrip.live.decode import Decoder, check_channels
+from terragrip.live.inbox import Inbox
+from terragrip.live.many.journal import Journal
+from terragrip.live.many.memory import held_now, in_words
+from terragrip.live.many.roster import Roster
+from terragrip.live.message import Message
+from terragrip.live.options import Options
+from terragrip.live.record import record_thread
+from terragrip.live.topics import VehicleTopics, is_name
+from terragrip.live.vehicle_run import VehicleRun
+
+MOST_BYTES = 64 * 1024  # of a message
+CAPACITY = 1024  # samples of a vehicle that may wait for its estimator
+PREDICT = 10.0  # s of silence: a parked vehicle costs nothing after that
+RETRY = 30.0  # s after which a vehicle that was refused, or failed, may try again
+_WAITING = 256  # messages of a vehicle that is being opened
+_REMEMBERED = 1000  # vehicles that were refused
+_SAID = 5.0  # s between two events about names that are none
+_THREADS = 4  # for records
+
+Waiting = tuple[int, bytes, float, str]
+"""Source, message, arrival, topic."""
+
+
+@dataclass(frozen=True)
+class Limits:
+    """``vehicles``: most at once. ``memory`` [bytes]: of the process, above which no other is opened."""
+
+    vehicles: int = 256
+    memory: float = 4e9
+
+
+@dataclass(slots=True)
+class Refusal:
+    """Why a vehicle is not estimated, until when [s, monotonic], and its messages since."""
+
+    why: str
+    until: float
+    messages: int = 0
+
+
+class Vehicles:
+    """Takes messages by topic, opens runs, and keeps the failure of one from the others.
+
+    ``ready``: runs with something to do since they were taken out; ``filled`` and ``asked``: set where there is one, and where a vehicle
+    waits to be opened. ``listeners`` get all that is published.
+    """
+
+    def __init__(
+        self,
+        roster: Roster,
+        options: Options,
+        topics: Sequence[VehicleTopics],
+        listeners: list[Callable[[Message], None]],
+        *,
+        record: Path | None = None,
+        limits: Limits,
+    ) -> None:
+        self.roster, self.limits = roster, limits
+        self._options, self._topics, self._record = options, topics, record
+        self._listeners = listeners
+        self.journal = Journal(listeners)
+        self.runs: dict[str, VehicleRun] = {}
+        self.ready: dict[str, VehicleRun] = {}
+        self.refusals: dict[str, Refusal] = {}
+        self.unnamed = 0  # messages whose topic names no vehicle
+        self.failures = 0
+        self.filled, self.asked = asyncio.Event(), asyncio.Event()
+        self._waiting: dict[str, deque[Waiting]] = {}
+        self._said = float("-inf")
+        self._ahead = time.time() - time.monotonic()
+        self._closing = ExitStack()
+        threads = [self._closing.enter_context(record_thread()) for _ in range(_THREADS if record else 0)]
+        self._threads = cycle(threads or [None])
+
+    def clock(self) -> float:
+        """s since 1970; it never steps within one run."""
+        return time.monotonic() + self._ahead
+
+    def message(self, source: int, data: bytes, topic: str) -> None:
+        """A message of source number ``source``."""
+        name, general = self._topics[source].split(topic)
+        run = self.runs.get(name)
+        if run is None:
+            self._wait(name, (source, data, self.clock(), general))
+            return
+        self.guarded(run, lambda: _feed(run, source, data, None, general))
+        self.ready[name] = run
+        self.filled.set()
+
+    def guarded(self, run: VehicleRun, work: Callable[[], object]) -> None:
+        """Do a vehicle's work; where that fails the vehicle is closed, and opened anew after a while."""
+        try:
+            work()
+        except Exception as error:  # noqa: BLE001 - whatever it is, it is this vehicle's and no other's
+            self._fail(run, error)
+
+    def _fail(self, run: VehicleRun, error: Exception) -> None:
+        if self.runs.get(run.name) is not run:
+            return
+        del self.runs[run.name]
+        self.ready.pop(run.name, None)
+        self.failures += 1
+        run.pipeline.abandon()
+        self.refuse(run.name, _in_words(error), "vehicle_failed")
+
+    def refuse(self, name: str, why: str, kind: str = "vehicle_refused") -> None:
+        if len(self.refusals) >= _REMEMBERED:
+            del self.refusals[next(iter(self.refusals))]
+        self.refusals[name] = Refusal(why, time.monotonic() + RETRY)
+        self.journal.event(kind, "service", why, name)
+
+    def _wait(self, name: str, message: Waiting) -> None:
+        """Keep a message until its vehicle is open, where it may be opened."""
+        waiting = self._waiting.get(name)
+        if waiting is None:
+            refusal = self.refusals.get(name)
+            if refusal is not None:
+                refusal.messages += 1
+                if time.monotonic() < refusal.until:
+                    return
+            elif not is_name(name):
+                self._say_unnamed(name)
+                return
+            why = self._no_room()
+            if why is not None:
+                self.refuse(name, why)
+                return
+            waiting = self._waiting[name] = deque(maxlen=_WAITING)
+            self.asked.set()
+        if len(message[1]) <= MOST_BYTES:
+            waiting.append(message)
+
+    def _say_unnamed(self, name: str) -> None:
+        self.unnamed += 1
+        now = time.monotonic()
+        if now - self._said >= _SAID:
+            self._said = now
+            text = f"{name[:40]!r} in a topic is no name of a vehicle: letters, digits and _ - . alone"
+            self.journal.event("vehicle_refused", "service", text)
+
+    def _no_room(self) -> str | None:
+        """Why no other vehicle may be opened; None where one may."""
+        limits, count = self.limits, len(self.runs) + len(self._waiting)
+        if count >= limits.vehicles:
+            return f"there are {count} vehicles already; raise --max-vehicles"
+        held = held_now()
+        if held >= limits.memory:
+            return f"the process holds {in_words(held)} already; raise --memory"
+        return None
+
+    def open_next(self) -> bool:
+        """Open the vehicle that has waited longest and give it its messages; whether there was one."""
+        if not self._waiting:
+            self.asked.clear()
+            return False
+        name = next(iter(self._waiting))
+        try:
+            run = self._opened(name)
+        except Exception as error:  # noqa: BLE001 - as in `guarded`
+            del self._waiting[name]
+            self.refuse(name, _in_words(error))
+            return True
+        self.refusals.pop(name, None)
+        self.runs[name] = self.ready[name] = run
+        self.journal.event(
+            "vehicle_started",
+            "service",
+            f"{run.core.vehicle.name or 'vehicle'}, {len(self.runs)} in all",
+            name,
+        )
+        self.guarded(run, run.open)
+        for source, data, arrival, topic in self._waiting.pop(name):
+            self.guarded(run, lambda s=source, d=data, a=arrival, t=topic: _feed(run, s, d, a, t))  # type: ignore[misc]
+        self.filled.set()
+        return True
+
+    def _opened(self, name: str) -> VehicleRun:
+        self.roster.refresh()
+        entry = self.roster.of(name)
+        if entry.profile is not None:
+            check_channels(entry.profile, entry.vehicle)
+        decoders = [Decoder(entry.profile) for _ in self._topics]
+        channels = [
+            channel for decoder in decoders for channel in self._options.promised(decoder, entry.vehicle)
+        ]
+        core, setpoint = self._options.core(
+            entry.vehicle, [one.named(name) for one in self._topics], channels
+        )
+        run = VehicleRun(
+            core, Inbox(CAPACITY, self.clock), decoders, (), profile=entry.profile, name=name, setpoint=setpoint,
+            record=None if self._record is None else self._record / name, thread=next(self._threads), predict=PREDICT,
+        )  # fmt: skip
+        run.listeners += self._listeners
+        return run
+
+    def finish(self) -> None:
+        """The sources have ended: estimate and publish what is left."""
+        for run in list(self.runs.values()):
+            self.guarded(run, run.finish)
+
+    def close(self) -> dict[str, str]:
+        """Close the records whole; by vehicle, why one was not written to its end."""
+        failed = {}
+        for run in self.runs.values():
+            run.pipeline.close()
+            if run.pipeline.failure:
+                failed[run.name] = run.pipeline.failure
+        self._closing.close()
+        return failed
+
+
+def _feed(run: VehicleRun, source: int, data: bytes, arrival: float | None, topic: str) -> None:
+    feed = run.feeds[source]
+    if len(data) > MOST_BYTES:
+        feed.reject(f"of {len(data)} bytes, more than {MOST_BYTES}")
+    elif len(run.inbox.samples) >= run.inbox.capacity:
+        feed.dropped(1)  # before it is decoded: a vehicle that sends too much costs no other more than that
+    else:
+        feed.message(data, arrival, topic=topic)
+
+
+def _in_words(error: Exception) -> str:
+    if isinstance(error, InputError):
+        return str(error)
+    if isinstance(error, MemoryError):
+        return "not enough memory"
+    if isinstance(error, OSError):
+        return f"a file cannot be read or written ({error})"
+    return " ".join(f"a defect of Terragrip ({type(error).__name__}: {error})".split())
