@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import socket
 import ssl
 from typing import Any
 
@@ -45,6 +46,8 @@ def client(uri: Uri) -> Any:
         identifier=uri.options.get("client"),
         tls_context=_tls(uri) if secure else None,
         timeout=5.0,
+        # Or a message waits up to 40 ms for the broker to acknowledge the one before (Nagle's algorithm).
+        socket_options=[(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)],
         logger=_silent,
     )
 
