@@ -19,6 +19,7 @@ from terragrip.live.outbox import Outbox
 from terragrip.live.payload import unpacker
 from terragrip.live.pipeline import Pipeline
 from terragrip.live.prediction import Prediction
+from terragrip.live.record import SECONDS
 from terragrip.live.statistics import Statistics
 from terragrip.log_events import emit
 
@@ -43,7 +44,8 @@ class VehicleRun:
     record: folder of the record; None: none is kept.
     setpoint: that is published beside the estimates; None: none is.
     is_real_time: samples come when they come, and silence means something.
-    name: of the vehicle, where many are served. thread: of the record (`Recorder`). predict: s of silence that predictions go on for.
+    name: of the vehicle, where many are served. thread, segment: of the record, and s after which a
+        segment of it is closed (`Recorder`). predict: s of silence that predictions go on for.
 
     Raises InputError where the record cannot be used.
     """
@@ -61,11 +63,12 @@ class VehicleRun:
         is_real_time: bool = True,
         name: str = "",
         thread: Executor | None = None,
+        segment: float = SECONDS,
         predict: float = float("inf"),
     ) -> None:
         self.name = name
         self.inbox, self.setpoint, self.is_real_time = inbox, setpoint, is_real_time
-        self.pipeline = Pipeline(core, record, thread=thread)
+        self.pipeline = Pipeline(core, record, seconds=segment, thread=thread)
         unpack = unpacker(None if profile is None else profile.payload)
         self.feeds = [
             Feed(k, name, decoders[k], unpack, inbox, after=self.core.clocks[k].newest)

@@ -19,7 +19,7 @@ from terragrip.live.many.memory import held_now, in_words
 from terragrip.live.many.roster import Roster
 from terragrip.live.message import Message
 from terragrip.live.options import Options
-from terragrip.live.record import record_thread
+from terragrip.live.record import SECONDS, record_thread
 from terragrip.live.topics import VehicleTopics, is_name
 from terragrip.live.vehicle_run import VehicleRun
 
@@ -31,6 +31,7 @@ _WAITING = 256  # messages of a vehicle that is being opened
 _REMEMBERED = 1000  # vehicles that were refused
 _SAID = 5.0  # s between two events about names that are none
 _THREADS = 4  # for records
+_LENGTHS = 61  # of segments, from half the usual one to one and a half
 
 Waiting = tuple[int, bytes, float, str]
 """Source, message, arrival, topic."""
@@ -86,6 +87,8 @@ class Vehicles:
         self._closing = ExitStack()
         threads = [self._closing.enter_context(record_thread()) for _ in range(_THREADS if record else 0)]
         self._threads = cycle(threads or [None])
+        # Vehicles that begin together do not close their segments together.
+        self._segments = cycle(SECONDS * (0.5 + k / _LENGTHS) for k in range(_LENGTHS))
 
     def clock(self) -> float:
         """s since 1970; it never steps within one run."""
@@ -203,7 +206,8 @@ class Vehicles:
         )
         run = VehicleRun(
             core, Inbox(CAPACITY, self.clock), decoders, (), profile=entry.profile, name=name, setpoint=setpoint,
-            record=None if self._record is None else self._record / name, thread=next(self._threads), predict=PREDICT,
+            record=None if self._record is None else self._record / name, thread=next(self._threads), segment=next(self._segments),
+            predict=PREDICT,
         )  # fmt: skip
         run.listeners += self._listeners
         return run
