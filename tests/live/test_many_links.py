@@ -17,6 +17,7 @@ from terragrip.live.topics import VehicleTopics, is_name
 from terragrip.live.uri import Uri
 from test_many import NOWHERE, everyone, listed, put, rows_of
 from test_monitor import get, parsed
+from test_service import walked
 
 __all__ = ["everyone", "listed"]
 
@@ -60,6 +61,20 @@ async def test_health_tells_which_vehicle_gets_no_data(listed, short, port):
             503,
             "mqtt://127.0.0.1:1/field/{vehicle}/sample: the broker: gone",
         )
+
+
+@pytest.mark.asyncio
+async def test_no_object_holds_its_caller(tmp_path, everyone, short, port):
+    """As of the service of one vehicle; and what is the service's own goes to no topic."""
+    sinks = ["mqtt://127.0.0.1:1/field/{vehicle}", f"studio://127.0.0.1:{port}"]
+    service = ManyService(everyone, [NOWHERE], sinks, record=tmp_path / "many")
+    async with running(service):
+        for name in "ab":
+            put(service, name, *messages(short.recording, 20))
+            await rows_of(service, name, 20)
+        await until(lambda: any(m.vehicle == "" for m in service.seen))  # the broker is not there
+        assert len(walked(service, [], set())) > 25
+        assert set(service.outboxes[0]._lanes) == {"a", "b"}
 
 
 @pytest.mark.asyncio

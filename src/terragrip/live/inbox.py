@@ -17,13 +17,18 @@ Arrived = tuple[float, int, float, Values]
 """Arrival [s], source, stamp [s], values."""
 
 
+def steady_clock() -> Callable[[], float]:
+    """A clock that gives s since 1970 and never steps."""
+    ahead, now = time.time() - time.monotonic(), time.monotonic
+    return lambda: now() + ahead
+
+
 class Inbox:
-    """A queue with one reader. ``clock`` gives s since 1970; it never steps within one run."""
+    """A queue with one reader. ``clock``: arrivals' (`steady_clock`)."""
 
     def __init__(self, capacity: int = CAPACITY, clock: Callable[[], float] | None = None) -> None:
         self.capacity = capacity
-        ahead, now = time.time() - time.monotonic(), time.monotonic
-        self.clock = clock or (lambda: now() + ahead)
+        self.clock = clock or steady_clock()
         self.samples: deque[Arrived] = deque()
         self.values_dropped = 0
         self._counts: dict[tuple[str, int | None, tuple[str, ...]], int] = {}

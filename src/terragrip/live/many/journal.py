@@ -12,10 +12,10 @@ logger = logging.getLogger("terragrip.live")
 
 
 class Journal:
-    """Logs each event and gives it to every listener. ``counts``: by kind."""
+    """Logs each event and gives it to every listener, none of which is a sink: a sink's topics belong to vehicles. ``counts``: by kind."""
 
     def __init__(self, listeners: list[Callable[[Message], None]]) -> None:
-        self._listeners = listeners
+        self.listeners = listeners
         self.counts: dict[str, int] = {}
 
     def event(self, kind: str, source: str, text: str, vehicle: str = "") -> None:
@@ -25,5 +25,5 @@ class Journal:
         message = Message(
             EVENT, float("nan"), data={"kind": kind, "source": source, "text": text}, vehicle=vehicle
         )
-        for listener in self._listeners:
+        for listener in self.listeners:
             listener(message)

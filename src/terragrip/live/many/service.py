@@ -13,6 +13,7 @@ from typing import Any, cast
 from terragrip.errors import InputError
 from terragrip.live.counts import FATES
 from terragrip.live.decode import Decoder
+from terragrip.live.many.journal import Journal
 from terragrip.live.many.links import Router, check_sources, open_sinks
 from terragrip.live.many.monitor import ManyMonitor
 from terragrip.live.many.roster import Roster
@@ -41,7 +42,8 @@ class ManyService:
     sources: URIs of MQTT or Zenoh with ``{vehicle}`` as one level of the topic.
     sinks: likewise, or a `studio:`, where a client asks for one vehicle.
     record: folder that holds a record a vehicle, by its name; None: none is kept.
-    options: as for one vehicle. limits: how many vehicles there may be, and how much memory.
+    options: as for one vehicle. ``listeners`` get what is published of every vehicle, and events of the service itself.
+    limits: how many vehicles there may be, and how much memory.
 
     Raises InputError on a URI or folder that cannot be used, or where vehicles are listed and none of them has a usable file.
     """
@@ -61,13 +63,18 @@ class ManyService:
         opened = open_sinks(sinks, topics)
         self.sinks = [sink for _, sink in opened]
         self.listeners: list[Callable[[Message], None]] = []
+        self.journal = Journal(self.listeners)
+        self.outboxes = [Outbox(uri, self.journal, _QUEUE) for uri, _ in opened]
         self.vehicles = Vehicles(
-            roster, options or Options(), topics, self.listeners, record=record, limits=limits or Limits()
+            roster,
+            options or Options(),
+            topics,
+            self.journal,
+            self.outboxes,
+            record=record,
+            limits=limits or Limits(),
         )
         self._unusable = _unusable(roster)
-        self.journal = self.vehicles.journal
-        self.outboxes = [Outbox(uri, self.journal, _QUEUE) for uri, _ in opened]
-        self.listeners += [outbox.put for outbox in self.outboxes]
         self.routers = [Router(k, text, self.vehicles) for k, text in enumerate(sources)]
         self.monitor = ManyMonitor(self.vehicles, self.routers, self.outboxes)
         for sink in self.sinks:

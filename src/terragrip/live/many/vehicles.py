@@ -13,12 +13,12 @@ from pathlib import Path
 
 from terragrip.errors import InputError
 from terragrip.live.decode import Decoder, check_channels
-from terragrip.live.inbox import Inbox
+from terragrip.live.inbox import Inbox, steady_clock
 from terragrip.live.many.journal import Journal
 from terragrip.live.many.memory import held_now, in_words
 from terragrip.live.many.roster import Roster
-from terragrip.live.message import Message
 from terragrip.live.options import Options
+from terragrip.live.outbox import Outbox
 from terragrip.live.record import SECONDS, record_thread
 from terragrip.live.topics import VehicleTopics, is_name
 from terragrip.live.vehicle_run import VehicleRun
@@ -58,7 +58,7 @@ class Vehicles:
     """Takes messages by topic, opens runs, and keeps the failure of one from the others.
 
     ``ready``: runs with something to do since they were taken out; ``filled`` and ``asked``: set where there is one, and where a vehicle
-    waits to be opened. ``listeners`` get all that is published.
+    waits to be opened. What is published goes to ``outboxes`` and to the journal's listeners.
     """
 
     def __init__(
@@ -66,15 +66,15 @@ class Vehicles:
         roster: Roster,
         options: Options,
         topics: Sequence[VehicleTopics],
-        listeners: list[Callable[[Message], None]],
+        journal: Journal,
+        outboxes: Sequence[Outbox],
         *,
         record: Path | None = None,
         limits: Limits,
     ) -> None:
         self.roster, self.limits = roster, limits
         self._options, self._topics, self._record = options, topics, record
-        self._listeners = listeners
-        self.journal = Journal(listeners)
+        self.journal, self._outboxes = journal, outboxes
         self.runs: dict[str, VehicleRun] = {}
         self.ready: dict[str, VehicleRun] = {}
         self.refusals: dict[str, Refusal] = {}
@@ -83,16 +83,12 @@ class Vehicles:
         self.filled, self.asked = asyncio.Event(), asyncio.Event()
         self._waiting: dict[str, deque[Waiting]] = {}
         self._said = float("-inf")
-        self._ahead = time.time() - time.monotonic()
+        self.clock = steady_clock()
         self._closing = ExitStack()
         threads = [self._closing.enter_context(record_thread()) for _ in range(_THREADS if record else 0)]
         self._threads = cycle(threads or [None])
         # Vehicles that begin together do not close their segments together.
         self._segments = cycle(SECONDS * (0.5 + k / _LENGTHS) for k in range(_LENGTHS))
-
-    def clock(self) -> float:
-        """s since 1970; it never steps within one run."""
-        return time.monotonic() + self._ahead
 
     def message(self, source: int, data: bytes, topic: str) -> None:
         """A message of source number ``source``."""
@@ -209,7 +205,7 @@ class Vehicles:
             record=None if self._record is None else self._record / name, thread=next(self._threads), segment=next(self._segments),
             predict=PREDICT,
         )  # fmt: skip
-        run.listeners += self._listeners
+        run.listeners += [*(outbox.put for outbox in self._outboxes), *self.journal.listeners]
         return run
 
     def finish(self) -> None:
