@@ -16,6 +16,8 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "estimation"))  # for drives.
 
 from drives import Drive, drive, robot
 from terragrip.live.feed import Feed
+from terragrip.live.many.links import Router
+from terragrip.live.many.service import ManyService
 from terragrip.live.outbox import Outbox
 from terragrip.live.service import Service
 
@@ -53,7 +55,7 @@ async def until(condition, seconds: float = 60.0) -> None:
 
 
 @asynccontextmanager
-async def running(service: Service):
+async def running(service: Service | ManyService):
     """The service at work; what it published is in `service.seen`.
 
     The block begins when each source and each sink has its other side, or has said that it has not.
@@ -69,13 +71,14 @@ async def running(service: Service):
         await asyncio.wait_for(task, 60)
 
 
-_settled: WeakSet[Feed | Outbox] = WeakSet()
+_settled: WeakSet[Feed | Router | Outbox] = WeakSet()
 """Those that have said whether their other side is there."""
 
 
-def is_settled(service: Service) -> bool:
+def is_settled(service: Service | ManyService) -> bool:
     """Whether each source and each sink has its other side, or has said that it has not."""
-    return _settled.issuperset([*service.feeds, *service.outboxes])
+    ends = service.routers if isinstance(service, ManyService) else service.feeds
+    return _settled.issuperset([*ends, *service.outboxes])
 
 
 def _noted(say):
@@ -86,7 +89,7 @@ def _noted(say):
     return noted
 
 
-for _kind in (Feed, Outbox):
+for _kind in (Feed, Router, Outbox):
     for _name in ("connected", "lost"):
         setattr(_kind, _name, _noted(getattr(_kind, _name)))
 

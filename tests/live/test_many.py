@@ -89,7 +89,6 @@ async def test_each_has_the_digits_of_a_service_of_its_own(tmp_path, vehicle, ev
             client, got = await stack.enter_async_context(listening(port, "field/+/estimate"))
             for service in (many, *alone.values()):
                 await stack.enter_async_context(running(service))
-            await until(lambda: many.routers[0].is_connected)
             while not all(one.feeds[0].unreadable for one in alone.values()) or len(many.vehicles.runs) < 3:
                 for name in logs:
                     await client.publish(f"field/{name}/sample", b"no json")

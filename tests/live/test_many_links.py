@@ -27,6 +27,7 @@ async def test_health_tells_which_vehicle_gets_no_data(listed, short, port):
     service = ManyService(listed, [NOWHERE], [f"studio://127.0.0.1:{port}"])
 
     async def idle(feed):
+        feed.connected()
         await asyncio.Event().wait()
 
     service.sources[0].run = idle
@@ -39,7 +40,6 @@ async def test_health_tells_which_vehicle_gets_no_data(listed, short, port):
             "0 of 3 vehicles get data\na: nothing has come yet\nb: nothing has come yet\nlost: not estimated: "
             in text
         )
-        service.routers[0].connected()
         for k, message in enumerate(good):
             put(service, "a", message)
             if k == 100:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import inspect
 import json
 import socket
@@ -20,6 +21,7 @@ from terragrip.formats import Profile
 from terragrip.live import read_record
 from terragrip.live.options import Options
 from terragrip.live.service import Service
+from terragrip.live.supervision import cancelled
 
 pytestmark = pytest.mark.asyncio
 
@@ -46,6 +48,20 @@ async def test_no_object_holds_its_caller(tmp_path, vehicle, short, port, sender
         sender.send(*messages(short.recording, 20))
         await until(lambda: service.core.rows == 20)
         assert len(walked(service, [], set())) > 15
+
+
+async def test_a_task_that_loses_its_cancellation_is_cancelled_again():
+    """As a sink that publishes by aiomqtt under Python 3.11: the service did not end."""
+
+    async def loses_one():
+        with contextlib.suppress(asyncio.CancelledError):
+            await asyncio.Event().wait()
+        await asyncio.Event().wait()
+
+    task = asyncio.create_task(loses_one())
+    await asyncio.sleep(0)
+    await asyncio.wait_for(cancelled([task]), 60)
+    assert task.cancelled()
 
 
 def walked(thing, path: list, done: set) -> set:

@@ -12,6 +12,7 @@ from terragrip.live.outbox import Outbox
 from terragrip.live.sinks import Sink
 
 _BACKOFF = (0.5, 30.0)  # s, doubled from the first to the last
+_PATIENCE = 1.0  # s until a task is cancelled again
 _SETTLED = 10.0  # s connected, after which the back-off begins anew
 
 Task = asyncio.Task[Any]
@@ -56,9 +57,13 @@ async def ended(sources: Sequence[Task], sinks: Sequence[Task], until_end: Seque
 
 
 async def cancelled(tasks: Sequence[Task]) -> None:
-    """Cancel tasks and wait for their end."""
-    for task in tasks:
-        task.cancel()
+    """Cancel tasks and wait for their end; again, where one goes on: Python 3.11's `wait_for`, by which aiomqtt publishes, may lose a
+    cancellation that comes together with what it waits for.
+    """
+    while going_on := [task for task in tasks if not task.done()]:
+        for task in going_on:
+            task.cancel()
+        await asyncio.wait(going_on, timeout=_PATIENCE)
     await asyncio.gather(*tasks, return_exceptions=True)
 
 
