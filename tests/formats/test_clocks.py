@@ -13,7 +13,7 @@ from terragrip.errors import InputError
 from terragrip.formats import Profile, inspect
 from terragrip.formats.csv import csv_on_disk
 from terragrip.formats.log_blocks import recordings_of
-from terragrip.recording.lag import Speed, lag_between
+from terragrip.recording.lag import Speed, lag_between, lag_within
 from test_sources import nmea
 
 TIME = np.round(np.arange(0, 200, 0.05), 2)
@@ -178,6 +178,22 @@ def test_a_lag_within_one_file_is_found_and_said(tmp_path: Path, seed: int, held
     }
     mended = tg.read(tmp_path / "late.csv", Profile.from_dict({"channels": channels}))
     assert not [note for note in mended.notes if "behind" in note]
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_free_wheel_that_was_made_of_the_ground_speed_hides_no_lag(seed: int) -> None:
+    """A caster without a sensor gets the ground speed over its radius (docs/vehicle.md); averaged with the others it halved the lag."""
+    late = noisy(speed_at(TIME - 0.3), seed, 0.02)
+    every = np.where(np.arange(len(TIME)) % 4 == 0, late, np.nan)
+    columns = {
+        "ground_speed": every,
+        "wheel_speed_l": noisy(speed_at(TIME) / 0.065, seed + 10, 0.1),
+        "wheel_speed_r": noisy(speed_at(TIME) / 0.065, seed + 20, 0.1),
+        "wheel_speed_c": every / 0.03,
+    }
+    (note,) = lag_within(TIME, columns)
+    seconds, deviation = (float(note.split()[k]) for k in (2, 4))
+    assert abs(seconds - 0.3) < 3 * deviation
 
 
 def test_effort_is_a_torque(tmp_path: Path) -> None:

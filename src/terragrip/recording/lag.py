@@ -124,6 +124,12 @@ def lag_within(time: Floats, columns: Mapping[str, npt.NDArray[Any]]) -> list[st
     """
     rows = slice(None, _MOST_ROWS)
     part = {name: values[rows] for name, values in columns.items()}
+    if "ground_speed" in part:
+        part = {
+            n: v
+            for n, v in part.items()
+            if not n.startswith("wheel_speed_") or not _is_copy(v, part["ground_speed"])
+        }
     wheels = wheels_of(time[rows], part)
     ground = speed_of(time[rows], {"ground_speed": part["ground_speed"]}) if "ground_speed" in part else None
     lag = None if wheels is None or ground is None else lag_between(wheels, ground, reach=_WITHIN)
@@ -139,6 +145,15 @@ def lag_within(time: Floats, columns: Mapping[str, npt.NDArray[Any]]) -> list[st
         f"({lag.correlation:.3f}); a vehicle's own lag is {lag.explained[1]:.2f} s at most. If a sensor is late, write "
         f"'delay: {abs(lag.seconds):.2f} s' for {what} in a profile."
     ]
+
+
+def _is_copy(turning: npt.NDArray[Any], ground: npt.NDArray[Any]) -> bool:
+    """Whether a wheel's speed was made of the ground speed, as a free wheel's without a sensor is: it has the ground speed's lag."""
+    known = np.isfinite(turning) & np.isfinite(ground)
+    if not np.array_equal(known, np.isfinite(turning)) or not np.any(ground[known]):
+        return False
+    scale = float(np.sum(turning[known] * ground[known]) / np.sum(ground[known] ** 2))
+    return bool(np.allclose(turning[known], scale * ground[known], rtol=1e-6, atol=1e-9))
 
 
 def offset_between(
