@@ -81,6 +81,12 @@ def test_intervals_that_repeated_passes_show_to_be_too_wide_are_narrowed() -> No
     assert any(re.match(r"adhesion: passes over one cell agree better", note) for note in made.notes)
 
 
+def test_a_drive_mapped_twice_is_no_evidence_that_it_is_exact() -> None:
+    once = drive(*lanes(6, 60, 2), noise=0.02, std=0.02)
+    twice = map_of([("a", once), ("b", once)]).cells["adhesion"].std
+    assert np.median(twice) > 0.2 * np.median(map_of([("a", once)]).cells["adhesion"].std)
+
+
 def test_intervals_stay_where_no_pass_is_repeated_or_passes_differ_more_than_they_say() -> None:
     once = map_of(repeated(0.2, 1))
     assert not any("agree better" in note for note in once.notes)

@@ -13,7 +13,8 @@ import pytest
 sys.path += [
     str(Path(__file__).parents[2] / "benchmarks"),
     str(Path(__file__).parent),
-]  # studio_session.py, live_service.py
+    str(Path(__file__).parents[1] / "maps"),
+]  # studio_session.py, live_service.py, lane_drives.py
 pytest.importorskip("fastapi", reason="the studio needs terragrip[studio]")
 
 from fastapi.testclient import TestClient
@@ -34,6 +35,37 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
     recording, vehicle = tg.read(folder / "recording.parquet"), tg.Vehicle.load(folder / "vehicle.yaml")
     tg.estimate(recording, vehicle).write(folder / "estimates.parquet")
     soils_of([folder / "estimates.parquet"]).library().write(folder / "soils.json")
+    return folder
+
+
+@pytest.fixture(scope="session")
+def field_maps(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """field.gpkg (two days over lanes 1 m apart: a wet hole, a firm patch, the western half weaker on the second day), once.gpkg (one
+    straight pass, nothing repeated), monday.parquet, nowhere.parquet (without positions); not to be changed."""
+    pytest.importorskip("geopandas", reason="maps need terragrip[geo]")
+    import numpy as np
+
+    from lane_drives import drive, lanes
+    from terragrip.maps import MapSettings, map_of, write_map
+
+    def ground(east: np.ndarray, north: np.ndarray) -> np.ndarray:
+        hole = (np.abs(east - 12) < 2) & (np.abs(north - 10) < 2)
+        firm = (np.abs(east - 40) < 2) & (np.abs(north - 20) < 2)
+        return np.where(hole, 0.5, 1.0) * np.where(firm, 1.5, 1.0)
+
+    folder = tmp_path_factory.mktemp("maps")
+    way = lanes(30, 52, 1)
+    monday = drive(*way, a=ground, noise=0.01)
+    monday.labels["soil"][:] = np.where(way[0] < 26, "sand", "clay")
+    friday = drive(
+        *way, a=lambda e, n: ground(e, n) * np.where(e < 20, 0.85, 1.0), noise=0.01, std=0.02, seed=2
+    )
+    write_map(map_of([("monday", monday), ("friday", friday)], MapSettings(cell=1.0)), folder / "field.gpkg")
+    east = np.arange(0.0, 60.0, 0.05)
+    write_map(map_of([("once", drive(east, 0 * east))]), folder / "once.gpkg")
+    monday.write(folder / "monday.parquet")
+    del monday.columns["latitude"], monday.columns["longitude"]
+    monday.write(folder / "nowhere.parquet")
     return folder
 
 

@@ -13,6 +13,8 @@ Floats = npt.NDArray[np.float64]
 
 LEAST_REPEATS = 100
 """Pairs of passes over one cell that a share needs."""
+LEAST_SHARE = 0.25
+"""Passes that agree still better are no evidence: one log given twice, or values that are rounded alike."""
 WORTH_A_WORD = 0.9
 """A share below which the user is told."""
 
@@ -22,7 +24,7 @@ def share_of_repeats(passes: Cells) -> float:
 
     `passes`: a row a pass (:func:`terragrip.maps.cells.cells_of`). Consecutive passes over a cell are compared, the constants that both
     share left out; the share is the robust SD (1.4826 times the median size) of the differences over their stated SDs. More than 1 is
-    no error of the SDs: between two passes the ground may have changed.
+    no error of the SDs: between two passes the ground may have changed. Never less than `LEAST_SHARE`.
     """
     order = np.lexsort((passes.time, passes.run, passes.row, passes.column))
     column, row = passes.column[order], passes.row[order]
@@ -32,7 +34,7 @@ def share_of_repeats(passes: Cells) -> float:
     first, second = order[again], order[again + 1]
     own = random_std(passes)
     size = np.abs(passes.value[second] - passes.value[first]) / np.hypot(own[first], own[second])
-    return float(min(1.4826 * np.median(size), 1.0))
+    return float(np.clip(1.4826 * np.median(size), LEAST_SHARE, 1.0))
 
 
 def scaled(cells: Cells, share: float) -> Cells:

@@ -11,6 +11,7 @@ import numpy as np
 
 from terragrip.errors import InputError
 from terragrip.files import replacing
+from terragrip.maps.about import ABOUT, About
 from terragrip.maps.field_map import MOST_CELLS, FieldMap
 
 KINDS: dict[str, tuple[str, str]] = {
@@ -78,11 +79,13 @@ def _geopackage(made: FieldMap, path: Path) -> None:
     from terragrip.maps.layers import layer as table
 
     path.unlink()
+    about = About(made.epsg, made.cell, made.datum, made.reference_slip, list(made.runs), list(made.notes))
+    metadata = {ABOUT: about.to_text()}
     for name in LAYERS:
         frame = table(made, name)
         if not len(frame) and name != "cells":
             continue
-        frame.to_file(path, layer=name, driver="GPKG", engine="pyogrio")
+        frame.to_file(path, layer=name, driver="GPKG", engine="pyogrio", dataset_metadata=metadata)
 
 
 def _geotiff(made: FieldMap, path: Path) -> None:

@@ -32,6 +32,7 @@ ROUTES = (
     "signals",
     "live",
     "basemap",
+    "maps",
 )
 NOT_BUILT = (
     "The studio's pages are not built. They need Node.js 20 or newer: install it, then run `make studio` in a clone "

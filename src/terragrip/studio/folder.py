@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import json
 import os
+import sqlite3
 from collections.abc import Iterator
+from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
+from urllib.parse import quote
 
 from terragrip.errors import InputError
 
@@ -38,7 +41,7 @@ PICTURES = frozenset([".png", ".jpg", ".jpeg", ".webp", ".svg"])
 @dataclass(frozen=True)
 class Item:
     """One file: `path` relative to the folder, `kind` (recording, estimates, library, ground, vehicle, profile, scenario, report,
-    picture, basemap, calibration), `size` [bytes], `modified` [s since 1970]."""
+    picture, basemap, map, calibration), `size` [bytes], `modified` [s since 1970]."""
 
     path: str
     kind: str
@@ -159,6 +162,8 @@ def kind_of(path: Path) -> str | None:
         return "report"
     if suffix in (".tif", ".tiff"):
         return "basemap"
+    if suffix == ".gpkg":
+        return "map" if _holds_map(path) else None
     if suffix in PICTURES:
         return "picture"
     return "recording" if suffix in RECORDINGS else None
@@ -173,6 +178,18 @@ def _holds_estimates(path: Path) -> bool:
     try:
         return METADATA_KEY in (pq.read_schema(path).metadata or {})
     except (pa.ArrowException, OSError):
+        return False
+
+
+def _holds_map(path: Path) -> bool:
+    """Whether `terragrip map` wrote a GeoPackage; asked of its tables, since a list of files should not wait for GDAL."""
+    from terragrip.maps.about import ABOUT
+
+    try:
+        with closing(sqlite3.connect(f"file:{quote(str(path))}?mode=ro&immutable=1", uri=True)) as base:
+            found = base.execute("SELECT count(*) FROM gpkg_metadata WHERE metadata LIKE ?", (f"%{ABOUT}%",))
+            return bool(found.fetchone()[0])
+    except sqlite3.Error:
         return False
 
 

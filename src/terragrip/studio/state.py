@@ -21,6 +21,7 @@ from terragrip.studio.tables import Tables
 
 if TYPE_CHECKING:
     from terragrip.estimation import Estimates
+    from terragrip.maps.reading import MapFile
     from terragrip.recording import Recording
 
 UPLOAD_LIMIT = 2_000_000_000
@@ -37,6 +38,12 @@ def _recording(path: Path, profile: str = "") -> Recording:
     from terragrip.formats import read
 
     return read(path, profile or None)
+
+
+def _map(path: Path) -> MapFile:
+    from terragrip.maps.reading import read_map
+
+    return read_map(path)
 
 
 class Studio:
@@ -59,6 +66,7 @@ class Studio:
         self.estimates: Tables[Estimates] = Tables(_estimates)
         self.shown: Tables[Shown] = Tables(lambda path: Shown(self.estimates.get(path)))
         self.recordings: Tables[Recording] = Tables(_recording)
+        self.maps: Tables[MapFile] = Tables(_map)
         self.logs: Tables[LogLook] = Tables(look_at)
         self.fingerprints: Tables[str] = Tables(sha256, MOST)
         # by SHA-256, rows and times: the recording and the profile that reads it, None where the folder does not hold it

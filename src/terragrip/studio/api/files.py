@@ -190,6 +190,10 @@ def _check(temporary: Path, path: str) -> None:
             from terragrip.soil.library import SoilLibrary
 
             SoilLibrary.load(temporary)
+        elif kind == "map":
+            from terragrip.maps.reading import read_map
+
+            read_map(temporary)
         elif kind == "picture":
             check_picture(temporary.read_bytes()[:64], temporary.suffix.lower(), path)
         elif kind is None or kind == "report":

@@ -66,6 +66,17 @@ class GroundRequest(Request):
     library: str | None = None
 
 
+class MapRequest(Request):
+    """A map (GeoPackage) of drives with positions."""
+
+    estimates: list[str] = Field(min_length=1)
+    cell: float | None = Field(None, description="Size of a cell [m]; by the machine.")
+    slip: float | None = Field(None, description="Slip that adhesion is mapped at, as a share.")
+    datum: str | None = Field(None, max_length=100, description="Of latitude and longitude.")
+    library: str | None = None
+    ground: str | None = None
+
+
 class ReportRequest(Request):
     """A report of drives, as a page (HTML) and a PDF beside it."""
 
@@ -144,6 +155,16 @@ async def add_ground(studio: Here, wanted: GroundRequest) -> dict[str, Any]:
     """Queue the search for changes, soils and events."""
     options = _options(studio, library=wanted.library)
     return _queue(studio, "ground", wanted.estimates, wanted, (".json",), options)
+
+
+@router.post("/jobs/map", status_code=202)
+async def add_map(studio: Here, wanted: MapRequest) -> dict[str, Any]:
+    """Queue a map."""
+    options = _options(studio, soils=wanted.library, ground=wanted.ground)
+    for name, value in (("cell", wanted.cell), ("slip", wanted.slip)):
+        options += [f"--{name}={value:g}"] if value is not None else []
+    options += [f"--datum={wanted.datum.strip()}"] if wanted.datum and wanted.datum.strip() else []
+    return _queue(studio, "map", wanted.estimates, wanted, (".gpkg",), options)
 
 
 @router.post("/jobs/report", status_code=202)

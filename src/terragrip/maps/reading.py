@@ -1,0 +1,168 @@
+"""A map read back from the GeoPackage that it was written to."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from terragrip.errors import InputError
+from terragrip.maps.about import ABOUT, About
+from terragrip.maps.values import QUANTITIES
+
+Floats = npt.NDArray[np.float64]
+Ints = npt.NDArray[np.int64]
+
+_REMAKE = "make it anew: terragrip map ESTIMATES... -o map.gpkg"
+
+
+@dataclass(frozen=True)
+class Patch:
+    """An anomaly of a map's file: columns of its row by name, and the ``rings`` of its outline, each east and north (n, 2) [m]."""
+
+    row: Mapping[str, Any]
+    rings: list[Floats]
+
+
+@dataclass(frozen=True)
+class MapFile:
+    """A map's file.
+
+    ``about``: how it was made; ``column``, ``row`` (k,) of its cells on the grid; ``cells``: their columns (k,) by name as
+    :func:`terragrip.maps.layers.cell_table` has them; ``anomalies``; ``changes``: of each quantity the rows of that layer, ``column``
+    and ``row`` among them; ``points``: how many there are along the way.
+    """
+
+    path: Path
+    about: About
+    column: Ints
+    row: Ints
+    cells: Mapping[str, npt.NDArray[Any]]
+    anomalies: list[Patch]
+    changes: Mapping[str, Mapping[str, npt.NDArray[Any]]]
+    points: int
+
+    @property
+    def quantities(self) -> list[str]:
+        """What is mapped."""
+        return [name for name in QUANTITIES if name in self.cells]
+
+    def way(self, most: int) -> tuple[npt.NDArray[np.object_], Floats, Floats, Floats]:
+        """Of at most `most` points along the way, evenly drawn: run, time [s], east and north [m] (n,)."""
+        if not self.points:
+            return np.zeros(0, dtype=object), np.zeros(0), np.zeros(0), np.zeros(0)
+        every = -(-self.points // most)
+        table, shapes = _layer(self.path, "points", columns=["run", "time"], where=f"fid % {every} = 0")
+        import shapely
+
+        place = shapely.get_coordinates(shapes)
+        return table["run"], table["time"], place[:, 0], place[:, 1]
+
+
+def read_map(path: str | os.PathLike[str]) -> MapFile:
+    """A map from its GeoPackage.
+
+    Raises InputError where the file is none that `terragrip map` wrote, or pyogrio is missing.
+    """
+    file = Path(path)
+    about = _about(file)
+    table, shapes = _layer(file, "cells")
+    column, row = _places(shapes, about.cell)
+    layers = _names(file)
+    return MapFile(
+        file,
+        about,
+        column,
+        row,
+        table,
+        _anomalies(file) if "anomalies" in layers else [],
+        _changes(file, about.cell) if "changes" in layers else {},
+        layers.get("points", 0),
+    )
+
+
+def _pyogrio(file: Path) -> Any:
+    try:
+        import pyogrio
+    except ModuleNotFoundError as error:
+        raise InputError(
+            "to read a map pyogrio is needed", file=file, hint="pip install 'terragrip[geo]'"
+        ) from error
+    return pyogrio
+
+
+def _about(file: Path) -> About:
+    pyogrio = _pyogrio(file)
+    try:
+        info = pyogrio.read_info(file, layer="cells")
+        return About.from_text((info["dataset_metadata"] or {})[ABOUT])
+    except (pyogrio.errors.DataSourceError, pyogrio.errors.DataLayerError) as error:
+        raise InputError("is no GeoPackage with a layer of cells", file=file, hint=_REMAKE) from error
+    except (KeyError, ValueError, TypeError) as error:
+        raise InputError("is no map of this version of Terragrip", file=file, hint=_REMAKE) from error
+
+
+def _names(file: Path) -> dict[str, int]:
+    """Rows by layer."""
+    pyogrio = _pyogrio(file)
+    return {
+        str(name): int(pyogrio.read_info(file, layer=name)["features"])
+        for name, _ in pyogrio.list_layers(file)
+    }
+
+
+def _layer(file: Path, layer: str, **which: Any) -> tuple[dict[str, npt.NDArray[Any]], npt.NDArray[Any]]:
+    """Columns by name and shapes (n,) of a layer. Raises InputError where the file is damaged."""
+    import shapely
+
+    pyogrio = _pyogrio(file)
+    try:
+        meta, _, shapes, columns = pyogrio.raw.read(file, layer=layer, **which)
+    except (pyogrio.errors.DataSourceError, pyogrio.errors.DataLayerError) as error:
+        raise InputError(f"the layer {layer} cannot be read", file=file, hint=_REMAKE) from error
+    return dict(zip(map(str, meta["fields"]), columns, strict=True)), shapely.from_wkb(shapes)
+
+
+def _places(shapes: npt.NDArray[Any], cell: float) -> tuple[Ints, Ints]:
+    """Columns and rows of the grid (n,) of cells."""
+    import shapely
+
+    corner = np.rint(shapely.bounds(shapes)[:, :2] / cell).astype(np.int64)
+    return corner[:, 0], corner[:, 1]
+
+
+def _anomalies(file: Path) -> list[Patch]:
+    import shapely
+
+    table, shapes = _layer(file, "anomalies")
+    names = list(table)
+    rows = [dict(zip(names, one, strict=True)) for one in zip(*table.values(), strict=True)]
+    return [
+        Patch(
+            row,
+            [
+                shapely.get_coordinates(ring)
+                for part in shapely.get_parts(shape)
+                for ring in shapely.get_rings(part)
+            ],
+        )
+        for row, shape in zip(rows, shapes, strict=True)
+    ]
+
+
+def _changes(file: Path, cell: float) -> dict[str, dict[str, npt.NDArray[Any]]]:
+    table, shapes = _layer(file, "changes")
+    column, row = _places(shapes, cell)
+    quantity = table.pop("quantity")
+    out = {}
+    for name in QUANTITIES:
+        rows = quantity == name
+        if rows.any():
+            out[name] = {key: values[rows] for key, values in table.items()}
+            out[name] |= {"column": column[rows], "row": row[rows]}
+    return out
