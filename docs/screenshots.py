@@ -49,6 +49,12 @@ def map_page(page: Any) -> None:
     page.wait_for_function("() => window.terragripMap?.map.getSource('track')")
 
 
+def field(page: Any) -> None:
+    page.wait_for_selector("#map[data-cells]")
+    page.focus(".maplibregl-canvas")
+    page.keyboard.press("ArrowRight")
+
+
 def start(page: Any) -> None:
     page.wait_for_selector("h1")
 
@@ -76,8 +82,23 @@ PAGES = {
     "honesty": ("#/drive?path=multi2-aukf-fs.parquet", honesty),
     "live": ("#/live?replay={run}&speed=5", live),
     "map": ("#/map?path={run}", map_page),
+    "field": ("#/map?map=field.gpkg", field),
     "fit": ("#/fit?path={run}", fit),
 }
+
+
+def field_of(folder: Path) -> None:
+    """field.gpkg: a simulated field with patches of other soils, driven on two days."""
+    from bench_maps import field_scenario
+
+    from terragrip.maps import MapSettings, map_of, write_map
+
+    scenario = field_scenario(7000)
+    days = []
+    for seed, day in ((7000, "monday"), (7001, "friday")):
+        result = tg.simulate(scenario, seed)
+        days.append((day, tg.estimate(result.recording, result.vehicle)))
+    write_map(map_of(days, MapSettings(cell=1.0)), folder / "field.gpkg")
 
 
 def main() -> None:
@@ -87,6 +108,7 @@ def main() -> None:
         fill(folder)
         recording, vehicle = tg.read(folder / "multi2.parquet"), tg.Vehicle.load(folder / "vehicle.yaml")
         tg.estimate(recording, vehicle, "aukf-fs").write(folder / "multi2-aukf-fs.parquet")
+        field_of(folder)
         run = next(folder.glob("*-estimates.parquet")).name
         with studio(folder) as (url, _):
             for theme in ("light", "dark"):

@@ -7,6 +7,7 @@ import threading
 import time
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import pytest
 import uvicorn
@@ -69,3 +70,20 @@ def until(condition: Callable[[], object], seconds: float = 60.0) -> None:
     while not condition():
         assert time.monotonic() < end, "it never happened"
         time.sleep(0.01)
+
+
+def axe_faults(browser: Any, served: Served, where: str, theme: str, width: int, ready: str) -> list[str]:
+    """What axe-core says of a page once `ready` is there, of any weight, and whether anything is wider than the screen."""
+    context = browser.new_context(
+        viewport={"width": width, "height": 720}, color_scheme=theme, bypass_csp=True
+    )
+    tab = context.new_page()
+    tab.set_default_timeout(90_000)
+    tab.goto(f"{served.url}/{where}")
+    tab.wait_for_selector(ready, state="attached")
+    tab.add_script_tag(path=str(AXE))
+    result = tab.evaluate("() => axe.run(document, { resultTypes: ['violations'] })")
+    wide = tab.evaluate("() => document.documentElement.scrollWidth")
+    context.close()
+    faults = [f"{v['id']}: {v['nodes'][0]['html'][:120]}" for v in result["violations"]]
+    return [*faults, *([f"{wide} pixels wide"] if wide > width else [])]

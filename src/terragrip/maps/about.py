@@ -14,7 +14,8 @@ ABOUT = "TERRAGRIP_MAP"
 @dataclass(frozen=True)
 class About:
     """``epsg`` of the grid and the ``cell`` [m]; the ``datum`` that positions were read in; the slip that adhesion is mapped at; names of
-    the ``runs``; ``notes``: sentences for the user; the ``version`` of Terragrip."""
+    the ``runs``; ``notes``: sentences for the user; ``changes``: of each quantity from which run to which how many cells were driven again,
+    and how many of them changed; the ``version`` of Terragrip."""
 
     epsg: int
     cell: float
@@ -22,6 +23,7 @@ class About:
     reference_slip: float
     runs: list[str]
     notes: list[str]
+    changes: dict[str, list[tuple[str, str, int, int]]]
     version: str = __version__
 
     def to_text(self) -> str:

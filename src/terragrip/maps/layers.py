@@ -53,8 +53,7 @@ def cell_table(made: FieldMap) -> dict[str, npt.NDArray[Any]]:
 
 def _cells(made: FieldMap) -> geopandas.GeoDataFrame:
     table = cell_table(made)
-    column, row = table.pop("column"), table.pop("row")
-    return _frame(table, _boxes(made, column, row), made)
+    return _frame(table, _boxes(made, table["column"], table["row"]), made)
 
 
 def _boxes(made: FieldMap, column: npt.NDArray[np.int64], row: npt.NDArray[np.int64]) -> Any:
@@ -118,6 +117,7 @@ def _changes(made: FieldMap) -> geopandas.GeoDataFrame:
     shapes: list[Any] = []
     for quantity, one in made.changes.items():
         table = {
+            "column": one.column, "row": one.row,
             "quantity": np.full(len(one), quantity, dtype=object), "first": one.first, "last": one.last, "difference": one.difference,
             "difference_std": one.std, "p": one.p, "significant": one.significant, "first_run": runs[one.first_run],
             "last_run": runs[one.last_run], "seconds": one.seconds,
@@ -127,6 +127,23 @@ def _changes(made: FieldMap) -> geopandas.GeoDataFrame:
         shapes.append(_boxes(made, one.column, one.row))
     table = {name: np.concatenate(values) for name, values in parts.items()}
     return _frame(table, np.concatenate(shapes) if shapes else [], made)
+
+
+def changes_between(made: FieldMap) -> dict[str, list[tuple[str, str, int, int]]]:
+    """Of each quantity from which run to which how many cells were driven again, and how many of them changed."""
+    out: dict[str, list[tuple[str, str, int, int]]] = {}
+    for quantity, one in made.changes.items():
+        pairs, which = np.unique(np.column_stack([one.first_run, one.last_run]), axis=0, return_inverse=True)
+        out[quantity] = [
+            (
+                made.runs[first],
+                made.runs[last],
+                int(np.sum(which.ravel() == k)),
+                int(one.significant[which.ravel() == k].sum()),
+            )
+            for k, (first, last) in enumerate(pairs.tolist())
+        ]
+    return out
 
 
 def _frame(table: dict[str, Any], geometry: Any, made: FieldMap) -> geopandas.GeoDataFrame:

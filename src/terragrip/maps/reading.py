@@ -34,8 +34,8 @@ class MapFile:
     """A map's file.
 
     ``about``: how it was made; ``column``, ``row`` (k,) of its cells on the grid; ``cells``: their columns (k,) by name as
-    :func:`terragrip.maps.layers.cell_table` has them; ``anomalies``; ``changes``: of each quantity the rows of that layer, ``column``
-    and ``row`` among them; ``points``: how many there are along the way.
+    :func:`terragrip.maps.layers.cell_table` has them; ``anomalies``; ``points``: how many there are along the way. Changes and the way
+    are read when they are asked for.
     """
 
     path: Path
@@ -44,7 +44,6 @@ class MapFile:
     row: Ints
     cells: Mapping[str, npt.NDArray[Any]]
     anomalies: list[Patch]
-    changes: Mapping[str, Mapping[str, npt.NDArray[Any]]]
     points: int
 
     @property
@@ -52,14 +51,20 @@ class MapFile:
         """What is mapped."""
         return [name for name in QUANTITIES if name in self.cells]
 
+    def changes(self, quantity: str) -> dict[str, npt.NDArray[Any]]:
+        """A quantity's rows of the layer ``changes`` by column, ``column`` and ``row`` of the grid among them; empty where it has none."""
+        if not self.about.changes.get(quantity):
+            return {}
+        return _columns(self.path, "changes", where=f"quantity = '{quantity}'")
+
     def way(self, most: int) -> tuple[npt.NDArray[np.object_], Floats, Floats, Floats]:
         """Of at most `most` points along the way, evenly drawn: run, time [s], east and north [m] (n,)."""
         if not self.points:
             return np.zeros(0, dtype=object), np.zeros(0), np.zeros(0), np.zeros(0)
         every = -(-self.points // most)
-        table, shapes = _layer(self.path, "points", columns=["run", "time"], where=f"fid % {every} = 0")
         import shapely
 
+        table, shapes = _layer(self.path, "points", columns=["run", "time"], where=f"fid % {every} = 0")
         place = shapely.get_coordinates(shapes)
         return table["run"], table["time"], place[:, 0], place[:, 1]
 
@@ -71,19 +76,10 @@ def read_map(path: str | os.PathLike[str]) -> MapFile:
     """
     file = Path(path)
     about = _about(file)
-    table, shapes = _layer(file, "cells")
-    column, row = _places(shapes, about.cell)
+    table = _columns(file, "cells")
     layers = _names(file)
-    return MapFile(
-        file,
-        about,
-        column,
-        row,
-        table,
-        _anomalies(file) if "anomalies" in layers else [],
-        _changes(file, about.cell) if "changes" in layers else {},
-        layers.get("points", 0),
-    )
+    anomalies = _anomalies(file) if "anomalies" in layers else []
+    return MapFile(file, about, table["column"], table["row"], table, anomalies, layers.get("points", 0))
 
 
 def _pyogrio(file: Path) -> Any:
@@ -128,12 +124,14 @@ def _layer(file: Path, layer: str, **which: Any) -> tuple[dict[str, npt.NDArray[
     return dict(zip(map(str, meta["fields"]), columns, strict=True)), shapely.from_wkb(shapes)
 
 
-def _places(shapes: npt.NDArray[Any], cell: float) -> tuple[Ints, Ints]:
-    """Columns and rows of the grid (n,) of cells."""
-    import shapely
-
-    corner = np.rint(shapely.bounds(shapes)[:, :2] / cell).astype(np.int64)
-    return corner[:, 0], corner[:, 1]
+def _columns(file: Path, layer: str, **which: Any) -> dict[str, npt.NDArray[Any]]:
+    """Columns of a layer by name (n,), without its shapes, which take most of the time. Raises InputError where the file is damaged."""
+    pyogrio = _pyogrio(file)
+    try:
+        _, table = pyogrio.read_arrow(file, layer=layer, read_geometry=False, **which)
+    except (pyogrio.errors.DataSourceError, pyogrio.errors.DataLayerError) as error:
+        raise InputError(f"the layer {layer} cannot be read", file=file, hint=_REMAKE) from error
+    return {name: table[name].to_numpy() for name in table.column_names}
 
 
 def _anomalies(file: Path) -> list[Patch]:
@@ -153,16 +151,3 @@ def _anomalies(file: Path) -> list[Patch]:
         )
         for row, shape in zip(rows, shapes, strict=True)
     ]
-
-
-def _changes(file: Path, cell: float) -> dict[str, dict[str, npt.NDArray[Any]]]:
-    table, shapes = _layer(file, "changes")
-    column, row = _places(shapes, cell)
-    quantity = table.pop("quantity")
-    out = {}
-    for name in QUANTITIES:
-        rows = quantity == name
-        if rows.any():
-            out[name] = {key: values[rows] for key, values in table.items()}
-            out[name] |= {"column": column[rows], "row": row[rows]}
-    return out

@@ -75,11 +75,13 @@ def write_map(made: FieldMap, path: str | os.PathLike[str], layer: str = "cells"
 
 
 def _geopackage(made: FieldMap, path: Path) -> None:
-    from terragrip.maps.layers import LAYERS
+    from terragrip.maps.layers import LAYERS, changes_between
     from terragrip.maps.layers import layer as table
 
     path.unlink()
-    about = About(made.epsg, made.cell, made.datum, made.reference_slip, list(made.runs), list(made.notes))
+    about = About(
+        made.epsg, made.cell, made.datum, made.reference_slip, list(made.runs), list(made.notes), changes_between(made)
+    )  # fmt: skip
     metadata = {ABOUT: about.to_text()}
     for name in LAYERS:
         frame = table(made, name)

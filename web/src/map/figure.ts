@@ -9,23 +9,22 @@ import type { Corners } from "./basemap";
 import { inkLegend, type Legend } from "./quantities";
 
 const [LEFT, RIGHT, FOOT, GAP] = [84, 24, 40, 14];
-const [TRACK, RIM, BRUSHED] = [5, 8, 16]; // pixels, as on the page
 const EARTH = 40_075_016.686; // metres around the equator
 const TILE = 512; // pixels of the world at zoom 0
 
-type Place = [number, number];
+export type Place = [number, number];
+export type Project = (place: Place) => Place;
 
 export interface Drawing {
   map: Maplibre;
   title: string;
   legend: Legend;
-  track: GeoJSON.Feature[];
-  brushed: GeoJSON.Feature[];
-  picked: Place | null;
   base: { image: HTMLImageElement; corners: Corners } | null;
+  /** Draw what lies on the map; `box`: where the map is on the sheet. */
+  draw(ink: Ink, project: Project, box: Box): void;
 }
 
-export function sheetOf({ map, title, legend, track, brushed, picked, base }: Drawing): Sheet {
+export function sheetOf({ map, title, legend, base, draw }: Drawing): Sheet {
   const { clientWidth: width, clientHeight: height } = map.getContainer();
   const whole = width + LEFT + RIGHT;
   const top = GAP + LINE + inkLegend(DRY, legend, LEFT, GAP + LINE + 4, width) + 4;
@@ -33,9 +32,6 @@ export function sheetOf({ map, title, legend, track, brushed, picked, base }: Dr
   const project = (place: Place): Place => {
     const { x, y } = map.project(place);
     return [LEFT + x, top + y];
-  };
-  const line = (ink: Ink, feature: GeoJSON.Feature, shade: string, wide: number, alpha = 1): void => {
-    if (feature.geometry.type === "LineString") ink.line(feature.geometry.coordinates.flatMap((place) => project(place as Place)), { color: shade, width: wide, alpha, round: true });
   };
   return {
     width: whole,
@@ -46,13 +42,7 @@ export function sheetOf({ map, title, legend, track, brushed, picked, base }: Dr
       ink.clipped(box, () => {
         ink.area([box.x, top, box.x + width, top, box.x + width, top + height, box.x, top + height], color("panel"), 1);
         if (base) ink.picture(base.image, laid(base.image, base.corners.map(project) as Place[]));
-        for (const feature of brushed) line(ink, feature, color("accent"), BRUSHED, 0.45);
-        for (const feature of track) line(ink, feature, color("muted"), RIM);
-        for (const feature of track) line(ink, feature, String(feature.properties?.["shade"]), TRACK, Number(feature.properties?.["ink"] ?? 1));
-        if (picked) {
-          ink.dots(project(picked), 9, color("ink"), 1);
-          ink.dots(project(picked), 6, color("accent"), 1);
-        }
+        draw(ink, project, box);
         drawScale(ink, map, box);
       });
       drawDegrees(ink, map, box, project);

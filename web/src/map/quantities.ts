@@ -5,8 +5,8 @@ import { digits, fill, h } from "../ui/dom";
 import type { Ink } from "../ui/ink";
 import { legend as legendLines, LINE, widthOf } from "../ui/sheet";
 import { color } from "../ui/theme";
-import type { Unit } from "../ui/units";
-import { UNLABELLED } from "./scale";
+import { type Unit, withUnit } from "../ui/units";
+import { PALEST, UNLABELLED } from "./scale";
 import { SCALE } from "./shade";
 
 const QUANTITIES: [string, string][] = [
@@ -49,6 +49,10 @@ export interface Scale {
   high: number;
   /** What is said of it. */
   about: string;
+  /** Its colours, where they are not the usual. */
+  colors?: (share: number) => string;
+  /** What is drawn paler, in words: shown with a sample from full to palest. */
+  fades?: string;
 }
 
 /** Of a quantity that is a word: each word with its colour. */
@@ -72,14 +76,20 @@ export function showLegend(element: HTMLElement, legend: Legend): void {
     fill(element, legend.words.length ? legend.words.map(({ text, shade }) => h("span", {}, h("i", { class: `strip ${shade}` }), text)) : h("span", { class: "hint" }, "none in this run"));
     return;
   }
-  const { title, unit, low, high, about } = legend;
-  const bar = h("canvas", { width: 180, height: 10, class: "bar", "aria-hidden": "true" });
+  const { title, unit, low, high, about, colors = SCALE, fades } = legend;
+  const bar = strip(180, (share) => [colors(share), 1]);
+  const pale = fades ? h("span", { class: "hint" }, strip(60, (share) => [colors(0.75), 1 - (1 - PALEST) * share]), fades) : null;
+  fill(element, h("span", {}, title), h("span", {}, digits(low * unit.scale), bar, withUnit(digits(high * unit.scale), unit)), pale, h("span", { class: "hint" }, about));
+}
+
+function strip(width: number, ink: (share: number) => [string, number]): HTMLElement {
+  const bar = h("canvas", { width, height: 10, class: "bar", "aria-hidden": "true" });
   const pen = bar.getContext("2d");
-  for (let i = 0; pen && i < 180; i++) {
-    pen.fillStyle = SCALE(i / 179);
+  for (let i = 0; pen && i < width; i++) {
+    [pen.fillStyle, pen.globalAlpha] = ink(i / (width - 1));
     pen.fillRect(i, 0, 1, 10);
   }
-  fill(element, h("span", {}, title), h("span", {}, digits(low * unit.scale), bar, `${digits(high * unit.scale)} ${unit.name}`), h("span", { class: "hint" }, about));
+  return bar;
 }
 
 /** Draw the legend in lines no wider than `width`; gives the height that it took. */
@@ -97,7 +107,7 @@ export function inkLegend(ink: Ink, legend: Legend, x: number, y: number, width:
   for (let i = 0; i < 60; i++) ink.area([bar + 3 * i, y - 5, Math.min(bar + 3 * i + 4, bar + 180), y - 5, Math.min(bar + 3 * i + 4, bar + 180), y + 5, bar + 3 * i, y + 5], SCALE(i / 59), 1);
   ink.text(high, bar + 186, y, color("ink"), "start");
   let [line, height] = ["", LINE];
-  for (const word of [...legend.about.split(" "), ""]) {
+  for (const word of [...[legend.about, legend.fades].filter(Boolean).join("; ").split(" "), ""]) {
     if (word && widthOf(`${line} ${word}`) < width) line += ` ${word}`;
     else {
       ink.text(line.trim(), x, y + height, color("muted"), "start");

@@ -1,11 +1,12 @@
 /** The scale that a quantity is coloured by: its ends by quantiles, what lies beyond them, and how much ink an uncertain value gets. */
 
 import { digits } from "../ui/dom";
+import { withUnit } from "../ui/units";
 
 /** The colour of ground without a label: none of the soils'. */
 export const UNLABELLED = "line";
 const LEVELS = 5;
-const PALEST = 0.2;
+export const PALEST = 0.2;
 
 /** 5 % and 95 % of the values: one spike must not wash out the rest. */
 export function spread(values: Float64Array): [number, number] {
@@ -25,9 +26,9 @@ export function outliers(values: Float64Array | undefined, low: number, high: nu
   return found;
 }
 
-/** In words. */
-export function outside(found: ReturnType<typeof outliers>, scale: number, unit: string): string {
-  const side = (count: number, value: number, word: string): string[] => (count ? [`${count} points ${word}, to ${digits(value * scale)} ${unit}`] : []);
+/** In words; `noun`: what they are. */
+export function outside(found: ReturnType<typeof outliers>, scale: number, unit: string, noun = "points"): string {
+  const side = (count: number, value: number, word: string): string[] => (count ? [`${count} ${noun} ${word}, to ${withUnit(digits(value * scale), { name: unit })}`] : []);
   const said = [...side(found.under, found.least, "below"), ...side(found.over, found.most, "above")];
   return said.length ? `; ${said.join("; ")}` : "";
 }

@@ -2,9 +2,14 @@
 
 import { during, type Run } from "../drive/run";
 import type { Columns } from "../ui/columns";
+import type { Ink } from "../ui/ink";
 import { note } from "../ui/notes";
 import { csvOf } from "../ui/sheet";
+import { color } from "../ui/theme";
+import type { Place, Project } from "./figure";
 import { soilAt, type Legend } from "./quantities";
+
+const [TRACK, RIM, BRUSHED] = [5, 8, 16]; // pixels, as on the page
 
 /** Seconds without a position that part a track. */
 const APART = 5;
@@ -39,4 +44,17 @@ export function tableOf({ data, names, of, count }: Columns, run: Run, legend: L
   });
   if (of && of > count) note(`The track is thinned to ${count} of ${of} positions, and so is the table; Drive saves every row.`);
   return csvOf([head, ...rows]);
+}
+
+/** The track on a sheet: the stretch whose times are shown below it, the picked sample above. */
+export function drawTrack(ink: Ink, project: Project, { track, brushed, picked }: { track: GeoJSON.Feature[]; brushed: GeoJSON.Feature[]; picked: Place | null }): void {
+  const line = (feature: GeoJSON.Feature, shade: string, wide: number, alpha = 1): void => {
+    if (feature.geometry.type === "LineString") ink.line(feature.geometry.coordinates.flatMap((place) => project(place as Place)), { color: shade, width: wide, alpha, round: true });
+  };
+  for (const feature of brushed) line(feature, color("accent"), BRUSHED, 0.45);
+  for (const feature of track) line(feature, color("muted"), RIM);
+  for (const feature of track) line(feature, String(feature.properties?.["shade"]), TRACK, Number(feature.properties?.["ink"] ?? 1));
+  if (!picked) return;
+  ink.dots(project(picked), 9, color("ink"), 1);
+  ink.dots(project(picked), 6, color("accent"), 1);
 }

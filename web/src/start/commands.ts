@@ -1,11 +1,11 @@
 /** One command over chosen files: what it needs is asked in a dialog, then it is a job. */
 
-import { send, type Item } from "../ui/api";
+import { send, type Item, type Job } from "../ui/api";
 import { fill, h } from "../ui/dom";
 import { tried } from "../ui/notes";
 import { freeName, stemOf } from "./jobs";
 
-type Ask = "vehicle" | "profile" | "library" | "ground" | "soil" | "title" | "smooth";
+type Ask = "vehicle" | "profile" | "library" | "ground" | "soil" | "title" | "smooth" | "cell" | "slip" | "datum";
 
 interface Command {
   kind: string;
@@ -22,17 +22,21 @@ const COMMANDS: Record<string, Command> = {
   calibrate: { kind: "calibrate", title: "Calibrate a vehicle", files: "recordings", asks: ["vehicle", "profile"], ending: ".yaml", about: "Zeros from standstill, radii from straight passes without load, torque gains from the wheels against each other." },
   soils: { kind: "soils", title: "Learn soils", files: "estimates", asks: ["soil"], ending: ".json", about: "The adhesion curve of each soil that the logs name, with its interval." },
   ground: { kind: "ground", title: "Find changes of the ground", files: "estimates", asks: ["library"], ending: ".json", about: "Where the ground changes, which soil it is, and what happened on it." },
+  map: { kind: "map", title: "Map the ground", files: "estimates", asks: ["cell", "slip", "datum", "library", "ground"], ending: ".gpkg", about: "Cells of adhesion, soil resistance, slip and efficiency with their standard deviations; what changed between passes and runs, patches unlike their surroundings. Runs in the order of their days." },
   report: { kind: "report", title: "Write a report", files: "estimates", asks: ["title", "library", "ground"], ending: ".html", about: "A page with figures and tables, and a PDF beside it." },
 };
 
 /** The commands that files of a kind can be given to. */
 export const ACTIONS: Record<string, [string, string][]> = {
   recording: [["batch", "Estimate"], ["calibrate", "Calibrate"]],
-  estimates: [["soils", "Learn soils"], ["ground", "Ground"], ["report", "Report"]],
+  estimates: [["soils", "Learn soils"], ["ground", "Ground"], ["map", "Map"], ["report", "Report"]],
 };
 
-/** Ask what a command over `files` needs, and queue it. */
-export function ask(dialog: HTMLDialogElement, name: string, files: string[], items: Item[]): void {
+/** What the server takes in place of what was typed, where that is not the same. */
+const SENT: Partial<Record<Ask, (text: string) => unknown>> = { slip: (text) => Number(text) / 100, cell: Number };
+
+/** Ask what a command over `files` needs, and queue it; `queued` is called with its job. */
+export function ask(dialog: HTMLDialogElement, name: string, files: string[], items: Item[], queued: (job: Job) => void = () => {}): void {
   const command = COMMANDS[name] as Command;
   const fields = new Map<Ask, HTMLInputElement | HTMLSelectElement>();
   const of = (kind: string): string[] => items.filter((item) => item.kind === kind).map((item) => item.path);
@@ -47,10 +51,18 @@ export function ask(dialog: HTMLDialogElement, name: string, files: string[], it
     fields.set(kind, field);
     return row(NAMES[kind], field);
   };
+  const number = (kind: Ask, range: Record<string, string>, placeholder: string): HTMLElement => {
+    const field = h("input", { type: "number", id: `job-${kind}`, placeholder, ...range });
+    fields.set(kind, field);
+    return row(NAMES[kind], field);
+  };
   const forms: Record<Ask, () => HTMLElement> = {
+    cell: () => number("cell", { min: "0.05", max: "1000", step: "any" }, "by the machine: 1 m, above a tonne 3 m"),
+    slip: () => number("slip", { min: "2", max: "90", step: "any" }, "20: the slip that adhesion is given at"),
+    datum: () => text("datum", "", "EPSG:4326 (WGS 84), what GNSS receivers give"),
     vehicle: () => select("vehicle", ""),
     profile: () => select("profile", "none: the columns have our names"),
-    library: () => select("library", command.kind === "report" ? "none: curves are learned from these runs" : "none: soils are not named"),
+    library: () => select("library", NO_SOILS[command.kind] ?? "none: soils are not named"),
     ground: () => select("ground", "none"),
     soil: () => text("soil", "", "as the logs' labels say"),
     title: () => text("title", "Traction report", ""),
@@ -83,8 +95,8 @@ export function ask(dialog: HTMLDialogElement, name: string, files: string[], it
       const replace = items.some((item) => item.path === path || item.path.startsWith(`${path}/`));
       if (replace && !confirm(`Replace ${path}?`)) return;
       const wanted: Record<string, unknown> = { [command.files]: files, output: path, replace };
-      for (const [key, field] of fields) wanted[key] = field instanceof HTMLInputElement && field.type === "checkbox" ? field.checked : field.value || null;
-      await send("POST", `jobs/${command.kind}`, wanted);
+      for (const [key, field] of fields) wanted[key] = field instanceof HTMLInputElement && field.type === "checkbox" ? field.checked : field.value.trim() ? (SENT[key] ?? String)(field.value) : null;
+      queued(await send<Job>("POST", `jobs/${command.kind}`, wanted));
       dialog.close();
     });
   });
@@ -92,11 +104,12 @@ export function ask(dialog: HTMLDialogElement, name: string, files: string[], it
   dialog.showModal();
 }
 
-const NAMES: Record<Ask, string> = { vehicle: "Vehicle", profile: "Profile", library: "Soils", ground: "Ground", soil: "One soil", title: "Title", smooth: "" };
+const NAMES: Record<Ask, string> = { vehicle: "Vehicle", profile: "Profile", library: "Soils", ground: "Ground", soil: "One soil", title: "Title", smooth: "", cell: "Cell [m]", slip: "Slip [%]", datum: "Datum" };
+const NO_SOILS: Record<string, string> = { report: "none: curves are learned from these runs", map: "none: adhesion is carried to that slip by the paper's curve" };
 
 function proposed(command: Command, files: string[]): string {
   const one = files.length === 1 ? `${stemOf(files[0] as string).replace(/-estimates$/, "")}-` : "";
-  return { batch: "estimates", calibrate: "calibrated-vehicle", soils: `${one}soils`, ground: `${one}ground`, report: `${one}report` }[command.kind] as string;
+  return { batch: "estimates", calibrate: "calibrated-vehicle", soils: `${one}soils`, ground: `${one}ground`, map: `${one}map`, report: `${one}report` }[command.kind] as string;
 }
 
 function row(label: string, field: HTMLElement): HTMLElement {

@@ -7,7 +7,7 @@ import { onceReleased } from "../ui/press";
 import { focusOn } from "./focus";
 
 const SHOWN = 8;
-const NAMES: Record<string, string> = { estimate: "Estimate", batch: "Estimate", calibrate: "Calibrate", soils: "Learn soils", ground: "Ground", report: "Report" };
+const NAMES: Record<string, string> = { estimate: "Estimate", batch: "Estimate", calibrate: "Calibrate", soils: "Learn soils", ground: "Ground", map: "Map", report: "Report" };
 
 /** A file that does not exist yet: `stem + ending`, or numbered. */
 export function freeName(items: Item[], stem: string, ending: string): string {
@@ -28,6 +28,7 @@ export function viewOf(kind: string, path: string): string | null {
   const query = `path=${encodeURIComponent(path)}`;
   if (kind === "estimates" || kind === "estimate") return `#/drive?${query}`;
   if (kind === "library" || kind === "soils") return `#/fit?${query}`;
+  if (kind === "map") return `#/map?map=${encodeURIComponent(path)}`;
   if (kind === "report" && path.endsWith(".html")) return `./api/report?${query}`;
   return null;
 }
@@ -39,10 +40,11 @@ export class JobList {
   private lines = new Map<string, { state: string; element: HTMLElement; bar: HTMLProgressElement }>();
   readonly leave: () => void;
 
-  /** `ended` is called when a job ends while the page is open. */
+  /** `ended` is called when a job ends while the page is open; `listed`: whether a job is shown. */
   constructor(
     notices: Notices,
     private ended: (job: Job) => void = () => {},
+    private listed: (job: Job) => boolean = () => true,
   ) {
     this.element.append(h("h2", {}, "Work"), this.list);
     this.leave = notices.on((notice) => this.hear(notice));
@@ -59,12 +61,12 @@ export class JobList {
     this.jobs.set(job.id, job);
     onceReleased(this.list, () => this.draw());
     if (job.state === before || job.state === "queued" || job.state === "running") return;
-    if (job.state === "failed") note(job.text, "error");
+    if (job.state === "failed" && this.listed(job)) note(job.text, "error");
     this.ended(job);
   }
 
   private draw(): void {
-    const shown = [...this.jobs.values()].slice(-SHOWN).reverse();
+    const shown = [...this.jobs.values()].filter(this.listed).slice(-SHOWN).reverse();
     this.element.hidden = !shown.length;
     const elements = shown.map((job) => this.line(job));
     const known = new Set(shown.map((job) => job.id));

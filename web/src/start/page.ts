@@ -17,6 +17,7 @@ const KINDS: [string, string, string][] = [
   ["estimates", "Estimates", "None yet: open a recording and estimate it."],
   ["library", "Soil libraries", "None yet: learn one from estimates, or save a curve on the fit page."],
   ["ground", "Ground", "None yet: find changes of the ground from estimates."],
+  ["map", "Maps", "None yet: make one from estimates of a drive with positions."],
   ["report", "Reports", "None yet: write one from estimates."],
   ["vehicle", "Vehicles", "None yet: an estimate needs one."],
   ["profile", "Profiles", "Only needed for logs with names of their own; choosing a log's columns makes one."],

@@ -23,13 +23,13 @@ export type Kind = keyof typeof KINDS;
 
 /** What a column holds, by how its name begins; a text is a unit that is not chosen. */
 const COLUMNS: [RegExp, Kind | string][] = [
-  [/^(slip|efficiency)_/, "share"],
+  [/^(slip|efficiency)(_|$)/, "share"],
   [/^(ground_speed|wheel_based_speed)$/, "speed"],
   [/^(wheel_speed_|engine_speed$)/, "rotation"],
   [/^(drive_torque_|engine_torque$)/, "torque"],
   [/^(drawbar_force$|hitch_load$|vertical_load_|wheel_force_)/, "force"],
   [/^mass$/, "kg"],
-  [/^(adhesion_|net_traction_|curve_a$|soil_resistance$|nis$|supervisor$|adaptation_)/, "–"],
+  [/^(adhesion(_|$)|net_traction_|curve_a$|soil_resistance$|nis$|supervisor$|adaptation_)/, "–"],
   [/^(distance|altitude)$/, "m"],
   [/^fuel_rate$/, "m³/s"],
   [/^(latitude|longitude)$/, "°"],

@@ -10,15 +10,16 @@ import numpy.typing as npt
 from fastapi import APIRouter, Query, Response
 
 from terragrip.errors import InputError
-from terragrip.maps.reading import MapFile, read_map
+from terragrip.maps.reading import MapFile
 from terragrip.studio.api.files import Named, finite
 from terragrip.studio.state import Here, Studio
 from terragrip.studio.tables import packed
 
 router = APIRouter(tags=["maps"])
 
-TILE = 1024
-"""Cells along the side of a tile, over which the grid is a parallelogram on the page's map: at 3 m a twentieth of a cell off at most."""
+TILE, WHOLE = 256, 1024
+"""Cells along the side of a tile, over which the grid is a parallelogram on the page's map; and of a map that is one tile: at 3 m a cell
+its middle is a twentieth of a cell off at most."""
 WAY = 20_000
 """Points of the way that are sent."""
 BINARY = "application/octet-stream"
@@ -52,7 +53,6 @@ def about(studio: Here, path: Named) -> dict[str, Any]:
             "cells": len(made.column),
             "soils": bool((made.cells["soil"] != "").any()),
             "points": made.points,
-            "tile": TILE,
             "tiles": list(_tiles(made, to_degrees)),
             "quantities": [
                 {"name": name, "areas": _areas(made, name), "changes": _changed(made, name)}
@@ -95,8 +95,9 @@ def cells(studio: Here, path: Named, quantity: Quantity, version: str = "") -> R
         "soil": soil[rows],
         "soil_probability": table["soil_probability"][rows],
     }
-    if quantity in made.changes:
-        columns |= _changes_of(made, quantity, rows)
+    changes = made.changes(quantity)
+    if changes:
+        columns |= _beside(made, changes, rows)
     whole = [np.issubdtype(values.dtype, np.integer) or values.dtype == bool for values in columns.values()]
     head = {
         "columns": list(columns),
@@ -152,9 +153,10 @@ def _tiles(made: MapFile, to_degrees: _Degrees) -> Iterator[dict[str, Any]]:
     north-west, north-east, south-east, south-west."""
     west, south = int(made.column.min()), int(made.row.min())
     east, north = int(made.column.max()) + 1, int(made.row.max()) + 1
-    number = np.unique(np.column_stack([(made.column - west) // TILE, (made.row - south) // TILE]), axis=0)
-    for column, row in (np.array([west, south]) + TILE * number).tolist():
-        wide, high = min(TILE, east - column), min(TILE, north - row)
+    side = WHOLE if max(east - west, north - south) <= WHOLE else TILE
+    number = np.unique(np.column_stack([(made.column - west) // side, (made.row - south) // side]), axis=0)
+    for column, row in (np.array([west, south]) + side * number).tolist():
+        wide, high = min(side, east - column), min(side, north - row)
         x = np.array([column, column + wide, column + wide, column]) * made.about.cell
         y = np.array([row + high, row + high, row, row]) * made.about.cell
         yield {"column": column, "row": row, "wide": wide, "high": high, "corners": to_degrees(x, y)}
@@ -174,23 +176,14 @@ def _areas(made: MapFile, quantity: str) -> dict[str, dict[str, float] | None]:
 
 def _changed(made: MapFile, quantity: str) -> list[dict[str, Any]]:
     """From which run to which how many cells were driven again, and how many of them changed."""
-    if quantity not in made.changes:
-        return []
-    table = made.changes[quantity]
-    pairs = sorted(set(zip(table["first_run"].tolist(), table["last_run"].tolist(), strict=True)))
-    out = []
-    for first, last in pairs:
-        rows = (table["first_run"] == first) & (table["last_run"] == last)
-        significant = table["significant"][rows].astype(bool)
-        out.append(
-            {"first": first, "last": last, "cells": int(rows.sum()), "significant": int(significant.sum())}
-        )
-    return out
+    names = ("first", "last", "cells", "significant")
+    return [dict(zip(names, one, strict=True)) for one in made.about.changes.get(quantity, [])]
 
 
-def _changes_of(made: MapFile, quantity: str, rows: npt.NDArray[np.intp]) -> Mapping[str, npt.NDArray[Any]]:
+def _beside(
+    made: MapFile, table: Mapping[str, npt.NDArray[Any]], rows: npt.NDArray[np.intp]
+) -> Mapping[str, npt.NDArray[Any]]:
     """The changes of a quantity laid beside its cells `rows` (k,)."""
-    table = made.changes[quantity]
     high = int(max(made.row.max(), table["row"].max())) + 1
     low = int(min(made.row.min(), table["row"].min()))
 

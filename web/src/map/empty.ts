@@ -1,0 +1,14 @@
+/** What stands in place of a map that cannot be drawn: why, and what to do. */
+
+import { h } from "../ui/dom";
+
+/** A run without positions; `recording`: the log that it is of, where the folder has it. */
+export function noPositions(recording: string | null): HTMLElement {
+  const columns = recording ? h("a", { href: `#/start?log=${encodeURIComponent(recording)}` }, "the log's page") : "the log's page";
+  return h(
+    "div",
+    { class: "map-empty", id: "map-empty" },
+    h("h2", {}, "This run has no positions, so there is no place to draw it at"),
+    h("ul", {}, h("li", {}, "The log holds them under other names: choose its columns for latitude and longitude on ", columns, ", and estimate it anew."), h("li", {}, "A receiver wrote them to a file of its own (NMEA, CSV): give both files to ", h("code", {}, "terragrip estimate"), " (", h("code", {}, "--with"), ")."), h("li", {}, "Nothing recorded them: let a GNSS receiver run beside the next drive; once a second is enough.")),
+  );
+}
