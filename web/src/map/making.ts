@@ -7,9 +7,8 @@ import { JobList } from "../start/jobs";
 import { addressOf } from "./which";
 
 export class MapMaking {
-  readonly button = h("button", { type: "button", id: "map-make", click: () => this.ask(), title: "Cells of adhesion, resistance, slip and efficiency from this run" }, "Make a map …");
+  readonly button = h("button", { type: "button", id: "map-make", disabled: true, click: () => this.ask(), title: "Cells of adhesion, resistance, slip and efficiency from this run" }, "Make a map …");
   readonly element: HTMLElement;
-  private dialog = h("dialog", { class: "wizard" });
   private mine = new Set<string>();
   private list: JobList;
   readonly leave: () => void;
@@ -24,12 +23,16 @@ export class MapMaking {
       (job) => void (job.state === "done" && this.mine.has(job.id) && (location.hash = addressOf(job.output))),
       (job) => this.mine.has(job.id),
     );
-    this.element = h("div", { class: "making" }, this.list.element, this.dialog);
+    this.element = h("div", { class: "making" }, this.list.element);
     this.leave = this.list.leave;
   }
 
   private ask(): void {
     const run = this.run();
-    if (run) ask(this.dialog, "map", [run], this.items(), (job) => this.mine.add(job.id));
+    if (!run) return;
+    const dialog = h("dialog", { class: "wizard" });
+    dialog.addEventListener("close", () => dialog.remove());
+    this.element.append(dialog);
+    ask(dialog, "map", [run], this.items(), (job) => this.mine.add(job.id));
   }
 }

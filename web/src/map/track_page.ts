@@ -92,6 +92,7 @@ export const page: Page = (main, { notices, query }) => {
   function leave(wanted: string, why: string): void {
     path = wanted;
     run = null;
+    making.button.disabled = true;
     track = null;
     charts.clear(why);
     fill(legend);
@@ -302,7 +303,6 @@ export const page: Page = (main, { notices, query }) => {
     const wanted = path || query.get("path") || brushed()?.path || [...runs.keys()][0] || "";
     const now = runs.get(wanted) ?? "";
     fill(choice, listed(items, wanted));
-    making.button.disabled = !now;
     under.offer(items);
     if (!wanted) charts.clear("Nothing to show yet: open a recording on the folder page and estimate it.");
     else if (!now) leave(wanted, path && run ? `${wanted} was removed from the folder. Choose another run.` : notHere(wanted));
