@@ -90,7 +90,6 @@ PAGES = {
 def field_of(folder: Path) -> None:
     """field.gpkg: a simulated field with patches of other soils, driven on two days."""
     from bench_maps import field_scenario
-
     from terragrip.maps import MapSettings, map_of, write_map
 
     scenario = field_scenario(7000)
