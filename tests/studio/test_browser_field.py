@@ -87,10 +87,11 @@ def test_a_cell_is_read_by_pointer_and_by_keyboard(page: Any, served: Served, fo
     for _ in range(80):
         page.keyboard.press("ArrowDown")
     assert page.evaluate(PICKED)[1] == frame.row.min()  # to the edge and no further
-    page.wait_for_function("() => location.hash.includes('cell=')")
+    last = page.evaluate(PICKED)
+    page.wait_for_function("cell => location.hash.includes(`cell=${cell}`)", arg=f"{last[0]},{last[1]}")
     page.reload()
     page.wait_for_selector(".line:has-text('(SD)')")
-    assert page.evaluate(PICKED)[1] == frame.row.min()
+    assert page.evaluate(PICKED) == last
 
 
 def test_colours_are_lighter_where_there_is_more_and_fainter_where_less_is_known(
