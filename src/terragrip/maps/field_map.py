@@ -31,6 +31,8 @@ REFERENCE_SLIP = 0.2
 """Slip that adhesion is mapped at by default."""
 GROUND = ("adhesion", "soil_resistance")
 """What is the ground's own, and searched for anomalies; slip and efficiency answer to the load too, and slip stands in where it is all."""
+READ_BY_WHEELS = ("adhesion", "slip", "efficiency")
+"""What repeated passes tell the errors of; the resistance's are mostly those of slope and drawbar, which stay the same in each pass."""
 MOST_CELLS = 50_000_000
 """Cells of the box around all runs beyond which a raster of them would not fit a common machine's memory."""
 LARGE_MACHINE = 1000.0
@@ -165,7 +167,7 @@ class MapMaker:
         for quantity in (name for name in QUANTITIES if name in self._parts):
             whole, each = cells_of(self._parts[quantity], self._correlated)
             if len(whole):
-                share = share_of_repeats(each)
+                share = share_of_repeats(each) if quantity in READ_BY_WHEELS else 1.0
                 cells[quantity], passes[quantity] = scaled(whole, share), scaled(each, share)
                 if share < WORTH_A_WORD:
                     self.notes.append(
