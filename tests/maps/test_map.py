@@ -74,7 +74,7 @@ def repeated(stated: float, passes: int) -> list[tuple[str, Estimates]]:
 
 
 def test_intervals_that_repeated_passes_show_to_be_too_wide_are_narrowed() -> None:
-    made = map_of(repeated(0.2, 3))
+    made = map_of(repeated(0.02, 3))  # white, so it averages out within a cell more than is stated
     cells = made.cells["adhesion"]
     held = np.abs(cells.value - REFERENCE) < 1.645 * cells.std
     assert 0.8 < held.mean() < 0.96
@@ -84,13 +84,13 @@ def test_intervals_that_repeated_passes_show_to_be_too_wide_are_narrowed() -> No
 def test_a_drive_mapped_twice_is_no_evidence_that_it_is_exact() -> None:
     once = drive(*lanes(6, 60, 2), noise=0.02, std=0.02)
     twice = map_of([("a", once), ("b", once)]).cells["adhesion"].std
-    assert np.median(twice) > 0.2 * np.median(map_of([("a", once)]).cells["adhesion"].std)
+    assert np.median(twice) > 0.15 * np.median(map_of([("a", once)]).cells["adhesion"].std)
 
 
 def test_intervals_stay_where_no_pass_is_repeated_or_passes_differ_more_than_they_say() -> None:
-    once = map_of(repeated(0.2, 1))
+    once = map_of(repeated(0.02, 1))
     assert not any("agree better" in note for note in once.notes)
-    assert np.median(once.cells["soil_resistance"].std) > 0.05  # 0.2 over a few independent metres
+    assert np.median(once.cells["adhesion"].std) > 0.01  # 0.02 over a few independent metres
     days = [
         ("monday", drive(*lanes(6, 60, 2))),
         ("friday", drive(*lanes(6, 60, 2), a=lambda e, n: 0.5 + 0 * e)),
