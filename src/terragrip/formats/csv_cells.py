@@ -101,7 +101,10 @@ def _arrow(body: bytes | memoryview, dialect: Dialect, chosen: list[int], types:
     separator = "\t" if dialect.separator == " " else dialect.separator
     return csv.read_csv(
         pa.BufferReader(pa.py_buffer(body)),
-        read_options=csv.ReadOptions(column_names=[_field(k) for k in range(len(dialect.names))]),
+        # Threads of a read that failed may still start while the process ends, and abort it (apache/arrow#34314).
+        read_options=csv.ReadOptions(
+            column_names=[_field(k) for k in range(len(dialect.names))], use_threads=False
+        ),
         parse_options=csv.ParseOptions(delimiter=separator),
         convert_options=csv.ConvertOptions(
             column_types=types,

@@ -136,7 +136,7 @@ def _binned(place: npt.NDArray[np.intp], count: int, values: Floats) -> Floats:
 
 
 def _means(recording: Recording) -> _Means | None:
-    """None where too few windows of driving are left."""
+    """None where too few windows of driving are left, or time runs back."""
     speed = recording.channels.get("ground_speed")
     known = np.flatnonzero(np.isfinite(speed)) if speed is not None else ()
     if speed is None or len(known) < _LEAST:
@@ -144,6 +144,8 @@ def _means(recording: Recording) -> _Means | None:
     length = max(_WINDOW, 2 * float(np.median(np.diff(recording.time[known]))))
     place = ((recording.time - recording.time[0]) / length).astype(np.intp)
     count = int(place[-1]) + 1
+    if place.min() < 0 or place.max() >= count:  # time runs back: refused elsewhere
+        return None
     mean = _binned(place, count, speed)
     if count < _LEAST or float(np.nansum(mean)) <= 0:
         return None
