@@ -178,7 +178,7 @@ def fuzz(name: str, options: list[str]) -> None:
         sizes = [file.stat().st_size for folder in corpora for file in folder.iterdir()]
         found = BUILD / "found"
         found.mkdir(parents=True, exist_ok=True)
-        limits = [f"-max_len={max([LONGEST, *sizes])}", "-timeout=20", "-rss_limit_mb=3000"]
+        limits = [f"-max_len={max([LONGEST, *sizes])}", "-timeout=60", "-rss_limit_mb=3000"]
         files = [] if any(not option.startswith("-") for option in options) else map(str, corpora)
         atheris.Setup([sys.argv[0], *limits, f"-artifact_prefix={found}/{name}-", *options, *files], one)
         atheris.Fuzz()

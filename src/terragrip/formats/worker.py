@@ -25,7 +25,7 @@ from terragrip.errors import InputError
 from terragrip.formats.boundary import needed
 
 _MEMORY = 3 << 30  # bytes of address space beyond what the imports and the file take
-_SECONDS, _BYTES_A_SECOND = 60, 1 << 20  # of the processor: so many, and one more for so many bytes
+_SECONDS, _BYTES_A_SECOND = 10, 1 << 20  # of the processor: so many, and one more for so many bytes
 _ENDED = "it ends the reader"
 
 
