@@ -73,9 +73,7 @@ def main() -> None:
     with tempfile.TemporaryDirectory(prefix="terragrip-bench-") as name:
         folder = Path(name)
         vehicle, vehicle_file = pull.vehicle(folder)
-        frame, load = pull.recording(vehicle, 20.0)
-        _, step = peer.run(pull.problem(vehicle, frame, load), 1000)
-        log = Recording.from_frame(frame)
+        log, step = log_and_peer(vehicle)
         lines = [
             f"Peer: a step of filterpy's UKF, {1e6 * step:.0f} us in this run.",
             "",
@@ -108,6 +106,13 @@ def start(vehicle_file: Path, record: Path, ports: Ports) -> subprocess.Popen[by
     os.sched_setaffinity(process.pid, CORES[:1])
     prefer(process.pid)
     return process
+
+
+def log_and_peer(vehicle: Vehicle) -> tuple[Recording, float]:
+    """What is sent, and how long [s] a step of the peer takes on it."""
+    frame, load = pull.recording(vehicle, 20.0)
+    _, step = peer.run(pull.problem(vehicle, frame, load), 1000)
+    return Recording.from_frame(frame), step
 
 
 def messages(log: Recording, rate: int, count: int) -> list[bytes]:

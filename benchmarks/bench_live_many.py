@@ -23,9 +23,8 @@ from pathlib import Path
 
 import numpy as np
 
-import peer
 import pull
-from bench_live import CORES, usage
+from bench_live import CORES, log_and_peer, usage
 from marked import put
 from mqtt_wire import Wire, broker, packet
 from priority import prefer
@@ -48,9 +47,8 @@ def main() -> None:
     with tempfile.TemporaryDirectory(prefix="terragrip-bench-") as name:
         folder = Path(name)
         vehicle, vehicle_file = pull.vehicle(folder)
-        frame, load = pull.recording(vehicle, 20.0)
-        _, step = peer.run(pull.problem(vehicle, frame, load), 1000)
-        text = bench(options, Recording.from_frame(frame), vehicle_file, folder, step)
+        log, step = log_and_peer(vehicle)
+        text = bench(options, log, vehicle_file, folder, step)
     print(text)
     if options.write:
         put(DOCUMENT, BEGIN, text)

@@ -8,7 +8,7 @@ decided by the change of ground speed. Slip must vanish with the torque, so that
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -157,7 +157,7 @@ def _means(recording: Recording) -> _Means | None:
     if "pitch" not in recording.channels:
         return means
     climb = STANDARD_GRAVITY * means.of(np.sin(recording.channels["pitch"]))
-    return _Means(place, count, rows, change[rows], mean[rows], climb)
+    return replace(means, climb=climb)
 
 
 def _driven(vehicle: Vehicle) -> dict[str, float]:
@@ -190,7 +190,7 @@ def _balance_warnings(
     thrust = np.sum(list(thrusts.values()), axis=0)
     driven = means.fit(thrust, means.change, beside_climb=True)
     together = means.fit(thrust, forward)
-    exchanged = _exchanged(recording, means, forward, thrusts)
+    exchanged = _exchanged(recording, means, forward, thrusts, together)
     if exchanged:
         return [exchanged]
     if not together.is_another_scale:
@@ -213,10 +213,12 @@ def _balance_warnings(
     ]
 
 
-def _exchanged(recording: Recording, means: _Means, forward: Floats, thrusts: dict[str, Floats]) -> str:
+def _exchanged(
+    recording: Recording, means: _Means, forward: Floats, thrusts: dict[str, Floats], together: _Fit
+) -> str:
     """Whether some wheels' torques with the other sign, or the accelerometer's other axis, make a balance where there is none."""
     signs = {wheel: -1 if means.fit(own, forward).slope < 0 else 1 for wheel, own in thrusts.items()}
-    plain = abs(means.fit(np.sum(list(thrusts.values()), axis=0), forward).alike)
+    plain = abs(together.alike)
     turned = abs(means.fit(np.sum([signs[w] * own for w, own in thrusts.items()], axis=0), forward).alike)
     sideways = recording.channels.get("acceleration_y")
     other = (

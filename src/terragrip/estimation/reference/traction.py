@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -86,7 +87,7 @@ class TractionModel:
 
     def derivative(self, x: Vector, u: Input) -> Vector:
         """dx/dt (..., 2n+2) by paper eq. 2 and 3; μ and ρ_s stay (they walk by the process noise)."""
-        wheel_speed, _, adhesion, soil_resistance = self.split(x)
+        wheel_speed, _, adhesion, _ = self.split(x)
         machine = self.machine
         spin = wheel_acceleration(
             wheel_speed,
@@ -98,18 +99,23 @@ class TractionModel:
             tire_resistance=machine.tire_rolling_resistance,
             bearing_resistance=machine.bearing_resistance,
         )
-        acceleration = ground_acceleration(
+        acceleration = self._along(ground_acceleration, x, u)
+        still = np.zeros((*x.shape[:-1], self.wheels + 1), spin.dtype)
+        return np.concatenate([spin, acceleration[..., np.newaxis], still], axis=-1)
+
+    def _along(self, law: Callable[..., Vector], x: Vector, u: Input) -> Vector:
+        """What the forces along the vehicle make of x, by `ground_acceleration` or `specific_force` (...,) [m/s²]."""
+        _, _, adhesion, soil_resistance = self.split(x)
+        return law(
             adhesion,
             u.load,
             u.drawbar,
             soil_resistance,
             u.slope,
             mass=self.mass(u),
-            gravity=machine.gravity,
+            gravity=self.machine.gravity,
             hitch_load=u.hitch_load,
         )
-        still = np.zeros((*x.shape[:-1], self.wheels + 1), spin.dtype)
-        return np.concatenate([spin, acceleration[..., np.newaxis], still], axis=-1)
 
     def substeps(self, dt: Any) -> int:
         """Equal Runge-Kutta steps in dt, each at most a quarter of the fastest wheel's time constant."""
@@ -144,17 +150,7 @@ class TractionModel:
 
     def output(self, x: Vector, u: Input) -> Vector:
         """ŷ (..., n+2): wheel speeds, ground speed, and what an accelerometer reads (physics.md 1)."""
-        _, _, adhesion, soil_resistance = self.split(x)
-        force = specific_force(
-            adhesion,
-            u.load,
-            u.drawbar,
-            soil_resistance,
-            u.slope,
-            mass=self.mass(u),
-            gravity=self.machine.gravity,
-            hitch_load=u.hitch_load,
-        )
+        force = self._along(specific_force, x, u)
         return np.concatenate([x[..., : self.wheels + 1], force[..., np.newaxis]], axis=-1)
 
     def output_matrix(self, x: Vector, u: Input) -> Matrix:
