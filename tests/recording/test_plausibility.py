@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from terragrip.recording import Recording, unit_warnings
-from terragrip.recording.plausibility import _filled, _pairs
+from terragrip.recording.plausibility import _pairs
+from terragrip.recording.turns import filled
 from terragrip.vehicle import Vehicle
 
 Columns = dict[str, np.ndarray]
@@ -113,6 +114,6 @@ def test_speeds_of_two_rates_are_compared_at_one_time() -> None:
 def test_gaps_of_a_turn_are_bridged_and_nothing_stays_nothing() -> None:
     time = np.arange(5.0)
     np.testing.assert_allclose(
-        _filled(time, np.array([0.0, np.nan, 2.0, 3.0, np.nan])), [0.0, 1.0, 2.0, 3.0, 3.0]
+        filled(time, np.array([0.0, np.nan, 2.0, 3.0, np.nan])), [0.0, 1.0, 2.0, 3.0, 3.0]
     )
-    assert np.isnan(_filled(time, np.full(5, np.nan))).all()
+    assert np.isnan(filled(time, np.full(5, np.nan))).all()

@@ -22,8 +22,9 @@ from terragrip.formats.profile_parts import Rows, Source, TimeSource, matching, 
 from terragrip.formats.table import LogTable, since_clock_was_set
 from terragrip.formats.timebase import spread, union
 from terragrip.physics.geodesy import metres_of
-from terragrip.recording import Recording
+from terragrip.recording import Recording, checks
 from terragrip.recording.columns import SINCE_1970, columns_of, numbers, seconds, start_of, texts
+from terragrip.recording.repeats import once_each
 from terragrip.recording.schema import LABELS, TIME, unit_of
 from terragrip.units import UnitError, factor_to, quantity
 
@@ -64,7 +65,10 @@ def converted(profile: Profile, log: LogTable, *, partial: bool = False) -> Part
     """The channels that ``profile`` makes of a log; where it is ``partial``, those that it can make of this one."""
     profile, notes = bound(profile, log, partial=partial)
     log, unset = since_clock_was_set(log, profile.time.column, profile.time.unit)
-    notes += unset
+    columns, repeats = once_each(log.columns, profile.time.column)
+    log = replace(log, columns=columns)
+    checks.refuse_one_stamp(repeats.rows, repeats.instants, log.source)
+    notes += [*unset, *repeats.notes()]
     time, start, remarks = _time(profile.time, log)
     notes += remarks
     channels: dict[str, Column] = {}

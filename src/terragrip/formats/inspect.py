@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -24,6 +24,7 @@ from terragrip.recording import Recording, unit_warnings
 from terragrip.recording.columns import SINCE_1970
 from terragrip.recording.held import fresh_samples, held_period, measured_part
 from terragrip.recording.noise import white_noise
+from terragrip.recording.repeats import Repeats, once_each
 from terragrip.recording.schema import TIME, has_torque, is_own, unit_of
 from terragrip.units import factor_to
 from terragrip.vehicle import Vehicle
@@ -148,15 +149,17 @@ def inspect(
     numbers = seen.numbers()
     proposals = seen.proposals(GENERAL)
     quiet = silent(numbers, proposals, seen.units)
-    warnings += quiet
+    warnings += [*quiet, *(note for note in seen.repeats.notes() if recording is None)]
     stamp, base = seen.stamp, seen.base
     present = proposals.keys() | fits.channels
     ready = recording is not None and is_ready(recording)
     return Inspection(
         file=str(log.source),
         sha256=str(log.sha256),
-        rows=len(next(iter(seen.columns.values()), ())) if base is None else len(base),
-        time=None if stamp is None or base is None else _time_summary(stamp[0], stamp[1], base, seen.whole),
+        rows=seen.repeats.rows or len(next(iter(seen.columns.values()), ()) if base is None else base),
+        time=None
+        if stamp is None or base is None
+        else _time_summary(stamp[0], stamp[1], base, seen.whole, seen.repeats),
         columns=tuple(
             _column_summary(n, c, seen.units.get(n), seen.clock_of(n), seen.whole)
             for n, c in seen.columns.items()
@@ -198,6 +201,9 @@ class Seen:
     clocks: dict[str, Floats]
     since_1970: bool
     whole: bool  # no block of the log was left out
+    repeats: Repeats = field(
+        default_factory=Repeats
+    )  # rows that bore the stamp of the one before them; none is left
 
     @classmethod
     def of(cls, log: LogTable | SignalLog, *, whole: bool = True, vocabulary: Vocabulary = GENERAL) -> Seen:
@@ -217,6 +223,10 @@ class Seen:
         numbers = {n: c.astype(np.float64) for n, c in log.columns.items() if c.dtype.kind in "fiub"}
         dates = tuple(n for n, c in log.columns.items() if c.dtype.kind == "M")
         stamp = find_time(numbers, dates, log.units, vocabulary)
+        repeats = Repeats()
+        if stamp is not None:
+            columns, repeats = once_each(log.columns, stamp[0])
+            log = replace(log, columns=columns)
         instants = None if stamp is None else _seconds(log.columns[stamp[0]], stamp[1])
         large = (
             stamp is not None
@@ -224,7 +234,16 @@ class Seen:
             and _is_large(log.columns[stamp[0]], stamp[1])
         )
         dated = stamp is not None and stamp[0] in dates
-        return cls(log.columns, log.units, stamp, instants, {}, since_1970=large or dated, whole=whole)
+        return cls(
+            log.columns,
+            log.units,
+            stamp,
+            instants,
+            {},
+            since_1970=large or dated,
+            whole=whole,
+            repeats=repeats,
+        )
 
     def clock_of(self, name: str) -> Floats | None:
         """The instants of a column; None of the time column, which has no rate or noise of its own."""
@@ -295,7 +314,7 @@ def _seconds(column: npt.NDArray[Any], unit: str) -> Floats:
     return np.asarray(column, dtype=np.float64) * factor_to(unit, "s")
 
 
-def _time_summary(name: str, unit: str, time: Floats, whole: bool) -> TimeSummary | None:
+def _time_summary(name: str, unit: str, time: Floats, whole: bool, repeats: Repeats) -> TimeSummary | None:
     known = time[np.isfinite(time)]
     if len(known) < 2:
         return None
@@ -313,7 +332,7 @@ def _time_summary(name: str, unit: str, time: Floats, whole: bool) -> TimeSummar
         spacing_95=high,
         gaps=tuple((float(known[k]), float(spacing[k])) for k in longest),
         gap_count=len(wide),
-        repeated=int(np.sum(spacing == 0)),
+        repeated=repeats.same + repeats.other,
         backward=int(np.sum(spacing < 0)),
         missing=len(time) - len(known),
     )

@@ -18,6 +18,7 @@ from terragrip.formats.table_on_disk import Columns, TableOnDisk
 from terragrip.recording import LogBlocks, Recording, checks
 from terragrip.recording.columns import seconds, start_of
 from terragrip.recording.lag import lag_within
+from terragrip.recording.repeats import Repeats, once_each
 from terragrip.recording.schema import TIME, is_own
 from terragrip.recording.survey import ROWS
 
@@ -103,13 +104,35 @@ def _converted(log: TableOnDisk, profile: Profile, table: LogTable, about: _Abou
 def _since_set(
     log: TableOnDisk, blocks: Iterator[Columns], table: LogTable, column: str, unit: str
 ) -> Iterator[LogTable]:
-    """The blocks as tables, without first rows from before the logger's clock was set."""
-    for number, block in enumerate(blocks):
+    """The blocks as tables, without first rows from before the logger's clock was set, and with one row an instant."""
+    repeats = Repeats()
+    for number, block in enumerate(_whole_instants(blocks, column)):
         part = replace(table, columns=block)
         if number == 0:
             part, notes = since_clock_was_set(part, column, unit)
             log.notes.extend(notes)
-        yield part
+        columns, found = once_each(part.columns, column)
+        before, repeats = repeats.notes(), repeats + found
+        log.notes[:] = [*(n for n in log.notes if n not in before), *repeats.notes()]
+        yield replace(part, columns=columns)
+    checks.refuse_one_stamp(repeats.rows, repeats.instants, log.source)
+
+
+def _whole_instants(blocks: Iterator[Columns], column: str) -> Iterator[Columns]:
+    """The blocks cut so that no run of equal stamps in ``column`` is in two of them."""
+    held: Columns = {}
+    for block in blocks:
+        before, stamps = held.get(column, block[column][:0]), block[column]
+        if len(before) and len(stamps) and stamps[0] == before[-1]:
+            other = np.flatnonzero(before != before[-1])
+            cut = int(other[-1]) + 1 if len(other) else 0
+            block = {name: np.concatenate([held[name][cut:], values]) for name, values in block.items()}
+            held = {name: values[:cut] for name, values in held.items()}
+        if held:
+            yield held
+        held = block
+    if held:
+        yield held
 
 
 def long_log(path: str | os.PathLike[str]) -> TableOnDisk | None:

@@ -110,14 +110,15 @@ def texts(name: str, column: npt.NDArray[Any], rows: int, source: str | None) ->
     result = np.empty(len(starts), dtype=object)
     for k, label in enumerate(column[starts].tolist()):
         try:
-            result[k] = shared.setdefault(label, _label(label))
+            result[k] = shared.setdefault(label, label_of(label))
         except TypeError:  # an unhashable cell
             problem, where = f"holds a {type(label).__name__}", place(name, int(starts[k]))
             raise InputError(problem, file=source, place=where, hint="give text labels") from None
     return np.repeat(result, np.diff(np.r_[starts, rows]))
 
 
-def _label(value: Any) -> str:
+def label_of(value: Any) -> str:
+    """A cell as a label, without the blanks around it; empty where it is missing."""
     # pandas' NA first: it is neither equal nor unequal to anything
     missing = value is None or type(value).__name__ == "NAType" or value != value
     return "" if missing else str(value).strip()

@@ -9,12 +9,14 @@ import numpy.typing as npt
 
 from terragrip.recording.mechanics import RATIOS, motion_warnings
 from terragrip.recording.track import Track, track_of
+from terragrip.recording.turns import SURE, agreement, exchange_warnings, filled, straight_rows
 
 if TYPE_CHECKING:
     from terragrip.recording.table import Recording
     from terragrip.vehicle import Vehicle
 
 Floats = npt.NDArray[np.float64]
+Bools = npt.NDArray[np.bool_]
 
 # Ratio of wheel speed times radius to ground speed, and what makes it so; slip raises it by 1/(1 - slip).
 _RATIOS = (
@@ -30,10 +32,9 @@ _RATIOS = (
     (1e3, "wheel_speed or ground_speed may be off by a factor of 1000"),
 )
 _ENOUGH = 4000  # rows: a median that is to be distinguished from another by a third needs no more
+_GAP = 1.0  # s, or three samples: what lies between them was not measured
 _OUTRUN = 1.5  # straight line over way: above, the way is too short
 _WAY_WINDOW = 10.0  # s
-_SURE = 0.5  # correlation of two rates of turn
-_LEAST_TURN = 1.5  # rad: with less there is nothing to compare
 
 
 def unit_warnings(recording: Recording, vehicle: Vehicle | None) -> list[str]:
@@ -43,11 +44,17 @@ def unit_warnings(recording: Recording, vehicle: Vehicle | None) -> list[str]:
     The speeds are judged where both are well above standstill, by the median of their ratio.
     """
     track = track_of(recording)
+    exchanged = (
+        []
+        if vehicle is None or not vehicle.knows_wheels
+        else exchange_warnings(recording, vehicle, _shown_turn(recording, track))
+    )
     return [
         *(_speed_warnings(recording, vehicle) if vehicle is not None else ()),
         *_drive_warnings(recording),
         *_position_warnings(recording, track),
-        *_turn_warnings(recording, vehicle, track),
+        *exchanged,
+        *_turn_warnings(recording, None if exchanged else vehicle, track),
         *_angle_warnings(recording),
         *_acceleration_warnings(recording),
         *motion_warnings(recording, vehicle),
@@ -59,8 +66,9 @@ def _speed_warnings(recording: Recording, vehicle: Vehicle) -> list[str]:
     result: dict[str, list[tuple[str, float]]] = {}
     if not vehicle.knows_wheels:
         return []
+    straight = straight_rows(recording, vehicle)
     for wheel, radius in zip(vehicle.wheels, vehicle.wheel_radius, strict=True):
-        ratio = _speed_ratio(recording, wheel, float(radius))
+        ratio = _speed_ratio(recording, wheel, float(radius), straight)
         if ratio is None or RATIOS[0] <= ratio <= RATIOS[1]:
             continue
         reasons = [(radius, "wheel_speed may be the rim's speed in m/s: divide it by the radius"), *_RATIOS]
@@ -115,7 +123,7 @@ def _position_warnings(recording: Recording, track: Track | None) -> list[str]:
 
 def _straight_ahead(recording: Recording, track: Track) -> float:
     """What the positions come in a straight line over what the ground speed makes in the same time: median over windows in motion."""
-    speed = np.abs(_filled(recording.time, recording.channels["ground_speed"]))
+    speed = np.abs(filled(recording.time, recording.channels["ground_speed"]))
     way = np.r_[0.0, np.cumsum(np.diff(recording.time) * (speed[1:] + speed[:-1]) / 2)]
     edges = np.arange(track.time[0], track.time[-1], _WAY_WINDOW)
     if len(edges) < 2:
@@ -126,6 +134,17 @@ def _straight_ahead(recording: Recording, track: Track) -> float:
     return float(np.median(chord[moving] / np.maximum(made[moving], 1e-9))) if moving.any() else 0.0
 
 
+def _shown_turn(recording: Recording, track: Track | None) -> Floats | None:
+    """The rate of turn (n,) that the gyroscope shows, else the positions; None where they contradict each other."""
+    yaw = recording.channels.get("angular_velocity_z")
+    placed = None if track is None else track.at("turn", recording.time)
+    if yaw is None or not np.nanmax(np.abs(yaw), initial=0.0):
+        return placed
+    if placed is None:
+        return yaw
+    return None if agreement(recording.time, yaw, placed) < -SURE else yaw
+
+
 def _turn_warnings(recording: Recording, vehicle: Vehicle | None, track: Track | None) -> list[str]:
     """The gyroscope's rate of turn against that of the positions and that of the wheels' speeds from side to side."""
     yaw = recording.channels.get("angular_velocity_z")
@@ -133,14 +152,14 @@ def _turn_warnings(recording: Recording, vehicle: Vehicle | None, track: Track |
         return []
     text: dict[str, float] = {}
     if track is not None:
-        text["the positions"] = _agreement(recording.time, yaw, track.at("turn", recording.time))
+        text["the positions"] = agreement(recording.time, yaw, track.at("turn", recording.time))
     if vehicle is not None:
-        text["the wheels' speeds"] = _agreement(recording.time, yaw, _wheel_turn(recording, vehicle))
+        text["the wheels' speeds"] = agreement(recording.time, yaw, _wheel_turn(recording, vehicle))
     scaled = _turn_scale(recording, yaw, vehicle, track)
     if scaled:
         return [scaled]
-    against = [who for who, value in text.items() if value < -_SURE]
-    agreed = [who for who, value in text.items() if value > _SURE]
+    against = [who for who, value in text.items() if value < -SURE]
+    agreed = [who for who, value in text.items() if value > SURE]
     if not against:
         return []
     if agreed:
@@ -166,7 +185,7 @@ def _turn_scale(recording: Recording, yaw: Floats, vehicle: Vehicle | None, trac
     if track is not None:
         others["the positions"] = track.at("turn", recording.time)
     for who, turn in others.items():
-        if abs(_agreement(recording.time, yaw, turn)) < _SURE:
+        if abs(agreement(recording.time, yaw, turn)) < SURE:
             continue
         known = np.isfinite(yaw) & np.isfinite(turn)
         ratio = float(np.sqrt(np.mean(yaw[known] ** 2) / np.mean(turn[known] ** 2)))
@@ -182,33 +201,15 @@ def _wheel_turn(recording: Recording, vehicle: Vehicle, *, rims: bool = False) -
     for axle in vehicle.axles.values():
         left, right = (recording.channels.get(f"wheel_speed_{axle.wheels[k]}") for k in (0, -1))
         if len(axle.wheels) > 1 and left is not None and right is not None:
-            part = _filled(recording.time, right) - _filled(recording.time, left)
+            part = filled(recording.time, right) - filled(recording.time, left)
             parts.append(part * radius.get(axle.wheels[-1], 1.0))
     return np.mean(parts, axis=0) if parts else np.full(len(recording), np.nan)
 
 
-def _agreement(time: Floats, yaw: Floats, other: Floats) -> float:
-    """Correlation about 0 of two rates of turn (n,) over windows of 2 s; 0 where there is little turning."""
-    place = ((time - time[0]) / 2.0).astype(np.intp)
-    known = np.isfinite(yaw) & np.isfinite(other)
-    count = np.bincount(place[known])
-    if not known.any():
-        return 0.0
-    with np.errstate(invalid="ignore"):
-        a, b = (np.bincount(place[known], x[known])[count > 0] / count[count > 0] for x in (yaw, other))
-    if np.sum(np.abs(a)) * 2.0 < _LEAST_TURN or not np.any(b):
-        return 0.0
-    return float(np.sum(a * b) / np.sqrt(np.sum(a**2) * np.sum(b**2)))
-
-
-def _filled(time: Floats, values: Floats) -> Floats:
-    known = np.isfinite(values)
-    return np.interp(time, time[known], values[known]) if known.any() else values
-
-
-def _speed_ratio(recording: Recording, wheel: str, radius: float) -> float | None:
-    """Median of |wheel speed| radius / |ground speed| while both move; None without enough motion."""
-    return _ratio_of(recording, recording.channels.get(f"wheel_speed_{wheel}"), radius)
+def _speed_ratio(recording: Recording, wheel: str, radius: float, rows: Bools) -> float | None:
+    """Median of |wheel speed| radius / |ground speed| in ``rows`` (n,) while both move; None without enough motion."""
+    turning = recording.channels.get(f"wheel_speed_{wheel}")
+    return _ratio_of(recording, None if turning is None else np.where(rows, turning, np.nan), radius)
 
 
 def _ratio_of(recording: Recording, turning: Floats | None, radius: float) -> float | None:
@@ -241,6 +242,11 @@ def _pairs(time: Floats, speed: Floats, turning: Floats) -> tuple[Floats, Floats
         return speed[few], turning[few]
     known, rows = np.flatnonzero(np.isfinite(speed)), np.flatnonzero(np.isfinite(turning))
     if len(known) < 2 or len(rows) < 2:
+        return None
+    after = known[np.clip(np.searchsorted(known, rows), 1, len(known) - 1)]
+    before = known[np.clip(np.searchsorted(known, rows) - 1, 0, len(known) - 2)]
+    rows = rows[time[after] - time[before] < max(_GAP, 3 * float(np.median(np.diff(time[known]))))]
+    if not len(rows):
         return None
     rows = rows[:: max(1, len(rows) // _ENOUGH)]
     return np.interp(time[rows], time[known], speed[known]), turning[rows]

@@ -1,0 +1,200 @@
+"""What turns and straight stretches say about which wheel is which: sentences for the user, never errors.
+
+In a turn the wheels of the outer side run faster, on every axle; straight ahead the wheels of an axle, which bear alike and slip alike,
+take like torques. A log in which two wheels are exchanged breaks that, and exchanging them back restores it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from itertools import combinations
+from typing import TYPE_CHECKING
+
+import numpy as np
+import numpy.typing as npt
+
+if TYPE_CHECKING:
+    from terragrip.recording.table import Recording
+    from terragrip.vehicle import Vehicle
+
+Floats = npt.NDArray[np.float64]
+Order = tuple[int, ...]
+Axles = list[tuple[int, int]]
+
+SURE = 0.5
+"""Correlation of two rates of turn that tell the same, or of the opposite sign contradict each other."""
+
+_WINDOW = 2.0  # s
+_LEAST_TURN = 1.5  # rad: with less there is nothing to compare
+_CLEAR = 0.8  # correlation from which another order of the wheels is the right one
+_SIZES = 0.4  # of what is shown: the turn by the rims of an axle
+_WIDE = 0.05  # of the wheels' speeds: what they differ by from side to side must be more than noise
+_RADII = 4.0  # the usual track, where none is stated
+_LEAST = 15  # windows straight ahead
+_STRAIGHT = 0.05  # of the speed from side to side
+_SLANT = 0.2  # of the sum of both sides' speeds
+_FEW = 30  # rows
+_UNLIKE = np.log(1.35)  # of an axle's two torques: beyond the gains that `calibrate` takes
+_ALIKE = np.log(1.15)
+
+
+def filled(time: Floats, values: Floats) -> Floats:
+    """Values (n,) on straight lines between those that are known."""
+    known = np.isfinite(values)
+    return np.interp(time, time[known], values[known]) if known.any() else values
+
+
+def agreement(time: Floats, yaw: Floats, other: Floats) -> float:
+    """Correlation about 0 of two rates of turn (n,) over windows of 2 s; 0 where there is little turning."""
+    known = np.isfinite(yaw) & np.isfinite(other)
+    if not known.any():
+        return 0.0
+    a, b = windows(time, np.where(known, [yaw, other], np.nan))
+    return _correlation(a, b) if np.sum(np.abs(a)) * _WINDOW >= _LEAST_TURN else 0.0
+
+
+def windows(time: Floats, values: Floats) -> Floats:
+    """Means of channels (k, n) over the windows of 2 s in which all of them hold a value (k, m)."""
+    known = np.isfinite(values).all(axis=0)
+    place = ((time - time[0]) / _WINDOW).astype(np.intp)[known]
+    count = np.bincount(place) if known.any() else np.zeros(0)
+    return np.array([np.bincount(place, row[known])[count > 0] / count[count > 0] for row in values])
+
+
+def _correlation(a: Floats, b: Floats) -> float:
+    size = float(np.sqrt(np.sum(a**2) * np.sum(b**2)))
+    return float(np.sum(a * b)) / size if size else 0.0
+
+
+def straight_rows(recording: Recording, vehicle: Vehicle) -> npt.NDArray[np.bool_]:
+    """Rows (n,) in which the rims of each axle go alike from side to side, so that none is far from the ground speed by a turn; where
+    there are hardly any, those in which they go the same way."""
+    rows, forward = np.ones((2, len(recording)), dtype=bool)
+    radius = dict(zip(vehicle.wheels, vehicle.wheel_radius, strict=True))
+    for axle in vehicle.axles.values():
+        sides = [
+            (recording.channels.get(f"wheel_speed_{w}"), radius[w]) for w in (axle.wheels[0], axle.wheels[-1])
+        ]
+        rims = [r * filled(recording.time, speed) for speed, r in sides if speed is not None]
+        if len(axle.wheels) > 1 and len(rims) == 2:
+            rows &= np.abs(rims[1] - rims[0]) < _SLANT * np.abs(rims[1] + rims[0])
+            forward &= rims[0] * rims[1] > 0
+    return rows if rows.sum() > _FEW else forward
+
+
+def exchange_warnings(recording: Recording, vehicle: Vehicle, turn: Floats | None) -> list[str]:
+    """Sentences on wheels whose speeds, or torques, may be exchanged. ``turn`` (n,) [rad/s], left positive: what a sensor shows."""
+    place = {wheel: k for k, wheel in enumerate(vehicle.wheels)}
+    axles = [(place[a.wheels[0]], place[a.wheels[-1]]) for a in vehicle.axles.values() if len(a.wheels) > 1]
+    speeds, torques = (_of_wheels(recording, vehicle, name) for name in ("wheel_speed", "drive_torque"))
+    if not axles or speeds is None or np.any(np.diff(recording.time) < 0):
+        return []
+    rims = speeds * vehicle.wheel_radius[:, None]
+    found = _turned(recording.time, rims, axles, turn, vehicle)
+    notes = [_sentence("wheel_speed", vehicle, found, "in turns")] if found else []
+    if torques is not None:
+        pulls = torques / vehicle.wheel_radius[:, None]
+        loads = np.array([a.mass for a in vehicle.axles.values() if len(a.wheels) > 1])
+        means = windows(recording.time, np.r_[rims, pulls])
+        uneven = _uneven(means[: len(rims)], means[len(rims) :], axles, loads)
+        notes += [_sentence("drive_torque", vehicle, uneven, "straight ahead")] if uneven else []
+    return notes
+
+
+def _of_wheels(recording: Recording, vehicle: Vehicle, quantity: str) -> Floats | None:
+    """A quantity of all wheels (k, n), None where one has none."""
+    known = [recording.channels.get(f"{quantity}_{wheel}") for wheel in vehicle.wheels]
+    return (
+        np.array([filled(recording.time, v) for v in known if v is not None])
+        if all(v is not None for v in known)
+        else None
+    )
+
+
+def _sentence(quantity: str, vehicle: Vehicle, found: list[tuple[int, int]], where: str) -> str:
+    pairs = [" and ".join(f"{quantity}_{vehicle.wheels[k]}" for k in pair) for pair in found]
+    return (
+        f"{', or '.join(pairs)} may be exchanged: {where} left and right wheels do not go together from axle to axle as they are, and "
+        "would then. Check which wheel each column is of, torques too."
+    )
+
+
+def _exchanges(count: int, pairs: list[tuple[int, int]]) -> Iterator[tuple[tuple[int, int], Order]]:
+    """Each pair of wheels with the order (count,) in which they are exchanged."""
+    for a, b in pairs:
+        order = list(range(count))
+        order[a], order[b] = b, a
+        yield (a, b), tuple(order)
+
+
+def _turned(
+    time: Floats, rims: Floats, axles: Axles, turn: Floats | None, vehicle: Vehicle
+) -> list[tuple[int, int]]:
+    """A left and a right wheel that, exchanged, make every axle turn as ``turn`` does, or without one as the others do."""
+    if turn is not None:
+        *means, shown = windows(time, np.r_[rims, turn[None]])
+    else:
+        means, shown = list(windows(time, rims)), None
+    wheels = np.array(means)
+    if wheels.shape[1] == 0 or (shown is None and len(axles) < 2):
+        return []
+    width = vehicle.track or _RADII * float(np.mean(vehicle.wheel_radius))
+    pace = float(np.sqrt(np.mean(wheels**2)))
+    if shown is None:  # what is in proportion to the speed is the radii's
+        common = wheels.mean(axis=0)
+        wheels = wheels - np.outer(wheels @ common / max(float(common @ common), 1e-12), common)
+
+    def agree(order: Order) -> float:
+        """The least correlation of an axle's turn with what is shown."""
+        ordered = wheels[list(order)]
+        turns = [(ordered[right] - ordered[left]) / width for left, right in axles]
+        against = turns[0] if shown is None else shown
+        if np.sum(np.abs(against)) * _WINDOW < _LEAST_TURN:
+            return 0.0
+        if shown is None and width * np.sqrt(np.mean(against**2)) < _WIDE * pace:
+            return 0.0
+        sizes = [float(np.sum(one**2)) for one in turns]
+        alike = min(sizes) > _SIZES**2 * max(sizes[0], float(np.sum(against**2)))
+        return min(_correlation(against, one) for one in turns) if alike else 0.0
+
+    straight = tuple(range(len(rims)))
+    if agree(straight) > SURE or (shown is not None and len(axles) == 1):
+        return []
+    pairs = [(left, right) for left, _ in axles for _, right in axles]
+    if shown is not None and all(_correlation(shown, wheels[r] - wheels[le]) < -SURE for le, r in axles):
+        return []  # all of them: the turn's own sign, or whole sides
+    return [pair for pair, order in _exchanges(len(rims), pairs) if agree(order) > _CLEAR]
+
+
+def _uneven(rims: Floats, pulls: Floats, axles: Axles, loads: Floats) -> list[tuple[int, int]]:
+    """Two wheels of two axles whose torques, exchanged, make every axle pull alike on both sides straight ahead: of those pairs the one
+    by which the axles pull in proportion to their loads."""
+    if len(axles) < 2 or not rims.shape[1]:
+        return []
+    total, pace = pulls.sum(axis=0), np.abs(rims).mean(axis=0)
+    apart = np.max([np.abs(rims[right] - rims[left]) for left, right in axles], axis=0)
+    rows = (total > 0.3 * np.quantile(total, 0.95)) & (apart < _STRAIGHT * pace)
+    if rows.sum() < _LEAST:
+        return []
+    mean = np.median(pulls[:, rows], axis=1)
+    if (mean <= 0).any():
+        return []
+
+    def off(order: Order) -> tuple[float, float]:
+        """How unlike the most unlike axle pulls, and how far the axles' pulls are from their loads, both as logarithms."""
+        ordered = mean[list(order)]
+        sides = np.array([[ordered[left], ordered[right]] for left, right in axles])
+        share = np.log(sides.sum(axis=1) / loads)
+        return float(np.max(np.abs(np.log(sides[:, 0] / sides[:, 1])))), float(np.ptp(share))
+
+    straight = tuple(range(len(rims)))
+    ratios = np.log([mean[left] / mean[right] for left, right in axles])
+    if np.sum(np.abs(ratios) > _UNLIKE) < 2 or off(straight)[0] < _UNLIKE:
+        return []
+    sides = [k for axle in axles for k in axle]
+    same = {frozenset(axle) for axle in axles}
+    pairs = [pair for pair in combinations(sides, 2) if frozenset(pair) not in same]
+    restored = [
+        (off(order)[1], pair) for pair, order in _exchanges(len(rims), pairs) if off(order)[0] < _ALIKE
+    ]
+    return [min(restored)[1]] if restored else []

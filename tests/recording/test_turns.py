@@ -1,0 +1,87 @@
+"""Wheels that are exchanged are named, by turns and by torques straight ahead; right logs are left alone (simulation)."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+
+from terragrip.recording import Recording, unit_warnings
+from terragrip.simulation import SimulationResult, families
+
+TURNING, WORKING = 1, 7
+"""Of the development machines: one that turns, of unlike axles, and one that works straight ahead."""
+
+
+@cache
+def machine(number: int) -> SimulationResult:
+    kind, seed = list(families.machines("development", 24))[number]
+    return families.draw(kind, seed, rate=20.0)
+
+
+def told(
+    result: SimulationResult, pair: tuple[str, str] = ("", ""), *quantities: str, without: str = "-"
+) -> list[str]:
+    """The notes on a machine's log, two wheels exchanged in it, and without some channel."""
+    log, channels = result.recording, dict(result.recording.channels)
+    for quantity in quantities:
+        a, b = (f"{quantity}_{wheel}" for wheel in pair)
+        channels[a], channels[b] = log.channels[b], log.channels[a]
+    kept = {name: values for name, values in channels.items() if not name.startswith(without)}
+    return unit_warnings(replace(log, channels=kept), result.vehicle)
+
+
+@pytest.mark.parametrize("number", range(24))
+def test_a_right_log_is_left_alone(number: int) -> None:
+    result = machine(number)
+    assert told(result) == []
+    assert told(result, without="angular_velocity") == []
+
+
+@pytest.mark.parametrize("pair", [("1l", "1r"), ("1l", "2r"), ("2l", "1r"), ("2l", "2r")])
+@pytest.mark.parametrize("quantities", [("wheel_speed",), ("wheel_speed", "drive_torque")])
+def test_a_left_wheel_for_a_right_one_is_named_by_turns(
+    pair: tuple[str, str], quantities: tuple[str, ...]
+) -> None:
+    note = told(machine(TURNING), pair, *quantities)[0]
+    assert note.startswith(f"wheel_speed_{pair[0]} and wheel_speed_{pair[1]} may be exchanged: in turns")
+
+
+def test_without_a_gyroscope_both_pairs_that_would_do_are_named() -> None:
+    notes = told(machine(TURNING), ("1l", "1r"), "wheel_speed", without="angular_velocity")
+    assert [n.split(" may be")[0] for n in notes] == [
+        "wheel_speed_1l and wheel_speed_1r, or wheel_speed_2l and wheel_speed_2r"
+    ]
+
+
+@pytest.mark.parametrize("pair", [("1l", "2l"), ("1l", "2r"), ("1r", "2l"), ("1r", "2r")])
+def test_torques_of_two_axles_are_named_straight_ahead(pair: tuple[str, str]) -> None:
+    notes = told(machine(WORKING), pair, "drive_torque")
+    assert [n.split(": ")[0] for n in notes] == [
+        f"drive_torque_{pair[0]} and drive_torque_{pair[1]} may be exchanged"
+    ]
+
+
+@pytest.mark.parametrize("gyroscope", [True, False])
+def test_gains_and_radii_that_are_off_are_no_exchange(gyroscope: bool) -> None:
+    result = machine(TURNING)
+    channels = {n: v for n, v in result.recording.channels.items() if gyroscope or "angular" not in n}
+    for k, wheel in enumerate(result.vehicle.wheels):
+        channels[f"drive_torque_{wheel}"] = channels[f"drive_torque_{wheel}"] * (0.9, 1.1, 1.1, 0.9)[k]
+        channels[f"wheel_speed_{wheel}"] = channels[f"wheel_speed_{wheel}"] * (0.96, 1.04, 1.04, 0.96)[k]
+    assert unit_warnings(replace(result.recording, channels=channels), result.vehicle) == []
+
+
+def test_turning_on_the_spot_and_a_silent_ground_speed_are_no_wrong_unit() -> None:
+    """A robot that drives straight, then turns on the spot for most of the log, its pose missing in between."""
+    result = machine(WORKING)
+    time = np.arange(0, 300, 0.05)
+    spin = (time > 60) & (time < 260)
+    speed = np.where(spin, 0.02, 1.0)
+    radius = result.vehicle.wheel_radius
+    columns = {"time": time, "ground_speed": np.where((time > 100) & (time < 200), np.nan, speed)}
+    for k, wheel in enumerate(result.vehicle.wheels):
+        columns[f"wheel_speed_{wheel}"] = np.where(spin, -0.5 if k % 2 else 0.5, 1.02) / radius[k]
+    assert unit_warnings(Recording.from_frame(columns), result.vehicle) == []
