@@ -1,6 +1,6 @@
 """How good the advised slip is on simulated machines with known truth: efficiency lost there, error of the best slip, its interval.
 
-    python benchmarks/bench_advice.py [--part development|coarse|other-grounds|held-out|second-plant] [--machines 24] [--seed 0] [--write]
+    python benchmarks/bench_advice.py [--part development|coarse|other-grounds|yielding|held-out|second-plant] [--machines 24] [--seed 0] [--write]
 
 Machines of terragrip.simulation.families, split by kind, or of the second plant (docs/decisions/0095). Development has two parts beside its
 own kinds: their masses and curves with coarse sensors, and grounds whose curve is no exponential (other_grounds.py). Each has a drive of
@@ -36,7 +36,7 @@ from terragrip.vehicle import Vehicle
 
 Floats = NDArray[np.float64]
 RATE = 50.0
-PARTS = ("development", "coarse", "other-grounds", "held-out", "second-plant")
+PARTS = ("development", "coarse", "other-grounds", "yielding", "held-out", "second-plant")
 DOCUMENT = Path(__file__).resolve().parents[1] / "docs/advice.md"
 BEGIN = "<!-- made by benchmarks/bench_advice.py --write: {part} -->"
 
@@ -87,6 +87,8 @@ def machines(part: str, count: int, first: int) -> Iterator[tuple[Kind, int]]:
         yield from second.machines(count, first)
     elif part == "other-grounds":
         yield from other_grounds.machines(count, first)
+    elif part == "yielding":
+        yield from other_grounds.machines(count, first, ("yielding",))
     elif part == "coarse":
         for kind, seed in families.machines("development", count, first):
             yield Kind(kind.mass, kind.curve, "coarse"), seed
@@ -123,7 +125,7 @@ def score(kind: Kind, seed: int, part: str) -> list[Row]:
 def drawn(kind: Kind, seed: int, part: str) -> tuple[SimulationResult, Callable[[str, float], OverSlip]]:
     """A machine's drive, and its true curves by the soil's name and the driven wheels' share of the weight."""
     if part != "second-plant":
-        draw = other_grounds.draw if part == "other-grounds" else families.draw
+        draw = other_grounds.draw if part in ("other-grounds", "yielding") else families.draw
         result = draw(kind, seed, rate=RATE)
         return result, lambda soil, driven: true_curves(result.scenario, soil, result.vehicle, driven)
     run, scenario, vehicle, seed = second.drive(kind, seed, rate=RATE)

@@ -1,9 +1,12 @@
 """Development machines on grounds whose curve is no exponential: what leaving a family of curves out would show, were not all of
-ours exponentials (docs/decisions/0156). Forms of the literature that rise slower or sharper; the held-out one is not among them."""
+ours exponentials (docs/decisions/0156). Forms of the literature that rise slower or sharper; the held-out one is not among them.
+*yielding*: what Wong and Reece's stresses under a rigid wheel of the machine's size add up to on Wong's soils (wheel_stresses.py), each constant
+drawn about the table's."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from functools import lru_cache
 from types import MappingProxyType
 from unittest.mock import patch
 
@@ -14,6 +17,8 @@ from terragrip.physics.adhesion import CURVES, CurveModel, Parameter
 from terragrip.simulation import SimulationResult, families, family_soils, scenario, terrain
 from terragrip.simulation.families import Kind
 from terragrip.simulation.family_machines import Machine
+from terragrip.units import STANDARD_GRAVITY
+from wheel_stresses import SOILS, wheel
 
 Floats = NDArray[np.float64]
 
@@ -48,18 +53,57 @@ def _model(name: str) -> CurveModel:
     return CurveModel(name, parameters, value, slope, "")  # type: ignore[arg-type]
 
 
-EVERY = MappingProxyType({**CURVES, **{name: _model(name) for name in RISES}})
+CONSTANTS = ("n", "kc", "kphi", "cohesion", "phi", "shear", "radius", "width", "load")
+SLIPS = np.r_[0.0:0.1:0.01, 0.1:0.3:0.02, 0.3:1.05:0.1]
+NO_JUMP = 0.004
+"""Slip over which adhesion that yielding ground asks without slip comes up from 0: the plant's curves are odd in slip."""
 
 
-def machines(count: int, first: int) -> Iterator[tuple[Kind, int]]:
+@lru_cache(maxsize=64)
+def _under(constants: tuple[float, ...]) -> tuple[Floats, Floats]:
+    """(mu, rho_s) over SLIPS."""
+    mu, rho = np.array([wheel(s, constants[:6], *constants[6:]) for s in SLIPS]).T  # type: ignore[arg-type]
+    return mu, rho
+
+
+def _yielding() -> CurveModel:
+    def value(s: Floats, q: dict[str, Floats]) -> Floats:
+        mu, _ = _under(tuple(float(q[name]) for name in CONSTANTS))
+        return np.asarray(-np.interp(s, SLIPS, mu) * np.expm1(-s / NO_JUMP))
+
+    def slope(s: Floats, q: dict[str, Floats]) -> Floats:
+        below = np.maximum(s - 1e-4, 0)
+        return np.asarray((value(s + 1e-4, q) - value(below, q)) / (s + 1e-4 - below))
+
+    parameters = tuple(Parameter(key, "1", -1e9, 1e9, 1.0, "") for key in CONSTANTS)
+    return CurveModel("yielding", parameters, value, slope, "")  # type: ignore[arg-type]
+
+
+EVERY = MappingProxyType({**CURVES, **{name: _model(name) for name in RISES}, "yielding": _yielding()})
+
+
+def machines(count: int, first: int, curves: tuple[str, ...] = tuple(RISES)) -> Iterator[tuple[Kind, int]]:
     """Development kinds, the name of a rise in the place of the family of curves."""
     for k, (kind, seed) in enumerate(families.machines("development", count, first)):
-        yield Kind(kind.mass, list(RISES)[k % len(RISES)], kind.sensors), seed
+        yield Kind(kind.mass, curves[k % len(curves)], kind.sensors), seed
 
 
 def draw(kind: Kind, seed: int, rate: float) -> SimulationResult:
     """A work drive on such ground; soils drawn about as widely as the saturating ones."""
-    faster = RISES[kind.curve][1]
+    faster = RISES[kind.curve][1] if kind.curve in RISES else 0.0
+
+    def yielding(rng: np.random.Generator, machine: Machine) -> tuple[dict[str, object], float, float]:
+        while True:
+            drawn = np.array(SOILS[list(SOILS)[rng.integers(len(SOILS))]]) * np.exp(
+                0.2 * rng.standard_normal(6)
+            )
+            size = (machine.radius, 0.5 * machine.radius, machine.corner_mass * STANDARD_GRAVITY)
+            constants = tuple(float(x) for x in (*drawn, *size))
+            mu, rho = _under(constants)
+            growth, level = np.polyfit(SLIPS[SLIPS < 0.5], rho[SLIPS < 0.5], 1)
+            if np.interp(0.2, SLIPS, mu - rho) > 0.1 and rho.max() < 0.4:
+                form = {"name": "yielding", **dict(zip(CONSTANTS, constants, strict=True))}
+                return form, float(level), max(float(growth), 0.0) + rng.uniform(0.0, 0.2)
 
     def soil(rng: np.random.Generator, machine: Machine) -> tuple[dict[str, object], float, float]:
         form = {"name": kind.curve, "A": rng.uniform(0.35, 0.8), "k": faster * rng.uniform(6, 25)}
@@ -70,6 +114,6 @@ def draw(kind: Kind, seed: int, rate: float) -> SimulationResult:
         patch.object(family_soils, "CURVES", EVERY),
         patch.object(terrain, "CURVES", EVERY),
         patch.object(scenario, "CURVES", EVERY),
-        patch.dict(family_soils.SOILS_OF, {"saturating": soil}),
+        patch.dict(family_soils.SOILS_OF, {"saturating": yielding if kind.curve == "yielding" else soil}),
     ):
         return families.draw(Kind(kind.mass, "saturating", kind.sensors), seed, rate=rate)

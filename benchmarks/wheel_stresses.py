@@ -29,9 +29,11 @@ WHEELS = {"light robot": (0.1, 0.05, 40.0), "robot": (0.2, 0.1, 340.0), "tractor
 TIRE = 0.02
 
 
-def forces(entry: float, slip: float, soil: str, radius: float, width: float) -> tuple[float, float, float]:
+def forces(
+    entry: float, slip: float, soil: tuple[float, ...], radius: float, width: float
+) -> tuple[float, float, float]:
     """Vertical force, pull and torque over radius [N] of a wheel that enters the ground at an angle [rad]."""
-    n, kc, kphi, cohesion, phi, shear = SOILS[soil]
+    n, kc, kphi, cohesion, phi, shear = soil
     top, angle = (0.4 + 0.2 * slip) * entry, np.linspace(0.0, entry, 200)
     front = np.where(angle >= top, angle, entry - angle / top * (entry - top))
     depth = radius * np.maximum(np.cos(front) - np.cos(entry), 0)
@@ -49,7 +51,9 @@ def forces(entry: float, slip: float, soil: str, radius: float, width: float) ->
     return vertical, pull, rim
 
 
-def wheel(slip: float, soil: str, radius: float, width: float, load: float) -> tuple[float, float]:
+def wheel(
+    slip: float, soil: tuple[float, ...], radius: float, width: float, load: float
+) -> tuple[float, float]:
     """(mu, rho_s) in the paper's split at the sinkage that carries the load."""
     low, high = 0.02, 1.3
     for _ in range(40):
@@ -66,8 +70,8 @@ def main() -> None:
     )
     print("|---|---|---|---|---|---|")
     for size, (radius, width, load) in WHEELS.items():
-        for soil in SOILS:
-            mu, rho = np.array([wheel(s, soil, radius, width, load) for s in slips]).T
+        for soil, constants in SOILS.items():
+            mu, rho = np.array([wheel(s, constants, radius, width, load) for s in slips]).T
             pull = mu - rho
             efficiency = np.where(pull > 0, pull / np.maximum(mu + TIRE, 1e-9) * (1 - slips), 0.0)
             best = f"{slips[efficiency.argmax()]:.2f}" if efficiency.max() > 0 else "pulls nothing"

@@ -10,6 +10,8 @@ from terragrip.advice.analysis import advise
 from terragrip.advice.optimum import GRID, best_of, over_slip
 from terragrip.advice.result import to_dict, write
 from terragrip.errors import InputError
+from terragrip.soil.estimates import pairs_of
+from terragrip.soil.learn import learn_soils
 from terragrip.soil.library import Soil
 from terragrip.vehicle import Vehicle
 
@@ -61,6 +63,18 @@ def test_a_slip_error_that_lasts_all_drive_is_not_taken_for_the_soils(off):
     given = [only([drive(seed=seed, slip_off=off, slip_std=0.04)]).best_efficiency for seed in range(5)]
     assert sum(one.interval[0] <= best.slip <= one.interval[1] for one in given) >= 4
     assert abs(np.median([one.slip for one in given]) - best.slip) < 0.02
+
+
+@pytest.mark.parametrize("off", [-0.03, 0.03])
+def test_a_librarys_slips_err_as_those_of_the_drives_it_was_learned_from(off):
+    best, _ = truth()
+    tables = [drive(seed=seed, slip_off=off, slip_std=0.04, soil="field") for seed in range(2)]
+    library = learn_soils(
+        [pair for k, table in enumerate(tables) for pair in pairs_of(table, f"run {k}")]
+    ).library()
+    given = only([drive(seed=9, soil="field")], soils=library).best_efficiency
+    assert given.interval[0] <= best.slip <= given.interval[1]
+    assert given.interval[1] - given.interval[0] > 2 * 0.02
 
 
 def test_the_vaguer_slips_are_the_wider_the_interval():

@@ -96,6 +96,11 @@ def resistance(parameters: Array, slip: Array) -> Array:
     return np.asarray(np.maximum(parameters[:, 4, None] + parameters[:, 5, None] * slipping, 0.0))
 
 
+def lasting_sd(radius_sd: float, slip_sd: float) -> float:
+    """SD of slip's error that stays alike for a drive: by the radius's relative SD, and by slip's own."""
+    return float(np.hypot(radius_sd, COMMON * slip_sd))
+
+
 def draw_curves(
     samples: Samples,
     *,
@@ -141,7 +146,7 @@ def draw_curves(
     slip[1:] += own * rng.standard_normal((draws, bins))
     slip_sd = np.sqrt(slip_sd**2 + SLIP_FLOOR**2 + own**2)
     prior_sd = SPREAD.copy()
-    prior_sd[E] = np.hypot(radius_sd, COMMON * float(np.median(samples.slip_std)))
+    prior_sd[E] = lasting_sd(radius_sd, float(np.median(samples.slip_std)))
     prior = CENTRE + prior_sd * rng.standard_normal((draws + 1, len(CENTRE)))
     prior[0] = CENTRE
     scale = 1 + common_sd * rng.standard_normal((draws + 1, 1))

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from terragrip.advice.curves import DRAWS, draw_curves
+from terragrip.advice.curves import DRAWS, draw_curves, lasting_sd
 from terragrip.advice.optimum import GRID, OverSlip, over_slip
 from terragrip.advice.samples import Samples
 from terragrip.soil.estimates import torque_scale_sd
@@ -42,7 +42,7 @@ def of_drives(samples: Samples, vehicle: Vehicle) -> SoilCurves | None:
     draws = draw_curves(
         samples,
         common_sd=torque_scale_sd(vehicle),
-        radius_sd=RADIUS_SD if known.wheel_radius is None else known.wheel_radius,
+        radius_sd=_radius_sd(vehicle),
         offset_sd=float(max(np.nanmedian(samples.resistance_std), stated)),
     )
     if draws is None:
@@ -54,13 +54,20 @@ def of_drives(samples: Samples, vehicle: Vehicle) -> SoilCurves | None:
 
 
 def of_library(soil: Soil, samples: Samples | None, vehicle: Vehicle, seed: int = 0) -> SoilCurves | None:
-    """From a library's curve with its interval; resistance from the rows where there are some. None where neither tells the resistance."""
+    """From a library's curve with its interval; resistance from the rows where there are some. None where neither tells the resistance.
+
+    The library's slips err alike by what they were learned with (its ``slip_noise``, else the rows'), as a drive's own do.
+    """
     rng = np.random.default_rng(seed)
     low, high = _band(soil)
     width = rng.standard_normal((DRAWS + 1, 1)) / (2 * NORMAL_95)
     growth = np.maximum(GROWTH[0] + GROWTH[1] * rng.standard_normal((DRAWS + 1, 1)), 0.0)
     shift = rng.standard_normal((DRAWS + 1, 1))
-    width[0], growth[0], shift[0] = 0.0, GROWTH[0], 0.0
+    slip_sd = float(soil.fit.get("slip_noise", {}).get("slip_std", np.nan))
+    if not np.isfinite(slip_sd):
+        slip_sd = 0.0 if samples is None else float(np.median(samples.slip_std))
+    error = lasting_sd(_radius_sd(vehicle), slip_sd) * rng.standard_normal((DRAWS + 1, 1))
+    width[0], growth[0], shift[0], error[0] = 0.0, GROWTH[0], 0.0, 0.0
     if samples is not None:
         level = float(np.average(samples.resistance, weights=samples.metres))
         at = max(float(np.average(samples.slip, weights=samples.metres)), 0.0)
@@ -71,10 +78,16 @@ def of_library(soil: Soil, samples: Samples | None, vehicle: Vehicle, seed: int 
         spread = soil.resistance[1] if np.isfinite(soil.resistance[1]) else SHARE_OF_VARIATION * level
     else:
         return None
-    mu = soil.value(GRID) + width * (high - low)
+    measured = GRID + error
+    mu = soil.value(measured) + width * np.interp(measured, GRID, high - low)
     rho = np.maximum(level + spread * shift + growth * (GRID - at), 0.0)
     reach = max((float(one["slip"]) for one in soil.bins), default=float(GRID[-1]))
     return SoilCurves(over_slip(mu, rho, GRID, vehicle.tire_rolling_resistance, driven), mu, reach)
+
+
+def _radius_sd(vehicle: Vehicle) -> float:
+    known = vehicle.uncertainty.wheel_radius
+    return RADIUS_SD if known is None else known
 
 
 def _band(soil: Soil) -> tuple[Array, Array]:
