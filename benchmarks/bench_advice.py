@@ -1,6 +1,6 @@
 """How good the advised slip is on simulated machines with known truth: efficiency lost there, error of the best slip, its interval.
 
-    python benchmarks/bench_advice.py [--part development|coarse|other-grounds|yielding|held-out|second-plant] [--machines 24] [--seed 0] [--write]
+    python benchmarks/bench_advice.py [--part NAME] [--machines 24] [--seed 0] [--write]
 
 Machines of terragrip.simulation.families, split by kind, or of the second plant (docs/decisions/0095). Development has two parts beside its
 own kinds: their masses and curves with coarse sensors, and grounds whose curve is no exponential (other_grounds.py). Each has a drive of
