@@ -1,4 +1,4 @@
-"""Which test runs which line of some rooms, and how long it takes: recorded once by coverage with contexts, kept in build/mutants.
+"""Which test runs which line of some rooms, and how long the processor takes: recorded once by coverage with contexts, kept in build/mutants.
 
 Of a later commit only the test files that changed are run anew; lines keep their tests wherever a comparison of both sources finds them.
 """
@@ -58,7 +58,10 @@ def record(rooms: list[str], files: list[str], data: Path, log: Path, workers: i
         "--durations-min=0",
         "-p",
         "no:cacheprovider",
+        "-p",
+        "processor_time",
     ]
+    paths = [str(ROOT / "benchmarks"), *filter(None, [os.environ.get("PYTHONPATH")])]
     text = log.with_suffix(".log.new")
     with text.open("w", encoding="utf-8") as out:
         done = subprocess.run(
@@ -66,7 +69,7 @@ def record(rooms: list[str], files: list[str], data: Path, log: Path, workers: i
             cwd=ROOT,
             stdout=out,
             stderr=subprocess.STDOUT,
-            env={**os.environ, "COVERAGE_FILE": f"{data}.new"},
+            env={**os.environ, "COVERAGE_FILE": f"{data}.new", "PYTHONPATH": os.pathsep.join(paths)},
             check=False,
         )
     if done.returncode != 0:
