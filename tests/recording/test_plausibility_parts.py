@@ -1,0 +1,258 @@
+"""Doubts about units: where each begins, on signals whose ratios are known."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from terragrip.recording import Recording, unit_warnings
+from terragrip.recording.plausibility import (
+    _agreement,
+    _high,
+    _pairs,
+    _ratio,
+    _straight_ahead,
+    _turn_scale,
+    _wheel_turn,
+)
+from terragrip.recording.track import Track
+from terragrip.vehicle import Vehicle
+
+N = 200
+TIME = np.arange(N) / 10
+RADIUS = 0.2
+SPEED = 1.0 + 0.2 * np.sin(TIME)
+
+
+def said(vehicle: Vehicle | None = None, time: np.ndarray = TIME, **channels: np.ndarray) -> str:
+    return " ".join(unit_warnings(Recording(time, channels), vehicle))
+
+
+def wheels(ratio: float) -> dict[str, np.ndarray]:
+    return {f"wheel_speed_{w}": ratio * SPEED / RADIUS for w in ("fl", "fr", "rl", "rr")}
+
+
+@pytest.mark.parametrize(
+    ("ratio", "words"),
+    [
+        (3.6, "wheel_speed may come from km/h"),
+        (30 / np.pi, "wheel_speed may be in rpm"),
+        (180 / np.pi, "wheel_speed may be in deg/s"),
+        (1 / 3.6, "ground_speed may be in km/h"),
+        (np.pi / 30, "rpm divided twice"),
+        (0.5 / np.pi, "revolutions per second"),
+        (np.pi / 180, "from degrees to radians twice"),
+        (0.01, "ground_speed may be in cm/s"),
+        (0.001, "ground_speed may be in mm/s"),
+        (1000.0, "a factor of 1000"),
+        (RADIUS, "the rim's speed in m/s"),
+        (25.0, "check units, gear ratio and radius"),
+        (0.05, "check units, gear ratio and radius"),
+    ],
+)
+@pytest.mark.parametrize("slip", [0.0, 0.15])
+def test_a_ratio_of_wheel_to_ground_speed_names_the_unit_at_any_usual_slip(
+    vehicle: Vehicle, ratio: float, words: str, slip: float
+) -> None:
+    note = said(vehicle, ground_speed=SPEED, **wheels(ratio / (1 - slip)))
+    assert words in note
+    assert f"is {ratio / (1 - slip):.3g} times the ground speed" in note
+
+
+@pytest.mark.parametrize(
+    ("beside", "words"), [(1.3, "deg/s"), (1.4, "check units"), (1 / 1.3, "deg/s"), (1 / 1.4, "check")]
+)
+def test_a_third_beside_what_a_unit_makes_it_is_no_unit(vehicle: Vehicle, beside: float, words: str) -> None:
+    assert words in said(vehicle, ground_speed=SPEED, **wheels(1.08 * 180 / np.pi * beside))
+
+
+@pytest.mark.parametrize(("ratio", "doubted"), [(0.59, True), (0.61, False), (2.19, False), (2.21, True)])
+def test_what_may_be_slip_is_not_doubted(vehicle: Vehicle, ratio: float, doubted: bool) -> None:
+    assert bool(said(vehicle, ground_speed=SPEED, **wheels(ratio))) is doubted
+    assert bool(said(ground_speed=SPEED, wheel_based_speed=ratio * SPEED)) is doubted
+
+
+@pytest.mark.parametrize(
+    ("ratio", "words"),
+    [
+        (2.4, "check units"),
+        (2.6, "wheel_based_speed may be in km/h, or ground_speed was taken"),
+        (5.4, "wheel_based_speed may be in km/h"),
+        (5.6, "check units"),
+        (1 / 2.6, "ground_speed may be in km/h, or wheel_based_speed was taken"),
+        (1 / 5.6, "check units"),
+    ],
+)
+def test_a_drive_is_in_kmh_where_it_is_about_so_many_times_faster(ratio: float, words: str) -> None:
+    note = said(ground_speed=SPEED, wheel_based_speed=ratio * SPEED)
+    assert note.startswith(f"wheel_based_speed is {ratio:.3g} times the ground speed: {words}")
+
+
+def driven(speed: float, turn: float = 0.0) -> dict[str, np.ndarray]:
+    """Positions at the equator at a constant speed [m/s]."""
+    time = TIME * 3
+    way = speed * time
+    angle = turn * time
+    north, east = (way, 0 * way) if not turn else (speed / turn * np.sin(angle), speed / turn * np.cos(angle))
+    return {"latitude": north / 110_574.3, "longitude": east / 111_319.5}
+
+
+@pytest.mark.parametrize(
+    ("times", "words"),
+    [
+        (1.0, ""),
+        (2.8, ""),
+        (3.0, "is 3 times the speed of the positions: it may be in km/h"),
+        (4.3, "is 4.3 times the speed of the positions: it may be in km/h"),
+        (4.5, ""),
+        (1 / 3.0, "is 0.333 times the speed of the positions: it was taken for km/h"),
+        (1 / 4.3, "is 0.233 times the speed of the positions: it was taken for km/h"),
+        (1 / 2.8, ""),
+        (1 / 4.5, ""),
+    ],
+)
+def test_ground_speed_is_held_against_positions(times: float, words: str) -> None:
+    note = said(time=3 * TIME, ground_speed=np.full(N, 2.0 * times), **driven(2.0))
+    assert note == "" if not words else note.startswith(f"ground_speed {words}")
+
+
+def test_positions_that_jump_about_do_not_outrun_a_slow_speed() -> None:
+    """They make much speed and little way: circles of 3 s."""
+    assert said(time=3 * TIME, ground_speed=np.full(N, 2.0 / 3.6), **driven(2.0, turn=2.0)) == ""
+
+
+def test_the_straight_way_is_told_against_the_one_driven() -> None:
+    time = np.arange(0.0, 101.0)
+    nothing = np.zeros(101)
+    track = Track(time, 3.0 * time, 4.0 * time, nothing, nothing, nothing, nothing.astype(bool))
+    log = Recording(time, {"ground_speed": np.where(time % 2, -2.0, np.nan)})
+    assert _straight_ahead(log, track) == pytest.approx(2.5)
+    stop = Recording(time, {"ground_speed": np.where(time < 50, 2.0, 0.1)})  # creeping windows do not count
+    assert _straight_ahead(stop, track) == pytest.approx(2.5)
+    assert _straight_ahead(Recording(time, {"ground_speed": nothing}), track) == 0.0
+    short = Track(time[:10], *(nothing[:10] for _ in range(5)), nothing[:10].astype(bool))
+    assert _straight_ahead(log, short) == 0.0
+
+
+def test_turns_agree_by_their_correlation_about_zero_over_two_seconds() -> None:
+    time = np.arange(0.0, 80.0, 0.5)
+    a = np.repeat([0.3, -0.1, 0.2, 0.0], 40)
+    b = np.repeat([0.1, 0.2, 0.4, 0.1], 40)
+    expected = np.sum(a * b) / np.sqrt(np.sum(a**2) * np.sum(b**2))
+    assert _agreement(time, a, b) == pytest.approx(expected)
+    noisy = a + np.tile([1.0, -1.0, 0.0, 0.0], 40)  # which two seconds cancel
+    assert _agreement(time, noisy, b) == pytest.approx(expected)
+    gaps = np.where(np.arange(160) % 4 == 1, np.nan, b)
+    assert _agreement(time + 100.0, a, gaps) == pytest.approx(expected)
+    assert _agreement(time, a, np.full(160, np.nan)) == 0.0
+    assert _agreement(time, a, 0 * b) == 0.0
+
+
+@pytest.mark.parametrize(("rate", "enough"), [(0.0186, False), (0.0189, True)])
+def test_under_one_and_a_half_radians_of_turning_nothing_is_compared(rate: float, enough: bool) -> None:
+    time = np.arange(0.0, 80.0, 0.5)
+    assert (_agreement(time, np.full(160, rate), np.full(160, 0.1)) != 0.0) is enough
+
+
+def test_wheels_tell_a_turn_by_right_less_left(vehicle: Vehicle) -> None:
+    channels = {
+        "wheel_speed_fl": np.array([1.0, np.nan, 3.0]),
+        "wheel_speed_fr": np.array([2.0, 3.0, 4.0]),
+        "wheel_speed_rl": np.array([1.0, 1.0, 1.0]),
+        "wheel_speed_rr": np.array([4.0, 4.0, 4.0]),
+    }
+    log = Recording(np.arange(3.0), channels)
+    np.testing.assert_allclose(_wheel_turn(log, vehicle), [2.0, 2.0, 2.0])
+    np.testing.assert_allclose(_wheel_turn(log, vehicle, rims=True), [0.4, 0.4, 0.4])
+    front = Recording(np.arange(3.0), {n: v for n, v in channels.items() if n != "wheel_speed_rr"})
+    np.testing.assert_allclose(_wheel_turn(front, vehicle), [1.0, 1.0, 1.0])
+    assert np.isnan(_wheel_turn(Recording(np.arange(3.0), {}), vehicle)).all()
+
+
+@pytest.mark.parametrize(
+    ("times", "doubted"), [(11.5, False), (12.5, True), (57.3, True), (99.0, True), (101.0, False)]
+)
+def test_a_yaw_rate_in_degrees_is_known_by_its_size(vehicle: Vehicle, times: float, doubted: bool) -> None:
+    track, turn = 0.8, 0.3 * np.sign(np.sin(TIME / 2))
+    car = Vehicle.from_dict({**vehicle.to_dict(), "track": track})
+    sides = {f"wheel_speed_{w}": (2.0 + s * track / 2 * turn) / RADIUS for w, s in
+             (("fl", -1), ("fr", 1), ("rl", -1), ("rr", 1))}  # fmt: skip
+    log = Recording(TIME, sides)
+    note = _turn_scale(log, times * turn, car, None)
+    assert (
+        note.startswith(f"angular_velocity_z is {times:.2g} times the rate of turn of the wheels' speeds")
+        if doubted
+        else not note
+    )
+    assert _turn_scale(log, times * turn, vehicle, None) == ""  # without a track there is no scale
+
+
+def test_a_ratio_is_the_median_where_both_move() -> None:
+    time = np.arange(40.0)
+    speed = np.where(time < 20, 2.0, 0.5)  # under three tenths of what it reaches
+    other = np.where(time % 2, -3.0, 4.0)
+    assert _ratio(time, speed, other) == pytest.approx(1.75)
+    assert _ratio(time, other, speed) == pytest.approx((2 / 3 + 2 / 4) / 2)
+    assert _ratio(time[:10], speed[:10], other[:10]) == pytest.approx(1.75)
+    assert _ratio(time[:9], speed[:9], other[:9]) is None
+    assert _ratio(time, 0 * speed, other) is None
+    assert _ratio(time, np.full(40, np.nan), other) is None
+
+
+def test_what_a_twentieth_reaches() -> None:
+    assert _high(np.arange(101.0)[::-1].copy()) == 95.0
+    assert _high(np.array([3.0])) == 3.0
+
+
+def test_of_a_long_log_four_thousand_pairs_are_enough() -> None:
+    time = np.arange(40_000.0)
+    speed, turning = _pairs(time, time, 2 * time) or (time, time)
+    assert len(speed) == 4000
+    np.testing.assert_array_equal(turning, 2 * speed)
+    speed, turning = _pairs(time, np.where(time % 2, time, np.nan), np.where(time % 3, 2 * time, np.nan)) or (
+        time,
+        time,
+    )
+    assert 4000 <= len(speed) < 5000
+    np.testing.assert_allclose(turning[1:-1], 2 * speed[1:-1])
+
+
+@pytest.mark.parametrize(
+    ("channel", "value", "words"),
+    [
+        ("pitch", 1.5, ""),
+        ("pitch", 1.7, "pitch reaches 1.7 rad: it may be in degrees."),
+        ("roll", -1.7, "roll reaches 1.7 rad: it may be in degrees."),
+        ("longitude", 179.0, ""),
+        ("longitude", -180.5, "longitude exceeds 180: it must be in degrees."),
+        ("latitude", 180.0, ""),
+        ("acceleration_z", 0.91, "acceleration_z rests at 1: the accelerations may be in g."),
+        ("acceleration_z", -1.09, "acceleration_z rests at 1: the accelerations may be in g."),
+        ("acceleration_z", 0.89, ""),
+        ("acceleration_z", 1.11, ""),
+        ("acceleration_z", -7.9, ""),
+        (
+            "acceleration_z",
+            -8.1,
+            "acceleration_z rests at -g: the axes point the other way (z up, specific force).",
+        ),
+    ],
+)
+def test_angles_and_gravity_are_doubted_by_their_size(channel: str, value: float, words: str) -> None:
+    few = np.where(np.arange(N) % 3, np.nan, value)
+    assert said(ground_speed=SPEED, **{channel: few}) == words
+    assert said(ground_speed=SPEED, **{channel: np.full(N, np.nan)}) == ""
+
+
+@pytest.mark.parametrize(
+    ("step", "rows", "words"),
+    [
+        (4.9, 50, ""),
+        (5.0, 50, "The samples are 5 s apart: time may not be in seconds."),
+        (5.0, 10, "The samples are 5 s apart: time may not be in seconds."),
+        (5.0, 9, ""),
+        (5.0, 9000, "The samples are 5 s apart: time may not be in seconds."),
+    ],
+)
+def test_samples_five_seconds_apart_may_be_in_another_unit(step: float, rows: int, words: str) -> None:
+    assert said(time=step * np.arange(rows), drawbar_force=np.zeros(rows)) == words
