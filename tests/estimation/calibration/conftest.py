@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -12,6 +14,8 @@ import pytest
 from terragrip.physics.loads import GRAVITY
 from terragrip.recording import Recording
 from terragrip.vehicle import Vehicle
+
+sys.path.insert(0, str(Path(__file__).parent))  # for window_table.py
 
 Floats = npt.NDArray[np.float64]
 Make = Callable[..., Recording]

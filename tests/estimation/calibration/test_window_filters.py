@@ -1,0 +1,271 @@
+"""Which windows count, at the bounds: one window of many is changed and the others are left as they are."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from terragrip.estimation.calibration import gains, radii, torque_scale, zeros
+from terragrip.estimation.calibration.plausible import turns_unseen
+from terragrip.estimation.calibration.windows import Windows, track_blocks
+from terragrip.estimation.calibration.zeros import Spell, evidence, resting, spells, standstills
+from terragrip.vehicle import Vehicle
+from window_table import RADIUS, N, table
+
+ODD = 7  # the window that is changed
+
+
+def with_one(name: str, value: float, wheel: int | None = None) -> Windows:
+    """The windows with one column of window ODD (of one wheel) changed."""
+    whole = table()
+    column = getattr(whole, name).copy()
+    column[ODD if wheel is None or column.ndim == 1 else (ODD, wheel)] = value
+    return replace(whole, **{name: column})
+
+
+def rim(speed: float) -> float:
+    return speed / RADIUS
+
+
+def passes(windows: Windows, vehicle: Vehicle) -> np.ndarray:
+    return radii._passes(windows, vehicle)
+
+
+def driving(windows: Windows, vehicle: Vehicle) -> np.ndarray:
+    return np.isin(windows.start, gains._driving(windows, vehicle).start)
+
+
+def usable(windows: Windows, vehicle: Vehicle) -> np.ndarray:
+    return torque_scale._usable(windows, vehicle)
+
+
+CASES = [
+    (passes, "count", 26.0, None, True),
+    (passes, "count", 25.0, None, False),  # half of what is usual
+    (passes, "wheel_speed", rim(0.21), 0, False),  # far from the others: no straight line
+    (passes, "ground_speed", 0.9, None, True),
+    (passes, "wheel_speed", rim(1.1111 * 1.03), 2, True),  # sides 1.5 % apart
+    (passes, "wheel_speed", rim(1.1111 * 1.05), 2, False),
+    (driving, "count", 26.0, None, True),
+    (driving, "count", 25.0, None, False),
+    (driving, "ground_speed", 0.16, None, True),
+    (driving, "ground_speed", 0.14, None, False),
+    (driving, "torque", np.nan, 1, False),
+    (driving, "load", np.nan, 3, False),
+    (driving, "wheel_acceleration", np.nan, 3, False),
+    (driving, "hub_speed", 1.04, 3, True),
+    (driving, "hub_speed", 1.06, 3, False),  # hubs 6 % apart
+    (usable, "count", 26.0, None, True),
+    (usable, "count", 25.0, None, False),
+    (usable, "ground_speed", 0.11, None, True),
+    (usable, "ground_speed", 0.09, None, False),
+    (usable, "ground_speed", -1.0, None, False),  # wheels go the other way
+    (usable, "push", np.nan, None, False),
+    (usable, "drawbar", np.nan, None, False),
+    (usable, "torque", np.nan, 1, False),
+    (usable, "hub_speed", 0.61, 0, True),  # mean slip .19
+    (usable, "hub_speed", 0.54, 0, False),  # .203
+]
+
+
+@pytest.mark.parametrize(("of", "name", "value", "wheel", "counts"), CASES)
+def test_one_window_counts_or_not(
+    vehicle: Vehicle,
+    of: Callable[[Windows, Vehicle], np.ndarray],
+    name: str,
+    value: float,
+    wheel: int | None,
+    counts: bool,
+) -> None:
+    assert of(table(), vehicle).all()
+    expected = np.ones(N, dtype=bool)
+    expected[ODD] = counts
+    np.testing.assert_array_equal(of(with_one(name, value, wheel), vehicle), expected)
+
+
+@pytest.mark.parametrize(("slips", "counts"), [(0.59, True), (0.61, False), (-0.09, True), (-0.11, False)])
+def test_wheels_share_a_curve_up_to_six_tenths_of_slip(vehicle: Vehicle, slips: float, counts: bool) -> None:
+    hub = (1 - slips) / 0.9 if slips >= 0 else 1 / (0.9 * (1 + slips))
+    windows = table()
+    windows.hub_speed[ODD] = hub
+    assert driving(windows, vehicle)[ODD] == counts
+    assert driving(windows, vehicle).sum() == N - (not counts)
+
+
+@pytest.mark.parametrize(("speed", "counts"), [(0.21, True), (0.19, False), (-1.0, False)])
+def test_passes_are_forward_and_faster_than_a_fifth_of_a_metre_a_second(
+    vehicle: Vehicle, speed: float, counts: bool
+) -> None:
+    slow = table(ground_speed=np.full(N, speed))
+    assert passes(slow, vehicle).all() == counts
+    slow = table(wheel_speed=np.full((N, 4), rim(speed)))
+    assert passes(slow, vehicle).all() == counts
+    assert len(passes(table(1), vehicle)) == 1
+
+
+@pytest.mark.parametrize(("rate", "counts"), [(0.49, True), (0.5, False)])
+def test_passes_are_steady_to_a_twentieth_of_gravity(vehicle: Vehicle, rate: float, counts: bool) -> None:
+    for length in (1.0, 2.0):
+        windows = table(length=length, ground_speed=1.0 + rate * length * np.arange(N))
+        assert passes(windows, vehicle).all() == counts
+
+
+@pytest.mark.parametrize(("apart", "counts"), [(0.33, True), (0.34, False)])
+def test_where_the_turn_is_known_a_pass_may_bend(vehicle: Vehicle, apart: float, counts: bool) -> None:
+    """Hubs may be .3 of the rims' mean speed apart, however far the rims are."""
+    wheel_speed = table().wheel_speed * [0.9, 1.1, 0.9, 1.1]
+    hub = np.ones((N, 4)) + apart * np.array([-0.5, 0.5, -0.5, 0.5])
+    known = table(yaw_rate=np.full(N, 0.1), wheel_speed=wheel_speed, hub_speed=hub)
+    assert passes(known, vehicle).all() == counts
+    assert not passes(replace(known, yaw_rate=np.full(N, np.nan)), vehicle).any()
+
+
+def test_left_middle_and_right_of_an_axle(vehicle: Vehicle) -> None:
+    assert [radii._side(vehicle, k) for k in range(4)] == [1, -1, 1, -1]
+    six = {"a": {"mass": 70, "wheels": ["l", "m", "r"]}, "b": {"mass": 70, "wheels": ["x"]}}
+    other = Vehicle.from_dict({**vehicle.to_dict(), "axles": six, "uncertainty": {}})
+    assert [radii._side(other, k) for k in range(4)] == [1, 0, -1, 0]
+
+
+@pytest.mark.parametrize(("apart", "turning"), [(0.039, False), (0.041, True)])
+def test_a_turn_shows_in_either_axle_unless_a_yaw_rate_tells_it(
+    vehicle: Vehicle, apart: float, turning: bool
+) -> None:
+    for wheel in range(4):
+        windows = table()
+        windows.wheel_speed[ODD, wheel ^ 1] *= 1 - apart / 2
+        windows.wheel_speed[ODD, wheel] *= 1 + apart / 2
+        shown = turns_unseen(windows, vehicle)
+        assert shown[ODD] == turning
+        assert shown.sum() == turning
+        backward = replace(windows, wheel_speed=-windows.wheel_speed)
+        assert turns_unseen(backward, vehicle).sum() == turning
+        assert not turns_unseen(replace(windows, yaw_rate=np.zeros(N)), vehicle).any()
+
+
+@pytest.mark.parametrize("of", [driving, usable])
+def test_turns_that_nothing_tells_do_not_count(
+    vehicle: Vehicle, of: Callable[[Windows, Vehicle], np.ndarray]
+) -> None:
+    windows = table()
+    windows.wheel_speed[ODD, 0] *= 1.05
+    assert of(windows, vehicle).sum() == N - 1
+    assert of(replace(windows, yaw_rate=np.zeros(N)), vehicle).all()
+
+
+def test_windows_near_a_border_of_soils_may_be_on_both(vehicle: Vehicle) -> None:
+    """Within a wheelbase of .6 m and .3 m more of the middle between two labels; metres of the front axle."""
+    soil = np.array(["a"] * 30 + ["b"] * 20 + [""] * 10, dtype=object)
+    place = 0.2 * np.arange(60)
+    windows = table(60, soil=soil, position=place[:, None] - np.array([0.0, 0.0, 0.6, 0.6]))
+    expected = (np.abs(place - 5.9) < 0.9) | (np.abs(place - 9.9) < 0.9)
+    np.testing.assert_array_equal(gains._near_border(windows), expected)
+    two = replace(
+        windows, recording=np.repeat([0, 1], 30), soil=np.array(["a"] * 30 + ["b"] * 30, dtype=object)
+    )
+    assert not gains._near_border(two).any()  # between logs there is no border
+    assert not gains._near_border(table()).any()
+
+
+def test_unlabelled_track_is_a_soil_every_twenty_metres_of_a_log() -> None:
+    windows = table(50, recording=np.repeat([0, 1], 25))
+    windows.position[:, 0] = np.r_[0:25, 0:25]
+    windows.soil[:5] = "clay"
+    codes = gains._soil_codes(windows)
+    groups = [set(np.flatnonzero(codes == c).tolist()) for c in np.unique(codes)]
+    expected = [set(range(5)), set(range(5, 20)), set(range(20, 25)), set(range(25, 45)), set(range(45, 50))]
+    assert sorted(map(min, groups)) == sorted(map(min, expected))
+    assert all(group in expected for group in groups)
+
+
+@pytest.mark.parametrize(("metres", "step"), [(100.0, 4.0), (400.0, 10.0), (4000.0, 20.0)])
+def test_stretches_of_track_are_a_fortieth_of_it_within_bounds(metres: float, step: float) -> None:
+    windows = table(401)
+    windows.position[:] = np.linspace(0.0, metres, 401)[:, None]
+    np.testing.assert_array_equal(track_blocks(windows), np.floor(windows.position[:, 0] / step).astype(int))
+
+
+def test_runs_of_windows_end_with_a_log_and_last_long_enough() -> None:
+    wanted = np.array([1, 1, 0, 1, 1, 1, 1, 0, 1], dtype=bool)
+    log = np.array([0, 0, 0, 0, 0, 1, 1, 1, 1])
+    assert spells(wanted, log, 2) == [Spell(0, 1), Spell(3, 4), Spell(5, 6)]
+    assert spells(wanted, log, 1)[-1] == Spell(8, 8)
+    assert spells(wanted, log, 3) == []
+    assert spells(wanted[:0], log[:0], 1) == []
+
+
+def stopped(*stops: tuple[int, int], **columns: np.ndarray) -> Windows:
+    """Windows of half a second, standing from one row to another (exclusive) at each stop."""
+    standing = np.zeros(40, dtype=bool)
+    for first, last in stops:
+        standing[first:last] = True
+    moving = np.where(standing, 0.0, 1.0)
+    return table(
+        40, length=0.5, ground_speed=moving, wheel_speed=moving[:, None] / RADIUS * np.ones(4), **columns
+    )
+
+
+def test_a_standstill_begins_after_the_first_window_but_at_the_start_of_a_log(vehicle: Vehicle) -> None:
+    assert standstills(stopped((0, 4), (10, 14), (20, 23)), vehicle) == [Spell(0, 3), Spell(11, 13)]
+    two = stopped((10, 18), recording=np.repeat([0, 1], [14, 26]))
+    assert standstills(two, vehicle) == [Spell(11, 13), Spell(14, 17)]
+    slow = stopped((10, 20))
+    for value, count in ((0.029, 1), (0.031, 0)):
+        slow.ground_speed[10:20] = -value
+        assert len(standstills(slow, vehicle)) == count
+        slow.ground_speed[10:20] = 0.0
+        slow.wheel_speed[10:20, 2] = value / RADIUS
+        assert len(standstills(slow, vehicle)) == count
+        slow.wheel_speed[10:20, 2] = 0.0
+
+
+def test_evidence_is_an_entry_a_log_with_its_span_and_samples() -> None:
+    windows = stopped(recording=np.repeat([0, 1], 20), count=np.arange(40.0))
+    stops = [Spell(2, 3), Spell(10, 10), Spell(30, 31)]
+    first, second = evidence(windows, stops, ["a", "b"])
+    assert (first.source, first.start, first.end, first.samples) == ("a", 1.0, 5.5, 15)
+    assert (second.source, second.start, second.end, second.samples) == ("b", 15.0, 16.0, 61)
+    assert evidence(windows, stops[:1], ["a", "b"], np.full(40, 3.0))[0].samples == 6
+
+
+@pytest.mark.parametrize(("apart", "alike"), [(0.29, True), (0.31, False)])
+def test_stops_are_alike_within_three_errors_of_noise(apart: float, alike: bool) -> None:
+    """Of 200 samples with noise of 1 the error of a stop is .0707, and that of a difference .1."""
+    both = [Spell(0, 3), Spell(4, 7)]
+    values = np.repeat([0.0, apart], 4)[:, None]
+    assert resting(values, both, np.full(8, 50.0), 1.0) == (both if alike else both[:1])
+
+
+def test_of_stops_the_most_that_agree_count_and_of_as_many_those_nearest_to_zero() -> None:
+    count, four = np.full(20, 100.0), [Spell(4 * k, 4 * k + 3) for k in range(5)]
+    values = np.repeat([2.0, 2.0, 2.0, -1.0, 5.0], 4)[:, None]
+    assert resting(values, four, count, 1.0) == four[:3]
+    values = np.repeat([2.0, 2.0, -1.0, -1.0, 5.0], 4)[:, None]
+    assert resting(values, four, count, 1.0) == four[2:4]
+    assert resting(values, four, count, 0.0) == four
+    unread = np.where(np.arange(20)[:, None] >= 16, np.nan, values)
+    assert resting(unread, four, count, 0.0) == four[:4]
+    both = np.column_stack([values[:, 0], np.repeat([0.0, 3.0, 0.0, 0.0, 0.0], 4)])
+    assert resting(both, four[:2], count, 1.0) == four[:1]
+
+
+def test_a_yaw_rate_rests_at_its_mean_over_all_samples_of_standstill(vehicle: Vehicle) -> None:
+    yaw = np.where(np.arange(40) < 20, 0.02, 0.05)
+    yaw[11] = np.nan
+    windows = stopped((0, 6), (10, 15), (30, 35))
+    assert zeros.yaw_rate_zero(windows, vehicle, yaw) == pytest.approx((0.02 * (6 + 3) + 0.05 * 4) / 13)
+    assert zeros.yaw_rate_zero(stopped(), vehicle, yaw) == 0.0
+
+
+@pytest.mark.parametrize(("scatter", "free"), [(1.9, True), (2.1, False)])
+def test_a_bar_that_moves_no_more_than_its_noise_is_free(scatter: float, free: bool) -> None:
+    """Windows of 100 samples with noise of 5: .5 each."""
+    bar = 3.0 + scatter * 0.5 * np.where(np.arange(40) % 2, 1.0, -1.0)
+    windows = stopped(drawbar=bar, drawbar_count=np.full(40, 100.0))
+    assert zeros._free_passes(windows, 5.0) == ([Spell(0, 39)] if free else [])
+    assert zeros._free_passes(stopped((15, 25), drawbar=bar, drawbar_count=np.full(40, 100.0)), 5.0) == []
+    slow = replace(windows, ground_speed=np.full(40, 0.09))
+    assert zeros._free_passes(slow, 5.0) == []
