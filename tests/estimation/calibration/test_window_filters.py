@@ -13,7 +13,7 @@ from terragrip.estimation.calibration.plausible import turns_unseen
 from terragrip.estimation.calibration.windows import Windows, track_blocks
 from terragrip.estimation.calibration.zeros import Spell, evidence, resting, spells, standstills
 from terragrip.vehicle import Vehicle
-from window_table import RADIUS, N, table
+from window_table import RADIUS, N, stopped, table
 
 ODD = 7  # the window that is changed
 
@@ -195,17 +195,6 @@ def test_runs_of_windows_end_with_a_log_and_last_long_enough() -> None:
     assert spells(wanted, log, 1)[-1] == Spell(8, 8)
     assert spells(wanted, log, 3) == []
     assert spells(wanted[:0], log[:0], 1) == []
-
-
-def stopped(*stops: tuple[int, int], **columns: np.ndarray) -> Windows:
-    """Windows of half a second, standing from one row to another (exclusive) at each stop."""
-    standing = np.zeros(40, dtype=bool)
-    for first, last in stops:
-        standing[first:last] = True
-    moving = np.where(standing, 0.0, 1.0)
-    return table(
-        40, length=0.5, ground_speed=moving, wheel_speed=moving[:, None] / RADIUS * np.ones(4), **columns
-    )
 
 
 def test_a_standstill_begins_after_the_first_window_but_at_the_start_of_a_log(vehicle: Vehicle) -> None:

@@ -8,6 +8,7 @@ import numpy as np
 
 from terragrip.estimation.calibration.windows import Windows
 from terragrip.physics.loads import GRAVITY
+from terragrip.vehicle import Vehicle
 
 RADIUS, N = 0.2, 20
 LOAD = np.array([30.0, 30.0, 40.0, 40.0]) * GRAVITY
@@ -27,3 +28,19 @@ def table(n: int = N, *, slip: float = 0.1, length: float = 1.0, **columns: np.n
         length=length,
     )  # fmt: skip
     return replace(base, **columns)
+
+
+def stopped(*stops: tuple[int, int], **columns: np.ndarray) -> Windows:
+    """Windows of half a second, standing from one row to another (exclusive) at each stop."""
+    standing = np.zeros(40, dtype=bool)
+    for first, last in stops:
+        standing[first:last] = True
+    moving = np.where(standing, 0.0, 1.0)
+    return table(
+        40, length=0.5, ground_speed=moving, wheel_speed=moving[:, None] / RADIUS * np.ones(4), **columns
+    )
+
+
+def stating(vehicle: Vehicle, **uncertainty: float) -> Vehicle:
+    """The vehicle with another ``uncertainty`` block."""
+    return Vehicle.from_dict({**vehicle.to_dict(), "uncertainty": uncertainty})

@@ -1,0 +1,287 @@
+"""Radii, torque scale and gains of a calibration, step by step, against closed forms and NumPy."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from terragrip.estimation.calibration import gains, radii, torque_scale
+from terragrip.estimation.calibration.gains import ChannelErrors
+from terragrip.estimation.calibration.sharing import SharedGains, Sharing, block_covariance, effective_blocks
+from terragrip.estimation.calibration.windows import Windows, wheel_loads
+from terragrip.physics.loads import GRAVITY
+from terragrip.recording import Recording
+from terragrip.vehicle import Vehicle
+from window_table import LOAD, N, stating, table
+
+
+def test_adhesion_of_driven_wheels_is_their_mean_by_load(vehicle: Vehicle) -> None:
+    torque = np.tile([8.0, 9.0, 10.0, 11.0], (N, 1))
+    own = (torque[0] - 0.2 * 2.0 / 0.18) / (0.2 * LOAD) - 0.02  # bearings: r ρ_w ω; tires: ρ_t
+    adhesion = radii._adhesion(table(torque=torque), vehicle)
+    np.testing.assert_allclose(adhesion, np.sum(own * LOAD) / np.sum(LOAD))
+    axles = {**vehicle.to_dict()["axles"], "front": {"mass": 60.0, "wheels": ["fl", "fr"], "driven": False}}
+    rear = Vehicle.from_dict({**vehicle.to_dict(), "axles": axles})
+    adhesion = radii._adhesion(table(torque=torque), rear)
+    np.testing.assert_allclose(adhesion[0], [own[0], own[1], *[np.mean(own[2:])] * 2])
+
+
+def test_windows_of_most_pull() -> None:
+    assert radii._most(np.linspace(0.0, 1.0, 101)) == pytest.approx(0.95)
+    assert radii._most(np.zeros(5)) == 0.15
+    assert radii._most(np.empty(0)) == 0.15
+
+
+@pytest.mark.parametrize(
+    ("stated", "adhesion", "rolling"),
+    [
+        ({}, 0.02, 0.0),
+        ({"drive_torque_offset": 0.3}, 0.3 * 4 / (140 * GRAVITY * 0.2), 0.0),
+        ({"drive_torque_gain": 0.1, "tire_rolling_resistance": 0.005}, np.hypot(0.02, 0.1 * 0.15), 0.005),
+    ],
+)
+def test_what_passes_cannot_tell_is_in_the_variance_of_a_radius(
+    vehicle: Vehicle, stated: dict[str, float], adhesion: float, rolling: float
+) -> None:
+    expected = (adhesion**2 / 4 + rolling**2) / 5.0**2
+    np.testing.assert_allclose(radii._considered(stating(vehicle, **stated), 5.0), expected)
+
+
+def bent(
+    vehicle: Vehicle, pulls: np.ndarray, level: float, steepness: float, radius: float
+) -> tuple[Windows, np.ndarray]:
+    """Windows whose wheels slip by -(A/C) ln(1 - μ/A) at wheels of ``radius``."""
+    slip = -(level / steepness) * np.log(1 - pulls / level)
+    hub = np.ones((len(pulls), 4))
+    return table(len(pulls), hub_speed=hub, wheel_speed=hub / radius / (1 - slip[:, None])), np.tile(
+        pulls[:, None], 4
+    )
+
+
+def test_a_fit_of_radii_finds_the_curve_that_made_the_slip(vehicle: Vehicle) -> None:
+    pulls = np.r_[np.linspace(0.04, 0.08, 60), np.linspace(0.1, 0.5, 60)]
+    data, adhesion = bent(vehicle, pulls, 0.7, 6.0, 0.206)
+    scale, variance, steepness, blocks = radii._fit(
+        data,
+        vehicle,
+        adhesion,
+        np.zeros(120, int),
+        np.array([0.5]),
+        np.ones((120, 4), bool),
+        np.arange(120) // 6,
+    )
+    np.testing.assert_allclose(scale, 1.03, rtol=1e-3)
+    np.testing.assert_allclose(steepness, 6.0, rtol=0.03)
+    assert len(set(scale.tolist())) == 1
+    assert 1.0 < blocks <= 20.0
+    assert (np.sqrt(variance) < 1e-3).all()
+
+
+def balance(n: int = 200, seed: int = 1, **more: Any) -> torque_scale._Balance:
+    draws = np.random.default_rng(seed)
+    force, noise = draws.normal(500.0, 100.0, n), draws.normal(0.0, 20.0, (2, n))
+    base = torque_scale._Balance(
+        1.2 * (force + 50.0),
+        np.full(n, 50.0),
+        force + noise[0],
+        force + noise[1],
+        np.ones((n, 1)),
+        np.zeros(n),
+        True,
+    )
+    return replace(base, **more)
+
+
+def test_the_scale_is_that_of_two_instruments() -> None:
+    rows, weight = balance(), np.random.default_rng(2).uniform(0.2, 1.0, 200)
+    scale, strength, rest = torque_scale._slope(rows, weight)
+
+    def centered(x: np.ndarray) -> np.ndarray:
+        return x - np.average(x, weights=weight)
+
+    x, y1, y2 = map(centered, (rows.thrust, rows.force, rows.other))
+    assert strength == pytest.approx(np.mean(weight * y1 * y2))
+    assert scale == pytest.approx(np.sum(weight * x * (y1 + y2) / 2) / np.sum(weight * y1 * y2))
+    np.testing.assert_allclose(rest, x - scale * (y1 + y2) / 2, atol=1e-8)
+    assert scale == pytest.approx(1.2, abs=0.01)  # by one measure alone, noise would take 4 % of it
+    wavy = balance(losses=rows.force / 10)
+    _, losses, y1, y2 = (centered(v) for v in (wavy.thrust, wavy.losses, wavy.force, wavy.other))
+    below = np.sum(weight * (y1 * y2 + losses * (y1 + y2) / 2))
+    assert torque_scale._slope(wavy, weight)[0] == pytest.approx(np.sum(weight * x * (y1 + y2) / 2) / below)
+    chance = np.sqrt(np.mean(weight * y1**2) * np.mean(weight * y2**2) / 200)
+    assert torque_scale._no_strength(rows, weight) == pytest.approx(chance)
+    slips = 0.1 * rows.force
+    steepness = torque_scale._partial_slope(slips, rows, weight)
+    assert steepness == pytest.approx(np.sum(weight * 0.1 * y1 * (y1 + y2) / 2) / np.sum(weight * y1 * y2))
+
+
+@pytest.mark.parametrize(("n", "blocks"), [(200, 20), (30, 15)])
+def test_the_error_of_the_scale_is_a_jackknife_over_stretches(n: int, blocks: int) -> None:
+    rows, weight = balance(n), np.ones(n)
+    block = np.arange(n) * blocks // n
+    without = [torque_scale._slope(rows, (block != b).astype(float))[0] for b in range(blocks)]
+    expected = np.sqrt((blocks - 1) / blocks * np.sum((without - np.mean(without)) ** 2))
+    assert torque_scale._jackknife(rows, weight) == pytest.approx(expected)
+
+
+def test_a_slope_that_nothing_tells_is_three_tenths_of_it_over_the_force(vehicle: Vehicle) -> None:
+    rows, weight = balance(slope_known=False), np.ones(200)
+    per_radian = 0.3 * 140 * GRAVITY / np.std(rows.force)
+    assert torque_scale._unseen_slope(stating(vehicle, slope=0.02), rows, weight) == pytest.approx(
+        0.02 * per_radian
+    )
+    assert torque_scale._unseen_slope(stating(vehicle), rows, weight) == pytest.approx(
+        np.radians(0.5) * per_radian
+    )
+    assert torque_scale._unseen_slope(vehicle, balance(), weight) == 0.0
+
+
+def test_the_bars_gain_counts_where_there_is_one(vehicle: Vehicle) -> None:
+    assert torque_scale._drawbar_gain(table(), stating(vehicle)) == 0.01
+    assert torque_scale._drawbar_gain(table(), stating(vehicle, drawbar_gain=0.03)) == 0.03
+    assert torque_scale._drawbar_gain(table(drawbar=np.zeros(N)), vehicle) == 0.0
+
+
+@pytest.mark.parametrize(("every", "length"), [(1, 1.0), (10, 1.0), (20, 2.0), (35, 3.5)])
+def test_a_window_spans_two_updates_of_the_slowest_torque(every: int, length: float) -> None:
+    time = 0.05 * np.arange(400)
+    slow = np.where(np.arange(400) % every == 0, 1.0, np.nan)
+    log = Recording(
+        time,
+        {"drive_torque_fl": np.ones(400), "drive_torque_fr": slow, "pitch": np.where(time < 0.1, 1, np.nan)},
+    )
+    assert torque_scale._window_length([log]) == pytest.approx(length)
+
+
+def test_the_balance_of_forces_of_windows(vehicle: Vehicle) -> None:
+    """X = Σ M/r; losses Σ J ω'/r + Σ ρ_t F + ρ_w ω; Y = F_dx + m (dv/dt + g sinθ) by either sensor."""
+    way = np.where(np.arange(N) < N // 2, 1.0, -1.0)
+    spin = 0.5 * np.ones((N, 4))
+    data = table(
+        ground_speed=way, push=0.3 * np.ones(N), kinematic_push=0.2 * np.ones(N), wheel_acceleration=spin,
+        acceleration=np.r_[np.nan, np.ones(N - 1)], pitch=np.zeros(N), wheel_speed=way[:, None] * table().wheel_speed,
+    )  # fmt: skip
+    rows = torque_scale._balance(data, vehicle)
+    np.testing.assert_allclose(rows.thrust, 4 * 10.0 / 0.2)
+    omega = 1 / 0.18
+    np.testing.assert_allclose(
+        rows.losses, 4 * 0.15 * 0.5 / 0.2 + way * (0.02 * 140 * GRAVITY + 4 * 2.0 * omega)
+    )
+    np.testing.assert_allclose(rows.force, 100.0 + 140 * 0.3)
+    np.testing.assert_allclose(rows.other, 100.0 + 140 * np.r_[0.3, np.full(N - 1, 0.2)])
+    np.testing.assert_allclose(rows.slip, 0.1 * way)
+    assert rows.slope_known
+    np.testing.assert_array_equal(rows.nuisance.sum(axis=1), 1.0)
+    assert rows.nuisance.shape == (N, 2)
+    for known in (10, 11):  # more than half
+        some = np.where(np.arange(N) < known, 0.0, np.nan)
+        assert torque_scale._balance(table(pitch=some), vehicle).slope_known is (known > 10)
+        assert torque_scale._balance(table(acceleration=some), vehicle).slope_known is (known > 10)
+    turning = table(
+        hub_speed=np.ones((N, 4)) + np.linspace(0, 0.1, N)[:, None] * [-1, 1, -1, 1],
+        soil=np.array(["a", "b"] * 10, object),
+    )
+    nuisance = torque_scale._balance(turning, vehicle).nuisance
+    assert nuisance.shape == (N, 3)
+    np.testing.assert_allclose(nuisance[:, 2], np.linspace(0, 0.2, N))
+
+
+def test_evidence_of_the_scale_is_an_entry_a_log() -> None:
+    data = table(recording=np.repeat([0, 1], 10), count=np.arange(20.0))
+    logs = [Recording(np.zeros(1), {}, source="a"), Recording(np.zeros(1), {})]
+    first, second = torque_scale._evidence(data, logs)
+    assert (first.source, first.start, first.end, first.samples) == ("a", 0.0, 10.0, 45)
+    assert (second.source, second.start, second.end, second.samples) == ("recording 2", 10.0, 20.0, 145)
+
+
+def test_rows_of_shared_curves(vehicle: Vehicle) -> None:
+    data = table(wheel_acceleration=0.5 * np.ones((N, 4)))
+    driven = np.array([0, 1, 3])
+    rows = gains._rows(
+        data, stating(vehicle, wheel_radius=0.01), np.array([0.1, 0.0, 0.2, 0.3]), np.arange(N), driven
+    )
+    np.testing.assert_allclose(
+        rows.known, 0.15 * 0.5 + 0.2 * (0.02 * LOAD + 2.0 / 0.18)[driven] * np.ones((N, 1))
+    )
+    np.testing.assert_allclose(rows.leverage, 0.2 * LOAD[driven] * np.ones((N, 1)))
+    np.testing.assert_allclose(rows.slip, 0.1)
+    np.testing.assert_allclose(rows.offset_std, [0.1, 1e-3, 0.3])
+    assert rows.radius_std == 0.01
+    assert gains._rows(data, stating(vehicle), np.zeros(4), np.arange(N), driven).radius_std == 0.003
+
+
+def test_constant_errors_of_channels_shift_loads_and_so_gains(vehicle: Vehicle) -> None:
+    tall = Vehicle.from_dict(
+        {**vehicle.to_dict(), "center_of_gravity_height": 0.3, "hitch_height": 0.25, "track": 0.5}
+    )
+    data, errors = table(), ChannelErrors(push=0.1, lateral=0.2, drawbar=30.0)
+    sensitivity = np.random.default_rng(3).normal(size=(8, 4))
+    fit = SharedGains(np.zeros(4), np.zeros(4), np.eye(8), N, 10, sensitivity)
+    covariance = gains._considered_loads(fit, data, tall, np.arange(4), errors)
+
+    def loads(drawbar: float = 100.0, push: float = 0.0, lateral: float = 0.0) -> np.ndarray:
+        one = np.ones(1)
+        return wheel_loads(
+            tall, drawbar=drawbar * one, push=push * one, slope=0 * one, spin_torque=0 * one, lateral=lateral * one,
+            measured=np.full((1, 2), np.nan),
+        )[0]  # fmt: skip
+
+    effects = [
+        sensitivity @ (loads(**by) / loads() - 1)
+        for by in ({"drawbar": 130.0}, {"push": 0.1}, {"lateral": 0.2})
+    ]
+    np.testing.assert_allclose(covariance, sum(np.outer(e, e) for e in effects))
+
+
+@pytest.mark.parametrize("seed", [0, 1])
+def test_a_fit_without_a_block_is_one_step_from_the_optimum(seed: int) -> None:
+    """CR3 of a linear fit: leave one block out, refit by NumPy."""
+    draws = np.random.default_rng(seed)
+    design, y = draws.normal(size=(40, 1, 3)), draws.normal(size=40)
+    block, prior = np.repeat(np.arange(8), 5) * 3, 0.5 * np.eye(3)
+    flat = design[:, 0]
+    normal = flat.T @ flat + prior
+    best = np.linalg.solve(normal, flat.T @ y)
+    score = flat * (y - flat @ best)[:, None]
+    shifts = []
+    for label in np.unique(block):
+        rest = block != label
+        shifts.append(np.linalg.solve(flat[rest].T @ flat[rest] + prior, flat[rest].T @ y[rest]) - best)
+    inverse = np.linalg.inv(normal)
+    expected = 7 / 8 * np.sum([np.outer(s, s) for s in shifts], axis=0) + inverse @ prior @ inverse
+    np.testing.assert_allclose(block_covariance(normal, design, score, block, prior), expected)
+    part = np.array([np.sum((flat[block == b] @ inverse[1]) ** 2) for b in np.unique(block)])
+    assert effective_blocks(normal, design, block, 1) == pytest.approx(part.sum() ** 2 / np.sum(part**2))
+    assert effective_blocks(normal, 0 * design, block, 1) == 1.0
+
+
+def test_soils_that_disagree_widen_by_birges_ratio() -> None:
+    """Two soils of 20 stretches whose wheels differ by ± 5 %; under 15 stretches a soil is not asked."""
+    draws, n = np.random.default_rng(5), 240
+
+    def rows(gain: float, each: int = 120, stretches: int = 20) -> Sharing:
+        soil = np.arange(n) // each
+        lever = 60.0 * np.ones((n, 2))
+        torque = lever * 0.4 * (1 + 0.01 * draws.standard_normal((n, 2)))
+        torque[:, 0] *= np.where(soil == 0, 1 + gain, 1 - gain)
+        slip = np.linspace(0.1, 0.3, n)[:, None] * np.ones(2)
+        return Sharing(
+            torque, 0 * lever, lever, slip, soil, np.arange(n) * 2 * stretches // n, 1e-6, np.full(2, 1e-6)
+        )
+
+    assert gains._disagreement(rows(0.0)) == 1.0
+    apart = gains._disagreement(rows(0.05))
+    from terragrip.estimation.calibration.sharing import fit_shared_gains
+
+    data = rows(0.05)
+    fits = [fit_shared_gains(data.select(data.soil == k)) for k in (0, 1)]
+    x, v = ([f.log_gain[1] for f in fits if f], [f.covariance[1, 1] for f in fits if f])
+    mean = (x[0] / v[0] + x[1] / v[1]) / (1 / v[0] + 1 / v[1])
+    expected = np.sqrt((x[0] - mean) ** 2 / v[0] + (x[1] - mean) ** 2 / v[1])
+    assert gains._disagreement(data) == pytest.approx(expected)
+    assert apart > 5
+    assert gains._disagreement(rows(0.05, stretches=14)) == 1.0
+    assert gains._disagreement(rows(0.05, each=n)) == 1.0
