@@ -116,9 +116,13 @@ def test_ground_speed_is_held_against_positions(times: float, words: str) -> Non
     assert note == "" if not words else note.startswith(f"ground_speed {words}")
 
 
-def test_positions_that_jump_about_do_not_outrun_a_slow_speed() -> None:
-    """They make much speed and little way: circles of 3 s."""
-    assert said(time=3 * TIME, ground_speed=np.full(N, 2.0 / 3.6), **driven(2.0, turn=2.0)) == ""
+@pytest.mark.parametrize(("turn", "outrun"), [(0.3, True), (0.4, True), (0.45, False), (2.0, False)])
+def test_positions_outrun_a_slow_speed_by_half_as_much_again_in_a_straight_line(
+    turn: float, outrun: bool
+) -> None:
+    """In 10 s on a circle at 2 m/s they come 4/ω sin(5 ω) m, 13, 9.1 and 6.9; the ground speed makes 5.6 of it."""
+    note = said(time=3 * TIME, ground_speed=np.full(N, 2.0 / 3.6), **driven(2.0, turn=turn))
+    assert ("taken for km/h" in note) is outrun
 
 
 def test_the_straight_way_is_told_against_the_one_driven() -> None:
@@ -185,6 +189,16 @@ def test_a_yaw_rate_in_degrees_is_known_by_its_size(vehicle: Vehicle, times: flo
         else not note
     )
     assert _turn_scale(log, times * turn, vehicle, None) == ""  # without a track there is no scale
+
+
+def test_positions_tell_the_size_of_a_turn_too() -> None:
+    turn, nothing = 0.3 * np.sign(np.sin(TIME / 2)), np.zeros(N)
+    track = Track(TIME, nothing, nothing, 1.0 + nothing, turn, nothing, nothing.astype(bool))
+    log = Recording(TIME, {})
+    assert _turn_scale(log, 57.3 * turn, None, track).startswith(
+        "angular_velocity_z is 57 times the rate of turn of the positions"
+    )
+    assert _turn_scale(log, turn, None, track) == _turn_scale(log, 57.3 * turn, None, None) == ""
 
 
 def test_a_ratio_is_the_median_where_both_move() -> None:
