@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.stats import t as student
 
 from terragrip.estimation.calibration import gains, radii, torque_scale
 from terragrip.estimation.calibration.gains import ChannelErrors
@@ -78,6 +79,76 @@ def test_a_fit_of_radii_finds_the_curve_that_made_the_slip(vehicle: Vehicle) -> 
     assert len(set(scale.tolist())) == 1
     assert 1.0 < blocks <= 20.0
     assert (np.sqrt(variance) < 1e-3).all()
+
+
+def test_where_no_window_pulls_the_curve_keeps_its_priors_and_the_radius_their_spread(
+    vehicle: Vehicle,
+) -> None:
+    """Slip s = -(A/C) ln(1 - μ/A) at C = 5, SD .8 of ln C, and A = .6, SD .6 of ln A; the rest of the error is next to none."""
+    pulls = np.full(60, 0.1)
+    data, adhesion = bent(vehicle, pulls, 0.6, 5.0, 0.2)
+    code, used = np.zeros(60, int), np.ones((60, 4), bool)
+    data.hub_speed[:] *= (1 + 1e-3 * np.where(np.arange(60) % 2, 1, -1))[:, None]
+    scale, variance, steepness, _ = radii._fit(
+        data, vehicle, adhesion, code, np.array([0.2]), used, np.arange(60) // 6
+    )
+    share = 0.1 / 0.6
+    slip = -0.6 / 5 * np.log1p(-share)
+    by_level = slip - 0.6 / 5 * share / (1 - share)  # d slip / d ln A
+    np.testing.assert_allclose(scale, 1.0, atol=1e-4)
+    assert steepness == pytest.approx([5.0], rel=1e-3)
+    np.testing.assert_allclose(
+        np.sqrt(variance), np.hypot(0.8 * slip, 0.6 * by_level) / (1 - slip), rtol=0.02
+    )
+
+
+def test_a_window_that_says_something_else_moves_no_radius(vehicle: Vehicle) -> None:
+    pulls = np.r_[np.linspace(0.04, 0.08, 60), np.linspace(0.1, 0.5, 60)]
+    data, adhesion = bent(vehicle, pulls, 0.7, 6.0, 0.206)
+    used = np.ones((120, 4), bool)
+    data.hub_speed[5] *= 1.5
+    data.hub_speed[7], adhesion[7], used[7] = np.nan, np.nan, False
+    scale, _, steepness, _ = radii._fit(
+        data, vehicle, adhesion, np.zeros(120, int), np.array([0.5]), used, np.arange(120) // 6
+    )
+    np.testing.assert_allclose(scale, 1.03, rtol=2e-3)
+    np.testing.assert_allclose(steepness, 6.0, rtol=0.05)
+
+
+def rolled(vehicle: Vehicle, free: int, pull: float = 100.0, **more: Any) -> Windows:
+    """Windows of 2 s on a curve of A = .7, C = 6 at a radius of .206, the first ``free`` without a load to tow."""
+    pulls = np.r_[np.linspace(0.04, 0.08, 30), np.linspace(0.1, 0.5, 60)]
+    data, adhesion = bent(vehicle, pulls, 0.7, 6.0, 0.206)
+    torque = 0.2 * LOAD * (adhesion + 0.02) + 0.2 * 2.0 * data.wheel_speed
+    drawbar = np.where(np.arange(90) < free, 41.0, pull)  # 3 % of the weight is 41.2
+    return replace(data, torque=torque, drawbar=drawbar, length=2.0, start=2.0 * np.arange(90), **more)
+
+
+def test_radii_come_from_passes_at_zero_pull_with_their_slip_and_evidence(vehicle: Vehicle) -> None:
+    data = rolled(vehicle, 30)
+    data.torque[3, 1] = np.nan
+    rolling = radii.rolling_radii(data, vehicle, np.arange(90) // 6, ["log"])
+    assert isinstance(rolling, radii.Rolling)
+    np.testing.assert_allclose(rolling.radius, 0.206, rtol=1e-3)
+    slips = -(0.7 / 6) * np.log(1 - np.linspace(0.04, 0.08, 30) / 0.7)
+    assert rolling.slip == pytest.approx(np.delete(slips, 3).mean(), rel=0.05)
+    assert [(e.source, e.start, e.end, e.samples) for e in rolling.rests_on] == [("log", 0.0, 60.0, 29 * 50)]
+    _, variance, steepness, blocks = radii._fit(
+        data, vehicle, radii._adhesion(data, vehicle), np.zeros(90, int), np.array([0.475]),
+        np.isfinite(data.torque).all(axis=1)[:, None] & (radii._adhesion(data, vehicle) < 0.7 * 0.475), np.arange(90) // 6,
+    )  # fmt: skip
+    assert rolling.factor == pytest.approx(student.ppf(0.975, blocks - 1), rel=0.05)
+    np.testing.assert_allclose(
+        rolling.std, np.sqrt(variance + radii._considered(vehicle, float(steepness[0]))), rtol=0.05
+    )
+
+
+@pytest.mark.parametrize(("free", "known"), [(2, False), (3, True)])
+def test_five_metres_without_pull_are_needed(vehicle: Vehicle, free: int, known: bool) -> None:
+    result = radii.rolling_radii(rolled(vehicle, free), vehicle, np.arange(90) // 6, ["log"])
+    assert isinstance(result, radii.Rolling) is known
+    if not known:
+        assert result.why == "4 m of straight steady passes at zero pull, and 5 m are needed"
 
 
 def balance(n: int = 200, seed: int = 1, **more: Any) -> torque_scale._Balance:
