@@ -81,6 +81,16 @@ def test_a_radius_vaguer_than_the_vehicle_file_is_left_out(drive: Make, vehicle:
     assert any(u.name == "wheel_radius" and "knows it to" in u.why for u in result.unknown)
 
 
+def test_gains_that_the_file_knows_better_move_no_radius(drive: Make, vehicle: Vehicle) -> None:
+    data = vehicle.to_dict()
+    data["uncertainty"] = {**data["uncertainty"], "drive_torque_gain": 1e-6}
+    logs = [free_pass(drive, 0.2), drive(120, radius=[0.2, 0.2, 0.2, 0.201], slip=(0.0, 0.3))]
+    result = calibrate(logs, Vehicle.from_dict(data))
+    assert "drive_torque_gain rr" not in result
+    assert result["wheel_radius rr"].value == result["wheel_radius rl"].value
+    assert "over slip" not in result["wheel_radius rr"].sentence
+
+
 def test_without_a_zero_pull_pass_there_is_a_reason(drive: Make, vehicle: Vehicle) -> None:
     result = calibrate(drive(120, slip=(0.1, 0.3)), vehicle)
     assert "wheel_radius fl" not in result

@@ -116,7 +116,7 @@ def calibrate(
         shared = _useful(likely, vehicle, unknown)
     else:
         unknown += gains
-    if isinstance(rolling, Rolling) and rolled is not zeroed:
+    if isinstance(rolling, Rolling):
         apart = gains if isinstance(gains, RelativeGains) and shared else None
         quantities += _useful(plausible(_radii(rolling, apart, vehicle), vehicle, unknown), vehicle, unknown)
     quantities += shared
