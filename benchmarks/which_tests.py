@@ -1,6 +1,7 @@
-"""Which test runs which line of some rooms, and how long the processor takes: recorded once by coverage with contexts, kept in build/mutants.
+"""Which test runs which line of some rooms, and how long the processor takes: recorded once by coverage with contexts.
 
-Of a later commit only the test files that changed are run anew; lines keep their tests wherever a comparison of both sources finds them.
+It is kept in build/mutants. Of a later commit only the test files that changed are run anew; lines keep their tests wherever a
+comparison of both sources finds them.
 """
 
 from __future__ import annotations

@@ -7,7 +7,6 @@ import pytest
 
 from terragrip.recording import Recording, unit_warnings
 from terragrip.recording.plausibility import (
-    _agreement,
     _high,
     _pairs,
     _ratio,
@@ -16,6 +15,7 @@ from terragrip.recording.plausibility import (
     _wheel_turn,
 )
 from terragrip.recording.track import Track
+from terragrip.recording.turns import agreement, straight_rows, windows
 from terragrip.vehicle import Vehicle
 
 N = 200
@@ -143,19 +143,19 @@ def test_turns_agree_by_their_correlation_about_zero_over_two_seconds() -> None:
     a = np.repeat([0.3, -0.1, 0.2, 0.0], 40)
     b = np.repeat([0.1, 0.2, 0.4, 0.1], 40)
     expected = np.sum(a * b) / np.sqrt(np.sum(a**2) * np.sum(b**2))
-    assert _agreement(time, a, b) == pytest.approx(expected)
+    assert agreement(time, a, b) == pytest.approx(expected)
     noisy = a + np.tile([1.0, -1.0, 0.0, 0.0], 40)  # which two seconds cancel
-    assert _agreement(time, noisy, b) == pytest.approx(expected)
+    assert agreement(time, noisy, b) == pytest.approx(expected)
     gaps = np.where(np.arange(160) % 4 == 1, np.nan, b)
-    assert _agreement(time + 100.0, a, gaps) == pytest.approx(expected)
-    assert _agreement(time, a, np.full(160, np.nan)) == 0.0
-    assert _agreement(time, a, 0 * b) == 0.0
+    assert agreement(time + 100.0, a, gaps) == pytest.approx(expected)
+    assert agreement(time, a, np.full(160, np.nan)) == 0.0
+    assert agreement(time, a, 0 * b) == 0.0
 
 
 @pytest.mark.parametrize(("rate", "enough"), [(0.0186, False), (0.0189, True)])
 def test_under_one_and_a_half_radians_of_turning_nothing_is_compared(rate: float, enough: bool) -> None:
     time = np.arange(0.0, 80.0, 0.5)
-    assert (_agreement(time, np.full(160, rate), np.full(160, 0.1)) != 0.0) is enough
+    assert (agreement(time, np.full(160, rate), np.full(160, 0.1)) != 0.0) is enough
 
 
 def test_wheels_tell_a_turn_by_right_less_left(vehicle: Vehicle) -> None:
@@ -270,3 +270,27 @@ def test_angles_and_gravity_are_doubted_by_their_size(channel: str, value: float
 )
 def test_samples_five_seconds_apart_may_be_in_another_unit(step: float, rows: int, words: str) -> None:
     assert said(time=step * np.arange(rows), drawbar_force=np.zeros(rows)) == words
+
+
+def test_windows_hold_the_rows_in_which_every_channel_does() -> None:
+    time = 50.0 + np.arange(0.0, 8.0, 0.5)
+    a, b = np.arange(16.0), np.where((np.arange(16) == 5) | (np.arange(16) > 11), np.nan, 2.0)
+    np.testing.assert_allclose(windows(time, np.array([a, b])), [[1.5, 17 / 3, 9.5], [2.0, 2.0, 2.0]])
+    assert windows(time, np.array([a, np.full(16, np.nan)])).shape == (2, 0)
+
+
+@pytest.mark.parametrize(("rows", "few"), [(31, False), (30, True)])
+def test_straight_rows_are_those_of_alike_sides_or_else_of_one_way(
+    vehicle: Vehicle, rows: int, few: bool
+) -> None:
+    """Apart by less than a fifth of the sum: 4 beside 6 is straight no more; 30 rows are too few."""
+    straight = np.arange(100) < rows
+    sides = {
+        "fl": np.full(100, 4.01),
+        "fr": np.where(straight, 6.0, 6.1),
+        "rl": np.ones(100),
+        "rr": np.where(np.arange(100) > 90, -1.0, 1.0),
+    }
+    log = Recording(np.arange(100.0), {f"wheel_speed_{w}": v for w, v in sides.items()})
+    expected = np.arange(100) <= 90 if few else straight
+    np.testing.assert_array_equal(straight_rows(log, vehicle), expected)
