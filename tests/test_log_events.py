@@ -28,7 +28,7 @@ def test_an_event_that_is_not_listed_is_refused() -> None:
 
 
 def test_live_logs_its_life_in_json_and_no_secret(tmp_path: Path) -> None:
-    pytest.importorskip("aiomqtt")
+    pytest.importorskip("paho.mqtt")
     made = [sys.executable, "-m", "terragrip", "simulate", "grass-05", "-o", "."]
     subprocess.run(made, cwd=tmp_path, check=True, capture_output=True)
     (vehicle,) = list(tmp_path.rglob("vehicle*.yaml"))[:1]

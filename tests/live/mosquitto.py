@@ -7,10 +7,12 @@ import contextlib
 import json
 import os
 import shutil
+import signal
 import subprocess
+import threading
 import time
 
-import aiomqtt
+import paho.mqtt.client as paho
 import pytest
 
 MOSQUITTO = shutil.which("mosquitto") or shutil.which("mosquitto", path="/usr/sbin:/usr/local/sbin")
@@ -22,7 +24,7 @@ def openssl(*arguments: str) -> None:
 
 @contextlib.contextmanager
 def broker(folder, port, *, password=None, tls=False):
-    """mosquitto on loopback while the block runs."""
+    """mosquitto on loopback while the block runs; gives its process."""
     if MOSQUITTO is None:
         pytest.skip("NOT TESTED: there is no mosquitto; apt-get install mosquitto")
     lines = [
@@ -50,8 +52,9 @@ def broker(folder, port, *, password=None, tls=False):
     process = subprocess.Popen([MOSQUITTO, "-c", folder / "mosquitto.conf"], stderr=subprocess.DEVNULL)
     try:
         wait_for(port)
-        yield
+        yield process
     finally:
+        process.send_signal(signal.SIGCONT)  # a test may have stopped it
         process.terminate()
         process.wait(60)
 
@@ -68,19 +71,55 @@ def wait_for(port: int) -> None:
 
 
 @contextlib.asynccontextmanager
-async def listening(port: int, topic: str, **options):
-    """A client that has what came on a topic in a list."""
-    got = []
-    async with aiomqtt.Client("127.0.0.1", port, **options) as client:
-        await client.subscribe(topic)
+async def listening(port: int, topic: str | None = None, *, username=None, password=None, tls=None):
+    """Another client, paho in a thread, and what came on a topic in a list."""
+    got, heard = [], threading.Event()
+    client = paho.Client(paho.CallbackAPIVersion.VERSION2)
+    client.username_pw_set(username, password)
+    if tls is not None:
+        client.tls_set_context(tls)
+    client.on_message = lambda _, __, message: got.append((message.topic, json.loads(message.payload)))
+    client.on_subscribe = lambda *_: heard.set()
+    await asyncio.to_thread(client.connect, "127.0.0.1", port)
+    client.loop_start()
+    try:
+        if topic is not None:
+            client.subscribe(topic)
+            assert await asyncio.to_thread(heard.wait, 60)
+        yield client, got
+    finally:
+        client.disconnect()
+        await asyncio.to_thread(client.loop_stop)
 
-        async def collect():
-            async for message in client.messages:
-                got.append((message.topic.value, json.loads(message.payload)))  # noqa: PERF401
 
-        task = asyncio.create_task(collect())
+@contextlib.asynccontextmanager
+async def pretended(port: int, *, takes_topics: bool = True, acknowledges: bool = True):
+    """A broker that may refuse topics or not acknowledge, which mosquitto does not; gives what was published to it, as JSON."""
+    got, links = [], []
+
+    async def serve(reader, writer):
+        links.append(writer)
+        with contextlib.suppress(asyncio.IncompleteReadError):
+            while True:
+                kind, byte = await reader.readexactly(2)
+                length, shift = byte & 0x7F, 7
+                while byte >= 0x80:
+                    (byte,) = await reader.readexactly(1)
+                    length, shift = length | (byte & 0x7F) << shift, shift + 7
+                body = await reader.readexactly(length)
+                if kind == 0x10:
+                    writer.write(b"\x20\x02\x00\x00")
+                elif kind == 0x82:
+                    writer.write(b"\x90\x03" + body[:2] + (b"\x00" if takes_topics else b"\x80"))
+                elif kind & 0xF6 == 0x32:  # of quality 1, perhaps once more
+                    end = 2 + int.from_bytes(body[:2], "big")
+                    got.append(json.loads(body[end + 2 :]))
+                    if acknowledges:
+                        writer.write(b"\x40\x02" + body[end : end + 2])
+
+    async with await asyncio.start_server(serve, "127.0.0.1", port):
         try:
-            yield client, got
+            yield got
         finally:
-            task.cancel()
-            await asyncio.gather(task, return_exceptions=True)
+            for link in links:
+                link.close()

@@ -103,7 +103,7 @@ def test_what_cannot_be_is_one_line_and_exit_2(capsys, files, options, expected)
 
 
 def test_a_missing_package_names_the_extra(capsys, files, monkeypatch):
-    monkeypatch.setitem(sys.modules, "aiomqtt", None)
+    monkeypatch.setitem(sys.modules, "paho", None)
     code, _, err = run(capsys, files, "--source", "mqtt://127.0.0.1/machine")
     assert code == 2
     assert "pip install 'terragrip[live]'" in err

@@ -91,11 +91,11 @@ async def test_each_has_the_digits_of_a_service_of_its_own(tmp_path, vehicle, ev
                 await stack.enter_async_context(running(service))
             while not all(one.feeds[0].unreadable for one in alone.values()) or len(many.vehicles.runs) < 3:
                 for name in logs:
-                    await client.publish(f"field/{name}/sample", b"no json")
+                    client.publish(f"field/{name}/sample", b"no json")
                 await asyncio.sleep(0.05)
             for k in range(580):
                 for name, one in sent.items():
-                    await client.publish(f"field/{name}/sample", json.dumps(one[k]))
+                    client.publish(f"field/{name}/sample", json.dumps(one[k]))
                 await asyncio.sleep(0.003)
             for name, service in alone.items():
                 await until(lambda s=service: s.core.rows >= 579, 30)

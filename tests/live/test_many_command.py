@@ -8,7 +8,6 @@ import os
 import signal
 import subprocess
 
-import aiomqtt
 import numpy as np
 import pytest
 
@@ -38,7 +37,7 @@ async def test_killed_and_started_again_each_goes_on(tmp_path, vehicle, port):
 
             async def publish(k: int) -> None:
                 for name, one in sent.items():
-                    await client.publish(f"field/{name}/sample", json.dumps(one[k]))
+                    client.publish(f"field/{name}/sample", json.dumps(one[k]))
 
             def reached(k: int) -> bool:
                 """Whether the estimate of each vehicle's row ``k`` has come."""
@@ -125,9 +124,9 @@ async def test_log_lines_bear_the_vehicle(tmp_path, vehicle, port):
                 lines.append(json.loads(line))
 
         reading = asyncio.create_task(read())
-        async with aiomqtt.Client("127.0.0.1", port) as client, asyncio.timeout(60):
+        async with listening(port) as (client, _), asyncio.timeout(60):
             while not any(line["event"] == "unreadable" for line in lines):
-                await client.publish("t7/s", b"no json")
+                client.publish("t7/s", b"no json")
                 await asyncio.sleep(0.05)
         process.send_signal(signal.SIGINT)
         await asyncio.wait_for(reading, 30)

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
+import asyncio
 import json
+import signal
 import ssl
 
-import aiomqtt
 import pytest
 
-from machine import events, messages, running, until
-from mosquitto import broker, listening
+from machine import events, messages, rows_of, running, until
+from mosquitto import broker, listening, pretended
 from terragrip.errors import InputError
 from terragrip.formats import Profile
 from terragrip.live.service import Service
@@ -28,8 +29,8 @@ async def test_by_password_in_and_out(tmp_path, vehicle, short, port, monkeypatc
         known = {"username": "robot", "password": "kept-well"}
         async with listening(port, "terragrip/#", **known) as (client, got), running(service):
             for message in messages(short.recording, 300):
-                await client.publish("machine/all", json.dumps(message))
-            await client.publish("machine/all", b"no json")
+                client.publish("machine/all", json.dumps(message))
+            client.publish("machine/all", b"no json")
             await until(lambda: service.core.rows == 300)
             await until(lambda: any(topic == "terragrip/event" for topic, _ in got))
             await until(
@@ -55,10 +56,10 @@ async def test_by_tls_and_a_number_a_topic(tmp_path, vehicle, short, port):
         )
         service = Service(vehicle, [f"mqtts://127.0.0.1:{port}/m/#?ca={tmp_path}/cert.pem"], profile=profile)
         trusted = ssl.create_default_context(cafile=tmp_path / "cert.pem")
-        async with running(service), aiomqtt.Client("127.0.0.1", port, tls_context=trusted) as client:
+        async with running(service), listening(port, tls=trusted) as (client, _):
             for _ in range(20):
-                await client.publish("m/speed", "3.6")
-                await client.publish("m/hubs", json.dumps(dict.fromkeys(vehicle.wheels, 5.0)))
+                client.publish("m/speed", "3.6")
+                client.publish("m/hubs", json.dumps(dict.fromkeys(vehicle.wheels, 5.0)))
             await until(lambda: service.core.counts.total("received") == 100)
             await until(lambda: service.core.rows > 0)
         rows = [message.row for message in service.seen if message.kind == "estimate"]
@@ -77,8 +78,8 @@ async def test_a_broker_that_refuses_is_named_and_tried_again(tmp_path, vehicle,
             monkeypatch.setenv("TERRAGRIP_USERNAME", "robot")
             monkeypatch.setenv("TERRAGRIP_PASSWORD", "kept-well")
             await until(lambda: events(service, "source_back") and events(service, "sink_back"))
-            async with aiomqtt.Client("127.0.0.1", port, username="robot", password="kept-well") as client:
-                await client.publish("m", json.dumps(messages(short.recording, 1)[0]))
+            async with listening(port, username="robot", password="kept-well") as (client, _):
+                client.publish("m", json.dumps(messages(short.recording, 1)[0]))
             await until(lambda: service.core.rows == 1)
         before = len(events(service, "source_lost"))
         await until(
@@ -100,3 +101,75 @@ async def test_credentials_that_others_may_read_are_refused(tmp_path, vehicle, m
     secret.write_text("pasword: x\n")
     with pytest.raises(InputError, match="line 1"):
         Service(vehicle, ["mqtts://broker.example/m"])
+
+
+@pytest.mark.parametrize(("qos", "tls"), [(0, True), (1, False), (2, True)])
+async def test_a_burst_comes_and_goes_whole(tmp_path, vehicle, short, port, qos, tls):
+    """All at once, by each quality of service: each sample is a row, each row's estimate is heard."""
+    sent = messages(short.recording, 600)
+    with broker(tmp_path, port, tls=tls):
+        at, ca = f"{'mqtts' if tls else 'mqtt'}://127.0.0.1:{port}", f"&ca={tmp_path}/cert.pem" if tls else ""
+        trusted = ssl.create_default_context(cafile=tmp_path / "cert.pem") if tls else None
+        service = Service(vehicle, [f"{at}/m?qos={qos}{ca}"], [f"{at}/out?qos={qos}{ca}"])
+        async with listening(port, "out/estimate", tls=trusted) as (client, got), running(service):
+            for message in sent:
+                client.publish("m", json.dumps(message), qos)
+            await until(lambda: sum(not data["predicted"] for _, data in got) == 600)
+    assert service.core.rows == 600
+    assert [data["time"] for _, data in got if not data["predicted"]] == [message["time"] for message in sent]
+
+
+async def test_a_broker_that_stands_still_holds_nothing_up(tmp_path, vehicle, short, port):
+    """Estimates go on, the sink's oldest are dropped and counted; once the broker runs again the newest come. It ends beside one, too."""
+    with broker(tmp_path, port) as process:
+        at = f"mqtt://127.0.0.1:{port}/out?qos=1"
+        service = Service(vehicle, ["udp://127.0.0.1:0"], [at])
+        async with listening(port, "out/estimate") as (_, got), running(service):
+            rows = [(time, values) for time, values in rows_of(short.recording)]
+            process.send_signal(signal.SIGSTOP)
+            for k in range(1500):
+                time, values = rows[k % 500]
+                service.feeds[0].sample(time + 5.0 * (k // 500), values)
+                if k % 50 == 0:
+                    await asyncio.sleep(0)
+            await until(lambda: service.core.rows == 1500)
+            (outbox,) = service.outboxes
+            assert outbox.dropped >= 1500 - outbox.capacity - 20
+            assert not outbox.is_lost
+            process.send_signal(signal.SIGCONT)
+            await until(lambda: got and got[-1][1]["time"] >= service.core.time)
+            process.send_signal(signal.SIGSTOP)
+            service.feeds[0].sample(15.0, rows[0][1])
+            await until(lambda: service.core.rows == 1501)
+
+
+async def test_what_no_broker_acknowledged_is_sent_again(vehicle, short, port):
+    service = Service(vehicle, ["udp://127.0.0.1:0"], [f"mqtt://127.0.0.1:{port}/out?qos=1"])
+    rows = list(rows_of(short.recording))[:40]
+    async with pretended(port, acknowledges=False) as first:
+        task = asyncio.create_task(service.run())
+        for time, values in rows:
+            service.feeds[0].sample(time, values)
+        await until(lambda: len(first) == 20)  # no more wait for a broker
+    async with pretended(port) as second:
+        await until(lambda: sum("slip_fl" in one for one in second) >= 40)
+        service.stop()
+        await task
+    assert first == second[:20]
+    assert [one["time"] for one in second if not one.get("predicted", True)] == [time for time, _ in rows]
+
+
+async def test_a_broker_that_refuses_the_topic_is_named(vehicle, port):
+    async with pretended(port, takes_topics=False):
+        service = Service(vehicle, [f"mqtt://127.0.0.1:{port}/m"])
+        async with running(service):
+            await until(lambda: events(service, "source_lost"))
+    assert events(service, "source_lost") == ["the broker refuses the topic: Unspecified error"]
+
+
+@pytest.mark.parametrize(
+    ("source", "sink"), [("a/#/b", "out"), ("a+/b", "out"), ("a", "out/#"), ("a", "out/+")]
+)
+async def test_wild_cards_out_of_place_are_refused(vehicle, source, sink):
+    with pytest.raises(InputError, match="wild card where none may stand"):
+        Service(vehicle, [f"mqtt://127.0.0.1/{source}"], [f"mqtt://127.0.0.1/{sink}"])

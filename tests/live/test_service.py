@@ -51,7 +51,7 @@ async def test_no_object_holds_its_caller(tmp_path, vehicle, short, port, sender
 
 
 async def test_a_task_that_loses_its_cancellation_is_cancelled_again():
-    """As a sink that publishes by aiomqtt under Python 3.11: the service did not end."""
+    """As `wait_for` of Python 3.11 may lose it, by which libraries wait: the service did not end."""
 
     async def loses_one():
         with contextlib.suppress(asyncio.CancelledError):

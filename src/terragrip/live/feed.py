@@ -63,6 +63,8 @@ class Feed:
 
     def _of_topic(self, topic: str, fields: Mapping[str, Any]) -> Mapping[str, Any]:
         """Fields by their own names, and by ``topic/name`` where the profile asks for that."""
+        if self.decoder.profile is None:
+            return fields
         long = {f"{topic}/{name}": value for name, value in fields.items()}
         wanted = {name: value for name, value in long.items() if self.decoder.wants(name)}
         return {**fields, **wanted} if wanted else fields

@@ -1,27 +1,38 @@
-"""The connection to an MQTT broker, for source and sink."""
+"""The connection to an MQTT broker, for source and sink: what there is to read or to write goes in one turn of the loop."""
 
 from __future__ import annotations
 
-import logging
+import asyncio
+import select
 import socket
 import ssl
-from typing import Any
+from collections.abc import Callable
+from typing import Any, Self
 
 from terragrip.errors import InputError
 from terragrip.live.credentials import Credentials
+from terragrip.live.feed import Lost
 from terragrip.live.uri import Uri
 
-_silent = logging.getLogger("terragrip.live.mqtt")
-_silent.addHandler(logging.NullHandler())
-_silent.propagate = False  # the service says itself what is lost
+_PATIENCE = 5.0  # s for the broker to answer, and to take what is left at the end
+_AT_ONCE = 64  # messages read before others have their turn
+_UNACKNOWLEDGED = 20  # messages of quality 1 or 2 that may wait for the broker: mosquitto holds back what is more
+_KEEP = 1.0  # s between two looks at whether the broker is alive
 
 
-def check(uri: Uri) -> Credentials:
-    """Raise InputError on a missing host or topic, a CA that cannot be read, or a password that would travel openly."""
-    import aiomqtt  # noqa: F401  # so that a missing package is said at once
+def check(uri: Uri, wild: bool = False) -> Credentials:
+    """Raise InputError on a missing host or topic, a wild card out of place (``wild``: some may stand), a CA that cannot be read, or a
+    password that would travel openly.
+    """
+    import paho.mqtt.client  # noqa: F401  # so that a missing package is said at once
 
     if not uri.host or not uri.path.strip("/"):
         raise InputError("names no broker and topic", place=uri.text, hint="write mqtt://127.0.0.1/machine/+")
+    levels = uri.path.split("/")
+    proper = levels.count("+") + (levels[-1] == "#") if wild else 0
+    if uri.path.count("+") + uri.path.count("#") > proper:
+        hint = "+ stands for one whole level, # for all at the end" if wild else "name one topic"
+        raise InputError("has a wild card where none may stand", place=uri.text, hint=hint)
     credentials = Credentials.find()
     if uri.scheme == "mqtts":
         _tls(uri)
@@ -30,26 +41,189 @@ def check(uri: Uri) -> Credentials:
     return credentials
 
 
-def client(uri: Uri) -> Any:
-    """An aiomqtt client for ``mqtt://HOST[:1883]/TOPIC`` or, by TLS, ``mqtts://HOST[:8883]/TOPIC?ca=FILE``.
+class Connection:
+    """A connection by ``mqtt://HOST[:1883]/TOPIC`` or, with TLS, ``mqtts://HOST[:8883]/TOPIC?ca=FILE``, while an ``async with`` lasts.
 
-    Needs a running loop; raises InputError as `check` does.
+    ``take`` gets topic and bytes of each message that comes, in the loop; what it raises ends the connection. Lost is raised where the
+    broker cannot be reached, refuses or goes away; InputError as by `check`. Needs a running loop.
     """
-    import aiomqtt
 
-    credentials, secure = check(uri), uri.scheme == "mqtts"
-    return aiomqtt.Client(
-        uri.host,
-        uri.port or (8883 if secure else 1883),
-        username=credentials.username,
-        password=credentials.password,
-        identifier=uri.options.get("client"),
-        tls_context=_tls(uri) if secure else None,
-        timeout=5.0,
+    def __init__(self, uri: Uri, take: Callable[[str, bytes], None] | None = None) -> None:
+        from paho.mqtt.client import Client
+        from paho.mqtt.enums import CallbackAPIVersion
+
+        self.unacknowledged: dict[int, tuple[str, bytes]] = {}  # published with quality 1 or 2, in order
+        credentials, self._secure = check(uri, wild=True), uri.scheme == "mqtts"
+        self._where = uri.host, uri.port or (8883 if self._secure else 1883)
+        self._loop = asyncio.get_running_loop()
+        self._moved = asyncio.Event()  # something came of what is waited for
+        self._failure: Exception | None = None
+        self._is_accepted = self._is_subscribed = False
+        self._come = select.poll()
+        self._take = take
+        client = self._client = Client(
+            CallbackAPIVersion.VERSION2, uri.options.get("client"), reconnect_on_failure=False
+        )
+        client.username_pw_set(credentials.username, credentials.password)
+        if self._secure:
+            client.tls_set_context(_tls(uri))
+        client.connect_timeout = _PATIENCE
+        client.max_inflight_messages = _UNACKNOWLEDGED
+        client.on_connect, client.on_disconnect = self._accepted, self._disconnected
+        client.on_subscribe, client.on_message = self._subscribed, self._message
+
+    async def __aenter__(self) -> Self:
+        client = self._client
+        try:
+            await asyncio.to_thread(client.connect, *self._where)
+        except (OSError, UnicodeError) as error:  # a host's name may be no text that DNS knows
+            raise Lost(f"the broker: {getattr(error, 'strerror', None) or error}") from error
+        link: Any = client.socket()
+        if link is None:
+            raise Lost("the broker: closed the connection")
         # Or a message waits up to 40 ms for the broker to acknowledge the one before (Nagle's algorithm).
-        socket_options=[(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)],
-        logger=_silent,
-    )
+        link.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        self._number = link.fileno()
+        client.on_socket_close = lambda *_: self._forget()
+        self._come.register(self._number, select.POLLIN)
+        self._loop.add_reader(self._number, self._read)
+        self._timer = self._loop.call_later(_KEEP, self._keep)
+        try:
+            async with asyncio.timeout(_PATIENCE):
+                await self._until(lambda: self._is_accepted)
+        except TimeoutError:
+            self._close()
+            raise Lost(f"the broker: no answer for {_PATIENCE:.0f} s") from None
+        except BaseException:
+            self._close()
+            raise
+        return self
+
+    async def __aexit__(self, *_: object) -> None:
+        try:
+            if self._failure is None:
+                async with asyncio.timeout(_PATIENCE):
+                    await self._until(lambda: not self.unacknowledged)
+                    self._client.disconnect()  # behind what is still to be written
+                    self._await_room()
+                    await self.ended()
+        except (TimeoutError, Lost):
+            pass
+        finally:
+            self._close()
+
+    async def subscribe(self, topic: str, qos: int) -> None:
+        """Have the messages of a topic; they come while `ended` is awaited, and before."""
+        self._client.subscribe(topic, qos)
+        self._await_room()
+        await self._until(lambda: self._is_subscribed)
+
+    async def ended(self) -> None:
+        """Wait until the connection is lost, and raise why."""
+        await self._until(lambda: False)
+
+    def publish(self, topic: str, data: bytes, qos: int) -> None:
+        """Send a message, as far as there is room before the broker; `room` waits for that."""
+        if qos and self._client.on_publish is None:  # a call that costs as much as the message
+            self._client.on_publish = self._acknowledged
+        info = self._client.publish(topic, data, qos)
+        if qos:
+            self.unacknowledged[info.mid] = topic, data
+        if self._failure is not None:
+            raise self._failure
+        self._await_room()
+
+    @property
+    def has_room(self) -> bool:
+        """Whether all was written, and the broker has few left to acknowledge."""
+        return not self._client.want_write() and len(self.unacknowledged) < _UNACKNOWLEDGED
+
+    async def room(self) -> None:
+        """Wait until there is room; lets others have their turn in any case."""
+        await asyncio.sleep(0)
+        await self._until(lambda: self.has_room)
+
+    async def _until(self, condition: Callable[[], bool]) -> None:
+        while not condition():
+            if self._failure is not None:
+                raise self._failure
+            self._moved.clear()
+            await self._moved.wait()
+
+    def _read(self) -> None:
+        """Take what has come, up to some messages; the loop calls again where there are more."""
+        try:
+            for _ in range(_AT_ONCE):
+                self._client.loop_read()  # a packet
+                if self._failure is not None or not (self._is_decrypted() or self._come.poll(0)):
+                    break
+        except Exception as error:  # noqa: BLE001 - whatever `take` raised: to whom waits, not to the loop
+            self._fail(error)
+        self._await_room()
+        if self._is_decrypted():
+            self._loop.call_soon(self._read)
+
+    def _is_decrypted(self) -> bool:
+        """Whether TLS holds bytes that the loop does not see."""
+        link: Any = self._client.socket() if self._secure else None
+        return link is not None and link.pending() > 0
+
+    def _await_room(self) -> None:
+        if self._failure is None and self._client.want_write():
+            self._loop.add_writer(self._number, self._write)
+
+    def _write(self) -> None:
+        self._client.loop_write()
+        if self._failure is None and not self._client.want_write():
+            self._loop.remove_writer(self._number)
+            self._moved.set()
+
+    def _keep(self) -> None:
+        self._client.loop_misc()
+        if self._failure is None:
+            self._await_room()
+            self._timer = self._loop.call_later(_KEEP, self._keep)
+
+    def _accepted(self, _: object, __: object, ___: object, reason: Any, *____: object) -> None:
+        if reason.is_failure:
+            self._fail(Lost(f"the broker: {reason}"))
+            return
+        self._is_accepted = True
+        self._moved.set()
+
+    def _subscribed(self, _: object, __: object, ___: object, reasons: Any, *____: object) -> None:
+        if reasons[0].is_failure:
+            self._fail(Lost(f"the broker refuses the topic: {reasons[0]}"))
+            return
+        self._is_subscribed = True
+        self._moved.set()
+
+    def _message(self, _: object, __: object, message: Any) -> None:
+        if self._take is not None:
+            self._take(message.topic, message.payload)
+
+    def _acknowledged(self, _: object, __: object, mid: int, *___: object) -> None:
+        self.unacknowledged.pop(mid, None)
+        self._moved.set()
+
+    def _disconnected(self, _: object, __: object, ___: object, reason: Any, *____: object) -> None:
+        self._fail(Lost(f"the broker: the connection is lost ({reason})"))
+
+    def _fail(self, why: Exception) -> None:
+        if self._failure is None:
+            self._failure = why
+        self._moved.set()
+
+    def _forget(self) -> None:
+        self._loop.remove_reader(self._number)
+        self._loop.remove_writer(self._number)
+        self._timer.cancel()
+
+    def _close(self) -> None:
+        link: Any = self._client.socket()
+        if link is not None:
+            self._forget()
+            link.close()
 
 
 def _tls(uri: Uri) -> ssl.SSLContext:

@@ -19,7 +19,7 @@ from terragrip.live.options import Options
 from terragrip.live.outbox import Outbox
 from terragrip.live.sinks import open_sink
 from terragrip.live.sources import Source, open_source
-from terragrip.live.supervision import cancelled, ended, report_unhandled, supervise_sink, supervise_source
+from terragrip.live.supervision import cancelled, ended, supervise_sink, supervise_source
 from terragrip.live.vehicle_run import VehicleRun
 
 if TYPE_CHECKING:
@@ -110,7 +110,6 @@ class Service:
 
         Raises InputError where a source or sink cannot be used at all, or the record could not be written.
         """
-        asyncio.get_running_loop().set_exception_handler(report_unhandled)
         gc.freeze()  # what is there now stays: the collector need not look at it again
         start = asyncio.create_task
         sources = [

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import logging
 from collections.abc import Awaitable, Callable, Sequence
 from typing import Any
 
@@ -17,8 +16,6 @@ _SETTLED = 10.0  # s connected, after which the back-off begins anew
 
 Task = asyncio.Task[Any]
 Run = Callable[[], Awaitable[None]]
-
-logger = logging.getLogger("terragrip.live")
 
 
 async def supervise_source(run: Run, lost: Callable[[str], None]) -> None:
@@ -57,19 +54,11 @@ async def ended(sources: Sequence[Task], sinks: Sequence[Task], until_end: Seque
 
 
 async def cancelled(tasks: Sequence[Task]) -> None:
-    """Cancel tasks and wait for their end; again, where one goes on: Python 3.11's `wait_for`, by which aiomqtt publishes, may lose a
-    cancellation that comes together with what it waits for.
+    """Cancel tasks and wait for their end; again, where one goes on: it may wait for another side that no longer answers, or a library may
+    have lost the cancellation.
     """
     while going_on := [task for task in tasks if not task.done()]:
         for task in going_on:
             task.cancel()
         await asyncio.wait(going_on, timeout=_PATIENCE)
     await asyncio.gather(*tasks, return_exceptions=True)
-
-
-def report_unhandled(loop: asyncio.AbstractEventLoop, context: dict[str, Any]) -> None:
-    """A future whose failure nobody awaits: aiomqtt leaves some when a broker goes, of which the service knows."""
-    if type(context.get("exception")).__module__.startswith("aiomqtt"):
-        logger.info("%s: %s", context["message"], context["exception"])
-    else:
-        loop.default_exception_handler(context)

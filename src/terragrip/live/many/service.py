@@ -26,7 +26,7 @@ from terragrip.live.record_folder import locked
 from terragrip.live.service import HOUSEKEEPING, LINGER
 from terragrip.live.sinks.studio import StudioSink
 from terragrip.live.sources import TopicSource, open_source
-from terragrip.live.supervision import cancelled, ended, report_unhandled, supervise_sink, supervise_source
+from terragrip.live.supervision import cancelled, ended, supervise_sink, supervise_source
 from terragrip.live.vehicle_run import VehicleRun
 
 _SLICE = 8  # vehicles that are looked after at once
@@ -97,7 +97,6 @@ class ManyService:
 
         Raises InputError where a source or sink cannot be used at all, or a record could not be written to its end.
         """
-        asyncio.get_running_loop().set_exception_handler(report_unhandled)
         gc.freeze()
         start = asyncio.create_task
         sources = [
@@ -157,8 +156,11 @@ class ManyService:
             return
         vehicles.filled.clear()
         until = min((run.pipeline.waiting_until or 0.0 for run in pending.values()), default=None)
+        if until is None:
+            await vehicles.filled.wait()
+            return
         try:
-            async with asyncio.timeout(None if until is None else max(until - vehicles.clock(), 0.0) + 1e-4):
+            async with asyncio.timeout(max(until - vehicles.clock(), 0.0) + 1e-4):
                 await vehicles.filled.wait()
         except TimeoutError:
             pass

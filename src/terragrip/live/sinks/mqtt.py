@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
-from terragrip.live.feed import Lost
-from terragrip.live.mqtt_client import check, client, quality
+from collections import deque
+
+from terragrip.live.mqtt_client import Connection, check, quality
 from terragrip.live.outbox import Outbox
 from terragrip.live.topics import of_vehicle
 from terragrip.live.uri import Uri
+
+_AT_ONCE = 64  # messages before others have their turn
 
 
 class MqttSink:
@@ -19,20 +22,24 @@ class MqttSink:
         self.uri = uri
         self.qos = quality(uri)
         check(uri)
+        self._again: deque[tuple[str, bytes]] = deque()  # what no broker acknowledged
 
     async def run(self, outbox: Outbox) -> None:
         """Publish messages; raises Lost where the broker refuses or goes away."""
-        import aiomqtt
-
-        prefix = self.uri.path.rstrip("/")
-        try:
-            async with client(self.uri) as broker:
-                outbox.connected()
+        prefix, sent = self.uri.path.rstrip("/"), 0
+        async with Connection(self.uri) as broker:
+            outbox.connected()
+            try:
                 while True:
-                    message = await outbox.get()
-                    topic = f"{of_vehicle(prefix, message.vehicle)}/{message.kind}"
-                    await broker.publish(topic, message.json(outbox.columns), qos=self.qos)
-        except aiomqtt.MqttError as error:
-            raise Lost(f"the broker: {error}") from error
-        except OSError as error:
-            raise Lost(f"the broker: {error.strerror or error}") from error
+                    if self._again:
+                        topic, data = self._again.popleft()
+                    else:
+                        message = await outbox.get()
+                        topic = f"{of_vehicle(prefix, message.vehicle)}/{message.kind}"
+                        data = message.json(outbox.columns)
+                    broker.publish(topic, data, self.qos)
+                    sent += 1
+                    if not broker.has_room or not sent % _AT_ONCE:
+                        await broker.room()
+            finally:
+                self._again.extendleft(reversed(broker.unacknowledged.values()))

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from terragrip.live.feed import Lost, Receiver
-from terragrip.live.mqtt_client import check, client, quality
+from terragrip.live.feed import Receiver
+from terragrip.live.mqtt_client import Connection, check, quality
 from terragrip.live.uri import Uri
 
 
@@ -15,21 +15,11 @@ class MqttSource:
     def __init__(self, uri: Uri, *_: object) -> None:
         self.uri = uri
         self.qos = quality(uri)
-        check(uri)
+        check(uri, wild=True)
 
     async def run(self, feed: Receiver) -> None:
         """Feed messages; raises Lost where the broker refuses or goes away."""
-        import aiomqtt
-
-        try:
-            async with client(self.uri) as broker:
-                await broker.subscribe(self.uri.path, qos=self.qos)
-                feed.connected()
-                async for message in broker.messages:
-                    payload = message.payload
-                    data = payload if isinstance(payload, bytes) else str(payload).encode()
-                    feed.message(data, topic=message.topic.value)
-        except aiomqtt.MqttError as error:
-            raise Lost(f"the broker: {error}") from error
-        except OSError as error:  # TLS failures come through as they are
-            raise Lost(f"the broker: {error.strerror or error}") from error
+        async with Connection(self.uri, lambda topic, data: feed.message(data, topic=topic)) as broker:
+            await broker.subscribe(self.uri.path, self.qos)
+            feed.connected()
+            await broker.ended()
