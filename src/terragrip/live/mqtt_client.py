@@ -16,7 +16,7 @@ from terragrip.live.uri import Uri
 
 _PATIENCE = 5.0  # s for the broker to answer, and to take what is left at the end
 _AT_ONCE = 64  # messages read before others have their turn
-_UNACKNOWLEDGED = 20  # messages of quality 1 or 2 that may wait for the broker: mosquitto holds back what is more
+_UNACKNOWLEDGED = 20  # messages of quality 1 or 2: of more mosquitto holds some back
 _KEEP = 1.0  # s between two looks at whether the broker is alive
 
 
