@@ -187,3 +187,37 @@ def test_on_a_terminal_it_asks_and_asks_again(tmp_path: Path, monkeypatch: pytes
 def test_what_is_no_class_is_an_input_error() -> None:
     with pytest.raises(InputError, match="no class of machine"):
         make("boat")
+
+
+def test_a_tank_is_asked_for_and_its_filling_acts_where_it_is(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    asked: list[str] = []
+    told = {"centre of gravity ahead": "-0.4 m", "its centre of gravity above": "1.2 m"}
+
+    def prompt(text: str, **_: object) -> str:
+        asked.append(text)
+        return next((answer for part, answer in told.items() if part in text), "")
+
+    monkeypatch.setattr("sys.stdin.isatty", lambda: True)
+    monkeypatch.setattr(
+        typer, "prompt", lambda text, **_: "tractor-4wd" if "number" in text else prompt(text)
+    )
+    by_hand, by_options = tmp_path / "asked.yaml", tmp_path / "options.yaml"
+    assert main(["new", "vehicle", "--signals", "torque", "-o", str(by_hand), "--quiet"]) == 0
+    words = ["--class", "tractor-4wd", "--payload-x=-0.4 m", "--payload-z", "1.2 m"]
+    assert main(["new", "vehicle", *words, "-o", str(by_options), "--quiet"]) == 0
+    empty = tg.Vehicle.load(by_hand)
+    assert empty == tg.Vehicle.load(by_options)
+    full = empty.loaded(empty.mass + 1000)
+    added = full.axle_mass - empty.axle_mass
+    assert added[1] == pytest.approx(1000 * (1 + 0.4 / empty.wheelbase))
+    assert full.center_of_gravity_height > empty.center_of_gravity_height
+
+
+def test_without_a_tank_the_file_has_none_and_no_height_stands_alone() -> None:
+    assert make("tractor-4wd").vehicle.payload is None
+    assert "payload" not in make("tractor-4wd").to_yaml()
+    assert not any(field.name.startswith("payload") for field in fields(class_named("rover"), "torque"))
+    with pytest.raises(InputError, match="give payload_x too"):
+        make("tractor-4wd", "torque", {"payload_z": 1.2})

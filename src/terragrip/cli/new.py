@@ -30,7 +30,7 @@ def _list_classes(wanted: bool) -> None:
         for machine in classes():
             print(f"{machine.name}: {machine.title}")
             for field in fields(machine, "torque"):
-                print(f"    {field.assumption} ({field.typical.source})")
+                print(f"    {field.assumption}" + (f" ({field.typical.source})" if field.typical else ""))
         raise typer.Exit
 
 
@@ -78,6 +78,14 @@ def vehicle(
         str | None, typer.Option(metavar="VALUE", help="The tyres' own, share of the load.")
     ] = None,
     bearing_resistance: Annotated[str | None, typer.Option(metavar="VALUE", help="In N s/rad.")] = None,
+    payload_x: Annotated[
+        str | None,
+        typer.Option(
+            metavar="VALUE",
+            help="Of a tank or hopper, for a log with the machine's mass: its centre of gravity ahead of the rear axle.",
+        ),
+    ] = None,
+    payload_z: Annotated[str | None, typer.Option(metavar="VALUE", help="The same, above ground.")] = None,
     drive_torque_gain: Annotated[
         str | None,
         typer.Option(metavar="VALUE", help="Standard deviation of the torques' scale, e.g. '5 %'."),
@@ -123,6 +131,8 @@ def vehicle(
         "wheel_inertia": wheel_inertia,
         "tire_rolling_resistance": tire_rolling_resistance,
         "bearing_resistance": bearing_resistance,
+        "payload_x": payload_x,
+        "payload_z": payload_z,
         "drive_torque_gain": drive_torque_gain,
         "drive_torque_offset": drive_torque_offset,
         "drawbar_offset": drawbar_offset,
@@ -186,7 +196,7 @@ def _ask_values(machine: str, signals: str, given: dict[str, str | None]) -> dic
             "A number with its unit, or Enter where it is not known: then what is typical is taken, and its doubt counted."
         )
     for field in asked:
-        if field.name in known:
+        if field.name in known or (field.name == "payload_z" and "payload_x" not in known):
             continue
         numbers = {
             name: quantity(value, one.unit)
@@ -195,12 +205,11 @@ def _ask_values(machine: str, signals: str, given: dict[str, str | None]) -> dic
             if one.name == name
         }
         now = next(one for one in fields(chosen, signals, numbers) if one.name == field.name)  # type: ignore[arg-type]
-        typical = now.assumption.split(": ", 1)[1]
+        left_out = now.assumption.split(": ", 1)[1]
+        left_out = f"typical: {left_out}" if now.typical else left_out
         while True:
             important = "; needed for a useful result" if field.needed else ""
-            answer = typer.prompt(
-                f"{field.title} [typical: {typical}{important}]", default="", show_default=False
-            )
+            answer = typer.prompt(f"{field.title} [{left_out}{important}]", default="", show_default=False)
             if not answer.strip():
                 break
             try:

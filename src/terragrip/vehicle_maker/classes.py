@@ -43,6 +43,11 @@ class MachineClass:
         """Whether the front wheels have a radius of their own."""
         return "front_radius_share" in self.data
 
+    @property
+    def carries(self) -> bool:
+        """Whether it may have a tank or hopper, whose filling is part of its mass."""
+        return bool(self.data.get("carries", False))
+
     def typical_mass(self) -> Typical:
         """Mass [kg] where the user does not know it."""
         return _relative(self.data["mass"])

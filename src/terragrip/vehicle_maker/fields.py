@@ -19,24 +19,31 @@ SIGNALS: dict[str, str] = {
 """What a log of the machine measures beside the ground speed."""
 
 
+NOTHING = "none"
+"""What stands for a number that nothing is assumed for."""
+
+
 @dataclass(frozen=True)
 class Field:
     """A number about the machine.
 
-    ``typical`` is what its class has; ``needed``: without it the result says little. A field that ``is_spread`` is itself a standard
-    deviation, of a sensor or of the ground. ``unit`` is SI, as `terragrip.units` reads it.
+    ``typical`` is what its class has; None: nothing is assumed where no answer is given, and the vehicle file leaves it out. ``needed``:
+    without it the result says little. A field that ``is_spread`` is itself a standard deviation, of a sensor or of the ground. ``unit`` is
+    SI, as `terragrip.units` reads it.
     """
 
     name: str
     title: str
     unit: str
-    typical: Typical
+    typical: Typical | None
     needed: bool = False
     is_spread: bool = False
 
     @property
     def assumption(self) -> str:
         """What is assumed where it is not known: ``wheelbase: 2.68 ± 0.395 m``, or of a spread ``slope: ± 0.0175 rad``."""
+        if self.typical is None:
+            return f"{self.name}: {NOTHING}"
         value, spread = (f"{float(f'{x:.3g}'):g}" for x in (self.typical.value, self.typical.spread))
         unit = "" if self.unit == "1" else f" {self.unit}"
         return f"{self.name}: ± {value}{unit}" if self.is_spread else f"{self.name}: {value} ± {spread}{unit}"
@@ -54,6 +61,14 @@ _FIELDS: tuple[tuple[str, str, str], ...] = (
     ("wheel_inertia", "moment of inertia of a wheel with its geared drive", "kg m^2"),
     ("tire_rolling_resistance", "rolling resistance of the tyres on hard ground, share of the load", "1"),
     ("bearing_resistance", "bearing resistance", "N s/rad"),
+)
+_PAYLOAD: tuple[tuple[str, str, str], ...] = (
+    (
+        "payload_x",
+        "tank or hopper, where the log has the machine's mass: its centre of gravity ahead of the rear axle (behind: -)",
+        "m",
+    ),
+    ("payload_z", "its centre of gravity above the ground", "m"),
 )
 _SPREADS: tuple[tuple[str, str, str], ...] = (
     ("drive_torque_gain", "error of the torques' scale, standard deviation", "1"),
@@ -86,6 +101,8 @@ def fields(
             Field(name, title, unit, _typical(machine, name, mass, radius), needed=_is_needed(name, signals))
         )
     if signals == "torque":
+        if machine.carries:
+            found += [Field(name, title, unit, None) for name, title, unit in _PAYLOAD]
         for name, title, unit in _SPREADS:
             if name == "drawbar_offset" and not machine.tows:
                 continue
@@ -138,6 +155,10 @@ def read_values(machine: MachineClass, signals: Signals, given: Mapping[str, obj
             values[name] = quantity(value, asked[name].unit)
         except UnitError as error:
             raise InputError(error.problem, place=name, hint=error.hint) from error
-        if values[name] < 0 or (values[name] == 0 and not asked[name].is_spread):
+        if (values[name] < 0 and name != "payload_x") or (
+            values[name] == 0 and not (asked[name].is_spread or name == "payload_x")
+        ):
             raise InputError(f"{value} is impossible", place=name, hint="give a positive number")
+    if "payload_z" in values and "payload_x" not in values:
+        raise InputError("is of no use alone", place="payload_z", hint="give payload_x too")
     return values

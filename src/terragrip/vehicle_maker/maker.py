@@ -49,7 +49,7 @@ class Made:
             lines.append(
                 "# Not known, typical of the class; the standard deviations are considered under 'uncertainty':"
             )
-            lines += [f"#   {field.assumption} ({field.typical.source})" for field in self.assumed]
+            lines += [f"#   {one.assumption} ({one.typical.source})" for one in self.assumed if one.typical]
         return "\n".join(lines) + "\n" + self.vehicle.to_yaml()
 
     def save(self, path: str | os.PathLike[str]) -> None:
@@ -77,7 +77,7 @@ def make(
         raise InputError(f"no signals {signals!r}", place="--signals", hint=f"say {', '.join(SIGNALS)}")
     values = read_values(chosen, signals, known or {})
     asked = fields(chosen, signals, values)
-    assumed = tuple(field for field in asked if field.name not in values)
+    assumed = tuple(field for field in asked if field.typical and field.name not in values)
     return Made(
         vehicle_of(chosen, signals, values, [f.name for f in assumed], name), chosen, signals, values, assumed
     )
@@ -96,7 +96,7 @@ def vehicle_of(
 
     ``is_calibrated``: a known wheel radius has no error. Raises InputError on impossible values.
     """
-    typical = {field.name: field.typical for field in fields(machine, "torque", known)}
+    typical = {field.name: field.typical for field in fields(machine, "torque", known) if field.typical}
     values = {field: spec.value for field, spec in typical.items()} | dict(known)
     tree = _tree(machine, values, name)
     if signals == "bus-speed":
@@ -152,6 +152,8 @@ def _tree(machine: MachineClass, values: Mapping[str, float], name: str) -> dict
     for key in ("wheelbase", "track", "center_of_gravity_height", "hitch_height"):
         if key in values:
             tree[key] = _digits(values[key])
+    if "payload_x" in values:
+        tree["payload"] = {key: values[f"payload_{key}"] for key in ("x", "z") if f"payload_{key}" in values}
     wheel = {"radius": _digits(radius), "inertia": _digits(inertia)}
     if machine.has_small_front_wheels:
         small = values["front_wheel_radius"]

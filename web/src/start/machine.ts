@@ -10,9 +10,10 @@ interface Field {
   name: string;
   title: string;
   unit: string;
-  value: number;
-  spread: number;
-  source: string;
+  /** What is typical; null where nothing is assumed. */
+  value: number | null;
+  spread: number | null;
+  source: string | null;
   needed: boolean;
   is_spread: boolean;
   known: number | null;
@@ -150,7 +151,7 @@ export class MachineMaker {
       const input = this.inputs.get(field.name);
       if (input) input.placeholder = typical(field);
       const line = this.element.querySelector(`#typical-${field.name}`);
-      if (line) line.textContent = field.known === null ? `typical ${typical(field)}; ${field.source}` : `${digits(field.known)} ${field.unit === "1" ? "" : field.unit}`;
+      if (line) line.textContent = field.known === null ? (field.source === null ? "" : `typical ${typical(field)}; ${field.source}`) : `${digits(field.known)} ${field.unit === "1" ? "" : field.unit}`;
     }
   }
 
@@ -186,6 +187,7 @@ export class MachineMaker {
 
 function typical(field: Field): string {
   const unit = field.unit === "1" ? "" : ` ${field.unit}`;
+  if (field.value === null || field.spread === null) return "none";
   return field.is_spread ? `± ${digits(field.value)}${unit}` : `${digits(field.value)} ± ${digits(field.spread)}${unit}`;
 }
 

@@ -54,7 +54,7 @@ def parts_of_machine(studio: Here, path: Named) -> dict[str, list[str]]:
 
 @router.post("/machines/made")
 def make_machine(wanted: Machine) -> dict[str, Any]:
-    """What is asked for, with what is typical and from where; the vehicle for its sketch; the file as text."""
+    """What is asked for, with what is typical and from where (null: nothing is assumed); the vehicle for its sketch; the file as text."""
     made = wanted.make()
     asked = fields(made.machine, made.signals, made.known)
     plain: dict[str, Any] = finite(
@@ -64,9 +64,9 @@ def make_machine(wanted: Machine) -> dict[str, Any]:
                     "name": field.name,
                     "title": field.title,
                     "unit": field.unit,
-                    "value": field.typical.value,
-                    "spread": field.typical.spread,
-                    "source": field.typical.source,
+                    "value": field.typical and field.typical.value,
+                    "spread": field.typical and field.typical.spread,
+                    "source": field.typical and field.typical.source,
                     "needed": field.needed,
                     "is_spread": field.is_spread,
                     "known": made.known.get(field.name),
