@@ -13,6 +13,8 @@ from terragrip.errors import InputError
 from terragrip.formats import Profile, inspect
 from terragrip.formats.csv import csv_on_disk
 from terragrip.formats.log_blocks import recordings_of
+from terragrip.recording import Recording
+from terragrip.recording.alignment import aligned
 from terragrip.recording.lag import Speed, lag_between, lag_within
 from test_sources import nmea
 
@@ -156,7 +158,7 @@ def test_an_offset_within_twice_its_deviation_is_not_corrected(seed: int) -> Non
 @pytest.mark.parametrize("seed", range(1000, 1004))
 @pytest.mark.parametrize("held", [False, True])
 def test_a_lag_within_one_file_is_found_and_said(tmp_path: Path, seed: int, held: bool) -> None:
-    """GNSS .2 s behind the wheels, at each row or held at 5 Hz; the profile's ``delay`` then takes it away."""
+    """GNSS .2 s behind the wheels, at each row or held at 5 Hz, is set right; by a profile's ``delay`` there is nothing left to say."""
 
     def ground(late: float) -> np.ndarray:
         values = noisy(speed_at(TIME - late), seed, 0.01)
@@ -165,6 +167,13 @@ def test_a_lag_within_one_file_is_found_and_said(tmp_path: Path, seed: int, held
     wheels = noisy(5 * speed_at(TIME), seed + 100, 0.05)
     late = tg.read(put(tmp_path / "late.csv", table(TIME, ground(0.2), wheels)))
     (notes,) = [note for note in late.notes if "behind" in note]
+    known = np.isfinite(late["ground_speed"])
+    assert known[:-5].all()
+    np.testing.assert_allclose(
+        late["ground_speed"][known], speed_at(TIME - 0.1 * held)[known], atol=0.2 if held else 0.06
+    )
+    if held:
+        assert set(late["ground_speed"][known]) <= set(ground(0.2))
     result, spread = (float(notes.split()[k]) for k in (2, 4))
     assert result == pytest.approx(0.2, abs=0.03)
     assert abs(result - 0.2) < 3 * spread
@@ -191,9 +200,12 @@ def test_a_free_wheel_that_was_made_of_the_ground_speed_hides_no_lag(seed: int) 
         "wheel_speed_r": noisy(speed_at(TIME) / 0.065, seed + 20, 0.1),
         "wheel_speed_c": every / 0.03,
     }
-    (note,) = lag_within(TIME, columns)
-    seconds, deviation = (float(note.split()[k]) for k in (2, 4))
-    assert abs(seconds - 0.3) < 3 * deviation
+    lag = lag_within(TIME, columns)
+    assert lag is not None
+    assert abs(lag.seconds - 0.3) < 3 * lag.std
+    (mended,) = aligned([Recording.from_frame({"time": TIME, **columns})])
+    assert np.nanmax(np.abs(mended["ground_speed"] - speed_at(TIME))) < 0.12
+    np.testing.assert_allclose(mended["wheel_speed_c"], mended["ground_speed"] / 0.03)
 
 
 def test_effort_is_a_torque(tmp_path: Path) -> None:

@@ -16,8 +16,8 @@ from terragrip.formats.registry import format_of
 from terragrip.formats.table import LogTable, in_si, since_clock_was_set
 from terragrip.formats.table_on_disk import Columns, TableOnDisk
 from terragrip.recording import LogBlocks, Recording, checks
+from terragrip.recording.alignment import aligned
 from terragrip.recording.columns import seconds, start_of
-from terragrip.recording.lag import lag_within
 from terragrip.recording.repeats import Repeats, once_each
 from terragrip.recording.schema import TIME, is_own
 from terragrip.recording.survey import ROWS
@@ -65,7 +65,7 @@ def recordings_of(log: TableOnDisk, profile: Profile | None = None) -> Iterator[
             in_si(block)
             for block in _since_set(log, log.blocks(chosen, 1), table, TIME, log.units.get(TIME, "s"))
         )
-        return _checked(own, log.names, chosen, log.source, log.digest, about, log.notes)
+        return aligned(_checked(own, log.names, chosen, log.source, log.digest, about, log.notes))
     result = settled(profile, table)
     if result is None:
         return None
@@ -74,7 +74,7 @@ def recordings_of(log: TableOnDisk, profile: Profile | None = None) -> Iterator[
     names = [TIME, *ready.channels]
     about.profiles = (profile.to_dict(),)
     blocks = _converted(log, ready, table, about)
-    return _checked(blocks, tuple(names), names, log.source, log.digest, about, log.notes)
+    return aligned(_checked(blocks, tuple(names), names, log.source, log.digest, about, log.notes))
 
 
 @dataclass
@@ -182,9 +182,6 @@ def _checked(
             about.start = start_of(time, block.time)
         said = tuple(dict.fromkeys((*notes, *more_notes)))
         block = replace(block, sha256=digest, notes=said, start=about.start, profiles=about.profiles)
-        if first == 0 and (late := lag_within(block.time, block.channels)):
-            notes += late
-            block = replace(block, notes=(*block.notes, *late))
         first, after = first + len(block), float(block.time[-1])
         yield block
     if first == 0:

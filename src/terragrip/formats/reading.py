@@ -16,8 +16,8 @@ from terragrip.formats.registry import Databases, format_of
 from terragrip.formats.signals import SignalLog
 from terragrip.formats.table import LogTable, Wanted, in_si, since_clock_was_set
 from terragrip.recording import Recording, checks
+from terragrip.recording.alignment import aligned
 from terragrip.recording.columns import seconds, start_of
-from terragrip.recording.lag import lag_within
 from terragrip.recording.repeats import once_each
 from terragrip.recording.schema import TIME, is_own
 
@@ -63,8 +63,7 @@ def read(
 def recording_of(table: LogTable, profile: Profile | None) -> Recording:
     """The recording that a table is by a profile, or without one by its own names; raises InputError as `read` does."""
     recording = profile.apply(table) if profile is not None else _as_it_stands(table)
-    late = lag_within(recording.time, recording.channels)
-    return replace(recording, notes=(*recording.notes, *late)) if late else recording
+    return next(aligned([recording]))
 
 
 def _as_it_stands(table: LogTable) -> Recording:

@@ -14,7 +14,6 @@ import numpy as np
 import numpy.typing as npt
 
 from terragrip.recording.held import fresh_samples, held_period
-from terragrip.recording.survey import ROWS
 from terragrip.units import STANDARD_GRAVITY
 
 Floats = npt.NDArray[np.float64]
@@ -36,7 +35,6 @@ _STIFFNESS = (
     2.0  # K on soft soil: the slope of ASABE D497's gross traction ratio at 15 % slip, Bn = 20, is 1.85
 )
 _WITHIN = 5.0  # s, the largest lag looked for between channels of one file
-_MOST_ROWS = ROWS  # of a file, whose lag is found from its first rows: a block's
 
 
 @dataclass(frozen=True)
@@ -117,37 +115,25 @@ def lag_between(first: Speed, second: Speed, *, reach: float | None = None) -> L
     return replace(result, explained=(low, high))
 
 
-def lag_within(time: Floats, columns: Mapping[str, npt.NDArray[Any]]) -> list[str]:
-    """A sentence where one file's ground speed and wheel speeds (n,) are further apart in time than a vehicle's dynamics explain.
+def lag_within(time: Floats, columns: Mapping[str, npt.NDArray[Any]]) -> Lag | None:
+    """How far one file's ground speed is behind its wheel speeds (n,), where that is certain and more than a vehicle's dynamics explain.
 
-    Said and not corrected: which of the two sensors is late, the file cannot tell, and the user can.
+    Which of the two sensors is late the file cannot tell; slip asks only that both are of one instant.
     """
-    rows = slice(None, _MOST_ROWS)
-    part = {name: values[rows] for name, values in columns.items()}
+    part = columns
     if "ground_speed" in part:
         part = {
             n: v
             for n, v in part.items()
-            if not n.startswith("wheel_speed_") or not _is_copy(v, part["ground_speed"])
+            if not n.startswith("wheel_speed_") or not is_copy(v, part["ground_speed"])
         }
-    wheels = wheels_of(time[rows], part)
-    ground = speed_of(time[rows], {"ground_speed": part["ground_speed"]}) if "ground_speed" in part else None
+    wheels = wheels_of(time, part)
+    ground = speed_of(time, {"ground_speed": part["ground_speed"]}) if "ground_speed" in part else None
     lag = None if wheels is None or ground is None else lag_between(wheels, ground, reach=_WITHIN)
-    if lag is None or not lag.is_of_the_clock:
-        return []
-    late, other = (
-        ("ground_speed", "the wheel speeds") if lag.seconds > 0 else ("The wheel speeds", "ground_speed")
-    )
-    verb = "is" if lag.seconds > 0 else "are"
-    what = "it" if lag.seconds > 0 else "each"
-    return [
-        f"{late} {verb} {abs(lag.seconds):.3f} ± {lag.std:.3f} s behind {other}, by the correlation of the speeds "
-        f"({lag.correlation:.3f}); a vehicle's own lag is {lag.explained[1]:.2f} s at most. If a sensor is late, write "
-        f"'delay: {abs(lag.seconds):.2f} s' for {what} in a profile."
-    ]
+    return lag if lag is not None and lag.is_of_the_clock else None
 
 
-def _is_copy(turning: npt.NDArray[Any], ground: npt.NDArray[Any]) -> bool:
+def is_copy(turning: npt.NDArray[Any], ground: npt.NDArray[Any]) -> bool:
     """Whether a wheel's speed was made of the ground speed, as a free wheel's without a sensor is: it has the ground speed's lag."""
     known = np.isfinite(turning) & np.isfinite(ground)
     if not np.array_equal(known, np.isfinite(turning)) or not np.any(ground[known]):

@@ -1,0 +1,111 @@
+"""Ground speed and wheel speeds of one file on one clock: a sensor's lag that is certain is set right, and said."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+import numpy.typing as npt
+
+from terragrip.recording.held import held_period
+from terragrip.recording.lag import Lag, is_copy, lag_within
+from terragrip.recording.survey import ROWS
+from terragrip.recording.table import Recording
+
+Floats = npt.NDArray[np.float64]
+
+_LONGEST = 1.0  # s, or three samples, across which nothing is interpolated
+
+
+def aligned(blocks: Iterable[Recording]) -> Iterator[Recording]:
+    """Consecutive blocks of a log with its ground speed moved by the lag of `lag_within`, and a note; as they are where none is certain.
+
+    The rows stay: at each instant of a ground speed stands what was measured when it was due, on a straight line between two
+    samples, or the last one of a held channel. The lag is that of the first `ROWS` rows, whatever the blocks.
+    """
+    source, ahead = iter(blocks), list[Recording]()
+    for block in source:
+        ahead.append(block)
+        if sum(map(len, ahead)) >= ROWS:
+            break
+    shift = _Shift.of(ahead) if ahead else None
+    if shift is None:
+        yield from ahead
+        yield from source
+        return
+    tail: list[Recording] = []
+    while ahead or (ahead := [more for more in (next(source, None),) if more is not None]):
+        end = ahead[0].time[-1] + shift.reach
+        while ahead[-1].time[-1] < end and (more := next(source, None)) is not None:
+            ahead.append(more)
+        block = ahead.pop(0)
+        yield shift.moved(block, [*tail, block, *ahead])
+        tail = [b for b in (*tail, block) if b.time[-1] > block.time[-1] - shift.reach]
+
+
+@dataclass(frozen=True)
+class _Shift:
+    """What is moved by how much: the late channels' names, the longest gap [s] within which they are known, whether they are held."""
+
+    lag: Lag
+    names: tuple[str, ...]
+    longest: float
+    held: bool
+
+    @classmethod
+    def of(cls, blocks: list[Recording]) -> _Shift | None:
+        """The lag in the first rows of a log, None where none is certain."""
+        asked = [
+            n
+            for n in blocks[0].channels
+            if n == "ground_speed" or n.startswith(("wheel_speed_", "wheel_based"))
+        ]
+        time = np.concatenate([b.time for b in blocks])[:ROWS]
+        columns = {n: np.concatenate([b.channels[n] for b in blocks])[:ROWS] for n in asked}
+        lag = lag_within(time, columns)
+        if lag is None:
+            return None
+        ground = columns["ground_speed"]
+        when, kept = time[np.isfinite(ground)], ground[np.isfinite(ground)]
+        late = [
+            n
+            for n in asked
+            if n == "ground_speed" or (n != "wheel_based_speed" and is_copy(columns[n], ground))
+        ]
+        longest = max(_LONGEST, 3 * float(np.median(np.diff(when))))
+        return cls(lag, tuple(late), longest, held_period(when, kept) is not None)
+
+    @property
+    def reach(self) -> float:
+        """How far a block's values are looked for beyond it [s]."""
+        return abs(self.lag.seconds) + self.longest
+
+    def moved(self, block: Recording, near: list[Recording]) -> Recording:
+        """A block with its late channels set right, by the samples of the blocks ``near`` it."""
+        channels = dict(block.channels)
+        for name in self.names:
+            time = np.concatenate([b.time[np.isfinite(b.channels[name])] for b in near])
+            values = np.concatenate([b.channels[name][np.isfinite(b.channels[name])] for b in near])
+            rows = np.flatnonzero(np.isfinite(block.channels[name]))
+            channels[name] = np.full(len(block), np.nan)
+            channels[name][rows] = self._at(block.time[rows] + self.lag.seconds, time, values)
+        return replace(block, channels=channels).with_notes(_sentence(self.lag))
+
+    def _at(self, when: Floats, time: Floats, values: Floats) -> Floats:
+        """A channel (n,) of instants ``time`` at others; NaN outside, and in gaps."""
+        after = np.searchsorted(time, when, side="right")
+        known = (after > 0) & (after < len(time))
+        after = np.clip(after, 1, max(len(time) - 1, 1))
+        known[known] = (time[after] - time[after - 1])[known] <= self.longest
+        result = values[after - 1] if self.held else np.interp(when, time, values)
+        return np.where(known, result, np.nan)
+
+
+def _sentence(lag: Lag) -> str:
+    side = "behind" if lag.seconds > 0 else "ahead of"
+    return (
+        f"ground_speed was {abs(lag.seconds):.3f} ± {lag.std:.3f} s {side} the wheel speeds, by the correlation of the speeds "
+        f"({lag.correlation:.3f}), where a vehicle's own lag is {lag.explained[1]:.2f} s at most; it was set right by that. If you know "
+        "which sensor is late, and how much, write it as 'delay:' in a profile."
+    )

@@ -1,0 +1,81 @@
+"""A sensor's lag within one log is set right, whatever the blocks, and slip is then what it is without it (simulation)."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pandas.testing
+import pytest
+
+from terragrip.estimation import estimate
+from terragrip.recording import Recording, alignment
+from terragrip.recording.alignment import aligned
+from terragrip.recording.survey import LogBlocks
+from terragrip.simulation import families
+
+
+def late(recording: Recording, seconds: float) -> Recording:
+    ground, time = recording.channels["ground_speed"], recording.time
+    known = np.isfinite(ground)
+    moved = np.full(len(time), np.nan)
+    moved[known] = np.interp(time[known] - seconds, time[known], ground[known])
+    return replace(recording, channels={**recording.channels, "ground_speed": moved})
+
+
+@pytest.mark.parametrize("number", [14, 17])
+def test_slip_of_a_log_with_a_lag_is_that_of_the_log_without(number: int) -> None:
+    kind, seed = list(families.machines("development", 24))[number]
+    result = families.draw(kind, seed, rate=20.0)
+    moving = np.abs(result.truth["true_ground_speed"].to_numpy()) > 0.05
+
+    def judged(recording: Recording) -> tuple[float, float]:
+        """Error of slip (RMS), and share of rows held, over all wheels."""
+        estimates = estimate(recording, result.vehicle)
+        rows = moving & (np.asarray(estimates["event"]) != "standstill")
+        errors, held = [], []
+        for wheel in result.vehicle.wheels:
+            error = (estimates[f"slip_{wheel}"] - result.truth[f"true_slip_{wheel}"].to_numpy())[rows]
+            known = np.isfinite(error)
+            errors.append(error[known])
+            held.append(np.abs(error[known]) < 1.96 * estimates[f"slip_{wheel}_std"][rows][known])
+        return float(np.sqrt(np.mean(np.concatenate(errors) ** 2))), float(np.mean(np.concatenate(held)))
+
+    right, wrong = result.recording, late(result.recording, 0.2)
+    (mended,) = aligned([wrong])
+    assert [note for note in mended.notes if "behind the wheel speeds" in note]
+    assert judged(wrong)[0] > 3 * judged(right)[0]
+    assert judged(wrong)[1] < 0.9
+    assert judged(mended)[0] < 1.5 * judged(right)[0]
+    assert judged(mended)[1] > 0.92
+
+
+@pytest.mark.parametrize("rows", [37, 1000])
+@pytest.mark.parametrize("seconds", [0.3, -0.3])
+@pytest.mark.parametrize("every", [1, 4])
+def test_blocks_are_moved_as_the_whole_is(
+    monkeypatch: pytest.MonkeyPatch, rows: int, seconds: float, every: int
+) -> None:
+    monkeypatch.setattr(alignment, "ROWS", 1500)
+    time = np.arange(0, 120, 0.05)
+    speed = 1.2 + 0.5 * np.sin(time / 5) + 0.2 * np.sin(time * 0.9)
+    log = late(
+        Recording.from_frame({"time": time, "ground_speed": speed, "wheel_speed_l": 5 * speed}), seconds
+    )
+    log.channels["ground_speed"][np.arange(len(time)) % every > 0] = np.nan
+    (whole,) = aligned([log])
+    parts = list(aligned(LogBlocks.of(log, rows).blocks()))
+    for name in ("ground_speed", "wheel_speed_l"):
+        np.testing.assert_array_equal(np.concatenate([p[name] for p in parts]), whole[name])
+    assert {part.notes for part in parts} == {whole.notes}
+    known = np.isfinite(whole["ground_speed"])
+    assert np.isnan(whole["ground_speed"][known.nonzero()[0][-1] + 1 :]).all()
+    np.testing.assert_allclose(whole["ground_speed"][known][20:-20], speed[known][20:-20], atol=0.02)
+
+
+def test_a_log_without_a_lag_stays_as_it_is() -> None:
+    kind, seed = list(families.machines("development", 24))[9]
+    log = families.draw(kind, seed, rate=20.0).recording
+    (same,) = aligned([log])
+    pandas.testing.assert_frame_equal(same.to_pandas(), log.to_pandas())
+    assert same.notes == log.notes
