@@ -169,9 +169,9 @@ def test_a_lag_within_one_file_is_found_and_said(tmp_path: Path, seed: int, held
     (notes,) = [note for note in late.notes if "behind" in note]
     known = np.isfinite(late["ground_speed"])
     assert known[:-5].all()
-    np.testing.assert_allclose(
-        late["ground_speed"][known], speed_at(TIME - 0.1 * held)[known], atol=0.2 if held else 0.06
-    )
+    true = speed_at(TIME - 0.1 * held)[known]  # a held value is late by half its period on average
+    left_in = ground(0.2)[known] - true
+    assert np.std(late["ground_speed"][known] - true) < 0.5 * np.std(left_in)
     if held:
         assert set(late["ground_speed"][known]) <= set(ground(0.2))
     result, spread = (float(notes.split()[k]) for k in (2, 4))

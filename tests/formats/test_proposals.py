@@ -8,6 +8,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -80,6 +81,30 @@ def test_motors_are_left_out_where_wheels_are_and_need_a_gear_ratio_where_not() 
     alone = _propose(motors)
     assert set(alone) == {"wheel_speed_l", "wheel_speed_r"}
     assert all("turns per motor turn" in p.give and p.unit == "rpm" for p in alone.values())
+
+
+@pytest.mark.parametrize(
+    ("speed", "torque"),
+    [("n_mot_{} [1/min]", "M_mot_{} [Nm]"), ("Motordrehzahl_{} [U/min]", "Motormoment_{} [Nm]"),
+     ("n_Antrieb_{} [1/min]", "M_Antrieb_{} [Nm]"), ("esc_{}_rpm", "esc_{}_current"), ("nMot{} [1/min]", "iMot{} [A]")],
+)  # fmt: skip
+@pytest.mark.parametrize("corners", [("FL", "FR", "RL", "RR"), ("VL", "VR", "HL", "HR")])
+def test_what_is_of_a_motor_asks_for_the_gear_ratio(
+    tmp_path: Path, speed: str, torque: str, corners: tuple[str, ...]
+) -> None:
+    """A motor 30 times as fast as its wheel of .35 m; no scale is guessed, and the line says what is missing."""
+    columns = {"t [s]": TIME, "v_gps [m/s]": SPEED}
+    columns |= {speed.format(c): 30 * SPEED / 0.35 * 60 / (2 * np.pi) for c in corners}
+    columns |= {torque.format(c): 3 + 2 * np.sin(TIME + k) for k, c in enumerate(corners)}
+    pd.DataFrame(columns).to_csv(tmp_path / "log.csv", index=False)
+    found = inspect(tmp_path / "log.csv")
+    for wheel in ("fl", "fr", "rl", "rr"):
+        for channel in (f"wheel_speed_{wheel}", f"drive_torque_{wheel}"):
+            proposal = found.proposals[channel]
+            assert "gear ratio" in proposal.give
+            assert proposal.entry["scale"] == 1.0
+        assert any("0.0117 m a radian" in words for words in found.proposals[f"wheel_speed_{wheel}"].evidence)
+    assert found.to_text().count("gear ratio") >= 8
 
 
 @pytest.mark.parametrize(

@@ -80,6 +80,7 @@ def _proposal_text(channel: str, proposal: Proposal) -> str:
         [
             *proposal.evidence,
             *[f"but {proposal.doubt}"] * bool(proposal.doubt and proposal.doubt not in proposal.evidence),
+            *[proposal.give] * bool(proposal.give),
         ]
     )
     others = f"; else {', '.join(proposal.alternatives)}" if proposal.alternatives else ""

@@ -140,15 +140,17 @@ def _proposal(channel: str, guess: Guess, ranked: list[Guess]) -> Proposal:
     kind = kind_of(unit)
     if channel.startswith("drive_torque_") and kind in ("current", None) and guess.column.name.has("current"):
         entry |= {"scale": 1.0, "unit": "N m"} if guess.column.unit else {"scale": 1.0}
-        give = "a current: the scale in N m per A is yours to give"
+        side = " times the gear ratio" if guess.column.name.has("motor") else ""
+        give = f"a current: the scale in N m per A{side} is yours to give"
     elif channel.startswith("wheel_speed_") and kind == "speed" and unit is not None:
         entry |= {"scale": float(f"{factor_to(unit, 'm/s'):.6g}"), "unit": "rad/s"}
         give = f"a rim speed in {unit}: divide the scale by the wheel's radius in m"
     elif unit and target and (unit != target or guess.column.stated not in (None, unit)):
         entry["unit"] = unit
-    if channel.startswith("wheel_speed_") and guess.column.name.has("motor") and not give:
+    if guess.column.name.has("motor") and not give and channel.startswith(("wheel_speed_", "drive_torque_")):
         entry |= {"scale": 1.0} | ({"unit": unit} if unit and unit != target else {})
-        give = "a motor: the scale is wheel turns per motor turn"
+        turns = "wheel turns per motor turn" if channel.startswith("wheel") else "motor turns per wheel turn"
+        give = f"motor side, needs the gear ratio: the scale is {turns}"
     if target is not None and guess.sign < 0:
         entry["sign"] = -1
     return Proposal(

@@ -78,7 +78,15 @@ class Rims:
     def _rim(self, guess: Guess, metres: float, ground: str) -> Finding | None:
         """``metres``: of ground speed for one count of wheel speed, by what is called ``ground``."""
         if guess.column.name.has("motor"):
-            return None
+            if guess.column.kind != "rotation" or guess.column.unit is None:
+                return None
+            rolled = metres / factor_to(guess.column.unit, "rad/s")
+            if RADII[0] <= rolled <= RADII[1]:
+                return None
+            return Finding(
+                True,
+                f"{ground} makes {rolled:.3g} m a radian: the gear ratio is the wheel's radius over that",
+            )
         if guess.column.unit is not None:
             if guess.column.kind == "speed":
                 share = metres / factor_to(guess.column.unit, "m/s")

@@ -39,7 +39,7 @@ MEANINGS: dict[str, str] = {
     "time": "time timestamp stamp unix epoch clock utc zeit temps tiempo tempo tijd tow",
     # what it is of
     "wheel": "wheel whl rim tire tyre joint roue rueda ruota wiel axle rad theoretical",
-    "motor": "motor moteur motore",
+    "motor": "motor moteur motore antrieb antriebs esc",
     "ground": "ground gps gnss radar navigation visual vio lidar icp true location rtk ublox slam",
     "body": "vehicle machine car robot body base ego tractor fahrzeug fzg obd",
     "odometry": "odom odometry",

@@ -79,7 +79,7 @@ class _Shift:
     @property
     def reach(self) -> float:
         """How far a block's values are looked for beyond it [s]."""
-        return abs(self.lag.seconds) + self.longest
+        return abs(self.lag.of_the_clock) + self.longest
 
     def moved(self, block: Recording, near: list[Recording]) -> Recording:
         """A block with its late channels set right, by the samples of the blocks ``near`` it."""
@@ -89,7 +89,7 @@ class _Shift:
             values = np.concatenate([b.channels[name][np.isfinite(b.channels[name])] for b in near])
             rows = np.flatnonzero(np.isfinite(block.channels[name]))
             channels[name] = np.full(len(block), np.nan)
-            channels[name][rows] = self._at(block.time[rows] + self.lag.seconds, time, values)
+            channels[name][rows] = self._at(block.time[rows] + self.lag.of_the_clock, time, values)
         return replace(block, channels=channels).with_notes(_sentence(self.lag))
 
     def _at(self, when: Floats, time: Floats, values: Floats) -> Floats:
@@ -106,6 +106,6 @@ def _sentence(lag: Lag) -> str:
     side = "behind" if lag.seconds > 0 else "ahead of"
     return (
         f"ground_speed was {abs(lag.seconds):.3f} ± {lag.std:.3f} s {side} the wheel speeds, by the correlation of the speeds "
-        f"({lag.correlation:.3f}), where a vehicle's own lag is {lag.explained[1]:.2f} s at most; it was set right by that. If you know "
-        "which sensor is late, and how much, write it as 'delay:' in a profile."
+        f"({lag.correlation:.3f}), where a vehicle's own lag is up to {lag.explained[1]:.2f} s; it was set right by "
+        f"{abs(lag.of_the_clock):.3f} s. If you know which sensor is late, and how much, write it as 'delay:' in a profile."
     )

@@ -62,6 +62,11 @@ class Lag:
         return max(least - self.seconds, self.seconds - most) > _CERTAIN * self.std
 
     @property
+    def of_the_clock(self) -> float:
+        """What of it [s] is to be taken off: the vehicle's own lag lies anywhere within what is explained, half way on average."""
+        return self.seconds - 0.5 * sum(self.explained)
+
+    @property
     def why_not(self) -> str:
         """The cause for which no clock is to be corrected."""
         if abs(self.seconds) <= _CERTAIN * self.std:
