@@ -11,7 +11,7 @@ from soil_campaign import pairs
 from terragrip.errors import InputError
 from terragrip.physics.adhesion import CURVES
 from terragrip.soil.bins import BinSettings, bin_pairs
-from terragrip.soil.digitised import _curve, _rows, _title
+from terragrip.soil.digitised import _curve, _numbers, _rows, _title
 from terragrip.soil.fit import AdhesionCurve
 from terragrip.soil.identifiability import _sensitivity, _twin
 from terragrip.soil.library import Soil, SoilLibrary
@@ -157,3 +157,11 @@ def test_separators_decimals_and_titles_of_digitised_points() -> None:
     assert _rows("0.1   0.2 ") == [["0.1", "0.2"]]
     head = [["clay", "", "x"], ["Slip [-]", "mu", "s", "loam"]]
     assert [_title(head, k) for k in (0, 2, 3, 4)] == ["clay", "curve 2", "loam", "curve 3"]
+
+
+def test_a_short_row_of_digitised_points_has_no_value_there() -> None:
+    body = [["0.1", "0.2", "0.3"], ["0.2", ""], ["0.3"]]
+    np.testing.assert_array_equal(_numbers(body, 1, 0, "f.csv"), [0.2, np.nan, np.nan])
+    for cell in ("two", "inf"):
+        with pytest.raises(InputError, match=r"row 6, column 2: '.*' is not a number"):
+            _numbers([*body, ["0.4", cell]], 1, 2, "f.csv")
