@@ -64,6 +64,7 @@ def test_blocks_make_up_the_whole(tmp_path: Path, log: pd.DataFrame, rows: int) 
 @pytest.mark.parametrize(
     ("column", "row", "value", "message"),
     [
+        ("time", 200, 1.99, r"column time, row 201 \(time 1.99 s\): time repeats"),
         ("time", 200, 0.5, r"column time, row 201 \(time 0.5 s\): time runs back from 1.99 s"),
         ("time", 250, np.nan, "column time, row 251: time is not a finite number"),
         ("wheel_speed_l", 250, np.inf, r"column wheel_speed_l, row 251 \(time 2.5 s\): is infinite"),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
@@ -22,9 +23,9 @@ from terragrip.formats.profile_parts import Rows, Source, TimeSource, matching, 
 from terragrip.formats.table import LogTable, since_clock_was_set
 from terragrip.formats.timebase import spread, union
 from terragrip.physics.geodesy import metres_of
-from terragrip.recording import Recording, checks
+from terragrip.recording import Recording
 from terragrip.recording.columns import SINCE_1970, columns_of, numbers, seconds, start_of, texts
-from terragrip.recording.repeats import once_each
+from terragrip.recording.repeats import merged
 from terragrip.recording.schema import LABELS, TIME, unit_of
 from terragrip.units import UnitError, factor_to, quantity
 
@@ -65,9 +66,9 @@ def converted(profile: Profile, log: LogTable, *, partial: bool = False) -> Part
     """The channels that ``profile`` makes of a log; where it is ``partial``, those that it can make of this one."""
     profile, notes = bound(profile, log, partial=partial)
     log, unset = since_clock_was_set(log, profile.time.column, profile.time.unit)
-    columns, repeats = once_each(log.columns, profile.time.column)
+    wanted = asked(profile, log.columns)
+    columns, repeats = merged({n: c for n, c in log.columns.items() if n in wanted}, profile.time.column)
     log = replace(log, columns=columns)
-    checks.refuse_one_stamp(repeats.rows, repeats.instants, log.source)
     notes += [*unset, *repeats.notes()]
     time, start, remarks = _time(profile.time, log)
     notes += remarks
@@ -91,6 +92,13 @@ def converted(profile: Profile, log: LogTable, *, partial: bool = False) -> Part
         channels = {n: spread(v, rows[delays[n]], len(instants)) for n, v in channels.items()}
         time = instants
     return Part(time, channels, log.source, log.sha256, (*log.notes, *notes), noise, start)
+
+
+def asked(profile: Profile, names: Iterable[str]) -> set[str]:
+    """Which columns ``names`` of a log the profile may read."""
+    rows = () if profile.rows is None else (profile.rows.column,)
+    every = {c for origin in profile.channels.values() for one in origin.chain for c in one.columns}
+    return {name for c in (profile.time.column, *rows, *every) for name in matching(c, names)}
 
 
 def settled(profile: Profile, log: LogTable) -> tuple[Profile, list[str]] | None:

@@ -24,7 +24,7 @@ from terragrip.recording import Recording, unit_warnings
 from terragrip.recording.columns import SINCE_1970
 from terragrip.recording.held import fresh_samples, held_period, measured_part
 from terragrip.recording.noise import white_noise
-from terragrip.recording.repeats import Repeats, once_each
+from terragrip.recording.repeats import Repeats, merged
 from terragrip.recording.schema import TIME, has_torque, is_own, unit_of
 from terragrip.units import factor_to
 from terragrip.vehicle import Vehicle
@@ -156,7 +156,7 @@ def inspect(
     return Inspection(
         file=str(log.source),
         sha256=str(log.sha256),
-        rows=seen.repeats.rows or len(next(iter(seen.columns.values()), ()) if base is None else base),
+        rows=seen.repeats.merged + len(next(iter(seen.columns.values()), ()) if base is None else base),
         time=None
         if stamp is None or base is None
         else _time_summary(stamp[0], stamp[1], base, seen.whole, seen.repeats),
@@ -201,9 +201,7 @@ class Seen:
     clocks: dict[str, Floats]
     since_1970: bool
     whole: bool  # no block of the log was left out
-    repeats: Repeats = field(
-        default_factory=Repeats
-    )  # rows that bore the stamp of the one before them; none is left
+    repeats: Repeats = field(default_factory=Repeats)
 
     @classmethod
     def of(cls, log: LogTable | SignalLog, *, whole: bool = True, vocabulary: Vocabulary = GENERAL) -> Seen:
@@ -225,7 +223,7 @@ class Seen:
         stamp = find_time(numbers, dates, log.units, vocabulary)
         repeats = Repeats()
         if stamp is not None:
-            columns, repeats = once_each(log.columns, stamp[0])
+            columns, repeats = merged(log.columns, stamp[0])
             log = replace(log, columns=columns)
         instants = None if stamp is None else _seconds(log.columns[stamp[0]], stamp[1])
         large = (
@@ -332,7 +330,7 @@ def _time_summary(name: str, unit: str, time: Floats, whole: bool, repeats: Repe
         spacing_95=high,
         gaps=tuple((float(known[k]), float(spacing[k])) for k in longest),
         gap_count=len(wide),
-        repeated=repeats.same + repeats.other,
+        repeated=repeats.merged + repeats.other,
         backward=int(np.sum(spacing < 0)),
         missing=len(time) - len(known),
     )

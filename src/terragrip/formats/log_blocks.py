@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from terragrip.errors import InputError
-from terragrip.formats.conversion import converted_block, first_start, settled
+from terragrip.formats.conversion import asked, converted_block, first_start, settled
 from terragrip.formats.profile import Profile
 from terragrip.formats.registry import format_of
 from terragrip.formats.table import LogTable, in_si, since_clock_was_set
@@ -18,7 +18,7 @@ from terragrip.formats.table_on_disk import Columns, TableOnDisk
 from terragrip.recording import LogBlocks, Recording, checks
 from terragrip.recording.alignment import aligned
 from terragrip.recording.columns import seconds, start_of
-from terragrip.recording.repeats import Repeats, once_each
+from terragrip.recording.repeats import Repeats, merged
 from terragrip.recording.schema import TIME, is_own
 from terragrip.recording.survey import ROWS
 
@@ -87,9 +87,11 @@ class _About:
 
 def _converted(log: TableOnDisk, profile: Profile, table: LogTable, about: _About) -> Iterator[Columns]:
     """The blocks of a log as a `settled` profile makes channels of them."""
-    asked = {profile.time.column, *(c for origin in profile.channels.values() for c in origin.columns)}
+    wanted = asked(profile, log.names)
     first = None
-    blocks = log.blocks([name for name in log.names if name in asked], 1)
+    blocks = _one_row_an_instant(
+        log, log.blocks([name for name in log.names if name in wanted], 1), profile.time.column
+    )
     for block in _since_set(log, blocks, table, profile.time.column, profile.time.unit):
         stamps = block.columns[profile.time.column]
         if not len(stamps):
@@ -104,18 +106,23 @@ def _converted(log: TableOnDisk, profile: Profile, table: LogTable, about: _Abou
 def _since_set(
     log: TableOnDisk, blocks: Iterator[Columns], table: LogTable, column: str, unit: str
 ) -> Iterator[LogTable]:
-    """The blocks as tables, without first rows from before the logger's clock was set, and with one row an instant."""
-    repeats = Repeats()
-    for number, block in enumerate(_whole_instants(blocks, column)):
+    """The blocks as tables, without first rows from before the logger's clock was set."""
+    for number, block in enumerate(blocks):
         part = replace(table, columns=block)
         if number == 0:
             part, notes = since_clock_was_set(part, column, unit)
             log.notes.extend(notes)
-        columns, found = once_each(part.columns, column)
+        yield part
+
+
+def _one_row_an_instant(log: TableOnDisk, blocks: Iterator[Columns], column: str) -> Iterator[Columns]:
+    """The blocks with rows of one stamp in ``column`` put together, which the log's notes count."""
+    repeats = Repeats()
+    for block in _whole_instants(blocks, column):
+        columns, found = merged(block, column)
         before, repeats = repeats.notes(), repeats + found
         log.notes[:] = [*(n for n in log.notes if n not in before), *repeats.notes()]
-        yield replace(part, columns=columns)
-    checks.refuse_one_stamp(repeats.rows, repeats.instants, log.source)
+        yield columns
 
 
 def _whole_instants(blocks: Iterator[Columns], column: str) -> Iterator[Columns]:

@@ -18,7 +18,6 @@ from terragrip.formats.table import LogTable, Wanted, in_si, since_clock_was_set
 from terragrip.recording import Recording, checks
 from terragrip.recording.alignment import aligned
 from terragrip.recording.columns import seconds, start_of
-from terragrip.recording.repeats import once_each
 from terragrip.recording.schema import TIME, is_own
 
 PathLike = str | os.PathLike[str]
@@ -167,13 +166,11 @@ def _part(path: PathLike, profile: Profile | None, databases: Databases, also: t
             hint="name it in a profile for this source",
         )
     table, unset = since_clock_was_set(table, TIME, _time_unit(table))
-    columns, repeats = once_each(in_si(table), TIME)
+    columns = in_si(table)
     stamps = columns.pop(TIME)
     time, _ = seconds(stamps, table.source)
     start = table.start if table.start is not None else start_of(stamps, time)
-    return Part(
-        time, columns, table.source, table.sha256, (*table.notes, *unset, *repeats.notes()), {}, start
-    )
+    return Part(time, columns, table.source, table.sha256, (*table.notes, *unset), {}, start)
 
 
 def _time_unit(table: LogTable) -> str:

@@ -137,13 +137,6 @@ def check_time(time: Floats, source: str | None, *, first_row: int = 0, after: f
     raise InputError(problem, file=source, place=place(TIME, row, time, first_row=first_row), hint=hint)
 
 
-def refuse_one_stamp(rows: int, instants: int, source: str | None) -> None:
-    """Raise InputError where all of several ``rows`` are at one instant."""
-    if rows > 1 and instants == 1:
-        hint = "it is the same in all rows: name the column that counts time"
-        raise InputError("time repeats", file=source, place=f"column {TIME}", hint=hint)
-
-
 def refuse_infinite(
     name: str, values: Floats, time: Floats, source: str | None, *, first_row: int = 0
 ) -> None:

@@ -14,7 +14,6 @@ from terragrip.errors import InputError
 from terragrip.recording import checks
 from terragrip.recording.clock import LATEST, clock_index
 from terragrip.recording.columns import columns_of, numbers, seconds, start_of, texts
-from terragrip.recording.repeats import once_each
 from terragrip.recording.schema import (
     LABELS,
     REFERENCE,
@@ -69,16 +68,13 @@ class Recording:
 
         Raises InputError with column and row on a missing required column (time, ground_speed, a wheel
         speed), text or infinities in a channel, a required channel without any value, time that is NaN,
-        never changes or runs back, and on an empty table. Rows that repeat the time of the one before become one row
-        (`once_each`), with a note. ``source`` is the file that errors name. Without ``start``, dates and stamps
+        repeats or runs back, and on an empty table. ``source`` is the file that errors name. Without ``start``, dates and stamps
         since 1970 tell it.
         """
         columns = columns_of(frame, source)
         checks.require_columns(columns, source)
-        columns, repeats = once_each(columns, TIME)
-        checks.refuse_one_stamp(repeats.rows, repeats.instants, source)
         result, remark = cls.of_block(columns, source)
-        remarks = [*notes, *remark, *repeats.notes(), *checks.remarks(columns)]
+        remarks = [*notes, *remark, *checks.remarks(columns)]
         if start is None:
             start = start_of(columns[TIME], result.time)
         channels = {}
