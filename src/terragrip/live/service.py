@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import gc
 from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
@@ -19,7 +18,7 @@ from terragrip.live.options import Options
 from terragrip.live.outbox import Outbox
 from terragrip.live.sinks import open_sink
 from terragrip.live.sources import Source, open_source
-from terragrip.live.supervision import cancelled, ended, supervise_sink, supervise_source
+from terragrip.live.supervision import PAUSE, run_links
 from terragrip.live.vehicle_run import VehicleRun
 
 if TYPE_CHECKING:
@@ -27,8 +26,6 @@ if TYPE_CHECKING:
     from terragrip.vehicle import Vehicle
 
 HOUSEKEEPING = 0.09  # s: what came in is handed to the system at least ten times a second
-_PAUSE = 0.002  # s for sinks that have enough to do
-LINGER = 2.0  # s for sinks to send the last messages
 
 
 class Service:
@@ -110,47 +107,30 @@ class Service:
 
         Raises InputError where a source or sink cannot be used at all, or the record could not be written.
         """
-        gc.freeze()  # what is there now stays: the collector need not look at it again
-        start = asyncio.create_task
         sources = [
-            start(supervise_source(partial(source.run, feed), feed.lost))
+            (partial(source.run, feed), feed.lost)
             for source, feed in zip(self.sources, self.feeds, strict=True)
         ]
-        sinks = [
-            start(supervise_sink(sink, outbox))
-            for (_, sink), outbox in zip(self.sinks, self.outboxes, strict=True)
-        ]
-        until_end = [
-            start(self._until_all_is_estimated(sources)), start(self._stopping.wait()),
-            start(self._estimate()), start(self._keep_house()),
-        ]  # fmt: skip
+        sinks = [(sink, outbox) for (_, sink), outbox in zip(self.sinks, self.outboxes, strict=True)]
         try:
             self.run_of_vehicle.open()
-            await ended(sources, sinks, until_end)
-            self.run_of_vehicle.finish()
-            for outbox in self.outboxes:
-                await outbox.emptied(LINGER)
+            await run_links(
+                sources, sinks, [self._stopping.wait(), self._estimate(), self._keep_house()],
+                has_left=lambda: bool(self.inbox.samples), finish=self.run_of_vehicle.finish,
+            )  # fmt: skip
         finally:
-            await cancelled([*sources, *until_end, *sinks])
             self.pipeline.close()
-            gc.unfreeze()
         if self.pipeline.failure:
             raise InputError(
                 self.pipeline.failure, place="--record", hint="free space or choose another folder"
             )
-
-    async def _until_all_is_estimated(self, sources: Sequence[asyncio.Task[None]]) -> None:
-        """Wait until the sources have ended, and what they brought is estimated; raises what one of them raises."""
-        await asyncio.gather(*sources)
-        while self.inbox.samples:
-            await asyncio.sleep(_PAUSE)
 
     async def _estimate(self) -> None:
         """Turn after turn, as samples come in or a row has waited for long enough."""
         while True:
             await self.inbox.filled(self.pipeline.waiting_until if self.is_real_time else None)
             while not self.is_real_time and any(outbox.is_busy for outbox in self.outboxes):
-                await asyncio.sleep(_PAUSE)
+                await asyncio.sleep(PAUSE)
             self.run_of_vehicle.turn()
 
     async def _keep_house(self) -> None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import gc
 import os
 from collections.abc import Callable, Sequence
 from functools import partial
@@ -23,10 +22,10 @@ from terragrip.live.message import Message
 from terragrip.live.options import Options
 from terragrip.live.outbox import Outbox
 from terragrip.live.record_folder import locked
-from terragrip.live.service import HOUSEKEEPING, LINGER
+from terragrip.live.service import HOUSEKEEPING
 from terragrip.live.sinks.studio import StudioSink
 from terragrip.live.sources import TopicSource, open_source
-from terragrip.live.supervision import cancelled, ended, supervise_sink, supervise_source
+from terragrip.live.supervision import run_links
 from terragrip.live.vehicle_run import VehicleRun
 
 _SLICE = 8  # vehicles that are looked after at once
@@ -97,31 +96,22 @@ class ManyService:
 
         Raises InputError where a source or sink cannot be used at all, or a record could not be written to its end.
         """
-        gc.freeze()
-        start = asyncio.create_task
         sources = [
-            start(supervise_source(partial(source.run, router), router.lost))
+            (partial(source.run, router), router.lost)
             for source, router in zip(self.sources, self.routers, strict=True)
         ]
-        sinks = [start(supervise_sink(s, box)) for s, box in zip(self.sinks, self.outboxes, strict=True)]
-        until_end = [
-            start(self._stopping.wait()), start(self._estimate()), start(self._open()), start(self._keep_house()),
-            *sources,
-        ]  # fmt: skip
-        failed: dict[str, str] = {}
         try:
             for name, why in self._unusable.items():
                 self.vehicles.refuse(name, why)
-            await ended(sources, sinks, until_end)
-            self.vehicles.finish()
-            for outbox in self.outboxes:
-                await outbox.emptied(LINGER)
+            await run_links(
+                sources, list(zip(self.sinks, self.outboxes, strict=True)),
+                [self._stopping.wait(), self._estimate(), self._open(), self._keep_house()],
+                has_left=lambda: bool(self.vehicles.ready), finish=self.vehicles.finish,
+            )  # fmt: skip
         finally:
-            await cancelled([*sources, *until_end, *sinks])
             failed = self.vehicles.close()
             if self._lock is not None:
                 os.close(self._lock)
-            gc.unfreeze()
         if failed:
             name, why = next(iter(failed.items()))
             others = f", and the records of {len(failed) - 1} other vehicles" if len(failed) > 1 else ""
