@@ -25,6 +25,7 @@ SURE = 0.5
 """Correlation of two rates of turn that tell the same, or of the opposite sign contradict each other."""
 
 _WINDOW = 2.0  # s
+_MOST = 1e9  # of any unit: what is more is a fault, and its square may be no number
 _LEAST_TURN = 1.5  # rad: with less there is nothing to compare
 _CLEAR = 0.8  # correlation from which another order of the wheels is the right one
 _SIZES = 0.4  # of what is shown: the turn by the rims of an axle
@@ -54,8 +55,8 @@ def agreement(time: Floats, yaw: Floats, other: Floats) -> float:
 
 
 def windows(time: Floats, values: Floats) -> Floats:
-    """Means of channels (k, n) over the windows of 2 s in which all of them hold a value (k, m)."""
-    known = np.isfinite(values).all(axis=0)
+    """Means of channels (k, n) over the windows of 2 s in which all of them hold a value that can be (k, m)."""
+    known = (np.abs(values) < _MOST).all(axis=0)
     place = ((time - time[0]) / _WINDOW).astype(np.intp)[known]
     count = np.bincount(place) if known.any() else np.zeros(0)
     return np.array([np.bincount(place, row[known])[count > 0] / count[count > 0] for row in values])
