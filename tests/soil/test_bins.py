@@ -45,7 +45,15 @@ def test_the_papers_range_has_55_bins():
 
 
 @pytest.mark.parametrize(
-    "bad", [{"width": 0.0}, {"lower": 0.6, "upper": 0.6}, {"minimum": 0}, {"metres": 0.0}, {"runs": 0}]
+    "bad",
+    [
+        {"width": 0.0},
+        {"lower": 0.6, "upper": 0.6},
+        {"minimum": 0},
+        {"metres": 0.0},
+        {"metres": -1.0},
+        {"runs": 0},
+    ],
 )
 def test_settings_that_are_no_bins(bad):
     with pytest.raises(ValueError, match="no bins"):

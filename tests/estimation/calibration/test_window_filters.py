@@ -86,6 +86,14 @@ def test_one_window_counts_or_not(
     np.testing.assert_array_equal(of(with_one(name, value, wheel), vehicle), expected)
 
 
+@pytest.mark.parametrize("of", [passes, driving, usable])
+def test_empty_windows_do_not_say_how_many_samples_are_usual(
+    vehicle: Vehicle, of: Callable[[Windows, Vehicle], np.ndarray]
+) -> None:
+    count = np.r_[np.zeros(12), 24.0, np.full(7, 50.0)]
+    np.testing.assert_array_equal(of(table(count=count), vehicle), count > 25)
+
+
 @pytest.mark.parametrize(("slips", "counts"), [(0.59, True), (0.61, False), (-0.09, True), (-0.11, False)])
 def test_wheels_share_a_curve_up_to_six_tenths_of_slip(vehicle: Vehicle, slips: float, counts: bool) -> None:
     hub = (1 - slips) / 0.9 if slips >= 0 else 1 / (0.9 * (1 + slips))
