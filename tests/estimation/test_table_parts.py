@@ -186,6 +186,15 @@ def test_a_file_is_converted_with_its_progress(tmp_path: Path, monkeypatch: pyte
     assert (tmp_path / "again.csv").read_bytes() == (tmp_path / "e.csv").read_bytes()
 
 
+def test_a_latitude_alone_is_no_place(tmp_path: Path) -> None:
+    from mcap.reader import make_reader
+
+    table(latitude=np.ones(12)).write(tmp_path / "e.mcap")
+    with (tmp_path / "e.mcap").open("rb") as stream:
+        topics = {channel.topic for _, channel, _ in make_reader(stream).iter_messages()}
+    assert topics == {"/terragrip/estimate"}
+
+
 def test_rows_as_json_leave_nothing_out_and_nan_as_null() -> None:
     part = table(2, adhesion_l=np.array([0.25, np.nan]))
     assert list(json_rows(part, ("time", "adhesion_l", "event", "soil"))) == [

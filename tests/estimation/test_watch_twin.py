@@ -10,7 +10,7 @@ import pytest
 from drives import RADIUS, WHEELS, drive, robot
 from terragrip.estimation import Estimates, estimate
 from terragrip.estimation.engine import SIGNS
-from terragrip.estimation.reference.immobilization import Watch, pace, rows_of
+from terragrip.estimation.reference.immobilization import Row, Watch, pace, rows_of
 from terragrip.estimation.settings import watch_limits
 from terragrip.recording import Recording
 
@@ -83,3 +83,28 @@ def test_wheels_that_spin_after_a_stop_are_stuck_after_half_a_second(
     _, result = table
     first, _ = spell(result, "stuck")
     assert result.time[first] == pytest.approx(38.0 + watch_limits(RADIUS)["stuck_duration"], abs=0.03)
+
+
+@pytest.mark.parametrize(
+    ("after", "travel", "event"),
+    [
+        (1.0, 0.3, "stuck"),  # hardly free: under four tenths of the rims
+        (1.0, 0.5, ""),
+        (2.0, 0.3, ""),  # what was seen more than a second and a half ago counts no more
+        (2.0, 0.02, ""),
+    ],
+)
+def test_a_machine_is_stuck_until_it_comes_free_or_is_not_seen_for_long(
+    after: float, travel: float, event: str
+) -> None:
+    """Rims at 1 m/s: for half a second, and half a turn of a wheel of .2 m, they must make no way."""
+    watch = Watch(watch_limits(RADIUS), 1.0, RADIUS)
+
+    def row(time: float, travel: float) -> Row:
+        return Row(time, 1 - travel, 0.01, 1.0, 0.3, 0.3, 0.1, 1.0, travel, travel_deviation=0.001)
+
+    events = [watch.update(row(0.125 * k, 0.02)) for k in range(17)]
+    first = events.index("stuck")
+    assert 0.125 * first == pytest.approx(max(0.5, np.pi * RADIUS), abs=0.13)
+    assert set(events[first:]) == {"stuck"}
+    assert watch.update(row(2.0 + after, travel)) == event

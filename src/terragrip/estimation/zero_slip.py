@@ -88,16 +88,14 @@ def zero_of(
 def _judged(ratio: Floats, fast: npt.NDArray[np.bool_]) -> Zero:
     modes = _modes(ratio)
     value, spread, share = modes[-1]
-    count = max(1, round(share * len(ratio)))
+    count = round(share * len(ratio))  # four or more
     road = ratio[fast]
     of_road = len(road) >= FEWEST and (len(road) > 0.8 * len(ratio) or float(np.median(road)) > value)
     if (
         of_road
     ):  # firm ground, and no pull: nearer to no slip than the lightest work in the field, however short
         value, spread, count = float(np.median(road)), _spread(road), len(road)
-    std = float(
-        np.sqrt(spread**2 / max(1.0, count / 2) + _LIGHT**2 + (_SELF_ROAD if of_road else _SELF_FIELD) ** 2)
-    )
+    std = float(np.sqrt(spread**2 / (count / 2) + _LIGHT**2 + (_SELF_ROAD if of_road else _SELF_FIELD) ** 2))
     if abs(value - 1) > _PLAUSIBLE:
         why = f"ground speed is {value:.3g} times wheel speed even in the lightest work: check the units and the radius"
         return Zero(1.0, UNTOLD, count, why)
