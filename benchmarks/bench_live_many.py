@@ -96,7 +96,8 @@ def bench(options: argparse.Namespace, log: Recording, vehicle_file: Path, folde
         ("memory without a vehicle, MB; more a vehicle, MB", f"{empty:.0f}; {(full - empty) / count:.2f}"),
     ]  # fmt: skip
     lines = [
-        f"{count} vehicles at {rate} Hz, {options.seconds:.0f} s; peer: a step of filterpy's UKF, {1e6 * step:.0f} us in this run.",
+        f"{count} vehicles at {rate} Hz, {options.seconds:.0f} s; peer: a step of filterpy's UKF, {1e6 * step:.0f} us in this run. "
+        f"Load of the machine's {os.cpu_count()} cores at its end, this run's own 1 to 2 included: {os.getloadavg()[0]:.0f}.",
         "",
         "| | seen |",
         "|---|---:|",

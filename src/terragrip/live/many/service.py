@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import os
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from functools import partial
 from pathlib import Path
 from typing import Any, cast
@@ -29,6 +30,7 @@ from terragrip.live.supervision import run_links
 from terragrip.live.vehicle_run import VehicleRun
 
 _SLICE = 8  # vehicles that are looked after at once
+_TOGETHER = 0.002  # s: what comes so close together shares a turn, which costs a sixth less a sample
 _QUEUE = 100  # messages of a vehicle before a sink
 
 
@@ -148,12 +150,11 @@ class ManyService:
         until = min((run.pipeline.waiting_until or 0.0 for run in pending.values()), default=None)
         if until is None:
             await vehicles.filled.wait()
-            return
-        try:
-            async with asyncio.timeout(max(until - vehicles.clock(), 0.0) + 1e-4):
-                await vehicles.filled.wait()
-        except TimeoutError:
-            pass
+        else:
+            with suppress(TimeoutError):
+                async with asyncio.timeout(max(until - vehicles.clock(), 0.0) + 1e-4):
+                    await vehicles.filled.wait()
+        await asyncio.sleep(_TOGETHER)
 
     async def _open(self) -> None:
         """Open vehicles one by one, with as much time for the others between two as one takes."""
