@@ -97,7 +97,7 @@ def bench(options: argparse.Namespace, log: Recording, vehicle_file: Path, folde
     ]  # fmt: skip
     lines = [
         f"{count} vehicles at {rate} Hz, {options.seconds:.0f} s; peer: a step of filterpy's UKF, {1e6 * step:.0f} us in this run. "
-        f"Load of the machine's {os.cpu_count()} cores at its end, this run's own 1 to 2 included: {os.getloadavg()[0]:.0f}.",
+        f"Load of the machine's {os.cpu_count()} cores at its end, this run included: {os.getloadavg()[0]:.0f}.",
         "",
         "| | seen |",
         "|---|---:|",
