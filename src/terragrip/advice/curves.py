@@ -2,14 +2,15 @@
 
 Model, over the true slip s, while what is measured is s + e:
 
-    mu(s) = c r_0 + A (h(k s; p) - f s),   dh/dx = (1 - h)^p,   rho_s(s) = r_0 + r_1 s
+    mu(s) = c r_0 + A (h(q(p) k s; p) - f s),   dh/dx = (1 - h)^p,   rho_s(s) = r_0 + r_1 s
 
 p shapes the rise: 2/3 is the brush tyre's cubic, 1 the exponential of physics.md 5, 2 the hyperbola x/(1 + x); Janosi's shear under a
-contact patch lies between. c r_0 is the adhesion that a wheel needs before it slips where soil yields. e is the error of slip that stays
+contact patch lies between. q makes every shape reach 3/4 of its height at the exponential's slip, ln 4/k: how fast soils give grip is
+known, by what form is not. c r_0 is the adhesion that a wheel needs before it slips where soil yields. e is the error of slip that stays
 alike for a whole drive: a wrong radius, a slow error of the ground speed. Each curve is fitted to bins drawn anew by stretches of way,
 to constants (torque scale, drawbar and slope) drawn by their stated spread, and to a prior drawn by its spread (randomised maximum a
 posteriori; Bardsley et al. 2014): with much data the curves agree, with little they spread as far as soils do.
-Why these: docs/decisions/0156.
+Why these: docs/decisions/0156, 0155.
 """
 
 from __future__ import annotations
@@ -38,6 +39,12 @@ spread of e is the drive's own."""
 LOWER = np.array([-4.0, 0.0, -0.5, np.nan, 0.0, 0.0, 0.1, 0.0])
 UPPER = np.array([1.5, np.log(100.0), 1.5, np.nan, 0.6, 0.5, 2.5, 1.5])
 E = NAMES.index("e")
+YIELDING, SOFT = 0.08, 0.18
+"""Resistance up to which ground counts as firm, and from which it is taken to yield under the wheel as Wong and Reece's does."""
+NO_SMALLER, SLOWER = 0.5, 0.75
+"""Wheel radius [m] below which k falls on yielding ground, and its power of the radius there: shear needs a way K of 1 to 2.5 cm whatever
+the wheel (Wong), which a small one has only at more slip. K alone gives a power of 1, and 3 on .2 m; the paper's robot of .2 m shows
+11. Between the two."""
 COMMON = 0.5
 """Share of slip's SD that stays alike for a drive: its mean error over the SD is .4 on development machines, .7 with coarse sensors."""
 BY_BIN = 0.2
@@ -80,7 +87,7 @@ def adhesion(parameters: Array, slip: Array) -> Array:
     """mu (draws, slips) of parameters (draws, 8) at measured slips (draws, slips)."""
     height, rate, fall, error, level, _, shape, share = (parameters[:, i, None] for i in range(len(NAMES)))
     s = slip - error
-    rise = np.sign(s) * _rise(np.exp(rate) * np.abs(s), shape)
+    rise = np.sign(s) * _rise(np.exp(rate) * _three_quarters(shape) / np.log(4.0) * np.abs(s), shape)
     return np.asarray(share * level + np.exp(height) * (rise - fall * s))
 
 
@@ -88,6 +95,12 @@ def _rise(x: Array, shape: Array) -> Array:
     """h of dh/dx = (1 - h)^p, h(0) = 0, at x >= 0."""
     q = np.where(np.abs(1 - shape) < 1e-4, 1e-4, 1 - shape)
     return np.asarray(-np.expm1(np.log(np.maximum(1 - q * x, 1e-12)) / q))
+
+
+def _three_quarters(shape: Array) -> Array:
+    """x at which h is 3/4."""
+    q = np.where(np.abs(1 - shape) < 1e-4, 1e-4, 1 - shape)
+    return np.asarray(-np.expm1(-q * np.log(4.0)) / q)
 
 
 def resistance(parameters: Array, slip: Array) -> Array:
@@ -107,12 +120,14 @@ def draw_curves(
     common_sd: float,
     radius_sd: float,
     offset_sd: float,
+    wheel_radius: float,
     draws: int = DRAWS,
     seed: int = 0,
 ) -> CurveDraws | None:
     """Curves of one soil; None with fewer than LEAST_STRETCHES stretches or LEAST_BINS bins.
 
-    common_sd: relative SD of the torque scale; radius_sd: relative, of the rolling radius; offset_sd: of rho_s by drawbar offset and slope.
+    common_sd: relative SD of the torque scale; radius_sd: relative, of the rolling radius; offset_sd: of rho_s by drawbar offset and slope;
+    wheel_radius [m].
     """
     _, label = np.unique(samples.stretch, return_inverse=True)
     stretches = int(label.max()) + 1 if label.size else 0
@@ -147,8 +162,13 @@ def draw_curves(
     slip_sd = np.sqrt(slip_sd**2 + SLIP_FLOOR**2 + own**2)
     prior_sd = SPREAD.copy()
     prior_sd[E] = lasting_sd(radius_sd, float(np.median(samples.slip_std)))
-    prior = CENTRE + prior_sd * rng.standard_normal((draws + 1, len(CENTRE)))
-    prior[0] = CENTRE
+    centre = CENTRE.copy()
+    yields = np.clip(
+        (np.average(samples.resistance, weights=samples.metres) - YIELDING) / (SOFT - YIELDING), 0, 1
+    )
+    centre[1] += SLOWER * float(yields) * min(np.log(wheel_radius / NO_SMALLER), 0.0)
+    prior = centre + prior_sd * rng.standard_normal((draws + 1, len(CENTRE)))
+    prior[0] = centre
     scale = 1 + common_sd * rng.standard_normal((draws + 1, 1))
     shift = offset_sd * rng.standard_normal((draws + 1, 1))
     scale[0], shift[0] = 1.0, 0.0

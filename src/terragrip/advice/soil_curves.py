@@ -43,6 +43,7 @@ def of_drives(samples: Samples, vehicle: Vehicle) -> SoilCurves | None:
         samples,
         common_sd=torque_scale_sd(vehicle),
         radius_sd=_radius_sd(vehicle),
+        wheel_radius=float(vehicle.wheel_radius[vehicle.driven].mean()),
         offset_sd=float(max(np.nanmedian(samples.resistance_std), stated)),
     )
     if draws is None:
