@@ -26,8 +26,10 @@ def picture(made: FieldMap) -> Figure:
     from matplotlib.figure import Figure
 
     corner, extent = _corner(made), _extent(made)
-    tall = WIDTH / 2.6 * min(max(extent[1] / max(extent[0], 1e-9), 0.25), 2.0) + 0.9
-    figure = Figure(figsize=(WIDTH, tall * len(made.cells)), layout="constrained")
+    shape = extent[1] / max(extent[0], 1e-9)
+    tall = WIDTH / 2.6 * min(max(shape, 0.25), 2.0) + 0.9
+    wide = WIDTH * min(max(2.0 / shape, 0.55), 1.0)  # a narrow field needs no white beside it
+    figure = Figure(figsize=(wide, tall * len(made.cells)), layout="constrained")
     axes = figure.subplots(len(made.cells), 2, squeeze=False, sharex=True, sharey=True)
     for line, quantity in zip(axes, made.cells, strict=True):
         cells = made.cells[quantity]
@@ -44,8 +46,9 @@ def picture(made: FieldMap) -> Figure:
     for ax in axes[-1]:
         ax.set_xlabel("east [m]")
     west, south = corner
+    ringed = "anomalies ringed" if any(made.anomalies.values()) else "no anomalies"
     figure.suptitle(
-        f"EPSG:{made.epsg}, from east {west:.0f} m, north {south:.0f} m; cells of {made.cell:g} m; anomalies ringed",
+        f"EPSG:{made.epsg}, from east {west:.0f} m, north {south:.0f} m\ncells of {made.cell:g} m; {ringed}",
         fontsize=9,
     )
     return figure

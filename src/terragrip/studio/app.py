@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import os
+import threading
 from collections.abc import AsyncIterator, Iterable
 from importlib import import_module
 from pathlib import Path
@@ -66,6 +67,7 @@ def create_app(
 
     @contextlib.asynccontextmanager
     async def life(_: FastAPI) -> AsyncIterator[None]:
+        threading.Thread(target=studio.prepare_maps, daemon=True).start()
         yield
         await studio.jobs.close()
 

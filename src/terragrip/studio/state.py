@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import os
+from importlib import import_module
+from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -72,6 +74,12 @@ class Studio:
         # by SHA-256, rows and times: the recording and the profile that reads it, None where the folder does not hold it
         self.origins: dict[tuple[str | float, ...], tuple[Path, str] | None] = {}
         self.upload_limit, self.live = upload_limit, live
+
+    def prepare_maps(self) -> None:
+        """Load what reads a map where the folder holds one: half of what the first map's opening took."""
+        if any(self.folder.root.glob("**/*.gpkg")) and find_spec("pyogrio"):
+            import_module("pyogrio")
+            import_module("pyproj")
 
 
 def _studio(connection: HTTPConnection) -> Studio:
