@@ -10,6 +10,7 @@ import pytest
 from terragrip.errors import InputError
 from terragrip.estimation import Estimates
 from terragrip.physics.adhesion import CURVES
+from terragrip.soil.bins import BinSettings
 from terragrip.soil.estimates import (
     GatheredRuns,
     distinct,
@@ -18,6 +19,7 @@ from terragrip.soil.estimates import (
     torque_scale_sd,
     whole_length,
 )
+from terragrip.soil.fit import AdhesionCurve
 from terragrip.vehicle import Vehicle
 
 
@@ -105,12 +107,13 @@ def test_runs_add_up_join_and_come_apart_by_soil() -> None:
     clay = first.only("clay")
     assert {p.soil for p in clay.pairs} == {"clay"} == set(clay.blocks)
     assert clay.runs == first.runs
-    campaign = first.learn()
+    plain = AdhesionCurve(bins=BinSettings(by="pull"), bootstrap=0)
+    campaign = first.learn(plain)
     assert campaign.soils["clay"].soil.parameters["a"] == pytest.approx(0.8, rel=0.01)
     assert campaign.soils["loam"].soil.parameters["a"] == pytest.approx(0.5, rel=0.01)
     assert campaign.soils["clay"].soil.source == "3 runs: one, two, three"
     first.join(second)
-    assert first.learn().soils["loam"].soil.source == "5 runs: one, two, three and 2 more"
+    assert first.learn(plain).soils["loam"].soil.source == "5 runs: one, two, three and 2 more"
 
 
 def test_a_file_given_twice_and_slip_without_adhesion_are_refused(tmp_path: Path) -> None:
