@@ -175,6 +175,14 @@ def test_a_map_is_in_metres_from_its_first_position_and_shows_the_wheels_mean() 
     np.testing.assert_allclose(points.get_array(), 0.15)
 
 
+def test_estimates_say_whether_they_are_smoothed() -> None:
+    log = drive(1.0).recording
+    assert [bool(estimate(log, robot(), smooth=smooth).about.get("smooth")) for smooth in (False, True)] == [
+        False,
+        True,
+    ]
+
+
 def test_a_file_is_converted_with_its_progress(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("terragrip.estimation.converting.ROWS", 40)
     result = estimate(drive(1.0).recording, robot())

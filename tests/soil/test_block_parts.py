@@ -82,6 +82,13 @@ def test_a_block_is_half_a_second_of_means_and_scatter() -> None:
     np.testing.assert_array_equal(blocks.known, blocks.streak > 4)
 
 
+@pytest.mark.parametrize(("usable", "counts"), [(4, False), (5, True)])
+def test_a_block_counts_that_is_usable_by_half(usable: int, counts: bool) -> None:
+    data = columns(30, rate=20.0)
+    data["event"][10 + usable : 20] = "gap"
+    assert blocks_of(data, AXLES).streak.tolist() == ([1, 2, 3] if counts else [1, 0, 1])
+
+
 def test_without_deviations_loads_or_a_curve_estimates_count_as_exact_and_wheels_alike() -> None:
     bare = {
         n: v for n, v in columns().items() if not n.endswith("_std") and "load" not in n and n != "curve_a"
