@@ -20,7 +20,7 @@ from terragrip.estimation.reference import (
     runge_kutta,
     smooth,
 )
-from terragrip.estimation.reference.linear_algebra import cholesky, solve_positive
+from terragrip.estimation.reference.linear_algebra import cholesky, solve_positive, symmetric
 
 ENGINES = ["linear", "extended", "unscented"]
 Array = NDArray[Any]
@@ -288,3 +288,8 @@ def test_linear_algebra_agrees_with_lapack(size, seed):
     np.testing.assert_allclose(A @ solve_positive(A, B), B, atol=1e-7)
     long = solve_positive(A.astype(np.longdouble), B)
     assert long.dtype == np.longdouble
+
+
+def test_of_an_asymmetry_half_goes_either_way():
+    uneven = np.array([[[1.0, 2.0], [4.0, 5.0]], [[0.0, 1.0], [0.0, 3.0]]])
+    np.testing.assert_array_equal(symmetric(uneven), [[[1.0, 3.0], [3.0, 5.0]], [[0.0, 0.5], [0.5, 3.0]]])

@@ -173,7 +173,8 @@ def test_wheels_that_stand_for_several_shift_loads_less() -> None:
         from terragrip._kernel import ffi
 
         s = ffi.new("tg_settings *", plain)
-        Thresholds(standstill_speed=0.25, together=together).put(s)
+        given = {} if together == 1 else {"together": together}  # a wheel stands for itself
+        Thresholds(standstill_speed=0.25, **given).put(s)
         assert s.tuned.uneven_memory == memory
         assert s.tuned.least_load_spread == pytest.approx(spread * plain.tuned.least_load_spread)
         assert (s.standstill_speed, s.gap) == (0.25, plain.gap)
