@@ -12,6 +12,7 @@ from pathlib import Path
 import pytest
 
 from terragrip.log_events import EVENTS, emit
+from terragrip.simulation import Scenario
 
 TOKEN, PASSWORD = "a-token-of-many-characters", 'a "quoted" password'
 SECRETS = {"TERRAGRIP_TOKEN": TOKEN, "TERRAGRIP_PASSWORD": PASSWORD, "TERRAGRIP_USERNAME": "me"}
@@ -29,9 +30,8 @@ def test_an_event_that_is_not_listed_is_refused() -> None:
 
 def test_live_logs_its_life_in_json_and_no_secret(tmp_path: Path) -> None:
     pytest.importorskip("paho.mqtt")
-    made = [sys.executable, "-m", "terragrip", "simulate", "grass-05", "-o", "."]
-    subprocess.run(made, cwd=tmp_path, check=True, capture_output=True)
-    (vehicle,) = list(tmp_path.rglob("vehicle*.yaml"))[:1]
+    vehicle = tmp_path / "vehicle.yaml"
+    Scenario.load("grass-05").nominal_vehicle().save(vehicle)
     words = ["--source", "udp://127.0.0.1:0", "--source", "mqtt://127.0.0.1:1/machine", "--duration", "1.6"]
     command = [sys.executable, "-m", "terragrip", "live", "--vehicle", str(vehicle), *words]
     done = subprocess.run(

@@ -64,7 +64,7 @@ def drive(name: str = "multi2", method: str = "bank", seconds: float = 120.0, se
     return Run(name, estimates, method, truth, recording, Vehicle.from_dict(VEHICLE))
 
 
-@pytest.fixture(name="drive")
+@pytest.fixture(scope="session", name="drive")
 def drive_fixture() -> Callable[..., Run]:
     """The maker of made-up drives."""
     return drive

@@ -14,7 +14,7 @@ from terragrip.cli import main
 from terragrip.estimation import Estimates
 from terragrip.report import soil_sections
 from terragrip.report.from_estimates import report_of
-from terragrip.report.page import number
+from terragrip.report.page import Page, Section, number
 from terragrip.soil.library import Soil, SoilLibrary
 
 
@@ -29,6 +29,13 @@ def files_fixture(tmp_path_factory: pytest.TempPathFactory) -> list[str]:
         folder / "multi.parquet"
     )
     return [str(path) for path in sorted(folder.glob("*.parquet"))]
+
+
+@pytest.fixture
+def drawn(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A page is there at once, for what is about the files alone."""
+    page = Page("Traction report", "of nothing", (Section("a", "A", prose=("A word.",)),))
+    monkeypatch.setattr("terragrip.report.from_estimates.report_of", lambda *_: page)
 
 
 @pytest.fixture(scope="module", name="report")
@@ -76,7 +83,8 @@ def test_a_library_given_is_what_is_shown(
     """Nothing is learned beside it; a soil that it does not hold is said."""
     SoilLibrary({"fine": Soil("fine", "exponential", {"a": 0.777})}).write(tmp_path / "soils.json")
     monkeypatch.setattr("terragrip.soil.estimates.learn_soils", None)
-    words = ["report", *files, "--library", str(tmp_path / "soils.json"), "-o", str(tmp_path / "report.html")]
+    runs = [file for file in files if file.endswith("-0.parquet")]
+    words = ["report", *runs, "--library", str(tmp_path / "soils.json"), "-o", str(tmp_path / "report.html")]
     assert main([*words, "--no-pdf", "--quiet"]) == 0
     html = (tmp_path / "report.html").read_text(encoding="utf-8")
     assert "0.777" in html
@@ -116,7 +124,7 @@ def test_the_pdf_has_an_outline_of_the_sections_and_tags_for_who_cannot_see_it(r
 
 
 def test_no_pdf_and_another_place_for_it(
-    files: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    drawn: None, files: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert main(["report", files[0], "-o", str(tmp_path / "a.html"), "--no-pdf"]) == 0
     assert {path.name for path in tmp_path.iterdir()} == {"a.html"}
@@ -126,7 +134,11 @@ def test_no_pdf_and_another_place_for_it(
 
 
 def test_without_typst_the_page_is_written_and_one_line_says_what_to_install(
-    files: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+    drawn: None,
+    files: list[str],
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr("terragrip.report.pdf.pdf_possible", lambda: False)
     assert main(["report", files[0], "-o", str(tmp_path / "a.html"), "--quiet"]) == 0

@@ -22,7 +22,7 @@ from terragrip.report.timeline import Lane, slots, timeline
 Drive = Callable[..., Run]
 
 
-@pytest.fixture(name="page")
+@pytest.fixture(scope="module", name="page")
 def page_fixture(drive: Drive) -> Page:
     """A page with every section."""
     first, second = drive("multi1", seed=1), drive("multi2", seed=2)

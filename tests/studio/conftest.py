@@ -94,7 +94,7 @@ def browser() -> Iterator[Any]:
         yield running
 
 
-PATIENCE = 60_000
+PATIENCE = 180_000
 """How long [ms] a page may need on a busy machine before a test gives up; no test passes or fails by what it waits less."""
 
 

@@ -78,7 +78,7 @@ def axe_faults(browser: Any, served: Served, where: str, theme: str, width: int,
         viewport={"width": width, "height": 720}, color_scheme=theme, bypass_csp=True
     )
     tab = context.new_page()
-    tab.set_default_timeout(90_000)
+    tab.set_default_timeout(180_000)
     tab.goto(f"{served.url}/{where}")
     tab.wait_for_selector(ready, state="attached")
     tab.add_script_tag(path=str(AXE))

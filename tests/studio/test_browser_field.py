@@ -41,12 +41,6 @@ def folder(folder: Path, field_maps: Path) -> Path:
     return folder
 
 
-@pytest.fixture(autouse=True)
-def patient(page: Any) -> None:
-    """A map is made and read by the server: a busy machine takes its time."""
-    page.set_default_timeout(90_000)
-
-
 def open_map(page: Any, served: Served, query: str = "map=field.gpkg") -> None:
     page.goto(f"{served.url}/#/map?{query}")
     page.wait_for_selector("#map[data-cells]")
