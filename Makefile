@@ -26,7 +26,7 @@ KERNEL_TESTS := $(patsubst kernel/tests/%.c,%,$(wildcard kernel/tests/*.c))
 BUILD_INPUTS := pyproject.toml setup.py cffi_build.py $(KERNEL_SOURCES) $(KERNEL_HEADERS) \
 	$(wildcard kernel/python/*.[ch] src/terragrip/*/*.c src/terragrip/*/*.h)
 
-.PHONY: beside pytest-long notebooks soak soak-short help demo test lint kernel-test web-test pytest studio wheel docs system bench lock clean sbom audit \
+.PHONY: beside beside-long collected pytest-long notebooks soak soak-short help demo test lint kernel-test web-test pytest studio wheel docs system bench lock clean sbom audit \
 	kernel-aarch64 kernel-others test-long kernel-sanitized fuzz system-fuzz fuzz-kernel fuzz-kernel-run fuzz-parsers kills
 
 help: ## show this list
@@ -37,9 +37,15 @@ demo: $(VENV)/package studio ## set up, simulate the campaign, estimate every ru
 
 test: system beside pytest ## set up, then lint, type checks, import rules, C tests and Python tests
 
-# Lint, C tests and the pages' tests each use one processor: side by side, each with its own output in one piece.
-beside: $(VENV)/package $(VENV)/dev studio
-	@$(MAKE) --no-print-directory BESIDE=1 -j $(WORKERS) $(if $(findstring output-sync,$(.FEATURES)),--output-sync=target) lint kernel-test web-test
+# Lint, C tests and the pages' tests each use one processor: side by side with each other and with what they wait for. Three jobs on two
+# processors, for pip and npm wait for the network; each command's output in one piece.
+AT_ONCE := --no-print-directory BESIDE=1 -j 3 $(if $(findstring output-sync,$(.FEATURES)),--output-sync=line)
+beside:
+	@$(MAKE) $(AT_ONCE) lint kernel-test web-test collected
+
+# Every test file imported once: else each worker of pytest would rewrite and compile all of them anew.
+collected: $(VENV)/package $(VENV)/dev
+	@mkdir -p build && $(BIN)/python -m pytest --collect-only -q > build/collected.txt || { tail -n 40 build/collected.txt; exit 1; }
 
 lint: $(VENV)/package $(VENV)/dev ## ruff, mypy and import-linter
 	$(BIN)/ruff check
@@ -58,8 +64,11 @@ system: ## as root on Debian: install the programs that the tests of studio and 
 	    || echo "make: could not install$$missing; their tests will be skipped" >&2; \
 	elif [ -n "$$missing" ]; then echo "make: without$$missing some tests are skipped" >&2; fi
 
+# Two workers a processor, for nearly half of the time they wait for browsers, brokers and timers; each takes a run of whole files, so that what a file's
+# tests share is made once. The workers fill the processors: no threads inside a product of matrices.
+PYTEST = OMP_NUM_THREADS=1 $(BIN)/python -m pytest --dist worksteal -n
 pytest: $(VENV)/package $(VENV)/dev studio ## the Python tests alone
-	$(BIN)/python -m pytest -n $(WORKERS)
+	$(PYTEST) $(shell expr 2 \* $(WORKERS))
 
 studio: $(VENV)/made ## build the studio's pages, where Node.js 20 or newer is
 	@$(BIN)/python build_pages.py
@@ -89,6 +98,7 @@ mutants: $(VENV)/package $(VENV)/dev ## do the tests notice? 400 random changes 
 lock: $(VENV)/made ## resolve the dependencies anew into requirements.lock and requirements-dev.lock
 	$(PIP) install --quiet uv
 	echo 'setuptools>=77' | $(BIN)/uv pip compile $(LOCK_FLAGS) --extra all pyproject.toml - -o requirements.lock
+	echo pip | $(BIN)/uv pip compile $(LOCK_FLAGS) - -o requirements-pip.lock
 	$(BIN)/uv pip compile $(LOCK_FLAGS) --extra dev -c requirements.lock pyproject.toml -o requirements-dev.lock
 LOCK_FLAGS := --quiet --upgrade --generate-hashes --universal --python-version 3.11 --no-annotate --no-emit-index-url \
 	--no-emit-find-links --fork-strategy fewest --custom-compile-command "make lock"
@@ -116,7 +126,8 @@ clean: ## remove everything that was built or installed
 	rm -f src/terragrip/*.so src/terragrip/*/*.so src/terragrip/_kernel_*.py src/terragrip/simulation/_plant.py
 
 # --- the environment -------------------------------------------------------------------------------------------------
-# Each file below is a stamp: it is newer than what it was made from, so a second run does nothing.
+# Each file below is a stamp: it is newer than what it was made from, so a second run does nothing. The pip that installs is a recent one:
+# that of Python 3.11 takes twice the time. -qq: warnings are about indexes that lack a package, one for each.
 $(VENV)/made:
 	@python=""; for candidate in $(if $(PYTHON),$(PYTHON),$(CANDIDATES)); do \
 	  if "$$candidate" -c 'import sys; sys.exit(sys.version_info < (3, 11))' >/dev/null 2>&1; then python="$$candidate"; break; fi; \
@@ -129,16 +140,20 @@ $(VENV)/made:
 	  echo "make: no C compiler named $(CC); on Debian and Ubuntu: apt-get install gcc libc6-dev, or name one: make CC=clang" >&2; exit 1; fi; \
 	echo "Setting up $(VENV) with $$("$$python" -c 'import sys; print(sys.executable, sys.version.split()[0])')"; \
 	"$$python" -m venv --clear $(VENV)
+	@$(PIP) install -qq -r requirements-pip.lock || echo "make: pip stays as it came with Python, which is slower" >&2
 	@$(BIN)/python -c 'import sys; print(sys._base_executable, sys.version)' > $@
 
+# Byte code on two processors, as pip does it on one (nobody imports the few files that do not compile).
 $(VENV)/runtime: $(VENV)/made requirements.lock
 	@echo "Installing the packages of requirements.lock"
-	@$(PIP) install --quiet -r requirements.lock
+	@$(PIP) install -qq --no-compile -r requirements.lock
+	@$(BIN)/python -m compileall -qq -j 2 $(VENV)/lib || true
 	@touch $@
 
-$(VENV)/dev: $(VENV)/runtime requirements-dev.lock
+# After the package, for pip works on one environment one call at a time.
+$(VENV)/dev: $(VENV)/runtime requirements-dev.lock | $(VENV)/package
 	@echo "Installing the packages of requirements-dev.lock"
-	@$(PIP) install --quiet -r requirements-dev.lock
+	@$(PIP) install -qq --no-compile -r requirements-dev.lock
 	@touch $@
 
 $(VENV)/package: $(VENV)/runtime $(BUILD_INPUTS)
@@ -177,10 +192,13 @@ KILLS ?= 25
 FUZZERS := $(patsubst fuzz/kernel/%.c,build/fuzz/kernel-%,$(wildcard fuzz/kernel/*.c))
 FUZZ_CC := clang
 
-test-long: kernel-sanitized pytest-long fuzz kills soak-short ## every C test under the address and undefined-behaviour sanitizers, tests marked long, each fuzzer for FUZZ_SECONDS, a hundred kills, a soak of 60 s
+test-long: beside-long kills soak-short ## every C test under the address and undefined-behaviour sanitizers, tests marked long, each fuzzer for FUZZ_SECONDS, a hundred kills, a soak of 60 s
+
+beside-long:
+	@$(MAKE) $(AT_ONCE) kernel-sanitized pytest-long fuzz
 
 pytest-long: $(VENV)/package $(VENV)/dev studio ## the Python tests marked long, but for the kills: what shorter tests show too
-	$(BIN)/python -m pytest -m long -n $(WORKERS) --ignore tests/test_kills.py
+	$(PYTEST) $(WORKERS) -m long --ignore tests/test_kills.py
 
 kills: $(VENV)/package $(VENV)/dev ## kill -9 a hundred times during estimate, soils, a fit saved and an upload
 	TERRAGRIP_KILLS=$(KILLS) $(BIN)/python -m pytest tests/test_kills.py -m long -q -n $(WORKERS) -rP

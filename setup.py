@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import sys
+from copy import copy
 from pathlib import Path
 
 from setuptools import Extension, setup
@@ -21,12 +22,9 @@ class BuildBindings(build_ext):
     build_temp: str
 
     def build_extension(self, ext: Extension) -> None:
-        shared = self.build_temp
-        self.build_temp = os.path.join(shared, ext.name)
-        try:
-            super().build_extension(ext)
-        finally:
-            self.build_temp = shared
+        apart = copy(self)
+        apart.build_temp = os.path.join(self.build_temp, ext.name)
+        super(BuildBindings, apart).build_extension(ext)
 
 
 class BuildPackage(build_py):
@@ -41,5 +39,5 @@ class BuildPackage(build_py):
 setup(
     cmdclass={"build_ext": BuildBindings, "build_py": BuildPackage},
     ext_modules=[extension(binding, ROOT / "build" / "glue") for binding in bindings()],
-    options={"bdist_wheel": {"py_limited_api": "cp311"}},
+    options={"build_ext": {"parallel": 2}, "bdist_wheel": {"py_limited_api": "cp311"}},
 )
