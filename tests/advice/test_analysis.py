@@ -119,6 +119,15 @@ def test_load_advised_is_the_pull_of_the_best_slip():
     assert kilonewton == pytest.approx(one.best_efficiency.net_traction * 6000 * 9.80665 / 1e3, rel=0.01)
 
 
+def test_a_robots_pull_is_told_in_newtons():
+    axles = {name: {**axle, "mass": axle["mass"] / 100} for name, axle in VEHICLE.to_dict()["axles"].items()}
+    robot = Vehicle.from_dict({**VEHICLE.to_dict(), "mass": 60.0, "axles": axles})
+    one = only([drive(top=0.06, vehicle=robot)], robot)
+    action = next(a for a in one.actions if "Load more" in a.what)
+    newtons = float(action.what.split("about ")[1].split(" N ")[0])
+    assert newtons == pytest.approx(one.best_efficiency.net_traction * 60 * 9.80665, abs=1)
+
+
 def test_the_reserve_is_what_the_mean_adhesion_leaves_of_the_curves_top():
     one = only([drive(a=0.9)])
     used = one.drive["adhesion"]

@@ -97,7 +97,7 @@ def _load(work: Work, vehicle: Vehicle) -> list[Action]:
     weight = vehicle.mass * STANDARD_GRAVITY
     more = best > now
     what = (
-        f"{'Load more' if more else 'Load less'}: pull about {best * weight / 1e3:.3g} kN instead of {max(now, 0) * weight / 1e3:.3g} kN "
+        f"{'Load more' if more else 'Load less'}: pull about {_force(best * weight)} instead of {_force(max(now, 0) * weight)} "
         f"on average ({'a deeper or wider tool' if more else 'a shallower or narrower tool'}), until slip is {work.best.slip:.1%} "
         f"({low:.1%} to {high:.1%})."
     )
@@ -107,6 +107,10 @@ def _load(work: Work, vehicle: Vehicle) -> list[Action]:
         else "Above the best slip, more of the way is lost in slip than the pull gains."
     )
     return [Action(what, why, gain, interval)]
+
+
+def _force(newtons: float) -> str:
+    return f"{newtons:.0f} N" if newtons < 1e3 else f"{newtons / 1e3:.3g} kN"
 
 
 def _ballast(work: Work, vehicle: Vehicle) -> list[Action]:

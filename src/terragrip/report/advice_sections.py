@@ -163,11 +163,12 @@ def _soil(name: str) -> str:
 
 
 def _slips(advice: Mapping[str, Advice], order: Sequence[str], mass: float) -> Table:
+    unit, weight = ("kN", mass * 9.80665e-3) if mass > 1000 else ("N", mass * 9.80665)
+    digits = 2 if unit == "kN" else 0
     rows = []
     for name in order:
         one, drive = advice[name], advice[name].drive
         best, power = one.best_efficiency, one.best_productivity
-        weight = mass * 9.80665e-3
         now = [number(drive.get("metres"), 0), percent(drive.get("slip"))]
         if best is None:
             rows.append((_soil(name), *now, "not known", "–", percent(drive.get("efficiency"), 0), "–", "–"))
@@ -177,11 +178,13 @@ def _slips(advice: Mapping[str, Advice], order: Sequence[str], mass: float) -> T
             "–" if power is None else _between(power.slip, power.interval),
         ]
         there = f"{percent(best.efficiency, 0)} ({_ends(best.efficiency_interval)})"
-        pull = f"{number(weight * drive['net_traction'], 2)} → {number(weight * best.net_traction, 2)}"
+        pull = (
+            f"{number(weight * drive['net_traction'], digits)} → {number(weight * best.net_traction, digits)}"
+        )
         rows.append((_soil(name), *now, *said, percent(drive.get("efficiency"), 0), there, pull))
     head = (
         "soil", "way [m]", "slip driven", "slip of best efficiency", "of most pull power", "efficiency driven", "at best",
-        "pull [kN], driven → best",
+        f"pull [{unit}], driven → best",
     )  # fmt: skip
     return Table("What was driven, and what would be best, by soil.", head, tuple(rows))
 

@@ -75,8 +75,8 @@ def _drawn(made: FieldMap) -> Picture:
     return Picture(
         "map",
         to_svg(figure),
-        f"Cells of {made.cell:g} m, {len(made.runs)} run{'s' * (len(made.runs) != 1)}: value on the left, standard deviation on the right; "
-        "anomalies ringed. How a cell is made: docs/maps.md. As a file for a GIS: terragrip map.",
+        f"Cells of {made.cell:g} m, {len(made.runs)} run{'s' * (len(made.runs) != 1)}: value on the left, standard deviation on the right. "
+        "How a cell is made: docs/maps.md. As a file for a GIS: terragrip map.",
         "Map of the ground by cell",
     )
 
