@@ -213,7 +213,7 @@ soak-short:
 kernel-sanitized: $(foreach real,sanitized sanitized-float,$(KERNEL_TESTS:%=build/kernel/$(real)/%))
 	@for program in $^; do echo "$$program"; ./$$program > /dev/null || exit 1; done
 
-fuzz: system-fuzz fuzz-kernel fuzz-parsers ## fuzz the kernel (libFuzzer) and every parser (atheris); longer: make fuzz FUZZ_SECONDS=600
+fuzz: fuzz-kernel fuzz-parsers ## fuzz the kernel (libFuzzer) and every parser (atheris); longer: make fuzz FUZZ_SECONDS=600
 
 system-fuzz:
 	@if ! command -v $(FUZZ_CC) >/dev/null 2>&1 && [ "$$(id -u)" = 0 ] && command -v apt-get >/dev/null 2>&1; then \
@@ -229,7 +229,7 @@ build/fuzz/objects/%.o: kernel/src/%.c $(KERNEL_HEADERS) Makefile
 build/fuzz/kernel-%: fuzz/kernel/%.c fuzz/kernel/bytes.h $(patsubst kernel/src/%.c,build/fuzz/objects/%.o,$(KERNEL_SOURCES))
 	$(FUZZ_CC) $(FUZZ_FLAGS) -fsanitize=fuzzer -o $@ $(filter %.c %.o,$^) -lm
 
-fuzz-kernel:
+fuzz-kernel: system-fuzz
 	@if echo 'int LLVMFuzzerTestOneInput(const char *d, unsigned long n) { return d && n > 9 ? 0 : 0; }' \
 	    | $(FUZZ_CC) -fsanitize=fuzzer -x c - -o /dev/null 2>/dev/null; then $(MAKE) --no-print-directory fuzz-kernel-run; \
 	else echo "SKIPPED: the kernel's fuzzers need clang with libFuzzer; on Debian and Ubuntu: apt-get install clang libclang-rt-dev" >&2; fi
