@@ -231,7 +231,7 @@ def _refined(
     time = first[0] + _STEP * np.arange(len(first[1]))
     mine = _smooth(first[1])
     rate, jerk = np.gradient(mine, _STEP), np.gradient(_smooth(np.gradient(mine, _STEP)), _STEP)
-    deviation = _LEAST_STD
+    deviation = 0.5 * _APART  # where nothing can be refined, only that the correlation is worse at _APART
     for _ in range(_ROUNDS):
         stamps = second[0] - seconds + _STEP * np.arange(len(second[1]))
         known = np.isfinite(second[1])
