@@ -23,10 +23,11 @@ import numpy as np
 import numpy.typing as npt
 import pandas as pd
 
+import nis_causes
 from marked import put
 from terragrip.cli import main as terragrip
 from terragrip.estimation import Estimates
-from terragrip.estimation.channel_nis import PREFIX, estimate_with_channel_nis, moving_nis
+from terragrip.estimation.channel_nis import PREFIX, estimate_with_channel_nis
 from terragrip.formats import read
 from terragrip.recording import Recording
 from terragrip.vehicle import Vehicle
@@ -87,11 +88,23 @@ class Source:
     calibrates: bool = False
 
 
+WINDOWS = "drive_warthog/windows/warthog_wheels_"
 SOURCES = (
     Source("Alostar", "alostar_4wd/*.txt", "alostar_4wd", calibrates=True),
     Source("Warthog, raw", "drive_warthog/raw20hz/*.csv.gz", "drive_warthog", calibrates=True),
     Source(
-        "Warthog, windows", "drive_warthog/windows/*.csv.gz", "drive_warthog", windows_joined, "windows.yaml"
+        "Warthog, windows, asphalt",
+        f"{WINDOWS}asphalt*.csv.gz",
+        "drive_warthog",
+        windows_joined,
+        "windows.yaml",
+    ),
+    Source(
+        "Warthog, windows, grass",
+        f"{WINDOWS}grass*.csv.gz",
+        "drive_warthog",
+        windows_joined,
+        "windows_grass.yaml",
     ),
     Source("Pathfinder", "pathfinder_rover/*_odom_gps_10hz.csv.gz", "pathfinder_rover", calibrates=True),
     Source("Tractor T7", "tractor_t7/*.csv.gz", "tractor_t7", profile="", calibrates=True),
@@ -111,20 +124,6 @@ SOURCES = (
     Source("Husky, IMU", "borealtc_husky/imu/*/imu_00.csv.gz"),
     Source("Pathfinder, IMU", "pathfinder_rover/*imu*.csv.gz"),
 )
-
-
-CHANGES = (
-    ("Alostar", "wheel_speed", 0.5),
-    ("Alostar", "ground_speed", 2.0),
-    ("Warthog, raw", "wheel_speed", 0.5),
-    ("Warthog, raw", "ground_speed", 2.0),
-    ("Warthog, windows", "ground_speed", 0.5),
-    ("Pathfinder", "ground_speed", 2.0),
-    ("Tractor T7", "wheel_based_speed", 0.5),
-    ("Tractor T7", "ground_speed", 0.5),
-    ("comma2k19", "ground_speed", 3.0),
-)
-"""Source, beginning of the channels' names, and what their noise is multiplied by to see whether it is the cause."""
 
 
 @dataclass
@@ -326,22 +325,14 @@ def nis_table(logs: list[Log]) -> str:
 
 
 def causes(logs: list[Log]) -> str:
-    """NIS, the mean over a source's logs, as it is and with another noise than the log's scatter shows."""
-    lines = ["| data | channel | noise times | NIS as it is | NIS then |", "|---" * 5 + "|"]
-    for name, kind, factor in CHANGES:
-        before, after = [], []
-        for log in logs:
-            if log.source.name != name:
-                continue
-            noise = log.estimates.about["settings"]["noise"]
-            changed = {channel: factor * sd for channel, sd in noise.items() if channel.startswith(kind)}
-            again = estimate_with_channel_nis(log.recording, log.vehicle, sensors=changed)
-            for result, means in ((log.estimates, before), (again, after)):
-                means.append(
-                    np.mean([mean for channel, (mean, _) in moving_nis(result).items() if channel in changed])
-                )
-        lines.append(f"| {name} | {kind} | {factor:g} | {np.mean(before):.2f} | {np.mean(after):.2f} |")
-    return "\n".join(lines)
+    """What experiments show of each mean outside GOOD."""
+    rows = []
+    for log in logs:
+        for kind in nis_causes.KINDS:
+            known = nis_causes.values(log.estimates, kind)
+            if len(known) >= 2 * BLOCKS and not GOOD[0] <= known.mean() <= GOOD[1]:
+                rows.append((log.source.name, log.name, log.recording, log.vehicle, log.estimates, kind))
+    return nis_causes.table(rows, lambda value: "-" if np.isnan(value) else f"{value:.2f}")
 
 
 def main() -> None:

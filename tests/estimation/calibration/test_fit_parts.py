@@ -162,6 +162,7 @@ def balance(n: int = 200, seed: int = 1, **more: Any) -> torque_scale._Balance:
         np.ones((n, 1)),
         np.zeros(n),
         True,
+        np.zeros(n),
     )
     return replace(base, **more)
 

@@ -161,8 +161,33 @@ def test_of_a_short_log_two_windows_at_a_time_are_left_out() -> None:
     rng = np.random.default_rng(14)
     force = rng.normal(0, 100, 24)
     thrust = 0.8 * force + np.repeat(rng.normal(0, 20, 12), 2)
-    rows = _Balance(thrust, np.zeros(24), force, force, np.ones((24, 1)), np.zeros(24), True)
+    rows = _Balance(thrust, np.zeros(24), force, force, np.ones((24, 1)), np.zeros(24), True, np.zeros(24))
     keep = [np.delete(np.arange(24), [2 * k, 2 * k + 1]) for k in range(12)]
     slopes = [np.polyfit(force[rest], thrust[rest], 1)[0] for rest in keep]
     expected = np.sqrt(11 / 12 * np.sum((slopes - np.mean(slopes)) ** 2))
     assert _jackknife(rows, np.ones(24)) == pytest.approx(expected, rel=1e-9)
+
+
+def graded(seed: int, *, growth: float, pulled: float) -> Recording:
+    """Hills on which the resistance goes with the grade (.08 + growth sinθ), and a bar whose pull changes by ``pulled`` of the weight."""
+    rng = np.random.default_rng(seed)
+    log = hilly(rng, 1.0, push_noise=0.05, pitch_noise=0.003)
+    nodes = np.arange(0.0, 408.0, 8.0)
+    pull = 140 * GRAVITY * np.interp(log.time, nodes, np.abs(pulled * rng.standard_normal(len(nodes))))
+    more = 140 * GRAVITY * growth * np.sin(log["pitch"]) + pull
+    torques = {n: x + more * 0.2 / 4 for n, x in log.channels.items() if n.startswith("drive_torque")}
+    return log.with_channels(drawbar_force=pull, **torques)
+
+
+@pytest.mark.parametrize("growth", [-0.2, 0.0, 0.2])
+def test_resistance_that_goes_with_the_grade_does_not_make_it_sure_and_wrong(
+    vehicle: Vehicle, growth: float
+) -> None:
+    """Without a pull the grade alone tells the scale, and the interval says so; a pull that changes tells it."""
+    for seed in range(4):
+        alone = identify_torque_scale(graded(seed, growth=growth, pulled=0.0), vehicle)
+        assert alone.interval[0] < 1.0 < alone.interval[1]
+        assert "level ground" in alone.sentence
+        pulling = identify_torque_scale(graded(seed, growth=growth, pulled=0.15), vehicle)
+        assert pulling.interval[0] < 1.0 < pulling.interval[1]
+        assert pulling.std < 0.6 * alone.std

@@ -50,7 +50,7 @@ def test_positions_give_yaw_rate_and_slope(seed: int, circling: bool, soft: floa
         assert radius.interval[0] < true < radius.interval[1]
     scale = calibration["drive_torque_scale"]
     assert scale.interval[0] < 1 < scale.interval[1]
-    assert scale.std < 0.04
+    assert scale.std < 0.06  # a resistance that goes with the grade is in it
     for quantity in calibration.quantities:
         if quantity.key == "drive_torque_gain":
             assert quantity.interval[0] < 1 < quantity.interval[1]

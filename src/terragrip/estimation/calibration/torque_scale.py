@@ -10,7 +10,8 @@ K is raw torque over true torque. ρ_s, constant for a log, soil and direction o
 vehicle's resistance in turns is a term of its own. Resistance that grows with slip would pass for a larger K: windows of high
 slip, where it grows fastest, do not count, and its prior is in the interval. (As a term of the regression it would take up thrust
 itself, since slip follows thrust more closely than Y does.) A slope that nothing measures is in the interval as far as a driver takes it
-with another speed or pull.
+with another speed or pull. Resistance that goes with the grade (wet below, dry above) would pass for a larger K, too, the more the grade
+makes of Y: it is in the interval.
 
 Errors in Y would pull K towards 0. Where there are two measures of dv/dt + g sinθ, the accelerometer and ground speed with
 pitch, each is the other's instrument: K = cov(X, (Y1 + Y2)/2)/cov(Y1, Y2), so errors of either, if unlike, do no harm.
@@ -45,6 +46,9 @@ _SLIP_RESISTANCE = 0.1  # prior SD of dρ_s/ds: hard ground 0, Brixius 0.06 to 0
 _MOST_SLIP = 0.2  # beyond, resistance grows faster; much less leaves out the starts of a log that has few
 _SLOPE = float(np.radians(0.5))  # prior of a slope that nothing measures, where the vehicle states none,
 _WITH_PUSH = 0.3  # and of its correlation with pull and acceleration
+_GROUND_WITH_GRADE = (
+    0.006  # prior SD of what of ρ_s goes with the grade: .02 from place to place, correlated by .3 as above
+)
 _DRAWBAR_GAIN = 0.01  # prior where the vehicle states none
 _HUBER = 2.5
 _STRONG = 3.0  # the instruments' covariance over its error
@@ -61,6 +65,8 @@ class _Balance:
     nuisance: Floats
     slip: Floats
     slope_known: bool
+    climb: Floats
+    """m g sinθ, 0 where no slope is measured."""
 
 
 def identify_torque_scale(recordings: Recording | Sequence[Recording], vehicle: Vehicle) -> Quantity:
@@ -100,9 +106,23 @@ def identify_torque_scale(recordings: Recording | Sequence[Recording], vehicle: 
         _SLIP_RESISTANCE * vehicle.mass * GRAVITY * _partial_slope(rows.slip, rows, weight),
         np.hypot(_drawbar_gain(table, vehicle), _unseen_slope(vehicle, rows, weight)),
     )
-    std = float(np.hypot(error, scale * considered))
     sentence = "torques over radius against drawbar force and mass times acceleration and slope; it goes with the mass"
+    by_grade = _with_grade(vehicle, rows, weight)
+    if by_grade > max(error / scale, considered):
+        sentence += (
+            "; a resistance that goes with the grade would pass for it: pull changing loads on level ground"
+        )
+    std = float(np.hypot(error, scale * np.hypot(considered, by_grade)))
     return Quantity("drive_torque_scale", float(scale), std, "1", _evidence(table, logs), sentence)
+
+
+def _with_grade(vehicle: Vehicle, rows: _Balance, weight: Floats) -> float:
+    """Relative SD of K by a resistance that goes with the grade."""
+    climb = _centered(rows.climb[:, None], rows.nuisance, weight)[:, 0]
+    size = float(np.sqrt(np.mean(weight * climb**2)))
+    if not size:
+        return 0.0
+    return _GROUND_WITH_GRADE * vehicle.mass * GRAVITY / size * abs(_partial_slope(rows.climb, rows, weight))
 
 
 def _window_length(logs: Sequence[Recording]) -> float:
@@ -151,7 +171,10 @@ def _balance(table: Windows, vehicle: Vehicle) -> _Balance:
         nuisance = np.column_stack([nuisance, turn * way])
     slips = slip(table.wheel_speed, table.hub_speed, radius, standstill_speed=0.0)
     known = bool(np.isfinite(table.pitch).mean() > 0.5 or np.isfinite(table.acceleration).mean() > 0.5)
-    return _Balance(thrust, losses, first, other, nuisance, np.mean(slips, axis=1) * way, known)
+    inclined = GRAVITY * np.sin(table.pitch)
+    inclined = np.where(np.isfinite(inclined), inclined, table.push - kinematic)
+    climb = vehicle.mass * np.where(np.isfinite(inclined), inclined, 0.0)
+    return _Balance(thrust, losses, first, other, nuisance, np.mean(slips, axis=1) * way, known, climb)
 
 
 def _centered(values: Floats, nuisance: Floats, weight: Floats) -> Floats:
