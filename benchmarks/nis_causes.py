@@ -51,7 +51,7 @@ class Shown:
         """The cause that the experiments name, the most direct one first."""
         if self.together < TOGETHER and self.stale is False:
             return "sides go against each other: the wheels' adhesions walk apart, their sum does not"
-        if self.mean < 1 and self.typical < 0.2 * self.mean:
+        if self.stale and self.mean < 1 and self.typical < 0.2 * self.mean:
             return "a torque or pose that is held counts as noise in every row since; the few fresh rows carry the rest"
         for value, words in (
             (

@@ -160,3 +160,49 @@ def test_a_mass_in_the_wrong_unit_is_named() -> None:
 
 def test_a_short_log_says_nothing() -> None:
     assert told({n: v[:200] for n, v in scaled(drive(), {"drive_torque": -1.0}).items()}) == ""
+
+
+def pulling(seed: int = 0) -> Columns:
+    """The same drive with a tool behind it that takes a fifth of the weight, more or less."""
+    columns = drive(seed)
+    pull = MASS * G * (0.2 + 0.05 * np.sin(columns["time"] / 5))
+    torques = {n: v + RADIUS * pull / 4 for n, v in columns.items() if n.startswith("drive_torque")}
+    return {**columns, **torques, "drawbar_force": pull}
+
+
+@pytest.mark.parametrize(
+    ("factors", "expected"),
+    [
+        ({}, ""),
+        (
+            {"drawbar_force": -1.0},
+            "drawbar_force is -0.2 of the weight on average: a backward pull is positive",
+        ),
+        ({"drawbar_force": 1e-3}, "it may be in kN"),
+        ({"drawbar_force": 3.0}, "leaves nothing that could drive the vehicle"),
+        ({"drive_torque": 1e-3}, "leaves nothing that could drive the vehicle"),
+    ],
+)
+def test_a_pull_that_cannot_be_is_named(factors: dict[str, float], expected: str) -> None:
+    for seed in range(3):
+        notes = told(scaled(pulling(seed), factors))
+        assert expected in notes
+        assert bool(notes) == bool(expected)
+
+
+@pytest.mark.parametrize(("bias", "expected"), [(1.0, "reads 1"), (-1.0, "reads -0.9"), (0.4, "")])
+def test_an_accelerometer_that_is_tilted_is_named(bias: float, expected: str) -> None:
+    columns = drive()
+    notes = told({**columns, "acceleration_x": columns["acceleration_x"] + bias})
+    assert expected in notes
+    assert bool(notes) == bool(expected)
+
+
+def test_radii_that_are_exchanged_are_named_and_slip_is_not() -> None:
+    """Front wheels of .35 m that are stated as .45 m; then wheels of .35 m of which the front ones slip by 10 % more."""
+    axles = {
+        "front": {"mass": 350, "wheels": ["fl", "fr"], "wheel": {"radius": 0.45, "inertia": 4}},
+        "rear": {"mass": 450, "wheels": ["rl", "rr"]},
+    }
+    assert "The rims of the axle front go 1.29 times" in told(drive(), machine(axles=axles))
+    assert told(scaled(drive(), {"wheel_speed_f": 1.1})) == ""

@@ -36,6 +36,9 @@ _CLEAR = 0.85  # and from which another reading of the channels is the right one
 _FACTOR = 1.8  # more than an uncalibrated torque and an estimated mass make of a force balance
 _LIGHT = 0.12  # adhesion: below, no ground lets a wheel slip by
 _SPIN = 0.3  # (that is a stiffness of .4, where the softest soils have 2)
+_PULL = 0.03  # of the weight: a mean that no offset of a sensor makes
+_NO_PULL = 1e-3  # of the weight: less than any tool, or than a load cell tells
+_OFFSET = 0.7  # m/s²: more than twice the bias that is taken for usual, four degrees of mounting
 _SIGN = "forward is positive: write 'sign: -1' for {} in the profile"
 
 
@@ -115,9 +118,11 @@ def motion_warnings(recording: Recording, vehicle: Vehicle | None) -> list[str]:
         notes = _dead_warnings(recording, vehicle)
         notes += _radius_warnings(recording, vehicle, means)
         thrusts = {} if notes else _thrusts(recording, vehicle, means)
+        notes += _pull_warnings(means, thrusts, recording, vehicle)
     if forward is not None:
         found = _balance_warnings(recording, means, forward, thrusts, vehicle)
-        return [*notes, *(found or _pitch_warnings(recording, means, forward))]
+        found = found or _pitch_warnings(recording, means, forward) or _offset_warnings(means, forward)
+        return [*notes, *found]
     return [*notes, *_thrust_warnings(means, thrusts, vehicle)]
 
 
@@ -268,6 +273,49 @@ def _pitch_warnings(recording: Recording, means: _Means, forward: Floats) -> lis
             "The accelerometer shows climbs that go with roll and not with pitch: the two may be exchanged."
         ]
     return []
+
+
+def _pull_warnings(
+    means: _Means, thrusts: dict[str, Floats], recording: Recording, vehicle: Vehicle
+) -> list[str]:
+    """The drawbar force against what it can be: backward, and less than the wheels' thrust, over a whole drive."""
+    if "drawbar_force" not in recording.channels or not thrusts:
+        return []
+    pull = means.of(recording.channels["drawbar_force"]) / vehicle.mass / STANDARD_GRAVITY
+    left = np.sum(list(thrusts.values()), axis=0) / STANDARD_GRAVITY
+    known = np.isfinite(pull) & np.isfinite(left)
+    if known.sum() < _LEAST:
+        return []
+    pulled, rest = float(np.mean(pull[known])), float(np.mean(left[known]))
+    if pulled < -_PULL:
+        return [
+            f"drawbar_force is {pulled:.2g} of the weight on average: a backward pull is positive; write 'sign: -1' for it in the profile."
+        ]
+    if rest < -_PULL:
+        return [
+            f"The drive torques over the wheel radius are {rest + pulled:.2g} of the weight on average and the drawbar force {pulled:.2g}, "
+            "which leaves nothing that could drive the vehicle: check the units of both, and that each wheel's torque is there."
+        ]
+    if 0 < float(np.quantile(np.abs(pull[known]), 0.95)) < _NO_PULL:
+        return [
+            "drawbar_force stays below a thousandth of the weight: it may be in kN: write 'unit: kN' for it in the profile."
+        ]
+    return []
+
+
+def _offset_warnings(means: _Means, forward: Floats) -> list[str]:
+    """What the accelerometer reads beyond the change of ground speed and the climb that the pitch shows, on average."""
+    if means.climb is None:
+        return []
+    rest = forward - means.change - means.climb
+    known = np.isfinite(rest)
+    offset = float(np.median(rest[known])) if known.sum() >= _LEAST else 0.0
+    if abs(offset) < _OFFSET:
+        return []
+    return [
+        f"acceleration_x reads {offset:.2g} m/s² more than speed and pitch explain: its bias or its mounting, which "
+        "'terragrip calibrate' finds."
+    ]
 
 
 def _dead_warnings(recording: Recording, vehicle: Vehicle) -> list[str]:

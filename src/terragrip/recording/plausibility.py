@@ -32,6 +32,7 @@ _RATIOS = (
     (1e3, "wheel_speed or ground_speed may be off by a factor of 1000"),
 )
 _ENOUGH = 4000  # rows: a median that is to be distinguished from another by a third needs no more
+_APART = 1.2  # of the rims of driven wheels: front wheels lead by 5 % at most, radii are known to 10 %
 _GAP = 1.0  # s, or three samples: what lies between them was not measured
 _OUTRUN = 1.5  # straight line over way: above, the way is too short
 _WAY_WINDOW = 10.0  # s
@@ -67,8 +68,11 @@ def _speed_warnings(recording: Recording, vehicle: Vehicle) -> list[str]:
     if not vehicle.knows_wheels:
         return []
     straight = straight_rows(recording, vehicle)
-    for wheel, radius in zip(vehicle.wheels, vehicle.wheel_radius, strict=True):
+    usual: dict[str, float] = {}
+    for wheel, radius, driven in zip(vehicle.wheels, vehicle.wheel_radius, vehicle.driven, strict=True):
         ratio = _speed_ratio(recording, wheel, float(radius), straight)
+        if ratio is not None and driven:
+            usual[wheel] = ratio
         if ratio is None or RATIOS[0] <= ratio <= RATIOS[1]:
             continue
         reasons = [(radius, "wheel_speed may be the rim's speed in m/s: divide it by the radius"), *_RATIOS]
@@ -78,6 +82,19 @@ def _speed_warnings(recording: Recording, vehicle: Vehicle) -> list[str]:
         if distance > np.log(1.35):
             why = "check units, gear ratio and radius"
         result.setdefault(why, []).append((wheel, ratio))
+    mean = {
+        name: float(
+            np.exp(np.mean([np.log(usual[w]) for w in axle.wheels]))
+        )  # of both sides, so that no turn counts
+        for name, axle in vehicle.axles.items()
+        if all(w in usual for w in axle.wheels)
+    }
+    if not result and mean and max(mean.values()) > _APART * min(mean.values()):
+        fast, slow = (pick(mean, key=lambda name: mean[name]) for pick in (max, min))
+        return [
+            f"The rims of the axle {fast} go {mean[fast] / mean[slow]:.2f} times as fast as those of {slow}, both driven: check their "
+            "radii, and which wheel each column is of."
+        ]
     return [
         f"The wheel speed of {', '.join(wheel for wheel, _ in those)} times the radius is "
         f"{np.median([ratio for _, ratio in those]):.3g} times the ground speed: {why}."
@@ -169,9 +186,14 @@ def _turn_warnings(recording: Recording, vehicle: Vehicle | None, track: Track |
             else "check the positions"
         )
         return [f"angular_velocity_z turns with {agreed[0]} and against {against[0]}: {doubt}."]
+    or_else = (
+        " If you are sure of it, left and right wheels are exchanged."
+        if against == ["the wheels' speeds"]
+        else ""
+    )
     return [
         f"angular_velocity_z is of the wrong sign: {' and '.join(against)} turn the other way. Left is positive: write 'sign: -1' for "
-        "it in the profile."
+        f"it in the profile.{or_else}"
     ]
 
 
