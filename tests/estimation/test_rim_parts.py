@@ -317,3 +317,14 @@ def test_a_public_estimate_takes_the_same_zero() -> None:
     wave = 1 + 1e-3 * np.sin(TIME)
     result = tg.estimate(log_of(ground_speed=1.96 * wave, wheel_based_speed=2.0 * wave), tractor())
     assert result.about["zero_slip"]["drive"]["ratio"] == pytest.approx(0.98)
+
+
+def test_an_estimator_for_a_log_takes_the_logs_zero_unless_one_is_given() -> None:
+    wave = 1 + 1e-3 * np.sin(TIME)
+    log = log_of(ground_speed=1.96 * wave, wheel_based_speed=2.0 * wave)
+    own = tg.TractionEstimator.for_recording(log, tractor())
+    assert own.slip_reference is not None
+    assert own.slip_reference.rims[0].radius == pytest.approx(0.98 * 0.8, rel=1e-6)
+    given = slip_reference_in(log_of(ground_speed=1.98 * wave, wheel_based_speed=2.0 * wave), tractor())
+    other = tg.TractionEstimator.for_recording(log, tractor(), slip_reference=given)
+    assert other.slip_reference is given

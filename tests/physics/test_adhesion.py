@@ -75,6 +75,18 @@ def test_prototype_peaks_at_0_476_a():
     assert slip == pytest.approx(exact, abs=1e-5)
 
 
+def test_a_peak_at_the_end_of_the_slips_is_that_end_and_one_beside_it_is_refined():
+    falling = {"A": 0.1, "k": 1.0, "d": 3.0}
+    assert CURVES["effective"].peak(falling) == (0.0, 0.0)
+    rising = {"A": 0.5, "k": 4.0, "d": 0.0}
+    assert CURVES["effective"].peak(rising, upper=0.4) == (0.4, pytest.approx(0.5 * (1 - np.exp(-1.6))))
+    # A k e^(-k s) = d at .7 of the first step of the grid
+    top = 0.7 * 0.0005
+    slip, mu = CURVES["effective"].peak({"A": 0.5, "k": 4.0, "d": 2.0 * np.exp(-4 * top)})
+    assert slip == pytest.approx(top, rel=1e-2)
+    assert mu > 0
+
+
 def test_negative_slip_is_not_the_printed_form():
     parameters = {**PROTOTYPE, "a": 1.42}
     printed = 1.42 * (1 - 0.52 * np.exp(0.01 * -0.5) - 0.48 * np.exp(-11.36 * -0.5))
