@@ -211,3 +211,5 @@ def test_eight_windows_are_enough_of_all_logs_together_and_declared_rows_alone_c
     assert declared == Zero(
         pytest.approx(1.0), pytest.approx(np.hypot(1.2533 * 0.003 / np.sqrt(5.5), 0.002)), 11
     )
+    with pytest.raises(ValueError, match="shorter"):  # a span for each log, or none at all
+        zero_of([log, part], "wheel_based_speed", 0.4, [(0.0, 50.0)])
