@@ -7,6 +7,7 @@ import contextlib
 import json
 import threading
 from typing import Any
+from urllib.parse import parse_qs, urlsplit
 
 import numpy as np
 
@@ -19,6 +20,7 @@ class LiveService:
     status a second; "frozen": nothing."""
 
     step = 0.05
+    vehicles: tuple[str, ...] = ()  # of a service of many; the n-th drives n times as fast as `VALUES` say
     setpoint: dict[str, Any] | None = None  # what is published of it, four times a second
 
     def __init__(self) -> None:
@@ -41,13 +43,23 @@ class LiveService:
 
     async def _send(self, socket: Any) -> None:
         hello = {"kind": "hello", "vehicle": "v", "columns": COLUMNS, "wheels": ["a"], "events": [""]}
+        values = dict(zip(COLUMNS, VALUES, strict=True))
+        if self.vehicles:
+            (name,) = parse_qs(urlsplit(socket.request.path).query).get("vehicle", self.vehicles[:1])
+            if name not in self.vehicles:
+                await socket.close(1008, f"no vehicle {name!r} sends")
+                return
+            hello |= {"name": name, "vehicles": self.vehicles}
+            values["ground_speed"] *= 1 + self.vehicles.index(name)
         await socket.send(json.dumps(hello))
         row = 0
         while not self._stop.is_set():
             row += 1
             if self.mode in ("measured", "predicted"):
                 await socket.send(
-                    np.array([row * self.step, float(self.mode == "predicted"), 0.0, *VALUES]).tobytes()
+                    np.array(
+                        [row * self.step, float(self.mode == "predicted"), 0.0, *values.values()]
+                    ).tobytes()
                 )
             if row % 5 == 0 and self.setpoint and self.mode == "measured":
                 await socket.send(json.dumps({"kind": "setpoint", "time": row * self.step, **self.setpoint}))

@@ -64,3 +64,31 @@ def test_the_numbers_are_whole_on_a_telephone(page: Any, served: Served) -> None
     cut = "() => [...document.querySelectorAll('.tile > div')].some((e) => e.scrollWidth > e.clientWidth)"
     assert not page.evaluate(cut)
     assert page.evaluate("() => document.documentElement.scrollWidth") <= 390
+
+
+def test_of_many_vehicles_one_is_chosen(page: Any, served: Served) -> None:
+    """The first at first; then the chosen one, in the cab too and after the service was away; one that does not send is said."""
+    service = LiveService()
+    service.vehicles = ("t7", "t8 grün", "t9")
+    served.stop()
+    served.live = service.address
+    served.start()
+    try:
+        page.goto(f"{served.url}/#/live")
+        page.wait_for_selector("#live-vehicle:visible")
+        assert page.locator("#live-vehicle option").all_inner_texts() == ["t7", "t8 grün", "t9"]
+        page.wait_for_selector(".tile:has-text('1.50')")
+        page.select_option("#live-vehicle", "t8 grün")
+        page.wait_for_selector(".tile:has-text('3.00')")
+        assert page.input_value("#live-vehicle") == "t8 grün"
+        page.click("a:text-is('Cab')")
+        page.wait_for_selector(".cab-numbers:has-text('3.00')")
+        page.click("a:text-is('Leave')")
+        page.wait_for_selector(".tile:has-text('3.00')")
+        service.vehicles = ("t7", "t6", "t9")
+        page.evaluate("() => window.terragripLive.feed.again()")
+        page.wait_for_selector("#live-state:has-text(\"no vehicle 't8 grün' sends\")")
+        page.select_option("#live-vehicle", "t9")
+        page.wait_for_selector(".tile:has-text('4.50')")
+    finally:
+        service.stop()

@@ -22,6 +22,7 @@ from terragrip.ground.events import events
 if TYPE_CHECKING:
     from terragrip.estimation import Estimates
 
+_REFUSED = 1008  # how a live service closes what asks for what it has not
 PERIOD = 1 / 60
 """Seconds between messages: as often as a screen draws."""
 PATTERNS = (
@@ -109,14 +110,18 @@ def _soils(table: Estimates) -> list[dict[str, Any]]:
     ]
 
 
-async def relayed(address: str, token: str | None) -> AsyncIterator[str | bytes]:
-    """Pass on a live service's messages; ends when it goes. Raises InputError where it cannot be reached."""
+async def relayed(address: str, token: str | None, vehicle: str = "") -> AsyncIterator[str | bytes]:
+    """Pass on a live service's messages, of one ``vehicle`` of many; ends when it goes.
+
+    Raises InputError where it cannot be reached, or has no such vehicle.
+    """
     from urllib.parse import urlencode
 
     from websockets.asyncio.client import connect
     from websockets.exceptions import ConnectionClosed, WebSocketException
 
-    query = urlencode({"format": "binary", "columns": ",".join(PATTERNS)})
+    asked = {"format": "binary", "columns": ",".join(PATTERNS), "vehicle": vehicle}
+    query = urlencode({name: value for name, value in asked.items() if value})
     headers = {"Authorization": f"Bearer {token}"} if token else {}
     try:
         async with connect(
@@ -124,8 +129,9 @@ async def relayed(address: str, token: str | None) -> AsyncIterator[str | bytes]
         ) as socket:
             async for message in _together(socket):
                 yield message
-    except ConnectionClosed:
-        return
+    except ConnectionClosed as closed:
+        if closed.rcvd is not None and closed.rcvd.code == _REFUSED:
+            raise InputError(closed.rcvd.reason, place=address) from closed
     except (OSError, WebSocketException, TimeoutError) as error:
         raise InputError(
             f"does not answer ({error})",

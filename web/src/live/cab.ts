@@ -6,13 +6,14 @@ import { tried } from "../ui/notes";
 import type { Page } from "../ui/page";
 import { onUnits, unitFor, unitsChooser, type Kind } from "../ui/units";
 import { Alarms } from "./alarms";
-import { Feed, type Said } from "./feed";
+import { Feed, of, type Said } from "./feed";
 import { ageOf, brief, eventNow, LINGER, reading, seconds, WARNING, type Figure } from "./numbers";
 
 const LOOK = 100; // ms
 
 export const page: Page = (main, { query }) => {
   const replay = query.get("replay");
+  const vehicle = of(query.get("vehicle") ?? "");
   const speed = Number(query.get("speed")) || 1;
   const alarms = new Alarms();
   const tiles = { slip: tile("Slip", "share"), grip: tile("Grip in use", "share"), speed: tile("Speed", "speed") };
@@ -23,14 +24,14 @@ export const page: Page = (main, { query }) => {
     h("div", { class: "cab-numbers" }, tiles.slip.element, tiles.grip.element, tiles.speed.element),
     warning,
     alarms.element,
-    h("div", { class: "cab-foot" }, age, h("span", { class: "spring" }), unitsChooser(), alarms.settings, h("button", { type: "button", click: () => void tried(() => document.documentElement.requestFullscreen()) }, "Full screen"), h("a", { class: "button", href: "#/live" }, "Leave")),
+    h("div", { class: "cab-foot" }, age, h("span", { class: "spring" }), unitsChooser(), alarms.settings, h("button", { type: "button", click: () => void tried(() => document.documentElement.requestFullscreen()) }, "Full screen"), h("a", { class: "button", href: `#/live?${new URLSearchParams(vehicle)}` }, "Leave")),
   );
   let peak = NaN; // largest adhesion of the online curve over its scale
   let delay = 0;
   let warnedAt = -Infinity;
   let why = "";
   void tried(() => sampled({ model: "exponential", parameters: { a: 1 } })).then((shape) => shape && (peak = shape.peak[1]));
-  const feed = new Feed(() => new URLSearchParams(replay ? { replay, speed: String(speed) } : {}).toString());
+  const feed = new Feed(() => new URLSearchParams(replay ? { replay, speed: String(speed) } : vehicle).toString());
 
   function warn(kind: string, text: string): void {
     warnedAt = feed.ring.now;

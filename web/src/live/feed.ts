@@ -9,6 +9,9 @@ export interface Hello {
   wheels: string[];
   events: string[];
   replay?: { start: number; end: number };
+  /** Of a service of many: which this is, and all that send. */
+  name?: string;
+  vehicles?: string[];
 }
 
 export interface Said {
@@ -23,6 +26,11 @@ export interface Said {
   row_rate?: number;
   delay?: number;
   waiting?: number;
+}
+
+/** The query for a vehicle of many; empty for the first. */
+export function of(vehicle: string): Record<string, string> {
+  return vehicle ? { vehicle } : {};
 }
 
 export type State = "connecting" | "connected" | "lost" | "ended";

@@ -8,7 +8,7 @@ import { tried } from "../ui/notes";
 import type { Page } from "../ui/page";
 import { onUnits, unitFor, unitNamed, type Kind } from "../ui/units";
 import { Alarms } from "./alarms";
-import { Feed, type Said } from "./feed";
+import { Feed, of, type Said } from "./feed";
 import { ageOf, brief, eventNow, LINGER, oldSaid, reading, seconds, WARNING } from "./numbers";
 import { SetpointLine, type Setpoint } from "./setpoint";
 import { Traces, type Trace } from "./traces";
@@ -42,10 +42,16 @@ export const page: Page = (main, { notices, query }) => {
   let heldAt = NaN; // when what is shown was held [ms]
 
   let begin: number | null = null; // where the replay begins [s]
+  let chosen = query.get("vehicle") ?? ""; // of a service of many
 
   const feed = new Feed(() => {
     const replay = source.value;
-    return new URLSearchParams(replay ? { replay, speed: speed.value, ...(begin === null ? {} : { start: String(begin) }) } : {}).toString();
+    return new URLSearchParams(replay ? { replay, speed: speed.value, ...(begin === null ? {} : { start: String(begin) }) } : of(chosen)).toString();
+  });
+  const vehicle = h("select", { id: "live-vehicle", "aria-label": "Vehicle", hidden: true });
+  vehicle.addEventListener("change", () => {
+    chosen = vehicle.value;
+    feed.again();
   });
   const traces = new Traces(feed.ring, () => feed.hello?.events ?? []);
   const alarms = new Alarms();
@@ -67,7 +73,7 @@ export const page: Page = (main, { notices, query }) => {
   traces.onBack = drawPast;
   const cab = h("a", { class: "button", href: "#/cab" }, "Cab");
   main.append(
-    h("div", { class: "tools" }, source, speed, seek, pause, span, alarms.settings, cab, state, h("span", { class: "spring" }), health),
+    h("div", { class: "tools" }, source, vehicle, speed, seek, pause, span, alarms.settings, cab, state, h("span", { class: "spring" }), health),
     warning,
     alarms.element,
     old,
@@ -98,10 +104,13 @@ export const page: Page = (main, { notices, query }) => {
     if (now === "connected" && feed.hello) {
       traces.show(tracesOf(feed.hello.wheels, feed.hello.columns));
       traces.lookBack(null);
-      const { replay } = feed.hello;
+      const { replay, name = "", vehicles = [] } = feed.hello;
+      fill(vehicle, vehicles.map((one) => h("option", { value: one, selected: one === name }, one)));
+      vehicle.hidden = !vehicles.length;
+      chosen = name || chosen; // after a loss the same again, not what is first then
       seek.hidden = !replay;
       if (replay) [seek.min, seek.max, seek.value] = [String(replay.start), String(replay.end), String(begin ?? replay.start)];
-      cab.href = `#/cab${replay ? `?${new URLSearchParams({ replay: source.value, speed: speed.value })}` : ""}`;
+      cab.href = `#/cab?${new URLSearchParams(replay ? { replay: source.value, speed: speed.value } : of(name))}`;
       warnedAt = -Infinity;
       warning.hidden = true;
       for (const one of [slip, grip, soil, speedTile]) one.set("–", "");

@@ -31,13 +31,14 @@ async def live(
     socket: WebSocket,
     studio: Here,
     replay: str = "",
+    vehicle: str = "",
     speed: Annotated[float, Query(gt=0, le=1000)] = 1.0,
     start: float = 0.0,
 ) -> None:
-    """Rows of the live service, or of estimates of the folder played again (`replay`)."""
+    """Rows of the live service, of its ``vehicle`` where it has many, or of estimates of the folder played again (`replay`)."""
     await socket.accept()
     try:
-        frames = await _frames(studio, replay, speed, start)
+        frames = await _frames(studio, replay, vehicle, speed, start)
         await _send_all(socket, frames)
         await socket.send_json({"kind": "end"})
         await socket.close()
@@ -50,7 +51,9 @@ async def live(
         return
 
 
-async def _frames(studio: Studio, replay: str, speed: float, start: float) -> AsyncIterator[str | bytes]:
+async def _frames(
+    studio: Studio, replay: str, vehicle: str, speed: float, start: float
+) -> AsyncIterator[str | bytes]:
     if replay:
         table = await asyncio.to_thread(studio.estimates.get, studio.folder.file(replay))
         if not len(table):
@@ -60,7 +63,7 @@ async def _frames(studio: Studio, replay: str, speed: float, start: float) -> As
         raise InputError(
             "no live service was named", hint="start the studio with --live ws://HOST:PORT, or replay a run"
         )
-    return relayed(studio.live, os.environ.get(LIVE_TOKEN))
+    return relayed(studio.live, os.environ.get(LIVE_TOKEN), vehicle)
 
 
 async def _send_all(socket: WebSocket, frames: AsyncIterator[str | bytes]) -> None:
