@@ -6,6 +6,7 @@ import asyncio
 import contextlib
 import json
 import threading
+from collections.abc import Iterator
 from typing import Any
 from urllib.parse import parse_qs, urlsplit
 
@@ -77,3 +78,16 @@ class LiveService:
             self._ready.set()
             while not self._stop.is_set():
                 await asyncio.sleep(0.02)
+
+
+@contextlib.contextmanager
+def listened_to(served: Any) -> Iterator[LiveService]:
+    """A service while the block runs, of which the studio was told at its start."""
+    service = LiveService()
+    served.stop()
+    served.live = service.address
+    served.start()
+    try:
+        yield service
+    finally:
+        service.stop()

@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from live_service import LiveService
+from live_service import listened_to
 from served import NEEDS, Served
 from terragrip.cli import main
 
@@ -34,11 +34,7 @@ def test_the_panel_of_drive_shows_the_best_slip_and_what_to_do(
 
 
 def test_live_shows_the_set_point_as_advice_and_none_once_nothing_comes(page: Any, served: Served) -> None:
-    service = LiveService()
-    served.stop()
-    served.live = service.address
-    served.start()
-    try:
+    with listened_to(served) as service:
         page.goto(f"{served.url}/#/live")
         page.wait_for_selector("#live-state:text-is('connected')")
         page.wait_for_function("() => window.terragripLive.feed.ring.taken > 30")
@@ -52,5 +48,3 @@ def test_live_shows_the_set_point_as_advice_and_none_once_nothing_comes(page: An
         assert "a 2.50 rad/s" in text
         service.mode = "silent"
         page.wait_for_selector("#setpoint", state="hidden")
-    finally:
-        service.stop()

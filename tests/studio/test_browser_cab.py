@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from live_service import LiveService
+from live_service import LiveService, listened_to
 from served import NEEDS, Served
 
 pytest.importorskip("playwright.sync_api", reason="SKIPPED LOUDLY: the browser tests need playwright")
@@ -23,12 +23,8 @@ def assert_marked(page: Any, line: str) -> None:
 
 @pytest.fixture
 def service(served: Served) -> Iterator[LiveService]:
-    service = LiveService()
-    served.stop()
-    served.live = service.address
-    served.start()
-    yield service
-    service.stop()
+    with listened_to(served) as service:
+        yield service
 
 
 def test_the_cab_shows_three_numbers_and_fails_visibly(

@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from live_service import LiveService
+from live_service import listened_to
 from served import NEEDS, Served
 
 pytest.importorskip("playwright.sync_api", reason="SKIPPED LOUDLY: the browser tests need playwright")
@@ -14,11 +14,7 @@ pytestmark = NEEDS
 
 
 def test_a_dead_source_shows_on_the_live_page(page: Any, served: Served) -> None:
-    service = LiveService()
-    served.stop()
-    served.live = service.address
-    served.start()
-    try:
+    with listened_to(served) as service:
         page.goto(f"{served.url}/#/live")
         page.wait_for_selector("#live-state:text-is('connected')")
         page.wait_for_function("() => window.terragripLive.feed.ring.taken > 30")
@@ -53,8 +49,6 @@ def test_a_dead_source_shows_on_the_live_page(page: Any, served: Served) -> None
         page.wait_for_selector("#live-state:has-text('connection lost')")
         page.wait_for_selector("#live-age:has-text('s old')")
         assert page.evaluate(mark) == "line-through"
-    finally:
-        service.stop()
 
 
 def test_the_numbers_are_whole_on_a_telephone(page: Any, served: Served) -> None:
@@ -68,12 +62,8 @@ def test_the_numbers_are_whole_on_a_telephone(page: Any, served: Served) -> None
 
 def test_of_many_vehicles_one_is_chosen(page: Any, served: Served) -> None:
     """The first at first; then the chosen one, in the cab too and after the service was away; one that does not send is said."""
-    service = LiveService()
-    service.vehicles = ("t7", "t8 grün", "t9")
-    served.stop()
-    served.live = service.address
-    served.start()
-    try:
+    with listened_to(served) as service:
+        service.vehicles = ("t7", "t8 grün", "t9")
         page.goto(f"{served.url}/#/live")
         page.wait_for_selector("#live-vehicle:visible")
         assert page.locator("#live-vehicle option").all_inner_texts() == ["t7", "t8 grün", "t9"]
@@ -90,5 +80,3 @@ def test_of_many_vehicles_one_is_chosen(page: Any, served: Served) -> None:
         page.wait_for_selector("#live-state:has-text(\"no vehicle 't8 grün' sends\")")
         page.select_option("#live-vehicle", "t9")
         page.wait_for_selector(".tile:has-text('4.50')")
-    finally:
-        service.stop()

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from live_service import LiveService
+from live_service import listened_to
 from served import NEEDS, Served
 from terragrip.estimation import Estimates
 
@@ -100,11 +100,7 @@ def test_map_fit_and_another_tab_follow(page: Any, served: Served) -> None:
 
 
 def test_live_and_cab_follow_and_an_alarm_stays_where_it_was_set(page: Any, served: Served) -> None:
-    service = LiveService()  # 20 % of slip at 1.5 m/s
-    served.stop()
-    served.live = service.address
-    served.start()
-    try:
+    with listened_to(served):  # 20 % of slip at 1.5 m/s
         page.goto(f"{served.url}/#/live")
         page.wait_for_function("() => window.terragripLive?.feed.ring.taken > 10")
         page.click("summary:text-is('Alarms')")
@@ -126,5 +122,3 @@ def test_live_and_cab_follow_and_an_alarm_stays_where_it_was_set(page: Any, serv
         page.wait_for_selector(".alarm:has-text('Slip 0.20 is over 0.15')")
         choose(page, share="%")
         page.wait_for_selector(".alarm:has-text('Slip 20 % is over 15 %')")
-    finally:
-        service.stop()
