@@ -7,6 +7,7 @@ import pytest
 
 from advice_drives import VEHICLE, drive, slip_only
 from terragrip.advice.analysis import advise
+from terragrip.advice.curves import adhesion
 from terragrip.advice.optimum import GRID, best_of, over_slip
 from terragrip.advice.result import to_dict, write
 from terragrip.errors import InputError
@@ -75,6 +76,29 @@ def test_a_librarys_slips_err_as_those_of_the_drives_it_was_learned_from(off):
     given = only([drive(seed=9, soil="field")], soils=library).best_efficiency
     assert given.interval[0] <= best.slip <= given.interval[1]
     assert given.interval[1] - given.interval[0] > 2 * 0.02
+
+
+def test_on_yielding_ground_a_small_wheel_is_expected_to_need_much_slip():
+    ground = {"a": 1.2, "k": 3.0, "resistance": 0.2}
+    best, _ = truth(**ground)
+    small = Vehicle.from_dict({**VEHICLE.to_dict(), "wheel": {"radius": 0.12, "inertia": 0.01}})
+    given = [
+        only([drive(seed=seed, vehicle=small, top=0.12, metres=300, **ground)], small).best_efficiency
+        for seed in range(3)
+    ]
+    assert all(one.interval[0] <= best.slip <= one.interval[1] for one in given)
+    assert np.median([np.ptp(one.interval) for one in given]) < 0.12
+
+
+@pytest.mark.parametrize("shape", [2 / 3, 1.0, 1.5, 2.0])
+def test_curves_of_every_shape_meet_at_three_quarters_of_their_height(shape):
+    height, rate = 0.6, 9.0
+    meet = np.log(4) / rate
+    curve = np.array([[np.log(height), np.log(rate), 0.0, 0.0, 0.07, 0.0, shape, 0.0]])
+    assert adhesion(curve, np.array([[meet]]))[0, 0] == pytest.approx(0.75 * height, rel=1e-3)
+    if shape == 2.0:
+        x = 3 * np.array([0.3, 2.0])
+        assert adhesion(curve, meet * x[None] / 3)[0] == pytest.approx(height * x / (1 + x), rel=1e-3)
 
 
 def test_the_vaguer_slips_are_the_wider_the_interval():
