@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from terragrip.recording import Recording, unit_warnings
+from terragrip.simulation.campaign import simulate_campaign
 from terragrip.vehicle import Vehicle
 
 Columns = dict[str, np.ndarray]
@@ -206,3 +207,10 @@ def test_radii_that_are_exchanged_are_named_and_slip_is_not() -> None:
     }
     assert "The rims of the axle front go 1.29 times" in told(drive(), machine(axles=axles))
     assert told(scaled(drive(), {"wheel_speed_f": 1.1})) == ""
+
+
+@pytest.mark.parametrize("run", ["hard-09", "fine-09"])
+def test_axles_that_share_a_pull_as_loads_do_are_no_wrong_sign(run: str) -> None:
+    """Runs of the demonstration's campaign (simulation), in which the front wheels' share of the pull falls as the rear's grows."""
+    ((_, result),) = simulate_campaign([run], seed=0, workers=1)
+    assert unit_warnings(result.recording, result.vehicle) == []

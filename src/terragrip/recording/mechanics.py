@@ -222,7 +222,11 @@ def _exchanged(
     recording: Recording, means: _Means, forward: Floats, thrusts: dict[str, Floats], together: _Fit
 ) -> str:
     """Whether some wheels' torques with the other sign, or the accelerometer's other axis, make a balance where there is none."""
-    signs = {wheel: -1 if means.fit(own, forward).slope < 0 else 1 for wheel, own in thrusts.items()}
+    # A wheel of a wrong sign also brakes on average; how axles share a pull that changes looks like a sign in their changes alone.
+    backward = {w for w in thrusts if np.nanmean(means.of(recording.channels[f"drive_torque_{w}"])) < 0}
+    signs = {
+        w: -1 if w in backward and means.fit(own, forward).slope < 0 else 1 for w, own in thrusts.items()
+    }
     plain = abs(together.alike)
     turned = abs(means.fit(np.sum([signs[w] * own for w, own in thrusts.items()], axis=0), forward).alike)
     sideways = recording.channels.get("acceleration_y")
