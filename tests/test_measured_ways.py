@@ -102,12 +102,7 @@ GRASS = (
     "grass_2024_7_18_16h59s20",
     "grass_2024_7_29_14h46s15",
     "grass_2024_7_29_14h4s53",
-    pytest.param(
-        "grass_2024_7_29_14h8s51",
-        marks=pytest.mark.xfail(
-            strict=True, reason="a warning of .05 s at 74.7 s, score 3.34 of 3.3: docs/events.md"
-        ),
-    ),
+    "grass_2024_7_29_14h8s51",
 )
 
 

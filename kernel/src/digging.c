@@ -113,15 +113,16 @@ int32_t tgi_digging_update(tg_estimator *e, double time, const tgi_view *row)
     if (!add_row(e, time, row, &since)) return 0;
     const tg_real slip = now[TGI_SLIP], deviation = now[TGI_DEVIATION], sure = slip - s->sure * deviation, rise = slip - mean[TGI_SLIP];
     const tg_real rim = now[TGI_RIM] - mean[TGI_RIM], gain = now[TGI_TRAVEL] - mean[TGI_TRAVEL];
-    /* Rims that gain while the vehicle loses speed spin, by no command. They slow by command and in hits, yet also of a weak drive that digs in. */
-    const tg_real command = tgi_max(tgi_max(rim + (gain < 0 ? gain : 0), gain), -rim / 2);
+    /* Rims that gain while the vehicle loses speed spin, by no command. They slow by command and in hits, yet also of a weak drive that digs in.
+     * Rims are known well where slip is not; what the vehicle gains has slip's SD, which is that of the speeds, relative. */
+    const tg_real rims = tgi_max(rim + (gain < 0 ? gain : 0), -rim / 2) / s->command, command = tgi_max(rims, gain / one_point(s->command, deviation));
     const tg_real high = s->high_slip > 0 ? sure / s->high_slip - 1 : 0;
     const tg_real leading = d->usual[1] - now[TGI_BALANCE], resistance = now[TGI_RESISTANCE] - mean[TGI_RESISTANCE];
     d->points[TG_SIGN_RISE] = bounded(rise / one_point(s->rise, deviation), -s->most, s->most);
     d->points[TG_SIGN_HIGH] = bounded(s->most * high, 0, 2 * s->most);
     d->points[TG_SIGN_LEADING] = bounded(leading / one_point(s->leading, now[TGI_BALANCE_DEVIATION]), -s->most, s->most);
     d->points[TG_SIGN_RESISTANCE] = bounded(resistance / one_point(s->resistance, now[TGI_RESISTANCE_DEVIATION]), -s->most, s->most);
-    d->points[TG_SIGN_COMMAND] = -bounded(command / one_point(s->command, deviation), 0, 2 * s->most); /* slip's SD is that of the speeds, relative */
+    d->points[TG_SIGN_COMMAND] = -bounded(command, 0, 2 * s->most);
     tg_real sum = 0;
     for (int32_t k = 0; k < TG_SIGNS; k++) sum += d->points[k];
     d->score = low_pass(d->score, since < e->constants.pace ? since : e->constants.pace, s->memory * e->constants.pace, sum);

@@ -21,16 +21,16 @@ static tg_watch_settings default_watch(void)
 {
     tg_watch_settings w;
     w.pace = 4;
-    w.memory = (tg_real)0.4;
+    w.memory = (tg_real)0.35;
     w.usual = 12;
-    w.sure = (tg_real)1.5;
-    w.ahead = (tg_real)0.2;
-    w.warn = (tg_real)3.3;
+    w.sure = 1;
+    w.ahead = (tg_real)0.21;
+    w.warn = (tg_real)3.6;
     w.most = 3;
     w.rise = (tg_real)0.035;
     w.high_slip = (tg_real)0.28;
-    w.leading = (tg_real)0.08;
-    w.resistance = (tg_real)0.015;
+    w.leading = (tg_real)0.06;
+    w.resistance = (tg_real)0.006;
     w.command = (tg_real)0.03;
     w.stuck_duration = (tg_real)0.5;
     w.stuck_travel = (tg_real)0.1;

@@ -118,6 +118,16 @@ def test_rims_that_gain_while_the_vehicle_loses_speed_are_no_command():
     assert 24 < warned[0] < 24.8
 
 
+@pytest.mark.parametrize("deviation", [0.01, 0.1, 0.3])
+def test_rims_tell_a_command_however_coarse_the_ground_speed_is(deviation):
+    """Rims and vehicle 40 % faster within half a second: the most that a command takes off, slip's SD or not."""
+    watch = Watch(watch_limits(), 1.0)
+    for k in range(105):
+        rim = 0.6 * (1 + min(max(0.1 * k - 9.9, 0.0), 0.5) * 0.8)
+        watch.update(Row(0.1 * k, 0.06, deviation, rim, 0.25, 0.25, 0.1, rim, 0.94 * rim))
+    assert watch.points[SIGNS.index("command")] == pytest.approx(-2 * watch_limits()["most"])
+
+
 def stuck_by(rows, radius=0.2):
     """First time at which the twin says stuck of (time, rim, ground speed, its SD), or None."""
     watch = Watch(watch_limits(), 1.0, radius)

@@ -222,7 +222,8 @@ class Watch:
 
         deviation = self.now[DEVIATION]
         sure = self.now[SLIP] - limits["sure"] * deviation
-        command = max(change(RIM) + min(change(TRAVEL), 0.0), change(TRAVEL), -change(RIM) / 2)
+        rims = max(change(RIM) + min(change(TRAVEL), 0.0), -change(RIM) / 2) / limits["command"]
+        command = max(rims, change(TRAVEL) / hypot(limits["command"], deviation))
         leading = hypot(limits["leading"], self.now[BALANCE_DEVIATION])
         resistance = hypot(limits["resistance"], self.now[RESISTANCE_DEVIATION])
         self.points = [
@@ -230,7 +231,7 @@ class Watch:
             bounded(most * (sure / limits["high_slip"] - 1), 0.0, 2 * most),
             bounded((self.usual[1] - self.now[BALANCE]) / leading, -most, most),
             bounded(change(RESISTANCE) / resistance, -most, most),
-            -bounded(command / hypot(limits["command"], deviation), 0.0, 2 * most),
+            -bounded(command, 0.0, 2 * most),
         ]
         tau = limits["memory"] * self.pace
         self.score = _low_pass(self.score, min(since, self.pace), tau, sum(self.points))
