@@ -7,6 +7,7 @@ import os
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field, replace
 from datetime import datetime
+from functools import cached_property
 from typing import TYPE_CHECKING, Any, Literal, Self, overload
 
 import numpy as np
@@ -113,7 +114,7 @@ class Estimates:
         """Name of the method."""
         return str(self.about.get("method", ""))
 
-    @property
+    @cached_property
     def vehicle(self) -> Vehicle:
         """The vehicle that the estimates were made for; raises InputError if the table does not hold one."""
         from terragrip.vehicle import Vehicle

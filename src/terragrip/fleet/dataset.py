@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import io
 import json
-import tempfile
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 from typing import Any
 
 from terragrip.errors import InputError
@@ -105,8 +103,8 @@ def soil_rows(notes: Sequence[Note]) -> list[dict[str, Any]]:
 
 def write_text(store: Store, name: str, text: str) -> None:
     """Write a text file, whole or not at all."""
-    with tempfile.TemporaryDirectory(prefix="terragrip-fleet-") as folder:
-        local = Path(folder) / "text"
+    with store.bench() as bench:
+        local = bench / "text"
         local.write_text(text, encoding="utf-8")
         store.put(local, name)
 
@@ -114,8 +112,8 @@ def write_text(store: Store, name: str, text: str) -> None:
 def _write(store: Store, name: str, table: Any) -> None:
     import pyarrow.parquet as pq
 
-    with tempfile.TemporaryDirectory(prefix="terragrip-fleet-") as folder:
-        local = Path(folder) / "table.parquet"
+    with store.bench() as bench:
+        local = bench / "table.parquet"
         pq.write_table(table, local)
         store.put(local, name)
 

@@ -10,6 +10,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any, TypeVar
 from urllib.parse import quote
 
@@ -23,7 +24,7 @@ WAITS = (0.2, 0.5, 1.0, 2.0, 4.0)
 TEMPORARY, LOCK = ".tmp", ".lock"
 _WHOLE = frozenset({"s3", "s3a", "gs", "gcs", "abfs", "az", "adl", "memory"})
 """Stores that show an object only when all of it is there; elsewhere a file is written beside and renamed."""
-_FINAL = (FileNotFoundError, PermissionError, IsADirectoryError, NotADirectoryError)
+_FINAL = (FileNotFoundError, PermissionError, IsADirectoryError, NotADirectoryError, MemoryError)
 
 
 def is_remote(path: str) -> bool:
@@ -99,8 +100,19 @@ class Store:
     def _path(self, name: str) -> str:
         return f"{self._place[1]}/{name}"
 
+    @contextmanager
+    def bench(self, scratch: str | None = None) -> Iterator[Path]:
+        """A folder for files that are made to be `put`: within a local store, so that a rename puts them, else in ``scratch`` (None: the
+        system's). It goes with what is left in it. Raises OSError where it cannot be made.
+        """
+        if self.is_local:
+            scratch = os.path.join(self.url, TEMPORARY)
+            os.makedirs(scratch, exist_ok=True)
+        with TemporaryDirectory(prefix="terragrip-fleet-", dir=scratch, ignore_cleanup_errors=True) as folder:
+            yield Path(folder)
+
     def put(self, local: Path, name: str) -> None:
-        """Copy a file to ``name``: whole or not at all. Raises OSError where the store keeps refusing."""
+        """Move a file of a `bench` to ``name``: whole or not at all. Raises OSError where the store keeps refusing."""
         system, protocol = self._place[0], self._place[0].protocol
         whole = bool({protocol} & _WHOLE if isinstance(protocol, str) else _WHOLE.intersection(protocol))
         target = self._path(name)
@@ -113,14 +125,17 @@ class Store:
             beside = self._path(f"{TEMPORARY}/{secrets.token_hex(8)}")
             system.makedirs(os.path.dirname(beside), exist_ok=True)
             system.put_file(os.fspath(local), beside)
-            if self.is_local:
-                sync(Path(beside))
-                os.replace(beside, target)
-                sync_folder(Path(target).parent)
-            else:
-                system.mv(beside, target)
+            system.mv(beside, target)
 
-        patiently(copy)
+        if not self.is_local:
+            patiently(copy)
+            local.unlink()
+            return
+        folder = Path(target).parent
+        patiently(lambda: folder.mkdir(parents=True, exist_ok=True))
+        patiently(lambda: sync(local))
+        patiently(lambda: os.replace(local, target))
+        patiently(lambda: sync_folder(folder))
 
     def read(self, name: str) -> bytes | None:
         """The content of a file; None where there is none."""
@@ -177,28 +192,36 @@ class Store:
             ) from error
 
 
-def fetched(url: str, folder: Path) -> Path:
-    """A log on this machine: itself, or a copy of one of a store in ``folder``. Raises OSError, also where there is none."""
+@contextmanager
+def fetched(url: str, folder: Path) -> Iterator[Path]:
+    """A log on this machine: itself, or for as long as it is needed a copy in ``folder`` of one of a store.
+
+    Raises OSError, also where there is none.
+    """
     if not is_remote(url):
-        return Path(url)
+        yield Path(url)
+        return
     from fsspec.core import url_to_fs
 
     system, path = url_to_fs(url)
-    local = folder / os.path.basename(path)
-    patiently(lambda: system.get_file(path, os.fspath(local)))
-    return local
+    with TemporaryDirectory(dir=folder) as own:
+        local = Path(own) / os.path.basename(path)
+        patiently(lambda: system.get_file(path, os.fspath(local)))
+        yield local
 
 
 def patiently(function: Callable[[], Result]) -> Result:
-    """The function's result, tried again after each of `WAITS` while the store refuses. Raises what it raised last."""
-    for wait in WAITS:
+    """What a store answers, asked again after each of `WAITS` while it refuses. Raises the OSError that it ends with."""
+    for wait in (*WAITS, None):
         try:
             return function()
         except _FINAL:
             raise
-        except OSError:
+        except Exception as error:  # each store has its own errors (botocore's are no OSError)
+            if wait is None:
+                raise error if isinstance(error, OSError) else OSError(_said(error)) from error
             time.sleep(wait)
-    return function()
+    raise AssertionError("not reached")
 
 
 def _said(error: Exception) -> str:

@@ -5,12 +5,12 @@ from __future__ import annotations
 import hashlib
 import json
 import os
-import tempfile
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from terragrip.errors import InputError
 from terragrip.fleet.logs import FleetLog
@@ -18,6 +18,8 @@ from terragrip.fleet.store import Store, fetched, safe_name
 
 if TYPE_CHECKING:
     from terragrip.fleet.tally import LogTally
+
+Result = TypeVar("Result")
 
 NO_DAY = "__HIVE_DEFAULT_PARTITION__"
 """The partition of logs that do not say when they were written: null to readers of Hive partitions."""
@@ -48,14 +50,37 @@ class Outcome:
     seconds: float = 0.0
 
 
+@dataclass(frozen=True)
+class _Made:
+    """A log that is estimated but not yet put: its ``files`` on the worker with their names in the store, in the order in which they are
+    put, and how long it has taken [s].
+    """
+
+    log: str
+    note: dict[str, Any]
+    files: tuple[tuple[Path, str], ...]
+    seconds: float
+
+
 def estimate_logs(logs: Sequence[FleetLog], settings: Settings, store: Store) -> list[Outcome]:
-    """One outcome a log. A log that cannot be estimated does not stop the others. Raises nothing that a log can cause."""
-    return [_outcome(log, settings, store) for log in logs]
+    """One outcome a log. A log that cannot be estimated does not stop the others. Raises nothing that a log can cause.
+
+    A log's files are put to the store while the next one is estimated.
+    """
+    outcomes: list[Future[Outcome]] = []
+    with store.bench(_scratch()) as bench, ThreadPoolExecutor(1) as putting:
+        for number, log in enumerate(logs):
+            made = _tried(log, _estimated, log, settings, store, bench, number)
+            if outcomes:
+                outcomes[-1].result()  # the disk holds no more than two logs
+            outcomes.append(putting.submit(_tried, log, _put, made, store))
+        return [one.result() for one in outcomes]
 
 
-def _outcome(log: FleetLog, settings: Settings, store: Store) -> Outcome:
+def _tried(log: FleetLog, step: Callable[..., Result], *given: Any) -> Result | Outcome:
+    """What a step makes of its log, or the reason why it cannot."""
     try:
-        return _estimate(log, settings, store)
+        return step(*given)
     except InputError as error:
         reason = str(error)
     except MemoryError:
@@ -67,7 +92,7 @@ def _outcome(log: FleetLog, settings: Settings, store: Store) -> Outcome:
     return Outcome(log.name, reason=" ".join(reason.split()))
 
 
-def _estimate(log: FleetLog, settings: Settings, store: Store) -> Outcome:
+def _estimated(log: FleetLog, settings: Settings, store: Store, bench: Path, number: int) -> Outcome | _Made:
     from terragrip import __version__
     from terragrip.fleet.tally import LogTally
     from terragrip.from_log import estimate_file
@@ -78,13 +103,12 @@ def _estimate(log: FleetLog, settings: Settings, store: Store) -> Outcome:
             hint="install one version on all workers",
         )
     began = time.monotonic()
-    with tempfile.TemporaryDirectory(prefix="terragrip-fleet-", dir=_scratch()) as folder:
-        source = fetched(log.url, Path(folder))
+    with fetched(log.url, bench) as source:
         key = key_of(log, source, settings)
         known = store.read(f"{NOTES}/{key}.json")
         if known is not None:
             return Outcome(log.name, json.loads(known))
-        local = Path(folder) / "estimates.parquet"
+        local, thin, told = (bench / f"{number}{end}" for end in (".parquet", "-sample.parquet", ".json"))
         tally = LogTally()
         estimate_file(
             source,
@@ -96,20 +120,29 @@ def _estimate(log: FleetLog, settings: Settings, store: Store) -> Outcome:
             smooth=settings.smooth,
             labels={"log": log.name},
             observe=tally.add,
+            summary=False,
         )
-        note = make_note(log, key, settings, tally)
-        if tally.sample:
-            from terragrip.estimation.writing import write_parts
+    note = make_note(log, key, settings, tally)
+    files = [(local, note["file"])]
+    if tally.sample:
+        import pyarrow as pa
+        import pyarrow.parquet as pq
 
-            thin = Path(folder) / "sample.parquet"
-            write_parts(tally.sample, thin)
-            store.put(thin, f"{SAMPLES}/{key}.parquet")
-        store.put(local, note["file"])
-        # Last of all: only what a note tells of belongs to the data set.
-        told = Path(folder) / "note.json"
-        told.write_text(json.dumps(note), encoding="utf-8")
-        store.put(told, f"{NOTES}/{key}.json")
-    return Outcome(log.name, note, fresh=True, seconds=time.monotonic() - began)
+        pq.write_table(pa.concat_tables([part.to_arrow() for part in tally.sample]), thin)
+        files.insert(0, (thin, f"{SAMPLES}/{key}.parquet"))
+    told.write_text(json.dumps(note), encoding="utf-8")
+    # Last of all: only what a note tells of belongs to the data set.
+    files.append((told, f"{NOTES}/{key}.json"))
+    return _Made(log.name, note, tuple(files), time.monotonic() - began)
+
+
+def _put(made: Outcome | _Made, store: Store) -> Outcome:
+    if isinstance(made, Outcome):
+        return made
+    began = time.monotonic()
+    for local, name in made.files:
+        store.put(local, name)
+    return Outcome(made.log, made.note, fresh=True, seconds=made.seconds + time.monotonic() - began)
 
 
 def make_note(log: FleetLog, key: str, settings: Settings, tally: LogTally) -> dict[str, Any]:

@@ -72,8 +72,16 @@ class GatheredRuns:
     common_sd: float = 0.0
     wheels: int = 1
 
-    def add(self, estimates: Estimates, run: str, soil: str | None = None, file: str | None = None) -> None:
-        """Take one run; `soil` names all its rows, `file` is named where it is unusable."""
+    def add(
+        self,
+        estimates: Estimates,
+        run: str,
+        soil: str | None = None,
+        file: str | None = None,
+        *,
+        signatures: bool = True,
+    ) -> None:
+        """Take one run; `soil` names all its rows, `file` is named where it is unusable; `signatures`: False takes no blocks."""
         if not estimates.has_adhesion:
             problem, hint = (
                 "holds slip but no adhesion, so no soil can be learned",
@@ -82,7 +90,7 @@ class GatheredRuns:
             raise InputError(problem, file=file or run, hint=hint)
         self.runs.append(run)
         self.pairs += pairs_of(estimates, run, soil)
-        for name, blocks in labelled_blocks(estimates, soil, file or run):
+        for name, blocks in labelled_blocks(estimates, soil, file or run) if signatures else ():
             self.blocks.setdefault(name, []).append(blocks)
         self.makers.add(maker(estimates))
         self.periods.append(float(np.median(np.diff(estimates.time))) if len(estimates) > 1 else np.nan)

@@ -15,7 +15,9 @@ class _ArrowFile:
     """A file that Arrow writes table by table."""
 
     def __init__(self, path: Path, first: Estimates, target: Path) -> None:
-        self._schema = first.to_arrow().schema
+        table = first.to_arrow()
+        self._first: tuple[Estimates, pa.Table] | None = (first, table)
+        self._schema = table.schema
         self._writer = self._opened(path, self._schema)
 
     def _opened(self, path: Path, schema: pa.Schema) -> Any:
@@ -23,7 +25,9 @@ class _ArrowFile:
 
     def write(self, part: Estimates) -> None:
         """Write the rows of a part."""
-        self._writer.write_table(part.to_arrow().cast(self._schema))
+        begun, self._first = self._first, None
+        table = begun[1] if begun is not None and begun[0] is part else part.to_arrow()
+        self._writer.write_table(table.cast(self._schema))
 
     def close(self) -> None:
         """Complete the file."""
