@@ -156,6 +156,12 @@ def test_thrust_of_a_wheel_is_torque_over_radius_less_its_share_of_the_pull(vehi
 X = np.sin(np.arange(80) / 3.0) + 0.3 * np.sin(np.arange(80))
 
 
+def torques(turned: tuple[str, ...] = (), **more: np.ndarray) -> Recording:
+    """Wheels that drive on average, but those of a wrong sign."""
+    mean = {f"drive_torque_{w}": np.full(80, -10.0 if w in turned else 10.0) for w in WHEELS}
+    return Recording(np.arange(80.0), mean | more)
+
+
 @pytest.mark.parametrize(
     ("forward", "thrust", "words"),
     [  # what accelerometer and torques make of a change of speed of 1
@@ -174,7 +180,7 @@ def test_which_of_torques_and_accelerometer_is_wrong_the_speed_decides(
     vehicle: Vehicle, forward: float, thrust: float, words: str
 ) -> None:
     means = _Means(np.arange(80), 80, np.ones(80, dtype=bool), X, np.ones(80))
-    log = Recording(np.arange(80.0), {})
+    log = torques()
     thrusts = dict.fromkeys(WHEELS, thrust * X / 4)
     notes = _balance_warnings(log, means, forward * X, thrusts, vehicle)
     assert " ".join(notes) == "" if not words else words in " ".join(notes)
@@ -190,13 +196,13 @@ def test_wheels_that_drive_against_the_others_are_named(
 ) -> None:
     means = _Means(np.arange(80), 80, np.ones(80, dtype=bool), X, np.ones(80))
     thrusts = {w: (-1 if w in turned else 1) * X / 4 for w in WHEELS}
-    notes = " ".join(_balance_warnings(Recording(np.arange(80.0), {}), means, X, thrusts, vehicle))
+    notes = " ".join(_balance_warnings(torques(turned), means, X, thrusts, vehicle))
     assert notes == "" if not words else words in notes
 
 
 def test_torques_that_go_with_the_other_axis_are_told(vehicle: Vehicle) -> None:
     means = _Means(np.arange(80), 80, np.ones(80, dtype=bool), X, np.ones(80))
-    log = Recording(np.arange(80.0), {"acceleration_y": np.convolve(X, [0.0, 1.0, 0.0], "same")})
+    log = torques(acceleration_y=np.convolve(X, [0.0, 1.0, 0.0], "same"))
     sideways = np.random.default_rng(1).normal(size=80)
     (note,) = _balance_warnings(log, means, sideways, dict.fromkeys(WHEELS, X / 4), vehicle)
     assert note.startswith("acceleration_y goes with the drive torques")
