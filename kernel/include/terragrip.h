@@ -321,7 +321,7 @@ typedef struct {
     tg_real unknown_slope;          /* rad: SD of a pitch never seen or long silent */
     tg_real wheel_late;             /* intervals after which a wheel's last sample stands for nothing */
     tg_real mounting_walk;          /* rad^2, gained in T: of what a pitch sensor does not tell of the slope */
-    tg_real terrain_walk;           /* rad^2, gained in T: of the whole slope, where there is none */
+    tg_real terrain_walk;           /* rad^2, gained on a wheel radius of way: of the whole slope, where there is none */
     tg_real silence;                /* s without a ground speed after which it is reckoned from the wheels */
     tg_real slip_memory;            /* s over which slip and adhesion are remembered for that */
     tg_real most_slope;             /* of slip over adhesion */
@@ -344,6 +344,8 @@ typedef struct {
     tg_real uneven_memory;          /* wheel radii over which their mean squares are taken */
     tg_real uneven_most;            /* usual squares that one counts at most: a border between soils is no bump */
     tg_real least_load_spread;      /* relative SD of the load that no log can show, since all wheels share it */
+    tg_real soil_spread;            /* relative SD of the resistance of a field's soil: what it does beyond that may be slope, where nothing tells the slope; */
+    tg_real hill_memory;            /* wheel radii over which its mean and its SD are taken for that, at most */
 } tg_tuned;
 
 typedef struct {

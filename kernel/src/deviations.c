@@ -67,11 +67,12 @@ static void add_hitch_load(const tg_estimator *e, tg_real inverse_mass, const tg
     d->acceleration = d->accelerometer = (add_loads(e, mu, gain, d) - mu[n] * spread) * inverse_mass;
 }
 
-/* The slope is known better where the motion shows it. */
+/* The slope is known better where the motion shows it; what it leaves unknown of a whole slope is noise, see slope.c. */
 static tg_real slope_spread(const tg_estimator *e)
 {
     const tg_real given = e->settings.uncertainty.slope, found = tgi_sqrt(e->slope.error_variance);
-    return e->slope.running && found < given ? found : given;
+    if (!e->slope.running) return given;
+    return e->pitch.count == 0 ? 0 : found < given ? found : given;
 }
 
 /* Work out e->deviation, one a constant in the order of tgi_deviation_columns; `u` are the inputs along the travel, `mu` adhesion and rho_s.

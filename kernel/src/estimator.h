@@ -47,6 +47,7 @@ typedef struct { /* what a row's values need beside the belief; all reals, so th
     tg_real hub[8];  /* wheel, m/s: what its hub is faster than the vehicle, along the travel */
     tg_real direction, standing, seen_motion; /* standing: or else without a slip */
     tg_real roughness; /* mean square of what rho_s wanders over uneven ground, see roughness.c */
+    tg_real unseen_grade; /* variance of a slope that rho_s may be, see roughness.c */
     tg_real weight; /* N, on level ground, with what hangs on the hitch */
     tg_real unseen_load; /* relative variance of a wheel's load */
     tg_real slow_speed; /* variance of the ground speed's slow error, see slow_speed.c */
@@ -62,6 +63,7 @@ typedef struct { /* what drives the model between two rows, in the vehicle's own
     tg_real mass, inverse_mass; /* kg, as measured, else the machine's */
     tg_real hitch_load;   /* N */
     tg_real slope, cosine, sine;
+    tg_real strayed; /* variance that the slope's error gave the ground speed over the step that ends now, (m/s)^2 */
 } tg_drive;
 
 typedef struct { /* the estimate with its spreads, along the travel; the filter's row order (mu, rho_s, v, omega), see filter.h */
@@ -92,6 +94,7 @@ typedef struct { /* uneven ground, see roughness.c */
     tg_real adhesion[8], resistance; /* low-passed over the distance */
     tg_real scatter, square;         /* mean squares: of a wheel's adhesion beyond the others', of the adhesion */
     tg_real wander;                  /* mean square of rho_s about its low-pass */
+    tg_real usual, swing, way;       /* rho_s over the way: its mean, its mean square about that, wheel radii that these stand for; 0: nothing yet */
 } tgi_roughness;
 
 typedef struct { /* what stops tell of the ground speed, see slow_speed.c */
@@ -162,7 +165,7 @@ typedef struct { /* what follows from the settings alone */
     tg_real least_shock;            /* (m/s^2)^2, variance of the accelerometer at rest */
     tg_real scale_score[TG_MODES];  /* of the bank: log scale, 0 the smallest, 1 the largest */
     tg_real force_walk;             /* m^2/s^3 */
-    tg_real mounting_walk, terrain_walk; /* rad^2/s */
+    tg_real mounting_walk;          /* rad^2/s */
     tg_real pace;                   /* s, the unit of time of the watch, see digging.c */
     int32_t watched[8], side[8];    /* wheel: powered, or no wheel is; by its place on its axle -1 left, 1 right, 0 middle */
     int32_t holds;                  /* some channel is held */
@@ -242,7 +245,7 @@ tg_status tgi_filter_anew(tg_filter *f, tg_consider *c, const tg_settings *s);
 
 /* slope.c */
 void tgi_slope_correct(tgi_slope *s, tg_real speed, tg_real noise);
-tg_real tgi_slope_update(tg_estimator *e, const tg_row *row, tg_real pitch, tg_real dt);
+void tgi_slope_update(tg_estimator *e, const tg_row *row, tg_real pitch, tg_real dt, tg_drive *drive);
 
 /* wheels.c */
 void tgi_hold_wheels(tg_estimator *e, tg_real dt, tg_row *row);
@@ -254,6 +257,7 @@ void tgi_reckon(tg_estimator *e, const tg_drive *drive, tg_real dt, tg_row *row,
 /* roughness.c; variance that unseen load adds to an adhesion */
 TG_INLINE tg_real tgi_rough_adhesion(const tgi_scene *scene, tg_real mu) { return scene->unseen_load * tgi_square(mu); }
 tg_real tgi_unseen_load(const tg_estimator *e);
+tg_real tgi_unseen_grade(const tg_estimator *e);
 void tgi_watch_roughness(tg_estimator *e, int32_t flowing, tg_real distance);
 
 /* slow_speed.c */

@@ -148,7 +148,7 @@ void tgi_input_noise(const tg_estimator *e, const tg_drive *drive, tg_real dt, t
     const tgi_constants *c = &e->constants;
     const int32_t n = s->machine.wheels;
     for (int32_t j = 0; j < TG_MAX_STATES; j++) q[j] = 0;
-    q[n] = walking_forces(e, drive, dt);
+    q[n] = walking_forces(e, drive, dt) + drive->strayed;
     memset(row->shared, 0, sizeof row->shared);
     for (int32_t i = 0; i < n; i++)
         if (s->driven[i]) {
@@ -187,7 +187,7 @@ void tgi_take_inputs(tg_estimator *e, tg_row *row, tg_real dt, tg_drive *drive)
     drive->mean_drawbar = e->drawbar.mean;
     drive->calm_drawbar = e->drawbar.value;
     tgi_weigh(e, row, drive);
-    drive->slope = tgi_slope_update(e, row, e->pitch.value, dt);
+    tgi_slope_update(e, row, e->pitch.value, dt, drive);
     drive->cosine = tgi_cos(drive->slope);
     drive->sine = tgi_sin(drive->slope);
 }

@@ -7,7 +7,7 @@
 
 #define TG_LOAD_LENGTH ((tg_real)1.25)       /* wheel radii over which an unseen load is taken to be alike */
 #define TG_SMALL_ADHESION ((tg_real)1e-4)    /* .01 squared: below it scatter is not relative */
-#define TG_SMALL_RESISTANCE ((tg_real)4e-6)  /* .002 squared */
+#define TG_SMALL_RESISTANCE ((tg_real)1.6e-5) /* .004 squared */
 
 /* Mean square of what each of `count` wheels does beyond all of them. */
 static tg_real apart(const tg_real *change, int32_t count)
@@ -27,6 +27,21 @@ static void count_square(tg_real *mean, tg_real square, tg_real least, tg_real m
 {
     most *= *mean + least;
     *mean += gain * ((square < most ? square : most) - *mean);
+}
+
+/* rho_s over the whole way; at first the prior, as if driven over the length of `uneven_memory`. */
+static void watch_hills(tg_estimator *e, tg_real rho, tg_real travelled)
+{
+    tgi_roughness *r = &e->roughness;
+    const tg_tuned *k = &e->settings.tuned;
+    if (r->way == 0) {
+        r->usual = e->settings.prior_resistance;
+        r->way = k->uneven_memory;
+    }
+    r->way = r->way + travelled < k->hill_memory ? r->way + travelled : k->hill_memory;
+    const tg_real gain = travelled / r->way;
+    r->usual += gain * (rho - r->usual);
+    r->swing += gain * (tgi_square(rho - r->usual) - r->swing);
 }
 
 /* After a row's estimate, `distance` m behind the one before. `flowing`: the row goes on from that one. */
@@ -49,6 +64,7 @@ void tgi_watch_roughness(tg_estimator *e, int32_t flowing, tg_real distance)
     if (driven) square /= (tg_real)driven;
     count_square(&r->scatter, apart(change, driven), tgi_square(k->least_load_spread) * square + TG_SMALL_ADHESION, k->uneven_most, gain);
     r->square += gain * (square - r->square);
+    watch_hills(e, rho, travelled);
     if (!flowing) r->resistance = rho;
     r->resistance += fresh * (rho - r->resistance);
     count_square(&r->wander, tgi_square(rho - r->resistance), TG_SMALL_RESISTANCE, k->uneven_most, gain);
@@ -62,4 +78,16 @@ tg_real tgi_unseen_load(const tg_estimator *e)
     const tg_tuned *k = &e->settings.tuned;
     const tg_real whole = 1 + TG_LOAD_LENGTH / k->uneven_length;
     return whole * r->scatter / (r->square + TG_SMALL_ADHESION) + tgi_square(k->least_load_spread);
+}
+
+/* Variance of the slope that rho_s may hold where nothing tells the slope: thrust goes into hills and soft soil alike. What rho_s does
+ * about its mean, now or as a rule, beyond what one soil's resistance does and the slope that the vehicle's file states. */
+tg_real tgi_unseen_grade(const tg_estimator *e)
+{
+    const tgi_roughness *r = &e->roughness;
+    const tg_settings *s = &e->settings;
+    if (e->pitch.count > 0 || e->slope.running) return 0;
+    const tg_real now = tgi_square(e->belief.x[s->machine.wheels] - r->usual);
+    const tg_real beyond = tgi_sqrt(tgi_max(now, r->swing)) - s->tuned.soil_spread * tgi_fabs(r->usual);
+    return beyond > s->uncertainty.slope ? tgi_square(beyond) - tgi_square(s->uncertainty.slope) : 0;
 }

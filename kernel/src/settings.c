@@ -54,7 +54,7 @@ static tg_tuned default_tuned(void)
     k.unknown_slope = (tg_real)0.1;
     k.wheel_late = (tg_real)1.5;
     k.mounting_walk = (tg_real)7e-8;
-    k.terrain_walk = (tg_real)4e-6;
+    k.terrain_walk = (tg_real)8e-5;
     k.silence = (tg_real)0.5;
     k.slip_memory = (tg_real)0.3;
     k.most_slope = (tg_real)0.4;
@@ -79,6 +79,8 @@ static tg_tuned default_tuned(void)
     k.uneven_memory = 40;
     k.uneven_most = 4;
     k.least_load_spread = (tg_real)0.02;
+    k.soil_spread = (tg_real)0.2;
+    k.hill_memory = 1000;
     return k;
 }
 
@@ -254,7 +256,6 @@ static void work_out_constants(const tg_settings *s, tgi_constants *c)
     const tg_real T = natural_time(m);
     c->force_walk = force_walk(s);
     c->mounting_walk = s->tuned.mounting_walk / T;
-    c->terrain_walk = s->tuned.terrain_walk / T;
     c->inverse_mass = 1 / m->mass;
     c->inverse_weight = 1 / weight;
     c->pace = tgi_pace(s);

@@ -1,7 +1,8 @@
 /* Slope as the motion shows it, where there is an accelerometer: it reads dv/dt + g sin(slope), so what it reads beyond the change of ground
  * speed is slope. A pitch sensor alone errs by its mounting and by wheels that sink unevenly; without one the whole slope is found. A
- * Kalman filter of two states, ground speed and slope error, beside the main one (R). The accelerometer's bias goes into the error too,
- * as it should: the two then agree on dv/dt. */
+ * Kalman filter of two states, ground speed and slope error, beside the main one (R). Of a whole slope, what its error makes of the speed over a step is
+ * noise of the main filter's, which then weighs ground speeds as this one does. The accelerometer's bias goes into the error too, as it should: the two then
+ * agree on dv/dt. */
 #include "estimator.h"
 
 #define TG_SLOPE_LIMIT ((tg_real)0.5) /* rad: no vehicle of ours drives steeper */
@@ -14,14 +15,17 @@ static void start(tgi_slope *s, const tg_settings *settings, tg_real speed)
     s->running = 1;
 }
 
-static void predict(tgi_slope *s, const tg_settings *settings, tg_real pitch, tg_real walk, tg_real force, tg_real dt)
+/* Returns the variance that the slope error gives the speed. */
+static tg_real predict(tgi_slope *s, const tg_settings *settings, tg_real pitch, tg_real walk, tg_real force, tg_real dt)
 {
     const tg_real g = settings->machine.gravity, k = g * dt;
     const tg_real noise = tgi_square(settings->noise[TG_ACCELERATION_X]) * dt + force; /* of shocks that its noise does not hold */
     s->speed += dt * (s->acceleration - g * (tgi_sin(pitch) + s->error));
-    s->speed_variance += k * (k * s->error_variance - 2 * s->covariance) + noise * dt;
+    const tg_real strayed = k * (k * s->error_variance - 2 * s->covariance);
+    s->speed_variance += strayed + noise * dt;
     s->covariance -= k * s->error_variance;
     s->error_variance += walk * dt;
+    return strayed;
 }
 
 /* Take a ground speed of this variance. */
@@ -40,18 +44,21 @@ void tgi_slope_correct(tgi_slope *s, tg_real speed, tg_real noise)
     if (s->error < -TG_SLOPE_LIMIT) s->error = -TG_SLOPE_LIMIT;
 }
 
-/* Take a row; `pitch` as measured, 0 where it is not. Returns the slope. */
-tg_real tgi_slope_update(tg_estimator *e, const tg_row *row, tg_real pitch, tg_real dt)
+/* Take a row; `pitch` as measured, 0 where it is not. */
+void tgi_slope_update(tg_estimator *e, const tg_row *row, tg_real pitch, tg_real dt, tg_drive *drive)
 {
     tgi_slope *s = &e->slope;
     const tg_settings *settings = &e->settings;
-    tg_real speed = row->value[TG_GROUND_SPEED], walk = e->pitch.count > 0 ? e->constants.mounting_walk : e->constants.terrain_walk;
+    const tg_real speed = row->value[TG_GROUND_SPEED];
+    const int32_t sensed = e->pitch.count > 0;
+    const tg_real walk = sensed ? e->constants.mounting_walk : settings->tuned.terrain_walk * tgi_fabs(s->speed) / e->constants.mean_radius;
     if (s->running && (dt > settings->gap || row->time - e->acceleration.time > 1)) s->running = 0;
-    if (s->running && dt > 0) predict(s, settings, pitch, walk, e->constants.force_walk, dt);
+    const tg_real strayed = s->running && dt > 0 ? predict(s, settings, pitch, walk, e->constants.force_walk, dt) : 0;
+    drive->strayed = sensed ? 0 : strayed; /* a mounting is a constant, and considered */
     if (!isnan(row->value[TG_ACCELERATION_X])) s->acceleration = row->value[TG_ACCELERATION_X];
     if (!isnan(speed)) {
         if (s->running) tgi_slope_correct(s, speed, e->constants.variance[TG_GROUND_SPEED] + row->doubt[settings->machine.wheels]);
         else if (e->acceleration.seen) start(s, settings, speed);
     }
-    return pitch + s->error;
+    drive->slope = pitch + s->error;
 }

@@ -25,7 +25,7 @@ def eventful() -> Recording:
     log = drive(42.0, rate=50.0, noise=0.3, slip=slip, speed=lambda t: 0.55 * (1 - slip(t))).recording
     time = log.time
     locked, standing, spinning = (time > 25) & (time < 28), (time > 35) & (time < 38), time >= 38
-    changed = {"ground_speed": np.where(time < 35, log["ground_speed"], 0.0)}
+    changed = {"ground_speed": np.where(time < 35, log["ground_speed"], 0.0), "pitch": np.zeros(len(time))}
     for wheel in WHEELS:
         speed, torque = log[f"wheel_speed_{wheel}"], log[f"drive_torque_{wheel}"]
         cases = [locked, standing, spinning]

@@ -1,0 +1,84 @@
+"""Hills that no pitch sensor tells of: intervals hold the truth with an accelerometer alone, and without one."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+
+from terragrip.estimation import Estimates, estimate
+from terragrip.simulation import SimulationResult, simulate
+from terragrip.simulation.families import Kind, scenario
+from terragrip.vehicle import Vehicle
+
+MACHINES = (
+    (Kind("tractor", "brixius", "multirate"), 0),
+    (Kind("tractor", "sinkage", "even"), 10),
+)  # development ones
+WAVE = 50.0  # m
+HIDDEN = {"accelerometer": ("pitch",), "neither": ("pitch", "acceleration")}
+
+
+@cache
+def drive(number: int, grade: float) -> SimulationResult:
+    """A development machine, little pulled, on hills of this SD of the grade."""
+    kind, seed = MACHINES[number]
+    level = scenario(kind, seed, rate=20.0, duration=120.0)
+    slope = level.route.slope.model_copy(update={"sd": grade, "length": WAVE / 4.44})
+    route = level.route.model_copy(update={"slope": slope})
+    tools = tuple(tool.model_copy(update={"added": ()}) for tool in level.tools)
+    return simulate(level.model_copy(update={"route": route, "tools": tools}), seed)
+
+
+def seen(result: SimulationResult, hidden: tuple[str, ...]) -> Estimates:
+    """Estimates without some channels, of a user who says `slope: 0.5 deg`."""
+    log, data = result.recording, result.vehicle.to_dict()
+    channels = {
+        name: np.full(len(log.time), np.nan) if name.startswith(hidden) else values
+        for name, values in log.channels.items()
+    }
+    data["uncertainty"]["slope"] = float(np.radians(0.5))
+    return estimate(replace(log, channels=channels), Vehicle.from_dict(data))
+
+
+def held(result: SimulationResult, estimates: Estimates, quantity: str) -> float:
+    """Share of moving rows whose 95 % interval holds the truth, of all wheels together."""
+    truth, inside = result.truth, []
+    wheels = result.vehicle.wheels
+    for name in [quantity] if quantity == "soil_resistance" else [f"{quantity}_{w}" for w in wheels]:
+        error = (estimates[name] - truth[f"true_{name}"]).to_numpy()
+        rows = (np.abs(truth["true_ground_speed"]) > 0.1).to_numpy() & np.isfinite(error)
+        inside.append(np.abs(error[rows]) <= 1.96 * np.asarray(estimates[f"{name}_std"])[rows])
+    return float(np.mean(np.concatenate(inside)))
+
+
+@pytest.mark.parametrize("number", range(len(MACHINES)))
+@pytest.mark.parametrize("view", list(HIDDEN))
+def test_intervals_hold_on_hills(number: int, view: str) -> None:
+    result = drive(number, 0.1)
+    estimates = seen(result, HIDDEN[view])
+    for quantity in ("slip", "soil_resistance", "net_traction", "efficiency"):
+        assert held(result, estimates, quantity) > 0.85, quantity
+
+
+def test_an_accelerometer_does_not_make_slip_worse() -> None:
+    """It tells the slope in part; where it does not, the ground speed sensor must count as it does without."""
+    result = drive(0, 0.1)
+    error = {
+        view: np.nanmean(np.abs(seen(result, hidden)["slip_1l"] - result.truth["true_slip_1l"]))
+        for view, hidden in HIDDEN.items()
+    }
+    assert error["accelerometer"] < 1.05 * error["neither"]
+
+
+def test_hills_widen_resistance_only_where_nothing_tells_them() -> None:
+    spread = {
+        (grade, view): float(np.nanmedian(seen(drive(1, grade), hidden)["soil_resistance_std"]))
+        for grade in (0.0, 0.1)
+        for view, hidden in HIDDEN.items()
+    }
+    assert spread[0.1, "neither"] > 3 * spread[0.0, "neither"]
+    assert spread[0.1, "accelerometer"] < 1.5 * spread[0.0, "accelerometer"]
+    assert spread[0.0, "neither"] < 2 * spread[0.0, "accelerometer"]
