@@ -299,9 +299,10 @@ def test_the_kernel_and_its_twin_flag_the_same_rows_for_the_same_signs(soft):
 
 
 def test_the_twins_agree_of_a_spinning_diagonal_at_10_hz():
-    assert {"immobilization", "stuck"} <= assert_twins_agree(
-        snow_run_of(1).recording, estimates_of(snow_run_of(1))
-    )
+    """On level snow, as a pitch sensor tells: without, the table's SD of the resistance holds hills that the kernel's watch leaves out."""
+    log, table = snow_run_of(1).recording, estimates_of(snow_run_of(1))
+    level = log.with_channels(pitch=np.zeros(len(log.time)))
+    assert {"immobilization", "stuck"} <= assert_twins_agree(level, estimate(level, table.vehicle))
 
 
 def test_an_undriven_wheel_with_a_torque_in_the_log_is_not_watched(soft):
