@@ -137,14 +137,17 @@ def test_a_radius_in_doubt_comes_with_its_doubt_and_what_it_rests_on() -> None:
     assert radius.samples == 119
 
 
-def test_of_a_wheel_only_straight_windows_count() -> None:
-    """A minute straight on and a minute in a bend: the left wheels run slower there, and nothing but their speeds says so."""
+@pytest.mark.parametrize("front", [0.8, 0.55])
+def test_of_a_wheel_only_straight_windows_count(front: float) -> None:
+    """A minute straight on and a minute in a bend: the left wheels run slower there, and nothing but their speeds says so; a tractor's
+    smaller front wheels turn faster all the time."""
     time = np.arange(0.0, 120.0, 0.2)
     bend = np.where(time < 60, 0.0, 0.06)
     columns = {"time": time, "ground_speed": np.full(len(time), 2.0)}
     for wheel, side in (("fl", 1), ("fr", -1), ("rl", 1), ("rr", -1)):
-        columns[f"wheel_speed_{wheel}"] = 2.0 * (1 - side * bend) / 0.8
-    zero = zero_of([tg.Recording.from_frame(columns)], "wheel_speed_fl", 0.8)
+        columns[f"wheel_speed_{wheel}"] = 2.0 * (1 - side * bend) / (front if wheel[0] == "f" else 0.8)
+    radii = {"fl": front, "fr": front, "rl": 0.8, "rr": 0.8}
+    zero = zero_of([tg.Recording.from_frame(columns)], "wheel_speed_fl", front, radii=radii)
     assert zero is not None
     assert zero.windows == 12
     assert zero.ratio == pytest.approx(1.0, abs=1e-9)

@@ -57,8 +57,11 @@ def slip_reference_in(log: Recording, vehicle: Vehicle) -> SlipReference:
     is held against the log's own zero, unless the vehicle's calibration names the radii.
     """
     rims, zero, notes = [], {}, [WHAT_IS_MISSING]
+    radii = (
+        dict(zip(vehicle.wheels, vehicle.wheel_radius.tolist(), strict=True)) if vehicle.knows_wheels else {}
+    )
     for rim in rims_of(vehicle, log.channels, log.source):
-        at = zero_of([log], rim.channel, 1.0 if rim.wheel == DRIVE else rim.radius)
+        at = zero_of([log], rim.channel, 1.0 if rim.wheel == DRIVE else rim.radius, radii=radii)
         if at is not None:
             zero[rim.wheel] = at
         learns = rim.wheel == DRIVE and calibrated_scale(vehicle) is None

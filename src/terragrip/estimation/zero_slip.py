@@ -10,9 +10,10 @@ maximisation, their number by the Bayesian information criterion (Schwarz 1978).
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
+from types import MappingProxyType
 
 import numpy as np
 import numpy.typing as npt
@@ -30,6 +31,7 @@ FEWEST = 8
 UNTOLD = 0.03
 """Relative SD of a radius that nothing tells but the machine itself: worn or other tires, other pressure."""
 
+_ALIKE: Mapping[str, float] = MappingProxyType({})  # wheels of one radius
 REMEDY = "record 40 s without load too (headland, road), or say which rows are without load (terragrip calibrate --light FROM:TO)"
 _SLOWEST = 0.3  # m/s
 _GOING = 0.5  # of the window's mean speed: slower samples are stops
@@ -63,17 +65,22 @@ class Zero:
 
 
 def zero_of(
-    logs: Sequence[Recording], channel: str, radius: float, light: Sequence[Span | None] | None = None
+    logs: Sequence[Recording],
+    channel: str,
+    radius: float,
+    light: Sequence[Span | None] | None = None,
+    radii: Mapping[str, float] = _ALIKE,
 ) -> Zero | None:
     """The zero of a channel over logs of one machine; None where there are too few windows of driving.
 
     ``channel`` times ``radius`` is the rim speed [m/s]. ``light``: of each log the span [s] that was driven without load, if the
-    user knows one; then only that counts.
+    user knows one; then only that counts. ``radii`` [m]: of all wheels, where they are not alike, to see by their rims' speeds what is
+    straight.
     """
     spans = [None] * len(logs) if light is None else list(light)
     declared = any(span is not None for span in spans)
     parts = [
-        _windows(log, channel, radius, span)
+        _windows(log, channel, radius, span, radii)
         for log, span in zip(logs, spans, strict=True)
         if channel in log.channels and (span is not None or not declared)
     ]
@@ -174,7 +181,7 @@ def _fit(ratio: Floats, number: int, mean: Floats) -> tuple[float, list[tuple[fl
 
 
 def _windows(
-    recording: Recording, channel: str, radius: float, span: Span | None
+    recording: Recording, channel: str, radius: float, span: Span | None, radii: Mapping[str, float] = _ALIKE
 ) -> tuple[Floats, npt.NDArray[np.bool_]]:
     """Ground speed over rim speed in windows without a stop (n,), of one wheel in straight ones; and whether each is of a road."""
     log = without_held(recording, held_periods(recording))
@@ -190,16 +197,20 @@ def _windows(
         used = (np.abs(ground) > _SLOWEST) & (np.abs(rim) > _SLOWEST) & (ground * rim > 0)
         used &= (slowest > _GOING * np.abs(ground)) & (least > _GOING * np.abs(rim))
         if channel != "wheel_based_speed":
-            used &= _straight(log, place, count)
+            used &= _straight(log, place, count, radii)
         return (ground / rim)[used], (np.abs(ground) > _ROAD)[used]
 
 
-def _straight(log: Recording, place: npt.NDArray[np.intp], count: int) -> npt.NDArray[np.bool_]:
-    """Windows (count,) in which no turn shows: in the yaw rate, else in the wheels' speeds."""
+def _straight(
+    log: Recording, place: npt.NDArray[np.intp], count: int, radii: Mapping[str, float]
+) -> npt.NDArray[np.bool_]:
+    """Windows (count,) in which no turn shows: in the yaw rate, else in the rims' speeds."""
     if "angular_velocity_z" in log.channels:
         return ~(np.abs(_means(log.channels["angular_velocity_z"], place, count)[0]) > _TURNING)
-    wheels = np.stack([_means(log.channels[f"wheel_speed_{w}"], place, count)[0] for w in log.wheels])
-    return np.asarray(np.ptp(wheels, axis=0) <= _STRAIGHT * np.abs(wheels.mean(axis=0)))
+    rims = np.stack(
+        [radii.get(w, 1.0) * _means(log.channels[f"wheel_speed_{w}"], place, count)[0] for w in log.wheels]
+    )
+    return np.asarray(np.ptp(rims, axis=0) <= _STRAIGHT * np.abs(rims.mean(axis=0)))
 
 
 def _means(values: Floats, place: npt.NDArray[np.intp], count: int) -> tuple[Floats, Floats]:

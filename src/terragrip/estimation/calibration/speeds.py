@@ -24,13 +24,14 @@ def calibrate_radii(
     """
     quantities: list[Quantity | Unknown] = []
     if vehicle.knows_wheels:
+        radii = dict(zip(vehicle.wheels, vehicle.wheel_radius.tolist(), strict=True))
         for wheel, data, driven in zip(vehicle.wheels, vehicle.wheel_data, vehicle.driven, strict=True):
             channel, radius = f"wheel_speed_{wheel}", data.radius
             if not any(channel in log for log in logs):
                 if not driven:
                     continue
                 channel, radius = "wheel_based_speed", 1.0
-            zero = zero_of(logs, channel, radius, light)
+            zero = zero_of(logs, channel, radius, light, radii)
             radius_of = Quantity(
                 "wheel_radius", data.radius, 0.0, "m", _evidence(logs, sources, channel), "", wheel=wheel
             )
