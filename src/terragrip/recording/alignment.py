@@ -19,7 +19,7 @@ _LONGEST = 1.0  # s, or three samples, across which nothing is interpolated
 
 
 def aligned(blocks: Iterable[Recording]) -> Iterator[Recording]:
-    """Consecutive blocks of a log with its ground speed moved by the lag of `lag_within`, and a note; as they are where none is certain.
+    """Consecutive blocks of a log with its ground speed moved by the lag of `lag_within`, and a note; a lag in doubt is only noted.
 
     The rows stay: at each instant of a ground speed stands what was measured when it was due, on a straight line between two
     samples, or the last one of a held channel. The lag is that of the first `ROWS` rows, whatever the blocks.
@@ -33,6 +33,10 @@ def aligned(blocks: Iterable[Recording]) -> Iterator[Recording]:
     if shift is None:
         yield from ahead
         yield from source
+        return
+    if not shift.lag.is_to_set_right:
+        yield from (block.with_notes(_doubt(shift.lag)) for block in ahead)
+        yield from (block.with_notes(_doubt(shift.lag)) for block in source)
         return
     tail: list[Recording] = []
     while ahead or (ahead := [more for more in (next(source, None),) if more is not None]):
@@ -102,10 +106,23 @@ class _Shift:
         return np.where(known, result, np.nan)
 
 
-def _sentence(lag: Lag) -> str:
+def _found(lag: Lag) -> str:
     side = "behind" if lag.seconds > 0 else "ahead of"
     return (
-        f"ground_speed was {abs(lag.seconds):.3f} ± {lag.std:.3f} s {side} the wheel speeds, by the correlation of the speeds "
-        f"({lag.correlation:.3f}), where a vehicle's own lag is up to {lag.explained[1]:.2f} s; it was set right by "
-        f"{abs(lag.of_the_clock):.3f} s. If you know which sensor is late, and how much, write it as 'delay:' in a profile."
+        f"{abs(lag.seconds):.3f} ± {lag.std:.3f} s {side} the wheel speeds, by the correlation of the speeds "
+        f"({lag.correlation:.3f}), where a vehicle's own lag is up to {lag.explained[1]:.2f} s on firm ground"
+    )
+
+
+def _sentence(lag: Lag) -> str:
+    return (
+        f"ground_speed was {_found(lag)}; it was set right by {abs(lag.of_the_clock):.3f} s. If you know which sensor is late, and how "
+        "much, write it as 'delay:' in a profile."
+    )
+
+
+def _doubt(lag: Lag) -> str:
+    return (
+        f"ground_speed is {_found(lag)}, which is too uncertain to set right: if a sensor is late, write "
+        f"'delay: {abs(lag.seconds):.2f} s' for it in a profile."
     )

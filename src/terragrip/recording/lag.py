@@ -31,6 +31,7 @@ _LONGEST = 20_000_000  # points; a record over ten days
 
 
 _CERTAIN = 2.0  # standard deviations by which an offset must exceed what is explained
+_SURE = 4.0  # the same, to be taken off unasked: of runs without a late sensor up to 2.7 (decision 0152)
 _STIFFNESS = (
     2.0  # K on soft soil: the slope of ASABE D497's gross traction ratio at 15 % slip, Bn = 20, is 1.85
 )
@@ -60,6 +61,14 @@ class Lag:
         """Whether it is certain, and more than a vehicle's dynamics explain."""
         least, most = self.explained
         return max(least - self.seconds, self.seconds - most) > _CERTAIN * self.std
+
+    @property
+    def is_to_set_right(self) -> bool:
+        """Whether it is so certain that it may be taken off unasked: soil that gives way makes a ground speed follow late, too, by more
+        than firm ground explains.
+        """
+        least, most = self.explained
+        return max(least - self.seconds, self.seconds - most) > _SURE * self.std
 
     @property
     def of_the_clock(self) -> float:
