@@ -65,6 +65,24 @@ def test_kernel_and_twin_agree(wheels: int, seed: int) -> None:
     _same(smooth, states, covariances, names, rtol=1e-7)
 
 
+@pytest.mark.parametrize("off", [-6.0, 6.0])
+def test_an_outlier_in_the_second_sample_weighs_as_in_the_twin(off: float) -> None:
+    """No sample was off before it, so that nothing confirms it, on either side."""
+    speeds = np.array([[5.0, 5.5], [5.0 + off, 5.5], [5.0, 5.5]])
+    columns = {"time": [0.0, 0.1, 0.2], "ground_speed": speeds[:, 0], "wheel_speed_a": speeds[:, 1] / RADIUS}
+    sensors = {"ground_speed": 0.03, "wheel_speed": 0.02 / RADIUS}
+    log = tg.Recording.from_frame(columns)
+    estimates = tg.estimate(log, machine(("a",)), sensors=sensors, held={}, gap=1e3)
+    twin = SpeedsFilter(np.array([0.03, 0.02]))
+    weights = []
+    for row, dt in zip(speeds, (0.0, 0.1, 0.1), strict=True):
+        twin.step(dt, row)
+        weights.append(twin.weight[0])
+    assert weights[1] < 0.5
+    assert list(estimates["event"] == "outlier") == [weight < 0.5 for weight in weights]
+    assert estimates["ground_speed"][-1] == pytest.approx(twin.state[0], rel=1e-9)
+
+
 def _same(
     estimates: tg.Estimates,
     states: list[np.ndarray],

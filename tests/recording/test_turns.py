@@ -9,7 +9,9 @@ import numpy as np
 import pytest
 
 from terragrip.recording import Recording, unit_warnings
+from terragrip.recording.turns import exchange_warnings
 from terragrip.simulation import SimulationResult, families
+from terragrip.vehicle import Vehicle
 
 TURNING, WORKING = 1, 7
 """Of the development machines: one that turns, of unlike axles, and one that works straight ahead."""
@@ -62,6 +64,33 @@ def test_torques_of_two_axles_are_named_straight_ahead(pair: tuple[str, str]) ->
     assert [n.split(": ")[0] for n in notes] == [
         f"drive_torque_{pair[0]} and drive_torque_{pair[1]} may be exchanged"
     ]
+
+
+def test_of_wheels_of_unlike_radii_the_pulls_are_compared_with_the_loads() -> None:
+    """Torques of a steady tractor, in closed form: front left and rear right exchanged, which front right and rear left
+    would mend too, were the torques compared."""
+    wheels, radii, loads = ("fl", "fr", "rl", "rr"), (0.5, 0.5, 0.8, 0.8), (4000.0, 3600.0)
+    axles = {
+        name: {
+            "mass": loads[k],
+            "wheels": list(wheels[2 * k :][:2]),
+            "wheel": {"radius": radii[2 * k], "inertia": 1},
+        }
+        for k, name in enumerate(("front", "rear"))
+    }
+    vehicle = Vehicle.from_dict(
+        {"mass": sum(loads), "wheelbase": 2.8, "center_of_gravity_height": 1, "axles": axles}
+    )
+    columns = {"time": np.arange(0.0, 60.0, 0.5), "ground_speed": np.full(120, 1.8)}
+    for wheel, radius, load in zip(wheels, radii, np.repeat(loads, 2), strict=True):
+        columns[f"wheel_speed_{wheel}"] = np.full(120, 2.0 / radius)
+        columns[f"drive_torque_{wheel}"] = np.full(120, load * radius)
+    columns["drive_torque_fl"], columns["drive_torque_rr"] = (
+        columns["drive_torque_rr"],
+        columns["drive_torque_fl"],
+    )
+    (note,) = exchange_warnings(Recording.from_frame(columns), vehicle, None)
+    assert note.startswith("drive_torque_fl and drive_torque_rr may be exchanged: straight ahead")
 
 
 @pytest.mark.parametrize("gyroscope", [True, False])

@@ -40,7 +40,7 @@ def merged(columns: Mapping[str, Column], stamp: str) -> tuple[dict[str, Column]
     A run in which a column has two different values is left as it is, for the recording to refuse: nothing says which was measured when.
     """
     stamps = columns[stamp]
-    again = np.r_[False, stamps[1:] == stamps[:-1]] if len(stamps) else np.zeros(0, dtype=bool)
+    again = np.r_[False, stamps[1:] == stamps[:-1]]
     if not again.any():
         return dict(columns), Repeats()
     rows, starts = np.arange(len(stamps)), np.flatnonzero(~again)

@@ -94,10 +94,9 @@ def exchange_warnings(recording: Recording, vehicle: Vehicle, turn: Floats | Non
     found = _turned(recording.time, rims, axles, turn, vehicle)
     notes = [_sentence("wheel_speed", vehicle, found, "in turns")] if found else []
     if torques is not None:
-        pulls = torques / vehicle.wheel_radius[:, None]
         loads = np.array([a.mass for a in vehicle.axles.values() if len(a.wheels) > 1])
-        means = windows(recording.time, np.r_[rims, pulls])
-        uneven = _uneven(means[: len(rims)], means[len(rims) :], axles, loads)
+        means = windows(recording.time, np.r_[rims, torques])
+        uneven = _uneven(means[: len(rims)], means[len(rims) :], vehicle.wheel_radius, axles, loads)
         notes += [_sentence("drive_torque", vehicle, uneven, "straight ahead")] if uneven else []
     return notes
 
@@ -167,29 +166,31 @@ def _turned(
     return [pair for pair, order in _exchanges(len(rims), pairs) if agree(order) > _CLEAR]
 
 
-def _uneven(rims: Floats, pulls: Floats, axles: Axles, loads: Floats) -> list[tuple[int, int]]:
+def _uneven(
+    rims: Floats, torques: Floats, radii: Floats, axles: Axles, loads: Floats
+) -> list[tuple[int, int]]:
     """Two wheels of two axles whose torques, exchanged, make every axle pull alike on both sides straight ahead: of those pairs the one
     by which the axles pull in proportion to their loads."""
     if len(axles) < 2 or not rims.shape[1]:
         return []
-    total, pace = pulls.sum(axis=0), np.abs(rims).mean(axis=0)
+    total, pace = (torques / radii[:, None]).sum(axis=0), np.abs(rims).mean(axis=0)
     apart = np.max([np.abs(rims[right] - rims[left]) for left, right in axles], axis=0)
     rows = (total > 0.3 * np.quantile(total, 0.95)) & (apart < _STRAIGHT * pace)
     if rows.sum() < _LEAST:
         return []
-    mean = np.median(pulls[:, rows], axis=1)
+    mean = np.median(torques[:, rows], axis=1)
     if (mean <= 0).any():
         return []
 
     def off(order: Order) -> tuple[float, float]:
         """How unlike the most unlike axle pulls, and how far the axles' pulls are from their loads, both as logarithms."""
-        ordered = mean[list(order)]
+        ordered = mean[list(order)] / radii
         sides = np.array([[ordered[left], ordered[right]] for left, right in axles])
         share = np.log(sides.sum(axis=1) / loads)
         return float(np.max(np.abs(np.log(sides[:, 0] / sides[:, 1])))), float(np.ptp(share))
 
     straight = tuple(range(len(rims)))
-    ratios = np.log([mean[left] / mean[right] for left, right in axles])
+    ratios = np.log([mean[left] / radii[left] * radii[right] / mean[right] for left, right in axles])
     if np.sum(np.abs(ratios) > _UNLIKE) < 2 or off(straight)[0] < _UNLIKE:
         return []
     sides = [k for axle in axles for k in axle]

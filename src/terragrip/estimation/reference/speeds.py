@@ -42,12 +42,12 @@ class SpeedsFilter:
     means: Floats = field(init=False)
     spreads: Floats = field(init=False)
     probability: Floats = field(init=False)
-    begun: bool = field(init=False, default=False)
+    begun: bool = field(init=False)
     nis: float = field(init=False, default=0.0)
     channels: int = field(init=False, default=0)
     weight: Floats = field(init=False)
     densities: tuple[float, float] = field(init=False, default=(0.0, 0.0))
-    off: float = field(init=False, default=0.0)
+    off: float = field(init=False)
     """1, -1: the last ground speed lay above, below what was expected, and counted less; 0: neither."""
 
     def __post_init__(self) -> None:
