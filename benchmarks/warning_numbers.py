@@ -3,13 +3,14 @@
     python benchmarks/warning_numbers.py [--stops 60] [--hours 2] [--seed 0] [--workers 2] [--write]
 
 Development drives of bench_warning.py at 10 Hz and the made-up snow are estimated once; then the warning's twin
-(terragrip.estimation.reference.immobilization) goes over the estimates with each number of tg_watch_settings changed.
+(tests/estimation/kernel_twin) goes over the estimates with each number of tg_watch_settings changed.
 --write puts the table into docs/decisions/0100.
 """
 
 from __future__ import annotations
 
 import argparse
+import sys
 from collections.abc import Iterator
 from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
@@ -20,12 +21,14 @@ import snow_runs
 from bench_warning import HEALTHY, Course, Tally, course_of, jobs, judge
 from marked import put
 from terragrip.estimation import estimate
-from terragrip.estimation.reference.immobilization import Row, Watch, pace, rows_of
 from terragrip.estimation.settings import watch_limits
 from terragrip.recording import Recording
 from terragrip.simulation import families
 from terragrip.simulation.families import Kind
 from terragrip.vehicle import Vehicle
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests/estimation"))
+from kernel_twin.immobilization import Row, Watch, pace, rows_of
 
 NUMBERS = (
     "pace", "memory", "usual", "sure", "ahead", "warn", "most", "rise", "high_slip", "leading", "resistance", "command",

@@ -2,7 +2,7 @@
  * the slip speed d = r omega - (v - side yaw_rate), in the vehicle's own directions: so both speeds are linear in it, and a wheel that spins
  * at rest is no special case. a is an Ornstein-Uhlenbeck process (Singer 1970), d a random walk in proportion to speed. How hard both are
  * driven is not known: TG_SPEED_MODES filters, one a pair of densities, are mixed as an interacting multiple model (Blom and Bar-Shalom
- * 1988). The same in NumPy: estimation/reference/speeds.py. */
+ * 1988). The same in NumPy: tests/estimation/kernel_twin/speeds.py. */
 #include "estimator.h"
 
 #define TG_LEVELS 3

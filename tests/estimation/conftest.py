@@ -14,9 +14,9 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from terragrip.estimation.reference import Input, Machine, TractionModel
+sys.path.insert(0, str(Path(__file__).parent))  # for kernel_filter.py and kernel_twin
 
-sys.path.insert(0, str(Path(__file__).parent))  # for kernel_filter.py
+from kernel_twin import Input, Machine, TractionModel
 
 
 @dataclass(frozen=True)

@@ -7,8 +7,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from kernel_twin import Machine, Step, Tuning
 from terragrip._kernel import ffi, lib
-from terragrip.estimation.reference import BankUpdate, Machine, Step, Tuning
+from terragrip.estimation.reference import BankUpdate
 
 Array = NDArray[Any]
 Report = dict[str, Array]

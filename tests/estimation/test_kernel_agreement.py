@@ -17,7 +17,8 @@ import pytest
 from numpy.typing import NDArray
 
 from kernel_filter import KernelFilter, Report, allocated, checked, ffi, lib, report, writable
-from terragrip.estimation.reference import Step, TractionFilter, Tuning, smooth
+from kernel_twin import Step, TractionFilter, Tuning
+from terragrip.estimation.reference import smooth
 
 Array = NDArray[Any]
 TOLERANCE = 1e-9

@@ -9,10 +9,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from terragrip.estimation.reference import (
-    Bank,
-    KalmanFilter,
-)
+from terragrip.estimation.reference import Bank, KalmanFilter
 from terragrip.estimation.reference.bank import mixture
 
 Array = NDArray[Any]

@@ -10,16 +10,12 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from kernel_twin import Input, Machine, TractionFilter, TractionModel, Tuning
 from terragrip.estimation.reference import (
     AdaptiveFilter,
     DriveSupervisor,
-    Input,
     KalmanFilter,
-    Machine,
     SpeedSupervisor,
-    TractionFilter,
-    TractionModel,
-    Tuning,
     memberships,
     supervise,
 )

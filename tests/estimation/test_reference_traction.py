@@ -8,17 +8,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from terragrip.estimation.reference import (
-    Considered,
-    Constant,
-    Input,
-    Machine,
-    Step,
-    TractionFilter,
-    TractionModel,
-    Tuning,
-    smooth,
-)
+from kernel_twin import Considered, Constant, Input, Machine, Step, TractionFilter, TractionModel, Tuning
+from terragrip.estimation.reference import smooth
 from terragrip.estimation.reference.filters import jacobian
 
 Array = NDArray[Any]

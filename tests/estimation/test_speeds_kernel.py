@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import terragrip as tg
-from terragrip.estimation.reference.speeds import SpeedsFilter, process_noise, transition
+from kernel_twin.speeds import SpeedsFilter, process_noise, transition
 
 RADIUS = 0.25
 

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from drives import MASS, RADIUS, drive, robot
+from kernel_twin.immobilization import _ends, pace, side_of_wheels
 from terragrip._kernel import lib
 from terragrip.errors import InputError
 from terragrip.estimation import Estimates, estimate, estimated, methods
@@ -22,7 +23,6 @@ from terragrip.estimation.engine_torque import EngineTorque
 from terragrip.estimation.export.limits import SHEET_ROWS
 from terragrip.estimation.export.rows_as_json import json_rows
 from terragrip.estimation.forward import flag_before_gaps, table_of
-from terragrip.estimation.reference.immobilization import _ends, pace, side_of_wheels
 from terragrip.estimation.rims import Rim
 from terragrip.estimation.settings import watch_limits
 from terragrip.estimation.summary import Tally

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from drives import RADIUS, WHEELS, drive, robot
+from kernel_twin.immobilization import Row, Watch, pace, rows_of
 from terragrip.estimation import Estimates, estimate
 from terragrip.estimation.engine import SIGNS
-from terragrip.estimation.reference.immobilization import Row, Watch, pace, rows_of
 from terragrip.estimation.settings import watch_limits
 from terragrip.recording import Recording
 

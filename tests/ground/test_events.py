@@ -12,7 +12,6 @@ import pytest
 
 from terragrip.estimation import TractionEstimator, estimate
 from terragrip.estimation.engine import EVENTS, SIGNS
-from terragrip.estimation.reference.immobilization import Row, Watch, pace, rows_of
 from terragrip.estimation.settings import watch_limits
 from terragrip.ground.events import events
 from terragrip.recording import Recording
@@ -20,7 +19,9 @@ from terragrip.simulation import simulate
 from terragrip.simulation.soft_spots import healthy_drive, soft_spot_drive
 from terragrip.vehicle import Vehicle
 
+sys.path.insert(0, str(Path(__file__).parents[1] / "estimation"))  # for kernel_twin
 sys.path.insert(0, str(Path(__file__).parents[2] / "benchmarks"))  # for snow_runs.py
+from kernel_twin.immobilization import Row, Watch, pace, rows_of
 from snow_runs import RADIUS, RUNS, healthy_snow, rover, snow_run
 
 

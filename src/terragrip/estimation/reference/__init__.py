@@ -1,4 +1,4 @@
-"""The filters in plain NumPy: slow, readable, for any model of one's own, and the oracle of the C kernel.
+"""The filters in plain NumPy: slow, readable, for any model of one's own, and what the oracle of the C kernel is made of.
 
     from terragrip.estimation.reference import UnscentedKalmanFilter, runge_kutta
 
@@ -9,12 +9,11 @@
 
 The equations are the paper's (Kobelski, Osinenko, Streif 2021, "Adaptive Unscented Kalman filter") with the
 corrections of physics.md 6. Any filter can be made adaptive (:class:`AdaptiveFilter`) or stand in a
-:class:`Bank`; :class:`TractionFilter` puts the parts together as the kernel does.
+:class:`Bank`. `tests/estimation/kernel_twin` puts the parts together as the kernel does.
 """
 
 from terragrip.estimation.reference.adaptation import Adaptation, AdaptiveFilter
 from terragrip.estimation.reference.bank import Bank, BankUpdate
-from terragrip.estimation.reference.consider import Considered, Constant
 from terragrip.estimation.reference.filters import (
     ExtendedKalmanFilter,
     GaussianFilter,
@@ -26,8 +25,6 @@ from terragrip.estimation.reference.filters import (
 )
 from terragrip.estimation.reference.smoother import smooth
 from terragrip.estimation.reference.supervisor import DriveSupervisor, SpeedSupervisor, memberships, supervise
-from terragrip.estimation.reference.traction import Input, Machine, TractionModel
-from terragrip.estimation.reference.traction_filter import Step, TractionFilter, Tuning
 from terragrip.estimation.reference.unscented import UnscentedKalmanFilter
 
 __all__ = [
@@ -48,12 +45,4 @@ __all__ = [
     "Bank",
     "BankUpdate",
     "smooth",
-    "Considered",
-    "Constant",
-    "Machine",
-    "Input",
-    "TractionModel",
-    "TractionFilter",
-    "Tuning",
-    "Step",
 ]
