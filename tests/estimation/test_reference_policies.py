@@ -10,15 +10,18 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from kernel_twin import Input, Machine, TractionFilter, TractionModel, Tuning
-from terragrip.estimation.reference import (
-    AdaptiveFilter,
+from kernel_twin import (
     DriveSupervisor,
-    KalmanFilter,
+    Input,
+    Machine,
     SpeedSupervisor,
+    TractionFilter,
+    TractionModel,
+    Tuning,
     memberships,
     supervise,
 )
+from terragrip.estimation.reference import AdaptiveFilter, KalmanFilter
 
 Array = NDArray[Any]
 

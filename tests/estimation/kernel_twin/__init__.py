@@ -1,11 +1,25 @@
 """The kernel in plain NumPy, written apart from it: the oracle that its tests compare it with.
 
 The filters themselves are :mod:`terragrip.estimation.reference`, which serves any model; here stand the machine's model, the
-filter with the kernel's arguments, the considered constants, slip from speeds alone, and the warning of immobilization.
+filter with the kernel's arguments, its supervisor, the considered constants, slip from speeds alone, and the warning of immobilization.
 """
 
 from kernel_twin.consider import Considered, Constant
+from kernel_twin.supervisor import DriveSupervisor, SpeedSupervisor, memberships, supervise
 from kernel_twin.traction import Input, Machine, TractionModel
 from kernel_twin.traction_filter import Step, TractionFilter, Tuning
 
-__all__ = ["Considered", "Constant", "Input", "Machine", "Step", "TractionFilter", "TractionModel", "Tuning"]
+__all__ = [
+    "Considered",
+    "Constant",
+    "DriveSupervisor",
+    "Input",
+    "Machine",
+    "SpeedSupervisor",
+    "Step",
+    "TractionFilter",
+    "TractionModel",
+    "Tuning",
+    "memberships",
+    "supervise",
+]

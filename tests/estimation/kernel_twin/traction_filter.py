@@ -9,6 +9,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
+from kernel_twin.supervisor import RULES, DriveSupervisor, SpeedSupervisor
 from kernel_twin.traction import Input, Machine, TractionModel
 from terragrip.estimation.reference.adaptation import AdaptiveFilter
 from terragrip.estimation.reference.bank import Bank, BankUpdate
@@ -23,7 +24,6 @@ from terragrip.estimation.reference.filters import (
     Vector,
     score,
 )
-from terragrip.estimation.reference.supervisor import RULES, DriveSupervisor, SpeedSupervisor
 from terragrip.estimation.reference.unscented import UnscentedKalmanFilter
 from terragrip.physics.slip import slip
 

@@ -24,7 +24,6 @@ from terragrip.estimation.reference.filters import (
     runge_kutta,
 )
 from terragrip.estimation.reference.smoother import smooth
-from terragrip.estimation.reference.supervisor import DriveSupervisor, SpeedSupervisor, memberships, supervise
 from terragrip.estimation.reference.unscented import UnscentedKalmanFilter
 
 __all__ = [
@@ -38,10 +37,6 @@ __all__ = [
     "runge_kutta",
     "Adaptation",
     "AdaptiveFilter",
-    "SpeedSupervisor",
-    "DriveSupervisor",
-    "memberships",
-    "supervise",
     "Bank",
     "BankUpdate",
     "smooth",
