@@ -20,8 +20,8 @@ from terragrip.formats.derivation import (
     yaw_of,
 )
 from terragrip.formats.profile_parts import Rows, Source, TimeSource, matching, rate_unit
+from terragrip.formats.signals import SAME, union
 from terragrip.formats.table import LogTable, since_clock_was_set
-from terragrip.formats.timebase import spread, union
 from terragrip.physics.geodesy import metres_of
 from terragrip.recording import Recording
 from terragrip.recording.columns import SINCE_1970, columns_of, numbers, seconds, start_of, texts
@@ -88,10 +88,25 @@ def converted(profile: Profile, log: LogTable, *, partial: bool = False) -> Part
     delays = {name: origin.delay for name, origin in profile.channels.items()}
     # A faulty time base is left as it is, for the recording's own checks to name.
     if len(time) and np.isfinite(time).all() and bool((np.diff(time) > 0).all()):
-        instants, rows = union(time, delays)
-        channels = {n: spread(v, rows[delays[n]], len(instants)) for n, v in channels.items()}
-        time = instants
+        time, channels = _shifted(time, channels, delays)
     return Part(time, channels, log.source, log.sha256, (*log.notes, *notes), noise, start)
+
+
+def _shifted(
+    time: Floats, channels: dict[str, Column], delays: dict[str, float]
+) -> tuple[Floats, dict[str, Column]]:
+    """Channels (n,) that were stamped ``delays`` [s] late, on the union of their instants: NaN, or an empty text, where not measured."""
+    late = sorted(set(delays.values()))
+    if late in ([], [0.0]):
+        return time, channels
+    # Closer stamps are one instant, so that rounding makes no rows of its own.
+    tolerance = SAME * float(np.min(np.diff(time))) if len(time) > 1 else 0.0
+    instants, rows = union([time - delay for delay in late], tolerance)
+    place, result = dict(zip(late, rows, strict=True)), {}
+    for name, values in channels.items():
+        result[name] = np.full(len(instants), "" if values.dtype.kind == "O" else np.nan, values.dtype)
+        result[name][place[delays[name]]] = values
+    return instants, result
 
 
 def asked(profile: Profile, names: Iterable[str]) -> set[str]:

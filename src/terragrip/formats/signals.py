@@ -15,7 +15,8 @@ from terragrip.recording.schema import TIME
 
 Floats = npt.NDArray[np.float64]
 
-_SAME = 1e-3  # share of the shortest typical spacing within which two stamps are one instant
+SAME = 1e-3
+"""Share of the shortest typical spacing within which two stamps are one instant."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,7 +63,8 @@ class SignalLog:
         if unset:
             notes.append(f"{unset} samples were stamped before the logger's clock was set, and left out.")
         orders = {key: _order(t) for key, t in clocks.items()}
-        base, rows = _union([clocks[key][order] for key, order in orders.items()])
+        ordered = [clocks[key][order] for key, order in orders.items()]
+        base, rows = union(ordered, _tolerance(ordered))
         if not len(base):
             if self.signals:
                 raise InputError(
@@ -88,7 +90,8 @@ class SignalLog:
     def instants(self) -> Floats:
         """The union of the signals' instants [s] (n,), as they are stamped."""
         clocks = {id(s.time): s.time for s in self.signals.values()}
-        return _union([clock[_order(clock)] for clock in clocks.values()])[0]
+        ordered = [clock[_order(clock)] for clock in clocks.values()]
+        return union(ordered, _tolerance(ordered))[0]
 
     def _renamed(self) -> SignalLog:
         """The same log, in which a signal ``time`` is ``signal.time``: the table's own time takes that name."""
@@ -115,8 +118,10 @@ def _order(time: Floats) -> npt.NDArray[np.intp] | slice:
     return known[np.argsort(time[known], kind="stable")]
 
 
-def _union(clocks: list[Floats]) -> tuple[Floats, list[npt.NDArray[np.int32]]]:
-    """The instants (m,) of sorted clocks, and the row (n,) of each of their samples. Frugal, since logs are long."""
+def union(clocks: list[Floats], tolerance: float) -> tuple[Floats, list[npt.NDArray[np.int32]]]:
+    """The instants (m,) of sorted clocks, and the row (n,) of each of their samples; stamps no more than ``tolerance`` [s] apart are
+    one instant. Frugal, since logs are long.
+    """
     if not clocks:
         return np.empty(0), []
     stamps = np.concatenate(clocks)
@@ -126,7 +131,7 @@ def _union(clocks: list[Floats]) -> tuple[Floats, list[npt.NDArray[np.int32]]]:
     stamps = stamps[order]
     apart = np.empty(len(stamps), dtype=bool)
     apart[0] = True
-    np.greater(stamps[1:] - stamps[:-1], _tolerance(clocks), out=apart[1:])
+    np.greater(stamps[1:] - stamps[:-1], tolerance, out=apart[1:])
     row = np.empty(len(stamps), dtype=np.int32)
     row[order] = np.cumsum(apart, dtype=np.int32)
     row -= 1
@@ -137,7 +142,7 @@ def _union(clocks: list[Floats]) -> tuple[Floats, list[npt.NDArray[np.int32]]]:
 
 def _tolerance(clocks: list[Floats]) -> float:
     spacings = [float(np.median(np.diff(clock))) for clock in clocks if len(clock) > 2]
-    return _SAME * min((s for s in spacings if s > 0), default=0.0)
+    return SAME * min((s for s in spacings if s > 0), default=0.0)
 
 
 def _rises(rows: npt.NDArray[np.int32]) -> bool:
