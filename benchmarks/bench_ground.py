@@ -24,9 +24,9 @@ from typing import Any
 import numpy as np
 
 from ground_drives import LIBRARY_SEED, ONE, Drive, Matches, score_seed
+from ground_scores import ReliabilityBin, calibration_error, confusion, merged, reliability
 from marked import put
 from terragrip.ground.result import Timeline
-from terragrip.ground.scores import ReliabilityBin, calibration_error, confusion, merged, reliability
 
 SEEDS = tuple(range(3000, 3008))
 WAYS = ("offline", "online", "adwin")

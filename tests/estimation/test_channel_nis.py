@@ -8,9 +8,20 @@ import pytest
 import terragrip as tg
 from drives import WHEELS, drive, robot
 from terragrip.estimation import estimate
-from terragrip.estimation.channel_nis import estimate_with_channel_nis, moving_nis
+from terragrip.estimation.channel_nis import PREFIX, estimate_with_channel_nis
 
 SPEEDS = (*(f"wheel_speed_{wheel}" for wheel in WHEELS), "ground_speed")
+
+
+def moving_nis(estimates: tg.Estimates) -> dict[str, tuple[float, int]]:
+    """Mean NIS of each channel over the rows in which the vehicle moves and nothing is flagged, and how many rows these are."""
+    result = {}
+    for name in estimates:
+        if name.startswith(PREFIX):
+            values = estimates[name][(estimates.event_codes == 0) & np.isfinite(estimates[name])]
+            if len(values):
+                result[name.removeprefix(PREFIX)] = (float(values.mean()), len(values))
+    return result
 
 
 @pytest.mark.parametrize("method", ["kalman", "bank", "aukf-fs"])

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,7 +13,9 @@ from ground_drives import FINE, GRASS, drive
 from terragrip.errors import InputError
 from terragrip.ground.analysis import Settings, analyse
 from terragrip.ground.result import Timeline, read, write
-from terragrip.ground.scores import calibration_error, confusion, merged, reliability
+
+sys.path.insert(0, str(Path(__file__).parents[2] / "benchmarks"))
+from ground_scores import calibration_error, confusion, merged, reliability
 
 
 @pytest.fixture(scope="module")

@@ -46,20 +46,6 @@ def estimate_with_channel_nis(
     return finished(estimator, log, out, event, notes_of(estimator, log), smooth=False)
 
 
-def moving_nis(estimates: Estimates) -> dict[str, tuple[float, int]]:
-    """Mean NIS of each channel over the rows in which the vehicle moves and nothing is flagged, and how many rows these are.
-
-    ``estimates``: of :func:`estimate_with_channel_nis`. A channel without such a row is left out.
-    """
-    result = {}
-    for name in estimates:
-        if name.startswith(PREFIX):
-            values = estimates[name][(estimates.event_codes == 0) & np.isfinite(estimates[name])]
-            if len(values):
-                result[name.removeprefix(PREFIX)] = (float(values.mean()), len(values))
-    return result
-
-
 def _places(slots_in: Mapping[str, int]) -> dict[str, int]:
     """The place in tg_estimate.value of each channel's NIS: wheel speeds, ground speed, the accelerometer."""
     wheels = {n: s - lib.TG_WHEEL_SPEED for n, s in slots_in.items() if n.startswith("wheel_")}

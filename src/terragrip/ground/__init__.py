@@ -18,8 +18,6 @@ if TYPE_CHECKING:
     from terragrip.ground.result import Timeline as Timeline
     from terragrip.ground.result import read as read
     from terragrip.ground.result import write as write
-    from terragrip.ground.scores import confusion as confusion
-    from terragrip.ground.scores import reliability as reliability
     from terragrip.ground.sections import Section as Section
 
 _HOME = {
@@ -34,8 +32,6 @@ _HOME = {
     "Section": "sections",
     "LiveGround": "live",
     "GroundState": "live",
-    "confusion": "scores",
-    "reliability": "scores",
 }
 
 __all__ = list(_HOME)
