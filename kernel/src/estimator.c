@@ -208,7 +208,7 @@ static void report(tg_estimator *e, const tg_drive *drive, tg_estimate *out)
 }
 
 /* A_k before this row moves it: with gamma of the row it makes the row's Q (physics.md 6). */
-static void tell_adaptation(const tg_estimator *e, tg_real *o)
+static void report_adaptation(const tg_estimator *e, tg_real *o)
 {
     const int32_t policy = e->settings.tuning.policy;
     if (policy != TG_ADAPTIVE && policy != TG_SUPERVISED) return;
@@ -273,7 +273,7 @@ tg_status tg_estimator_update(tg_estimator *e, const tg_sample *sample, tg_estim
     if (!e->started) e->ground_time = row.time;
     tgi_reckon(e, &drive, course == TG_GO ? dt : 0, &row, q);
     if (e->settings.method == TG_FILTERED) tgi_hold_wheels(e, course == TG_GO ? dt : 0, &row);
-    tell_adaptation(e, out->value);
+    report_adaptation(e, out->value);
     const int32_t lost = !go_on(e, &row, &drive, course, dt, q), breaks = gap || lost;
     balance_forces(e, &drive, row.time);
     tgi_watch_roughness(e, course == TG_GO && !breaks, e->standing ? 0 : travelled * dt);

@@ -14,8 +14,8 @@ from terragrip.estimation.engine_torque import (
     EngineTorque,
     driveline_torque,
     earlier,
+    has_engine_torque,
     held,
-    tells_engine_torque,
 )
 from terragrip.physics.driveline import torque_spread
 from terragrip.physics.efficiency import tractive_efficiency
@@ -89,9 +89,9 @@ def test_how_a_log_tells_its_engines_torque() -> None:
     np.testing.assert_allclose(both.at(channels, time), [360.0, 360.0, 360.0, np.nan])
     np.testing.assert_allclose(assumed.at({"engine_torque_share": np.full(4, 0.5)}, time), 336.0)
     np.testing.assert_allclose(plain.at({"engine_torque": time}, time), time)
-    assert tells_engine_torque(("engine_speed", "engine_torque_share"))
-    assert not tells_engine_torque(("engine_torque",))
-    assert not tells_engine_torque(("engine_speed",))
+    assert has_engine_torque(("engine_speed", "engine_torque_share"))
+    assert not has_engine_torque(("engine_torque",))
+    assert not has_engine_torque(("engine_speed",))
 
 
 LINE = gears(efficiency=0.8, accessory_power=2000.0, engine_inertia=1.5)

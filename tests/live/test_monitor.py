@@ -154,10 +154,10 @@ async def test_the_period_of_a_source_is_its_own_and_no_silence_becomes_it():
     for now in (1.0, 2.1, 3.0, 4.0, 5.1, 6.0):
         feed.sample(now, {"ground_speed": 1.0})
         assert one.silence(now) == 0.0  # there is a message, though nobody has looked yet
-        assert one.look(now)
+        assert one.update(now)
     assert one.period == pytest.approx(1.0, abs=0.11)
     feed.sample(66.0, {"ground_speed": 1.0})
-    assert one.look(66.0)
+    assert one.update(66.0)
     assert one.period == pytest.approx(1.0, abs=0.11)
     assert one.silence(67.5) == 1.5
 

@@ -10,7 +10,7 @@ from terragrip.estimation.by_engine import ByEngine
 from terragrip.estimation.driveline import by_engine
 from terragrip.estimation.estimates import Estimates
 from terragrip.estimation.estimator import TractionEstimator
-from terragrip.estimation.forward import flag_before_gaps, passed_on, run
+from terragrip.estimation.forward import carried_channels, flag_before_gaps, run
 from terragrip.estimation.methods import DEFAULT, method_named
 from terragrip.estimation.provenance import notes_of
 from terragrip.estimation.rims import speeds_alone
@@ -126,7 +126,7 @@ def estimated(
         together=together,
     )
     if planned is not None:
-        beside_them = (*passed_on(known.sample, estimator), *known.sample.labels)
+        beside_them = (*carried_channels(known.sample, estimator), *known.sample.labels)
         planned(known.rows, ("time", *estimator.columns, *beside_them, "event"))
     notes = notes_of(estimator, known.sample)
     blocks = (known.without_empty(block) for block in log.blocks())
@@ -147,7 +147,7 @@ class _Passes:
 
     def of(self, number: int) -> Callable[[int], None]:
         """Progress of one pass, counted from 0."""
-        return lambda done: self._tell(number * self.rows + min(done, self.rows))
+        return lambda done: self._report_progress(number * self.rows + min(done, self.rows))
 
     @property
     def first(self) -> Callable[[int], None]:
@@ -156,9 +156,9 @@ class _Passes:
 
     def done(self, count: int) -> None:
         """So many passes are done."""
-        self._tell(count * self.rows)
+        self._report_progress(count * self.rows)
 
-    def _tell(self, done: int) -> None:
+    def _report_progress(self, done: int) -> None:
         if self._progress is not None:
             self._progress(done, self.count * self.rows)
 

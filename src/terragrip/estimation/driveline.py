@@ -18,7 +18,7 @@ from terragrip.estimation.engine_torque import (
     DrivelineTorque,
     EngineTorque,
     driveline_torque,
-    tells_engine_torque,
+    has_engine_torque,
 )
 from terragrip.estimation.estimates import Estimates
 from terragrip.estimation.rims import DRIVE, Rim, rims_of, speeds_alone
@@ -46,7 +46,7 @@ _TOWING = (
 
 def by_engine(channels: Collection[str], vehicle: Vehicle) -> bool:
     """Whether columns give the sum of drive torques by the engine's, and no wheel's torque."""
-    return vehicle.driveline is not None and speeds_alone(channels, vehicle) and tells_engine_torque(channels)
+    return vehicle.driveline is not None and speeds_alone(channels, vehicle) and has_engine_torque(channels)
 
 
 @dataclass(frozen=True)

@@ -97,7 +97,7 @@ class EngineEstimator(TractionEstimator):
         return self._completed(super().update_at(time, self.converted), drive.std)
 
     def _learn_engine(self, sample: Mapping[str, float | None]) -> None:
-        """Take what the bus tells of its engine once: the reference torque, and that its friction is told."""
+        """Keep what the bus sends of its engine once: the reference torque, and whether it sends its friction."""
         machine, engine = self.machine, self.machine.engine
         reference = _number(sample.get("engine_reference_torque"))
         if engine.reference is not None and reference > 0 and reference != engine.reference:
@@ -224,7 +224,7 @@ def live_estimator(
 ) -> TractionEstimator:
     """The estimator for samples of these ``channels`` as they come in; arguments as of `TractionEstimator`.
 
-    ``driveline``: what an earlier log of a machine that tells engine torque told of it, as its estimates hold it (``about["driveline"]``).
+    ``driveline``: what an earlier log of a machine with engine torque showed of it, as its estimates hold it (``about["driveline"]``).
     Raises InputError as making an estimator does.
     """
     if not by_engine(channels, vehicle):

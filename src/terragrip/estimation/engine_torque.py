@@ -32,14 +32,14 @@ _FRICTION = (0.08, 0.04)  # of the reference torque, where the bus does not say 
 _TORQUES = ("engine_torque", "engine_torque_share")
 
 
-def tells_engine_torque(channels: Collection[str]) -> bool:
+def has_engine_torque(channels: Collection[str]) -> bool:
     """Whether a log's channels hold the engine's speed and torque."""
     return "engine_speed" in channels and any(name in channels for name in _TORQUES)
 
 
 @dataclass(frozen=True)
 class EngineTorque:
-    """How a log tells its engine's torque: ``reference`` [N m] of its shares (None: it is in N m; NaN: nobody has told yet).
+    """How a log has its engine's torque: ``reference`` [N m] of its shares (None: it is in N m; NaN: not sent yet).
 
     ``stated`` [N m]: SD of its error as a constant; None: the ``share`` of the reference. ``notes``: sentences for the user."""
 

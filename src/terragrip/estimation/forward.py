@@ -21,7 +21,7 @@ Floats = npt.NDArray[np.float64]
 Codes = npt.NDArray[np.uint8]
 
 GAP = EVENTS.index("gap")
-PASSED_ON = ("latitude", "longitude", "altitude", "fuel_rate", "mass", "hitch_load")
+CARRIED = ("latitude", "longitude", "altitude", "fuel_rate", "mass", "hitch_load")
 """Channels that stand beside the estimates as they were measured."""
 
 
@@ -72,15 +72,15 @@ def finished(
     smooth: bool,
 ) -> Estimates:
     """Estimates from the kernel's columns, with what is passed on and notes."""
-    out |= {name: recording.channels[name] for name in passed_on(recording, estimator)}
+    out |= {name: recording.channels[name] for name in carried_channels(recording, estimator)}
     about = about_run(estimator, about_recording(recording), smooth=smooth)
     return Estimates(recording.time, out, event, dict(recording.labels), about, tuple(notes))
 
 
-def passed_on(recording: Recording, estimator: TractionEstimator) -> tuple[str, ...]:
+def carried_channels(recording: Recording, estimator: TractionEstimator) -> tuple[str, ...]:
     """The channels that stand beside the estimates as they were measured."""
     own = ("drawbar_force",) if estimator.method == SLIP_ONLY.name else ()
-    return tuple(n for n in (*own, *PASSED_ON, *recording.references) if n in recording.channels)
+    return tuple(n for n in (*own, *CARRIED, *recording.references) if n in recording.channels)
 
 
 def flag_before_gaps(event: Codes, before: Codes | None = None) -> None:

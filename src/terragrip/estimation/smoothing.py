@@ -17,9 +17,9 @@ import numpy.typing as npt
 from terragrip.estimation.arrow import floats, texts
 from terragrip.estimation.estimates import Estimates
 from terragrip.estimation.forward import (
+    carried_channels,
     finished,
     flag_before_gaps,
-    passed_on,
     prepared,
     table_of,
 )
@@ -142,7 +142,7 @@ def _as_table(estimator: TractionEstimator, one: _Forward) -> pa.Table:
     import pyarrow as pa
 
     inputs = prepared(estimator, one.block)[1]
-    inputs |= {name: one.block.channels[name] for name in passed_on(one.block, estimator)}
+    inputs |= {name: one.block.channels[name] for name in carried_channels(one.block, estimator)}
     columns = {_TIME: one.block.time, **{_INPUT + name: values for name, values in inputs.items()}, **one.out}
     arrays = {name: floats(values) for name, values in columns.items()}
     arrays |= {_LABEL + name: texts(values) for name, values in one.block.labels.items()}

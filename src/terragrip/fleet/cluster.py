@@ -74,7 +74,7 @@ def workers_at(scheduler: str | None, workers: int, memory: str | None) -> Itera
         raise InputError(
             "Dask is not installed", hint="pip install 'terragrip[fleet]'", page="install"
         ) from None
-    # A lost worker or scheduler is told by the failures or by one line, not by Dask's log.
+    # A lost worker or scheduler shows in the failures or in one line, not by Dask's log.
     for name in [*logging.root.manager.loggerDict]:
         if name.split(".")[0] in ("distributed", "tornado", "asyncio"):
             logging.getLogger(name).setLevel(logging.CRITICAL + 1)

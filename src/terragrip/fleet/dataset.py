@@ -1,4 +1,4 @@
-"""A fleet's tables: which logs are in the data set, which failed, and no file of a log that is told of twice."""
+"""A fleet's tables: which logs are in the data set, which failed, and no file of a log that counts twice."""
 
 from __future__ import annotations
 

@@ -108,7 +108,9 @@ def _estimated(log: FleetLog, settings: Settings, store: Store, bench: Path, num
         known = store.read(f"{NOTES}/{key}.json")
         if known is not None:
             return Outcome(log.name, json.loads(known))
-        local, thin, told = (bench / f"{number}{end}" for end in (".parquet", "-sample.parquet", ".json"))
+        local, thin, note_file = (
+            bench / f"{number}{end}" for end in (".parquet", "-sample.parquet", ".json")
+        )
         tally = LogTally()
         estimate_file(
             source,
@@ -130,9 +132,9 @@ def _estimated(log: FleetLog, settings: Settings, store: Store, bench: Path, num
 
         pq.write_table(pa.concat_tables([part.to_arrow() for part in tally.sample]), thin)
         files.insert(0, (thin, f"{SAMPLES}/{key}.parquet"))
-    told.write_text(json.dumps(note), encoding="utf-8")
-    # Last of all: only what a note tells of belongs to the data set.
-    files.append((told, f"{NOTES}/{key}.json"))
+    note_file.write_text(json.dumps(note), encoding="utf-8")
+    # Last of all: only what has a note belongs to the data set.
+    files.append((note_file, f"{NOTES}/{key}.json"))
     return _Made(log.name, note, tuple(files), time.monotonic() - began)
 
 

@@ -48,7 +48,7 @@ def fit_of(log: LogTable | SignalLog) -> Fit:
 def _nearly(name: str, profile: Profile, columns: tuple[str, ...]) -> str:
     """A sentence on a profile of which some of the speeds are there; empty if none is, or all are."""
     needed = {c: s for c, s in profile.channels.items() if not s.optional}
-    result = {c: near for c, source in needed.items() if (near := _found(source, columns))}
+    result = {c: near for c, source in needed.items() if (near := _present(source, columns))}
     lacking = [c for c in needed if c not in result]
     if not result or not lacking:
         return ""
@@ -59,7 +59,7 @@ def _nearly(name: str, profile: Profile, columns: tuple[str, ...]) -> str:
     return f"The profile {name} nearly fits: {there}; but no {away}."
 
 
-def _found(source: Source, columns: tuple[str, ...]) -> str:
+def _present(source: Source, columns: tuple[str, ...]) -> str:
     """The columns that a source or one in its place would read, all of which are there; empty if none is."""
     for one in source.chain:
         if one.candidates:

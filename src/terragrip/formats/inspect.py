@@ -121,7 +121,7 @@ def inspect(
     machine = vehicle if isinstance(vehicle, Vehicle) or vehicle is None else Vehicle.load(vehicle)
     databases = tuple(dbc)
     chosen = profile if isinstance(profile, Profile) or profile is None else Profile.load(profile)
-    log, every = look_into(path, (*databases, *(chosen.dbc if chosen else ())))
+    log, every = read_whole_or_thinned(path, (*databases, *(chosen.dbc if chosen else ())))
     warnings, recording = list(log.notes), None
     if every > 1:
         warnings.insert(0, _SPARSE.format(_size(path) / 1e9, every))
@@ -178,7 +178,7 @@ def inspect(
     )
 
 
-def look_into(
+def read_whole_or_thinned(
     path: str | os.PathLike[str], dbc: Sequence[str | os.PathLike[str]] = ()
 ) -> tuple[LogTable | SignalLog, int]:
     """A log as its columns, and of a long one which blocks: one of every so many, all over it (1: all of it). Raises as `read_log`."""

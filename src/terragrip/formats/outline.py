@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from terragrip.formats.inspect import Seen, look_into
+from terragrip.formats.inspect import Seen, read_whole_or_thinned
 
 WIDTH = 80
 """Stretches that a column is cut into."""
@@ -21,7 +21,7 @@ def outlines(path: str | os.PathLike[str]) -> dict[str, Outline]:
 
     A long log is looked at in parts, as `inspect` does. Raises InputError where it cannot be read.
     """
-    log, every = look_into(path)
+    log, every = read_whole_or_thinned(path)
     seen = Seen.of(log, whole=every == 1)
     return {name: outline(column, seen.clock_of(name)) for name, column in seen.numbers().items()}
 

@@ -109,13 +109,13 @@ class RosTopic(Topic):
             rows = np.array(places, dtype=np.intp)
             data = np.frombuffer(b"".join([raws[k] for k in places]), np.uint8).reshape(len(rows), size)
             for layout in self._layouts.get(size, []):
-                rows, data = self._take_many(layout, rows, data, block)
+                rows, data = self._decode_many(layout, rows, data, block)
             while len(rows):
-                new = self._take_one(int(rows[0]), data[0].tobytes(), block)
+                new = self._decode_one(int(rows[0]), data[0].tobytes(), block)
                 rows, data = rows[1:], data[1:]
                 if new is not None:
                     self._layouts.setdefault(size, []).append(new)
-                    rows, data = self._take_many(new, rows, data, block)
+                    rows, data = self._decode_many(new, rows, data, block)
         self._append(np.array(came), block)
 
     def _append(self, came: npt.NDArray[np.float64], block: _Block) -> None:
@@ -139,7 +139,7 @@ class RosTopic(Topic):
             self.bad += 1
             return None
 
-    def _take_one(self, row: int, raw: bytes, block: _Block) -> Layout | None:
+    def _decode_one(self, row: int, raw: bytes, block: _Block) -> Layout | None:
         """Read a message by rosbags; returns its layout, if it has one."""
         message = self._read(raw)
         if message is None:
@@ -175,7 +175,7 @@ class RosTopic(Topic):
             return None
         return layout if same else None
 
-    def _take_many(self, layout: Layout, rows: Rows, data: Bytes, block: _Block) -> tuple[Rows, Bytes]:
+    def _decode_many(self, layout: Layout, rows: Rows, data: Bytes, block: _Block) -> tuple[Rows, Bytes]:
         """Read the messages of a layout; returns those that have another one."""
         fitting = layout.fits(data)
         own, ours = rows[fitting], data[fitting]

@@ -50,7 +50,7 @@ class Settings:
     first row. ``sources``: their URIs without options. ``held`` [s]: update periods of channels that are repeated between
     updates. ``noise``: SDs [SI] by channel, over the vehicle file's. ``ground``: whether ground changes and soils are followed. ``learn``:
     whether noise and held channels that are not given are learned from the rows as they come (`terragrip.estimation.learning`).
-    ``driveline``: what an earlier log told of a machine that tells engine torque (`terragrip.estimation.engine_estimator`).
+    ``driveline``: what an earlier log showed of a machine with engine torque (`terragrip.estimation.engine_estimator`).
     """
 
     sources: tuple[str, ...]

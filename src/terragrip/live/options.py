@@ -30,7 +30,7 @@ class Options:
     learn: tell noise and held channels that are not given from the rows as they come.
     ground: report ground changes while driving; library: and which of these soils it is.
     setpoint: slip and ground speed wanted [m/s] of the set-point to publish beside the estimates; None: none is.
-    driveline: what an earlier log told of a machine that tells engine torque (``about["driveline"]`` of its estimates).
+    driveline: what an earlier log showed of a machine with engine torque (``about["driveline"]`` of its estimates).
 
     Raises InputError on an unknown method.
     """

@@ -13,7 +13,7 @@ _GAPS = 5
 class Pulse:
     """The beat of one source, as it is looked at now and then.
 
-    ``arrival`` [s]: when `look` last saw a new message. ``period`` [s]: the median of the last gaps between messages, so that one
+    ``arrival`` [s]: when `update` last saw a new message. ``period`` [s]: the median of the last gaps between messages, so that one
     long silence does not become the measure; 0 before the second message.
     """
 
@@ -22,8 +22,8 @@ class Pulse:
         self.messages = 0
         self._gaps: deque[float] = deque(maxlen=_GAPS)
 
-    def look(self, now: float) -> bool:
-        """Whether messages came since the last look."""
+    def update(self, now: float) -> bool:
+        """Whether messages came since the last call."""
         messages = self._messages
         new, before = messages - self.messages, self.messages
         if not new:

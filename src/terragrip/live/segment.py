@@ -136,13 +136,13 @@ class Segment:
 
         from terragrip.estimation.engine_estimator import EngineEstimator
         from terragrip.estimation.estimates import Estimates
-        from terragrip.estimation.forward import PASSED_ON
+        from terragrip.estimation.forward import CARRIED
         from terragrip.estimation.provenance import about_run
 
         table = np.frombuffer(self.estimates).reshape(len(self), -1)
         columns = {name: np.ascontiguousarray(table[:, place]) for name, place in estimator.places.items()}
         measured = self.channels()
-        columns |= {name: measured[name] for name in PASSED_ON if name in measured}
+        columns |= {name: measured[name] for name in CARRIED if name in measured}
         about = about_run(estimator, {"source": None, "sha256": None}, smooth=False)
         if isinstance(estimator, EngineEstimator):
             about["driveline"] = estimator.machine.to_dict()

@@ -98,7 +98,7 @@ class Statistics:
 
     def _watch_silence(self, pulse: Pulse, now: float) -> None:
         feed = pulse.feed
-        if pulse.look(now):
+        if pulse.update(now):
             if pulse.is_silent:
                 pulse.is_silent = False
                 feed.connected("it sends again")

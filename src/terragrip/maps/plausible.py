@@ -46,7 +46,7 @@ def refuse_impossible(estimates: Estimates, fixes: npt.NDArray[np.intp], file: s
             f"latitudes reach {np.abs(latitude).max():.6g}, beyond 90 degrees",
             file=file,
             place=place,
-            hint=f"they look {likely}: mend the profile"
+            hint=f"they look {likely}: correct the profile"
             if likely == "swapped"
             else f"they look like {likely}: give degrees",
         )
@@ -68,7 +68,7 @@ def refuse_impossible(estimates: Estimates, fixes: npt.NDArray[np.intp], file: s
                     f"positions move {np.exp(given):.3g} times as far as the wheels and the ground speed, or as little",
                     file=file,
                     place=place,
-                    hint=f"latitude and longitude look {what}: mend the profile",
+                    hint=f"latitude and longitude look {what}: correct the profile",
                 )
     if given > NEVER:
         raise InputError(
@@ -83,7 +83,7 @@ def refuse_impossible(estimates: Estimates, fixes: npt.NDArray[np.intp], file: s
             "the track turns left where the wheels turn right",
             file=file,
             place=place,
-            hint="a sign of latitude or longitude is lost (west and south are negative), or they are swapped: mend the profile",
+            hint="a sign of latitude or longitude is lost (west and south are negative), or they are swapped: correct the profile",
         )
 
 

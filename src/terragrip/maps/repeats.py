@@ -16,7 +16,7 @@ LEAST_REPEATS = 100
 LEAST_SHARE = 0.25
 """Passes that agree still better are no evidence: one log given twice, or values that are rounded alike."""
 WORTH_A_WORD = 0.9
-"""A share below which the user is told."""
+"""A share below which the user is warned."""
 
 
 def share_of_repeats(passes: Cells) -> float:

@@ -106,7 +106,7 @@ class _Shift:
         return np.where(known, result, np.nan)
 
 
-def _found(lag: Lag) -> str:
+def _evidence(lag: Lag) -> str:
     side = "behind" if lag.seconds > 0 else "ahead of"
     return (
         f"{abs(lag.seconds):.3f} ± {lag.std:.3f} s {side} the wheel speeds, by the correlation of the speeds "
@@ -116,13 +116,13 @@ def _found(lag: Lag) -> str:
 
 def _sentence(lag: Lag) -> str:
     return (
-        f"ground_speed was {_found(lag)}; it was set right by {abs(lag.of_the_clock):.3f} s. If you know which sensor is late, and how "
+        f"ground_speed was {_evidence(lag)}; it was set right by {abs(lag.of_the_clock):.3f} s. If you know which sensor is late, and how "
         "much, write it as 'delay:' in a profile."
     )
 
 
 def _doubt(lag: Lag) -> str:
     return (
-        f"ground_speed is {_found(lag)}, which is too uncertain to set right: if a sensor is late, write "
+        f"ground_speed is {_evidence(lag)}, which is too uncertain to set right: if a sensor is late, write "
         f"'delay: {abs(lag.seconds):.2f} s' for it in a profile."
     )

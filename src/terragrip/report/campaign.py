@@ -158,7 +158,7 @@ def estimate_campaign(
     logs: dict[str, Recording] = {}
     for name, log in in_processes(_record, [(name, seed) for name in calibrating], workers):
         logs[name] = log
-        _tell(progress, len(logs), total, f"{name}, to calibrate")
+        _report_progress(progress, len(logs), total, f"{name}, to calibrate")
     nominal = Scenario.load(BENCHMARKS[-1]).nominal_vehicle()
     calibration = calibrate([logs[name] for name in calibrating], nominal)
     vehicle = calibration.apply(nominal)
@@ -167,7 +167,7 @@ def estimate_campaign(
     done: dict[str, EstimatedRun] = {}
     for item in in_processes(_estimate, [(name, seed, vehicle, folder) for name in order], workers):
         done[item.name] = item
-        _tell(progress, len(calibrating) + len(done), total, item.name)
+        _report_progress(progress, len(calibrating) + len(done), total, item.name)
     return EstimatedCampaign(tuple(done[name] for name in wanted), calibration, vehicle)
 
 
@@ -197,7 +197,7 @@ def _ignore_interrupts() -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
 
 
-def _tell(progress: Progress | None, done: int, total: int, what: str) -> None:
+def _report_progress(progress: Progress | None, done: int, total: int, what: str) -> None:
     if progress is not None:
         progress(done, total, what)
 

@@ -66,7 +66,7 @@ class Access:
             if scope["type"] == "http" and scope["path"] == "/" and handed:
                 await self._log_in(send, handed, secure=self._tls or scope.get("scheme") == "https")
                 return
-            if not self._knows_token(headers):
+            if not self._has_token(headers):
                 problem = (401, "a token is needed: open the address that 'terragrip studio' printed")
         if problem is not None:
             _audit(scope, problem[0])
@@ -106,7 +106,7 @@ class Access:
         # by its address, and by a name that only its own network gives out (RFC 6762, mDNS).
         return self._token is not None and (_is_address(name) or name.endswith(".local"))
 
-    def _knows_token(self, headers: dict[str, str]) -> bool:
+    def _has_token(self, headers: dict[str, str]) -> bool:
         assert self._token is not None
         kind, _, given = headers.get("authorization", "").partition(" ")
         if kind.lower() == "bearer" and _same(given.strip(), self._token):

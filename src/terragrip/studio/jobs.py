@@ -54,7 +54,7 @@ class Jobs:
         self._waiting.put_nowait(job)
         if self._runner is None or self._runner.done():
             self._runner = asyncio.create_task(self._run())
-        self._tell(job)
+        self._publish(job)
         return job
 
     def all(self) -> list[Job]:
@@ -101,7 +101,7 @@ class Jobs:
         job.state = "running"
         self._keep(job)
         emit(logger, "job_started", job=job.id, kind=job.kind, output=job.output)
-        self._tell(job)
+        self._publish(job)
         process = await asyncio.create_subprocess_exec(
             sys.executable, "-m", "terragrip.cli.job", *job.words, stdin=asyncio.subprocess.DEVNULL, stdout=asyncio.subprocess.PIPE,
             stderr=asyncio.subprocess.PIPE, limit=1 << 22, cwd=self._folder,
@@ -130,7 +130,7 @@ class Jobs:
             elif job.state == "running":
                 step = json.loads(line)
                 job.done, job.total = int(step["done"]), int(step["total"])
-                self._tell(job)
+                self._publish(job)
         return "\n".join(lines).strip()
 
     def _end(self, job: Job, state: str, text: str) -> None:
@@ -138,7 +138,7 @@ class Jobs:
         job.state, job.text = state, text.replace(root, "")
         self._keep(job)
         emit(logger, "job_ended", job=job.id, kind=job.kind, state=state)
-        self._tell(job)
+        self._publish(job)
 
     def _keep(self, job: Job) -> None:
         with contextlib.suppress(
@@ -146,5 +146,5 @@ class Jobs:
         ):  # a full disk ends no job; after a restart this one counts as interrupted
             self._store.save(job)
 
-    def _tell(self, job: Job) -> None:
+    def _publish(self, job: Job) -> None:
         self._notices.publish("job", job=job.to_dict())

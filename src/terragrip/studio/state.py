@@ -15,7 +15,7 @@ from terragrip.files import sha256
 from terragrip.studio.folder import MOST, Folder
 from terragrip.studio.job_store import JobStore
 from terragrip.studio.jobs import Jobs
-from terragrip.studio.log_look import LogLook, look_at
+from terragrip.studio.log_preview import LogPreview, preview
 from terragrip.studio.notices import Notices
 from terragrip.studio.own_folder import OwnFolder
 from terragrip.studio.shown import Shown
@@ -69,7 +69,7 @@ class Studio:
         self.shown: Tables[Shown] = Tables(lambda path: Shown(self.estimates.get(path)))
         self.recordings: Tables[Recording] = Tables(_recording)
         self.maps: Tables[MapFile] = Tables(_map)
-        self.logs: Tables[LogLook] = Tables(look_at)
+        self.logs: Tables[LogPreview] = Tables(preview)
         self.fingerprints: Tables[str] = Tables(sha256, MOST)
         # by SHA-256, rows and times: the recording and the profile that reads it, None where the folder does not hold it
         self.origins: dict[tuple[str | float, ...], tuple[Path, str] | None] = {}

@@ -37,7 +37,7 @@ _SENSOR_BIAS = 0.03  # m/s^2, likewise, of an accelerometer
 
 
 def _refuse_other_load(log: Recording, vehicle: Vehicle) -> None:
-    """Raise InputError where a log's machine is not loaded as the vehicle file has it: torque gains are told by its weight."""
+    """Raise InputError where a log's machine is not loaded as the vehicle file has it: torque gains follow from its weight."""
     for name, usual in (("mass", vehicle.mass), ("hitch_load", 0.0)):
         values = log.channels.get(name, np.empty(0))
         known = values[np.isfinite(values)]

@@ -31,8 +31,8 @@ TITLES = {
 
 
 @dataclass(frozen=True)
-class LogLook:
-    """What one look into a log gives: its `inspection`, and the `outlines` of its columns."""
+class LogPreview:
+    """A log at a glance: its `inspection`, and the `outlines` of its columns."""
 
     inspection: Inspection
     outlines: dict[str, Outline]
@@ -85,12 +85,12 @@ class LogLook:
         return found
 
 
-def look_at(path: Path) -> LogLook:
-    """Look into a log. Raises InputError where it cannot be read."""
+def preview(path: Path) -> LogPreview:
+    """A log at a glance. Raises InputError where it cannot be read."""
     from terragrip.formats import inspect
     from terragrip.formats.outline import outlines
 
-    return LogLook(inspect(path), outlines(path))
+    return LogPreview(inspect(path), outlines(path))
 
 
 def _ranked(best: Proposal | None) -> list[dict[str, Any]]:
