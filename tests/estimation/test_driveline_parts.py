@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from terragrip.errors import InputError
-from terragrip.estimation.driveline import _by_efficiency, by_engine, lumped
+from terragrip.estimation.driveline import DrivenMachine, _by_efficiency, by_engine, lumped
 from terragrip.estimation.engine_torque import (
     EngineTorque,
     driveline_torque,
@@ -222,3 +222,31 @@ def test_efficiency_changes_by_adhesion_and_resistance_as_its_formula() -> None:
         np.testing.assert_allclose(_by_efficiency(vehicle, mu, rho, slip, by_mu, by_rho), change, rtol=1e-4)
     low = _by_efficiency(vehicle, np.array([-0.2, 0.1]), np.array([0.1, 0.3]), slip, 0.1, 0.0)
     np.testing.assert_allclose(low, [0.9 / 0.02 * 0.1, 0.8 / 0.13 * 0.1])
+
+
+def test_what_the_driveline_takes_widens_intervals_by_its_force_over_loads() -> None:
+    """The spread of a torque over radius and load adds to adhesion's as independent ones do, and to a curve's scale in proportion, as
+    though adhesion were .1 at least."""
+    line = {"driveline": {"efficiency": 0.8, "efficiency_std": 0.04, "accessory_power": 0}}
+    machine = DrivenMachine.of_file(tractor(**line), ("engine_torque", "engine_speed", "wheel_based_speed"))
+    size, load, own = 5, 30_000.0, 0.01
+    columns = {
+        "vertical_load_driven": np.full(size, load),
+        "adhesion_driven": np.array([0.4, 0.05, -0.4, 0.0, 0.4]),
+        "curve_a": np.full(size, 0.9),
+        "curve_a_driven": np.full(size, 0.7),
+    }
+    columns |= {
+        n: np.full(size, 0.1)
+        for n in ("soil_resistance", "slip_driven", "net_traction_driven", "efficiency_driven")
+    }
+    columns |= {f"{name}_std": np.full(size, own) for name in columns}
+    std = np.array([240.0, 240.0, 240.0, 240.0, np.nan])  # N m, at a radius of .8 m: 300 N
+    result = machine.completed(columns, std)
+    share, divisor = 0.01, np.array([0.4, 0.1, 0.4, 0.1])
+    for name, scale in (("curve_a", 0.9), ("curve_a_driven", 0.7)):
+        assert result[f"{name}_std"] == pytest.approx([*np.hypot(own, scale * share / divisor), own])
+    for name, change in (("adhesion_driven", share), ("soil_resistance", 300 / (6000 * G))):
+        assert result[f"{name}_std"] == pytest.approx([*[np.hypot(own, change)] * 4, np.nan], nan_ok=True)
+    assert result["net_traction_driven_std"][0] == pytest.approx(np.hypot(own, share - 300 / (6000 * G)))
+    assert result["adhesion_driven"] == pytest.approx([0.4, 0.05, -0.4, 0.0, np.nan], nan_ok=True)

@@ -11,6 +11,7 @@ import pytest
 from drives import WHEELS, drive, robot
 from terragrip.errors import InputError
 from terragrip.estimation import Estimates, estimate, estimated
+from terragrip.estimation.export import KINDS
 from terragrip.estimation.writing import write_parts
 from terragrip.recording import LogBlocks, Recording
 
@@ -79,6 +80,12 @@ def test_a_file_gives_back_the_table(estimates, tmp_path):
     assert [p.name for p in tmp_path.iterdir()] == ["e.parquet"]
 
 
+def test_another_order_of_columns_is_the_same_table(estimates):
+    table = estimates.to_arrow()
+    back = Estimates.from_arrow(table.select(table.column_names[::-1]))
+    pd.testing.assert_frame_equal(back.to_pandas()[estimates.to_pandas().columns], estimates.to_pandas())
+
+
 def test_a_folder_that_is_not_there_is_refused(estimates, tmp_path):
     with pytest.raises(InputError, match="cannot be written"):
         estimates.write(tmp_path / "no" / "e.parquet")
@@ -98,8 +105,9 @@ def test_the_suffix_says_how_a_table_is_written(estimates, tmp_path):
 
 @pytest.mark.parametrize("name", ["x.doc", "x"])
 def test_what_cannot_be_written_is_refused_by_its_suffix(estimates, tmp_path, name):
-    with pytest.raises(InputError, match=r"x\.parquet"):
+    with pytest.raises(InputError, match=r"x\.parquet") as refused:
         estimates.write(tmp_path / name)
+    assert all(suffix in str(refused.value) for suffix in KINDS)
     assert not list(tmp_path.iterdir())
 
 

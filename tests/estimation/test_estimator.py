@@ -147,6 +147,15 @@ def test_a_named_noise_wins_over_the_vehicle_file(noisy):
     assert np.median(trusting["ground_speed_std"]) < np.median(plain["ground_speed_std"])
 
 
+def test_noise_set_before_the_first_sample_is_that_of_a_new_estimator(noisy):
+    changed, new = TractionEstimator(robot()), TractionEstimator(robot(), sensors={"ground_speed": 0.005})
+    changed.set_noise({"ground_speed": 0.005}, {})
+    for row in noisy.recording.to_pandas().to_dict("records")[:5]:
+        assert changed.update(row).to_dict() == new.update(row).to_dict()
+    with pytest.raises(InputError, match="must be positive"):
+        changed.set_noise({}, {"ground_speed": -1.0})
+
+
 def test_noise_the_file_does_not_name_comes_from_the_log(noisy):
     estimator = TractionEstimator.for_recording(noisy.recording, robot(sensors={"drive_torque": 1.0}))
     assert estimator.noise["ground_speed"] == pytest.approx(0.02, rel=0.2)

@@ -10,7 +10,8 @@ import pytest
 
 from terragrip.estimation import estimate
 from terragrip.recording import Recording, alignment
-from terragrip.recording.alignment import aligned
+from terragrip.recording.alignment import _Shift, aligned
+from terragrip.recording.lag import Lag
 from terragrip.recording.survey import LogBlocks
 from terragrip.simulation import families, simulate
 
@@ -71,6 +72,18 @@ def test_blocks_are_moved_as_the_whole_is(
     known = np.isfinite(whole["ground_speed"])
     assert np.isnan(whole["ground_speed"][known.nonzero()[0][-1] + 1 :]).all()
     np.testing.assert_allclose(whole["ground_speed"][known][20:-20], speed[known][20:-20], atol=0.02)
+
+
+@pytest.mark.parametrize("held", [False, True])
+def test_a_moved_channel_is_on_lines_or_held_within_its_samples_and_short_gaps(held: bool) -> None:
+    time, values = np.array([0.0, 0.5, 1.5, 4.0, 4.5]), np.array([1.0, 2.0, 3.0, 4.0, 6.0])
+    shift = _Shift(Lag(0.3, 0.01, 1.0, (0.0, 0.0)), ("ground_speed",), longest=1.0, held=held)
+    when = np.array([-0.1, 0.0, 0.25, 0.5, 1.0, 1.5, 2.0, 4.25, 4.5])
+    lines, last = (
+        [np.nan, 1.0, 1.5, 2.0, 2.5, np.nan, np.nan, 5.0, np.nan],
+        [np.nan, 1.0, 1.0, 2.0, 2.0, np.nan, np.nan, 4.0, np.nan],
+    )
+    np.testing.assert_allclose(shift._at(when, time, values), last if held else lines)
 
 
 def test_a_log_without_a_lag_stays_as_it_is() -> None:

@@ -89,6 +89,7 @@ def test_a_drive_train_speaks_before_wheels_and_wheels_by_their_mean() -> None:
     drive = speed_of(time, {**wheels, "wheel_based_speed": -1.0 - 0.1 * time})
     assert drive is not None
     assert drive.pace is None
+    np.testing.assert_array_equal(drive.time, time)
     np.testing.assert_allclose(drive.values, 1.0 + 0.1 * time)
     assert speed_of(time, {"wheel_speed_l": np.full(50, "x", object), "pitch": time}) is None
 

@@ -245,7 +245,12 @@ def test_a_clock_that_would_leave_its_range_within_the_recording_has_no_zero() -
 
 @pytest.mark.parametrize(
     ("count", "expected"),
-    [(2, "a, b."), (8, "a, b, c, d, e, f, g, h."), (12, "a, b, c, d, e, f, g, h and 4 more.")],
+    [
+        (2, "a, b."),
+        (8, "a, b, c, d, e, f, g, h."),
+        (9, "a, b, c, d, e, f, g, h and 1 more."),
+        (12, "a, b, c, d, e, f, g, h and 4 more."),
+    ],
 )
 def test_columns_without_use_are_named_up_to_eight(count: int, expected: str) -> None:
     (note,) = [

@@ -143,8 +143,8 @@ class AdhesionCurve:
             at, low, high = self.written_band
             return np.interp(s, at, low), np.interp(s, at, high)
         if self.samples_ is None:
-            ends = np.array(self.interval_[self.free_[0]])[:, None]
-            given = {**self.parameters_, self.free_[0]: ends}
+            (free,) = self.free_
+            given = {**self.parameters_, free: np.array(self.interval_[free])[:, None]}
             edges = CURVES[self.model].value(s[None, :], given, given.pop(INTERCEPT, 0.0))
             return edges.min(axis=0), edges.max(axis=0)
         given = {name: self.samples_[:, i, None] for i, name in enumerate(self.free_)}
