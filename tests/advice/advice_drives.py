@@ -66,12 +66,13 @@ def drive(
     return Estimates(distance / speed, columns, np.zeros(n, np.uint8), labels, {"vehicle": vehicle.to_dict()})
 
 
-def slip_only(slip: np.ndarray, vehicle: Vehicle = VEHICLE) -> Estimates:
-    """A stock tractor's estimates: slip and speed, a row a second."""
+def slip_only(slip: np.ndarray, vehicle: Vehicle = VEHICLE, std: float = 0.004) -> Estimates:
+    """A stock tractor's estimates: slip with its SD, and speed, a row a second."""
     n = len(slip)
     columns = {"distance": np.arange(n) * 2.0, "ground_speed": np.full(n, 2.0)}
     for wheel in vehicle.wheels:
         columns[f"slip_{wheel}"] = np.asarray(slip, dtype=float)
+        columns[f"slip_{wheel}_std"] = np.full(n, std)
     return Estimates(
         np.arange(n, dtype=float), columns, np.zeros(n, np.uint8), {}, {"vehicle": vehicle.to_dict()}
     )

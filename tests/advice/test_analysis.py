@@ -1,6 +1,7 @@
 """Advice on drives whose ground is known exactly."""
 
 import json
+import re
 
 import numpy as np
 import pytest
@@ -9,7 +10,7 @@ from advice_drives import VEHICLE, drive, slip_only
 from terragrip.advice.analysis import advise
 from terragrip.advice.curves import adhesion
 from terragrip.advice.optimum import GRID, best_of, over_slip
-from terragrip.advice.result import to_dict, write
+from terragrip.advice.result import to_dict, words, write
 from terragrip.errors import InputError
 from terragrip.soil.estimates import pairs_of
 from terragrip.soil.learn import learn_soils
@@ -213,6 +214,26 @@ def test_a_stock_tractor_is_held_against_the_usual_band_by_shares_of_time():
     assert one.drive["time_lost"] == pytest.approx(0.2 * (1 - 0.70 / 0.85), abs=0.002)
     assert "Load less" in one.actions[0].what
     assert any("torque" in sentence for sentence in one.missing)
+
+
+def test_shares_of_time_hold_what_the_zero_of_slip_leaves_open():
+    """Work at 10 % that may as well be 5 or 15 %: neither too light nor too heavy is claimed, and the way to know is named."""
+    one = only([slip_only(np.repeat([0.02, 0.10], 200)[3:], std=0.026)])
+    below, above = ([one.drive[f"share_{name}{end}"] for end in ("", "_low", "_high")] for name in ("below", "above"))
+    assert below == pytest.approx([0.5, 0.5, 1.0], abs=0.01)
+    assert above == pytest.approx([0.0, 0.0, 0.5], abs=0.01)
+    assert not one.actions
+    assert "± 5.1 points" in one.missing[0]
+    assert "without load" in one.missing[0]
+    assert "below in 50% (50% to 100%)" in words({"": one})
+    sure = only([slip_only(np.repeat([0.02, 0.10], 200)[3:], std=0.005)])
+    assert "Keep load" in sure.actions[0].what
+
+
+def test_pull_slip_and_rolling_are_all_of_the_wheels_power():
+    one = only([drive(a=0.9, top=0.3)])
+    slip, rolling = (float(share) for share in re.findall(r"(\d+)%(?: \(.*?\))? (?:is lost in slip|in rolling)", one.limits[0]))
+    assert slip + rolling + 100 * one.drive["efficiency"] == pytest.approx(100, abs=1)
 
 
 def test_slip_and_torque_logs_are_not_mixed():

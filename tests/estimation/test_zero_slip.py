@@ -106,6 +106,16 @@ def test_field_work_alone_is_not_called_light() -> None:
     assert "record 40 s without load" in calibration.unknown[0].why
 
 
+def test_the_lighter_of_two_loads_is_not_called_light_for_sure() -> None:
+    """Work at 5 and 12 % slip and nothing else, by the right radius: the interval holds both, and a note says why it is wide."""
+    log = log_of(np.repeat([0.05, 0.12, 0.05, 0.12], 800), 1.0, 1004)
+    estimates = tg.estimate(log, tractor())
+    assert "lighter field work as likely as another radius" in " ".join(estimates.notes)
+    moving = estimates["event"] == ""
+    error = estimates["slip_drive"] - np.repeat([0.05, 0.12, 0.05, 0.12], 800)
+    assert np.mean(np.abs(error) < 1.96 * estimates["slip_drive_std"], where=moving) > 0.95
+
+
 def test_rows_that_the_user_calls_light_are_taken() -> None:
     slip = np.r_[np.full(1500, 0.1), np.full(1500, 0.0)]
     log = log_of(slip, 0.93, 1002)  # a radius that nobody would guess

@@ -125,6 +125,7 @@ def _ballast(work: Work, vehicle: Vehicle) -> list[Action]:
     mass = abs(change) * vehicle.mass
     what = (
         f"{'Add' if change > 0 else 'Take off'} about {_round(mass)} kg of ballast if the load stays as it is"
+        f"{'' if change > 0 else ', as far as it carries so much'}"
     )
     what += ", spread so that the axles keep their shares." if len(vehicle.axles) > 1 else "."
     why = (

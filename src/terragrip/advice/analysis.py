@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from terragrip.advice.actions import Work, actions_for
+from terragrip.advice.actions import Work, actions_for, gained
 from terragrip.advice.fuel import burnt
 from terragrip.advice.optimum import Best, OverSlip, best_of
 from terragrip.advice.result import Advice
@@ -215,16 +215,15 @@ def _curve(over: OverSlip) -> tuple[Mapping[str, float], ...]:
 
 
 def _limits(work: Work, drive: Mapping[str, float]) -> tuple[str, ...]:
-    """What holds this drive back: which of the two losses is the larger."""
-    slipping = drive["slip"]
-    eta = float(work.efficiency[0])
-    rolling = 1 - eta / max(1 - slipping, 1e-6)
+    """What holds this drive back: which of the two losses is the larger; with what becomes pull they are all of the wheels' power."""
+    slipping = max(drive["slip"], 0.0)
+    rolling, (low, high) = gained(1 - slipping - work.efficiency)
     larger, cure = (
         ("rolling resistance", "more load or less weight")
         if rolling > slipping
         else ("slip", "less load, more weight or better grip")
     )
-    shares = f"of the wheels' power {max(slipping, 0):.0%} is lost in slip and {rolling:.0%} in rolling"
+    shares = f"of the wheels' power {slipping:.0%} is lost in slip and {rolling:.0%} ({low:.0%} to {high:.0%}) in rolling"
     return (f"{shares}; {larger} is the larger: {cure} helps.",)
 
 

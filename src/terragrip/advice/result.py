@@ -131,8 +131,9 @@ def words(advice: Mapping[str, Advice]) -> str:
             if best is not None:
                 low, high = best.interval
                 lines.append(
-                    f"  {title}: {best.slip:.1%} slip ({low:.1%} to {high:.1%}), efficiency {best.efficiency:.2f}, "
-                    f"pull {best.net_traction:.2f} of the weight"
+                    f"  {title}: {best.slip:.1%} slip (95 %: {low:.1%} to {high:.1%}), "
+                    f"efficiency {_between(best.efficiency, best.efficiency_interval)}, "
+                    f"pull {_between(best.net_traction, best.net_traction_interval)} of the weight"
                 )
         lines += _shares(one.drive)
         if one.reserve:
@@ -152,13 +153,27 @@ def words(advice: Mapping[str, Advice]) -> str:
     return "\n".join(lines)
 
 
+def _between(value: float, interval: tuple[float, float]) -> str:
+    return f"{value:.2f} ({interval[0]:.2f} to {interval[1]:.2f})"
+
+
 def _field(work: Mapping[str, float]) -> list[str]:
-    """ha/h, l/h and l/ha as they were driven."""
+    """ha/h, l/h and l/ha as they were driven, and what they would be at the best slip."""
     units = {
         "hectares_per_hour": "ha/h", "litres_per_hour": "l/h", "litres_per_hectare_measured": "l/ha measured",
         "litres_per_hectare": "l/ha reckoned from the pull",
     }  # fmt: skip
-    said = [f"{work[key]:.3g} {unit}" for key, unit in units.items() if key in work]
+    better = {
+        "hectares_per_hour": ("hectares_per_hour_at_best", "at the best slip and this wheel speed"),
+        "litres_per_hectare": ("litres_per_hectare_same_pull_at_best", "at the best efficiency"),
+    }
+    said = []
+    for key, unit in units.items():
+        if key in work:
+            other, where = better.get(key, ("", ""))
+            said.append(
+                f"{work[key]:.3g} {unit}" + (f" ({work[other]:.3g} {where})" if other in work else "")
+            )
     return [f"  field work: {', '.join(said)}"] if said else []
 
 
@@ -167,7 +182,14 @@ def _shares(drive: Mapping[str, float]) -> list[str]:
     if "share_below" not in drive:
         return []
     band = f"{drive['band_low']:.0%} to {drive['band_high']:.0%}"
-    below, within, above = (f"{drive[f'share_{name}']:.0%}" for name in ("below", "within", "above"))
+    below, within, above = (share_words(drive, name) for name in ("below", "within", "above"))
     return [
-        f"  slip within the usual {band} in {within} of the driving time, below in {below}, above in {above}"
+        f"  slip within the usual {band} in {within} of the driving time, below in {below}, above in {above}; "
+        "in parentheses 95 %, by what slip's zero leaves open"
     ]
+
+
+def share_words(drive: Mapping[str, float], name: str) -> str:
+    """A share of the driving time with its interval."""
+    share, low, high = (drive[f"share_{name}{end}"] for end in ("", "_low", "_high"))
+    return f"{share:.0%} ({low:.0%} to {high:.0%})"

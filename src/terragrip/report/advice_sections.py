@@ -121,8 +121,9 @@ def of_slip(advice: Advice, notes: Sequence[str] = ()) -> Section:
     low, high = drive["band_low"], drive["band_high"]
     prose = (
         f"Slip was within the usual band of {percent(low, 0)} to {percent(high, 0)} (ASABE EP496) in "
-        f"{percent(drive['share_within'], 0)} of the driving "
-        f"time, below in {percent(drive['share_below'], 0)}, above in {percent(drive['share_above'], 0)}. What this ground bears, "
+        f"{_share(drive, 'within')} of the driving "
+        f"time, below in {_share(drive, 'below')}, above in {_share(drive, 'above')}; in parentheses 95 %, by what slip's "
+        "zero leaves open. What this ground bears, "
         "its own best slip and "
         "the efficiency are not known without a torque.",
         *notes,
@@ -222,6 +223,12 @@ def _missing(advice: Mapping[str, Advice], order: Sequence[str]) -> Table | None
 
 def _between(value: float, interval: tuple[float, float]) -> str:
     return f"{percent(value)} ({_ends(interval, 1)})"
+
+
+def _share(drive: Mapping[str, float], name: str) -> str:
+    """A share of the driving time with its interval."""
+    share = f"share_{name}"
+    return f"{percent(drive[share], 0)} ({_ends((drive[f'{share}_low'], drive[f'{share}_high']))})"
 
 
 def _ends(interval: tuple[float, float], digits: int = 0) -> str:

@@ -106,8 +106,9 @@ export class AdvicePanel {
     }
     if (power) rows.push(["Most pull power at", between(power)]);
     if (drive["share_within"] !== undefined) {
-      const of = (name: string): string => `${digits(100 * (drive[`share_${name}`] ?? NaN), 2)} %`;
-      rows.push([`Time at ${slip(drive["band_low"] ?? NaN)} to ${slip(drive["band_high"] ?? NaN)}`, of("within")], ["Below, above", `${of("below")}, ${of("above")}`]);
+      const percent = (name: string): string => digits(100 * (drive[`share_${name}`] ?? NaN), 2);
+      const of = (name: string): string => `${percent(name)} % (${percent(`${name}_low`)} to ${percent(`${name}_high`)})`;
+      rows.push([`Time, 95 %, at ${slip(drive["band_low"] ?? NaN)} to ${slip(drive["band_high"] ?? NaN)}`, of("within")], ["Below, above", `${of("below")}, ${of("above")}`]);
     }
     for (const [key, unit] of WORK) if (soil.field_work[key] !== undefined) rows.push(["Field work", `${digits(soil.field_work[key], 3)} ${unit}`]);
     return h(
