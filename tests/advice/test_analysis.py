@@ -219,7 +219,9 @@ def test_a_stock_tractor_is_held_against_the_usual_band_by_shares_of_time():
 def test_shares_of_time_hold_what_the_zero_of_slip_leaves_open():
     """Work at 10 % that may as well be 5 or 15 %: neither too light nor too heavy is claimed, and the way to know is named."""
     one = only([slip_only(np.repeat([0.02, 0.10], 200)[3:], std=0.026)])
-    below, above = ([one.drive[f"share_{name}{end}"] for end in ("", "_low", "_high")] for name in ("below", "above"))
+    below, above = (
+        [one.drive[f"share_{name}{end}"] for end in ("", "_low", "_high")] for name in ("below", "above")
+    )
     assert below == pytest.approx([0.5, 0.5, 1.0], abs=0.01)
     assert above == pytest.approx([0.0, 0.0, 0.5], abs=0.01)
     assert not one.actions
@@ -232,7 +234,10 @@ def test_shares_of_time_hold_what_the_zero_of_slip_leaves_open():
 
 def test_pull_slip_and_rolling_are_all_of_the_wheels_power():
     one = only([drive(a=0.9, top=0.3)])
-    slip, rolling = (float(share) for share in re.findall(r"(\d+)%(?: \(.*?\))? (?:is lost in slip|in rolling)", one.limits[0]))
+    slip, rolling = (
+        float(share)
+        for share in re.findall(r"(\d+)%(?: \(.*?\))? (?:is lost in slip|in rolling)", one.limits[0])
+    )
     assert slip + rolling + 100 * one.drive["efficiency"] == pytest.approx(100, abs=1)
 
 

@@ -61,7 +61,10 @@ def advise_rows(rows: Sequence[Rows], vehicle: Vehicle) -> Advice:
     }  # fmt: skip
     moved = [_shares(slip + z * error, seconds) for z in SHIFTS]
     for name in shares:
-        drive |= {f"{name}_low": min(one[name] for one in moved), f"{name}_high": max(one[name] for one in moved)}
+        drive |= {
+            f"{name}_low": min(one[name] for one in moved),
+            f"{name}_high": max(one[name] for one in moved),
+        }
     lost = drive["time_lost"]
     work: dict[str, float] = {}
     if vehicle.working_width:
@@ -135,7 +138,8 @@ def _actions(drive: Mapping[str, float], cost: str) -> tuple[tuple[Action, ...],
             f"{drive['share_below_low']:.0%} to {drive['share_below_high']:.0%}; {REMEDY}",
         )
     keep = Action(
-        "Keep load and ballast.", f"Slip is above {high:.0%} in {above}, below {low:.0%} in {below} of the time."
+        "Keep load and ballast.",
+        f"Slip is above {high:.0%} in {above}, below {low:.0%} in {below} of the time.",
     )
     return (keep,), ()
 

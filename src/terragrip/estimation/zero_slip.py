@@ -2,10 +2,11 @@
 
 Speeds tell slip only against a condition that is called zero (ASABE S296: "zero condition"): driving without load on firm ground.
 A log of work holds such stretches too, on the headland and on the road. Over windows of some seconds the ratio then has more than
-one mode; the mode of the highest ratio is light work. Where there is one mode only, or the highest runs far behind the supposed radius, field
-work cannot be distinguished from light work, and that is said. Wheels slip there, too, to carry the vehicle alone, on soft ground by a per cent or two: that is in the interval, and a road,
-where it is least, counts before light work in the field. The modes are Gaussians beside a uniform floor, fitted by expectation and
-maximisation, their number by the Bayesian information criterion (Schwarz 1978). (R), our own construction.
+one mode; the mode of the highest ratio is light work. Where there is one mode only, or the highest runs far behind the supposed radius,
+field work cannot be distinguished from light work, and that is said. Wheels slip there, too, to carry the vehicle alone, on soft ground
+by a per cent or two: that is in the interval, and a road, where it is least, counts before light work in the field. The modes are
+Gaussians beside a uniform floor, fitted by expectation and maximisation, their number by the Bayesian information criterion (Schwarz
+1978). (R), our own construction.
 """
 
 from __future__ import annotations
@@ -40,7 +41,9 @@ _STRAIGHT = 0.05  # relative difference of the wheels' speeds
 _ROAD = 5.0  # m/s: faster than any work in the soil
 _PLAUSIBLE = 0.15  # a radius is not further off than this; units are
 _NEAR = 0.05  # a radius is seldom further off than this
-_BEHIND = 1.5 * UNTOLD  # from here on a log of two loads without light work is as likely as light work by such a radius (R)
+_BEHIND = (
+    1.5 * UNTOLD
+)  # from here on a log of two loads without light work is as likely as light work by such a radius (R)
 _LIGHT = 0.002  # SD of the slip in light work from place to place
 # Slip of wheels that carry their vehicle alone, by ASABE D497 at zero net traction: .2 to .3 % on firm ground (mobility number 80 to 55),
 # .6 to 1.8 % on tilled to very soft fields (30 to 13). Root mean squares of what may be, from 0 to .5 and to 2 %:
@@ -110,9 +113,7 @@ def _judged(ratio: Floats, fast: npt.NDArray[np.bool_]) -> Zero:
     if of_road or (len(modes) > 1 and 1 - value <= _BEHIND):
         return Zero(value, std, count)
     if len(modes) > 1:
-        why = (
-            f"it runs {1 - value:.0%} behind the supposed radius, so that it is lighter field work as likely as another radius: {REMEDY}"
-        )
+        why = f"it runs {1 - value:.0%} behind the supposed radius, so that it is lighter field work as likely as another radius: {REMEDY}"
         return Zero(value, float(np.hypot(std, max(UNTOLD, (1 - value) / 2))), count, why)
     if abs(value - 1) <= _NEAR:
         why = f"all windows slip alike, so light work cannot be distinguished from field work: {REMEDY}"
