@@ -54,15 +54,15 @@ lint: $(VENV)/package $(VENV)/dev ## ruff, mypy and import-linter
 	$(BIN)/lint-imports
 
 # Real parts of some tests: a browser for the studio, a broker for the live service. Installed only by root on Debian; without them
-# those tests say loudly that they were skipped.
-SYSTEM := chromium mosquitto openssl
+# those tests say loudly that they were skipped (the whole chromium does too, at twice the processor time).
+SYSTEM := chromium-headless-shell mosquitto openssl
 system: ## as root on Debian: install the programs that the tests of studio and live service drive
 	@missing=""; for name in $(SYSTEM); do PATH="$$PATH:/usr/sbin" command -v $$name >/dev/null 2>&1 || missing="$$missing $$name"; done; \
 	if [ -n "$$missing" ] && [ "$$(id -u)" = 0 ] && command -v apt-get >/dev/null 2>&1; then \
 	  echo "Installing$$missing for the tests"; \
 	  { apt-get update -qq && DEBIAN_FRONTEND=noninteractive apt-get install -qq -y --no-install-recommends $$missing; } >/dev/null 2>&1 \
-	    || echo "make: could not install$$missing; their tests will be skipped" >&2; \
-	elif [ -n "$$missing" ]; then echo "make: without$$missing some tests are skipped" >&2; fi
+	    || echo "make: could not install$$missing; tests that have no other will be skipped" >&2; \
+	elif [ -n "$$missing" ]; then echo "make: without$$missing some tests are slower or skipped" >&2; fi
 
 # Two workers a processor, for nearly half of the time they wait for browsers, brokers and timers; each takes a run of whole files, so that what a file's
 # tests share is made once. The workers fill the processors: no threads inside a product of matrices.

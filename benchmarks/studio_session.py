@@ -88,8 +88,9 @@ def studio(folder: Path) -> Iterator[tuple[str, int]]:
 
 
 def chromium() -> str | None:
-    """Debian's chromium, or None."""
-    return shutil.which("chromium") or shutil.which("chromium-browser")
+    """Debian's chromium, or None; its shell without windows by preference, which takes half of the processor for the same pages."""
+    names = ("chromium-headless-shell", "chromium", "chromium-browser")
+    return next(filter(None, map(shutil.which, names)), None)
 
 
 @contextlib.contextmanager
@@ -99,7 +100,7 @@ def browser() -> Iterator[Any]:
 
     path = chromium()
     if path is None:
-        raise SystemExit("this needs chromium: apt-get install chromium")
+        raise SystemExit("this needs chromium: apt-get install chromium-headless-shell")
     with sync_playwright() as started:
         running = started.chromium.launch(executable_path=path, args=ARGUMENTS)
         yield running

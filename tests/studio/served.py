@@ -20,7 +20,8 @@ BUILT = (STATIC / "index.html").is_file() and AXE.is_file()
 
 NEEDS = [
     pytest.mark.skipif(
-        chromium() is None, reason="no chromium: apt-get install chromium, or run `make test` as root"
+        chromium() is None,
+        reason="no chromium: apt-get install chromium-headless-shell, or run `make test` as root",
     ),
     pytest.mark.skipif(not BUILT, reason="the pages are not built: `make studio` needs Node.js 20 or newer"),
     # playwright's loop and sockets are still open when pytest looks for what was left behind
