@@ -26,16 +26,13 @@ from terragrip.estimation.rims import (
 )
 from terragrip.estimation.settings import Thresholds
 from terragrip.estimation.slip_only import (
-    SlipReference,
     _against_travel,
     _dead_band,
     _said,
-    _turns,
     slip_reference_in,
 )
 from terragrip.estimation.zero_slip import REMEDY, Zero
 from terragrip.recording import Recording
-from terragrip.recording.track import Track
 from terragrip.vehicle import Vehicle
 
 G = 9.80665
@@ -251,26 +248,6 @@ def test_a_wheel_that_turns_against_the_travel_is_named(share: float, odd: bool)
     assert bool(_against_travel(reverse, RIMS)) is not odd
 
 
-@pytest.mark.parametrize(
-    ("share", "apart", "said"),
-    [(0.06, 0.1, False), (0.12, 0.1, True), (0.5, 0.035, False), (0.5, 0.045, True)],
-)
-def test_turns_that_nothing_tells_are_said_where_they_are_a_tenth(
-    share: float, apart: float, said: bool
-) -> None:
-    turn = np.where(60 * share - 1e-9 > TIME, apart / 2, 0.0)
-    log = log_of(wheel_speed_rl=2.0 * (1 - turn), wheel_speed_rr=2.0 * (1 + turn))
-    words = _turns(log, RIMS, None)
-    assert bool(words) is said
-    if said:
-        windows = np.mean(turn.reshape(-1, 4).mean(axis=1) * 2 > 0.04)
-        assert words[0].startswith(f"The rims of left and right differ in {windows:.0%} of the driving")
-    still = log_of(wheel_speed_rl=0.05 * (1 - turn), wheel_speed_rr=0.05 * (1 + turn))
-    assert _turns(still, RIMS, None) == []
-    track = Track(*(TIME for _ in range(6)), TIME > 99)
-    assert _turns(log, RIMS, track) == ["The rate of turn is that of the positions."]
-
-
 REST = "from 12 windows of the lightest work (the vehicle file says 0.8000 m)"
 
 
@@ -310,7 +287,6 @@ def test_a_remedy_is_told_once_and_a_drives_speed_beside_wheels_is_not_used() ->
     own = {"calibration": {"wheel_radius": {"rl": 0.81, "rr": 0.81}}}
     kept = slip_reference_in(log_of(ground_speed=1.96 * wave, wheel_based_speed=2.0 * wave), tractor(**own))
     assert kept.rims[0].radius == pytest.approx(0.81)
-    assert SlipReference((), {}, 0.0, ()).completed(TIME, {"a": TIME}) == {"a": TIME}
 
 
 def test_a_public_estimate_takes_the_same_zero() -> None:

@@ -15,6 +15,7 @@ from terragrip.estimation.methods import DEFAULT, method_named
 from terragrip.estimation.provenance import notes_of
 from terragrip.estimation.rims import speeds_alone
 from terragrip.estimation.slip_only import slip_reference_in
+from terragrip.estimation.turning import turn_in
 from terragrip.recording import LogBlocks, Recording, survey_of
 
 if TYPE_CHECKING:
@@ -114,6 +115,7 @@ def estimated(
         known.sample.check_against(vehicle)
     # Where slip counts from may be determined by one stretch of light work, which a sample of the rows can miss.
     reference = slip_reference_in(log.whole(), vehicle) if alone else None
+    track, said = turn_in(log, known.sample, vehicle)
     estimator = TractionEstimator.for_recording(
         known.sample,
         vehicle,
@@ -125,10 +127,11 @@ def estimated(
         slip_reference=reference,
         together=together,
     )
+    estimator.track = track
     if planned is not None:
         beside_them = (*carried_channels(known.sample, estimator), *known.sample.labels)
         planned(known.rows, ("time", *estimator.columns, *beside_them, "event"))
-    notes = notes_of(estimator, known.sample)
+    notes = (*notes_of(estimator, known.sample), *said)
     blocks = (known.without_empty(block) for block in log.blocks())
     forward = passes.of(log.from_disk)
     if options.smooth:

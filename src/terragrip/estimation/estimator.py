@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from terragrip.estimation.estimates import Estimates
     from terragrip.estimation.slip_only import SlipReference
     from terragrip.recording import Recording
+    from terragrip.recording.track import Track
 
 _SNAPSHOT_MAGIC = b"TGRIPSN2"
 
@@ -121,6 +122,7 @@ class TractionEstimator:
         self.channels = default_channels(vehicle) if channels is None else tuple(channels)
         self.thresholds = Thresholds(gap=gap, standstill_speed=standstill_speed, together=together)
         self.slip_reference: SlipReference | None = None
+        self.track: Track | None = None
         self.rims: tuple[Rim, ...] = ()
         if speeds_alone(self.channels, vehicle):
             self.method = SLIP_ONLY.name

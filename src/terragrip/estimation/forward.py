@@ -46,8 +46,8 @@ def run(
 def prepared(estimator: TractionEstimator, recording: Recording) -> tuple[Floats, dict[str, Floats]]:
     """Time and those channels that the estimator looks at, each contiguous."""
     wanted, channels = estimator.engine.slots_in, recording.channels
-    if estimator.slip_reference is not None:
-        channels = estimator.slip_reference.completed(recording.time, channels)
+    if estimator.track is not None:
+        channels = {**channels, "angular_velocity_z": estimator.track.at("turn", recording.time)}
     columns = {name: np.ascontiguousarray(values) for name, values in channels.items() if name in wanted}
     return np.ascontiguousarray(recording.time), columns
 

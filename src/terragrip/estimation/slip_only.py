@@ -5,7 +5,7 @@ The estimates are the kernel's method TG_SPEEDS; while samples come in, the vehi
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,17 +14,12 @@ import numpy.typing as npt
 from terragrip.estimation.rims import DRIVE, Rim, at_zero, calibrated_scale, rims_of
 from terragrip.estimation.zero_slip import REMEDY, Zero, zero_of
 from terragrip.recording import Recording
-from terragrip.recording.track import Track, track_of
 from terragrip.vehicle import Vehicle
 
 Floats = npt.NDArray[np.float64]
 
 _MOVING = 0.1  # m/s
 _BLIND = 5  # rows of rims that stand while the vehicle moves
-_CALM = 4.0  # s that a rate of turn by positions is taken over
-_TURN_WINDOW = 2.0  # s
-_TURNING = 0.04  # relative difference of the rims from side to side
-_MUCH = 0.1  # share of the driving
 _WIDEST = 0.5  # m/s: a wider dead band is a speed that is missing
 WHAT_IS_MISSING = (
     "There is no drive torque: slip, speeds and distance are estimated, and maps of slip can be drawn; adhesion, soil "
@@ -34,20 +29,12 @@ WHAT_IS_MISSING = (
 
 @dataclass(frozen=True)
 class SlipReference:
-    """Rims of a log, the zero of each that has one, the rims' dead band [m/s], sentences for the user; and the ``track``, where the rate of
-    turn is that of the positions."""
+    """Rims of a log, the zero of each that has one, the rims' dead band [m/s], and sentences for the user."""
 
     rims: tuple[Rim, ...]
     zero: dict[str, Zero]
     dead_band: float
     notes: tuple[str, ...]
-    track: Track | None = None
-
-    def completed(self, time: Floats, columns: Mapping[str, Floats]) -> dict[str, Floats]:
-        """Columns (n,) of the log, and the rate of turn at ``time`` (n,) by its positions where no sensor gives it."""
-        if self.track is None:
-            return dict(columns)
-        return {**columns, "angular_velocity_z": self.track.at("turn", time)}
 
 
 def slip_reference_in(log: Recording, vehicle: Vehicle) -> SlipReference:
@@ -77,43 +64,7 @@ def slip_reference_in(log: Recording, vehicle: Vehicle) -> SlipReference:
             "is left open there (event gap)."
         )
     notes += _against_travel(log, rims)
-    track = None
-    if any(rim.side for rim in rims) and "angular_velocity_z" not in log.channels:
-        track = track_of(log, _CALM)
-        if track is not None and not np.isfinite(track.turn).any():
-            track = None
-        notes += _turns(log, rims, track)
-    return SlipReference(tuple(rims), zero, band, tuple(notes), track)
-
-
-def _turns(log: Recording, rims: Sequence[Rim], track: Track | None) -> list[str]:
-    """A sentence on where the rate of turn comes from, or that it is missing."""
-    if track is not None:
-        return ["The rate of turn is that of the positions."]
-    place = ((log.time - log.time[0]) / _TURN_WINDOW).astype(np.intp)
-    left, right = (_rim_means([rim for rim in rims if rim.side * sign > 0], log, place) for sign in (1, -1))
-    with np.errstate(invalid="ignore"):
-        mean = np.abs(left + right) / 2
-        moving, turning = mean > _MOVING, np.abs(left - right) > _TURNING * mean
-    share = float(np.mean(turning[moving])) if moving.any() else 0.0
-    if share < _MUCH:
-        return []
-    return [
-        f"The rims of left and right differ in {share:.0%} of the driving, and nothing says how fast the machine turned: the slips of both "
-        "sides are wrong there. Give a yaw rate, or positions."
-    ]
-
-
-def _rim_means(rims: Sequence[Rim], log: Recording, place: npt.NDArray[np.intp]) -> Floats:
-    """Mean rim speed (windows,) [m/s] of some wheels, NaN where none was measured."""
-    size = int(place[-1]) + 1
-    total, count = np.zeros(size), np.zeros(size)
-    for rim in rims:
-        values = rim.radius * log.channels[rim.channel]
-        known = np.isfinite(values)
-        total += np.bincount(place[known], values[known], size)
-        count += np.bincount(place[known], minlength=size)
-    return np.where(count > 0, total / np.maximum(count, 1), np.nan)
+    return SlipReference(tuple(rims), zero, band, tuple(notes))
 
 
 def _said(rim: Rim, zero: Zero | None, learns: bool) -> list[str]:

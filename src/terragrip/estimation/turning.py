@@ -1,0 +1,72 @@
+"""The rate of turn of a log whose sensors do not give it: each wheel's slip is against the speed of its own hub, which a turn moves."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import numpy.typing as npt
+
+from terragrip.estimation.rims import Rim, rims_of
+from terragrip.recording import LogBlocks, Recording
+from terragrip.recording.track import Track, track_of
+from terragrip.vehicle import Vehicle
+
+Floats = npt.NDArray[np.float64]
+
+_CALM = 4.0  # s that a rate of turn by positions is taken over
+_MOVING = 0.1  # m/s
+_WINDOW = 2.0  # s
+_TURNING = 0.04  # relative difference of the rims from side to side
+_MUCH = 0.1  # share of the driving
+
+
+def turn_in(log: LogBlocks, sample: Recording, vehicle: Vehicle) -> tuple[Track | None, list[str]]:
+    """The motion by the positions, where no sensor tells how fast the machine turns, and a sentence on it.
+
+    ``sample``: rows of the log, by which it is judged whether the machine turned where nothing tells how fast.
+    """
+    channels = sample.channels
+    rims = rims_of(vehicle, channels)
+    if "angular_velocity_z" in channels or not any(rim.side for rim in rims):
+        return None, []
+    track = track_of(_positions(log), _CALM) if {"latitude", "longitude"} <= set(channels) else None
+    if track is not None and np.isfinite(track.turn).any():
+        return track, ["The rate of turn is that of the positions."]
+    return None, _unseen_turns(sample, rims)
+
+
+def _positions(log: LogBlocks) -> Recording:
+    """The positions of a whole log."""
+    names = ("latitude", "longitude")
+    parts = [(block.time, *(block.channels[name] for name in names)) for block in log.blocks()]
+    time, *columns = (np.concatenate(column) for column in zip(*parts, strict=True))
+    return Recording(time, dict(zip(names, columns, strict=True)))
+
+
+def _unseen_turns(log: Recording, rims: Sequence[Rim]) -> list[str]:
+    """A sentence on a rate of turn that is missing."""
+    place = ((log.time - log.time[0]) / _WINDOW).astype(np.intp)
+    left, right = (_rim_means([rim for rim in rims if rim.side * sign > 0], log, place) for sign in (1, -1))
+    with np.errstate(invalid="ignore"):
+        mean = np.abs(left + right) / 2
+        moving, turning = mean > _MOVING, np.abs(left - right) > _TURNING * mean
+    share = float(np.mean(turning[moving])) if moving.any() else 0.0
+    if share < _MUCH:
+        return []
+    return [
+        f"The rims of left and right differ in {share:.0%} of the driving, and nothing says how fast the machine turned: the slips of both "
+        "sides are wrong there. Give a yaw rate, or positions."
+    ]
+
+
+def _rim_means(rims: Sequence[Rim], log: Recording, place: npt.NDArray[np.intp]) -> Floats:
+    """Mean rim speed (windows,) [m/s] of some wheels, NaN where none was measured."""
+    size = int(place[-1]) + 1
+    total, count = np.zeros(size), np.zeros(size)
+    for rim in rims:
+        values = rim.radius * log.channels[rim.channel]
+        known = np.isfinite(values)
+        total += np.bincount(place[known], values[known], size)
+        count += np.bincount(place[known], minlength=size)
+    return np.where(count > 0, total / np.maximum(count, 1), np.nan)

@@ -1,0 +1,69 @@
+"""Where no sensor gives a rate of turn: the positions do, with torques too; where nothing does, it is said."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from tests.estimation.test_rim_parts import RIMS, TIME, log_of
+from tests.estimation.turning_log import TRACK, machine, turning_log
+
+import terragrip as tg
+from terragrip.estimation.turning import _unseen_turns, turn_in
+from terragrip.recording import LogBlocks, Recording
+
+POSITIONS = ("latitude", "longitude", "altitude")
+SAID = "The rate of turn is that of the positions."
+
+
+def without(log: Recording, *names: str) -> Recording:
+    return replace(log, channels={name: v for name, v in log.channels.items() if name not in names})
+
+
+def test_torques_with_positions_and_no_gyroscope_give_slip_against_the_hub() -> None:
+    log = turning_log(3, seconds=120.0, free=0.0)
+    told = tg.estimate(log, machine())
+    turning = log.time % 40 > 32
+    assert SAID in told.notes
+    apart = np.median(np.abs(told["slip_r"] - told["slip_l"])[turning])
+    bare = tg.estimate(without(log, *POSITIONS), machine())
+    hubs = TRACK * np.pi / 10 / 1.2  # of the speed, between the hubs
+    assert apart < 0.15 * hubs < 0.5 * np.median(np.abs(bare["slip_r"] - bare["slip_l"])[turning])
+
+
+def test_torques_without_positions_and_gyroscope_are_said_to_be_wrong_in_turns() -> None:
+    bare = tg.estimate(without(turning_log(3, seconds=120.0), *POSITIONS), machine())
+    assert any("nothing says how fast the machine turned" in note for note in bare.notes)
+
+
+def test_blocks_tell_the_turn_of_the_whole_log() -> None:
+    log = turning_log(3, seconds=120.0)
+    whole, _ = turn_in(LogBlocks.of(log), log, machine())
+    parts, _ = turn_in(LogBlocks.of(log, 250), log, machine())
+    assert whole is not None
+    assert parts is not None
+    np.testing.assert_array_equal(whole.turn, parts.turn)
+
+
+def test_a_gyroscope_is_not_replaced() -> None:
+    log = turning_log(3, seconds=60.0).with_channels(angular_velocity_z=np.zeros(600))
+    assert turn_in(LogBlocks.of(log), log, machine()) == (None, [])
+
+
+@pytest.mark.parametrize(
+    ("share", "apart", "said"),
+    [(0.06, 0.1, False), (0.12, 0.1, True), (0.5, 0.035, False), (0.5, 0.045, True)],
+)
+def test_turns_that_nothing_tells_are_said_where_they_are_a_tenth(
+    share: float, apart: float, said: bool
+) -> None:
+    turn = np.where(60 * share - 1e-9 > TIME, apart / 2, 0.0)
+    log = log_of(wheel_speed_rl=2.0 * (1 - turn), wheel_speed_rr=2.0 * (1 + turn))
+    words = _unseen_turns(log, RIMS)
+    assert bool(words) is said
+    if said:
+        windows = np.mean(turn.reshape(-1, 4).mean(axis=1) * 2 > 0.04)
+        assert words[0].startswith(f"The rims of left and right differ in {windows:.0%} of the driving")
+    still = log_of(wheel_speed_rl=0.05 * (1 - turn), wheel_speed_rr=0.05 * (1 + turn))
+    assert _unseen_turns(still, RIMS) == []
