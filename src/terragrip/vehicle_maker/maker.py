@@ -173,8 +173,8 @@ def _considered(
     """What the doubts about a machine's numbers are to the constants that a vehicle file considers.
 
     An adhesion is torque over radius and load, so the errors of mass and radius are one of all torques' scale; the errors of lengths
-    and of the axles' shares shift load between the axles, as at `WORK` and `PUSH`; the errors of inertia and bearings
-    are torques, at `PUSH` and at the class's speed.
+    and of the axles' shares shift load between the axles, as at `WORK` and `PUSH`; the error of the inertia
+    is a torque, at `PUSH`, and that of the bearings one of all wheels alike, at the class's speed.
     """
     relative = {name: value / values[name] for name, value in spread.items()}
     found: dict[str, float] = {}
@@ -192,11 +192,20 @@ def _considered(
     widen("drive_torque_gain_common", relative.get("mass", 0.0))
     widen("tire_rolling_resistance", spread.get("tire_rolling_resistance", 0.0))
     widen("drive_torque_offset", spread.get("wheel_inertia", 0.0) * PUSH * GRAVITY / radius)
-    widen("drive_torque_offset", spread.get("bearing_resistance", 0.0) * machine.speed)
+    widen(
+        "tire_rolling_resistance",
+        spread.get("bearing_resistance", 0.0) * machine.speed * _turning_share(vehicle),
+    )
     for name in ("front_mass", "wheelbase", "center_of_gravity_height", "hitch_height"):
         if name in spread:
             widen("vertical_load", _shift(vehicle, values, name, spread[name]))
     return found
+
+
+def _turning_share(vehicle: Vehicle) -> float:
+    """What a torque of 1 N m on each wheel is of its load times its radius: mean over the wheels [1/(N m)]."""
+    loads = GRAVITY * vehicle.axle_mass / np.bincount(vehicle.wheel_axle)
+    return float(np.mean(1 / (loads[list(vehicle.wheel_axle)] * np.array(vehicle.wheel_radius))))
 
 
 def _shift(vehicle: Vehicle, values: Mapping[str, float], name: str, error: float) -> float:
