@@ -1,6 +1,9 @@
 /* Considered constants of the machine and its sensors: what one SD of each adds to the computed motion (physics.md 6). */
 #include "estimator.h"
 
+/* A pull at the hitch that nothing measures reads as soil resistance, and the load that it moves between the axles is not known. */
+static int32_t pull_is_unseen(const tg_settings *s) { return !s->towing && s->hitch_height > 0 && s->axles > 1; }
+
 /* How many columns these spreads need: constants without a spread take none. */
 int32_t tgi_deviation_columns(const tg_settings *s)
 {
@@ -9,7 +12,7 @@ int32_t tgi_deviation_columns(const tg_settings *s)
     if (u->drive_torque_gain > 0 || u->drive_torque_offset > 0)
         for (int32_t i = 0; i < s->machine.wheels; i++) columns += s->driven[i] != 0;
     return columns + (u->drive_torque_gain_common > 0) + (u->drawbar_gain > 0 || u->drawbar_offset > 0) + (u->slope > 0)
-         + (u->tire_rolling_resistance > 0) + (u->vertical_load > 0) + (u->mass > 0 || s->weighed) + (s->carrying != 0)
+         + (u->tire_rolling_resistance > 0) + (u->vertical_load > 0 || pull_is_unseen(s)) + (u->mass > 0 || s->weighed) + (s->carrying != 0)
          + (u->acceleration_bias > 0);
 }
 
@@ -25,7 +28,7 @@ static tg_real add_loads(const tg_estimator *e, const tg_real *mu, const tg_real
     return force;
 }
 
-/* What the front axles gain and the rear axles lose, as a share of the mean axle load. */
+/* What the front axles gain and the rear axles lose: a share of the mean axle load, and what an unseen pull may move, which is at most all of rho_s. */
 static void shift_loads(const tg_estimator *e, tg_real weight, tg_real inverse_mass, const tg_real *mu, tg_deviation *d)
 {
     const tg_settings *s = &e->settings;
@@ -33,8 +36,10 @@ static void shift_loads(const tg_estimator *e, tg_real weight, tg_real inverse_m
     for (int32_t k = 0; k < s->axles; k++)
         if (tgi_fabs(s->load_transfer[k]) > largest) largest = tgi_fabs(s->load_transfer[k]);
     if (!(largest > 0)) return;
-    tg_real mean = s->uncertainty.vertical_load * weight / (tg_real)s->axles;
-    for (int32_t i = 0; i < s->machine.wheels; i++) gain[i] = mean * s->load_transfer[s->wheel_axle[i]] / largest * s->wheel_share[i];
+    const tg_real share = s->uncertainty.vertical_load * weight / ((tg_real)s->axles * largest);
+    const tg_real pull = pull_is_unseen(s) ? mu[s->machine.wheels] * weight * s->hitch_height : 0;
+    const tg_real moment = tgi_sqrt(share * share + pull * pull);
+    for (int32_t i = 0; i < s->machine.wheels; i++) gain[i] = moment * s->load_transfer[s->wheel_axle[i]] * s->wheel_share[i];
     d->acceleration = d->accelerometer = add_loads(e, mu, gain, d) * inverse_mass;
 }
 
@@ -107,7 +112,7 @@ void tgi_deviations(tg_estimator *e, const tg_input *u, const tg_real *mu)
             d->wheel_acceleration[i] = -s->machine.radius[i] * spread->tire_rolling_resistance * u->load[i] * inverse_inertia[i];
         d++;
     }
-    if (spread->vertical_load > 0) shift_loads(e, mass * s->machine.gravity, inverse_mass, mu, d++);
+    if (spread->vertical_load > 0 || pull_is_unseen(s)) shift_loads(e, mass * s->machine.gravity, inverse_mass, mu, d++);
     if (spread->mass > 0 || s->weighed) add_mass(e, u, inverse_mass, mu, d++);
     if (s->carrying) add_hitch_load(e, inverse_mass, mu, d++);
     if (spread->acceleration_bias > 0) {
