@@ -2,19 +2,25 @@
 
 For each mean outside what is good: what the typical row has (median over that of chi-square, so that a few rows do not count), the share
 of the sum that a twentieth of the rows carries, the mean with this channel's noise halved and doubled, without accelerometer, without
-yaw rate, and how far the wheels' adhesions walk together: the square of their sum's steps over the sum of their squares, which the model
+yaw rate, with a hundredth of the soil resistance's walk, with one fixed Q (method kalman), with the accelerometer's shocks counted once
+and remembered ten times as long, and over the rows whose rims are steady; how much successive innovations are alike, which white ones
+are not; and how far the wheels' adhesions walk together: the square of their sum's steps over the sum of their squares, which the model
 takes to be 1.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
+from terragrip._kernel import lib
 from terragrip.estimation import Estimates
+from terragrip.estimation import estimator as estimator_module
 from terragrip.estimation.channel_nis import PREFIX, estimate_with_channel_nis
 from terragrip.recording import Recording
 from terragrip.vehicle import Vehicle
@@ -30,6 +36,16 @@ TOGETHER = 0.2
 """Below this the wheels' adhesions go against each other."""
 NEAR = 0.5
 """Share of the way (as a logarithm) to 1 that an experiment must make to name a cause."""
+ALIKE = 0.5
+"""Above this successive innovations are not white."""
+LARGEST = 4.0
+"""SDs: an innovation beyond counts as this where successive ones are compared."""
+AROUND, STEADY = 0.5, 0.1
+"""Steady rims: from so many seconds before to so many after they stay within this share of their speed."""
+GAP = 2.0
+"""s: rows farther apart are not compared."""
+LEAST = 20
+"""Rows of a mean."""
 
 
 @dataclass(frozen=True)
@@ -43,36 +59,62 @@ class Shown:
     doubled: float
     no_acceleration: float
     no_yaw: float
+    calm_resistance: float
+    fixed: float
+    calm_shocks: float
+    steady: float
+    alike: float
     together: float
     stale: bool
+
+    def near(self, value: float) -> bool:
+        """Whether an experiment's mean has made its share of the way to 1."""
+        return bool(np.isfinite(value) and abs(np.log(value)) < (1 - NEAR) * abs(np.log(self.mean)))
+
+    def beyond(self, value: float) -> bool:
+        """The same, or gone past 1."""
+        most = (1 - NEAR) * np.log(self.mean)
+        return bool(np.isfinite(value) and (np.log(value) < most if most > 0 else np.log(value) > most))
 
     @property
     def cause(self) -> str:
         """The cause that the experiments name, the most direct one first."""
-        if self.together < TOGETHER and self.stale is False:
-            return "sides go against each other: the wheels' adhesions walk apart, their sum does not"
-        if self.stale and self.mean < 1 and self.typical < 0.2 * self.mean:
-            return "a torque or pose that is held counts as noise in every row since; the few fresh rows carry the rest"
-        for value, words in (
+        lasting = "smoothed before it was logged" if self.mean < 1 else "errors that last"
+        for holds, words in (
             (
-                self.no_acceleration,
+                self.stale and self.mean < 1 and self.typical < 0.2 * self.mean,
+                "a torque or pose that is held counts as noise in every row since; the few fresh rows carry the rest",
+            ),
+            (
+                self.near(self.calm_resistance),
+                "soil resistance is expected to walk, by the bank's scale in turns and starts even more; here it does not",
+            ),
+            (
+                not self.stale and self.together < TOGETHER,
+                "sides go against each other: the wheels' adhesions walk apart, their sum does not",
+            ),
+            (
+                self.near(self.no_acceleration),
                 "accelerometer and derived speed contradict each other: its window flattens starts and stops",
             ),
-            (self.no_yaw, "turns: the yaw rate is not what the sides do"),
-            (self.doubled, "noise understated, or errors that last"),
-            (self.halved, "noise overstated: scatter and manoeuvre look alike"),
-        ):
-            if np.isfinite(value) and abs(np.log(value)) < (1 - NEAR) * abs(np.log(self.mean)):
+            (self.near(self.no_yaw), "turns: the yaw rate is not what the sides do"),
+            (self.alike > ALIKE, f"{lasting}: successive innovations are alike"),
+            (self.mean > 1 and self.beyond(self.steady), "rims that change: starts, stops and turns of a new command carry it"),
+            (self.near(self.doubled), "noise understated"),
+            (self.near(self.halved), "noise overstated: scatter and manoeuvre look alike"),
+            (self.near(self.calm_shocks), "shocks of starts and bumps count twice, and for seconds after"),
+            (self.beyond(self.fixed), "the bank's scale: it is that of the turns and starts around"),
+            (self.carried > 0.5, "few rows carry it: shocks, stops and starts"),
+        ):  # fmt: skip
+            if holds:
                 return words
-        if self.carried > 0.5:
-            return "few rows carry it: shocks, stops and starts"
         return "none of these experiments moves it half way to 1"
 
 
-def values(estimates: Estimates, kind: str) -> Floats:
-    """NIS of a kind of channel in the rows that move and carry no event, all its channels together."""
+def values(estimates: Estimates, kind: str, which: npt.NDArray[np.bool_] | None = None) -> Floats:
+    """NIS of a kind of channel in the rows that move and carry no event, and of them ``which`` (n,), all its channels together."""
     names = [n for n in estimates if n.removeprefix(PREFIX).startswith(KINDS[kind]) and n.startswith(PREFIX)]
-    rows = estimates.event_codes == 0
+    rows = (estimates.event_codes == 0) & (True if which is None else which)
     parts = [estimates[n][rows & np.isfinite(estimates[n])] for n in names]
     return np.concatenate([*parts, np.empty(0)])
 
@@ -88,33 +130,98 @@ def together(estimates: Estimates) -> float:
     return float(np.mean(steps.sum(axis=0) ** 2) / np.mean((steps**2).sum(axis=0)))
 
 
+def alike(recording: Recording, estimates: Estimates, kind: str) -> float:
+    """Correlation of successive innovations of moving rows over their SDs, all channels of a kind together; NaN where they cannot be had.
+
+    An innovation has the sign of what the channel is beyond the row's estimate, which lies between prediction and measurement.
+    """
+    if len(recording.time) != len(estimates.time):
+        return float("nan")
+    before, after = [np.empty(0)], [np.empty(0)]
+    for name in (n.removeprefix(PREFIX) for n in estimates if n.startswith(PREFIX)):
+        if not name.startswith(KINDS[kind]) or name not in estimates or name not in recording.channels:
+            continue
+        nis = estimates[PREFIX + name]
+        rows = np.flatnonzero((estimates.event_codes == 0) & np.isfinite(nis))
+        white = np.sign(recording[name] - estimates[name])[rows] * np.minimum(np.sqrt(nis[rows]), LARGEST)
+        one_drive = np.diff(recording.time[rows]) < GAP
+        before.append(white[:-1][one_drive])
+        after.append(white[1:][one_drive])
+    left, right = np.concatenate(before), np.concatenate(after)
+    return float(np.corrcoef(left, right)[0, 1]) if len(left) >= LEAST else float("nan")
+
+
+def rims_are_steady(estimates: Estimates) -> npt.NDArray[np.bool_]:
+    """Rows around which no rim's speed changes by more than its share (n,)."""
+    time = estimates.time
+    rows = zip(
+        np.searchsorted(time, time - AROUND), np.searchsorted(time, time + AROUND, "right"), strict=True
+    )
+    rims = np.abs(np.stack([estimates[f"wheel_speed_{w}"] for w in estimates.wheels], axis=1))
+    spans = [(rims[i:j].min(axis=0), rims[i:j].max(axis=0)) for i, j in rows]
+    return np.array([(high - low <= STEADY * high).all() for low, high in spans])
+
+
+@contextmanager
+def tuned(**factors: float) -> Iterator[None]:
+    """Estimators are made with these tuned numbers (tg_tuned) times their factors."""
+    as_set = estimator_module.settings_of
+
+    def changed(*arguments: Any, **named: Any) -> Any:
+        settings = as_set(*arguments, **named)
+        for name, factor in factors.items():
+            setattr(settings.tuned, name, factor * getattr(settings.tuned, name))
+        lib.tg_tune_walks(settings)
+        return settings
+
+    estimator_module.settings_of = changed
+    try:
+        yield
+    finally:
+        estimator_module.settings_of = as_set
+
+
 def experiments(recording: Recording, vehicle: Vehicle, estimates: Estimates, kind: str) -> Shown:
     """Try the changes on one log, for one kind of channel."""
     noise = estimates.about["settings"]["noise"]
     starts = tuple(part.rstrip("_") for part in KINDS[kind])
     own = {n: sd for n, sd in noise.items() if n.startswith(starts) and n in recording.channels}
+    filtered = f"adhesion_{estimates.wheels[0]}" in estimates
 
-    def mean(log: Recording, factor: float = 1.0) -> float:
+    def mean(log: Recording, factor: float = 1.0, **options: Any) -> float:
         changed = {n: factor * sd for n, sd in own.items() if n in log.channels}
-        return float(np.mean(values(estimate_with_channel_nis(log, vehicle, sensors=changed), kind)))
+        return float(
+            np.mean(values(estimate_with_channel_nis(log, vehicle, sensors=changed, **options), kind))
+        )
 
     def without(name: str) -> float:
         if name not in recording.channels or name.startswith(starts):
             return float("nan")
         return mean(replace(recording, channels={n: v for n, v in recording.channels.items() if n != name}))
 
+    def with_tuned(applies: bool, **factors: float) -> float:
+        with tuned(**factors):
+            return mean(recording) if applies else float("nan")
+
     now = values(estimates, kind)
     largest = np.sort(now)[-max(int(FEW * len(now)), 1) :]
+    steady = values(estimates, kind, rims_are_steady(estimates))
+    held = estimates.about["settings"]["held"]
     return Shown(
-        float(np.mean(now)),
-        float(np.median(now)) / MEDIAN,
-        float(largest.sum() / now.sum()),
-        mean(recording, 0.5),
-        mean(recording, 2.0),
-        without("acceleration_x"),
-        without("angular_velocity_z"),
-        together(estimates),
-        any(n.startswith(("drive_torque", "wheel_speed")) for n in estimates.about["settings"]["held"]),
+        mean=float(np.mean(now)),
+        typical=float(np.median(now)) / MEDIAN,
+        carried=float(largest.sum() / now.sum()),
+        halved=mean(recording, 0.5),
+        doubled=mean(recording, 2.0),
+        no_acceleration=without("acceleration_x"),
+        no_yaw=without("angular_velocity_z"),
+        calm_resistance=with_tuned(filtered, resistance_walk=0.01),
+        fixed=mean(recording, method="kalman") if filtered else float("nan"),
+        calm_shocks=with_tuned(kind == "accelerometer", shock_samples=0.5, shock_memory=10.0),
+        steady=float(np.mean(steady)) if len(steady) >= LEAST else float("nan"),
+        alike=alike(recording, estimates, kind),
+        together=together(estimates),
+        stale=any(n.startswith(("drive_torque", "wheel_speed")) for n in held),
     )
 
 
@@ -123,11 +230,14 @@ def table(
 ) -> str:
     """The rows (data, log, recording, vehicle, estimates, kind) as a table; ``cell`` writes a number."""
     head = ("data", "log", "channel", "NIS", "typical row", "a twentieth carries", "noise halved", "doubled", "no accelerometer",
-            "no yaw rate", "adhesions together", "cause")  # fmt: skip
+            "no yaw rate", "calm resistance", "fixed Q", "calm shocks", "rims steady", "alike", "adhesions together", "cause")  # fmt: skip
     lines = [f"| {' | '.join(head)} |", "|---" * len(head) + "|"]
     for data, log, recording, vehicle, estimates, kind in rows:
         shown = experiments(recording, vehicle, estimates, kind)
-        figures = (shown.halved, shown.doubled, shown.no_acceleration, shown.no_yaw, shown.together)
+        figures = (
+            shown.halved, shown.doubled, shown.no_acceleration, shown.no_yaw, shown.calm_resistance, shown.fixed,
+            shown.calm_shocks, shown.steady, shown.alike, shown.together,
+        )  # fmt: skip
         lines.append(
             f"| {data} | {log} | {kind} | {shown.mean:.2f} | {shown.typical:.2f} | {shown.carried:.0%} | "
             f"{' | '.join(map(cell, figures))} | {shown.cause} |"

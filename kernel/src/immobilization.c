@@ -107,7 +107,8 @@ static void watch_digging(tg_estimator *e, const tg_row *row, const tgi_view *l,
 }
 
 /* Where the ground speed was measured, for a reckoned one follows from the slip last seen. Slower than the standstill speed is standing.
- * Time counts from when the vehicle may stand, for an estimate comes after the fact; stuck is what surely does not go freely. */
+ * Time counts from when the vehicle may stand, for an estimate comes after the fact; stuck is what surely does not go freely. What surely
+ * goes against its rims slides, or still goes the way it came: it does not stand. */
 static void watch_stuck(tg_estimator *e, const tg_row *row, const tgi_view *l)
 {
     const tg_watch_settings *s = &e->settings.watch;
@@ -125,10 +126,11 @@ static void watch_stuck(tg_estimator *e, const tg_row *row, const tgi_view *l)
     w->turned += dt * l->fastest;
     const tg_real hardly = tgi_max(s->stuck_travel * l->fastest, still), freely = s->free_travel * l->fastest, unsure = TG_SURE * l->travel_deviation;
     const int32_t turning = w->rim > 3 * still && l->fastest > 3 * still, begun = w->turned > TG_HALF_TURN * e->constants.mean_radius;
-    w->spinning = turning ? count_seconds(w->spinning, dt, l->travel - unsure < hardly, 1, s->stuck_duration) : 0;
-    w->held = turning && l->travel < hardly && tgi_max(l->travel, 0) + unsure < freely;
+    const int32_t may_stand = tgi_fabs(l->travel) - unsure < hardly;
+    w->spinning = turning ? count_seconds(w->spinning, dt, may_stand, 1, s->stuck_duration) : 0;
+    w->held = turning && may_stand && l->travel < hardly && tgi_max(l->travel, 0) + unsure < freely;
     const int32_t long_enough = w->spinning + dt / 2 >= s->stuck_duration; /* to the nearest sample */
-    w->stuck = turning && ((w->held && long_enough && begun) || (w->stuck && l->travel < freely));
+    w->stuck = turning && ((w->held && long_enough && begun) || (w->stuck && tgi_fabs(l->travel) < freely));
     if (w->stuck) w->sinking = 0;
 }
 

@@ -249,3 +249,26 @@ def test_the_ground_speed_is_followed_where_all_wheels_lose_hold_together(
     vehicle = robot(sensors={"ground_speed": 0.04, "wheel_speed": noise / 0.2})
     estimates = tg.estimate(tg.Recording(time=time, channels={**channels, "ground_speed": measured}), vehicle)
     assert np.abs(estimates["ground_speed"][(time > 10.9) & (time < 11.4)]).max() < most
+
+
+@pytest.mark.parametrize("stands", [False, True])
+def test_a_turnabout_on_slick_ground_is_not_stuck(stands: bool) -> None:
+    """Windows of 2 s, 10 s apart: rims turn about within .3 s while the vehicle still goes the other way and slows by 1.2 m/s². It was
+    called stuck half a second after the rims had turned. Where it comes to stand while they spin it is, half a second later."""
+    rng = np.random.default_rng(7)
+    since = np.arange(0.0, 2.5, 0.05)
+    rim = np.interp(since, [0.3, 0.6], [-1.5, 1.5])
+    speed = np.interp(since, [0.45, 0.45 + 1.4 / 1.2, 0.45 + 2.8 / 1.2], [-1.4, 0.0, 0.0 if stands else 1.4])
+    time = (12.0 * np.arange(20)[:, None] + since).ravel()
+    names = [f"wheel_speed_{w}" for w in ("fl", "fr", "rl", "rr")]
+    channels = {name: (np.tile(rim, 20) + rng.normal(0, 0.01, len(time))) / 0.2 for name in names}
+    channels["ground_speed"] = np.tile(speed, 20) + rng.normal(0, 0.01, len(time))
+    vehicle = robot(sensors={"ground_speed": 0.01, "wheel_speed": 0.05})
+    estimates = tg.estimate(tg.Recording(time=time, channels=channels), vehicle)
+    stuck = (estimates["event"] == "stuck").reshape(20, -1)
+    if not stands:
+        assert not stuck.any()
+        return
+    assert stuck.any(axis=1).all()
+    first = since[np.argmax(stuck, axis=1)]
+    assert (np.abs(first - (0.45 + 1.4 / 1.2 + 0.5)) < 0.2).all()

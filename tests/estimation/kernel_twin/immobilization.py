@@ -250,15 +250,15 @@ class Watch:
         hardly = max(limits["stuck_travel"] * row.fastest, still)
         freely, unsure = limits["free_travel"] * row.fastest, SURE * row.travel_deviation
         turning = min(self.rim, row.fastest) > 3 * still
-        may_stand = row.travel - unsure < hardly
+        may_stand = abs(row.travel) - unsure < hardly
         spinning = min(max(self.spinning + (dt if may_stand else -dt), 0.0), limits["stuck_duration"])
         self.spinning = spinning if turning else 0.0
-        self.held = turning and row.travel < hardly and max(row.travel, 0.0) + unsure < freely
+        self.held = turning and may_stand and row.travel < hardly and max(row.travel, 0.0) + unsure < freely
         sure = (
             self.held
             and self.spinning + dt / 2 >= limits["stuck_duration"]
             and self.turned > HALF_TURN * self.radius
         )
-        self.stuck = turning and (sure or (self.stuck and row.travel < freely))
+        self.stuck = turning and (sure or (self.stuck and abs(row.travel) < freely))
         if self.stuck:
             self.sinking = False
