@@ -23,6 +23,7 @@ import numpy as np
 import numpy.typing as npt
 import pandas as pd
 
+import joined_windows
 import nis_causes
 from marked import put
 from terragrip.cli import main as terragrip
@@ -335,6 +336,17 @@ def causes(logs: list[Log]) -> str:
     return nis_causes.table(rows, lambda value: "-" if np.isnan(value) else f"{value:.2f}")
 
 
+def windows_table(logs: list[Log]) -> str:
+    """What windows laid one after another show."""
+    joined = [log for log in logs if log.source.prepare is windows_joined]
+    return joined_windows.table(
+        [
+            (g.source.name, g.name, joined_windows.windows_of(g.recording, g.vehicle, g.estimates))
+            for g in joined
+        ]
+    )
+
+
 def main() -> None:
     """Print or write the tables."""
     arguments = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
@@ -362,6 +374,7 @@ def main() -> None:
         sys.path.insert(0, str(EXAMPLES))
         import real_logs
     tables = {"the way": way_table(result), "slip and events": slip_table(logs), "NIS": nis_table(logs)}
+    tables["windows"] = windows_table(logs)
     if not given.only:
         tables |= {
             m.name: real_logs.table(real_logs.verdicts(m, given.data, "kalman")) for m in real_logs.MACHINES
