@@ -48,9 +48,11 @@ def windows_of(recording: Recording, vehicle: Vehicle, estimates: Estimates) -> 
     alone = frozenset(
         k
         for k in range(len(starts))
-        if _warns(estimate(recording.select(window == k), vehicle, sensors=noise)).any()
+        if _warns(estimate(recording.select(window == k), vehicle, sensors=noise))[:-1].any()
     )
-    in_log = frozenset(int(k) for k in np.unique(window[_warns(estimates)]))
+    warns = _warns(estimates)
+    warns[ends] = False  # the row before a gap is `gap` in the log
+    in_log = frozenset(int(k) for k in np.unique(window[warns]))
     return Windows(len(starts), jumps, np.abs(ground[starts[1:]] - ground[ends[:-1]])[meet], in_log, alone)
 
 
