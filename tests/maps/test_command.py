@@ -4,12 +4,15 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 pytest.importorskip("geopandas", reason="needs terragrip[geo]")
 
 from lane_drives import drive, lanes
 from terragrip.cli import main
+from terragrip.maps.field_map import usual_cell
+from terragrip.vehicle import Vehicle
 
 
 @pytest.fixture
@@ -26,11 +29,56 @@ def test_the_map_is_written_and_summed_up(
 
     out = tmp_path / "map.gpkg"
     assert main(["map", str(estimates), "-o", str(out)]) == 0
-    assert [name for name, _ in pyogrio.list_layers(out)] == ["cells", "points"]
+    assert [name for name, _ in pyogrio.list_layers(out)] == ["cells", "points", "anomalies"]
+    assert pyogrio.read_info(out, layer="anomalies")["features"] == 0
+    assert "difference_std" in pyogrio.read_info(out, layer="anomalies")["fields"]
     said = capsys.readouterr().out
+    assert "10 % to 90 %" in said
     assert "adhesion at 20 % slip" in said
     assert "headland" in said
     assert "driven once" in said
+
+
+def test_a_geotiff_tells_what_was_driven_from_what_is_kriged(tmp_path: Path) -> None:
+    import rasterio
+
+    source, out = tmp_path / "drive.parquet", tmp_path / "map.tif"
+    drive(*lanes(4, 30, 3), noise=0.02).write(source)
+    assert main(["map", str(source), "-o", str(out), "--fill", "1", "--quiet"]) == 0
+    with rasterio.open(out) as file:
+        band = {name: file.read(number) for number, name in enumerate(file.descriptions, 1)}
+    known = np.isfinite(band["soil_resistance"])
+    kriged = known & (band["count"] == 0)
+    assert kriged.any(), "one cell beside the driven ones"
+    assert np.all(band["passes"][known & ~kriged] >= 1)
+    assert np.all(band["passes"][kriged] == 0)
+
+
+def test_cells_are_as_wide_as_a_tractor_works() -> None:
+    light = {
+        "name": "rover",
+        "mass": 60.0,
+        "axles": {"drive": {"mass": 60.0, "wheels": ["l", "r"]}},
+        "wheel": {"radius": 0.2, "inertia": 0.1},
+    }
+    heavy = light | {"mass": 3000.0, "axles": {"drive": {"mass": 3000.0, "wheels": ["l", "r"]}}}
+    tool = {"working_width": 6.0}
+    cells = [usual_cell(Vehicle.from_dict(one)) for one in (light, light | tool, heavy, heavy | tool)]
+    assert cells == [1.0, 1.0, 3.0, 6.0]
+
+
+def test_two_days_of_one_file_name_are_told_apart(tmp_path: Path) -> None:
+    import geopandas
+
+    paths = [tmp_path / day / "field.parquet" for day in ("monday", "friday")]
+    for seed, path in enumerate(paths):
+        path.parent.mkdir()
+        drive(*lanes(3, 30, 3), noise=0.01, seed=seed).write(path)
+    out = tmp_path / "map.gpkg"
+    assert main(["map", *map(str, paths), "-o", str(out), "--quiet"]) == 0
+    changes = geopandas.read_file(out, layer="changes")
+    assert set(changes["first_run"]) == {"monday/field"}
+    assert set(changes["last_run"]) == {"friday/field"}
 
 
 @pytest.mark.parametrize(

@@ -43,6 +43,19 @@ def test_impossible_positions_are_refused(
         map_of([("a", estimates)])
 
 
+def test_swapped_columns_are_found_by_the_turns_of_lanes_along_one_direction() -> None:
+    """Lanes from south to north are as long either way, and the drive's one speed shows no turn: only the headlands are too wide."""
+    north, east = lanes(10, 60, 6)
+    estimates = drive(east, north, antenna=(1.5, 0.5))
+    for wheel in estimates.vehicle.wheels:
+        estimates.columns[f"wheel_speed_{wheel}"] = np.full(len(estimates), 5.0)
+    columns = estimates.columns
+    assert map_of([("a", estimates)]).epsg == 32633
+    columns["latitude"], columns["longitude"] = columns["longitude"], columns["latitude"]
+    with pytest.raises(InputError, match="swapped"):
+        map_of([("a", estimates)])
+
+
 def test_no_positions_is_one_line() -> None:
     estimates = drive(*lanes(2, 30, 4))
     del estimates.columns["latitude"]

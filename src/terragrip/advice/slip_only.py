@@ -96,11 +96,12 @@ def advise_rows(rows: Sequence[Rows], vehicle: Vehicle) -> Advice:
 def _shares(slip: np.ndarray, seconds: np.ndarray) -> dict[str, float]:
     """Shares of the time below, within and above the band, and of the time that slip above it costs, of rows (n,)."""
     (low, high), total = BAND, float(seconds.sum())
-    below, above = (float(seconds[mask].sum() / total) for mask in (slip < low, slip > high))
+    inside = (slip >= low) & (slip <= high)
+    below, within, above = (float(seconds[mask].sum() / total) for mask in (slip < low, inside, slip > high))
     lost = float((seconds * np.maximum(1 - (1 - slip) / (1 - high), 0)).sum() / total)
     return {
         "share_below": below,
-        "share_within": 1 - below - above,
+        "share_within": within,
         "share_above": above,
         "time_lost": lost,
     }

@@ -34,7 +34,10 @@ def command(
     ],
     cell: Annotated[
         float | None,
-        typer.Option(metavar="METRES", help="Size of a cell; 1 m, for machines above a tonne 3 m."),
+        typer.Option(
+            metavar="METRES",
+            help="Size of a cell; 1 m, for machines above a tonne the working width, or 3 m.",
+        ),
     ] = None,
     slip: Annotated[float, typer.Option(metavar="SHARE", help="Slip that adhesion is mapped at.")] = 0.2,
     soils: Annotated[
@@ -82,8 +85,9 @@ def command(
         raise InputError(f"there is no layer {layer!r}", place="--layer", hint=f"take {', '.join(LAYERS)}")
     library = SoilLibrary.load(soils) if soils else None
     files = distinct(inputs)
-    sections = sections_by_run(ground, [path.stem for path in files]) if ground else {}
-    runs = ((path.stem, Estimates.read(path), str(path)) for path in files)
+    names = run_names(files)
+    sections = sections_by_run(ground, names) if ground else {}
+    runs = ((name, Estimates.read(path), str(path)) for name, path in zip(names, files, strict=True))
     steps = len(files) + 2
     with progress("map", quiet) as step:
         made = map_of(
@@ -94,6 +98,15 @@ def command(
     if not quiet:
         print(summary(made))
         print(f"Written to {output}")
+
+
+def run_names(files: list[Path]) -> list[str]:
+    """The files' names without suffix; with their folder where two are alike: monday/field, friday/field."""
+    stems = [path.stem for path in files]
+    return [
+        f"{path.resolve().parent.name}/{path.stem}" if stems.count(path.stem) > 1 else path.stem
+        for path in files
+    ]
 
 
 def summary(made: FieldMap) -> str:
@@ -108,6 +121,7 @@ def summary(made: FieldMap) -> str:
         f"{runs}, cells of {made.cell:g} m, EPSG:{made.epsg}; positions around {around} in {made.datum}"
         " (--datum names another)"
     ]
+    lines.append("Median of the cells, and what 10 % to 90 % of them lie between:")
     for name, cells in made.cells.items():
         at = f" at {100 * made.reference_slip:g} % slip" if name == "adhesion" else ""
         driven = cells.count > 0

@@ -24,6 +24,7 @@ from terragrip.maps.values import QUANTITIES, readings_of
 if TYPE_CHECKING:
     from terragrip.estimation import Estimates
     from terragrip.soil.library import SoilLibrary
+    from terragrip.vehicle import Vehicle
 
 Floats = npt.NDArray[np.float64]
 
@@ -36,7 +37,8 @@ READ_BY_WHEELS = ("adhesion", "slip", "efficiency")
 MOST_CELLS = 50_000_000
 """Cells of the box around all runs beyond which a raster of them would not fit a common machine's memory."""
 LARGE_MACHINE = 1000.0
-"""kg: by default heavier machines are mapped by `LARGE_CELL`, lighter ones by `SMALL_CELL`."""
+"""kg: by default heavier machines are mapped by their working width, or by `LARGE_CELL` where it is not known, lighter ones by
+`SMALL_CELL`."""
 LARGE_CELL, SMALL_CELL = 3.0, 1.0
 FARTHEST = 100_000.0
 """Metres from the first run beyond which another is no part of its map: the grid would be another zone's."""
@@ -101,9 +103,7 @@ class MapMaker:
                 "holds no positions", file=file or run, hint="estimate a log with latitude and longitude"
             )
         epsg = self._epsg or zone_of(estimates["latitude"], estimates["longitude"])
-        cell = (
-            self._cell or self.settings.cell or (LARGE_CELL if vehicle.mass > LARGE_MACHINE else SMALL_CELL)
-        )
+        cell = self._cell or self.settings.cell or usual_cell(vehicle)
         places = places_of(estimates, epsg, self.settings.datum, file)
         self._check_extent(places, cell, file or run)
         if not self.runs:
@@ -193,6 +193,13 @@ class MapMaker:
             self._epsg, self._cell, cells, passes, anomalies, changes, soil_of_cells(self._soil), Points.joined(self._points),
             tuple(self.runs), self.settings.reference_slip, self.settings.datum, self._middle, tuple(self.notes),
         )  # fmt: skip
+
+
+def usual_cell(vehicle: Vehicle) -> float:
+    """Size of a cell [m] where nobody says one."""
+    if vehicle.mass <= LARGE_MACHINE:
+        return SMALL_CELL
+    return vehicle.working_width or LARGE_CELL
 
 
 def _enough(long: float, wide: float) -> float:

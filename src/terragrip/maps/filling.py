@@ -67,7 +67,9 @@ def _near(
         line = np.column_stack(
             [np.arange(low[0], high[0] + 1), np.full(int(high[0] - low[0]) + 1, row)]
         ).astype(np.int64)
-        distance = tree.query(line, distance_upper_bound=reach)[0]
+        distance = tree.query(line, distance_upper_bound=np.nextafter(reach, np.inf))[
+            0
+        ]  # which must be nearer
         out += [cell for cell in map(tuple, line[np.isfinite(distance)].tolist()) if cell not in held]
     return np.array(out, dtype=np.int64).reshape(-1, 2)
 

@@ -56,6 +56,13 @@ def refuse_impossible(estimates: Estimates, fixes: npt.NDArray[np.intp], file: s
         return
     driven = np.diff(way[ends])
     given = _apart(latitude, longitude, ends, driven)
+    if np.abs(longitude).max() <= 90 and _only_swapped_fits(latitude, longitude, ends, driven):
+        raise InputError(
+            "positions move too far in one direction and not in the other, against the wheels and the ground speed",
+            file=file,
+            place=place,
+            hint="latitude and longitude look swapped: mend the profile",
+        )
     if given > APART:
         degrees = 180 / np.pi
         others = {
@@ -93,12 +100,32 @@ def _stretches(way: Floats) -> npt.NDArray[np.intp]:
     return np.flatnonzero(np.r_[True, np.diff(number) > 0])
 
 
-def _apart(latitude: Floats, longitude: Floats, ends: npt.NDArray[np.intp], driven: Floats) -> float:
-    """Median size of ln(way by positions / way driven) over stretches; a turn's chord is shorter, which the median bears."""
+def _off(latitude: Floats, longitude: Floats, ends: npt.NDArray[np.intp], driven: Floats) -> Floats:
+    """Size of ln(way by positions / way driven) of each stretch."""
     north, east = metres_of(latitude, longitude)
     moved = np.hypot(np.diff(north[ends]), np.diff(east[ends]))
     with np.errstate(divide="ignore"):
-        return float(np.median(np.abs(np.log(np.maximum(moved, 1e-9) / driven))))
+        return np.asarray(np.abs(np.log(np.maximum(moved, 1e-9) / driven)))
+
+
+def _apart(latitude: Floats, longitude: Floats, ends: npt.NDArray[np.intp], driven: Floats) -> float:
+    """Median of `_off`; a turn's chord is shorter, which the median bears."""
+    return float(np.median(_off(latitude, longitude, ends, driven)))
+
+
+def _only_swapped_fits(
+    latitude: Floats, longitude: Floats, ends: npt.NDArray[np.intp], driven: Floats
+) -> bool:
+    """Whether stretches fit the way driven much better with the columns swapped, and hardly any much worse.
+
+    Lanes along one direction fit either way: then the turns tell, which the median over all stretches does not see. An antenna that
+    swings out in them makes both readings worse alike.
+    """
+    given, swapped = (
+        _off(north, east, ends, driven) for north, east in ((latitude, longitude), (longitude, latitude))
+    )
+    better = int(np.sum(given - swapped > APART))
+    return better >= LEAST and better > 5 * int(np.sum(swapped - given > APART))
 
 
 def _wheel_turns(

@@ -18,8 +18,8 @@ KINDS: dict[str, tuple[str, str]] = {
     ".gpkg": ("a GeoPackage with all layers", "pyogrio"),
     ".parquet": ("a GeoParquet file of one layer", "geopandas"),
     ".geojson": ("a GeoJSON file of one layer", "pyogrio"),
-    ".tif": ("a GeoTIFF, a band a quantity and a band its SD", "rasterio"),
-    ".tiff": ("a GeoTIFF, a band a quantity and a band its SD", "rasterio"),
+    ".tif": ("a GeoTIFF, a band a quantity and a band its SD, count and passes", "rasterio"),
+    ".tiff": ("a GeoTIFF, a band a quantity and a band its SD, count and passes", "rasterio"),
     ".png": ("a picture", "matplotlib"),
     ".svg": ("a picture", "matplotlib"),
     ".pdf": ("a picture", "matplotlib"),
@@ -85,13 +85,13 @@ def _geopackage(made: FieldMap, path: Path) -> None:
     metadata = {ABOUT: about.to_text()}
     for name in LAYERS:
         frame = table(made, name)
-        if not len(frame) and name != "cells":
-            continue
+        if name == "changes" and not len(frame):
+            continue  # nothing was driven twice; an empty layer would say that nothing changed
         frame.to_file(path, layer=name, driver="GPKG", engine="pyogrio", dataset_metadata=metadata)
 
 
 def _geotiff(made: FieldMap, path: Path) -> None:
-    """Cloud-optimised, north up, NaN where nothing is known."""
+    """Cloud-optimised, north up, NaN where nothing is known; bands ``count`` and ``passes`` tell what was driven from what is kriged."""
     import rasterio
     from rasterio.transform import from_origin
 
@@ -108,7 +108,7 @@ def _geotiff(made: FieldMap, path: Path) -> None:
             place="--cell",
             hint="map the runs one by one, or coarser",
         )
-    names = [name for quantity in made.cells for name in (quantity, f"{quantity}_std")]
+    names = [name for quantity in made.cells for name in (quantity, f"{quantity}_std")] + ["count", "passes"]
     profile: dict[str, Any] = {
         "driver": "COG", "width": width, "height": height, "count": len(names), "dtype": "float32", "nodata": float("nan"),
         "crs": made.epsg, "transform": from_origin(west * made.cell, (top + 1) * made.cell, made.cell, made.cell), "compress": "deflate",
