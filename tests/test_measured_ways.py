@@ -133,10 +133,10 @@ def test_innovations_on_grass_are_of_the_right_order(shared: Located) -> None:
 
 @pytest.mark.xfail(
     strict=True,
-    reason="the bank takes its walk's scale from the turns around: .46 straight ahead: docs/real-logs.md",
+    reason="the bank takes its walk's scale from the turns around: .46 straight ahead, 1.2 in turns: docs/real-logs.md",
 )
-def test_wheels_of_a_turning_robot_are_expected_too_sure(shared: Located) -> None:
-    """Alostar, bank: straight ahead wheel speeds fit; in turns, where sides slip alternately, they do not."""
+def test_wheels_of_a_turning_robot_fit_straight_ahead_and_in_turns(shared: Located) -> None:
+    """Alostar, bank. Its sides slip against each other in turns."""
     vehicle = tg.Vehicle.load(EXAMPLES / "alostar_4wd/vehicle.yaml")
     nis: dict[bool, list[np.ndarray]] = {False: [], True: []}
     for log in sorted(shared("data/alostar_4wd").glob("*.txt")):
@@ -149,5 +149,5 @@ def test_wheels_of_a_turning_robot_are_expected_too_sure(shared: Located) -> Non
             rows = (estimates.event_codes == 0) & (turning == which)
             nis[which] += [estimates[f"{PREFIX}wheel_speed_{w}"][rows] for w in vehicle.wheels]
     straight, turns = (float(np.nanmean(np.concatenate(nis[which]))) for which in (False, True))
-    assert 0.5 < straight < 1.3
-    assert 1.3 < turns < 2.2
+    assert 0.8 < straight < 1.3
+    assert 0.8 < turns < 1.3
