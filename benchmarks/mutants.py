@@ -291,6 +291,10 @@ def main() -> int:
         drawn = [
             one for name in dict(places) for _, one in mutants(ROOT / name) if (one.path, one.line) in places
         ]
+        if not drawn:
+            raise SystemExit(
+                "nothing on these lines can be changed: give lines of code with an operator or a number"
+            )
         kept = Path(os.devnull)
     else:
         seed = wanted.seed or commit

@@ -224,6 +224,26 @@ def test_efficiency_changes_by_adhesion_and_resistance_as_its_formula() -> None:
     np.testing.assert_allclose(low, [0.9 / 0.02 * 0.1, 0.8 / 0.13 * 0.1])
 
 
+def test_free_wheels_turn_as_measured_or_else_as_the_ground_goes_by() -> None:
+    """Of two driven wheels the mean rim speed over the radius of one; free wheels whose speeds are not known slip nowhere."""
+    line = {"driveline": {"efficiency": 0.8, "efficiency_std": 0.04, "accessory_power": 0}}
+    channels = {
+        "ground_speed": np.array([1.0, 2.0]),
+        "engine_torque": np.array([400.0, 500.0]),
+        "engine_speed": np.array([200.0, 200.0]),
+        "wheel_speed_rl": np.array([1.4, 2.6]),
+        "wheel_speed_rr": np.array([1.6, 2.8]),
+    }
+    time = np.array([0.0, 0.1])
+    free = {"wheel_speed_fl": np.array([2.1, 4.1]), "wheel_speed_fr": np.array([2.3, 4.3])}
+    for given, turns in ((channels, [2.0, 4.0]), ({**channels, **free}, [2.2, 4.2])):
+        own, drive = DrivenMachine.of_file(tractor(**line), tuple(given)).converted(time, given, 0)
+        np.testing.assert_allclose(own["wheel_speed_undriven"], turns)
+        np.testing.assert_allclose(own["wheel_speed_driven"], [1.5, 2.7])
+        np.testing.assert_allclose(own["drive_torque_driven"], [0.8 * 400 * 200 / 1.5, 0.8 * 500 * 200 / 2.7])
+        np.testing.assert_array_equal(drive.torque, own["drive_torque_driven"])
+
+
 def test_what_the_driveline_takes_widens_intervals_by_its_force_over_loads() -> None:
     """The spread of a torque over radius and load adds to adhesion's as independent ones do, and to a curve's scale in proportion, as
     though adhesion were .1 at least."""

@@ -196,6 +196,12 @@ def test_unscented_moments_of_a_square_are_exact():
     assert filter.P[0, 0] == pytest.approx(p - cross**2 / variance, rel=1e-13)
 
 
+def test_by_default_the_variance_of_a_square_about_zero_is_exact():
+    """Var x² = 2 p² of x ~ N(0, p): of a normal distribution beta = 2 is right (Wan and van der Merwe)."""
+    filter = UnscentedKalmanFilter(lambda x, u, dt: x, lambda x: x**2, [[0.0]], [[0.05]], [0.0], [[0.3]])
+    assert filter.update([1.3]).innovation_variance[0] == pytest.approx(2 * 0.3**2 + 0.05, rel=1e-14)
+
+
 def pendulum(x: Array, u: float) -> Array:
     return np.stack([x[..., 1], u - 9.81 * np.sin(x[..., 0]) - 0.1 * x[..., 1]], axis=-1)
 

@@ -61,6 +61,7 @@ def test_it_says_what_was_driven_what_is_assumed_and_what_next(drive: tuple[tg.E
     estimates, text = drive
     assert len(text.splitlines()) <= 24
     assert text.startswith("Innok Heros 444 (4 wheels): ")
+    assert "\n  by wheel" in text
     assert f"{estimates['distance'][-1]:.1f} m in 40.0 s" in text
     assert "Assumed: considered as unknown drive_torque_gain ±2 %" in text
     assert "the vehicle is not calibrated" in text
@@ -98,6 +99,8 @@ def test_nothing_considered_is_said_and_doubtful_units_come_first() -> None:
         "wheel": {"radius": 0.2, "inertia": 0.1},
     }
     text = tg.estimate(pd.DataFrame(columns), tg.Vehicle.from_dict(vehicle)).summary()
+    assert "Medians ± half the 95 % interval, the mean over the driven wheels:" in text
+    assert "\n  by wheel" in text
     assert "the intervals hold the sensors' noise alone" in text
     assert text.splitlines()[-1].startswith("Next: settle what the notes doubt")
 
@@ -177,6 +180,8 @@ def test_words_of_a_summary_that_no_drive_above_needs() -> None:
     assert lines[1].startswith("Events: outlier 2 (5 rows)")
     assert "Normalised innovation squared a channel: 2.00, expected 1 (the noise may be set too low" in text
     assert "  and 2 more labels" in lines
+    assert "Medians ± half the 95 % interval:" in lines  # of one wheel, which has no table of its own
+    assert "by wheel" not in text
     assert sum(line.startswith("  field ") for line in lines) == 8
     whole = next(line for line in lines if line.startswith("  all "))
     assert cells(whole) == [pytest.approx((1.25, 0.02), abs=5e-4), pytest.approx((0.125, 0.039), abs=5e-4)]

@@ -155,9 +155,10 @@ def test_a_figure_over_time_has_lines_intervals_and_stripes_where_they_belong() 
     assert [t.get_text() for t in speed.get_legend().get_texts()] == ["stuck", "gap"]
     assert slip.get_ylim() == pytest.approx((0.1 - 0.035, 0.2 + 0.035))
     assert speed.get_ylim() == pytest.approx((1.48, 1.52))
-    assert (
-        plane_points(table(codes={3: STUCK}).plot("plane").axes[0]) == [(0.1, 0.3)] * 11 + [(0.2, 0.5)] * 11
-    )
+    plane = table(codes={3: STUCK}).plot("plane").axes[0]
+    assert plane_points(plane) == [(0.1, 0.3)] * 11 + [(0.2, 0.5)] * 11
+    across, up = (line.get_xydata().tolist() for line in plane.get_lines() if line.get_marker() != ".")
+    assert (across, up) == ([[0, 0], [1, 0]], [[0, 0], [0, 1]])  # both axes, in shares of the figure
 
 
 def plane_points(axes: Any) -> list[tuple[float, float]]:

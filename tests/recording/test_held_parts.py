@@ -59,6 +59,15 @@ def test_more_than_a_fifth_of_the_runs_must_repeat(repeats: int, held: bool) -> 
         assert result == pytest.approx(0.1 * (25 + repeats) / 25)
 
 
+@pytest.mark.parametrize(("repeats", "held"), [(10, False), (11, True)])
+def test_at_steps_of_two_quanta_two_fifths_of_the_runs_may_repeat_by_chance(repeats: int, held: bool) -> None:
+    """0.8 over their median size, of 25 runs."""
+    values = np.cumsum([5.0, *[2.0, -2.0, 3.0, -2.0] * 6, 2.0, -2.0])
+    series = np.repeat(values, [1, *([2] * repeats + [1] * (25 - repeats)), 1])
+    assert quantum(series) == 1.0
+    assert (held_period(0.1 * np.arange(len(series)), series) is not None) is held
+
+
 def test_steps_of_one_and_a_half_quanta_end_no_run_that_counts() -> None:
     steps = np.tile([3.0, -3.0, 2.0, -2.0], 10)
     time, values = 0.1 * np.arange(205), np.repeat(np.cumsum(np.r_[5.0, steps]), 5)

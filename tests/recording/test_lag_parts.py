@@ -205,6 +205,15 @@ def test_offsets_beyond_reach_are_not_looked_for() -> None:
         assert nearer is None or abs(nearer.seconds) < 3.9
 
 
+@pytest.mark.parametrize(("longest", "compared"), [(4900, True), (4700, False)])
+def test_records_that_are_too_long_together_are_not_compared(
+    monkeypatch: pytest.MonkeyPatch, longest: int, compared: bool
+) -> None:
+    monkeypatch.setattr("terragrip.recording.lag._LONGEST", longest)  # of twice 2400 points
+    time = STEP * np.arange(2400)
+    assert (offset_between((time, wander(time)), (time, wander(time))) is not None) is compared
+
+
 @pytest.mark.parametrize(("late", "certain"), [(0.4, True), (-0.4, True), (0.08, False)])
 def test_a_lag_within_a_log_counts_where_a_vehicle_does_not_explain_it(late: float, certain: bool) -> None:
     time = np.arange(0.0, 300.0, STEP)

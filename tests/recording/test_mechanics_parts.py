@@ -126,6 +126,9 @@ def test_standing_windows_and_backward_driving_do_not_count() -> None:
         assert means.rows.sum() == count
         assert means.climb is None
     assert _means(Recording(time, {"ground_speed": np.full(120, -1.0)})) is None
+    backward = np.where(time < 29, 1.0, -1.0)  # more backward than forward
+    assert _means(Recording(time, {"ground_speed": backward})) is None
+    assert _means(Recording(time[:20], {"ground_speed": np.ones(20)})) is None
     assert _means(Recording(time, {})) is None
     for seconds, enough in ((26.0, False), (26.5, True)):
         rows = time < seconds

@@ -231,6 +231,20 @@ def test_of_a_long_log_four_thousand_pairs_are_enough() -> None:
     np.testing.assert_allclose(turning[1:-1], 2 * speed[1:-1])
 
 
+def test_speeds_that_are_measured_by_turns_are_compared_within_three_samples() -> None:
+    """Before a gap of more, and never beyond the last sample behind one."""
+    time = np.r_[np.arange(0.0, 10.0), np.arange(20.0, 23.0)]
+    result = _pairs(time, np.where(time < 21, 0.1 * time, np.nan), np.where(time % 2 == 1, time, np.nan))
+    assert result is not None
+    np.testing.assert_allclose(result, [[0.1, 0.3, 0.5, 0.7, 0.9], [1.0, 3.0, 5.0, 7.0, 9.0]])
+    two = _pairs(np.arange(4.0), np.array([1.0, np.nan, 3.0, np.nan]), np.array([np.nan, 5.0, np.nan, 7.0]))
+    assert two is not None
+    np.testing.assert_allclose(two, [[2.0, 3.0], [5.0, 7.0]])
+    one = np.array([1.0, np.nan, np.nan, np.nan])
+    assert _pairs(np.arange(4.0), one, np.arange(4.0)) is None
+    assert _pairs(np.arange(4.0), np.arange(4.0), one) is None
+
+
 @pytest.mark.parametrize(
     ("channel", "value", "words"),
     [
@@ -270,6 +284,10 @@ def test_angles_and_gravity_are_doubted_by_their_size(channel: str, value: float
 )
 def test_samples_five_seconds_apart_may_be_in_another_unit(step: float, rows: int, words: str) -> None:
     assert said(time=step * np.arange(rows), drawbar_force=np.zeros(rows)) == words
+    first = np.r_[
+        0.0, 10.0 - step + step * np.arange(rows - 1)
+    ]  # a first step of the other kind changes nothing
+    assert said(time=first, drawbar_force=np.zeros(rows)) == words
 
 
 def test_windows_hold_the_rows_in_which_every_channel_does() -> None:

@@ -237,8 +237,9 @@ def test_a_clock_that_would_leave_its_range_within_the_recording_has_no_zero() -
         return Recording(np.array(time), {"ground_speed": np.ones(len(time))}, start=start).clock_zero
 
     assert zero(LATEST - 10.0, 0.0, 5.0) == LATEST - 10.0
-    assert zero(LATEST - 10.0, 0.0, 15.0) is None
+    assert zero(LATEST - 10.0, 0.0, 5.0, 10.0) is None
     assert zero(-4.0, 5.0, 6.0) == -4.0  # its first row is after 1970
+    assert zero(-4.0, 4.0, 6.0) is None
     assert zero(-4.0, 3.0, 6.0) is None
     assert zero(LATEST - 10.0) is None  # without a row no clock has been read
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from terragrip.recording import Recording
-from terragrip.recording.track import Track, _fitted, track_of
+from terragrip.recording.track import Track, _fitted, _grade, track_of
 
 METRES = 111_132.954 - 559.822 + 1.175  # m a degree of latitude at the equator (series of the meridian arc)
 Path = Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]
@@ -115,6 +115,17 @@ def test_a_turn_is_given_to_three_hundredths_of_a_radian_a_second(noise: float, 
         positions(time, lambda t: tuple(x + noise * draws.standard_normal(300) for x in circle(0.1, 2.0)(t)))
     )
     assert np.isfinite(track.turn).mean() > 0.99 if known else np.isnan(track.turn).all()
+
+
+def test_a_grade_needs_four_metres_on_either_side() -> None:
+    """Up 3 % at a metre a second, from a stop to a stop."""
+    time = np.arange(60.0)
+    speed = ((time >= 15) & (time < 45)).astype(float)
+    way = np.r_[0.0, np.cumsum((speed[1:] + speed[:-1]) / 2)]
+    grade = _grade(time, speed, 0.03 * way)
+    known = (way > 4.0) & (way < way[-1] - 4.0)
+    np.testing.assert_array_equal(np.isfinite(grade), known)
+    np.testing.assert_allclose(grade[known], np.arctan(0.03))
 
 
 def test_altitude_is_that_of_the_instant() -> None:

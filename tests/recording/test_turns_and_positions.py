@@ -128,6 +128,12 @@ def test_an_inverted_yaw_rate_is_noticed_everywhere(
     assert any(expected in note for note in inspect(tmp_path / "log.csv", vehicle=machine()).warnings)
     # Without a vehicle the positions alone speak.
     assert any("wrong sign: the positions turn" in note for note in inspect(tmp_path / "log.csv").warnings)
+    # Without positions the wheels alone do, and either may be wrong.
+    where = ("latitude", "longitude")
+    alone = Recording.from_frame({name: values for name, values in columns.items() if name not in where})
+    or_else = "If you are sure of it, left and right wheels are exchanged."
+    assert [or_else in note for note in unit_warnings(alone, machine()) if "wrong sign" in note] == [True]
+    assert not any(or_else in note for note in unit_warnings(log, machine()))
     machine().save(tmp_path / "v.yaml")
     words = [
         "calibrate",

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from terragrip.physics.adhesion import CURVES
-from terragrip.soil.identifiability import LIMIT, judge
+from terragrip.soil.identifiability import LIMIT, _sensitivity, _twin, judge
 
 SLIP = np.linspace(0.05, 0.55, 40)
 EFFECTIVE = {"A": 0.6, "k": 10.0, "d": 0.2}
@@ -63,6 +63,16 @@ def test_parameters_that_draw_one_curve_have_a_twin() -> None:
     bounds = {p.name: (p.lower, p.upper) for p in model.parameters}
     assert all(low <= badge.twin[n] <= high for n, (low, high) in bounds.items())
     assert badge.effective == pytest.approx({"A": 1.42 * 0.48, "k": 11.36, "d": 1.42 * 0.52 * 0.01})
+
+
+def test_a_twin_is_looked_for_on_both_sides() -> None:
+    """Where one parameter is at its bound there is a way to one side alone, wherever the direction points."""
+    model, parameters = CURVES["exponential"], {"a": 10.0, "p": 0.52, "alpha_1": 0.01, "alpha_2": -11.36}
+    columns = [_sensitivity(model, parameters, name, SLIP) for name in parameters]
+    flattest = np.linalg.svd(np.column_stack(columns))[2][-1]
+    twins = [_twin(model, parameters, list(parameters), way, SLIP)[0] for way in (flattest, -flattest)]
+    assert twins[0] == pytest.approx(twins[1])
+    assert twins[0]["a"] < 10.0
 
 
 def test_a_parameter_without_any_effect_is_no_division_by_zero() -> None:

@@ -75,6 +75,7 @@ def test_literature_is_as_printed():
     assert soils["ice"].value(0.1) == pytest.approx(0.05, abs=1e-9)
     assert all(soil.source for soil in soils.values())
     assert brixius_soil(900e3, 0.1, 0.4, 340).resistance[0] > 0
+    assert brixius_soil(900e3, 0.1, 0.4, 340).name == "cone index 900 kPa"
     with pytest.raises(InputError, match="positive"):
         brixius_soil(-1, 0.1, 0.4, 340)
 

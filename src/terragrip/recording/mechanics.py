@@ -152,7 +152,7 @@ def _means(recording: Recording) -> _Means | None:
     if place.min() < 0 or place.max() >= count:  # time runs back: refused elsewhere
         return None
     mean = _binned(place, count, speed)
-    if count < _LEAST or float(np.nansum(mean)) <= 0:
+    if float(np.nansum(mean)) <= 0:
         return None
     change = np.r_[np.nan, (mean[2:] - mean[:-2]) / (2 * length), np.nan]
     rows = np.isfinite(change) & (np.nan_to_num(mean) > _MOVING * float(np.nanquantile(mean, 0.95)))

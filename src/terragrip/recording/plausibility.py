@@ -265,9 +265,10 @@ def _pairs(time: Floats, speed: Floats, turning: Floats) -> tuple[Floats, Floats
     known, rows = np.flatnonzero(np.isfinite(speed)), np.flatnonzero(np.isfinite(turning))
     if len(known) < 2 or len(rows) < 2:
         return None
-    after = known[np.clip(np.searchsorted(known, rows), 1, len(known) - 1)]
-    before = known[np.clip(np.searchsorted(known, rows) - 1, 0, len(known) - 2)]
-    rows = rows[time[after] - time[before] < max(_GAP, 3 * float(np.median(np.diff(time[known]))))]
+    after = np.clip(np.searchsorted(known, rows), 1, len(known) - 1)
+    rows = rows[
+        time[known[after]] - time[known[after - 1]] < max(_GAP, 3 * float(np.median(np.diff(time[known]))))
+    ]
     if not len(rows):
         return None
     rows = rows[:: max(1, len(rows) // _ENOUGH)]

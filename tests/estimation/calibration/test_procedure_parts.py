@@ -220,6 +220,8 @@ def test_a_calibration_as_plain_text() -> None:
     assert lines[3:] == [
         "", "wheel_radius: so", "drive_torque_scale: so", "", "Not determined by the data:", "  pitch_offset: no pitch", "", "Note: Look.",
     ]  # fmt: skip
+    wide = Calibration((quantity("drive_torque_scale", 600.0, 1000.0),), ()).table()
+    assert "  600    -1360 to 2560  " in wide  # no digits to cut off before the point
     assert Calibration((), ()).table() == "quantity  value  95 % interval  unit  from"
 
 

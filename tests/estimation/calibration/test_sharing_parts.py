@@ -100,6 +100,35 @@ def test_a_wheel_that_jumps_now_and_then_keeps_its_gain(monkeypatch: pytest.Monk
     assert abs(robust.log_gain[1] - plain.log_gain[1]) < 0.5 * abs(squares.log_gain[1] - plain.log_gain[1])
 
 
+def test_the_covariance_is_that_of_leaving_out_each_block_and_of_the_priors() -> None:
+    """Every block left out once and fitted anew (jackknife); what the priors' own errors add stands apart."""
+    bearing = np.array(
+        [0.3, 1.0, 1.7]
+    )  # so that a wheel's level counts by its load, beside one noise of the torques
+    data = rows(200)
+    data = replace(
+        data, leverage=bearing * data.leverage, torque=data.known + bearing * (data.torque - data.known)
+    )
+    problem = replace(_Problem.of(data).refined(np.zeros(3 * W)), torque_noise=2.0)
+    best = problem.solve(np.zeros(3 * W), 1.0)
+    values = []
+    for kept in (data.block != label for label in np.unique(data.block)):
+        parts = {
+            name: getattr(data, name)[kept]
+            for name in ("torque", "known", "leverage", "slip", "soil", "block")
+        }
+        rest = replace(
+            problem, data=replace(data, **parts), steepness=problem.steepness[kept], local=problem.local[kept]
+        )
+        values.append(rest.solve(best, 1.0))
+    apart = np.array(values) - np.mean(values, axis=0)
+    fit = problem.fit(best, 1.0)
+    inverse = _inverse(fit.normal)
+    expected = apart.T @ apart * (1 - 1 / len(values)) + inverse @ (fit.variance**2 * problem.prior) @ inverse
+    result = problem.covariance(best, 1.0, data.block)
+    np.testing.assert_allclose(np.diag(result), np.diag(expected), rtol=0.1)
+
+
 def test_what_is_not_determined_stays_nothing_in_an_inverse() -> None:
     matrix = np.diag([4.0, 0.0, 1e-8])
     np.testing.assert_allclose(_inverse(matrix), np.diag([0.25, 0.0, 1e8]), rtol=1e-9)

@@ -166,9 +166,8 @@ def _disagreement(rows: Sharing) -> float:
 def _driving(table: Windows, vehicle: Vehicle) -> Windows:
     """Windows of forward driving in which everything was measured."""
     rim = table.wheel_speed * vehicle.wheel_radius
-    known = np.all(
-        np.isfinite(table.torque + table.load + rim + table.wheel_acceleration + table.hub_speed), axis=1
-    )
+    needed = (table.torque, table.load, rim, table.wheel_acceleration, table.hub_speed)
+    known = np.isfinite(needed).all(axis=(0, 2))
     moving = (table.ground_speed > _SLOWEST) & np.all(rim > _SLOWEST, axis=1)
     whole = table.count > 0.5 * np.median(table.count[table.count > 0])
     slips = slip(table.wheel_speed, table.hub_speed, vehicle.wheel_radius)
