@@ -224,6 +224,49 @@ def test_two_vehicles_of_one_name(place: Path, refused: Refused) -> None:
     assert "has its name 'Heros'" in refused("--index", index, "--vehicle", place / "Heros.yaml")
 
 
+@pytest.mark.parametrize(
+    ("address", "said"),
+    [
+        ("foo", "write e.g. tcp://host:8786"),
+        ("http://x:1", "write e.g."),
+        ("tcp://x:y", "write e.g."),
+        ("tls://127.0.0.1:9", "certificates"),
+    ],
+)
+def test_what_is_no_address_of_a_scheduler_is_one_line(
+    place: Path, refused: Refused, address: str, said: str
+) -> None:
+    assert said in refused("--scheduler", address)
+
+
+def test_maps_of_logs_with_positions(place: Path, ran: Ran) -> None:
+    for number, name in enumerate(("mapped", "metres", "without")):
+        path = write_log(place / f"fields/{name}.csv", number)
+        if name != "without":
+            table = pd.read_csv(path)
+            table["latitude"], table["longitude"] = 51.0, 13.5 + table.index * 0.02 / 70100
+            if name == "metres":
+                table["latitude"] *= 111e3
+            table.to_csv(path, index=False)
+    logs = str(place / "fields/*.csv")
+    assert ran(logs, "--map")[0] == 0
+    summary = pd.read_parquet(place / "out/summary.parquet").set_index("log")
+    assert "metres of a grid" in summary["no_map"]["metres.csv"]
+    assert summary["no_map"]["without.csv"] == "holds no positions"
+    (file,) = (place / "out/cells").rglob("*.parquet")
+    cells = pd.read_parquet(file, partitioning=None)
+    assert set(cells["log"]) == {"mapped.csv"}
+    assert set(cells["epsg"]) == {32633}
+    assert len(cells) == summary["cells"]["mapped.csv"] > 15
+    rows = pd.read_parquet(place / "out" / summary["file"]["mapped.csv"], partitioning=None)
+    mean = rows[["slip_l", "slip_r"]].to_numpy()[rows["event"] == ""].mean()
+    assert np.average(cells["slip"], weights=cells["count"]) == pytest.approx(mean, abs=0.003)
+
+    assert "0 estimated, 3 unchanged" in ran(logs, "--map")[1]
+    assert "3 estimated" in ran(logs)[1]
+    assert not list((place / "out/cells").rglob("*.parquet"))
+
+
 def test_a_scheduler_that_does_not_answer(place: Path) -> None:
     code, _, errors = fleet(place, "--scheduler", "tcp://127.0.0.1:9")
     assert (code, errors.count("\n")) == (2, 1)

@@ -65,6 +65,9 @@ def command(
         str | None,
         typer.Option(metavar="AMOUNT", help="Most memory of a worker here, e.g. 2GB; its share by default."),
     ] = None,
+    maps: Annotated[
+        bool, typer.Option("--map", help="Map each log that has positions, too: OUT/cells.")
+    ] = False,
     metrics: Annotated[
         Path | None,
         typer.Option(metavar="FILE.prom", help="Write the run's numbers for Prometheus's node exporter."),
@@ -79,6 +82,7 @@ def command(
     import time
 
     from terragrip.estimation.methods import method_named
+    from terragrip.fleet.cells import require_maps
     from terragrip.fleet.logs import fleet_logs, matching, on_disk
     from terragrip.fleet.store import is_remote
     from terragrip.report.page import require_drawing
@@ -95,6 +99,8 @@ def command(
             hint="leave it out with --scheduler",
         )
     require_drawing()
+    if maps:
+        require_maps()
     here = [Path(one) for one in patterns if not is_remote(one)]
     files = on_disk(logs_in(here), output) if here else []
     files += [file for one in patterns if is_remote(one) for file in matching(one)]
@@ -111,6 +117,7 @@ def command(
             scheduler=scheduler,
             workers=workers,
             memory=memory,
+            maps=maps,
             progress=step,
         )
     if metrics is not None:

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import logging
 import os
+import re
 import time
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import CancelledError
 from contextlib import contextmanager
+from importlib.util import find_spec
 from typing import Any
 
 from terragrip.errors import InputError
@@ -101,6 +103,28 @@ def workers_at(scheduler: str | None, workers: int, memory: str | None) -> Itera
                 yield pool
             finally:
                 pool.close()
+
+
+def check_address(address: str) -> None:
+    """Refuse what Dask cannot connect to: it would leave a client half made, which complains with a traceback when it goes."""
+    written = re.fullmatch(r"(?:([a-z]+)://)?[^\s:/]+:\d{1,5}|(?:([a-z]+)://)?\[[^\s\]]+\]:\d{1,5}", address)
+    scheme = (written[1] or written[2] or "tcp") if written else None
+    if scheme not in ("tcp", "tls", "ws", "wss"):
+        raise InputError(
+            f"{address!r} is no address of a scheduler",
+            place="--scheduler",
+            hint="write e.g. tcp://host:8786",
+        )
+    if scheme not in ("tls", "wss") or find_spec("dask") is None:
+        return
+    import dask
+
+    if not dask.config.get("distributed.comm.tls.ca-file", None):
+        raise InputError(
+            f"{address} needs certificates",
+            place="--scheduler",
+            hint="name them in Dask's configuration, e.g. DASK_DISTRIBUTED__COMM__TLS__CA_FILE=ca.pem and those of client",
+        )
 
 
 def _client(address: str) -> Any:

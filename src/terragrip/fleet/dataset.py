@@ -54,8 +54,9 @@ def settled(
 
 
 def _drop(store: Store, old: Note, keep: Note | None) -> None:
-    if keep is None or keep["file"] != old["file"]:
-        store.remove(old["file"])
+    for kind in ("file", "cells"):
+        if old.get(kind) and (keep is None or keep[kind] != old[kind]):
+            store.remove(old[kind])
     store.remove(f"{NOTES}/{old['key']}.json")
     store.remove(f"{SAMPLES}/{old['key']}.parquet")
 
@@ -81,6 +82,8 @@ def write_tables(store: Store, notes: Sequence[Note], reasons: Mapping[str, str]
             *[(f"{name}_events", pa.int64()) for name in COUNTED],
             ("soils", pa.string()),
             ("notes", pa.string()),
+            ("cells", pa.int64()),
+            ("no_map", pa.string()),
         ]
     )
     rows = [{"log": n["log"], "key": n["key"], "file": n["file"], **n["summary"]} for n in notes]

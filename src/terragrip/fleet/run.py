@@ -10,7 +10,7 @@ from pathlib import Path
 
 from terragrip.errors import InputError
 from terragrip.estimation.methods import DEFAULT
-from terragrip.fleet.cluster import default_workers, workers_at
+from terragrip.fleet.cluster import check_address, default_workers, workers_at
 from terragrip.fleet.curves import learn_curves
 from terragrip.fleet.dataset import Note, known_notes, settled, write_tables, write_text
 from terragrip.fleet.logs import FleetLog
@@ -49,6 +49,7 @@ def run_fleet(
     scheduler: str | None = None,
     workers: int | None = None,
     memory: str | None = None,
+    maps: bool = False,
     progress: Callable[[int, int], None] | None = None,
 ) -> FleetResult:
     """Estimate logs into a data set (docs/fleet.md); what it holds already by the same log, vehicle, profile, method and version stays.
@@ -59,6 +60,7 @@ def run_fleet(
     output: a folder, or an address of a store that fsspec knows.
     method, smooth, dbc: as for :func:`terragrip.from_log.estimate_file`.
     scheduler: address of a Dask scheduler; None: ``workers`` processes here, each with ``memory`` ("2GB"; None: its share).
+    maps: map each log with positions, too (`terragrip.fleet.cells`).
     progress: called with logs done and logs in all.
 
     Raises
@@ -68,9 +70,11 @@ def run_fleet(
     """
     from terragrip import __version__
 
+    if scheduler is not None:
+        check_address(scheduler)
     store = Store.at(output)
     store.check()
-    settings = Settings(method, smooth, tuple(str(path.absolute()) for path in dbc), __version__)
+    settings = Settings(method, smooth, tuple(str(path.absolute()) for path in dbc), __version__, maps)
     outcomes: list[Outcome] = []
     emit(logger, "fleet_started", logs=len(logs))
     try:

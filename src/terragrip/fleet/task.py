@@ -23,18 +23,20 @@ Result = TypeVar("Result")
 
 NO_DAY = "__HIVE_DEFAULT_PARTITION__"
 """The partition of logs that do not say when they were written: null to readers of Hive partitions."""
-NOTES, SAMPLES, ESTIMATES = "state/logs", "state/samples", "estimates"
+NOTES, SAMPLES, ESTIMATES, CELLS = "state/logs", "state/samples", "estimates", "cells"
 """Folders of a data set."""
 
 
 @dataclass(frozen=True)
 class Settings:
-    """What all logs of a call share. ``version``: of the Terragrip that was called; workers must have the same."""
+    """What all logs of a call share. ``version``: of the Terragrip that was called; workers must have the same. ``maps``: each log with
+    positions is mapped, too."""
 
     method: str
     smooth: bool
     dbc: tuple[str, ...]
     version: str
+    maps: bool = False
 
 
 @dataclass(frozen=True)
@@ -108,8 +110,8 @@ def _estimated(log: FleetLog, settings: Settings, store: Store, bench: Path, num
         known = store.read(f"{NOTES}/{key}.json")
         if known is not None:
             return Outcome(log.name, json.loads(known))
-        local, thin, note_file = (
-            bench / f"{number}{end}" for end in (".parquet", "-sample.parquet", ".json")
+        local, thin, cells, note_file = (
+            bench / f"{number}{end}" for end in (".parquet", "-sample.parquet", "-cells.parquet", ".json")
         )
         tally = LogTally()
         estimate_file(
@@ -124,8 +126,11 @@ def _estimated(log: FleetLog, settings: Settings, store: Store, bench: Path, num
             observe=tally.add,
             summary=False,
         )
-    note = make_note(log, key, settings, tally)
+    mapped, no_map = _mapped(local, cells, log.name) if settings.maps else (0, "")
+    note = make_note(log, key, settings, tally, mapped, no_map)
     files = [(local, note["file"])]
+    if mapped:
+        files.insert(0, (cells, note["cells"]))
     if tally.sample:
         import pyarrow as pa
         import pyarrow.parquet as pq
@@ -138,6 +143,22 @@ def _estimated(log: FleetLog, settings: Settings, store: Store, bench: Path, num
     return _Made(log.name, note, tuple(files), time.monotonic() - began)
 
 
+def _mapped(estimates: Path, cells: Path, log: str) -> tuple[int, str]:
+    """Write the cells of a log's map; how many there are, and why there is none where its positions cannot be."""
+    import pyarrow.parquet as pq
+
+    from terragrip.fleet.cells import cells_of_log
+
+    try:
+        table = cells_of_log(estimates, log)
+    except InputError as error:
+        return 0, " ".join(str(error).split())
+    if table is None:
+        return 0, "holds no positions"
+    pq.write_table(table, cells)
+    return table.num_rows, ""
+
+
 def _put(made: Outcome | _Made, store: Store) -> Outcome:
     if isinstance(made, Outcome):
         return made
@@ -147,15 +168,21 @@ def _put(made: Outcome | _Made, store: Store) -> Outcome:
     return Outcome(made.log, made.note, fresh=True, seconds=made.seconds + time.monotonic() - began)
 
 
-def make_note(log: FleetLog, key: str, settings: Settings, tally: LogTally) -> dict[str, Any]:
-    """What the data set keeps of a log beside its estimates, ready for JSON: its row of the summary and those of its soils."""
+def make_note(
+    log: FleetLog, key: str, settings: Settings, tally: LogTally, mapped: int = 0, no_map: str = ""
+) -> dict[str, Any]:
+    """What the data set keeps of a log beside its estimates, ready for JSON: its row of the summary and those of its soils.
+
+    ``mapped``: cells of its map; ``no_map``: why it has none though one was asked for.
+    """
     row = tally.row()
     day = str(row["start"])[:10] if row["start"] else None
-    folder = f"{ESTIMATES}/vehicle={safe_name(log.machine)}/day={day or NO_DAY}"
+    place = f"vehicle={safe_name(log.machine)}/day={day or NO_DAY}/{safe_name(log.name)}.parquet"
     return {
         "log": log.name,
         "key": key,
-        "file": f"{folder}/{safe_name(log.name)}.parquet",
+        "file": f"{ESTIMATES}/{place}",
+        "cells": f"{CELLS}/{place}" if mapped else None,
         "sample": bool(tally.sample),
         "summary": {
             "vehicle": log.machine,
@@ -165,6 +192,8 @@ def make_note(log: FleetLog, key: str, settings: Settings, tally: LogTally) -> d
             "smooth": settings.smooth,
             "version": settings.version,
             **row,
+            "cells": mapped,
+            "no_map": no_map,
         },
         "soils": tally.soil_rows(),
     }
@@ -182,6 +211,7 @@ def key_of(log: FleetLog, source: Path, settings: Settings) -> str:
         "method": settings.method,
         "smooth": settings.smooth,
         "version": settings.version,
+        **({"maps": True} if settings.maps else {}),
     }
     return hashlib.sha256(json.dumps(parts, sort_keys=True).encode()).hexdigest()
 
