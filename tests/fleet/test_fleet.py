@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import polars as pl
+import pyarrow.parquet as pq
 import pytest
 
 import terragrip as tg
@@ -258,6 +259,8 @@ def test_maps_of_logs_with_positions(place: Path, ran: Ran) -> None:
     assert set(cells["log"]) == {"mapped.csv"}
     assert set(cells["epsg"]) == {32633}
     assert len(cells) == summary["cells"]["mapped.csv"] > 15
+    adhesion = pq.read_table(file, partitioning=None)["adhesion"]
+    assert adhesion.null_count == cells["adhesion"].isna().sum(), "null, which sums pass over, not NaN"
     rows = pd.read_parquet(place / "out" / summary["file"]["mapped.csv"], partitioning=None)
     mean = rows[["slip_l", "slip_r"]].to_numpy()[rows["event"] == ""].mean()
     assert np.average(cells["slip"], weights=cells["count"]) == pytest.approx(mean, abs=0.003)

@@ -48,4 +48,5 @@ def cells_of_log(path: str | os.PathLike[str], log: str) -> pa.Table | None:
         "east": (table["column"] + 0.5) * made.cell,
         "north": (table["row"] + 0.5) * made.cell,
     }
-    return pa.table({**where, **table})
+    # null, not NaN, where a cell does not hold a quantity: sums pass over it
+    return pa.table({name: pa.array(values, from_pandas=True) for name, values in {**where, **table}.items()})
