@@ -209,8 +209,15 @@ def test_radii_that_are_exchanged_are_named_and_slip_is_not() -> None:
     assert told(scaled(drive(), {"wheel_speed_f": 1.1})) == ""
 
 
-@pytest.mark.parametrize("run", ["hard-09", "fine-09"])
-def test_axles_that_share_a_pull_as_loads_do_are_no_wrong_sign(run: str) -> None:
-    """Runs of the demonstration's campaign (simulation), in which the front wheels' share of the pull falls as the rear's grows."""
-    ((_, result),) = simulate_campaign([run], seed=0, workers=1)
+@pytest.mark.parametrize(("run", "seed"), [("hard-09", 0), ("fine-09", 0), ("fine-08", 1)])
+def test_axles_that_share_a_pull_and_wheels_that_dig_in_are_no_wrong_sign(run: str, seed: int) -> None:
+    """Runs of the demonstration's campaign (simulation): the front wheels' share of the pull falls as the rear's grows, or the vehicle
+    slows down the harder it is driven."""
+    ((_, result),) = simulate_campaign([run], seed=seed, workers=1)
     assert unit_warnings(result.recording, result.vehicle) == []
+
+
+def test_without_an_accelerometer_the_thrust_tells_the_pitchs_sign() -> None:
+    columns = without(drive(), "acceleration_x", "acceleration_y", "acceleration_z")
+    assert told(columns) == ""
+    assert told(scaled(columns, {"pitch": -1.0})).startswith("pitch falls where the wheels are driven harder")

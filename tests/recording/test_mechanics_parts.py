@@ -7,18 +7,18 @@ import pytest
 
 from terragrip.recording import Recording
 from terragrip.recording.mechanics import (
+    Means,
     _balance_warnings,
     _binned,
     _dead_warnings,
     _Fit,
-    _Means,
-    _means,
     _pitch_warnings,
     _radius_warnings,
     _scale_sentence,
     _thrust_warnings,
-    _thrusts,
+    means_of,
     motion_warnings,
+    thrusts_of,
 )
 from terragrip.vehicle import Vehicle
 
@@ -27,9 +27,9 @@ WHEELS = ("fl", "fr", "rl", "rr")
 RADIUS, MASS = 0.2, 139.0
 
 
-def windows(n: int, climb: np.ndarray | None = None) -> _Means:
+def windows(n: int, climb: np.ndarray | None = None) -> Means:
     """n windows of one row each, all of them used."""
-    return _Means(np.arange(n), n, np.ones(n, dtype=bool), np.zeros(n), np.ones(n), climb)
+    return Means(np.arange(n), n, np.ones(n, dtype=bool), np.zeros(n), np.ones(n), climb)
 
 
 @pytest.mark.parametrize(
@@ -109,7 +109,7 @@ def test_windows_last_a_second_and_two_samples(step: float, length: float) -> No
     time = 50.0 + step * np.arange(round(60 * length / step))
     speed = 1.0 + 0.03 * (time - 50.0)
     pitch = np.full(len(time), 0.1)
-    means = _means(Recording(time, {"ground_speed": speed, "pitch": pitch}))
+    means = means_of(Recording(time, {"ground_speed": speed, "pitch": pitch}))
     assert means is not None
     assert means.count == 60
     assert means.rows.sum() == 58
@@ -121,19 +121,19 @@ def test_windows_last_a_second_and_two_samples(step: float, length: float) -> No
 def test_standing_windows_and_backward_driving_do_not_count() -> None:
     time = np.arange(0.0, 60.0, 0.5)
     for slow, count in ((0.14, 29), (0.16, 58)):
-        means = _means(Recording(time, {"ground_speed": np.where(time < 30, 1.0, slow)}))
+        means = means_of(Recording(time, {"ground_speed": np.where(time < 30, 1.0, slow)}))
         assert means is not None
         assert means.rows.sum() == count
         assert means.climb is None
-    assert _means(Recording(time, {"ground_speed": np.full(120, -1.0)})) is None
+    assert means_of(Recording(time, {"ground_speed": np.full(120, -1.0)})) is None
     backward = np.where(time < 29, 1.0, -1.0)  # more backward than forward
-    assert _means(Recording(time, {"ground_speed": backward})) is None
-    assert _means(Recording(time[:20], {"ground_speed": np.ones(20)})) is None
-    assert _means(Recording(time, {})) is None
+    assert means_of(Recording(time, {"ground_speed": backward})) is None
+    assert means_of(Recording(time[:20], {"ground_speed": np.ones(20)})) is None
+    assert means_of(Recording(time, {})) is None
     for seconds, enough in ((26.0, False), (26.5, True)):
         rows = time < seconds
-        assert (_means(Recording(time[rows], {"ground_speed": np.ones(rows.sum())})) is not None) is enough
-    assert _means(Recording(np.r_[time[1:], 0.0], {"ground_speed": np.ones(120)})) is None
+        assert (means_of(Recording(time[rows], {"ground_speed": np.ones(rows.sum())})) is not None) is enough
+    assert means_of(Recording(np.r_[time[1:], 0.0], {"ground_speed": np.ones(120)})) is None
 
 
 def test_thrust_of_a_wheel_is_torque_over_radius_less_its_share_of_the_pull(vehicle: Vehicle) -> None:
@@ -141,15 +141,15 @@ def test_thrust_of_a_wheel_is_torque_over_radius_less_its_share_of_the_pull(vehi
     channels = {"ground_speed": np.ones(120), "drawbar_force": np.full(120, 200.0)}
     channels |= {f"drive_torque_{w}": np.full(120, 10.0 + k) for k, w in enumerate(WHEELS)}
     log = Recording(time, channels)
-    means = _means(log)
+    means = means_of(log)
     assert means is not None
-    thrusts = _thrusts(log, vehicle, means)
+    thrusts = thrusts_of(log, vehicle, means)
     for k, wheel in enumerate(WHEELS):
         np.testing.assert_allclose(thrusts[wheel], ((10.0 + k) / RADIUS - 50.0) / MASS)
     free = Recording(time, {n: v for n, v in channels.items() if n != "drawbar_force"})
-    np.testing.assert_allclose(_thrusts(free, vehicle, means)["fl"], 10.0 / RADIUS / MASS)
+    np.testing.assert_allclose(thrusts_of(free, vehicle, means)["fl"], 10.0 / RADIUS / MASS)
     assert (
-        _thrusts(
+        thrusts_of(
             Recording(time, {n: v for n, v in channels.items() if n != "drive_torque_rr"}), vehicle, means
         )
         == {}
@@ -182,7 +182,7 @@ def torques(turned: tuple[str, ...] = (), **more: np.ndarray) -> Recording:
 def test_which_of_torques_and_accelerometer_is_wrong_the_speed_decides(
     vehicle: Vehicle, forward: float, thrust: float, words: str
 ) -> None:
-    means = _Means(np.arange(80), 80, np.ones(80, dtype=bool), X, np.ones(80))
+    means = Means(np.arange(80), 80, np.ones(80, dtype=bool), X, np.ones(80))
     log = torques()
     thrusts = dict.fromkeys(WHEELS, thrust * X / 4)
     notes = _balance_warnings(log, means, forward * X, thrusts, vehicle)
@@ -197,14 +197,14 @@ def test_which_of_torques_and_accelerometer_is_wrong_the_speed_decides(
 def test_wheels_that_drive_against_the_others_are_named(
     vehicle: Vehicle, turned: tuple[str, ...], words: str
 ) -> None:
-    means = _Means(np.arange(80), 80, np.ones(80, dtype=bool), X, np.ones(80))
+    means = Means(np.arange(80), 80, np.ones(80, dtype=bool), X, np.ones(80))
     thrusts = {w: (-1 if w in turned else 1) * X / 4 for w in WHEELS}
     notes = " ".join(_balance_warnings(torques(turned), means, X, thrusts, vehicle))
     assert notes == "" if not words else words in notes
 
 
 def test_torques_that_go_with_the_other_axis_are_told(vehicle: Vehicle) -> None:
-    means = _Means(np.arange(80), 80, np.ones(80, dtype=bool), X, np.ones(80))
+    means = Means(np.arange(80), 80, np.ones(80, dtype=bool), X, np.ones(80))
     log = torques(acceleration_y=np.convolve(X, [0.0, 1.0, 0.0], "same"))
     sideways = np.random.default_rng(1).normal(size=80)
     (note,) = _balance_warnings(log, means, sideways, dict.fromkeys(WHEELS, X / 4), vehicle)
@@ -219,7 +219,7 @@ def test_pitch_is_held_against_what_the_accelerometer_reads_beyond_the_speed(
     slope: float, with_roll: bool, words: str
 ) -> None:
     climb, roll = 0.3 * X, 0.1 * np.cos(np.arange(80) / 5.0)
-    means = _Means(np.arange(80), 80, np.ones(80, dtype=bool), X, np.ones(80), climb)
+    means = Means(np.arange(80), 80, np.ones(80, dtype=bool), X, np.ones(80), climb)
     log = Recording(np.arange(80.0), {"roll": roll})
     seen = means.of(np.sin(roll)) if with_roll else slope * climb
     notes = _pitch_warnings(log, means, np.nan_to_num(X + seen))
@@ -285,7 +285,7 @@ def test_slip_at_hardly_a_torque_is_a_wrong_radius(
         channels[f"wheel_speed_{wheel}"] = np.full(120, 1.0 / (ratio * RADIUS))
         channels[f"drive_torque_{wheel}"] = np.full(120, torque * LIGHT)
     log = Recording(time, channels)
-    means = _means(log)
+    means = means_of(log)
     assert means is not None
     notes = _radius_warnings(log, vehicle, means)
     assert bool(notes) is doubted
@@ -316,7 +316,7 @@ def test_without_an_accelerometer_change_of_speed_and_climb_tell(
 ) -> None:
     climb = np.cos(np.arange(80) / 5.0)
     for grade in (None, climb):
-        means = _Means(np.arange(80), 80, np.ones(80, dtype=bool), X, np.ones(80), grade)
+        means = Means(np.arange(80), 80, np.ones(80, dtype=bool), X, np.ones(80), grade)
         force = X + (0.0 if grade is None else grade)
         notes = " ".join(_thrust_warnings(means, dict.fromkeys(WHEELS, scale * force / 4), vehicle))
         assert notes == "" if not words else words in notes

@@ -69,7 +69,7 @@ class _Fit:
 
 
 @dataclass(frozen=True)
-class _Means:
+class Means:
     """Windows of driving forward (n,): ``place`` of each row of the log among all ``count`` windows, which of them are used (``rows``),
     and of these the ``change`` of ground speed [m/s²], the ``speed`` [m/s] and g sin(pitch), ``climb`` [m/s²], if the log has it."""
 
@@ -106,7 +106,7 @@ class _Means:
 
 def motion_warnings(recording: Recording, vehicle: Vehicle | None) -> list[str]:
     """Sentences on accelerations, pitch, torques, radius and mass that the motion contradicts, and on sensors that never change."""
-    means = _means(recording)
+    means = means_of(recording)
     if means is None:
         return []
     forward = (
@@ -117,7 +117,7 @@ def motion_warnings(recording: Recording, vehicle: Vehicle | None) -> list[str]:
     if vehicle is not None and vehicle.knows_wheels:
         notes = _dead_warnings(recording, vehicle)
         notes += _radius_warnings(recording, vehicle, means)
-        thrusts = {} if notes else _thrusts(recording, vehicle, means)
+        thrusts = {} if notes else thrusts_of(recording, vehicle, means)
         notes += _pull_warnings(means, thrusts, recording, vehicle)
     if forward is not None:
         found = _balance_warnings(recording, means, forward, thrusts, vehicle)
@@ -140,7 +140,7 @@ def _binned(place: npt.NDArray[np.intp], count: int, values: Floats) -> Floats:
     return np.where(number > 0, total / np.maximum(number, 1), np.nan)
 
 
-def _means(recording: Recording) -> _Means | None:
+def means_of(recording: Recording) -> Means | None:
     """None where too few windows of driving are left, or time runs back."""
     speed = recording.channels.get("ground_speed")
     known = np.flatnonzero(np.isfinite(speed)) if speed is not None else ()
@@ -158,22 +158,22 @@ def _means(recording: Recording) -> _Means | None:
     rows = np.isfinite(change) & (np.nan_to_num(mean) > _MOVING * float(np.nanquantile(mean, 0.95)))
     if rows.sum() < _LEAST:
         return None
-    means = _Means(place, count, rows, change[rows], mean[rows])
+    means = Means(place, count, rows, change[rows], mean[rows])
     if "pitch" not in recording.channels:
         return means
     climb = STANDARD_GRAVITY * means.of(np.sin(recording.channels["pitch"]))
     return replace(means, climb=climb)
 
 
-def _driven(vehicle: Vehicle) -> dict[str, float]:
+def driven_radii(vehicle: Vehicle) -> dict[str, float]:
     """Radius of each driven wheel."""
     wheels = zip(vehicle.wheels, vehicle.wheel_radius, vehicle.driven, strict=True)
     return {wheel: float(radius) for wheel, radius, driven in wheels if driven}
 
 
-def _thrusts(recording: Recording, vehicle: Vehicle, means: _Means) -> dict[str, Floats]:
+def thrusts_of(recording: Recording, vehicle: Vehicle, means: Means) -> dict[str, Floats]:
     """Of each driven wheel its thrust less its share of the drawbar force, over the mass (n,) [m/s²]; none where a torque is missing."""
-    radii, channels = _driven(vehicle), recording.channels
+    radii, channels = driven_radii(vehicle), recording.channels
     if not all(f"drive_torque_{wheel}" in channels for wheel in radii):
         return {}
     pulled = means.of(channels["drawbar_force"]) / len(radii) if "drawbar_force" in channels else 0.0
@@ -184,7 +184,7 @@ def _thrusts(recording: Recording, vehicle: Vehicle, means: _Means) -> dict[str,
 
 
 def _balance_warnings(
-    recording: Recording, means: _Means, forward: Floats, thrusts: dict[str, Floats], vehicle: Vehicle | None
+    recording: Recording, means: Means, forward: Floats, thrusts: dict[str, Floats], vehicle: Vehicle | None
 ) -> list[str]:
     """acceleration_x and the torques against each other, and where they differ, each against the change of ground speed."""
     moved = means.fit(forward, means.change, beside_climb=True)
@@ -210,7 +210,9 @@ def _balance_warnings(
             "'unit: g' in the profile), or not the axis that points forward."
         ]
     if driven.is_off() and driven.distance > moved.distance:
-        return [_scale_sentence(together.slope, vehicle)]
+        # What digs in slows down the harder it is driven.
+        digs = together.slope < 0 and np.nanmean(thrust) > 0
+        return [] if digs else [_scale_sentence(together.slope, vehicle)]
     wrong = "against each other" if together.slope < 0 else f"{together.slope:.2g} times apart"
     return [
         f"The drive torques over radius and mass and acceleration_x go {wrong}, and the ground speed does not show which of them is wrong: "
@@ -219,7 +221,7 @@ def _balance_warnings(
 
 
 def _exchanged(
-    recording: Recording, means: _Means, forward: Floats, thrusts: dict[str, Floats], together: _Fit
+    recording: Recording, means: Means, forward: Floats, thrusts: dict[str, Floats], together: _Fit
 ) -> str:
     """Whether some wheels' torques with the other sign, or the accelerometer's other axis, make a balance where there is none."""
     # A wheel of a wrong sign also brakes on average; how axles share a pull that changes looks like a sign in their changes alone.
@@ -243,12 +245,23 @@ def _exchanged(
     return f"{names}: the other wheels' torques go with acceleration_x, and these against it; {_SIGN.format('each')}."
 
 
-def _thrust_warnings(means: _Means, thrusts: dict[str, Floats], vehicle: Vehicle | None) -> list[str]:
+def _thrust_warnings(means: Means, thrusts: dict[str, Floats], vehicle: Vehicle | None) -> list[str]:
     """The torques against the change of ground speed and the climb alone."""
     if not thrusts or vehicle is None:
         return []
-    moved = means.change + (0.0 if means.climb is None else means.climb)
-    fit = means.fit(np.sum(list(thrusts.values()), axis=0), moved)
+    moved, thrust = (
+        means.change + (0.0 if means.climb is None else means.climb),
+        np.sum(list(thrusts.values()), axis=0),
+    )
+    if means.climb is not None:
+        uphill = means.fit(thrust - means.change, means.climb)
+        if uphill.alike < -_ALIKE and np.nanmean(thrust) > 0:
+            return [
+                "pitch falls where the wheels are driven harder at one speed: nose up is positive; write 'sign: -1' for it in the profile."
+            ]
+    fit = means.fit(thrust, moved)
+    if fit.slope < 0 and np.nanmean(thrust) > 0:
+        return []
     return [_scale_sentence(fit.slope, vehicle)] if fit.is_another_scale else []
 
 
@@ -261,7 +274,7 @@ def _scale_sentence(scale: float, vehicle: Vehicle) -> str:
     )
 
 
-def _pitch_warnings(recording: Recording, means: _Means, forward: Floats) -> list[str]:
+def _pitch_warnings(recording: Recording, means: Means, forward: Floats) -> list[str]:
     """The pitch against what the accelerometer reads beyond the change of ground speed."""
     if means.climb is None:
         return []
@@ -280,7 +293,7 @@ def _pitch_warnings(recording: Recording, means: _Means, forward: Floats) -> lis
 
 
 def _pull_warnings(
-    means: _Means, thrusts: dict[str, Floats], recording: Recording, vehicle: Vehicle
+    means: Means, thrusts: dict[str, Floats], recording: Recording, vehicle: Vehicle
 ) -> list[str]:
     """The drawbar force against what it can be: backward, and less than the wheels' thrust, over a whole drive."""
     if "drawbar_force" not in recording.channels or not thrusts:
@@ -307,7 +320,7 @@ def _pull_warnings(
     return []
 
 
-def _offset_warnings(means: _Means, forward: Floats) -> list[str]:
+def _offset_warnings(means: Means, forward: Floats) -> list[str]:
     """What the accelerometer reads beyond the change of ground speed and the climb that the pitch shows, on average."""
     if means.climb is None:
         return []
@@ -325,7 +338,7 @@ def _offset_warnings(means: _Means, forward: Floats) -> list[str]:
 def _dead_warnings(recording: Recording, vehicle: Vehicle) -> list[str]:
     """Wheels' channels that hold one value for the whole drive where other wheels' change."""
     notes = []
-    for quantity, wheels in (("wheel_speed", vehicle.wheels), ("drive_torque", tuple(_driven(vehicle)))):
+    for quantity, wheels in (("wheel_speed", vehicle.wheels), ("drive_torque", tuple(driven_radii(vehicle)))):
         known = {f"{quantity}_{wheel}": recording.channels.get(f"{quantity}_{wheel}") for wheel in wheels}
         held = {
             name: v[np.isfinite(v)] for name, v in known.items() if v is not None and np.isfinite(v).any()
@@ -340,11 +353,11 @@ def _dead_warnings(recording: Recording, vehicle: Vehicle) -> list[str]:
     return notes
 
 
-def _radius_warnings(recording: Recording, vehicle: Vehicle, means: _Means) -> list[str]:
+def _radius_warnings(recording: Recording, vehicle: Vehicle, means: Means) -> list[str]:
     """Slip where there is hardly a torque; beyond `RATIOS` `unit_warnings` says which unit may be wrong."""
     load = vehicle.mass * STANDARD_GRAVITY / len(vehicle.wheels)
     off: dict[str, float] = {}
-    for wheel, radius in _driven(vehicle).items():
+    for wheel, radius in driven_radii(vehicle).items():
         turning, torque = (
             recording.channels.get(f"{name}_{wheel}") for name in ("wheel_speed", "drive_torque")
         )
@@ -360,7 +373,7 @@ def _radius_warnings(recording: Recording, vehicle: Vehicle, means: _Means) -> l
         return []
     apparent, stated = (
         float(np.median(list(off.values()))),
-        float(np.median([_driven(vehicle)[w] for w in off])),
+        float(np.median([driven_radii(vehicle)[w] for w in off])),
     )
     return [
         f"With hardly a torque the wheels {', '.join(off)} slip by {1 - apparent / stated:.2f}, which no ground lets them: they roll "

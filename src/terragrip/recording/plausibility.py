@@ -8,6 +8,8 @@ import numpy as np
 import numpy.typing as npt
 
 from terragrip.recording.mechanics import RATIOS, motion_warnings
+from terragrip.recording.sides import exchanged_torques, side_warnings
+from terragrip.recording.torques import torque_warnings
 from terragrip.recording.track import Track, track_of
 from terragrip.recording.turns import SURE, agreement, exchange_warnings, filled, straight_rows
 
@@ -35,6 +37,8 @@ _ENOUGH = 4000  # rows: a median that is to be distinguished from another by a t
 _APART = 1.2  # of the rims of driven wheels: front wheels lead by 5 % at most, radii are known to 10 %
 _GAP = 1.0  # s, or three samples: what lies between them was not measured
 _OUTRUN = 1.5  # straight line over way: above, the way is too short
+_TOO_SLOW, _LONG_WAY = 1.15, 20.0  # the same, over windows of so many metres
+_TOO_FAST = 1.3  # ground speed over the positions' speed, which noise only makes larger
 _WAY_WINDOW = 10.0  # s
 
 
@@ -45,28 +49,29 @@ def unit_warnings(recording: Recording, vehicle: Vehicle | None) -> list[str]:
     The speeds are judged where both are well above standstill, by the median of their ratio.
     """
     track = track_of(recording)
-    exchanged = (
-        []
-        if vehicle is None or not vehicle.knows_wheels
-        else exchange_warnings(recording, vehicle, _shown_turn(recording, track))
-    )
-    return [
-        *(_speed_warnings(recording, vehicle) if vehicle is not None else ()),
+    known = vehicle if vehicle is not None and vehicle.knows_wheels else None
+    shown = None if known is None else _shown_turn(recording, track)
+    exchanged = [] if known is None else exchange_warnings(recording, known, shown)
+    sided = [] if known is None else side_warnings(recording, known, shown)
+    moved = motion_warnings(recording, vehicle)
+    notes = [
+        *(_speed_warnings(recording, known) if known is not None and not sided else ()),
+        *sided,
         *_drive_warnings(recording),
         *_position_warnings(recording, track),
         *exchanged,
         *_turn_warnings(recording, None if exchanged else vehicle, track),
         *_angle_warnings(recording),
         *_acceleration_warnings(recording),
-        *motion_warnings(recording, vehicle),
+        *moved,
+        *(torque_warnings(recording, known) if known is not None and not moved else ()),
         *_time_warnings(recording),
     ]
+    return notes if notes or known is None else exchanged_torques(recording, known, shown)
 
 
 def _speed_warnings(recording: Recording, vehicle: Vehicle) -> list[str]:
     result: dict[str, list[tuple[str, float]]] = {}
-    if not vehicle.knows_wheels:
-        return []
     straight = straight_rows(recording, vehicle)
     usual: dict[str, float] = {}
     for wheel, radius, driven in zip(vehicle.wheels, vehicle.wheel_radius, vehicle.driven, strict=True):
@@ -133,16 +138,28 @@ def _position_warnings(recording: Recording, track: Track | None) -> list[str]:
     sentence = f"ground_speed is {1 / result:.3g} times the speed of the positions"
     if 2.9 < 1 / result < 4.4:
         return [f"{sentence}: it may be in km/h: 1 km/h is 0.2778 m/s."]
+    if result < 1 / _TOO_FAST:
+        return [f"{sentence}: check its unit and scale."]
     if 2.9 < result < 4.4 and _straight_ahead(recording, track) > _OUTRUN:
         return [f"{sentence}: it was taken for km/h, and may be in m/s."]
+    ahead = _straight_ahead(recording, track, _LONG_WAY)
+    if ahead > _TOO_SLOW:
+        return [
+            f"In a straight line the positions come {ahead:.3g} times as far as ground_speed makes: check its unit and scale "
+            "(a knot is 1.852 km/h, a mile an hour 1.609), and that latitude and longitude are not exchanged."
+        ]
     return []
 
 
-def _straight_ahead(recording: Recording, track: Track) -> float:
-    """What the positions come in a straight line over what the ground speed makes in the same time: median over windows in motion."""
+def _straight_ahead(recording: Recording, track: Track, least: float = 0.0) -> float:
+    """What the positions come in a straight line over what the ground speed makes in the same time: median over windows in motion.
+
+    ``least`` [m]: what the ground speed makes of a window at least, so that it is more than the positions' noise.
+    """
     speed = np.abs(filled(recording.time, recording.channels["ground_speed"]))
     way = np.r_[0.0, np.cumsum(np.diff(recording.time) * (speed[1:] + speed[:-1]) / 2)]
-    edges = np.arange(track.time[0], track.time[-1], _WAY_WINDOW)
+    length = max(_WAY_WINDOW, least / max(_high(speed), 1e-9))
+    edges = np.arange(track.time[0], track.time[-1], length)
     if len(edges) < 2:
         return 0.0
     north, east = (np.interp(edges, track.time, x) for x in (track.north, track.east))
@@ -166,7 +183,7 @@ def _turn_warnings(recording: Recording, vehicle: Vehicle | None, track: Track |
     """The gyroscope's rate of turn against that of the positions and that of the wheels' speeds from side to side."""
     yaw = recording.channels.get("angular_velocity_z")
     if yaw is None:
-        return []
+        return [] if vehicle is None or track is None else _mirrored(recording, vehicle, track)
     text: dict[str, float] = {}
     if track is not None:
         text["the positions"] = agreement(recording.time, yaw, track.at("turn", recording.time))
@@ -194,6 +211,15 @@ def _turn_warnings(recording: Recording, vehicle: Vehicle | None, track: Track |
     return [
         f"angular_velocity_z is of the wrong sign: {' and '.join(against)} turn the other way. Left is positive: write 'sign: -1' for "
         f"it in the profile.{or_else}"
+    ]
+
+
+def _mirrored(recording: Recording, vehicle: Vehicle, track: Track) -> list[str]:
+    """The positions' turns against those of the wheels, where no gyroscope decides."""
+    if agreement(recording.time, _wheel_turn(recording, vehicle), track.at("turn", recording.time)) > -SURE:
+        return []
+    return [
+        "The positions turn against the wheels' speeds: latitude and longitude, or left and right wheels, may be exchanged."
     ]
 
 

@@ -24,9 +24,9 @@ Axles = list[tuple[int, int]]
 SURE = 0.5
 """Correlation of two rates of turn that tell the same, or of the opposite sign contradict each other."""
 
-_WINDOW = 2.0  # s
+WINDOW = 2.0  # s
 _MOST = 1e9  # of any unit: what is more is a fault, and its square may be no number
-_LEAST_TURN = 1.5  # rad: with less there is nothing to compare
+LEAST_TURN = 1.5  # rad: with less there is nothing to compare
 _CLEAR = 0.8  # correlation from which another order of the wheels is the right one
 _SIZES = 0.4  # of what is shown: the turn by the rims of an axle
 _WIDE = 0.05  # of the wheels' speeds: what they differ by from side to side must be more than noise
@@ -51,13 +51,13 @@ def agreement(time: Floats, yaw: Floats, other: Floats) -> float:
     if not known.any():
         return 0.0
     a, b = windows(time, np.where(known, [yaw, other], np.nan))
-    return _correlation(a, b) if np.sum(np.abs(a)) * _WINDOW >= _LEAST_TURN else 0.0
+    return _correlation(a, b) if np.sum(np.abs(a)) * WINDOW >= LEAST_TURN else 0.0
 
 
 def windows(time: Floats, values: Floats) -> Floats:
     """Means of channels (k, n) over the windows of 2 s in which all of them hold a value that can be (k, m)."""
     known = (np.abs(values) < _MOST).all(axis=0)
-    place = ((time - time[0]) / _WINDOW).astype(np.intp)[known]
+    place = ((time - time[0]) / WINDOW).astype(np.intp)[known]
     count = np.bincount(place) if known.any() else np.zeros(0)
     return np.array([np.bincount(place, row[known])[count > 0] / count[count > 0] for row in values])
 
@@ -149,7 +149,7 @@ def _turned(
         ordered = wheels[list(order)]
         turns = [(ordered[right] - ordered[left]) / width for left, right in axles]
         against = turns[0] if shown is None else shown
-        if np.sum(np.abs(against)) * _WINDOW < _LEAST_TURN:
+        if np.sum(np.abs(against)) * WINDOW < LEAST_TURN:
             return 0.0
         if shown is None and width * np.sqrt(np.mean(against**2)) < _WIDE * pace:
             return 0.0

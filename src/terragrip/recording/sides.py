@@ -1,0 +1,238 @@
+"""What the left and the right wheel of an axle say against each other: sentences for the user, never errors.
+
+Straight ahead both roll alike and, within what sensors and ground make, take like torques, as the wheels of the other axles do. In a turn
+the wheel that the drive makes faster than its hub pulls, and the slower one brakes: a torque goes with its own wheel's slip.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+import numpy.typing as npt
+
+from terragrip.recording.turns import LEAST_TURN, SURE, WINDOW, filled, windows
+from terragrip.units import STANDARD_GRAVITY
+
+if TYPE_CHECKING:
+    from terragrip.recording.table import Recording
+    from terragrip.vehicle import Vehicle
+
+Floats = npt.NDArray[np.float64]
+
+_LEAST = 15  # windows of 2 s
+_DRIVING = 0.3  # of the speed that a twentieth of the windows reach
+_BACKWARD = 0.5  # share of the driving in which a wheel turns against all others
+_STRAIGHT = 0.03  # of the speed: the hubs' difference by the turn
+_ROLL = 0.05  # of a rim's speed: radii of one axle's tyres differ by 2 %
+_PULLING = 0.1  # of an axle's load: torques that are compared
+_UNEVEN = 0.22  # the logarithm of 1.25: uncalibrated torques of a wheel are 5 % off, two of them 7
+_STEADY = 0.15  # quartiles of that logarithm
+_OPPOSED = 0.7  # correlation, of the other sign
+_HARD = 0.05  # of a wheel's load: sides that are driven against each other in turns
+
+
+def side_warnings(recording: Recording, vehicle: Vehicle, turn: Floats | None) -> list[str]:
+    """Sentences on wheels of a wrong sign, radius, or torque scale. ``turn`` (n,) [rad/s], left positive: what a sensor shows."""
+    backward = _backward_warnings(recording, vehicle)
+    drive = None if backward or turn is None else _Drive.of(recording, vehicle, turn)
+    if drive is None:
+        return backward
+    straight = drive.driving & (np.abs(drive.hubs) < _STRAIGHT * drive.pace)
+    rolling = [note for axle in drive.axles for note in _rolling(axle, straight)]
+    opposed = [note for axle in drive.axles for note in _opposed(axle, straight)]
+    return rolling or opposed or _uneven(drive.axles, straight)
+
+
+def exchanged_torques(recording: Recording, vehicle: Vehicle, turn: Floats | None) -> list[str]:
+    """Torques that go against their wheels' slip in turns, on a vehicle whose sides are driven against each other there.
+
+    Other faults of speeds, torques and turn look alike: this is to be asked where nothing else was found.
+    """
+    drive = None if turn is None else _Drive.of(recording, vehicle, turn)
+    if drive is None:
+        return []
+    odd = [
+        "drive_torque_{} and drive_torque_{}".format(*axle.wheels)
+        for axle in drive.axles
+        if drive.contradicts(axle)
+    ]
+    if not odd:
+        return []
+    return [
+        f"{', '.join(odd)} (or these wheels' speeds) may be exchanged: in turns the wheel that is faster than its hub would brake, and the "
+        "slower one pull. Check which wheel each column is of."
+    ]
+
+
+@dataclass(frozen=True)
+class _Axle:
+    """Window means of an axle's outer wheels (2, n), left and right: ``rims`` [m/s] and ``pulls`` [N], the latter None without torques."""
+
+    name: str
+    wheels: tuple[str, str]
+    load: float
+    rims: Floats
+    pulls: Floats | None
+
+
+@dataclass(frozen=True)
+class _Drive:
+    """Axles in windows (n,): their mean ``pace`` and what their ``hubs`` differ by in turns [m/s], whether they are ``driving``,
+    and what all turns come to (``turned``) [rad]."""
+
+    axles: tuple[_Axle, ...]
+    pace: Floats
+    hubs: Floats
+    driving: npt.NDArray[np.bool_]
+    turned: float
+
+    @classmethod
+    def of(cls, recording: Recording, vehicle: Vehicle, turn: Floats) -> _Drive | None:
+        """None without a track, axles of two sides, or windows enough."""
+        if not vehicle.track or np.any(np.diff(recording.time) < 0):
+            return None
+        axles, shown = _axles(recording, vehicle, turn)
+        if not axles or len(shown) < _LEAST:
+            return None
+        pace = np.abs(np.mean([axle.rims for axle in axles], axis=(0, 1)))
+        turned = WINDOW * float(np.abs(shown).sum())
+        return cls(
+            tuple(axles), pace, vehicle.track * shown, pace > _DRIVING * np.quantile(pace, 0.95), turned
+        )
+
+    def contradicts(self, axle: _Axle) -> bool:
+        """Whether an axle's torques, beyond what goes with pace and pull, are against the slips from side to side."""
+        rows = self.driving
+        if axle.pulls is None or rows.sum() < _LEAST or self.turned < LEAST_TURN:
+            return False
+        common = np.column_stack([np.ones(rows.sum()), self.pace[rows], axle.pulls.sum(axis=0)[rows]])
+        pair = np.column_stack([np.diff(axle.rims, axis=0)[0] - self.hubs, np.diff(axle.pulls, axis=0)[0]])[
+            rows
+        ]
+        slip, pull = (pair - common @ np.linalg.lstsq(common, pair, rcond=None)[0]).T
+        size, hard = float(np.sqrt(np.mean(slip**2) * np.mean(pull**2))), float(np.sqrt(np.mean(pull**2)))
+        return hard > _HARD * axle.load / 2 and float(np.mean(slip * pull)) < -SURE * size
+
+
+def _backward_warnings(recording: Recording, vehicle: Vehicle) -> list[str]:
+    """A wheel that turns the other way than all others together, most of the time."""
+    speeds = {w: recording.channels.get(f"wheel_speed_{w}") for w in vehicle.wheels}
+    known = {
+        w: filled(recording.time, v) for w, v in speeds.items() if v is not None and np.isfinite(v).any()
+    }
+    if len(known) < 3:
+        return []
+    rims = np.array(list(known.values()))
+    signs = np.sign(
+        np.where(np.abs(rims) > _DRIVING * np.quantile(np.abs(rims), 0.95, axis=1, keepdims=True), rims, 0.0)
+    )
+    odd = []
+    for k, wheel in enumerate(known):
+        others = np.delete(signs, k, axis=0)
+        turning = signs[k] != 0
+        alone = turning & (others.sum(axis=0) == -signs[k] * len(others))
+        if turning.sum() >= _LEAST and alone.sum() > _BACKWARD * turning.sum():
+            odd.append(wheel)
+    return (
+        [
+            f"The wheel speed of {', '.join(odd)} is against that of all others: write 'sign: -1' for it in the profile."
+        ]
+        if odd
+        else []
+    )
+
+
+def _axles(recording: Recording, vehicle: Vehicle, turn: Floats) -> tuple[list[_Axle], Floats]:
+    """Axles of two sides of which both speeds are known, and the turn, as means over the windows that have them all."""
+    radius, channels = (
+        dict(zip(vehicle.wheels, vehicle.wheel_radius.tolist(), strict=True)),
+        recording.channels,
+    )
+    rows: list[Floats] = [turn]
+    found: list[tuple[str, tuple[str, str], float, int, bool]] = []
+    for name, axle in vehicle.axles.items():
+        sides = (axle.wheels[0], axle.wheels[-1])
+        if len(axle.wheels) < 2 or not all(
+            np.isfinite(channels.get(f"wheel_speed_{w}", np.nan)).any() for w in sides
+        ):
+            continue
+        powered = all(np.isfinite(channels.get(f"drive_torque_{w}", np.nan)).any() for w in sides)
+        found.append((name, sides, axle.mass * STANDARD_GRAVITY, len(rows), powered))
+        rows += [radius[w] * filled(recording.time, channels[f"wheel_speed_{w}"]) for w in sides]
+        rows += (
+            [filled(recording.time, channels[f"drive_torque_{w}"]) / radius[w] for w in sides]
+            if powered
+            else []
+        )
+    means = windows(recording.time, np.array(rows))
+    axles = [
+        _Axle(name, sides, load, means[at : at + 2], means[at + 2 : at + 4] if powered else None)
+        for name, sides, load, at, powered in found
+    ]
+    return axles, means[0]
+
+
+def _rolling(axle: _Axle, straight: npt.NDArray[np.bool_]) -> list[str]:
+    """Rims that go at unlike speeds straight ahead."""
+    left, right = axle.rims[:, straight]
+    if straight.sum() < _LEAST or (right == 0).any():
+        return []
+    low, ratio, high = np.quantile(left / right, [0.25, 0.5, 0.75])
+    if abs(np.log(max(ratio, 1e-9))) < _ROLL or low < 1 < high:
+        return []
+    a, b = axle.wheels
+    return [
+        f"Straight ahead the rim of {a} goes {ratio:.2f} times as fast as that of {b}: check the scale of wheel_speed_{a} and "
+        f"wheel_speed_{b} (ticks a turn, gear ratio), and both radii."
+    ]
+
+
+def _opposed(axle: _Axle, straight: npt.NDArray[np.bool_]) -> list[str]:
+    """Torques that rise on one side where they fall on the other, straight ahead."""
+    if axle.pulls is None or straight.sum() < _LEAST:
+        return []
+    left, right = axle.pulls[:, straight]
+    means = axle.pulls[:, straight].mean(axis=1)
+    if (
+        not np.ptp(left)
+        or not np.ptp(right)
+        or np.prod(means) > 0
+        or float(np.corrcoef(left, right)[0, 1]) > -_OPPOSED
+    ):
+        return []
+    wheel = axle.wheels[int(np.argmin(means))]
+    return [
+        f"drive_torque_{wheel} falls where that of the axle's other wheel rises, straight ahead: write 'sign: -1' for it in the "
+        "profile, where forward is positive."
+    ]
+
+
+def _uneven(axles: tuple[_Axle, ...], straight: npt.NDArray[np.bool_]) -> list[str]:
+    """An axle of which one torque is steadily more than the other straight ahead, where the other axles' are alike."""
+    shares: dict[str, tuple[float, _Axle]] = {}
+    for axle in axles:
+        if axle.pulls is None:
+            continue
+        rows = straight & (axle.pulls.min(axis=0) > 0) & (axle.pulls.sum(axis=0) > _PULLING * axle.load)
+        if rows.sum() < _LEAST:
+            return []
+        low, share, high = np.quantile(np.log(axle.pulls[0, rows] / axle.pulls[1, rows]), [0.25, 0.5, 0.75])
+        if high - low < _STEADY:
+            shares[axle.name] = (float(share), axle)
+    notes = []
+    for name, (share, axle) in shares.items():
+        others = [other for key, (other, _) in shares.items() if key != name]
+        if (
+            not others
+            or np.abs(share - np.array(others)).min() < _UNEVEN
+            or max(map(abs, others)) > _UNEVEN / 2
+        ):
+            continue
+        a, b = axle.wheels
+        notes.append(
+            f"Straight ahead drive_torque_{a} is {np.exp(share):.2f} times drive_torque_{b}, and other axles' torques are alike: check the "
+            "scale of both; 'terragrip calibrate' finds their gains."
+        )
+    return notes

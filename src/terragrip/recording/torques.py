@@ -1,0 +1,165 @@
+"""What the drive torques say against the drawbar force and the wheels' change of speed: sentences for the user, never errors.
+
+At every instant the wheels' thrust Σ M/r is the pull, the force that moves the mass, and a resistance (physics.md 1). So thrust goes with
+the sum of the first two one to one and at once; another scale, or a lag, is a channel's. Where a tool pulls and no cell measures it, the
+thrust goes with what nothing shows, and nothing is said.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+import numpy.typing as npt
+
+from terragrip.recording.mechanics import driven_radii, means_of, thrusts_of
+from terragrip.units import STANDARD_GRAVITY
+
+if TYPE_CHECKING:
+    from terragrip.recording.table import Recording
+    from terragrip.vehicle import Vehicle
+
+Floats = npt.NDArray[np.float64]
+
+_MOST = 1.0  # of the weight: a mean thrust over a whole drive that no ground carries
+_BRAKING = 0.06  # of the weight: a mean that takes a drive downhill by a tenth throughout
+_STEP = 0.05  # s between the points on which torques and speeds are compared
+_CALM = 0.4  # s over which they are smoothed
+_SLOW = 6.0  # s: what changes more slowly has no time
+_WITHIN = 2.0  # s, the largest lag looked for
+_LEAST_TIME, _MOST_TIME = 30.0, 1200.0  # s of the log, from its start
+_MOVING = 0.3  # of the rims' speed that a twentieth of the drive reaches
+_LAG = 0.2  # s, and two samples: tyres and filters make .1, rarely .15
+_UNSEEN_LAG = 0.3  # s, where a tool may pull unseen: an engine's governor answers it by .2
+_ALIKE = 0.7  # correlation at the lag
+_BETTER = 0.05  # than without it
+
+
+def torque_warnings(recording: Recording, vehicle: Vehicle) -> list[str]:
+    """Sentences on torques of another scale than the pull, and on torques that come late or early."""
+    return _scale_warnings(recording, vehicle) or _lag_warnings(recording, vehicle)
+
+
+def _scale_warnings(recording: Recording, vehicle: Vehicle) -> list[str]:
+    means = means_of(recording)
+    beyond_pull = {} if means is None else thrusts_of(recording, vehicle, means)
+    if means is None or not beyond_pull:
+        return []
+    rest = np.sum(list(beyond_pull.values()), axis=0)
+    towing = "drawbar_force" in recording.channels
+    pull = means.of(recording.channels["drawbar_force"]) / vehicle.mass if towing else np.zeros_like(rest)
+    thrust = rest + pull
+    mean = float(np.nanmean(thrust)) / STANDARD_GRAVITY if np.isfinite(thrust).any() else 0.0
+    check = "(at the wheel, not at the motor: the gear ratio counts), the wheel radius and the mass"
+    if mean > _MOST:
+        return [
+            f"The drive torques over the wheel radius are {mean:.2g} times the weight on average, which no ground carries: check "
+            f"the torques' unit and scale {check}."
+        ]
+    if mean < -_BRAKING:
+        return [
+            f"The drive torques over the wheel radius are {mean:.2g} times the weight on average, while the vehicle drives "
+            "forward: write 'sign: -1' for each in the profile."
+        ]
+    if not towing:
+        return []
+    moved = means.change + (0.0 if means.climb is None else means.climb)
+    if "acceleration_x" in recording.channels:
+        moved = means.of(recording.channels["acceleration_x"])
+    fit = means.fit(thrust, pull + moved)
+    if not fit.is_another_scale:
+        return []
+    return [
+        f"The drive torques over the wheel radius are {fit.slope:.2g} times the drawbar force and the force that moves "
+        f"{vehicle.mass:.4g} kg like this: check the units of both, the torques' scale {check}."
+    ]
+
+
+@dataclass(frozen=True)
+class _Course:
+    """Thrust, and pull with the force that speeds the rims up, over the mass (n,) [m/s²] on points ``step`` [s] apart, while ``moving``."""
+
+    step: float
+    thrust: Floats
+    force: Floats
+    moving: npt.NDArray[np.bool_]
+
+    @classmethod
+    def of(cls, recording: Recording, vehicle: Vehicle) -> _Course | None:
+        """None where a torque or a wheel speed is missing, or the log is short."""
+        radii, channels, time = driven_radii(vehicle), recording.channels, recording.time
+        names = [f"{quantity}_{w}" for w in radii for quantity in ("drive_torque", "wheel_speed")]
+        if not radii or not all(np.isfinite(channels.get(name, np.nan)).sum() > 1 for name in names):
+            return None
+        step = max(_STEP, float(np.median(np.diff(time))))
+        points = np.arange(time[0], min(time[-1], time[0] + _MOST_TIME), step)
+        if len(points) * step < _LEAST_TIME:
+            return None
+
+        def at(name: str) -> Floats:
+            known = np.isfinite(channels[name])
+            return np.interp(points, time[known], channels[name][known])
+
+        thrust = (
+            np.sum([at(f"drive_torque_{w}") / radius for w, radius in radii.items()], axis=0) / vehicle.mass
+        )
+        rim = np.mean([radius * at(f"wheel_speed_{w}") for w, radius in radii.items()], axis=0)
+        force = np.gradient(_smooth(rim, _CALM, step), step)
+        if np.isfinite(channels.get("drawbar_force", np.nan)).sum() > 1:
+            force = force + at("drawbar_force") / vehicle.mass
+        moving = rim > _MOVING * float(np.quantile(rim, 0.95))
+        return cls(step, _quick(thrust, step), _quick(force, step), moving)
+
+    def lag(self) -> tuple[float, float, float]:
+        """By how much the thrust is behind [s], the correlation there, and without a lag."""
+        most = round(_WITHIN / self.step)
+        a, b = np.where(self.moving, self.thrust, 0.0), np.where(self.moving, self.force, 0.0)
+        ends = [(max(0, k), len(a) + min(0, k)) for k in range(-most, most + 1)]
+        found = np.array([_alike(a[i:j], b[len(b) - j : len(b) - i]) for i, j in ends])
+        best = int(np.argmax(found))
+        return (best - most) * self.step, float(found[best]), float(found[most])
+
+
+def _smooth(values: Floats, seconds: float, step: float) -> Floats:
+    """Means (n,) over so many seconds; what lies outside is as at the ends."""
+    half = max(1, round(seconds / step / 2))
+    padded = np.cumsum(np.pad(values, (half + 1, half), mode="edge"))
+    return (padded[2 * half + 1 :] - padded[: -2 * half - 1]) / (2 * half + 1)
+
+
+def _quick(values: Floats, step: float) -> Floats:
+    """What of a course (n,) changes within seconds."""
+    return _smooth(values, _CALM, step) - _smooth(values, _SLOW, step)
+
+
+def _alike(a: Floats, b: Floats) -> float:
+    a, b = a - a.mean(), b - b.mean()
+    size = float(np.sqrt(np.sum(a * a) * np.sum(b * b)))
+    return float(np.sum(a * b)) / size if size else 0.0
+
+
+def _lag_warnings(recording: Recording, vehicle: Vehicle) -> list[str]:
+    course = _Course.of(recording, vehicle)
+    if course is None:
+        return []
+    seconds, alike, without = course.lag()
+    towing = "drawbar_force" in recording.channels
+    least = max(_LAG if towing else _UNSEEN_LAG, 2 * course.step)
+    if (
+        abs(seconds) <= least
+        or alike < _ALIKE
+        or alike - without < _BETTER
+        or abs(seconds) >= _WITHIN - course.step
+    ):
+        return []
+    side, by = (
+        ("behind", "the torques are")
+        if seconds > 0
+        else ("ahead of", f"{'these' if towing else 'the speeds'} are")
+    )
+    what = "drawbar force and wheel speeds" if towing else "the wheel speeds"
+    return [
+        f"The drive torques are {abs(seconds):.2f} s {side} {what}, by the force that these take (correlation {alike:.2f}, "
+        f"{without:.2f} as they are): if {by} late, write 'delay: {abs(seconds):.2f} s' for it in a profile."
+    ]

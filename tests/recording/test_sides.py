@@ -1,0 +1,116 @@
+"""What left and right wheels say against each other, on a skid-steered drive whose every number is known (made here, quasi-steady)."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from terragrip.recording import Recording, unit_warnings
+from terragrip.vehicle import Vehicle
+
+WHEELS = ("fl", "fr", "rl", "rr")
+MASS, RADIUS, TRACK, G = 120.0, 0.18, 0.6, 9.80665
+WEIGHT = MASS * G
+
+
+def vehicle() -> Vehicle:
+    axles = {"front": {"mass": 55, "wheels": ["fl", "fr"]}, "rear": {"mass": 65, "wheels": ["rl", "rr"]}}
+    base = {"mass": MASS, "wheelbase": 0.6, "track": TRACK, "center_of_gravity_height": 0.25, "axles": axles}
+    return Vehicle.from_dict({**base, "wheel": {"radius": RADIUS, "inertia": 0.1}})
+
+
+def skidding(seed: int = 0, *, steered: bool = False) -> Recording:
+    """Straight stretches and turns on hills at 20 Hz; each side slips by what it takes to scrub round. ``steered``: no side does."""
+    rng, time = np.random.default_rng(seed), np.arange(0, 240, 0.05)
+    turn = np.where(time % 30 > 20, 0.5 * np.sign(np.sin(time / 30 * np.pi)), 0.0)
+    turn = np.convolve(turn, np.ones(20) / 20, "same")
+    v = 1.0 + 0.2 * np.sin(time / 9)
+    slope = 0.05 * np.sin(time / 12)
+    force = 0.14 + np.sin(slope) + np.gradient(v, 0.05) / G  # of the weight
+    scrub = 0.0 if steered else 0.25 * np.tanh(turn / 0.2)
+    columns = {
+        "time": time,
+        "ground_speed": v + 0.01 * rng.standard_normal(len(time)),
+        "angular_velocity_z": turn,
+        "pitch": slope,
+    }
+    for wheel in WHEELS:
+        side = 1 if wheel.endswith("l") else -1
+        load = 0.25 * WEIGHT * (1.08 if wheel.startswith("r") else 0.92)
+        mu = force - side * scrub
+        slip = np.clip(mu / 4, -0.3, 0.3)
+        columns[f"wheel_speed_{wheel}"] = (v - side * TRACK / 2 * turn) / (
+            1 - slip
+        ) / RADIUS + 0.02 * rng.standard_normal(len(time))
+        columns[f"drive_torque_{wheel}"] = RADIUS * load * mu + 0.2 * rng.standard_normal(len(time))
+    return Recording.from_frame(columns)
+
+
+def told(log: Recording, **factors: float) -> list[str]:
+    """The notes on a log of which some channels are multiplied."""
+    changed = {name: log.channels[name] * factor for name, factor in factors.items()}
+    return unit_warnings(log.with_channels(**changed), vehicle())
+
+
+def exchanged(log: Recording, *wheels: str) -> list[str]:
+    a, b = (f"drive_torque_{w}" for w in wheels)
+    return unit_warnings(log.with_channels(**{a: log.channels[b], b: log.channels[a]}), vehicle())
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_right_log_is_left_alone(seed: int) -> None:
+    assert told(skidding(seed)) == []
+    assert told(skidding(seed, steered=True)) == []
+
+
+@pytest.mark.parametrize("axle", ["f", "r"])
+def test_torques_exchanged_within_an_axle_are_named_by_skid_turns(axle: str) -> None:
+    (note,) = exchanged(skidding(), f"{axle}l", f"{axle}r")
+    assert note.startswith(
+        f"drive_torque_{axle}l and drive_torque_{axle}r (or these wheels' speeds) may be exchanged: in turns"
+    )
+
+
+def test_a_steered_vehicle_does_not_show_torques_exchanged_within_an_axle() -> None:
+    assert exchanged(skidding(steered=True), "fl", "fr") == []
+
+
+def test_exchanged_torques_need_a_rate_of_turn() -> None:
+    log = skidding()
+    unseen = replace(log, channels={n: v for n, v in log.channels.items() if n != "angular_velocity_z"})
+    assert exchanged(unseen, "fl", "fr") == []
+
+
+@pytest.mark.parametrize(("gain", "said"), [(0.9, False), (0.75, True), (1.35, True)])
+def test_a_torque_of_another_scale_is_named_straight_ahead(gain: float, said: bool) -> None:
+    notes = told(skidding(), drive_torque_rl=gain)
+    assert bool(notes) is said
+    if said:
+        assert notes[0].startswith(
+            f"Straight ahead drive_torque_rl is {gain:.2f} times drive_torque_rr, and other axles' torques are alike"
+        )
+
+
+def test_torques_uneven_on_both_axles_are_the_load() -> None:
+    assert told(skidding(), drive_torque_rl=0.75, drive_torque_fl=0.75) == []
+
+
+@pytest.mark.parametrize(("scale", "said"), [(1.03, False), (1.1, True)])
+def test_a_rim_that_goes_faster_straight_ahead_is_named(scale: float, said: bool) -> None:
+    notes = told(skidding(), wheel_speed_fl=scale)
+    assert bool(notes) is said
+    if said:
+        assert notes[0].startswith(
+            f"Straight ahead the rim of fl goes {scale:.2f} times as fast as that of fr"
+        )
+
+
+def test_a_wheel_that_turns_against_all_others_is_named() -> None:
+    (note,) = [n for n in told(skidding(), wheel_speed_rr=-1.0) if "against that of all others" in n]
+    assert note.startswith("The wheel speed of rr is")
+
+
+def test_a_torque_that_falls_where_its_neighbour_rises_is_named() -> None:
+    assert any(n.startswith("drive_torque_rr falls where") for n in told(skidding(), drive_torque_rr=-1.0))
