@@ -46,6 +46,8 @@ def _positions(log: LogBlocks) -> Recording:
 
 def _unseen_turns(log: Recording, rims: Sequence[Rim]) -> list[str]:
     """A sentence on a rate of turn that is missing."""
+    if np.any(np.diff(log.time) < 0):  # refused where the estimator meets it
+        return []
     place = ((log.time - log.time[0]) / _WINDOW).astype(np.intp)
     left, right = (_rim_means([rim for rim in rims if rim.side * sign > 0], log, place) for sign in (1, -1))
     with np.errstate(invalid="ignore"):
