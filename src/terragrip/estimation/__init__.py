@@ -5,7 +5,9 @@ The names load on first use: consistency measures and the reference filters need
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
+
+from terragrip.lazy import lazily
 
 if TYPE_CHECKING:
     from terragrip.estimation.batch import RunOptions as RunOptions
@@ -22,29 +24,19 @@ if TYPE_CHECKING:
     from terragrip.estimation.methods import Method as Method
 
 _HOME = {
-    "estimate": "batch",
-    "estimated": "batch",
-    "RunOptions": "batch",
-    "Estimates": "estimates",
-    "Estimate": "estimator",
-    "TractionEstimator": "estimator",
-    "DEFAULT": "methods",
-    "METHODS": "methods",
-    "Method": "methods",
-    "Calibration": "calibration",
-    "calibrate": "calibration",
-    "identify_torque_scale": "calibration",
+    "estimate": ".batch",
+    "estimated": ".batch",
+    "RunOptions": ".batch",
+    "Estimates": ".estimates",
+    "Estimate": ".estimator",
+    "TractionEstimator": ".estimator",
+    "DEFAULT": ".methods",
+    "METHODS": ".methods",
+    "Method": ".methods",
+    "Calibration": ".calibration",
+    "calibrate": ".calibration",
+    "identify_torque_scale": ".calibration",
 }
 
 __all__ = list(_HOME)
-
-
-def __getattr__(name: str) -> Any:
-    """Load a public name from its home (PEP 562)."""
-    if name not in _HOME:
-        raise AttributeError(f"module 'terragrip.estimation' has no attribute {name!r}")
-    from importlib import import_module
-
-    value = getattr(import_module(f"terragrip.estimation.{_HOME[name]}"), name)
-    globals()[name] = value
-    return value
+__getattr__ = lazily(__name__, _HOME)

@@ -208,20 +208,7 @@ def _set_uncertainty(settings: Any, vehicle: Vehicle, pitch_measured: bool) -> N
     """The vehicle file's spreads. A measured pitch leaves only its mounting unknown, not the slope."""
     given = vehicle.uncertainty
     spread = settings.uncertainty
-    for name in (
-        "drive_torque_gain",
-        "drive_torque_gain_common",
-        "drive_torque_offset",
-        "drawbar_gain",
-        "drawbar_offset",
-        "tire_rolling_resistance",
-        "vertical_load",
-        "mass",
-        "hitch_load_gain",
-        "hitch_load_offset",
-        "wheel_radius",
-        "acceleration_bias",
-    ):
+    for name, _ in ffi.typeof("tg_uncertainty").fields:
         setattr(spread, name, getattr(given, name) or 0.0)
-    slope = given.slope or 0.0
-    spread.slope = min(slope, _SENSED_SLOPE) if pitch_measured and given.slope is not None else slope
+    if pitch_measured and given.slope is not None:
+        spread.slope = min(given.slope, _SENSED_SLOPE)

@@ -17,7 +17,7 @@ from terragrip.formats.evidence import (
     nearest_unit,
 )
 from terragrip.formats.judgement import Guess
-from terragrip.formats.rims import Ranked, Rims, Way
+from terragrip.formats.rims import Ranked, Rims, Way, surest
 from terragrip.units import factor_to
 
 Floats = npt.NDArray[np.float64]
@@ -69,18 +69,15 @@ class Agreement:
     def _paths(self, ranked: Mapping[str, list[Guess]]) -> list[Way]:
         """What was driven, in metres: by latitude and longitude, by positions, by a distance."""
         result: list[Way] = []
-        best = [
-            max(ranked.get(c, []), key=lambda g: g.confidence, default=None)
-            for c in ("latitude", "longitude")
-        ]
+        north, east = surest(ranked, "latitude"), surest(ranked, "longitude")
         if (
-            best[0] is not None
-            and best[1] is not None
-            and best[0].unit == best[1].unit
-            and best[0].unit in ("deg", "rad")
+            north is not None
+            and east is not None
+            and north.unit == east.unit
+            and north.unit in ("deg", "rad")
         ):
-            pair = (best[0].column.column, best[1].column.column)
-            factor = 1.0 if best[0].unit == "deg" else 180 / np.pi
+            pair = (north.column.column, east.column.column)
+            factor = 1.0 if north.unit == "deg" else 180 / np.pi
             if (path := self._evidence.displacements(pair, degrees=True, unit=factor)) is not None:
                 result.append((f"{pair[0]}, {pair[1]}", path))
         for name, column in self._columns.items():
@@ -188,7 +185,7 @@ class Agreement:
 
     def _ground(self, ranked: Mapping[str, list[Guess]]) -> tuple[str, float] | None:
         """The best ground speed and its factor to m/s, where its unit is beyond doubt."""
-        best = max(ranked.get("ground_speed", []), key=lambda g: g.confidence, default=None)
+        best = surest(ranked, "ground_speed")
         if best is None or best.unit is None or best.contradicted:
             return None
         if (best.doubt or best.unit_doubt) and best.column.unit is None:
@@ -254,7 +251,7 @@ class Agreement:
                 guess = guess.with_finding(self._at_speed(guess, self._ground(ranked)))
             judged.append(guess)
         ranked["angular_velocity_z"] = [g for g in judged if g.confidence > 0.35]
-        best = max(ranked["angular_velocity_z"], key=lambda g: g.confidence, default=None)
+        best = surest(ranked, "angular_velocity_z")
         if best is None or best.doubt or best.unit_doubt or best.unit is None:
             return
         for channel in ("angular_velocity_x", "angular_velocity_y"):
@@ -288,7 +285,7 @@ class Agreement:
 
     def _turns_of_body(self, ranked: Mapping[str, list[Guess]]) -> list[tuple[str, Series]]:
         """Rates of turn [rad/s] that no wheel made: a gyro's beyond doubt, and those of `_turns`."""
-        best = max(ranked.get("angular_velocity_z", []), key=lambda g: g.confidence, default=None)
+        best = surest(ranked, "angular_velocity_z")
         result = self._turns(ranked)
         if best is not None and best.unit is not None and not (best.doubt or best.unit_doubt):
             series = self._evidence.series(best.column.column)
@@ -312,7 +309,7 @@ class Agreement:
                 degrees = factor_to(column.unit, "rad") < 0.1 if column.unit else size > 7
                 if (rate := self._evidence.rate_of_angle(name, degrees=degrees)) is not None:
                     result.append((name, rate))
-        lateral = max(ranked.get("acceleration_y", []), key=lambda g: g.confidence, default=None)
+        lateral = surest(ranked, "acceleration_y")
         ground = self._ground(ranked)
         if lateral is not None and lateral.unit is not None and ground is not None:
             series = self._evidence.series(lateral.column.column)

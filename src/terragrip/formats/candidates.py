@@ -47,6 +47,10 @@ class Candidate:
     why: str
 
 
+Hint = tuple[str, float, str]
+"""What a name says of a column that may be a channel: the channel, the score, and why."""
+
+
 def columns_of(
     numbers: Sequence[str], constants: Mapping[str, str], units: Mapping[str, str], vocabulary: Vocabulary
 ) -> dict[str, Column]:
@@ -117,12 +121,13 @@ def candidates_of(column: Column) -> list[Candidate]:
     for ways in (_of_wheels, _of_motion, _of_place, _of_speed):
         result = ways(column)
         if result:
-            return [c for c in result if column.kind is None or _fits(column.kind, c.channel)]
+            fitting = (hint for hint in result if column.kind is None or _fits(column.kind, hint[0]))
+            return [Candidate(channel, own, score, why) for channel, score, why in fitting]
     return []
 
 
-def _of_wheels(column: Column) -> list[Candidate]:
-    name, own = column.name, column.column
+def _of_wheels(column: Column) -> list[Hint]:
+    name = column.name
     if (
         not name.wheel
         or name.axis
@@ -130,13 +135,9 @@ def _of_wheels(column: Column) -> list[Candidate]:
     ):
         return []
     if name.has("torque") or (name.has("wheel") and column.kind == "torque"):
-        return [
-            Candidate(
-                f"drive_torque_{name.wheel}", own, 0.9 if name.has("wheel") else 0.8, "a torque and a wheel"
-            )
-        ]
+        return [(f"drive_torque_{name.wheel}", 0.9 if name.has("wheel") else 0.8, "a torque and a wheel")]
     if name.has("current") or column.kind == "current":
-        return [Candidate(f"drive_torque_{name.wheel}", own, 0.75, "a current and a wheel")]
+        return [(f"drive_torque_{name.wheel}", 0.75, "a current and a wheel")]
     turning = name.has("speed", "rotation") or (
         name.has("wheel", "motor") and column.kind in ("speed", "rotation")
     )
@@ -144,11 +145,11 @@ def _of_wheels(column: Column) -> list[Candidate]:
         return []
     score = 0.9 if name.has("wheel") else 0.65 if name.has("motor") else 0.8
     what = "a motor" if name.has("motor") else "a wheel"
-    return [Candidate(f"wheel_speed_{name.wheel}", own, score, f"a speed and {what}")]
+    return [(f"wheel_speed_{name.wheel}", score, f"a speed and {what}")]
 
 
-def _of_motion(column: Column) -> list[Candidate]:
-    name, own = column.name, column.column
+def _of_motion(column: Column) -> list[Hint]:
+    name = column.name
     axis = name.axis or next(
         (a for a, c in (("x", "longitudinal"), ("y", "lateral"), ("z", "vertical")) if name.has(c)), ""
     )
@@ -157,67 +158,59 @@ def _of_motion(column: Column) -> list[Candidate]:
         if name.has("gyro", "rate", "rotation") or about or name.has("position", "east", "north"):
             return []
         if axis:
-            return [
-                Candidate(
-                    f"acceleration_{axis}", own, 0.8 if name.axis else 0.6, "an acceleration and an axis"
-                )
-            ]
-        return [Candidate("acceleration_x", own, 0.4, "an acceleration, along which axis is not said")]
+            return [(f"acceleration_{axis}", 0.8 if name.axis else 0.6, "an acceleration and an axis")]
+        return [("acceleration_x", 0.4, "an acceleration, along which axis is not said")]
     if name.has("rate") and about and not axis:
-        return [Candidate(f"angular_velocity_{about}", own, 0.85, "the rate of an angle")]
+        return [(f"angular_velocity_{about}", 0.85, "the rate of an angle")]
     of_wheels = name.has("odometry")
     angular = name.has("gyro") or (name.has("rate") and (name.has("speed") or "twist" in name.words))
     if angular and axis:
         if of_wheels:
-            return [Candidate(f"angular_velocity_{axis}", own, 0.6, "odometry's rate of turn and an axis")]
-        return [Candidate(f"angular_velocity_{axis}", own, 0.85, "a gyro and an axis")]
+            return [(f"angular_velocity_{axis}", 0.6, "odometry's rate of turn and an axis")]
+        return [(f"angular_velocity_{axis}", 0.85, "a gyro and an axis")]
     if axis and name.has("rate") and not name.has("position"):
-        return [Candidate(f"angular_velocity_{axis}", own, 0.7, "a rate and an axis")]
+        return [(f"angular_velocity_{axis}", 0.7, "a rate and an axis")]
     if name.has("rate") and "turn" in name.words:
-        return [Candidate("angular_velocity_z", own, 0.55, "a rate of turn")]
+        return [("angular_velocity_z", 0.55, "a rate of turn")]
     if axis and column.kind == "rotation" and not name.has("wheel", "motor") and not name.wheel:
-        return [Candidate(f"angular_velocity_{axis}", own, 0.6, "turns about an axis")]
+        return [(f"angular_velocity_{axis}", 0.6, "turns about an axis")]
     if axis and column.kind == "acceleration":
-        return [Candidate(f"acceleration_{axis}", own, 0.6, "an acceleration by its unit, and an axis")]
+        return [(f"acceleration_{axis}", 0.6, "an acceleration by its unit, and an axis")]
     if (
         column.kind == "rotation"
         and not name.has("wheel", "motor")
         and not name.wheel
         and not _in_turns(column.unit)
     ):
-        return [Candidate("angular_velocity_z", own, 0.3, "turns, of what is not said")]
+        return [("angular_velocity_z", 0.3, "turns, of what is not said")]
     if name.has("pitch", "roll") and not name.has("rate", "speed", "rotation", "yaw", "position"):
-        return [Candidate("pitch" if name.has("pitch") else "roll", own, 0.85, "its name")]
+        return [("pitch" if name.has("pitch") else "roll", 0.85, "its name")]
     return []
 
 
-def _of_place(column: Column) -> list[Candidate]:
-    name, own = column.name, column.column
+def _of_place(column: Column) -> list[Hint]:
+    name = column.name
     if name.has("speed", "acceleration", "rate"):
         return []
     for channel in ("latitude", "longitude"):
         if name.has(channel):
             whole = channel in name.words or channel[:3] in name.words
-            return [Candidate(channel, own, 0.85 if whole else 0.75, "its name")]
+            return [(channel, 0.85 if whole else 0.75, "its name")]
     if name.has("altitude"):
-        return [Candidate("altitude", own, 0.85, "its name")]
+        return [("altitude", 0.85, "its name")]
     if name.has("coupling") and name.has("vertical") and (name.has("force") or column.kind == "force"):
-        return [Candidate("hitch_load", own, 0.75, "a vertical force at the hitch")]
+        return [("hitch_load", 0.75, "a vertical force at the hitch")]
     if name.has("mass") and not (
         name.strange or name.wheel or name.has("wheel", "front", "rear", "motor", "coupling")
     ):
-        return [
-            Candidate(
-                "mass", own, 0.85 if name.has("body") else 0.6, "a mass, of nothing less than the machine"
-            )
-        ]
+        return [("mass", 0.85 if name.has("body") else 0.6, "a mass, of nothing less than the machine")]
     if name.has("pull") or (name.has("force") and (name.has("coupling") or "tow" in name.words)):
-        return [Candidate("drawbar_force", own, 0.85, "a pull")]
+        return [("drawbar_force", 0.85, "a pull")]
     return []
 
 
-def _of_speed(column: Column) -> list[Candidate]:
-    name, own = column.name, column.column
+def _of_speed(column: Column) -> list[Hint]:
+    name = column.name
     along = "twist" in name.words and "linear" in name.words
     if not (name.has("speed") or along) or name.wheel:
         return []
@@ -232,18 +225,20 @@ def _of_speed(column: Column) -> list[Candidate]:
     if name.has("odometry"):
         if not {"filtered", "filter", "fused", "ekf", "ukf"}.isdisjoint(name.words):
             return []  # of more than the wheels
-        return [Candidate("wheel_based_speed", own, 0.8, "odometry, which is made of the wheels")]
+        return [("wheel_based_speed", 0.8, "odometry, which is made of the wheels")]
     if name.has("ground"):
-        return [Candidate("ground_speed", own, 0.85, "a speed over ground")]
+        return [("ground_speed", 0.85, "a speed over ground")]
     if name.has("wheel"):
         score = 0.5 if name.has("front", "rear") else 0.85
-        return [Candidate("wheel_based_speed", own, score, "a speed of the wheels as one")]
+        return [("wheel_based_speed", score, "a speed of the wheels as one")]
     if along and not name.has("body"):
-        return [Candidate("ground_speed", own, 0.4, "a velocity; wheel odometry is none over ground")]
-    ground = Candidate("ground_speed", own, 0.55, "a speed, of what is not said")
+        return [("ground_speed", 0.4, "a velocity; wheel odometry is none over ground")]
     if name.axis == "x" or name.has("longitudinal"):
-        return [replace(ground, score=0.65, why="a speed along the vehicle")]
-    return [ground, Candidate("wheel_based_speed", own, 0.35, "a speed, of what is not said")]
+        return [("ground_speed", 0.65, "a speed along the vehicle")]
+    return [
+        ("ground_speed", 0.55, "a speed, of what is not said"),
+        ("wheel_based_speed", 0.35, "a speed, of what is not said"),
+    ]
 
 
 def _fits(kind: str, channel: str) -> bool:

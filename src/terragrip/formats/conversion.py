@@ -316,19 +316,14 @@ def _kept(rows: Rows, log: LogTable) -> npt.NDArray[np.bool_]:
     if log.clocked and column.dtype.kind == "f":  # a state lasts until the next is sent
         last = np.maximum.accumulate(np.where(np.isfinite(column), np.arange(len(column)), 0))
         column = column[last]
+    hint = "correct 'rows:' in the profile"
     if column.dtype.kind in "fiub" and isinstance(rows.equals, int | float):
         keep = column == rows.equals
     else:
         labels = texts(rows.column, column, len(column), log.source)
         keep = np.array([label.strip() == str(rows.equals) for label in labels], dtype=bool)
-        if not keep.any():
-            present = ", ".join(sorted({str(label) for label in labels})[:8])
-            hint = f"the column holds {present}"
-            raise InputError(
-                f"no row equals {rows.equals!r}", file=log.source, place=f"column {rows.column}", hint=hint
-            )
+        hint = f"the column holds {', '.join(sorted({str(label) for label in labels})[:8])}"
     if not keep.any():
-        hint = "correct 'rows:' in the profile"
         raise InputError(
             f"no row equals {rows.equals!r}", file=log.source, place=f"column {rows.column}", hint=hint
         )

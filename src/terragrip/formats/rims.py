@@ -35,6 +35,11 @@ _SMALL, _FAST = (
 )  # m, rad/s: a wheel this small that turns this fast is rarer than turns a minute called rad/s
 
 
+def surest(ranked: Mapping[str, list[Guess]], channel: str) -> Guess | None:
+    """The guess of a channel with the highest confidence; None where there is none."""
+    return max(ranked.get(channel, ()), key=lambda guess: guess.confidence, default=None)
+
+
 class Rims:
     """Judges the guesses of wheel speeds of one log."""
 
@@ -132,8 +137,7 @@ class Rims:
         self, ranked: Mapping[str, list[Guess]], left: str, right: str, turns: list[tuple[str, Series]]
     ) -> None:
         """Right less left over the rate of turn: the track over the wheel's radius, in any log with turns."""
-        pair = [max(ranked.get(c, []), key=lambda g: g.confidence, default=None) for c in (left, right)]
-        first, second = pair
+        first, second = surest(ranked, left), surest(ranked, right)
         if first is None or second is None or first.unit is None or first.unit != second.unit:
             return
         kind = first.column.kind or "rotation"

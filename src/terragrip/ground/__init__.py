@@ -5,7 +5,9 @@ The names load on first use.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
+
+from terragrip.lazy import lazily
 
 if TYPE_CHECKING:
     from terragrip.ground.analysis import Settings as Settings
@@ -21,28 +23,18 @@ if TYPE_CHECKING:
     from terragrip.ground.sections import Section as Section
 
 _HOME = {
-    "analyse": "analysis",
-    "Settings": "analysis",
-    "Ground": "result",
-    "Timeline": "result",
-    "read": "result",
-    "write": "result",
-    "Change": "changes",
-    "changes_of": "changes",
-    "Section": "sections",
-    "LiveGround": "live",
-    "GroundState": "live",
+    "analyse": ".analysis",
+    "Settings": ".analysis",
+    "Ground": ".result",
+    "Timeline": ".result",
+    "read": ".result",
+    "write": ".result",
+    "Change": ".changes",
+    "changes_of": ".changes",
+    "Section": ".sections",
+    "LiveGround": ".live",
+    "GroundState": ".live",
 }
 
 __all__ = list(_HOME)
-
-
-def __getattr__(name: str) -> Any:
-    """Load a public name from its home (PEP 562)."""
-    if name not in _HOME:
-        raise AttributeError(f"module 'terragrip.ground' has no attribute {name!r}")
-    from importlib import import_module
-
-    value = getattr(import_module(f"terragrip.ground.{_HOME[name]}"), name)
-    globals()[name] = value
-    return value
+__getattr__ = lazily(__name__, _HOME)

@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Protocol
 
 from terragrip.errors import InputError
+from terragrip.estimation.export import limits
 
 if TYPE_CHECKING:
     from terragrip.estimation.estimates import Estimates
@@ -48,24 +49,12 @@ class FileKind:
     most: Callable[[Collection[str]], int] | None = None
 
 
-def _sheet_rows(names: Collection[str]) -> int:
-    from terragrip.estimation.export.limits import SHEET_ROWS
-
-    return SHEET_ROWS - 1
-
-
-def _struct_rows(names: Collection[str]) -> int:
-    from terragrip.estimation.export.limits import struct_rows
-
-    return struct_rows(names)
-
-
 _PLACE = ("latitude", "longitude")
 KINDS: dict[str, FileKind] = {
     ".parquet": FileKind("Parquet", ("arrow_files", "ParquetFile")),
     ".csv": FileKind("CSV", ("arrow_files", "CsvFile")),
-    ".xlsx": FileKind("an Excel sheet", ("spreadsheet", "Spreadsheet"), "xlsxwriter", "formats", most=_sheet_rows),
-    ".mat": FileKind("a MATLAB file", ("matlab", "MatFile"), most=_struct_rows),
+    ".xlsx": FileKind("an Excel sheet", ("spreadsheet", "Spreadsheet"), "xlsxwriter", "formats", most=lambda names: limits.SHEET_ROWS - 1),
+    ".mat": FileKind("a MATLAB file", ("matlab", "MatFile"), most=lambda names: limits.struct_rows(names)),
     ".geojson": FileKind("GeoJSON", ("places", "GeoJson"), needs=_PLACE),
     ".gpkg": FileKind("a GeoPackage", ("places", "GeoPackage"), "pyogrio", "geo", needs=_PLACE),
     ".mcap": FileKind("MCAP", ("foxglove", "McapFile"), "mcap", "formats"),
