@@ -9,7 +9,6 @@ from terragrip.recording import Recording
 from terragrip.recording.mechanics import (
     Means,
     _balance_warnings,
-    _binned,
     _dead_warnings,
     _Fit,
     _pitch_warnings,
@@ -20,6 +19,7 @@ from terragrip.recording.mechanics import (
     motion_warnings,
     thrusts_of,
 )
+from terragrip.recording.window_means import window_means
 from terragrip.vehicle import Vehicle
 
 G = 9.80665
@@ -66,7 +66,7 @@ def test_how_far_a_slope_is_from_one_is_a_factor() -> None:
 def test_means_of_windows_with_holes() -> None:
     place = np.array([0, 0, 1, 1, 1, 3])
     values = np.array([1.0, 3.0, np.nan, 5.0, 7.0, np.nan])
-    np.testing.assert_array_equal(_binned(place, 4, values), [2.0, 6.0, np.nan, np.nan])
+    np.testing.assert_array_equal(window_means(values, place, 4), [2.0, 6.0, np.nan, np.nan])
 
 
 def test_a_channel_is_averaged_like_the_change_of_speed() -> None:

@@ -21,6 +21,7 @@ import numpy.typing as npt
 
 from terragrip.recording import Recording
 from terragrip.recording.held import held_periods, without_held
+from terragrip.recording.window_means import window_means
 
 Floats = npt.NDArray[np.float64]
 Span = tuple[float, float]
@@ -213,9 +214,9 @@ def _straight(
 ) -> npt.NDArray[np.bool_]:
     """Windows (count,) in which no turn shows: in the yaw rate, else in the rims' speeds."""
     if "angular_velocity_z" in log.channels:
-        return ~(np.abs(_means(log.channels["angular_velocity_z"], place, count)[0]) > _TURNING)
+        return ~(np.abs(window_means(log.channels["angular_velocity_z"], place, count)) > _TURNING)
     rims = np.stack(
-        [radii.get(w, 1.0) * _means(log.channels[f"wheel_speed_{w}"], place, count)[0] for w in log.wheels]
+        [radii.get(w, 1.0) * window_means(log.channels[f"wheel_speed_{w}"], place, count) for w in log.wheels]
     )
     return np.asarray(np.ptp(rims, axis=0) <= _STRAIGHT * np.abs(rims.mean(axis=0)))
 
@@ -223,8 +224,6 @@ def _straight(
 def _means(values: Floats, place: npt.NDArray[np.intp], count: int) -> tuple[Floats, Floats]:
     """Mean of a channel in windows (count,), NaN where nothing was measured, and its least magnitude there."""
     known = np.isfinite(values)
-    number = np.bincount(place[known], minlength=count)
-    total = np.bincount(place[known], values[known], count)
     least = np.full(count, np.inf)
     np.minimum.at(least, place[known], np.abs(values[known]))
-    return np.where(number > 0, total / np.maximum(number, 1), np.nan), least
+    return window_means(values, place, count), least

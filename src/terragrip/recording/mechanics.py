@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
+from terragrip.recording.window_means import window_means
 from terragrip.units import STANDARD_GRAVITY
 
 if TYPE_CHECKING:
@@ -82,7 +83,7 @@ class Means:
 
     def of(self, values: Floats) -> Floats:
         """A channel (rows,) as means over the stretch that ``change`` is of (n,)."""
-        plain = _binned(self.place, self.count, values)
+        plain = window_means(values, self.place, self.count)
         inner = (plain[:-2] + 2 * plain[1:-1] + plain[2:]) / 4
         return np.r_[np.nan, inner, np.nan][self.rows]
 
@@ -133,13 +134,6 @@ def _ratio(pair: Floats) -> float:
     return float(np.sum(a * b)) / below if below else np.nan
 
 
-def _binned(place: npt.NDArray[np.intp], count: int, values: Floats) -> Floats:
-    known = np.isfinite(values)
-    number = np.bincount(place[known], minlength=count)
-    total = np.bincount(place[known], values[known], count)
-    return np.where(number > 0, total / np.maximum(number, 1), np.nan)
-
-
 def means_of(recording: Recording) -> Means | None:
     """None where too few windows of driving are left, or time runs back."""
     speed = recording.channels.get("ground_speed")
@@ -151,7 +145,7 @@ def means_of(recording: Recording) -> Means | None:
     count = int(place[-1]) + 1
     if place.min() < 0 or place.max() >= count:  # time runs back: refused elsewhere
         return None
-    mean = _binned(place, count, speed)
+    mean = window_means(speed, place, count)
     if float(np.nansum(mean)) <= 0:
         return None
     change = np.r_[np.nan, (mean[2:] - mean[:-2]) / (2 * length), np.nan]
@@ -364,7 +358,7 @@ def _radius_warnings(recording: Recording, vehicle: Vehicle, means: Means) -> li
         if turning is None or torque is None:
             continue
         with np.errstate(invalid="ignore", divide="ignore"):
-            rolled = np.abs(means.speed / _binned(means.place, means.count, turning)[means.rows])
+            rolled = np.abs(means.speed / window_means(turning, means.place, means.count)[means.rows])
         light = (np.abs(means.of(torque)) < _LIGHT * radius * load) & np.isfinite(rolled)
         shown = float(np.median(rolled[light])) if light.sum() >= _LEAST else radius
         if abs(1 - shown / radius) > _SPIN and RATIOS[0] <= radius / shown <= RATIOS[1]:

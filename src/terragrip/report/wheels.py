@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from terragrip.recording.window_means import window_means
 from terragrip.report.page import Picture, Section, Table, number, percent
 from terragrip.report.runs import FloatArray, Run
 from terragrip.report.style import BLUE, GREEN, ORANGE, PURPLE, SKY, VERMILLION, new_figure, styled, to_svg
@@ -78,10 +79,7 @@ def _means(time: FloatArray, values: FloatArray) -> tuple[FloatArray, FloatArray
     slots = min(SLOTS, max(len(time) // 4, 1))
     edges = np.linspace(time[0], time[-1], slots + 1)
     place = np.clip(np.searchsorted(edges, time, side="right") - 1, 0, slots - 1)
-    known = np.isfinite(values)
-    count = np.bincount(place[known], minlength=slots)
-    total = np.bincount(place[known], weights=values[known], minlength=slots)
-    return (edges[:-1] + edges[1:]) / 2, np.where(count > 0, total / np.maximum(count, 1), np.nan)
+    return (edges[:-1] + edges[1:]) / 2, window_means(values, place, slots)
 
 
 def _mean(values: FloatArray) -> float:

@@ -29,6 +29,7 @@ from terragrip.errors import InputError
 from terragrip.estimation.calibration.plausible import turns_unseen
 from terragrip.estimation.calibration.result import Evidence, Quantity
 from terragrip.estimation.calibration.windows import Windows, windows
+from terragrip.estimation.calibration.zeros import Spell, evidence
 from terragrip.physics.loads import GRAVITY
 from terragrip.physics.slip import slip
 from terragrip.recording import Recording, without_held
@@ -235,13 +236,5 @@ def _drawbar_gain(table: Windows, vehicle: Vehicle) -> float:
 
 
 def _evidence(table: Windows, logs: Sequence[Recording]) -> tuple[Evidence, ...]:
-    return tuple(
-        Evidence(
-            logs[index].source or f"recording {index + 1}",
-            float(table.start[own].min()),
-            float(table.start[own].max() + table.length),
-            int(table.count[own].sum()),
-        )
-        for index in np.unique(table.recording)
-        for own in [table.recording == index]
-    )
+    sources = [log.source or f"recording {k + 1}" for k, log in enumerate(logs)]
+    return evidence(table, [Spell(k, k) for k in range(len(table))], sources)

@@ -14,6 +14,7 @@ import numpy.typing as npt
 
 from terragrip.physics.loads import GRAVITY, axle_loads, wheel_shares
 from terragrip.recording import Recording
+from terragrip.recording.window_means import window_means
 from terragrip.vehicle import Vehicle
 
 Floats = npt.NDArray[np.float64]
@@ -87,7 +88,7 @@ def _windows_of(index: int, recording: Recording, vehicle: Vehicle, length: floa
 
     def mean(name: str, absent: float = np.nan) -> Floats:
         values = recording.channels.get(name)
-        return np.full(n, absent) if values is None else _means(values, bin_of, n)
+        return np.full(n, absent) if values is None else window_means(values, bin_of, n)
 
     def samples(name: str) -> Floats:
         values = recording.channels.get(name)
@@ -208,14 +209,6 @@ def wheel_loads(
 
 def _driven(vehicle: Vehicle) -> list[str]:
     return [wheel for wheel, driven in zip(vehicle.wheels, vehicle.driven, strict=True) if driven]
-
-
-def _means(values: Floats, bin_of: Ints, n: int) -> Floats:
-    """Mean of each bin's measured values (n,), NaN where there are none."""
-    known = np.isfinite(values)
-    count = np.bincount(bin_of[known], minlength=n)
-    total = np.bincount(bin_of[known], values[known], n)
-    return np.where(count > 0, total / np.maximum(count, 1), np.nan)
 
 
 def _rate(values: Floats, step: float) -> Floats:
