@@ -17,17 +17,11 @@ tg_status tg_consider_init(tg_consider *c, const tg_filter *f, int32_t columns)
 /* The column over the last step's map, with what one SD of its constant adds on the way. */
 TG_INLINE void consider_predict(const tg_passage *p, const tg_deviation *d, const tg_real *s, tg_real *prior, const int n)
 {
-    int i = 0;
     tg_real v = p->keep * s[n + 1] - p->g * s[n];
     for (int k = 0; k < n; k++) v += p->c[k] * s[k];
     for (int k = 0; k <= n; k++) prior[k] = s[k];
     prior[n + 1] = d ? v + p->dt * d->acceleration : v;
-    for (; i + TG_LANES <= n; i += TG_LANES) {
-        const tg_lanes moved = lanes_mul(lanes_load(p->phi + i), lanes_load(s + n + 2 + i));
-        const tg_lanes omega = lanes_mul_add(lanes_load(p->b + i), lanes_load(s + i), moved);
-        lanes_store(prior + n + 2 + i, d ? lanes_mul_add(lanes_load(p->psi + i), lanes_load(d->wheel_acceleration + i), omega) : omega);
-    }
-    for (; i < n; i++) {
+    for (int i = 0; i < n; i++) {
         const tg_real omega = p->phi[i] * s[n + 2 + i] + p->b[i] * s[i];
         prior[n + 2 + i] = d ? omega + p->psi[i] * d->wheel_acceleration[i] : omega;
     }
@@ -48,14 +42,11 @@ tg_status tg_consider_step(tg_consider *c, const tg_filter *f, const tg_deviatio
     if (!c || !f || c->wheels != f->wheels) return TG_BAD_ARGUMENT;
     const int n = f->wheels;
     tg_real zero = 0; /* NaN, from an infinite or NaN term */
-    tg_lanes zeros = lanes_all(0);
     for (int k = 0; deviations && k < c->columns; k++) {
-        int i = 0;
         zero += deviations[k].acceleration * 0 + deviations[k].accelerometer * 0;
-        for (; i + TG_LANES <= n; i += TG_LANES) zeros = lanes_mul_add(lanes_load(deviations[k].wheel_acceleration + i), lanes_all(0), zeros);
-        for (; i < n; i++) zero += deviations[k].wheel_acceleration[i] * 0;
+        for (int i = 0; i < n; i++) zero += deviations[k].wheel_acceleration[i] * 0;
     }
-    if (zero + lanes_sum(zeros) != 0) return TG_NOT_FINITE;
+    if (zero != 0) return TG_NOT_FINITE;
     for (int k = 0; k < c->columns; k++) {
         consider_predict(&f->passage, deviations ? deviations + k : NULL, c->s[k], c->prior[k], n);
         memcpy(c->s[k], c->prior[k], sizeof c->s[k]);

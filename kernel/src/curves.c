@@ -31,7 +31,7 @@ static tg_pair pair_of(const tg_estimator *e, int32_t i, const tg_real *o)
     const tg_real constant = tgi_square(o[TG_OUT_ADHESION_STD + i]) - random - tgi_square(o[TG_OUT_ADHESION + i] * radius);
     const tg_real slip = tgi_square(o[TG_OUT_SLIP_STD + i]) - tgi_square(travel * radius);
     const tg_pair pair = {o[TG_OUT_ADHESION + i], o[TG_OUT_SLIP + i], random, slip > 0 ? slip : 0,
-                          tgi_sqrt(constant > 0 ? constant : 0), radius};
+                          tgi_root(constant), radius};
     return pair;
 }
 

@@ -9,13 +9,7 @@ TG_INLINE void exact_move(const tg_passage *p, const tg_real *from, tg_real *to,
     tg_real v = from[n + 1] - p->g * from[n];
     for (int i = 0; i < n; i++) v += p->c[i] * from[i];
     for (int i = 0; i < stride; i += TG_LANES) lanes_store(to + i, lanes_load(from + i));
-    if (n % TG_LANES == 0)
-        for (int i = 0; i < n; i += TG_LANES) {
-            const tg_lanes moved = lanes_mul(lanes_load(p->phi + i), lanes_load(from + n + 2 + i));
-            lanes_store(to + n + 2 + i, lanes_mul_add(lanes_load(p->b + i), lanes_load(from + i), moved));
-        }
-    else
-        for (int i = 0; i < n; i++) to[n + 2 + i] = p->phi[i] * from[n + 2 + i] + p->b[i] * from[i];
+    for (int i = 0; i < n; i++) to[n + 2 + i] = p->phi[i] * from[n + 2 + i] + p->b[i] * from[i];
     to[n + 1] = v;
 }
 

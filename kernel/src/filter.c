@@ -40,15 +40,12 @@ tg_tuning tg_default_tuning(void)
     return t;
 }
 
-static int positive(tg_real x) { return x > 0 && tgi_finite(x); }
-static int not_negative(tg_real x) { return x >= 0 && tgi_finite(x); }
-
 static int machine_is_sound(const tg_machine *m)
 {
     if (m->wheels < 1 || m->wheels > TG_MAX_WHEELS) return 0;
-    if (!positive(m->mass) || !positive(m->gravity) || !not_negative(m->tire_rolling_resistance)) return 0;
+    if (!tgi_positive(m->mass) || !tgi_positive(m->gravity) || !tgi_not_negative(m->tire_rolling_resistance)) return 0;
     for (int i = 0; i < m->wheels; i++)
-        if (!positive(m->radius[i]) || !positive(m->inertia[i]) || !not_negative(m->bearing_resistance[i])) return 0;
+        if (!tgi_positive(m->radius[i]) || !tgi_positive(m->inertia[i]) || !tgi_not_negative(m->bearing_resistance[i])) return 0;
     return 1;
 }
 
@@ -57,15 +54,15 @@ static int tuning_is_sound(const tg_tuning *t, int n)
     if (t->engine != TG_EXACT && t->engine != TG_UNSCENTED) return 0;
     if (t->policy < TG_FIXED || t->policy > TG_BANK || (t->policy == TG_BANK && t->engine != TG_EXACT)) return 0;
     for (int e = 0; e < TG_TWICE(n); e++)
-        if (!not_negative(t->walk[e])) return 0;
-    if (!not_negative(t->huber) || !not_negative(t->rate) || !positive(t->memory) || t->stride < 1) return 0;
-    if (!positive(t->window) || !positive(t->wheel_speed_min) || !positive(t->ground_speed_min)) return 0;
-    if ((t->supervisor != 0 && t->supervisor != 1) || !positive(t->dwell) || t->mix_stride < 1) return 0;
+        if (!tgi_not_negative(t->walk[e])) return 0;
+    if (!tgi_not_negative(t->huber) || !tgi_not_negative(t->rate) || !tgi_positive(t->memory) || t->stride < 1) return 0;
+    if (!tgi_positive(t->window) || !tgi_positive(t->wheel_speed_min) || !tgi_positive(t->ground_speed_min)) return 0;
+    if ((t->supervisor != 0 && t->supervisor != 1) || !tgi_positive(t->dwell) || t->mix_stride < 1) return 0;
     for (int b = 0; b < TG_MODES; b++)
-        if (!positive(t->scales[b])) return 0;
+        if (!tgi_positive(t->scales[b])) return 0;
     /* weights of the sigma points: the spread positive, neither centre weight negative */
     const tg_real spread = t->alpha * t->alpha * ((tg_real)TG_TWICE(n) + t->kappa), centre = spread - (tg_real)TG_TWICE(n);
-    return positive(spread) && tgi_finite(t->beta) && centre >= 0 && centre / spread + 1 - t->alpha * t->alpha + t->beta >= 0;
+    return tgi_positive(spread) && tgi_finite(t->beta) && centre >= 0 && centre / spread + 1 - t->alpha * t->alpha + t->beta >= 0;
 }
 
 tg_status tg_filter_init(tg_filter *f, const tg_machine *machine, const tg_tuning *tuning, const tg_real *x0, const tg_real *P0)

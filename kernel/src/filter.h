@@ -50,6 +50,10 @@ TG_INLINE int tgi_channel(int n, int o) { return o == 0 ? n : o <= n ? o - 1 : o
 TG_INLINE int tgi_stride(int n) { return (TG_TWICE(n) + TG_LANES - 1) / TG_LANES * TG_LANES; }
 
 TG_INLINE int tgi_finite(tg_real x) { return x - x == 0; }
+TG_INLINE int tgi_positive(tg_real x) { return x > 0 && tgi_finite(x); }
+TG_INLINE int tgi_not_negative(tg_real x) { return x >= 0 && tgi_finite(x); }
+/* SD of a variance that rounding may have left below zero. */
+TG_INLINE tg_real tgi_root(tg_real variance) { return tgi_sqrt(variance > 0 ? variance : 0); }
 TG_INLINE tg_real tgi_inverse_mass(const tg_filter *f, const tg_input *u) { return u->mass > 0 ? 1 / u->mass : f->inverse_mass; }
 
 /* Innovation weight of physics.md 6 (Huber): 1 within `huber` SDs, then falling. */
@@ -87,6 +91,9 @@ void tgi_bank_factors_of(const tg_filter *f, int mode, tg_real *u, tg_real *d); 
 tg_real tgi_nis(const tgi_plan *plan, const tgi_result *result, int n);
 /* nu' S^-1 nu of `count` channels, by the lower triangle of S; both are used up. No pivot falls below `least`. */
 tg_real tgi_quadratic(int count, tg_real (*S)[TG_MAX_CHANNELS], tg_real *nu, const tg_real *least);
+
+/* smoother.c: rows of X: row <- row M^-1, by Cholesky of the symmetric M, which is overwritten. 0 where M is not positive definite. */
+int tgi_divide_rows(int states, int stride, tg_real *M, tg_real *X);
 
 /* filter.c: the outputs anew with variances q, the parameters kept and widened by q. */
 void tgi_restart(int n, int stride, const tg_real *q, tg_real *u, tg_real *d);

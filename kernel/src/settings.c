@@ -1,21 +1,6 @@
 /* Settings of the estimator: defaults, checks, and an estimator made from them. */
 #include "estimator.h"
 
-static int is_number(tg_real x)
-{
-    return !isnan(x) && !isinf(x);
-}
-
-static int is_positive(tg_real x)
-{
-    return is_number(x) && x > 0;
-}
-
-static int is_spread(tg_real x)
-{
-    return is_number(x) && x >= 0;
-}
-
 /* The warning's on simulated drives and made-up snow runs, see docs/decisions/0100. */
 static tg_watch_settings default_watch(void)
 {
@@ -133,9 +118,9 @@ tg_status tg_tune_walks(tg_settings *s)
 {
     if (!s || s->machine.wheels < 1 || s->machine.wheels > TG_MAX_WHEELS) return TG_BAD_ARGUMENT;
     const int32_t n = s->machine.wheels;
-    if (!is_positive(s->machine.gravity)) return TG_NOT_POSITIVE;
+    if (!tgi_positive(s->machine.gravity)) return TG_NOT_POSITIVE;
     for (int32_t i = 0; i < n; i++)
-        if (!is_positive(s->machine.radius[i])) return TG_NOT_POSITIVE;
+        if (!tgi_positive(s->machine.radius[i])) return TG_NOT_POSITIVE;
     const tg_real T = natural_time(&s->machine), force = force_walk(s);
     for (int32_t i = 0; i < n; i++) {
         s->tuning.walk[i] = force / tgi_square(s->machine.radius[i]);
@@ -150,13 +135,13 @@ static tg_status check_wheels(const tg_settings *s)
 {
     for (int32_t i = 0; i < s->machine.wheels; i++) {
         if (s->wheel_axle[i] < 0 || s->wheel_axle[i] >= s->axles) return TG_BAD_ARGUMENT;
-        if (!is_positive(s->rolling_radius[i]) || !is_positive(s->wheel_share[i])) return TG_NOT_POSITIVE;
-        if (!is_number(s->lateral_share[i]) || !is_number(s->wheel_side[i])) return TG_NOT_FINITE;
-        if (!is_positive(s->noise[TG_WHEEL_SPEED + i])) return TG_NOT_POSITIVE;
+        if (!tgi_positive(s->rolling_radius[i]) || !tgi_positive(s->wheel_share[i])) return TG_NOT_POSITIVE;
+        if (!tgi_finite(s->lateral_share[i]) || !tgi_finite(s->wheel_side[i])) return TG_NOT_FINITE;
+        if (!tgi_positive(s->noise[TG_WHEEL_SPEED + i])) return TG_NOT_POSITIVE;
     }
     for (int32_t k = 0; k < s->axles; k++) {
-        if (!is_positive(s->load_share[k])) return TG_NOT_POSITIVE;
-        if (!is_number(s->load_transfer[k]) || !is_number(s->payload_share[k]) || !is_number(s->hitch_share[k])) return TG_NOT_FINITE;
+        if (!tgi_positive(s->load_share[k])) return TG_NOT_POSITIVE;
+        if (!tgi_finite(s->load_transfer[k]) || !tgi_finite(s->payload_share[k]) || !tgi_finite(s->hitch_share[k])) return TG_NOT_FINITE;
     }
     return TG_OK;
 }
@@ -176,15 +161,15 @@ static tg_status check_numbers(const tg_settings *s)
                                 s->noise[TG_GROUND_SPEED], s->noise[TG_ACCELERATION_X]};
     const tg_real *const tuned = (const tg_real *)&s->tuned; /* all of them reals */
     for (size_t k = 0; k < sizeof s->tuned / sizeof *tuned; k++)
-        if (!is_positive(tuned[k])) return TG_NOT_POSITIVE;
+        if (!tgi_positive(tuned[k])) return TG_NOT_POSITIVE;
     for (size_t k = 0; k < sizeof spreads / sizeof *spreads; k++)
-        if (!is_spread(spreads[k])) return TG_NOT_POSITIVE;
+        if (!tgi_not_negative(spreads[k])) return TG_NOT_POSITIVE;
     for (size_t k = 0; k < sizeof positive / sizeof *positive; k++)
-        if (!is_positive(positive[k])) return TG_NOT_POSITIVE;
-    if (!is_number(s->watch.warn) || !is_number(s->prior_adhesion) || !is_number(s->prior_resistance)) return TG_NOT_FINITE;
+        if (!tgi_positive(positive[k])) return TG_NOT_POSITIVE;
+    if (!tgi_finite(s->watch.warn) || !tgi_finite(s->prior_adhesion) || !tgi_finite(s->prior_resistance)) return TG_NOT_FINITE;
     for (int32_t k = 0; k < TG_SLOTS; k++) {
-        if (!is_number(s->offset[k])) return TG_NOT_FINITE;
-        if (!is_positive(s->gain[k]) || !is_spread(s->noise[k]) || !is_spread(s->held_period[k])) return TG_NOT_POSITIVE;
+        if (!tgi_finite(s->offset[k])) return TG_NOT_FINITE;
+        if (!tgi_positive(s->gain[k]) || !tgi_not_negative(s->noise[k]) || !tgi_not_negative(s->held_period[k])) return TG_NOT_POSITIVE;
     }
     return TG_OK;
 }

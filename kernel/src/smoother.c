@@ -82,25 +82,24 @@ static void add_congruence(int states, const tg_real *A, const tg_real *B, tg_re
         for (int j = 0; j < states; j++) C[i * states + j] += (sum[i * states + j] + sum[j * states + i]) / 2;
 }
 
-/* Rows of X: row <- row M^-1, by Cholesky of the symmetric M, which is overwritten. 0 where M is not positive definite. */
-static int divide_rows(int states, tg_real *M, tg_real *X)
+int tgi_divide_rows(int states, int stride, tg_real *M, tg_real *X)
 {
     for (int j = 0; j < states; j++)
         for (int i = j; i < states; i++) {
-            tg_real sum = M[i * states + j];
-            for (int k = 0; k < j; k++) sum -= M[i * states + k] * M[j * states + k];
+            tg_real sum = M[i * stride + j];
+            for (int k = 0; k < j; k++) sum -= M[i * stride + k] * M[j * stride + k];
             if (i == j && !(sum > 0)) return 0;
-            M[i * states + j] = i == j ? tgi_sqrt(sum) : sum / M[j * states + j];
+            M[i * stride + j] = i == j ? tgi_sqrt(sum) : sum / M[j * stride + j];
         }
     for (int r = 0; r < states; r++) {
-        tg_real *const x = X + r * states;
+        tg_real *const x = X + r * stride;
         for (int i = 0; i < states; i++) {
-            for (int k = 0; k < i; k++) x[i] -= M[i * states + k] * x[k];
-            x[i] /= M[i * states + i];
+            for (int k = 0; k < i; k++) x[i] -= M[i * stride + k] * x[k];
+            x[i] /= M[i * stride + i];
         }
         for (int i = states - 1; i >= 0; i--) {
-            for (int k = i + 1; k < states; k++) x[i] -= M[k * states + i] * x[k];
-            x[i] /= M[i * states + i];
+            for (int k = i + 1; k < states; k++) x[i] -= M[k * stride + i] * x[k];
+            x[i] /= M[i * stride + i];
         }
     }
     return 1;
@@ -208,7 +207,7 @@ tg_status tg_smooth_step(int32_t wheels, int32_t columns, const tg_real *here, c
     memcpy(prior, Q, sizeof Q);
     add_congruence(states, F, before, prior);
     multiply(states, before, F, 1, G);
-    if (!divide_rows(states, prior, G)) return TG_NOT_POSITIVE;
+    if (!tgi_divide_rows(states, states, prior, G)) return TG_NOT_POSITIVE;
     multiply(states, G, F, 0, rest);
     for (int i = 0; i < states * states; i++) rest[i] = (i % (states + 1) == 0) - rest[i];
     memset(smooth, 0, sizeof smooth);

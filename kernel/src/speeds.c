@@ -314,29 +314,6 @@ void tgi_speeds_update(tg_estimator *e, tg_row *row, tg_estimate *out)
 
 size_t tgi_speeds_length(void) { return sizeof(tgi_speeds) / sizeof(tg_real); }
 
-/* Solve A Z = B in place of B, A symmetric and positive definite: by Cholesky. Returns 0 where A is not. */
-static int solve(tg_real (*A)[SIZE], tg_real (*B)[SIZE], int32_t size)
-{
-    for (int32_t j = 0; j < size; j++) {
-        for (int32_t k = 0; k < j; k++)
-            for (int32_t i = j; i < size; i++) A[i][j] -= A[i][k] * A[j][k];
-        if (!(A[j][j] > 0)) return 0;
-        const tg_real pivot = tgi_sqrt(A[j][j]);
-        for (int32_t i = j; i < size; i++) A[i][j] /= pivot;
-    }
-    for (int32_t c = 0; c < size; c++) {
-        for (int32_t i = 0; i < size; i++) {
-            for (int32_t k = 0; k < i; k++) B[i][c] -= A[i][k] * B[k][c];
-            B[i][c] /= A[i][i];
-        }
-        for (int32_t i = size - 1; i >= 0; i--) {
-            for (int32_t k = i + 1; k < size; k++) B[i][c] -= A[k][i] * B[k][c];
-            B[i][c] /= A[i][i];
-        }
-    }
-    return 1;
-}
-
 /* Rauch, Tung and Striebel (1965), with the densities that the row behind was reached by. */
 static void step_back(tgi_speeds *here, const tgi_speeds *filtered_next, const tgi_speeds *next, int32_t n)
 {
@@ -346,22 +323,19 @@ static void step_back(tgi_speeds *here, const tgi_speeds *filtered_next, const t
     memcpy(ahead, here->P, sizeof ahead);
     memcpy(gain, here->P, sizeof gain);
     carry_on(ahead, reach, keep, size);
-    for (int32_t j = 0; j < size; j++) { /* F P: its transpose times inverse(ahead) is the gain */
-        gain[0][j] += reach * gain[1][j];
-        gain[1][j] *= keep;
-    }
+    for (int32_t j = 0; j < size; j++) move(gain[j], reach, keep); /* P F', which times inverse(ahead) is the gain */
     memcpy(x, here->x, sizeof x);
     move(x, reach, keep);
     disturb(x, ahead, filtered_next->dt, filtered_next->manoeuvre, filtered_next->slipping, n);
     for (int32_t j = 0; j < size; j++) change[j] = next->x[j] - x[j];
     memcpy(factor, ahead, sizeof factor);
-    if (!solve(factor, gain, size)) return;
+    if (!tgi_divide_rows(size, SIZE, factor[0], gain[0])) return;
     for (int32_t i = 0; i < size; i++)
-        for (int32_t k = 0; k < size; k++) here->x[i] += gain[k][i] * change[k];
+        for (int32_t k = 0; k < size; k++) here->x[i] += gain[i][k] * change[k];
     for (int32_t i = 0; i < size; i++)
         for (int32_t j = 0; j < size; j++)
             for (int32_t k = 0; k < size; k++)
-                for (int32_t l = 0; l < size; l++) here->P[i][j] += gain[k][i] * (next->P[k][l] - ahead[k][l]) * gain[l][j];
+                for (int32_t l = 0; l < size; l++) here->P[i][j] += gain[i][k] * (next->P[k][l] - ahead[k][l]) * gain[j][l];
 }
 
 /* One row back: `carry` holds the smoothed row behind and is overwritten by this one's; `next` is the filtered one behind, or null. */

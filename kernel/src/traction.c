@@ -49,10 +49,8 @@ TG_INLINE void roughen(tgi_moments *c, const tg_real *x, const tgi_scene *scene,
     for (int i = 0; i < n; i++) c->mm[i] += tgi_rough_adhesion(scene, x[i]);
 }
 
-TG_INLINE tg_real root(tg_real variance) { return tgi_sqrt(variance > 0 ? variance : 0); }
-
 /* Slip lies in [-1, 1], so no spread above 1 says more than 1 does; the same is said of the efficiency. */
-TG_INLINE tg_real bounded_root(tg_real variance) { return root(variance < 1 ? variance : 1); }
+TG_INLINE tg_real bounded_root(tg_real variance) { return tgi_root(variance < 1 ? variance : 1); }
 
 /* Net traction (paper eq. 5), slip and efficiency (paper eq. 7) of all wheels, delta method. `mean` is the mean adhesion over the load: what a common radius error does to rho_s. */
 TG_INLINE void traction(const tg_settings *restrict s, const tg_real *restrict x, const tgi_moments *restrict c, const tg_real *restrict hub,
@@ -63,11 +61,11 @@ TG_INLINE void traction(const tg_settings *restrict s, const tg_real *restrict x
     for (int i = 0; i < n; i++) {
         const tg_real mu = x[i], kappa = mu - rho;
         o[TG_OUT_WHEEL_SPEED + i] = x[n + 2 + i];
-        o[TG_OUT_WHEEL_SPEED_STD + i] = root(c->ww[i]);
+        o[TG_OUT_WHEEL_SPEED_STD + i] = tgi_root(c->ww[i]);
         o[TG_OUT_ADHESION + i] = mu;
-        o[TG_OUT_ADHESION_STD + i] = root(c->mm[i] + tgi_square(mu * error));
+        o[TG_OUT_ADHESION_STD + i] = tgi_root(c->mm[i] + tgi_square(mu * error));
         o[TG_OUT_NET_TRACTION + i] = kappa;
-        o[TG_OUT_NET_TRACTION_STD + i] = root(c->mm[i] - 2 * c->mr[i] + c->rr + tgi_square((mu - mean) * error));
+        o[TG_OUT_NET_TRACTION_STD + i] = tgi_root(c->mm[i] - 2 * c->mr[i] + c->rr + tgi_square((mu - mean) * error));
     }
     for (int i = 0; i < n; i++) {
         const tgi_slip g = tgi_slip_of(x[n + 2 + i], v + hub[i], s->rolling_radius[i], s->standstill_speed);
@@ -87,9 +85,9 @@ TG_INLINE void traction(const tg_settings *restrict s, const tg_real *restrict x
                                                     + tgi_square(by_radius * error));
     }
     o[TG_OUT_GROUND_SPEED] = v;
-    o[TG_OUT_GROUND_SPEED_STD] = root(c->vv);
+    o[TG_OUT_GROUND_SPEED_STD] = tgi_root(c->vv);
     o[TG_OUT_SOIL_RESISTANCE] = rho;
-    o[TG_OUT_SOIL_RESISTANCE_STD] = root(c->rr + tgi_square(mean * error));
+    o[TG_OUT_SOIL_RESISTANCE_STD] = tgi_root(c->rr + tgi_square(mean * error));
 }
 
 static void blank(tg_real *out, int32_t place, int32_t n)
