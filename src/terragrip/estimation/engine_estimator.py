@@ -50,8 +50,6 @@ class EngineEstimator(TractionEstimator):
         *,
         sensors: Mapping[str, float] | None = None,
         held: Mapping[str, float] | None = None,
-        gap: float | None = None,
-        standstill_speed: float | None = None,
         fixed: bool = False,
     ) -> None:
         super().__init__(
@@ -60,8 +58,6 @@ class EngineEstimator(TractionEstimator):
             sensors=sensors,
             held=held,
             channels=machine.own_channels,
-            gap=gap,
-            standstill_speed=standstill_speed,
             together=machine.together,
         )
         self.machine = machine
@@ -148,14 +144,7 @@ class EngineEstimator(TractionEstimator):
         known = about["machine"]
         machine = DrivenMachine.of_file(Vehicle.from_dict(known["vehicle"]), known["channels"], known)
         result = cls(
-            machine,
-            about["given"],
-            inner.method,
-            sensors=inner.noise,
-            held=inner.held,
-            gap=inner.thresholds.gap,
-            standstill_speed=inner.thresholds.standstill_speed,
-            fixed=about["fixed"],
+            machine, about["given"], inner.method, sensors=inner.noise, held=inner.held, fixed=about["fixed"]
         )
         result.guessed, result._engine = inner.guessed, inner._engine
         result._tail.restore(about["tail"])

@@ -62,7 +62,7 @@ class FrameDecoder:
         by_name = {field.name: field for field, _ in plan}
         for field, names in plan:
             raw = raws[field.name]
-            if raw is None or not _chosen(field, raws) or (field.codes and _is_code(field, raw)):
+            if raw is None or not _chosen(field, raws) or raw in field.missing:
                 continue
             value = _physical(field, raw)
             if field.reverse is not None and field.reverse in by_name and raws[field.reverse] == 0:
@@ -105,17 +105,6 @@ def _raw(field: Field, data: bytes) -> int | None:
 
 def _chosen(field: Field, raws: dict[str, int | None]) -> bool:
     return field.selector is None or raws.get(field.selector) in field.chosen
-
-
-def _is_code(field: Field, raw: int) -> bool:
-    """Whether a raw value says "error" or "not available" (see `terragrip.formats.can.bits.missing_codes`)."""
-    if field.length < 2 or field.floating:
-        return False
-    if field.signed:
-        return raw in ((1 << (field.length - 1)) - 1, (1 << (field.length - 1)) - 2)
-    if field.length % 8 == 0:
-        return raw >= 0xFB << (field.length - 8)
-    return raw >= (1 << field.length) - 2
 
 
 def _physical(field: Field, raw: int) -> float:

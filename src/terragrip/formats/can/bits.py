@@ -41,6 +41,18 @@ class Field:
             return (self.start + self.length - 1) // 8
         return (8 * (self.start // 8) + 7 - self.start % 8 + self.length - 1) // 8
 
+    @property
+    def missing(self) -> range:
+        """Raw values that say "error", "not available" or are reserved (SAE J1939-71, ISO 11783-7).
+
+        Whole bytes: the highest byte is 0xFB or more. Fewer bits: the two highest codes, "error" and "not available"; a
+        single bit has none. Signed fields are NMEA 2000's: the two highest codes.
+        """
+        if not self.codes or self.length < 2 or self.floating:
+            return range(0)
+        end = 1 << (self.length - self.signed)
+        return range(0xFB << (self.length - 8) if self.length % 8 == 0 and not self.signed else end - 2, end)
+
 
 def raw_of(field: Field, data: Bytes) -> npt.NDArray[np.uint64]:
     """Raw values (n,) of a field in payloads (n, bytes); the payloads must reach to the field's last byte."""
@@ -59,22 +71,6 @@ def raw_of(field: Field, data: Bytes) -> npt.NDArray[np.uint64]:
     if field.length < 64:
         result &= np.uint64((1 << field.length) - 1)
     return result
-
-
-def missing_codes(field: Field, raw: npt.NDArray[np.uint64]) -> npt.NDArray[np.bool_]:
-    """Which raw values (n,) say "error", "not available" or are reserved (SAE J1939-71, ISO 11783-7).
-
-    Whole bytes: the highest byte is 0xFB or more. Fewer bits: the two highest codes, "error" and "not available"; a
-    single bit has none. Signed fields are NMEA 2000's: the two highest codes.
-    """
-    if field.length < 2 or field.floating:
-        return np.zeros(len(raw), dtype=bool)
-    if field.signed:
-        top = (1 << (field.length - 1)) - 1
-        return (raw == np.uint64(top)) | (raw == np.uint64(top - 1))
-    if field.length % 8 == 0:
-        return raw >= np.uint64(0xFB << (field.length - 8))
-    return raw >= np.uint64((1 << field.length) - 2)
 
 
 def physical(field: Field, raw: npt.NDArray[np.uint64]) -> Floats:
@@ -118,8 +114,8 @@ def decode(
     result = {}
     for field in (f for f in fields if f.name in wanted):
         known = present(field)
-        if field.codes:
-            known = known & ~missing_codes(field, raw(field))
+        if field.missing:
+            known = known & ((raw(field) < field.missing[0]) | (raw(field) > field.missing[-1]))
         values = np.where(known, physical(field, raw(field)), np.nan)
         if field.reverse is not None:
             backward = by_name[field.reverse]
