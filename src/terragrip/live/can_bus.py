@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import asyncio
 import sys
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import AsyncIterator, Iterator
+from contextlib import asynccontextmanager, contextmanager
 from importlib.util import find_spec
 from typing import Any
 
@@ -35,21 +36,23 @@ def check(uri: Uri) -> str:
     return interface
 
 
-def open_bus(uri: Uri) -> Any:
-    """The bus of ``can:can0?interface=socketcan&bitrate=250000``; raises Lost where it is not there."""
+@asynccontextmanager
+async def bus_of(uri: Uri) -> AsyncIterator[Any]:
+    """The bus of ``can:can0?interface=socketcan&bitrate=250000``; raises Lost where it is not there or goes away."""
     can = _python_can()
     options: dict[str, Any] = {"interface": check(uri), "channel": uri.path}
     if "bitrate" in uri.options:
         options["bitrate"] = round(uri.number("bitrate", 250_000))
     try:
-        return can.Bus(**options)
+        bus = await asyncio.to_thread(can.Bus, **options)
     except (can.CanError, OSError, ValueError, ImportError, NotImplementedError) as error:
         raise Lost(f"the bus: {' '.join(str(error).split())[:160]}") from error
-
-
-def errors() -> tuple[type[Exception], ...]:
-    """What a bus that is lost raises."""
-    return (_python_can().CanError, OSError)
+    try:
+        yield bus
+    except (can.CanError, OSError) as error:
+        raise Lost(f"the bus: {error}") from error
+    finally:
+        bus.shutdown()
 
 
 def _python_can() -> Any:

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import asyncio
 import json
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
 from typing import Any
 
 from terragrip.errors import InputError
@@ -10,15 +13,20 @@ from terragrip.live.feed import Lost
 from terragrip.live.uri import Uri
 
 
-def open_session(uri: Uri) -> Any:
+@asynccontextmanager
+async def session(uri: Uri) -> AsyncIterator[Any]:
     """A peer that connects to ``connect`` and listens on ``listen`` (``tcp/127.0.0.1:7447``); it looks for others with ``scout=1``.
 
-    By itself it neither listens nor looks beyond this machine. Raises Lost where the other side is not there.
+    By itself it neither listens nor looks beyond this machine. Raises Lost where the other side is not there, or refuses.
     """
     import zenoh
 
     try:
-        return zenoh.open(config(uri))
+        opened = await asyncio.to_thread(zenoh.open, config(uri))
+        try:
+            yield opened
+        finally:
+            await asyncio.to_thread(opened.close)
     except zenoh.ZError as error:
         raise Lost(f"Zenoh: {' '.join(str(error).split())[:160]}") from error
 

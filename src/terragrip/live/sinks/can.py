@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import asyncio
 import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -13,9 +12,8 @@ from terragrip.estimation.engine import EVENTS
 from terragrip.estimation.estimator import Estimate
 from terragrip.estimation.rims import DRIVE
 from terragrip.ground.classification.labels import UNKNOWN
-from terragrip.live.can_bus import check, errors, open_bus
+from terragrip.live.can_bus import bus_of, check
 from terragrip.live.core import Row
-from terragrip.live.feed import Lost
 from terragrip.live.message import GROUND, SOIL, Message
 from terragrip.live.outbox import Outbox
 from terragrip.live.uri import Uri
@@ -60,16 +58,11 @@ class CanSink:
         """Send frames; raises Lost where the bus goes away or takes nothing any more."""
         import can
 
-        bus = await asyncio.to_thread(open_bus, self.uri)
-        try:
+        async with bus_of(self.uri) as bus:
             outbox.connected()
             while True:
                 for identifier, data in self.frames_of(await outbox.get()):
                     bus.send(can.Message(arbitration_id=identifier, is_extended_id=True, data=data))
-        except errors() as error:
-            raise Lost(f"the bus: {error}") from error
-        finally:
-            bus.shutdown()
 
     def frames_of(self, message: Message) -> list[tuple[int, bytes]]:
         """Identifier and payload of each frame that a message becomes: of an estimate, and of what the ground is."""

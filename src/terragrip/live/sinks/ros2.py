@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import asyncio
 import secrets
 import struct
 import time
@@ -36,13 +35,10 @@ class Ros2Sink:
         await (self._by_rclpy if self.by_rclpy else self._by_zenoh)(outbox)
 
     async def _by_zenoh(self, outbox: Outbox) -> None:
-        import zenoh
+        from terragrip.live.zenoh_session import session
 
-        from terragrip.live.zenoh_session import open_session
-
-        session = await asyncio.to_thread(open_session, self.uri)
         sender, number = secrets.token_bytes(16), 0
-        try:
+        async with session(self.uri) as peer:
             outbox.connected()
             while True:
                 message = await outbox.get()
@@ -50,11 +46,7 @@ class Ros2Sink:
                 # What rmw_zenoh reads beside a message: its number, when it was sent, and by whom.
                 beside = struct.pack("<qq", number, time.time_ns()) + bytes([16]) + sender
                 key = f"{self.domain}/{self.name}/{message.kind}/{dds_name(STRING)}/{STRING_HASH}"
-                session.put(key, cdr_string(message.json(outbox.columns)), attachment=beside)
-        except zenoh.ZError as error:
-            raise Lost(f"Zenoh: {error}") from error
-        finally:
-            await asyncio.to_thread(session.close)
+                peer.put(key, cdr_string(message.json(outbox.columns)), attachment=beside)
 
     async def _by_rclpy(self, outbox: Outbox) -> None:
         import rclpy

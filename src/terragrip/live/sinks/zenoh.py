@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-import asyncio
-
-from terragrip.live.feed import Lost
 from terragrip.live.outbox import Outbox
 from terragrip.live.topics import of_vehicle
 from terragrip.live.uri import Uri
-from terragrip.live.zenoh_session import config, key_of, open_session
+from terragrip.live.zenoh_session import config, key_of, session
 
 
 class ZenohSink:
@@ -23,17 +20,12 @@ class ZenohSink:
         """Put messages; raises Lost where Zenoh refuses."""
         import zenoh
 
-        session = await asyncio.to_thread(open_session, self.uri)
-        try:
+        async with session(self.uri) as peer:
             outbox.connected()
             while True:
                 message = await outbox.get()
-                session.put(
+                peer.put(
                     f"{of_vehicle(self.key, message.vehicle)}/{message.kind}",
                     message.json(outbox.columns),
                     encoding=zenoh.Encoding.APPLICATION_JSON,
                 )
-        except zenoh.ZError as error:
-            raise Lost(f"Zenoh: {error}") from error
-        finally:
-            await asyncio.to_thread(session.close)

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import asyncio
+from functools import partial
 from typing import Any
 
-from terragrip.live.can_bus import check, errors, open_bus
+from terragrip.live.can_bus import bus_of, check
 from terragrip.live.decode import Decoder
-from terragrip.live.feed import Feed, Lost
+from terragrip.live.feed import Feed
 from terragrip.live.frame_decoder import FrameDecoder
 from terragrip.live.thread_bridge import ThreadBridge, repeated_in_thread
 from terragrip.live.uri import Uri
@@ -36,11 +36,9 @@ class CanSource:
     async def run(self, feed: Feed) -> None:
         """Feed frames; raises Lost where the bus is not there or goes away."""
         bridge = ThreadBridge(feed, _BATCHES)
-        bus = await asyncio.to_thread(open_bus, self.uri)
         feed.one_layout = False
-        feed.connected()
 
-        def read() -> None:
+        def read(bus: Any) -> None:
             frame = bus.recv(_PATIENCE)
             batch: list[Any] = []
             while frame is not None and len(batch) < _AT_ONCE:
@@ -51,12 +49,9 @@ class CanSource:
             if batch:
                 bridge.call(self._feed, feed, batch)
 
-        try:
-            await repeated_in_thread(read)
-        except errors() as error:
-            raise Lost(f"the bus: {error}") from error
-        finally:
-            bus.shutdown()
+        async with bus_of(self.uri) as bus:
+            feed.connected()
+            await repeated_in_thread(partial(read, bus))
 
     def _feed(self, feed: Feed, batch: list[Any]) -> None:
         for frame in batch:

@@ -58,18 +58,15 @@ class Ros2Source:
         await (self._by_rclpy if self.by_rclpy else self._by_zenoh)(feed, received)
 
     async def _by_zenoh(self, feed: Feed, received: Receive) -> None:
-        from terragrip.live.zenoh_session import open_session
+        from terragrip.live.zenoh_session import session
 
-        session = await asyncio.to_thread(open_session, self.uri)
-        try:
+        async with session(self.uri) as peer:
             for topic, kind in self.topics.items():
-                session.declare_subscriber(f"{self.domain}{topic}/*/*", self._typed(topic, received))
+                peer.declare_subscriber(f"{self.domain}{topic}/*/*", self._typed(topic, received))
                 if kind:
-                    session.declare_subscriber(topic.strip("/"), self._bridged(topic, kind, received))
+                    peer.declare_subscriber(topic.strip("/"), self._bridged(topic, kind, received))
             feed.connected()
             await asyncio.Event().wait()
-        finally:
-            await asyncio.to_thread(session.close)
 
     def _typed(self, topic: str, received: Receive) -> Callable[[Any], None]:
         def listen(sample: Any) -> None:

@@ -8,7 +8,7 @@ from typing import Any
 from terragrip.live.feed import Receiver
 from terragrip.live.thread_bridge import ThreadBridge
 from terragrip.live.uri import Uri
-from terragrip.live.zenoh_session import config, key_of, open_session
+from terragrip.live.zenoh_session import config, key_of, session
 
 
 class ZenohSource:
@@ -24,17 +24,14 @@ class ZenohSource:
     async def run(self, feed: Receiver) -> None:
         """Feed samples; raises Lost where the other side is not there. Zenoh itself connects again later."""
         bridge = ThreadBridge(feed)
-        session = await asyncio.to_thread(open_session, self.uri)
 
         def received(sample: Any) -> None:  # in a thread of Zenoh's
             bridge.call(self._feed, feed, bytes(sample.payload), str(sample.key_expr))
 
-        try:
-            session.declare_subscriber(self.key, received)
+        async with session(self.uri) as peer:
+            peer.declare_subscriber(self.key, received)
             feed.connected()
             await asyncio.Event().wait()
-        finally:
-            await asyncio.to_thread(session.close)
 
     def _feed(self, feed: Receiver, data: bytes, key: str) -> None:
         feed.message(data, topic=key)
