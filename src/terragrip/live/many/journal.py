@@ -12,15 +12,13 @@ logger = logging.getLogger("terragrip.live")
 
 
 class Journal:
-    """Logs each event and gives it to every listener, none of which is a sink: a sink's topics belong to vehicles. ``counts``: by kind."""
+    """Logs each event and gives it to every listener, none of which is a sink: a sink's topics belong to vehicles."""
 
     def __init__(self, listeners: list[Callable[[Message], None]]) -> None:
         self.listeners = listeners
-        self.counts: dict[str, int] = {}
 
     def event(self, kind: str, source: str, text: str, vehicle: str = "") -> None:
         """An event of ``source``: a link's URI, or ``service``."""
-        self.counts[kind] = self.counts.get(kind, 0) + 1
         emit(logger, kind, source=source, text=text, **({"vehicle": vehicle} if vehicle else {}))
         message = Message(
             EVENT, float("nan"), data={"kind": kind, "source": source, "text": text}, vehicle=vehicle
