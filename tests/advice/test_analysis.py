@@ -216,6 +216,18 @@ def test_a_stock_tractor_is_held_against_the_usual_band_by_shares_of_time():
     assert any("torque" in sentence for sentence in one.missing)
 
 
+def test_a_library_gives_no_most_pull_power_beyond_the_slips_it_was_learned_at():
+    ground = {"a": 0.9, "k": 11.36}
+    tables = [drive(soil="hard", seed=seed, **ground) for seed in range(2)]
+    pairs = [pair for k, table in enumerate(tables) for pair in pairs_of(table, f"run {k}")]
+    library = learn_soils(pairs).library().soils
+    assert max(one["slip"] for one in library["hard"].bins) < 0.2 < truth(**ground)[1].slip
+    one = only(tables, soils=library)
+    assert one.best_efficiency is not None
+    assert one.best_productivity is None
+    assert any("form of the curve alone" in sentence for sentence in one.missing)
+
+
 def test_shares_of_time_hold_what_the_zero_of_slip_leaves_open():
     """Work at 10 % that may as well be 5 or 15 %: neither too light nor too heavy is claimed, and the way to know is named."""
     one = only([slip_only(np.repeat([0.02, 0.10], 200)[3:], std=0.026)])

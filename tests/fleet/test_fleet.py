@@ -17,6 +17,7 @@ import terragrip as tg
 from small_fleet import VEHICLE, call, fleet, whole, write_log
 from terragrip.cli import main
 from terragrip.files import lock
+from terragrip.fleet.run import FleetResult
 
 Ran = Callable[..., tuple[int, str, str]]
 
@@ -238,6 +239,18 @@ def test_what_is_no_address_of_a_scheduler_is_one_line(
     place: Path, refused: Refused, address: str, said: str
 ) -> None:
     assert said in refused("--scheduler", address)
+
+
+def test_a_full_disk_is_no_success(place: Path, ran: Ran, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Each log's reason stands among the failures; a caller that looks at the exit code alone must see it too."""
+    reason = (
+        f"0.parquet: cannot be written (Error writing bytes to file. Detail: [errno 28] {os.strerror(28)})"
+    )
+    done = FleetResult(4, 0, {"drive0.csv": reason, "drive1.csv": "is damaged"}, 0, 4000, 0, (1.0,), (0.1,))
+    monkeypatch.setattr("terragrip.fleet.run.run_fleet", lambda *_, **__: done)
+    code, _, errors = ran()
+    assert (code, errors.count("\n")) == (2, 1)
+    assert "1 of 6 logs found no space left" in errors
 
 
 def test_maps_of_logs_with_positions(place: Path, ran: Ran) -> None:

@@ -54,6 +54,25 @@ def test_a_geotiff_tells_what_was_driven_from_what_is_kriged(tmp_path: Path) -> 
     assert np.all(band["passes"][kriged] == 0)
 
 
+@pytest.mark.parametrize("name", ["map.gpkg", "map.tif", "map.geojson", "map.parquet", "map.png"])
+def test_a_disk_that_is_full_is_one_line_and_no_file(
+    estimates: Path, tmp_path: Path, name: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    resource = pytest.importorskip("resource")
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(
+        resource.RLIMIT_FSIZE, (2048, hard)
+    )  # no file may grow further: writing fails as on a full disk
+    try:
+        code = main(["map", str(estimates), "-o", str(tmp_path / name), "--quiet"])
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+    error = capsys.readouterr().err
+    assert (code, error.count("\n")) == (2, 1)
+    assert "cannot be written" in error
+    assert list(tmp_path.iterdir()) == [estimates]
+
+
 def test_cells_are_as_wide_as_a_tractor_works() -> None:
     light = {
         "name": "rover",

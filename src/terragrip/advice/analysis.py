@@ -108,6 +108,12 @@ def _of_soil(
     best = best_of(over, over.efficiency)
     power = best_of(over, over.productivity)
     missing = _missing(best, power, curves, vehicle, measured="litres_per_hour" in _burnt(samples, vehicle))
+    beyond = known is not None and power.slip > curves.reach
+    if beyond:
+        missing.append(
+            f"the library's curve was learned at slips up to {curves.reach:.0%}: where most pull power lies beyond them rests on the "
+            "form of the curve alone; learn it from drives with harder pulls"
+        )
     if soils and known is None:
         lacking = (
             f"the library has no soil named {name!r}"
@@ -123,7 +129,7 @@ def _of_soil(
     work = Work(over, best, slip, pull, drive["ground_speed"], drive["soil_resistance"])
     return Advice(
         name, best,
-        power if power.interval[1] - power.interval[0] <= WIDEST_POWER else None,
+        power if power.interval[1] - power.interval[0] <= WIDEST_POWER and not beyond else None,
         _front(over, best, power),
         tuple(actions_for(work, vehicle)), tuple(missing), {**drive, "efficiency": float(work.efficiency[0])},
         _reserve(samples, curves, wheels), {**_field_work(work, vehicle), **fuel}, _limits(work, drive), _curve(over),

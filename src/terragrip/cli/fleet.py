@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import errno
+import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -122,6 +124,14 @@ def command(
         )
     if metrics is not None:
         _write_metrics(metrics, done, time.monotonic() - began)
+    unwritten = sum(os.strerror(errno.ENOSPC) in reason for reason in done.failed.values())
+    if unwritten:
+        raise InputError(
+            f"{unwritten} of {len(logs)} logs found no space left on the disk",
+            file=output,
+            place="--output",
+            hint="free space and run again: what was estimated is kept",
+        )
     if not (quiet or as_json):
         print("\n".join(_lines(done, output)))
 

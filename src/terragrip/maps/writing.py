@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import os
 from importlib.util import find_spec
 from pathlib import Path
@@ -62,8 +63,9 @@ def write_map(made: FieldMap, path: str | os.PathLike[str], layer: str = "cells"
             if suffix == ".parquet":
                 frame.to_parquet(temporary, index=False)
             else:
-                temporary.unlink()
-                frame.to_crs(4326).to_file(temporary, driver="GeoJSON", engine="pyogrio", RFC7946="YES")
+                written = io.BytesIO()  # GDAL says nothing of a disk that is full
+                frame.to_crs(4326).to_file(written, driver="GeoJSON", engine="pyogrio", RFC7946="YES")
+                temporary.write_bytes(written.getvalue())
         elif suffix in (".tif", ".tiff"):
             _geotiff(made, temporary)
         else:
@@ -87,7 +89,10 @@ def _geopackage(made: FieldMap, path: Path) -> None:
         frame = table(made, name)
         if name == "changes" and not len(frame):
             continue  # nothing was driven twice; an empty layer would say that nothing changed
-        frame.to_file(path, layer=name, driver="GPKG", engine="pyogrio", dataset_metadata=metadata)
+        try:
+            frame.to_file(path, layer=name, driver="GPKG", engine="pyogrio", dataset_metadata=metadata)
+        except RuntimeError as error:  # pyogrio's own, the disk's among them
+            raise OSError(str(error).rpartition("failed: ")[2]) from error
 
 
 def _geotiff(made: FieldMap, path: Path) -> None:
@@ -113,9 +118,11 @@ def _geotiff(made: FieldMap, path: Path) -> None:
         "driver": "COG", "width": width, "height": height, "count": len(names), "dtype": "float32", "nodata": float("nan"),
         "crs": made.epsg, "transform": from_origin(west * made.cell, (top + 1) * made.cell, made.cell, made.cell), "compress": "deflate",
     }  # fmt: skip
-    with rasterio.open(path, "w", **profile) as file:
-        for band, name in enumerate(names, 1):
-            values = np.full((height, width), np.nan, dtype=np.float32)
-            values[top - row, column - west] = table[name]
-            file.write(values, band)
-            file.set_band_description(band, name)
+    with rasterio.MemoryFile() as memory:
+        with memory.open(**profile) as file:
+            for band, name in enumerate(names, 1):
+                values = np.full((height, width), np.nan, dtype=np.float32)
+                values[top - row, column - west] = table[name]
+                file.write(values, band)
+                file.set_band_description(band, name)
+        path.write_bytes(memory.getbuffer())  # GDAL says nothing of a disk that is full
