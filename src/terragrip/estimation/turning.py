@@ -10,6 +10,7 @@ import numpy.typing as npt
 from terragrip.estimation.rims import Rim, rims_of
 from terragrip.recording import LogBlocks, Recording
 from terragrip.recording.track import Track, track_of
+from terragrip.recording.window_means import window_means
 from terragrip.vehicle import Vehicle
 
 Floats = npt.NDArray[np.float64]
@@ -64,11 +65,5 @@ def _unseen_turns(log: Recording, rims: Sequence[Rim]) -> list[str]:
 
 def _rim_means(rims: Sequence[Rim], log: Recording, place: npt.NDArray[np.intp]) -> Floats:
     """Mean rim speed (windows,) [m/s] of some wheels, NaN where none was measured."""
-    size = int(place[-1]) + 1
-    total, count = np.zeros(size), np.zeros(size)
-    for rim in rims:
-        values = rim.radius * log.channels[rim.channel]
-        known = np.isfinite(values)
-        total += np.bincount(place[known], values[known], size)
-        count += np.bincount(place[known], minlength=size)
-    return np.where(count > 0, total / np.maximum(count, 1), np.nan)
+    values = np.concatenate([np.empty(0), *(rim.radius * log.channels[rim.channel] for rim in rims)])
+    return window_means(values, np.tile(place, len(rims)), int(place[-1]) + 1)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,10 +32,6 @@ class Event(Span):
     start: float
     end: float
     why: str = ""
-
-    def to_dict(self) -> dict[str, Any]:
-        """As ground.json holds it."""
-        return {"kind": self.kind, "start": self.start, "end": self.end, "why": self.why}
 
 
 def events(estimates: Estimates) -> tuple[Event, ...]:

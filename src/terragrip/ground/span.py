@@ -25,4 +25,4 @@ class Span:
 
     def to_dict(self) -> dict[str, Any]:
         """As ground.json holds it."""
-        raise NotImplementedError
+        return dict(vars(self))

@@ -270,12 +270,9 @@ class ExtendedKalmanFilter(GaussianFilter):
         cross = self.P @ F.T
         return self.f(self.x, u, dt), F @ cross, cross
 
-    def observe(self, h: Measurement | None = None, H: Matrix | None = None) -> Observation:
-        """As the base's; H (m, n) is the Jacobian of another h, differences are taken without it."""
-        if h is None:
-            h = self.h
-            H = None if self.H is None else self.H(self.x)
-        H = jacobian(h, self.x) if H is None else H
+    def observe(self, h: Measurement | None = None) -> Observation:
+        own, h = h is None, self.h if h is None else h
+        H = self.H(self.x) if own and self.H is not None else jacobian(h, self.x)
         return LinearObservation(self.P, h(self.x), H)
 
 

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from terragrip.errors import InputError
 from terragrip.ground.classification.chances import doubting_log
+from terragrip.ground.classification.kernel_machine import learner
 from terragrip.ground.classification.standardization import centre_of
 
 Floats = npt.NDArray[np.float64]
@@ -42,7 +41,10 @@ class Forest:
         Raises InputError if scikit-learn is missing.
         """
         centre = centre_of(features).astype(np.float32)
-        trees = [one.tree_ for one in _trees(seed).fit(_filled(features, centre), codes).estimators_]
+        forest = learner("ensemble", "ExtraTreesClassifier")(
+            _TREES, min_samples_leaf=_LEAF, class_weight="balanced", n_jobs=1, random_state=seed
+        )
+        trees = [one.tree_ for one in forest.fit(_filled(features, centre), codes).estimators_]
         sizes = [tree.node_count for tree in trees]
         roots = np.r_[0, np.cumsum(sizes)[:-1]].astype(np.int32)
         own = np.arange(sum(sizes))
@@ -97,14 +99,3 @@ def _rounded_down(threshold: Floats) -> npt.NDArray[np.float32]:
     """Single precision that single-precision features compare with as with the double."""
     single = threshold.astype(np.float32)
     return np.where(single > threshold, np.nextafter(single, np.float32(-np.inf)), single)
-
-
-def _trees(seed: int) -> Any:
-    try:
-        from sklearn.ensemble import ExtraTreesClassifier
-    except ImportError:
-        hint = "pip install 'terragrip[ground]'"
-        raise InputError("scikit-learn is needed to train a GroundClassifier", hint=hint) from None
-    return ExtraTreesClassifier(
-        _TREES, min_samples_leaf=_LEAF, class_weight="balanced", n_jobs=1, random_state=seed
-    )

@@ -7,6 +7,7 @@ window costs one product of matrices.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from importlib import import_module
 from itertools import combinations
 from typing import Any
 
@@ -42,7 +43,10 @@ class KernelMachine:
 
         Raises InputError if scikit-learn is missing.
         """
-        machine = _svm(WIDTH / points.shape[1]).fit(points, codes)
+        svm = learner("svm", "SVC")(
+            C=PENALTY, gamma=WIDTH / points.shape[1], class_weight="balanced", cache_size=300
+        )
+        machine = svm.fit(points, codes)
         classes = len(machine.classes_)
         first = np.r_[0, np.cumsum(machine.n_support_)]
         dual = np.asarray(machine.dual_coef_)
@@ -87,10 +91,10 @@ def votes(pairs: Floats, classes: int) -> Floats:
     return scores / (classes - 1)
 
 
-def _svm(width: float) -> Any:
+def learner(module: str, name: str) -> Any:
+    """A class of scikit-learn; raises InputError where it is missing."""
     try:
-        from sklearn.svm import SVC
+        return getattr(import_module(f"sklearn.{module}"), name)
     except ImportError:
         hint = "pip install 'terragrip[ground]'"
         raise InputError("scikit-learn is needed to train a GroundClassifier", hint=hint) from None
-    return SVC(C=PENALTY, gamma=width, class_weight="balanced", cache_size=300)
