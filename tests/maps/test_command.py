@@ -12,6 +12,7 @@ pytest.importorskip("geopandas", reason="needs terragrip[geo]")
 from lane_drives import drive, lanes
 from terragrip.cli import main
 from terragrip.maps.field_map import usual_cell
+from terragrip.maps.reading import read_map
 from terragrip.vehicle import Vehicle
 
 
@@ -71,6 +72,14 @@ def test_a_disk_that_is_full_is_one_line_and_no_file(
     assert (code, error.count("\n")) == (2, 1)
     assert "cannot be written" in error
     assert list(tmp_path.iterdir()) == [estimates]
+
+
+def test_reading_a_map_leaves_nothing_beside_it(estimates: Path, tmp_path: Path) -> None:
+    """A studio shows the maps of a folder that it may only read."""
+    out = tmp_path / "map.gpkg"
+    assert main(["map", str(estimates), "-o", str(out), "--quiet"]) == 0
+    assert read_map(out).about.runs == ["drive"]
+    assert sorted(tmp_path.iterdir()) == [estimates, out]
 
 
 def test_cells_are_as_wide_as_a_tractor_works() -> None:

@@ -89,6 +89,9 @@ def _pyogrio(file: Path) -> Any:
         raise InputError(
             "to read a map pyogrio is needed", file=file, hint="pip install 'terragrip[geo]'"
         ) from error
+    pyogrio.set_gdal_config_options(
+        {"GDAL_PAM_ENABLED": False}
+    )  # else reading leaves a .aux.xml beside the map
     return pyogrio
 
 
