@@ -14,4 +14,5 @@ it("puts ticks on round numbers inside the range", () => {
   expect(ticks({ low: -0.03, high: 0.71 }, 7)).toEqual([0, 0.2, 0.4, 0.6]);
   expect(ticks({ low: 0, high: 1 }, 10)).toHaveLength(11);
   expect(ticks({ low: 1, high: 1 }, 5)).toEqual([]);
+  expect(ticks({ low: 0.0758, high: 0.0842 }, 4)).toEqual([0.076, 0.078, 0.08, 0.082, 0.084]);
 });

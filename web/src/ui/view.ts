@@ -67,5 +67,5 @@ export function ticks({ low, high }: Range, count: number): number[] {
   const step = [1, 2, 5, 10].map((m) => m * power).find((s) => s >= rough) ?? 10 * power;
   const found: number[] = [];
   for (let i = Math.ceil(low / step - 1e-9); i * step <= high + step * 1e-9; i++) found.push(Number((i * step).toPrecision(12)));
-  return found;
+  return found.length < 2 && count < 16 ? ticks({ low, high }, 2 * count) : found; // one number gives no scale
 }
