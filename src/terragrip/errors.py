@@ -8,14 +8,14 @@ from typing import Any
 
 
 class InputError(ValueError):
-    """An input or a call is unusable. The text is one line: what, where, and how to fix it.
+    """An input or a call is unusable. The text is one line: the problem, the place, and the fix.
 
     Parameters
     ----------
-    problem: what is wrong, without the place.
-    file: the file it is in, if it came from one.
-    place: where in the file (``"column ground_speed, row 17"``, ``"axles.front.mass"``).
-    hint: what the user can do about it.
+    problem: the problem, without the place.
+    file: the file that has it, if any.
+    place: the place in the file (``"column ground_speed, row 17"``, ``"axles.front.mass"``).
+    hint: how the user can correct it.
     page: the page of the documentation that explains it, and its heading: ``"vehicle#all-keys"`` is docs/vehicle.md.
 
     The command line prints ``str(error)`` and exits with 2.
@@ -54,7 +54,7 @@ def _rebuild(
 
 
 def nearest(name: str, known: Iterable[str]) -> str | None:
-    """The known name most like ``name`` (case and underscores aside), or None if none comes near."""
+    """The known name most similar to ``name`` (case and underscores ignored), or None if none is close."""
     from difflib import get_close_matches
 
     wanted = _plain(name)

@@ -1,4 +1,4 @@
-"""From a log to a file of estimates: the one way of command line, studio, campaign and fleet."""
+"""From a log to a file of estimates: the one way for command line, studio, campaign and fleet."""
 
 from __future__ import annotations
 
@@ -44,19 +44,19 @@ def estimate_file(
 ) -> str:
     """Estimate a log into a file, Parquet or another by its suffix (docs/export.md); returns the summary as text.
 
-    The rows are those of :func:`terragrip.estimate`, to the last digit, whatever the log's length: it is gone through once for the
-    noise and the held channels, which stand in the file's metadata with all other settings, and then in blocks, so that memory stays
-    small. The file appears whole or not at all.
+    The rows are those of :func:`terragrip.estimate`, to the last digit, at any length of the log. A first pass finds the
+    noise and the held channels, which are in the file's metadata with all other settings. The second pass estimates in blocks,
+    so memory stays small. The file appears whole or not at all.
 
     Parameters
     ----------
     log: the path of a log, those of several sources of one drive, or a Recording.
     vehicle, method, smooth, sensors, held, gap, standstill_speed: as for :func:`terragrip.estimate`.
     profile, dbc: as for :func:`terragrip.read`.
-    labels: text columns that are one and the same in every row, such as ``log``.
+    labels: text columns with one value in every row, such as ``log``.
     observe: called with each block of estimates, in the order of time, before it is written.
-    summary: False: the text is left out (""), a tenth of the time of a log of a minute.
-    progress: called with the rows done and those to do; a pass over the log counts all its rows.
+    summary: False: no text (""), which saves a tenth of the time for a log of a minute.
+    progress: called with the rows done and the total; each pass over the log counts all its rows.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""What the machine is: masses, axles, wheels, hitch, sensors. A validated YAML file; every number is SI.
+"""The vehicle: masses, axles, wheels, hitch, sensors. A validated YAML file; every number is SI.
 
 The frame is the body's: x forward, z up. Axles are listed front to rear, wheels in the order of the axles.
 """
@@ -41,7 +41,7 @@ from terragrip.vehicle_parts import (
 Floats = npt.NDArray[np.float64]
 
 MAX_WHEELS = 8
-_MASS_TOLERANCE = 0.01  # share of the mass by which the axles may miss it
+_MASS_TOLERANCE = 0.01  # allowed difference of the axles' sum, share of the mass
 _ADD_WHEELS = "add e.g. 'wheel: {radius: 0.2 m, inertia: 0.15 kg m^2}': only slip from wheel_based_speed alone needs none"
 
 
@@ -49,8 +49,8 @@ class Vehicle(Part):
     """A machine of 1 to 8 wheels on one or more axles.
 
     Fields are those of the vehicle file (architecture.md, contracts) in SI; ``wheelbase`` [m] reaches from the first axle to
-    the last. The properties hold numbers per wheel or axle as read-only arrays, in the order of ``wheels``. Without any ``wheel`` (see
-    `knows_wheels`) the vehicle does for slip from ``wheel_based_speed`` alone.
+    the last. The properties give numbers per wheel or axle as read-only arrays, in the order of ``wheels``. Without any ``wheel``
+    (see `knows_wheels`) the vehicle is enough for slip from ``wheel_based_speed`` alone.
     """
 
     PAGE: ClassVar[str | None] = "vehicle#all-keys"
@@ -84,7 +84,7 @@ class Vehicle(Part):
 
     @classmethod
     def from_dict(cls, data: dict[str, Any], file: str | None = None) -> Self:
-        """Build from a mapping as a vehicle file holds; raises InputError, which names ``file`` if given."""
+        """Build from a mapping with the content of a vehicle file; raises InputError, which names ``file`` if given."""
         return validate(cls, data, file=file)
 
     def to_dict(self) -> dict[str, Any]:
@@ -171,12 +171,12 @@ class Vehicle(Part):
 
     @property
     def knows_wheels(self) -> bool:
-        """Whether the file gives the wheels' radii and inertias; slip from ``wheel_based_speed`` alone does without."""
+        """Whether the file gives the wheels' radii and inertias; slip from ``wheel_based_speed`` alone does not need them."""
         return self.wheel is not None or all(axle.wheel is not None for axle in self.axles.values())
 
     @cached_property
     def wheel_data(self) -> tuple[Wheel, ...]:
-        """Each wheel's radius, inertia, width and radius model: its axle's, else the vehicle's; raises InputError where there is none."""
+        """Each wheel's radius, inertia, width and radius model: its axle's, else the vehicle's; raises InputError if there is none."""
         if not self.knows_wheels:
             of = f" of {self.name}" if self.name else ""
             raise InputError(f"the vehicle file{of} has no wheel data", place="wheel", hint=_ADD_WHEELS)
@@ -211,7 +211,7 @@ class Vehicle(Part):
 
     @cached_property
     def axle_to_rear(self) -> Floats:
-        """Distance of each axle to the rear one (axles,) [m]; axles are taken as evenly spaced."""
+        """Distance of each axle to the rear one (axles,) [m]; axles are assumed evenly spaced."""
         count = len(self.axles)
         return _frozen(np.linspace(self.wheelbase or 0.0, 0.0, count) if count > 1 else np.zeros(1))
 
@@ -231,24 +231,24 @@ class Vehicle(Part):
 
     @cached_property
     def payload_share(self) -> Floats:
-        """Part of what is carried beside the file's mass that each axle carries (axles,): by ``payload``, else as the mass itself."""
+        """Share of the load beside the file's mass that each axle carries (axles,): by ``payload``, else as the mass itself."""
         if self.payload is None:
             return _frozen(self.axle_mass / self.axle_mass.sum())
         return _frozen(point_load_shares(self.axle_to_rear, self.payload.x))
 
     @property
     def payload_height(self) -> float:
-        """Height of its centre of gravity [m]: ``payload``'s, else the vehicle's own."""
+        """Height of the payload's centre of gravity [m]: ``payload``'s, else the vehicle's own."""
         height = None if self.payload is None else self.payload.z
         return self.center_of_gravity_height if height is None else height
 
     @cached_property
     def hitch_share(self) -> Floats:
-        """Part of a vertical load on the hitch that each axle carries (axles,); below 0 where that lifts it."""
+        """Share of a vertical load on the hitch that each axle carries (axles,); below 0 where the load lifts it."""
         return _frozen(point_load_shares(self.axle_to_rear, -self.hitch_overhang))
 
     def loaded(self, mass: float) -> Self:
-        """The vehicle when it weighs ``mass`` [kg], which `payload` says how to carry; raises InputError where an axle would lift."""
+        """The vehicle at ``mass`` [kg], with the difference at `payload`; raises InputError where an axle would lift."""
         more = mass - self.mass
         axles = {
             name: axle.model_copy(update={"mass": axle.mass + more * float(share)})

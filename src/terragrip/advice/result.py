@@ -19,7 +19,7 @@ VERSION = 1
 
 @dataclass(frozen=True)
 class Action:
-    """One thing to do: ``what`` and ``why`` in words; ``gain``: efficiency gained with its 95 % ``interval``, None for a direction."""
+    """One action: ``what`` and ``why`` in words; ``gain``: efficiency gained with its 95 % ``interval``, None for a direction."""
 
     what: str
     why: str
@@ -29,9 +29,10 @@ class Action:
 
 @dataclass(frozen=True)
 class Advice:
-    """Advice on one soil. ``drive``: what was driven (numbers by name, SI); ``reserve``: of each driven wheel, the share of the ground's
-    grip that is left on average, with its interval; ``field``: ha/h and l/ha now and at best, where known; ``missing``: what is not
-    known and which drive would tell it; ``curve``: efficiency and net traction over slip with their 95 % bands, where slip is advised."""
+    """Advice on one soil. ``drive``: the drive in numbers by name, SI; ``reserve``: of each driven wheel, the mean share of the
+    ground's grip that is unused, with its interval; ``field``: ha/h and l/ha now and at best, where known; ``missing``: unknown
+    quantities and the drive that would determine each; ``curve``: efficiency and net traction over slip with their 95 % bands,
+    where slip is advised."""
 
     soil: str
     best_efficiency: Best | None = None
@@ -46,7 +47,7 @@ class Advice:
     curve: tuple[Mapping[str, float], ...] = ()
 
     def to_dict(self) -> dict[str, Any]:
-        """As advice.json holds one soil."""
+        """One soil of advice.json."""
         return {
             "best_efficiency": None if self.best_efficiency is None else _best(self.best_efficiency),
             "best_productivity": None if self.best_productivity is None else _best(self.best_productivity),
@@ -69,7 +70,7 @@ def _best(best: Best) -> dict[str, Any]:
 
 
 def to_dict(advice: Mapping[str, Advice], way: Mapping[str, float]) -> dict[str, Any]:
-    """advice.json: the advice on the soil with the most way; with several, its name as ``soil`` and all in ``soils``."""
+    """advice.json: the advice on the soil with the longest distance; with several, its name as ``soil`` and all in ``soils``."""
     first = max(advice, key=lambda name: way.get(name, 0.0))
     whole: dict[str, Any] = {"version": VERSION, **advice[first].to_dict()}
     if len(advice) > 1:
@@ -80,14 +81,14 @@ def to_dict(advice: Mapping[str, Advice], way: Mapping[str, float]) -> dict[str,
 
 
 def write(advice: Mapping[str, Advice], way: Mapping[str, float], path: str | os.PathLike[str]) -> None:
-    """Write advice.json, whole or not at all. InputError where it cannot be written."""
+    """Write advice.json, whole or not at all. Raises InputError if it cannot be written."""
     text = json.dumps(to_dict(advice, way), indent=1, allow_nan=False, ensure_ascii=False)
     with replacing(path) as temporary:
         temporary.write_text(text + "\n", encoding="utf-8")
 
 
 def advised_slip(path: str | os.PathLike[str]) -> float:
-    """The slip of best efficiency of an advice.json, on the soil with the most way. InputError where it holds none."""
+    """The slip of best efficiency of an advice.json, on the soil with the longest distance. Raises InputError if there is none."""
     try:
         best = json.loads(Path(path).read_text(encoding="utf-8"))["best_efficiency"]
         slip = None if best is None else float(best["slip"])
@@ -108,7 +109,7 @@ def advised_slip(path: str | os.PathLike[str]) -> float:
 
 
 def _finite(value: Any) -> Any:
-    """The same with null for numbers that JSON does not know, others to six digits."""
+    """The same with null for numbers that JSON cannot represent, others to six digits."""
     if isinstance(value, dict):
         return {key: _finite(one) for key, one in value.items()}
     if isinstance(value, list):
@@ -158,7 +159,7 @@ def _between(value: float, interval: tuple[float, float]) -> str:
 
 
 def _field(work: Mapping[str, float]) -> list[str]:
-    """ha/h, l/h and l/ha as they were driven, and what they would be at the best slip."""
+    """ha/h, l/h and l/ha as driven, and their values at the best slip."""
     units = {
         "hectares_per_hour": "ha/h", "litres_per_hour": "l/h", "litres_per_hectare_measured": "l/ha measured",
         "litres_per_hectare": "l/ha reckoned from the pull",
@@ -178,7 +179,7 @@ def _field(work: Mapping[str, float]) -> list[str]:
 
 
 def _shares(drive: Mapping[str, float]) -> list[str]:
-    """Shares of driving time about the usual band, of a drive with slip alone."""
+    """Shares of driving time about the usual band, for a drive with slip alone."""
     if "share_below" not in drive:
         return []
     band = f"{drive['band_low']:.0%} to {drive['band_high']:.0%}"

@@ -1,4 +1,4 @@
-"""A whole recording: one loop over its blocks, of which a recording in memory is one."""
+"""Estimates of a whole recording: one loop over its blocks; a recording in memory is one block."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ Progress = Callable[[int, int], None]
 
 @dataclass(frozen=True)
 class RunOptions:
-    """How a log is to be estimated; the fields are arguments of :func:`estimate`."""
+    """How to estimate a log; the fields are arguments of :func:`estimate`."""
 
     method: str = DEFAULT
     smooth: bool = False
@@ -53,21 +53,21 @@ def estimate(
     standstill_speed: float | None = None,
     progress: Progress | None = None,
 ) -> Estimates:
-    """Estimate a whole recording; of one without any drive torque, slip alone (docs/methods.md).
+    """Estimate a whole recording; without any drive torque, slip alone (docs/methods.md).
 
     Parameters
     ----------
-    recording: a Recording, or a table that :meth:`Recording.from_frame` takes.
+    recording: a Recording, or a table that :meth:`Recording.from_frame` accepts.
     vehicle, method, gap, standstill_speed: see :class:`TractionEstimator`.
-    smooth: run the recording backwards too: every row then knows the rows after it.
-    sensors: SDs of the noise [SI] by channel or sensor; what neither they nor the vehicle file give is
+    smooth: run the recording backwards too: every row then also uses the rows after it.
+    sensors: SDs of the noise [SI] by channel or sensor. A value given neither here nor in the vehicle file is
         estimated from the log, else guessed with a note.
-    held: update periods [s] of held channels; None finds them.
-    progress: called with rows done and rows in all.
+    held: update periods [s] of held channels; None: found in the log.
+    progress: called with the rows done and the total.
 
     Raises
     ------
-    InputError: the recording or the vehicle is unusable, there is no such method, or `algebraic` is to smooth.
+    InputError: the recording or the vehicle is unusable, there is no such method, or `algebraic` is used with ``smooth``.
     """
     log = recording if isinstance(recording, Recording) else Recording.from_frame(recording)
     options = RunOptions(method, smooth, sensors, held, gap, standstill_speed)
@@ -85,11 +85,11 @@ def estimated(
     progress: Progress | None = None,
     together: int = 1,
 ) -> Iterator[Estimates]:
-    """The estimates of a log in blocks, a table a block, in the order of time; ``options``: None: as :func:`estimate` without any.
+    """The estimates of a log in blocks, a table for each block, in the order of time; ``options``: None: the defaults of :func:`estimate`.
 
-    A first pass over the log finds the noise and the held channels (`terragrip.recording.survey`), so that the blocks' size
-    changes no digit. ``beside``: the folder in whose neighbourhood blocks wait for the backward pass of ``smooth``, where the log
-    has more than one; None: the system's. ``planned`` is called with the rows and the columns that there will be, before any row is
+    A first pass over the log finds the noise and the held channels (`terragrip.recording.survey`), so the size of the blocks
+    changes no digit. ``beside``: blocks that wait for the backward pass of ``smooth`` are written next to this folder, if the log
+    has more than one block; None: the system's folder. ``planned`` is called with the rows and the columns to come, before any row is
     estimated. ``together``: see :class:`TractionEstimator`. Raises InputError as :func:`estimate` does, each when its block is reached.
     """
     options = options or RunOptions()
@@ -113,7 +113,7 @@ def estimated(
     alone = speeds_alone(known.sample.channels, vehicle)
     if not alone:
         known.sample.check_against(vehicle)
-    # Where slip counts from may be determined by one stretch of light work, which a sample of the rows can miss.
+    # One stretch of light work may determine the zero of slip, and a sample of the rows can miss it.
     reference = slip_reference_in(log.whole(), vehicle) if alone else None
     track, said = turn_in(log, known.sample, vehicle)
     estimator = TractionEstimator.for_recording(
@@ -143,7 +143,7 @@ def estimated(
 
 
 class _Passes:
-    """Progress over several passes of all rows, each as a function of the rows that it has done."""
+    """Progress over several passes of all rows, each as a function of its finished rows."""
 
     def __init__(self, progress: Progress | None, rows: int, count: int) -> None:
         self._progress, self.rows, self.count = progress, rows, count
@@ -158,7 +158,7 @@ class _Passes:
         return self.of(0)
 
     def done(self, count: int) -> None:
-        """So many passes are done."""
+        """This many passes are done."""
         self._report_progress(count * self.rows)
 
     def _report_progress(self, done: int) -> None:
@@ -172,7 +172,7 @@ def _filtered(
     notes: Sequence[str],
     progress: Callable[[int], None],
 ) -> Iterator[Estimates]:
-    """Each block through the estimator."""
+    """Each block run through the estimator."""
     rows = 0
     for block in blocks:
         yield run(estimator, block, notes, lambda done, before=rows: progress(before + done))  # type: ignore[misc]
@@ -180,7 +180,7 @@ def _filtered(
 
 
 def _flagged(parts: Iterator[Estimates]) -> Iterator[Estimates]:
-    """Hold each part back until the next shows whether a gap follows its last row."""
+    """Delay each part until the next shows whether a gap follows its last row."""
     last: Estimates | None = None
     for part in parts:
         flag_before_gaps(part.event_codes, None if last is None else last.event_codes)

@@ -1,4 +1,4 @@
-"""The table of estimates: one row a recording row, SI units (architecture.md, contracts)."""
+"""The table of estimates: one row per recording row, SI units (architecture.md, contracts)."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ METADATA_KEY = b"terragrip"
 
 
 def wheels_with(quantity: str, columns: Iterable[str]) -> tuple[str, ...]:
-    """The wheels, in the columns' order, of which there is a ``<quantity>_<wheel>`` (other than a ``_std``)."""
+    """The wheels with a column ``<quantity>_<wheel>`` (other than a ``_std``), in the columns' order."""
     begin = f"{quantity}_"
     return tuple(n.removeprefix(begin) for n in columns if n.startswith(begin) and not n.endswith("_std"))
 
@@ -42,22 +42,22 @@ def wheels_with(quantity: str, columns: Iterable[str]) -> tuple[str, ...]:
 class Estimates:
     """Estimates of one recording.
 
-    ``time`` (n,) [s]; ``columns`` float64 (n,) by name in the table's order, then what was passed through from
-    the recording (position, references), each with the unit of `terragrip.estimation.columns`; ``event_codes`` (n,) index
+    ``time`` (n,) [s]; ``columns`` float64 (n,) by name in the table's order, then the recording's own columns
+    (position, references), each with the unit of `terragrip.estimation.columns`; ``event_codes`` (n,) index
     :data:`~terragrip.estimation.engine.EVENTS`; ``labels`` text (n,), such as ``soil``; ``about``: version,
     method, smooth, vehicle, recording (source, sha256, start, profile), settings (noise, held, thresholds); ``notes``: plain
     sentences for the user.
 
-    Quantities have a twin ``_std``: one standard deviation that holds the filter's own variance and the
-    constants that data cannot tell. ``channels`` is how many channels an update took, the expectation of
-    ``nis``. ``supervisor`` is γ of the supervised policy, 1 under `aukf`, 0 under a fixed policy; under `bank`
-    it is where the expected scale of the noise stands between the smallest (0) and the largest (1), on a
+    A quantity has a twin ``_std``: one standard deviation that covers the filter's own variance and the
+    constants that the data cannot determine. ``channels`` is the number of channels in an update, the expectation of
+    ``nis``. ``supervisor`` is γ of the supervised policy, 1 under `aukf`, 0 under a fixed policy. Under `bank`
+    it is the position of the expected scale of the noise between the smallest (0) and the largest (1), on a
     logarithmic scale. ``adaptation_<state>`` (of `aukf` and `aukf-fs` alone) are the factors a_j on the diagonal of
-    A_k, one a state of the filter, by which the process noise of the row was Q_k = [I + γ_k (A_k - I)] Q_0
+    A_k, one for each state of the filter: the process noise of the row was Q_k = [I + γ_k (A_k - I)] Q_0
     (physics.md 6). ``curve_a`` (vehicle, and of each wheel) is the scale of the adhesion curve known so far
     (docs/kernel.md). ``warning`` is the score of the warning of immobilization, ``warning_<sign>`` its signs in points,
-    ``warning_usual_slip`` the slip it holds for usual (docs/events.md). NaN stands only where ``event`` says why: slip and
-    efficiency at ``standstill``, and speeds in a ``gap`` before anything was measured.
+    ``warning_usual_slip`` the usual slip (docs/events.md). A value is NaN only where ``event`` gives the reason: slip and
+    efficiency at ``standstill``, and speeds in a ``gap`` before the first measurement.
     """
 
     time: Floats
@@ -90,7 +90,7 @@ class Estimates:
         return self.labels[name] if name in self.labels else self.columns[name]
 
     def select(self, rows: Any) -> Self:
-        """The rows of a mask, a slice or an array of increasing indices; a slice copies nothing."""
+        """The rows of a mask, a slice or an array of increasing indices; a slice copies no data."""
         return replace(
             self,
             time=self.time[rows],
@@ -106,7 +106,7 @@ class Estimates:
 
     @property
     def has_adhesion(self) -> bool:
-        """Whether torques were measured; else there are slip and speeds alone."""
+        """Whether torques were measured; without them there are slip and speeds alone."""
         return bool(wheels_with("adhesion", self.columns))
 
     @property
@@ -116,7 +116,7 @@ class Estimates:
 
     @cached_property
     def vehicle(self) -> Vehicle:
-        """The vehicle that the estimates were made for; raises InputError if the table does not hold one."""
+        """The vehicle of the estimates; raises InputError if the table does not contain one."""
         from terragrip.vehicle import Vehicle
 
         if "vehicle" not in self.about:
@@ -125,15 +125,15 @@ class Estimates:
 
     @property
     def start(self) -> datetime | None:
-        """When the log's time 0 was (UTC), None where the log does not say; dates without a zone count as UTC."""
+        """The clock time (UTC) of the log's time 0, None where the log has none; dates without a zone count as UTC."""
         text = self.about.get("recording", {}).get("time_zero")
         return None if text is None else datetime.fromisoformat(text)
 
     def to_pandas(self) -> pd.DataFrame:
         """The whole table as a pandas DataFrame; ``event`` and labels are text.
 
-        Its index is the clock time (UTC) where the log says it, else the row's number. ``attrs`` hold ``units`` and ``descriptions``
-        by column, ``notes``, and what `about` holds.
+        Its index is the clock time (UTC) where the log has one, else the row's number. ``attrs`` has ``units`` and ``descriptions``
+        by column, ``notes``, and the content of `about`.
         """
         import pandas as pd
 
@@ -178,13 +178,14 @@ class Estimates:
         yield from self.columns.items()
 
     def metadata(self) -> bytes:
-        """What a Parquet file says of the table: `about` and `notes` as JSON."""
+        """The metadata of a Parquet file: `about` and `notes` as JSON."""
         return json.dumps({**self.about, "notes": list(self.notes)}).encode()
 
     def write(self, path: str | os.PathLike[str]) -> None:
-        """Write a file, whole or not at all, in the format of its suffix (docs/export.md); `read` takes Parquet alone.
+        """Write a file, whole or not at all, in the format of its suffix (docs/export.md); `read` reads Parquet alone.
 
-        Raises InputError where the suffix is none of `terragrip.estimation.export.KINDS`, or the file cannot hold the table or be written.
+        Raises InputError if the suffix is none of `terragrip.estimation.export.KINDS`, the format cannot represent the table, or the
+        file cannot be written.
         """
         from terragrip.estimation.writing import write_parts
 
@@ -194,7 +195,7 @@ class Estimates:
         """A matplotlib figure, which a notebook shows: "time", speed, slip, adhesion and resistance with 95 % intervals and events;
         "plane", adhesion over slip by soil; "map", the track coloured by a ``quantity``.
 
-        Raises InputError where there is nothing to draw so, or matplotlib is not installed.
+        Raises InputError if there is nothing to draw, or matplotlib is not installed.
         """
         from terragrip.estimation.views import plot
 
@@ -214,7 +215,7 @@ class Estimates:
 
     @classmethod
     def read_about(cls, path: str | os.PathLike[str]) -> dict[str, Any]:
-        """What a Parquet file of estimates was made from (``about``), without its rows; raises InputError as `read`."""
+        """The origin of a Parquet file of estimates (``about``), without its rows; raises InputError as `read`."""
         import pyarrow.parquet as pq
 
         about: dict[str, Any] = json.loads(
@@ -225,7 +226,7 @@ class Estimates:
 
     @classmethod
     def from_arrow(cls, table: pa.Table, source: str | None = None) -> Self:
-        """Take an Arrow table of estimates; raises InputError if columns are missing or of another type."""
+        """Convert an Arrow table of estimates; raises InputError if columns are missing or of another type."""
         missing = [n for n in ("time", "event", "ground_speed") if n not in table.column_names]
         if missing:
             raise InputError(
@@ -252,8 +253,8 @@ class Estimates:
     def summary(self, by: str) -> pd.DataFrame: ...
 
     def summary(self, by: str | None = None) -> str | pd.DataFrame:
-        """What a user wants to know first, in a few lines of text; ``by`` a label ("soil") or "event": a table, a row a text of it
-        (see `terragrip.estimation.grouped.summary_by`). Raises InputError where ``by`` is no column of texts."""
+        """A short summary for the user, in a few lines of text; ``by`` a label ("soil") or "event": a table, a row for each text
+        (see `terragrip.estimation.grouped.summary_by`). Raises InputError where ``by`` is not a column of texts."""
         if by is not None:
             from terragrip.estimation.grouped import summary_by
 
@@ -266,7 +267,7 @@ class Estimates:
 
 
 def opened(path: str | os.PathLike[str], reading: Callable[[str], Any]) -> Any:
-    """What ``reading`` makes of a Parquet file; raises InputError where it is missing, damaged or none."""
+    """The result of ``reading`` on a Parquet file; raises InputError if it is missing, damaged or not a Parquet file."""
     import pyarrow as pa
 
     from terragrip.files import refuse_missing, unreadable

@@ -1,4 +1,4 @@
-"""One sample in, one estimate out; a whole recording is its samples one after another, with identical results."""
+"""The estimator: one sample in, one estimate out. A whole recording is its samples in order, with identical results."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ class Estimate:
     """The estimate at one instant: a column of architecture.md, contracts by ``e["slip_fl"]`` or ``e.slip_fl``.
 
     ``time`` [s], ``event`` (a text of :data:`~terragrip.estimation.engine.EVENTS`), and the columns of
-    :attr:`TractionEstimator.columns` as plain floats; NaN only where ``event`` says why.
+    :attr:`TractionEstimator.columns` as plain floats. A value is NaN only where ``event`` gives the reason.
     """
 
     __slots__ = ("_values", "event", "packed", "places", "time")
@@ -40,9 +40,9 @@ class Estimate:
     def __init__(self, time: float, event: str, packed: bytes, places: dict[str, int]) -> None:
         self.time = time
         self.event = event
-        self.packed = packed  # doubles: what is only passed on need not become floats
+        self.packed = packed  # doubles: values that are only forwarded need not become floats
         self._values: tuple[float, ...] | None = None
-        self.places = places  # where in `values` each column stands
+        self.places = places  # index of each column in `values`
 
     def __getitem__(self, name: str) -> Any:
         if name in self.places:
@@ -62,7 +62,7 @@ class Estimate:
 
     @property
     def values(self) -> tuple[float, ...]:
-        """All numbers of ``packed``, by `places`."""
+        """All numbers of ``packed``, in the order of `places`."""
         if self._values is None:
             self._values = struct.unpack(f"={len(self.packed) // 8}d", self.packed)
         return self._values
@@ -81,27 +81,27 @@ class Estimate:
 
 
 class TractionEstimator:
-    """Estimates adhesion, soil resistance, slip and efficiency while the samples come in.
+    """Estimates adhesion, soil resistance, slip and efficiency sample by sample.
 
     Parameters
     ----------
     vehicle: the machine; its ``calibration`` corrects the samples.
     method: a name of :data:`~terragrip.estimation.methods.METHODS`.
     sensors: standard deviations of the noise [SI], by channel (``wheel_speed_fl``) or sensor
-        (``wheel_speed``); they win over the vehicle file's. Where neither knows one it is guessed from the
-        vehicle's size (``guessed`` lists those): better give it, or let :func:`estimate` read it from a log.
+        (``wheel_speed``); they override the vehicle file's. A value given in neither is guessed from the
+        vehicle's size (``guessed`` lists those): better give it, or let :func:`estimate` determine it from a log.
     held: update period [s] of channels whose values are repeated between updates.
-    channels: the columns that samples carry. It decides whether a drawbar force is unknown before its first
-        value (in ``channels``) or taken as 0, and whether an undriven wheel has a torque. Default: wheel
-        speeds, ground speed and torques of driven wheels. Columns with speeds and no torque (``wheel_speed_<wheel>`` or
-        ``wheel_based_speed``) make it estimate slip alone, whatever the ``method``: docs/methods.md.
-    gap: s without any wheel or ground speed after which the motion starts anew.
+    channels: the columns of the samples. A drawbar force in ``channels`` is unknown before its first value, else it
+        is 0; an undriven wheel has a torque only if ``channels`` has one. Default: wheel speeds, ground speed and
+        torques of driven wheels. With speeds and no torque (``wheel_speed_<wheel>`` or ``wheel_based_speed``) slip
+        alone is estimated, whatever the ``method``: docs/methods.md.
+    gap: s without any wheel or ground speed after which the motion restarts.
     standstill_speed: m/s under which vehicle and wheels count as standing.
-    together: how many wheels each wheel of ``vehicle`` stands for (`terragrip.estimation.driveline`).
+    together: how many wheels each wheel of ``vehicle`` represents (`terragrip.estimation.driveline`).
 
     Raises InputError on an unknown method or sensor, or a vehicle that the kernel cannot work with.
 
-    A row before a gap is flagged in a whole-recording run only: while streaming nobody knows that a gap follows.
+    A row before a gap is flagged only in a run over a whole recording: a stream does not show that a gap follows.
     """
 
     def __init__(
@@ -141,7 +141,7 @@ class TractionEstimator:
         self._engine = Engine(self._settings(), slots, out)
 
     def _settings(self) -> Any:
-        """The kernel's settings by what this estimator has."""
+        """The kernel's settings for this estimator."""
         common: dict[str, Any] = {"noise": self.noise, "held": self.held, "thresholds": self.thresholds}
         if self.rims:
             return speeds.speed_settings(self.vehicle, self.rims, dead_band=self.dead_band, **common)
@@ -161,8 +161,8 @@ class TractionEstimator:
         slip_reference: SlipReference | None = None,
         together: int = 1,
     ) -> Self:
-        """An estimator set up as :func:`estimate` does it: noise and held channels found in the log where not given; where it holds
-        no torque, also what slip counts from (``slip_reference``; None finds it)."""
+        """An estimator set up as :func:`estimate` does it: noise and held channels that are not given are determined from the
+        log. Without a torque in the log the zero of slip is determined, too (``slip_reference``; None: from the log)."""
         from terragrip.estimation.noise import settings_in
         from terragrip.estimation.slip_only import slip_reference_in
 
@@ -194,21 +194,21 @@ class TractionEstimator:
 
     @property
     def places(self) -> dict[str, int]:
-        """Where in an estimate's values each column stands."""
+        """Index of each column in an estimate's values."""
         return self._engine.index_out
 
     @property
     def engine(self) -> Engine:
-        """The kernel's estimator behind this one."""
+        """The kernel's estimator that this one uses."""
         return self._engine
 
     def update(self, sample: Mapping[str, float | None]) -> Estimate:
-        """Take one sample and return the estimate at its instant.
+        """Process one sample and return the estimate at its instant.
 
-        ``sample`` maps ``time`` [s] and recording columns to SI numbers; a column that is absent, None or NaN
-        was not measured at that instant; columns that the estimator does not use are passed over. Raises
-        InputError, and stays as it was, where time does not run forward, is missing, or a value is no finite
-        number.
+        ``sample`` maps ``time`` [s] and recording columns to SI numbers. A column that is absent, None or NaN
+        was not measured at that instant; columns that the estimator does not use are ignored. Raises
+        InputError, with the estimator unchanged, if time is missing or does not increase, or a value is not a
+        finite number.
         """
         time = sample.get("time")
         if time is None:
@@ -216,7 +216,7 @@ class TractionEstimator:
         return self.update_at(time, sample)
 
     def update_at(self, time: float, sample: Mapping[str, float | None]) -> Estimate:
-        """As `update`, with the instant [s] beside the sample."""
+        """As `update`, with the instant [s] as an argument beside the sample."""
         engine = self._engine
         try:
             status = engine.update(time, sample)
@@ -227,13 +227,13 @@ class TractionEstimator:
         return self.latest()
 
     def latest(self) -> Estimate:
-        """The estimate that the kernel made last."""
+        """The kernel's latest estimate."""
         engine = self._engine
         out = engine.estimate
         return Estimate(out.time, EVENTS[out.event], engine.packed(), engine.index_out)
 
     def _update_known(self, time: float, sample: Mapping[str, float | None]) -> int:
-        """A sample in which values are None; raises InputError on what is no number."""
+        """A sample with None values; raises InputError on a value that is not a number."""
         known = {name: value for name, value in sample.items() if value is not None}
         try:
             return self._engine.update(time, known)
@@ -241,30 +241,30 @@ class TractionEstimator:
             raise unusable({**sample, "time": time}, self._engine.inputs) from None
 
     def update_block(self, recording: Recording) -> Estimates:
-        """Take all rows of a recording; the same as `update` row by row. Raises InputError as `update` does."""
+        """Process all rows of a recording, as `update` row by row. Raises InputError as `update` does."""
         from terragrip.estimation.forward import run
 
         return run(self, recording)
 
     def set_noise(self, sensors: Mapping[str, float], held: Mapping[str, float]) -> None:
-        """From the next sample on, these SDs [SI] by channel and update periods [s]; the estimate goes on.
+        """Use these SDs [SI] by channel and update periods [s] from the next sample on; the estimate continues.
 
-        As for a new estimator: an SD that ``sensors`` lack is the vehicle file's, else a guess; a channel that ``held`` lacks is not
-        held. Raises InputError as making one does.
+        As for a new estimator: an SD missing in ``sensors`` is the vehicle file's, else a guess; a channel missing in ``held`` is
+        not held. Raises InputError as the constructor does.
         """
         self.noise, self.guessed = channel_noise(self.vehicle, self._engine.inputs, sensors)
         self.held = dict(held)
         self._engine.set_noise(self._settings())
 
     def new_ground(self) -> None:
-        """Forget the adhesion curves (``curve_a``, ``curve_a_<wheel>``): from here on the ground is another one.
+        """Forget the adhesion curves (``curve_a``, ``curve_a_<wheel>``), because the ground has changed.
 
-        Without it a new ground takes a few seconds to show, in which the intervals are too narrow (docs/kernel.md).
+        Without this call a new ground is recognised after a few seconds, in which the intervals are too narrow (docs/kernel.md).
         """
         self._engine.new_ground()
 
     def snapshot(self) -> bytes:
-        """Everything needed to go on later, bit for bit: vehicle, settings and state."""
+        """Everything needed to continue later, bit for bit: vehicle, settings and state."""
         about = {
             "vehicle": self.vehicle.to_dict(),
             "method": self.method,
@@ -314,13 +314,13 @@ class TractionEstimator:
 
 
 def default_channels(vehicle: Vehicle) -> tuple[str, ...]:
-    """The columns that samples of this vehicle carry at least: speeds, and torques of driven wheels."""
+    """The columns that samples of this vehicle have at least: speeds, and torques of driven wheels."""
     torques = [f"drive_torque_{w}" for w, on in zip(vehicle.wheels, vehicle.driven, strict=True) if on]
     return (*(f"wheel_speed_{w}" for w in vehicle.wheels), "ground_speed", *torques)
 
 
 def unusable(sample: Mapping[str, Any], names: Collection[str]) -> InputError:
-    """Name the value in a sample that is no finite number."""
+    """The error that names the value in a sample that is not a finite number."""
     for name in ("time", *names):
         value = sample.get(name)
         try:

@@ -1,4 +1,4 @@
-"""From a log on disk to a Recording, and what is in a log."""
+"""From a log on disk to a Recording, and the content of a log."""
 
 from terragrip.formats.inspect import Inspection, inspect
 from terragrip.formats.profile import Profile

@@ -1,4 +1,4 @@
-"""The table of what was measured: one row an instant, SI units, NaN where a channel was not measured."""
+"""The table of measurements: one row per instant, SI units, NaN where a channel was not measured."""
 
 from __future__ import annotations
 
@@ -36,10 +36,10 @@ Floats = npt.NDArray[np.float64]
 class Recording:
     """Measured channels on one time base (columns and units: architecture.md, contracts).
 
-    ``time`` (n,) [s] runs forward; ``channels`` hold float64 (n,) by name, NaN = not measured at that
-    instant; ``labels`` hold text (n,), empty = unlabelled; ``notes`` are plain sentences for the user;
-    ``noise`` is the standard deviation of a channel where the reader knows it (a derived one); ``start`` is when time 0 was
-    [s since 1970], None where the log does not say; ``profiles`` are those that the log was read by, as their files hold them.
+    ``time`` (n,) [s] increases; ``channels`` are float64 (n,) by name, NaN = not measured at that
+    instant; ``labels`` are text (n,), empty = unlabelled; ``notes`` are plain sentences for the user;
+    ``noise`` is the standard deviation of a channel where the reader knows it (a derived one); ``start`` is the clock time of time 0
+    [s since 1970], None where the log has none; ``profiles`` are those that the log was read with, as in their files.
     Arrays may be read-only.
     """
 
@@ -64,12 +64,12 @@ class Recording:
         noise: Mapping[str, float] | None = None,
         start: float | None = None,
     ) -> Self:
-        """Take a pandas or polars frame, an Arrow table or a mapping of arrays; float64 is not copied.
+        """Convert a pandas or polars frame, an Arrow table or a mapping of arrays; float64 is not copied.
 
         Raises InputError with column and row on a missing required column (time, ground_speed, a wheel
         speed), text or infinities in a channel, a required channel without any value, time that is NaN,
-        repeats or runs back, and on an empty table. ``source`` is the file that errors name. Without ``start``, dates and stamps
-        since 1970 tell it.
+        repeats or decreases, and on an empty table. ``source`` is the file that errors name. Without ``start``, it follows from
+        dates and stamps since 1970.
         """
         columns = columns_of(frame, source)
         checks.require_columns(columns, source)
@@ -96,10 +96,10 @@ class Recording:
         first_row: int = 0,
         after: float | None = None,
     ) -> tuple[Self, list[str]]:
-        """Consecutive rows of a table as they are, channels without a value too, and remarks on their time.
+        """Consecutive rows of a table, unchanged, with channels without a value too, and remarks on their time.
 
-        ``first_row``: how many rows of the table stand before them; ``after``: the time of the last of those. Raises InputError as
-        `from_frame` does of time, texts and infinities.
+        ``first_row``: the number of rows of the table before them; ``after``: the time of the last of those. Raises InputError as
+        `from_frame` does for time, texts and infinities.
         """
         time, remarks = seconds(columns[TIME], source)
         checks.check_time(time, source, first_row=first_row, after=after)
@@ -127,7 +127,7 @@ class Recording:
 
     @property
     def clock_zero(self) -> float | None:
-        """``start``, where it and the last row are dates of 1970 to 2199; else None."""
+        """``start``, if it and the last row are dates of 1970 to 2199; else None."""
         if self.start is None or not len(self) or not -LATEST < self.start < LATEST:
             return None
         return self.start if self.start + self.time[0] > 0 and self.start + self.time[-1] < LATEST else None
@@ -139,11 +139,11 @@ class Recording:
 
     @property
     def references(self) -> tuple[str, ...]:
-        """Names of the columns that no filter may look at: measured wheel forces and ``true_`` columns."""
+        """Names of the columns that no filter may use: measured wheel forces and ``true_`` columns."""
         return tuple(n for n in self.channels if n.startswith((REFERENCE, "wheel_force_")))
 
     def select(self, rows: Any) -> Self:
-        """The rows of a mask, a slice or an array of increasing indices; a slice copies nothing."""
+        """The rows of a mask, a slice or an array of increasing indices; a slice copies no data."""
         return replace(
             self,
             time=self.time[rows],
@@ -163,7 +163,7 @@ class Recording:
     def to_pandas(self) -> pd.DataFrame:
         """The whole table as a pandas DataFrame, time first.
 
-        Its index is the clock time (UTC) where the log says it, else the row's number; ``attrs`` hold ``units`` and ``notes``.
+        Its index is the clock time (UTC) where the log has one, else the row's number; ``attrs`` has ``units`` and ``notes``.
         """
         import pandas as pd
 
@@ -186,7 +186,7 @@ class Recording:
         return html_table(head, rows, f"{self.source or 'recording'}: {span}") + html_notes(self.notes)
 
     def check_against(self, vehicle: Vehicle) -> None:
-        """Raise InputError unless the log's wheels and axles are the vehicle's, with all that estimates need.
+        """Raise InputError unless the log's wheels and axles are the vehicle's, with all channels that estimates need.
 
         A driven wheel needs a torque; an undriven one without a torque column has torque 0. A drawbar force
         on two or more axles needs the vehicle's ``hitch_height``, since it moves load between them.
