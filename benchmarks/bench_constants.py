@@ -3,9 +3,10 @@
     python benchmarks/bench_constants.py [--machines 12] [--rates 100 20] [--only NAME ...] [--write]
 
 The numbers are tg_tuned (kernel/include/terragrip.h), the bank's scales, all together, and `huber`. A line a number: R² of
-adhesion less that with the number as it is, median and worst machine over all rates, and NIS a channel of moving rows. Every log
-loses its ground speed for 8 s and everything for 3 s, and half of them their pitch and accelerometer, so that each number has
-something to do. --write puts the table into docs/families.md.
+adhesion less that with the number as it is, median and worst machine over all rates; NIS a channel of moving rows; the interval
+scores of adhesion, slip and soil resistance over those with the number as it is, geometric means. Every log loses its ground speed
+for 8 s and everything for 3 s, and half of them their pitch and accelerometer, so that each number has something to do. --write
+puts the table into docs/families.md.
 """
 
 from __future__ import annotations
@@ -17,7 +18,8 @@ from typing import Any
 
 import numpy as np
 
-from bench_families import DOCUMENT, Floats, moving_rows, pooled_r2
+from bench_families import DOCUMENT, Floats, driven_wheels, moving_rows, pooled_r2
+from family_intervals import SCORED, intervals
 from marked import put
 from terragrip._kernel import ffi, lib
 from terragrip.estimation import estimator as estimator_module
@@ -33,10 +35,11 @@ as_set = estimator_module.settings_of
 
 @dataclass(frozen=True)
 class Figures:
-    """R² of adhesion and NIS a channel, a number a machine and rate."""
+    """R² of adhesion, NIS a channel, and interval scores (k, SCORED), a number a machine and rate."""
 
     r2: Floats
     nis: Floats
+    score: Floats
 
 
 def main() -> None:
@@ -53,10 +56,12 @@ def main() -> None:
     ]
     drawn = [damaged(result, bare=k % 2 == 1) for k, result in enumerate(drawn)]
     usual = figures(drawn, lambda settings: None)
+    nis = f"{np.median(usual.nis):.2f}"
+    columns = ["R² median", "worst", "NIS", "score µ", "slip", "ρs"]
     lines = [
-        "| number | value | halved: R² median | worst | NIS | doubled: R² median | worst | NIS |",
-        "|---|---:|---:|---:|---:|---:|---:|---:|",
-        f"| as they are | | | | {np.median(usual.nis):.2f} | | | {np.median(usual.nis):.2f} |",
+        f"| number | value | halved: {' | '.join(columns)} | doubled: {' | '.join(columns)} |",
+        f"|---|---:{'|---:' * 2 * len(columns)}|",
+        f"| as they are | {f'| | | {nis} | 1 | 1 | 1 ' * 2}|",
     ]
     for name, value in numbers().items():
         if arguments.only and name not in arguments.only:
@@ -66,6 +71,7 @@ def main() -> None:
             out = figures(drawn, scaled(name, factor))
             change = out.r2 - usual.r2
             cells += [f"{np.median(change):+.4f}", f"{change.min():+.4f}", f"{np.median(out.nis):.2f}"]
+            cells += [f"{ratio:.3f}" for ratio in np.exp(np.nanmean(np.log(out.score / usual.score), axis=0))]
         lines.append("| " + " | ".join(cells) + " |")
         print(lines[-1], flush=True)
     text = "\n".join(lines)
@@ -122,18 +128,20 @@ def figures(drawn: list[SimulationResult], change: Callable[[Any], None]) -> Fig
         return settings
 
     estimator_module.settings_of = changed
-    r2, nis = [], []
+    r2, nis, score = [], [], []
     for result in drawn:
         estimates = estimate(result.recording, result.vehicle)
-        wheels = [w for w, driven in zip(result.vehicle.wheels, result.vehicle.driven, strict=True) if driven]
+        wheels = driven_wheels(result)
         measured = np.isfinite(result.recording[f"wheel_speed_{wheels[0]}"])
         rows = moving_rows(result) & measured
         truth = np.stack([result.truth[f"true_adhesion_{w}"] for w in wheels], axis=1)
         r2.append(pooled_r2(truth, np.stack([estimates[f"adhesion_{w}"] for w in wheels], axis=1), rows))
+        held = intervals(result, estimates, wheels, rows)
+        score.append([held.score[name] for name in SCORED])
         taken = (estimates["channels"] > 0) & ~np.isin(estimates.event_codes, AT_REST)
         nis.append(float(estimates["nis"][taken].sum() / estimates["channels"][taken].sum()))
     estimator_module.settings_of = as_set
-    return Figures(np.array(r2), np.array(nis))
+    return Figures(np.array(r2), np.array(nis), np.array(score))
 
 
 if __name__ == "__main__":

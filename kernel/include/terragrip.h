@@ -309,7 +309,7 @@ typedef struct { /* when the estimator warns of immobilization (see src/digging.
 } tg_watch_settings;
 
 /* The tuned numbers of this floor, all that there are beside thresholds in the settings; what halving and doubling each does:
- * docs/methods.md. Scaled by the machine where that says how: T = sqrt(r/g), r its mean wheel radius, and V = sqrt(g r). */
+ * docs/families.md. Scaled by the machine where that says how: T = sqrt(r/g), r its mean wheel radius, and V = sqrt(g r). */
 typedef struct {
     tg_real adhesion_walk;          /* variance of a wheel's adhesion, gained in T */
     tg_real resistance_walk;        /* variance of the soil resistance, gained in T */
