@@ -219,9 +219,8 @@ def _channel(name: str, origin: Source, log: LogTable, time: Floats) -> tuple[Co
     factor = _factor(name, origin, log)
     if deviation is not None:
         deviation *= abs(factor * origin.scale)
-    if (factor, origin.scale, origin.offset, origin.sign) == (1.0, 1.0, 0.0, 1):
-        return raw, deviation
-    return (origin.sign * factor) * (origin.scale * raw + origin.offset), deviation
+    gain, offset = origin.gain(factor)
+    return (raw if (gain, offset) == (1.0, 0.0) else gain * raw + offset), deviation
 
 
 def _refuse_apart(name: str, origin: Source, dividend: Floats, divisor: Floats, log: LogTable) -> None:

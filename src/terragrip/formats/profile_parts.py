@@ -92,6 +92,10 @@ class Source(Part):
             raise Fault("is not a span of time", "write e.g. '0.5 s'", ("window",))
         return self
 
+    def gain(self, factor: float) -> tuple[float, float]:
+        """What a value is multiplied by, and what is then added, where ``factor`` leads from its unit to the channel's."""
+        return self.sign * factor * self.scale, self.sign * factor * self.offset
+
     @property
     def is_geographic(self) -> bool:
         """Whether it is the derivative of a latitude and a longitude."""

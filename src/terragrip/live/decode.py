@@ -182,7 +182,7 @@ class Decoder:
         if unit is None and source.scale == 1.0 and source.over is None and column is not None:
             unit = self.units.get(column)
         factor = factor_to(unit, unit_of(name) or "1") if unit else 1.0
-        return source.sign * factor * source.scale, source.sign * factor * source.offset
+        return source.gain(factor)
 
     def _scaled(self, name: str, source: Source, column: str) -> Read:
         gain, offset = self._gain(name, source, column)
@@ -222,7 +222,9 @@ class Decoder:
             if len(numbers) < len(parts):
                 return None
             if source.norm_of is not None:
-                value = math.hypot(*numbers)
+                value = math.sqrt(
+                    sum(number * number for number in numbers)
+                )  # hypot rounds otherwise than a file's columns
             else:
                 angle = pitch_of if source.pitch_of is not None else roll_of
                 value = float(angle([np.array([number]) for number in numbers])[0])
