@@ -169,7 +169,7 @@ def test_words_of_a_summary_that_no_drive_above_needs() -> None:
     }.items()}  # fmt: skip
     about = {
         "method": "slip-only",
-        "vehicle": {"name": "tractor", "uncertainty": {"slope": 0.01, "drawbar_offset": 120.0, "drawbar_gain": 0.015, "wheel_radius": 0.0}},
+        "vehicle": {"name": "tractor", "uncertainty": {"slope": 0.01, "drawbar_offset": 120.0, "drawbar_gain": 0.015, "wheel_radius": 0.0, "hitch_load_offset": 150.0}},
         "settings": {"held": {"ground_speed": 0.2}},
     }  # fmt: skip
     codes = np.zeros(rows, dtype=np.uint8)
@@ -185,7 +185,10 @@ def test_words_of_a_summary_that_no_drive_above_needs() -> None:
     assert sum(line.startswith("  field ") for line in lines) == 8
     whole = next(line for line in lines if line.startswith("  all "))
     assert cells(whole) == [pytest.approx((1.25, 0.02), abs=5e-4), pytest.approx((0.125, 0.039), abs=5e-4)]
-    assert "considered as unknown slope ±0.57 deg, drawbar_offset ±1.2e+02 N, drawbar_gain ±1.5 %;" in text
+    assert (
+        "considered as unknown slope ±0.57 deg, drawbar_offset ±120 N, drawbar_gain ±1.5 %, hitch_load_offset ±150 N;"
+        in text
+    )
     assert "repeated values are missing ones, of ground_speed (5 Hz)" in text
     assert "the vehicle is not calibrated" in text
     assert "'terragrip calibrate' on a pass without load makes slip absolute; " in lines[-1]

@@ -167,10 +167,12 @@ def _short(name: str, value: float) -> str:
     unit = {
         "drive_torque_offset": " N m",
         "drawbar_offset": " N",
+        "hitch_load_offset": " N",
         "acceleration_bias": " m/s²",
         "tire_rolling_resistance": "",
     }
-    return f"{value:.2g}{unit[name]}" if name in unit else f"{100 * value:.2g} %"
+    said = value if name in unit else 100 * value
+    return f"{float(f'{said:.2g}'):g}{unit.get(name, ' %')}"
 
 
 def _next(tally: Tally, notes: tuple[str, ...], output: str | None) -> str:
