@@ -169,7 +169,10 @@ def test_words_of_a_summary_that_no_drive_above_needs() -> None:
     }.items()}  # fmt: skip
     about = {
         "method": "slip-only",
-        "vehicle": {"name": "tractor", "uncertainty": {"slope": 0.01, "drawbar_offset": 120.0, "drawbar_gain": 0.015, "wheel_radius": 0.0, "hitch_load_offset": 150.0}},
+        "vehicle": {
+            "name": "tractor",
+            "uncertainty": {"slope": 0.01, "drawbar_offset": 120.0, "drawbar_gain": 0.015, "wheel_radius": 0.0, "hitch_load_offset": 150.0},
+        },
         "settings": {"held": {"ground_speed": 0.2}},
     }  # fmt: skip
     codes = np.zeros(rows, dtype=np.uint8)
