@@ -14,8 +14,8 @@ FILTERED, ALGEBRAIC, SPEEDS = 0, 1, 2
 
 @dataclass(frozen=True)
 class Method:
-    """A way to estimate. ``kind`` is tg_method, ``engine`` tg_engine, ``policy`` tg_policy of the kernel; ``supervisor`` says what
-    the fuzzy supervisor judges by: 0 the wheel and ground speeds (paper), 1 drive torque and slip."""
+    """An estimation method. ``kind`` is tg_method, ``engine`` tg_engine, ``policy`` tg_policy of the kernel; ``supervisor`` is the
+    input of the fuzzy supervisor: 0 the wheel and ground speeds (paper), 1 drive torque and slip."""
 
     name: str
     meaning: str
@@ -31,7 +31,7 @@ class Method:
 
     @property
     def adapts(self) -> bool:
-        """Whether it has factors A_k on its process noise."""
+        """Whether it adapts its process noise by factors A_k."""
         return self.kind == FILTERED and self.policy in (ADAPTIVE, SUPERVISED)
 
 
@@ -67,7 +67,7 @@ SLIP_ONLY = Method("slip-only", "slip from speeds, where no torque is measured; 
 
 
 def method_named(name: str, *, smooth: bool = False) -> Method:
-    """The method of that name; raises InputError, which names the nearest one, or where it is to ``smooth`` and cannot."""
+    """The method of that name; raises InputError, which names the nearest one, or if it cannot ``smooth``."""
     if name in METHODS:
         if smooth and not METHODS[name].can_smooth:
             hint = "use another method, or leave out smooth"

@@ -24,14 +24,14 @@ Floats = npt.NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Thresholds:
-    """What a user may set. Speeds in m/s, times in s; None keeps the kernel's tuned default."""
+    """The user's settings. Speeds in m/s, times in s; None keeps the kernel's tuned default."""
 
     gap: float | None = None
     standstill_speed: float | None = None
-    together: int = 1  # wheels that each wheel of the vehicle stands for
+    together: int = 1  # wheels that each wheel of the vehicle represents
 
     def put(self, settings: Any) -> None:
-        """Write what the user set into a tg_settings."""
+        """Write the user's settings into a tg_settings."""
         for name in ("gap", "standstill_speed"):
             value = getattr(self, name)
             if value is not None:
@@ -50,7 +50,7 @@ WITHOUT_TORQUE = 2 / 3
 def watch_limits(wheel_radius: float = 0.2) -> dict[str, float]:
     """The thresholds by which the estimator flags rows: tg_watch_settings, ``gap`` [s] and ``standstill_speed`` [m/s].
 
-    ``wheel_radius`` [m]: the machine's mean one, which says below what speed it stands; default: the robot of physics.md 8.
+    ``wheel_radius`` [m]: the machine's mean one, which sets the speed of standstill; default: the robot of physics.md 8.
     """
     settings = lib.tg_default_settings()
     names = [name for name, _ in ffi.typeof("tg_watch_settings").fields]
@@ -60,7 +60,7 @@ def watch_limits(wheel_radius: float = 0.2) -> dict[str, float]:
 
 
 def sample_slots(vehicle: Vehicle) -> dict[str, int]:
-    """The place in tg_sample.value of each recording column that the estimator looks at."""
+    """The place in tg_sample.value of each recording column that the estimator uses."""
     return {
         **{f"wheel_speed_{w}": lib.TG_WHEEL_SPEED + i for i, w in enumerate(vehicle.wheels)},
         "ground_speed": lib.TG_GROUND_SPEED,
@@ -88,9 +88,9 @@ def settings_of(
 ) -> Any:
     """A tg_settings for the vehicle.
 
-    ``noise``: SD of each channel the estimator looks at, SI. ``held``: update period [s] of held channels.
-    ``channels``: the columns that samples will carry, which tells whether drawbar force, mass, hitch load and the torque of an
-    undriven wheel are measured. Raises InputError where the vehicle lacks what one of them needs.
+    ``noise``: SD of each channel that the estimator uses, SI. ``held``: update period [s] of held channels.
+    ``channels``: the columns of the samples. They determine whether drawbar force, mass, hitch load and the torque of an
+    undriven wheel are measured. Raises InputError where the vehicle lacks a value that one of them needs.
     """
     require_hitch(vehicle, channels)
     settings = ffi.new("tg_settings *", lib.tg_default_settings())
@@ -167,7 +167,7 @@ def _deflection(wheel: Wheel, radius: float, load: float) -> float:
 
 
 def put_axles(settings: Any, vehicle: Vehicle) -> None:
-    """Into a tg_settings: the axles, what each carries, and their levers, which are the machine's length besides."""
+    """Write into a tg_settings the axles, their loads and levers, and the machine's length."""
     levers, mass = load_levers(vehicle.axle_to_rear), vehicle.axle_mass
     settings.axles = len(vehicle.axle_names)
     for k in range(len(mass)):
@@ -176,7 +176,7 @@ def put_axles(settings: Any, vehicle: Vehicle) -> None:
 
 
 def _set_loads(settings: Any, vehicle: Vehicle) -> None:
-    """Heights and shares of the load formulas (physics.md 3), which physics.loads has."""
+    """Heights and shares of the load formulas (physics.md 3), from physics.loads."""
     settings.center_of_gravity_height = vehicle.center_of_gravity_height
     settings.hitch_height = vehicle.hitch_height
     settings.payload_height = vehicle.payload_height
@@ -201,7 +201,7 @@ def _set_calibration(settings: Any, vehicle: Vehicle) -> None:
     settings.offset[lib.TG_PITCH] = vehicle.calibration.pitch_offset
 
 
-_SENSED_SLOPE = np.deg2rad(0.2)  # SD of a pitch sensor's mounting, where the vehicle file does not say
+_SENSED_SLOPE = np.deg2rad(0.2)  # SD of a pitch sensor's mounting, if the vehicle file has none
 
 
 def _set_uncertainty(settings: Any, vehicle: Vehicle, pitch_measured: bool) -> None:

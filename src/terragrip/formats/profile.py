@@ -1,4 +1,4 @@
-"""A profile: how the columns of a foreign log become those of a recording. A YAML file.
+"""A profile: the rules that turn the columns of a foreign log into those of a recording. A YAML file.
 
     time: {from: unix_ns, unit: ns, zero: first}
     rows: {column: calib_state, equals: calib}              # optional: only these rows
@@ -10,15 +10,15 @@
       drive_torque_right: {from: right_current, over: meas_right_vel, over_minimum: 0.3, scale: 48, unit: N m}
       soil: {constant: grass}
 
-A value is ``sign * (scale * raw + offset)`` in ``unit``; ``invalid`` values and ranges are judged on the raw one.
-With ``over`` the raw value is a quotient of two columns, as a torque is power over speed: missing where the divisor is
+A value is ``sign * (scale * raw + offset)`` in ``unit``; ``invalid`` values and ranges apply to the raw one.
+With ``over`` the raw value is a quotient of two columns, as a torque is power over speed. It is missing where the divisor is
 smaller in size than ``over_minimum``, and between the updates of a held dividend.
 
-``from`` may list names, of which the first that the log has, with a value, counts; ``*`` in a name stands for any text.
-``norm_of`` is the size of a vector of two or three columns; ``derivative_of`` takes a latitude and a longitude too, with
-``unit: deg``. ``else`` holds what to do where the log lacks a source: ``{from: gps_speed, else: {derivative_of: [x, y]}}``.
+``from`` may list names; the first one in the log with a value counts. ``*`` in a name is any text.
+``norm_of`` is the size of a vector of two or three columns. ``derivative_of`` accepts a latitude and a longitude too, with
+``unit: deg``. ``else`` is the source to use where the log lacks the first: ``{from: gps_speed, else: {derivative_of: [x, y]}}``.
 A channel with ``optional: true`` is left out, with a note, where the log lacks it. ``dbc:`` names the DBC files of a CAN
-log, from the profile's folder. Profiles that come with Terragrip go by name: `SHIPPED`.
+log, from the profile's folder. Profiles that come with Terragrip are used by name: `SHIPPED`.
 """
 
 from __future__ import annotations
@@ -53,7 +53,7 @@ SHIPPED = ("tractor-isobus", "ros2-4wd", "simulink")
 
 
 class Profile(Part):
-    """How a foreign log becomes a recording; the module's text shows the file."""
+    """The rules that turn a foreign log into a recording; the module's docstring shows the file."""
 
     PAGE: ClassVar[str | None] = "formats#in-a-profile"
 
@@ -67,7 +67,7 @@ class Profile(Part):
 
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> Self:
-        """Read a profile file, or take one of `SHIPPED` by name.
+        """Read a profile file, or one of `SHIPPED` by name.
 
         Raises InputError with the file, the key, its line and the fix.
         """
@@ -85,11 +85,11 @@ class Profile(Part):
 
     @classmethod
     def from_dict(cls, data: dict[str, Any], file: str | None = None) -> Self:
-        """Build from a mapping as a profile file holds; raises InputError, which names ``file`` if given."""
+        """Build from a mapping with the content of a profile file; raises InputError, which names ``file`` if given."""
         return validate(cls, data, file=file)
 
     def to_dict(self) -> dict[str, Any]:
-        """What `from_dict` takes, ready for JSON."""
+        """The profile as `from_dict` accepts it, ready for JSON."""
         return self.model_dump(mode="json", by_alias=True, exclude_unset=True)
 
     @field_validator("dbc", mode="before")
@@ -129,7 +129,7 @@ class Profile(Part):
         return self
 
     def wants(self, name: str) -> bool:
-        """Whether the profile may read a column of that name."""
+        """Whether the profile may read a column of this name."""
         return name in self.sources or any(fnmatch.fnmatchcase(name, p) for p in self._patterns)
 
     @cached_property
@@ -147,8 +147,8 @@ class Profile(Part):
     def apply(self, log: Any, source: str | None = None) -> Recording:
         """Turn a log (a `LogTable`, a DataFrame or a mapping of columns) into a Recording.
 
-        Raises InputError where a column is missing (and names the nearest), where it holds text, where no row
-        is left, and for whatever `Recording.from_frame` refuses. ``source`` is the file that errors name.
+        Raises InputError where a column is missing (and names the nearest), where it contains text, where no row
+        is left, and for anything that `Recording.from_frame` refuses. ``source`` is the file that errors name.
         """
         return convert(self, log, source)
 

@@ -29,18 +29,18 @@ def read(
     *,
     dbc: PathLike | Sequence[PathLike] = (),
 ) -> Recording:
-    """Read a log of any known format (docs/formats.md) as a Recording; its content tells which format it has.
+    """Read a log of any known format (docs/formats.md) as a Recording; the format is recognised by its content.
 
     Without a profile the columns must have the recording's own names; a unit that the file itself states
     (``ground_speed [km/h]``, or a row of units) is converted. With a `Profile`, the path of one, or the name of one
-    that comes with Terragrip, the columns become what it says. ``dbc``: the DBC files of a CAN log, beside the
+    that comes with Terragrip, the profile defines the columns. ``dbc``: the DBC files of a CAN log, beside the
     profile's own.
 
-    Several paths are sources of one drive: each gives the channels that it has, the first source where several have
-    one; a list of profiles has one for each, None for one with our names. Clocks are aligned by their stamps where both
-    count from 1970, then by the correlation of the speeds, and the notes say by how much.
+    Several paths are sources of one drive. Each gives its channels; where several have one, the first source counts.
+    A list of profiles has one for each, None for a source with our names. Clocks are aligned by their stamps where both
+    count from 1970, then by the correlation of the speeds, and the notes report by how much.
 
-    Raises InputError with file, column, row and hint for whatever makes the log unusable.
+    Raises InputError with file, column, row and hint if the log is unusable.
     """
     databases: Databases = (dbc,) if isinstance(dbc, str | os.PathLike) else tuple(dbc)
     if not isinstance(path, str | os.PathLike):
@@ -60,7 +60,7 @@ def read(
 
 
 def recording_of(table: LogTable, profile: Profile | None) -> Recording:
-    """The recording that a table is by a profile, or without one by its own names; raises InputError as `read` does."""
+    """The recording from a table by a profile, or without one by its own names; raises InputError as `read` does."""
     recording = profile.apply(table) if profile is not None else _as_it_stands(table)
     return next(aligned([recording]))
 
@@ -82,9 +82,9 @@ def read_channels(
     dbc: Sequence[PathLike] = (),
     also: tuple[str, ...] = (),
 ) -> dict[str, np.ndarray]:
-    """The channels that one drive's logs hold, whatever they are, as columns by name: a body sensor alone will do.
+    """All channels in one drive's logs as columns by name; a body sensor alone is enough.
 
-    As `read`, but ``ground_speed`` and wheel speeds may be missing, each log is read by the profile as far as it goes, and
+    As `read`, but ``ground_speed`` and wheel speeds may be missing, the profile is applied to each log as far as possible, and
     columns whose names begin with one of ``also`` are kept as they are. Raises InputError as `read`.
     """
     chosen = _loaded(profile)
@@ -97,13 +97,13 @@ def read_channels(
 
 
 def read_table(path: PathLike, wanted: Wanted | None = None, databases: Databases = ()) -> LogTable:
-    """Read the ``wanted`` columns of a log by their own names (None: all); raises InputError if it is no log."""
+    """Read the ``wanted`` columns of a log by their own names (None: all); raises InputError if it is not a log."""
     log = read_log(path, wanted, databases)
     return log.table(release=True) if isinstance(log, SignalLog) else log
 
 
 def read_log(path: PathLike, wanted: Wanted | None = None, databases: Databases = ()) -> LogTable | SignalLog:
-    """Read a log as `read_table` does; signals with clocks of their own are left on them."""
+    """Read a log as `read_table` does; signals with clocks of their own keep them."""
     own = format_of(path)
     if databases and not own.takes_databases:
         hint = "leave out --dbc, or 'dbc:' in the profile"

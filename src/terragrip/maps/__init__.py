@@ -1,4 +1,4 @@
-"""Maps: where the ground is how, from estimates with positions (docs/maps.md)."""
+"""Maps of the ground, from estimates with positions (docs/maps.md)."""
 
 from terragrip.maps.field_map import FieldMap, MapMaker, MapSettings, map_of
 from terragrip.maps.writing import write_map

@@ -1,4 +1,4 @@
-"""What a map's file says of how the map was made."""
+"""The record of how a map was made, kept in the map's file."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ ABOUT = "TERRAGRIP_MAP"
 
 @dataclass(frozen=True)
 class About:
-    """``epsg`` of the grid and the ``cell`` [m]; the ``datum`` that positions were read in; the slip that adhesion is mapped at; names of
-    the ``runs``; ``notes``: sentences for the user; ``changes``: of each quantity from which run to which how many cells were driven again,
-    and how many of them changed; the ``version`` of Terragrip."""
+    """``epsg`` of the grid and the ``cell`` [m]; the ``datum`` of the positions; the slip at which adhesion is mapped; names of
+    the ``runs``; ``notes``: sentences for the user; ``changes``: for each quantity and pair of runs, the number of cells driven again
+    and of cells that changed; the ``version`` of Terragrip."""
 
     epsg: int
     cell: float
@@ -27,10 +27,10 @@ class About:
     version: str = __version__
 
     def to_text(self) -> str:
-        """As JSON."""
+        """The record as JSON."""
         return json.dumps(asdict(self))
 
     @classmethod
     def from_text(cls, text: str) -> About:
-        """From `to_text`. Raises ValueError or TypeError on anything else."""
+        """From the result of `to_text`. Raises ValueError or TypeError on anything else."""
         return cls(**json.loads(text))

@@ -30,8 +30,8 @@ LEAST_CELLS = 2
 
 @dataclass(frozen=True)
 class Anomaly:
-    """A patch unlike its surroundings: ``cells`` (indices), centre ``column``, ``row`` (in cells), its ``value``, that ``around``, the
-    ``difference`` with its ``std``, and ``p``, the smallest p-value of its cells."""
+    """A patch unlike its surroundings: ``cells`` (indices), centre ``column``, ``row`` (in cells), its ``value``, the value ``around``,
+    the ``difference`` with its ``std``, and ``p``, the smallest p-value of its cells."""
 
     cells: npt.NDArray[np.intp]
     column: float
@@ -44,11 +44,11 @@ class Anomaly:
 
 
 def anomalies_of(cells: Cells, share: float = FALSE_DISCOVERIES) -> list[Anomaly]:
-    """Patches of cells unlike what is around them, the strongest first.
+    """Patches of cells unlike their surroundings, the strongest first.
 
-    A cell's residual is what it lies beyond the medians of its surroundings on each side. Residuals of neighbours are joined by inverse
-    variance; the scatter (MAD) of such scores about the median of all that is around is the null (Efron 2004: most of a field is no
-    anomaly), so that soil varying as it does everywhere is none. At most `share` of what is listed is chance.
+    A cell's residual is its distance beyond the medians of its surroundings on each side. Residuals of neighbours are combined by inverse
+    variance. The null is the scatter (MAD) of these scores about the median of all surrounding cells (Efron 2004: most of a field is no
+    anomaly), so soil that varies as it does everywhere is not an anomaly. At most `share` of the listed patches are due to chance.
     """
     from scipy.spatial import cKDTree
     from scipy.stats import norm
@@ -89,12 +89,12 @@ def significant(p: Floats, share: float) -> npt.NDArray[np.bool_]:
 
 
 def _around(tree: Any, place: Floats, value: Floats) -> tuple[Floats, Floats]:
-    """What each cell should be (n,), and the median of all around (n,).
+    """The expected value of each cell (n,), and the median of its surroundings (n,).
 
-    The first: of the medians of the cells around on each of four sides the one nearest to the cell's value. At the border of two soils
-    one side agrees with it, so that a border is no anomaly; a value between the sides' medians agrees with its surroundings.
-    Around are `AROUND` cells, the nearest beyond `CORE` and within `REACH`; a side of less than `SIDE` of them is not
-    asked. NaN where fewer than half of them, or no side, are there.
+    The first is, of the medians of the surrounding cells on each of four sides, the one nearest to the cell's value. At the border of two
+    soils one side agrees with it, so a border is no anomaly; a value between the sides' medians agrees with its surroundings.
+    The surroundings are `AROUND` cells, the nearest beyond `CORE` and within `REACH`; a side with less than `SIDE` of them is
+    ignored. NaN if fewer than half of them, or no side, are there.
     """
     inner = int(np.ceil(np.pi * CORE**2)) + 1
     count = min(AROUND + inner, len(place))
@@ -134,7 +134,7 @@ def _joined(tree: Any, place: Floats, residual: Floats, variance: Floats) -> tup
 def _patches(
     tree: Any, place: Floats, chosen: npt.NDArray[np.bool_], score: Floats
 ) -> list[npt.NDArray[np.intp]]:
-    """Chosen cells of one sign that touch, corners included."""
+    """Chosen cells of one sign that touch, including at corners."""
     from scipy.sparse import coo_matrix
     from scipy.sparse.csgraph import connected_components
 

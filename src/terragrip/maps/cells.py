@@ -31,11 +31,11 @@ VAGUE_X = 0.35
 
 @dataclass(frozen=True)
 class Pieces(Columns):
-    """Consecutive rows of one reading in one part of a cell, many of them (m,).
+    """Consecutive rows of one reading in one part of a cell, as arrays (m,).
 
-    ``column``, ``row``: the cell; ``run``: number of the run; ``time`` [s] of the first row; ``metres`` of way; ``x``, ``y`` and their
-    four SDs summed over the metres; ``rows``: how many; ``headland``: whether the first row is on a headland. Braked wheels' x and y are
-    turned round.
+    ``column``, ``row``: the cell; ``run``: number of the run; ``time`` [s] of the first row; ``metres`` driven; ``x``, ``y`` and their
+    four SDs summed over the metres; ``rows``: their number; ``headland``: whether the first row is on a headland. The signs of x and y
+    are reversed for braked wheels.
     """
 
     column: Ints
@@ -56,7 +56,7 @@ class Pieces(Columns):
 @dataclass(frozen=True)
 class Cells(Columns):
     """Cells of one quantity (k,), or of its passes: grid ``column`` and ``row``, ``value``, ``std``, ``constant`` (the part of ``std`` that
-    all cells share), ``count`` of rows, ``passes``; ``run``, ``time`` of the first pass; ``headland`` share of the way."""
+    all cells share), ``count`` of rows, ``passes``; ``run``, ``time`` of the first pass; ``headland`` share of the distance."""
 
     column: Ints
     row: Ints
@@ -73,7 +73,7 @@ class Cells(Columns):
 def pieces_of(
     reading: Reading, time: Floats, way: Floats, size: float, run: int, headland: npt.NDArray[np.bool_]
 ) -> Pieces:
-    """A reading's rows summed over parts of cells of `size` [m]; `way` [m] (n,) not falling."""
+    """A reading's rows summed over parts of cells of `size` [m]; `way` [m] (n,) not decreasing."""
     rows = np.flatnonzero(reading.good)
     column = np.floor(reading.east[rows] / size).astype(np.int64)
     line = np.floor(reading.north[rows] / size).astype(np.int64)
@@ -98,10 +98,10 @@ def pieces_of(
 def cells_of(parts: Sequence[Pieces], correlated: float) -> tuple[Cells, Cells]:
     """The cells of one quantity, and the same by pass. `correlated` [m]: `CORRELATED` wheel radii.
 
-    A cell's value is Σ y/Σ x: errors of x that average out do not draw it down, as least squares would. Its variance is the larger of
-    two, and the constants' besides, which no number of passes lessens: what the pieces scatter by (K Σ metres/(Σ x)², K pooled over the
-    map: how the ground varies within a cell, and random errors over a piece), and the estimator's own random variance, once for every
-    `correlated` metres of wheel way.
+    A cell's value is Σ y/Σ x: random errors of x average out and do not reduce it, as they would in least squares. Its variance is
+    the larger of two, plus that of the constants, which no number of passes reduces. The first is the scatter of the pieces
+    (K Σ metres/(Σ x)², K pooled over the map: variation of the ground within a cell, and random errors over a piece). The second is
+    the estimator's own random variance, once for every `correlated` metres of wheel travel.
     """
     joined = Pieces.joined(parts)
     joined = joined.where(np.lexsort((joined.time, joined.run, joined.row, joined.column)))
@@ -124,7 +124,7 @@ def _starts(*columns: npt.NDArray[np.generic]) -> npt.NDArray[np.bool_]:
 
 
 def _scatter(pieces: Pieces, cell: Ints) -> float:
-    """K [y² m]: the variance of y - value x over a metre, over all cells that hold two pieces or more."""
+    """K [y² m]: the variance of y - value x over a metre, over all cells with two pieces or more."""
     if not len(cell):
         return 0.0
     x = np.bincount(cell, pieces.x)

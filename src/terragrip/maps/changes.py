@@ -1,4 +1,4 @@
-"""What became of the ground between passes and days: the change of each cell, and whether it is one."""
+"""Changes of the ground between passes and days: the change of each cell, and whether it is significant."""
 
 from __future__ import annotations
 
@@ -36,8 +36,8 @@ class Changes(Columns):
 def changes_of(passes: Cells, share: float = FALSE_DISCOVERIES, *, same_machine: bool = True) -> Changes:
     """From the first to the last pass of each cell, in the order of the runs and of time.
 
-    `passes`: one row a pass (:func:`terragrip.maps.cells.cells_of`). On one machine constants that all passes share cannot make a change;
-    between machines each has its own. `significant` holds the false discovery rate at `share`.
+    `passes`: one row per pass (:func:`terragrip.maps.cells.cells_of`). On one machine constants that all passes share cannot cause a
+    change; between machines each has its own. `significant` controls the false discovery rate at `share`.
     """
     from scipy.stats import norm
 

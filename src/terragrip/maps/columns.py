@@ -1,4 +1,4 @@
-"""Tables of a map: arrays of one length, a row an item."""
+"""Tables of a map: arrays of one length, a row for each item."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ class Columns:
         return len(getattr(self, fields(self)[0].name))
 
     def where(self, rows: npt.NDArray[Any]) -> Self:
-        """The rows that a mask (n,) or indices (k,) choose."""
+        """The rows of a mask (n,) or of indices (k,)."""
         return type(self)(*(getattr(self, one.name)[rows] for one in fields(self)))
 
     @classmethod

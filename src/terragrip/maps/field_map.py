@@ -46,8 +46,8 @@ FARTHEST = 100_000.0
 
 @dataclass(frozen=True)
 class MapSettings:
-    """How a map is made: ``cell`` [m] (None: by the machine), ``reference_slip``, ``datum`` of the positions, ``fill``: cell sizes to
-    krige beyond the driven cells (0: none)."""
+    """Settings of a map: ``cell`` [m] (None: from the machine), ``reference_slip``, ``datum`` of the positions, ``fill``: number of cell
+    sizes to krige beyond the driven cells (0: none)."""
 
     cell: float | None = None
     reference_slip: float = REFERENCE_SLIP
@@ -57,8 +57,8 @@ class MapSettings:
 
 @dataclass(frozen=True)
 class FieldMap:
-    """A map: ``epsg`` of its grid and the ``cell`` [m], the ``datum`` that positions were read in, ``middle`` (latitude, longitude [deg]);
-    by quantity ``cells``, ``passes`` (a row a pass), ``anomalies``, ``changes``; the ``soil`` of cells; the ``points`` along the way;
+    """A map: ``epsg`` of its grid and the ``cell`` [m], the ``datum`` of the positions, ``middle`` (latitude, longitude [deg]);
+    by quantity ``cells``, ``passes`` (a row per pass), ``anomalies``, ``changes``; the ``soil`` of cells; the ``points`` along the path;
     names of the ``runs``; ``notes``: sentences for the user."""
 
     epsg: int
@@ -78,7 +78,7 @@ class FieldMap:
 
 @dataclass
 class MapMaker:
-    """Takes runs one by one, so that many fit the memory; `finish` makes the map."""
+    """Adds runs one by one, so many fit the memory; `finish` makes the map."""
 
     settings: MapSettings = field(default_factory=MapSettings)
     library: SoilLibrary | None = None
@@ -96,7 +96,7 @@ class MapMaker:
     _machines: set[str] = field(default_factory=set)
 
     def add(self, estimates: Estimates, run: str, file: str | None = None) -> None:
-        """Take one run. Raises InputError where it has no positions, or impossible ones; ``file`` is named there."""
+        """Add one run. Raises InputError if it has no positions, or impossible ones; ``file`` is named there."""
         vehicle = estimates.vehicle
         if not has_positions(estimates):
             raise InputError(
@@ -124,7 +124,7 @@ class MapMaker:
         self._points.append(points_of(estimates, places, way, self._cell, number))
 
     def _begin(self, estimates: Estimates, places: Places, epsg: int, cell: float) -> None:
-        """What the first run decides for all."""
+        """Settings that the first run determines for all."""
         vehicle = estimates.vehicle
         radius = float(vehicle.wheel_radius.mean()) if vehicle.knows_wheels else 0.5
         self._epsg, self._cell, self._correlated = epsg, cell, CORRELATED * radius
@@ -159,7 +159,7 @@ class MapMaker:
             )  # fmt: skip
 
     def finish(self) -> FieldMap:
-        """The map of the runs taken. Raises InputError where none was, or no row counts."""
+        """The map of the added runs. Raises InputError if there are none, or no row counts."""
         if not self.runs:
             raise InputError("there is no run to map", hint="give files written by 'terragrip estimate'")
         cells: dict[str, Cells] = {}
@@ -196,14 +196,14 @@ class MapMaker:
 
 
 def usual_cell(vehicle: Vehicle) -> float:
-    """Size of a cell [m] where nobody says one."""
+    """Size of a cell [m] if the user gives none."""
     if vehicle.mass <= LARGE_MACHINE:
         return SMALL_CELL
     return vehicle.working_width or LARGE_CELL
 
 
 def _enough(long: float, wide: float) -> float:
-    """The least size [m] of cells of which `MOST_CELLS` cover a box: (long/size + 1)(wide/size + 1) = MOST_CELLS."""
+    """The smallest size [m] at which `MOST_CELLS` cells cover a box: (long/size + 1)(wide/size + 1) = MOST_CELLS."""
     both, rest = long * wide, MOST_CELLS - 1
     half = 0.5 * (long + wide)
     return (half + math.sqrt(half**2 + rest * both)) / rest
@@ -216,7 +216,7 @@ def map_of(
     progress: Callable[[int], None] | None = None,
     ground: Mapping[str, list[Mapping[str, object]]] | None = None,
 ) -> FieldMap:
-    """The map of runs (name, estimates, and the file that errors name), of which one at a time is held in memory.
+    """The map of runs (name, estimates, and the file that errors name); one run at a time is in memory.
 
     ``ground``: sections of ground.json by run; ``progress`` is called with the runs done. Raises as `MapMaker`.
     """

@@ -23,7 +23,7 @@ MOST = 2_000_000
 def filled(cells: Cells, reach: float) -> Cells:
     """The cells and those within `reach` cell sizes of one, by ordinary kriging with an exponential variogram (pykrige).
 
-    A filled cell has ``count`` and ``passes`` 0; its SD holds the kriging variance and the constants that all cells share. Raises
+    A filled cell has ``count`` and ``passes`` 0; its SD includes the kriging variance and the constants that all cells share. Raises
     InputError where pykrige is missing, there are too few cells to fit a variogram, or too many to fill.
     """
     from scipy.spatial import cKDTree
@@ -60,7 +60,7 @@ def filled(cells: Cells, reach: float) -> Cells:
 def _near(
     tree: Any, place: npt.NDArray[np.int64], low: Floats, high: Floats, reach: float
 ) -> npt.NDArray[np.int64]:
-    """Cells of the box that hold no value and are no further than `reach` from one, row by row so that the box may be large."""
+    """Cells of the box without a value, at most `reach` from a driven one, row by row because the box may be large."""
     held = set(map(tuple, place.tolist()))
     out = []
     for row in range(int(low[1]), int(high[1]) + 1):
@@ -77,7 +77,7 @@ def _near(
 def _kriged(
     place: npt.NDArray[np.int64], value: Floats, noise: float, wanted: npt.NDArray[np.int64]
 ) -> tuple[Floats, Floats]:
-    """Values and variances at cells (m, 2). `noise`: the driven cells' own variance, the least that the nugget is."""
+    """Values and variances at cells (m, 2). `noise`: the driven cells' own variance, the lower limit of the nugget."""
     try:
         from pykrige.ok import OrdinaryKriging
     except ImportError as error:
@@ -86,7 +86,7 @@ def _kriged(
         ) from error
     if not len(wanted):
         return np.zeros(0), np.zeros(0)
-    if np.ptp(value) == 0:  # nothing to fit a variogram to
+    if np.ptp(value) == 0:  # no variation to fit a variogram to
         return np.full(len(wanted), value[0]), np.full(len(wanted), noise)
     centre, scale = float(value.mean()), max(float(value.std()), float(np.sqrt(noise)), 1e-9)
     unit = (value - centre) / scale  # the kriging system is ill-conditioned where variances are far from 1

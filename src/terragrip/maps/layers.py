@@ -19,13 +19,13 @@ LAYERS = ("cells", "points", "anomalies", "changes")
 
 
 def layer(made: FieldMap, name: str) -> geopandas.GeoDataFrame:
-    """One of `LAYERS`; without rows where there is nothing to show. Raises KeyError on another name."""
+    """One of `LAYERS`; without rows if there is nothing to show. Raises KeyError on another name."""
     return {"cells": _cells, "points": _points, "anomalies": _anomalies, "changes": _changes}[name](made)
 
 
 def cell_table(made: FieldMap) -> dict[str, npt.NDArray[Any]]:
     """The cells of all quantities side by side (k,): ``column``, ``row``, ``<quantity>``, ``<quantity>_std`` (NaN where a cell has none),
-    ``count`` of rows and ``passes`` (of the quantity that has most), ``headland`` (share of the way), ``soil``, ``soil_probability``."""
+    ``count`` of rows and ``passes`` (of the quantity with most), ``headland`` (share of the distance), ``soil``, ``soil_probability``."""
     width = 1 << 32
     keys = {name: cells.column * width + cells.row for name, cells in made.cells.items()}
     every = np.unique(np.concatenate(list(keys.values())))
@@ -130,7 +130,7 @@ def _changes(made: FieldMap) -> geopandas.GeoDataFrame:
 
 
 def changes_between(made: FieldMap) -> dict[str, list[tuple[str, str, int, int]]]:
-    """Of each quantity from which run to which how many cells were driven again, and how many of them changed."""
+    """For each quantity and pair of runs, the number of cells driven again and of cells that changed."""
     out: dict[str, list[tuple[str, str, int, int]]] = {}
     for quantity, one in made.changes.items():
         pairs, which = np.unique(np.column_stack([one.first_run, one.last_run]), axis=0, return_inverse=True)

@@ -37,8 +37,8 @@ TURNED = np.radians(25.0)
 class Places:
     """Where the vehicle is at each row of a run.
 
-    ``east``, ``north`` (n,) [m] of the rear axle's centre, NaN where no position tells; ``heading`` (n,) [rad, from east towards north];
-    ``headland`` (n,): the vehicle turns or drives across the run's main direction; ``notes``: sentences on what was cut.
+    ``east``, ``north`` (n,) [m] of the rear axle's centre, NaN where no position determines it; ``heading`` (n,) [rad, from east towards
+    north]; ``headland`` (n,): the vehicle turns or drives across the run's main direction; ``notes``: sentences on removed positions.
     """
 
     east: Floats
@@ -73,10 +73,10 @@ def has_positions(estimates: Estimates) -> bool:
 def places_of(estimates: Estimates, epsg: int, datum: str = "EPSG:4326", file: str | None = None) -> Places:
     """Where the vehicle is at each row.
 
-    `epsg`: the grid; `datum`: the coordinate reference system of latitude and longitude. The antenna stands where the vehicle file says
-    (``antenna``), over the rear axle's centre if it does not. Between fixes the place is interpolated; outages and
-    jumps are cut, and positions that are certainly behind the wheels are moved back. Raises
-    InputError where there are no positions, or where speed or turns contradict them (:mod:`terragrip.maps.plausible`).
+    `epsg`: the grid; `datum`: the coordinate reference system of latitude and longitude. The antenna is at the vehicle file's
+    ``antenna``, or over the rear axle's centre. Between fixes the place is interpolated; outages and jumps are removed, and positions
+    that are certainly behind the wheels are moved back. Raises InputError if there are no positions, or if speed or turns contradict
+    them (:mod:`terragrip.maps.plausible`).
     """
     if not has_positions(estimates):
         raise InputError("holds no positions", file=file, hint="estimate a log with latitude and longitude")
@@ -104,7 +104,7 @@ def _base(vehicle: Vehicle) -> float:
 
 
 def _fixes(latitude: Floats, longitude: Floats) -> npt.NDArray[np.intp]:
-    """Rows with a new position: those that repeat the last one are held, not measured."""
+    """Rows with a new position: repeated ones are held, not measured."""
     rows = np.flatnonzero(np.isfinite(latitude) & np.isfinite(longitude))
     fresh = np.r_[True, (np.diff(latitude[rows]) != 0) | (np.diff(longitude[rows]) != 0)]
     return np.asarray(rows[fresh])
@@ -132,7 +132,7 @@ def _projected(latitude: Floats, longitude: Floats, epsg: int, datum: str) -> tu
 
 
 def _late(estimates: Estimates, time: Floats, east: Floats, north: Floats) -> tuple[float, tuple[str, ...]]:
-    """Seconds by which the positions are behind the wheels, 0 where it is not certain, and a sentence on it."""
+    """Seconds by which the positions are behind the wheels, 0 if that is not certain, and a sentence on it."""
     names = [
         name for name in estimates.columns if name.startswith("wheel_speed_") and not name.endswith("_std")
     ]
@@ -152,7 +152,7 @@ def _late(estimates: Estimates, time: Floats, east: Floats, north: Floats) -> tu
 def _pieces(
     time: Floats, way: Floats, east: Floats, north: Floats
 ) -> tuple[npt.NDArray[np.intp], tuple[str, ...]]:
-    """Which unbroken piece each fix (n,) belongs to, -1 for strays; sentences on what was cut."""
+    """The number of the unbroken piece of each fix (n,), -1 for strays; sentences on removed positions."""
     if len(time) < 2:
         return np.full(len(time), -1), ("There are fewer than two positions.",)
     step, driven, wait = np.hypot(np.diff(east), np.diff(north)), np.diff(way), np.diff(time)
@@ -175,7 +175,7 @@ def _pieces(
 
 
 def counted(which: npt.NDArray[np.bool_], noun: str) -> str:
-    """How many, with the noun: 1 jump, 2 jumps."""
+    """The number with its noun: 1 jump, 2 jumps."""
     count = int(which.sum())
     return f"{count} {noun}{'s' * (count != 1)}"
 
@@ -195,7 +195,7 @@ def _between(time: Floats, fixed: Floats, values: Floats, piece: npt.NDArray[np.
 
 
 def _heading(east: Floats, north: Floats, way: Floats, base: float, speed: Floats) -> Floats:
-    """Course over `base` metres behind and ahead (n,) [rad], turned round in reverse; NaN where no place is known."""
+    """Course over `base` metres behind and ahead (n,) [rad], reversed when driving backward; NaN where no place is known."""
     known = np.isfinite(east)
     heading = np.full(len(east), np.nan)
     if known.sum() < 2:
@@ -218,8 +218,8 @@ def _heading(east: Floats, north: Floats, way: Floats, base: float, speed: Float
 def _headland(heading: Floats, way: Floats) -> npt.NDArray[np.bool_]:
     """Where the vehicle does not drive along the main direction of the run or back (n,).
 
-    The main direction is the mean of the doubled angle over the way (axial mean, Mardia and Jupp 2000). A run that has none, half of
-    whose way would be headland, has no headlands.
+    The main direction is the mean of the doubled angle over the path (axial mean, Mardia and Jupp 2000). A run without one, of which
+    half would be headland, has no headlands.
     """
     length = np.r_[0.0, np.diff(way)]
     known = np.isfinite(heading)

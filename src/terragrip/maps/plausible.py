@@ -1,6 +1,6 @@
-"""Whether positions can be what they are named: latitude and longitude swapped, a sign lost, radians for degrees.
+"""Whether positions agree with their names: latitude and longitude swapped, a sign lost, radians for degrees.
 
-Judged by what else the log tells of the motion: the speed over ground, and turns by the difference of the wheels' speeds.
+Two other signals of motion judge this: the speed over ground, and turns from the difference of the wheels' speeds.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ MIRRORED = -0.6
 
 
 def refuse_impossible(estimates: Estimates, fixes: npt.NDArray[np.intp], file: str | None = None) -> None:
-    """Raise InputError where positions contradict the motion, with what they look like. ``fixes``: rows with a fresh position."""
+    """Raise InputError if positions contradict the motion, with the likely mistake. ``fixes``: rows with a fresh position."""
     latitude, longitude = estimates["latitude"][fixes], estimates["longitude"][fixes]
     place = "columns latitude, longitude"
     if np.abs(latitude).max() > 90.0001 or np.abs(longitude).max() > 360.0001:
@@ -101,7 +101,7 @@ def _stretches(way: Floats) -> npt.NDArray[np.intp]:
 
 
 def _off(latitude: Floats, longitude: Floats, ends: npt.NDArray[np.intp], driven: Floats) -> Floats:
-    """Size of ln(way by positions / way driven) of each stretch."""
+    """Absolute ln(distance by positions / distance driven) of each stretch."""
     north, east = metres_of(latitude, longitude)
     moved = np.hypot(np.diff(north[ends]), np.diff(east[ends]))
     with np.errstate(divide="ignore"):
@@ -109,16 +109,16 @@ def _off(latitude: Floats, longitude: Floats, ends: npt.NDArray[np.intp], driven
 
 
 def _apart(latitude: Floats, longitude: Floats, ends: npt.NDArray[np.intp], driven: Floats) -> float:
-    """Median of `_off`; a turn's chord is shorter, which the median bears."""
+    """Median of `_off`; a turn's chord is shorter, which the median tolerates."""
     return float(np.median(_off(latitude, longitude, ends, driven)))
 
 
 def _only_swapped_fits(
     latitude: Floats, longitude: Floats, ends: npt.NDArray[np.intp], driven: Floats
 ) -> bool:
-    """Whether stretches fit the way driven much better with the columns swapped, and hardly any much worse.
+    """Whether stretches fit the distance driven much better with the columns swapped, and hardly any much worse.
 
-    Lanes along one direction fit either way: then the turns tell, which the median over all stretches does not see. An antenna that
+    Lanes along one direction fit either way: then the turns decide, which the median over all stretches does not see. An antenna that
     swings out in them makes both readings worse alike.
     """
     given, swapped = (
@@ -146,11 +146,11 @@ def _wheel_turns(
 
 
 def _mirrored(latitude: Floats, longitude: Floats, ends: npt.NDArray[np.intp], turning: Floats) -> bool:
-    """Whether the track's turns are the wheels' with the other sign. Both must turn in enough stretches to tell."""
+    """Whether the track's turns have the opposite sign to the wheels'. Both must turn in enough stretches to decide."""
     north, east = metres_of(latitude, longitude)
     course = np.arctan2(np.diff(north[ends]), np.diff(east[ends]))
     bend = np.remainder(np.diff(course) + np.pi, 2 * np.pi) - np.pi
-    by_wheels = 0.5 * (turning[1:] + turning[:-1])  # a bend lies between two stretches
+    by_wheels = 0.5 * (turning[1:] + turning[:-1])  # a bend is between two stretches
     clear = np.abs(bend) > 0.15
     if clear.sum() < LEAST or np.ptp(by_wheels[clear]) == 0:
         return False

@@ -1,4 +1,4 @@
-"""The points of a map: the vehicle's way, a point a quarter of a cell, with what was estimated there."""
+"""The points of a map: the vehicle's path, a point for each quarter of a cell, with the estimates there."""
 
 from __future__ import annotations
 
@@ -24,8 +24,8 @@ _SKIPPED = ("latitude", "longitude", "altitude", "distance", "warning", "channel
 @dataclass(frozen=True)
 class Points:
     """Points (n,): number of the ``run``, ``time`` [s], ``east``, ``north`` [m] of the rear axle, ``heading`` [rad], ``headland``,
-    ``values`` by column of the estimates (the mean over the way of the point; SDs likewise, for neighbours err alike), ``soil``,
-    ``event``."""
+    ``values`` by column of the estimates (the mean over the point's distance; SDs likewise, because neighbours have the same error),
+    ``soil``, ``event``."""
 
     run: npt.NDArray[np.int64]
     time: Floats
@@ -55,7 +55,7 @@ class Points:
 
 
 def points_of(estimates: Estimates, places: Places, way: Floats, size: float, run: int) -> Points:
-    """A run's points. Between two of them lies `SPACING` of a cell; rows without a place are left out."""
+    """A run's points, `SPACING` of a cell apart; rows without a place are left out."""
     rows = np.flatnonzero(np.isfinite(places.east))
     number = np.floor(way[rows] / (SPACING * size))
     begin = np.flatnonzero(np.r_[True, (np.diff(number) != 0) | (np.diff(rows) > 1)])

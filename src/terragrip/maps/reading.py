@@ -1,4 +1,4 @@
-"""A map read back from the GeoPackage that it was written to."""
+"""A map read back from its GeoPackage."""
 
 from __future__ import annotations
 
@@ -34,8 +34,8 @@ class MapFile:
     """A map's file.
 
     ``about``: how it was made; ``column``, ``row`` (k,) of its cells on the grid; ``cells``: their columns (k,) by name as
-    :func:`terragrip.maps.layers.cell_table` has them; ``anomalies``; ``points``: how many there are along the way. Changes and the way
-    are read when they are asked for.
+    :func:`terragrip.maps.layers.cell_table` has them; ``anomalies``; ``points``: their number along the path. Changes and the path
+    are read on request.
     """
 
     path: Path
@@ -48,17 +48,17 @@ class MapFile:
 
     @property
     def quantities(self) -> list[str]:
-        """What is mapped."""
+        """The mapped quantities."""
         return [name for name in QUANTITIES if name in self.cells]
 
     def changes(self, quantity: str) -> dict[str, npt.NDArray[Any]]:
-        """A quantity's rows of the layer ``changes`` by column, ``column`` and ``row`` of the grid among them; empty where it has none."""
+        """A quantity's rows of the layer ``changes`` by column, with ``column`` and ``row`` of the grid; empty if it has none."""
         if not self.about.changes.get(quantity):
             return {}
         return _columns(self.path, "changes", where=f"quantity = '{quantity}'")
 
     def way(self, most: int) -> tuple[npt.NDArray[np.object_], Floats, Floats, Floats]:
-        """Of at most `most` points along the way, evenly drawn: run, time [s], east and north [m] (n,)."""
+        """At most `most` points along the path, evenly drawn: run, time [s], east and north [m] (n,)."""
         if not self.points:
             return np.zeros(0, dtype=object), np.zeros(0), np.zeros(0), np.zeros(0)
         every = -(-self.points // most)
@@ -72,7 +72,7 @@ class MapFile:
 def read_map(path: str | os.PathLike[str]) -> MapFile:
     """A map from its GeoPackage.
 
-    Raises InputError where the file is none that `terragrip map` wrote, or pyogrio is missing.
+    Raises InputError if `terragrip map` did not write the file, or pyogrio is missing.
     """
     file = Path(path)
     about = _about(file)

@@ -1,4 +1,4 @@
-"""Standard deviations of cells held to what repeated passes show (decision 0151)."""
+"""Standard deviations of cells limited by the differences of repeated passes (decision 0151)."""
 
 from __future__ import annotations
 
@@ -20,10 +20,10 @@ WORTH_A_WORD = 0.9
 
 
 def share_of_repeats(passes: Cells) -> float:
-    """By how much passes over one cell differ, as a share of what their SDs let expect; 1 where it is more, or there are too few.
+    """The difference between passes over one cell as a share of that expected from their SDs; 1 if it is more, or there are too few.
 
-    `passes`: a row a pass (:func:`terragrip.maps.cells.cells_of`). Consecutive passes over a cell are compared, the constants that both
-    share left out; the share is the robust SD (1.4826 times the median size) of the differences over their stated SDs. More than 1 is
+    `passes`: a row per pass (:func:`terragrip.maps.cells.cells_of`). Consecutive passes over a cell are compared, without the constants
+    that both share. The share is the robust SD (1.4826 times the median size) of the differences over their stated SDs. More than 1 is
     no error of the SDs: between two passes the ground may have changed. Never less than `LEAST_SHARE`.
     """
     order = np.lexsort((passes.time, passes.run, passes.row, passes.column))
@@ -38,7 +38,7 @@ def share_of_repeats(passes: Cells) -> float:
 
 
 def scaled(cells: Cells, share: float) -> Cells:
-    """The cells with their SDs but for the constants times `share`."""
+    """The cells with their SDs, except the constants, times `share`."""
     return replace(cells, std=np.hypot(share * random_std(cells), cells.constant))
 
 

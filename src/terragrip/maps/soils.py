@@ -1,4 +1,4 @@
-"""Which soil a cell has, and how surely: by the recording's labels, or by the ground that was recognised."""
+"""The soil of each cell with its probability: by the recording's labels, or by the recognised ground."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ Ints = npt.NDArray[np.int64]
 
 @dataclass(frozen=True)
 class SoilWay(Columns):
-    """Metres of way by cell and soil (m,): ``column``, ``row``, ``soil``, ``metres``; a section's soils share its metres."""
+    """Metres driven by cell and soil (m,): ``column``, ``row``, ``soil``, ``metres``; a section's soils share its metres."""
 
     column: Ints
     row: Ints
@@ -34,7 +34,7 @@ class SoilWay(Columns):
 def sections_by_run(
     ground: str | os.PathLike[str], runs: Sequence[str]
 ) -> dict[str, list[Mapping[str, Any]]]:
-    """Sections of a ground.json by run; those of one drive alone are the first run's. Raises InputError where it is none."""
+    """Sections of a ground.json by run; those of one drive alone are the first run's. Raises InputError if it is not one."""
     result: dict[str, list[Mapping[str, Any]]] = {}
     for one in read_json(os.fspath(ground), "sections", 1, "'terragrip ground'")["sections"]:
         result.setdefault(str(one.get("run", runs[0])), []).append(one)
@@ -44,7 +44,7 @@ def sections_by_run(
 def soil_way(
     estimates: Estimates, places: Places, way: Floats, size: float, sections: Sequence[Mapping[str, Any]]
 ) -> SoilWay:
-    """A run's metres by cell and soil: of ``sections`` (of ground.json) where there are any, else of the labels."""
+    """A run's metres by cell and soil: of ``sections`` (of ground.json) if there are any, else of the labels."""
     import pandas as pd
 
     known = np.isfinite(places.east)
@@ -82,7 +82,7 @@ def soil_way(
 
 
 def soil_of_cells(ways: Sequence[SoilWay]) -> dict[tuple[int, int], tuple[str, float]]:
-    """The soil of most metres in each cell, and its share of them."""
+    """The soil with most metres in each cell, and its share of them."""
     metres: dict[tuple[int, int], dict[str, float]] = {}
     for one in ways:
         for column, row, soil, way in zip(

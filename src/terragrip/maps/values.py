@@ -1,7 +1,7 @@
-"""What each row of a run tells of the ground, and where: the quantities of a map.
+"""The quantities of a map: what each row of a run shows about the ground, and where.
 
-A quantity is read as y = value · x: x = 1 for what is a value itself; for adhesion y = mu and x = g(s)/g(reference slip), g the
-form of the soil's curve, so that the value is the adhesion at the reference slip whatever the slip was. Both y and x err. Both err.
+A quantity is read as y = value · x. x = 1 where y itself is the value. For adhesion y = mu and x = g(s)/g(reference slip), g the
+form of the soil's curve: the value is then the adhesion at the reference slip, whatever the slip was. Both y and x have errors.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ UNSTATED_RADIUS = 0.02
 class Reading:
     """One quantity read at one place of the vehicle, row by row (n,).
 
-    ``east``, ``north`` [m]; ``x``, ``y`` as in the module's first lines; ``constant``, ``x_constant``: SDs of their errors that all rows
+    ``east``, ``north`` [m]; ``x``, ``y`` as in the module's docstring; ``constant``, ``x_constant``: SDs of their errors that all rows
     share; ``random``, ``x_random``: SDs of the rest, as the estimator states them; ``good``: rows that count; ``turns``: x and
     y change sign together where a wheel brakes.
     """
@@ -66,7 +66,7 @@ class Reading:
 def readings_of(
     estimates: Estimates, places: Places, reference_slip: float, library: SoilLibrary | None = None
 ) -> Iterator[Reading]:
-    """The readings of one run: adhesion, slip, efficiency of each driven wheel where it stands, soil resistance in the wheels' middle."""
+    """The readings of one run: adhesion, slip, efficiency of each driven wheel at its place, soil resistance at the wheels' middle."""
     vehicle = estimates.vehicle
     counted = np.isin(estimates["event"].astype(str), COUNTED)
     form = _form(estimates, reference_slip, library)
@@ -100,8 +100,8 @@ def readings_of(
 
 
 def _driven(estimates: Estimates, vehicle: Vehicle) -> Iterator[tuple[int, str, float, float]]:
-    """Of each driven wheel with estimates its number, name and place ahead and to the left of the rear axle [m]; of a machine that
-    tells its drive train's speed alone the middle of the driven wheels."""
+    """For each driven wheel with estimates its number, name and place ahead and to the left of the rear axle [m]; for a machine that
+    reports its drive train's speed alone, the middle of the driven wheels."""
     driven = np.flatnonzero(vehicle.driven)
     ahead = vehicle.axle_to_rear[vehicle.wheel_axle]
     for i in driven:
@@ -120,7 +120,7 @@ def _reading(
     counted: Flags,
     x: tuple[Floats, Floats, Floats] | None = None,
 ) -> Reading:
-    """`std` and the third of `x` (value, constant SD, SD) are whole SDs, of which the constant part is taken off."""
+    """`std` and the third of `x` (value, constant SD, SD) are whole SDs; the constant part is subtracted from them."""
     turns = x is not None
     if x is None:
         x = np.ones(len(y)), np.zeros(len(y)), np.zeros(len(y))
@@ -133,7 +133,7 @@ def _reading(
 
 
 def _torque_constant(vehicle: Vehicle, mu: Floats, wheel: int) -> Floats:
-    """SD of adhesion's error by the constants that the vehicle file holds uncertain: mu = T/(r F_z)."""
+    """SD of adhesion's error from the constants that are uncertain in the vehicle file: mu = T/(r F_z)."""
     known = vehicle.uncertainty
     share = np.hypot.reduce([
         known.drive_torque_gain or 0.0, known.drive_torque_gain_common or 0.0,
@@ -147,7 +147,7 @@ def _torque_constant(vehicle: Vehicle, mu: Floats, wheel: int) -> Floats:
 
 
 def _resistance_constant(vehicle: Vehicle, estimates: Estimates) -> Floats:
-    """SD of rho_s's error by the same constants: rho_s = mean mu - (drawbar + m a)/(m g) - slope."""
+    """SD of rho_s's error from the same constants: rho_s = mean mu - (drawbar + m a)/(m g) - slope."""
     known, count = vehicle.uncertainty, len(vehicle.wheels)
     mean = np.mean([np.abs(estimates[f"adhesion_{wheel}"]) for wheel in estimates.wheels], axis=0)
     weight = vehicle.mass * STANDARD_GRAVITY
@@ -157,7 +157,7 @@ def _resistance_constant(vehicle: Vehicle, estimates: Estimates) -> Floats:
     )
     force = (known.drawbar_offset or 0.0) / weight
     slope = known.slope or 0.0
-    if known.acceleration_bias is not None:  # an accelerometer feels slope and acceleration together
+    if known.acceleration_bias is not None:  # an accelerometer measures slope and acceleration together
         slope = min(slope or np.inf, known.acceleration_bias / STANDARD_GRAVITY)
     return np.asarray(np.sqrt((share * mean) ** 2 + offset**2 + force**2 + slope**2))
 

@@ -29,7 +29,7 @@ KINDS: dict[str, tuple[str, str]] = {
 
 
 def require_suffix(path: str | os.PathLike[str]) -> None:
-    """Raise InputError where a map cannot be written under this name, or what it needs is not installed."""
+    """Raise InputError if a map cannot be written under this name, or a package for it is not installed."""
     suffix = Path(path).suffix.lower()
     if suffix not in KINDS:
         problem = f"a map cannot be written as {suffix!r}" if suffix else "the name has no suffix"
@@ -63,7 +63,7 @@ def write_map(made: FieldMap, path: str | os.PathLike[str], layer: str = "cells"
             if suffix == ".parquet":
                 frame.to_parquet(temporary, index=False)
             else:
-                written = io.BytesIO()  # GDAL says nothing of a disk that is full
+                written = io.BytesIO()  # GDAL does not report a full disk
                 frame.to_crs(4326).to_file(written, driver="GeoJSON", engine="pyogrio", RFC7946="YES")
                 temporary.write_bytes(written.getvalue())
         elif suffix in (".tif", ".tiff"):
@@ -96,7 +96,7 @@ def _geopackage(made: FieldMap, path: Path) -> None:
 
 
 def _geotiff(made: FieldMap, path: Path) -> None:
-    """Cloud-optimised, north up, NaN where nothing is known; bands ``count`` and ``passes`` tell what was driven from what is kriged."""
+    """Cloud-optimised, north up, NaN where nothing is known; bands ``count`` and ``passes`` distinguish driven cells from kriged ones."""
     import rasterio
     from rasterio.transform import from_origin
 

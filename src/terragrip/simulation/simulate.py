@@ -1,4 +1,4 @@
-"""From a scenario to a recording and the truth beside it."""
+"""From a scenario to a recording and its truth."""
 
 from __future__ import annotations
 
@@ -31,10 +31,10 @@ Floats = npt.NDArray[np.float64]
 class SimulationResult:
     """A simulated drive.
 
-    ``recording``: what the sensors read. ``truth``: a row for each of its rows (columns: :func:`truth_frame`).
-    ``vehicle``: as its user wrote it, ignorant of the errors. ``true_parameters``: ``gain`` and ``offset`` of every
+    ``recording``: the readings of the sensors. ``truth``: a row for each of its rows (columns: :func:`truth_frame`).
+    ``vehicle``: as its user would write it, without the errors. ``true_parameters``: ``gain`` and ``offset`` of every
     channel (reading = gain x true + offset), ``wheel_radius`` by wheel [m], and ``calibration``, the block that would
-    undo them in a vehicle file. ``scenario`` and ``seed`` make it again.
+    correct them in a vehicle file. ``scenario`` and ``seed`` make it again.
     """
 
     recording: Recording
@@ -69,10 +69,10 @@ class SimulationResult:
 def simulate(
     scenario: Scenario | str | os.PathLike[str], seed: int | None = None, *, machine_seed: int | None = None
 ) -> SimulationResult:
-    """Simulate a scenario (or the one of that name or file).
+    """Simulate a scenario (an object, the name of one, or a file).
 
     ``seed`` (default: the scenario's) fixes ground, noise and faults; ``machine_seed`` (default: the same) fixes the
-    machine's errors, so that many runs can share one machine. The same seeds give the same bits. Raises InputError on an
+    machine's errors: many runs can share one machine. The same seeds give the same bits. Raises InputError on an
     unusable scenario.
     """
     if not isinstance(scenario, Scenario):
@@ -104,7 +104,7 @@ def simulate(
 
 
 def true_radius(scenario: Scenario, vehicle: Vehicle, seed: int) -> Floats:
-    """Each wheel's true radius (wheels,) [m]: the file's with the error that the scenario draws."""
+    """Each wheel's true radius (wheels,) [m]: the file's with the drawn error of the scenario."""
     error = scenario.robot.wheel_radius_sd * stream(seed, "wheel radius").standard_normal()
     return vehicle.wheel_radius * (1.0 + error)
 
@@ -140,7 +140,7 @@ def one_table(series: list[Series]) -> tuple[Floats, dict[str, Floats]]:
 
 
 def true_parameters(vehicle: Vehicle, errors: Errors, radius: Floats) -> dict[str, Any]:
-    """What a result holds of its machine: gains, offsets, radii (wheels,) and the calibration that would undo them."""
+    """A result's values of its machine: gains, offsets, radii (wheels,) and the calibration that would correct them."""
     wheels = vehicle.wheels
     torque = [f"drive_torque_{wheel}" for wheel in wheels]
     calibration: dict[str, Any] = {

@@ -22,11 +22,11 @@ BY_SLIP, BY_PULL = "slip", "pull"
 class BinSettings:
     """How pairs become bins. Recorded in every result; slips are fractions.
 
-    width, lower, upper: of the bins. by: "slip" sorts each pair by its own slip (the paper); "pull" by the slip that the soil's mean curve
-    gives for the vehicle's pull (`pull_bins`). minimum: fewest samples of a bin by slip. metres, runs: fewest metres of way and
-    fewest runs of a bin by pull; bins short of them are joined to the next. With 4 m, of ground that varies over about a metre, the
+    width, lower, upper: of the bins. by: "slip" sorts each pair by its own slip (the paper); "pull" by the slip at which the soil's mean
+    curve gives the vehicle's pull (`pull_bins`). minimum: fewest samples of a bin by slip. metres, runs: shortest distance and
+    fewest runs of a bin by pull; smaller bins are joined to the next. With 4 m, on ground that varies over about a metre, the
     standard error of a bin's mean is half of the SD within it or less.
-    Raises ValueError where the range is empty, the width not positive, or a least number below its own least.
+    Raises ValueError where the range is empty, the width not positive, or a minimum below its own limit.
     """
 
     width: float = 0.01
@@ -49,7 +49,7 @@ class BinSettings:
 
     @property
     def least(self) -> float:
-        """The least weight of a bin: samples by slip, metres by pull."""
+        """The smallest weight of a bin: samples by slip, metres by pull."""
         return self.metres if self.by == BY_PULL else float(self.minimum)
 
     @property
@@ -77,9 +77,9 @@ class Bins:
     """Pairs sorted into slip bins. Arrays have shape (bins,); the `cluster_` arrays (clusters, bins).
 
     A cluster is a set of samples that are not independent of each other: a run, or a stretch of one.
-    By slip: bins with too few samples hold NaN in slip, mean and std; `cluster_count` holds samples, `cluster_slip` sums of slip.
-    By pull: every bin is used; `cluster_count` holds metres, `cluster_slip` sums of slip on `pull_bins`' scale, and `reference` is the
-    scale a of the curve that the pulls were sorted with.
+    By slip: bins with too few samples are NaN in slip, mean and std; `cluster_count` gives samples, `cluster_slip` sums of slip.
+    By pull: every bin is used; `cluster_count` gives metres, `cluster_slip` sums of slip on `pull_bins`' scale, and `reference` is the
+    scale a of the curve that sorted the pulls.
     """
 
     settings: BinSettings
@@ -95,7 +95,7 @@ class Bins:
 
     @property
     def used(self) -> NDArray[np.bool_]:
-        """Which bins hold enough."""
+        """The bins with enough data."""
         return np.asarray(np.isfinite(self.mean))
 
     @property
@@ -104,9 +104,9 @@ class Bins:
         return np.asarray(self.cluster_count.sum(axis=0))
 
     def drawn(self, times: Array, least: float | None = None) -> tuple[Array, Array, NDArray[np.bool_]]:
-        """Slip, mean and enough, each (draws, bins), with every cluster taken `times` (draws, clusters).
+        """Slip, mean and enough, each (draws, bins), with every cluster counted `times` (draws, clusters).
 
-        `enough`: the bin is used and the draw holds `least` of it (default: the settings'); elsewhere slip and mean mean nothing.
+        `enough`: the bin is used and the draw has `least` of it (default: the settings'); elsewhere slip and mean are meaningless.
         """
         n = times @ self.cluster_count
         enough = self.used & (n >= (self.settings.least if least is None else least))
@@ -116,11 +116,11 @@ class Bins:
 
     @property
     def clusters(self) -> int:
-        """How many clusters have samples in the bins."""
+        """The number of clusters with samples in the bins."""
         return int(np.count_nonzero(self.cluster_count.sum(axis=1)))
 
     def to_list(self) -> list[dict[str, float]]:
-        """The used bins as soils.json holds them."""
+        """The used bins in the form of soils.json."""
         columns = {"slip": self.slip, "mean": self.mean, "std": self.std, "count": self.count}
         if self.settings.by == BY_PULL:
             columns["metres"] = self.weight
@@ -139,7 +139,7 @@ _HEIGHTS = height_of(_SLIPS)
 
 
 def slip_of(height: ArrayLike) -> Array:
-    """The slip at which the prototype curve of scale 1 has `height` (any shape), odd; heights past its top give 0.6."""
+    """The slip at which the prototype curve of scale 1 has `height` (any shape), odd; heights above its maximum give 0.6."""
     h = np.asarray(height, dtype=float)
     return np.asarray(np.sign(h) * np.interp(np.abs(h), _HEIGHTS, _SLIPS))
 

@@ -1,6 +1,6 @@
-"""Blocks of half a second of a drive: the level of rho_s, mu and slip, and how much they vary within the block.
+"""Blocks of half a second of a drive: the level of rho_s, mu and slip, and their variation within the block.
 
-Both are what a soil is recognised by: its level and its roughness. Blocks count from a fixed instant, so that a drive gives the same blocks
+Both identify a soil: its level and its roughness. Blocks count from a fixed instant, so a drive gives the same blocks
 sample by sample as at once.
 """
 
@@ -36,14 +36,14 @@ _USABLE = ("", "immobilization", "outlier")
 
 @dataclass(frozen=True)
 class Blocks:
-    """Blocks of one drive, arrays of shape (blocks,) or, by driven wheel, (blocks, wheels). NaN: nothing usable in the block.
+    """Blocks of one drive, arrays of shape (blocks,) or, by driven wheel, (blocks, wheels). NaN: no usable data in the block.
 
-    `number` counts periods since `origin`; a gap leaves numbers out. `start`, `end` [s]: its first row, and the first row after it;
-    `rows`: how many rows, `usable`: of these without an event, moving and with slips up to 60 %; `streak`: how many blocks on end, up to
-    and with this one, are usable by half. `travelled` [m]: distance at its last row.
-    `resistance` rho_s, `adhesion`, `slip`: means of usable rows, the `_variance` of each: mean square of the estimates' own SD.
-    `roughness` (blocks, 2): ln of the SD within the block of rho_s, and of mu (the wheels' mean); `slip_sd`: so of slip. `curve_a`: its
-    mean (NaN where the table has none). `share`: the wheels' shares of the load.
+    `number` counts periods since `origin`; a gap skips numbers. `start`, `end` [s]: its first row, and the first row after it;
+    `rows`: the number of rows; `usable`: of these without an event, moving and with slips up to 60 %; `streak`: the number of consecutive
+    blocks, up to and including this one, of which half the rows are usable. `travelled` [m]: distance at its last row.
+    `resistance` rho_s, `adhesion`, `slip`: means of usable rows; the `_variance` of each: mean square of the estimates' own SD.
+    `roughness` (blocks, 2): ln of the SD within the block of rho_s, and of mu (the wheels' mean); `slip_sd`: the same of slip. `curve_a`:
+    its mean (NaN where the table has none). `share`: the wheels' shares of the load.
     """
 
     number: NDArray[np.int64]
@@ -69,7 +69,7 @@ class Blocks:
 
     @property
     def known(self) -> NDArray[np.bool_]:
-        """Which blocks tell of the ground, (blocks,): the estimates have settled since the vehicle stood or spun."""
+        """The blocks that identify the ground, (blocks,): the estimates have settled since the vehicle stood or spun."""
         return (self.streak > SETTLING) & np.isfinite(self.resistance) & np.isfinite(self.mean_adhesion)
 
     @property
@@ -88,7 +88,7 @@ class Blocks:
 
 
 def wheel_loads(columns: Mapping[str, Any], axle_of: Mapping[str, str]) -> dict[str, Array]:
-    """The columns that weigh the wheels: the load of each wheel's axle; ones where the table holds none."""
+    """The columns that weight the wheels: the load of each wheel's axle; ones where the table has none."""
     rows = len(np.asarray(columns["time"]))
     return {
         wheel: np.asarray(columns.get(f"vertical_load_{axle}", np.ones(rows)), dtype=float)
@@ -97,7 +97,7 @@ def wheel_loads(columns: Mapping[str, Any], axle_of: Mapping[str, str]) -> dict[
 
 
 def needed_columns(wheels: Sequence[str]) -> tuple[str, ...]:
-    """What blocks are made of."""
+    """The columns from which blocks are made."""
     each = [f"{name}_{w}" for w in wheels for name in ("adhesion", "slip")]
     return ("time", "distance", "event", "soil_resistance", *each)
 
@@ -111,9 +111,9 @@ def blocks_of(
 ) -> Blocks:
     """Cut a table of estimates into blocks.
 
-    columns: those of `needed_columns`, (rows,) each; where there are any, their `_std` (else they count as exact) and
+    columns: those of `needed_columns`, (rows,) each; if available, their `_std` (else they count as exact) and
     `vertical_load_<axle>`. `axle_of`: the driven wheels and their axles. `origin` [s]: where the count starts (default: the first row).
-    `before`: number and streak of the block before, of a drive that goes on. InputError where a column, a distance or every row is missing.
+    `before`: number and streak of the block before, when a drive continues. InputError where a column, a distance or every row is missing.
     """
     wheels = tuple(axle_of)
     for name in needed_columns(wheels):
@@ -202,9 +202,9 @@ def driven_wheels(vehicle: Vehicle) -> dict[str, str]:
 def estimates_blocks(
     estimates: Estimates, rows: NDArray[np.bool_] | None = None, file: str | None = None
 ) -> Blocks:
-    """The blocks of a table of estimates; of some `rows` (rows,) only: the others count as unusable.
+    """The blocks of a table of estimates; with `rows` (rows,), the others count as unusable.
 
-    Raises InputError as `blocks_of`, and where the table holds no vehicle.
+    Raises InputError as `blocks_of`, and where the table has no vehicle.
     """
     if not estimates.has_adhesion:
         raise InputError(
@@ -221,7 +221,7 @@ def estimates_blocks(
 def _streak(
     number: NDArray[np.int64], good: NDArray[np.bool_], before: tuple[int, int] | None
 ) -> NDArray[np.int64]:
-    """Good blocks on end up to and with each block, (blocks,); a number left out ends a streak."""
+    """The number of consecutive good blocks up to and including each block, (blocks,); a skipped number ends a streak."""
     last, run = before or (int(number[0]) - 1, 0)
     follows = number == np.concatenate(([last], number[:-1])) + 1
     out = np.empty(len(number), dtype=np.int64)

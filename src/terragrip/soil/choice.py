@@ -1,4 +1,4 @@
-"""Which form can follow the data: cross-validation over runs, and a plain verdict on the form that was asked for."""
+"""Which form can follow the data: cross-validation over runs, and a verdict on the requested form."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ class FormScore:
 
 @dataclass(frozen=True)
 class FormVerdict:
-    """Ranking of forms, best first; `follows`: the asked form can follow the data; `proposal`: the form to take instead, or None."""
+    """Ranking of forms, best first; `follows`: the requested form can follow the data; `proposal`: a better form, or None."""
 
     asked: str
     ranking: tuple[FormScore, ...]
@@ -58,9 +58,9 @@ def compare_forms(
 ) -> FormVerdict:
     """Leave whole clusters (runs) out in turn, fit each form on the rest, judge it on the bin means of those left out.
 
-    Bins with fewer clusters than 2: the folds are alternate bins instead (said in the sentence). A form takes part where the used bins
-    exceed its parameters by two or more: a fold that loses a bin must still leave one beyond what the form can pass through; what is left
-    out is said. Raises InputError on an unknown form, with fewer than LEAST_BINS used bins, or too few for the asked form.
+    With fewer than 2 clusters the folds are alternate bins instead, and the sentence says so. A form takes part where the used bins
+    exceed its parameters by two or more: a fold that loses a bin must still leave one more than the form can fit exactly. The sentence
+    names the forms left out. Raises InputError on an unknown form, with fewer than LEAST_BINS used bins, or too few for the requested form.
     """
     names = tuple(candidates or FORMS)
     if asked not in FORMS:
@@ -108,7 +108,7 @@ def _run_folds(bins: Bins, folds: int) -> list[Split]:
 def _split(bins: Bins, train: NDArray[np.int64], test: NDArray[np.int64]) -> Split:
     parts: list[Array] = []
     least, by_pull = bins.settings.least, bins.settings.by == BY_PULL
-    # by pull a bin is as wide as its least asks: what a fold keeps of it is less
+    # by pull a bin is as wide as its minimum requires: a fold keeps less than that of it
     for rows, needed in (
         (train, least / 2 if by_pull else least),
         (test, least / 10 if by_pull else least / 2),
@@ -133,7 +133,7 @@ def _bin_folds(bins: Bins, folds: int) -> list[Split]:
 
 
 def _parameters(form: str) -> tuple[dict[str, float], list[str]]:
-    """(held, free): the parameters that a form holds at their values, and the names of those it fits."""
+    """(held, free): the values of a form's fixed parameters, and the names of the fitted ones."""
     name, intercept = FORMS[form]
     model = CURVES[name]
     held = {p.name: p.start for p in model.parameters if p.name in model.fixed}

@@ -1,4 +1,4 @@
-"""Digitised points of a printed curve: CSV as WebPlotDigitizer, Engauge and others write it."""
+"""Digitised points of a printed curve: CSV files of WebPlotDigitizer, Engauge and others."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class DigitisedCurve:
-    """Points of one curve: slip (n,) as a fraction, value (n,) [-], the curve's name, notes on what was assumed."""
+    """Points of one curve: slip (n,) as a fraction, value (n,) [-], the curve's name, notes on assumptions."""
 
     name: str
     slip: Array
@@ -35,7 +35,7 @@ class DigitisedCurve:
 def read_points(path: str | os.PathLike[str]) -> list[DigitisedCurve]:
     """Read pairs of columns (slip, value), several curves side by side as WebPlotDigitizer writes them; header rows are optional.
 
-    Comma, semicolon, tab or spaces; decimal comma where the separator is not a comma. Slips beyond 1.5 are taken as per cent (noted).
+    Comma, semicolon, tab or spaces; decimal comma where the separator is not a comma. Slips above 1.5 are read as per cent (noted).
     InputError: no such file, not text, no numbers, a cell that is not a number (row and cell named), an odd number of columns.
     """
     file = os.fspath(path)
@@ -123,11 +123,11 @@ def _curve(slip: Array, value: Array, name: str, file: str) -> DigitisedCurve:
 def soils_of_points(
     path: str | os.PathLike[str], curve: AdhesionCurve | None = None, soil: str | None = None
 ) -> SoilLibrary:
-    """A soil for each digitised curve of a file (see `read_points`), each point a bin of its own; what cannot be fitted is in `not_fitted`.
+    """A soil for each digitised curve of a file (see `read_points`), each point a bin of its own; curves without a fit are in `not_fitted`.
 
-    curve: an unfitted AdhesionCurve whose model and range of slips to use (default: the paper's, 5-60 %). Points of one curve are no
+    curve: an unfitted AdhesionCurve with the model and range of slips to use (default: the paper's, 5-60 %). Points of one curve are not
     repetitions, so there are no intervals. soil: the name of the file's one curve. Raises InputError as `read_points`, on two curves of
-    one name, and where `soil` is to name several.
+    one name, and if `soil` would name several.
     """
     template = curve or AdhesionCurve()
     soils: dict[str, Soil] = {}

@@ -33,8 +33,8 @@ def soils_of(
 ) -> Campaign:
     """Learn the soils of estimates files (Parquet, written by `terragrip estimate`).
 
-    `soil`: the name of all rows, for logs without labels. Other arguments as `learn_soils`. Raises InputError on a file that is no table
-    of estimates, on one file given twice, and where no row is labelled.
+    `soil`: the name of all rows, for logs without labels. Other arguments as `learn_soils`. Raises InputError on a file that is not a table
+    of estimates, on a file given twice, and if no row is labelled.
     """
     paths = distinct(files)
     gathered = GatheredRuns()
@@ -49,7 +49,7 @@ def soils_of(
 
 
 def distinct(files: Sequence[str | os.PathLike[str]]) -> list[Path]:
-    """The files as paths. Raises InputError on one that is given twice."""
+    """The files as paths. Raises InputError on a file given twice."""
     paths = [Path(file) for file in files]
     seen: set[Path] = set()
     for path in paths:
@@ -61,7 +61,7 @@ def distinct(files: Sequence[str | os.PathLike[str]]) -> list[Path]:
 
 @dataclass
 class GatheredRuns:
-    """What soils are learned from, run after run: usable pairs, blocks for signatures, and what the advice needs of the machine."""
+    """The data for learning soils, run after run: usable pairs, blocks for signatures, and the machine's data for the advice."""
 
     runs: list[str] = field(default_factory=list)
     pairs: list[RunPairs] = field(default_factory=list)
@@ -81,7 +81,7 @@ class GatheredRuns:
         *,
         signatures: bool = True,
     ) -> None:
-        """Take one run; `soil` names all its rows, `file` is named where it is unusable; `signatures`: False takes no blocks."""
+        """Add one run; `soil` names all its rows, errors name `file`; `signatures`: False adds no blocks."""
         if not estimates.has_adhesion:
             problem, hint = (
                 "holds slip but no adhesion, so no soil can be learned",
@@ -100,7 +100,7 @@ class GatheredRuns:
         self.wheels = max(self.wheels, len(estimates.wheels))
 
     def join(self, other: GatheredRuns) -> None:
-        """Take all runs of `other` too."""
+        """Add all runs of `other`."""
         self.runs += other.runs
         self.pairs += other.pairs
         for name, blocks in other.blocks.items():
@@ -119,7 +119,7 @@ class GatheredRuns:
     def learn(
         self, curve: AdhesionCurve | None = None, bins: Mapping[str, BinSettings] | None = None
     ) -> Campaign:
-        """Fit every soil of what was gathered. Raises as `learn_soils`."""
+        """Fit every soil of the runs. Raises as `learn_soils`."""
         names = ", ".join(self.runs[:3])
         names += f" and {len(self.runs) - 3} more" if len(self.runs) > 3 else ""
         campaign = learn_soils(
@@ -139,7 +139,7 @@ class GatheredRuns:
 
 
 def torque_scale_sd(vehicle: Vehicle) -> float:
-    """Relative SD of the mean torque scale of all wheels, by the vehicle's stated uncertainty: every log of the machine shares it."""
+    """Relative SD of the mean torque scale of all wheels, by the vehicle's stated uncertainty: all logs of the machine share it."""
     known = vehicle.uncertainty
     own, common = known.drive_torque_gain or 0.0, known.drive_torque_gain_common or 0.0
     return float(np.hypot(own / np.sqrt(len(vehicle.wheels)), common))
@@ -168,5 +168,5 @@ def _labels(estimates: Estimates, soil: str | None) -> NDArray[np.object_]:
 
 
 def whole_length(vehicle: Vehicle) -> float:
-    """From the front axle to the end of the tool [m]: over this way vehicle and tool come onto a new soil."""
+    """From the front axle to the end of the tool [m]: over this distance vehicle and tool move onto a new soil."""
     return (vehicle.wheelbase or 0.0) + (vehicle.hitch_overhang or 0.0) + (vehicle.tool_length or 0.0)

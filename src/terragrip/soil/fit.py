@@ -34,20 +34,20 @@ class AdhesionCurve:
     Parameters
     ----------
     model : a name of `terragrip.physics.adhesion.CURVES`; "exponential" is the paper's eq. 8.
-    fixed : parameters held, e.g. {"p": .52}; None = the model's own choice (the paper's prototype shape), "free" = hold none.
-    bounds : (lower, upper) of free parameters, within the model's own; those not named keep the model's.
-    intercept : also fit a constant, for a sensor that sees net traction (kappa = mu - rho).
-    weights : None (the paper: each bin counts alike) or "count" (by the samples' standard error of the mean).
+    fixed : parameters kept at a value, e.g. {"p": .52}; None = the model's own choice (the paper's prototype shape), "free" = fix none.
+    bounds : (lower, upper) of free parameters, within the model's own; parameters not named keep the model's.
+    intercept : also fit a constant, for a sensor that measures net traction (kappa = mu - rho).
+    weights : None (the paper: all bins have the same weight) or "count" (by the samples' standard error of the mean).
     bins : BinSettings.
     bootstrap : repetitions for the 95 % intervals, 0 = none. Runs are drawn, not samples: samples of one run are not independent.
     seed : of the bootstrap.
-    common_sd : relative SD of an error of adhesion that all runs share (the machine's torque scale); no drawing of runs shows it, so it
+    common_sd : relative SD of an error of adhesion that all runs share (the machine's torque scale). Drawing runs does not show it, so it
         widens the intervals.
 
     After `fit`: `parameters_` (all of the model's, and intercept), `free_`, `interval_` {name: (low, high)}, `r2_`, `nrmse_`, `bins_`,
-    `identifiability_`, `at_bound_` (free parameters that stopped at an end of their range: the end gave the value, not the data, so the
-    curve is not identifiable), `notes_` (plain sentences). Where the data do not fix the four parameters of eq. 8 one by one, `interval_`
-    holds the effective A, k, d instead (physics.md 5).
+    `identifiability_`, `at_bound_` (free parameters that stopped at a bound: the bound gave the value, not the data, so the
+    curve is not identifiable), `notes_` (plain sentences). Where the data do not determine the four parameters of eq. 8 one by one,
+    `interval_` has the effective A, k, d instead (physics.md 5).
     """
 
     def __init__(
@@ -69,19 +69,19 @@ class AdhesionCurve:
         self.model, self.fixed, self.intercept, self.weights = model, fixed, intercept, weights
         self.bins, self.bootstrap, self.seed = bins or BinSettings(), bootstrap, seed
         self.common_sd, self.bounds = common_sd, dict(bounds or {})
-        self.written_band: tuple[Array, Array, Array] | None = None  # slip, low, high of a fit that was read
+        self.written_band: tuple[Array, Array, Array] | None = None  # slip, low, high of a stored fit
 
     def fit(self, slip: ArrayLike, adhesion: ArrayLike, run: ArrayLike | None = None) -> AdhesionCurve:
-        """Fit to pairs, each of shape (n,); `run` (n,) are integer or string labels of what is not independent.
+        """Fit to pairs, each of shape (n,); `run` (n,) are integer or string labels of samples that are not independent.
 
-        Pairs are sorted by slip; bins by pull need to know the pull: `pull_bins.bin_by_pull` and `fit_bins`.
-        Raises InputError where the data hold fewer used bins than free parameters, or only one, and on bounds that the model does not have.
+        Pairs are sorted by slip. Bins by pull need the pull: `pull_bins.bin_by_pull` and `fit_bins`.
+        Raises InputError where the data have fewer used bins than free parameters, or only one, and on bounds that the model does not have.
         """
         labels = None if run is None else np.unique(np.ravel(np.asarray(run)), return_inverse=True)[1]
         return self.fit_bins(bin_pairs(slip, adhesion, labels, replace(self.bins, by=BY_SLIP)))
 
     def fit_bins(self, bins: Bins) -> AdhesionCurve:
-        """Fit to bins that stand already. Raises as `fit`."""
+        """Fit to existing bins. Raises as `fit`."""
         curve = self._bounded(CURVES[self.model])
         held = self._held(curve)
         free = [name for name in curve.names if name not in held] + ([INTERCEPT] if self.intercept else [])
@@ -126,7 +126,7 @@ class AdhesionCurve:
 
     @property
     def has_band(self) -> bool:
-        """Whether `band` is known: by the bootstrap, of a fit that was read by its band or the interval of its one free parameter."""
+        """Whether `band` is known: from the bootstrap; for a stored fit, from its band or its one free parameter's interval."""
         return (
             self.samples_ is not None
             or self.written_band is not None
@@ -134,8 +134,8 @@ class AdhesionCurve:
         )
 
     def band(self, slip: ArrayLike, level: float = 0.95) -> tuple[Array, Array]:
-        """Pointwise interval of the curve at slips (n,): from the bootstrap; of a fit that was read its 95 %, between the slips that it was
-        written at, or between the curves at the ends of the one free parameter's interval. Raises ValueError where none is known."""
+        """Pointwise interval of the curve at slips (n,), from the bootstrap. For a stored fit it is the 95 % interval, between the
+        slips of its band, or between the curves at the ends of the one free parameter's interval. Raises ValueError if none is known."""
         if not self.has_band:
             raise ValueError("this curve was fitted without a bootstrap")
         s = np.asarray(slip, dtype=float)
@@ -175,7 +175,7 @@ class AdhesionCurve:
         return SoilLibrary({"curve": Soil.from_curve("curve", self)})
 
     def to_dict(self) -> dict[str, Any]:
-        """The fit as soils.json holds it (architecture.md, contracts)."""
+        """The fit in the form of soils.json (architecture.md, contracts)."""
         badge = self.identifiability_
         band = {}
         if self.samples_ is not None and len(self.free_) > 1:
@@ -284,7 +284,7 @@ class AdhesionCurve:
         }
 
     def unfitted(self, **changes: Any) -> AdhesionCurve:
-        """The same curve, not fitted; `changes` are arguments of the constructor."""
+        """The same curve, unfitted; `changes` are arguments of the constructor."""
         same = {
             name: getattr(self, name)
             for name in (
@@ -303,7 +303,7 @@ class AdhesionCurve:
 
 
 def _at_bound(curve: CurveModel, parameters: Mapping[str, float], free: Sequence[str]) -> list[str]:
-    """The free parameters within AT_BOUND of an end of their range."""
+    """The free parameters within AT_BOUND of a bound."""
     return [
         p.name
         for p in curve.parameters

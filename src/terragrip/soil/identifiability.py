@@ -1,4 +1,4 @@
-"""What a fit's data can tell of its parameters: condition number, what stays fixed, a twin set that draws the same curve."""
+"""What a fit's data determine of its parameters: condition number, effective parameters, a twin set that draws the same curve."""
 
 from __future__ import annotations
 
@@ -24,8 +24,8 @@ class Identifiability:
 
     `condition`: ratio of the largest to the smallest singular value of the scaled sensitivities d curve/d ln parameter.
     `identifiable`: condition below LIMIT, and R2 at least POOR.
-    `effective`: parameters that the data do fix (A, k, d), for the paper's form.
-    `twin`: another parameter set, `twin_difference` away at most over the data's slips; None where there is none.
+    `effective`: parameters that the data do determine (A, k, d), for the paper's form.
+    `twin`: another parameter set, at most `twin_difference` away over the data's slips; None where there is none.
     """
 
     condition: float
@@ -37,14 +37,14 @@ class Identifiability:
 
     @property
     def separable(self) -> bool:
-        """Whether the bins' slips tell the parameters apart, however well the curve explains the bins."""
+        """Whether the bins' slips distinguish the parameters, however well the curve explains the bins."""
         return self.condition < LIMIT
 
 
 def judge(
     model: CurveModel, parameters: Mapping[str, float], free: Sequence[str], slip: Array, r2: float
 ) -> Identifiability:
-    """Badge of a fit of `free` parameters on bins at `slip` (bins,), all other parameters held; `r2` of the fit on them."""
+    """Badge of a fit of `free` parameters on bins at `slip` (bins,), all other parameters fixed; `r2` of the fit on them."""
     names = [name for name in free if name != "intercept"]
     columns = [_sensitivity(model, parameters, name, slip) for name in names]
     if "intercept" in free:

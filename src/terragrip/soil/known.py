@@ -1,4 +1,4 @@
-"""The soils of a library as fits that stand already, for the report: nothing is learned anew."""
+"""The soils of a library as finished fits, for the report: nothing is learned again."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from terragrip.soil.slip_noise import SlipNoise
 
 
 def known_soils(library: SoilLibrary, names: Iterable[str]) -> Campaign:
-    """The library's soils of these names; a name that it does not hold is not fitted."""
+    """The library's soils of these names; a name that is not in it is not fitted."""
     wanted = sorted(set(names))
     soils = {name: _known(library[name]) for name in wanted if name in library}
     return Campaign(soils, {n: "the library does not hold it" for n in wanted if n not in library}, ())
@@ -39,7 +39,7 @@ def _known(soil: Soil) -> LearnedSoil:
 
 
 def _fitted(soil: Soil, fit: Mapping[str, Any]) -> AdhesionCurve:
-    """A curve as its fit left it: parameters, intervals, bins and badge; without the bootstrap's draws."""
+    """A curve from its stored fit: parameters, intervals, bins and badge, without the bootstrap's draws."""
     known = {field.name for field in fields(BinSettings)}
     settings = BinSettings(**{k: v for k, v in (fit.get("settings") or {}).items() if k in known})
     curve = AdhesionCurve(soil.model, bins=settings, bootstrap=0)

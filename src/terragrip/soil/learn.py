@@ -39,9 +39,9 @@ DEFAULT = BinSettings(by=BY_PULL)
 
 @dataclass(frozen=True)
 class RunPairs:
-    """The usable pairs of one run on one soil: slip, adhesion and slip noise (n,), wheel after wheel; the vehicle's pull, its wheels'
-    mean adhesion, at that instant (n,); the stretch of `STRETCH` metres that each lies in and the metres of the vehicle's way that it
-    stands for, the wheels sharing a row's (n,); rho_s and speed (rows,)."""
+    """The usable pairs of one run on one soil: slip, adhesion and slip noise (n,), wheel after wheel; the vehicle's pull, the mean
+    adhesion of its wheels, at that instant (n,); the stretch of `STRETCH` metres of each pair, and the metres of the vehicle's path that
+    it represents, divided among a row's wheels (n,); rho_s and speed (rows,)."""
 
     run: str
     soil: str
@@ -57,10 +57,10 @@ class RunPairs:
 
 @dataclass(frozen=True)
 class LearnedSoil:
-    """One soil's fit with all that the report shows beside it.
+    """One soil's fit with everything that the report shows beside it.
 
-    `curve`: the fit that counts, by pull freed of slip noise; `slip_noise`: what that noise does to it. `by_slip`: the paper's, each pair
-    sorted by its own slip (`curve` itself where that one counts).
+    `curve`: the fit that counts, by pull and without slip noise; `slip_noise`: the effect of that noise on it. `by_slip`: the paper's, each
+    pair sorted by its own slip (`curve` itself where that one counts).
     """
 
     soil: Soil
@@ -74,7 +74,7 @@ class LearnedSoil:
 
 @dataclass(frozen=True)
 class Campaign:
-    """All soils of a set of estimates: what was fitted, what was not and why, sentences for the user."""
+    """All soils of a set of estimates: the fits, the soils without a fit and why, sentences for the user."""
 
     soils: Mapping[str, LearnedSoil]
     not_fitted: Mapping[str, str]
@@ -145,13 +145,13 @@ def learn_soils(
     source: str = "",
     common_sd: float = 0.0,
 ) -> Campaign:
-    """Fit a curve to each soil of the pairs; compare forms, correct for slip noise, say what to drive next.
+    """Fit a curve to each soil of the pairs; compare forms, correct for slip noise, propose what to drive next.
 
     `curve`: an unfitted AdhesionCurve with the settings to use (default: the paper's shape on bins by pull). `bins` by soil; default the
-    curve's, on grass the paper's range up to 40 %. Bins by pull give way to bins by slip where adhesion falls within the bins (past the
-    top one pull has two slips) or too few of them are filled; a note says so. `mass` [kg] gives the pulls of
+    curve's, on grass the paper's range up to 40 %. Bins by slip replace bins by pull where adhesion falls within the bins (beyond the
+    maximum one pull has two slips) or too few bins are filled; a note says so. `mass` [kg] gives the pulls of
     the advice. `common_sd`: relative SD of adhesion's error that all runs share; it widens the intervals.
-    Raises InputError where no pair is labelled.
+    Raises InputError if no pair is labelled.
     """
     template = (curve or AdhesionCurve(bins=DEFAULT)).unfitted(common_sd=common_sd)
     special = bins
@@ -191,7 +191,7 @@ def learn_soils(
 
 
 def _clusters(parts: Sequence[RunPairs]) -> NDArray[np.int64]:
-    """Labels (n,) of what is drawn by the bootstrap: runs, or stretches of runs where there are few."""
+    """Labels (n,) of the units that the bootstrap draws: runs, or stretches of runs where there are few."""
     run = np.repeat(np.arange(len(parts)), [part.slip.size for part in parts])
     if len(parts) >= FEW_RUNS:
         return run
@@ -200,7 +200,7 @@ def _clusters(parts: Sequence[RunPairs]) -> NDArray[np.int64]:
 
 
 def bin_parts(parts: Sequence[RunPairs], settings: BinSettings) -> Bins:
-    """Bins of one soil's pairs, clusters as the bootstrap draws them: runs, or stretches of runs where there are few."""
+    """Bins of one soil's pairs, with the clusters that the bootstrap draws: runs, or stretches of runs where there are few."""
     slip, adhesion, pull, metres, noise = (
         _joined(parts, name) for name in ("slip", "adhesion", "pull", "metres", "slip_std")
     )
@@ -290,7 +290,7 @@ def _fits(
 
 
 def _of_noise(parts: Sequence[RunPairs], curve: AdhesionCurve) -> SlipNoise:
-    """What noise of slip does to the fit that counts: by pull it is freed of it, by slip it is as it is (the paper's)."""
+    """The effect of slip noise on the fit that counts: by pull it is removed, by slip the fit keeps it (the paper's way)."""
     slip, adhesion, noise = (_joined(parts, key) for key in ("slip", "adhesion", "slip_std"))
     if curve.bins_.settings.by == BY_SLIP:
         return correct_slip_noise(curve, slip, adhesion, noise)
@@ -302,7 +302,7 @@ def _of_noise(parts: Sequence[RunPairs], curve: AdhesionCurve) -> SlipNoise:
 
 
 def _compared(bins: Bins) -> FormVerdict | None:
-    """The verdict on the paper's form; None where the bins cannot tell."""
+    """The verdict on the paper's form; None where the bins cannot decide."""
     try:
         return compare_forms(bins)
     except InputError:
@@ -310,7 +310,7 @@ def _compared(bins: Bins) -> FormVerdict | None:
 
 
 def _falls(bins: Bins, verdict: FormVerdict | None) -> bool:
-    """Whether adhesion falls by more than FALL of its top within the bins: by the best form, where the paper's cannot follow them."""
+    """Whether adhesion falls by more than FALL of its maximum within the bins: by the best form, where the paper's cannot follow them."""
     if verdict is None or verdict.proposal is None:
         return False
     model, intercept = FORMS[verdict.proposal]
@@ -321,7 +321,7 @@ def _falls(bins: Bins, verdict: FormVerdict | None) -> bool:
 
 
 def _enough(bins: Bins) -> Bins:
-    """The bins by pull themselves. Raises InputError where there are fewer than LEAST_BINS."""
+    """The bins by pull. Raises InputError where there are fewer than LEAST_BINS."""
     filled = int(np.count_nonzero(bins.used))
     if filled < LEAST_BINS:
         raise InputError(
@@ -331,7 +331,7 @@ def _enough(bins: Bins) -> Bins:
 
 
 def explaining(curve: AdhesionCurve) -> AdhesionCurve:
-    """The fitted curve itself. Raises InputError where it explains nothing of its bins (R2 of 0 or less)."""
+    """The fitted curve. Raises InputError where it explains nothing of its bins (R2 of 0 or less)."""
     if curve.r2_ <= 0:
         raise InputError(
             f"the {curve.model} curve explains nothing of its {np.count_nonzero(curve.bins_.used)} bins (R2 {curve.r2_:.2f}): "

@@ -26,7 +26,7 @@ def solve(
     """Parameters (sets, free) that minimise sum_j w_j (means_j - curve(slip_j))^2, and that sum (sets,).
 
     slip, means, weights: (sets, bins), weight 0 where a bin is missing; start: (sets, free). `free` may name "intercept".
-    Each set walks on its own: a step is kept where it lowers the sum, and the damping follows (Marquardt 1963).
+    Each set iterates on its own: a step is kept where it lowers the sum, and the damping follows (Marquardt 1963).
     """
     bounds = {p.name: (p.lower, p.upper) for p in model.parameters} | {INTERCEPT: (-2.0, 2.0)}
     lower = np.array([bounds[name][0] for name in free])

@@ -28,10 +28,10 @@ VERSION = 1
 
 @dataclass(frozen=True)
 class Soil:
-    """One soil: the curve's model and parameters, and how well they are known.
+    """One soil: the curve's model and parameters, and their uncertainty.
 
     `resistance` and `spread`: (mean, SD) of rho_s, and the SD of adhesion about the curve; None where not known.
-    `fit`: the rest of a fit as `AdhesionCurve.to_dict` gives it (settings, badge, notes).
+    `fit`: the rest of a fit from `AdhesionCurve.to_dict` (settings, badge, notes).
     """
 
     name: str
@@ -70,7 +70,7 @@ class Soil:
         return CURVES[self.model].value(slip, given, self.parameters.get("intercept", 0.0))
 
     def to_dict(self) -> dict[str, Any]:
-        """As soils.json holds it; what is not known is null."""
+        """The soil in the form of soils.json; unknown values are null."""
         return {
             "model": self.model,
             "parameters": dict(self.parameters),
@@ -106,7 +106,7 @@ class SoilLibrary(Mapping[str, Soil]):
 
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> SoilLibrary:
-        """Read soils.json. InputError: no such file, not JSON, a newer version, two soils of one name, a number that is none."""
+        """Read soils.json. InputError: no such file, not JSON, a newer version, two soils of one name, a value that is not a number."""
         file = os.fspath(path)
         try:
             data = read_json(file, "soils", VERSION, "'terragrip soils'", pairs=_refuse_twins)
@@ -118,7 +118,7 @@ class SoilLibrary(Mapping[str, Soil]):
         return cls(soils, data.get("provenance") or {}, data.get("not_fitted") or {})
 
     def write(self, path: str | os.PathLike[str]) -> None:
-        """Write soils.json, whole or not at all. InputError where it cannot be written, or a number is NaN or infinite."""
+        """Write soils.json, whole or not at all. InputError if it cannot be written, or a number is NaN or infinite."""
         try:
             text = json.dumps(self.to_dict(), indent=1, allow_nan=False)
         except ValueError as error:
@@ -137,13 +137,13 @@ class SoilLibrary(Mapping[str, Soil]):
         }
 
     def to_pandas(self) -> pd.DataFrame:
-        """A row a soil: model, parameters with their 95 % intervals, how well they fit (`terragrip.soil.views.table_of`)."""
+        """A row for each soil: model, parameters with their 95 % intervals, quality of the fit (`terragrip.soil.views.table_of`)."""
         from terragrip.soil.views import table_of
 
         return table_of(self.soils)
 
     def plot(self) -> Figure:
-        """The curves with their bins, as a matplotlib figure; raises InputError where there is none, or no matplotlib."""
+        """The curves with their bins, as a matplotlib figure; raises InputError if there is none, or no matplotlib."""
         from terragrip.soil.views import plot
 
         return plot(self.soils)
@@ -154,7 +154,7 @@ class SoilLibrary(Mapping[str, Soil]):
         return html_of(self.soils, self.not_fitted)
 
     def merge(self, other: SoilLibrary, clash: str = "refuse") -> SoilLibrary:
-        """Both libraries' soils. `clash`: "refuse" two soils of one name (InputError), "keep" ours, or "replace" by theirs."""
+        """The soils of both libraries. `clash`: "refuse" two soils of one name (InputError), "keep" ours, or "replace" by theirs."""
         if clash not in ("refuse", "keep", "replace"):
             raise InputError(f"clash={clash!r} is no choice", hint="use 'refuse', 'keep' or 'replace'")
         twins = sorted(set(self.soils) & set(other.soils))
@@ -260,7 +260,7 @@ def _soil(name: str, entry: Any, file: str) -> Soil:
 
 
 def _refuse_bad_fit(entry: Mapping[str, Any], values: Mapping[str, float], file: str, place: str) -> None:
-    """InputError where what a fit tells beside its curve cannot be read: free parameters, settings, badge, the paper's fit by slip."""
+    """InputError if the fit beside a curve cannot be read: free parameters, settings, badge, the paper's fit by slip."""
     free = entry.get("free", [])
     if not isinstance(free, list) or not all(isinstance(name, str) and name in values for name in free):
         raise InputError("is not a list of the soil's parameters", file=file, place=f"{place}.free")
@@ -285,7 +285,7 @@ def _refuse_bad_fit(entry: Mapping[str, Any], values: Mapping[str, float], file:
 
 
 def _refuse_bad_band(band: Any, file: str, place: str) -> None:
-    """InputError unless a band is three lists of as many numbers, its slips in order."""
+    """InputError unless a band is three lists of equal length, its slips in order."""
     if band is None:
         return
     columns: list[Any] = (

@@ -1,4 +1,4 @@
-"""Soils and grounds of the literature as library entries, each with its source."""
+"""Soils and surfaces from the literature as library entries, each with its source."""
 
 from __future__ import annotations
 
@@ -77,5 +77,5 @@ def brixius_soil(
 
 
 def literature_soils() -> SoilLibrary:
-    """All soils built in: the paper's five and Burckhardt's seven (Brixius needs a tyre: `brixius_soil`)."""
+    """All built-in soils: the paper's five and Burckhardt's seven (Brixius needs a tyre: `brixius_soil`)."""
     return paper_soils().merge(burckhardt_grounds())

@@ -16,8 +16,8 @@ from terragrip.soil.library import Soil
 class Gap:
     """A stretch of slips without enough samples, and the drive that fills it.
 
-    slip (low, high) [-]; drawbar pull (low, high) [N] that brings the vehicle there; `seconds` of driving needed at `speed` [m/s] wheel
-    speed; `reachable` False where the curve falls with slip there, so that no steady pull holds the vehicle at that slip.
+    slip (low, high) [-]; drawbar pull (low, high) [N] for that slip; `seconds` of driving needed at `speed` [m/s] wheel
+    speed; `reachable` False where the curve falls with slip, because no steady pull keeps the vehicle at that slip.
     """
 
     slip: tuple[float, float]
@@ -28,7 +28,7 @@ class Gap:
 
 
 def missing_slips(bins: Bins) -> list[tuple[float, float]]:
-    """Stretches (low, high) of slip whose bins hold too few samples, neighbours joined."""
+    """Stretches (low, high) of slip whose bins have too few samples, neighbours joined."""
     return _stretches(bins.settings, bins.used)
 
 
@@ -51,8 +51,8 @@ def what_to_drive(
 ) -> list[Gap]:
     """The pulls that fill the missing slips on level ground: F_dx = (mu(s) - rho_s) m g, from the soil's own curve (paper eq. 3, steady).
 
-    mass [kg]; sample_period [s] between samples; each of `wheels` gives a pair a sample; speed [m/s]: the usual one of the data.
-    A soil without a known resistance counts 0 (the pull is then the gross one).
+    mass [kg]; sample_period [s] between samples; each of `wheels` gives one pair per sample; speed [m/s]: the usual one of the data.
+    For a soil without a known resistance it is 0 (the pull is then the gross one).
     """
     weight, resistance = mass * gravity, soil.resistance[0] if soil.resistance else 0.0
     peak = float(np.argmax(soil.value(np.linspace(0, 1, 1001)))) / 1000
@@ -66,7 +66,7 @@ def what_to_drive(
 
 
 def in_words(name: str, gaps: Sequence[Gap]) -> list[str]:
-    """A sentence a gap, for the report and the command line."""
+    """A sentence for each gap, for the report and the command line."""
     if not gaps:
         return [f"{name}: every slip bin holds enough samples."]
     out = []

@@ -1,14 +1,14 @@
 """Slip bins of pairs sorted by the vehicle's pull: each bin is then a fair sample of the ground.
 
-Slip answers to the ground: under one pull a weak spot slips more than a strong one. Sorted by their own slip, bins of high slip gather
-weak spots, and bins at 5 % leave the strongest ground out (decision 0075); noise of slip sorts too. The pull does not answer to the spot.
-So a pair goes into the bin of the slip that the soil's mean curve gives for the vehicle's pull, its driven wheels' mean adhesion.
+Slip depends on the ground: under one pull a weak spot slips more than a strong one. Sorted by their own slip, bins of high slip gather
+weak spots, and bins at 5 % miss the strongest ground (decision 0075); noise of slip sorts too. The pull does not depend on the spot.
+So a pair goes into the bin of the slip at which the soil's mean curve gives the vehicle's pull, its driven wheels' mean adhesion.
 The bin's adhesion is the mean over its metres. Its slip is the mean too, on the scale of the prototype curve g (physics.md 5): a spot of
-scale a_i has mu_i = a_i g(s_i), so that mean(mu) = a mean(g(s)), which the plain mean of s would miss where the curve bends. Random errors
-of slip cancel in that mean but for g's bend, which is known: the mean of e^(-k s) under normal errors is e^(k^2 sigma^2 / 2) too large.
+scale a_i has mu_i = a_i g(s_i). So mean(mu) = a mean(g(s)), whereas the plain mean of s is biased where the curve bends. Random errors
+of slip cancel in that mean except for g's bend, which is known: the mean of e^(-k s) under normal errors is e^(k^2 sigma^2 / 2) too large.
 
-This asks that the pull is given and slip follows, as in the field. Where slip is set and the pull follows (a single-wheel test bench), sort
-by slip. It asks too that the curve does not fall within the bins: past its top one pull has two slips.
+Conditions: the pull is given and slip follows, as in the field; where slip is set and the pull follows (a single-wheel test bench), sort
+by slip. The curve does not fall within the bins: beyond its maximum one pull has two slips.
 """
 
 from __future__ import annotations
@@ -39,12 +39,12 @@ def bin_by_pull(
 ) -> Bins:
     """Sort pairs, each array of shape (n,), into slip bins by the pull.
 
-    pull: the mean adhesion of the vehicle's driven wheels at that instant [-]; metres: way of the vehicle that the pair stands for [m];
-    cluster: integer labels (run) of what is not independent (default: one). slip_std: SD of the random part of each slip, taken as 0 where
-    it is NaN and as 0.1 where it is more (default: exact). A bin short of `settings.metres` or `settings.runs`
-    (clusters, if there are as many) is joined to the next, the last to the one before. The scale of the curve that sorts is the one that
-    the bins then give (fixed point, physics.md 5's least squares).
-    `std` of a bin is the SD of adhesion about the curve through it. Pairs without slip, adhesion, pull or way, and pulls outside
+    pull: the mean adhesion of the vehicle's driven wheels at that instant [-]; metres: distance of the vehicle for the pair [m];
+    cluster: integer labels (run) of samples that are not independent (default: one). slip_std: SD of the random part of each slip, 0 where
+    it is NaN and at most 0.1 (default: exact). A bin with less than `settings.metres` or `settings.runs`
+    (clusters, if there are as many) is joined to the next, the last to the one before. The scale of the sorting curve is the one that
+    the resulting bins give (fixed point, physics.md 5's least squares).
+    `std` of a bin is the SD of adhesion about the curve through it. Pairs without slip, adhesion, pull or distance, and pulls outside
     the range, are left out and counted. ValueError if the lengths differ.
     """
     chosen = settings or BinSettings(by=BY_PULL)
@@ -100,7 +100,7 @@ def bin_by_pull(
 
 
 def _unbiased(slip: Array, noise: Array) -> Array:
-    """The prototype's height (n,), at positive slips freed of what normal errors of SD `noise` (n,) do to it."""
+    """The prototype's height (n,), corrected at positive slips for the effect of normal errors of SD `noise` (n,)."""
     share, slow, fast = PROTOTYPE["p"], PROTOTYPE["alpha_1"], PROTOTYPE["alpha_2"]
     sd = np.clip(np.nan_to_num(noise), 0.0, _WIDEST)
     freed = 1.0 - sum(
@@ -117,7 +117,7 @@ def _start(mu: Array, height: Array, dx: Array, lowest: float) -> float:
 
 
 def _joined(way: Array, metres: float, runs: int) -> list[list[int]]:
-    """Neighbouring cells joined, from the lowest up, until each group holds `metres` from `runs` clusters; way: (clusters, cells)."""
+    """Neighbouring cells joined, from the lowest up, until each group has `metres` from `runs` clusters; way: (clusters, cells)."""
     groups: list[list[int]] = []
     open_ = []
     for cell in range(way.shape[1]):

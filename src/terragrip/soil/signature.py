@@ -1,4 +1,4 @@
-"""What a known soil looks like from the vehicle, beyond its mean curve: how level and roughness of its blocks are distributed.
+"""The signature of a soil beyond its mean curve: the distributions of level and roughness of its blocks.
 
 Learned from blocks of labelled estimates and kept in the library (`soils.<name>.signature`), for recognition.
 """
@@ -35,8 +35,8 @@ LEAST_SD = (0.005, 0.03)
 class Signature:
     """A soil's blocks: level (rho_s, relative error of mu about the curve) and roughness (see `Blocks`), normally distributed.
 
-    `level_sd`, `level_correlation`: of the ground alone; the estimates' own variance comes on top of it, block by block.
-    `made_by`: method of the estimates, since methods smooth differently. `blocks`, `runs`: what it was learned from.
+    `level_sd`, `level_correlation`: of the ground alone; the estimates' own variance is added, block by block.
+    `made_by`: method of the estimates, since methods smooth differently. `blocks`, `runs`: the amount of data.
     """
 
     level: Array
@@ -49,12 +49,12 @@ class Signature:
     runs: int
 
     def to_dict(self) -> dict[str, Any]:
-        """As soils.json holds it."""
+        """In the form of soils.json."""
         return {k: v.tolist() if isinstance(v, np.ndarray) else v for k, v in vars(self).items()}
 
     @classmethod
     def from_dict(cls, data: Any, place: str, file: str | os.PathLike[str] | None = None) -> Signature:
-        """Of a library's entry; raises InputError where it is not what `to_dict` gives."""
+        """From a library's entry; raises InputError where it is not what `to_dict` gives."""
         shapes = {"level": (2,), "level_sd": (2,), "roughness": (2,), "roughness_covariance": (2, 2)}
         try:
             arrays = {k: np.array(data[k], dtype=float).reshape(shape) for k, shape in shapes.items()}
@@ -87,15 +87,15 @@ class Signature:
 
 
 def signature_in(soil: Soil, file: str | os.PathLike[str] | None = None) -> Signature | None:
-    """The signature that a library's soil holds, None where there is none; InputError where it is damaged, in the library `file`."""
+    """The signature in a library's soil, None where there is none; InputError where it is damaged, in the library `file`."""
     data = soil.fit.get("signature")
     return None if data is None else Signature.from_dict(data, f"soils.{soil.name}.signature", file)
 
 
 def curve_error(soil: Soil, blocks: Blocks) -> tuple[Array, Array, Array]:
-    """Relative error of mu about the soil's curve, the variance of it that the estimates know of, and its scale, (blocks,) each.
+    """Relative error of mu about the soil's curve, its variance according to the estimates, and its scale, (blocks,) each.
 
-    error = mean over wheels, by load, of mu - f(s), over scale = |f(s)| + `OFFSET`. Errors of the wheels are taken as alike; that of slip
+    error = mean over wheels, by load, of mu - f(s), over scale = |f(s)| + `OFFSET`. Errors of the wheels are assumed alike; that of slip
     enters by the curve's slope.
     """
     plain = {k: v for k, v in soil.parameters.items() if k != "intercept"}
@@ -108,9 +108,9 @@ def curve_error(soil: Soil, blocks: Blocks) -> tuple[Array, Array, Array]:
 
 
 def learn_signature(soil: Soil, runs: Sequence[Blocks], made_by: str = "") -> Signature | None:
-    """The signature of one soil from the blocks of runs that lie on it; None where there are fewer than `LEAST_BLOCKS`.
+    """The signature of one soil from the blocks of runs on it; None where there are fewer than `LEAST_BLOCKS`.
 
-    Differences between runs count: they widen the law.
+    Differences between runs count: they widen the distribution.
     """
     levels, noises, roughness = [], [], []
     for run in runs:
@@ -154,7 +154,7 @@ def _correlation(pairs: Array) -> float:
 def _ground(values: Array, noise: Array) -> tuple[Array, Array]:
     """Mean and SD of the ground under values (blocks, 2) whose own variances are known.
 
-    The SD with which the squares, over their whole variance, have the mean 1 (Paule and Mandel 1982), by bisection; at least `LEAST_SD`.
+    The SD for which the squares, over their whole variance, have the mean 1 (Paule and Mandel 1982), by bisection; at least `LEAST_SD`.
     """
     middle, sd = np.zeros(2), np.zeros(2)
     for k in range(2):
@@ -170,7 +170,7 @@ def _ground(values: Array, noise: Array) -> tuple[Array, Array]:
 
 
 def maker(estimates: Estimates) -> str:
-    """The method of a table of estimates in words: what its roughness depends on."""
+    """The method of a table of estimates in words: roughness depends on it."""
     return estimates.method + (", smoothed" if estimates.about.get("smooth") else "")
 
 

@@ -1,8 +1,8 @@
-"""What noise in slip does to a curve, and the correction: simulation-extrapolation (SIMEX, Cook and Stefanski 1994).
+"""The effect of slip noise on a curve, and its correction: simulation-extrapolation (SIMEX, Cook and Stefanski 1994).
 
-Slip is itself an estimate. Samples sorted by a noisy slip flatten the steep part of the curve. Adding still more noise of known size
-shows how the parameters move with it; the trend is followed back to no noise. Sorted by pull only the curve's bend lets noise through,
-and `pull_bins` takes that out.
+Slip is itself an estimate. Samples sorted by a noisy slip flatten the steep part of the curve. Adding more noise of known size
+shows how the parameters move with it; the trend is extrapolated back to no noise. Sorted by pull, noise enters only by the curve's bend,
+and `pull_bins` removes that.
 """
 
 from __future__ import annotations
@@ -26,8 +26,8 @@ SAMPLES = 20_000
 
 @dataclass(frozen=True)
 class SlipNoise:
-    """`plain` and `corrected` free parameters; `slip_std`: the median SD of the slips within the bins' range; `matters`: the shift leaves
-    the plain fit's 95 % interval or exceeds 2 %."""
+    """`plain` and `corrected` free parameters; `slip_std`: the median SD of the slips within the bins' range; `matters`: the corrected
+    value is outside the plain fit's 95 % interval or more than 2 % away."""
 
     plain: Mapping[str, float]
     corrected: Mapping[str, float]
@@ -43,13 +43,13 @@ def correct_slip_noise(
     slip_std: ArrayLike,
     seed: int = 0,
 ) -> SlipNoise:
-    """Refit `curve` (already fitted to these pairs) with added slip noise and follow the parameters back to none.
+    """Refit `curve` (already fitted to these pairs) with added slip noise and extrapolate the parameters back to none.
 
     slip, adhesion, slip_std: shape (n,); slip_std is the SD of the random part of each slip (a wrong radius is not noise).
     The curve's bins are by slip.
-    Good for noise up to about half the lowest bin's slip; beyond it, samples from below the range spoil the trend.
-    About 20 000 pairs at most are used, evenly taken. A quadratic in the added variance is extrapolated to -1.
-    Raises InputError where a noisy set holds too few bins.
+    Valid for noise up to about half the lowest bin's slip; beyond it, samples from below the range distort the trend.
+    At most about 20 000 pairs are used, evenly drawn. A quadratic in the added variance is extrapolated to -1.
+    Raises InputError where a noisy set has too few bins.
     """
     columns = np.stack([np.ravel(np.asarray(x, dtype=float)) for x in (slip, adhesion, slip_std)])
     columns = columns[:, np.isfinite(columns).all(axis=0)]
@@ -87,7 +87,7 @@ def shifted(
     slip_std: Array,
     advice: str,
 ) -> SlipNoise:
-    """What noise did to the free parameters of `curve`, in numbers and words; slip and its SD of all pairs (n,); `advice` if it matters."""
+    """The effect of noise on the free parameters of `curve`, in numbers and words; slip and its SD of all pairs (n,); `advice` if large."""
     settings = curve.bins_.settings
     inside = (slip >= settings.lower) & (slip < settings.upper) & np.isfinite(slip_std)
     noise = float(np.median(slip_std[inside])) if inside.any() else float(np.nanmedian(slip_std))

@@ -1,4 +1,4 @@
-"""Where the vehicle and its tool stand on one soil: the geometric transition mask (physics.md 7)."""
+"""Where the vehicle and its tool are on one soil: the geometric transition mask (physics.md 7)."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ from numpy.typing import ArrayLike, NDArray
 def settled(distance: ArrayLike, soil: ArrayLike, length: float) -> NDArray[np.bool_]:
     """True where the label has been the same over the last `length` metres driven, shape (n,).
 
-    distance [m] along the path (n,), not falling; soil: labels (n,), empty = unlabelled, never settled. `length` [m]: from the label's
-    reference point to the rearmost wheel or tool. The start of a recording counts as settled: nothing is known of what lies behind it.
+    distance [m] along the path (n,), not decreasing; soil: labels (n,), empty = unlabelled, never settled. `length` [m]: from the label's
+    reference point to the rearmost wheel or tool. The start of a recording counts as settled: the ground behind it is not known.
     """
     path = np.asarray(distance, dtype=float)
     labels = np.asarray(soil, dtype=object)

@@ -1,4 +1,4 @@
-"""What a notebook shows of soils: a table, and curves with their bins."""
+"""Soils in a notebook: a table, and curves with their bins."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ _SLIPS = np.linspace(0.0, 0.65, 131)
 
 
 def table_of(soils: Mapping[str, Soil]) -> pd.DataFrame:
-    """A row a soil: model, each parameter with its 95 % interval (``<name>_low``, ``<name>_high``), R2, NRMSE, mean rho_s and its SD."""
+    """A row per soil: model, parameters with 95 % intervals (``<name>_low``, ``<name>_high``), R2, NRMSE, mean rho_s and its SD."""
     import pandas as pd
 
     rows = {}
@@ -37,7 +37,7 @@ def table_of(soils: Mapping[str, Soil]) -> pd.DataFrame:
 
 
 def html_of(soils: Mapping[str, Soil], not_fitted: Mapping[str, str]) -> str:
-    """Curves by soil with their intervals, and what was not fitted."""
+    """Curves by soil with their intervals, and the soils without a fit."""
     rows = []
     for name, soil in soils.items():
         parameters = [

@@ -1,4 +1,4 @@
-"""The calibration of a vehicle from its own logs: zeros, then radii, then relative gains, each on what came before."""
+"""The calibration of a vehicle from its own logs: zeros, then radii, then relative gains, each using the results before it."""
 
 from __future__ import annotations
 
@@ -30,14 +30,14 @@ from terragrip.physics.loads import GRAVITY
 from terragrip.recording import Recording, sensor_noise, unit_warnings, without_held
 from terragrip.vehicle import Vehicle
 
-_SLOPE, _PITCH_ZERO = float(np.radians(0.5)), float(np.radians(0.2))  # priors where the vehicle states none
+_SLOPE, _PITCH_ZERO = float(np.radians(0.5)), float(np.radians(0.2))  # priors where the vehicle gives none
 _UNSTATED_RADIUS = 0.02  # relative, likewise
 _OTHER_LOAD = 0.02  # of the mass, by which the load may differ
 _SENSOR_BIAS = 0.03  # m/s^2, likewise, of an accelerometer
 
 
 def _refuse_other_load(log: Recording, vehicle: Vehicle) -> None:
-    """Raise InputError where a log's machine is not loaded as the vehicle file has it: torque gains follow from its weight."""
+    """Raise InputError if a log's machine does not carry the vehicle file's load: torque gains follow from its weight."""
     for name, usual in (("mass", vehicle.mass), ("hitch_load", 0.0)):
         values = log.channels.get(name, np.empty(0))
         known = values[np.isfinite(values)]
@@ -58,19 +58,19 @@ def calibrate(
     *,
     light: Sequence[Span | None] | None = None,
 ) -> Calibration:
-    """Find what logs can tell of a vehicle's sensors and wheels.
+    """Determine a vehicle's sensor errors and wheel radii from its logs.
 
     Zeros of torque, drawbar and accelerometer come from standstill; rolling radii from straight passes at zero pull;
-    relative torque gains of the wheels from the adhesion curve that they share. Each has a 95 % interval and says what
-    it rests on; what the logs cannot give is listed with the reason. Logs without any torque give radii alone, by the
-    zero of slip that `estimate` finds too. A ``calibration`` block that the vehicle already
-    has is used for whatever the logs cannot give.
+    relative torque gains of the wheels from the adhesion curve that they share. Each has a 95 % interval and names its
+    data; values that the logs do not determine are listed with the reason. Logs without any torque give radii alone, by the
+    zero of slip that `estimate` finds too. An existing ``calibration`` block of the vehicle is used for values that the
+    logs do not determine.
 
     Parameters
     ----------
     recordings: logs of one vehicle in one state, read by :func:`terragrip.read`. A ``soil`` label sharpens the gains.
-    vehicle: as its file says.
-    light: of each log without torque the span [s] that was driven without load, where one is known (None: not).
+    vehicle: from its file.
+    light: of each log without torque the span [s] driven without load, if known (None: unknown).
 
     Raises
     ------
@@ -131,7 +131,7 @@ def calibrate(
 def _zeros(
     logs: Sequence[Recording], vehicle: Vehicle, sources: Sequence[str]
 ) -> tuple[list[Quantity], list[Unknown], float]:
-    """Everything that standstill tells; the last is the gyroscope's zero, which has no place in the vehicle file."""
+    """Everything that standstill determines; the last is the gyroscope's zero, which has no place in the vehicle file."""
     noise, standing = _sensor_noise(logs, vehicle), windows(logs, vehicle, zeros.WINDOW)
     quantities: list[Quantity] = []
     unknown: list[Unknown] = []
@@ -150,7 +150,7 @@ def _zeros(
 
 
 def _possible(quantities: Sequence[Quantity], vehicle: Vehicle, unknown: list[Unknown]) -> list[Quantity]:
-    """The quantities that a vehicle can have; the others go to ``unknown``."""
+    """The quantities that a vehicle can have; the others are added to ``unknown``."""
     kept = []
     for quantity in quantities:
         try:
@@ -164,7 +164,7 @@ def _possible(quantities: Sequence[Quantity], vehicle: Vehicle, unknown: list[Un
 
 
 def _corrected(log: Recording, vehicle: Vehicle, yaw_zero: float) -> Recording:
-    """The log with the vehicle's zeros taken off; gains stay."""
+    """The log with the vehicle's zeros subtracted; gains stay."""
     block = vehicle.calibration
     offsets = {f"drive_torque_{w}": block.drive_torque_offset.get(w, 0.0) for w in vehicle.wheels}
     offsets |= {
@@ -216,7 +216,7 @@ def _offset_errors(quantities: Sequence[Quantity], vehicle: Vehicle) -> npt.NDAr
 def _channel_errors(
     quantities: Sequence[Quantity], vehicle: Vehicle, logs: Sequence[Recording]
 ) -> ChannelErrors:
-    """Errors that the channels keep: they move load between the wheels, and so the gains."""
+    """Errors that the channels keep: they move load between the wheels, and thereby change the gains."""
     stated, errors = vehicle.uncertainty, {quantity.name: quantity.std for quantity in quantities}
     ground = GRAVITY * (_SLOPE if stated.slope is None else stated.slope) / np.sqrt(len(logs))
     sensor = _SENSOR_BIAS if stated.acceleration_bias is None else stated.acceleration_bias
@@ -257,7 +257,7 @@ def _useful(quantities: list[Quantity], vehicle: Vehicle, unknown: list[Unknown]
 
 
 def _radii(rolling: Rolling, gains: RelativeGains | None, vehicle: Vehicle) -> list[Quantity]:
-    """The radii of all wheels: what the passes say of them together, and the gains of each."""
+    """The radii of all wheels: the common part from the passes, the differences of the wheels from ``gains``."""
     wheels = len(vehicle.wheels)
     differences = (np.ones(wheels), np.zeros(wheels)) if gains is None else (gains.radius, gains.radius_std)
     sentence = (
@@ -284,7 +284,7 @@ def _radii(rolling: Rolling, gains: RelativeGains | None, vehicle: Vehicle) -> l
 
 
 def _left(quantities: Sequence[Quantity], vehicle: Vehicle) -> dict[str, Any]:
-    """The vehicle's considered constants after calibration: what remains unknown of each that was calibrated."""
+    """The vehicle's considered constants after calibration: the remaining uncertainty of each calibrated one."""
     prior, left = vehicle.uncertainty, {}
 
     def spread(key: str) -> float | None:

@@ -1,4 +1,4 @@
-"""GroundClassifier: learn grounds from labelled recordings, and tell them, window by window, in scikit-learn's manner."""
+"""GroundClassifier: learn grounds from labelled recordings, and classify others window by window, in scikit-learn's manner."""
 
 from __future__ import annotations
 
@@ -25,30 +25,30 @@ Floats = npt.NDArray[np.float64]
 
 
 class GroundClassifier:
-    """Tells grounds apart from windows of wheel speed, torque or current, and body motion, whichever there are.
+    """Classifies grounds by windows of wheel speed, torque or current, and body motion, with any of these.
 
     Parameters
     ----------
     window: length of a window [s].
     step: time from one window to the next in prediction [s]; None: one window, so that they do not overlap.
     rejection: share of windows on known grounds, from runs not trained on, that may be called ``unknown``;
-        0 never says unknown where any trained set of sensors was measured.
+        0 always names a ground where any trained set of sensors was measured.
     smooth: length of time [s] over which neighbouring windows of one recording share their evidence, novelty too; 0: each
-        window is judged by itself alone.
+        window is classified by itself alone.
     max_windows: windows of each ground to train on; rarer grounds are cut into windows that overlap more.
     random_state: seed of the draws in training; the same data and seed give the same classifier.
 
     After `fit`: ``classes_`` (the labels, sorted), ``n_features_in_``, ``feature_names_in_``, ``sensors_`` (the sets
-    of sensors that it can judge from), ``notes_`` (sentences on what was left out or learnt in another way).
+    of sensors that it can classify from), ``notes_`` (sentences on data left out or learned in another way).
 
-    Recordings are `Recording` or tables with recording columns (architecture.md, contracts); a motor current may stand as
-    ``drive_torque_<wheel>`` in any unit or as ``motor_current_<wheel>``. Sensors may be missing in any of them:
-    there is an expert for each set of sensors, and a window goes to the one that uses most of what it holds.
+    Recordings are `Recording` or tables with recording columns (architecture.md, contracts); a motor current may be
+    ``drive_torque_<wheel>`` in any unit or ``motor_current_<wheel>``. Sensors may be missing in any of them:
+    there is an expert for each set of sensors, and a window goes to the one that uses most of its sensors.
 
-    Method: support vector machines (Boser, Guyon, Vapnik 1992) on features of the window (`features`), beside them
-    what the sensors show given the motion (`motion_law`) where wheel speeds are, and extremely randomised trees (Geurts,
-    Ernst, Wehenkel 2006) where only wheels are; probabilities after Platt (1999) from recordings held out, all grounds
-    taken to be equally likely beforehand.
+    Method: support vector machines (Boser, Guyon, Vapnik 1992) on features of the window (`features`). Where wheel speeds
+    are measured, a law of the other sensors given the motion (`motion_law`) is added; where only wheels are measured, extremely
+    randomised trees (Geurts, Ernst, Wehenkel 2006). Probabilities after Platt (1999) from recordings held out, all grounds
+    assumed equally likely beforehand.
     """
 
     def __init__(
@@ -82,7 +82,7 @@ class GroundClassifier:
         return self
 
     def __sklearn_tags__(self) -> Any:
-        """What scikit-learn's cross-validation asks an estimator: that it is a classifier."""
+        """Marks this estimator as a classifier for scikit-learn's cross-validation."""
         from sklearn.utils import ClassifierTags, Tags, TargetTags
 
         return Tags("classifier", TargetTags(required=True), classifier_tags=ClassifierTags())
@@ -129,13 +129,13 @@ class GroundClassifier:
     def predict(self, recordings: Iterable[Any]) -> npt.NDArray[Any]:
         """The label (windows,) of each window, ``"unknown"`` where none fits; recordings follow one another.
 
-        `windows` tells which recording and time a row belongs to. Raises InputError as `fit` does on tables that
+        `windows` gives the recording and time of each row. Raises InputError as `fit` does on tables that
         cannot be read, and if not fitted.
         """
         return self._grounds(self._judge(recordings))
 
     def predict_proba(self, recordings: Iterable[Any]) -> Floats:
-        """Probability (windows, classes) of each class in ``classes_``, given that it is one of them.
+        """Probability (windows, classes) of each class in ``classes_``, given that the ground is one of them.
 
         A window without usable sensors has equal probabilities. Raises InputError as `predict`.
         """
@@ -144,17 +144,17 @@ class GroundClassifier:
     def novelty(self, recordings: Iterable[Any]) -> Floats:
         """Share (windows,) of windows on known grounds, from runs not trained on, that would look as strange.
 
-        `predict` says unknown below ``rejection``. NaN where no usable sensor was measured. Raises InputError as `predict`.
+        `predict` gives unknown below ``rejection``. NaN where no usable sensor was measured. Raises InputError as `predict`.
         """
         return _joined([one.novelty for one in self._judge(recordings)])
 
     def windows(self, recordings: Iterable[Any]) -> pd.DataFrame:
-        """Which window each row of a prediction is: columns ``recording`` (its number), ``start`` and ``end`` [s]."""
+        """The window of each row of a prediction: columns ``recording`` (its number), ``start`` and ``end`` [s]."""
         learnt = self._known()
         return _windows([learnt.windows(table, self.step) for table in tables_of(recordings)], learnt)
 
     def judge(self, recordings: Iterable[Any]) -> pd.DataFrame:
-        """All that is known of every window, judged once: the columns of `windows`, ``ground`` (`predict`), ``novelty`` and
+        """All results for every window, classified once: the columns of `windows`, ``ground`` (`predict`), ``novelty`` and
         ``probability_<class>`` (`predict_proba`). Raises InputError as `predict`.
         """
         judged = self._judge(recordings)
@@ -175,7 +175,7 @@ class GroundClassifier:
         return float(np.mean([a == truth[k] for a, k in zip(result.tolist(), of_window, strict=True)]))
 
     def save(self, path: str | os.PathLike[str]) -> None:
-        """Write the classifier to one file that holds numbers and text only; raises InputError if it cannot."""
+        """Write the classifier to one file of numbers and text only; raises InputError if it cannot."""
         from terragrip.ground.classification.storage import save
 
         save(self.get_params(), self._known(), path)
@@ -189,13 +189,13 @@ class GroundClassifier:
 
     @classmethod
     def restored(cls, parameters: Mapping[str, Any], learnt: Learnt) -> Self:
-        """A fitted classifier of its parameters and what it has learnt; raises InputError on parameters out of range."""
+        """A fitted classifier from its parameters and learned values; raises InputError on parameters out of range."""
         classifier = cls(**parameters)
         classifier.check_parameters()
         return classifier._know(learnt)
 
     def _judge(self, recordings: Iterable[Any]) -> list[Judgement]:
-        """Judge all windows of each recording."""
+        """Classify all windows of each recording."""
         learnt = self._known()
         self.check_parameters()
         return [learnt.judge(table, self.step, self.smooth) for table in tables_of(recordings)]
@@ -221,7 +221,7 @@ class GroundClassifier:
         return self
 
     def _known(self) -> Learnt:
-        """What was learnt; raises InputError if nothing was."""
+        """The learned values; raises InputError if the classifier is not fitted."""
         if not hasattr(self, "_learnt"):
             raise InputError("the classifier knows no ground yet", hint="call fit(recordings, labels) first")
         return self._learnt
