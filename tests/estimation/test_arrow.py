@@ -1,4 +1,4 @@
-"""Columns reach Arrow as pyarrow itself would make them."""
+"""Columns reach Arrow, and come back, as pyarrow itself would make them."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from terragrip.estimation.arrow import choices, floats, texts
+from terragrip.estimation.arrow import choices, codes_of, floats, texts, values_of
 
 
 @given(st.lists(st.floats()))
@@ -38,9 +38,42 @@ def test_choices(codes):
     ]
 
 
+@pytest.mark.parametrize(
+    "parts",
+    [
+        [["a", None, "b"], ["a"]],
+        [[1.0, 2.0], [3.0]],
+        [[1.0, 2.0]],
+        [[1.0, None]],
+        [[1, 2]],
+        [[True, False]],
+        [pa.array(["x", "y", None]).slice(1)],
+        [pa.array([1.0, 2.0, 3.0]).slice(1)],
+        [pa.array([0, 1], type=pa.timestamp("ns"))],
+        [pa.array([], type=pa.string())],
+        [pa.array([], type=pa.float64())],
+    ],
+)
+def test_values_come_back(parts):
+    column = pa.chunked_array([pa.array(part) for part in parts])
+    got, wanted = values_of(column), column.to_numpy()
+    assert got.dtype == wanted.dtype
+    np.testing.assert_array_equal(got, wanted)
+
+
+def test_codes_come_back():
+    names, codes = codes_of(
+        pa.chunked_array([pa.array(["stuck", "", "stuck"]), pa.array([None], type=pa.string())])
+    )
+    assert [names[code] for code in codes] == ["stuck", "", "stuck", None]
+
+
 def test_none_of_them_loads_pandas():
     code = (
-        "import sys, numpy as np; from terragrip.estimation.arrow import choices, floats, texts;"
-        "floats(np.ones(3)); texts(['a', None]); choices(np.zeros(2, np.uint8), ['']); sys.exit('pandas' in sys.modules)"
+        "import sys, numpy as np, pyarrow as pa;"
+        "from terragrip.estimation.arrow import choices, codes_of, floats, texts, values_of;"
+        "of = lambda column: pa.chunked_array([column]); values_of(of(floats(np.ones(3))));"
+        "values_of(of(texts(['a', None]))); codes_of(of(choices(np.zeros(2, np.uint8), [''])));"
+        "sys.exit('pandas' in sys.modules)"
     )
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0

@@ -5,7 +5,7 @@ from __future__ import annotations
 import socket
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -73,6 +73,20 @@ def until(condition: Callable[[], object], seconds: float = 60.0) -> None:
         time.sleep(0.01)
 
 
+def axe_violations(tab: Any, theme: str, impacts: Sequence[str] = ()) -> list[tuple[str, str]]:
+    """What axe-core says of a page in a theme, of these weights or of any."""
+    tab.emulate_media(color_scheme=theme)
+    tab.wait_for_function("theme => document.documentElement.dataset.theme === theme", arg=theme)
+    if not tab.evaluate("() => 'axe' in window"):
+        tab.add_script_tag(path=str(AXE))
+    result = tab.evaluate("() => axe.run(document, { resultTypes: ['violations'] })")
+    return [
+        (v["id"], v["nodes"][0]["html"][:120])
+        for v in result["violations"]
+        if not impacts or v["impact"] in impacts
+    ]
+
+
 def axe_faults(browser: Any, served: Served, where: str, theme: str, width: int, ready: str) -> list[str]:
     """What axe-core says of a page once `ready` is there, of any weight, and whether anything is wider than the screen."""
     context = browser.new_context(
@@ -82,9 +96,7 @@ def axe_faults(browser: Any, served: Served, where: str, theme: str, width: int,
     tab.set_default_timeout(180_000)
     tab.goto(f"{served.url}/{where}")
     tab.wait_for_selector(ready, state="attached")
-    tab.add_script_tag(path=str(AXE))
-    result = tab.evaluate("() => axe.run(document, { resultTypes: ['violations'] })")
+    faults = [f"{name}: {node}" for name, node in axe_violations(tab, theme)]
     wide = tab.evaluate("() => document.documentElement.scrollWidth")
     context.close()
-    faults = [f"{v['id']}: {v['nodes'][0]['html'][:120]}" for v in result["violations"]]
     return [*faults, *([f"{wide} pixels wide"] if wide > width else [])]

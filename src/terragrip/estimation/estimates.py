@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from terragrip.errors import InputError
-from terragrip.estimation.arrow import choices, floats, texts
+from terragrip.estimation.arrow import choices, codes_of, floats, texts, values_of
 from terragrip.estimation.columns import column_named
 from terragrip.estimation.engine import EVENTS
 from terragrip.recording.clock import clock_index
@@ -211,7 +211,7 @@ class Estimates:
         """Read a Parquet file of estimates; raises InputError if it is missing, damaged or no such table."""
         import pyarrow.parquet as pq
 
-        return cls.from_arrow(opened(path, pq.read_table), source=os.fspath(path))
+        return cls.from_arrow(opened(path, lambda one: pq.ParquetFile(one).read()), source=os.fspath(path))
 
     @classmethod
     def read_about(cls, path: str | os.PathLike[str]) -> dict[str, Any]:
@@ -239,7 +239,7 @@ class Estimates:
         for name in table.column_names:
             if name == "event":
                 continue
-            values = table.column(name).to_numpy()
+            values = values_of(table.column(name))
             if values.dtype.kind in "fiu":
                 columns[name] = values.astype(np.float64, copy=False)
             else:
@@ -284,12 +284,7 @@ def opened(path: str | os.PathLike[str], reading: Callable[[str], Any]) -> Any:
 
 
 def _event_codes(table: pa.Table, source: str | None) -> npt.NDArray[np.uint8]:
-    import pyarrow as pa
-    import pyarrow.compute as pc
-
-    column = table.column("event").combine_chunks()
-    result = pc.index_in(column.cast(pa.string()), value_set=pa.array(EVENTS))
-    if result.null_count:
-        unknown = column.filter(pc.is_null(result))[0]
-        raise InputError(f"there is no event {unknown!s}", file=source, place="column event")
-    return result.to_numpy().astype(np.uint8)
+    words, codes = codes_of(table.column("event"))
+    if unknown := [word for word in words if word not in EVENTS]:
+        raise InputError(f"there is no event {unknown[0]}", file=source, place="column event")
+    return np.array([EVENTS.index(str(word)) for word in words], dtype=np.uint8)[codes]

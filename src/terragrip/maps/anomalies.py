@@ -51,7 +51,7 @@ def anomalies_of(cells: Cells, share: float = FALSE_DISCOVERIES) -> list[Anomaly
     anomaly), so soil that varies as it does everywhere is not an anomaly. At most `share` of the listed patches are due to chance.
     """
     from scipy.spatial import cKDTree
-    from scipy.stats import norm
+    from scipy.special import ndtr
 
     if len(cells) < AROUND:
         return []
@@ -67,7 +67,7 @@ def anomalies_of(cells: Cells, share: float = FALSE_DISCOVERIES) -> list[Anomaly
     null = (plain / spread)[known]
     scale = 1.4826 * np.median(np.abs(null - np.median(null)))
     score = beyond / spread / max(scale, 1.0)
-    p = np.where(known, 2 * norm.sf(np.abs(np.nan_to_num(score))), 1.0)
+    p = np.where(known, 2 * ndtr(-np.abs(np.nan_to_num(score))), 1.0)
     chosen = significant(p, share)
     return sorted(
         (

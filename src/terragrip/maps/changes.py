@@ -39,7 +39,7 @@ def changes_of(passes: Cells, share: float = FALSE_DISCOVERIES, *, same_machine:
     `passes`: one row per pass (:func:`terragrip.maps.cells.cells_of`). On one machine constants that all passes share cannot cause a
     change; between machines each has its own. `significant` controls the false discovery rate at `share`.
     """
-    from scipy.stats import norm
+    from scipy.special import ndtr
 
     order = np.lexsort((passes.time, passes.run, passes.row, passes.column))
     column, row = passes.column[order], passes.row[order]
@@ -52,7 +52,7 @@ def changes_of(passes: Cells, share: float = FALSE_DISCOVERIES, *, same_machine:
     variance = passes.std**2 - (passes.constant**2 if same_machine else 0.0)
     difference = passes.value[last] - passes.value[first]
     std = np.sqrt(np.maximum(variance[first] + variance[last], 1e-18))
-    p = 2 * norm.sf(np.abs(difference) / std)
+    p = 2 * ndtr(-np.abs(difference) / std)
     same = passes.run[first] == passes.run[last]
     return Changes(
         passes.column[first], passes.row[first], passes.value[first], passes.value[last], difference, std, p,
