@@ -189,8 +189,10 @@ static void report(tg_estimator *e, const tg_drive *drive, tg_estimate *out)
 {
     tg_real *o = out->value;
     memcpy(e->scene.load, drive->load, sizeof drive->load);
-    for (int32_t i = 0; i < e->settings.machine.wheels; i++)
+    for (int32_t i = 0; i < e->settings.machine.wheels; i++) {
         e->scene.hub[i] = -(tg_real)e->direction * e->settings.wheel_side[i] * e->yaw_rate;
+        e->scene.across[i] = e->settings.wheel_ahead[i] * e->yaw_rate;
+    }
     e->scene.direction = (tg_real)e->direction;
     e->scene.standing = (tg_real)(e->standing || wheels_are_silent(e, out->time));
     e->scene.seen_motion = (tg_real)e->seen_motion;

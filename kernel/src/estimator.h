@@ -45,6 +45,7 @@ typedef struct { /* one row, calibrated and checked, in the vehicle's own direct
 typedef struct { /* what a row's values need beside the belief; all reals, so that it goes into a record */
     tg_real load[8]; /* wheel, N */
     tg_real hub[8];  /* wheel, m/s: what its hub is faster than the vehicle, along the travel */
+    tg_real across[8]; /* steered wheel, m/s: its hub's speed across the vehicle; else 0 */
     tg_real direction, standing, seen_motion; /* standing: or else without a slip */
     tg_real roughness; /* mean square of what rho_s wanders over uneven ground, see roughness.c */
     tg_real unseen_grade; /* variance of a slope that rho_s may be, see roughness.c */
@@ -303,6 +304,14 @@ void tgi_speeds_smooth(const tg_settings *set, const tg_real *record, const tg_r
 typedef struct { /* slip, and its change with omega, v and the relative radius */
     tg_real slip, wheel, ground, radius;
 } tgi_slip;
+
+/* How fast a hub moves that goes at `along` in the vehicle's direction: of a steered wheel, which points along its way, with what goes across. */
+TG_INLINE tg_real tgi_hub_of(tg_real along, tg_real across)
+{
+    if (across == 0) return along;
+    const tg_real way = tgi_sqrt(along * along + across * across);
+    return along < 0 ? -way : way;
+}
 
 /* Slip (paper eq. 6): (rim - travel)/larger. Where wheel and vehicle both creep, the divisor is floored. */
 TG_INLINE tgi_slip tgi_slip_of(tg_real omega, tg_real v, tg_real radius, tg_real least)

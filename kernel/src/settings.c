@@ -136,7 +136,7 @@ static tg_status check_wheels(const tg_settings *s)
     for (int32_t i = 0; i < s->machine.wheels; i++) {
         if (s->wheel_axle[i] < 0 || s->wheel_axle[i] >= s->axles) return TG_BAD_ARGUMENT;
         if (!tgi_positive(s->rolling_radius[i]) || !tgi_positive(s->wheel_share[i])) return TG_NOT_POSITIVE;
-        if (!tgi_finite(s->lateral_share[i]) || !tgi_finite(s->wheel_side[i])) return TG_NOT_FINITE;
+        if (!tgi_finite(s->lateral_share[i]) || !tgi_finite(s->wheel_side[i]) || !tgi_finite(s->wheel_ahead[i])) return TG_NOT_FINITE;
         if (!tgi_positive(s->noise[TG_WHEEL_SPEED + i])) return TG_NOT_POSITIVE;
     }
     for (int32_t k = 0; k < s->axles; k++) {

@@ -1,6 +1,6 @@
 /* Slip from speeds alone, where no torque is measured (docs/decisions/0110). The state is the ground speed v, its rate a, and of each wheel
  * the slip speed d = r omega - (v - side yaw_rate), in the vehicle's own directions: so both speeds are linear in it, and a wheel that spins
- * at rest is no special case. a is an Ornstein-Uhlenbeck process (Singer 1970), d a random walk in proportion to speed. How hard both are
+ * at rest is no special case (a steered wheel's hub moves at more than v - side yaw_rate, by what the last v tells). a is an Ornstein-Uhlenbeck process (Singer 1970), d a random walk in proportion to speed. How hard both are
  * driven is not known: TG_SPEED_MODES filters, one a pair of densities, are mixed as an interacting multiple model (Blom and Bar-Shalom
  * 1988). The same in NumPy: tests/estimation/kernel_twin/speeds.py. */
 #include "estimator.h"
@@ -240,12 +240,13 @@ static void samples_of(const tg_estimator *e, const tg_row *row, const tgi_speed
     const tg_settings *set = &e->settings;
     const tg_real lean = tgi_square(set->noise[TG_YAW_RATE]);
     const int32_t n = set->machine.wheels;
+    const tg_real ground = s->begun != 0 || isnan(row->value[TG_GROUND_SPEED]) ? s->x[0] : row->value[TG_GROUND_SPEED];
     in->count = 0;
     in->y[0] = row->value[TG_GROUND_SPEED];
     in->variance[0] = e->constants.variance[TG_GROUND_SPEED];
     for (int32_t i = 0; i < n; i++) {
-        const tg_real r = set->rolling_radius[i], side = set->wheel_side[i];
-        in->y[1 + i] = s->open != 0 ? (tg_real)NAN : r * row->value[TG_WHEEL_SPEED + i] + side * s->yaw;
+        const tg_real r = set->rolling_radius[i], side = set->wheel_side[i], along = ground - side * s->yaw;
+        in->y[1 + i] = s->open != 0 ? (tg_real)NAN : r * row->value[TG_WHEEL_SPEED + i] + side * s->yaw - (tgi_hub_of(along, set->wheel_ahead[i] * s->yaw) - along);
         in->variance[1 + i] = r * r * e->constants.variance[TG_WHEEL_SPEED + i] + (s->yaw != 0 ? side * side * lean : 0);
     }
     for (int32_t c = 0; c <= n; c++)

@@ -10,7 +10,8 @@ void tgi_speeds_report(const tg_settings *set, const tgi_speeds *s, tg_real *o)
     o[TG_OUT_GROUND_SPEED_STD] = known ? tgi_root(s->P[0][0]) : nan;
     for (int32_t i = 0; i < set->machine.wheels; i++) {
         const int32_t k = 2 + i;
-        const tg_real r = set->rolling_radius[i], hub = s->x[0] - set->wheel_side[i] * s->yaw, omega = (hub + s->x[k]) / r;
+        const tg_real r = set->rolling_radius[i], hub = tgi_hub_of(s->x[0] - set->wheel_side[i] * s->yaw, set->wheel_ahead[i] * s->yaw);
+        const tg_real omega = (hub + s->x[k]) / r;
         const tg_real vv = s->P[0][0], wv = (vv + s->P[0][k]) / r, ww = (vv + 2 * s->P[0][k] + s->P[k][k]) / (r * r);
         const tgi_slip g = tgi_slip_of(omega, hub, r, set->standstill_speed);
         const tg_real variance = g.wheel * (g.wheel * ww + 2 * g.ground * wv) + g.ground * g.ground * vv + tgi_square(g.radius * error);

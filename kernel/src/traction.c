@@ -53,7 +53,7 @@ TG_INLINE void roughen(tgi_moments *c, const tg_real *x, const tgi_scene *scene,
 TG_INLINE tg_real bounded_root(tg_real variance) { return tgi_root(variance < 1 ? variance : 1); }
 
 /* Net traction (paper eq. 5), slip and efficiency (paper eq. 7) of all wheels, delta method. `mean` is the mean adhesion over the load: what a common radius error does to rho_s. */
-TG_INLINE void traction(const tg_settings *restrict s, const tg_real *restrict x, const tgi_moments *restrict c, const tg_real *restrict hub,
+TG_INLINE void traction(const tg_settings *restrict s, const tg_real *restrict x, const tgi_moments *restrict c, const tgi_scene *restrict scene,
                         tg_real mean, tg_real *restrict o, const int n)
 {
     const tg_real rho = x[n], v = x[n + 1], error = s->uncertainty.wheel_radius;
@@ -68,7 +68,7 @@ TG_INLINE void traction(const tg_settings *restrict s, const tg_real *restrict x
         o[TG_OUT_NET_TRACTION_STD + i] = tgi_root(c->mm[i] - 2 * c->mr[i] + c->rr + tgi_square((mu - mean) * error));
     }
     for (int i = 0; i < n; i++) {
-        const tgi_slip g = tgi_slip_of(x[n + 2 + i], v + hub[i], s->rolling_radius[i], s->standstill_speed);
+        const tgi_slip g = tgi_slip_of(x[n + 2 + i], tgi_hub_of(v + scene->hub[i], scene->across[i]), s->rolling_radius[i], s->standstill_speed);
         const tg_real slip_variance = g.wheel * (g.wheel * c->ww[i] + 2 * g.ground * c->wv[i]) + g.ground * g.ground * c->vv;
         o[TG_OUT_SLIP + i] = g.slip;
         o[TG_OUT_SLIP_STD + i] = bounded_root(slip_variance + tgi_square(g.radius * error));
@@ -118,7 +118,7 @@ void tgi_traction(const tg_settings *restrict s, const tg_belief *restrict b, co
     thrust /= scene->weight;
     gather(b, S, n, tgi_stride(n), &c);
     roughen(&c, b->x, scene, n);
-    traction(s, b->x, &c, scene->hub, thrust, o, n);
+    traction(s, b->x, &c, scene, thrust, o, n);
     if (scene->direction < 0) {
         o[TG_OUT_GROUND_SPEED] = -o[TG_OUT_GROUND_SPEED];
         for (int32_t i = 0; i < n; i++) o[TG_OUT_WHEEL_SPEED + i] = -o[TG_OUT_WHEEL_SPEED + i];

@@ -225,6 +225,13 @@ class Vehicle(Part):
         )
 
     @cached_property
+    def wheel_ahead(self) -> Floats:
+        """How far ahead of what the vehicle turns about each steered wheel is (n,) [m]: of the axles that do not steer; 0 of the others."""
+        steers = np.array([axle.steered for axle in self.axles.values()])
+        ahead = self.axle_to_rear - np.mean(self.axle_to_rear[~steers if not steers.all() else steers])
+        return _frozen(np.where(steers, ahead, 0.0)[self.wheel_axle])
+
+    @cached_property
     def center_of_gravity_to_rear(self) -> float:
         """Distance of the centre of gravity to the rear axle [m], from the axles' masses; 0 with one axle."""
         return float(self.axle_mass @ self.axle_to_rear / self.axle_mass.sum())

@@ -153,12 +153,13 @@ class Wheel(Part):
 
 
 class Axle(Part):
-    """An axle: the mass it carries at rest on level ground [kg], its wheels' names, whether it is driven."""
+    """An axle: the mass it carries at rest on level ground [kg], its wheels' names, whether it is driven, and whether it steers."""
 
     mass: Mass
     wheels: tuple[str, ...]
     wheel: Wheel | None = None
     driven: bool = True
+    steered: bool = False
 
     @field_validator("wheels", mode="before")
     @classmethod

@@ -21,6 +21,7 @@ from terragrip.estimation.engine import EVENTS
 
 START = 1_560_326_400.25  # 2019-06-12 08:00:00.25 UTC
 NOTE = 'A note, "quoted" & <tagged>.'
+TURN = "The rate of turn is that of the positions."
 
 
 def log(*, clock: bool = True, places: bool = True) -> Any:
@@ -84,7 +85,7 @@ def test_parquet_says_what_its_columns_mean(estimates, tmp_path):
     assert all(f.metadata[b"description"] for f in schema)
     about = json.loads(schema.metadata[b"terragrip"])
     assert about["recording"]["start"] == "2019-06-12T08:00:00.250000+00:00"
-    assert about["notes"] == [NOTE]
+    assert about["notes"] == [NOTE, TURN]
     assert about["vehicle"]["mass"] == 139.0
 
 
@@ -101,9 +102,10 @@ def test_an_excel_workbook(written, estimates):
     assert table["clock (UTC)"].iloc[-1] == pd.Timestamp("2019-06-12 08:01:00.230")
     meaning = {row[0]: row[1:] for row in book["columns"].iter_rows(values_only=True)}
     assert meaning["ground_speed_std"][0] == "m/s"
-    about = {row[0]: row[1] for row in book["about"].iter_rows(values_only=True)}
+    said = list(book["about"].iter_rows(values_only=True))
+    about = {row[0]: row[1] for row in said}
     assert about["start"] == "2019-06-12T08:00:00.250000+00:00"
-    assert about["note"] == NOTE
+    assert [row[1] for row in said if row[0] == "note"] == [NOTE, TURN]
     assert json.loads(about["vehicle"])["mass"] == 139.0
 
 
@@ -165,7 +167,7 @@ def test_geojson_as_gdal_and_json_read_it(written, estimates):
     plain = json.loads(path.read_text(encoding="utf-8"))
     assert plain["features"][0]["properties"]["clock"].startswith("2019-06-12T08:00:00.250")
     assert plain["columns"]["slip_fl"]["unit"] == "1"
-    assert plain["about"]["notes"] == [NOTE]
+    assert plain["about"]["notes"] == [NOTE, TURN]
 
 
 def test_a_geopackage_as_sqlite_and_gdal_read_it(written, estimates):
@@ -217,7 +219,7 @@ def test_mcap_opens_as_foxglove_wants_it(written, estimates):
     assert (fix["latitude"], fix["longitude"]) == (estimates["latitude"][70], estimates["longitude"][70])
     said = [(name, data["message"], data["level"]) for name, _, data in by_topic["/terragrip/event"]]
     assert said == [("foxglove.Log", "stuck begins", 3), ("foxglove.Log", "stuck ends", 2)]
-    assert metadata["terragrip"]["notes"] == NOTE
+    assert metadata["terragrip"]["notes"] == f"{NOTE}\n{TURN}"
 
 
 def obeys(data: Any, schema: Any) -> None:
@@ -259,7 +261,7 @@ def test_pandas_has_clock_units_and_notes(estimates):
     assert table.index.name == "clock"
     assert table.loc["2019-06-12 08:00:30":"2019-06-12 08:00:31", "time"].between(29.7, 31.8).all()
     assert table.attrs["units"]["wheel_speed_fl"] == "rad/s"
-    assert table.attrs["notes"] == [NOTE]
+    assert table.attrs["notes"] == [NOTE, TURN]
     assert table.attrs["vehicle"]["mass"] == 139.0
     plain = estimate(log(clock=False), robot()).to_pandas()
     assert isinstance(plain.index, pd.RangeIndex)

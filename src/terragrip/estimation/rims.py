@@ -29,8 +29,9 @@ class Rim:
     """A wheel whose slip is known, and the ``channel`` that gives its speed.
 
     ``scale``: reading of the channel at 1 rad/s (1, or for the drive train the radius that it supposes [m]); ``radius`` [m] at zero slip
-    and its relative SD ``spread``; ``side``: m left of the vehicle's middle. Where no radius is known (``has_radius``) the drive train is a
-    wheel of 1 m, which slip does not see, and what a radius is needed for is no column.
+    and its relative SD ``spread``; ``side``: m left of the vehicle's middle; ``ahead``: of a steered wheel, as `Vehicle.wheel_ahead`. Where
+    no radius is known (``has_radius``) the drive train is a wheel of 1 m, which slip does not see, and what a radius is needed for is no
+    column.
     """
 
     wheel: str
@@ -40,6 +41,7 @@ class Rim:
     spread: float
     side: float
     has_radius: bool = True
+    ahead: float = 0.0
 
 
 def speeds_alone(channels: Collection[str], vehicle: Vehicle) -> bool:
@@ -59,10 +61,12 @@ def rims_of(vehicle: Vehicle, channels: Collection[str], source: str | None = No
             place = f"column wheel_speed_{wheel}"
             raise InputError(f"the vehicle has no wheel {wheel}", file=source, place=place, hint=hint)
     if named:
-        radii, sides = wheel_radii(vehicle)[1], vehicle.wheel_side
+        places = zip(
+            vehicle.wheels, wheel_radii(vehicle)[1], vehicle.wheel_side, vehicle.wheel_ahead, strict=True
+        )
         return tuple(
-            Rim(wheel, f"wheel_speed_{wheel}", 1.0, float(radius), spread, float(side))
-            for wheel, radius, side in zip(vehicle.wheels, radii, sides, strict=True)
+            Rim(wheel, f"wheel_speed_{wheel}", 1.0, float(radius), spread, float(side), ahead=float(ahead))
+            for wheel, radius, side, ahead in places
             if wheel in named
         )
     supposed, calibrated = supposed_radius(vehicle), calibrated_scale(vehicle)
@@ -157,7 +161,7 @@ def speed_settings(
         machine.radius[i] = settings.rolling_radius[i] = rim.radius
         machine.inertia[i] = 1.0  # of no effect without torque
         settings.wheel_share[i] = 1 / len(rims)
-        settings.wheel_side[i] = rim.side
+        settings.wheel_side[i], settings.wheel_ahead[i] = rim.side, rim.ahead
         if rim.wheel in vehicle.wheels:
             place = vehicle.wheels.index(rim.wheel)
             settings.wheel_axle[i], settings.powered[i] = (

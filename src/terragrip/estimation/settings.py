@@ -189,7 +189,7 @@ def _set_loads(settings: Any, vehicle: Vehicle) -> None:
     )
     for i, side in enumerate(vehicle.wheel_side):
         settings.wheel_share[i], settings.lateral_share[i] = level[i], leaning[i]
-        settings.wheel_side[i] = side
+        settings.wheel_side[i], settings.wheel_ahead[i] = side, vehicle.wheel_ahead[i]
 
 
 def _set_calibration(settings: Any, vehicle: Vehicle) -> None:

@@ -29,7 +29,7 @@ def turn_in(log: LogBlocks, sample: Recording, vehicle: Vehicle) -> tuple[Track 
     """
     channels = sample.channels
     rims = rims_of(vehicle, channels)
-    if "angular_velocity_z" in channels or not any(rim.side for rim in rims):
+    if "angular_velocity_z" in channels or not any(rim.side or rim.ahead for rim in rims):
         return None, []
     track = track_of(_positions(log), _CALM) if {"latitude", "longitude"} <= set(channels) else None
     if track is not None and np.isfinite(track.turn).any():

@@ -41,3 +41,12 @@ def slip(
     moving = faster > standstill_speed  # also False for NaN and for 0/0
     change = (rim - travel) / np.where(moving, faster, 1)
     return np.where(moving, change, np.nan)
+
+
+def hub_speed(along: ArrayLike, across: ArrayLike) -> NDArray[Any]:
+    """Speed of the hub of a steered wheel, which points along its way [m/s, of the sign of ``along``], any shape.
+
+    ``along`` the vehicle: v - side x yaw rate; ``across`` it: how far ahead of the axle that does not steer, times the yaw rate; 0 of a
+    wheel that does not steer.
+    """
+    return np.asarray(np.copysign(np.hypot(along, across), along))

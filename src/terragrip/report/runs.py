@@ -172,17 +172,20 @@ class Run:
     def measured_slip(self) -> FloatArray | None:
         """Slip of the shown wheel from the recorded speeds (paper eq. 6), (n,), NaN where no ground speed is.
 
-        The hub of a wheel off the middle runs at v - y times the yaw rate. Wheel speed and yaw rate are
+        The hub of a wheel off the middle runs at v - y times the yaw rate, of a steered one faster. Wheel speed and yaw rate are
         interpolated to the rows of the ground speed. None without a recording or a vehicle.
         """
         if self.recording is None or self.vehicle is None:
             return None
-        from terragrip.physics.slip import slip
+        from terragrip.physics.slip import hub_speed, slip
 
         wheel = self.vehicle.wheels.index(self.shown_wheel)
         hub = self.recording["ground_speed"].to_numpy(dtype=np.float64)
         if "angular_velocity_z" in self.recording:
-            hub = hub - self.vehicle.wheel_side[wheel] * self._everywhere("angular_velocity_z")
+            turn = self._everywhere("angular_velocity_z")
+            hub = hub_speed(
+                hub - self.vehicle.wheel_side[wheel] * turn, self.vehicle.wheel_ahead[wheel] * turn
+            )
         turning = self._everywhere(f"wheel_speed_{self.shown_wheel}")
         return slip(turning, hub, float(self.vehicle.wheel_radius[wheel]))
 

@@ -145,8 +145,7 @@ def _tree(machine: MachineClass, values: Mapping[str, float], name: str) -> dict
     axles = {}
     for (key, own), load in zip(machine.axles.items(), masses, strict=True):
         axles[key] = {"mass": load, "wheels": list(own["wheels"])}
-        if own.get("driven") is False:
-            axles[key]["driven"] = False
+        axles[key] |= {name: own[name] for name in ("driven", "steered") if name in own}
     inertia = values["wheel_inertia"]
     tree: dict[str, Any] = {"name": name or machine.title, "mass": _digits(sum(masses))}
     for key in ("wheelbase", "track", "center_of_gravity_height", "hitch_height"):
