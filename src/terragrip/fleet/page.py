@@ -99,7 +99,8 @@ def _by_soil(rows: Sequence[Row], curves: FleetCurves) -> Section:
         listed.append((name, str(len(group)), machines, _hours(group), km, *_means(group), percent(best)))
     caption = (
         "By the logs' own labels. Best slip: where the pooled curve's tractive efficiency is largest, at the soil's mean resistance"
-        f" and the vehicles' mean tire resistance {number(curves.tire_resistance)}."
+        f" and the vehicles' mean tire resistance {number(curves.tire_resistance)}. It has no interval here, since machines differ: "
+        "'terragrip advise' with soils.json gives that of one machine."
     )
     return Section("soils", "By soil", content=(Table(caption, header, tuple(listed)),))
 
