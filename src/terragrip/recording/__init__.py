@@ -1,4 +1,4 @@
-"""What was measured: the schema, the checks, and what the log says of its own sensors."""
+"""Measurements: the schema, the checks, and the sensors' properties estimated from the log."""
 
 from terragrip.recording.held import fresh_samples, held_periods, without_held
 from terragrip.recording.noise import sensor_noise

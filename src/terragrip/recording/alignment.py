@@ -1,4 +1,4 @@
-"""Ground speed and wheel speeds of one file on one clock: a sensor's lag that is certain is set right, and said."""
+"""Ground speed and wheel speeds of one file on one clock: a certain lag of a sensor is corrected and reported."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ _LONGEST = 1.0  # s, or three samples, across which nothing is interpolated
 
 
 def aligned(blocks: Iterable[Recording]) -> Iterator[Recording]:
-    """Consecutive blocks of a log with its ground speed moved by the lag of `lag_within`, and a note; a lag in doubt is only noted.
+    """Consecutive blocks of a log with its ground speed shifted by the lag of `lag_within`, and a note; an uncertain lag is only noted.
 
-    The rows stay: at each instant of a ground speed stands what was measured when it was due, on a straight line between two
+    The rows stay. At each instant of a ground speed the result is the value measured then, on a straight line between two
     samples, or the last one of a held channel. The lag is that of the first `ROWS` rows, whatever the blocks.
     """
     source, ahead = iter(blocks), list[Recording]()
@@ -50,7 +50,7 @@ def aligned(blocks: Iterable[Recording]) -> Iterator[Recording]:
 
 @dataclass(frozen=True)
 class _Shift:
-    """What is moved by how much: the late channels' names, the longest gap [s] within which they are known, whether they are held."""
+    """The shift and its channels: their names, the longest gap [s] for interpolation, whether they are held."""
 
     lag: Lag
     names: tuple[str, ...]
@@ -59,7 +59,7 @@ class _Shift:
 
     @classmethod
     def of(cls, blocks: list[Recording]) -> _Shift | None:
-        """The lag in the first rows of a log, None where none is certain."""
+        """The lag in the first rows of a log, None if none is certain."""
         asked = [
             n
             for n in blocks[0].channels
@@ -82,11 +82,11 @@ class _Shift:
 
     @property
     def reach(self) -> float:
-        """How far a block's values are looked for beyond it [s]."""
+        """How far beyond a block its values may come from [s]."""
         return abs(self.lag.of_the_clock) + self.longest
 
     def moved(self, block: Recording, near: list[Recording]) -> Recording:
-        """A block with its late channels set right, by the samples of the blocks ``near`` it."""
+        """A block with its late channels corrected, by the samples of the blocks ``near`` it."""
         channels = dict(block.channels)
         for name in self.names:
             time = np.concatenate([b.time[np.isfinite(b.channels[name])] for b in near])

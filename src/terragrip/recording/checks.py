@@ -1,4 +1,4 @@
-"""What makes a table unusable, said with column, row and hint."""
+"""Checks for an unusable table; each error has column, row and hint."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ _ESSENTIAL = ("wheel_speed_", "wheel_based_speed", "drive_torque_", "ground_spee
 
 
 def place(column: str, row: int, time: Floats | None = None, *, first_row: int = 0) -> str:
-    """Where a cell stands: data rows count from 1, as below a header."""
+    """The place of a cell: data rows count from 1, as below a header."""
     where = f"column {column}, row {first_row + row + 1}"
     if time is None or not np.isfinite(time[row]):
         return where
@@ -41,7 +41,7 @@ def require_columns(columns: Collection[str], source: str | None) -> None:
     if not missing:
         return
     near = {name: nearest(name.replace("_<wheel>", ""), columns) for name in missing}
-    # The name with a likely cousin in the table is the one to name first.
+    # Name first the missing column that resembles one in the table.
     name = next((n for n in missing if near[n]), missing[0])
     hint = f"the nearest column is {near[name]!r}: rename it, or map it in a profile"
     if near[name] is None:
@@ -51,7 +51,7 @@ def require_columns(columns: Collection[str], source: str | None) -> None:
 
 
 def remarks(columns: Collection[str]) -> list[str]:
-    """Sentences on what the columns of a table are not used for."""
+    """Sentences on uses for which the columns of a table are not enough."""
     notes = []
     unused = [c for c in columns if c != TIME and c not in LABELS and not is_channel(c)]
     if unused:
@@ -63,7 +63,7 @@ def remarks(columns: Collection[str]) -> list[str]:
 
 
 def require_hitch_height(vehicle: Vehicle, channels: Collection[str], source: str | None = None) -> None:
-    """Raise InputError where a pull moves load between axles and the vehicle does not say at what height."""
+    """Raise InputError if a pull moves load between axles and the vehicle file has no height for it."""
     if (
         "drawbar_force" in channels
         and len(vehicle.axles) > 1
@@ -77,7 +77,7 @@ def require_hitch_height(vehicle: Vehicle, channels: Collection[str], source: st
 
 
 def require_hitch(vehicle: Vehicle, channels: Collection[str], source: str | None = None) -> None:
-    """Raise InputError where a load on the hitch moves load between axles and the vehicle does not say where it acts."""
+    """Raise InputError if a load on the hitch moves load between axles and the vehicle file has no place for it."""
     if (
         "hitch_load" in channels
         and len(vehicle.axles) > 1
@@ -91,7 +91,7 @@ def require_hitch(vehicle: Vehicle, channels: Collection[str], source: str | Non
 
 
 def refuse_other_mass(vehicle: Vehicle, channels: Mapping[str, Floats], source: str | None = None) -> None:
-    """Raise InputError where most of a measured mass cannot be this vehicle's."""
+    """Raise InputError if most of a measured mass is impossible for this vehicle."""
     known = channels.get("mass", np.empty(0))
     known = known[np.isfinite(known)]
     if not len(known):
@@ -111,9 +111,9 @@ def refuse_other_mass(vehicle: Vehicle, channels: Mapping[str, Floats], source: 
 
 
 def check_time(time: Floats, source: str | None, *, first_row: int = 0, after: float | None = None) -> None:
-    """Raise InputError unless there is a row and time is finite and runs forward.
+    """Raise InputError unless there is a row and time is finite and increases.
 
-    A block of a longer table says how many rows stand before it, and the time of the last of them.
+    For a block of a longer table: the number of rows before it, and the time of the last of them.
     """
     if len(time) == 0:
         raise InputError("the table is empty", file=source, hint="give a log with at least one row")
@@ -150,7 +150,7 @@ def refuse_infinite(
 
 
 def refuse_empty(name: str, source: str | None) -> None:
-    """Raise InputError where a channel that holds no value at all is one that estimates rest on."""
+    """Raise InputError if a channel without any value is one that estimates need."""
     if name.startswith(_ESSENTIAL):
         hint = "fill it, or leave the column out"
         raise InputError("holds no value", file=source, place=f"column {name}", hint=hint)

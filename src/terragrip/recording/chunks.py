@@ -1,7 +1,7 @@
-"""The rows that a long log's noise and held channels are learned from: chunks of neighbouring rows, spread over the whole of it.
+"""The rows from which a long log's noise and held channels are learned: chunks of neighbouring rows, spread over the whole of it.
 
-Chunks, since every k-th row would destroy rates, held values and noise. Every second, fourth, eighth ... chunk counts, so that
-they can be chosen while the log goes by and its length is not known yet.
+Chunks, because every k-th row would destroy rates, held values and noise. Every second, fourth, eighth ... chunk counts: they
+can be chosen during the pass, before the log's length is known.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ CHUNKS = 16
 
 
 def sampled_rows(rows: int) -> slice | npt.NDArray[np.intp]:
-    """Which of a log's ``rows`` are its sample: all where they are `CHUNKS` chunks at most, else every 2^k-th chunk."""
+    """The sample of a log's ``rows``: all if they are `CHUNKS` chunks at most, else every 2^k-th chunk."""
     chunks, every = -(-rows // CHUNK), 1
     if chunks <= CHUNKS:
         return slice(None)

@@ -18,7 +18,7 @@ Floats = npt.NDArray[np.float64]
 def columns_of(frame: Any, source: str | None) -> dict[str, npt.NDArray[Any]]:
     """The columns of a pandas or polars frame, an Arrow table or a mapping, by name.
 
-    Raises InputError on anything else, on a name that stands twice and on columns of unlike length.
+    Raises InputError on anything else, on a name that occurs twice and on columns of unlike length.
     """
     package = type(frame).__module__.partition(".")[0]
     pairs: list[tuple[Any, Any]]
@@ -49,7 +49,7 @@ def columns_of(frame: Any, source: str | None) -> dict[str, npt.NDArray[Any]]:
 
 
 def numbers(name: str, column: npt.NDArray[Any], time: Floats | None, source: str | None) -> Floats:
-    """A column as float64, missing = NaN; raises InputError at the first cell that is no number."""
+    """A column as float64, missing = NaN; raises InputError at the first cell that is not a number."""
     if time is not None and len(column) != len(time):
         problem = f"has {len(column)} rows, time has {len(time)}"
         raise InputError(problem, file=source, place=f"column {name}", hint="give one value an instant")
@@ -73,7 +73,7 @@ SINCE_1970 = 1e8
 
 
 def start_of(stamps: npt.NDArray[Any], time: Floats) -> float | None:
-    """When time 0 was [s since 1970] of stamps as they were written and as ``time`` [s]; None where they do not say.
+    """The clock time of time 0 [s since 1970] from stamps as written and as ``time`` [s]; None if they do not give it.
 
     Dates without a zone count as UTC.
     """
@@ -119,7 +119,7 @@ def texts(name: str, column: npt.NDArray[Any], rows: int, source: str | None) ->
 
 def label_of(value: Any) -> str:
     """A cell as a label, without the blanks around it; empty where it is missing."""
-    # pandas' NA first: it is neither equal nor unequal to anything
+    # test for pandas' NA first: it is neither equal nor unequal to anything
     missing = value is None or type(value).__name__ == "NAType" or value != value
     return "" if missing else str(value).strip()
 

@@ -1,11 +1,11 @@
 """Held channels: values that a logger repeats between true updates.
 
-How a held channel is distinguished from a fresh one. A fresh sample repeats its predecessor exactly only when the
-signal moved by less than its quantum (the step of which all steps are multiples), so a run of equal values
+To distinguish a held channel from a fresh one: a fresh sample repeats its predecessor exactly only when the
+signal moved by less than its quantum (all steps are multiples of it). A run of equal values then
 ends in a step of about one quantum, or belongs to a standstill that happens a few times a log. A held
 channel shows run after run of two and more equal values that begin and end with steps of several quanta,
-alike in length. So only runs between two large steps are judged (standstill and slow quantised signals drop
-out), there must be eight of them, repeats must be commoner among them than the size of the steps allows by
+alike in length. So only runs between two large steps count, which excludes standstill and slow quantised
+signals. There must be eight of them, repeats must be commoner among them than the size of the steps allows by
 chance, and three fifths must last between half and twice the median.
 """
 
@@ -27,8 +27,8 @@ Floats = npt.NDArray[np.float64]
 
 _FEWEST_RUNS = 8
 _REGULAR_SHARE = 0.6
-_LARGE_STEP = 1.5  # quanta: one and a half parts a single step from a double one
-_WORTH_A_LOOK = 0.01  # share of exact repeats under which a channel is taken to be fresh
+_LARGE_STEP = 1.5  # quanta: halfway between a single step and a double one
+_WORTH_A_LOOK = 0.01  # share of exact repeats below which a channel counts as fresh
 
 
 def held_periods(recording: Recording) -> dict[str, float]:
@@ -60,7 +60,7 @@ def held_period(time: Floats, values: Floats) -> float | None:
     lasting = np.diff(time[starts])[1:][between]
     if len(lengths) < _FEWEST_RUNS:
         return None
-    # A Gaussian increment of median size m quanta repeats with probability 0.27/m; thrice that is no chance.
+    # A Gaussian increment of median size m quanta repeats with probability 0.27/m; three times that is not chance.
     by_chance = 0.8 / float(np.median(in_quanta))
     typical = float(np.median(lasting))
     alike = (lasting > 0.49 * typical) & (lasting < 2.1 * typical)
@@ -75,7 +75,7 @@ def fresh_samples(time: Floats, values: Floats, period: float) -> npt.NDArray[np
 
     A changed value is one. A value held for longer than 1.5 periods counts again, once a period, where
     it is 0 (standstill) or where the channel's steps are so coarse that equal updates are to be
-    expected; elsewhere the sensor is taken to be silent.
+    expected; elsewhere the sensor counts as silent.
     """
     fresh = np.zeros(len(values), dtype=bool)
     rows = np.flatnonzero(np.isfinite(values))
@@ -104,9 +104,9 @@ def without_held(recording: Recording, held: dict[str, float] | None = None) -> 
 
 
 def quantum(values: Floats) -> float:
-    """The step of which all steps between neighbours (n,) are multiples: the resolution; 0 if there is none.
+    """The quantum of a channel, its resolution: all steps between neighbours (n,) are multiples of it; 0 if there is none.
 
-    Euclid's algorithm on a sample of the steps, where a remainder of 2 % of the divisor is still none.
+    Euclid's algorithm on a sample of the steps; a remainder up to 2 % of the divisor counts as none.
     """
     steps = np.abs(np.diff(values))
     size = float(np.max(np.abs(values), initial=0.0))

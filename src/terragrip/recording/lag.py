@@ -1,7 +1,7 @@
-"""How far one record of a machine's speed lags behind another: the clocks of two files, or two channels of one.
+"""The lag of one record of a machine's speed behind another: the clocks of two files, or two channels of one.
 
-A vehicle follows its wheels with a lag of its own: it accelerates by pull, which takes slip. With the pull coefficient rising by K per
-slip, a = g K s for small slip, hence v = w (1 - v'/(g K)): the ground speed lags by v / (g K). What that explains is no clock's fault.
+A vehicle follows its wheels with a lag of its own: it accelerates by pull, and pull needs slip. With the pull coefficient rising by K per
+slip, a = g K s for small slip, hence v = w (1 - v'/(g K)): the ground speed lags by v / (g K). That part of a lag is not a clock's error.
 """
 
 from __future__ import annotations
@@ -24,23 +24,23 @@ _LEAST_SHARE = 0.3  # of the shorter record
 _LEAST_CORRELATION = 0.8
 _APART = 2.0  # s from the best offset, where another one must be worse
 _WORSE = 0.02  # in correlation
-_WIDTH = 20  # points that rates are smoothed over: a second
+_WIDTH = 20  # points over which rates are smoothed: a second
 _ROUNDS = 5
 _LEAST_STD = 0.005  # s
 _LONGEST = 20_000_000  # points; a record over ten days
 
 
-_CERTAIN = 2.0  # standard deviations by which an offset must exceed what is explained
-_SURE = 4.0  # the same, to be taken off unasked: of runs without a late sensor up to 2.7 (decision 0152)
+_CERTAIN = 2.0  # standard deviations by which an offset must exceed the explained one
+_SURE = 4.0  # the same, for an automatic correction: runs without a late sensor reach 2.7 (decision 0152)
 _STIFFNESS = (
     2.0  # K on soft soil: the slope of ASABE D497's gross traction ratio at 15 % slip, Bn = 20, is 1.85
 )
-_WITHIN = 5.0  # s, the largest lag looked for between channels of one file
+_WITHIN = 5.0  # s, the largest lag searched between channels of one file
 
 
 @dataclass(frozen=True)
 class Speed:
-    """A record of a speed (n,) of any scale; ``pace`` [m/s] is its usual size where it is measured over ground, else None."""
+    """A record of a speed (n,) of any scale; ``pace`` [m/s] is its usual size if it is a ground speed, else None."""
 
     time: Floats
     values: Floats
@@ -49,7 +49,7 @@ class Speed:
 
 @dataclass(frozen=True)
 class Lag:
-    """``seconds`` by which the second record is behind, its standard deviation, the correlation there, and what is ``explained``."""
+    """``seconds`` by which the second record is behind, its standard deviation, the correlation there, and the ``explained`` part."""
 
     seconds: float
     std: float
@@ -58,13 +58,13 @@ class Lag:
 
     @property
     def is_of_the_clock(self) -> bool:
-        """Whether it is certain, and more than a vehicle's dynamics explain."""
+        """Whether it is certain, and larger than a vehicle's dynamics explain."""
         least, most = self.explained
         return max(least - self.seconds, self.seconds - most) > _CERTAIN * self.std
 
     @property
     def is_to_set_right(self) -> bool:
-        """Whether it is so certain that it may be taken off unasked: soil that gives way makes a ground speed follow late, too, by more
+        """Whether it is certain enough for an automatic correction: on yielding soil a ground speed is late, too, by more
         than firm ground explains.
         """
         least, most = self.explained
@@ -72,19 +72,19 @@ class Lag:
 
     @property
     def of_the_clock(self) -> float:
-        """What of it [s] is to be taken off: the vehicle's own lag lies anywhere within what is explained, half way on average."""
+        """The part [s] to correct: the vehicle's own lag is anywhere within the explained one, half of it on average."""
         return self.seconds - 0.5 * sum(self.explained)
 
     @property
     def why_not(self) -> str:
-        """The cause for which no clock is to be corrected."""
+        """The reason not to correct any clock."""
         if abs(self.seconds) <= _CERTAIN * self.std:
             return "that is no more than twice its standard deviation"
         return f"a vehicle follows its wheels by up to {max(map(abs, self.explained)):.2f} s"
 
 
 def speed_of(time: Floats, columns: Mapping[str, npt.NDArray[Any]]) -> Speed | None:
-    """The speed that some channels (n,) tell at ``time`` (n,): over ground, of the drive train, or of the wheels on average."""
+    """The speed by some channels (n,) at ``time`` (n,): over ground, of the drive train, or of the wheels on average."""
     ground = _measured(time, columns.get("ground_speed"))
     if ground is not None:
         speed = np.abs(ground[1])
@@ -117,7 +117,7 @@ def _measured(time: Floats, values: npt.NDArray[Any] | None) -> tuple[Floats, Fl
 
 
 def lag_between(first: Speed, second: Speed, *, reach: float | None = None) -> Lag | None:
-    """How far ``second`` is behind ``first``, with what a vehicle's dynamics explain of it; None as `offset_between`."""
+    """The lag of ``second`` behind ``first``, with the part that a vehicle's dynamics explain; None as `offset_between`."""
     result = offset_between((first.time, first.values), (second.time, second.values), reach=reach)
     if result is None:
         return None
@@ -130,9 +130,9 @@ def lag_between(first: Speed, second: Speed, *, reach: float | None = None) -> L
 
 
 def lag_within(time: Floats, columns: Mapping[str, npt.NDArray[Any]]) -> Lag | None:
-    """How far one file's ground speed is behind its wheel speeds (n,), where that is certain and more than a vehicle's dynamics explain.
+    """The lag of one file's ground speed behind its wheel speeds (n,), if it is certain and larger than a vehicle's dynamics explain.
 
-    Which of the two sensors is late the file cannot tell; slip asks only that both are of one instant.
+    The file cannot show which of the two sensors is late; slip needs only that both are of one instant.
     """
     part = columns
     if "ground_speed" in part:
@@ -148,7 +148,7 @@ def lag_within(time: Floats, columns: Mapping[str, npt.NDArray[Any]]) -> Lag | N
 
 
 def is_copy(turning: npt.NDArray[Any], ground: npt.NDArray[Any]) -> bool:
-    """Whether a wheel's speed was made of the ground speed, as a free wheel's without a sensor is: it has the ground speed's lag."""
+    """Whether a wheel's speed was computed from the ground speed, as for a free wheel without a sensor: it has the ground speed's lag."""
     known = np.isfinite(turning) & np.isfinite(ground)
     if not np.array_equal(known, np.isfinite(turning)) or not np.any(ground[known]):
         return False
@@ -159,17 +159,17 @@ def is_copy(turning: npt.NDArray[Any], ground: npt.NDArray[Any]) -> bool:
 def offset_between(
     reference: tuple[Floats, Floats], other: tuple[Floats, Floats], *, reach: float | None = None
 ) -> Lag | None:
-    """How far the clock of ``other`` is ahead of that of ``reference``; each is (time [s], speed), of any scale. Nothing is explained.
+    """How far the clock of ``other`` is ahead of that of ``reference``; each is (time [s], speed), of any scale. No part is explained.
 
     The correlation of both speeds over their common part is largest at the true offset (Padfield 2012, for records
-    that overlap in part). ``reach``: the largest offset looked for [s]; None: any. None comes back where the common part
-    is short, the speeds are unlike, or do not tell one offset from another.
+    that overlap in part). ``reach``: the largest offset searched [s]; None: any. The result is None if the common part
+    is short, the speeds are unlike, or do not distinguish one offset from another.
     """
     first, second = _regular(*reference), _regular(*other)
     if first is None or second is None or len(first[1]) + len(second[1]) > _LONGEST:
         return None
     correlation, lags = _correlation(first[1], second[1])
-    shift = second[0] - first[0] - _STEP * lags  # what must be taken off the second clock
+    shift = second[0] - first[0] - _STEP * lags  # to subtract from the second clock
     if reach is not None:
         correlation = np.where(np.abs(shift) <= reach, correlation, -np.inf)
     best = int(np.argmax(correlation))
@@ -233,14 +233,14 @@ def _refined(
 ) -> tuple[float, float]:
     """A better offset, from the changes of the speeds, and its standard deviation.
 
-    The rate of the second speed is regressed on rate and jerk of the first, whose coefficients are k and -k times what
-    the offset lacks; rates, since a change of slip shifts a speed for long and a rate for a moment, and biweights keep
-    those moments out.
+    The rate of the second speed is regressed on rate and jerk of the first, whose coefficients are k and -k times the
+    missing part of the offset. Rates are used because a change of slip shifts a speed for long but a rate for a moment, and
+    biweights exclude those moments.
     """
     time = first[0] + _STEP * np.arange(len(first[1]))
     mine = _smooth(first[1])
     rate, jerk = np.gradient(mine, _STEP), np.gradient(_smooth(np.gradient(mine, _STEP)), _STEP)
-    deviation = 0.5 * _APART  # where nothing can be refined, only that the correlation is worse at _APART
+    deviation = 0.5 * _APART  # without refinement only the correlation at _APART is known to be worse
     for _ in range(_ROUNDS):
         stamps = second[0] - seconds + _STEP * np.arange(len(second[1]))
         known = np.isfinite(second[1])

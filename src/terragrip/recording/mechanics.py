@@ -1,9 +1,9 @@
-"""What the motion itself says against torques, accelerations and angles: sentences for the user, never errors.
+"""Torques, accelerations and angles compared with the motion: sentences for the user, never errors.
 
-Over windows of a second, averaged so that all see the same stretch, an accelerometer along the vehicle reads dv/dt + g sin(pitch), and the
-wheels' thrust Σ M/r less the drawbar force is m times that plus a resistance (physics.md 1). A wrong sign, unit, gear ratio or mass makes
-these proportional by another factor than 1. Thrust and accelerometer agree best, since both see a slope; which of them is wrong is then
-decided by the change of ground speed. Slip must vanish with the torque, so that large slip at small torque is a wrong radius or ratio.
+Over windows of a second, averaged over the same stretch for all, an accelerometer along the vehicle reads dv/dt + g sin(pitch), and the
+wheels' thrust Σ M/r less the drawbar force is m times that plus a resistance (physics.md 1). With a wrong sign, unit, gear ratio or mass
+they are proportional by a factor other than 1. Thrust and accelerometer agree best, since both see a slope; the change of ground speed
+then decides which of them is wrong. Slip must vanish with the torque, so large slip at small torque is a wrong radius or ratio.
 """
 
 from __future__ import annotations
@@ -28,31 +28,31 @@ RATIOS = (0.6, 2.2)
 """Rim speed over ground speed that may still be slip; beyond it is a unit."""
 
 _WINDOW = 1.0  # s, at least, and two samples of the ground speed
-_MOVING = 0.15  # of the speed that a twentieth of the windows reach
+_MOVING = 0.15  # of the speed that a twentieth of the windows exceed
 _LEAST = 25  # windows
-_BLOCKS = 10  # of windows that hang together, for the jackknife
+_BLOCKS = 10  # of correlated windows, for the jackknife
 _SURE = 3.0  # standard errors
 _ALIKE = 0.7  # correlation from which two signals are proportional
 _CLEAR = 0.85  # and from which another reading of the channels is the right one
-_FACTOR = 1.8  # more than an uncalibrated torque and an estimated mass make of a force balance
-_LIGHT = 0.12  # adhesion: below, no ground lets a wheel slip by
+_FACTOR = 1.8  # larger than an uncalibrated torque and an estimated mass change a force balance
+_LIGHT = 0.12  # adhesion: below it, no ground lets a wheel slip by
 _SPIN = 0.3  # (that is a stiffness of .4, where the softest soils have 2)
-_PULL = 0.03  # of the weight: a mean that no offset of a sensor makes
-_NO_PULL = 1e-3  # of the weight: less than any tool, or than a load cell tells
-_OFFSET = 0.7  # m/s²: more than twice the bias that is taken for usual, four degrees of mounting
+_PULL = 0.03  # of the weight: a mean larger than any offset of a sensor
+_NO_PULL = 1e-3  # of the weight: less than any tool, or than a load cell resolves
+_OFFSET = 0.7  # m/s²: more than twice the usual bias, four degrees of mounting
 _SIGN = "forward is positive: write 'sign: -1' for {} in the profile"
 
 
 @dataclass(frozen=True)
 class _Fit:
-    """Slope with its standard error, and the correlation; a slope of 0 ± inf where there is too little to say."""
+    """Slope with its standard error, and the correlation; a slope of 0 ± inf where there are too few data."""
 
     slope: float = 0.0
     error: float = np.inf
     alike: float = 0.0
 
     def is_off(self, value: float = 1.0) -> bool:
-        """Whether the slope is surely another one."""
+        """Whether the slope is certainly a different one."""
         return abs(self.slope - value) > _SURE * self.error
 
     @property
@@ -62,7 +62,7 @@ class _Fit:
 
     @property
     def is_another_scale(self) -> bool:
-        """Proportional, and by a factor that is not 1. What noise flattens of a slope, the squared correlation holds."""
+        """Proportional, with a factor other than 1. The squared correlation is the flattening of a slope by noise."""
         if abs(self.alike) < _ALIKE:
             return False
         low, high = self.slope - _SURE * self.error, self.slope / self.alike**2 + _SURE * self.error
@@ -82,13 +82,13 @@ class Means:
     climb: Floats | None = None
 
     def of(self, values: Floats) -> Floats:
-        """A channel (rows,) as means over the stretch that ``change`` is of (n,)."""
+        """A channel (rows,) as means over the stretch of ``change`` (n,)."""
         plain = window_means(values, self.place, self.count)
         inner = (plain[:-2] + 2 * plain[1:-1] + plain[2:]) / 4
         return np.r_[np.nan, inner, np.nan][self.rows]
 
     def fit(self, y: Floats, x: Floats, *, beside_climb: bool = False) -> _Fit:
-        """y over x (n,), its error by leaving out one block of windows at a time; ``beside_climb``: less what climbs explain of both."""
+        """y over x (n,), its error by leaving out one block of windows at a time; ``beside_climb``: without the effect of climbs."""
         known = np.isfinite(y) & np.isfinite(x)
         other = self.climb if beside_climb else None
         if other is not None:
@@ -135,7 +135,7 @@ def _ratio(pair: Floats) -> float:
 
 
 def means_of(recording: Recording) -> Means | None:
-    """None where too few windows of driving are left, or time runs back."""
+    """None if too few windows of driving are left, or time decreases."""
     speed = recording.channels.get("ground_speed")
     known = np.flatnonzero(np.isfinite(speed)) if speed is not None else ()
     if speed is None or len(known) < _LEAST:
@@ -143,7 +143,7 @@ def means_of(recording: Recording) -> Means | None:
     length = max(_WINDOW, 2 * float(np.median(np.diff(recording.time[known]))))
     place = ((recording.time - recording.time[0]) / length).astype(np.intp)
     count = int(place[-1]) + 1
-    if place.min() < 0 or place.max() >= count:  # time runs back: refused elsewhere
+    if place.min() < 0 or place.max() >= count:  # time decreases: refused elsewhere
         return None
     mean = window_means(speed, place, count)
     if float(np.nansum(mean)) <= 0:
@@ -166,7 +166,7 @@ def driven_radii(vehicle: Vehicle) -> dict[str, float]:
 
 
 def thrusts_of(recording: Recording, vehicle: Vehicle, means: Means) -> dict[str, Floats]:
-    """Of each driven wheel its thrust less its share of the drawbar force, over the mass (n,) [m/s²]; none where a torque is missing."""
+    """For each driven wheel its thrust less its share of the drawbar force, over the mass (n,) [m/s²]; empty if a torque is missing."""
     radii, channels = driven_radii(vehicle), recording.channels
     if not all(f"drive_torque_{wheel}" in channels for wheel in radii):
         return {}
@@ -204,7 +204,7 @@ def _balance_warnings(
             "'unit: g' in the profile), or not the axis that points forward."
         ]
     if driven.is_off() and driven.distance > moved.distance:
-        # What digs in slows down the harder it is driven.
+        # A vehicle that digs in slows down the harder it is driven.
         digs = together.slope < 0 and np.nanmean(thrust) > 0
         return [] if digs else [_scale_sentence(together.slope, vehicle)]
     wrong = "against each other" if together.slope < 0 else f"{together.slope:.2g} times apart"
@@ -217,8 +217,8 @@ def _balance_warnings(
 def _exchanged(
     recording: Recording, means: Means, forward: Floats, thrusts: dict[str, Floats], together: _Fit
 ) -> str:
-    """Whether some wheels' torques with the other sign, or the accelerometer's other axis, make a balance where there is none."""
-    # A wheel of a wrong sign also brakes on average; how axles share a pull that changes looks like a sign in their changes alone.
+    """Whether the balance closes with the other sign of some wheels' torques, or the accelerometer's other axis."""
+    # A wheel of a wrong sign also brakes on average; in changes alone, the sharing of a pull among axles looks like a sign.
     backward = {w for w in thrusts if np.nanmean(means.of(recording.channels[f"drive_torque_{w}"])) < 0}
     signs = {
         w: -1 if w in backward and means.fit(own, forward).slope < 0 else 1 for w, own in thrusts.items()
@@ -269,7 +269,7 @@ def _scale_sentence(scale: float, vehicle: Vehicle) -> str:
 
 
 def _pitch_warnings(recording: Recording, means: Means, forward: Floats) -> list[str]:
-    """The pitch against what the accelerometer reads beyond the change of ground speed."""
+    """The pitch against the accelerometer's reading beyond the change of ground speed."""
     if means.climb is None:
         return []
     seen = forward - means.change
@@ -289,7 +289,7 @@ def _pitch_warnings(recording: Recording, means: Means, forward: Floats) -> list
 def _pull_warnings(
     means: Means, thrusts: dict[str, Floats], recording: Recording, vehicle: Vehicle
 ) -> list[str]:
-    """The drawbar force against what it can be: backward, and less than the wheels' thrust, over a whole drive."""
+    """The drawbar force against its limits: backward, and less than the wheels' thrust, over a whole drive."""
     if "drawbar_force" not in recording.channels or not thrusts:
         return []
     pull = means.of(recording.channels["drawbar_force"]) / vehicle.mass / STANDARD_GRAVITY
@@ -315,7 +315,7 @@ def _pull_warnings(
 
 
 def _offset_warnings(means: Means, forward: Floats) -> list[str]:
-    """What the accelerometer reads beyond the change of ground speed and the climb that the pitch shows, on average."""
+    """The accelerometer's reading beyond the change of ground speed and the climb by the pitch, on average."""
     if means.climb is None:
         return []
     rest = forward - means.change - means.climb
@@ -330,7 +330,7 @@ def _offset_warnings(means: Means, forward: Floats) -> list[str]:
 
 
 def _dead_warnings(recording: Recording, vehicle: Vehicle) -> list[str]:
-    """Wheels' channels that hold one value for the whole drive where other wheels' change."""
+    """Wheels' channels with one value for the whole drive while other wheels' change."""
     notes = []
     for quantity, wheels in (("wheel_speed", vehicle.wheels), ("drive_torque", tuple(driven_radii(vehicle)))):
         known = {f"{quantity}_{wheel}": recording.channels.get(f"{quantity}_{wheel}") for wheel in wheels}
@@ -348,7 +348,7 @@ def _dead_warnings(recording: Recording, vehicle: Vehicle) -> list[str]:
 
 
 def _radius_warnings(recording: Recording, vehicle: Vehicle, means: Means) -> list[str]:
-    """Slip where there is hardly a torque; beyond `RATIOS` `unit_warnings` says which unit may be wrong."""
+    """Slip with hardly any torque; beyond `RATIOS` `unit_warnings` names the unit that may be wrong."""
     load = vehicle.mass * STANDARD_GRAVITY / len(vehicle.wheels)
     off: dict[str, float] = {}
     for wheel, radius in driven_radii(vehicle).items():

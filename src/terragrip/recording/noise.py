@@ -24,8 +24,8 @@ _NOT_SENSED = ("latitude", "longitude", "altitude", "fuel_rate")
 def sensor_noise(recording: Recording, held: dict[str, float] | None = None) -> dict[str, float]:
     """Standard deviation of each channel's white noise, in the channel's unit.
 
-    From third differences of the fresh samples (see `white_noise`); where the reader of the log knew better
-    (``recording.noise``), that stands. ``held`` as `held_periods` gives it, None: find it. A channel with too
+    From third differences of the fresh samples (see `white_noise`); a value that the reader of the log knows
+    (``recording.noise``) takes precedence. ``held`` as `held_periods` gives it, None: find it. A channel with too
     few samples, or one that never changes, is absent.
     """
     held = held_periods(recording) if held is None else held
@@ -48,9 +48,9 @@ def sensor_noise(recording: Recording, held: dict[str, float] | None = None) -> 
 def white_noise(time: Floats, values: Floats) -> float | None:
     """Robust standard deviation of the white noise on a smooth signal (n,); None if it cannot be determined.
 
-    The third divided difference Σ c_j x_j, c_j = Π 1/(t_j - t_i), of four samples is blind to any motion
-    that is quadratic over them; over √Σc² it has the noise's variance, and its median absolute value
-    keeps spikes out. Four samples that are all equal (standstill) or straddle a gap do not count. The
+    The third divided difference Σ c_j x_j, c_j = Π 1/(t_j - t_i), of four samples does not respond to any motion
+    that is quadratic over them. Over √Σc² it has the noise's variance, and its median absolute value
+    is robust against spikes. Four samples that are all equal (standstill) or straddle a gap do not count. The
     result is never under q/√12 for a resolution q, nor under 1e-4 of the signal's size. Noise with
     memory (a filtered channel) is underestimated.
     """

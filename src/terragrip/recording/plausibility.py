@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 Floats = npt.NDArray[np.float64]
 Bools = npt.NDArray[np.bool_]
 
-# Ratio of wheel speed times radius to ground speed, and what makes it so; slip raises it by 1/(1 - slip).
+# Ratio of wheel speed times radius to ground speed, and its cause; slip raises it by 1/(1 - slip).
 _RATIOS = (
     (3.6, "wheel_speed may come from km/h, or ground_speed may be 3.6 times too small"),
     (9.5493, "wheel_speed may be in rpm: 1 rpm is 0.1047 rad/s"),
@@ -33,20 +33,20 @@ _RATIOS = (
     (1e-3, "ground_speed may be in mm/s"),
     (1e3, "wheel_speed or ground_speed may be off by a factor of 1000"),
 )
-_ENOUGH = 4000  # rows: a median that is to be distinguished from another by a third needs no more
+_ENOUGH = 4000  # rows: enough to distinguish medians that differ by a third
 _APART = 1.2  # of the rims of driven wheels: front wheels lead by 5 % at most, radii are known to 10 %
-_GAP = 1.0  # s, or three samples: what lies between them was not measured
-_OUTRUN = 1.5  # straight line over way: above, the way is too short
+_GAP = 1.0  # s, or three samples: nothing was measured within it
+_OUTRUN = 1.5  # straight line over distance driven: above, that distance is too short
 _TOO_SLOW, _LONG_WAY = 1.15, 20.0  # the same, over windows of so many metres
-_TOO_FAST = 1.3  # ground speed over the positions' speed, which noise only makes larger
+_TOO_FAST = 1.3  # ground speed over the positions' speed, which noise can only increase
 _WAY_WINDOW = 10.0  # s
 
 
 def unit_warnings(recording: Recording, vehicle: Vehicle | None) -> list[str]:
     """Sentences on channels that are likely not in SI, or of the wrong sign: speeds against each other and against the positions, the
-    rate of turn against wheels and positions, angles, acceleration, time. Without a vehicle what needs its radii is left out.
+    rate of turn against wheels and positions, angles, acceleration, time. Without a vehicle, checks that need its radii are left out.
 
-    The speeds are judged where both are well above standstill, by the median of their ratio.
+    The speeds are compared where both are well above standstill, by the median of their ratio.
     """
     track = track_of(recording)
     known = vehicle if vehicle is not None and vehicle.knows_wheels else None
@@ -82,15 +82,13 @@ def _speed_warnings(recording: Recording, vehicle: Vehicle) -> list[str]:
             continue
         reasons = [(radius, "wheel_speed may be the rim's speed in m/s: divide it by the radius"), *_RATIOS]
         reasons.append((3.6 * float(radius), "wheel_speed may be the rim's speed in km/h"))
-        # Where two reasons fit, the nearer one speaks.
+        # Where two reasons fit, the nearer one is reported.
         distance, why = min((abs(np.log(ratio / (1.08 * r))), text) for r, text in reasons)
         if distance > np.log(1.35):
             why = "check units, gear ratio and radius"
         result.setdefault(why, []).append((wheel, ratio))
     mean = {
-        name: float(
-            np.exp(np.mean([np.log(usual[w]) for w in axle.wheels]))
-        )  # of both sides, so that no turn counts
+        name: float(np.exp(np.mean([np.log(usual[w]) for w in axle.wheels])))  # of both sides: turns cancel
         for name, axle in vehicle.axles.items()
         if all(w in usual for w in axle.wheels)
     }
@@ -108,7 +106,7 @@ def _speed_warnings(recording: Recording, vehicle: Vehicle) -> list[str]:
 
 
 def _drive_warnings(recording: Recording) -> list[str]:
-    """The drive train's speed against the ground speed: both are in m/s, so that no radius makes a factor of 3.6."""
+    """The drive train's speed against the ground speed: both are in m/s, so a radius cannot cause a factor of 3.6."""
     ratio = _ratio_of(recording, recording.channels.get("wheel_based_speed"), 1.0)
     if ratio is None or RATIOS[0] <= ratio <= RATIOS[1]:
         return []
@@ -127,8 +125,8 @@ def _drive_warnings(recording: Recording) -> list[str]:
 def _position_warnings(recording: Recording, track: Track | None) -> list[str]:
     """Ground speed against the positions, which are in degrees and nothing else.
 
-    Noise of positions only adds to their speed, so a ground speed far above it is wrong whatever they are worth. One far below is
-    wrong only if the positions also come further in a straight line than it reaches.
+    Noise of positions only adds to their speed, so a ground speed far above it is wrong whatever the noise. One far below is
+    wrong only if the positions also move further in a straight line than it allows.
     """
     if track is None or "ground_speed" not in recording.channels:
         return []
@@ -152,9 +150,9 @@ def _position_warnings(recording: Recording, track: Track | None) -> list[str]:
 
 
 def _straight_ahead(recording: Recording, track: Track, least: float = 0.0) -> float:
-    """What the positions come in a straight line over what the ground speed makes in the same time: median over windows in motion.
+    """Distance of the positions in a straight line over the distance by ground speed in the same time: median over windows in motion.
 
-    ``least`` [m]: what the ground speed makes of a window at least, so that it is more than the positions' noise.
+    ``least`` [m]: the shortest distance of a window by ground speed, larger than the positions' noise.
     """
     speed = np.abs(filled(recording.time, recording.channels["ground_speed"]))
     way = np.r_[0.0, np.cumsum(np.diff(recording.time) * (speed[1:] + speed[:-1]) / 2)]
@@ -169,7 +167,7 @@ def _straight_ahead(recording: Recording, track: Track, least: float = 0.0) -> f
 
 
 def _shown_turn(recording: Recording, track: Track | None) -> Floats | None:
-    """The rate of turn (n,) that the gyroscope shows, else the positions; None where they contradict each other."""
+    """The rate of turn (n,) by the gyroscope, else by the positions; None where they contradict each other."""
     yaw = recording.channels.get("angular_velocity_z")
     placed = None if track is None else track.at("turn", recording.time)
     if yaw is None or not np.nanmax(np.abs(yaw), initial=0.0):
@@ -224,8 +222,8 @@ def _mirrored(recording: Recording, vehicle: Vehicle, track: Track) -> list[str]
 
 
 def _turn_scale(recording: Recording, yaw: Floats, vehicle: Vehicle | None, track: Track | None) -> str:
-    """Where the rate of turn is larger than others' by what lies between degrees and radians. A skid-steered vehicle turns by as little
-    as a third of what its wheels' speeds say."""
+    """Where the rate of turn exceeds the others' by the factor of degrees to radians. A skid-steered vehicle turns by as little
+    as a third of the turn by its wheels' speeds."""
     others: dict[str, Floats] = {}
     if vehicle is not None and vehicle.track and vehicle.knows_wheels:
         rims = _wheel_turn(recording, vehicle, rims=True) / vehicle.track
@@ -278,7 +276,7 @@ def _ratio(time: Floats, speed: Floats, other: Floats) -> float | None:
 
 
 def _high(values: Floats) -> float:
-    """What 5 % of the values (n,), n > 0, reach."""
+    """The value that 5 % of the values (n,), n > 0, exceed."""
     rank = int(0.95 * (len(values) - 1))
     return float(np.partition(values, rank)[rank])
 

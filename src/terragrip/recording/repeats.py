@@ -1,4 +1,4 @@
-"""Rows of a log that bear one and the same stamp: a logger that writes twice, or a row for each message."""
+"""Rows of a log with one and the same stamp: a logger that writes twice, or a row for each message."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ Bools = npt.NDArray[np.bool_]
 
 @dataclass(frozen=True)
 class Repeats:
-    """How many rows repeat the stamp before them: put together with it (``merged``), or not, since values differ (``other``)."""
+    """How many rows repeat the stamp before them: ``merged`` with it, or ``other``, left as they are because values differ."""
 
     merged: int = 0
     other: int = 0
@@ -34,10 +34,10 @@ class Repeats:
 
 
 def merged(columns: Mapping[str, Column], stamp: str) -> tuple[dict[str, Column], Repeats]:
-    """Columns (n,) with one row for each run of equal stamps in the column ``stamp`` whose values do not differ, and what was repeated.
+    """Columns (n,) with one row for each run of equal stamps in the column ``stamp`` whose values do not differ, and the repeats.
 
-    What is missing in one row of a run is filled from the others: rows that a logger writes for one message each, or writes twice.
-    A run in which a column has two different values is left as it is, for the recording to refuse: nothing says which was measured when.
+    A value missing in one row of a run is filled from the others: a logger writes a row for each message, or writes twice.
+    A run with two different values in a column is left as it is, for the recording to refuse: nothing shows which was measured when.
     """
     stamps = columns[stamp]
     again = np.r_[False, stamps[1:] == stamps[:-1]]
@@ -62,7 +62,7 @@ def merged(columns: Mapping[str, Column], stamp: str) -> tuple[dict[str, Column]
 def _known(column: Column) -> Bools:
     if column.dtype.kind == "O":
         return np.array([label_of(cell) != "" for cell in column], dtype=bool)
-    return np.asarray(column == column)  # what is missing is unequal to itself
+    return np.asarray(column == column)  # a missing value is unequal to itself
 
 
 def _alike(column: Column, other: Column) -> Bools:

@@ -9,7 +9,7 @@ WHEEL_CHANNELS = {"wheel_speed": "rad/s", "drive_torque": "N m", "wheel_force_x"
 AXLE_CHANNELS = {"vertical_load": "N"}
 CHANNELS = {
     "ground_speed": "m/s",
-    "wheel_based_speed": "m/s",  # what the drive train says of all driven wheels as one, by the machine's own radius
+    "wheel_based_speed": "m/s",  # of all driven wheels as one, as the drive train reports it by the machine's own radius
     "engine_speed": "rad/s",
     "engine_torque": "N m",  # at the flywheel
     "engine_torque_share": "1",  # of the reference torque, friction included: J1939's actual engine percent torque
@@ -17,8 +17,8 @@ CHANNELS = {
     "engine_reference_torque": "N m",
     "fuel_rate": "m^3/s",
     "drawbar_force": "N",
-    "hitch_load": "N",  # what hangs on the hitch presses down on it: the vertical force, down positive
-    "mass": "kg",  # of the whole machine, without what is towed
+    "hitch_load": "N",  # vertical force of an implement on the hitch, down positive
+    "mass": "kg",  # of the whole machine, without anything towed
     "acceleration_x": "m/s^2",
     "acceleration_y": "m/s^2",
     "acceleration_z": "m/s^2",
@@ -32,7 +32,7 @@ CHANNELS = {
     "altitude": "m",
 }
 LABELS = ("soil",)
-REFERENCE = "true_"  # columns that begin so pass through untouched
+REFERENCE = "true_"  # columns with this beginning pass through unchanged
 
 
 def split_channel(name: str) -> tuple[str, str] | None:
@@ -49,12 +49,12 @@ def is_channel(name: str) -> bool:
 
 
 def is_own(name: str) -> bool:
-    """Whether a column goes by the recording's own names: time, a label, a channel or a reference."""
+    """Whether a column has one of the recording's own names: time, a label, a channel or a reference."""
     return name == TIME or name in LABELS or is_channel(name)
 
 
 def has_torque(names: Iterable[str]) -> bool:
-    """Whether any of the columns is a wheel's drive torque; without one, slip is all that can be determined."""
+    """Whether any of the columns is a wheel's drive torque; without one, only slip can be determined."""
     return any(name.startswith("drive_torque_") for name in names)
 
 
@@ -67,7 +67,7 @@ def unit_of(name: str) -> str | None:
 
 
 def wheel_names_in(columns: Iterable[str]) -> tuple[str, ...]:
-    """The wheels that the columns speak of, in the order they first appear."""
+    """The wheels named in the columns, in the order in which they first appear."""
     parts = (split_channel(name) for name in columns)
     return tuple(
         dict.fromkeys(wheel for quantity, wheel in filter(None, parts) if quantity in WHEEL_CHANNELS)

@@ -1,7 +1,7 @@
-"""What the left and the right wheel of an axle say against each other: sentences for the user, never errors.
+"""The left and the right wheel of an axle compared: sentences for the user, never errors.
 
-Straight ahead both roll alike and, within what sensors and ground make, take like torques, as the wheels of the other axles do. In a turn
-the wheel that the drive makes faster than its hub pulls, and the slower one brakes: a torque goes with its own wheel's slip.
+Straight ahead both roll alike and, within the accuracy of sensors and ground, need like torques, as the wheels of the other axles do. In a
+turn the wheel that the drive makes faster than its hub pulls, and the slower one brakes: a torque follows its own wheel's slip.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 Floats = npt.NDArray[np.float64]
 
 _LEAST = 15  # windows of 2 s
-_DRIVING = 0.3  # of the speed that a twentieth of the windows reach
+_DRIVING = 0.3  # of the speed that a twentieth of the windows exceed
 _BACKWARD = 0.5  # share of the driving in which a wheel turns against all others
 _STRAIGHT = 0.03  # of the speed: the hubs' difference by the turn
 _ROLL = 0.05  # of a rim's speed: radii of one axle's tyres differ by 2 %
@@ -34,7 +34,7 @@ _HARD = 0.05  # of a wheel's load: sides that are driven against each other in t
 
 
 def side_warnings(recording: Recording, vehicle: Vehicle, turn: Floats | None) -> list[str]:
-    """Sentences on wheels of a wrong sign, radius, or torque scale. ``turn`` (n,) [rad/s], left positive: what a sensor shows."""
+    """Sentences on wheels of a wrong sign, radius, or torque scale. ``turn`` (n,) [rad/s], left positive: by a sensor."""
     backward = _backward_warnings(recording, vehicle)
     drive = None if backward or turn is None else _Drive.of(recording, vehicle, turn)
     if drive is None:
@@ -46,9 +46,9 @@ def side_warnings(recording: Recording, vehicle: Vehicle, turn: Floats | None) -
 
 
 def exchanged_torques(recording: Recording, vehicle: Vehicle, turn: Floats | None) -> list[str]:
-    """Torques that go against their wheels' slip in turns, on a vehicle whose sides are driven against each other there.
+    """Torques that oppose their wheels' slip in turns, on a vehicle whose sides are driven against each other there.
 
-    Other faults of speeds, torques and turn look alike: this is to be asked where nothing else was found.
+    Other errors of speeds, torques and turn look alike: use this only where no other was found.
     """
     drive = None if turn is None else _Drive.of(recording, vehicle, turn)
     if drive is None:
@@ -79,8 +79,8 @@ class _Axle:
 
 @dataclass(frozen=True)
 class _Drive:
-    """Axles in windows (n,): their mean ``pace`` and what their ``hubs`` differ by in turns [m/s], whether they are ``driving``,
-    and what all turns come to (``turned``) [rad]."""
+    """Axles in windows (n,): their mean ``pace`` and the difference of their ``hubs`` in turns [m/s], whether they are ``driving``,
+    and the sum of all turns (``turned``) [rad]."""
 
     axles: tuple[_Axle, ...]
     pace: Floats
@@ -90,7 +90,7 @@ class _Drive:
 
     @classmethod
     def of(cls, recording: Recording, vehicle: Vehicle, turn: Floats) -> _Drive | None:
-        """None without a track, axles of two sides, or windows enough."""
+        """None without a track, axles of two sides, or enough windows."""
         if not vehicle.track or np.any(np.diff(recording.time) < 0):
             return None
         axles, shown = _axles(recording, vehicle, turn)
@@ -103,7 +103,7 @@ class _Drive:
         )
 
     def contradicts(self, axle: _Axle) -> bool:
-        """Whether an axle's torques, beyond what goes with pace and pull, are against the slips from side to side."""
+        """Whether an axle's torques, apart from the part due to pace and pull, oppose the slips from side to side."""
         rows = self.driving
         if axle.pulls is None or rows.sum() < _LEAST or self.turned < LEAST_TURN:
             return False
@@ -117,7 +117,7 @@ class _Drive:
 
 
 def _backward_warnings(recording: Recording, vehicle: Vehicle) -> list[str]:
-    """A wheel that turns the other way than all others together, most of the time."""
+    """A wheel that turns in the opposite direction to all others, most of the time."""
     speeds = {w: recording.channels.get(f"wheel_speed_{w}") for w in vehicle.wheels}
     known = {
         w: filled(recording.time, v) for w, v in speeds.items() if v is not None and np.isfinite(v).any()
@@ -145,7 +145,7 @@ def _backward_warnings(recording: Recording, vehicle: Vehicle) -> list[str]:
 
 
 def _axles(recording: Recording, vehicle: Vehicle, turn: Floats) -> tuple[list[_Axle], Floats]:
-    """Axles of two sides of which both speeds are known, and the turn, as means over the windows that have them all."""
+    """Axles of two sides with both speeds known, and the turn, as means over the windows that have them all."""
     radius, channels = (
         dict(zip(vehicle.wheels, vehicle.wheel_radius.tolist(), strict=True)),
         recording.channels,
@@ -175,7 +175,7 @@ def _axles(recording: Recording, vehicle: Vehicle, turn: Floats) -> tuple[list[_
 
 
 def _rolling(axle: _Axle, straight: npt.NDArray[np.bool_]) -> list[str]:
-    """Rims that go at unlike speeds straight ahead."""
+    """Rims with different speeds straight ahead."""
     left, right = axle.rims[:, straight]
     if straight.sum() < _LEAST or (right == 0).any():
         return []
@@ -210,7 +210,7 @@ def _opposed(axle: _Axle, straight: npt.NDArray[np.bool_]) -> list[str]:
 
 
 def _uneven(axles: tuple[_Axle, ...], straight: npt.NDArray[np.bool_]) -> list[str]:
-    """An axle of which one torque is steadily more than the other straight ahead, where the other axles' are alike."""
+    """An axle with one torque steadily larger than the other straight ahead, where the other axles' are alike."""
     shares: dict[str, tuple[float, _Axle]] = {}
     for axle in axles:
         if axle.pulls is None:

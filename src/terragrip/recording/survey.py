@@ -1,4 +1,4 @@
-"""A log in blocks, and what is known of it once it has been gone through: its length, its channels, a sample of its rows."""
+"""A log in blocks, and the result of one pass over it: its length, its channels, a sample of its rows."""
 
 from __future__ import annotations
 
@@ -20,10 +20,10 @@ Progress = Callable[[int], None]
 
 @dataclass(frozen=True)
 class LogBlocks:
-    """A recording as consecutive blocks that can be gone through more than once.
+    """A recording as consecutive blocks that can be read more than once.
 
-    ``rows``: how many there are, about; ``blocks``: gives the blocks anew, from the first; ``whole``: gives all rows as one
-    recording, for what cannot be determined block by block; ``from_disk``: each pass reads a file, so that it takes time.
+    ``rows``: their approximate number; ``blocks``: gives the blocks again, from the first; ``whole``: gives all rows as one
+    recording, for values that cannot be determined block by block; ``from_disk``: each pass reads a file, and so takes time.
     """
 
     rows: int
@@ -33,7 +33,7 @@ class LogBlocks:
 
     @classmethod
     def of(cls, recording: Recording, rows: int | None = None) -> Self:
-        """A recording in memory, in blocks of so many ``rows`` (None: one block); nothing is copied."""
+        """A recording in memory, in blocks of so many ``rows`` (None: one block); no data are copied."""
         length = rows or max(len(recording), 1)
 
         def blocks() -> Iterator[Recording]:
@@ -44,10 +44,10 @@ class LogBlocks:
 
 @dataclass(frozen=True)
 class Survey:
-    """What one pass over a log tells: the number of its ``rows``, and a ``sample`` of them that is spread over the whole of it.
+    """The result of one pass over a log: the number of its ``rows``, and a ``sample`` of them spread over the whole log.
 
-    ``sample`` has the channels that hold a value anywhere in the log, and all that its reader says of it (notes, noise).
-    ``empty``: the channels that hold none.
+    ``sample`` has the channels with a value anywhere in the log, and all remarks of its reader (notes, noise).
+    ``empty``: the channels without any value.
     """
 
     rows: int
@@ -55,14 +55,14 @@ class Survey:
     empty: tuple[str, ...]
 
     def without_empty(self, block: Recording) -> Recording:
-        """A block of the log without the channels that hold no value anywhere."""
+        """A block of the log without the channels that have no value anywhere."""
         if not self.empty:
             return block
         return replace(block, channels={n: v for n, v in block.channels.items() if n not in self.empty})
 
 
 def survey_of(log: LogBlocks, progress: Progress | None = None) -> Survey:
-    """Go through a log once; its sample is that of `sampled_rows`, whatever the blocks.
+    """Read a log once; its sample is that of `sampled_rows`, whatever the blocks.
 
     ``progress`` is called with the rows done. Raises InputError as reading the blocks does, and where there is no row.
     """
@@ -85,7 +85,7 @@ def survey_of(log: LogBlocks, progress: Progress | None = None) -> Survey:
             progress(rows)
     if last is None:
         raise InputError("there is no row to estimate", hint="give a log with at least one row")
-    if len(last) == rows:  # one block: its rows need not be put together
+    if len(last) == rows:  # one block: its rows need not be joined
         sample = last.select(sampled_rows(rows))
     else:
         sample = _joined([part for number in sorted(kept) for part in kept[number]], last)
@@ -96,7 +96,7 @@ def survey_of(log: LogBlocks, progress: Progress | None = None) -> Survey:
 
 
 def _copied(block: Recording, rows: slice) -> Recording:
-    """Rows of a block as their own memory, so that the block need not stay."""
+    """Rows of a block copied to memory of their own: the block can then be released."""
     part = block.select(rows)
     return replace(
         part,
@@ -107,7 +107,7 @@ def _copied(block: Recording, rows: slice) -> Recording:
 
 
 def _joined(parts: list[Recording], last: Recording) -> Recording:
-    """Parts of a log as one recording; what its reader said of it is complete with its ``last`` block."""
+    """Parts of a log as one recording; the reader's remarks are complete with its ``last`` block."""
     return replace(
         last,
         time=np.concatenate([part.time for part in parts]),

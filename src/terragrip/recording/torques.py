@@ -1,8 +1,8 @@
-"""What the drive torques say against the drawbar force and the wheels' change of speed: sentences for the user, never errors.
+"""The drive torques against the drawbar force and the wheels' change of speed: sentences for the user, never errors.
 
-At every instant the wheels' thrust Σ M/r is the pull, the force that moves the mass, and a resistance (physics.md 1). So thrust goes with
-the sum of the first two one to one and at once; another scale, or a lag, is a channel's. Where a tool pulls and no cell measures it, the
-thrust goes with what nothing shows, and nothing is said.
+At every instant the wheels' thrust Σ M/r is the pull, the force that moves the mass, and a resistance (physics.md 1). So thrust follows
+the sum of the first two one to one and at once; another scale, or a lag, is an error of a channel. Where a tool pulls and no cell
+measures it, the thrust follows an unknown force, and nothing is reported.
 """
 
 from __future__ import annotations
@@ -23,21 +23,21 @@ if TYPE_CHECKING:
 Floats = npt.NDArray[np.float64]
 
 _MOST = 1.0  # of the weight: a mean thrust over a whole drive that no ground carries
-_BRAKING = 0.06  # of the weight: a mean that takes a drive downhill by a tenth throughout
+_BRAKING = 0.06  # of the weight: a mean that brakes a drive down a 10 % grade throughout
 _STEP = 0.05  # s between the points on which torques and speeds are compared
 _CALM = 0.4  # s over which they are smoothed
-_SLOW = 6.0  # s: what changes more slowly has no time
-_WITHIN = 2.0  # s, the largest lag looked for
+_SLOW = 6.0  # s: slower changes do not show a lag
+_WITHIN = 2.0  # s, the largest lag searched
 _LEAST_TIME, _MOST_TIME = 30.0, 1200.0  # s of the log, from its start
-_MOVING = 0.3  # of the rims' speed that a twentieth of the drive reaches
-_LAG = 0.2  # s, and two samples: tyres and filters make .1, rarely .15
-_UNSEEN_LAG = 0.3  # s, where a tool may pull unseen: an engine's governor answers it by .2
+_MOVING = 0.3  # of the rims' speed that a twentieth of the drive exceeds
+_LAG = 0.2  # s, and two samples: tyres and filters cause .1, rarely .15
+_UNSEEN_LAG = 0.3  # s, where a tool may pull unmeasured: an engine's governor answers it within .2
 _ALIKE = 0.7  # correlation at the lag
 _BETTER = 0.05  # than without it
 
 
 def torque_warnings(recording: Recording, vehicle: Vehicle) -> list[str]:
-    """Sentences on torques of another scale than the pull, and on torques that come late or early."""
+    """Sentences on torques of another scale than the pull, and on torques that are late or early."""
     return _scale_warnings(recording, vehicle) or _lag_warnings(recording, vehicle)
 
 
@@ -78,7 +78,7 @@ def _scale_warnings(recording: Recording, vehicle: Vehicle) -> list[str]:
 
 @dataclass(frozen=True)
 class _Course:
-    """Thrust, and pull with the force that speeds the rims up, over the mass (n,) [m/s²] on points ``step`` [s] apart, while ``moving``."""
+    """Thrust, and pull plus the rims' accelerating force, over the mass (n,) [m/s²] on points ``step`` [s] apart, while ``moving``."""
 
     step: float
     thrust: Floats
@@ -112,7 +112,7 @@ class _Course:
         return cls(step, _quick(thrust, step), _quick(force, step), moving)
 
     def lag(self) -> tuple[float, float, float]:
-        """By how much the thrust is behind [s], the correlation there, and without a lag."""
+        """The lag of the thrust [s], the correlation there, and without a lag."""
         most = round(_WITHIN / self.step)
         a, b = np.where(self.moving, self.thrust, 0.0), np.where(self.moving, self.force, 0.0)
         ends = [(max(0, k), len(a) + min(0, k)) for k in range(-most, most + 1)]
@@ -122,14 +122,14 @@ class _Course:
 
 
 def _smooth(values: Floats, seconds: float, step: float) -> Floats:
-    """Means (n,) over so many seconds; what lies outside is as at the ends."""
+    """Means (n,) over so many seconds; beyond the ends the first and last value are used."""
     half = max(1, round(seconds / step / 2))
     padded = np.cumsum(np.pad(values, (half + 1, half), mode="edge"))
     return (padded[2 * half + 1 :] - padded[: -2 * half - 1]) / (2 * half + 1)
 
 
 def _quick(values: Floats, step: float) -> Floats:
-    """What of a course (n,) changes within seconds."""
+    """The part of a course (n,) that changes within seconds."""
     return _smooth(values, _CALM, step) - _smooth(values, _SLOW, step)
 
 

@@ -1,4 +1,4 @@
-"""What a recording's positions tell of its motion: speed over ground, rate of turn, grade."""
+"""Motion from a recording's positions: speed over ground, rate of turn, grade."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ WINDOW = 2.0
 
 _SLOWEST = 0.3  # m/s: slower, a course is noise
 _VAGUE_TURN = 0.03  # rad/s, and
-_VAGUE_GRADE = 0.02  # rad: SDs beyond which nothing is claimed
+_VAGUE_GRADE = 0.02  # rad: SDs above which no value is given
 _GRADE_WAY = 16.0  # m
 
 
@@ -30,7 +30,7 @@ class Track:
     """At each fix: ``time`` (n,) [s], ``north`` and ``east`` (n,) [m], ``speed`` (n,) [m/s], ``turn`` (n,) [rad/s, to the left] and
     ``grade`` (n,) [rad, uphill], from ``altitude`` (n,) [m]; ``gap`` (n,): whether fixes are missing there.
 
-    ``turn`` and ``grade`` are NaN where the vehicle hardly moves, or the positions are too noisy to tell; ``grade`` too without altitude.
+    ``turn`` and ``grade`` are NaN where the vehicle hardly moves, or the positions are too noisy; ``grade`` too without altitude.
     """
 
     time: Floats
@@ -43,7 +43,7 @@ class Track:
 
     @cached_property
     def grade(self) -> Floats:
-        """Grade (n,) [rad, uphill]; it takes longer than all the rest, and few ask for it."""
+        """Grade (n,) [rad, uphill]; it takes longer than all the rest, and is seldom needed."""
         found = _grade(self.time, self.speed, self.altitude)
         found[(self.speed < _SLOWEST) | self.gap] = np.nan
         return found
@@ -62,10 +62,10 @@ class Track:
 
 
 def track_of(recording: Recording, window: float = WINDOW) -> Track | None:
-    """Motion by the positions, None without any to speak of.
+    """Motion by the positions, None if there are too few.
 
     Positions that repeat are no fixes. Over each five fixes or more a parabola is fitted by least squares (Savitzky and Golay 1964, for
-    uneven steps); its derivatives at the middle give speed and turn: (x' y'' - y' x'')/v², which a reversing vehicle does not change.
+    uneven steps). Its derivatives at the middle give speed and turn: (x' y'' - y' x'')/v², which a reversing vehicle does not change.
     """
     channels = recording.channels
     if "latitude" not in channels or "longitude" not in channels:
@@ -108,7 +108,7 @@ def _altitude(recording: Recording, time: Floats) -> Floats:
 
 
 def _fitted(ago: Floats, values: Floats, degree: int) -> tuple[Floats, Floats]:
-    """Coefficients (n, 1 + degree) of polynomials through rows of (n, k), about 0, and their SDs by what the rows scatter about them."""
+    """Coefficients (n, 1 + degree) of polynomials through rows of (n, k), about 0, and their SDs from the scatter of the rows."""
     size = np.maximum(np.abs(ago).max(axis=1, keepdims=True), 1e-9)
     place, powers = np.arange(degree + 1), [np.ones_like(ago)]
     for _ in range(2 * degree):

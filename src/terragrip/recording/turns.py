@@ -1,7 +1,7 @@
-"""What turns and straight stretches say about which wheel is which: sentences for the user, never errors.
+"""Which wheel is which, by turns and straight stretches: sentences for the user, never errors.
 
-In a turn the wheels of the outer side run faster, on every axle; straight ahead the wheels of an axle, which bear alike and slip alike,
-take like torques. A log in which two wheels are exchanged breaks that, and exchanging them back restores it.
+In a turn the wheels of the outer side run faster, on every axle. Straight ahead the wheels of an axle, with equal load and equal slip,
+need equal torques. A log with two exchanged wheels contradicts that, and exchanging them back restores it.
 """
 
 from __future__ import annotations
@@ -25,17 +25,17 @@ SURE = 0.5
 """Correlation of two rates of turn that tell the same, or of the opposite sign contradict each other."""
 
 WINDOW = 2.0  # s
-_MOST = 1e9  # of any unit: what is more is a fault, and its square may be no number
-LEAST_TURN = 1.5  # rad: with less there is nothing to compare
+_MOST = 1e9  # of any unit: a larger value is an error, and its square may not be a number
+LEAST_TURN = 1.5  # rad: with less there is no turn to compare
 _CLEAR = 0.8  # correlation from which another order of the wheels is the right one
-_SIZES = 0.4  # of what is shown: the turn by the rims of an axle
-_WIDE = 0.05  # of the wheels' speeds: what they differ by from side to side must be more than noise
-_RADII = 4.0  # the usual track, where none is stated
+_SIZES = 0.4  # of the measured turn: the turn by the rims of an axle
+_WIDE = 0.05  # of the wheels' speeds: their difference from side to side must exceed noise
+_RADII = 4.0  # the usual track, if none is given
 _LEAST = 15  # windows straight ahead
 _STRAIGHT = 0.05  # of the speed from side to side
 _SLANT = 0.2  # of the sum of both sides' speeds
 _FEW = 30  # rows
-_UNLIKE = np.log(1.35)  # of an axle's two torques: beyond the gains that `calibrate` takes
+_UNLIKE = np.log(1.35)  # of an axle's two torques: beyond the gains that `calibrate` accepts
 _ALIKE = np.log(1.15)
 
 
@@ -55,7 +55,7 @@ def agreement(time: Floats, yaw: Floats, other: Floats) -> float:
 
 
 def windows(time: Floats, values: Floats) -> Floats:
-    """Means of channels (k, n) over the windows of 2 s in which all of them hold a value that can be (k, m)."""
+    """Means of channels (k, n) over the windows of 2 s in which all of them have a possible value (k, m)."""
     known = (np.abs(values) < _MOST).all(axis=0)
     place = ((time - time[0]) / WINDOW).astype(np.intp)[known]
     count = np.bincount(place) if known.any() else np.zeros(0)
@@ -68,8 +68,8 @@ def _correlation(a: Floats, b: Floats) -> float:
 
 
 def straight_rows(recording: Recording, vehicle: Vehicle) -> npt.NDArray[np.bool_]:
-    """Rows (n,) in which the rims of each axle go alike from side to side, so that none is far from the ground speed by a turn; where
-    there are hardly any, those in which they go the same way."""
+    """Rows (n,) in which the rims of each axle have like speeds from side to side, so no turn moves one far from the ground speed; if
+    there are hardly any, those in which they turn the same way."""
     rows, forward = np.ones((2, len(recording)), dtype=bool)
     radius = dict(zip(vehicle.wheels, vehicle.wheel_radius, strict=True))
     for axle in vehicle.axles.values():
@@ -84,7 +84,7 @@ def straight_rows(recording: Recording, vehicle: Vehicle) -> npt.NDArray[np.bool
 
 
 def exchange_warnings(recording: Recording, vehicle: Vehicle, turn: Floats | None) -> list[str]:
-    """Sentences on wheels whose speeds, or torques, may be exchanged. ``turn`` (n,) [rad/s], left positive: what a sensor shows."""
+    """Sentences on wheels whose speeds, or torques, may be exchanged. ``turn`` (n,) [rad/s], left positive: by a sensor."""
     place = {wheel: k for k, wheel in enumerate(vehicle.wheels)}
     axles = [(place[a.wheels[0]], place[a.wheels[-1]]) for a in vehicle.axles.values() if len(a.wheels) > 1]
     speeds, torques = (_of_wheels(recording, vehicle, name) for name in ("wheel_speed", "drive_torque"))
@@ -140,12 +140,12 @@ def _turned(
         return []
     width = vehicle.track or _RADII * float(np.mean(vehicle.wheel_radius))
     pace = float(np.sqrt(np.mean(wheels**2)))
-    if shown is None:  # what is in proportion to the speed is the radii's
+    if shown is None:  # the part in proportion to the speed is due to the radii
         common = wheels.mean(axis=0)
         wheels = wheels - np.outer(wheels @ common / max(float(common @ common), 1e-12), common)
 
     def agree(order: Order) -> float:
-        """The least correlation of an axle's turn with what is shown."""
+        """The smallest correlation of an axle's turn with the measured one."""
         ordered = wheels[list(order)]
         turns = [(ordered[right] - ordered[left]) / width for left, right in axles]
         against = turns[0] if shown is None else shown
@@ -170,7 +170,7 @@ def _uneven(
     rims: Floats, torques: Floats, radii: Floats, axles: Axles, loads: Floats
 ) -> list[tuple[int, int]]:
     """Two wheels of two axles whose torques, exchanged, make every axle pull alike on both sides straight ahead: of those pairs the one
-    by which the axles pull in proportion to their loads."""
+    with which the axles pull in proportion to their loads."""
     if len(axles) < 2 or not rims.shape[1]:
         return []
     total, pace = (torques / radii[:, None]).sum(axis=0), np.abs(rims).mean(axis=0)
@@ -183,7 +183,7 @@ def _uneven(
         return []
 
     def off(order: Order) -> tuple[float, float]:
-        """How unlike the most unlike axle pulls, and how far the axles' pulls are from their loads, both as logarithms."""
+        """The largest difference between an axle's sides, and how far the axles' pulls are from their loads, both as logarithms."""
         ordered = mean[list(order)] / radii
         sides = np.array([[ordered[left], ordered[right]] for left, right in axles])
         share = np.log(sides.sum(axis=1) / loads)
