@@ -17,7 +17,7 @@ NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_]*$")
 
 
 def _read(unit: str, low: float, high: float, likely: tuple[str, ...], above: bool) -> Callable[[Any], float]:
-    """A validator: a number or a text with a unit, within the limits; a slip of the unit is named."""
+    """A validator: a number or a text with a unit, within the limits; a likely wrong unit is named."""
 
     def check(value: Any) -> float:
         number = quantity(value, unit)
@@ -105,8 +105,8 @@ RadiusModel = Annotated[FixedRadius | HadekelRadius | BidermanRadius, Field(disc
 class Wheel(Part):
     """A wheel: ``radius`` [m] (unloaded, given a ``radius_model``), ``inertia`` [kg m²], ``width`` [m].
 
-    ``mass`` [kg]: of what hangs outside a force sensor in its axle; only a comparison with that sensor asks for it.
-    ``size`` of a tyre (``520/70R38``) gives width and radius where they are not given: with its inflation ``pressure`` [Pa] the unloaded
+    ``mass`` [kg]: of the parts outside a force sensor in its axle, for a comparison with that sensor only.
+    ``size`` of a tyre (``520/70R38``) gives width and radius where they are absent: with its inflation ``pressure`` [Pa] the unloaded
     radius and Hadekel's model, without it the rolling radius of a radial tyre.
     """
 
@@ -181,7 +181,7 @@ def _wheel_name(name: Any) -> str:
 
 
 class Antenna(Part):
-    """Where the position is taken, from the rear axle's centre: ``x`` forward, ``y`` to the left, ``z`` above the ground [m]."""
+    """Where the position is measured, from the rear axle's centre: ``x`` forward, ``y`` to the left, ``z`` above the ground [m]."""
 
     x: _Offset = 0.0
     y: _Offset = 0.0
@@ -189,18 +189,18 @@ class Antenna(Part):
 
 
 class Payload(Part):
-    """Centre of gravity of what is carried beside the file's ``mass``: from the rear axle ``x`` forward, ``z`` above the ground [m]."""
+    """Centre of gravity of the load beside the file's ``mass``: from the rear axle ``x`` forward, ``z`` above the ground [m]."""
 
     x: _Offset
     z: Annotated[float, *quantity_of("m", 0, 6, likely=("mm", "cm"))] | None = None
 
 
 class Driveline(Part):
-    """From the engine to the driven wheels, for machines that tell the engine's torque and not the wheels' (docs/vehicle.md).
+    """From the engine to the driven wheels, for machines that report the engine's torque and not the wheels' (docs/vehicle.md).
 
     Wheel torque = ``efficiency`` x ratio x (engine torque - ``accessory_power``/engine speed - ``engine_inertia`` x its
     acceleration), summed over the driven wheels. The ratio is ``ratio`` where the gear is fixed, else engine speed over wheel
-    speed. Each ``_std`` is the spread of what is not known.
+    speed. Each ``_std`` is the standard deviation of an unknown constant.
     """
 
     efficiency: Annotated[float, *quantity_of("1", 0.2, 1, likely=("%",))]
@@ -228,7 +228,7 @@ class Sensors(Part):
 
 
 class Uncertainty(Part):
-    """Prior standard deviations of constants that data cannot tell: they widen the intervals (physics.md 6)."""
+    """Prior standard deviations of constants that the data cannot determine: they widen the intervals (physics.md 6)."""
 
     drive_torque_gain: _Ratio | None = None  # of each wheel by itself
     drive_torque_gain_common: _Ratio | None = None  # of all wheels together
@@ -248,7 +248,7 @@ class Uncertainty(Part):
 class Calibration(Part):
     """Gains and offsets found by ``terragrip calibrate``: corrected value = (raw value - offset) / gain.
 
-    ``wheel_radius`` [m] takes the place of ``wheel.radius`` for the wheels it names; ``wheel_based_speed_gain`` is that of the drive
+    ``wheel_radius`` [m] replaces ``wheel.radius`` for the wheels it names; ``wheel_based_speed_gain`` is that of the drive
     train's speed on a machine whose file gives no wheels' radii.
     """
 

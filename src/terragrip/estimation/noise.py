@@ -1,4 +1,4 @@
-"""How noisy each channel is: as the vehicle file says, else as the log shows, else a cautious guess."""
+"""The noise of each channel: from the vehicle file, else from the log, else a cautious guess."""
 
 from __future__ import annotations
 
@@ -27,8 +27,8 @@ def channel_noise(
 ) -> tuple[dict[str, float], tuple[str, ...]]:
     """SD of every channel in ``channels``, SI, and the channels that had to be guessed.
 
-    ``sensors`` (by channel, ``ground_speed``, or by sensor, ``wheel_speed`` for all wheels) wins over the
-    vehicle file, that over a guess from the vehicle's size. Raises InputError on a name that is neither, or an
+    ``sensors`` (by channel, ``ground_speed``, or by sensor, ``wheel_speed`` for all wheels) overrides the
+    vehicle file, which overrides a guess from the vehicle's size. Raises InputError on a name that is neither, or an
     SD that is not positive.
     """
     given = dict(sensors or {})
@@ -52,7 +52,7 @@ def settings_in(
     sensors: Mapping[str, float] | None = None,
     held: Mapping[str, float] | None = None,
 ) -> tuple[dict[str, float], dict[str, float]]:
-    """What a log tells of its sensors: SDs [SI] by channel, and the update periods [s] of held channels.
+    """Properties of the sensors from a log: SDs [SI] by channel, and the update periods [s] of held channels.
 
     Without the SDs that the vehicle file or ``sensors`` (by channel or sensor) give; ``held``: None finds the periods.
     """
@@ -65,7 +65,7 @@ def settings_in(
 
 
 def logged_noise(recording: Recording, vehicle: Vehicle, held: dict[str, float]) -> dict[str, float]:
-    """SDs that the log gives where the vehicle file is silent, by channel."""
+    """SDs from the log for sensors that the vehicle file does not give, by channel."""
     from terragrip.recording import sensor_noise
 
     silent = {
@@ -81,7 +81,7 @@ def logged_noise(recording: Recording, vehicle: Vehicle, held: dict[str, float])
 
 
 def sensor_of(channel: str) -> str:
-    """The sensor of a channel, as the vehicle file names it: ``wheel_speed`` for ``wheel_speed_fl``."""
+    """The sensor of a channel, as in the vehicle file: ``wheel_speed`` for ``wheel_speed_fl``."""
     for prefix in ("wheel_speed", "drive_torque", "vertical_load"):
         if channel.startswith(f"{prefix}_"):
             return prefix
@@ -104,7 +104,7 @@ def _check(given: Mapping[str, float], channels: tuple[str, ...]) -> None:
 
 def _guesses(vehicle: Vehicle) -> dict[str, float]:
     """Cautious SDs from the vehicle's size, by sensor."""
-    # Without radii slip is from the drive train's speed, whose noise is in m/s.
+    # Without radii slip follows from the drive train's speed, whose noise is in m/s.
     radius = float(vehicle.wheel_radius.mean()) if vehicle.knows_wheels else 1.0
     weight = vehicle.mass * GRAVITY
     return {

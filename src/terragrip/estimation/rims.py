@@ -1,4 +1,4 @@
-"""Rims whose slip is known without torque: a wheel each, or a drive train as one wheel, and the radii that slip counts from."""
+"""Rims whose slip is known without torque: single wheels, or a drive train as one wheel, and their radii at zero slip."""
 
 from __future__ import annotations
 
@@ -28,10 +28,10 @@ _RADIUS = 0.02  # relative SD of a radius that the vehicle file gives without on
 class Rim:
     """A wheel whose slip is known, and the ``channel`` that gives its speed.
 
-    ``scale``: reading of the channel at 1 rad/s (1, or for the drive train the radius that it supposes [m]); ``radius`` [m] at zero slip
+    ``scale``: reading of the channel at 1 rad/s (1, or for the drive train the radius that it uses [m]); ``radius`` [m] at zero slip
     and its relative SD ``spread``; ``side``: m left of the vehicle's middle; ``ahead``: of a steered wheel, as `Vehicle.wheel_ahead`. Where
-    no radius is known (``has_radius``) the drive train is a wheel of 1 m, which slip does not see, and what a radius is needed for is no
-    column.
+    no radius is known (``has_radius``) the drive train is a wheel of 1 m, which does not affect slip, and quantities that need a radius
+    have no column.
     """
 
     wheel: str
@@ -45,13 +45,13 @@ class Rim:
 
 
 def speeds_alone(channels: Collection[str], vehicle: Vehicle) -> bool:
-    """Whether samples of these columns hold speeds, and no torque though the vehicle drives wheels."""
+    """Whether samples of these columns have speeds, and no torque though the vehicle drives wheels."""
     wheels = any(name == "wheel_based_speed" or name.startswith("wheel_speed_") for name in channels)
     return bool(vehicle.driven.any()) and wheels and "ground_speed" in channels and not has_torque(channels)
 
 
 def rims_of(vehicle: Vehicle, channels: Collection[str], source: str | None = None) -> tuple[Rim, ...]:
-    """The rims that samples of these columns tell of, by the vehicle file's radii; raises InputError on a wheel it does not have."""
+    """The rims in samples of these columns, by the vehicle file's radii; raises InputError on a wheel it does not have."""
     stated = vehicle.uncertainty.wheel_radius
     spread = _RADIUS if stated is None else stated
     named = [name.removeprefix("wheel_speed_") for name in channels if name.startswith("wheel_speed_")]
@@ -86,7 +86,7 @@ def rims_of(vehicle: Vehicle, channels: Collection[str], source: str | None = No
 
 
 def supposed_radius(vehicle: Vehicle) -> float:
-    """Mean radius [m] of the driven wheels by the vehicle file uncalibrated; 1 m where it has none: any will do for a speed in m/s."""
+    """Mean radius [m] of the driven wheels by the vehicle file uncalibrated; 1 m if it has none: any will do for a speed in m/s."""
     if not vehicle.knows_wheels:
         return 1.0
     radii = [data.radius for data, driven in zip(vehicle.wheel_data, vehicle.driven, strict=True) if driven]
@@ -94,7 +94,7 @@ def supposed_radius(vehicle: Vehicle) -> float:
 
 
 def calibrated_scale(vehicle: Vehicle) -> float | None:
-    """What the drive train's speed is to be multiplied by, where it or all driven wheels are calibrated."""
+    """The factor for the drive train's speed, if it or all driven wheels are calibrated."""
     if not vehicle.knows_wheels:
         gain = vehicle.calibration.wheel_based_speed_gain
         return None if gain is None else 1 / gain
@@ -110,7 +110,7 @@ def calibrated_scale(vehicle: Vehicle) -> float | None:
 
 
 def at_zero(rim: Rim, zero: Zero) -> Rim:
-    """The rim with the radius that a log tells."""
+    """The rim with the radius from a log."""
     return replace(rim, radius=zero.ratio * rim.radius, spread=zero.std)
 
 
@@ -159,7 +159,7 @@ def speed_settings(
     put_axles(settings, vehicle)
     for i, rim in enumerate(rims):
         machine.radius[i] = settings.rolling_radius[i] = rim.radius
-        machine.inertia[i] = 1.0  # of no effect without torque
+        machine.inertia[i] = 1.0  # no effect without torque
         settings.wheel_share[i] = 1 / len(rims)
         settings.wheel_side[i], settings.wheel_ahead[i] = rim.side, rim.ahead
         if rim.wheel in vehicle.wheels:
@@ -173,7 +173,7 @@ def speed_settings(
     lib.tg_tune_walks(settings)
     settings.noise[lib.TG_GROUND_SPEED] = noise["ground_speed"]
     settings.noise[lib.TG_YAW_RATE] = noise["angular_velocity_z"]
-    settings.noise[lib.TG_ACCELERATION_X] = 1.0  # of no effect either, but the kernel asks for one
+    settings.noise[lib.TG_ACCELERATION_X] = 1.0  # no effect either, but the kernel requires one
     for name, slot in slots_in(rims).items():
         settings.held_period[slot] = held.get(name, 0.0)
     settings.uncertainty.wheel_radius = max((rim.spread for rim in rims), default=0.0)

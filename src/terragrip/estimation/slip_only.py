@@ -1,6 +1,6 @@
-"""What a log as a whole tells where no torque is measured: where slip counts from, and where the rims read nothing.
+"""Properties of a whole log without torque: the zero of slip, and the speed below which the rims read nothing.
 
-The estimates are the kernel's method TG_SPEEDS; while samples come in, the vehicle file alone says where slip counts from.
+The estimates are the kernel's method TG_SPEEDS; while samples come in, the vehicle file alone gives the zero of slip.
 """
 
 from __future__ import annotations
@@ -19,8 +19,8 @@ from terragrip.vehicle import Vehicle
 Floats = npt.NDArray[np.float64]
 
 _MOVING = 0.1  # m/s
-_BLIND = 5  # rows of rims that stand while the vehicle moves
-_WIDEST = 0.5  # m/s: a wider dead band is a speed that is missing
+_BLIND = 5  # rows with rims at rest while the vehicle moves
+_WIDEST = 0.5  # m/s: a wider dead band is a missing speed
 WHAT_IS_MISSING = (
     "There is no drive torque: slip, speeds and distance are estimated, and maps of slip can be drawn; adhesion, soil "
     "resistance, net traction and efficiency cannot be had."
@@ -38,10 +38,10 @@ class SlipReference:
 
 
 def slip_reference_in(log: Recording, vehicle: Vehicle) -> SlipReference:
-    """What a log without torque tells; raises InputError where a wheel of it is not the vehicle's.
+    """The slip reference from a log without torque; raises InputError if a wheel of it is not the vehicle's.
 
-    Slip of a wheel is against the radius of the vehicle file. The drive train's speed is by a radius that the machine supposes: it
-    is held against the log's own zero, unless the vehicle's calibration names the radii.
+    Slip of a wheel is relative to the radius of the vehicle file. The drive train's speed depends on a radius set in the machine. It
+    is compared with the log's own zero, unless the vehicle's calibration gives the radii.
     """
     rims, zero, notes = [], {}, [WHAT_IS_MISSING]
     radii = (
@@ -68,7 +68,7 @@ def slip_reference_in(log: Recording, vehicle: Vehicle) -> SlipReference:
 
 
 def _said(rim: Rim, zero: Zero | None, learns: bool) -> list[str]:
-    """Sentences on where the slip of a rim counts from."""
+    """Sentences on the zero of slip of a rim."""
     what = "the drive" if rim.wheel == DRIVE else f"wheel {rim.wheel}"
     if zero is None:
         if not learns:
@@ -96,7 +96,7 @@ def _said(rim: Rim, zero: Zero | None, learns: bool) -> list[str]:
 
 
 def _dead_band(log: Recording, rims: Sequence[Rim]) -> tuple[float, int]:
-    """Ground speed [m/s] up to which the rims read 0 while the vehicle moves, and in how many rows they do."""
+    """Ground speed [m/s] up to which the rims read 0 while the vehicle moves, and the number of such rows."""
     ground = log.channels["ground_speed"]
     speeds = [log.channels[rim.channel] for rim in rims]
     measured = np.isfinite(speeds).any(axis=0)
@@ -112,7 +112,7 @@ def _dead_band(log: Recording, rims: Sequence[Rim]) -> tuple[float, int]:
 
 
 def _against_travel(log: Recording, rims: Sequence[Rim]) -> list[str]:
-    """A sentence on wheels that turn backward while the machine goes forward, most of the time."""
+    """A sentence on wheels that turn backward while the machine moves forward, most of the time."""
     ground, odd = log.channels["ground_speed"], []
     known = np.isfinite(ground)
     for rim in rims if known.any() else ():

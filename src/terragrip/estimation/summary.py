@@ -1,4 +1,4 @@
-"""What a summary of estimates needs, gathered block by block; `summary_text` writes it."""
+"""The data of a summary of estimates, gathered block by block; `summary_text` writes it."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ if TYPE_CHECKING:
 
 STANDSTILL = EVENTS.index("standstill")
 
-_SAMPLE = 20_000  # rows a block that medians are taken from,
+_SAMPLE = 20_000  # rows of a block for medians,
 _MOST = 200_000  # and rows in all
 
 
 @dataclass
 class Tally:
-    """What a summary needs, added up over consecutive blocks of one table of estimates."""
+    """The data of a summary, added up over consecutive blocks of one table of estimates."""
 
     about: dict[str, Any] = field(default_factory=dict)
     wheels: tuple[str, ...] = ()
@@ -66,14 +66,14 @@ class Tally:
         )
         self._sampled += len(chosen)
         self._count_time(block)
-        if self._sampled > _MOST:  # half of them do as well
+        if self._sampled > _MOST:  # half of them are enough
             self.sample = {name: [np.concatenate(parts)[::2]] for name, parts in self.sample.items()}
             self._every, self._sampled = 2 * self._every, (self._sampled + 1) // 2
 
     def _count_time(self, block: Estimates) -> None:
-        """Add up the time [s] of rows without an event, by label; a row lasts until the next one, at most as long as a gap is not one.
+        """Add up the time [s] of rows without an event, by label; a row lasts until the next one, at most as long as the gap threshold.
 
-        The last row waits for the next block to say how long it lasted.
+        The duration of the last row follows from the next block.
         """
         longest = self.about.get("settings", {}).get("gap") or 1.0
         if self._last_moving is not None:
@@ -98,7 +98,7 @@ class Tally:
             self.event_starts[code] += int(count)
 
     def text(self, notes: Iterable[str] = (), output: str | None = None) -> str:
-        """What was driven, medians with their intervals, what is assumed, notes, what to do next; lines of text.
+        """Distance and time driven, medians with their intervals, assumptions, notes, what to do next; lines of text.
 
         ``output``: the file of the estimates, for what to do next.
         """

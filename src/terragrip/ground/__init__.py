@@ -1,4 +1,4 @@
-"""The ground along a drive: where it changes, what it is, and what happened on it.
+"""The ground along a drive: where it changes, which soil it is, and the events on it.
 
 The names load on first use.
 """

@@ -33,8 +33,8 @@ SURE = 0.5
 
 @dataclass(frozen=True)
 class Settings:
-    """How a drive is looked at. `online`: as it would have been reported while driving (no look ahead); `length` [m]: mean way on one
-    ground before the data speak, of changes; `chain`: the prior of the soils; `signals`: what changes are looked for in."""
+    """Settings of the analysis. `online`: the results while driving (no future samples); `length` [m]: prior mean distance on one
+    ground, for changes; `chain`: the prior of the soils; `signals`: the signals in which changes are detected."""
 
     online: bool = False
     length: float = LENGTH
@@ -80,7 +80,7 @@ def analyse(
 def with_columns(estimates: Estimates, blocks: Blocks, timeline: Timeline, online: bool) -> Estimates:
     """The estimates with `soil_estimate` (the most probable soil) and `soil_probability` (its probability) in every row.
 
-    `online`: a row holds what was known before it, the block that ended last; else what its own block's is.
+    `online`: a row has the result of the block that ended last before it; else that of its own block.
     """
     soil, best = timeline.soil, timeline.probabilities.max(axis=1)
     if online:
@@ -106,7 +106,7 @@ def block_labels(estimates: Estimates, blocks: Blocks) -> NDArray[np.object_]:
 
 
 def _soils(timeline: Timeline) -> tuple[str, ...]:
-    """The most probable soils of at least a fiftieth of what tells of the ground, in the order of their appearance."""
+    """The most probable soils of at least a fiftieth of the blocks with evidence, in the order of their appearance."""
     named = timeline.soil[timeline.known]
     return tuple(name for name in dict.fromkeys(named) if (named == name).mean() >= 0.02)
 

@@ -1,4 +1,4 @@
-"""What happened on a drive, and why: spells of the estimates' ``event`` column, each with one sentence."""
+"""The events of a drive and their reasons: spells of the estimates' ``event`` column, each with one sentence."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ LEAST_POINTS = 0.3
 
 @dataclass(frozen=True)
 class Event(Span):
-    """Something that happened: ``kind`` (a text of :data:`~terragrip.estimation.engine.EVENTS`), ``start`` and ``end`` [s],
+    """An event: ``kind`` (a text of :data:`~terragrip.estimation.engine.EVENTS`), ``start`` and ``end`` [s],
     ``why``: one sentence."""
 
     kind: str
@@ -35,7 +35,7 @@ class Event(Span):
 
 
 def events(estimates: Estimates) -> tuple[Event, ...]:
-    """All events of a table of estimates, in order of their start; of an empty table none.
+    """All events of a table of estimates, in order of their start; none for an empty table.
 
     The estimator flags them while driving (docs/events.md); here each gets its reason, from the values at the time.
     """
@@ -96,7 +96,7 @@ def _stuck(estimates: Estimates, rows: NDArray[np.intp]) -> str:
     limits = watch_limits()
     speed = float(np.nanmedian(np.abs(estimates["ground_speed"][rows])))
     turn = "turn"
-    if wheels_with("wheel_speed", estimates.columns):  # of a drive train without a known radius there is none
+    if wheels_with("wheel_speed", estimates.columns):  # a drive train without a known radius has none
         turning = float(np.nanmedian(np.abs(_mean(estimates, "wheel_speed", rows))))
         turn = f"turn at {turning:.2f} rad/s"
     by_torque = ""

@@ -1,6 +1,6 @@
 """The ground while driving: estimates in, one by one; every half second the soils' probabilities, and changes as they are reported.
 
-The same blocks, the same model and the same code as for a whole drive looked at without looking ahead: identical results.
+The blocks, the model and the code are those of a whole drive with `online`: identical results.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ _VERSION = 1
 
 @dataclass(frozen=True)
 class GroundState:
-    """What is known at the end of a block. `time` [s]: of the row that ended it; `soil`: the most probable; `probabilities` of all soils.
+    """The state at the end of a block. `time` [s]: of the row that ended it; `soil`: the most probable; `probabilities` of all soils.
 
     `known`: whether the block gave evidence (else the probabilities are carried on). `change`: a change reported now, or None.
     """
@@ -43,8 +43,8 @@ class GroundState:
 class LiveGround:
     """Follows the ground along the estimates of one drive.
 
-    estimator: where the estimates come from; notified of a new ground (`new_ground()`) at every change, so that its adhesion curve
-    starts anew. library: the known soils; without one every soil is unknown, and only changes are reported.
+    estimator: the source of the estimates; at every change it is notified of a new ground (`new_ground()`), which restarts its
+    adhesion curve. library: the known soils; without one every soil is unknown, and only changes are reported.
     """
 
     def __init__(
@@ -68,7 +68,7 @@ class LiveGround:
         self._rows: list[list[Any]] = []
 
     def update(self, estimate: Estimate) -> GroundState | None:
-        """Take the next estimate; returns the state where it ends a block, else None."""
+        """Process the next estimate; returns the state if it ends a block, else None."""
         if self._origin is None:
             self._origin = estimate.time
         number = int(np.floor((estimate.time - self._origin) / PERIOD + 1e-9))
@@ -80,7 +80,7 @@ class LiveGround:
         return state
 
     def finish(self) -> GroundState | None:
-        """The state after the last, unfinished block; None where there is none. Nothing may follow."""
+        """The state after the last, unfinished block; None if there is none. No estimate may follow."""
         return self._close(float(self._rows[-1][0])) if self._rows else None
 
     def _close(self, end: float) -> GroundState:
@@ -101,7 +101,7 @@ class LiveGround:
         return replace(block, end=np.array([end]))
 
     def snapshot(self) -> bytes:
-        """Everything needed to go on later, bit for bit: the state, not the library, as JSON."""
+        """Everything needed to continue later, bit for bit: the state, not the library, as JSON."""
         state = {
             "version": _VERSION,
             "soils": list(self._emissions.soils),
@@ -123,7 +123,7 @@ class LiveGround:
         estimator: TractionEstimator,
         library: SoilLibrary | None = None,
     ) -> Self:
-        """Go on from a snapshot with the same estimator and library; raises InputError where it is damaged or of others."""
+        """Continue from a snapshot with the same estimator and library; raises InputError if it is damaged or belongs to others."""
         result = cls(estimator, library)
         try:
             state = json.loads(data)

@@ -1,4 +1,4 @@
-"""What is known of the ground of one drive, and ground.json (architecture.md, contracts)."""
+"""The result for the ground of one drive, and ground.json (architecture.md, contracts)."""
 
 from __future__ import annotations
 
@@ -30,10 +30,10 @@ VERSION = 1
 
 @dataclass(frozen=True)
 class Timeline:
-    """Probabilities of the soils over a drive, a block of half a second a row.
+    """Probabilities of the soils over a drive, a row for each block of half a second.
 
     `time` [s] (blocks,): each block's start; `names`: the soils, "unknown" last; `probabilities` (blocks, names); `known` (blocks,):
-    whether the block tells of the ground (elsewhere the probabilities are carried on); `label` (blocks,): the recording's own name of
+    whether the block gives evidence (elsewhere the probabilities are carried on); `label` (blocks,): the recording's own name of
     the soil, "" where it has none or where vehicle and tool are on different soils.
     """
 
@@ -51,7 +51,7 @@ class Timeline:
         return np.array(self.names, dtype=object)[self.probabilities.argmax(axis=1)]
 
     def to_dict(self) -> dict[str, Any]:
-        """As ground.json holds it: probabilities by soil, to four digits."""
+        """In the form of ground.json: probabilities by soil, to four digits."""
         return {
             "time": [round(float(t), 3) for t in self.time],
             "probabilities": {
@@ -64,7 +64,7 @@ class Timeline:
 
     @classmethod
     def from_dict(cls, data: Mapping[str, Any]) -> Timeline:
-        """Of ground.json; raises KeyError, TypeError or ValueError where it is none."""
+        """From ground.json; raises KeyError, TypeError or ValueError on anything else."""
         names = tuple(data["probabilities"])
         time = np.array(data["time"], dtype=float)
         table = np.array([data["probabilities"][name] for name in names], dtype=float).reshape(
@@ -78,8 +78,8 @@ class Timeline:
 
 @dataclass(frozen=True)
 class Ground:
-    """The ground along one drive. `run`: its name; `soils`: those named for more than moments, none without a library; `events`: what
-    happened, with reasons; `notes`: plain sentences for the user; `about`: the recording, and whether looked at `online`."""
+    """The ground along one drive. `run`: its name; `soils`: those present for more than moments, none without a library; `events` with
+    their reasons; `notes`: plain sentences for the user; `about`: the recording, and whether the analysis was `online`."""
 
     run: str
     start: float
@@ -93,7 +93,7 @@ class Ground:
     about: Mapping[str, Any] = field(default_factory=dict)
 
     def to_pandas(self) -> pd.DataFrame:
-        """A row a section, as ground.json holds it, and how many ``seconds`` it lasts; `views.table_of` makes one of events too."""
+        """A row for each section, as in ground.json, with its duration ``seconds``; `views.table_of` makes one of events too."""
         from terragrip.ground.views import table_of
 
         return table_of(self.sections)
@@ -111,7 +111,7 @@ class Ground:
 
 
 def to_dict(grounds: Sequence[Ground], about: Mapping[str, Any] | None = None) -> dict[str, Any]:
-    """One object for all drives: `changes`, `sections`, `events` of all, each with its `run`; `runs`: what is of a drive as a whole."""
+    """One object for all drives: `changes`, `sections`, `events` of all, each with its `run`; `runs`: the values of each whole drive."""
     return {
         "version": VERSION,
         **(about or {}),
@@ -136,14 +136,14 @@ def to_dict(grounds: Sequence[Ground], about: Mapping[str, Any] | None = None) -
 def write(
     grounds: Sequence[Ground], path: str | os.PathLike[str], about: Mapping[str, Any] | None = None
 ) -> None:
-    """Write ground.json, whole or not at all; raises InputError if it cannot be written. No number that JSON does not know is written."""
+    """Write ground.json, whole or not at all; raises InputError if it cannot be written. It never contains NaN or infinities."""
     text = json.dumps(to_dict(grounds, about), allow_nan=False, ensure_ascii=False)
     with replacing(path) as temporary:
         temporary.write_text(text + "\n", encoding="utf-8")
 
 
 def read(path: str | os.PathLike[str]) -> tuple[Ground, ...]:
-    """Read ground.json, a `Ground` a drive. Raises InputError: no such file, not JSON, of a newer version, or not what `write` writes."""
+    """Read ground.json, a `Ground` for each drive. Raises InputError: no such file, not JSON, a newer version, or not made by `write`."""
     file = os.fspath(path)
     data = read_json(file, "sections", VERSION, "'terragrip ground'")
     try:
