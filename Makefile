@@ -143,11 +143,11 @@ $(VENV)/made:
 	@$(PIP) install -qq -r requirements-pip.lock || echo "make: pip stays as it came with Python, which is slower" >&2
 	@$(BIN)/python -c 'import sys; print(sys._base_executable, sys.version)' > $@
 
-# Byte code on two processors, as pip does it on one (nobody imports the few files that do not compile).
+# Byte code on two processors, as pip does it on one (nobody imports the few files that do not compile), without the packages' own tests.
 $(VENV)/runtime: $(VENV)/made requirements.lock
 	@echo "Installing the packages of requirements.lock"
 	@$(PIP) install -qq --no-compile -r requirements.lock
-	@$(BIN)/python -m compileall -qq -j 2 $(VENV)/lib || true
+	@$(BIN)/python -m compileall -qq -j 2 -x '/tests?/' $(VENV)/lib || true
 	@touch $@
 
 # After the package, for pip works on one environment one call at a time.
