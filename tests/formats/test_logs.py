@@ -344,6 +344,23 @@ def test_mcap_with_json_and_protobuf(tmp_path: Path) -> None:
     assert np.allclose(table.columns["time"], TIME, atol=1e-6)
 
 
+def test_a_json_field_that_comes_later_and_seldom_is_a_signal(tmp_path: Path) -> None:
+    with (tmp_path / "log.mcap").open("wb") as stream:
+        writer = Writer(stream)
+        writer.start()
+        channel = writer.register_channel("/bus", "json", writer.register_schema("bus", "jsonschema", b"{}"))
+        for k, t in enumerate(TIME.tolist()):
+            message = {"rim": 5.0 + k} | (
+                {"gps": SPEED[k]} if k % 5 == 2 else {"gps": None} if k % 5 == 3 else {}
+            )
+            writer.add_message(channel, int(t * SNS), json.dumps(message).encode(), int(t * SNS))
+        writer.finish()
+    table = read_table(tmp_path / "log.mcap")
+    seldom = np.arange(COUNT) % 5 == 2
+    np.testing.assert_allclose(table.columns["/bus.gps"], np.where(seldom, SPEED, np.nan))
+    np.testing.assert_allclose(table.columns["/bus.rim"], 5.0 + np.arange(COUNT))
+
+
 def test_mcap_cut_off_and_with_a_damaged_chunk(tmp_path: Path) -> None:
     whole = write_mcap(tmp_path / "log.mcap").read_bytes()
     (tmp_path / "cut.mcap").write_bytes(whole[: len(whole) // 2])

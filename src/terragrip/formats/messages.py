@@ -66,6 +66,7 @@ class Topic:
     _stamps: array[float] = field(default_factory=lambda: array("d"))
     _columns: dict[str, Column] = field(default_factory=dict)
     _labels: tuple[str, ...] | None = None
+    _seen: set[str] = field(default_factory=set)
 
     @property
     def is_wanted(self) -> bool:
@@ -74,8 +75,9 @@ class Topic:
 
     def add(self, receipt: float, message: Any) -> None:
         """Add a message that came at ``receipt`` [s]."""
-        labels = self._names_of_entries(message)
-        if not self._columns or labels != self._labels:
+        parts = dict(self.parts(message))
+        labels, more = _names_of_entries(parts), self._brings_more(parts)
+        if not self._columns or more or labels != self._labels:
             self._learn(message, labels)
         self.count += 1
         if not self._columns or skips(self.count - 1, BLOCK, self.wanted):
@@ -113,7 +115,7 @@ class Topic:
 
     def fields(self, message: Any) -> dict[str, Any]:
         """The wanted fields of one message by name, for who takes messages as they come; nothing is collected."""
-        self._labels = self._names_of_entries(message)
+        self._labels = _names_of_entries(dict(self.parts(message)))
         fields: dict[Path, Any] = {}
         self._walk(message, (), fields, None)
         names = {
@@ -158,12 +160,11 @@ class Topic:
         )
         return stamps + offset, [instant]
 
-    def _names_of_entries(self, message: Any) -> tuple[str, ...] | None:
-        """The list ``name`` of a message, as of a JointState's joints; None if it has none."""
-        fields = next((value for key, value in self.parts(message) if key == "name"), None)
-        if isinstance(fields, list | tuple) and all(isinstance(entry, str) for entry in fields):
-            return tuple(fields)
-        return None
+    def _brings_more(self, parts: dict[str, Any]) -> bool:
+        """Whether a message has a field that none had before: a logger may write what was measured at that instant, and no more."""
+        new = {name for name, value in parts.items() if name not in self._seen and value is not None}
+        self._seen |= new
+        return bool(new)
 
     def _learn(self, message: Any, labels: tuple[str, ...] | None) -> None:
         """Make columns of the fields of a message, beside those that there are."""
@@ -242,3 +243,11 @@ def log_of(topics: Iterable[Topic], path: str, notes: list[str], files: Iterable
         )
     digest = "+".join(sha256(file) for file in files) or sha256(path)
     return SignalLog(tuple(names), result, path, digest, tuple(remarks))
+
+
+def _names_of_entries(parts: dict[str, Any]) -> tuple[str, ...] | None:
+    """The list ``name`` of a message, as of a JointState's joints; None if it has none."""
+    fields = parts.get("name")
+    if isinstance(fields, list | tuple) and all(isinstance(entry, str) for entry in fields):
+        return tuple(fields)
+    return None
