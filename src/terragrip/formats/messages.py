@@ -76,7 +76,7 @@ class Topic:
     def add(self, receipt: float, message: Any) -> None:
         """Add a message that came at ``receipt`` [s]."""
         parts = dict(self.parts(message))
-        labels, more = _names_of_entries(parts), self._brings_more(parts)
+        labels, more = names_of_entries(parts), self._brings_more(parts)
         if not self._columns or more or labels != self._labels:
             self._learn(message, labels)
         self.count += 1
@@ -115,7 +115,7 @@ class Topic:
 
     def fields(self, message: Any) -> dict[str, Any]:
         """The wanted fields of one message by name, for who takes messages as they come; nothing is collected."""
-        self._labels = _names_of_entries(dict(self.parts(message)))
+        self._labels = names_of_entries(dict(self.parts(message)))
         fields: dict[Path, Any] = {}
         self._walk(message, (), fields, None)
         names = {
@@ -245,7 +245,7 @@ def log_of(topics: Iterable[Topic], path: str, notes: list[str], files: Iterable
     return SignalLog(tuple(names), result, path, digest, tuple(remarks))
 
 
-def _names_of_entries(parts: dict[str, Any]) -> tuple[str, ...] | None:
+def names_of_entries(parts: dict[str, Any]) -> tuple[str, ...] | None:
     """The list ``name`` of a message, as of a JointState's joints; None if it has none."""
     fields = parts.get("name")
     if isinstance(fields, list | tuple) and all(isinstance(entry, str) for entry in fields):

@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from terragrip.formats.boundary import DAMAGE
-from terragrip.formats.messages import BLOCK, Column, Topic
+from terragrip.formats.messages import BLOCK, Column, Topic, names_of_entries
 from terragrip.formats.ros_layout import Bytes, Layout, Path, layout_of
 from terragrip.formats.signals import Signal
 from terragrip.formats.table import skips
@@ -78,7 +78,7 @@ class RosTopic(Topic):
             message = self._read(raw)
             if message is None:
                 return
-            self._learn(message, self._names_of_entries(message))
+            self._learn(message, names_of_entries(dict(self.parts(message))))
             if not self._columns:
                 self.count += 1
                 return
@@ -145,7 +145,7 @@ class RosTopic(Topic):
         if message is None:
             block.readable[row] = False
             return None
-        labels = self._names_of_entries(message)
+        labels = names_of_entries(dict(self.parts(message)))
         if labels != self._labels or self._tried < _MOST_LAYOUTS:
             self._learn(message, labels)  # another layout may have fields that there were none of
         stamp = self.stamp(message) or np.nan
