@@ -60,7 +60,7 @@ def _beyond(quantity: Quantity, vehicle: Vehicle) -> str:
     if quantity.key == "drive_torque_gain" and abs(np.log(max(quantity.value, 1e-9))) > np.log(_MOST_GAIN):
         return (
             f"that of {quantity.wheel} would be {quantity.value:.2f}, and no sensor is off by more than {1 / _MOST_GAIN:.2f} to "
-            f"{_MOST_GAIN:.2f}: the wheels did not share slip and soil (turns? other radii? a scale of its own?)"
+            f"{_MOST_GAIN:.2f}: the wheels did not share slip and soil (turns? other radii? a scale of its own? axles' masses exchanged?)"
         )
     if quantity.key == "wheel_radius":
         stated = vehicle.wheel_data[vehicle.wheels.index(str(quantity.wheel))].radius
