@@ -28,6 +28,7 @@ def moving_nis(estimates: tg.Estimates) -> dict[str, tuple[float, int]]:
 def test_it_stands_beside_the_estimates_and_changes_none(method: str) -> None:
     log = drive(10, seed=3).recording
     estimates, plain = estimate_with_channel_nis(log, robot(), method), estimate(log, robot(), method)
+    assert estimates.about == plain.about
     for name in plain:
         np.testing.assert_array_equal(estimates[name], plain[name], err_msg=name)
     moving = (estimates.event_codes == 0) & (

@@ -51,6 +51,12 @@ def test_what_cannot_be_scored_is_refused(observed: list[float], predicted: list
         agreement(observed, predicted)
 
 
+def test_an_error_needs_a_row() -> None:
+    assert mean_absolute_error([1.0, np.nan], [3.0, 1.0]) == 2.0
+    with pytest.raises(InputError, match="only 0 rows"):
+        mean_absolute_error([np.nan], [1.0])
+
+
 @pytest.mark.parametrize("probability", [0.5, 0.9, 0.95])
 def test_coverage_of_honest_and_of_too_narrow_intervals(probability: float) -> None:
     rng = np.random.default_rng(1)

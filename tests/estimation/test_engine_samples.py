@@ -73,6 +73,26 @@ def test_samples_give_the_digits_of_the_whole_log_across_a_snapshot() -> None:
     assert np.isnan(whole["adhesion_driven"][60:70]).all()  # of the shift
 
 
+@pytest.mark.parametrize("change", [{}, {"time": -1.0}, {"time": np.nan}, {"engine_speed": np.inf}])
+def test_a_refused_sample_leaves_no_row_behind(change: dict[str, float]) -> None:
+    """The sample before once more, as of another gear; an earlier one; one of no instant; one that cannot be."""
+    log = work()
+    rows = rows_of(log)[:44]
+    tried, untouched = (
+        live_estimator(tractor(), "kalman", tuple(log.channels), sensors=NOISE, held={}) for _ in range(2)
+    )
+    for time, sample in rows[:41]:
+        tried.update_at(time, sample)
+        untouched.update_at(time, sample)
+    wrong = {**rows[40][1], "time": rows[40][0], "engine_speed": 300.0, **change}
+    with pytest.raises(InputError):
+        tried.update_at(wrong.pop("time"), wrong)
+    for time, sample in rows[41:]:
+        assert str(tried.update_at(time, sample).to_dict()) == str(
+            untouched.update_at(time, sample).to_dict()
+        )
+
+
 def test_a_bus_may_tell_its_reference_torque_and_friction_late() -> None:
     log = work(share=True)
     live = live_estimator(tractor(), "kalman", tuple(log.channels), sensors=NOISE, held={})

@@ -11,7 +11,9 @@ import terragrip as tg
 from drives import MASS, WHEELS, drive, robot, with_values
 from terragrip.errors import InputError
 from terragrip.estimation import TractionEstimator, estimate
+from terragrip.estimation.calibration.procedure import _refuse_other_load
 from terragrip.estimation.estimates import Estimates
+from terragrip.physics.loads import GRAVITY
 from terragrip.recording import Recording
 
 METHODS = ("kalman", "bank", "ukf", "aukf-fs", "algebraic")
@@ -169,6 +171,18 @@ def test_sample_by_sample_and_after_a_snapshot_every_digit_is_the_same():
 def test_calibrate_refuses_another_load():
     with pytest.raises(InputError, match="column mass: calibrate needs the load of the vehicle file, 139 kg"):
         tg.calibrate(filled(40.0), tanker())
+
+
+@pytest.mark.parametrize(("share", "refused"), [(0.019, False), (0.021, True), (-0.021, True)])
+def test_calibrate_takes_loads_within_a_fiftieth_of_the_mass(share, refused):
+    rows = np.full(20, 139 * (1 + share)), np.full(20, share * 139 * GRAVITY)
+    for name, values in zip(("mass", "hitch_load"), rows, strict=True):
+        log = Recording(np.arange(20.0), {name: np.r_[np.nan, values[1:]]})
+        if refused:
+            with pytest.raises(InputError, match=f"column {name}: calibrate needs the load"):
+                _refuse_other_load(log, tanker())
+        else:
+            _refuse_other_load(log, tanker())
 
 
 def test_a_vehicle_file_says_where_the_payload_is():

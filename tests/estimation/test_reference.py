@@ -196,6 +196,12 @@ def test_unscented_moments_of_a_square_are_exact():
     assert filter.P[0, 0] == pytest.approx(p - cross**2 / variance, rel=1e-13)
 
 
+@pytest.mark.parametrize("size", [1, 3])
+def test_a_covariance_of_another_size_than_the_state_is_refused(size):
+    with pytest.raises(ValueError, match=rf"2 states, P0 has the shape \({size}, {size}\)"):
+        KalmanFilter(np.eye(2), [[1.0, 0.0]], np.eye(2), [[1.0]], [0.0, 0.0], np.eye(size))
+
+
 def test_by_default_the_variance_of_a_square_about_zero_is_exact():
     """Var x² = 2 p² of x ~ N(0, p): of a normal distribution beta = 2 is right (Wan and van der Merwe)."""
     filter = UnscentedKalmanFilter(lambda x, u, dt: x, lambda x: x**2, [[0.0]], [[0.05]], [0.0], [[0.3]])

@@ -245,6 +245,18 @@ def test_gamma_blends_between_the_given_and_the_adapted_noise():
     assert prior_variance(0.25) == pytest.approx(1 + 0.2 * (1 + 0.25 * 4) + 0.01)
 
 
+def test_a_step_is_a_second_where_nothing_else_is_given():
+    plain, said = (
+        AdaptiveFilter(KalmanFilter([[1.0]], [[1.0]], [[0.0]], [[1.0]], [0.0], [[1.0]]), [2.0], 1)
+        for _ in range(2)
+    )
+    plain.step([1.0])
+    said.step([1.0], None, 1.0)
+    assert (
+        plain.filter.P[0, 0] == said.filter.P[0, 0] == pytest.approx(3 / 4)
+    )  # 1 + 2 before the update, R = 1
+
+
 # ---- supervisor ----
 
 

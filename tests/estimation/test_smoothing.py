@@ -100,3 +100,14 @@ def test_algebraic_cannot_smooth():
         method_named("algebraic", smooth=True)
     with pytest.raises(InputError, match="cannot smooth"):
         estimate(drive(3.0).recording, robot(), "algebraic", smooth=True)
+
+
+def test_rows_done_are_told_forwards_and_backwards():
+    log, ahead, back = drive(1.0).recording, [], []
+    sizes = [40, 40, len(log) - 80]
+    blocks = (log.select(slice(k, k + 40)) for k in range(0, len(log), 40))
+    estimator = TractionEstimator.for_recording(log, robot())
+    parts = list(smoothed(estimator, blocks, (), forward=ahead.append, backward=back.append))
+    assert [len(part) for part in parts] == sizes
+    assert ahead == np.cumsum(sizes).tolist()
+    assert back == np.cumsum(sizes[::-1]).tolist()

@@ -18,11 +18,12 @@ from terragrip.estimation.batch import _Passes
 from terragrip.estimation.calibration.plausible import completed_by_positions
 from terragrip.estimation.converting import convert
 from terragrip.estimation.driveline import DrivenMachine
-from terragrip.estimation.engine import EVENTS
+from terragrip.estimation.engine import EVENTS, refusal
 from terragrip.estimation.engine_torque import EngineTorque
 from terragrip.estimation.export.limits import SHEET_ROWS
 from terragrip.estimation.export.rows_as_json import json_rows
 from terragrip.estimation.forward import flag_before_gaps, table_of
+from terragrip.estimation.provenance import about_recording
 from terragrip.estimation.rims import Rim
 from terragrip.estimation.settings import watch_limits
 from terragrip.estimation.summary import Tally
@@ -210,6 +211,22 @@ def test_rows_as_json_leave_nothing_out_and_nan_as_null() -> None:
         '{"time":10.0,"adhesion_l":0.25,"event":"","soil":"clay"}', '{"time":10.5,"adhesion_l":null,"event":"","soil":""}',
     ]  # fmt: skip
     assert SHEET_ROWS == 2**20
+
+
+@pytest.mark.parametrize(
+    "name", [name for name in dir(lib) if name.startswith(("TG_BAD_", "TG_NOT_", "TG_TIME_", "TG_DIVERGED"))]
+)
+def test_a_status_of_the_kernel_is_told_in_words(name: str) -> None:
+    assert not str(refusal(getattr(lib, name), None)).startswith("status ")
+
+
+def test_one_profile_stands_alone_and_several_in_a_list() -> None:
+    def profile(*profiles: dict[str, Any]) -> Any:
+        return about_recording(Recording(np.arange(2.0), {}, profiles=profiles)).get("profile")
+
+    assert profile() is None
+    assert profile({"name": "a"}) == {"name": "a"}
+    assert profile({"name": "a"}, {"name": "b"}) == [{"name": "a"}, {"name": "b"}]
 
 
 def test_progress_counts_over_all_passes_and_never_beyond_the_rows() -> None:

@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 
+from terragrip.estimation.calibration.result import Evidence
+from terragrip.estimation.calibration.speeds import _evidence
 from terragrip.estimation.zero_slip import (
     Zero,
     _error,
@@ -134,6 +138,10 @@ def test_modes_that_run_into_each_other_are_one_and_few_windows_none() -> None:
     one = _modes(0.95 + 0.01 * draws.standard_normal(300))
     assert len(one) == 1
     assert one[0][:2] == pytest.approx((0.95, 0.01), rel=0.15)
+    skewed = 1 + 0.03 * np.log(
+        1 - (np.arange(300) + 0.5) / 300
+    )  # would be three, nearer than their SDs together
+    assert all(b[0] - a[0] > a[1] + b[1] for a, b in pairwise(_modes(skewed)))
     three = np.r_[around(0.85, 60), around(0.92, 60), around(0.99, 60)]
     assert [m[0] for m in _modes(three)] == pytest.approx([0.85, 0.92, 0.99], abs=1e-3)
     assert [m[0] for m in _modes(np.r_[around(0.9, 60), around(1.0, 3)])] == pytest.approx([0.9], abs=1e-3)
@@ -213,3 +221,13 @@ def test_eight_windows_are_enough_of_all_logs_together_and_declared_rows_alone_c
     )
     with pytest.raises(ValueError, match="shorter"):  # a span for each log, or none at all
         zero_of([log, part], "wheel_based_speed", 0.4, [(0.0, 50.0)])
+
+
+def test_evidence_of_a_speeds_gain_is_each_log_that_has_it_with_its_windows() -> None:
+    """Whole windows of 5 s from the first to the last row."""
+    ones = np.ones(4)
+    logs = [
+        Recording(np.array([1.0, 7.0, 13.0, 20.9]), {name: ones})
+        for name in ("wheel_based_speed", "ground_speed")
+    ]
+    assert _evidence(logs, ("a.csv", "b.csv"), "wheel_based_speed") == (Evidence("a.csv", 1.0, 20.9, 3),)

@@ -119,6 +119,13 @@ def test_noise_is_what_a_parabola_leaves_of_four_samples() -> None:
     assert white_noise(time, values) == pytest.approx(1.482602218505602 * np.median(left), rel=1e-6)
 
 
+def test_noise_of_what_is_sensed_is_found_beside_what_is_not() -> None:
+    values = np.random.default_rng(7).standard_normal(400)
+    names = ("true_ground_speed", "latitude", "ground_speed", "fuel_rate", "pitch")
+    noise = sensor_noise(Recording(0.1 * np.arange(400), dict.fromkeys(names, values)))
+    assert noise == {"ground_speed": pytest.approx(1.0, rel=0.1), "pitch": pytest.approx(1.0, rel=0.1)}
+
+
 @pytest.mark.parametrize(("gap", "counts"), [(3.9, True), (4.1, False)])
 def test_four_samples_straddle_a_gap_of_four_steps(gap: float, counts: bool) -> None:
     time = np.cumsum(np.where(np.arange(60) % 3 == 0, gap, 1.0))

@@ -146,6 +146,7 @@ def test_of_long_records_three_tenths_of_the_shorter_must_be_common() -> None:
     result, lags = _correlation(a, b)
     common = np.minimum(4000, 3000 + lags) - np.maximum(lags, 0)
     np.testing.assert_array_equal(np.isfinite(result), common >= 900)
+    assert np.isfinite(_correlation(b, a)[0]).sum() == np.isfinite(result).sum()
 
 
 def test_a_mean_over_a_second_is_that_of_its_21_points() -> None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -189,6 +191,19 @@ def test_which_of_torques_and_accelerometer_is_wrong_the_speed_decides(
     assert " ".join(notes) == "" if not words else words in " ".join(notes)
     alone = _balance_warnings(log, means, forward * X, {}, vehicle)
     assert ("but its opposite: forward is positive" in " ".join(alone)) is (forward < 0)
+
+
+@pytest.mark.parametrize(("slope", "opposite"), [(-0.29, False), (-0.31, True)])
+def test_an_accelerometer_alone_is_backward_from_three_errors_below_none(
+    slope: float, opposite: bool
+) -> None:
+    class Fits(Means):
+        def fit(self, *values: Any, **options: Any) -> _Fit:
+            return _Fit(slope, 0.1, -0.5)
+
+    means = Fits(np.arange(3), 3, np.ones(3, dtype=bool), np.zeros(3), np.ones(3), None)
+    notes = _balance_warnings(Recording(np.arange(3.0), {}), means, np.zeros(3), {}, None)
+    assert [note.startswith("acceleration_x is not the change") for note in notes] == [True] * opposite
 
 
 @pytest.mark.parametrize(

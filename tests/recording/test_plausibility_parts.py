@@ -316,3 +316,7 @@ def test_straight_rows_are_those_of_alike_sides_or_else_of_one_way(
     log = Recording(np.arange(100.0), {f"wheel_speed_{w}": v for w, v in sides.items()})
     expected = np.arange(100) <= 90 if few else straight
     np.testing.assert_array_equal(straight_rows(log, vehicle), expected)
+    rig = Vehicle.from_dict(
+        {"mass": 20, "axles": {"only": {"mass": 20, "wheels": ["w"]}}, "wheel": {"radius": 0.2, "inertia": 1}}
+    )  # a wheel alone has no other side, and stands straight too
+    assert straight_rows(Recording(np.arange(100.0), {"wheel_speed_w": np.zeros(100)}), rig).all()

@@ -15,6 +15,7 @@ from terragrip.errors import InputError
 from terragrip.formats import inspect, parquet, read
 from terragrip.formats.log_blocks import recordings_of
 from terragrip.formats.profile import Profile
+from terragrip.recording.repeats import merged
 
 PLAIN = Profile.model_validate(
     {
@@ -69,6 +70,12 @@ def test_a_row_for_each_message_makes_one_row() -> None:
     found = PLAIN.apply(pd.concat([speed, wheel]).sort_values("t", kind="stable"))
     pandas.testing.assert_frame_equal(found.to_pandas(), PLAIN.apply(frame).to_pandas())
     assert [n for n in found.notes if "repeat" in n] == [f"400 {NOTE}"]
+
+
+def test_labels_that_differ_in_blanks_alone_are_one() -> None:
+    columns = {"t": np.array([0.0, 0.0, 1.0]), "field": np.array(["a", " a ", "b"], dtype=object)}
+    kept, repeats = merged(columns, "t")
+    assert (kept["t"].tolist(), repeats.merged, repeats.other) == ([0.0, 1.0], 1, 0)
 
 
 @pytest.mark.parametrize(("column", "value"), [("v", 7.0), ("field", "c")])

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from terragrip.recording import Recording, unit_warnings
-from terragrip.recording.turns import exchange_warnings
+from terragrip.recording.turns import _uneven, exchange_warnings
 from terragrip.simulation import SimulationResult, families
 from terragrip.vehicle import Vehicle
 
@@ -64,6 +64,16 @@ def test_torques_of_two_axles_are_named_straight_ahead(pair: tuple[str, str]) ->
     assert [n.split(": ")[0] for n in notes] == [
         f"drive_torque_{pair[0]} and drive_torque_{pair[1]} may be exchanged"
     ]
+
+
+@pytest.mark.parametrize(("torques", "pairs"), [([4, 2, 2, 4], [(0, 2)]), ([4, 2, 6, 3], [])])
+def test_an_exchange_must_make_both_axles_alike_from_side_to_side(
+    torques: list[float], pairs: list[tuple[int, int]]
+) -> None:
+    """One that only shares the pull as the loads, 1 to 2 and nearly 8 to 7, mends nothing."""
+    loads = np.array([1.0, 2.0]) if pairs else np.ones(2)
+    steady = np.outer(torques, np.ones(20))
+    assert _uneven(np.full((4, 20), 2.0), steady, np.ones(4), [(0, 1), (2, 3)], loads) == pairs
 
 
 def test_of_wheels_of_unlike_radii_the_pulls_are_compared_with_the_loads() -> None:

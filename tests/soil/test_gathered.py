@@ -16,6 +16,7 @@ from terragrip.soil.estimates import (
     distinct,
     labelled_blocks,
     pairs_of,
+    soils_of,
     torque_scale_sd,
     whole_length,
 )
@@ -126,3 +127,12 @@ def test_a_file_given_twice_and_slip_without_adhesion_are_refused(tmp_path: Path
         del bare.columns[f"adhesion_{wheel}"]
     with pytest.raises(InputError, match="one: holds slip but no adhesion"):
         GatheredRuns().add(bare, "one")
+
+
+def test_files_are_counted_and_the_fit_after_them(tmp_path: Path) -> None:
+    files = [tmp_path / f"{seed}.parquet" for seed in range(2)]
+    for seed, file in enumerate(files):
+        run_of(seed).write(file)
+    seen: list[tuple[int, int]] = []
+    soils_of(files, AdhesionCurve(bootstrap=0), progress=lambda *done: seen.append(done))
+    assert seen == [(1, 3), (2, 3), (3, 3)]

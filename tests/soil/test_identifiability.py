@@ -73,6 +73,8 @@ def test_a_twin_is_looked_for_on_both_sides() -> None:
     twins = [_twin(model, parameters, list(parameters), way, SLIP)[0] for way in (flattest, -flattest)]
     assert twins[0] == pytest.approx(twins[1])
     assert twins[0]["a"] < 10.0
+    judged = judge(model, parameters, list(parameters), SLIP, 0.99)
+    assert judged.twin == pytest.approx(twins[0])
 
 
 def test_a_parameter_without_any_effect_is_no_division_by_zero() -> None:

@@ -74,6 +74,8 @@ def test_the_papers_bins_stand_beside_those_by_pull():
     pairs = [p for seed in range(8) for p in usable_pairs(table(seed), WHEELS, 2.6, f"run {seed}")]
     learned = learn_soils(pairs).soils["fine"]
     assert learned.curve.bins_.settings.by == "pull"
+    assert learned.verdict.follows
+    assert not any(learned.verdict.sentence in words for words in learn_soils(pairs).words)
     slip, adhesion = (
         np.concatenate([getattr(p, k) for p in pairs if p.soil == "fine"]) for k in ("slip", "adhesion")
     )

@@ -15,7 +15,7 @@ from soil_campaign import pairs
 from terragrip.errors import InputError
 from terragrip.soil.digitised import read_points, soils_of_points
 from terragrip.soil.fit import AdhesionCurve
-from terragrip.soil.library import Soil, SoilLibrary
+from terragrip.soil.library import Soil, SoilLibrary, _refuse_bad_band
 from terragrip.soil.literature import brixius_soil, burckhardt_grounds, literature_soils, paper_soils
 
 
@@ -161,6 +161,23 @@ def test_bad_libraries_are_named_in_one_line(tmp_path, text):
         SoilLibrary.load(tmp_path / "s.json")
     assert "\n" not in str(caught.value)
     assert "s.json" in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("slip", "low", "high", "says"),
+    [
+        ([0.1, 0.2], [0.3, 0.4, 0.5], [0.4, 0.5], "of one length"),
+        ([0.1, 0.2], [0.3, 0.4], [0.4], "of one length"),
+        ([0.1], [0.3], [0.4], "of one length"),
+        ([0.2, 0.1], [0.3, 0.4], [0.4, 0.5], "not in order"),
+        ([0.1, 0.1], [0.3, 0.4], [0.4, 0.5], "not in order"),
+    ],
+)
+def test_a_band_is_of_one_length_and_in_order(slip, low, high, says):
+    band = {"slip": slip, "low": low, "high": high}
+    _refuse_bad_band({"slip": [0.1, 0.2], "low": [0.3, 0.4], "high": [0.4, 0.5]}, "s.json", "soil a")
+    with pytest.raises(InputError, match=says):
+        _refuse_bad_band(band, "s.json", "soil a")
 
 
 @pytest.mark.parametrize("parameters", [{"p": 1.0}, ["a"], None])

@@ -40,6 +40,14 @@ def test_a_windows_level_is_the_mean_of_its_wheels_by_their_spread() -> None:
         np.testing.assert_allclose(residual[n], rest - level[n] * lever)
 
 
+def test_torques_that_are_mostly_nothing_keep_a_noise_to_divide_by() -> None:
+    data = rows()
+    assert (
+        _Problem.of(replace(data, torque=np.where(np.arange(60)[:, None] % 3, 0.0, data.torque))).torque_noise
+        > 0
+    )
+
+
 def test_where_slip_hardly_changes_the_curve_is_the_prototypes() -> None:
     data = rows()
     flat = replace(data, slip=np.full_like(data.slip, 0.15))

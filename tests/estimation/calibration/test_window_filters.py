@@ -196,6 +196,14 @@ def test_stretches_of_track_are_a_fortieth_of_it_within_bounds(metres: float, st
     np.testing.assert_array_equal(track_blocks(windows), np.floor(windows.position[:, 0] / step).astype(int))
 
 
+def test_a_fortieth_is_of_all_logs_together() -> None:
+    """Of 300 m and 100 m: 10 m."""
+    windows = table(402, recording=np.repeat([0, 1], [301, 101]))
+    windows.position[:] = np.r_[0:301, 0:101].astype(float)[:, None]
+    expected = np.r_[np.arange(301) // 10, 31 + np.arange(101) // 10]
+    np.testing.assert_array_equal(track_blocks(windows), expected)
+
+
 def test_runs_of_windows_end_with_a_log_and_last_long_enough() -> None:
     wanted = np.array([1, 1, 0, 1, 1, 1, 1, 0, 1], dtype=bool)
     log = np.array([0, 0, 0, 0, 0, 1, 1, 1, 1])
@@ -247,6 +255,13 @@ def test_of_stops_the_most_that_agree_count_and_of_as_many_those_nearest_to_zero
     assert resting(unread, four, count, 0.0) == four[:4]
     both = np.column_stack([values[:, 0], np.repeat([0.0, 3.0, 0.0, 0.0, 0.0], 4)])
     assert resting(both, four[:2], count, 1.0) == four[:1]
+
+
+@pytest.mark.parametrize(("known", "told"), [(1, False), (2, True)])
+def test_a_mean_over_spells_needs_two_windows(known: int, told: bool) -> None:
+    values = np.where(np.arange(4) < known, 2.0, np.nan)
+    mean, error = zeros.spell_mean(values, [Spell(0, 3)], np.full(4, 100.0), 0.5)
+    assert (np.isfinite(mean), np.isfinite(error)) == (told, told)
 
 
 def test_a_yaw_rate_rests_at_its_mean_over_all_samples_of_standstill(vehicle: Vehicle) -> None:

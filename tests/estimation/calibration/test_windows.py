@@ -36,12 +36,12 @@ def test_stretches_of_track_are_of_one_log_and_follow_each_other(
 
 @pytest.mark.parametrize("axle", [0, 1])
 def test_where_one_axle_is_measured_the_other_takes_the_rest(axle: int, vehicle: Vehicle) -> None:
-    """In the second row nothing is measured: the static loads of 30, 30, 40 and 40 kg."""
-    none = np.zeros(2)
-    measured = np.full((2, 2), np.nan)
+    """In the other rows nothing is measured: the static loads of 30, 30, 40 and 40 kg."""
+    none = np.zeros(3)
+    measured = np.full((3, 2), np.nan)
     measured[0, axle] = 50.0 * GRAVITY
     load = wheel_loads(
         vehicle, drawbar=none, push=none, slope=none, spin_torque=none, lateral=none, measured=measured
     )
     rest = [25.0, 25.0, 45.0, 45.0] if axle == 0 else [45.0, 45.0, 25.0, 25.0]
-    np.testing.assert_allclose(load / GRAVITY, [rest, [30.0, 30.0, 40.0, 40.0]])
+    np.testing.assert_allclose(load / GRAVITY, [rest, *[[30.0, 30.0, 40.0, 40.0]] * 2])
