@@ -16,8 +16,10 @@ import pytest
 import terragrip as tg
 from small_fleet import VEHICLE, call, fleet, whole, write_log
 from terragrip.cli import main
+from terragrip.estimation import Estimates
 from terragrip.files import lock
 from terragrip.fleet.run import FleetResult
+from terragrip.ground.analysis import analyse
 
 Ran = Callable[..., tuple[int, str, str]]
 
@@ -281,6 +283,38 @@ def test_maps_of_logs_with_positions(place: Path, ran: Ran) -> None:
     assert "0 estimated, 3 unchanged" in ran(logs, "--map")[1]
     assert "3 estimated" in ran(logs)[1]
     assert not list((place / "out/cells").rglob("*.parquet"))
+
+
+def test_sections_and_events_of_logs(place: Path, ran: Ran) -> None:
+    """As `terragrip ground` finds them, a row each; a call without them takes them away again."""
+    for number, name in enumerate(("driven", "stopped")):
+        path = write_log(place / f"fields/{name}.csv", number)
+        table = pd.read_csv(path)
+        if name == "stopped":
+            still = [c for c in table if c.startswith(("wheel", "ground", "drive", "drawbar"))]
+            table.loc[300:600, still] = 0.0
+        table.to_csv(path, index=False)
+    logs = str(place / "fields/*.csv")
+    assert ran(logs, "--ground")[0] == 0
+    summary = pd.read_parquet(place / "out/summary.parquet").set_index("log")
+    assert (summary["no_ground"] == "").all()
+    for log, file in summary["file"].items():
+        ground, _ = analyse(Estimates.read(place / "out" / file), run=str(log))
+        for name, spans in (("sections", ground.sections), ("events", ground.events)):
+            there = place / "out" / file.replace("estimates/", f"{name}/", 1)
+            assert there.exists() == bool(spans)
+            if spans:
+                rows = pd.read_parquet(there, partitioning=None)
+                assert list(rows["start"]) == [span.start for span in spans]
+                assert list(rows["seconds"]) == [span.seconds for span in spans]
+                assert set(rows["log"]) == {log}
+    (events,) = [pd.read_parquet(one, partitioning=None) for one in (place / "out/events").rglob("stopped*")]
+    assert "standstill" in set(events["kind"])
+    assert events["why"].str.len().min() > 0
+
+    assert "0 estimated, 2 unchanged" in ran(logs, "--ground")[1]
+    assert "2 estimated" in ran(logs)[1]
+    assert not [*(place / "out/events").rglob("*.parquet"), *(place / "out/sections").rglob("*.parquet")]
 
 
 def test_a_scheduler_that_does_not_answer(place: Path) -> None:

@@ -70,6 +70,12 @@ def command(
     maps: Annotated[
         bool, typer.Option("--map", help="Map each log that has positions, too: OUT/cells.")
     ] = False,
+    ground: Annotated[
+        bool,
+        typer.Option(
+            "--ground", help="Find each log's sections of ground and its events, with reasons, too."
+        ),
+    ] = False,
     metrics: Annotated[
         Path | None,
         typer.Option(metavar="FILE.prom", help="Write the run's numbers for Prometheus's node exporter."),
@@ -120,6 +126,7 @@ def command(
             workers=workers,
             memory=memory,
             maps=maps,
+            ground=ground,
             progress=step,
         )
     if metrics is not None:

@@ -54,11 +54,15 @@ def settled(
 
 
 def _drop(store: Store, old: Note, keep: Note | None) -> None:
-    for kind in ("file", "cells"):
-        if old.get(kind) and (keep is None or keep[kind] != old[kind]):
-            store.remove(old[kind])
+    for name in sorted(_files(old) - (_files(keep) if keep else set())):
+        store.remove(name)
     store.remove(f"{NOTES}/{old['key']}.json")
     store.remove(f"{SAMPLES}/{old['key']}.parquet")
+
+
+def _files(note: Note) -> set[str]:
+    """A log's files in the data set."""
+    return {note["file"], *note.get("extra", {}).values()}
 
 
 def write_tables(store: Store, notes: Sequence[Note], reasons: Mapping[str, str]) -> None:
@@ -84,6 +88,7 @@ def write_tables(store: Store, notes: Sequence[Note], reasons: Mapping[str, str]
             ("notes", pa.string()),
             ("cells", pa.int64()),
             ("no_map", pa.string()),
+            ("no_ground", pa.string()),
         ]
     )
     rows = [{"log": n["log"], "key": n["key"], "file": n["file"], **n["summary"]} for n in notes]

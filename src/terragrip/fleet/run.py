@@ -50,6 +50,7 @@ def run_fleet(
     workers: int | None = None,
     memory: str | None = None,
     maps: bool = False,
+    ground: bool = False,
     progress: Callable[[int, int], None] | None = None,
 ) -> FleetResult:
     """Estimate logs into a data set (docs/fleet.md); what it holds already by the same log, vehicle, profile, method and version stays.
@@ -61,6 +62,7 @@ def run_fleet(
     method, smooth, dbc: as for :func:`terragrip.from_log.estimate_file`.
     scheduler: address of a Dask scheduler; None: ``workers`` processes here, each with ``memory`` ("2GB"; None: its share).
     maps: map each log with positions, too (`terragrip.fleet.cells`).
+    ground: find each log's sections and events, too (`terragrip.fleet.ground`).
     progress: called with logs done and logs in all.
 
     Raises
@@ -74,7 +76,9 @@ def run_fleet(
         check_address(scheduler)
     store = Store.at(output)
     store.check()
-    settings = Settings(method, smooth, tuple(str(path.absolute()) for path in dbc), __version__, maps)
+    settings = Settings(
+        method, smooth, tuple(str(path.absolute()) for path in dbc), __version__, maps, ground
+    )
     outcomes: list[Outcome] = []
     emit(logger, "fleet_started", logs=len(logs))
     try:

@@ -6,7 +6,7 @@ import hashlib
 import json
 import os
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,26 +17,29 @@ from terragrip.fleet.logs import FleetLog
 from terragrip.fleet.store import Store, fetched, safe_name
 
 if TYPE_CHECKING:
+    import pyarrow as pa
+
     from terragrip.fleet.tally import LogTally
 
 Result = TypeVar("Result")
 
 NO_DAY = "__HIVE_DEFAULT_PARTITION__"
 """The partition of logs that do not say when they were written: null to readers of Hive partitions."""
-NOTES, SAMPLES, ESTIMATES, CELLS = "state/logs", "state/samples", "estimates", "cells"
+NOTES, SAMPLES, ESTIMATES = "state/logs", "state/samples", "estimates"
 """Folders of a data set."""
 
 
 @dataclass(frozen=True)
 class Settings:
     """What all logs of a call share. ``version``: of the Terragrip that was called; workers must have the same. ``maps``: each log with
-    positions is mapped, too."""
+    positions is mapped, too; ``ground``: its sections and events are found, too."""
 
     method: str
     smooth: bool
     dbc: tuple[str, ...]
     version: str
     maps: bool = False
+    ground: bool = False
 
 
 @dataclass(frozen=True)
@@ -95,6 +98,9 @@ def _tried(log: FleetLog, step: Callable[..., Result], *given: Any) -> Result | 
 
 
 def _estimated(log: FleetLog, settings: Settings, store: Store, bench: Path, number: int) -> Outcome | _Made:
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
     from terragrip import __version__
     from terragrip.fleet.tally import LogTally
     from terragrip.from_log import estimate_file
@@ -110,8 +116,8 @@ def _estimated(log: FleetLog, settings: Settings, store: Store, bench: Path, num
         known = store.read(f"{NOTES}/{key}.json")
         if known is not None:
             return Outcome(log.name, json.loads(known))
-        local, thin, cells, note_file = (
-            bench / f"{number}{end}" for end in (".parquet", "-sample.parquet", "-cells.parquet", ".json")
+        local, thin, note_file = (
+            bench / f"{number}{end}" for end in (".parquet", "-sample.parquet", ".json")
         )
         tally = LogTally()
         estimate_file(
@@ -126,15 +132,14 @@ def _estimated(log: FleetLog, settings: Settings, store: Store, bench: Path, num
             observe=tally.add,
             summary=False,
         )
-    mapped, no_map = _mapped(local, cells, log.name) if settings.maps else (0, "")
-    note = make_note(log, key, settings, tally, mapped, no_map)
+    extra = Extra.of(local, log.name, settings)
+    note = make_note(log, key, settings, tally, extra)
     files = [(local, note["file"])]
-    if mapped:
-        files.insert(0, (cells, note["cells"]))
+    for name, table in extra.tables.items():
+        one = bench / f"{number}-{name}.parquet"
+        pq.write_table(table, one)
+        files.insert(0, (one, note["extra"][name]))
     if tally.sample:
-        import pyarrow as pa
-        import pyarrow.parquet as pq
-
         pq.write_table(pa.concat_tables([part.to_arrow() for part in tally.sample]), thin)
         files.insert(0, (thin, f"{SAMPLES}/{key}.parquet"))
     note_file.write_text(json.dumps(note), encoding="utf-8")
@@ -143,20 +148,37 @@ def _estimated(log: FleetLog, settings: Settings, store: Store, bench: Path, num
     return _Made(log.name, note, tuple(files), time.monotonic() - began)
 
 
-def _mapped(estimates: Path, cells: Path, log: str) -> tuple[int, str]:
-    """Write the cells of a log's map; how many there are, and why there is none where its positions cannot be."""
-    import pyarrow.parquet as pq
+@dataclass(frozen=True)
+class Extra:
+    """What a call may ask for beside a log's estimates: ``tables`` by the folder that they go into, and why a log has none of a kind."""
 
-    from terragrip.fleet.cells import cells_of_log
+    tables: Mapping[str, pa.Table]
+    no_map: str = ""
+    no_ground: str = ""
 
-    try:
-        table = cells_of_log(estimates, log)
-    except InputError as error:
-        return 0, " ".join(str(error).split())
-    if table is None:
-        return 0, "holds no positions"
-    pq.write_table(table, cells)
-    return table.num_rows, ""
+    @classmethod
+    def of(cls, estimates: Path, log: str, settings: Settings) -> Extra:
+        """Of a file of estimates."""
+        tables: dict[str, pa.Table] = {}
+        no_map = no_ground = ""
+        if settings.maps:
+            from terragrip.fleet.cells import cells_of_log
+
+            try:
+                cells = cells_of_log(estimates, log)
+            except InputError as error:
+                no_map = " ".join(str(error).split())
+            else:
+                no_map = "" if cells is not None else "holds no positions"
+                tables |= {} if cells is None else {"cells": cells}
+        if settings.ground:
+            from terragrip.fleet.ground import ground_of_log
+
+            try:
+                tables |= ground_of_log(estimates, log)
+            except InputError as error:
+                no_ground = " ".join(str(error).split())
+        return cls(tables, no_map, no_ground)
 
 
 def _put(made: Outcome | _Made, store: Store) -> Outcome:
@@ -168,13 +190,8 @@ def _put(made: Outcome | _Made, store: Store) -> Outcome:
     return Outcome(made.log, made.note, fresh=True, seconds=made.seconds + time.monotonic() - began)
 
 
-def make_note(
-    log: FleetLog, key: str, settings: Settings, tally: LogTally, mapped: int = 0, no_map: str = ""
-) -> dict[str, Any]:
-    """What the data set keeps of a log beside its estimates, ready for JSON: its row of the summary and those of its soils.
-
-    ``mapped``: cells of its map; ``no_map``: why it has none though one was asked for.
-    """
+def make_note(log: FleetLog, key: str, settings: Settings, tally: LogTally, extra: Extra) -> dict[str, Any]:
+    """What the data set keeps of a log beside its estimates, ready for JSON: its row of the summary, those of its soils, its files."""
     row = tally.row()
     day = str(row["start"])[:10] if row["start"] else None
     place = f"vehicle={safe_name(log.machine)}/day={day or NO_DAY}/{safe_name(log.name)}.parquet"
@@ -182,7 +199,7 @@ def make_note(
         "log": log.name,
         "key": key,
         "file": f"{ESTIMATES}/{place}",
-        "cells": f"{CELLS}/{place}" if mapped else None,
+        "extra": {name: f"{name}/{place}" for name in extra.tables},
         "sample": bool(tally.sample),
         "summary": {
             "vehicle": log.machine,
@@ -192,8 +209,9 @@ def make_note(
             "smooth": settings.smooth,
             "version": settings.version,
             **row,
-            "cells": mapped,
-            "no_map": no_map,
+            "cells": extra.tables["cells"].num_rows if "cells" in extra.tables else 0,
+            "no_map": extra.no_map,
+            "no_ground": extra.no_ground,
         },
         "soils": tally.soil_rows(),
     }
@@ -211,7 +229,7 @@ def key_of(log: FleetLog, source: Path, settings: Settings) -> str:
         "method": settings.method,
         "smooth": settings.smooth,
         "version": settings.version,
-        **({"maps": True} if settings.maps else {}),
+        **{name: True for name in ("maps", "ground") if getattr(settings, name)},
     }
     return hashlib.sha256(json.dumps(parts, sort_keys=True).encode()).hexdigest()
 
