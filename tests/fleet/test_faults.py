@@ -27,7 +27,7 @@ def until(condition: Callable[[], object]) -> None:
     end = time.monotonic() + PATIENCE
     while not condition():
         assert time.monotonic() < end, "it never happened"
-        time.sleep(0.02)
+        time.sleep(0.05)  # to look at all processes takes as long
 
 
 def at_work(place: Path, parent: int) -> list[psutil.Process]:

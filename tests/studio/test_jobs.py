@@ -29,7 +29,7 @@ def wait(
         job: dict[str, Any] = client.get(f"/api/jobs/{identity}").json()
         if job["state"] in until:
             return job
-        time.sleep(0.02)
+        time.sleep(0.1)  # each look costs this process some milliseconds
     raise AssertionError(f"the job did not end: {job}")
 
 

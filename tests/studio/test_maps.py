@@ -178,7 +178,7 @@ def test_a_map_is_made_as_a_job(client: TestClient, maps: Path, run: str, state:
         f"terragrip map {run}.parquet --cell=2 --slip=0.15 --datum=EPSG:4258 --output new.gpkg"
     )
     while job["state"] in ("queued", "running"):
-        time.sleep(0.05)
+        time.sleep(0.1)
         job = client.get(f"/api/jobs/{job['id']}").json()
     assert job["state"] == state, job
     if state == "failed":
