@@ -89,6 +89,7 @@ def test_a_full_disk_leaves_nothing(tmp_path: Path) -> None:
     done = subprocess.run(
         [*LAUNCH, "simulate", "constant", "-o", str(tmp_path / "out")],
         preexec_fn=limit,
+        env={**os.environ, "PYTHONDONTWRITEBYTECODE": "1"},  # which would be cut short, and stay so
         capture_output=True,
         text=True,
         check=False,

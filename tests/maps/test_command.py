@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -57,9 +58,15 @@ def test_a_geotiff_tells_what_was_driven_from_what_is_kriged(tmp_path: Path) -> 
 
 @pytest.mark.parametrize("name", ["map.gpkg", "map.tif", "map.geojson", "map.parquet", "map.png"])
 def test_a_disk_that_is_full_is_one_line_and_no_file(
-    estimates: Path, tmp_path: Path, name: str, capsys: pytest.CaptureFixture[str]
+    estimates: Path,
+    tmp_path: Path,
+    name: str,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     resource = pytest.importorskip("resource")
+    # Python would cut short the byte code of what is imported here for the first time, and no later import reads that.
+    monkeypatch.setattr(sys, "dont_write_bytecode", True)
     soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
     resource.setrlimit(
         resource.RLIMIT_FSIZE, (2048, hard)
