@@ -178,6 +178,23 @@ def test_events_are_gone_through(page: Any, served: Served, folder: Path) -> Non
         )
 
 
+def test_a_press_is_not_lost_where_a_caption_arrives(page: Any, served: Served) -> None:
+    """The plane's caption takes lines above the list of events: not while something below is pressed."""
+    held: list[Any] = []
+    page.route(lambda url: "/drive/pairs" in url, lambda route: held.append(route))
+    with page.expect_request(lambda request: "/drive/pairs" in request.url):
+        open_drive(page, served)
+    box = page.locator("button[aria-label='Next event']").bounding_box()
+    page.mouse.move(box["x"] + box["width"] / 2, box["y"] + box["height"] / 2)
+    page.mouse.down()
+    for route in held:
+        route.continue_()
+    page.wait_for_selector("[data-pairs]:not([data-pairs='0'])")
+    page.mouse.up()
+    page.wait_for_selector(".sample strong")
+    page.wait_for_selector("#across-caption:has-text('samples')")
+
+
 def test_the_reason_of_an_event_is_read_whole(page: Any, served: Served, folder: Path) -> None:
     page.set_viewport_size({"width": 768, "height": 720})
     open_drive(page, served)

@@ -3,6 +3,7 @@
 import { columns } from "../ui/columns";
 import { fill, h } from "../ui/dom";
 import { tried } from "../ui/notes";
+import { onceReleased } from "../ui/press";
 import { AXES, type Layer } from "./along";
 import { formulaPanels, type Formula } from "./formulas";
 import type { Range } from "./gestures";
@@ -144,7 +145,8 @@ export class Across {
       if (found && time && across && up) all.push({ time, x: across, y: up, of: found.of ?? found.count, color: this.layers.length > 1 ? runColor(i) : "muted", label: layer.label });
     }
     const beyond = this.plane.show(all, { x, y, curve: this.wheel !== FREE });
-    this.caption.textContent = captionOf(all, beyond);
+    // its lines move all that is below, which a press may be on
+    onceReleased(document.body, () => (this.caption.textContent = captionOf(all, beyond)));
     this.element.dataset["pairs"] = String(all.reduce((sum, one) => sum + one.time.length, 0));
   }
 }
