@@ -42,7 +42,7 @@ _ALIKE = np.log(1.15)
 def filled(time: Floats, values: Floats) -> Floats:
     """Values (n,) on straight lines between those that are known."""
     known = np.isfinite(values)
-    return np.interp(time, time[known], values[known]) if known.any() else values
+    return np.interp(time, time[known], values[known]) if known.any() and not known.all() else values
 
 
 def agreement(time: Floats, yaw: Floats, other: Floats) -> float:

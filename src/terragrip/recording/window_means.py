@@ -11,6 +11,7 @@ Floats = npt.NDArray[np.float64]
 def window_means(values: Floats, place: npt.NDArray[np.intp], count: int) -> Floats:
     """Mean of the measured ``values`` (n,) in each of ``count`` windows, NaN where there are none; ``place`` (n,): each value's window."""
     known = np.isfinite(values)
-    number = np.bincount(place[known], minlength=count)
-    total = np.bincount(place[known], values[known], count)
+    if not known.all():
+        values, place = values[known], place[known]
+    number, total = np.bincount(place, minlength=count), np.bincount(place, values, count)
     return np.where(number > 0, total / np.maximum(number, 1), np.nan)
