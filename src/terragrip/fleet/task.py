@@ -94,7 +94,11 @@ def _tried(log: FleetLog, step: Callable[..., Result], *given: Any) -> Result | 
         reason = f"could not be read, or its estimates not be written ({error})"
     except Exception as error:  # noqa: BLE001 - whatever it is, it is this log's reason and no other's
         reason = f"a defect of Terragrip ({type(error).__name__}: {error})"
-    return Outcome(log.name, reason=" ".join(reason.split()))
+    return Outcome(log.name, reason=_in_one_line(reason))
+
+
+def _in_one_line(text: str) -> str:
+    return " ".join(text.split())
 
 
 def _estimated(log: FleetLog, settings: Settings, store: Store, bench: Path, number: int) -> Outcome | _Made:
@@ -167,7 +171,7 @@ class Extra:
             try:
                 cells = cells_of_log(estimates, log)
             except InputError as error:
-                no_map = " ".join(str(error).split())
+                no_map = _in_one_line(str(error))
             else:
                 no_map = "" if cells is not None else "holds no positions"
                 tables |= {} if cells is None else {"cells": cells}
@@ -177,7 +181,7 @@ class Extra:
             try:
                 tables |= ground_of_log(estimates, log)
             except InputError as error:
-                no_ground = " ".join(str(error).split())
+                no_ground = _in_one_line(str(error))
         return cls(tables, no_map, no_ground)
 
 
