@@ -1,6 +1,6 @@
 """A report page as PDF, set by Typst from the page's own parts: with an outline, tags for screen readers, and fonts that come along.
 
-matplotlib's DejaVu Sans is embedded, so the PDF reads alike on a machine without fonts (docs/decisions/0136).
+matplotlib's DejaVu Sans is embedded, so the PDF reads alike on a machine without fonts (docs/report.md).
 """
 
 from __future__ import annotations
