@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kernel_twin import Machine, Step, Tuning
+from kernel_twin.bank import BankUpdate
 from terragrip._kernel import ffi, lib
-from terragrip.estimation.reference import BankUpdate
 
 Array = NDArray[Any]
 Report = dict[str, Array]

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from kernel_filter import KernelFilter, Report, allocated, checked, ffi, lib, report, writable
 from kernel_twin import Step, TractionFilter, Tuning
-from terragrip.estimation.reference import smooth
+from kernel_twin.smoother import smooth
 
 Array = NDArray[Any]
 TOLERANCE = 1e-9

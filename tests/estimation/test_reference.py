@@ -12,15 +12,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from terragrip.estimation.reference import (
-    ExtendedKalmanFilter,
-    GaussianFilter,
-    KalmanFilter,
-    UnscentedKalmanFilter,
-    runge_kutta,
-    smooth,
-)
-from terragrip.estimation.reference.linear_algebra import cholesky, solve_positive, symmetric
+from kernel_twin.filters import ExtendedKalmanFilter, GaussianFilter, KalmanFilter, runge_kutta
+from kernel_twin.linear_algebra import cholesky, solve_positive, symmetric
+from kernel_twin.smoother import smooth
+from kernel_twin.unscented import UnscentedKalmanFilter
 
 ENGINES = ["linear", "extended", "unscented"]
 Array = NDArray[Any]

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from terragrip.estimation.reference import Bank, KalmanFilter
-from terragrip.estimation.reference.bank import mixture
+from kernel_twin.bank import Bank, mixture
+from kernel_twin.filters import KalmanFilter
 
 Array = NDArray[Any]
 

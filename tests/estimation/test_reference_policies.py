@@ -21,7 +21,8 @@ from kernel_twin import (
     memberships,
     supervise,
 )
-from terragrip.estimation.reference import AdaptiveFilter, KalmanFilter
+from kernel_twin.adaptation import AdaptiveFilter
+from kernel_twin.filters import KalmanFilter
 
 Array = NDArray[Any]
 

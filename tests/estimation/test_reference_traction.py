@@ -9,8 +9,8 @@ import pytest
 from numpy.typing import NDArray
 
 from kernel_twin import Considered, Constant, Input, Machine, Step, TractionFilter, TractionModel, Tuning
-from terragrip.estimation.reference import smooth
-from terragrip.estimation.reference.filters import jacobian
+from kernel_twin.filters import jacobian
+from kernel_twin.smoother import smooth
 
 Array = NDArray[Any]
 

@@ -1,7 +1,8 @@
 """The kernel in plain NumPy, written apart from it: the oracle that its tests compare it with.
 
-The filters themselves are :mod:`terragrip.estimation.reference`, which serves any model; here stand the machine's model, the
-filter with the kernel's arguments, its supervisor, the considered constants, slip from speeds alone, and the warning of immobilization.
+The filters, in any precision (`filters`, `unscented`, `adaptation`, `bank`, `smoother`), know nothing of machines; the machine's model,
+the filter with the kernel's arguments, its supervisor, the considered constants, slip from speeds alone and the warning of immobilization
+are put together from them.
 """
 
 from kernel_twin.consider import Considered, Constant

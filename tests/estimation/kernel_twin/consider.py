@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
+from kernel_twin.filters import Matrix, Prediction, Update, Vector
 from kernel_twin.traction import Input, TractionModel, with_constant_error
-from terragrip.estimation.reference.filters import Matrix, Prediction, Update, Vector
 
 COMPLEX_STEP = 1e-30
 """Im f(c + i h)/h is the derivative of an analytic f to rounding, without a difference."""

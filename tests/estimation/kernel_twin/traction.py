@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from terragrip.estimation.reference.filters import Matrix, Vector, runge_kutta
+from kernel_twin.filters import Matrix, Vector, runge_kutta
 from terragrip.physics.motion import ground_acceleration, specific_force, wheel_acceleration
 
 STEP_BOUND = 0.25

@@ -9,11 +9,9 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from kernel_twin.supervisor import RULES, DriveSupervisor, SpeedSupervisor
-from kernel_twin.traction import Input, Machine, TractionModel
-from terragrip.estimation.reference.adaptation import AdaptiveFilter
-from terragrip.estimation.reference.bank import Bank, BankUpdate
-from terragrip.estimation.reference.filters import (
+from kernel_twin.adaptation import AdaptiveFilter
+from kernel_twin.bank import Bank, BankUpdate
+from kernel_twin.filters import (
     ExtendedKalmanFilter,
     GaussianFilter,
     LinearObservation,
@@ -24,7 +22,9 @@ from terragrip.estimation.reference.filters import (
     Vector,
     score,
 )
-from terragrip.estimation.reference.unscented import UnscentedKalmanFilter
+from kernel_twin.supervisor import RULES, DriveSupervisor, SpeedSupervisor
+from kernel_twin.traction import Input, Machine, TractionModel
+from kernel_twin.unscented import UnscentedKalmanFilter
 from terragrip.physics.slip import slip
 
 TORQUE_FLOOR = 0.02

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from terragrip.estimation.reference.filters import (
+from kernel_twin.filters import (
     GaussianFilter,
     Matrix,
     Observation,

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from terragrip.estimation.reference.filters import (
+from kernel_twin.filters import (
     GaussianFilter,
     Matrix,
     Measurement,
@@ -18,7 +18,7 @@ from terragrip.estimation.reference.filters import (
     Transition,
     Vector,
 )
-from terragrip.estimation.reference.linear_algebra import cholesky, solve_positive
+from kernel_twin.linear_algebra import cholesky, solve_positive
 
 
 class UnscentedKalmanFilter(GaussianFilter):

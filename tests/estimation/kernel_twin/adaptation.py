@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from terragrip.estimation.reference.filters import (
+from kernel_twin.filters import (
     GaussianFilter,
     Matrix,
     Observation,
@@ -16,7 +16,7 @@ from terragrip.estimation.reference.filters import (
     Update,
     Vector,
 )
-from terragrip.estimation.reference.linear_algebra import cholesky, solve_lower, solve_positive
+from kernel_twin.linear_algebra import cholesky, solve_lower, solve_positive
 
 SMALLEST, LARGEST = 0.05, 50.0
 """Bounds of a_j (R)."""

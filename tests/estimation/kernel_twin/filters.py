@@ -1,7 +1,6 @@
 """What all Kalman filters share, and the two that work with matrices: linear and extended.
 
-Slow and readable: the oracle of the kernel and the place to try a model of one's own. All work in the
-precision of ``P0``: give it as ``numpy.longdouble`` and everything is computed so.
+Slow and readable. All work in the precision of ``P0``: give it as ``numpy.longdouble`` and everything is computed so.
 """
 
 from __future__ import annotations
@@ -15,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from terragrip.estimation.reference.linear_algebra import cholesky, solve_lower, solve_positive, symmetric
+from kernel_twin.linear_algebra import cholesky, solve_lower, solve_positive, symmetric
 
 Matrix = NDArray[Any]
 Vector = NDArray[Any]

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from terragrip.estimation.reference.filters import Matrix, Prediction, Vector
-from terragrip.estimation.reference.linear_algebra import solve_positive, symmetric
+from kernel_twin.filters import Matrix, Prediction, Vector
+from kernel_twin.linear_algebra import solve_positive, symmetric
 
 
 def smooth(
