@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 from collections.abc import Iterable
 from typing import Any
 
@@ -51,6 +52,20 @@ def _rebuild(
     problem: str, file: str | None, place: str | None, hint: str | None, page: str | None
 ) -> InputError:
     return InputError(problem, file=file, place=place, hint=hint, page=page)
+
+
+def system_error(error: BaseException) -> int | None:
+    """The system's number (errno) of a failure or of what caused it; Arrow and Polars put it into their text. None where there is none."""
+    cause: BaseException | None = error
+    while cause is not None:
+        number = getattr(cause, "errno", None)
+        if number is not None:
+            return int(number)
+        written = re.search(r"(?:errno|os error) (\d+)", str(cause), re.IGNORECASE)
+        if written:
+            return int(written[1])
+        cause = cause.__cause__
+    return None
 
 
 def nearest(name: str, known: Iterable[str]) -> str | None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import json
 import os
 from collections.abc import Callable
@@ -16,9 +17,12 @@ import pytest
 import terragrip as tg
 from small_fleet import VEHICLE, call, fleet, whole, write_log
 from terragrip.cli import main
+from terragrip.errors import InputError
 from terragrip.estimation import Estimates
 from terragrip.files import lock
+from terragrip.fleet.logs import FleetLog
 from terragrip.fleet.run import FleetResult
+from terragrip.fleet.task import Outcome, _tried
 from terragrip.ground.analysis import analyse
 
 Ran = Callable[..., tuple[int, str, str]]
@@ -245,14 +249,37 @@ def test_what_is_no_address_of_a_scheduler_is_one_line(
 
 def test_a_full_disk_is_no_success(place: Path, ran: Ran, monkeypatch: pytest.MonkeyPatch) -> None:
     """Each log's reason stands among the failures; a caller that looks at the exit code alone must see it too."""
-    reason = (
-        f"0.parquet: cannot be written (Error writing bytes to file. Detail: [errno 28] {os.strerror(28)})"
-    )
-    done = FleetResult(4, 0, {"drive0.csv": reason, "drive1.csv": "is damaged"}, 0, 4000, 0, (1.0,), (0.1,))
+    failed = {"drive0.csv": "kann nicht", "drive1.csv": "is damaged"}
+    done = FleetResult(4, 0, failed, 1, 0, 4000, 0, (1.0,), (0.1,))
     monkeypatch.setattr("terragrip.fleet.run.run_fleet", lambda *_, **__: done)
     code, _, errors = ran()
     assert (code, errors.count("\n")) == (2, 1)
     assert "1 of 6 logs found no space left" in errors
+
+
+@pytest.mark.parametrize(
+    ("error", "full"),
+    [
+        (OSError(errno.ENOSPC, "auf dem Gerät ist kein Platz mehr"), True),
+        (OSError(errno.EDQUOT, "quota"), True),
+        (OSError("Error writing bytes to file. Detail: [errno 28] whatever"), True),
+        (OSError(errno.EACCES, os.strerror(errno.ENOSPC)), False),
+        (InputError(f"holds the text {os.strerror(errno.ENOSPC)}"), False),
+    ],
+)
+def test_a_full_disk_is_known_by_its_number_and_not_by_a_text(error: Exception, full: bool) -> None:
+    log = FleetLog("drive0.csv", "drive0.csv", 1, "Heros", None, None)  # type: ignore[arg-type]
+
+    def wrapped() -> None:
+        raise InputError("cannot be written", file="0.parquet") from error
+
+    def plain() -> None:
+        raise error
+
+    for step in (wrapped, plain):
+        outcome = _tried(log, step)
+        assert isinstance(outcome, Outcome)
+        assert outcome.disk_full is full
 
 
 def test_maps_of_logs_with_positions(place: Path, ran: Ran) -> None:
@@ -321,7 +348,7 @@ def test_a_scheduler_that_does_not_answer(place: Path) -> None:
     code, _, errors = fleet(place, "--scheduler", "tcp://127.0.0.1:9")
     assert (code, errors.count("\n")) == (2, 1)
     assert "no scheduler answers at tcp://127.0.0.1:9" in errors
-    assert not list((place / "out").rglob("*.parquet"))
+    assert not (place / "out").exists(), "no empty folder with its lock"
 
 
 def test_a_store_that_cannot_be_reached(place: Path, refused: Refused) -> None:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import errno
 import os
-import re
 import sys
 import tempfile
 import traceback
@@ -12,7 +11,7 @@ from collections.abc import Sequence
 
 import typer
 
-from terragrip.errors import InputError
+from terragrip.errors import InputError, system_error
 
 UNUSABLE = 2
 DEFECT = 1
@@ -86,11 +85,8 @@ def _usage(failure: BaseException, words: Sequence[str]) -> str:
 
 
 def _refusal(failure: BaseException) -> str | None:
-    """The operating system said no. Arrow and Polars put its number into their text."""
-    number = getattr(failure, "errno", None)
-    if number is None:
-        match = re.search(r"(?:errno|os error) (\d+)", str(failure), re.IGNORECASE)
-        number = int(match.group(1)) if match else None
+    """The operating system said no."""
+    number = system_error(failure)
     if number not in _REFUSALS:
         return None
     place = getattr(failure, "filename2", None) or getattr(failure, "filename", None)

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import errno
-import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -131,10 +129,9 @@ def command(
         )
     if metrics is not None:
         _write_metrics(metrics, done, time.monotonic() - began)
-    unwritten = sum(os.strerror(errno.ENOSPC) in reason for reason in done.failed.values())
-    if unwritten:
+    if done.unwritten:
         raise InputError(
-            f"{unwritten} of {len(logs)} logs found no space left on the disk",
+            f"{done.unwritten} of {len(logs)} logs found no space left on the disk",
             file=output,
             place="--output",
             hint="free space and run again: what was estimated is kept",

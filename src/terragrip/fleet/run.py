@@ -26,12 +26,14 @@ SOILS, REPORT = "soils.json", "report.html"
 @dataclass(frozen=True)
 class FleetResult:
     """What a call did: logs estimated now, those that an earlier call had estimated alike, and of this call's logs the failures with
-    their reasons; ``kept``: logs of earlier calls that this one did not name; ``rows`` and ``restarts`` of the filter in the logs estimated
-    now, and of each of these its ``nis`` over what is expected and the ``seconds`` that it took a worker."""
+    their reasons, of which ``unwritten`` found no space on the disk; ``kept``: logs of earlier calls that this one did not name; ``rows``
+    and ``restarts`` of the filter in the logs estimated now, and of each of these its ``nis`` over what is expected and the ``seconds``
+    that it took a worker."""
 
     estimated: int
     unchanged: int
     failed: dict[str, str]
+    unwritten: int
     kept: int
     rows: int
     restarts: int
@@ -75,22 +77,21 @@ def run_fleet(
     if scheduler is not None:
         check_address(scheduler)
     store = Store.at(output)
-    store.check()
     settings = Settings(
         method, smooth, tuple(str(path.absolute()) for path in dbc), __version__, maps, ground
     )
     outcomes: list[Outcome] = []
     emit(logger, "fleet_started", logs=len(logs))
     try:
-        with store.alone():
+        # Who has no workers leaves no folder behind.
+        with workers_at(scheduler, workers or default_workers(), memory) as pool, store.alone():
             before, failed = known_notes(store)
-            with workers_at(scheduler, workers or default_workers(), memory) as pool:
-                for outcome in pool.run(logs, settings, store):
-                    outcomes.append(outcome)
-                    if outcome.note is None:
-                        emit(logger, "fleet_log_failed", log=outcome.log, reason=outcome.reason)
-                    if progress:
-                        progress(len(outcomes), len(logs) + 1)
+            for outcome in pool.run(logs, settings, store):
+                outcomes.append(outcome)
+                if outcome.note is None:
+                    emit(logger, "fleet_log_failed", log=outcome.log, reason=outcome.reason)
+                if progress:
+                    progress(len(outcomes), len(logs) + 1)
             notes, reasons = settled(store, before, failed, outcomes)
             _write(store, notes, reasons)
     except OSError as error:
@@ -103,6 +104,7 @@ def run_fleet(
         estimated=sum(one.fresh for one in outcomes),
         unchanged=sum(one.note is not None and not one.fresh for one in outcomes),
         failed={one.log: one.reason or "" for one in outcomes if one.note is None},
+        unwritten=sum(one.disk_full for one in outcomes),
         kept=sum(note["log"] not in named for note in notes),
         rows=sum(one["rows"] for one in fresh),
         restarts=sum(one["restart_events"] for one in fresh),

@@ -79,8 +79,9 @@ class Store:
     def alone(self) -> Iterator[None]:
         """Keep other calls on this machine from a folder; the lock goes with the process. A store elsewhere has no lock.
 
-        Raises InputError where another call works on the folder, OSError where the lock cannot be made.
+        Raises InputError where the store cannot be written, or another call works on the folder; OSError where the lock cannot be made.
         """
+        self.check()
         if not self.is_local:
             yield
             return

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import hashlib
 import json
 import os
@@ -12,7 +13,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
-from terragrip.errors import InputError
+from terragrip.errors import InputError, system_error
 from terragrip.fleet.logs import FleetLog
 from terragrip.fleet.store import Store, fetched, safe_name
 
@@ -44,8 +45,8 @@ class Settings:
 
 @dataclass(frozen=True)
 class Outcome:
-    """What became of a log: its ``note`` (`make_note`), or the ``reason`` why it has none. ``fresh``: it was estimated by this call, in
-    ``seconds``, reading and writing included.
+    """What became of a log: its ``note`` (`make_note`), or the ``reason`` why it has none; ``disk_full``: its estimates found no space.
+    ``fresh``: it was estimated by this call, in ``seconds``, reading and writing included.
     """
 
     log: str
@@ -53,6 +54,7 @@ class Outcome:
     reason: str | None = None
     fresh: bool = False
     seconds: float = 0.0
+    disk_full: bool = False
 
 
 @dataclass(frozen=True)
@@ -86,15 +88,19 @@ def _tried(log: FleetLog, step: Callable[..., Result], *given: Any) -> Result | 
     """What a step makes of its log, or the reason why it cannot."""
     try:
         return step(*given)
-    except InputError as error:
-        reason = str(error)
-    except MemoryError:
-        reason = "not enough memory; give --memory, or use a shorter log"
-    except OSError as error:
-        reason = f"could not be read, or its estimates not be written ({error})"
     except Exception as error:  # noqa: BLE001 - whatever it is, it is this log's reason and no other's
-        reason = f"a defect of Terragrip ({type(error).__name__}: {error})"
-    return Outcome(log.name, reason=_in_one_line(reason))
+        full = system_error(error) in (errno.ENOSPC, errno.EDQUOT)
+        return Outcome(log.name, reason=_in_one_line(_reason(error)), disk_full=full)
+
+
+def _reason(error: Exception) -> str:
+    if isinstance(error, InputError):
+        return str(error)
+    if isinstance(error, MemoryError):
+        return "not enough memory; give --memory, or use a shorter log"
+    if isinstance(error, OSError):
+        return f"could not be read, or its estimates not be written ({error})"
+    return f"a defect of Terragrip ({type(error).__name__}: {error})"
 
 
 def _in_one_line(text: str) -> str:
