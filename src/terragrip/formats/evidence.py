@@ -90,6 +90,14 @@ class Evidence:
         time, values = time[forward], values[forward]
         return (time, values) if len(time) >= 3 else None
 
+    def _fresh(self, name: str, fewest: int) -> Series | None:
+        """The series where its values change; None without time, or where there are fewer."""
+        result = self.series(name)
+        if result is None or not self._timed:
+            return None
+        fresh = np.concatenate(([True], np.diff(result[1]) != 0))
+        return (result[0][fresh], result[1][fresh]) if fresh.sum() >= fewest else None
+
     def at(self, name: str, instants: Floats) -> Floats | None:
         """Values of a column at ``instants`` (m,), on straight lines between its samples; NaN outside and in gaps."""
         out = self.series(name)
@@ -200,34 +208,24 @@ class Evidence:
     def fit(self, name: str, time: Floats, reference: Floats) -> tuple[float, float] | None:
         """Slope of a column over a ``reference`` (m,) at ``time`` (m,), and their correlation."""
         values = self.at(name, time)
-        if values is None:
-            return None
-        return slope_of(reference, values)
+        return None if values is None else slope_of(reference, values)
 
     def rate_of_angle(self, name: str, *, degrees: bool) -> Series | None:
         """The rate [rad/s] of an angle column that wraps."""
-        result = self.series(name)
-        if result is None or not self._timed:
+        result = self._fresh(name, 8)
+        if result is None:
             return None
-        time, angle = result
-        fresh = np.concatenate(([True], np.diff(angle) != 0))
-        time, angle = time[fresh], np.unwrap(np.radians(angle[fresh]) if degrees else angle[fresh])
-        if len(time) < 8:
-            return None
+        time, angle = result[0], np.unwrap(np.radians(result[1]) if degrees else result[1])
         steps = np.diff(time)
         good = steps <= _gap(time)
         return ((time[1:] + time[:-1]) / 2)[good], (np.diff(angle) / steps)[good]
 
     def derivative(self, name: str, factor: float = 1.0) -> Series | None:
         """The derivative of a column times ``factor``, over fresh values."""
-        result = self.series(name)
-        if result is None or not self._timed:
+        result = self._fresh(name, 10)
+        if result is None:
             return None
-        time, values = result
-        fresh = np.concatenate(([True], np.diff(values) != 0))
-        time, values = time[fresh], values[fresh] * factor
-        if len(time) < 10:
-            return None
+        time, values = result[0], result[1] * factor
         width = max(2, min(len(time) // 6, int(0.3 / max(float(np.median(np.diff(time))), 1e-3))))
         steps = time[width:] - time[:-width]
         good = steps <= width * _gap(time)

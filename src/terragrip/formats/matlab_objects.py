@@ -139,7 +139,7 @@ def _name_of(element: Mapping[str, Any]) -> str:
 def _series(held: Mapping[str, Any]) -> dict[str, Any] | None:
     about = _properties(held.get("TimeInfo"))
     time = _times(held, about)
-    data = next((d for d in map(_numeric, (held.get("Data_"), held.get("Data"))) if d is not None), None)
+    data = _first_numeric(held.get("Data_"), held.get("Data"))
     if time is None or data is None:
         return None
     count = len(time)
@@ -160,14 +160,13 @@ def _times(held: Mapping[str, Any], about: Mapping[str, Any]) -> npt.NDArray[np.
     """The instants (n,) [s] of a series, written out or as a regular clock."""
     text = plain(about.get("Units"))
     tick = TICKS.get(text.strip().lower(), 1.0) if isinstance(text, str) else 1.0
-    written = (about.get("Time_"), held.get("Time_"), held.get("Time"))
-    time = next((t for t in map(_numeric, written) if t is not None), None)
+    time = _first_numeric(about.get("Time_"), held.get("Time_"), held.get("Time"))
     if time is not None:
         return np.asarray(time, dtype=np.float64).ravel() * tick
     start, step, count = (_scalar(about.get(key)) for key in ("Start_", "Increment_", "Length"))
     if start is None or step is None or count is None or not 0 < count < 1e10:
         return None
-    data = next((d for d in map(_numeric, (held.get("Data_"), held.get("Data"))) if d is not None), None)
+    data = _first_numeric(held.get("Data_"), held.get("Data"))
     if data is None or int(count) not in data.shape:
         return None  # a damaged length would ask for any memory
     return np.asarray((start + step * np.arange(int(count))) * tick, dtype=np.float64)
@@ -178,14 +177,13 @@ def _properties(value: Any) -> Mapping[str, Any]:
     return held if isinstance(held, Mapping) else {}
 
 
-def _numeric(value: Any) -> npt.NDArray[Any] | None:
-    if isinstance(value, np.ndarray) and value.dtype.kind in "fiub" and value.size:
-        return np.asarray(value)
-    return None
+def _first_numeric(*values: Any) -> npt.NDArray[Any] | None:
+    """The first of some values that is an array of numbers."""
+    return next((v for v in values if isinstance(v, np.ndarray) and v.dtype.kind in "fiub" and v.size), None)
 
 
 def _scalar(value: Any) -> float | None:
-    array = _numeric(value) if isinstance(value, np.ndarray) else None
+    array = _first_numeric(value)
     return float(array.ravel()[0]) if array is not None and np.isfinite(array.ravel()[0]) else None
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any, BinaryIO
 
 from terragrip.formats.boundary import DAMAGE, LARGEST, as_far_as_it_goes, needed
-from terragrip.formats.messages import Parts, Topic, log_of
+from terragrip.formats.messages import Topic, log_of
 from terragrip.formats.registry import Databases, Format
 from terragrip.formats.ros_types import Types, bag_topic, unpacked
 from terragrip.formats.signals import SignalLog
@@ -100,7 +100,7 @@ def _add(topic: Topic, add: Add, receipt: float, content: bytes) -> None:
 def _channel(
     channel: Any, schema: Any, wanted: Wanted | None, topics: dict[str, Topic], types: Types
 ) -> tuple[Topic, Add | None]:
-    """The topic of a channel, and what takes its messages; None if its encoding is not known."""
+    """The topic of a channel (of several of one name the same), and what takes its messages; None if its encoding is not known."""
     encoding = channel.message_encoding
     if encoding in ("cdr", "ros1") and schema is not None:
         ros = bag_topic(channel.topic, wanted, topics)
@@ -109,7 +109,9 @@ def _channel(
         form = types.form(name, one=encoding == "ros1")
         return ros, lambda receipt, content: ros.push(receipt, unpacked(content), form)
     if encoding == "protobuf" and schema is not None:
-        topic = _topic(channel.topic, _parts_of_protobuf, _stamp_of_protobuf, getattr, wanted, topics)
+        topic = topics.setdefault(
+            channel.topic, Topic(channel.topic, _parts_of_protobuf, _stamp_of_protobuf, wanted, getattr)
+        )
         factory = needed("mcap_protobuf.decoder", "protobuf messages").DecoderFactory()
         try:
             decode = factory.decoder_for(encoding, schema)
@@ -118,22 +120,12 @@ def _channel(
                 raise
             return topic, None
         return topic, lambda receipt, content: topic.add(receipt, decode(content))
-    topic = _topic(channel.topic, _parts_of_json, _stamp_of_json, dict.__getitem__, wanted, topics)
+    topic = topics.setdefault(
+        channel.topic, Topic(channel.topic, _parts_of_json, _stamp_of_json, wanted, dict.__getitem__)
+    )
     if encoding == "json":
         return topic, lambda receipt, content: topic.add(receipt, json.loads(content))
     return topic, None
-
-
-def _topic(
-    name: str,
-    parts: Parts,
-    stamp: Callable[[Any], float | None],
-    field_of: Callable[[Any, str], Any],
-    wanted: Wanted | None,
-    topics: dict[str, Topic],
-) -> Topic:
-    """The topic of this name, of several channels the same one."""
-    return topics.setdefault(name, Topic(name, parts, stamp, wanted, field_of=field_of))
 
 
 def _parts_of_json(message: Any) -> Iterable[tuple[str, Any]]:

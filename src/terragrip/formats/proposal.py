@@ -31,7 +31,7 @@ def missing_channels(proposals: Collection[str], has_time: bool) -> list[str]:
     if not wheels and "wheel_based_speed" not in proposals:
         return notes  # nothing else matters
     without = [wheel for wheel in wheels if f"drive_torque_{wheel}" not in proposals]
-    if len(without) == len(wheels) and (wheels or "wheel_based_speed" in proposals):
+    if len(without) == len(wheels):
         notes.append(
             "No drive torque was found: slip, its zero-slip radius, distance and maps of slip can be had; adhesion, soil "
             "resistance, net traction and efficiency cannot, and no soil can be learned."

@@ -69,14 +69,15 @@ def _distinct(names: list[str]) -> tuple[str, ...]:
 
 
 def _column(name: str, cells: list[str], path: str) -> npt.NDArray[np.float64]:
-    try:
-        values = np.array([float(cell) for cell in cells])
-    except ValueError:
-        row = next(k for k, cell in enumerate(cells, start=1) if not _is_number(cell))
-        problem = f"{cells[row - 1]!r} is not a number"
-        raise InputError(
-            problem, file=path, place=f"column {name}, row {row}", hint="leave the row out"
-        ) from None
+    values = np.empty(len(cells))
+    for k, cell in enumerate(cells):
+        try:
+            values[k] = float(cell)
+        except ValueError:
+            place = f"column {name}, row {k + 1}"
+            raise InputError(
+                f"{cell!r} is not a number", file=path, place=place, hint="leave the row out"
+            ) from None
     bare = name.lstrip("_").lower()
     if bare == "time":
         whole = np.floor(values)
@@ -85,14 +86,6 @@ def _column(name: str, cells: list[str], path: str) -> npt.NDArray[np.float64]:
     if bare in ("lat", "long"):
         return (-values if bare == "long" else values) / 60
     return values
-
-
-def _is_number(cell: str) -> bool:
-    try:
-        float(cell)
-    except ValueError:
-        return False
-    return True
 
 
 def _units(names: tuple[str, ...], section: str) -> dict[str, str]:

@@ -137,9 +137,9 @@ def _text_by_python_can(
     can = needed("can", f"a {kind}")
 
     def parse(lines: Iterator[str], count: Count, frames: Frames) -> Iterator[Frame]:
-        raw = Numbered(lines)
-        own = asc_lines(raw, frames) if reader == "ASCReader" else raw
-        return by_python_can(getattr(can, reader)(io.StringIO()), own, raw, count, (*DAMAGE, can.CanError))
+        numbered: Iterator[Numbered] = enumerate(lines, 1)
+        own = asc_lines(numbered, frames) if reader == "ASCReader" else numbered
+        return by_python_can(getattr(can, reader)(io.StringIO()), own, count, (*DAMAGE, can.CanError))
 
     return _from_lines(path, kind, wanted, databases, parse)
 

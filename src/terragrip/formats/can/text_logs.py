@@ -15,6 +15,8 @@ from terragrip.formats.can.catalog import EXTENDED
 from terragrip.formats.can.frames import Frames
 
 Frame = tuple[float, int, bytes]
+Numbered = tuple[int, str]
+"""A line's number, and the line."""
 
 _TIME = r"\s*\((\d+\.\d+|\d{4}-\d\d-\d\d \d\d:\d\d:\d\d\.\d+)\)\s+\S+\s+"
 # (1600000000.000000) can0 18FE4800#0000030405060708 R
@@ -163,21 +165,6 @@ def _seconds(stamp: str) -> float:
     return date.timestamp() + float(f"0.{part}")
 
 
-class Numbered:
-    """Lines, with the number of the last one."""
-
-    def __init__(self, lines: Iterable[str]) -> None:
-        self._lines, self.number = iter(lines), 0
-
-    def __iter__(self) -> Numbered:
-        return self
-
-    def __next__(self) -> str:
-        line = next(self._lines)
-        self.number += 1
-        return line
-
-
 def frames_of(messages: Iterable[Any]) -> Iterator[Frame]:
     """The data frames among python-can's messages."""
     for message in messages:
@@ -187,11 +174,11 @@ def frames_of(messages: Iterable[Any]) -> Iterator[Frame]:
 
 
 def by_python_can(
-    reader: Any, lines: Iterable[str], raw: Numbered, count: Count, errors: tuple[type[Exception], ...]
+    reader: Any, lines: Iterable[Numbered], count: Count, errors: tuple[type[Exception], ...]
 ) -> Iterator[Frame]:
     """Frames of an ASC or TRC log by a ``reader`` of python-can, which goes on behind lines that it cannot read; those are counted.
 
-    ``lines`` are those of ``raw`` that are of use; ``errors``: what the reader raises. Its ``file`` is whatever gives lines.
+    ``errors``: what the reader raises. Its ``file`` is whatever gives lines.
     """
     is_asc = type(reader).__name__ == "ASCReader"
     remark = _ASC_REMARK if is_asc else _TRC_REMARK
@@ -199,10 +186,10 @@ def by_python_can(
 
     def fed() -> Iterator[str]:
         nonlocal number, shown, in_doubt
-        for line in lines:
+        for place, line in lines:
             if in_doubt:  # the reader made no frame of the one before, and said nothing
                 count.add(number, shown)
-            number, shown, in_doubt = raw.number, line, not remark.match(line)
+            number, shown, in_doubt = place, line, not remark.match(line)
             yield line
 
     reader.file = source = fed()
@@ -225,14 +212,14 @@ def by_python_can(
         count.add(number, shown)
 
 
-def asc_lines(lines: Iterable[str], frames: Frames) -> Iterator[str]:
+def asc_lines(lines: Iterable[Numbered], frames: Frames) -> Iterator[Numbered]:
     """The lines of an ASC log, for python-can to read, but those of frames that ``frames`` has no use for and counts.
 
     Stamps that count from the event before ("timestamps relative") are made to count from the start.
     """
     unwanted: dict[str, int | None] = {}
     base, relative, now = 16, False, 0.0
-    for line in lines:
+    for number, line in lines:
         cells = line.split(None, 3)
         if cells and cells[0].lower() == "base":
             base, relative = 10 if "dec" in line.lower() else 16, "relative" in line.lower()
@@ -250,7 +237,7 @@ def asc_lines(lines: Iterable[str], frames: Frames) -> Iterator[str]:
             elif (known := unwanted[name]) is not None:
                 frames.pass_by(known)
                 continue
-        yield line
+        yield number, line
 
 
 def _asc_identifier(text: str, base: int) -> int | None:
