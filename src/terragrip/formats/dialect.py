@@ -5,7 +5,9 @@ from __future__ import annotations
 import csv
 import io
 import re
+from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import islice
 
 from terragrip.errors import InputError
 from terragrip.text import HEAD
@@ -166,21 +168,17 @@ def _names_and_units(header: list[str]) -> tuple[tuple[str, ...], dict[str, str]
     return tuple(chosen), {c: u for c, (_, u) in zip(chosen, bare, strict=True) if u}
 
 
-def _skip_comments(data: bytes) -> int:
-    start = 0
+def _lines(data: bytes, start: int = 0) -> Iterator[tuple[int, int, bytes]]:
+    """Where each line begins and the next one does, and its content without blanks around it."""
     while start < len(data):
-        end = data.find(b"\n", start)
-        end = len(data) if end < 0 else end + 1
-        line = data[start:end].strip()
-        if line and not line.startswith(_COMMENTS):
-            return start
+        end = data.find(b"\n", start) + 1 or len(data)
+        yield start, end, data[start:end].strip()
         start = end
-    return start
 
 
 def _start_of(data: bytes) -> int:
     """Where the table starts: after comments, or with the last comment line where that is the header of the rows below it."""
-    start = _skip_comments(data)
+    start = next((at for at, _, line in _lines(data) if line and not line.startswith(_COMMENTS)), len(data))
     above = data[:start].rstrip()
     begin = above.rfind(b"\n") + 1
     last = _without_mark(above[begin:].decode("utf-8", "replace"))
@@ -206,9 +204,5 @@ def _without_mark(line: str) -> str:
 
 def _after_lines(data: bytes, start: int, count: int) -> int:
     """Position after ``count`` lines that are not blank."""
-    while count and start < len(data):
-        end = data.find(b"\n", start)
-        end = len(data) if end < 0 else end + 1
-        count -= bool(data[start:end].strip())
-        start = end
-    return start
+    ends = (end for _, end, line in _lines(data, start) if line)
+    return next(islice(ends, count - 1, None), len(data)) if count else start

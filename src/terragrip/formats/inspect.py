@@ -209,15 +209,10 @@ class Seen:
         if isinstance(log, SignalLog):
             base = log.instants()
             first = float(base[0]) if len(base) else 0.0
-            return cls(
-                {name: signal.values for name, signal in log.signals.items()},
-                {name: signal.unit for name, signal in log.signals.items() if signal.unit},
-                (TIME, "s"),
-                base - first,
-                {name: signal.time - first for name, signal in log.signals.items()},
-                since_1970=False,
-                whole=whole,
-            )
+            columns = {name: signal.values for name, signal in log.signals.items()}
+            units = {name: signal.unit for name, signal in log.signals.items() if signal.unit}
+            clocks = {name: signal.time - first for name, signal in log.signals.items()}
+            return cls(columns, units, (TIME, "s"), base - first, clocks, since_1970=False, whole=whole)
         numbers = {n: c.astype(np.float64) for n, c in log.columns.items() if c.dtype.kind in "fiub"}
         dates = tuple(n for n, c in log.columns.items() if c.dtype.kind == "M")
         stamp = find_time(numbers, dates, log.units, vocabulary)
@@ -226,22 +221,11 @@ class Seen:
             columns, repeats = merged(log.columns, stamp[0])
             log = replace(log, columns=columns)
         instants = None if stamp is None else _seconds(log.columns[stamp[0]], stamp[1])
-        large = (
-            stamp is not None
-            and len(numbers.get(stamp[0], ())) > 0
-            and _is_large(log.columns[stamp[0]], stamp[1])
+        since_1970 = stamp is not None and (
+            stamp[0] in dates
+            or any(abs(float(x)) * factor_to(stamp[1], "s") > SINCE_1970 for x in log.columns[stamp[0]][:1])
         )
-        dated = stamp is not None and stamp[0] in dates
-        return cls(
-            log.columns,
-            log.units,
-            stamp,
-            instants,
-            {},
-            since_1970=large or dated,
-            whole=whole,
-            repeats=repeats,
-        )
+        return cls(log.columns, log.units, stamp, instants, {}, since_1970, whole, repeats)
 
     def clock_of(self, name: str) -> Floats | None:
         """The instants of a column; None of the time column, which has no rate or noise of its own."""
@@ -286,10 +270,6 @@ def _recording(log: LogTable | SignalLog, profile: Profile | None) -> Recording:
     return recording_of(
         replace(log, signals={n: s for n, s in log.signals.items() if wants(n)}).table(), profile
     )
-
-
-def _is_large(column: npt.NDArray[Any], unit: str) -> bool:
-    return bool(abs(float(column[0])) * factor_to(unit, "s") > SINCE_1970)
 
 
 def _cause(error: InputError) -> str:

@@ -172,35 +172,10 @@ def _add_derived(
 ) -> None:
     """Ground speed from two velocities or positions, pitch from a quaternion, where no column is it."""
     pose = _quaternion(tuple(numbers))
+    speed = _derived_speed(proposals, numbers, columns, plane, pose)
+    if "ground_speed" not in proposals and speed is not None:
+        proposals["ground_speed"] = speed
     made_of_wheels = any("odometry" in columns[c].name.concepts for c in pose)
-    parts = _east_and_north(columns) or plane
-    if "ground_speed" not in proposals and parts:
-        unit = columns[parts[0]].unit
-        entry: dict[str, object] = {"norm_of": list(parts)} | (
-            {"unit": unit} if unit and unit != "m/s" else {}
-        )
-        doubt = "" if unit else "no unit is stated: m/s?"
-        proposals["ground_speed"] = Proposal(
-            entry, doubt, "", 0.8, ("two velocities in the plane",), (), unit
-        )
-    pair = _position_pair(numbers, columns)
-    if "ground_speed" not in proposals and pair is not None:
-        forward = {"quaternion": pose} if pose else _yaw(numbers, columns)
-        unit = columns[pair[0]].unit if columns[pair[0]].kind == "length" else None
-        entry = {"derivative_of": list(pair), "unit": unit or "m", "window": "0.5 s"}
-        entry |= {"forward": forward} if forward else {}
-        sign = "x forward at yaw 0?" if forward else "a heading under 'forward:' would give its sign"
-        asked = "" if unit else "positions in m? "
-        proposals["ground_speed"] = Proposal(
-            entry, asked + sign, "", 0.5, ("two positions",), (), unit or "m"
-        )
-    place = ("latitude", "longitude")
-    if "ground_speed" not in proposals and all(c in proposals and not proposals[c].doubt for c in place):
-        entry = {"derivative_of": [proposals[c].columns[0] for c in place], "unit": "deg", "window": "2 s"}
-        if all(proposals[c].entry.get("unit", "deg") == "deg" for c in place):
-            proposals["ground_speed"] = Proposal(
-                entry, "no speed: from positions?", "", 0.5, ("latitude and longitude",), (), "deg"
-            )
     if (
         "pitch" not in proposals
         and pose
@@ -210,6 +185,34 @@ def _add_derived(
         proposals["pitch"] = Proposal(
             {"pitch_of": pose}, "axes forward, left, up?", "", 0.5, ("a quaternion",)
         )
+
+
+def _derived_speed(
+    proposals: Mapping[str, Proposal],
+    numbers: Mapping[str, Floats],
+    columns: Mapping[str, Column],
+    plane: tuple[str, str] | tuple[()],
+    pose: list[str],
+) -> Proposal | None:
+    if parts := _east_and_north(columns) or plane:
+        unit = columns[parts[0]].unit
+        entry: dict[str, object] = {"norm_of": list(parts)}
+        entry |= {"unit": unit} if unit and unit != "m/s" else {}
+        doubt = "" if unit else "no unit is stated: m/s?"
+        return Proposal(entry, doubt, "", 0.8, ("two velocities in the plane",), (), unit)
+    if pair := _position_pair(numbers, columns):
+        forward = {"quaternion": pose} if pose else _yaw(numbers, columns)
+        unit = columns[pair[0]].unit if columns[pair[0]].kind == "length" else None
+        entry = {"derivative_of": list(pair), "unit": unit or "m", "window": "0.5 s"}
+        entry |= {"forward": forward} if forward else {}
+        sign = "x forward at yaw 0?" if forward else "a heading under 'forward:' would give its sign"
+        doubt = ("" if unit else "positions in m? ") + sign
+        return Proposal(entry, doubt, "", 0.5, ("two positions",), (), unit or "m")
+    place = [proposals[c] for c in ("latitude", "longitude") if c in proposals]
+    if len(place) < 2 or any(one.doubt or one.entry.get("unit", "deg") != "deg" for one in place):
+        return None
+    entry = {"derivative_of": [one.columns[0] for one in place], "unit": "deg", "window": "2 s"}
+    return Proposal(entry, "no speed: from positions?", "", 0.5, ("latitude and longitude",), (), "deg")
 
 
 def _east_and_north(columns: Mapping[str, Column]) -> tuple[str, str] | None:
