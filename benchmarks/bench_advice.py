@@ -26,7 +26,7 @@ from second_plant.plant import curves as second_curves
 from second_plant.result import result_of
 from terragrip.advice.analysis import advise
 from terragrip.advice.optimum import GRID, OverSlip, best_of, over_slip
-from terragrip.advice.samples import samples_by_soil
+from terragrip.advice.samples import GatheredSamples
 from terragrip.advice.slip_only import BAND
 from terragrip.estimation import estimate
 from terragrip.simulation import SimulationResult, families
@@ -102,7 +102,9 @@ def score(kind: Kind, seed: int, part: str) -> list[Row]:
     vehicle = result.vehicle
     estimates = estimate(result.recording, vehicle)
     advice, _ = advise([estimates], vehicle)
-    samples = samples_by_soil([estimates], vehicle)
+    gathered = GatheredSamples(vehicle)
+    gathered.add(estimates)
+    samples = gathered.by_soil()
     rows = []
     for soil, one in advice.items():
         if soil not in samples:

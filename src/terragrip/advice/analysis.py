@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from terragrip.advice.actions import Work, actions_for, gained
 from terragrip.advice.fuel import burnt
@@ -20,8 +19,6 @@ from terragrip.estimation.driveline import machine_of
 from terragrip.soil.library import Soil
 from terragrip.units import STANDARD_GRAVITY
 from terragrip.vehicle import Vehicle
-
-Array = NDArray[np.float64]
 
 LEAST_REACH = 0.02
 """Mean slip that the hardest pulls must reach: below it, slip's own error and the curve cannot be distinguished."""

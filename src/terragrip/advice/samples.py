@@ -105,16 +105,6 @@ class GatheredSamples:
         return {name: _joined(several) for name, several in sorted(self._parts.items())}
 
 
-def samples_by_soil(
-    tables: Iterable[Estimates], vehicle: Vehicle, soil: str | None = None
-) -> dict[str, Samples]:
-    """The usable rows of all tables, see `GatheredSamples`."""
-    gathered = GatheredSamples(vehicle, soil)
-    for estimates in tables:
-        gathered.add(estimates)
-    return gathered.by_soil()
-
-
 def _of_table(
     estimates: Estimates, vehicle: Vehicle, soil: str | None, number: int
 ) -> Iterable[tuple[str, Samples]]:

@@ -108,7 +108,7 @@ def estimated(
         )
         return
     passes = _Passes(progress, log.rows, log.from_disk + 1 + options.smooth)
-    known = survey_of(log, passes.first if log.from_disk else None)
+    known = survey_of(log, passes.of(0) if log.from_disk else None)
     passes.rows = known.rows
     alone = speeds_alone(known.sample.channels, vehicle)
     if not alone:
@@ -150,20 +150,12 @@ class _Passes:
 
     def of(self, number: int) -> Callable[[int], None]:
         """Progress of one pass, counted from 0."""
-        return lambda done: self._report_progress(number * self.rows + min(done, self.rows))
 
-    @property
-    def first(self) -> Callable[[int], None]:
-        """Progress of the first pass."""
-        return self.of(0)
+        def report(done: int) -> None:
+            if self._progress is not None:
+                self._progress(number * self.rows + min(done, self.rows), self.count * self.rows)
 
-    def done(self, count: int) -> None:
-        """This many passes are done."""
-        self._report_progress(count * self.rows)
-
-    def _report_progress(self, done: int) -> None:
-        if self._progress is not None:
-            self._progress(done, self.count * self.rows)
+        return report
 
 
 def _filtered(

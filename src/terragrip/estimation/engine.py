@@ -227,7 +227,7 @@ _STATUS = {
     5: "the estimate left the finite numbers",
     6: "the snapshot is damaged, or of another version or machine",
 }
-_MEND = {
+_HINTS = {
     2: "leave a value that was not measured empty (NaN)",
     4: "give samples in the order of time, each instant once",
     6: "start a new estimator",
@@ -236,7 +236,7 @@ _MEND = {
 
 def refusal(status: int, place: str | None) -> InputError:
     """The error for a tg_status that a sample or a snapshot came back with."""
-    return InputError(_STATUS.get(status, f"status {status}"), place=place, hint=_MEND.get(status))
+    return InputError(_STATUS.get(status, f"status {status}"), place=place, hint=_HINTS.get(status))
 
 
 def _pointer(values: Floats, first: int) -> Any:

@@ -161,7 +161,8 @@ class Estimates:
         """The whole table as an Arrow table without copies, with its metadata and each column's unit and description."""
         import pyarrow as pa
 
-        arrays: dict[str, Any] = {name: floats(values) for name, values in self._numbers()}
+        numbers = {"time": self.time, **self.columns}
+        arrays: dict[str, Any] = {name: floats(values) for name, values in numbers.items()}
         arrays |= {name: texts(values) for name, values in self.labels.items()}
         arrays["event"] = self._events()
         fields = [
@@ -172,10 +173,6 @@ class Estimates:
 
     def _events(self) -> pa.Array:
         return choices(self.event_codes, EVENTS)
-
-    def _numbers(self) -> Iterator[tuple[str, Floats]]:
-        yield "time", self.time
-        yield from self.columns.items()
 
     def metadata(self) -> bytes:
         """The metadata of a Parquet file: `about` and `notes` as JSON."""

@@ -9,14 +9,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
 from terragrip.estimation.rims import DRIVE, Rim, at_zero, calibrated_scale, rims_of
 from terragrip.estimation.zero_slip import REMEDY, Zero, zero_of
 from terragrip.recording import Recording
 from terragrip.vehicle import Vehicle
-
-Floats = npt.NDArray[np.float64]
 
 _MOVING = 0.1  # m/s
 _BLIND = 5  # rows with rims at rest while the vehicle moves

@@ -9,14 +9,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from terragrip.errors import InputError
-from terragrip.estimation.export import KINDS, TableWriter, require_room, require_suffix, writer_of
+from terragrip.estimation.export import TableWriter, require_room, require_suffix, writer_of
 from terragrip.files import replacing
 
 if TYPE_CHECKING:
     from terragrip.estimation.estimates import Estimates
-
-SUFFIXES = tuple(KINDS)
-"""Of the files that estimates are written to."""
 
 
 def write_parts(parts: Iterable[Estimates], path: str | os.PathLike[str]) -> None:

@@ -6,7 +6,6 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
-import numpy.typing as npt
 
 from terragrip.formats.candidates import Column, candidates_of, kind_of
 from terragrip.formats.evidence import (
@@ -19,8 +18,6 @@ from terragrip.formats.evidence import (
 from terragrip.formats.judgement import Guess
 from terragrip.formats.rims import Ranked, Rims, Way, surest
 from terragrip.units import factor_to
-
-Floats = npt.NDArray[np.float64]
 
 _KNOWN = ("Terragrip", "a signal")
 _SIDEWAYS = 15.0  # m/s^2, the 90 % quantile

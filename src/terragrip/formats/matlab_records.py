@@ -25,7 +25,6 @@ _OF_SIZE = {1: "1", 2: "2", 4: "4", 8: "8"}
 _FIXED = ("fixed-point", "scaled-double")
 _WIDEST = 1 << 16  # numbers of a sample
 _DAYS_TO_1970, _DAY = 719_529.0, 86_400.0
-_SERIES = ("timeseries", "timetable")
 
 IN_RECORDS = "Dataset saved with -v7.3"
 """Stands for a series whose samples are in records that are not there, or cannot be read."""

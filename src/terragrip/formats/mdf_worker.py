@@ -34,7 +34,8 @@ def work(path: str, out: Outlet) -> None:
 
 
 def _serve(file: Any, out: Outlet) -> None:
-    buses = [k for k, group in enumerate(file.groups) if _is_bus(group)]
+    flags = [getattr(group.channel_group, "flags", 0) for group in file.groups]
+    buses = [k for k, flag in enumerate(flags) if flag & _BUS_EVENT]
     names = _names(file, set(buses))
     units = {name: str(file.groups[g].channels[i].unit or "") for name, (g, i) in names.items()}
     out.send({"start": file.start_time.timestamp(), "units": units})
@@ -66,10 +67,6 @@ def _let_go(file: Any) -> None:
     mapped = getattr(getattr(file, "_mdf", None), "_file", None)
     if isinstance(mapped, mmap.mmap):
         mapped.madvise(mmap.MADV_DONTNEED)
-
-
-def _is_bus(group: Any) -> bool:
-    return bool(getattr(group.channel_group, "flags", 0) & _BUS_EVENT)
 
 
 def _names(file: Any, buses: set[int]) -> dict[str, tuple[int, int]]:

@@ -145,13 +145,9 @@ def _tolerance(clocks: list[Floats]) -> float:
     return SAME * min((s for s in spacings if s > 0), default=0.0)
 
 
-def _rises(rows: npt.NDArray[np.int32]) -> bool:
-    return bool((rows[1:] > rows[:-1]).all())
-
-
 def _spread(values: npt.NDArray[Any], rows: npt.NDArray[np.int32], length: int) -> npt.NDArray[Any]:
     if values.dtype.kind in "fiub":
-        if values.dtype == np.float64 and len(rows) == length and _rises(rows):
+        if values.dtype == np.float64 and len(rows) == length and (rows[1:] > rows[:-1]).all():
             return values  # measured at every instant
         result = np.full(length, np.nan)
         result[rows] = values

@@ -17,8 +17,6 @@ from terragrip.recording import Recording
 from terragrip.recording.lag import lag_between, speed_of
 from terragrip.recording.schema import TIME, unit_of
 
-Floats = npt.NDArray[np.float64]
-
 _REACH = 60.0  # s that clocks which both count from 1970 may differ by: leap seconds are 18 s, time zones are distinguished
 
 

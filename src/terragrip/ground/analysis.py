@@ -25,8 +25,6 @@ from terragrip.soil.library import SoilLibrary
 from terragrip.soil.signature import maker
 from terragrip.soil.transitions import settled
 
-Array = NDArray[np.float64]
-
 SURE = 0.5
 """Probability from which a change cuts a section."""
 

@@ -14,7 +14,6 @@ from terragrip.live.feed import Lost
 from terragrip.live.uri import Uri
 
 INTERFACES = ("socketcan", "vector", "virtual", "pcan", "kvaser", "slcan", "ixxat", "udp_multicast")
-EXTENDED = 1 << 31  # set in an identifier of 29 bits, as in a DBC
 
 
 def check(uri: Uri) -> str:

@@ -42,7 +42,8 @@ class FrameDecoder:
         key = identifier | EXTENDED if extended else identifier
         if extended and (group := group_of(key)) in (CONNECTION, DATA):
             whole = self._transport.add(group, source_of(key), (identifier >> 8) & 0xFF, data)
-            return {} if whole is None else self._fields(_identifier(whole[0], source_of(key)), whole[1])
+            # By the identifier that it would have in one frame.
+            return {} if whole is None else self._fields(EXTENDED | whole[0] << 8 | source_of(key), whole[1])
         message = self._catalog.message_of(key) if extended else None
         if message is not None and message.by_group and is_fast(message.key, message.length):
             whole = self._transport.add_fast(message.key, source_of(key), data)
@@ -59,13 +60,14 @@ class FrameDecoder:
             return {}
         raws = {field.name: _raw(field, data) for field, _ in plan}
         result: Fields = {}
-        by_name = {field.name: field for field, _ in plan}
         for field, names in plan:
             raw = raws[field.name]
-            if raw is None or not _chosen(field, raws) or raw in field.missing:
+            if raw is None or raw in field.missing:
+                continue
+            if field.selector is not None and raws.get(field.selector) not in field.chosen:
                 continue
             value = _physical(field, raw)
-            if field.reverse is not None and field.reverse in by_name and raws[field.reverse] == 0:
+            if field.reverse is not None and raws.get(field.reverse) == 0:
                 value = -value
             for name in names:
                 result[name] = value
@@ -74,21 +76,14 @@ class FrameDecoder:
     def _plan(self, key: int) -> list[tuple[Field, tuple[str, ...]]] | None:
         """The message's fields and the names of each."""
         message = self._catalog.message_of(key)
-        return (
-            None
-            if message is None
-            else [(field, self._names(message, field, key)) for field in message.fields]
-        )
+        if message is None:
+            return None
+        return [(field, self._names(message, field, key)) for field in message.fields]
 
     def _names(self, message: Message, field: Field, key: int) -> tuple[str, ...]:
         name = self._catalog.name(message, field)
         sender = of_sender(name, source_of(key)) if message.by_group else name
         return (name, sender) if sender != name and self._wants(sender) else (name,)
-
-
-def _identifier(group: int, source: int) -> int:
-    """The identifier that a message of several frames would have in one."""
-    return EXTENDED | group << 8 | source
 
 
 def _raw(field: Field, data: bytes) -> int | None:
@@ -101,10 +96,6 @@ def _raw(field: Field, data: bytes) -> int | None:
         position = 8 * (field.start // 8) + 7 - field.start % 8  # from the first byte's highest bit
         raw = int.from_bytes(data, "big") >> (8 * len(data) - position - field.length)
     return raw & ((1 << field.length) - 1)
-
-
-def _chosen(field: Field, raws: dict[str, int | None]) -> bool:
-    return field.selector is None or raws.get(field.selector) in field.chosen
 
 
 def _physical(field: Field, raw: int) -> float:

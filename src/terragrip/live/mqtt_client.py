@@ -60,7 +60,6 @@ class Connection:
         self._failure: Exception | None = None
         self._is_accepted = self._is_subscribed = False
         self._come = select.poll()
-        self._take = take
         client = self._client = Client(
             CallbackAPIVersion.VERSION2, uri.options.get("client"), reconnect_on_failure=False
         )
@@ -70,7 +69,9 @@ class Connection:
         client.connect_timeout = _PATIENCE
         client.max_inflight_messages = _UNACKNOWLEDGED
         client.on_connect, client.on_disconnect = self._accepted, self._disconnected
-        client.on_subscribe, client.on_message = self._subscribed, self._message
+        client.on_subscribe = self._subscribed
+        if take is not None:
+            client.on_message = lambda _, __, message: take(message.topic, bytes(message.payload))
 
     async def __aenter__(self) -> Self:
         client = self._client
@@ -197,10 +198,6 @@ class Connection:
             return
         self._is_subscribed = True
         self._moved.set()
-
-    def _message(self, _: object, __: object, message: Any) -> None:
-        if self._take is not None:
-            self._take(message.topic, message.payload)
 
     def _acknowledged(self, _: object, __: object, mid: int, *___: object) -> None:
         self.unacknowledged.pop(mid, None)

@@ -11,6 +11,7 @@ from __future__ import annotations
 import json
 import os
 from concurrent.futures import Executor, Future, ThreadPoolExecutor, wait
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -63,9 +64,8 @@ class Recorder:
         self._thread = thread or record_thread()
         self._is_shared = thread is not None
         self._closing: list[Future[None]] = []
-        self._thread.submit(
-            _load_parquet
-        )  # now, or it would hold up the estimates when the first segment closes
+        # Now, or it would hold up the estimates when the first segment closes.
+        self._thread.submit(import_module, "pyarrow.parquet")
         self._syncing: Future[None] | None = None
         self.opening: list[Output] = []  # what opening brought: that a run goes on
         self.rows_kept = 0  # by this process
@@ -194,7 +194,3 @@ class Recorder:
 def record_thread() -> ThreadPoolExecutor:
     """A thread for records: what one of them gives it is done in that order."""
     return ThreadPoolExecutor(1, thread_name_prefix="record")
-
-
-def _load_parquet() -> None:
-    import pyarrow.parquet  # noqa: F401

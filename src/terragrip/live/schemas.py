@@ -25,11 +25,8 @@ NAMES = {
 
 def schema_of(kind: str, columns: Iterable[str] = ()) -> dict[str, Any]:
     """The schema of a kind of message; of an estimate, with the vehicle's ``columns``."""
-    return {"title": NAMES[kind], "type": "object", "properties": _PROPERTIES[kind] | _columns(kind, columns)}
-
-
-def _columns(kind: str, columns: Iterable[str]) -> dict[str, Any]:
-    return dict.fromkeys(columns, _NUMBER) if kind == ESTIMATE else {}
+    own = dict.fromkeys(columns, _NUMBER) if kind == ESTIMATE else {}
+    return {"title": NAMES[kind], "type": "object", "properties": _PROPERTIES[kind] | own}
 
 
 _PROPERTIES: dict[str, dict[str, Any]] = {

@@ -8,7 +8,6 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 import numpy as np
-import numpy.typing as npt
 
 from terragrip.errors import InputError
 from terragrip.maps.anomalies import Anomaly, anomalies_of
@@ -25,8 +24,6 @@ if TYPE_CHECKING:
     from terragrip.estimation import Estimates
     from terragrip.soil.library import SoilLibrary
     from terragrip.vehicle import Vehicle
-
-Floats = npt.NDArray[np.float64]
 
 REFERENCE_SLIP = 0.2
 """Slip that adhesion is mapped at by default."""

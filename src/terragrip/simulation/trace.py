@@ -13,8 +13,6 @@ from terragrip.units import STANDARD_GRAVITY
 from terragrip.vehicle import Vehicle
 
 Floats = npt.NDArray[np.float64]
-Array = npt.NDArray[np.float64]
-
 SCALARS = (
     "time", "position", "speed", "acceleration", "drawbar", "slope", "gradient_force", "assist", "body_pitch",
     "body_pitch_rate", "heave_acceleration", "curvature", "driver_mode", "command", "tool1_position", "tool1_speed",

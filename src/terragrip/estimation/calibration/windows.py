@@ -125,7 +125,9 @@ def _windows_of(index: int, recording: Recording, vehicle: Vehicle, length: floa
         start=recording.time[0] + length * np.arange(n),
         count=samples("ground_speed"),
         torque_count=np.min(
-            [samples(f"drive_torque_{wheel}") for wheel in _driven(vehicle)] or [np.zeros(n)], axis=0
+            [samples(f"drive_torque_{w}") for w, on in zip(wheels, vehicle.driven, strict=True) if on]
+            or [np.zeros(n)],
+            axis=0,
         ),
         drawbar_count=samples("drawbar_force"),
         acceleration_count=samples("acceleration_x"),
@@ -205,10 +207,6 @@ def wheel_loads(
     shares = level - leaning * lateral[:, np.newaxis]
     static = vehicle.axle_mass[vehicle.wheel_axle] * GRAVITY * level
     return np.asarray(np.maximum(shares * axles[:, vehicle.wheel_axle], _LEAST_LOAD * static))
-
-
-def _driven(vehicle: Vehicle) -> list[str]:
-    return [wheel for wheel, driven in zip(vehicle.wheels, vehicle.driven, strict=True) if driven]
 
 
 def _rate(values: Floats, step: float) -> Floats:

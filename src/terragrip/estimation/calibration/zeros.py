@@ -54,11 +54,8 @@ def standstills(windows: Windows, vehicle: Vehicle) -> list[Spell]:
     standing = (np.abs(windows.ground_speed) < _STANDING) & np.all(rim < _STANDING, axis=1)
     least = int(np.ceil(_LEAST_STANDING / windows.length))
     stops = spells(standing, windows.recording, least)
-    return [Spell(s.first + (not _starts_a_log(s, windows)), s.last) for s in stops]
-
-
-def _starts_a_log(spell: Spell, windows: Windows) -> bool:
-    return spell.first == 0 or windows.recording[spell.first] != windows.recording[spell.first - 1]
+    begins = np.diff(windows.recording, prepend=-1) != 0
+    return [Spell(s.first + (not begins[s.first]), s.last) for s in stops]
 
 
 def spells(wanted: npt.NDArray[np.bool_], recording: npt.NDArray[np.intp], least: int) -> list[Spell]:
@@ -241,19 +238,17 @@ def inclination_zeros(
         own = max(own, _UNKNOWN_BIAS)
     share = own**2 / (own**2 + other**2)
     left = own * other / np.hypot(own, other)
-    if not pitched:
-        sentence = (
-            "mean at standstill, split between bias and slope by their priors: they cannot be distinguished"
-        )
-        bias = Quantity(
-            bias_key, share * total, float(np.hypot(share * error, left)), "m/s^2", rests_on, sentence
-        )
-        return [bias], [no_pitch]
-    sentence = "accelerometer less g sin(pitch) at standstill, split by the priors of the two zeros: only the difference is known"
-    rest = 1 - share
+    sentence = (
+        "mean at standstill, split between bias and slope by their priors: they cannot be distinguished"
+    )
+    if pitched:
+        sentence = "accelerometer less g sin(pitch) at standstill, split by the priors of the two zeros: only the difference is known"
     bias = Quantity(
         bias_key, share * total, float(np.hypot(share * error, left)), "m/s^2", rests_on, sentence
     )
+    if not pitched:
+        return [bias], [no_pitch]
+    rest = 1 - share
     tilt = -rest * total / GRAVITY
     pitch = Quantity(
         pitch_key, tilt, float(np.hypot(rest * error, left)) / GRAVITY, "rad", rests_on, sentence

@@ -88,8 +88,9 @@ def _trained(
         features = training.features[rows][:, [training.names.index(name) for name in fitting]]
         shared = _on_every_ground(features, codes)
         names, features = tuple(n for n, ok in zip(fitting, shared, strict=True) if ok), features[:, shared]
-        if not _differ(features[:, roles_of(names).machine]):
-            continue
+        judged = features[:, roles_of(names).machine]
+        if not np.isfinite(scale_about(centre_of(judged), judged)).any():
+            continue  # none differs from window to window
         _, renumbered = np.unique(folds[rows], return_inverse=True)
         windows = Examples(features, codes, training.groups[rows], training.starts[rows], renumbered)
         result.append(train(families, names, windows, threads=min(4, os.cpu_count() or 1), seed=seed))
@@ -110,11 +111,6 @@ def _on_every_ground(features: Floats, codes: npt.NDArray[np.intp]) -> npt.NDArr
     there = np.isfinite(features)
     shares = [there[codes == code].mean(axis=0) for code in np.unique(codes)]
     return np.asarray(np.min(shares, axis=0) >= _NEARLY_ALL)
-
-
-def _differ(features: Floats) -> bool:
-    """Whether any of the ``features`` (n, features) differs from window to window."""
-    return bool(np.isfinite(scale_about(centre_of(features), features)).any())
 
 
 def _nothing_to_learn(

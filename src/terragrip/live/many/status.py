@@ -29,7 +29,9 @@ def table(service: ManyService) -> Any:
     for name in names[:_MOST]:
         run = runs.get(name)
         numbers = ("—",) * 4 if run is None else _numbers(run)
-        shown.add_row(name, *numbers, unready.get(name) or _event(run))
+        last = None if run is None else run.statistics.last
+        event = "" if last is None else last.estimate.event or "driving"
+        shown.add_row(name, *numbers, unready.get(name) or event)
     parts: list[Any] = [Text(head), shown]
     if len(names) > _MOST:
         parts.append(Text(f"and {len(names) - _MOST} more"))
@@ -45,9 +47,3 @@ def _numbers(run: VehicleRun) -> tuple[str, str, str, str]:
     known = [slip for slip in slips if math.isfinite(slip)]
     slip = f"{100 * max(known):.0f}" if known else "—"
     return f"{s.row_rate:.0f}", f"{1e3 * s.delay:.1f}", f"{estimate.ground_speed:.2f}", slip
-
-
-def _event(run: VehicleRun | None) -> str:
-    return (
-        "" if run is None or run.statistics.last is None else run.statistics.last.estimate.event or "driving"
-    )

@@ -64,7 +64,10 @@ class Ros2Source:
             for topic, kind in self.topics.items():
                 peer.declare_subscriber(f"{self.domain}{topic}/*/*", self._typed(topic, received))
                 if kind:
-                    peer.declare_subscriber(topic.strip("/"), self._bridged(topic, kind, received))
+                    peer.declare_subscriber(
+                        topic.strip("/"),
+                        lambda sample, t=topic, k=kind: received(t, k, bytes(sample.payload)),
+                    )
             feed.connected()
             await asyncio.Event().wait()
 
@@ -75,9 +78,6 @@ class Ros2Source:
                 received(topic, kind, bytes(sample.payload))
 
         return listen
-
-    def _bridged(self, topic: str, kind: str, received: Receive) -> Callable[[Any], None]:
-        return lambda sample: received(topic, kind, bytes(sample.payload))
 
     async def _by_rclpy(self, feed: Feed, received: Receive) -> None:
         """Raw subscriptions, so that messages are read the same way on both paths."""

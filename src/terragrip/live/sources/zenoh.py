@@ -26,12 +26,10 @@ class ZenohSource:
         bridge = ThreadBridge(feed)
 
         def received(sample: Any) -> None:  # in a thread of Zenoh's
-            bridge.call(self._feed, feed, bytes(sample.payload), str(sample.key_expr))
+            data, topic = bytes(sample.payload), str(sample.key_expr)
+            bridge.call(lambda: feed.message(data, topic=topic))
 
         async with session(self.uri) as peer:
             peer.declare_subscriber(self.key, received)
             feed.connected()
             await asyncio.Event().wait()
-
-    def _feed(self, feed: Receiver, data: bytes, key: str) -> None:
-        feed.message(data, topic=key)
