@@ -161,8 +161,7 @@ class Engine:
                 ffi.cast("uint8_t *", event.ctypes.data + first),
                 done,
             )
-            if status != lib.TG_OK:
-                raise refusal(status, f"row {first + done[0] + 1}")
+            _require(status, f"row {first + done[0] + 1}")
             if progress is not None:
                 progress(last)
 
@@ -174,11 +173,9 @@ class Engine:
         """Take rows and return their records (n, length), for `smooth`."""
         records = np.empty((len(time), lib.tg_smooth_length(self.handle)))
         sources = _pointers({self.slots_in[k]: v for k, v in columns.items()}, lib.TG_SLOTS, 0)
-        status = lib.tg_estimator_record(
-            self.handle, len(time), _pointer(time, 0), sources, _pointer(records, 0)
+        _require(
+            lib.tg_estimator_record(self.handle, len(time), _pointer(time, 0), sources, _pointer(records, 0))
         )
-        if status != lib.TG_OK:
-            raise refusal(status, None)
         return records
 
     def smooth(
@@ -187,17 +184,16 @@ class Engine:
         """Overwrite ``out`` by the smoothed values; ``following`` is the record behind the last row."""
         targets = _pointers({self._slots_out[k]: v for k, v in out.items()}, lib.TG_OUT_SLOTS, 0)
         behind = ffi.NULL if following is None else _pointer(following, 0)
-        status = lib.tg_estimator_smooth(
-            self.handle, len(records), _pointer(records, 0), behind, _pointer(carry, 0), targets
+        rows = len(records)
+        _require(
+            lib.tg_estimator_smooth(
+                self.handle, rows, _pointer(records, 0), behind, _pointer(carry, 0), targets
+            )
         )
-        if status != lib.TG_OK:
-            raise refusal(status, None)
 
     def set_noise(self, settings: Any) -> None:
         """From the next sample on, the noise and the update periods of these settings; raises InputError on unusable ones."""
-        status = lib.tg_estimator_set_noise(self.handle, settings.noise, settings.held_period)
-        if status != lib.TG_OK:
-            raise refusal(status, None)
+        _require(lib.tg_estimator_set_noise(self.handle, settings.noise, settings.held_period))
 
     def new_ground(self) -> None:
         """Forget the adhesion curves: the ground is another one."""
@@ -212,11 +208,8 @@ class Engine:
 
     def restore(self, data: bytes) -> None:
         """Continue from a snapshot; raises InputError if it is damaged or another kernel's."""
-        status = lib.tg_estimator_restore(
-            self.handle, self._size, ffi.from_buffer("uint8_t[]", data), len(data)
-        )
-        if status != lib.TG_OK:
-            raise refusal(status, None)
+        bytes_of = ffi.from_buffer("uint8_t[]", data)
+        _require(lib.tg_estimator_restore(self.handle, self._size, bytes_of, len(data)))
 
 
 _STATUS = {
@@ -237,6 +230,11 @@ _HINTS = {
 def refusal(status: int, place: str | None) -> InputError:
     """The error for a tg_status that a sample or a snapshot came back with."""
     return InputError(_STATUS.get(status, f"status {status}"), place=place, hint=_HINTS.get(status))
+
+
+def _require(status: int, place: str | None = None) -> None:
+    if status != lib.TG_OK:
+        raise refusal(status, place)
 
 
 def _pointer(values: Floats, first: int) -> Any:
