@@ -232,11 +232,10 @@ def test_one_profile_stands_alone_and_several_in_a_list() -> None:
 def test_progress_counts_over_all_passes_and_never_beyond_the_rows() -> None:
     seen: list[tuple[int, int]] = []
     passes = _Passes(lambda *done: seen.append(done), 10, 3)
-    for tell, rows in ((passes.first, 4), (passes.of(1), 10), (passes.of(2), 99)):
+    for tell, rows in ((passes.of(0), 4), (passes.of(1), 10), (passes.of(2), 99)):
         tell(rows)
-    passes.done(2)
-    assert seen == [(4, 30), (20, 30), (30, 30), (20, 30)]
-    _Passes(None, 10, 3).first(4)
+    assert seen == [(4, 30), (20, 30), (30, 30)]
+    _Passes(None, 10, 3).of(0)(4)
     log, done = drive(2.0).recording, []
     list(estimated(LogBlocks.of(log, 90), robot(), progress=lambda *rows: done.append(rows)))
     assert done[-1] == (200, 200)

@@ -127,7 +127,7 @@ def _judged(ratio: Floats, fast: npt.NDArray[np.bool_]) -> Zero:
 
 
 def _error(ratio: Floats) -> float:
-    """SD of a median of windows (n,) of which neighbours hang together."""
+    """SD of a median of windows (n,) of which neighbours are correlated."""
     return float(np.hypot(1.2533 * _spread(ratio) / np.sqrt(len(ratio) / 2), _LIGHT))
 
 

@@ -33,15 +33,9 @@ class Broadcast:
         self.columns = tuple(columns)
         self.wheels = wheels_with("slip", columns)
         self._clients: list[Outbox] = []
-        self._dropped = 0
 
     def __len__(self) -> int:
         return len(self._clients)
-
-    @property
-    def dropped(self) -> int:
-        """Messages that slow clients missed."""
-        return self._dropped + sum(client.dropped for client in self._clients)
 
     def put(self, message: Message) -> None:
         """Queue a message for each client."""
@@ -79,7 +73,6 @@ class Broadcast:
                     )
         finally:
             self._clients.remove(client)
-            self._dropped += client.dropped
 
 
 def _named(kind: str, data: bytes) -> str:

@@ -201,7 +201,7 @@ class Core:
         return self._release(self.reorder.ready(now), [])
 
     def flush(self) -> list[Output]:
-        """The sources have ended: all rows go on, and no sample waits for another that confirms its stamp."""
+        """The sources have ended: all rows go on, and no sample waits any longer for another to confirm its stamp."""
         out: list[Output] = []
         for source, clock in enumerate(self.clocks):
             self._refuse_stamps(source, clock.give_up(), out)
@@ -267,7 +267,7 @@ class Core:
                 out.append(self._warning(estimate))
 
     def _report_changes(self, out: list[Output]) -> None:
-        """Events of channels that went and came."""
+        """Events of channels that stopped or came back."""
         for kind, source, channel in self.reorder.changes:
             text = f"{channel} no longer comes" if kind == "channel_lost" else f"{channel} comes again"
             out.append(Event(self.time, kind, self.settings.sources[source], text))
@@ -284,7 +284,7 @@ class Core:
         return Event(estimate.time, estimate.event, "estimator", text)
 
     def _lacking(self, first: Pending) -> list[Output]:
-        """An event where the first rows lack a wheel's speed, or bear wheels that the vehicle has not."""
+        """An event where the first rows lack a wheel's speed, or have wheels that the vehicle lacks."""
         if isinstance(self.estimator, EngineEstimator):
             return []
         seen = {name for row in (first, *self.reorder.pending) for name in row.values}

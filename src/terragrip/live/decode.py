@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 Values = dict[str, float]
 Sample = tuple[float | None, Values]
-"""Stamp [s] on the source's clock, None where the message bears none; and values."""
+"""Stamp [s] on the source's clock, None where the message has none; and values."""
 
 _HUGE = 1e300
 _NAMES = 1000  # of fields, beyond which a sender makes them up
@@ -43,7 +43,7 @@ class _Step:
 class Decoder:
     """Turns fields into samples; ``unreadable`` collects channels whose value was no number since it was last cleared.
 
-    Without a profile fields must bear the recording's own names, in SI, with ``time`` in s. ``units``: what the source
+    Without a profile fields must have the recording's own names, in SI, with ``time`` in s. ``units``: what the source
     itself states of its fields. Raises InputError where the profile needs what only a whole log can give.
     """
 

@@ -36,7 +36,7 @@ class Inbox:
         self._filled, self._room = asyncio.Event(), asyncio.Event()
 
     def put(self, source: int, stamp: float | None, values: Values, arrival: float | None = None) -> None:
-        """Add a sample, stamped by its arrival where it bears no stamp; drop it, counted, where there is no room."""
+        """Add a sample, stamped by its arrival where it has no stamp; drop it, counted, where there is no room."""
         if len(self.samples) >= self.capacity:
             self.values_dropped += len(values)
             self.count("dropped", values, source=source)

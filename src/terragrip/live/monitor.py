@@ -1,4 +1,4 @@
-"""What a monitoring system asks the running service: is it alive, does it get data."""
+"""Answers to a monitoring system: is the service alive, does it get data."""
 
 from __future__ import annotations
 

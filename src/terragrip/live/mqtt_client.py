@@ -1,4 +1,4 @@
-"""The connection to an MQTT broker, for source and sink: what there is to read or to write goes in one turn of the loop."""
+"""The connection to an MQTT broker, for source and sink: reads and writes are made in the event loop, many messages in one turn."""
 
 from __future__ import annotations
 
@@ -21,8 +21,8 @@ _KEEP = 1.0  # s between two looks at whether the broker is alive
 
 
 def check(uri: Uri, wild: bool = False) -> Credentials:
-    """Raise InputError on a missing host or topic, a wild card out of place (``wild``: some may stand), a CA that cannot be read, or a
-    password that would travel openly.
+    """Raise InputError on a missing host or topic, a wild card that is not allowed (``wild``: some are), a CA that cannot be read, or a
+    password that would be sent in plain text.
     """
     import paho.mqtt.client  # noqa: F401  # so that a missing package is said at once
 
@@ -56,10 +56,10 @@ class Connection:
         credentials, self._secure = check(uri, wild=True), uri.scheme == "mqtts"
         self._where = uri.host, uri.port or (8883 if self._secure else 1883)
         self._loop = asyncio.get_running_loop()
-        self._moved = asyncio.Event()  # something came of what is waited for
+        self._progress = asyncio.Event()  # set where anything that may be waited for has changed
         self._failure: Exception | None = None
         self._is_accepted = self._is_subscribed = False
-        self._come = select.poll()
+        self._poller = select.poll()
         client = self._client = Client(
             CallbackAPIVersion.VERSION2, uri.options.get("client"), reconnect_on_failure=False
         )
@@ -86,9 +86,9 @@ class Connection:
         link.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         self._number = link.fileno()
         client.on_socket_close = lambda *_: self._forget()
-        self._come.register(self._number, select.POLLIN)
+        self._poller.register(self._number, select.POLLIN)
         self._loop.add_reader(self._number, self._read)
-        self._timer = self._loop.call_later(_KEEP, self._keep)
+        self._timer = self._loop.call_later(_KEEP, self._keep_alive)
         try:
             async with asyncio.timeout(_PATIENCE):
                 await self._until(lambda: self._is_accepted)
@@ -148,15 +148,15 @@ class Connection:
         while not condition():
             if self._failure is not None:
                 raise self._failure
-            self._moved.clear()
-            await self._moved.wait()
+            self._progress.clear()
+            await self._progress.wait()
 
     def _read(self) -> None:
         """Take what has come, up to some messages; the loop calls again where there are more."""
         try:
             for _ in range(_AT_ONCE):
                 self._client.loop_read()  # a packet
-                if self._failure is not None or not (self._is_decrypted() or self._come.poll(0)):
+                if self._failure is not None or not (self._is_decrypted() or self._poller.poll(0)):
                     break
         except Exception as error:  # noqa: BLE001 - whatever `take` raised: to whom waits, not to the loop
             self._fail(error)
@@ -177,31 +177,31 @@ class Connection:
         self._client.loop_write()
         if self._failure is None and not self._client.want_write():
             self._loop.remove_writer(self._number)
-            self._moved.set()
+            self._progress.set()
 
-    def _keep(self) -> None:
+    def _keep_alive(self) -> None:
         self._client.loop_misc()
         if self._failure is None:
             self._await_room()
-            self._timer = self._loop.call_later(_KEEP, self._keep)
+            self._timer = self._loop.call_later(_KEEP, self._keep_alive)
 
     def _accepted(self, _: object, __: object, ___: object, reason: Any, *____: object) -> None:
         if reason.is_failure:
             self._fail(Lost(f"the broker: {reason}"))
             return
         self._is_accepted = True
-        self._moved.set()
+        self._progress.set()
 
     def _subscribed(self, _: object, __: object, ___: object, reasons: Any, *____: object) -> None:
         if reasons[0].is_failure:
             self._fail(Lost(f"the broker refuses the topic: {reasons[0]}"))
             return
         self._is_subscribed = True
-        self._moved.set()
+        self._progress.set()
 
     def _acknowledged(self, _: object, __: object, mid: int, *___: object) -> None:
         self.unacknowledged.pop(mid, None)
-        self._moved.set()
+        self._progress.set()
 
     def _disconnected(self, _: object, __: object, ___: object, reason: Any, *____: object) -> None:
         self._fail(Lost(f"the broker: the connection is lost ({reason})"))
@@ -209,7 +209,7 @@ class Connection:
     def _fail(self, why: Exception) -> None:
         if self._failure is None:
             self._failure = why
-        self._moved.set()
+        self._progress.set()
 
     def _forget(self) -> None:
         self._loop.remove_reader(self._number)

@@ -1,4 +1,4 @@
-"""The queue in front of a sink: bounded; where a sink is too slow the oldest go, and are counted."""
+"""The queue in front of a sink: bounded; where a sink is too slow the oldest messages are dropped, and counted."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ CAPACITY = 1000  # messages of one vehicle
 
 
 class Events(Protocol):
-    """Who wants to know of a sink that is lost, or back: an inbox, or a service of many vehicles."""
+    """Where a sink that is lost, or back, is reported: an inbox, or a service of many vehicles."""
 
     def event(self, kind: str, source: str, text: str) -> None: ...
 
@@ -116,7 +116,7 @@ class Outbox:
     def __len__(self) -> int:
         return self._size
 
-    async def emptied(self, timeout: float) -> None:
+    async def drained(self, timeout: float) -> None:
         """Wait until the sink has sent all, at most ``timeout`` s."""
         try:
             async with asyncio.timeout(timeout):

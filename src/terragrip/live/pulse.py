@@ -39,7 +39,7 @@ class Pulse:
 
     @property
     def period(self) -> float:
-        """s between two messages, lately."""
+        """Usual time between two messages [s], of the last ones."""
         return sorted(self._gaps)[len(self._gaps) // 2] if self._gaps else 0.0
 
     @property

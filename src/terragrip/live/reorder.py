@@ -254,7 +254,7 @@ class Reorder:
 
 
 def _complete(time: float, layout: _Layout) -> bool:
-    """Whether nothing is due that the row lacks, and each of its channels was known (a new one may belong to others that come)."""
+    """Whether the row lacks nothing that is due, and each of its channels was known (a new one may belong to others still to come)."""
     present, absent, known = layout
     for stream in present:
         if time > stream.calm and stream.awaited(time, True):

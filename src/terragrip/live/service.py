@@ -115,7 +115,7 @@ class Service:
         try:
             self.run_of_vehicle.open()
             await run_links(
-                sources, sinks, [self._stopping.wait(), self._estimate(), self._keep_house()],
+                sources, sinks, [self._stopping.wait(), self._estimate(), self._housekeeping()],
                 has_left=lambda: bool(self.inbox.samples), finish=self.run_of_vehicle.finish,
             )  # fmt: skip
         finally:
@@ -133,7 +133,7 @@ class Service:
                 await asyncio.sleep(PAUSE)
             self.run_of_vehicle.turn()
 
-    async def _keep_house(self) -> None:
+    async def _housekeeping(self) -> None:
         while True:
             await asyncio.sleep(HOUSEKEEPING)
-            self.run_of_vehicle.keep_house()
+            self.run_of_vehicle.housekeeping()

@@ -37,8 +37,8 @@ async def run_links(
     """
     gc.freeze()  # what is there now stays: the collector need not look at it again
     start = asyncio.create_task
-    feeding = [start(_again_and_again(run, lost)) for run, lost in sources]
-    sending = [start(_again_and_again(partial(sink.run, outbox), outbox.lost)) for sink, outbox in sinks]
+    feeding = [start(_restarted_when_lost(run, lost)) for run, lost in sources]
+    sending = [start(_restarted_when_lost(partial(sink.run, outbox), outbox.lost)) for sink, outbox in sinks]
     until_end = [start(_all_done(feeding, has_left)), *map(start, work)]
     try:
         await asyncio.wait([*until_end, *sending], return_when=asyncio.FIRST_COMPLETED)
@@ -48,7 +48,7 @@ async def run_links(
                 raise failure
         finish()
         for _, outbox in sinks:
-            await outbox.emptied(_LINGER)
+            await outbox.drained(_LINGER)
     finally:
         await cancelled([*feeding, *until_end, *sending])
         gc.unfreeze()
@@ -61,7 +61,7 @@ async def _all_done(sources: Sequence[Task], has_left: Callable[[], bool]) -> No
         await asyncio.sleep(PAUSE)
 
 
-async def _again_and_again(run: Run, lost: Callable[[str], None]) -> None:
+async def _restarted_when_lost(run: Run, lost: Callable[[str], None]) -> None:
     loop = asyncio.get_running_loop()
     pause = _BACKOFF[0]
     while True:

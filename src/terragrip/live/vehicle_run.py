@@ -34,7 +34,7 @@ logger = logging.getLogger("terragrip.live")
 
 
 class VehicleRun:
-    """Whoever runs it fills the inbox by ``feeds``, and calls `open`, then `turn` and `keep_house`, then `finish`.
+    """Whoever runs it fills the inbox by ``feeds``, and calls `open`, then `turn` and `housekeeping`, then `finish`.
 
     Parameters
     ----------
@@ -99,8 +99,8 @@ class VehicleRun:
         elif self.is_real_time:
             self._publish(self.pipeline.tick(self.inbox.clock()))
 
-    def keep_house(self) -> None:
-        """What is done ten times a second: the record written, silences and backlogs noticed, the status sent."""
+    def housekeeping(self) -> None:
+        """Ten times a second: write the record, notice silences and backlogs, send the status."""
         now = self.inbox.clock()
         self._publish(self.pipeline.write())
         if self.is_real_time:
@@ -124,7 +124,7 @@ class VehicleRun:
         self.announce()
 
     def announce(self) -> None:
-        """Send the status to whom it concerns."""
+        """Send the status to all listeners."""
         self._send(Message(STATUS, self.core.time, data=self.statistics.to_dict(), vehicle=self.name))
 
     def _publish(self, outputs: list[Output]) -> None:

@@ -13,11 +13,11 @@ from numpy.typing import NDArray
 from terragrip.report.runs import FloatArray, Run
 
 LENGTH = 30.0
-"""Seconds of a piece: longer than an implement, a bump or the filter are remembered, so that pieces count as independent."""
+"""Seconds of a piece: longer than an implement, a bump or the filter's memory have an effect, so that pieces count as independent."""
 FEWEST = 4.0
-"""Pieces (as many of equal length) under which their scatter tells no interval."""
+"""Pieces (as many of equal length) below which their scatter gives no interval."""
 UNSURE = 0.15
-"""SD of slip beyond which a row says nothing of it."""
+"""SD above which a row is no information on slip."""
 BANDS = (-np.inf, 0.0, 0.05, 0.10, 0.15, 0.20, 0.30, np.inf)
 """Edges of the slip bands."""
 BAND_NAMES = ("under 0", "0 to 5 %", "5 to 10 %", "10 to 15 %", "15 to 20 %", "20 to 30 %", "over 30 %")
@@ -47,8 +47,8 @@ class Blocks:
 
 @dataclass(frozen=True)
 class Share:
-    """What pieces of one label (or hour) say together: time [s], way [m], mean and 95 % half width of slip and adhesion, mean resistance,
-    seconds by slip band."""
+    """Totals and means of the pieces of one label (or hour): time [s], way [m], mean and 95 % half width of slip and adhesion, mean
+    resistance, seconds by slip band."""
 
     label: str
     seconds: float
@@ -97,7 +97,7 @@ def blocks_of(run: Run, labels: NDArray[np.object_] | None = None) -> Blocks:
 
 
 def shares(every: Sequence[Blocks], order: Sequence[str] | None = None) -> list[Share]:
-    """What the pieces of all runs say by label, in `order`, else the longest first; pieces without a label (transitions) are left out."""
+    """Totals and means of the pieces of all runs by label, in `order`, else the longest first, without those that have no label."""
     labels = {str(name) for one in every for name in one.label if name}
     result = [share_of(label, [(one, one.label == label) for one in every]) for label in labels]
     if order is not None:
@@ -106,7 +106,7 @@ def shares(every: Sequence[Blocks], order: Sequence[str] | None = None) -> list[
 
 
 def share_of(label: str, chosen: Sequence[tuple[Blocks, NDArray[np.bool_]]]) -> Share:
-    """What the chosen pieces say together."""
+    """Totals and means of the chosen pieces."""
 
     def joined(name: str) -> FloatArray:
         return np.concatenate([getattr(one, name)[rows] for one, rows in chosen])
@@ -127,7 +127,7 @@ def share_of(label: str, chosen: Sequence[tuple[Blocks, NDArray[np.bool_]]]) -> 
 
 
 def wheel_mean(run: Run, quantity: str) -> FloatArray:
-    """The mean of a quantity over the wheels of a run (n,), stuck rows and those that hardly know slip left out; NaN where none knows."""
+    """The mean of a quantity over the wheels of a run (n,), without stuck rows and those of a large SD of slip; NaN where none is left."""
     columns = [f"{quantity}_{wheel}" for wheel in run.wheels if f"{quantity}_{wheel}" in run.estimates]
     if not columns:
         return np.full(len(run.time), np.nan)

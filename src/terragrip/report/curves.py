@@ -37,7 +37,7 @@ SLIPS = np.linspace(0.0, 0.65, 131)
 
 @dataclass(frozen=True)
 class SoilCurves:
-    """One soil's curve as everyone tells it.
+    """One soil's curve by each source.
 
     `learned`: from these estimates, or as the library holds it. `paper`: the paper's soil of that name. `truth`: what a
     simulation made the soil with; `true_pairs`: the fit of `learned` on the simulation's true slip and adhesion; `true_by_slip`: the
@@ -77,7 +77,7 @@ def maxima(soil: Soil, tire_resistance: float) -> Maxima:
 
 
 def draw_fits(curves: Sequence[SoilCurves], columns: int = 2) -> str:
-    """An SVG: a plot a soil, bin means with SD bars, the fit and whatever else tells the curve."""
+    """An SVG: a plot for each soil, bin means with SD bars, the fit and every other source of the curve."""
     columns = min(columns, len(curves))
     rows = -(-len(curves) // columns)
     wide = columns > 1
@@ -106,11 +106,11 @@ def draw_both_maxima(curve: SoilCurves, tire_resistance: float) -> str:
     figure = new_figure(8.4, 4.2)
     with styled():
         plot = figure.subplots()
-        voices: list[tuple[str, Soil, dict[str, Any]]] = [("", curve.learned.soil, {"linewidth": 1.8})]
+        sources: list[tuple[str, Soil, dict[str, Any]]] = [("", curve.learned.soil, {"linewidth": 1.8})]
         if curve.truth is not None:
-            voices.append((" of the truth", curve.truth, {"linewidth": 0.9, "linestyle": "--"}))
+            sources.append((" of the truth", curve.truth, {"linewidth": 0.9, "linestyle": "--"}))
         slip = np.linspace(0.0, 1.0, 401)
-        for ending, soil, style in voices:
+        for ending, soil, style in sources:
             eta = _efficiency(soil, slip, tire_resistance)
             for label, values, color in (
                 ("adhesion µ", soil.value(slip), BLUE),

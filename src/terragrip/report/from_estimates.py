@@ -1,4 +1,4 @@
-"""The report of any set of estimates: what they hold is shown, what they lack is said."""
+"""The report of any set of estimates: it shows what they contain, and says what they lack."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ SHOWN = 2
 HOURLY = 1800.0
 """Seconds of a run from which on it is also given by the hour."""
 ALL = "the drive"
-"""What a run is called by that has neither labels nor positions."""
+"""The label of a run that has neither labels nor positions."""
 
 
 @dataclass(frozen=True)
@@ -72,7 +72,7 @@ class _Summary:
 
 @dataclass
 class _Gathered:
-    """What all runs say, gathered file after file."""
+    """The content of all runs, gathered file by file."""
 
     summaries: list[_Summary] = field(default_factory=list)
     shown: list[Run] = field(default_factory=list)

@@ -1,4 +1,4 @@
-"""Are the intervals honest? Coverage against the truth, and NIS against its chi-square law."""
+"""Whether the intervals have the coverage that they claim: coverage against the truth, and NIS against its chi-square law."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ def pooled(coverages: Sequence[Coverage]) -> list[Coverage]:
 
 
 def draw_coverage(coverages: Sequence[Coverage]) -> str:
-    """An SVG: observed against nominal coverage. Above the diagonal is careful, under it is too sure."""
+    """An SVG: observed against nominal coverage. Above the diagonal intervals are conservative, below it overconfident."""
     figure = new_figure(width=5.6, height=4.4)
     with styled():
         plot = figure.subplots()

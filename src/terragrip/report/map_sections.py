@@ -22,7 +22,7 @@ ROWS = 12
 
 @dataclass
 class GatheredMap:
-    """The runs of a report for its map: taken one by one; why the first that could not be was not."""
+    """The runs of a report for its map: added one by one; and why the first one that could not be mapped was left out."""
 
     maker: MapMaker | None = None
     refused: str = ""

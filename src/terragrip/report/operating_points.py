@@ -21,13 +21,13 @@ LEAST_ROWS = 100
 
 @dataclass(frozen=True)
 class Cross:
-    """Mean and SD of slip and traction over the rows of one soil, as one voice tells it.
+    """Mean and SD of slip and traction over the rows of one soil, by one source.
 
-    `voice` is ``measured``, ``estimated`` or ``true``.
+    `source` is ``measured``, ``estimated`` or ``true``.
     """
 
     soil: str
-    voice: str
+    source: str
     slip: float
     slip_std: float
     traction: float
@@ -36,42 +36,42 @@ class Cross:
 
 
 def section_crosses(run: Run, quantity: str) -> list[Cross]:
-    """A cross per section of `run` on one soil, of every voice there is.
+    """A cross per section of `run` on one soil, one for each source.
 
     `quantity` is ``adhesion`` or ``net_traction``, here and below.
     """
     crosses = []
-    voices = _voices(run, quantity)
+    sources = _sources(run, quantity)
     for soil, first, last in label_stretches(run.soil):
         rows = np.zeros(len(run.time), dtype=np.bool_)
         rows[first : last + 1] = True
         rows &= run.moving & ~run.stuck
-        crosses += [_cross(soil, voice, slip[rows], mu[rows]) for voice, slip, mu in voices]
+        crosses += [_cross(soil, source, slip[rows], mu[rows]) for source, slip, mu in sources]
     return [cross for cross in crosses if cross.count >= LEAST_ROWS]
 
 
 def soil_crosses(runs: Sequence[Run], quantity: str) -> list[Cross]:
-    """A cross per soil over all `runs` together, of every voice there is."""
+    """A cross per soil over all `runs` together, one for each source."""
     pool: dict[tuple[str, str], list[tuple[FloatArray, FloatArray]]] = {}
     for run in runs:
         counted = run.moving & ~run.stuck
-        for voice, slip, mu in _voices(run, quantity):
+        for source, slip, mu in _sources(run, quantity):
             for soil in run.soils:
                 rows: BoolArray = counted & (run.soil == soil)
-                pool.setdefault((soil, voice), []).append((slip[rows], mu[rows]))
+                pool.setdefault((soil, source), []).append((slip[rows], mu[rows]))
     crosses = [
-        _cross(soil, voice, np.concatenate([s for s, _ in parts]), np.concatenate([m for _, m in parts]))
-        for (soil, voice), parts in pool.items()
+        _cross(soil, source, np.concatenate([s for s, _ in parts]), np.concatenate([m for _, m in parts]))
+        for (soil, source), parts in pool.items()
     ]
     return [cross for cross in crosses if cross.count >= LEAST_ROWS]
 
 
-def draw_crosses(crosses: Iterable[Cross], voices: Sequence[str], what: str) -> str:
-    """An SVG of `crosses`: colour tells the soil, line and marker tell who speaks."""
-    shown = [cross for cross in crosses if cross.voice in voices]
+def draw_crosses(crosses: Iterable[Cross], sources: Sequence[str], what: str) -> str:
+    """An SVG of `crosses`: the colour shows the soil, line and marker show the source."""
+    shown = [cross for cross in crosses if cross.source in sources]
     soils = tuple(dict.fromkeys(cross.soil for cross in shown))
     looks: dict[str, Any] = {
-        "measured": ("x", ":" if len(voices) > 1 else "-", 1.0),
+        "measured": ("x", ":" if len(sources) > 1 else "-", 1.0),
         "estimated": ("o", "-", 1.7),
         "true": ("+", "-", 0.8),
     }
@@ -81,8 +81,8 @@ def draw_crosses(crosses: Iterable[Cross], voices: Sequence[str], what: str) -> 
 
         plot = figure.subplots()
         for cross in shown:
-            marker, line, width = looks[cross.voice]
-            color = INK if cross.voice == "true" else soil_color(cross.soil, soils)
+            marker, line, width = looks[cross.source]
+            color = INK if cross.source == "true" else soil_color(cross.soil, soils)
             bars = plot.errorbar(
                 cross.slip, cross.traction, xerr=cross.slip_std, yerr=cross.traction_std, fmt=marker,
                 color=color, linewidth=width, markersize=7 if marker != "o" else 5,
@@ -94,8 +94,8 @@ def draw_crosses(crosses: Iterable[Cross], voices: Sequence[str], what: str) -> 
             Line2D(
                 [], [], color=INK, marker=looks[v][0], linestyle=looks[v][1], linewidth=looks[v][2], label=v
             )
-            for v in voices
-            if any(cross.voice == v for cross in shown)
+            for v in sources
+            if any(cross.source == v for cross in shown)
         ]
         plot.legend(handles=keys, loc="upper left", bbox_to_anchor=(1.01, 1.0))
         plot.set_xlabel("slip s [–]")
@@ -104,28 +104,28 @@ def draw_crosses(crosses: Iterable[Cross], voices: Sequence[str], what: str) -> 
 
 
 def cross_table(crosses: Iterable[Cross], what: str) -> Table:
-    """Means by soil, the voices side by side, and how far the estimate's mean lies from the other two."""
+    """Means by soil, the sources side by side, and how far the estimate's mean lies from the other two."""
     by_soil: dict[str, dict[str, Cross]] = {}
     for cross in crosses:
-        by_soil.setdefault(cross.soil, {})[cross.voice] = cross
-    voices = [v for v in ("measured", "estimated", "true") if any(v in kinds for kinds in by_soil.values())]
-    others = [v for v in voices if v != "estimated"]
+        by_soil.setdefault(cross.soil, {})[cross.source] = cross
+    sources = [v for v in ("measured", "estimated", "true") if any(v in kinds for kinds in by_soil.values())]
+    others = [v for v in sources if v != "estimated"]
     named = {"measured": "sensor", "estimated": "estimated", "true": "true"}
     rows = []
     for soil, kinds in by_soil.items():
-        row = [soil, *(_spread(kinds.get(v)) for v in voices)]
+        row = [soil, *(_spread(kinds.get(v)) for v in sources)]
         row += [_apart(kinds.get("estimated"), kinds.get(v)) for v in others]
-        row += [number(kinds[v].slip) if v in kinds else "–" for v in voices]
+        row += [number(kinds[v].slip) if v in kinds else "–" for v in sources]
         rows.append(tuple(row))
     return Table(
         f"Mean ± SD of {what} and mean slip by soil."
-        + (" The sensor's column is its F_x/F_z, which follows κ." if "measured" in voices else "")
+        + (" The sensor's column is its F_x/F_z, which follows κ." if "measured" in sources else "")
         + " The paper finds its estimate of µ within .015 of its sensor on grass, wet and fine, and within .03 on coarse.",
         (
             "soil",
-            *(named[v] for v in voices),
+            *(named[v] for v in sources),
             *(f"est. − {named[v]}" for v in others),
-            *(f"s {v}" for v in voices),
+            *(f"s {v}" for v in sources),
         ),
         tuple(rows),
     )
@@ -139,8 +139,8 @@ def _apart(estimated: Cross | None, other: Cross | None) -> str:
     return number(estimated.traction - other.traction) if estimated and other else "–"
 
 
-def _voices(run: Run, quantity: str) -> list[tuple[str, FloatArray, FloatArray]]:
-    """(voice, slip, traction) of every voice there is. Estimates alone hold no measured slip: the sensor's traction then stands at the
+def _sources(run: Run, quantity: str) -> list[tuple[str, FloatArray, FloatArray]]:
+    """(source, slip, traction) one for each source. Estimates alone hold no measured slip: the sensor's traction then stands at the
     estimated one."""
     wheel = run.shown_wheel
     slip = run.estimated(f"slip_{wheel}")
@@ -150,14 +150,14 @@ def _voices(run: Run, quantity: str) -> list[tuple[str, FloatArray, FloatArray]]
         ("estimated", slip, run.estimated(f"{quantity}_{wheel}")),
         ("true", run.true(f"slip_{wheel}"), run.true(f"{quantity}_{wheel}")),
     ]
-    return [(voice, slip, mu) for voice, slip, mu in result if slip is not None and mu is not None]
+    return [(source, slip, mu) for source, slip, mu in result if slip is not None and mu is not None]
 
 
-def _cross(soil: str, voice: str, slip: FloatArray, mu: FloatArray) -> Cross:
+def _cross(soil: str, source: str, slip: FloatArray, mu: FloatArray) -> Cross:
     """Mean and SD, slip and adhesion each over its own finite rows: their sensors may run at other rates."""
     s, m = slip[np.isfinite(slip)], mu[np.isfinite(mu)]
     if min(len(s), len(m)) == 0:
-        return Cross(soil, voice, np.nan, np.nan, np.nan, np.nan, 0)
+        return Cross(soil, source, np.nan, np.nan, np.nan, np.nan, 0)
     return Cross(
-        soil, voice, float(s.mean()), float(s.std()), float(m.mean()), float(m.std()), min(len(s), len(m))
+        soil, source, float(s.mean()), float(s.std()), float(m.mean()), float(m.std()), min(len(s), len(m))
     )

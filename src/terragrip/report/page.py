@@ -13,7 +13,7 @@ from terragrip.report.style import in_page, on_paper
 
 @dataclass(frozen=True)
 class Picture:
-    """A figure: `name` (file stem), `svg` (document), `caption`, and `alt` (for who cannot see it)."""
+    """A figure: `name` (file stem), `svg` (document), `caption`, and `alt` (for readers who cannot see it)."""
 
     name: str
     svg: str

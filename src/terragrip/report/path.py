@@ -73,7 +73,7 @@ def positions(run: Run) -> tuple[FloatArray, FloatArray] | None:
 
 
 def draw(placed: Sequence[tuple[Run, NDArray[np.object_], tuple[FloatArray, FloatArray]]]) -> str:
-    """An SVG: a map a run."""
+    """An SVG: a map for each run."""
     every = tuple(dict.fromkeys(str(name) for _, own, _ in placed for name in own if name))
     wide = 9.6 / len(placed)
     tall = max(float(np.ptp(north)) / max(float(np.ptp(east)), 1e-3) for _, _, (east, north) in placed)

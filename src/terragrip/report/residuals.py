@@ -1,4 +1,4 @@
-"""Residuals of traction against a sensor and a truth: their histogram, and how soon they forget (whiteness)."""
+"""Residuals of traction against a sensor and a truth: their histogram, and how fast their autocorrelation decays (whiteness)."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ LAGS = 50
 
 @dataclass(frozen=True)
 class Residual:
-    """Estimate minus reference, of one voice: every judged row (n,) and every `STEP` seconds; None where it is not enough to be judged."""
+    """Estimate minus reference, of one source: every judged row (n,) and every `STEP` seconds; None where it is not enough to be judged."""
 
-    voice: str
+    source: str
     what: str
     values: FloatArray
     white: Whiteness | None
@@ -30,7 +30,7 @@ class Residual:
 def residuals(run: Run) -> list[Residual]:
     """kappa against the sensor and mu against the truth of the shown wheel, while it moves and is neither stuck nor pushed."""
     wheel, shown = run.shown_wheel, []
-    for voice, what, column, reference in (
+    for source, what, column, reference in (
         ("sensor", "κ − sensor", f"net_traction_{wheel}", run.measured_ratio()),
         ("truth", "µ − truth", f"adhesion_{wheel}", run.true(f"adhesion_{wheel}")),
     ):
@@ -39,7 +39,7 @@ def residuals(run: Run) -> list[Residual]:
         off = np.where(run.judged, run.estimated(column) - reference, np.nan)
         known = np.isfinite(off)
         if known.sum() > 2:
-            shown.append(Residual(voice, what, off[known], _white(run.time[known], off[known])))
+            shown.append(Residual(source, what, off[known], _white(run.time[known], off[known])))
     return shown
 
 
@@ -81,13 +81,13 @@ def section(run: Run) -> Section:
 
 
 def draw_residuals(shown: list[Residual]) -> str:
-    """An SVG: a row a voice would repeat the axes, so both voices share two plots."""
+    """An SVG: a row for each source would repeat the axes, so both sources share two plots."""
     figure = new_figure(9.6, 3.5)
     colors = {"sensor": MEASURED, "truth": TRUE}
     with styled():
         left, right = figure.subplots(1, 2)
         for one in shown:
-            color = colors[one.voice]
+            color = colors[one.source]
             low, high = np.percentile(one.values, [0.2, 99.8])
             heights, edges = np.histogram(one.values, bins=60, range=(low, high))
             density = heights / (len(one.values) * (edges[1] - edges[0]))

@@ -32,8 +32,8 @@ STUCK = ("stuck", "push")
 FLAGGED = ("standstill", "stuck", "push", "immobilization", "outlier")
 """Events whose rows say little of the ground; at standstill the estimates are held, not made."""
 BEFORE_STUCK = 1.0
-"""Seconds before a stuck or push event that belong to it: the jolt that stops the vehicle, and the time that the event waits
-until it is sure (`stuck_duration`, 0.5 s, docs/events.md)."""
+"""Seconds before a stuck or push event that belong to it: the deceleration to a stop, and the time before the event is
+reported (`stuck_duration`, 0.5 s, docs/events.md)."""
 LEAST_PUSH = 1.0
 """An operator's push that counts [N]."""
 AFTER_STUCK = 2.0

@@ -21,7 +21,7 @@ QUANTITIES = ("net_traction", "adhesion")
 SENSOR_RATIO = "sensor_ratio"
 """What the sensor reads if estimate or truth is right (physics.md 2): kappa over the load without the wheel, less its inertia."""
 TRUTH = "the truth itself"
-"""Stands in a method's place where the simulated truth is compared with the sensor."""
+"""Takes the place of a method's name where the simulated truth is compared with the sensor."""
 PARTS = ("whole", "without_outlier", "without_stuck", "without_flagged")
 """Which rows of a run are compared."""
 

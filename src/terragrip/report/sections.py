@@ -38,14 +38,14 @@ def tracking(run: Run, prose: Sequence[str] = ()) -> Section:
         lanes.insert(0, _lane(run, f"net_traction_{wheel}", f"net traction κ, {wheel} [–]", measured))
     sim = "Simulated run" if run.truth is not None else "Run"
     what = "net traction ratio κ (top) and adhesion µ (bottom)" if len(lanes) > 1 else "adhesion µ"
-    voices = _voices(lanes[0])
+    sources = _sources(lanes[0])
     whole = Picture(
         f"traction-{run.name}",
         timeline(run, lanes),
-        f"{sim} {run.name}, method {run.method}: {what} of wheel {wheel} over time: {voices}. The strip on top "
+        f"{sim} {run.name}, method {run.method}: {what} of wheel {wheel} over time: {sources}. The strip on top "
         "names the soil, grey is a transition (vehicle and tool on different soils)."
         + (" Shaded: the vehicle is stuck." if run.stuck.any() else ""),
-        f"Traction of wheel {wheel} over time in {run.name}: {voices}",
+        f"Traction of wheel {wheel} over time in {run.name}: {sources}",
     )
     start, end, about = _zoom(run)
     near = Picture(
@@ -72,7 +72,7 @@ def slip_and_resistance(run: Run) -> Section:
         f"slip-resistance-{run.name}",
         timeline(run, lanes),
         f"{sim} {run.name}, method {run.method}: slip of wheel {wheel} (top) and soil rolling resistance "
-        f"(bottom): {_voices(lanes[0])}. At standstill slip is undefined and the resistance held.{off}",
+        f"(bottom): {_sources(lanes[0])}. At standstill slip is undefined and the resistance held.{off}",
         f"Slip of wheel {wheel} and soil resistance over time in {run.name}",
     )
     return Section(f"slip-{run.name}", "Slip and soil resistance", (), (picture,))
@@ -132,15 +132,15 @@ def soils(run: Run, together: Sequence[Run]) -> Section:
     crosses = section_crosses(run, quantity)
     if not crosses:
         return Section("soils", title, omitted="Left out: no section of these runs carries a soil label.")
-    voice = next((v for v in ("measured", "estimated") if any(c.voice == v for c in crosses)), "estimated")
+    source = next((v for v in ("measured", "estimated") if any(c.source == v for c in crosses)), "estimated")
     pooled = soil_crosses(together, quantity)
-    text = names([v for v in ("measured", "estimated", "true") if any(c.voice == v for c in pooled)])
+    text = names([v for v in ("measured", "estimated", "true") if any(c.source == v for c in pooled)])
     sim = "simulated " if run.truth is not None else ""
     what = "net traction ratio κ" if quantity == "net_traction" else "adhesion µ"
     sections_picture = Picture(
         f"sections-{run.name}",
-        draw_crosses(crosses, (voice,), what),
-        f"Mean ± SD of slip and {what} ({voice}) of each section of the {sim}run {run.name} that lies on one "
+        draw_crosses(crosses, (source,), what),
+        f"Mean ± SD of slip and {what} ({source}) of each section of the {sim}run {run.name} that lies on one "
         f"soil, wheel {run.shown_wheel}; transitions and stuck spells left out.",
         f"Crosses of slip and traction by section of {run.name}",
     )
@@ -232,8 +232,8 @@ def _lane(
     """
     estimate, std, truth = run.estimated(column), run.estimated(f"{column}_std"), run.true(column)
     rows = run.moving & ~run.stuck if never_stuck else run.moving
-    voices = [estimate - 1.96 * std, estimate + 1.96 * std, truth, measured]
-    known = [v[rows & np.isfinite(v)] for v in voices if v is not None]
+    sources = [estimate - 1.96 * std, estimate + 1.96 * std, truth, measured]
+    known = [v[rows & np.isfinite(v)] for v in sources if v is not None]
     ends = [np.percentile(v, [0.3, 99.7]) for v in known if len(v)]
     limits = None
     if ends:
@@ -243,8 +243,8 @@ def _lane(
     return Lane(label, estimate, std, measured, truth, limits)
 
 
-def _voices(lane: Lane) -> str:
-    """Who speaks in a lane, in words."""
+def _sources(lane: Lane) -> str:
+    """The sources in a lane, in words."""
     notes = ["the estimate"] + (["its 95 % interval"] if lane.std is not None else [])
     notes += [
         "the simulated force sensor's F_x/F_z" if lane.truth is not None else "the force sensor's F_x/F_z"

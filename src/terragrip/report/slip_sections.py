@@ -17,7 +17,7 @@ _POINTS = 2000
 """Places that a map is drawn with."""
 _EDGES = (-0.05, 0.0, 0.05, 0.10, 0.15, 0.20, 0.30, 0.50, 1.0)
 _UNSURE = 0.15
-"""SD of slip beyond which a row says nothing of it."""
+"""SD above which a row is no information on slip."""
 
 
 def of(run: Run) -> tuple[Section, ...]:

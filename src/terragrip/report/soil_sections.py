@@ -90,7 +90,7 @@ def fits(curves: Sequence[SoilCurves], not_fitted: Mapping[str, str]) -> Section
             prose=missed,
         )
     first, rest = curves[0], curves[1:]
-    text = _voices(curves)
+    text = _sources(curves)
     alike = [
         one
         for one in curves
@@ -251,7 +251,7 @@ def _maxima_table(curves: Sequence[SoilCurves], tire_resistance: float) -> Table
     )
 
 
-def _voices(curves: Sequence[SoilCurves]) -> str:
+def _sources(curves: Sequence[SoilCurves]) -> str:
     both = _both(curves)
     notes = ["mean and SD of each bin" + " by pull and by slip" * both]
     notes += ["the fit" + " to those by pull" * both + " with its 95 % interval"] + [

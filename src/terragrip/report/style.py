@@ -47,10 +47,10 @@ ON_COLOR = "#101214"
 """Text on a patch of the palette, in either scheme."""
 
 MEASURED, ESTIMATED, TRUE = VERMILLION, BLUE, INK
-"""Colours of the three voices in every figure: the reference sensor, the estimate, the truth."""
+"""Colours of the three sources of a value in every figure: the reference sensor, the estimate, the truth."""
 
 SOIL_COLORS = {"hard": MUTED, "fine": ORANGE, "wet": SKY, "coarse": PURPLE, "grass": GREEN}
-"""None of them is a voice's."""
+"""None of them is the colour of a source."""
 PART_COLORS = {"work": GREEN, "headland": ORANGE, "road": SKY, "standing": PURPLE, "the drive": BLUE}
 """Of what a machine did (field_work.py)."""
 _SPARE_COLORS = (BLUE, VERMILLION, "#8d4b35", "#7f20df", "#cab472", "#a3bfdc", "#234e5c", "#72ca9e")

@@ -1,4 +1,4 @@
-"""The summary on top of a report, for who reads nothing else: what was driven, slip by label, what the ground allows, what is missing."""
+"""The summary on top of a report, for readers of nothing else: what was driven, slip by label, what the ground allows, what is missing."""
 
 from __future__ import annotations
 

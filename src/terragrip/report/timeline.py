@@ -44,7 +44,7 @@ class Lane:
 
 
 def timeline(run: Run, lanes: list[Lane], window: tuple[float, float] | None = None) -> str:
-    """An SVG with one plot a lane over a common time axis.
+    """An SVG with one plot for each lane over a common time axis.
 
     `window` zooms to (start, end) seconds. The interval drawn is ±1.96 SD, so about 95 %.
     """

@@ -14,7 +14,7 @@ from terragrip.soil.missing import in_words
 
 
 def trust(curves: Sequence[SoilCurves], not_fitted: Mapping[str, str] = NOTHING) -> Section:
-    """What the data fix and what not, whether the form follows them, what slip noise and varying ground do."""
+    """What the data determine and what they do not, whether the form of the curve fits them, what slip noise and varying ground do."""
     title = "How far the curves can be trusted"
     if not curves:
         return Section("trust", title, omitted=NONE_FITTED if not_fitted else NO_SOILS)
@@ -78,7 +78,7 @@ def what_is_missing(curves: Sequence[SoilCurves], not_fitted: Mapping[str, str] 
 
 
 def _nothing_missing(curves: Sequence[SoilCurves]) -> str:
-    """What full bins say, and what they do not: a count of samples, not how well a curve explains them."""
+    """What full bins mean, and what they do not: a count of samples, not how well a curve explains them."""
     sentence = "Every slip bin of every soil holds enough samples."
     poor = [
         f"{one.name} (R² {number(one.learned.soil.r2, 2)})"

@@ -33,7 +33,7 @@ def section(run: Run) -> Section | None:
 
 
 def draw(run: Run, shown: list[tuple[str, str]]) -> str:
-    """An SVG: a plot a quantity, a line a wheel."""
+    """An SVG: a plot for each quantity, a line for each wheel."""
     figure = new_figure(9.6, 0.7 + 2.2 * len(shown))
     with styled():
         plots = figure.subplots(len(shown), 1, sharex=True, squeeze=False)[:, 0]

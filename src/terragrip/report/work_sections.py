@@ -74,7 +74,7 @@ def by_hour(every: Sequence[Blocks]) -> Section:
 
 
 def draw_bands(result: Sequence[Share]) -> str:
-    """An SVG: a bar a label, its slip bands one after the other."""
+    """An SVG: a bar for each label, its slip bands one after the other."""
     figure = new_figure(9.6, 0.9 + 0.45 * len(result))
     with styled():
         from matplotlib import colormaps

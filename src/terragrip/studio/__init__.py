@@ -1,1 +1,1 @@
-"""The studio: a local web page where an engineer looks (FastAPI; the front end's sources are in web/)."""
+"""The studio: local web pages that show and compute drives (FastAPI; the front end's sources are in web/)."""

@@ -1,4 +1,4 @@
-"""A drive for the screen: which columns there are, what happened when, and why an estimate moved."""
+"""A drive for the screen: which columns there are, the events, and why an estimate changed."""
 
 from __future__ import annotations
 
@@ -114,7 +114,7 @@ def _is_of(recording: Recording, table: Estimates) -> bool:
 
 
 def sample(table: Estimates, recording: Recording | None, time: float) -> dict[str, Any]:
-    """Everything known of the sample nearest to `time`, and for each wheel what moved its adhesion."""
+    """Everything known of the sample nearest to `time`, and for each wheel what changed its adhesion."""
     row = int(np.clip(np.searchsorted(table.time, time), 0, len(table) - 1))
     if row and abs(table.time[row - 1] - time) < abs(table.time[row] - time):
         row -= 1
@@ -133,10 +133,10 @@ def sample(table: Estimates, recording: Recording | None, time: float) -> dict[s
 
 
 def why(table: Estimates, recording: Recording | None, row: int) -> list[str]:
-    """Why adhesion moved around a sample: a sentence a wheel, the wheel that moved most first.
+    """Why adhesion changed around a sample: a sentence for each wheel, the largest change first.
 
     Compares the half second before with the half second after by the torque balance of a wheel (physics.md 1):
-    mu = (M - J domega/dt - r rho_w omega)/(r F_z) - rho_t, one term changed at a time. Of slip alone: how that moved.
+    mu = (M - J domega/dt - r rho_w omega)/(r F_z) - rho_t, one term changed at a time. Of slip alone: how that changed.
     """
     before, after = _half_seconds(table.time, row)
     if before.stop - before.start < 2 or after.stop - after.start < 2:
@@ -153,7 +153,7 @@ def why(table: Estimates, recording: Recording | None, row: int) -> list[str]:
 
 
 def _of_slip(table: Estimates, wheel: str, before: slice, after: slice) -> str:
-    """How slip alone moved, and which of the speeds moved it; there is no torque, so no adhesion."""
+    """How slip changed, and which of the speeds changed it; there is no torque, so no adhesion."""
     moved = [
         _mean(table[name], after) - _mean(table[name], before)
         for name in (f"slip_{wheel}", f"wheel_speed_{wheel}", "ground_speed")

@@ -1,4 +1,4 @@
-"""What every open page hears: changes of the folder, progress of jobs, new calibrations."""
+"""Notices that every open page receives: changes of the folder, progress of jobs, new calibrations."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from terragrip.studio.folder import Folder, Item
 PERIOD = 1.0
 """Seconds between looks at the folder while a page is open."""
 BACKLOG = 256
-"""Notices that a page may lag behind before the oldest is dropped."""
+"""Notices that may wait for a slow page before the oldest is dropped."""
 
 
 class Notices:
@@ -23,7 +23,7 @@ class Notices:
         self._looked = asyncio.Event()
 
     async def join(self) -> asyncio.Queue[dict[str, Any]]:
-        """A queue that receives every notice from now on; the folder has been looked at, so that a change after this is noticed."""
+        """A queue that receives every notice from now on; the folder is listed first, so that any later change is noticed."""
         queue: asyncio.Queue[dict[str, Any]] = asyncio.Queue(BACKLOG)
         self._pages.add(queue)
         if self._watch is None:
@@ -37,7 +37,7 @@ class Notices:
         return queue
 
     def leave(self, queue: asyncio.Queue[dict[str, Any]]) -> None:
-        """Send no more to `queue`; with the last page gone nobody looks at the folder."""
+        """Send no more to `queue`; without pages the folder is no longer watched."""
         self._pages.discard(queue)
         if not self._pages and self._watch is not None:
             self._watch.cancel()

@@ -22,7 +22,7 @@ from terragrip.ground.events import events
 if TYPE_CHECKING:
     from terragrip.estimation import Estimates
 
-_REFUSED = 1008  # how a live service closes what asks for what it has not
+_REFUSED = 1008  # how a live service refuses a request for what it does not have
 PERIOD = 1 / 60
 """Seconds between messages: as often as a screen draws."""
 PATTERNS = (
@@ -111,7 +111,7 @@ def _soils(table: Estimates) -> list[dict[str, Any]]:
 
 
 async def relayed(address: str, token: str | None, vehicle: str = "") -> AsyncIterator[str | bytes]:
-    """Pass on a live service's messages, of one ``vehicle`` of many; ends when it goes.
+    """Pass on a live service's messages, of one ``vehicle`` of many; ends when the service does.
 
     Raises InputError where it cannot be reached, or has no such vehicle.
     """

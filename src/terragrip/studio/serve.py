@@ -54,7 +54,7 @@ def serve(
     as_json: bool = False,
     certificate: Certificate | None = None,
 ) -> None:
-    """Bind, say where the pages are, serve. InputError where the folder or the port is not to be had, or the token is too short.
+    """Bind, say where the pages are, serve. InputError where the folder or the port cannot be used, or the token is too short.
 
     `public`: the address by which a reverse proxy is reached. What comes through it comes from other machines, so a token is needed,
     though the studio itself stands on loopback. `as_json`: nothing is printed; events are logged, as are uvicorn's warnings.

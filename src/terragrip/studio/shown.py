@@ -23,7 +23,7 @@ LEVEL = 1.959964
 """Standard deviations of a 95 % interval."""
 MEASURED = "measured:"
 FORMULA = "="
-"""What a name begins with that is worked out, and of what: ``=slip_rl - slip_rr``."""
+"""What the name of a computed signal begins with: ``=slip_rl - slip_rr``."""
 MEAN = 1.0
 """Seconds over which NIS is averaged."""
 HELD = 8

@@ -1,4 +1,4 @@
-"""What a calibration may claim: what positions add to a log, what a value may be, and what is missing."""
+"""Limits of a calibration: what positions add to a log, the range of plausible values, and what is missing."""
 
 from __future__ import annotations
 

@@ -1,8 +1,8 @@
-"""Rolling radius of each wheel: ground speed over wheel speed, taken to zero adhesion.
+"""Rolling radius of each wheel: ground speed over wheel speed, extrapolated to zero adhesion.
 
 On a zero-pull straight pass the wheels still pull the vehicle's own rolling resistance, and slip a little for
-it: v/ω = r (1 - s). The model is that of physics.md 5 in its identifiable form without the falling part, turned
-round::
+it: v/ω = r (1 - s). The model is that of physics.md 5 in its identifiable form without the falling part, solved
+for slip::
 
     v/ω_i = r_i (1 - s),   s = -(A_j/C_j) ln(1 - μ_i/A_j)
 
@@ -215,7 +215,7 @@ def _fit(
     score = np.einsum("nwp,nw->np", rows, weight * scaled)
     rooted = rows * np.sqrt(weight)[..., None]
     informed = np.any(used, axis=1)
-    # Few blocks may look calmer than they are. What single windows scatter is a floor: blocks can only hang together.
+    # The scatter of few blocks may be too small by chance; that of single windows is a lower bound.
     variance = np.max(
         [
             np.diag(block_covariance(normal, rooted[informed], score[informed], labels, np.diag(prior)))

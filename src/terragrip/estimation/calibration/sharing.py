@@ -5,13 +5,13 @@ its gain. Model of the mean torque of wheel i over window n (physics.md 1, avera
 
     M_in = k_i (B_in + r_i F_in (m_n + d_n (s_in - s_n + (1 - s_in) e_i))) + o_i,   B = J dω/dt + r ρ_t F + r ρ_w ω
 
-m_n is the adhesion that all wheels have at the window's mean slip s_n, unknown anew in every window: so neither the noise of
+m_n is the adhesion that all wheels have at the window's mean slip s_n, an unknown of its own in every window: so neither the noise of
 ground speed, nor the curve's form, nor what the soil does to all wheels alike enters the gains. The curve is needed only
 for its steepness d_n, which carries the wheels' small differences of slip. Unknown are ln k_i (mean 0: a gain common to all
 wheels cannot be distinguished from m_n) and, with their priors, the relative radii e_i and the offsets o_i. Weighted least squares
 with Huber weights; (R), our own construction.
 
-Adhesion differs from place to place, so the errors of neighbouring windows hang together: the covariance is the sandwich
+Adhesion differs from place to place, so the errors of neighbouring windows are correlated: the covariance is the sandwich
 over blocks of track.
 """
 
@@ -250,11 +250,11 @@ class _Problem:
 
 
 def block_covariance(normal: Floats, jacobian: Floats, score: Floats, block: Ints, prior: Floats) -> Floats:
-    """Covariance (p, p) of a least-squares fit whose errors hang together within blocks: leave one block out (CR3).
+    """Covariance (p, p) of a least-squares fit whose errors are correlated within blocks: leave one block out (CR3).
 
     ``normal`` (p, p) with all priors; ``jacobian`` (n, w, p), times the root of the weights; ``score`` (n, p) weighted
     residual times Jacobian; ``block`` (n,) labels; ``prior`` (p, p) what the priors' own errors add. One step from the
-    optimum stands for each refit. Unlike the plain sandwich it does not flatter a fit that few blocks hold.
+    optimum stands for each refit. Unlike the plain sandwich it does not understate the variance of a fit that rests on few blocks.
     """
     labels, code = np.unique(block, return_inverse=True)
     count, size = len(labels), len(normal)

@@ -71,7 +71,7 @@ class Windows:
 def windows(recordings: Sequence[Recording], vehicle: Vehicle, length: float) -> Windows:
     """Cut recordings into windows of ``length`` [s].
 
-    Channels are taken as they stand: take held samples and zeros off before. Without ``drawbar_force`` it is 0.
+    Channels are taken as they are: remove held samples and zeros first. Without ``drawbar_force`` it is 0.
     """
     parts = [_windows_of(index, r, vehicle, length) for index, r in enumerate(recordings)]
     joined = {

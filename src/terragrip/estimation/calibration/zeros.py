@@ -1,7 +1,7 @@
 """Zeros of the sensors from standstill: torque, drawbar, accelerometer.
 
 All of them assume that what a sensor should read there is known: nothing drives or holds the wheels, the bar is slack,
-the ground is level or its slope is measured. Where the readings contradict that, nothing is claimed.
+the ground is level or its slope is measured. Where the readings contradict that, there is no result.
 """
 
 from __future__ import annotations
@@ -113,8 +113,8 @@ def spell_mean(values: Floats, stops: Sequence[Spell], count: Floats, noise: flo
 def resting(values: Floats, stops: Sequence[Spell], count: Floats, noise: float) -> list[Spell]:
     """The spells that read alike in all of ``values`` (n, k), within noise: the most numerous such group.
 
-    A zero is the same at every stop, what a drive holds or a bar keeps is not. Of groups of one size the one nearest to
-    zero is taken.
+    A zero is the same at every stop; a torque that holds the vehicle, or a tension in the bar, is not. Of groups of one size
+    the one nearest to zero is taken.
     """
     stops = [spell for spell in stops if np.isfinite(values[spell.rows]).any(axis=0).all()]
     if len(stops) < 2 or noise <= 0:

@@ -107,7 +107,7 @@ class ManyService:
                 self.vehicles.refuse(name, why)
             await run_links(
                 sources, list(zip(self.sinks, self.outboxes, strict=True)),
-                [self._stopping.wait(), self._estimate(), self._open(), self._keep_house()],
+                [self._stopping.wait(), self._estimate(), self._open(), self._housekeeping()],
                 has_left=lambda: bool(self.vehicles.ready), finish=self.vehicles.finish,
             )  # fmt: skip
         finally:
@@ -165,7 +165,7 @@ class ManyService:
             if self.vehicles.open_next():
                 await asyncio.sleep(loop.time() - began)
 
-    async def _keep_house(self) -> None:
+    async def _housekeeping(self) -> None:
         """Each vehicle ten times a second, a few at once."""
         vehicles = self.vehicles
         while True:
@@ -175,7 +175,7 @@ class ManyService:
                 await asyncio.sleep(HOUSEKEEPING / len(slices))
                 for run in some:
                     if vehicles.runs.get(run.name) is run:
-                        vehicles.guarded(run, run.keep_house)
+                        vehicles.guarded(run, run.housekeeping)
                         if not run.inbox.is_empty:
                             vehicles.ready[run.name] = run
                             vehicles.filled.set()

@@ -29,7 +29,7 @@ PREDICT = 10.0  # s of silence: a parked vehicle costs nothing after that
 RETRY = 30.0  # s after which a vehicle that was refused, or failed, may try again
 _WAITING = 256  # messages of a vehicle that is being opened
 _REMEMBERED = 1000  # vehicles that were refused
-_SAID = 5.0  # s between two events about names that are none
+_REPORT_EVERY = 5.0  # s between two events about names that are none
 _THREADS = 4  # for records
 _LENGTHS = 61  # of segments, from half the usual one to one and a half
 
@@ -82,7 +82,7 @@ class Vehicles:
         self.failures = 0
         self.filled, self.asked = asyncio.Event(), asyncio.Event()
         self._waiting: dict[str, deque[Waiting]] = {}
-        self._said = float("-inf")
+        self._reported = float("-inf")
         self.clock = steady_clock()
         self._closing = ExitStack()
         threads = [self._closing.enter_context(record_thread()) for _ in range(_THREADS if record else 0)]
@@ -133,7 +133,7 @@ class Vehicles:
                 if time.monotonic() < refusal.until:
                     return
             elif not is_name(name):
-                self._say_unnamed(name)
+                self._report_unnamed(name)
                 return
             why = self._no_room()
             if why is not None:
@@ -144,11 +144,11 @@ class Vehicles:
         if len(message[1]) <= MOST_BYTES:
             waiting.append(message)
 
-    def _say_unnamed(self, name: str) -> None:
+    def _report_unnamed(self, name: str) -> None:
         self.unnamed += 1
         now = time.monotonic()
-        if now - self._said >= _SAID:
-            self._said = now
+        if now - self._reported >= _REPORT_EVERY:
+            self._reported = now
             text = f"{name[:40]!r} in a topic is no name of a vehicle: letters, digits and _ - . alone"
             self.journal.event("vehicle_refused", "service", text)
 

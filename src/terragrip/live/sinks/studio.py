@@ -32,7 +32,7 @@ class Stream(Protocol):
 
 
 class Answers(Protocol):
-    """What tells of the service's state (`terragrip.live.monitor.Monitor`)."""
+    """What reports the service's state (`terragrip.live.monitor.Monitor`)."""
 
     def answer(self, path: str) -> tuple[int, str] | None: ...
 
@@ -85,7 +85,7 @@ class StudioSink:
         return answer
 
     def _refusal(self, request: Any) -> tuple[http.HTTPStatus, str] | None:
-        """Who does not know the token, where one is set, and pages of other sites."""
+        """The refusal of a client without the token, where one is set, or of a page of another site; else None."""
         origin = request.headers.get("Origin")
         if origin and not Uri("", "", host=urlsplit(origin).hostname or "").is_loopback():
             return http.HTTPStatus.FORBIDDEN, "Pages of other sites may not listen.\n"
@@ -98,7 +98,7 @@ class StudioSink:
         return http.HTTPStatus.UNAUTHORIZED, "The token is wrong or missing.\n"
 
     async def _serve(self, connection: Any) -> None:
-        """Send one client its frames until it leaves, of which nothing but the connection tells while there are none."""
+        """Send one client its frames until it disconnects, which is noticed while there are no frames, too."""
         sending = asyncio.create_task(self._send(connection))
         closed = asyncio.create_task(connection.wait_closed())
         try:

@@ -42,7 +42,7 @@ class Source(Protocol):
 
 
 class TopicSource(Protocol):
-    """A source whose messages bear a topic: MQTT and Zenoh."""
+    """A source whose messages have a topic: MQTT and Zenoh."""
 
     async def run(self, feed: Receiver) -> None:
         """As of `Source`."""

@@ -102,7 +102,7 @@ def window(
 
 @router.get("/drive/sample")
 def sample(studio: Here, path: Named, time: Time, version: str = "") -> dict[str, Any]:
-    """Everything known of one sample, and what moved the adhesion there."""
+    """Everything known of one sample, and what changed the adhesion there."""
     table = table_of(studio, path, version)
     if not len(table):
         raise InputError("holds no rows", file=path)

@@ -1,4 +1,4 @@
-"""What the folder holds; taking new files; looking into a log."""
+"""What the folder holds; uploads; inspection of a log."""
 
 from __future__ import annotations
 
@@ -62,7 +62,7 @@ async def notices(socket: WebSocket, studio: Here) -> None:
 
 @router.get("/file")
 def get_file(studio: Here, path: Named) -> Response:
-    """One file of the folder, to keep. Pictures are shown, everything else is handed over as a download."""
+    """One file of the folder: a picture to show, anything else as a download."""
     target = studio.folder.file(path)
     shown = _SHOWN.get(target.suffix.lower())
     if shown is None:
@@ -72,7 +72,7 @@ def get_file(studio: Here, path: Named) -> Response:
 
 @router.get("/report")
 def show_report(studio: Here, path: Named) -> Response:
-    """A report as a page of its own: no script runs in it, it loads nothing, and it counts as of another site."""
+    """A report as a page of its own: no script runs in it, it loads nothing, and browsers treat it as another site's."""
     target = studio.folder.file(path)
     if target.suffix.lower() not in (".html", ".htm"):
         raise InputError("is no page", file=path, hint="download it")

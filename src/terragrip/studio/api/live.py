@@ -67,7 +67,7 @@ async def _frames(
 
 
 async def _send_all(socket: WebSocket, frames: AsyncIterator[str | bytes]) -> None:
-    """Send frames until they end or the page goes."""
+    """Send frames until they end or the page closes."""
 
     async def pump() -> None:
         async for frame in frames:

@@ -78,7 +78,7 @@ def get_calibration(studio: Here, path: Named) -> Calibration:
 async def put_calibration(
     studio: Here, path: Named, calibration: Calibration, by: Annotated[str, Query(max_length=40)] = ""
 ) -> dict[str, Any]:
-    """Keep a picture's calibration beside it; every open page hears of it, with the name `by` that the sender gave itself."""
+    """Keep a picture's calibration beside it; every open page is notified, with the name `by` that the sender gave itself."""
     _check(calibration.slip, "slip", path)
     _check(calibration.adhesion, "adhesion", path)
     file = _beside(studio.folder.file(path))

@@ -1,4 +1,4 @@
-"""Signals of runs: derived by a formula, one over another, and as a table to take away."""
+"""Signals of runs: derived by a formula, one over another, and as a table to download."""
 
 from __future__ import annotations
 
