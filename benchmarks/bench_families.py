@@ -15,7 +15,7 @@ docs/families.md.
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -36,7 +36,7 @@ from terragrip.simulation.families import Kind
 
 Floats = NDArray[np.float64]
 
-PARTS = ("development", "held-out", "second-plant")
+PARTS = ("development", "rigid", "held-out", "second-plant")
 RATES = (100.0, 50.0, 20.0, 10.0)
 MOVING = 0.05  # m/s, or a tenth of the usual speed where that is less
 LAGS = 40  # samples either way
@@ -91,8 +91,7 @@ def main() -> None:
     if arguments.quick:
         arguments.machines, arguments.rates = 8, [100.0, 20.0]
     for part in arguments.families:
-        source = second.machines(arguments.machines, arguments.seed) if part == "second-plant" else None
-        drawn = list(source or families.machines(part, arguments.machines, arguments.seed))
+        drawn = list(machines_of(part, arguments.machines, arguments.seed))
         rates = tuple(arguments.rates)
         jobs = [(part, kind, seed, rates, arguments.method, not arguments.quick) for kind, seed in drawn]
         result: list[Row] = []
@@ -115,6 +114,15 @@ def main() -> None:
         if arguments.write:
             put(DOCUMENT, BEGIN.format(part=part), text)
             print(f"written to {DOCUMENT}")
+
+
+def machines_of(part: str, count: int, seed: int) -> Iterator[tuple[Kind, int]]:
+    """``count`` machines of one of PARTS, of which rigid is for development, too."""
+    if part == "second-plant":
+        return second.machines(count, seed)
+    if part == "rigid":
+        return families.machines("development", count, seed, "rigid")
+    return families.machines("held-out" if part == "held-out" else "development", count, seed)
 
 
 Job = tuple[str, Kind, int, tuple[float, ...], str, bool]

@@ -45,6 +45,7 @@ typedef struct { /* one row, calibrated and checked, in the vehicle's own direct
 typedef struct { /* what a row's values need beside the belief; all reals, so that it goes into a record */
     tg_real load[8]; /* wheel, N */
     tg_real hub[8];  /* wheel, m/s: what its hub is faster than the vehicle, along the travel */
+    tg_real warp[8]; /* wheel: what lasts of its adhesion beyond all trends, see warp.c */
     tg_real across[8]; /* steered wheel, m/s: its hub's speed across the vehicle; else 0 */
     tg_real direction, standing, seen_motion; /* standing: or else without a slip */
     tg_real roughness; /* mean square of what rho_s wanders over uneven ground, see roughness.c */
@@ -93,6 +94,7 @@ typedef struct { /* low-passed while the ground speed is measured; the whole veh
 
 typedef struct { /* uneven ground, see roughness.c */
     tg_real adhesion[8], resistance; /* low-passed over the distance */
+    tg_real warp[8];                 /* low-passed likewise: adhesion beyond all trends, see warp.c */
     tg_real scatter, square;         /* mean squares: of a wheel's adhesion beyond the others', of the adhesion */
     tg_real wander;                  /* mean square of rho_s about its low-pass */
     tg_real usual, swing, way;       /* rho_s over the way: its mean, its mean square about that, wheel radii that these stand for; 0: nothing yet */
@@ -152,6 +154,8 @@ typedef struct {
     tg_real x[TG_SPEED_STATES], P[TG_SPEED_STATES][TG_SPEED_STATES];
 } tgi_speed_mode;
 
+#define TG_TRENDS 3
+
 typedef struct { /* what follows from the settings alone */
     tg_real limit[TG_SLOTS];        /* beyond it a value is a defect; negative: this machine has no such channel */
     tg_real inverse_gain[TG_SLOTS];
@@ -170,6 +174,9 @@ typedef struct { /* what follows from the settings alone */
     tg_real pace;                   /* s, the unit of time of the watch, see digging.c */
     int32_t watched[8], side[8];    /* wheel: powered, or no wheel is; by its place on its axle -1 left, 1 right, 0 middle */
     int32_t holds;                  /* some channel is held */
+    int32_t warps;                  /* there are more driven wheels than trends, see warp.c */
+    int32_t pulls[8];               /* wheel: driven */
+    tg_real trend[TG_TRENDS][8], by_trend[TG_TRENDS][8]; /* alike, along, across; and what of an adhesion goes into its share */
 } tgi_constants;
 
 struct tg_estimator {
@@ -261,6 +268,10 @@ tg_real tgi_unseen_load(const tg_estimator *e);
 tg_real tgi_unseen_grade(const tg_estimator *e);
 void tgi_watch_roughness(tg_estimator *e, int32_t flowing, tg_real distance);
 
+/* warp.c */
+void tgi_place_trends(const tg_settings *s, tgi_constants *c);
+void tgi_warp(const tgi_constants *c, const tg_real *mu, int32_t n, tg_real *warp);
+
 /* slow_speed.c */
 void tgi_rest_reading(tg_estimator *e, const tg_row *row);
 void tgi_rest_over(tg_estimator *e);
@@ -324,5 +335,5 @@ TG_INLINE tgi_slip tgi_slip_of(tg_real omega, tg_real v, tg_real radius, tg_real
     return result;
 }
 
-void tgi_traction(const tg_settings *s, const tg_belief *b, const tg_real (*S)[TG_ROWS], const tgi_scene *scene, tg_real *o);
+void tgi_traction(const tg_settings *s, const tgi_constants *c, const tg_belief *b, const tg_real (*S)[TG_ROWS], const tgi_scene *scene, tg_real *o);
 #endif

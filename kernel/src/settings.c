@@ -245,6 +245,7 @@ static void work_out_constants(const tg_settings *s, tgi_constants *c)
     c->inverse_weight = 1 / weight;
     c->pace = tgi_pace(s);
     place_wheels(s, c);
+    tgi_place_trends(s, c);
     c->unknown_pull = tgi_square(s->tuned.unknown_pull * weight);
     c->least_shock = c->variance[TG_ACCELERATION_X] + c->variance[TG_DRAWBAR_FORCE] * tgi_square(c->inverse_mass);
     tg_real low = s->tuning.scales[0], high = low;

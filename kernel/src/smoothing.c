@@ -113,7 +113,7 @@ tg_status tg_estimator_smooth(const tg_estimator *e, size_t rows, const tg_real 
         memcpy(&scene, here + filter_length(e), sizeof scene);
         step_back(e, here, next, &m);
         to_rows(e, &m, &belief, S);
-        tgi_traction(&e->settings, &belief, (const tg_real(*)[TG_ROWS])S, &scene, value);
+        tgi_traction(&e->settings, &e->constants, &belief, (const tg_real(*)[TG_ROWS])S, &scene, value);
         put(value, out, row, TG_OUT_VERTICAL_LOAD);
         next = here;
     }

@@ -47,8 +47,14 @@ def test_a_constant_mass_is_the_machine_that_weighs_it(method):
     for name in by_file.columns:
         if name.endswith("_std") or name.startswith(("curve", "warning", "adaptation", "nis", "distance")):
             continue
+        # what wheels do beyond axles and sides is weighed by the file's loads at rest, which the payload shifts (warp.c)
+        weighed = name.startswith(("adhesion_", "net_traction_", "efficiency_"))
         np.testing.assert_allclose(
-            by_channel[name][late], by_file[name][late], rtol=1e-6, atol=1e-7, err_msg=name
+            by_channel[name][late],
+            by_file[name][late],
+            rtol=1e-6,
+            atol=2e-3 if weighed else 1e-7,
+            err_msg=name,
         )
 
 

@@ -15,7 +15,7 @@ from typing import Any, Literal
 import numpy as np
 
 from terragrip.errors import InputError
-from terragrip.simulation.family_machines import Machine, draw_machine
+from terragrip.simulation.family_machines import Machine, draw_machine, draw_rigid
 from terragrip.simulation.family_sensors import SENSORS, draw_faults, draw_sensors, uncertainty
 from terragrip.simulation.family_soils import SOILS_OF, NoSinkage, capacity, draw_soils
 from terragrip.simulation.fields import stream
@@ -26,6 +26,8 @@ from terragrip.units import STANDARD_GRAVITY
 Tree = dict[str, Any]
 Part = Literal["development", "held-out"]
 Task = Literal["work", "healthy", "digging"]
+Chassis = Literal["sprung", "rigid"]
+"""rigid: three to eight wheels on a chassis that hardly warps, over ground so uneven that much of a wheel's load goes to the others."""
 
 MASSES: dict[str, tuple[float, float]] = {
     "light": (5.0, 50.0),
@@ -42,6 +44,10 @@ HELD_OUT: dict[str, str] = {"mass": "compact", "curve": "peaking", "sensors": "c
 
 LOAD_VARIATION = (0.02, 0.08)
 """Relative standard deviation of a wheel's load, from and to, over about 1.25 wheel radii."""
+UNEVEN = (0.15, 0.75)
+"""Of a rigid machine's ground: standard deviation of its height over what the static load yields the tyre, from and to."""
+SOFTENING = (0.0, 0.3)
+"""Power of the load by which adhesion at a slip falls, from and to: Brixius' at mobility numbers from 80 down to 20."""
 WORK = (0.45, 0.8)
 """Share of what the ground bears at 20 % of slip that tools and hills together ask for at most, from and to."""
 SOFTNESS = (0.9, 1.4)
@@ -50,11 +56,12 @@ SOFTNESS = (0.9, 1.4)
 
 @dataclass(frozen=True, order=True)
 class Kind:
-    """What kind of machine, ground and sensors: a name of ``MASSES``, of ``CURVES`` and of ``SENSORS``."""
+    """What kind of machine, ground and sensors: a name of ``MASSES``, of ``CURVES``, of ``SENSORS`` and of ``CHASSIS``."""
 
     mass: str
     curve: str
     sensors: str
+    chassis: Chassis = "sprung"
 
     @property
     def part(self) -> Part:
@@ -66,21 +73,23 @@ class Kind:
         )
 
     def __str__(self) -> str:
-        return f"{self.mass}-{self.curve}-{self.sensors}"
+        return f"{self.mass}-{self.curve}-{self.sensors}" + ("-rigid" if self.chassis == "rigid" else "")
 
 
-def kinds(part: Part | None = None) -> tuple[Kind, ...]:
-    """All kinds, or those of one part of the split."""
-    every = (Kind(*names) for names in product(MASSES, CURVES, SENSORS))
+def kinds(part: Part | None = None, chassis: Chassis = "sprung") -> tuple[Kind, ...]:
+    """All kinds on a chassis, or those of one part of the split."""
+    every = (Kind(*names, chassis) for names in product(MASSES, CURVES, SENSORS))
     return tuple(kind for kind in every if part in (None, kind.part))
 
 
-def machines(part: Part, count: int, first_seed: int = 0) -> Iterator[tuple[Kind, int]]:
+def machines(
+    part: Part, count: int, first_seed: int = 0, chassis: Chassis = "sprung"
+) -> Iterator[tuple[Kind, int]]:
     """``count`` pairs (kind, seed) for :func:`draw`: the kinds of a part in an order that mixes them, a seed each.
 
     The order is the same whatever ``first_seed`` is; masses, curves and sensors are each spread evenly over any first few.
     """
-    listed = kinds(part)
+    listed = kinds(part, chassis)
     order = stream(0, f"order {part}").permutation(len(listed))
     spread = sorted(range(len(listed)), key=lambda k: (_seen_before(listed, order, k), k))
     for k in range(count):
@@ -128,10 +137,12 @@ def scenario(
     known: Mapping[str, Any] | None = None,
 ) -> Scenario:
     """The scenario that :func:`draw` simulates. Raises as it does."""
-    if kind not in kinds():
+    if kind not in kinds(chassis=kind.chassis):
         raise InputError(f"no such kind {kind}", hint="choose one of families.kinds()")
     rng = stream(seed, f"family {kind}")
-    machine = replace(draw_machine(rng, MASSES[kind.mass]), **(known or {}))
+    rigid = kind.chassis == "rigid"
+    drawn = draw_rigid(rng, MASSES[kind.mass]) if rigid else draw_machine(rng, MASSES[kind.mass])
+    machine = replace(drawn, **(known or {}))
     soils, spots = draw_soils(rng, kind.curve, machine)
     towing = kind.sensors != "uncoupled" or task != "work"
     turning = kind.sensors != "plain" and rng.uniform() < 0.5 and task != "digging"
@@ -153,6 +164,9 @@ def scenario(
         speed = draw_speeds(rng, machine, duration)
     length = 1.1 * sum(0.5 * (b[1] + a[1]) * (b[0] - a[0]) for a, b in pairwise(speed[1:]))
     length += 5 * machine.wheelbase + machine.scale
+    if rigid:
+        for soil in soils.values():
+            soil["roughness"] = rng.uniform(*UNEVEN) * machine.deflection
     if task == "healthy":
         for soil in soils.values():
             soil["roughness"] *= 2.0
@@ -169,8 +183,7 @@ def scenario(
         "vehicle": machine.vehicle(),
         "robot": {
             **machine.robot(),
-            "load_variation": rng.uniform(*LOAD_VARIATION),
-            "load_variation_length": 1.25 * machine.radius,
+            **({"load_softening": rng.uniform(*SOFTENING)} if rigid else _load_variation(rng, machine)),
             "steers": True,
         },
         "soils": soils,
@@ -193,6 +206,10 @@ def scenario(
     tree["vehicle"]["uncertainty"] = uncertainty(tree["sensors"], machine, slope)
     tree["faults"] = draw_faults(duration, machine, kind.sensors) if faults else []
     return Scenario.from_dict(tree, file=name)
+
+
+def _load_variation(rng: np.random.Generator, machine: Machine) -> Tree:
+    return {"load_variation": rng.uniform(*LOAD_VARIATION), "load_variation_length": 1.25 * machine.radius}
 
 
 def draw_soft_spot(

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
+from terragrip.units import STANDARD_GRAVITY
+
 Tree = dict[str, Any]
 
 ROBOT_MASS = 139.0  # kg, at length scale 1
+TIRE_STIFFNESS, CHASSIS_TORSION = 2300.0, 43.0  # N/m a kg on the wheel, likewise
 LAYOUTS: tuple[tuple[float, tuple[int, ...]], ...] = (
     (0.22, (2,)),
     (0.38, (2, 2)),
@@ -57,6 +60,11 @@ class Machine:
     def corner_mass(self) -> float:
         """Mass over each wheel, in the mean [kg]."""
         return self.mass / sum(self.counts)
+
+    @property
+    def deflection(self) -> float:
+        """What the static load yields a tyre [m]."""
+        return STANDARD_GRAVITY * self.scale / (TIRE_STIFFNESS * self.stiffness)
 
     @property
     def drawbar_offset(self) -> float:
@@ -115,9 +123,9 @@ class Machine:
         corner, scale, beat = self.corner_mass, self.scale, np.sqrt(self.scale)
         return {
             "wheel_mass": 0.16 * corner,
-            "tire_stiffness": 2300.0 * corner / scale * self.stiffness,
+            "tire_stiffness": TIRE_STIFFNESS * corner / scale * self.stiffness,
             "tire_damping": 17.0 * corner / beat * np.sqrt(self.stiffness),
-            "chassis_torsion": 43.0 * corner / scale * self.torsion,
+            "chassis_torsion": CHASSIS_TORSION * corner / scale * self.torsion,
             "resistance_length": 0.02 * scale,
             "slip_speed": min(0.05 * beat, 0.2),
             "wheel_rest_speed": 0.02 / beat,
@@ -185,6 +193,14 @@ def draw_machine(rng: np.random.Generator, mass_range: tuple[float, float]) -> M
         motor_lag=float(0.01 * np.sqrt(scale) * np.exp(rng.uniform(np.log(0.5), np.log(4.0)))),
         radius_error=rng.uniform(0.004, 0.012),
     )
+
+
+def draw_rigid(rng: np.random.Generator, mass_range: tuple[float, float]) -> Machine:
+    """A machine of three wheels or more whose chassis resists warp four times as stiffly as a tyre the ground."""
+    machine = draw_machine(rng, mass_range)
+    while sum(machine.counts) < 3:
+        machine = draw_machine(rng, mass_range)
+    return replace(machine, torsion=TIRE_STIFFNESS * machine.stiffness / CHASSIS_TORSION)
 
 
 def _names(axle: int, count: int) -> tuple[str, ...]:

@@ -142,6 +142,7 @@ typedef struct {
     double warp[64];                      /* N/m, [wheel][wheel]: what the chassis' stiffness makes of corner heights */
     double resistance_length;             /* m, travel over which rolling resistance builds up */
     double slip_speed;                    /* m/s: below it slip is taken over this speed */
+    double load_softening;                /* adhesion at a slip goes as load^-load_softening, 1 at the static load */
     double wheel_rest_speed;              /* rad/s: tyre and bearing resistance reach full size here */
     double speed_gain, speed_integral, motor_lag, antiwindup_time, torque_limit, power_limit;
     int32_t tools;

@@ -183,7 +183,7 @@ def _machine(ffi: Any, lib: Any, scenario: Scenario, vehicle: Vehicle, radius: F
         machine.bearing[i] = vehicle.bearing_resistance
         machine.driven[i] = int(vehicle.driven[i])
     for name in (
-        "tire_stiffness", "tire_damping", "resistance_length", "slip_speed", "wheel_rest_speed", "speed_gain",
+        "tire_stiffness", "tire_damping", "resistance_length", "load_softening", "slip_speed", "wheel_rest_speed", "speed_gain",
         "speed_integral", "motor_lag", "antiwindup_time", "torque_limit", "power_limit",
     ):  # fmt: skip
         setattr(machine, name, getattr(scenario.robot, name))

@@ -1,6 +1,8 @@
 /* See plant.h. The forces on wheels and vehicle: slip, adhesion, vertical loads, rolling resistance. */
 #include "plant_inside.h"
 
+#define LEAST_SHARE 0.1 /* of the static load: adhesion of a wheel about to lift is not without bounds */
+
 /* Adhesion and its slope at |slip| on one soil: cubic Hermite between the tabulated points. */
 static void curve_at(const plant_ground *g, int32_t soil, double slip, double *mu, double *dmu) {
     const double h = 1.0 / g->curve_intervals;
@@ -70,6 +72,12 @@ static footing footing_of(const plant_machine *m, const plant_ground *g, const c
     return found;
 }
 
+/* Soil that yields under load bears less of it: Brixius' curves fall with the load, through the mobility number. */
+static void soften(footing *foot, double factor) {
+    foot->adhesion *= factor;
+    foot->by_slip *= factor;
+}
+
 /* One wheel: its slip, what it carries and pulls, and its row of the Jacobian. */
 static void wheel(const plant_machine *m, const plant_ground *g, const conduct *c, int i, const double *y, double *dy, findings *f) {
     const int n = m->wheels, axle = m->wheel_axle[i];
@@ -77,11 +85,12 @@ static void wheel(const plant_machine *m, const plant_ground *g, const conduct *
     const double hub_by_v = 1.0 - m->side[i] * f->curvature, hub = y[V] * hub_by_v;
     double by_rim, by_hub;
     const double slip = slip_of(r * w, hub, m->slip_speed, &by_rim, &by_hub);
-    const footing foot = footing_of(m, g, c, x, i, slip);
+    footing foot = footing_of(m, g, c, x, i, slip);
     const double static_load = m->mass * m->gravity * m->axle_share[axle] * m->wheel_share[i];
     const double spring = fmax(0.0, static_load + m->tire_stiffness * (foot.elevation - y[Z + i]) +
                                         m->tire_damping * (foot.gradient * hub - y[ZDOT + i]));
     const double load = g->load_variation[i] ? spring * (1.0 + at(g->load_variation[i], locate(g, x))) : spring;
+    if (m->load_softening > 0) soften(&foot, pow(fmax(load / static_load, LEAST_SHARE), -m->load_softening));
     const double rest = clamp(w / m->wheel_rest_speed, -1.0, 1.0), traction = foot.adhesion * load;
     dy[OMEGA + i] = (y[TORQUE + i] - r * traction - r * m->tire_resistance * load * rest - r * m->bearing[i] * w) / J;
     dy[Z + i] = y[ZDOT + i];

@@ -226,8 +226,8 @@ class Robot(Part):
     each wheel per metre of warp (one diagonal up). ``slip_speed`` [m/s]: slower than this, slip is taken over this
     speed. ``wheel_radius_sd`` is relative, common to all wheels. ``load_variation``: relative standard deviation by which each
     wheel's load differs from what springs and roughness make it, over ``load_variation_length`` [m] of travel, in no
-    relation to the other wheels. ``steers``: in a curve each side is commanded the speed of its own track (else all wheels
-    turn alike).
+    relation to the other wheels. ``load_softening``: adhesion at a slip goes as the load to minus this. ``steers``: in a curve
+    each side is commanded the speed of its own track (else all wheels turn alike).
     """
 
     wheel_mass: Mass = 5.4
@@ -235,6 +235,7 @@ class Robot(Part):
     tire_damping: Annotated[float, number_within("N s/m")] = 600.0
     chassis_torsion: Annotated[float, number_within("N/m", high=1e8)] = 1500.0
     resistance_length: PositiveLength = 0.02
+    load_softening: Share = 0.0
     slip_speed: Annotated[float, number_within("m/s", 1e-3, 1)] = 0.05
     wheel_rest_speed: Annotated[float, number_within("rad/s", 1e-4, 1)] = 0.02
     speed_gain: Annotated[float, number_within("N m s/rad")] = 20.0
