@@ -32,7 +32,7 @@ _LONGEST = 20_000_000  # points; a record over ten days
 
 _CERTAIN = 2.0  # standard deviations by which an offset must exceed the explained one
 _SURE = 4.0  # the same, for an automatic correction: runs without a late sensor reach 2.7 (decision 0152)
-_STIFFNESS = (
+STIFFNESS = (
     2.0  # K on soft soil: the slope of ASABE D497's gross traction ratio at 15 % slip, Bn = 20, is 1.85
 )
 _WITHIN = 5.0  # s, the largest lag searched between channels of one file
@@ -85,7 +85,7 @@ class Lag:
 
 def speed_of(time: Floats, columns: Mapping[str, npt.NDArray[Any]]) -> Speed | None:
     """The speed by some channels (n,) at ``time`` (n,): over ground, of the drive train, or of the wheels on average."""
-    ground = _measured(time, columns.get("ground_speed"))
+    ground = measured(time, columns.get("ground_speed"))
     if ground is not None:
         speed = np.abs(ground[1])
         moving = speed[speed > 0.5 * float(np.quantile(speed, 0.9))]
@@ -95,15 +95,15 @@ def speed_of(time: Floats, columns: Mapping[str, npt.NDArray[Any]]) -> Speed | N
 
 def wheels_of(time: Floats, columns: Mapping[str, npt.NDArray[Any]]) -> Speed | None:
     """As `speed_of`, from the drive train or the wheels alone."""
-    based = _measured(time, columns.get("wheel_based_speed"))
+    based = measured(time, columns.get("wheel_based_speed"))
     if based is not None:
         return Speed(based[0], np.abs(based[1]), None)
-    wheels = [_measured(time, v) for name, v in columns.items() if name.startswith("wheel_speed_")]
+    wheels = [measured(time, v) for name, v in columns.items() if name.startswith("wheel_speed_")]
     known = [np.interp(time, when, np.abs(values)) for when, values in filter(None, wheels)]
     return Speed(time, np.mean(known, axis=0), None) if known else None
 
 
-def _measured(time: Floats, values: npt.NDArray[Any] | None) -> tuple[Floats, Floats] | None:
+def measured(time: Floats, values: npt.NDArray[Any] | None) -> tuple[Floats, Floats] | None:
     """The true updates (m,) of a channel, since a held value is late by half its period; None if there are hardly any."""
     if values is None or values.dtype.kind not in "fiu":
         return None
@@ -123,9 +123,9 @@ def lag_between(first: Speed, second: Speed, *, reach: float | None = None) -> L
         return None
     low = high = 0.0
     if first.pace is None and second.pace is not None:
-        high = second.pace / (STANDARD_GRAVITY * _STIFFNESS)
+        high = second.pace / (STANDARD_GRAVITY * STIFFNESS)
     elif second.pace is None and first.pace is not None:
-        low = -first.pace / (STANDARD_GRAVITY * _STIFFNESS)
+        low = -first.pace / (STANDARD_GRAVITY * STIFFNESS)
     return replace(result, explained=(low, high))
 
 

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
+from terragrip.recording.inertial import inertial_warnings
 from terragrip.recording.mechanics import RATIOS, motion_warnings
 from terragrip.recording.sides import exchanged_torques, side_warnings
 from terragrip.recording.torques import torque_warnings
@@ -65,6 +66,7 @@ def unit_warnings(recording: Recording, vehicle: Vehicle | None) -> list[str]:
         *_acceleration_warnings(recording),
         *moved,
         *(torque_warnings(recording, known) if known is not None and not moved else ()),
+        *(inertial_warnings(recording, known) if known is not None else ()),
         *_time_warnings(recording),
     ]
     return notes if notes or known is None else exchanged_torques(recording, known, shown)

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
+from terragrip.recording.courses import CALM, lag_of, points_of, quick, smooth
 from terragrip.recording.mechanics import driven_radii, means_of, thrusts_of
 from terragrip.units import STANDARD_GRAVITY
 
@@ -24,11 +25,7 @@ Floats = npt.NDArray[np.float64]
 
 _MOST = 1.0  # of the weight: a mean thrust over a whole drive that no ground carries
 _BRAKING = 0.06  # of the weight: a mean that brakes a drive down a 10 % grade throughout
-_STEP = 0.05  # s between the points on which torques and speeds are compared
-_CALM = 0.4  # s over which they are smoothed
-_SLOW = 6.0  # s: slower changes do not show a lag
 _WITHIN = 2.0  # s, the largest lag searched
-_LEAST_TIME, _MOST_TIME = 30.0, 1200.0  # s of the log, from its start
 _MOVING = 0.3  # of the rims' speed that a twentieth of the drive exceeds
 _LAG = 0.2  # s, and two samples: tyres and filters cause .1, rarely .15
 _UNSEEN_LAG = 0.3  # s, where a tool may pull unmeasured: an engine's governor answers it within .2
@@ -92,10 +89,10 @@ class _Course:
         names = [f"{quantity}_{w}" for w in radii for quantity in ("drive_torque", "wheel_speed")]
         if not radii or not all(np.isfinite(channels.get(name, np.nan)).sum() > 1 for name in names):
             return None
-        step = max(_STEP, float(np.median(np.diff(time))))
-        points = np.arange(time[0], min(time[-1], time[0] + _MOST_TIME), step)
-        if len(points) * step < _LEAST_TIME:
+        found = points_of(time)
+        if found is None:
             return None
+        points, step = found
 
         def at(name: str) -> Floats:
             known = np.isfinite(channels[name])
@@ -105,38 +102,16 @@ class _Course:
             np.sum([at(f"drive_torque_{w}") / radius for w, radius in radii.items()], axis=0) / vehicle.mass
         )
         rim = np.mean([radius * at(f"wheel_speed_{w}") for w, radius in radii.items()], axis=0)
-        force = np.gradient(_smooth(rim, _CALM, step), step)
+        force = np.gradient(smooth(rim, CALM, step), step)
         if np.isfinite(channels.get("drawbar_force", np.nan)).sum() > 1:
             force = force + at("drawbar_force") / vehicle.mass
         moving = rim > _MOVING * float(np.quantile(rim, 0.95))
-        return cls(step, _quick(thrust, step), _quick(force, step), moving)
+        return cls(step, quick(thrust, step), quick(force, step), moving)
 
     def lag(self) -> tuple[float, float, float]:
         """The lag of the thrust [s], the correlation there, and without a lag."""
-        most = round(_WITHIN / self.step)
         a, b = np.where(self.moving, self.thrust, 0.0), np.where(self.moving, self.force, 0.0)
-        ends = [(max(0, k), len(a) + min(0, k)) for k in range(-most, most + 1)]
-        found = np.array([_alike(a[i:j], b[len(b) - j : len(b) - i]) for i, j in ends])
-        best = int(np.argmax(found))
-        return (best - most) * self.step, float(found[best]), float(found[most])
-
-
-def _smooth(values: Floats, seconds: float, step: float) -> Floats:
-    """Means (n,) over so many seconds; beyond the ends the first and last value are used."""
-    half = max(1, round(seconds / step / 2))
-    padded = np.cumsum(np.pad(values, (half + 1, half), mode="edge"))
-    return (padded[2 * half + 1 :] - padded[: -2 * half - 1]) / (2 * half + 1)
-
-
-def _quick(values: Floats, step: float) -> Floats:
-    """The part of a course (n,) that changes within seconds."""
-    return _smooth(values, _CALM, step) - _smooth(values, _SLOW, step)
-
-
-def _alike(a: Floats, b: Floats) -> float:
-    a, b = a - a.mean(), b - b.mean()
-    size = float(np.sqrt(np.sum(a * a) * np.sum(b * b)))
-    return float(np.sum(a * b)) / size if size else 0.0
+        return lag_of(a, b, self.step, _WITHIN)
 
 
 def _lag_warnings(recording: Recording, vehicle: Vehicle) -> list[str]:

@@ -1,0 +1,101 @@
+"""Gyroscope and accelerometer that are not of the wheels' instant, on simulated machines of several masses and rates."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+
+from terragrip.recording import Recording, unit_warnings
+from terragrip.simulation import families
+from terragrip.vehicle import Vehicle
+
+MACHINES = [
+    (families.Kind("tractor", "saturating", "uncoupled"), 1, 10.0),
+    (families.Kind("robot", "saturating", "even"), 17, 20.0),
+    (families.Kind("robot", "saturating", "multirate"), 7, 10.0),
+    (families.Kind("light", "brixius", "multirate"), 2, 50.0),
+]
+INERTIAL = ("angular_velocity_z", "acceleration_x", "pitch")
+
+
+@cache
+def drive(kind: families.Kind, seed: int, rate: float) -> tuple[Recording, Vehicle]:
+    result = families.draw(kind, seed, rate=rate, duration=200.0)
+    return result.recording, result.vehicle
+
+
+def later(log: Recording, names: tuple[str, ...], seconds: float) -> Recording:
+    """The log with some channels that many seconds late."""
+    moved = {}
+    for name in names:
+        known = np.isfinite(log.channels[name])
+        at = log.time[known]
+        moved[name] = np.full(len(log), np.nan)
+        moved[name][known] = np.interp(at - seconds, at, log.channels[name][known])
+    return log.with_channels(**moved)
+
+
+def lag_notes(log: Recording, vehicle: Vehicle) -> list[str]:
+    return [note for note in unit_warnings(log, vehicle) if "the wheel speeds: if" in note]
+
+
+@pytest.mark.parametrize(("kind", "seed", "rate"), MACHINES)
+def test_sensors_of_one_instant_are_left_alone(kind: families.Kind, seed: int, rate: float) -> None:
+    log, vehicle = drive(kind, seed, rate)
+    assert unit_warnings(log, vehicle) == []
+    assert lag_notes(later(log, INERTIAL, 0.05), vehicle) == [], "filters and tyres"
+
+
+@pytest.mark.parametrize(("kind", "seed", "rate"), MACHINES)
+@pytest.mark.parametrize("seconds", [0.5, -0.4])
+def test_an_inertial_sensor_that_is_late_or_early_is_named(
+    kind: families.Kind, seed: int, rate: float, seconds: float
+) -> None:
+    log, vehicle = drive(kind, seed, rate)
+    (note,) = lag_notes(later(log, INERTIAL, seconds), vehicle)
+    assert note.startswith("acceleration_x and angular_velocity_z are")
+    said = float(note.split(" are ")[1].split(" s ")[0])
+    assert said == pytest.approx(abs(seconds), abs=0.06)
+    assert ("behind" if seconds > 0 else "ahead of") in note
+    assert f"'delay: {said:.2f} s'" in note
+
+
+def test_a_late_gyroscope_alone_is_named_alone() -> None:
+    log, vehicle = drive(*MACHINES[1])
+    (note,) = lag_notes(later(log, ("angular_velocity_z",), 0.3), vehicle)
+    assert note.startswith(
+        "angular_velocity_z is 0.30 s behind the wheel speeds: if it is late, write 'delay: 0.30 s' for it"
+    )
+
+
+def test_wheel_speeds_that_are_held_are_compared_by_their_updates() -> None:
+    """A value held for a quarter of a second is an eighth late on average; that is no lag of a sensor."""
+    log, vehicle = drive(*MACHINES[1])
+    rows = np.arange(len(log)) // 8 * 8
+    held = {n: v[rows] for n, v in log.channels.items() if n.startswith("wheel_speed_")}
+    assert lag_notes(log.with_channels(**held), vehicle) == []
+
+
+def test_a_drive_without_turns_and_changes_of_speed_tells_nothing() -> None:
+    log, vehicle = drive(*MACHINES[1])
+    calm = {
+        n: np.full(len(log), np.nanmean(v)) for n, v in log.channels.items() if n.startswith("wheel_speed_")
+    }
+    assert lag_notes(log.with_channels(**calm), vehicle) == []
+
+
+def test_without_a_wheel_speed_or_in_a_short_log_nothing_is_compared() -> None:
+    from terragrip.recording.inertial import inertial_warnings
+
+    log, vehicle = drive(*MACHINES[1])
+    late = later(log, INERTIAL, 0.5)
+    wheelless = {n: v for n, v in late.channels.items() if not n.startswith("wheel_speed_")}
+    assert inertial_warnings(replace(late, channels=wheelless), vehicle) == []
+    short = late.time < 20
+    cut = replace(
+        late, time=late.time[short], channels={n: v[short] for n, v in late.channels.items()}, labels={}
+    )
+    assert inertial_warnings(cut, vehicle) == []
