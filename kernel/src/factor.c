@@ -91,16 +91,15 @@ TG_INLINE void row_of_lanes(tgi_gram *g, int j, const int lanes, int joins, tg_r
         const tg_lanes v = lanes_mul(lanes_all(g->noise), part_j);
         for (int i = 0; i < lanes; i++) sum[chains - 1][i] = lanes_mul(v, part[i]);
     }
-#define COLUMN(k, chain)                                                                                          \
-    {                                                                                                             \
-        tg_real *const w = g->W + (k) * stride;                                                                   \
-        const tg_lanes taken = lanes_all(w[previous]);                                                            \
-        const tg_lanes v = lanes_mul(lanes_all(g->weight[k]), lanes_mul_sub(part_j, taken, lanes_all(w[j])));     \
-        for (int i = 0; i < lanes; i++) {                                                                         \
-            const tg_lanes e = lanes_mul_sub(part[i], taken, lanes_load(w + TG_LANES * i));                       \
-            lanes_store(w + TG_LANES * i, e);                                                                     \
-            sum[(chain) % chains][i] = lanes_mul_add(v, e, sum[(chain) % chains][i]);                             \
-        }                                                                                                         \
+#define COLUMN(k, chain)                                                                              \
+    {                                                                                                 \
+        tg_real *const w = g->W + (k) * stride;                                                       \
+        const tg_lanes taken = lanes_all(w[previous]);                                                \
+        for (int i = 0; i < lanes; i++)                                                               \
+            lanes_store(w + TG_LANES * i, lanes_mul_sub(part[i], taken, lanes_load(w + TG_LANES * i))); \
+        const tg_lanes v = lanes_all(g->weight[k] * w[j]);                                            \
+        for (int i = 0; i < lanes; i++)                                                               \
+            sum[(chain) % chains][i] = lanes_mul_add(v, lanes_load(w + TG_LANES * i), sum[(chain) % chains][i]); \
     }
     int k = 0;
     for (; k + 4 <= columns; k += 4) {

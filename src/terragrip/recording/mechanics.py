@@ -39,6 +39,7 @@ _LIGHT = 0.12  # adhesion: below it, no ground lets a wheel slip by
 _SPIN = 0.3  # (that is a stiffness of .4, where the softest soils have 2)
 _PULL = 0.03  # of the weight: a mean larger than any offset of a sensor
 _NO_PULL = 1e-3  # of the weight: less than any tool, or than a load cell resolves
+_ROUNDING = 1e-12  # of a mean of equal values
 _OFFSET = 0.7  # m/s²: more than twice the usual bias, four degrees of mounting
 _SIGN = "forward is positive: write 'sign: -1' for {} in the profile"
 
@@ -337,7 +338,7 @@ def _dead_warnings(recording: Recording, vehicle: Vehicle) -> list[str]:
         held = {
             name: v[np.isfinite(v)] for name, v in known.items() if v is not None and np.isfinite(v).any()
         }
-        still = {name: float(v[0]) for name, v in held.items() if not np.ptp(v)}
+        still = {name: float(v[0]) for name, v in held.items() if np.ptp(v) <= _ROUNDING * abs(v[0])}
         if still and len(still) < len(held):
             shown = " and ".join(f"{name} ({value:.3g})" for name, value in still.items())
             verb = "change" if len(still) > 1 else "changes"

@@ -13,6 +13,7 @@ from terragrip.recording.sides import exchanged_torques, side_warnings
 from terragrip.recording.torques import torque_warnings
 from terragrip.recording.track import Track, track_of
 from terragrip.recording.turns import SURE, agreement, exchange_warnings, filled, straight_rows
+from terragrip.recording.window_means import averaged
 
 if TYPE_CHECKING:
     from terragrip.recording.table import Recording
@@ -34,6 +35,7 @@ _RATIOS = (
     (1e-3, "ground_speed may be in mm/s"),
     (1e3, "wheel_speed or ground_speed may be off by a factor of 1000"),
 )
+_FINEST = 0.05  # s: no check looks finer
 _ENOUGH = 4000  # rows: enough to distinguish medians that differ by a third
 _APART = 1.2  # of the rims of driven wheels: front wheels lead by 5 % at most, radii are known to 10 %
 _GAP = 1.0  # s, or three samples: nothing was measured within it
@@ -49,7 +51,8 @@ def unit_warnings(recording: Recording, vehicle: Vehicle | None) -> list[str]:
 
     The speeds are compared where both are well above standstill, by the median of their ratio.
     """
-    track = track_of(recording)
+    track, angles = track_of(recording), _angle_warnings(recording)
+    recording = averaged(recording, _FINEST)
     known = vehicle if vehicle is not None and vehicle.knows_wheels else None
     shown = None if known is None else _shown_turn(recording, track)
     exchanged = [] if known is None else exchange_warnings(recording, known, shown)
@@ -62,7 +65,7 @@ def unit_warnings(recording: Recording, vehicle: Vehicle | None) -> list[str]:
         *_position_warnings(recording, track),
         *exchanged,
         *_turn_warnings(recording, None if exchanged else vehicle, track),
-        *_angle_warnings(recording),
+        *angles,
         *_acceleration_warnings(recording),
         *moved,
         *(torque_warnings(recording, known) if known is not None and not moved else ()),

@@ -1,9 +1,15 @@
-"""Means of a channel over windows of time."""
+"""Means of a channel, or of a whole log, over windows of time."""
 
 from __future__ import annotations
 
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
 import numpy as np
 import numpy.typing as npt
+
+if TYPE_CHECKING:
+    from terragrip.recording.table import Recording
 
 Floats = npt.NDArray[np.float64]
 
@@ -15,3 +21,25 @@ def window_means(values: Floats, place: npt.NDArray[np.intp], count: int) -> Flo
         values, place = values[known], place[known]
     number, total = np.bincount(place, minlength=count), np.bincount(place, values, count)
     return np.where(number > 0, total / np.maximum(number, 1), np.nan)
+
+
+def averaged(recording: Recording, step: float) -> Recording:
+    """Time and channels of a log as means over windows of ``step`` [s], NaN without a value; as it is where most windows have one row."""
+    place = np.floor((recording.time - recording.time[:1]) / step)
+    starts = np.flatnonzero(np.diff(place, prepend=np.nan))
+    if 2 * len(starts) > len(place):
+        return recording
+    rows = np.diff(starts, append=len(place))
+
+    def mean(values: Floats) -> Floats:
+        known = np.isfinite(values)
+        if known.all():
+            return np.add.reduceat(values, starts) / rows
+        number, total = (
+            np.add.reduceat(known, starts, dtype=np.intp),
+            np.add.reduceat(np.where(known, values, 0.0), starts),
+        )
+        return np.where(number > 0, total / np.maximum(number, 1), np.nan)
+
+    channels = {name: mean(values) for name, values in recording.channels.items()}
+    return replace(recording, time=mean(recording.time), channels=channels, labels={})
