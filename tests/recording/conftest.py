@@ -38,6 +38,7 @@ def columns() -> Columns:
     result: Columns = {"time": time, "ground_speed": speed + 0.02 * rng.standard_normal(6000)}
     for wheel in WHEELS:
         result[f"wheel_speed_{wheel}"] = speed / 0.2 / 0.93 + 0.03 * rng.standard_normal(6000)
-        result[f"drive_torque_{wheel}"] = 15 + rng.standard_normal(6000)
+        by_load = 10 if wheel.startswith("f") else 20
+        result[f"drive_torque_{wheel}"] = by_load + rng.standard_normal(6000)
     result["drawbar_force"] = 200 + 4 * rng.standard_normal(6000)
     return result

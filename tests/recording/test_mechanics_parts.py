@@ -13,7 +13,6 @@ from terragrip.recording.mechanics import (
     _balance_warnings,
     _dead_warnings,
     _Fit,
-    _pitch_warnings,
     _radius_warnings,
     _scale_sentence,
     _thrust_warnings,
@@ -21,6 +20,7 @@ from terragrip.recording.mechanics import (
     motion_warnings,
     thrusts_of,
 )
+from terragrip.recording.pitch import pitch_warnings
 from terragrip.recording.window_means import window_means
 from terragrip.vehicle import Vehicle
 
@@ -235,11 +235,11 @@ def test_pitch_is_held_against_what_the_accelerometer_reads_beyond_the_speed(
 ) -> None:
     climb, roll = 0.3 * X, 0.1 * np.cos(np.arange(80) / 5.0)
     means = Means(np.arange(80), 80, np.ones(80, dtype=bool), X, np.ones(80), climb)
-    log = Recording(np.arange(80.0), {"roll": roll})
+    log = Recording(np.arange(80.0), {"roll": roll, "pitch": np.arcsin(climb / G)})
     seen = means.of(np.sin(roll)) if with_roll else slope * climb
-    notes = _pitch_warnings(log, means, np.nan_to_num(X + seen))
+    notes = pitch_warnings(log, means, np.nan_to_num(X + seen))
     assert " ".join(notes) == "" if not words else words in notes[0]
-    assert _pitch_warnings(log, windows(80), X) == []
+    assert pitch_warnings(log, windows(80), X) == []
 
 
 def test_what_a_wrong_scale_is_told_by() -> None:

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
+from terragrip.recording.pitch import pitch_warnings
 from terragrip.recording.window_means import window_means
 from terragrip.units import STANDARD_GRAVITY
 
@@ -73,7 +74,8 @@ class _Fit:
 @dataclass(frozen=True)
 class Means:
     """Windows of driving forward (n,): ``place`` of each row of the log among all ``count`` windows, which of them are used (``rows``),
-    and of these the ``change`` of ground speed [m/s²], the ``speed`` [m/s] and g sin(pitch), ``climb`` [m/s²], if the log has it."""
+    of which each is ``length`` [s] long, and of the used ones the ``change`` of ground speed [m/s²], the ``speed`` [m/s] and g sin(pitch),
+    ``climb`` [m/s²], if the log has it."""
 
     place: npt.NDArray[np.intp]
     count: int
@@ -81,6 +83,7 @@ class Means:
     change: Floats
     speed: Floats
     climb: Floats | None = None
+    length: float = _WINDOW
 
     def of(self, values: Floats) -> Floats:
         """A channel (rows,) as means over the stretch of ``change`` (n,)."""
@@ -123,9 +126,10 @@ def motion_warnings(recording: Recording, vehicle: Vehicle | None) -> list[str]:
         notes += _pull_warnings(means, thrusts, recording, vehicle)
     if forward is not None:
         found = _balance_warnings(recording, means, forward, thrusts, vehicle)
-        found = found or _pitch_warnings(recording, means, forward) or _offset_warnings(means, forward)
-        return [*notes, *found]
-    return [*notes, *_thrust_warnings(means, thrusts, vehicle)]
+        found = found or pitch_warnings(recording, means, forward) or _offset_warnings(means, forward)
+    else:
+        found = _thrust_warnings(means, thrusts, vehicle)
+    return [*notes, *found]
 
 
 def _ratio(pair: Floats) -> float:
@@ -153,7 +157,7 @@ def means_of(recording: Recording) -> Means | None:
     rows = np.isfinite(change) & (np.nan_to_num(mean) > _MOVING * float(np.nanquantile(mean, 0.95)))
     if rows.sum() < _LEAST:
         return None
-    means = Means(place, count, rows, change[rows], mean[rows])
+    means = Means(place, count, rows, change[rows], mean[rows], length=length)
     if "pitch" not in recording.channels:
         return means
     climb = STANDARD_GRAVITY * means.of(np.sin(recording.channels["pitch"]))
@@ -267,24 +271,6 @@ def _scale_sentence(scale: float, vehicle: Vehicle) -> str:
         f"The drive torques over the wheel radius are {scale:.2g} times the force that moves {vehicle.mass:.4g} kg like this: check the "
         "torques' unit and scale (at the wheel, not at the motor: the gear ratio counts), the wheel radius and the mass."
     )
-
-
-def _pitch_warnings(recording: Recording, means: Means, forward: Floats) -> list[str]:
-    """The pitch against the accelerometer's reading beyond the change of ground speed."""
-    if means.climb is None:
-        return []
-    seen = forward - means.change
-    fit = means.fit(seen, means.climb)
-    if fit.alike < -_ALIKE and fit.slope + _SURE * fit.error < 0:
-        return [
-            "pitch falls where the accelerometer shows a climb: nose up is positive; write 'sign: -1' for it in the profile."
-        ]
-    roll = recording.channels.get("roll")
-    if roll is not None and abs(fit.alike) < _ALIKE < abs(means.fit(seen, means.of(np.sin(roll))).alike):
-        return [
-            "The accelerometer shows climbs that go with roll and not with pitch: the two may be exchanged."
-        ]
-    return []
 
 
 def _pull_warnings(

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
+from terragrip.recording.axles import axle_warnings
 from terragrip.recording.inertial import inertial_warnings
 from terragrip.recording.mechanics import RATIOS, motion_warnings
 from terragrip.recording.sides import exchanged_torques, side_warnings
@@ -72,7 +73,9 @@ def unit_warnings(recording: Recording, vehicle: Vehicle | None) -> list[str]:
         *(inertial_warnings(recording, known) if known is not None else ()),
         *_time_warnings(recording),
     ]
-    return notes if notes or known is None else exchanged_torques(recording, known, shown)
+    if notes or known is None:
+        return notes
+    return exchanged_torques(recording, known, shown) or axle_warnings(recording, known)
 
 
 def _speed_warnings(recording: Recording, vehicle: Vehicle) -> list[str]:

@@ -1,0 +1,123 @@
+"""The axles' thrusts against their loads: sentences for the user, never errors.
+
+Wheels at one slip on one ground share an adhesion, so axles pull in proportion to their loads. Masses of two axles that are exchanged in
+the vehicle file, or exchanged torques, show as the square of the masses' ratio.
+"""
+
+from __future__ import annotations
+
+from itertools import combinations
+from typing import TYPE_CHECKING
+
+import numpy as np
+import numpy.typing as npt
+
+from terragrip.physics.loads import axle_loads
+from terragrip.recording.mechanics import Means, means_of
+from terragrip.units import STANDARD_GRAVITY
+
+if TYPE_CHECKING:
+    from terragrip.recording.table import Recording
+    from terragrip.vehicle import Vehicle
+
+Floats = npt.NDArray[np.float64]
+
+_LEAST = 15  # windows
+_PULLING = 0.5  # of the thrust that a twentieth of the windows exceed
+_STRAIGHT = 0.05  # of an axle's rims from side to side
+_SLIP = 0.02  # less is of the size of the radii's errors,
+_RADII = 0.01  # which are a like share of the slip, and so of the adhesion
+_ALIKE = 0.3  # of the slip: its difference between the axles
+_UNEVEN = 0.25  # logarithm of 1.28: uncalibrated torques and the rear wheels' trodden track
+_RESTORED = 0.4  # of the difference, at most, is left when the masses are exchanged
+
+
+def axle_warnings(recording: Recording, vehicle: Vehicle) -> list[str]:
+    """A sentence on two driven axles whose thrusts, at like slip, would be in proportion to each other's masses.
+
+    Other errors of torques and speeds look alike: use this only where no other was found.
+    """
+    names = list(vehicle.axles)
+    driven = [k for k, axle in enumerate(vehicle.axles.values()) if axle.driven]
+    wheels = {w for k in driven for w in vehicle.axles[names[k]].wheels}
+    needed = {f"{quantity}_{w}" for w in wheels for quantity in ("drive_torque", "wheel_speed")}
+    means = means_of(recording) if len(driven) > 1 and needed <= recording.channels.keys() else None
+    if means is None:
+        return []
+    thrust, slip, straight = _by_axle(recording, vehicle, means, driven)
+    total = np.sum(list(thrust.values()), axis=0)
+    known = np.isfinite(total) & straight
+    if not known.any():
+        return []
+    rows = known & (total > _PULLING * max(float(np.quantile(total[known], 0.95)), 0.0))
+    if rows.sum() < _LEAST:
+        return []
+    pulls = _pulls(recording, vehicle, means, total)
+    for a, b in combinations(driven, 2):
+        mean = float(np.median((slip[a] + slip[b])[rows])) / 2
+        if mean < _SLIP or abs(float(np.median((slip[a] - slip[b])[rows]))) > _ALIKE * mean:
+            continue
+        exchanged = vehicle.axle_mass.copy()
+        exchanged[[a, b]] = exchanged[[b, a]]
+        off, left = (
+            [_difference(thrust, vehicle, masses, means, pull, rows, (a, b)) for pull in pulls]
+            for masses in (vehicle.axle_mass, exchanged)
+        )
+        least, uneven = min(off, key=abs), _UNEVEN + _RADII / mean
+        if min(off) * max(off) > 0 and abs(least) > uneven and min(map(abs, left)) < _RESTORED * abs(least):
+            strong, weak = (names[a], names[b]) if least > 0 else (names[b], names[a])
+            return [
+                f"At like slip the axle {strong} pulls {np.exp(abs(least)):.2g} times as much for its load as {weak}, and with exchanged "
+                "masses they would pull alike: check the masses of the axles, and which axle each torque is of."
+            ]
+    return []
+
+
+def _by_axle(
+    recording: Recording, vehicle: Vehicle, means: Means, driven: list[int]
+) -> tuple[dict[int, Floats], dict[int, Floats], npt.NDArray[np.bool_]]:
+    """Thrust [N] and slip of each axle (n,), and the windows without a turn."""
+    radius = dict(zip(vehicle.wheels, vehicle.wheel_radius.tolist(), strict=True))
+    axles, channels = list(vehicle.axles.values()), recording.channels
+    thrust, slip = {}, {}
+    straight = np.ones(len(means.speed), dtype=bool)
+    for k in driven:
+        rims = [radius[w] * means.of(channels[f"wheel_speed_{w}"]) for w in axles[k].wheels]
+        rim = np.mean(rims, axis=0)
+        thrust[k] = np.sum(
+            [means.of(channels[f"drive_torque_{w}"]) / radius[w] for w in axles[k].wheels], axis=0
+        )
+        slip[k] = 1 - means.speed / np.where(rim > 0, rim, np.nan)
+        straight &= np.isfinite(slip[k]) & (np.ptp(rims, axis=0) < _STRAIGHT * np.abs(rim))
+    return thrust, slip, straight
+
+
+def _pulls(recording: Recording, vehicle: Vehicle, means: Means, total: Floats) -> list[Floats]:
+    """What may be pulled (n,) [N]: as measured, else nothing, and all that the thrust leaves."""
+    if "drawbar_force" in recording.channels:
+        return [np.nan_to_num(means.of(recording.channels["drawbar_force"]))]
+    climb = 0.0 if means.climb is None else np.nan_to_num(means.climb)
+    return [
+        np.zeros(len(total)),
+        np.maximum(np.nan_to_num(total) - vehicle.mass * (means.change + climb), 0.0),
+    ]
+
+
+def _difference(
+    thrust: dict[int, Floats], vehicle: Vehicle, masses: Floats, means: Means, pull: Floats,
+    rows: npt.NDArray[np.bool_], pair: tuple[int, int],
+) -> float:  # fmt: skip
+    """The logarithm of one axle's thrust over load, over that of another: median of the windows; 0 where one brakes or lifts."""
+    climb = 0.0 if means.climb is None else np.nan_to_num(means.climb)
+    loads = axle_loads(
+        masses,
+        vehicle.axle_to_rear,
+        center_of_gravity_height=vehicle.center_of_gravity_height,
+        hitch_height=vehicle.hitch_height,
+        hitch_overhang=vehicle.hitch_overhang,
+        drawbar=pull,
+        acceleration=means.change,
+        slope=np.arcsin(np.clip(climb / STANDARD_GRAVITY, -1.0, 1.0)),
+    )
+    first, second = (float(np.median((thrust[k] / np.maximum(loads[:, k], 1e-9))[rows])) for k in pair)
+    return float(np.log(first / second)) if min(first, second) > 0 and loads[rows].min() > 0 else 0.0

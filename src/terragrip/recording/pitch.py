@@ -1,0 +1,85 @@
+"""The pitch against the accelerometer's reading beyond the change of ground speed, g sin(pitch): sentences for the user, never errors."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+import numpy.typing as npt
+
+from terragrip.recording.window_means import window_means
+from terragrip.units import STANDARD_GRAVITY
+
+if TYPE_CHECKING:
+    from terragrip.recording.mechanics import Means
+    from terragrip.recording.table import Recording
+
+Floats = npt.NDArray[np.float64]
+
+_ALIKE = 0.7  # correlation from which two signals are proportional
+_SURE = 3.0  # standard errors
+_SCALE = 1.3  # an accelerometer's own scale is 2 % off at most
+_LATE = 0.15  # s, and half a window of slow samples: filters
+_FAR = 1.0  # windows: beyond, the first order says nothing
+_CERTAIN = 4.0  # standard errors of a lag
+_BLOCKS = 10  # of correlated windows, for the jackknife
+_CAUSES = (
+    (1.745, "the grade in per cent, declared as degrees: write 'unit: \"%\"'"),
+    (100.0, "the grade in per cent: write 'unit: \"%\"'"),
+    (57.3, "in degrees: write 'unit: deg'"),
+    (1 / 57.3, "in radians, and was taken for degrees: write 'unit: rad'"),
+    (0.01, "a grade, and was taken for one in per cent: write 'unit: rad'"),
+)
+
+
+def pitch_warnings(recording: Recording, means: Means, forward: Floats) -> list[str]:
+    """Sentences on a pitch of another sign, axis, scale or instant than the accelerometer's; ``forward`` (n,) [m/s²] is its reading."""
+    if means.climb is None:
+        return []
+    seen = forward - means.change
+    fit = means.fit(seen, means.climb)
+    if fit.alike < -_ALIKE and fit.slope + _SURE * fit.error < 0:
+        return [
+            "pitch falls where the accelerometer shows a climb: nose up is positive; write 'sign: -1' for it in the profile."
+        ]
+    roll = recording.channels.get("roll")
+    if roll is not None and abs(fit.alike) < _ALIKE < abs(means.fit(seen, means.of(np.sin(roll))).alike):
+        return [
+            "The accelerometer shows climbs that go with roll and not with pitch: the two may be exchanged."
+        ]
+    if fit.alike < _ALIKE:
+        return []
+    times = 1 / fit.slope
+    low, high = fit.slope - _SURE * fit.error, fit.slope / fit.alike**2 + _SURE * fit.error
+    if low > _SCALE or high < 1 / _SCALE:
+        distance, cause = min((abs(float(np.log(times / size))), text) for size, text in _CAUSES)
+        reason = f"it may be {cause} for it in the profile" if distance < 0.25 else "check its unit and scale"
+        return [f"pitch is {times:.2g} times the climb that the accelerometer shows: {reason}."]
+    return _late_warnings(recording, means, means.climb, seen)
+
+
+def _late_warnings(recording: Recording, means: Means, climb: Floats, seen: Floats) -> list[str]:
+    """A pitch that is late: to first order the climb seen is the pitch and its rate times the lag."""
+    plain = STANDARD_GRAVITY * window_means(np.sin(recording.channels["pitch"]), means.place, means.count)
+    rate = np.r_[np.nan, (plain[2:] - plain[:-2]) / (2 * means.length), np.nan][means.rows]
+    design = np.column_stack([np.ones(len(seen)), climb, rate, seen])
+    design = design[np.isfinite(design).all(axis=1)]
+    block = np.arange(len(design)) * _BLOCKS // len(design)
+
+    def lag(rows: Floats) -> float:
+        found = np.linalg.lstsq(rows[:, :3], rows[:, 3], rcond=None)[0]
+        return float(found[2] / found[1]) if found[1] else np.nan
+
+    seconds = lag(design)
+    without = np.array([lag(design[block != k]) for k in range(_BLOCKS)])
+    error = float(np.sqrt((_BLOCKS - 1) * np.var(without)))
+    if abs(seconds) > _FAR * means.length or not abs(seconds) > max(
+        _LATE, means.length / 2 if means.length > 1 else 0.0, _CERTAIN * error
+    ):
+        return []
+    side, by = ("behind", "it is late") if seconds > 0 else ("ahead of", "the accelerometer is late")
+    size = f"{abs(seconds):.1f} s"
+    return [
+        f"pitch is about {size} {side} the climb that the accelerometer shows: if {by}, give it 'delay: {size}' "
+        "in the profile."
+    ]

@@ -1,0 +1,61 @@
+"""Pitch of another unit or instant than the accelerometer's, on simulated machines on hills (development kinds)."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+import pytest
+
+from terragrip.recording import Recording, unit_warnings
+from terragrip.simulation import families
+
+Case = tuple[families.Kind, int, float]
+MACHINES: list[Case] = [
+    (families.Kind("tractor", "saturating", "uncoupled"), 1, 1.0),
+    (families.Kind("robot", "brixius", "even"), 6, 20.0),
+    (families.Kind("light", "brixius", "uncoupled"), 14, 10.0),
+    (families.Kind("robot", "brixius", "multirate"), 20, 100.0),
+]
+
+
+@cache
+def drive(kind: families.Kind, seed: int, rate: float) -> Recording:
+    return families.draw(kind, seed, rate=rate, duration=1500.0 if rate == 1 else 200.0).recording
+
+
+def said(log: Recording, pitch: np.ndarray) -> list[str]:
+    return [n for n in unit_warnings(log.with_channels(pitch=pitch), None) if n.startswith("pitch")]
+
+
+@pytest.mark.parametrize("case", MACHINES)
+def test_a_right_pitch_is_left_alone(case: Case) -> None:
+    log = drive(*case)
+    assert said(log, log.channels["pitch"]) == []
+    assert said(log, 1.1 * log.channels["pitch"] + 0.02) == [], "mounting"
+
+
+@pytest.mark.parametrize("case", MACHINES)
+def test_a_grade_in_per_cent_declared_as_degrees_is_named(case: Case) -> None:
+    log = drive(*case)
+    (note,) = said(log, np.radians(100 * np.tan(log.channels["pitch"])))
+    assert note.startswith(("pitch is 1.7 times the climb", "pitch is 1.8 times the climb"))
+    assert "declared as degrees: write 'unit: \"%\"'" in note
+
+
+@pytest.mark.parametrize("case", MACHINES)
+def test_radians_declared_as_degrees_are_named(case: Case) -> None:
+    log = drive(*case)
+    (note,) = said(log, np.radians(log.channels["pitch"]))
+    assert "in radians, and was taken for degrees" in note
+
+
+@pytest.mark.parametrize("case", MACHINES[2:])
+@pytest.mark.parametrize("seconds", [0.4, -0.4])
+def test_a_pitch_that_is_late_or_early_is_named(case: Case, seconds: float) -> None:
+    log = drive(*case)
+    known = np.isfinite(log.channels["pitch"])
+    late = np.full(len(log), np.nan)
+    late[known] = np.interp(log.time[known] - seconds, log.time[known], log.channels["pitch"][known])
+    (note,) = said(log, late)
+    assert note.startswith("pitch is about 0.4 s " + ("behind" if seconds > 0 else "ahead of"))
