@@ -76,7 +76,8 @@ def survey_of(log: LogBlocks, progress: Progress | None = None) -> Survey:
             if number % every:
                 continue
             part = slice(max(number * CHUNK - rows, 0), min((number + 1) * CHUNK, end) - rows)
-            kept.setdefault(number, []).append(_copied(last, part))
+            rows_of = _copied if log.from_disk else Recording.select
+            kept.setdefault(number, []).append(rows_of(last, part))
             if len(kept) > CHUNKS:
                 every *= 2
                 kept = {k: parts for k, parts in kept.items() if k % every == 0}
