@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from terragrip.recording import Recording, unit_warnings
+from terragrip.recording.sides import side_warnings
 from terragrip.vehicle import Vehicle
 
 WHEELS = ("fl", "fr", "rl", "rr")
@@ -114,3 +115,34 @@ def test_a_wheel_that_turns_against_all_others_is_named() -> None:
 
 def test_a_torque_that_falls_where_its_neighbour_rises_is_named() -> None:
     assert any(n.startswith("drive_torque_rr falls where") for n in told(skidding(), drive_torque_rr=-1.0))
+
+
+def little(gain: float = 1.0, *, offset: float = 0.0, gyroscope: bool = True) -> list[str]:
+    """The notes on a drive at a third of the pull, whose rear left torque has a gain, and an offset [N m]."""
+    log = skidding(steered=True)
+    small = {n: v / 3 for n, v in log.channels.items() if n.startswith("drive_torque")}
+    small["drive_torque_rl"] = gain * small["drive_torque_rl"] + offset
+    changed = log.with_channels(**small)
+    left_out = () if gyroscope else ("angular_velocity_z",)
+    kept = {n: v for n, v in changed.channels.items() if n not in left_out}
+    return side_warnings(replace(changed, channels=kept), vehicle(), kept.get("angular_velocity_z"))
+
+
+@pytest.mark.parametrize("gyroscope", [True, False])
+def test_a_torque_of_another_scale_is_named_where_the_vehicle_pulls_little(gyroscope: bool) -> None:
+    (note,) = little(0.7, gyroscope=gyroscope)
+    assert note.startswith("Straight ahead drive_torque_rl is 0.70 times drive_torque_rr")
+
+
+def test_an_offset_of_a_small_torque_is_no_scale() -> None:
+    assert little() == []
+    assert little(offset=1.0) == []
+
+
+def test_torques_of_a_free_axle_around_zero_have_no_sign() -> None:
+    log = skidding()
+    wave = 0.5 * np.sin(log.time / 7)
+    free = log.with_channels(drive_torque_fl=0.1 + wave, drive_torque_fr=-0.1 - wave)
+    assert [
+        n for n in side_warnings(free, vehicle(), free.channels["angular_velocity_z"]) if "falls" in n
+    ] == []

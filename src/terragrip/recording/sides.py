@@ -29,18 +29,29 @@ _ROLL = 0.05  # of a rim's speed: radii of one axle's tyres differ by 2 %
 _PULLING = 0.1  # of an axle's load: torques that are compared
 _UNEVEN = 0.22  # the logarithm of 1.25: uncalibrated torques of a wheel are 5 % off, two of them 7
 _STEADY = 0.15  # quartiles of that logarithm
+_TOGETHER = 0.95  # correlation of an axle's pulls: what they do not share is 5 % of their ratio
 _OPPOSED = 0.7  # correlation, of the other sign
 _HARD = 0.05  # of a wheel's load: sides that are driven against each other in turns
 
 
 def side_warnings(recording: Recording, vehicle: Vehicle, turn: Floats | None) -> list[str]:
-    """Sentences on wheels of a wrong sign, radius, or torque scale. ``turn`` (n,) [rad/s], left positive: by a sensor."""
+    """Sentences on wheels of a wrong sign, radius, or torque scale. ``turn`` (n,) [rad/s], left positive: by a sensor.
+
+    Without one the vehicle goes straight ahead where all its rims say so; what they say of each other is then not asked.
+    """
     backward = _backward_warnings(recording, vehicle)
-    drive = None if backward or turn is None else _Drive.of(recording, vehicle, turn)
+    drive = (
+        None
+        if backward
+        else _Drive.of(recording, vehicle, np.zeros(len(recording)) if turn is None else turn)
+    )
     if drive is None:
         return backward
     straight = drive.driving & (np.abs(drive.hubs) < _STRAIGHT * drive.pace)
-    rolling = [note for axle in drive.axles for note in _rolling(axle, straight)]
+    if turn is None:
+        apart = np.max([np.abs(np.diff(axle.rims, axis=0)[0]) for axle in drive.axles], axis=0)
+        straight &= apart < _STRAIGHT * drive.pace
+    rolling = [] if turn is None else [note for axle in drive.axles for note in _rolling(axle, straight)]
     opposed = [note for axle in drive.axles for note in _opposed(axle, straight)]
     return rolling or opposed or _uneven(drive.axles, straight)
 
@@ -199,6 +210,7 @@ def _opposed(axle: _Axle, straight: npt.NDArray[np.bool_]) -> list[str]:
         not np.ptp(left)
         or not np.ptp(right)
         or np.prod(means) > 0
+        or np.abs(means).max() < _HARD * axle.load / 2  # offsets of a free axle have signs, too
         or float(np.corrcoef(left, right)[0, 1]) > -_OPPOSED
     ):
         return []
@@ -209,18 +221,30 @@ def _opposed(axle: _Axle, straight: npt.NDArray[np.bool_]) -> list[str]:
     ]
 
 
+def _share(axle: _Axle, pulls: Floats, straight: npt.NDArray[np.bool_]) -> float | None:
+    """The logarithm of an axle's left pull over its right one, None where it is not steady.
+
+    Where it pulls little an offset of a torque would count as much as its scale: there, of the pulls' changes.
+    """
+    rows = straight & (pulls.min(axis=0) > 0) & (pulls.sum(axis=0) > _PULLING * axle.load)
+    if rows.sum() >= _LEAST:
+        low, share, high = np.quantile(np.log(pulls[0, rows] / pulls[1, rows]), [0.25, 0.5, 0.75])
+        return float(share) if high - low < _STEADY else None
+    own = pulls[:, straight]
+    if straight.sum() < _LEAST or not np.ptp(own, axis=1).all():
+        return None
+    return float(np.log(own[0].std() / own[1].std())) if np.corrcoef(own)[0, 1] > _TOGETHER else None
+
+
 def _uneven(axles: tuple[_Axle, ...], straight: npt.NDArray[np.bool_]) -> list[str]:
     """An axle with one torque steadily larger than the other straight ahead, where the other axles' are alike."""
     shares: dict[str, tuple[float, _Axle]] = {}
     for axle in axles:
         if axle.pulls is None:
             continue
-        rows = straight & (axle.pulls.min(axis=0) > 0) & (axle.pulls.sum(axis=0) > _PULLING * axle.load)
-        if rows.sum() < _LEAST:
-            return []
-        low, share, high = np.quantile(np.log(axle.pulls[0, rows] / axle.pulls[1, rows]), [0.25, 0.5, 0.75])
-        if high - low < _STEADY:
-            shares[axle.name] = (float(share), axle)
+        share = _share(axle, axle.pulls, straight)
+        if share is not None:
+            shares[axle.name] = (share, axle)
     notes = []
     for name, (share, axle) in shares.items():
         others = [other for key, (other, _) in shares.items() if key != name]
