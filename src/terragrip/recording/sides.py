@@ -233,7 +233,11 @@ def _share(axle: _Axle, pulls: Floats, straight: npt.NDArray[np.bool_]) -> float
     own = pulls[:, straight]
     if straight.sum() < _LEAST or not np.ptp(own, axis=1).all():
         return None
-    return float(np.log(own[0].std() / own[1].std())) if np.corrcoef(own)[0, 1] > _TOGETHER else None
+    return (
+        float(np.log(np.std(own[0]) / np.std(own[1])))
+        if np.corrcoef(own[0], own[1])[0, 1] > _TOGETHER
+        else None
+    )
 
 
 def _uneven(axles: tuple[_Axle, ...], straight: npt.NDArray[np.bool_]) -> list[str]:

@@ -51,7 +51,11 @@ class Field:
 
 _FIELDS: tuple[tuple[str, str, str], ...] = (
     ("mass", "mass, ready to work", "kg"),
-    ("front_mass", "mass on the front axle, at rest", "kg"),
+    (
+        "front_mass",
+        "mass on the front axle, at rest (of three axles the others carry alike what is left)",
+        "kg",
+    ),
     ("wheelbase", "wheelbase", "m"),
     ("track", "track, between the wheels' middles", "m"),
     ("center_of_gravity_height", "height of the centre of gravity", "m"),

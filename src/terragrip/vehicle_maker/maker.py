@@ -141,7 +141,7 @@ def _tree(machine: MachineClass, values: Mapping[str, float], name: str) -> dict
             place="front_mass",
             hint="give what the front axle carries at rest",
         )
-    masses = [_digits(front)] if len(machine.axles) == 1 else [_digits(front), _digits(mass - _digits(front))]
+    masses = [_digits(load) for load in _axle_masses(mass, front, len(machine.axles))]
     axles = {}
     for (key, own), load in zip(machine.axles.items(), masses, strict=True):
         axles[key] = {"mass": load, "wheels": list(own["wheels"])}
@@ -164,6 +164,11 @@ def _tree(machine: MachineClass, values: Mapping[str, float], name: str) -> dict
         "tire_rolling_resistance": _digits(values["tire_rolling_resistance"]),
         "bearing_resistance": _digits(values["bearing_resistance"]),
     }
+
+
+def _axle_masses(mass: float, front: float, axles: int) -> list[float]:
+    """What each axle carries [kg]: the first its own, the others alike what is left."""
+    return [mass] if axles == 1 else [front, *[(mass - front) / (axles - 1)] * (axles - 1)]
 
 
 def _considered(
@@ -209,13 +214,14 @@ def _turning_share(vehicle: Vehicle) -> float:
 
 def _shift(vehicle: Vehicle, values: Mapping[str, float], name: str, error: float) -> float:
     """Load that an error of a field moves between the axles, over the mean axle load, root of the mean square over some states."""
+    axles = len(vehicle.axles)
     drawbar = np.array([0.0, WORK, WORK, 2 * WORK]) * vehicle.mass * GRAVITY
     acceleration = np.array([0.0, 0.0, PUSH, -PUSH]) * GRAVITY
 
     def front(changed: Mapping[str, float]) -> np.ndarray:
         loads = axle_loads(
-            [changed["front_mass"], vehicle.mass - changed["front_mass"]],
-            [changed["wheelbase"], 0.0],
+            _axle_masses(vehicle.mass, changed["front_mass"], axles),
+            np.linspace(changed["wheelbase"], 0.0, axles),
             center_of_gravity_height=changed["center_of_gravity_height"],
             hitch_height=changed.get("hitch_height", 0.0),
             drawbar=drawbar,
@@ -224,4 +230,4 @@ def _shift(vehicle: Vehicle, values: Mapping[str, float], name: str, error: floa
         return loads[:, 0]
 
     moved = front({**values, name: values[name] + error}) - front(values)
-    return float(np.sqrt(np.mean(moved**2))) / (vehicle.mass * GRAVITY / 2)
+    return float(np.sqrt(np.mean(moved**2))) / (vehicle.mass * GRAVITY / axles)
