@@ -54,6 +54,25 @@ def _rebuild(
     return InputError(problem, file=file, place=place, hint=hint, page=page)
 
 
+def missing_package(
+    package: str,
+    extra: str,
+    purpose: str = "",
+    *,
+    file: str | os.PathLike[str] | None = None,
+    place: str | None = None,
+) -> InputError:
+    """The error of a package that is not installed: ``"to read MDF the Python package 'asammdf' is needed"``, and the extra to install."""
+    problem = f"to {purpose} the" if purpose else "the"
+    return InputError(
+        f"{problem} Python package {package!r} is needed",
+        file=file,
+        place=place,
+        hint=f"pip install 'terragrip[{extra}]'",
+        page="install",
+    )
+
+
 def system_error(error: BaseException) -> int | None:
     """The system's number (errno) of a failure or of what caused it; Arrow and Polars put it into their text. None where there is none."""
     cause: BaseException | None = error

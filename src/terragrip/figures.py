@@ -9,7 +9,7 @@ import io
 from functools import cache
 from typing import TYPE_CHECKING, Any
 
-from terragrip.errors import InputError
+from terragrip.errors import missing_package
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -64,7 +64,7 @@ def new_figure(width: float = 9.6, height: float = 3.4) -> Figure:
         from matplotlib import rc_context
         from matplotlib.figure import Figure
     except ImportError:
-        raise InputError("matplotlib is not installed", hint="pip install 'terragrip[report]'") from None
+        raise missing_package("matplotlib", "report") from None
     with rc_context(_RC):
         return Figure(figsize=(width, height), layout="constrained")
 

@@ -96,7 +96,9 @@ def test_an_unknown_interface_is_refused(vehicle):
 
 def test_an_interface_whose_package_is_missing_is_refused_with_the_extra(vehicle, monkeypatch):
     monkeypatch.setattr("terragrip.live.can_bus.find_spec", lambda name: None)
-    with pytest.raises(InputError, match=r"udp_multicast needs .*'msgpack'; pip install 'terragrip\[live\]'"):
+    with pytest.raises(
+        InputError, match=r"to use udp_multicast .*'msgpack' is needed; pip install 'terragrip\[live\]'"
+    ):
         Service(vehicle, ["udp://127.0.0.1:9870"], ["can:239.0.0.1?interface=udp_multicast"])
 
 

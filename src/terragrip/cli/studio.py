@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from terragrip.cli.log import LogForm, LogFormat, log_to_stderr
-from terragrip.errors import InputError
+from terragrip.errors import InputError, missing_package
 
 
 def command(
@@ -76,11 +76,7 @@ def command(
     except ModuleNotFoundError as error:
         if (error.name or "").split(".")[0] == "terragrip":
             raise
-        raise InputError(
-            f"the studio needs the Python package {error.name!r}",
-            hint="pip install 'terragrip[studio]'",
-            page="install",
-        ) from error
+        raise missing_package(error.name or "", "studio", "serve the studio") from error
     as_json = log_format is LogForm.json
     if as_json:
         log_to_stderr(log_format)

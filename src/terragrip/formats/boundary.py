@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from importlib import import_module
 from typing import Any
 
-from terragrip.errors import InputError
+from terragrip.errors import InputError, missing_package
 
 LARGEST = 1 << 30
 """Bytes of a record, or of what it unpacks to: a damaged length must not fill the memory."""
@@ -43,11 +43,7 @@ def needed(module: str, what: str) -> Any:
             result = import_module(module)
     except ModuleNotFoundError as error:
         missing = (error.name or module).partition(".")[0]
-        raise InputError(
-            f"to read {what} the Python package {missing!r} is needed",
-            hint="pip install 'terragrip[formats]'",
-            page="install",
-        ) from error
+        raise missing_package(missing, "formats", f"read {what}") from error
     # What its logger has to say of a damaged file, the InputError or a note says.
     logging.getLogger(module.partition(".")[0]).setLevel(logging.CRITICAL + 1)
     return result

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from terragrip.errors import InputError
+from terragrip.errors import InputError, missing_package
 from terragrip.ground.conjugate import Model
 from terragrip.ground.signals import GROUND, LAWS, SIGNALS, signals_of
 from terragrip.soil.blocks import PERIOD, Blocks
@@ -148,10 +148,7 @@ def _pelt(cost: _Cost, price: float) -> list[int]:
     try:
         from ruptures.detection.pelt import Pelt
     except ImportError:
-        raise InputError(
-            "finding changes of a whole drive needs ruptures",
-            hint="install it with pip install 'terragrip[ground]'",
-        ) from None
+        raise missing_package("ruptures", "ground", "find the changes of a whole drive") from None
     search = Pelt(min_size=LEAST, jump=_JUMP)
     search.cost = cost
     search.fit(cost.signal)

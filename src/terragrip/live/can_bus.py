@@ -9,7 +9,7 @@ from contextlib import asynccontextmanager, contextmanager
 from importlib.util import find_spec
 from typing import Any
 
-from terragrip.errors import InputError
+from terragrip.errors import InputError, missing_package
 from terragrip.live.feed import Lost
 from terragrip.live.uri import Uri
 
@@ -27,11 +27,7 @@ def check(uri: Uri) -> str:
             f"there is no interface {interface!r}", place=uri.text, hint=f"one of {', '.join(INTERFACES)}"
         )
     if interface == "udp_multicast" and find_spec("msgpack") is None:
-        raise InputError(
-            "udp_multicast needs the Python package 'msgpack'",
-            place=uri.text,
-            hint="pip install 'terragrip[live]'",
-        )
+        raise missing_package("msgpack", "live", "use udp_multicast", place=uri.text)
     return interface
 
 

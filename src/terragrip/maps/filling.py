@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from terragrip.errors import InputError
+from terragrip.errors import InputError, missing_package
 from terragrip.maps.cells import Cells
 
 Floats = npt.NDArray[np.float64]
@@ -81,9 +81,7 @@ def _kriged(
     try:
         from pykrige.ok import OrdinaryKriging
     except ImportError as error:
-        raise InputError(
-            "to fill cells pykrige is needed", place="--fill", hint="pip install 'terragrip[geo]'"
-        ) from error
+        raise missing_package("pykrige", "geo", "fill cells", place="--fill") from error
     if not len(wanted):
         return np.zeros(0), np.zeros(0)
     if np.ptp(value) == 0:  # no variation to fit a variogram to

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from terragrip.errors import InputError
+from terragrip.errors import InputError, missing_package
 from terragrip.maps.about import ABOUT, About
 from terragrip.maps.values import QUANTITIES
 
@@ -86,9 +86,7 @@ def _pyogrio(file: Path) -> Any:
     try:
         import pyogrio
     except ModuleNotFoundError as error:
-        raise InputError(
-            "to read a map pyogrio is needed", file=file, hint="pip install 'terragrip[geo]'"
-        ) from error
+        raise missing_package("pyogrio", "geo", "read a map", file=file) from error
     pyogrio.set_gdal_config_options(
         {"GDAL_PAM_ENABLED": False}
     )  # else reading leaves a .aux.xml beside the map

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from terragrip.errors import InputError
+from terragrip.errors import InputError, missing_package
 from terragrip.files import replacing
 from terragrip.maps.about import ABOUT, About
 from terragrip.maps.field_map import MOST_CELLS, FieldMap
@@ -42,11 +42,7 @@ def require_suffix(path: str | os.PathLike[str]) -> None:
     for package in ("pyproj", KINDS[suffix][1]):
         if find_spec(package) is None:
             extra = "report" if package == "matplotlib" else "geo"
-            raise InputError(
-                f"the Python package {package!r} is needed",
-                file=path,
-                hint=f"pip install 'terragrip[{extra}]'",
-            )
+            raise missing_package(package, extra, file=path)
 
 
 def write_map(made: FieldMap, path: str | os.PathLike[str], layer: str = "cells") -> None:

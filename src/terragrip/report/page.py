@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from terragrip.errors import InputError
+from terragrip.errors import InputError, missing_package
 from terragrip.files import replacing
 from terragrip.report.style import in_page, on_paper
 
@@ -81,9 +81,7 @@ def render(page: Page) -> str:
     try:
         import jinja2
     except ImportError:
-        raise InputError(
-            "Jinja2 is not installed", hint="pip install 'terragrip[report]'", page="install"
-        ) from None
+        raise missing_package("jinja2", "report") from None
     environment = jinja2.Environment(
         loader=jinja2.PackageLoader("terragrip.report"),
         autoescape=True,
@@ -147,4 +145,4 @@ def require_drawing() -> None:
 
     missing = [name for name in ("matplotlib", "jinja2") if find_spec(name) is None]
     if missing:
-        raise InputError(f"{missing[0]} is not installed", hint="pip install 'terragrip[report]'")
+        raise missing_package(missing[0], "report")

@@ -13,7 +13,7 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Protocol
 
-from terragrip.errors import InputError
+from terragrip.errors import InputError, missing_package
 from terragrip.estimation.export import limits
 
 if TYPE_CHECKING:
@@ -71,8 +71,7 @@ def require_suffix(path: str | os.PathLike[str]) -> FileKind:
         raise InputError(problem, file=path, hint=f"name it {Path(path).stem}.parquet, or any {named}")
     kind = KINDS[suffix]
     if kind.package is not None and find_spec(kind.package) is None:
-        problem = f"to write {kind.title} the Python package {kind.package!r} is needed"
-        raise InputError(problem, file=path, hint=f"pip install 'terragrip[{kind.extra}]'")
+        raise missing_package(kind.package, kind.extra, f"write {kind.title}", file=path)
     return kind
 
 

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from terragrip.errors import InputError
+from terragrip.errors import missing_package
 
 Floats = npt.NDArray[np.float64]
 
@@ -96,5 +96,4 @@ def learner(module: str, name: str) -> Any:
     try:
         return getattr(import_module(f"sklearn.{module}"), name)
     except ImportError:
-        hint = "pip install 'terragrip[ground]'"
-        raise InputError("scikit-learn is needed to train a GroundClassifier", hint=hint) from None
+        raise missing_package("scikit-learn", "ground", "train a GroundClassifier") from None

@@ -7,7 +7,7 @@ from contextlib import contextmanager
 from importlib import import_module
 from typing import Protocol
 
-from terragrip.errors import InputError
+from terragrip.errors import missing_package
 from terragrip.live.decode import Decoder
 from terragrip.live.feed import Feed, Receiver
 from terragrip.live.uri import Uri
@@ -65,6 +65,4 @@ def packages_of(uri: Uri) -> Iterator[None]:
     except ModuleNotFoundError as error:
         if (error.name or "").split(".")[0] == "terragrip":
             raise
-        raise InputError(
-            f"needs the Python package {error.name}", place=uri.text, hint="pip install 'terragrip[live]'"
-        ) from error
+        raise missing_package(error.name or "", "live", place=uri.text) from error

@@ -10,7 +10,7 @@ import numpy as np
 from fastapi import APIRouter, Response
 from fastapi.responses import FileResponse
 
-from terragrip.errors import InputError
+from terragrip.errors import InputError, missing_package
 from terragrip.studio.api.files import Named
 from terragrip.studio.state import Here
 
@@ -58,9 +58,7 @@ def _mercator(target: Path, path: str) -> Any:
         from rasterio.errors import RasterioError
         from rasterio.vrt import WarpedVRT
     except ModuleNotFoundError as error:
-        raise InputError(
-            "a GeoTIFF needs rasterio", file=path, hint="pip install 'terragrip[geo]'"
-        ) from error
+        raise missing_package("rasterio", "geo", "read a GeoTIFF", file=path) from error
     try:
         raster = rasterio.open(target)
         if raster.crs is None:
