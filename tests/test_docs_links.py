@@ -109,7 +109,7 @@ def test_every_page_that_an_error_names_exists() -> None:
         for path in (ROOT / "src").rglob("*.py")
         for found in PAGE_OF_AN_ERROR.findall(path.read_text(encoding="utf-8"))
     }
-    assert {("vehicle.py", "vehicle", "all-keys"), ("boundary.py", "install", "")} <= named
+    assert {("vehicle.py", "vehicle", "all-keys"), ("errors.py", "install", "")} <= named
     for source, page, heading in named:
         path = ROOT / "docs" / f"{page}.md"
         assert path.is_file(), f"{source} names docs/{page}.md"
