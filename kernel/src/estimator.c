@@ -199,10 +199,10 @@ static void report(tg_estimator *e, const tg_drive *drive, tg_estimate *out)
     e->scene.roughness = e->roughness.wander;
     e->scene.weight = drive->mass * e->settings.machine.gravity + drive->hitch_load;
     e->scene.unseen_load = tgi_unseen_load(e);
-    memcpy(e->scene.warp, e->roughness.warp, sizeof e->scene.warp);
+    if (e->constants.warps) e->scene.unseen_load += tgi_lasting_warp(e, e->scene.warp);
     e->scene.unseen_grade = tgi_unseen_grade(e);
     e->scene.slow_speed = tgi_slow_variance(e);
-    tgi_traction(&e->settings, &e->constants, &e->belief, (const tg_real(*)[TG_ROWS])e->consider.s, &e->scene, o);
+    tgi_traction(&e->settings, e->warped.now, &e->belief, (const tg_real(*)[TG_ROWS])e->consider.s, &e->scene, o);
     o[TG_OUT_NIS] = e->belief.nis;
     o[TG_OUT_CHANNELS] = (tg_real)e->belief.channels;
     o[TG_OUT_SUPERVISOR] = e->belief.supervisor;

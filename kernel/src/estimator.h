@@ -45,7 +45,7 @@ typedef struct { /* one row, calibrated and checked, in the vehicle's own direct
 typedef struct { /* what a row's values need beside the belief; all reals, so that it goes into a record */
     tg_real load[8]; /* wheel, N */
     tg_real hub[8];  /* wheel, m/s: what its hub is faster than the vehicle, along the travel */
-    tg_real warp[8]; /* wheel: what lasts of its adhesion beyond all trends, see warp.c */
+    tg_real warp[8]; /* wheel: what of its adhesion beyond all trends is no load, see warp.c */
     tg_real across[8]; /* steered wheel, m/s: its hub's speed across the vehicle; else 0 */
     tg_real direction, standing, seen_motion; /* standing: or else without a slip */
     tg_real roughness; /* mean square of what rho_s wanders over uneven ground, see roughness.c */
@@ -94,11 +94,17 @@ typedef struct { /* low-passed while the ground speed is measured; the whole veh
 
 typedef struct { /* uneven ground, see roughness.c */
     tg_real adhesion[8], resistance; /* low-passed over the distance */
-    tg_real warp[8];                 /* low-passed likewise: adhesion beyond all trends, see warp.c */
     tg_real scatter, square;         /* mean squares: of a wheel's adhesion beyond the others', of the adhesion */
     tg_real wander;                  /* mean square of rho_s about its low-pass */
     tg_real usual, swing, way;       /* rho_s over the way: its mean, its mean square about that, wheel radii that these stand for; 0: nothing yet */
 } tgi_roughness;
+
+typedef struct { /* what wheels do beyond all trends, see warp.c */
+    tg_real now[8], adhesion[8]; /* wheel: adhesion of the row, and low-passed over the length of unevenness */
+    tg_real usual[8], slip[8]; /* wheel: slip as a rule, and beyond that low-passed over `slip_length` */
+    tg_real told, noise;       /* mean squares of that slip before the low-pass: what it is, and what the wheel speeds' errors make of it */
+    tg_real pulling, slipping; /* adhesion and slip of all wheels, over the length of unevenness */
+} tgi_warped;
 
 typedef struct { /* what stops tell of the ground speed, see slow_speed.c */
     tg_real mean, count;    /* of this stop's readings */
@@ -175,7 +181,8 @@ typedef struct { /* what follows from the settings alone */
     int32_t watched[8], side[8];    /* wheel: powered, or no wheel is; by its place on its axle -1 left, 1 right, 0 middle */
     int32_t holds;                  /* some channel is held */
     int32_t warps;                  /* there are more driven wheels than trends, see warp.c */
-    int32_t pulls[8];               /* wheel: driven */
+    tg_real pulls[8], share;        /* wheel: 1 where driven; 1 over their number */
+    tg_real inverse_radius[8];      /* wheel, of the rolling radius */
     tg_real trend[TG_TRENDS][8], by_trend[TG_TRENDS][8]; /* alike, along, across; and what of an adhesion goes into its share */
 } tgi_constants;
 
@@ -202,6 +209,7 @@ struct tg_estimator {
     tgi_slip_memory slip_memory;
     tgi_slope slope;
     tgi_roughness roughness;
+    tgi_warped warped;
     tgi_slow_speed slow_speed;
     double ground_time;        /* of the last measured ground speed */
     tg_real shock;             /* variance of the accelerometer about the model, (m/s^2)^2 */
@@ -270,7 +278,9 @@ void tgi_watch_roughness(tg_estimator *e, int32_t flowing, tg_real distance);
 
 /* warp.c */
 void tgi_place_trends(const tg_settings *s, tgi_constants *c);
-void tgi_warp(const tgi_constants *c, const tg_real *mu, int32_t n, tg_real *warp);
+void tgi_warp(const tgi_constants *restrict c, const tg_real *restrict value, tg_real *restrict warp);
+void tgi_watch_warp(tg_estimator *e, int32_t flowing, tg_real travelled);
+tg_real tgi_lasting_warp(const tg_estimator *e, tg_real *warp);
 
 /* slow_speed.c */
 void tgi_rest_reading(tg_estimator *e, const tg_row *row);
@@ -335,5 +345,5 @@ TG_INLINE tgi_slip tgi_slip_of(tg_real omega, tg_real v, tg_real radius, tg_real
     return result;
 }
 
-void tgi_traction(const tg_settings *s, const tgi_constants *c, const tg_belief *b, const tg_real (*S)[TG_ROWS], const tgi_scene *scene, tg_real *o);
+void tgi_traction(const tg_settings *s, const tg_real *warp, const tg_belief *b, const tg_real (*S)[TG_ROWS], const tgi_scene *scene, tg_real *o);
 #endif

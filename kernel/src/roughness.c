@@ -52,7 +52,7 @@ void tgi_watch_roughness(tg_estimator *e, int32_t flowing, tg_real distance)
     const int32_t n = e->settings.machine.wheels;
     const tg_real *const mu = e->belief.x, rho = mu[n], travelled = distance / e->constants.mean_radius;
     const tg_real fresh = travelled / (k->uneven_length + travelled), gain = travelled / (k->uneven_memory + travelled);
-    tg_real change[TG_MAX_WHEELS], warp[TG_MAX_WHEELS], square = 0;
+    tg_real change[TG_MAX_WHEELS], square = 0;
     int32_t driven = 0;
     for (int32_t i = 0; i < n; i++) {
         if (!flowing) r->adhesion[i] = mu[i];
@@ -62,10 +62,7 @@ void tgi_watch_roughness(tg_estimator *e, int32_t flowing, tg_real distance)
         square += tgi_square(mu[i]);
     }
     if (driven) square /= (tg_real)driven;
-    if (e->constants.warps) {
-        tgi_warp(&e->constants, mu, n, warp);
-        for (int32_t i = 0; i < n; i++) r->warp[i] = flowing ? r->warp[i] + fresh * (warp[i] - r->warp[i]) : warp[i];
-    }
+    if (e->constants.warps) tgi_watch_warp(e, flowing, travelled);
     count_square(&r->scatter, apart(change, driven), tgi_square(k->least_load_spread) * square + TG_SMALL_ADHESION, k->uneven_most, gain);
     r->square += gain * (square - r->square);
     watch_hills(e, rho, travelled);

@@ -106,14 +106,15 @@ tg_status tg_estimator_smooth(const tg_estimator *e, size_t rows, const tg_real 
     }
     tgi_smoothed m = inside(e, carry);
     tg_belief belief;
-    tg_real S[TG_MAX_CONSIDERED][TG_ROWS];
+    tg_real S[TG_MAX_CONSIDERED][TG_ROWS], warp[TG_MAX_WHEELS];
     for (size_t row = rows; row-- > 0;) {
         const tg_real *here = records + row * tg_smooth_length(e);
         tgi_scene scene;
         memcpy(&scene, here + filter_length(e), sizeof scene);
         step_back(e, here, next, &m);
         to_rows(e, &m, &belief, S);
-        tgi_traction(&e->settings, &e->constants, &belief, (const tg_real(*)[TG_ROWS])S, &scene, value);
+        if (e->constants.warps) tgi_warp(&e->constants, belief.x, warp);
+        tgi_traction(&e->settings, e->constants.warps ? warp : scene.warp, &belief, (const tg_real(*)[TG_ROWS])S, &scene, value);
         put(value, out, row, TG_OUT_VERTICAL_LOAD);
         next = here;
     }

@@ -90,14 +90,6 @@ TG_INLINE void traction(const tg_settings *restrict s, const tg_real *restrict x
     o[TG_OUT_SOIL_RESISTANCE_STD] = tgi_root(c->rr + tgi_square(mean * error));
 }
 
-/* Adhesions with what lasts of the pattern that a chassis makes of loads, in place of what it is now (warp.c). */
-static void unwarp(const tgi_constants *k, const tgi_scene *scene, tg_real *mu, int32_t n)
-{
-    tg_real warp[TG_MAX_WHEELS];
-    tgi_warp(k, mu, n, warp);
-    for (int32_t i = 0; i < n; i++) mu[i] += scene->warp[i] - warp[i];
-}
-
 static void blank(tg_real *out, int32_t place, int32_t n)
 {
     for (int32_t i = 0; i < n; i++) out[place + i] = (tg_real)NAN;
@@ -114,9 +106,9 @@ static void leave_open(const tgi_scene *scene, int32_t n, tg_real *o)
     blank(o, TG_OUT_WHEEL_SPEED_STD, n);
 }
 
-/* All values that follow from the belief. Speeds get back the vehicle's own signs; mu, rho_s, slip and kappa stay in the direction of
- * travel. */
-void tgi_traction(const tg_settings *restrict s, const tgi_constants *restrict k, const tg_belief *restrict b, const tg_real (*restrict S)[TG_ROWS],
+/* All values that follow from the belief; in place of `warp`, what its adhesions are beyond all trends, they have the scene's (warp.c). Speeds
+ * get back the vehicle's own signs; mu, rho_s, slip and kappa stay in the direction of travel. */
+void tgi_traction(const tg_settings *restrict s, const tg_real *restrict warp, const tg_belief *restrict b, const tg_real (*restrict S)[TG_ROWS],
                   const tgi_scene *restrict scene, tg_real *restrict o)
 {
     const int32_t n = s->machine.wheels;
@@ -126,7 +118,7 @@ void tgi_traction(const tg_settings *restrict s, const tgi_constants *restrict k
     thrust /= scene->weight;
     gather(b, S, n, tgi_stride(n), &c);
     memcpy(x, b->x, sizeof x);
-    if (k->warps) unwarp(k, scene, x, n);
+    for (int32_t i = 0; i < n; i++) x[i] += scene->warp[i] - warp[i];
     roughen(&c, x, scene, n);
     traction(s, x, &c, scene, thrust, o, n);
     if (scene->direction < 0) {

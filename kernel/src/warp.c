@@ -1,10 +1,13 @@
 /* What a stiff chassis shifts between wheels (R; docs/decisions/0144). Loads that ground unevenness moves from wheel to wheel keep their sum and
  * both moments, so on the wheels they make a pattern that is neither alike, nor front against rear, nor left against right: one diagonal
  * against the other. Nothing on board measures it, and estimates take it for adhesion. True adhesions differ by axle and by side, hardly by
- * diagonal; so of that pattern only what lasts longer than unevenness does is taken for adhesion. */
+ * diagonal; so of that pattern only what lasts longer than unevenness does is taken for adhesion.
+ * Besides, wheels share a curve: a wheel that bears less slips more, and what it slips beyond the trends, along the curve, is true adhesion.
+ * Errors of the ground speed are alike on all wheels, so they are not in it; those of the wheels' speeds are, and what they make is known. */
 #include "estimator.h"
 
 #define TG_IN_LINE ((tg_real)1e-9) /* mean square below which a trend is none: all wheels on one axle, or on one side */
+#define TG_LEAST_SLIP ((tg_real)0.02) /* below it the secant of the curve is not known */
 
 /* Trends over the driven wheels, orthonormal under their loads at rest (Gram and Schmidt). More wheels than trends leave patterns. */
 void tgi_place_trends(const tg_settings *s, tgi_constants *c)
@@ -14,7 +17,9 @@ void tgi_place_trends(const tg_settings *s, tgi_constants *c)
     int32_t found = 0, driven = 0;
     for (int32_t k = 0; k < s->axles; k++) longest = tgi_max(longest, tgi_fabs(s->load_transfer[k]));
     for (int32_t i = 0; i < n; i++) {
-        driven += c->pulls[i] = s->driven[i] != 0;
+        c->inverse_radius[i] = 1 / s->rolling_radius[i];
+        c->pulls[i] = s->driven[i] ? 1 : 0;
+        driven += s->driven[i] != 0;
         whole += weight[i] = s->driven[i] ? s->load_share[s->wheel_axle[i]] * s->wheel_share[i] : 0;
     }
     for (int32_t a = 0; a < TG_TRENDS && driven; a++) {
@@ -35,15 +40,89 @@ void tgi_place_trends(const tg_settings *s, tgi_constants *c)
         }
         found += square > TG_IN_LINE;
     }
-    c->warps = driven > found;
+    c->warps = driven - found;
+    c->share = driven ? 1 / (tg_real)driven : 0;
 }
 
-/* Of adhesions what no trend holds (n,). */
-void tgi_warp(const tgi_constants *c, const tg_real *mu, int32_t n, tg_real *warp)
+/* Of adhesions or slips what no trend holds. All TG_MAX_WHEELS values are read and written, so that loops are of one length: those of absent
+ * wheels need only be finite. */
+void tgi_warp(const tgi_constants *restrict c, const tg_real *restrict value, tg_real *restrict warp)
 {
-    tg_real share[TG_TRENDS] = {0};
-    for (int32_t a = 0; a < TG_TRENDS; a++)
-        for (int32_t i = 0; i < n; i++) share[a] += c->by_trend[a][i] * mu[i];
-    for (int32_t i = 0; i < n; i++)
-        warp[i] = c->pulls[i] ? mu[i] - share[0] * c->trend[0][i] - share[1] * c->trend[1][i] - share[2] * c->trend[2][i] : 0;
+    tg_real alike = 0, along = 0, across = 0;
+    for (int i = 0; i < TG_MAX_WHEELS; i++) {
+        alike += c->by_trend[0][i] * value[i];
+        along += c->by_trend[1][i] * value[i];
+        across += c->by_trend[2][i] * value[i];
+    }
+    for (int i = 0; i < TG_MAX_WHEELS; i++)
+        warp[i] = c->pulls[i] * (value[i] - alike * c->trend[0][i] - along * c->trend[1][i] - across * c->trend[2][i]);
+}
+
+/* Slips of all wheels, and the variance that the errors of the wheels' speeds give one of them in the mean. 0: they tell nothing. */
+static int32_t slips_of(const tg_estimator *e, tg_real *slip, tg_real *variance)
+{
+    const int32_t n = e->settings.machine.wheels, stride = tgi_stride(n);
+    const tg_real v = e->belief.x[n + 1], *const omega = e->belief.x + n + 2, *const P = e->belief.P + (n + 2) * (stride + 1);
+    int32_t fit = v > e->settings.standstill_speed;
+    tg_real sum = 0;
+    for (int32_t i = 0; i < n; i++) {
+        if (!(e->constants.pulls[i] > 0)) continue;
+        const tg_real inverse = 1 / omega[i], part = v * inverse * e->constants.inverse_radius[i];
+        slip[i] = 1 - part;
+        fit &= part > 0 && part < 2 && e->wheel[i].count > 0 && e->time - e->wheel[i].time <= (double)e->settings.tuned.silence;
+        sum += tgi_square(part * inverse) * P[i * (stride + 1)];
+    }
+    *variance = sum * e->constants.share;
+    return fit;
+}
+
+static void watch_slips(tg_estimator *e, tg_real travelled)
+{
+    tgi_warped *w = &e->warped;
+    const tg_tuned *k = &e->settings.tuned;
+    const tgi_constants *c = &e->constants;
+    const tg_real gain = travelled / (k->uneven_memory + travelled), fresh = travelled / (k->uneven_length + travelled);
+    const tg_real soon = travelled / (k->slip_length + travelled);
+    tg_real slip[TG_MAX_WHEELS] = {0}, warp[TG_MAX_WHEELS], variance, square = 0, pull = 0, mean = 0;
+    if (!slips_of(e, slip, &variance)) {
+        memset(w->slip, 0, sizeof w->slip);
+        return;
+    }
+    tgi_warp(c, slip, warp);
+    const tg_real noise = variance * (tg_real)c->warps * c->share;
+    for (int i = 0; i < TG_MAX_WHEELS; i++) {
+        const tg_real beyond = warp[i] - w->usual[i];
+        w->usual[i] += gain * beyond;
+        w->slip[i] += soon * (beyond - w->slip[i]);
+        square += tgi_square(beyond);
+        pull += c->by_trend[0][i] * e->belief.x[i];
+        mean += c->by_trend[0][i] * slip[i];
+    }
+    w->told += gain * (square * c->share - w->told);
+    w->noise += gain * (noise - w->noise);
+    w->pulling += fresh * (pull - w->pulling);
+    w->slipping += fresh * (mean - w->slipping);
+}
+
+/* After a row's estimate, `travelled` wheel radii behind the one before. `flowing`: the row goes on from that one; else its adhesions may be
+ * anything, and what lasted before stays. */
+void tgi_watch_warp(tg_estimator *e, int32_t flowing, tg_real travelled)
+{
+    const tg_real fresh = flowing ? travelled / (e->settings.tuned.uneven_length + travelled) : 0;
+    tgi_warped *w = &e->warped;
+    tgi_warp(&e->constants, e->belief.x, w->now);
+    for (int i = 0; i < TG_MAX_WHEELS; i++) w->adhesion[i] += fresh * (w->now[i] - w->adhesion[i]);
+    if (flowing && e->settings.method == TG_FILTERED) watch_slips(e, travelled);
+    else memset(w->slip, 0, sizeof w->slip);
+}
+
+/* What of the adhesions beyond the trends is no load (n,): what lasts, and what slips tell. Returns the relative variance of what slips tell more. */
+tg_real tgi_lasting_warp(const tg_estimator *e, tg_real *warp)
+{
+    const tgi_warped *w = &e->warped;
+    const tg_tuned *k = &e->settings.tuned;
+    const tg_real excess = tgi_max(w->told - w->noise, 0), inverse = 1 / tgi_max(w->slipping, TG_LEAST_SLIP);
+    const tg_real slope = w->told > 0 ? k->bend * tgi_max(w->pulling, 0) * inverse * excess / w->told : 0;
+    for (int i = 0; i < TG_MAX_WHEELS; i++) warp[i] = w->adhesion[i] + slope * w->slip[i];
+    return tgi_square(k->bend_spread * inverse) * excess;
 }

@@ -66,3 +66,19 @@ def test_the_thrust_of_all_wheels_stays() -> None:
         return np.asarray(np.array([27, 27, 42.5, 42.5]) @ mu / MASS)
 
     assert np.std(thrust(with_bumps) - thrust(without)) < 0.05 * np.mean(thrust(without))
+
+
+def test_a_diagonal_that_slips_more_is_higher_on_the_curve() -> None:
+    """Wheels share a curve: at one torque a wheel that slips more bears less, so that its adhesion is larger."""
+    plain = drive(30.0)
+    by = 0.03 * np.sin(2 * np.pi * 0.6 * plain.recording.time / (8 * RADIUS))
+    channels = dict(plain.recording.channels)
+    for wheel, sign in zip(WHEELS, LAYOUT["diagonal"], strict=True):
+        channels[f"wheel_speed_{wheel}"] = channels[f"wheel_speed_{wheel}"] * (1 + sign * by)
+    made = replace(plain, recording=replace(plain.recording, channels=channels))
+    estimates, late = estimate(made.recording, robot()), made.recording.time > 10
+    mu, slip = (np.stack([estimates[f"{name}_{w}"][late] for w in WHEELS]) for name in ("adhesion", "slip"))
+    pattern, told = (np.array(LAYOUT["diagonal"]) @ one / 4 for one in (mu, slip))
+    secant = mu.mean() / slip.mean()
+    assert np.corrcoef(pattern, told)[0, 1] > 0.7
+    assert 0.2 * secant < np.std(pattern) / np.std(told) < 0.7 * secant
