@@ -340,6 +340,8 @@ typedef struct {
     tg_real first_slip;             /* until the first ground speed */
     tg_real slow_share;             /* of the ground speed's noise: SD of an error that stays alike for long, */
     tg_real slow_stops;             /* as if so many stops had shown it */
+    tg_real alike_memory;           /* ground speeds: over so many it is tallied how alike neighbouring innovations are, */
+    tg_real alike_sure;             /* and counts beyond this many SDs of chance */
     tg_real uneven_length;          /* wheel radii: shorter changes of adhesion and resistance are the ground's unevenness */
     tg_real uneven_memory;          /* wheel radii over which their mean squares are taken */
     tg_real uneven_most;            /* usual squares that one counts at most: a border between soils is no bump */

@@ -125,6 +125,7 @@ static int32_t advance(tg_estimator *e, tg_row *row, const tg_drive *drive, tg_r
     tgi_follow(e, e->deviation);
     watch_shocks(e, &step, r[s->machine.wheels + 1], dt);
     watch_consistency(e, row, &step, r);
+    tgi_watch_innovation(e, row, &step);
     e->belief.supervisor = supervisor_of(e, &step);
     row->outlier |= is_outlier(e, row, &step);
     return 1;
@@ -202,6 +203,7 @@ static void report(tg_estimator *e, const tg_drive *drive, tg_estimate *out)
     if (e->constants.warps) e->scene.unseen_load += tgi_lasting_warp(e, e->scene.warp);
     e->scene.unseen_grade = tgi_unseen_grade(e);
     e->scene.slow_speed = tgi_slow_variance(e);
+    e->scene.disputed = tgi_disputed_variance(e, drive);
     tgi_traction(&e->settings, e->warped.now, &e->belief, (const tg_real(*)[TG_ROWS])e->consider.s, &e->scene, o);
     o[TG_OUT_NIS] = e->belief.nis;
     o[TG_OUT_CHANNELS] = (tg_real)e->belief.channels;

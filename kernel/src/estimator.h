@@ -52,7 +52,8 @@ typedef struct { /* what a row's values need beside the belief; all reals, so th
     tg_real unseen_grade; /* variance of a slope that rho_s may be, see roughness.c */
     tg_real weight; /* N, on level ground, with what hangs on the hitch */
     tg_real unseen_load; /* relative variance of a wheel's load */
-    tg_real slow_speed; /* variance of the ground speed's slow error, see slow_speed.c */
+    tg_real slow_speed; /* variance of the ground speed's slow error, see slow_speed.c, */
+    tg_real disputed;   /* and of what its sensor and the forces disagree on, and of its samples' age */
     tg_real anew; /* the filter was started anew: nothing links this row to the one before */
 } tgi_scene;
 
@@ -109,6 +110,9 @@ typedef struct { /* what wheels do beyond all trends, see warp.c */
 typedef struct { /* what stops tell of the ground speed, see slow_speed.c */
     tg_real mean, count;    /* of this stop's readings */
     tg_real squares, stops; /* of all stops, weighted */
+    tg_real innovation;     /* of the last ground speed; 0: none */
+    tg_real alike, pairs;   /* mean product of two innovations that follow each other, over so many */
+    tg_real expected;       /* variance of the last innovation, which is the SD of such a product of unlike ones */
 } tgi_slow_speed;
 
 typedef struct { /* of the driven wheels, along the travel; see immobilization.c */
@@ -285,6 +289,8 @@ tg_real tgi_lasting_warp(const tg_estimator *e, tg_real *warp);
 /* slow_speed.c */
 void tgi_rest_reading(tg_estimator *e, const tg_row *row);
 void tgi_rest_over(tg_estimator *e);
+void tgi_watch_innovation(tg_estimator *e, const tg_row *row, const tg_step *step);
+tg_real tgi_disputed_variance(const tg_estimator *e, const tg_drive *drive);
 tg_real tgi_slow_variance(const tg_estimator *e);
 
 /* restarts.c */

@@ -60,6 +60,8 @@ static tg_tuned default_tuned(void)
     k.first_slip = (tg_real)0.08;
     k.slow_share = (tg_real)0.2;
     k.slow_stops = 1;
+    k.alike_memory = 1000;
+    k.alike_sure = 2;
     k.uneven_length = 4;
     k.uneven_memory = 40;
     k.uneven_most = 4;

@@ -1,7 +1,10 @@
 /* The part of the ground speed's noise that does not average out (R): receivers filter, so that their errors stay alike for seconds to minutes.
  * While driving it cannot be separated from slip, but at rest the speed is 0, and the mean of what the sensor reads there, beyond its white noise, is
- * one sample of that error a stop. Before the first stops a share of the noise is assumed to be slow. */
+ * one sample of that error a stop. Before the first stops a share of the noise is assumed to be slow. Errors of seconds, hills that the forces
+ * do not know and a late receiver show while driving: innovations that follow each other are then alike, and those of white noise are not. */
 #include "estimator.h"
+
+#define TG_SAMPLE_AGE ((tg_real)0.288675) /* sqrt(1/12) intervals: a sample may stand for any instant of its own */
 
 /* At rest: `row` may hold one more reading. */
 void tgi_rest_reading(tg_estimator *e, const tg_row *row)
@@ -25,6 +28,40 @@ void tgi_rest_over(tg_estimator *e)
         s->stops += weight;
     }
     s->count = s->mean = 0;
+}
+
+/* Take the innovation of the row's ground speed, if it was measured; beyond `spike` SDs it counts as that. A reckoned speed, or one that may be a
+ * spike, is neighbour to none. */
+void tgi_watch_innovation(tg_estimator *e, const tg_row *row, const tg_step *step)
+{
+    tgi_slow_speed *const s = &e->slow_speed;
+    const tg_tuned *const k = &e->settings.tuned;
+    const int32_t n = e->settings.machine.wheels;
+    const tg_real variance = step->innovation_variance[n], most = k->spike * tgi_sqrt(variance);
+    tg_real innovation = step->innovation[n];
+    if (isnan(innovation)) return;
+    if (row->reckoned || row->doubt[n] > 0) {
+        s->innovation = 0;
+        return;
+    }
+    innovation = innovation > most ? most : innovation < -most ? -most : innovation;
+    if (s->innovation != 0) {
+        if (s->pairs < k->alike_memory) s->pairs += 1;
+        s->alike += (s->innovation * innovation - s->alike) / s->pairs;
+    }
+    s->innovation = innovation;
+    s->expected = variance;
+}
+
+/* What the filter has not followed of a disagreement between its forces and the sensor, either of which may be right: the mean product of
+ * neighbouring innovations, less what chance makes of it; and, while the speed changes, the age of a sample. */
+tg_real tgi_disputed_variance(const tg_estimator *e, const tg_drive *drive)
+{
+    const tgi_slow_speed *const s = &e->slow_speed;
+    const tg_real rate = (tg_real)e->direction * (e->balance.value - e->settings.machine.gravity * drive->sine);
+    const tg_real aged = tgi_square(TG_SAMPLE_AGE * e->ground.interval * rate);
+    const tg_real chance = s->pairs > 0 ? e->settings.tuned.alike_sure * s->expected / tgi_sqrt(s->pairs) : 0;
+    return s->alike > chance ? aged + s->alike - chance : aged;
 }
 
 /* Variance of the slow error. */

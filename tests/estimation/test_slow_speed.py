@@ -1,7 +1,9 @@
-"""A receiver's error that stays alike for half a minute: intervals of slip hold it, and stops tell how large it is."""
+"""Errors of the receiver that do not average out: of half a minute, which stops tell, and of seconds, which neighbouring innovations
+tell; and a speed whose samples are half an interval late."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -14,11 +16,11 @@ from terragrip.simulation.families import Kind, draw, machines
 RATE, MEMORY = 50.0, 30.0  # 1/s, s
 
 
-def drifting(result: SimulationResult, share: float, seed: int) -> SimulationResult:
+def drifting(result: SimulationResult, share: float, seed: int, memory: float = MEMORY) -> SimulationResult:
     """The ground speed with a first-order Gauss-Markov error of this share of its noise on top."""
     log, noise = result.recording, result.vehicle.sensors.ground_speed
     assert noise is not None
-    keep = np.exp(-1 / (RATE * MEMORY))
+    keep = np.exp(-1 / (RATE * memory))
     rng = np.random.default_rng(seed)
     start, drive = share * noise * rng.standard_normal(), np.sqrt(1 - keep**2) * share * noise
     error = lfilter([1.0], [1.0, -keep], drive * rng.standard_normal(len(log.time)), zi=[keep * start])[0]
@@ -56,3 +58,30 @@ def test_a_sensor_that_reads_nothing_at_rest_gets_narrower_intervals_than_one_th
     usual = estimate(log, result.vehicle)
     rows = ~rest & np.isfinite(log["ground_speed"])
     assert np.median(wide["ground_speed_std"][rows]) > 1.15 * np.median(usual["ground_speed_std"][rows])
+
+
+def sampled(result: SimulationResult, period: float, late: float) -> SimulationResult:
+    """The ground speed at so few instants [s apart], each of this long [s] before."""
+    log = result.recording
+    count = round(period * RATE)
+    speed = np.interp(log.time - late, log.time, log["ground_speed"])
+    speed[np.arange(len(speed)) % count != 0] = np.nan
+    return replace(result, recording=replace(log, channels=dict(log.channels) | {"ground_speed": speed}))
+
+
+def shares(change: Callable[[SimulationResult, int], SimulationResult]) -> list[float]:
+    """Share held on each of six machines whose logs are changed so."""
+    held = []
+    for kind, seed in machines("development", 6, 40):
+        result = change(draw(kind, seed, rate=RATE), seed)
+        held.append(share_held(result, estimate(result.recording, result.vehicle)))
+    return held
+
+
+def test_slip_intervals_hold_an_error_of_seconds():
+    held = shares(lambda result, seed: drifting(result, 1.0, seed, memory=2.0))
+    assert np.mean(held) > 0.84  # .80 before neighbouring innovations were looked at
+
+
+def test_slip_intervals_hold_speeds_of_before():
+    assert min(shares(lambda result, _: sampled(result, 0.4, 0.2))) > 0.9  # .85 before a sample had an age

@@ -21,7 +21,7 @@ COLUMNS = 7  # torque gain of each wheel, drawbar, slope, the tyres' rolling res
 
 def joint(estimator: TractionEstimator, recording: Any) -> tuple[Any, Any, Any, float, float]:
     """Mean (10,), covariance (10, 10) and considered columns (k, 10) after the recording's last row, state order, and the SD of
-    a wheel's unseen load and of the slow error of the ground speed, in the row's scene."""
+    a wheel's unseen load and of the errors of the ground speed beyond the filter's, in the row's scene."""
     engine, ffi, lib = estimator.engine, _kernel.ffi, _kernel.lib
     time, columns = prepared(estimator, recording)
     last = engine.record(time, columns)[-1].copy()
@@ -29,7 +29,7 @@ def joint(estimator: TractionEstimator, recording: Any) -> tuple[Any, Any, Any, 
     x, P, s = np.empty(10), np.empty((10, 10)), np.empty((COLUMNS, 10))
     pointers = (ffi.cast("double *", a.ctypes.data) for a in (last, x, P, s))
     assert lib.tg_record_moments(4, COLUMNS, *pointers) == lib.TG_OK
-    return x, P, s, float(np.sqrt(last[-3])), float(np.sqrt(last[-2]))
+    return x, P, s, float(np.sqrt(last[-4])), float(np.sqrt(last[-3] + last[-2]))
 
 
 @pytest.mark.parametrize("slip", [0.03, 0.12, 0.35])
