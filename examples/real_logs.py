@@ -3,8 +3,8 @@
     python examples/real_logs.py [--data ../shared/data] [--method kalman] [--smooth] [--scale]
 
 Wheels are looked at where their own speed is freshly measured. Rows count as straight driving where the vehicle is
-faster than a limit, its sides turn alike and nothing is flagged. The hub of a side goes at v ∓ yaw rate · track/2:
-``hub slip`` is the slip with that speed.
+faster than a limit, its ground speed was measured in the last half second, its sides turn alike and nothing is flagged.
+The hub of a side goes at v ∓ yaw rate · track/2: ``hub slip`` is the slip with that speed.
 """
 
 from __future__ import annotations
@@ -87,7 +87,9 @@ def judge(machine: Machine, recording: Recording, vehicle: Vehicle, estimates: E
     left, right = (np.mean([rim[w] for w in side], axis=0) for side in (machine.left, machine.right))
     speed, calm = estimates["ground_speed"], estimates.event_codes == 0
     turning = np.abs(left - right) / np.maximum(np.abs(left + right), 1e-9)
-    straight = calm & (np.abs(speed) > machine.fast) & (turning < 0.1) & (estimates["ground_speed_std"] < 0.1)
+    stamps = np.where(np.isfinite(fresh["ground_speed"]), recording.time, np.nan)
+    seen = recording.time - _last(stamps) < 0.5  # s: the ground speed is a measured one
+    straight = calm & seen & (np.abs(speed) > machine.fast) & (turning < 0.1)
     spot = (turning > 1) & (np.abs(left - right) > 0.2)
     turn = _last(recording.channels.get("angular_velocity_z", np.zeros(len(recording))))
     half = np.nan_to_num(turn) * (vehicle.track or 0.0) / 2

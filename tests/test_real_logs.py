@@ -103,7 +103,8 @@ def test_warthog_on_grass(shared: Located, judging: ModuleType) -> None:
         # The authors' windows of gentle turns have 0.049 with 0.30 m; straight driving slips less, and the radius is
         # known to 3 %.
         assert 0.0 < verdict.hub_slip < 0.06
-        assert 0.03 <= verdict.slip_std < 0.08
+        # The pose's stamps are uncertain by .05 s, so that neighbouring innovations of the speed are alike (decision 0148).
+        assert 0.03 <= verdict.slip_std < 0.15
         # Short grass and tires, were all electrical power to reach the wheels of 500 kg: 0.1 to 0.2.
         assert 0.06 < verdict.resistance < 0.2
         assert abs(verdict.adhesion - verdict.resistance) < verdict.resistance_std

@@ -19,9 +19,11 @@ _SLOW = 6.0  # s: slower changes do not show a lag
 
 def points_of(time: Floats, most: float = MOST_TIME) -> tuple[Floats, float] | None:
     """Points (m,) [s] and their distance, as fine as the rows (n,) and no finer than `STEP`; None where the log is short."""
+    if time[-1] - time[0] < LEAST_TIME:
+        return None
     step = max(STEP, float(np.median(np.diff(time))))
     points = np.arange(time[0], min(time[-1], time[0] + most), step)
-    return (points, step) if len(points) * step >= LEAST_TIME else None
+    return points, step
 
 
 def smooth(values: Floats, seconds: float, step: float) -> Floats:
