@@ -26,7 +26,7 @@ KERNEL_TESTS := $(patsubst kernel/tests/%.c,%,$(wildcard kernel/tests/*.c))
 BUILD_INPUTS := pyproject.toml setup.py cffi_build.py $(KERNEL_SOURCES) $(KERNEL_HEADERS) \
 	$(wildcard kernel/python/*.[ch] src/terragrip/*/*.c src/terragrip/*/*.h)
 
-.PHONY: beside beside-long collected pytest-long notebooks soak soak-short help demo test lint kernel-test web-test pytest studio wheel docs system bench lock clean sbom audit \
+.PHONY: beside-long collected pytest-long notebooks soak soak-short help demo test lint kernel-test web-test pytest studio wheel docs system bench lock clean sbom audit \
 	kernel-aarch64 kernel-others test-long kernel-sanitized fuzz system-fuzz fuzz-kernel fuzz-kernel-run fuzz-parsers kills
 
 help: ## show this list
@@ -35,13 +35,11 @@ help: ## show this list
 demo: $(VENV)/package studio ## set up, simulate the campaign, estimate every run, and say where the report is
 	@$(BIN)/terragrip demo
 
-test: system beside pytest ## set up, then lint, type checks, import rules, C tests and Python tests
+test: system ## set up, then lint, type checks, import rules, C tests and Python tests
+	@$(MAKE) $(AT_ONCE) pytest lint kernel-test web-test
 
-# Lint, C tests and the pages' tests each use one processor: side by side with each other and with what they wait for. Three jobs on two
-# processors, for pip and npm wait for the network; each command's output in one piece.
+# Side by side, so that no processor waits for pip, npm or a test's timer; three jobs, the longest way first. Each command's output in one piece.
 AT_ONCE := --no-print-directory BESIDE=1 -j 3 $(if $(findstring output-sync,$(.FEATURES)),--output-sync=line)
-beside:
-	@$(MAKE) $(AT_ONCE) lint kernel-test web-test collected
 
 # Every test file imported once: else each worker of pytest would rewrite and compile all of them anew.
 collected: $(VENV)/package $(VENV)/dev
@@ -64,10 +62,10 @@ system: ## as root on Debian: install the programs that the tests of studio and 
 	    || echo "make: could not install$$missing; tests that have no other will be skipped" >&2; \
 	elif [ -n "$$missing" ]; then echo "make: without$$missing some tests are slower or skipped" >&2; fi
 
-# Two workers a processor, for nearly half of the time they wait for browsers, brokers and timers. A worker takes a whole file, then the next in order,
-# so that what a file's tests share is made once. The workers fill the processors: no threads inside a product of matrices.
-PYTEST = OMP_NUM_THREADS=1 $(BIN)/python -m pytest --dist loadfile --no-loadscope-reorder -n
-pytest: $(VENV)/package $(VENV)/dev studio ## the Python tests alone
+# Two workers a processor, for nearly half of the time they wait for browsers, brokers and timers. Each takes a quarter of the tests in order,
+# so that what a room's tests share is made once, and who is ready takes half of what another has left. The workers fill the processors: no threads inside a product of matrices.
+PYTEST = OMP_NUM_THREADS=1 $(BIN)/python -m pytest --dist worksteal -n
+pytest: collected studio ## the Python tests alone
 	$(PYTEST) $(shell expr 2 \* $(WORKERS))
 
 studio: $(VENV)/made ## build the studio's pages, where Node.js 20 or newer is
@@ -174,11 +172,11 @@ build/kernel/$(1)/%: kernel/tests/%.c $$(patsubst kernel/src/%.c,build/kernel/$(
 	$$(CC) $$(KERNEL_FLAGS) $(2) -o $$@ $$(filter %.c %.o,$$^) -lm
 endef
 # Restoring from damaged snapshots is tried under the sanitizers too, where the compiler has them; `make test-long` runs all tests so.
-SANITIZERS := -g -fsanitize=address,undefined,float-cast-overflow -fno-sanitize-recover=all
+SANITIZERS := -g1 -fsanitize=address,undefined,float-cast-overflow -fno-sanitize-recover=all
 SANITIZED := $(shell echo 'int main(void) { return 0; }' | $(CC) $(SANITIZERS) -x c - -o /dev/null 2>/dev/null && echo build/kernel/sanitized/restore)
 .SECONDARY:
-$(eval $(call kernel_rules,sanitized,-O1 $(SANITIZERS)))
-$(eval $(call kernel_rules,sanitized-float,-O1 -DTG_FLOAT $(SANITIZERS)))
+$(eval $(call kernel_rules,sanitized,-Og $(SANITIZERS)))
+$(eval $(call kernel_rules,sanitized-float,-Og -DTG_FLOAT $(SANITIZERS)))
 $(eval $(call kernel_rules,double,))
 $(eval $(call kernel_rules,float,-DTG_FLOAT))
 

@@ -23,8 +23,6 @@ from terragrip.live.pipeline import Pipeline
 from terragrip.live.record_folder import last_snapshot, write_snapshot
 from terragrip.live.wal import Reading
 
-KILLS = 100
-
 
 def settings_for(recording) -> Settings:
     return Settings(("replay:test",), channels=tuple(recording.channels))
@@ -73,7 +71,8 @@ def killed_child(act, seconds: float | None = None) -> bool:
     return os.WIFEXITED(status) and os.WEXITSTATUS(status) == 0
 
 
-def test_killed_a_hundred_times_it_ends_as_if_never_interrupted(tmp_path, vehicle):
+@pytest.mark.parametrize("least", [25, pytest.param(100, marks=pytest.mark.long)])
+def test_killed_many_times_it_ends_as_if_never_interrupted(tmp_path, vehicle, least):
     import pyarrow.parquet  # noqa: F401  # here, so that a child need not
 
     recording = drive(25.0, imu=True).recording
@@ -85,7 +84,7 @@ def test_killed_a_hundred_times_it_ends_as_if_never_interrupted(tmp_path, vehicl
     def act():
         play(Pipeline(Core(vehicle, settings), tmp_path / f"r{drives}", rows=150), rows, pause=0.004)
 
-    while kills < KILLS:
+    while kills < least:
         if killed_child(act, random.uniform(0.0, 0.15)):
             assert_as_never_interrupted(tmp_path / f"r{drives}", recording, vehicle)
             drives += 1
