@@ -62,9 +62,9 @@ system: ## as root on Debian: install the programs that the tests of studio and 
 	    || echo "make: could not install$$missing; tests that have no other will be skipped" >&2; \
 	elif [ -n "$$missing" ]; then echo "make: without$$missing some tests are slower or skipped" >&2; fi
 
-# Two workers a processor, for nearly half of the time they wait for browsers, brokers and timers. Each takes a quarter of the tests in order,
-# so that what a room's tests share is made once, and who is ready takes half of what another has left. The workers fill the processors: no threads inside a product of matrices.
-PYTEST = OMP_NUM_THREADS=1 $(BIN)/python -m pytest --dist worksteal -n
+# Two workers a processor, for nearly half of the time they wait for browsers, brokers and timers. A worker takes a whole file, then the next in order,
+# so that what a file's tests share is made once. The workers fill the processors: no threads inside a product of matrices.
+PYTEST = OMP_NUM_THREADS=1 $(BIN)/python -m pytest --dist loadfile --no-loadscope-reorder -n
 pytest: collected studio ## the Python tests alone
 	$(PYTEST) $(shell expr 2 \* $(WORKERS))
 
