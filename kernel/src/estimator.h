@@ -164,7 +164,6 @@ typedef struct {
     tg_real x[TG_SPEED_STATES], P[TG_SPEED_STATES][TG_SPEED_STATES];
 } tgi_speed_mode;
 
-#define TG_TRENDS 3
 
 typedef struct { /* what follows from the settings alone */
     tg_real limit[TG_SLOTS];        /* beyond it a value is a defect; negative: this machine has no such channel */
@@ -187,7 +186,8 @@ typedef struct { /* what follows from the settings alone */
     int32_t warps;                  /* there are more driven wheels than trends, see warp.c */
     tg_real pulls[8], share;        /* wheel: 1 where driven; 1 over their number */
     tg_real inverse_radius[8];      /* wheel, of the rolling radius */
-    tg_real trend[TG_TRENDS][8], by_trend[TG_TRENDS][8]; /* alike, along, across; and what of an adhesion goes into its share */
+    tg_real at_rest[8];             /* wheel: its share of the driven wheels' load at rest */
+    tg_real beyond[8][8];           /* wheel by wheel: what a value of the one adds to what no trend holds on the other, see warp.c */
 } tgi_constants;
 
 struct tg_estimator {

@@ -37,14 +37,14 @@ void tgi_watch_innovation(tg_estimator *e, const tg_row *row, const tg_step *ste
     tgi_slow_speed *const s = &e->slow_speed;
     const tg_tuned *const k = &e->settings.tuned;
     const int32_t n = e->settings.machine.wheels;
-    const tg_real variance = step->innovation_variance[n], most = k->spike * tgi_sqrt(variance);
+    const tg_real variance = step->innovation_variance[n], most = tgi_square(k->spike) * variance;
     tg_real innovation = step->innovation[n];
     if (isnan(innovation)) return;
     if (row->reckoned || row->doubt[n] > 0) {
         s->innovation = 0;
         return;
     }
-    innovation = innovation > most ? most : innovation < -most ? -most : innovation;
+    if (tgi_square(innovation) > most) innovation = innovation > 0 ? tgi_sqrt(most) : -tgi_sqrt(most);
     if (s->innovation != 0) {
         if (s->pairs < k->alike_memory) s->pairs += 1;
         s->alike += (s->innovation * innovation - s->alike) / s->pairs;
@@ -60,8 +60,8 @@ tg_real tgi_disputed_variance(const tg_estimator *e, const tg_drive *drive)
     const tgi_slow_speed *const s = &e->slow_speed;
     const tg_real rate = (tg_real)e->direction * (e->balance.value - e->settings.machine.gravity * drive->sine);
     const tg_real aged = tgi_square(TG_SAMPLE_AGE * e->ground.interval * rate);
-    const tg_real chance = s->pairs > 0 ? e->settings.tuned.alike_sure * s->expected / tgi_sqrt(s->pairs) : 0;
-    return s->alike > chance ? aged + s->alike - chance : aged;
+    if (!(s->alike > 0)) return aged;
+    return aged + tgi_max(s->alike - e->settings.tuned.alike_sure * s->expected / tgi_sqrt(s->pairs), 0);
 }
 
 /* Variance of the slow error. */

@@ -6,14 +6,15 @@
  * Errors of the ground speed are alike on all wheels, so they are not in it; those of the wheels' speeds are, and what they make is known. */
 #include "estimator.h"
 
+#define TG_TRENDS 3 /* alike, along, across */
 #define TG_IN_LINE ((tg_real)1e-9) /* mean square below which a trend is none: all wheels on one axle, or on one side */
 #define TG_LEAST_SLIP ((tg_real)0.02) /* below it the secant of the curve is not known */
 
-/* Trends over the driven wheels, orthonormal under their loads at rest (Gram and Schmidt). More wheels than trends leave patterns. */
+/* Trends over the driven wheels, orthonormal under their loads at rest (Gram and Schmidt), and what they leave. More wheels than trends leave patterns. */
 void tgi_place_trends(const tg_settings *s, tgi_constants *c)
 {
     const int32_t n = s->machine.wheels;
-    tg_real weight[TG_MAX_WHEELS], whole = 0, longest = 0;
+    tg_real weight[TG_MAX_WHEELS], trends[TG_TRENDS][TG_MAX_WHEELS] = {{0}}, by_trend[TG_TRENDS][TG_MAX_WHEELS] = {{0}}, whole = 0, longest = 0;
     int32_t found = 0, driven = 0;
     for (int32_t k = 0; k < s->axles; k++) longest = tgi_max(longest, tgi_fabs(s->load_transfer[k]));
     for (int32_t i = 0; i < n; i++) {
@@ -23,22 +24,30 @@ void tgi_place_trends(const tg_settings *s, tgi_constants *c)
         whole += weight[i] = s->driven[i] ? s->load_share[s->wheel_axle[i]] * s->wheel_share[i] : 0;
     }
     for (int32_t a = 0; a < TG_TRENDS && driven; a++) {
-        tg_real *const trend = c->trend[found], square = 0;
+        tg_real *const trend = trends[found], square = 0;
         for (int32_t i = 0; i < n; i++) {
             const tg_real along = longest > 0 ? s->load_transfer[s->wheel_axle[i]] / longest : 0;
             trend[i] = a == 0 ? 1 : a == 1 ? along : (tg_real)c->side[i];
         }
         for (int32_t b = 0; b < found; b++) {
             tg_real share = 0;
-            for (int32_t i = 0; i < n; i++) share += c->by_trend[b][i] * trend[i];
-            for (int32_t i = 0; i < n; i++) trend[i] -= share * c->trend[b][i];
+            for (int32_t i = 0; i < n; i++) share += by_trend[b][i] * trend[i];
+            for (int32_t i = 0; i < n; i++) trend[i] -= share * trends[b][i];
         }
         for (int32_t i = 0; i < n; i++) square += weight[i] / whole * tgi_square(trend[i]);
         for (int32_t i = 0; i < n; i++) {
             trend[i] *= square > TG_IN_LINE && s->driven[i] ? 1 / tgi_sqrt(square) : 0;
-            c->by_trend[found][i] = weight[i] / whole * trend[i];
+            by_trend[found][i] = weight[i] / whole * trend[i];
         }
         found += square > TG_IN_LINE;
+    }
+    for (int32_t j = 0; j < n && driven; j++) {
+        c->at_rest[j] = weight[j] / whole;
+        for (int32_t i = 0; i < n; i++) {
+            c->beyond[j][i] = i == j;
+            for (int32_t a = 0; a < found; a++) c->beyond[j][i] -= by_trend[a][j] * trends[a][i];
+            c->beyond[j][i] *= c->pulls[i];
+        }
     }
     c->warps = driven - found;
     c->share = driven ? 1 / (tg_real)driven : 0;
@@ -48,14 +57,9 @@ void tgi_place_trends(const tg_settings *s, tgi_constants *c)
  * wheels need only be finite. */
 void tgi_warp(const tgi_constants *restrict c, const tg_real *restrict value, tg_real *restrict warp)
 {
-    tg_real alike = 0, along = 0, across = 0;
-    for (int i = 0; i < TG_MAX_WHEELS; i++) {
-        alike += c->by_trend[0][i] * value[i];
-        along += c->by_trend[1][i] * value[i];
-        across += c->by_trend[2][i] * value[i];
-    }
-    for (int i = 0; i < TG_MAX_WHEELS; i++)
-        warp[i] = c->pulls[i] * (value[i] - alike * c->trend[0][i] - along * c->trend[1][i] - across * c->trend[2][i]);
+    memset(warp, 0, TG_MAX_WHEELS * sizeof *warp);
+    for (int j = 0; j < TG_MAX_WHEELS; j++)
+        for (int i = 0; i < TG_MAX_WHEELS; i++) warp[i] += c->beyond[j][i] * value[j];
 }
 
 /* Slips of all wheels, and the variance that the errors of the wheels' speeds give one of them in the mean. 0: they tell nothing. */
@@ -95,8 +99,8 @@ static void watch_slips(tg_estimator *e, tg_real travelled)
         w->usual[i] += gain * beyond;
         w->slip[i] += soon * (beyond - w->slip[i]);
         square += tgi_square(beyond);
-        pull += c->by_trend[0][i] * e->belief.x[i];
-        mean += c->by_trend[0][i] * slip[i];
+        pull += c->at_rest[i] * e->belief.x[i];
+        mean += c->at_rest[i] * slip[i];
     }
     w->told += gain * (square * c->share - w->told);
     w->noise += gain * (noise - w->noise);

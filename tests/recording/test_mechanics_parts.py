@@ -313,11 +313,13 @@ def test_slip_at_hardly_a_torque_is_a_wrong_radius(
 
 def test_without_motion_or_vehicle_nothing_is_said(vehicle: Vehicle) -> None:
     time = np.arange(0.0, 60.0, 0.5)
-    assert motion_warnings(Recording(time, {"ground_speed": np.zeros(120)}), vehicle) == []
-    assert motion_warnings(Recording(time, {"ground_speed": np.ones(120)}), vehicle) == []
+    for speed in (np.zeros(120), np.ones(120)):
+        log = Recording(time, {"ground_speed": speed})
+        assert motion_warnings(log, vehicle, means_of(log)) == []
     change = np.sin(time / 3)
     speed = 10.0 + np.cumsum(change) * 0.5
-    notes = motion_warnings(Recording(time, {"ground_speed": speed, "acceleration_x": -change}), None)
+    log = Recording(time, {"ground_speed": speed, "acceleration_x": -change})
+    notes = motion_warnings(log, None, means_of(log))
     assert notes == [
         "acceleration_x is not the change of ground speed but its opposite: forward is positive: write 'sign: -1' for it in the profile."
     ]

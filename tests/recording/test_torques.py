@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from terragrip.recording import Recording, unit_warnings
+from terragrip.recording.mechanics import means_of
 from terragrip.recording.torques import torque_warnings
 from terragrip.vehicle import Vehicle
 
@@ -47,10 +48,15 @@ def without_cell(log: Recording) -> Recording:
     return replace(log, channels={n: v for n, v in log.channels.items() if n != "drawbar_force"})
 
 
+def notes_of(log: Recording) -> list[str]:
+    """What is said of a log's torques."""
+    return torque_warnings(log, vehicle(), means_of(log))
+
+
 @pytest.mark.parametrize("rate", [5.0, 20.0, 100.0])
 def test_a_right_log_is_left_alone(rate: float) -> None:
     assert unit_warnings(working(rate=rate), vehicle()) == []
-    assert torque_warnings(without_cell(working(rate=rate)), vehicle()) == []
+    assert notes_of(without_cell(working(rate=rate))) == []
 
 
 @pytest.mark.parametrize(("late", "side"), [(0.3, "behind"), (0.5, "behind"), (-0.5, "ahead of")])
@@ -65,7 +71,7 @@ def test_a_tenth_of_a_second_is_left_to_tyres_and_filters() -> None:
 
 
 def test_without_a_cell_late_torques_are_held_against_the_wheels() -> None:
-    (note,) = torque_warnings(without_cell(working(late=0.5, pulled=0.0)), vehicle())
+    (note,) = notes_of(without_cell(working(late=0.5, pulled=0.0)))
     assert "0.50 s behind the wheel speeds" in note
 
 
@@ -73,7 +79,7 @@ def test_without_a_cell_late_torques_are_held_against_the_wheels() -> None:
     ("scale", "cell", "times"), [(2.2, 1.0, "2.2"), (1.0, 0.2248, "3.6"), (0.45, 1.0, "0.45")]
 )
 def test_torques_of_another_scale_than_the_pull_are_named(scale: float, cell: float, times: str) -> None:
-    notes = torque_warnings(working(scale=scale, cell=cell), vehicle())
+    notes = notes_of(working(scale=scale, cell=cell))
     assert notes[0].startswith(
         f"The drive torques over the wheel radius are {times} times the drawbar force and the force"
     )
@@ -81,7 +87,7 @@ def test_torques_of_another_scale_than_the_pull_are_named(scale: float, cell: fl
 
 def test_uncalibrated_torques_and_cells_are_no_wrong_scale() -> None:
     for scale in (0.75, 1.3):
-        assert torque_warnings(working(scale=scale), vehicle()) == []
+        assert notes_of(working(scale=scale)) == []
 
 
 @pytest.mark.parametrize("cell", [True, False])
@@ -92,7 +98,7 @@ def test_a_thrust_that_no_ground_carries_is_a_unit(cell: bool) -> None:
 
 
 def test_wheels_that_brake_on_average_while_nothing_pulls_have_a_sign() -> None:
-    notes = torque_warnings(without_cell(working(scale=-1.0)), vehicle())
+    notes = notes_of(without_cell(working(scale=-1.0)))
     assert notes[0].startswith(
         "The drive torques over the wheel radius are -0.22 times the weight on average"
     )

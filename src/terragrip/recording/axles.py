@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from terragrip.physics.loads import axle_loads
-from terragrip.recording.mechanics import Means, means_of
+from terragrip.recording.mechanics import Means
 from terragrip.units import STANDARD_GRAVITY
 
 if TYPE_CHECKING:
@@ -32,7 +32,7 @@ _UNEVEN = 0.25  # logarithm of 1.28: uncalibrated torques and the rear wheels' t
 _RESTORED = 0.4  # of the difference, at most, is left when the masses are exchanged
 
 
-def axle_warnings(recording: Recording, vehicle: Vehicle) -> list[str]:
+def axle_warnings(recording: Recording, vehicle: Vehicle, means: Means | None) -> list[str]:
     """A sentence on two driven axles whose thrusts, at like slip, would be in proportion to each other's masses.
 
     Other errors of torques and speeds look alike: use this only where no other was found.
@@ -41,8 +41,7 @@ def axle_warnings(recording: Recording, vehicle: Vehicle) -> list[str]:
     driven = [k for k, axle in enumerate(vehicle.axles.values()) if axle.driven]
     wheels = {w for k in driven for w in vehicle.axles[names[k]].wheels}
     needed = {f"{quantity}_{w}" for w in wheels for quantity in ("drive_torque", "wheel_speed")}
-    means = means_of(recording) if len(driven) > 1 and needed <= recording.channels.keys() else None
-    if means is None:
+    if means is None or len(driven) < 2 or not needed <= recording.channels.keys():
         return []
     thrust, slip, straight = _by_axle(recording, vehicle, means, driven)
     total = np.sum(list(thrust.values()), axis=0)

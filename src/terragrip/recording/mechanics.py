@@ -109,9 +109,8 @@ class Means:
         return _Fit(whole, error, float(np.corrcoef(pair.T)[0, 1])) if np.isfinite(whole + error) else _Fit()
 
 
-def motion_warnings(recording: Recording, vehicle: Vehicle | None) -> list[str]:
+def motion_warnings(recording: Recording, vehicle: Vehicle | None, means: Means | None) -> list[str]:
     """Sentences on accelerations, pitch, torques, radius and mass that the motion contradicts, and on sensors that never change."""
-    means = means_of(recording)
     if means is None:
         return []
     forward = (

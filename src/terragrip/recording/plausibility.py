@@ -9,7 +9,7 @@ import numpy.typing as npt
 
 from terragrip.recording.axles import axle_warnings
 from terragrip.recording.inertial import inertial_warnings
-from terragrip.recording.mechanics import RATIOS, motion_warnings
+from terragrip.recording.mechanics import RATIOS, means_of, motion_warnings
 from terragrip.recording.sides import exchanged_torques, side_warnings
 from terragrip.recording.torques import torque_warnings
 from terragrip.recording.track import Track, track_of
@@ -58,7 +58,8 @@ def unit_warnings(recording: Recording, vehicle: Vehicle | None) -> list[str]:
     shown = None if known is None else _shown_turn(recording, track)
     exchanged = [] if known is None else exchange_warnings(recording, known, shown)
     sided = [] if known is None else side_warnings(recording, known, shown)
-    moved = motion_warnings(recording, vehicle)
+    means = means_of(recording)
+    moved = motion_warnings(recording, vehicle, means)
     notes = [
         *(_speed_warnings(recording, known) if known is not None and not sided else ()),
         *sided,
@@ -69,13 +70,13 @@ def unit_warnings(recording: Recording, vehicle: Vehicle | None) -> list[str]:
         *angles,
         *_acceleration_warnings(recording),
         *moved,
-        *(torque_warnings(recording, known) if known is not None and not moved else ()),
+        *(torque_warnings(recording, known, means) if known is not None and not moved else ()),
         *(inertial_warnings(recording, known) if known is not None else ()),
         *_time_warnings(recording),
     ]
     if notes or known is None:
         return notes
-    return exchanged_torques(recording, known, shown) or axle_warnings(recording, known)
+    return exchanged_torques(recording, known, shown) or axle_warnings(recording, known, means)
 
 
 def _speed_warnings(recording: Recording, vehicle: Vehicle) -> list[str]:

@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from terragrip.recording.courses import CALM, lag_of, points_of, quick, smooth
-from terragrip.recording.mechanics import driven_radii, means_of, thrusts_of
+from terragrip.recording.mechanics import Means, driven_radii, thrusts_of
 from terragrip.units import STANDARD_GRAVITY
 
 if TYPE_CHECKING:
@@ -33,13 +33,12 @@ _ALIKE = 0.7  # correlation at the lag
 _BETTER = 0.05  # than without it
 
 
-def torque_warnings(recording: Recording, vehicle: Vehicle) -> list[str]:
+def torque_warnings(recording: Recording, vehicle: Vehicle, means: Means | None) -> list[str]:
     """Sentences on torques of another scale than the pull, and on torques that are late or early."""
-    return _scale_warnings(recording, vehicle) or _lag_warnings(recording, vehicle)
+    return _scale_warnings(recording, vehicle, means) or _lag_warnings(recording, vehicle)
 
 
-def _scale_warnings(recording: Recording, vehicle: Vehicle) -> list[str]:
-    means = means_of(recording)
+def _scale_warnings(recording: Recording, vehicle: Vehicle, means: Means | None) -> list[str]:
     beyond_pull = {} if means is None else thrusts_of(recording, vehicle, means)
     if means is None or not beyond_pull:
         return []
