@@ -31,6 +31,8 @@ def ramp(size: float) -> np.ndarray:
         ("rpm_rear_right", 30, "wheel_speed_rr", "rpm"),
         ("w_rl", 3, "wheel_speed_rl", None),
         ("M1", 20, "drive_torque_1", None),
+        ("log.n_fl", 3, "wheel_speed_fl", None),
+        ("run.wheels.T_rr", 20, "drive_torque_rr", None),
         ("torque_front_left", 20, "drive_torque_fl", None),
         ("right_wheel_current", 20, "drive_torque_r", None),
         ("speed", 1, "ground_speed", None),

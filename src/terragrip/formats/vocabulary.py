@@ -212,13 +212,14 @@ class Vocabulary:
             text = [w for w in text if w not in _OF_MESSAGES or w in last]
         if text == ["t"]:
             concepts.add("time")
-        if len(text) == 2 and text[0] in _AXIS_SYMBOLS and text[1] in ("x", "y", "z"):
-            text = ["".join(text)]  # a_z
+        own = text[-2:] if len(last) - used == 2 else []  # of a struct's field, less the structs it is in
+        if own and own[0] in _AXIS_SYMBOLS and own[1] in ("x", "y", "z"):
+            text = [*text[:-2], "".join(own)]  # a_z
         if len(words) > 1 and unit in ("rpm", "rev/s"):
             concepts.add("rotation")
-        if len(text) == 2 and text[0] in _SYMBOLS and (text[1] in _CORNERS or text[1] in "lr12345678"):
-            concepts.add(_SYMBOLS[text[0]])  # M1, w_rl
-            text = text[1:]
+        if own and own[0] in _SYMBOLS and (own[1] in _CORNERS or own[1] in "lr12345678"):
+            concepts.add(_SYMBOLS[own[0]])  # M1, w_rl, log.n_fl
+            text = [*text[:-2], own[1]]
         for word in text:
             short = _SYMBOL_OF_AXIS.match(word)
             if short is not None and word not in self._known:
