@@ -4,7 +4,7 @@
 
 Development drives of bench_warning.py at 10 Hz and the made-up snow are estimated once; then the warning's twin
 (tests/estimation/kernel_twin) goes over the estimates with each number of tg_watch_settings changed.
---write puts the table into docs/decisions/0100.
+--write puts the table into docs/warning.md.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ VARIATIONS: tuple[Variation, ...] = (
     *((name, factor) for name in NUMBERS for factor in (0.5, 2.0)),
 )
 Job = tuple[str, Kind, int, str, float]
-DOCUMENT = next((Path(__file__).resolve().parents[1] / "docs/decisions").glob("0100-*.md"))
+DOCUMENT = Path(__file__).resolve().parents[1] / "docs/warning.md"
 BEGIN = "<!-- made by benchmarks/warning_numbers.py --write -->"
 
 
@@ -108,7 +108,7 @@ def main() -> None:
     parser.add_argument("--hours", type=float, default=2.0)
     parser.add_argument("--seed", type=int, default=0, help="of the first machine")
     parser.add_argument("--workers", type=int, default=1)
-    parser.add_argument("--write", action="store_true", help="put the table into docs/decisions/0100")
+    parser.add_argument("--write", action="store_true", help="put the table into docs/warning.md")
     arguments = parser.parse_args()
     family, snow = ({key: Tally() for key in VARIATIONS} for _ in range(2))
     listed = list(jobs("development", arguments.stops, arguments.hours, [10.0], arguments.seed))

@@ -64,7 +64,7 @@ CONTENTS: dict[str, list[str]] = {
         "glossary",
         "licences",
     ],
-    "Science": ["physics", "methods", "families", "real-logs", "benchmarks"],
+    "Science": ["physics", "methods", "families", "warning", "real-logs", "benchmarks"],
     "Inside": ["architecture", "kernel", "decisions/README"],
 }
 """The site's table of contents. A page of docs/ that stands nowhere here is put at the end of the how-tos."""
