@@ -58,7 +58,7 @@ async def test_a_pair_of_zenoh_sessions(vehicle, short, port):
 async def subscribed(session, key: str) -> None:
     """Wait until the session knows of a subscriber to a key: what it puts before that goes nowhere."""
     publisher = session.declare_publisher(key)
-    await until(lambda: publisher.matching_status)
+    await until(lambda: publisher.matching_status.matching)
     publisher.undeclare()
 
 
