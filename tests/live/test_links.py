@@ -99,15 +99,30 @@ async def test_ros_2_by_zenoh(vehicle, short, port):
         async with running(service):
             for topic in ("joints", "gnss/vel"):
                 await subscribed(other, f"7/{topic}/type/hash")
-            for time, values in list(rows_of(short.recording))[:100]:
+
+            def send(time, values):
                 for topic, name, message in ros_messages(store, 5.0 + time, values, vehicle.wheels, joints):
                     key = f"7/{topic}/{name.replace('/msg/', '::msg::dds_::')}_/RIHS01_0"
-                    other.put(key, bytes(store.serialize_cdr(message, name)))
+                    data = bytes(store.serialize_cdr(message, name))
+                    other.put(key, data, congestion_control=zenoh.CongestionControl.BLOCK)
+
+            sent, left = 0, list(rows_of(short.recording))[:100]
+            while not got:  # estimates go nowhere until the sink's session knows who asks for them
+                send(*left[sent])
+                sent += 1
+                await until(lambda: service.core.rows == sent)  # noqa: B023
+                await asyncio.sleep(0.1)
+            for row in left[sent:]:
+                send(*row)
             other.put("7/joints/sensor_msgs::msg::dds_::JointState_/RIHS01_0", b"garbage")
             await until(
-                lambda: service.core.rows == 100 and len(got) >= 100 and service.feeds[0].unreadable == 1
+                lambda: (
+                    service.core.rows == 100
+                    and got[-1] == pytest.approx(5.0 + short.recording.time[99])
+                    and service.feeds[0].unreadable == 1
+                )
             )
-    assert got == pytest.approx((5.0 + short.recording.time[:100]).tolist())
+    assert got == pytest.approx((5.0 + short.recording.time[100 - len(got) : 100]).tolist())
     measured = [m.row for m in service.seen if m.kind == "estimate" and not m.row.predicted]
     sent = short.recording.channels["drive_torque_rr"][:100]
     assert [row.values["drive_torque_rr"] for row in measured] == sent.tolist()
