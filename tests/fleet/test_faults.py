@@ -59,13 +59,13 @@ def test_a_worker_that_is_killed_in_mid_task(place: Path) -> None:
 
 
 def test_a_log_that_needs_more_memory_than_a_worker_has(place: Path) -> None:
-    rows = 8_000_000  # 0.26 GB of numbers in a file of few
+    rows = 12_000_000  # 0.4 GB of numbers in a file of few
     ones = np.ones(rows, dtype=np.uint8)
     channels = dict.fromkeys(("ground_speed", "wheel_speed_l", "wheel_speed_r"), ones)
     time_column = np.arange(rows, dtype=np.int32)
     scipy.io.savemat(place / "logs/a/bomb.mat", {"time": time_column, **channels}, do_compression=True)
     code, output, errors = fleet(
-        place, place / "logs/**/*.*", "--vehicle", place / "Heros.yaml", "--workers", 1, "--memory", "320MB"
+        place, place / "logs/**/*.*", "--vehicle", place / "Heros.yaml", "--workers", 2, "--memory", "420MB"
     )
     assert (code, errors) == (0, "")
     assert "6 estimated, 0 unchanged, 1 failed" in output
