@@ -59,7 +59,8 @@ tg_real tgi_disputed_variance(const tg_estimator *e, const tg_drive *drive)
 {
     const tgi_slow_speed *const s = &e->slow_speed;
     const tg_real rate = (tg_real)e->direction * (e->balance.value - e->settings.machine.gravity * drive->sine);
-    const tg_real aged = tgi_square(TG_SAMPLE_AGE * e->ground.interval * rate);
+    const tg_real longest = e->settings.tuned.longest_walk, interval = e->ground.interval < longest ? e->ground.interval : longest;
+    const tg_real aged = tgi_square(TG_SAMPLE_AGE * interval * rate);
     if (!(s->alike > 0)) return aged;
     return aged + tgi_max(s->alike - e->settings.tuned.alike_sure * s->expected / tgi_sqrt(s->pairs), 0);
 }

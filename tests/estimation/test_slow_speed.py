@@ -9,7 +9,8 @@ from dataclasses import replace
 import numpy as np
 from scipy.signal import lfilter
 
-from terragrip.estimation import Estimates, estimate
+from drives import robot
+from terragrip.estimation import Estimates, TractionEstimator, estimate
 from terragrip.simulation import SimulationResult
 from terragrip.simulation.families import Kind, draw, machines
 
@@ -85,3 +86,13 @@ def test_slip_intervals_hold_an_error_of_seconds():
 
 def test_slip_intervals_hold_speeds_of_before():
     assert min(shares(lambda result, _: sampled(result, 0.4, 0.2))) > 0.9  # .85 before a sample had an age
+
+
+def test_a_sample_after_an_age_has_a_finite_interval() -> None:
+    """Found by the fuzzer: the age of a sample counts, and an interval of 1e200 s made the interval of the ground speed infinite."""
+    vehicle = robot()
+    estimator = TractionEstimator(vehicle)
+    for time in (0.0, 0.01, 0.02, 1e200):
+        values = {f"wheel_speed_{w}": 3.0 + time % 1 for w in vehicle.wheels}
+        out = estimator.update({"time": time, "ground_speed": 0.9 + time % 1, **values})
+    assert not np.isinf(out.ground_speed_std)
