@@ -16,6 +16,7 @@ from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from terragrip.errors import InputError
 from terragrip.formats.reading import read_table
+from terragrip.formats.ros_layout import Layout
 from terragrip.formats.ros_types import Types, bag_topic, ros_topic
 from test_logs import COUNT, fill, write_ros1
 
@@ -198,3 +199,11 @@ def test_a_topic_whose_first_messages_are_empty(tmp_path: Path) -> None:
     wanted = "/joint_states.velocity.fr"
     speed = read_table(tmp_path / "log.bag", lambda name: name == wanted).columns[wanted]
     assert speed.tolist() == list(range(3, 100))
+
+
+def test_a_damaged_text_is_read_with_marks() -> None:
+    """Found by the fuzzer: bytes of a text that are no UTF-8 stopped the whole log."""
+    marks = np.zeros(0, dtype=np.intp)
+    layout = Layout(numbers={}, texts={("frame_id",): (1, 4)}, marks=marks, marked=marks.astype(np.uint8))
+    data = np.frombuffer(b"\x00base\x00\x8dase", dtype=np.uint8).reshape(2, 5)
+    assert layout.text(("frame_id",), data) == ["base", "\ufffdase"]

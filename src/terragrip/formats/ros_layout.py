@@ -53,7 +53,7 @@ class Layout:
     def text(self, path: Path, data: Bytes) -> list[str]:
         """A text of each message (n, bytes)."""
         place, length = self.texts[path]
-        return [row.tobytes().decode("utf-8") for row in data[:, place : place + length]]
+        return [row.tobytes().decode("utf-8", errors="replace") for row in data[:, place : place + length]]
 
 
 def layout_of(
