@@ -103,7 +103,7 @@ typedef struct { /* uneven ground, see roughness.c */
 typedef struct { /* what wheels do beyond all trends, see warp.c */
     tg_real now[8], adhesion[8]; /* wheel: adhesion of the row, and low-passed over the length of unevenness */
     tg_real usual[8], slip[8]; /* wheel: slip as a rule, and beyond that low-passed over `slip_length` */
-    tg_real told, noise;       /* mean squares of that slip before the low-pass: what it is, and what the wheel speeds' errors make of it */
+    tg_real square, noise;     /* mean squares of that slip before the low-pass: what it is, and what the wheel speeds' errors make of it */
     tg_real pulling, slipping; /* adhesion and slip of all wheels, over the length of unevenness */
 } tgi_warped;
 
@@ -283,7 +283,7 @@ void tgi_watch_roughness(tg_estimator *e, int32_t flowing, tg_real distance);
 /* warp.c */
 void tgi_place_trends(const tg_settings *s, tgi_constants *c);
 void tgi_warp(const tgi_constants *restrict c, const tg_real *restrict value, tg_real *restrict warp);
-void tgi_watch_warp(tg_estimator *e, int32_t flowing, tg_real travelled);
+void tgi_watch_warp(tg_estimator *e, int32_t flowing, tg_real travelled, tg_real fresh, tg_real gain);
 tg_real tgi_lasting_warp(const tg_estimator *e, tg_real *warp);
 
 /* slow_speed.c */

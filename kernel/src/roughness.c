@@ -62,7 +62,7 @@ void tgi_watch_roughness(tg_estimator *e, int32_t flowing, tg_real distance)
         square += tgi_square(mu[i]);
     }
     if (driven) square /= (tg_real)driven;
-    if (e->constants.warps) tgi_watch_warp(e, flowing, travelled);
+    if (e->constants.warps) tgi_watch_warp(e, flowing, travelled, fresh, gain);
     count_square(&r->scatter, apart(change, driven), tgi_square(k->least_load_spread) * square + TG_SMALL_ADHESION, k->uneven_most, gain);
     r->square += gain * (square - r->square);
     watch_hills(e, rho, travelled);

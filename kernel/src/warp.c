@@ -80,13 +80,11 @@ static int32_t slips_of(const tg_estimator *e, tg_real *slip, tg_real *variance)
     return fit;
 }
 
-static void watch_slips(tg_estimator *e, tg_real travelled)
+static void watch_slips(tg_estimator *e, tg_real travelled, tg_real fresh, tg_real gain)
 {
     tgi_warped *w = &e->warped;
-    const tg_tuned *k = &e->settings.tuned;
     const tgi_constants *c = &e->constants;
-    const tg_real gain = travelled / (k->uneven_memory + travelled), fresh = travelled / (k->uneven_length + travelled);
-    const tg_real soon = travelled / (k->slip_length + travelled);
+    const tg_real soon = travelled / (e->settings.tuned.slip_length + travelled);
     tg_real slip[TG_MAX_WHEELS] = {0}, warp[TG_MAX_WHEELS], variance, square = 0, pull = 0, mean = 0;
     if (!slips_of(e, slip, &variance)) {
         memset(w->slip, 0, sizeof w->slip);
@@ -102,21 +100,20 @@ static void watch_slips(tg_estimator *e, tg_real travelled)
         pull += c->at_rest[i] * e->belief.x[i];
         mean += c->at_rest[i] * slip[i];
     }
-    w->told += gain * (square * c->share - w->told);
+    w->square += gain * (square * c->share - w->square);
     w->noise += gain * (noise - w->noise);
     w->pulling += fresh * (pull - w->pulling);
     w->slipping += fresh * (mean - w->slipping);
 }
 
-/* After a row's estimate, `travelled` wheel radii behind the one before. `flowing`: the row goes on from that one; else its adhesions may be
- * anything, and what lasted before stays. */
-void tgi_watch_warp(tg_estimator *e, int32_t flowing, tg_real travelled)
+/* After a row's estimate, `travelled` wheel radii behind the one before; `fresh` and `gain`: its weights over the length and the memory of
+ * unevenness. `flowing`: the row goes on from that one; else its adhesions may be anything, and what lasted before stays. */
+void tgi_watch_warp(tg_estimator *e, int32_t flowing, tg_real travelled, tg_real fresh, tg_real gain)
 {
-    const tg_real fresh = flowing ? travelled / (e->settings.tuned.uneven_length + travelled) : 0;
     tgi_warped *w = &e->warped;
     tgi_warp(&e->constants, e->belief.x, w->now);
-    for (int i = 0; i < TG_MAX_WHEELS; i++) w->adhesion[i] += fresh * (w->now[i] - w->adhesion[i]);
-    if (flowing && e->settings.method == TG_FILTERED) watch_slips(e, travelled);
+    for (int i = 0; i < TG_MAX_WHEELS && flowing; i++) w->adhesion[i] += fresh * (w->now[i] - w->adhesion[i]);
+    if (flowing && e->settings.method == TG_FILTERED) watch_slips(e, travelled, fresh, gain);
     else memset(w->slip, 0, sizeof w->slip);
 }
 
@@ -125,8 +122,8 @@ tg_real tgi_lasting_warp(const tg_estimator *e, tg_real *warp)
 {
     const tgi_warped *w = &e->warped;
     const tg_tuned *k = &e->settings.tuned;
-    const tg_real excess = tgi_max(w->told - w->noise, 0), inverse = 1 / tgi_max(w->slipping, TG_LEAST_SLIP);
-    const tg_real slope = w->told > 0 ? k->bend * tgi_max(w->pulling, 0) * inverse * excess / w->told : 0;
+    const tg_real excess = tgi_max(w->square - w->noise, 0), inverse = 1 / tgi_max(w->slipping, TG_LEAST_SLIP);
+    const tg_real slope = w->square > 0 ? k->bend * tgi_max(w->pulling, 0) * inverse * excess / w->square : 0;
     for (int i = 0; i < TG_MAX_WHEELS; i++) warp[i] = w->adhesion[i] + slope * w->slip[i];
     return tgi_square(k->bend_spread * inverse) * excess;
 }
