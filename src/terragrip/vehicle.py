@@ -13,6 +13,7 @@ import numpy as np
 import numpy.typing as npt
 from pydantic import Field, model_validator
 
+from terragrip.arrays import Bools, Floats, Ints
 from terragrip.document import Fault, Part, read_yaml, validate
 from terragrip.errors import InputError
 from terragrip.physics.loads import point_load_shares
@@ -37,8 +38,6 @@ from terragrip.vehicle_parts import (
     Width,
     quantity_of,
 )
-
-Floats = npt.NDArray[np.float64]
 
 MAX_WHEELS = 8
 _MASS_TOLERANCE = 0.01  # allowed difference of the axles' sum, share of the mass
@@ -164,7 +163,7 @@ class Vehicle(Part):
         return tuple(self.axles)
 
     @cached_property
-    def wheel_axle(self) -> npt.NDArray[np.intp]:
+    def wheel_axle(self) -> Ints:
         """Index of each wheel's axle (n,)."""
         counts = [len(axle.wheels) for axle in self.axles.values()]
         return _frozen(np.repeat(np.arange(len(counts)), counts))
@@ -200,7 +199,7 @@ class Vehicle(Part):
         return _frozen(np.array([wheel.inertia for wheel in self.wheel_data]))
 
     @cached_property
-    def driven(self) -> npt.NDArray[np.bool_]:
+    def driven(self) -> Bools:
         """Whether each wheel is driven (n,)."""
         return _frozen(np.array([axle.driven for axle in self.axles.values() for _ in axle.wheels]))
 

@@ -5,15 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from terragrip.advice.optimum import Best, OverSlip
 from terragrip.advice.result import Action
+from terragrip.arrays import Floats
 from terragrip.physics.loads import axle_loads
 from terragrip.units import STANDARD_GRAVITY
 from terragrip.vehicle import Vehicle
-
-Array = NDArray[np.float64]
 
 WORTH = 0.005
 """Efficiency gained under which nothing is advised."""
@@ -36,30 +34,30 @@ class Work:
 
     over: OverSlip
     best: Best
-    slip: Array
-    pull: Array
+    slip: Floats
+    pull: Floats
     speed: float
     resistance: float
 
     @property
-    def efficiency(self) -> Array:
+    def efficiency(self) -> Floats:
         """Useful over wheel energy of the drive's slips, by each curve (draws,)."""
         net, gross = self._at(self.slip)
         return np.asarray(np.maximum(net, 0).sum(axis=1) / gross.sum(axis=1))
 
-    def _at(self, slip: Array) -> tuple[Array, Array]:
+    def _at(self, slip: Floats) -> tuple[Floats, Floats]:
         """(pull, wheel energy per metre), each over weight, (draws, slips)."""
         i = np.clip(np.searchsorted(self.over.slip, slip), 1, len(self.over.slip) - 1)
         net, eta = self.over.net_traction[:, i], self.over.efficiency[:, i]
         pulls = (net > 0.005) & (eta > 0)
         return net, np.where(pulls, net / np.where(pulls, eta, 1.0), 0.02)
 
-    def efficiency_at(self, slip: float) -> Array:
+    def efficiency_at(self, slip: float) -> Floats:
         """eta of each curve at one slip (draws,)."""
         i = int(np.clip(np.searchsorted(self.over.slip, slip), 0, len(self.over.slip) - 1))
         return self.over.efficiency[:, i]
 
-    def efficiency_of_pull(self, pull: float) -> Array:
+    def efficiency_of_pull(self, pull: float) -> Floats:
         """eta of each curve where it pulls ``pull`` of its weight (draws,); 0 where it cannot."""
         top = self.over.net_traction.argmax(axis=1)
         enough = self.over.net_traction >= pull
@@ -68,7 +66,7 @@ class Work:
         return np.asarray(np.where(enough.any(axis=1), eta, 0.0))
 
 
-def gained(difference: Array) -> tuple[float, tuple[float, float]]:
+def gained(difference: Floats) -> tuple[float, tuple[float, float]]:
     """The first curve's gain, and the 95 % interval of all, from draws (draws,)."""
     low, high = np.percentile(difference, [2.5, 97.5])
     return float(difference[0]), (float(min(low, difference[0])), float(max(high, difference[0])))

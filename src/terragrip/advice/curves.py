@@ -18,11 +18,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from terragrip.advice.samples import Samples
-
-Array = NDArray[np.float64]
+from terragrip.arrays import Bools, Floats
 
 DRAWS = 300
 BINS = 12
@@ -60,30 +58,30 @@ class CurveDraws:
     """Curves of one soil: ``parameters`` (draws, 8) in the order of NAMES, the first row the best fit; ``reach``: slip that the data reach;
     ``slip``, ``adhesion``, ``resistance`` (bins,): what was fitted; ``stretches`` of way behind it."""
 
-    parameters: Array
+    parameters: Floats
     reach: float
-    slip: Array
-    adhesion: Array
-    resistance: Array
+    slip: Floats
+    adhesion: Floats
+    resistance: Floats
     stretches: int
     driven: float
 
-    def adhesion_at(self, slip: Array) -> Array:
+    def adhesion_at(self, slip: Floats) -> Floats:
         """mu (draws, slips) over the true slip."""
         return adhesion(self._true, np.broadcast_to(slip, (len(self.parameters), len(slip))))
 
-    def resistance_at(self, slip: Array) -> Array:
+    def resistance_at(self, slip: Floats) -> Floats:
         """rho_s (draws, slips) over the true slip."""
         return resistance(self._true, np.broadcast_to(slip, (len(self.parameters), len(slip))))
 
     @property
-    def _true(self) -> Array:
+    def _true(self) -> Floats:
         free = self.parameters.copy()
         free[:, E] = 0.0
         return free
 
 
-def adhesion(parameters: Array, slip: Array) -> Array:
+def adhesion(parameters: Floats, slip: Floats) -> Floats:
     """mu (draws, slips) of parameters (draws, 8) at measured slips (draws, slips)."""
     height, rate, fall, error, level, _, shape, share = (parameters[:, i, None] for i in range(len(NAMES)))
     s = slip - error
@@ -91,19 +89,19 @@ def adhesion(parameters: Array, slip: Array) -> Array:
     return np.asarray(share * level + np.exp(height) * (rise - fall * s))
 
 
-def _rise(x: Array, shape: Array) -> Array:
+def _rise(x: Floats, shape: Floats) -> Floats:
     """h of dh/dx = (1 - h)^p, h(0) = 0, at x >= 0."""
     q = np.where(np.abs(1 - shape) < 1e-4, 1e-4, 1 - shape)
     return np.asarray(-np.expm1(np.log(np.maximum(1 - q * x, 1e-12)) / q))
 
 
-def _three_quarters(shape: Array) -> Array:
+def _three_quarters(shape: Floats) -> Floats:
     """x at which h is 3/4."""
     q = np.where(np.abs(1 - shape) < 1e-4, 1e-4, 1 - shape)
     return np.asarray(-np.expm1(-q * np.log(4.0)) / q)
 
 
-def resistance(parameters: Array, slip: Array) -> Array:
+def resistance(parameters: Floats, slip: Floats) -> Floats:
     """rho_s (draws, slips) at measured slips; never below 0."""
     slipping = np.maximum(slip - parameters[:, E, None], 0)
     return np.asarray(np.maximum(parameters[:, 4, None] + parameters[:, 5, None] * slipping, 0.0))
@@ -140,7 +138,7 @@ def draw_curves(
     cell[order] = np.minimum((share * bins).astype(np.int64), bins - 1)
     flat = label * bins + cell
 
-    def sums(values: Array) -> Array:
+    def sums(values: Floats) -> Floats:
         summed = np.bincount(flat, weights=values * samples.metres, minlength=stretches * bins)
         return np.asarray(summed, dtype=float).reshape(stretches, bins)
 
@@ -177,7 +175,7 @@ def draw_curves(
     return CurveDraws(x, float(np.max(slip[0][enough[0]])), slip[0], mu[0], rho[0], stretches, samples.driven)
 
 
-def _pooled(sd: Array) -> Array:
+def _pooled(sd: Floats) -> Floats:
     """Each bin's SD (bins,), not under that of all: few stretches tell a bin's own badly."""
     known = np.isfinite(sd)
     usual = float(np.sqrt(np.mean(sd[known] ** 2))) if known.any() else 0.1
@@ -185,14 +183,14 @@ def _pooled(sd: Array) -> Array:
 
 
 def _fit(
-    slip: Array,
-    mu: Array,
-    rho: Array,
-    enough: NDArray[np.bool_],
-    sd: tuple[Array, Array, Array],
-    prior: Array,
-    prior_sd: Array,
-) -> Array:
+    slip: Floats,
+    mu: Floats,
+    rho: Floats,
+    enough: Bools,
+    sd: tuple[Floats, Floats, Floats],
+    prior: Floats,
+    prior_sd: Floats,
+) -> Floats:
     """The curve of each draw by Levenberg-Marquardt on bins and prior together, (draws, 8)."""
     slip_sd, mu_sd, rho_sd = (np.maximum(np.nan_to_num(x, nan=0.1), 1e-4) for x in sd)
     slip = np.where(enough, slip, 0.0)
@@ -200,7 +198,7 @@ def _fit(
     lower[E], upper[E] = -4 * prior_sd[E], 4 * prior_sd[E]
     steepness = np.zeros_like(mu)
 
-    def residual(p: Array) -> Array:
+    def residual(p: Floats) -> Floats:
         of_mu = np.sqrt(mu_sd**2 + (steepness * slip_sd) ** 2 + (MISFIT * mu) ** 2 + 1e-6)
         of_rho = np.sqrt(rho_sd**2 + (0.05 * rho) ** 2 + 1e-6)
         a = np.where(enough, (adhesion(p, slip) - mu) / of_mu, 0.0)

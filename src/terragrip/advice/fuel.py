@@ -5,11 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from terragrip.arrays import Floats
 from terragrip.estimation import Estimates
-
-Array = NDArray[np.float64]
 
 LONGEST = 5.0
 """Seconds between two messages from which the rate between them is not known."""
@@ -17,7 +15,7 @@ LEAST_KNOWN = 0.5
 """Share of the time for which the rate must be known for a figure."""
 
 
-def fuel_rate_of(estimates: Estimates) -> Array:
+def fuel_rate_of(estimates: Estimates) -> Floats:
     """Fuel burnt at each row (n,) [m³/s]; NaN where the log does not tell."""
     time = np.asarray(estimates.time)
     if "fuel_rate" not in estimates.names:
@@ -35,7 +33,7 @@ def fuel_rate_of(estimates: Estimates) -> Array:
 
 
 def burnt(
-    rate: Array, seconds: Array, metres: Array, width: float | None, names: Sequence[str]
+    rate: Floats, seconds: Floats, metres: Floats, width: float | None, names: Sequence[str]
 ) -> dict[str, float]:
     """Litres per hour of driving, and per hectare with a tool of ``width`` [m], over rows (n,) whose rate [m³/s] is known; empty
     where it is known for less than `LEAST_KNOWN` of the time. ``names``: of the two figures."""

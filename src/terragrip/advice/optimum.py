@@ -5,9 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from terragrip.arrays import Floats
 
 GRID = np.linspace(0.0, 0.6, 601)
 LEVEL = 0.95
@@ -33,12 +32,12 @@ class OverSlip:
     net traction times 1 - slip, the pull power per weight and wheel speed ("ground speed times the working area", the paper).
     """
 
-    slip: Array
-    efficiency: Array
-    net_traction: Array
+    slip: Floats
+    efficiency: Floats
+    net_traction: Floats
 
     @property
-    def productivity(self) -> Array:
+    def productivity(self) -> Floats:
         """kappa (1 - s)."""
         return np.asarray(self.net_traction * (1 - self.slip))
 
@@ -50,7 +49,7 @@ class OverSlip:
 
 
 def over_slip(
-    adhesion: Array, resistance: Array, slip: Array, tire_resistance: float, driven: float = 1.0
+    adhesion: Floats, resistance: Floats, slip: Floats, tire_resistance: float, driven: float = 1.0
 ) -> OverSlip:
     """Efficiency and net traction of a vehicle whose driven wheels carry the share ``driven`` of its weight.
 
@@ -63,14 +62,14 @@ def over_slip(
     return OverSlip(slip, efficiency, net)
 
 
-def best_of(curves: OverSlip, values: Array, level: float = LEVEL) -> Best:
+def best_of(curves: OverSlip, values: Floats, level: float = LEVEL) -> Best:
     """Where ``values`` (draws, slips) is largest."""
     at = _peaks(curves.slip, values)
     rows = np.arange(len(values))
     nearest = np.searchsorted(curves.slip, at[0])
     tail = 50 * (1 - level)
 
-    def interval(x: Array) -> tuple[float, float]:
+    def interval(x: Floats) -> tuple[float, float]:
         low, high = np.percentile(x[1:] if len(x) > 1 else x, [tail, 100 - tail])
         return float(low), float(high)
 
@@ -81,7 +80,7 @@ def best_of(curves: OverSlip, values: Array, level: float = LEVEL) -> Best:
     )
 
 
-def _peaks(slip: Array, values: Array) -> Array:
+def _peaks(slip: Floats, values: Floats) -> Floats:
     """Slip of the largest value of each row (draws,): the grid's, moved by a parabola through the best three.
 
     Where no value is above 0 there is no best slip: the grid's end stands for it, so that an interval over such rows is wide.

@@ -9,12 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from terragrip.advice.fuel import fuel_rate_of
+from terragrip.arrays import Floats
 from terragrip.estimation import Estimates
 from terragrip.soil.estimates import whole_length
 from terragrip.soil.transitions import settled
 from terragrip.vehicle import Vehicle
-
-Array = NDArray[np.float64]
 
 RADII = 10.0
 """Wheel radii of way that count as one draw: several times the length over which ground varies (2 m of the paper's robot)."""
@@ -30,21 +29,21 @@ class Samples:
     (rows, driven wheels); ``fuel`` [m³/s], NaN where not measured. ``driven``: the driven wheels' share of the weight, the mean.
     """
 
-    slip: Array
-    adhesion: Array
-    resistance: Array
-    pull: Array
-    metres: Array
+    slip: Floats
+    adhesion: Floats
+    resistance: Floats
+    pull: Floats
+    metres: Floats
     stretch: NDArray[np.int64]
-    speed: Array
-    slip_std: Array
-    adhesion_std: Array
-    resistance_std: Array
-    wheel_adhesion: Array
-    fuel: Array
+    speed: Floats
+    slip_std: Floats
+    adhesion_std: Floats
+    resistance_std: Floats
+    wheel_adhesion: Floats
+    fuel: Floats
     driven: float
 
-    def levels(self, count: int = 12) -> tuple[Array, Array]:
+    def levels(self, count: int = 12) -> tuple[Floats, Floats]:
         """(slip, pull): means (count,) over equal ways from the lowest pull to the highest."""
         order = np.argsort(self.pull, kind="stable")
         share = np.cumsum(self.metres[order]) / self.way
@@ -71,7 +70,7 @@ def driven_wheels(estimates: Estimates, vehicle: Vehicle) -> list[str]:
     ]
 
 
-def wheel_loads(estimates: Estimates, vehicle: Vehicle, wheels: Sequence[str]) -> Array:
+def wheel_loads(estimates: Estimates, vehicle: Vehicle, wheels: Sequence[str]) -> Floats:
     """Vertical load of each wheel by row, (rows, wheels) [N]: its part of its axle's."""
     axle = dict(zip(vehicle.wheels, vehicle.wheel_axle, strict=True))
     count = np.bincount(vehicle.wheel_axle)
@@ -120,7 +119,7 @@ def _of_table(
     every = wheel_loads(estimates, vehicle, [w for w in vehicle.wheels if w in estimates.wheels]).sum(axis=1)
     share = load / load.sum(axis=1, keepdims=True)
 
-    def mean(quantity: str) -> Array:
+    def mean(quantity: str) -> Floats:
         return np.asarray(
             (np.stack([estimates[quantity.format(w)] for w in wheels], axis=1) * share).sum(axis=1)
         )

@@ -5,17 +5,15 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from terragrip.advice.curves import DRAWS, draw_curves, lasting_sd
 from terragrip.advice.optimum import GRID, OverSlip, over_slip
 from terragrip.advice.samples import Samples
+from terragrip.arrays import Floats
 from terragrip.soil.estimates import torque_scale_sd
 from terragrip.soil.library import Soil
 from terragrip.units import STANDARD_GRAVITY
 from terragrip.vehicle import Vehicle
-
-Array = NDArray[np.float64]
 
 RADIUS_SD = 0.02
 """Of the rolling radius where the vehicle file does not say (docs/vehicle.md)."""
@@ -31,7 +29,7 @@ class SoilCurves:
     """What is known of one soil: ``over`` its curves; ``adhesion`` (draws, slips) behind them; ``reach``: highest mean slip in the data."""
 
     over: OverSlip
-    adhesion: Array
+    adhesion: Floats
     reach: float
 
 
@@ -91,7 +89,7 @@ def _radius_sd(vehicle: Vehicle) -> float:
     return RADIUS_SD if known is None else known
 
 
-def _band(soil: Soil) -> tuple[Array, Array]:
+def _band(soil: Soil) -> tuple[Floats, Floats]:
     """The 95 % band of a library's curve over GRID: written with the fit, or by the interval of its one free parameter, else none."""
     written = soil.fit.get("band")
     if written:

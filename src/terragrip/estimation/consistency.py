@@ -9,12 +9,10 @@ from __future__ import annotations
 from dataclasses import asdict, dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from terragrip.arrays import Bools, Floats
 from terragrip.errors import InputError
-
-FloatArray = NDArray[np.float64]
-BoolArray = NDArray[np.bool_]
 
 
 @dataclass(frozen=True)
@@ -54,7 +52,7 @@ class Whiteness:
     """
 
     count: int
-    autocorrelation: FloatArray
+    autocorrelation: Floats
     bound: float
     statistic: float
     p_value: float
@@ -145,12 +143,12 @@ def whiteness(residual: ArrayLike, lags: int = 20) -> Whiteness:
     return Whiteness(count, correlation, 1.96 / np.sqrt(count), statistic, float(chdtrc(lags, statistic)))
 
 
-def _finite_rows(arrays: tuple[ArrayLike, ...], mask: ArrayLike | None, least: int) -> list[FloatArray]:
+def _finite_rows(arrays: tuple[ArrayLike, ...], mask: ArrayLike | None, least: int) -> list[Floats]:
     """The rows where every array is finite (and `mask` holds), as float arrays of one length."""
     columns = [np.asarray(array, dtype=np.float64) for array in arrays]
     if len({column.shape for column in columns}) != 1 or columns[0].ndim != 1:
         raise InputError(f"arrays of one length are needed, not {[column.shape for column in columns]}")
-    rows: BoolArray = np.logical_and.reduce([np.isfinite(column) for column in columns])
+    rows: Bools = np.logical_and.reduce([np.isfinite(column) for column in columns])
     if mask is not None:
         rows &= np.asarray(mask, dtype=np.bool_)
     if int(rows.sum()) < least:

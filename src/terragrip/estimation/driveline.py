@@ -12,8 +12,8 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from terragrip.arrays import Floats
 from terragrip.estimation.engine_torque import (
     DrivelineTorque,
     EngineTorque,
@@ -27,8 +27,6 @@ from terragrip.estimation.slip_only import SlipReference
 from terragrip.physics.loads import GRAVITY
 from terragrip.recording import Recording
 from terragrip.vehicle import Vehicle
-
-Floats = npt.NDArray[np.float64]
 
 DRIVEN, UNDRIVEN = "driven", "undriven"
 """The wheels, and the axles, that stand for all driven and all free ones."""

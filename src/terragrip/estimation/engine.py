@@ -12,10 +12,9 @@ import numpy as np
 import numpy.typing as npt
 
 from terragrip._kernel import ffi, lib
+from terragrip.arrays import Floats
 from terragrip.errors import InputError
 from terragrip.vehicle import Vehicle
-
-Floats = npt.NDArray[np.float64]
 
 EVENTS = ("", "outlier", "standstill", "gap", "immobilization", "stuck", "push", "restart")
 """Texts of the ``event`` column, in the order of tg_event."""

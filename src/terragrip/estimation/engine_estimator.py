@@ -11,8 +11,8 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
-import numpy.typing as npt
 
+from terragrip.arrays import Floats
 from terragrip.errors import InputError
 from terragrip.estimation.driveline import DrivenMachine, by_engine
 from terragrip.estimation.engine import refusal
@@ -26,7 +26,6 @@ if TYPE_CHECKING:
     from terragrip.recording import Recording
     from terragrip.vehicle import Vehicle
 
-Floats = npt.NDArray[np.float64]
 
 _MAGIC = b"TGRIPEN1"
 _ROOM = 1024  # rows that the tail has room for at first

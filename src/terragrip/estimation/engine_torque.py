@@ -7,15 +7,12 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from terragrip.arrays import Bools, Floats
 from terragrip.errors import InputError
 from terragrip.physics.driveline import torque_into_gears, torque_spread, wheel_torque
 from terragrip.physics.loads import GRAVITY
 from terragrip.vehicle_parts import Driveline
-
-Floats = npt.NDArray[np.float64]
-Flags = npt.NDArray[np.bool_]
 
 _HOLD = 2.0  # s that a value stands for
 _LAGS = (0.5, 1.0)  # s: over them the ratio is compared
@@ -110,7 +107,7 @@ class DrivelineTorque:
 
     torque: Floats
     std: Floats
-    shift: Flags
+    shift: Bools
 
 
 def driveline_torque(

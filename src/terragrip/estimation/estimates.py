@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, Literal, Self, overload
 import numpy as np
 import numpy.typing as npt
 
+from terragrip.arrays import Floats
 from terragrip.errors import InputError
 from terragrip.estimation.arrow import choices, codes_of, floats, texts, values_of
 from terragrip.estimation.columns import column_named
@@ -26,7 +27,6 @@ if TYPE_CHECKING:
 
     from terragrip.vehicle import Vehicle
 
-Floats = npt.NDArray[np.float64]
 
 METADATA_KEY = b"terragrip"
 """Under it a Parquet file holds, as JSON, what the table was made from."""

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
+from terragrip.arrays import Floats
 from terragrip.estimation.engine import EVENTS
 from terragrip.estimation.estimates import Estimates
 from terragrip.estimation.methods import SLIP_ONLY
@@ -17,7 +18,6 @@ if TYPE_CHECKING:
     from terragrip.estimation.estimator import TractionEstimator
     from terragrip.recording import Recording
 
-Floats = npt.NDArray[np.float64]
 Codes = npt.NDArray[np.uint8]
 
 GAP = EVENTS.index("gap")

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from terragrip._kernel import ffi, lib
+from terragrip.arrays import Floats
 from terragrip.errors import InputError
 from terragrip.estimation.methods import Method
 from terragrip.physics.loads import GRAVITY, load_levers, wheel_shares
@@ -18,8 +18,6 @@ from terragrip.physics.radius import biderman_deflection, hadekel_deflection, lo
 from terragrip.recording.checks import require_hitch
 from terragrip.vehicle import Vehicle
 from terragrip.vehicle_parts import BidermanRadius, HadekelRadius, Wheel
-
-Floats = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
+from terragrip.arrays import Floats
 from terragrip.estimation.arrow import floats, texts
 from terragrip.estimation.estimates import Estimates
 from terragrip.estimation.forward import (
@@ -31,7 +32,6 @@ if TYPE_CHECKING:
     from terragrip.estimation.estimator import TractionEstimator
     from terragrip.recording import Recording
 
-Floats = npt.NDArray[np.float64]
 Done = Callable[[int], None]
 
 STEP = 8192

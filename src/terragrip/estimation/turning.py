@@ -5,15 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-import numpy.typing as npt
 
+from terragrip.arrays import Floats, Ints
 from terragrip.estimation.rims import Rim, rims_of
 from terragrip.recording import LogBlocks, Recording
 from terragrip.recording.track import Track, track_of
 from terragrip.recording.window_means import window_means
 from terragrip.vehicle import Vehicle
-
-Floats = npt.NDArray[np.float64]
 
 _CALM = 4.0  # s that a rate of turn by positions is taken over
 _MOVING = 0.1  # m/s
@@ -63,7 +61,7 @@ def _unseen_turns(log: Recording, rims: Sequence[Rim]) -> list[str]:
     ]
 
 
-def _rim_means(rims: Sequence[Rim], log: Recording, place: npt.NDArray[np.intp]) -> Floats:
+def _rim_means(rims: Sequence[Rim], log: Recording, place: Ints) -> Floats:
     """Mean rim speed (windows,) [m/s] of some wheels, NaN where none was measured."""
     values = np.concatenate([np.empty(0), *(rim.radius * log.channels[rim.channel] for rim in rims)])
     return window_means(values, np.tile(place, len(rims)), int(place[-1]) + 1)

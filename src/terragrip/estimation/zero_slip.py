@@ -17,13 +17,12 @@ from itertools import pairwise
 from types import MappingProxyType
 
 import numpy as np
-import numpy.typing as npt
 
+from terragrip.arrays import Bools, Floats, Ints
 from terragrip.recording import Recording
 from terragrip.recording.held import held_periods, without_held
 from terragrip.recording.window_means import window_means
 
-Floats = npt.NDArray[np.float64]
 Span = tuple[float, float]
 
 WINDOW = 5.0
@@ -97,7 +96,7 @@ def zero_of(
     return _judged(ratio, np.concatenate([fast for _, fast in parts]))
 
 
-def _judged(ratio: Floats, fast: npt.NDArray[np.bool_]) -> Zero:
+def _judged(ratio: Floats, fast: Bools) -> Zero:
     modes = _modes(ratio)
     value, spread, share = modes[-1]
     count = round(share * len(ratio))  # four or more
@@ -190,7 +189,7 @@ def _fit(ratio: Floats, number: int, mean: Floats) -> tuple[float, list[tuple[fl
 
 def _windows(
     recording: Recording, channel: str, radius: float, span: Span | None, radii: Mapping[str, float] = _ALIKE
-) -> tuple[Floats, npt.NDArray[np.bool_]]:
+) -> tuple[Floats, Bools]:
     """Ground speed over rim speed in windows without a stop (n,), of one wheel in straight ones; and whether each is of a road."""
     log = without_held(recording, held_periods(recording))
     if span is not None:
@@ -209,9 +208,7 @@ def _windows(
         return (ground / rim)[used], (np.abs(ground) > _ROAD)[used]
 
 
-def _straight(
-    log: Recording, place: npt.NDArray[np.intp], count: int, radii: Mapping[str, float]
-) -> npt.NDArray[np.bool_]:
+def _straight(log: Recording, place: Ints, count: int, radii: Mapping[str, float]) -> Bools:
     """Windows (count,) in which no turn shows: in the yaw rate, else in the rims' speeds."""
     if "angular_velocity_z" in log.channels:
         return ~(np.abs(window_means(log.channels["angular_velocity_z"], place, count)) > _TURNING)
@@ -221,7 +218,7 @@ def _straight(
     return np.asarray(np.ptp(rims, axis=0) <= _STRAIGHT * np.abs(rims.mean(axis=0)))
 
 
-def _means(values: Floats, place: npt.NDArray[np.intp], count: int) -> tuple[Floats, Floats]:
+def _means(values: Floats, place: Ints, count: int) -> tuple[Floats, Floats]:
     """Mean of a channel in windows (count,), NaN where nothing was measured, and its least magnitude there."""
     known = np.isfinite(values)
     least = np.full(count, np.inf)

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
+from terragrip.arrays import Bools, Floats
 from terragrip.errors import InputError
 from terragrip.formats.binding import bound
 from terragrip.formats.derivation import (
@@ -32,7 +33,6 @@ from terragrip.units import UnitError, factor_to, quantity
 if TYPE_CHECKING:
     from terragrip.formats.profile import Profile
 
-Floats = npt.NDArray[np.float64]
 Column = npt.NDArray[Any]
 
 
@@ -309,7 +309,7 @@ def _heading(origin: Source, log: LogTable, time: Floats) -> Floats:
     return _raw((str(forward.yaw),), log, time)[0] * factor_to(forward.unit, "rad")
 
 
-def _kept(rows: Rows, log: LogTable) -> npt.NDArray[np.bool_]:
+def _kept(rows: Rows, log: LogTable) -> Bools:
     """Which rows (n,) the profile keeps; raises InputError if none."""
     column = log.columns[rows.column]
     if log.clocked and column.dtype.kind == "f":  # a state lasts until the next is sent

@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 
+from terragrip.arrays import Bools, Floats
 from terragrip.recording.held import fresh_samples, held_period, quantum
-
-Floats = npt.NDArray[np.float64]
 
 _FEWEST = 4  # points for a parabola with one to spare
 _ROUNDS = 3  # of reweighting, after which outlying positions no longer move
@@ -16,7 +14,7 @@ _BLOCK = 20_000  # instants at once, to bound memory
 _MAD_TO_SD = 1.482602218505602  # of a normal distribution
 
 
-def fresh_positions(time: Floats, positions: list[Floats]) -> npt.NDArray[np.bool_]:
+def fresh_positions(time: Floats, positions: list[Floats]) -> Bools:
     """Rows (n,) where a position was truly measured: all of them, unless the coordinates are held."""
     fresh = np.all([np.isfinite(p) for p in positions], axis=0)
     held = [(p, held_period(time, p)) for p in positions]
@@ -135,7 +133,7 @@ def _flattened(u: Floats, y: Floats, weight: Floats, slope: Floats, variance: Fl
     return np.where(enough, (cubic - slope) ** 2 - noise, np.nan)
 
 
-def _moving(speed: Floats, known: npt.NDArray[np.bool_]) -> npt.NDArray[np.bool_]:
+def _moving(speed: Floats, known: Bools) -> Bools:
     """Rows (n,) in motion: at rest a tracker is quieter, and a scale found there would reject motion itself."""
     pace = np.where(known, np.abs(speed), 0.0)
     return pace >= max(0.2 * float(np.quantile(pace[known], 0.95)), 1e-12) if known.any() else known

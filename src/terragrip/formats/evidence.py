@@ -10,12 +10,11 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-import numpy.typing as npt
 
+from terragrip.arrays import Floats, Ints
 from terragrip.physics.geodesy import metres_of
 from terragrip.units import STANDARD_GRAVITY
 
-Floats = npt.NDArray[np.float64]
 Series = tuple[Floats, Floats]
 Path = tuple[Floats, Floats, Floats]
 """Begins [s], ends [s] and lengths [m] of straight pieces of what was driven."""
@@ -263,7 +262,7 @@ def _gap(time: Floats) -> float:
     return max(5 * float(np.median(np.diff(time))), 1e-9) if len(time) > 1 else 1.0
 
 
-def _windows(time: Floats) -> tuple[npt.NDArray[np.intp], npt.NDArray[np.intp]]:
+def _windows(time: Floats) -> tuple[Ints, Ints]:
     """First and last rows of pieces of some seconds without a gap in them."""
     gap = max(_gap(time), 1.5)
     cuts = np.concatenate(([0], np.flatnonzero(np.diff(time) > gap) + 1, [len(time)]))

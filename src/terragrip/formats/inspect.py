@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from terragrip.arrays import Floats
 from terragrip.errors import InputError
 from terragrip.formats.fitting import Fit, fit_of
 from terragrip.formats.profile import Profile
@@ -28,8 +29,6 @@ from terragrip.recording.repeats import Repeats, merged
 from terragrip.recording.schema import TIME, has_torque, is_own, unit_of
 from terragrip.units import factor_to
 from terragrip.vehicle import Vehicle
-
-Floats = npt.NDArray[np.float64]
 
 _LONG, _ENOUGH = 200_000_000, 60_000_000  # bytes of a log that is looked at in parts, and of these parts
 _SPARSE = (

@@ -6,14 +6,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
-import numpy.typing as npt
 
+from terragrip.arrays import Floats
 from terragrip.formats.candidates import ON_THE_BUS, Candidate, Column, kind_of, unit_on_the_bus
 from terragrip.formats.evidence import Evidence, Finding
 from terragrip.recording.schema import unit_of
 from terragrip.units import UnitError, factor_to
-
-Floats = npt.NDArray[np.float64]
 
 _LARGEST = {
     "m/s": 150.0,

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
+from terragrip.arrays import Floats
 from terragrip.errors import InputError
 from terragrip.files import sha256
 from terragrip.formats.boundary import needed, reading
@@ -29,7 +30,6 @@ from terragrip.formats.worker import Worker
 if TYPE_CHECKING:
     from terragrip.formats.table_on_disk import TableOnDisk
 
-Floats = npt.NDArray[np.float64]
 
 _NO_OBJECTS = ("", "function", "sparse", "function_handle")
 

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from terragrip.arrays import Floats
 from terragrip.formats.agreement import Agreement
 from terragrip.formats.candidates import Column, candidates_of, columns_of, kind_of
 from terragrip.formats.evidence import Evidence
@@ -21,7 +22,6 @@ from terragrip.formats.vocabulary import GENERAL, Vocabulary
 from terragrip.recording.schema import LABELS, unit_of
 from terragrip.units import factor_to
 
-Floats = npt.NDArray[np.float64]
 Texts = Mapping[str, npt.NDArray[Any]]
 
 SURE = 0.7

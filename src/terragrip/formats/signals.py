@@ -8,12 +8,11 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from terragrip.arrays import Floats, Ints
 from terragrip.errors import InputError
 from terragrip.formats.table import LogTable
 from terragrip.recording.columns import SINCE_1970
 from terragrip.recording.schema import TIME
-
-Floats = npt.NDArray[np.float64]
 
 SAME = 1e-3
 """Share of the shortest typical spacing within which two stamps are one instant."""
@@ -108,7 +107,7 @@ def _clock_set_at(time: Floats) -> float:
     return SINCE_1970 if 2 * np.count_nonzero(time > SINCE_1970) > len(time) else -np.inf
 
 
-def _order(time: Floats) -> npt.NDArray[np.intp] | slice:
+def _order(time: Floats) -> Ints | slice:
     """Places (m,) of the stamps that count, in the order of time; all of them where they are in order."""
     floor = _clock_set_at(time)
     in_order = bool(np.isfinite(time).all()) and bool((time[1:] >= time[:-1]).all())

@@ -5,15 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
-import numpy.typing as npt
 
+from terragrip.arrays import Floats
 from terragrip.formats.candidates import kind_of
 from terragrip.formats.vocabulary import GENERAL, Vocabulary
 from terragrip.recording.columns import SINCE_1970
 from terragrip.recording.schema import TIME
 from terragrip.units import factor_to
-
-Floats = npt.NDArray[np.float64]
 
 _EPOCH = ((1e17, "ns"), (1e14, "us"), (1e11, "ms"))
 _PLAUSIBLE = (1e-6, 3600.0)  # s between samples

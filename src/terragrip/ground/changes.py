@@ -13,12 +13,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from terragrip.arrays import Bools, Floats
 from terragrip.errors import InputError, missing_package
 from terragrip.ground.conjugate import Model
 from terragrip.ground.signals import GROUND, LAWS, SIGNALS, signals_of
 from terragrip.soil.blocks import PERIOD, Blocks
-
-Array = NDArray[np.float64]
 
 LENGTH = 30.0
 """Mean way on one ground [m], before anything is known of a drive."""
@@ -81,7 +80,7 @@ def changes_of(blocks: Blocks, names: Sequence[str] = GROUND, length: float = LE
     )
 
 
-def _prepared(blocks: Blocks, names: Sequence[str]) -> tuple[Array, Model, NDArray[np.bool_]]:
+def _prepared(blocks: Blocks, names: Sequence[str]) -> tuple[Floats, Model, Bools]:
     """Signals of the blocks that hold any (NaN: not measured), their model, and which blocks these are."""
     for name in names:
         if name not in SIGNALS:
@@ -96,7 +95,7 @@ def _prepared(blocks: Blocks, names: Sequence[str]) -> tuple[Array, Model, NDArr
     return signals, Model.of(names, measured), is_measured
 
 
-def weights(signal: Array) -> float:
+def weights(signal: Floats) -> float:
     """What a block counts for: (1 - r)/(1 + r), r the correlation of neighbours in a signal (blocks,), as of a first-order process.
 
     r from medians of squared differences one and six blocks apart, so that changes of the ground do not pass for correlation.
@@ -113,7 +112,7 @@ class _Cost:
     model = ""
     min_size = LEAST
 
-    def __init__(self, signals: Array, model: Model) -> None:
+    def __init__(self, signals: Floats, model: Model) -> None:
         measured = np.isfinite(signals)
         filled = np.where(measured, signals, 0.0)
         zero = np.zeros((1, signals.shape[1]))
@@ -138,7 +137,7 @@ class _Cost:
             return float(self.of(np.array([start]), np.array([end]))[0]) - _SHIFT
         return float(self._costs[-back]) - _SHIFT
 
-    def of(self, start: NDArray[np.int64], end: NDArray[np.int64]) -> Array:
+    def of(self, start: NDArray[np.int64], end: NDArray[np.int64]) -> Floats:
         """Costs of the stretches [start, end), (stretches,)."""
         count, total, square = (x[end] - x[start] for x in (self._count, self._sum, self._square))
         return -2 * self._model.evidence(count, total, square)
@@ -158,7 +157,7 @@ def _pelt(cost: _Cost, price: float) -> list[int]:
 def _change(
     cost: _Cost,
     blocks: Blocks,
-    signals: Array,
+    signals: Floats,
     names: Sequence[str],
     place: tuple[int, int, int],
     chance: float,

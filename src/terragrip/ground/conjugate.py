@@ -10,13 +10,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import gammaln
 
+from terragrip.arrays import Floats
 from terragrip.ground.signals import LAWS
 from terragrip.soil.blocks import PERIOD
-
-Array = NDArray[np.float64]
 
 SHAPE = 4.0
 """Shape of the prior on the variance: as sure of it as eight independent blocks would make one."""
@@ -26,14 +24,14 @@ SHAPE = 4.0
 class Model:
     """Prior of each signal, (signals,) each: mean, count, shape, scale of the normal-inverse-gamma law; what a block counts for."""
 
-    mean: Array
-    count: Array
-    shape: Array
-    scale: Array
-    weight: Array
+    mean: Floats
+    count: Floats
+    shape: Floats
+    scale: Floats
+    weight: Floats
 
     @classmethod
-    def of(cls, names: Sequence[str], weight: Array | None = None) -> Model:
+    def of(cls, names: Sequence[str], weight: Floats | None = None) -> Model:
         """The model of signals by name; `weight` (signals,) where it was measured on the drive itself."""
         laws = [LAWS[name] for name in names]
         within = np.array([law.within for law in laws])
@@ -45,7 +43,7 @@ class Model:
             weight=np.array([min(PERIOD / law.repeat, 1.0) for law in laws]) if weight is None else weight,
         )
 
-    def evidence(self, count: Array, total: Array, square: Array) -> Array:
+    def evidence(self, count: Floats, total: Floats, square: Floats) -> Floats:
         """Log evidence of stretches, summed over signals: from how many blocks tell each signal, their sums and sums of squares, all
         (stretches, signals)."""
         n = count * self.weight

@@ -13,6 +13,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from terragrip.arrays import Floats
 from terragrip.ground.laws import (
     BROAD_RESISTANCE,
     LEVEL_TIME,
@@ -28,8 +29,6 @@ from terragrip.ground.unknown import CELLS, ROUGHNESSES, UNKNOWN, cells, texture
 from terragrip.soil.blocks import Blocks
 from terragrip.soil.library import Soil
 from terragrip.soil.signature import Signature, curve_error, signature_in
-
-Array = NDArray[np.float64]
 
 _CURVE_SPREAD = 0.10
 """SD of mu about its curve, relative, where a library says nothing of it."""
@@ -84,7 +83,7 @@ class Emissions:
         per = [1 if self._texture(one) else ROUGHNESSES.size for one in self.signatures.values()]
         return np.repeat(np.arange(len(per) + 1), [*per, CELLS])
 
-    def log_likelihood(self, blocks: Blocks) -> Array:
+    def log_likelihood(self, blocks: Blocks) -> Floats:
         """(blocks, states), tempered: a block counts for PERIOD over the time in which blocks repeat each other.
 
         0 where a block tells nothing of the ground.
@@ -96,7 +95,7 @@ class Emissions:
                 out[rows] = self._likelihood(blocks[rows], is_rough)
         return out
 
-    def _likelihood(self, blocks: Blocks, rough: bool) -> Array:
+    def _likelihood(self, blocks: Blocks, rough: bool) -> Floats:
         roughness = blocks.roughness if rough else None
         level = broad_level(blocks)
         columns = []
@@ -122,7 +121,7 @@ class Emissions:
         return not (self.made_by and signature.made_by) or self.made_by == signature.made_by
 
 
-def _level(soil: Soil, signature: Signature | None, blocks: Blocks) -> Array:
+def _level(soil: Soil, signature: Signature | None, blocks: Blocks) -> Floats:
     """Log density of rho_s and mu on a known soil, (blocks,)."""
     error, own, scale = curve_error(soil, blocks)
     own = own + _relative_interval(soil) ** 2

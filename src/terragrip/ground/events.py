@@ -6,15 +6,13 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from terragrip.arrays import Floats, Ints
 from terragrip.estimation import Estimates
 from terragrip.estimation.engine import EVENTS, SIGNS
 from terragrip.estimation.estimates import wheels_with
 from terragrip.estimation.settings import WITHOUT_TORQUE, watch_limits
 from terragrip.ground.span import Span
-
-Array = NDArray[np.float64]
 
 CLOSE = 0.3
 """s: spells of one kind that lie closer are one event."""
@@ -46,7 +44,7 @@ def events(estimates: Estimates) -> tuple[Event, ...]:
     return tuple(sorted(result, key=lambda event: event.start))
 
 
-def _spells(estimates: Estimates) -> list[tuple[str, NDArray[np.intp]]]:
+def _spells(estimates: Estimates) -> list[tuple[str, Ints]]:
     """Kind and rows of each spell; spells of one kind closer than CLOSE are one."""
     result = []
     for code, kind in enumerate(EVENTS):
@@ -57,12 +55,12 @@ def _spells(estimates: Estimates) -> list[tuple[str, NDArray[np.intp]]]:
     return result
 
 
-def _mean(estimates: Estimates, quantity: str, rows: NDArray[np.intp]) -> Array:
+def _mean(estimates: Estimates, quantity: str, rows: Ints) -> Floats:
     """Mean of a quantity over the wheels (rows,)."""
     return np.mean([estimates[f"{quantity}_{wheel}"][rows] for wheel in estimates.wheels], axis=0)
 
 
-def _immobilization(estimates: Estimates, rows: NDArray[np.intp]) -> str:
+def _immobilization(estimates: Estimates, rows: Ints) -> str:
     """From the kernel's own signs and thresholds: columns ``warning``, ``warning_<sign>`` and tg_watch_settings."""
     limits, row = watch_limits(), rows[0]
     slip, speed = _mean(estimates, "slip", rows[:1])[0], abs(estimates["ground_speed"][row])
@@ -92,7 +90,7 @@ def _immobilization(estimates: Estimates, rows: NDArray[np.intp]) -> str:
     )
 
 
-def _stuck(estimates: Estimates, rows: NDArray[np.intp]) -> str:
+def _stuck(estimates: Estimates, rows: Ints) -> str:
     limits = watch_limits()
     speed = float(np.nanmedian(np.abs(estimates["ground_speed"][rows])))
     turn = "turn"
@@ -110,7 +108,7 @@ def _stuck(estimates: Estimates, rows: NDArray[np.intp]) -> str:
     )
 
 
-def _push(estimates: Estimates, rows: NDArray[np.intp]) -> str:
+def _push(estimates: Estimates, rows: Ints) -> str:
     limits = watch_limits()
     adhesion = float(np.nanmedian(_mean(estimates, "adhesion", rows)))
     resistance = float(np.nanmin(estimates["soil_resistance"][rows]))
@@ -121,7 +119,7 @@ def _push(estimates: Estimates, rows: NDArray[np.intp]) -> str:
     )
 
 
-def _standstill(estimates: Estimates, rows: NDArray[np.intp]) -> str:
+def _standstill(estimates: Estimates, rows: Ints) -> str:
     speed = estimates.about.get("settings", {}).get("standstill_speed") or watch_limits()["standstill_speed"]
     return (
         f"Neither the wheels' rims nor the vehicle moved faster than about {speed:.2g} m/s: slip and efficiency are undefined, "
@@ -129,7 +127,7 @@ def _standstill(estimates: Estimates, rows: NDArray[np.intp]) -> str:
     )
 
 
-def _gap(estimates: Estimates, rows: NDArray[np.intp]) -> str:
+def _gap(estimates: Estimates, rows: Ints) -> str:
     gap = estimates.about.get("settings", {}).get("gap") or watch_limits()["gap"]
     return (
         f"No wheel speed or ground speed came for more than {gap:g} s, or none had come yet: the motion starts anew, "
@@ -137,7 +135,7 @@ def _gap(estimates: Estimates, rows: NDArray[np.intp]) -> str:
     )
 
 
-def _outlier(estimates: Estimates, rows: NDArray[np.intp]) -> str:
+def _outlier(estimates: Estimates, rows: Ints) -> str:
     nis, channels = estimates["nis"][rows], estimates["channels"][rows]
     worst = int(np.nanargmax(nis)) if np.isfinite(nis).any() else 0
     return (
@@ -146,14 +144,14 @@ def _outlier(estimates: Estimates, rows: NDArray[np.intp]) -> str:
     )
 
 
-def _restart(estimates: Estimates, rows: NDArray[np.intp]) -> str:
+def _restart(estimates: Estimates, rows: Ints) -> str:
     return (
         f"A step of the filter left the finite numbers (at {estimates.time[rows[0]]:.2f} s): it began anew from the priors; what it had "
         "learned of adhesion and soil resistance is lost."
     )
 
 
-_WHY: dict[str, Callable[[Estimates, NDArray[np.intp]], str]] = {
+_WHY: dict[str, Callable[[Estimates, Ints], str]] = {
     "immobilization": _immobilization,
     "stuck": _stuck,
     "push": _push,

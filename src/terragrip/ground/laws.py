@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from terragrip.arrays import Floats
 from terragrip.physics.adhesion import CURVES
 from terragrip.soil.blocks import PERIOD, Blocks
 from terragrip.soil.signature import OFFSET
-
-Array = NDArray[np.float64]
 
 LEVEL_TIME, ROUGHNESS_TIME = 3.5, 1.3
 """Seconds for which neighbouring blocks repeat each other. All soils alike: else the sharper of two laws would win by its name."""
@@ -22,22 +20,22 @@ _STRAY = 0.01
 """Share of blocks that a soil leaves to the broad law: a stone, a rut, a step of the tool."""
 
 
-def tempered(logs: Array, seconds: float) -> Array:
+def tempered(logs: Floats, seconds: float) -> Floats:
     """Log likelihoods of blocks that repeat each other for `seconds`: each counts for PERIOD / seconds."""
     return logs * min(PERIOD / seconds, 1.0)
 
 
-def mixed(mine: Array, broad: Array) -> Array:
+def mixed(mine: Floats, broad: Floats) -> Floats:
     """Log density of a law with strays."""
     return np.asarray(np.logaddexp(np.log(1 - _STRAY) + mine, np.log(_STRAY) + broad))
 
 
-def normal(error: Array, variance: Array) -> Array:
+def normal(error: Floats, variance: Floats) -> Floats:
     """Log density of a normal law, elementwise."""
     return np.asarray(-0.5 * (error**2 / variance + np.log(2 * np.pi * variance)))
 
 
-def bivariate(off: Array, covariance: Array) -> Array:
+def bivariate(off: Floats, covariance: Floats) -> Floats:
     """Log density of a normal law of pairs, (blocks, 2) to (blocks,)."""
     (a, b), (_, c) = covariance
     determinant = a * c - b * b
@@ -46,7 +44,7 @@ def bivariate(off: Array, covariance: Array) -> Array:
     return np.asarray(-0.5 * square - np.log(2 * np.pi) - 0.5 * np.log(determinant))
 
 
-def broad_level(blocks: Blocks) -> Array:
+def broad_level(blocks: Blocks) -> Floats:
     """Log density of rho_s and mu, independent and broad, mu about the paper's prototype curve (blocks,)."""
     shape = CURVES["exponential"].value(blocks.mean_slip, {"a": 1.0})
     spread = BROAD_SCALE[1] * np.abs(shape) + OFFSET
@@ -55,7 +53,7 @@ def broad_level(blocks: Blocks) -> Array:
     return resistance + normal(blocks.mean_adhesion - BROAD_SCALE[0] * shape, spread**2)
 
 
-def broad_roughness(roughness: Array) -> Array:
+def broad_roughness(roughness: Floats) -> Floats:
     """Log density of the roughness of any ground (blocks,)."""
     mean, sd = _BROAD_ROUGHNESS
     off = roughness - np.array([mean, mean + ADHESION_ROUGHNESS])

@@ -11,15 +11,13 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import gammaln
 
+from terragrip.arrays import Floats
 from terragrip.ground.changes import Change
 from terragrip.ground.conjugate import Model
 from terragrip.ground.signals import GROUND, signals_of
 from terragrip.soil.blocks import PERIOD, Blocks
-
-Array = NDArray[np.float64]
 
 _MOST = 240
 """Run lengths kept: two minutes; a longer run is as well known as it will ever be."""
@@ -85,7 +83,7 @@ class OnlineChanges:
         self._travelled, self.probability = state["travelled"], float(state["probability"])
         self._quiet_until = -np.inf if state["quiet"] is None else float(state["quiet"])
 
-    def _add(self, x: Array, start: float, end: float, travelled: float) -> Change | None:
+    def _add(self, x: Floats, start: float, end: float, travelled: float) -> Change | None:
         driven = 0.0 if self._travelled is None else max(travelled - self._travelled, 0.0)
         self._travelled = travelled
         hazard = -np.expm1(-driven / self.settings.length)
@@ -100,7 +98,7 @@ class OnlineChanges:
         self._prune()
         return self._report(end)
 
-    def _learn(self, x: Array, weight: Array) -> None:
+    def _learn(self, x: Floats, weight: Floats) -> None:
         """Weigh the runs by what they predicted, then take the block into each."""
         off, degrees = x - self._mean, 2 * self._shape
         square = self._scale * (self._count + 1) / (self._shape * self._count)

@@ -10,10 +10,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from terragrip.arrays import Floats
 from terragrip.ground.emissions import Emissions
 from terragrip.soil.blocks import Blocks
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -23,7 +22,7 @@ class Chain:
     length: float = 8.0
     unknown: float = 0.1
 
-    def start(self, states: NDArray[np.int64]) -> Array:
+    def start(self, states: NDArray[np.int64]) -> Floats:
         """Probabilities before anything is seen (states,): known soils alike, states of one soil alike. `states`: of `Emissions`."""
         soils = int(states[-1])
         unknown = self.unknown if soils else 1.0
@@ -37,7 +36,7 @@ class ForwardFilter:
 
     emissions: Emissions
     chain: Chain
-    probabilities: Array
+    probabilities: Floats
     travelled: float | None = None
 
     @classmethod
@@ -70,13 +69,13 @@ class Forward:
     """A forward pass: filtered probabilities and relative likelihoods (blocks, states), the chance of a soil drawn anew before each block
     (blocks,), the law that it is drawn from and the soil of each state (states,)."""
 
-    filtered: Array
-    weight: Array
-    anew: Array
-    start: Array
+    filtered: Floats
+    weight: Floats
+    anew: Floats
+    start: Floats
     states: NDArray[np.int64]
 
-    def smoothed(self) -> Array:
+    def smoothed(self) -> Floats:
         """Probabilities given the whole drive, (blocks, states): the backward pass of Rabiner 1989, scaled."""
         out, after = self.filtered.copy(), np.ones(self.filtered.shape[1])
         for k in range(len(out) - 2, -1, -1):
@@ -88,6 +87,6 @@ class Forward:
         return out
 
 
-def by_soil(probabilities: Array, states: NDArray[np.int64]) -> Array:
+def by_soil(probabilities: Floats, states: NDArray[np.int64]) -> Floats:
     """The states of each soil put together: (blocks, soils + 1), the unknown soil last."""
     return np.asarray(np.add.reduceat(probabilities, np.flatnonzero(np.diff(states, prepend=-1)), axis=1))

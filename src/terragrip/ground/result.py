@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from terragrip.arrays import Bools, Floats
 from terragrip.document import read_json
 from terragrip.errors import InputError
 from terragrip.files import replacing
@@ -23,7 +24,6 @@ if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.figure import Figure
 
-Array = NDArray[np.float64]
 
 VERSION = 1
 
@@ -37,10 +37,10 @@ class Timeline:
     the soil, "" where it has none or where vehicle and tool are on different soils.
     """
 
-    time: Array
+    time: Floats
     names: tuple[str, ...]
-    probabilities: Array
-    known: NDArray[np.bool_]
+    probabilities: Floats
+    known: Bools
     label: NDArray[np.object_]
 
     @property

@@ -12,11 +12,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from terragrip.arrays import Floats, Ints
 from terragrip.estimation import Estimates
 from terragrip.ground.span import Span
 from terragrip.soil.blocks import driven_wheels, wheel_loads
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -142,13 +141,13 @@ class _Values:
         )
 
 
-def _moments(values: Array, rows: NDArray[np.intp]) -> tuple[float | None, float | None]:
+def _moments(values: Floats, rows: Ints) -> tuple[float | None, float | None]:
     chosen = values[rows]
     chosen = chosen[np.isfinite(chosen)]
     return (float(chosen.mean()), float(chosen.std())) if chosen.size else (None, None)
 
 
-def _ratio(force: Array, load: Array) -> Array:
+def _ratio(force: Floats, load: Floats) -> Floats:
     """F_x/F_z of a force sensor, (rows,), NaN where the wheel is nearly lifted."""
     typical = np.nanmedian(load) if np.isfinite(load).any() else np.nan
     with np.errstate(divide="ignore", invalid="ignore"):

@@ -9,12 +9,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from terragrip.arrays import Floats
 from terragrip.physics.adhesion import CURVES
 from terragrip.soil.blocks import FLOOR, Blocks
-
-Array = NDArray[np.float64]
 
 GROUND = ("soil_resistance", "curve_scale", "soil_resistance_sd", "adhesion_sd")
 """The signals that tell of the ground alone. `_sd`: ln of the SD within a block."""
@@ -55,7 +53,7 @@ LAWS: dict[str, Law] = {
 }
 
 
-def signals_of(blocks: Blocks, names: tuple[str, ...] = GROUND) -> Array:
+def signals_of(blocks: Blocks, names: tuple[str, ...] = GROUND) -> Floats:
     """Signals (blocks, names); NaN where a block tells nothing. Raises ValueError on a name that is none of `SIGNALS`."""
     slip, adhesion = blocks.mean_slip, blocks.mean_adhesion
     every = {
@@ -78,11 +76,11 @@ def signals_of(blocks: Blocks, names: tuple[str, ...] = GROUND) -> Array:
     return np.asarray(np.where(blocks.known[:, None], out, np.nan))
 
 
-def _log_sd(variance: Array) -> Array:
+def _log_sd(variance: Floats) -> Floats:
     return np.asarray(0.5 * np.log(variance + FLOOR**2))
 
 
-def curve_scale(slip: Array, adhesion: Array) -> Array:
+def curve_scale(slip: Floats, adhesion: Floats) -> Floats:
     """a of mu = a g(s), g the paper's prototype (eq. 8), drawn towards 0.85 where slip is too small to tell it; any shape."""
     shape = CURVES["exponential"].value(slip, {"a": 1.0})
     ridge = (_ADHESION_SD / _SCALE_SD) ** 2

@@ -8,8 +8,8 @@ there are many cells, each as probable as the rest, is what a known soil that fi
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from terragrip.arrays import Floats
 from terragrip.ground.laws import (
     ADHESION_ROUGHNESS,
     LEVEL_TIME,
@@ -24,8 +24,6 @@ from terragrip.ground.laws import (
 from terragrip.physics.adhesion import CURVES
 from terragrip.soil.blocks import Blocks
 from terragrip.soil.signature import OFFSET
-
-Array = NDArray[np.float64]
 
 UNKNOWN = "unknown"
 
@@ -46,7 +44,7 @@ _LEAST_RESISTANCE_SD = 0.01
 _ROUGHNESS_COVARIANCE = np.array([[0.50, 0.24], [0.24, 0.32]])
 
 
-def cells(blocks: Blocks, roughness: Array | None) -> Array:
+def cells(blocks: Blocks, roughness: Floats | None) -> Floats:
     """Tempered log likelihoods (blocks, CELLS) of known blocks; `roughness` (blocks, 2), None where it is not known."""
     rows = len(blocks)
     level = broad_level(blocks)
@@ -64,14 +62,14 @@ def cells(blocks: Blocks, roughness: Array | None) -> Array:
     return np.column_stack([out.reshape(rows, GRID), none])
 
 
-def textures(roughness: Array) -> Array:
+def textures(roughness: Floats) -> Floats:
     """Tempered log likelihoods (blocks, ROUGHNESSES) of the roughness alone."""
     middle = np.column_stack([ROUGHNESSES, ROUGHNESSES + ADHESION_ROUGHNESS])
     mine = bivariate(roughness[:, None, :] - middle, _ROUGHNESS_COVARIANCE)
     return tempered(mixed(mine, broad_roughness(roughness)[:, None]), ROUGHNESS_TIME)
 
 
-def _adhesion(blocks: Blocks) -> Array:
+def _adhesion(blocks: Blocks) -> Floats:
     """Log density of mu about the curve of each scale, (blocks, scales); as `signature.curve_error` has it."""
     curve = CURVES["exponential"]
     shape = (curve.value(blocks.slip, {"a": 1.0}) * blocks.share).sum(axis=1)[:, None]

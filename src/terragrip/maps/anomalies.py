@@ -6,11 +6,9 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from terragrip.arrays import Bools, Floats, Ints
 from terragrip.maps.cells import Cells
-
-Floats = npt.NDArray[np.float64]
 
 AROUND = 96
 """Cells around one, the nearest beyond `CORE`, whose median is what it should be."""
@@ -33,7 +31,7 @@ class Anomaly:
     """A patch unlike its surroundings: ``cells`` (indices), centre ``column``, ``row`` (in cells), its ``value``, the value ``around``,
     the ``difference`` with its ``std``, and ``p``, the smallest p-value of its cells."""
 
-    cells: npt.NDArray[np.intp]
+    cells: Ints
     column: float
     row: float
     value: float
@@ -78,7 +76,7 @@ def anomalies_of(cells: Cells, share: float = FALSE_DISCOVERIES) -> list[Anomaly
     )
 
 
-def significant(p: Floats, share: float) -> npt.NDArray[np.bool_]:
+def significant(p: Floats, share: float) -> Bools:
     """Which p-values (n,) are significant at a false discovery rate of `share` (Benjamini and Hochberg 1995)."""
     order = np.argsort(p)
     below = np.flatnonzero(p[order] <= share * np.arange(1, len(p) + 1) / max(len(p), 1))
@@ -131,9 +129,7 @@ def _joined(tree: Any, place: Floats, residual: Floats, variance: Floats) -> tup
     return mean, spread
 
 
-def _patches(
-    tree: Any, place: Floats, chosen: npt.NDArray[np.bool_], score: Floats
-) -> list[npt.NDArray[np.intp]]:
+def _patches(tree: Any, place: Floats, chosen: Bools, score: Floats) -> list[Ints]:
     """Chosen cells of one sign that touch, including at corners."""
     from scipy.sparse import coo_matrix
     from scipy.sparse.csgraph import connected_components
@@ -152,7 +148,7 @@ def _patches(
 
 
 def _anomaly(
-    patch: npt.NDArray[np.intp], cells: Cells, place: Floats, around: Floats, variance: Floats, p: Floats
+    patch: Ints, cells: Cells, place: Floats, around: Floats, variance: Floats, p: Floats
 ) -> Anomaly:
     weight = 1 / variance[patch]
     value, base = (float(np.average(x[patch], weights=weight)) for x in (cells.value, around))

@@ -8,10 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from terragrip.arrays import Bools, Floats
 from terragrip.maps.columns import Columns
 from terragrip.maps.values import Reading
 
-Floats = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
 
 PASS_TIME = 10.0
@@ -50,7 +50,7 @@ class Pieces(Columns):
     x_constant: Floats
     x_random: Floats
     rows: Ints
-    headland: npt.NDArray[np.bool_]
+    headland: Bools
 
 
 @dataclass(frozen=True)
@@ -70,9 +70,7 @@ class Cells(Columns):
     headland: Floats
 
 
-def pieces_of(
-    reading: Reading, time: Floats, way: Floats, size: float, run: int, headland: npt.NDArray[np.bool_]
-) -> Pieces:
+def pieces_of(reading: Reading, time: Floats, way: Floats, size: float, run: int, headland: Bools) -> Pieces:
     """A reading's rows summed over parts of cells of `size` [m]; `way` [m] (n,) not decreasing."""
     rows = np.flatnonzero(reading.good)
     column = np.floor(reading.east[rows] / size).astype(np.int64)
@@ -115,7 +113,7 @@ def cells_of(parts: Sequence[Pieces], correlated: float) -> tuple[Cells, Cells]:
     return whole, each
 
 
-def _starts(*columns: npt.NDArray[np.generic]) -> npt.NDArray[np.bool_]:
+def _starts(*columns: npt.NDArray[np.generic]) -> Bools:
     new = np.zeros(len(columns[0]), dtype=bool)
     new[:1] = True
     for column in columns:
@@ -135,9 +133,7 @@ def _scatter(pieces: Pieces, cell: Ints) -> float:
     return float(np.sum((pieces.y - value[cell] * pieces.x) ** 2 / pieces.metres) / freedom)
 
 
-def _summed(
-    pieces: Pieces, start: npt.NDArray[np.bool_], scatter: float, correlated: float, passes: Ints
-) -> Cells:
+def _summed(pieces: Pieces, start: Bools, scatter: float, correlated: float, passes: Ints) -> Cells:
     begin = np.flatnonzero(start)
 
     def total(values: Floats) -> Floats:

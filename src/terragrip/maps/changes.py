@@ -7,11 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from terragrip.arrays import Bools, Floats
 from terragrip.maps.anomalies import FALSE_DISCOVERIES, significant
 from terragrip.maps.cells import Cells
 from terragrip.maps.columns import Columns
 
-Floats = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
 
 
@@ -27,7 +27,7 @@ class Changes(Columns):
     difference: Floats
     std: Floats
     p: Floats
-    significant: npt.NDArray[np.bool_]
+    significant: Bools
     first_run: Ints
     last_run: Ints
     seconds: Floats

@@ -7,10 +7,9 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from terragrip.arrays import Floats
 from terragrip.errors import InputError, missing_package
 from terragrip.maps.cells import Cells
-
-Floats = npt.NDArray[np.float64]
 
 NEIGHBOURS = 24
 """Driven cells that a filled one is made of."""

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-import numpy.typing as npt
 
+from terragrip.arrays import Bools, Floats, Ints
 from terragrip.errors import InputError
 from terragrip.maps.plausible import refuse_impossible
 from terragrip.recording.lag import lag_between, speed_of, wheels_of
@@ -16,7 +16,6 @@ if TYPE_CHECKING:
     from terragrip.estimation import Estimates
     from terragrip.vehicle import Vehicle
 
-Floats = npt.NDArray[np.float64]
 
 OUTAGE_TIME = 1.0
 """Seconds between two fixes, or five usual periods if that is longer, beyond which the way between them is an outage ..."""
@@ -44,7 +43,7 @@ class Places:
     east: Floats
     north: Floats
     heading: Floats
-    headland: npt.NDArray[np.bool_]
+    headland: Bools
     notes: tuple[str, ...] = ()
 
     def of(self, forward: float, left: float) -> tuple[Floats, Floats]:
@@ -103,7 +102,7 @@ def _base(vehicle: Vehicle) -> float:
     return max(0.5, 0.5 * (vehicle.wheelbase or 0.0))
 
 
-def _fixes(latitude: Floats, longitude: Floats) -> npt.NDArray[np.intp]:
+def _fixes(latitude: Floats, longitude: Floats) -> Ints:
     """Rows with a new position: repeated ones are held, not measured."""
     rows = np.flatnonzero(np.isfinite(latitude) & np.isfinite(longitude))
     fresh = np.r_[True, (np.diff(latitude[rows]) != 0) | (np.diff(longitude[rows]) != 0)]
@@ -149,9 +148,7 @@ def _late(estimates: Estimates, time: Floats, east: Floats, north: Floats) -> tu
     return lag.seconds, (word,)
 
 
-def _pieces(
-    time: Floats, way: Floats, east: Floats, north: Floats
-) -> tuple[npt.NDArray[np.intp], tuple[str, ...]]:
+def _pieces(time: Floats, way: Floats, east: Floats, north: Floats) -> tuple[Ints, tuple[str, ...]]:
     """The number of the unbroken piece of each fix (n,), -1 for strays; sentences on removed positions."""
     if len(time) < 2:
         return np.full(len(time), -1), ("There are fewer than two positions.",)
@@ -174,13 +171,13 @@ def _pieces(
     return np.where(stray, -1, piece), tuple(notes)
 
 
-def counted(which: npt.NDArray[np.bool_], noun: str) -> str:
+def counted(which: Bools, noun: str) -> str:
     """The number with its noun: 1 jump, 2 jumps."""
     count = int(which.sum())
     return f"{count} {noun}{'s' * (count != 1)}"
 
 
-def _between(time: Floats, fixed: Floats, values: Floats, piece: npt.NDArray[np.intp]) -> Floats:
+def _between(time: Floats, fixed: Floats, values: Floats, piece: Ints) -> Floats:
     """Values at the fixes interpolated to all rows (n,), NaN outside the pieces."""
     out = np.full(len(time), np.nan)
     good = np.flatnonzero(piece >= 0)
@@ -215,7 +212,7 @@ def _heading(east: Floats, north: Floats, way: Floats, base: float, speed: Float
     return heading
 
 
-def _headland(heading: Floats, way: Floats) -> npt.NDArray[np.bool_]:
+def _headland(heading: Floats, way: Floats) -> Bools:
     """Where the vehicle does not drive along the main direction of the run or back (n,).
 
     The main direction is the mean of the doubled angle over the path (axial mean, Mardia and Jupp 2000). A run without one, of which

@@ -8,15 +8,14 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-import numpy.typing as npt
 
+from terragrip.arrays import Floats, Ints
 from terragrip.errors import InputError
 from terragrip.physics.geodesy import metres_of
 
 if TYPE_CHECKING:
     from terragrip.estimation import Estimates
 
-Floats = npt.NDArray[np.float64]
 
 STRETCH = 3.0
 """Metres over which a step of the positions and a turn are compared."""
@@ -32,7 +31,7 @@ MIRRORED = -0.6
 """Correlation of the track's turns with those of the wheels below which the track is a mirror image."""
 
 
-def refuse_impossible(estimates: Estimates, fixes: npt.NDArray[np.intp], file: str | None = None) -> None:
+def refuse_impossible(estimates: Estimates, fixes: Ints, file: str | None = None) -> None:
     """Raise InputError if positions contradict the motion, with the likely mistake. ``fixes``: rows with a fresh position."""
     latitude, longitude = estimates["latitude"][fixes], estimates["longitude"][fixes]
     place = "columns latitude, longitude"
@@ -94,13 +93,13 @@ def refuse_impossible(estimates: Estimates, fixes: npt.NDArray[np.intp], file: s
         )
 
 
-def _stretches(way: Floats) -> npt.NDArray[np.intp]:
+def _stretches(way: Floats) -> Ints:
     """Fixes that end stretches of `STRETCH` metres."""
     number = ((way - way[0]) // STRETCH).astype(np.intp)
     return np.flatnonzero(np.r_[True, np.diff(number) > 0])
 
 
-def _off(latitude: Floats, longitude: Floats, ends: npt.NDArray[np.intp], driven: Floats) -> Floats:
+def _off(latitude: Floats, longitude: Floats, ends: Ints, driven: Floats) -> Floats:
     """Absolute ln(distance by positions / distance driven) of each stretch."""
     north, east = metres_of(latitude, longitude)
     moved = np.hypot(np.diff(north[ends]), np.diff(east[ends]))
@@ -108,14 +107,12 @@ def _off(latitude: Floats, longitude: Floats, ends: npt.NDArray[np.intp], driven
         return np.asarray(np.abs(np.log(np.maximum(moved, 1e-9) / driven)))
 
 
-def _apart(latitude: Floats, longitude: Floats, ends: npt.NDArray[np.intp], driven: Floats) -> float:
+def _apart(latitude: Floats, longitude: Floats, ends: Ints, driven: Floats) -> float:
     """Median of `_off`; a turn's chord is shorter, which the median tolerates."""
     return float(np.median(_off(latitude, longitude, ends, driven)))
 
 
-def _only_swapped_fits(
-    latitude: Floats, longitude: Floats, ends: npt.NDArray[np.intp], driven: Floats
-) -> bool:
+def _only_swapped_fits(latitude: Floats, longitude: Floats, ends: Ints, driven: Floats) -> bool:
     """Whether stretches fit the distance driven much better with the columns swapped, and hardly any much worse.
 
     Lanes along one direction fit either way: then the turns decide, which the median over all stretches does not see. An antenna that
@@ -128,9 +125,7 @@ def _only_swapped_fits(
     return better >= LEAST and better > 5 * int(np.sum(swapped - given > APART))
 
 
-def _wheel_turns(
-    estimates: Estimates, fixes: npt.NDArray[np.intp], ends: npt.NDArray[np.intp]
-) -> Floats | None:
+def _wheel_turns(estimates: Estimates, fixes: Ints, ends: Ints) -> Floats | None:
     """Turn to the left by the wheels over each stretch, in any unit; None where no axle has two wheels."""
     pairs = [
         (axle.wheels[0], axle.wheels[-1]) for axle in estimates.vehicle.axles.values() if len(axle.wheels) > 1
@@ -145,7 +140,7 @@ def _wheel_turns(
     return np.diff(np.cumsum(total)[fixes[ends]])
 
 
-def _mirrored(latitude: Floats, longitude: Floats, ends: npt.NDArray[np.intp], turning: Floats) -> bool:
+def _mirrored(latitude: Floats, longitude: Floats, ends: Ints, turning: Floats) -> bool:
     """Whether the track's turns have the opposite sign to the wheels'. Both must turn in enough stretches to decide."""
     north, east = metres_of(latitude, longitude)
     course = np.arctan2(np.diff(north[ends]), np.diff(east[ends]))

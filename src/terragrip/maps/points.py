@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
+from terragrip.arrays import Bools, Floats
 from terragrip.maps.places import Places
 
 if TYPE_CHECKING:
     from terragrip.estimation import Estimates
 
-Floats = npt.NDArray[np.float64]
 
 SPACING = 0.25
 """Of a cell's size, along the way."""
@@ -32,7 +32,7 @@ class Points:
     east: Floats
     north: Floats
     heading: Floats
-    headland: npt.NDArray[np.bool_]
+    headland: Bools
     values: dict[str, Floats]
     soil: npt.NDArray[np.object_]
     event: npt.NDArray[np.object_]

@@ -11,11 +11,11 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from terragrip.arrays import Floats
 from terragrip.errors import InputError, missing_package
 from terragrip.maps.about import ABOUT, About
 from terragrip.maps.values import QUANTITIES
 
-Floats = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
 
 _REMAKE = "make it anew: terragrip map ESTIMATES... -o map.gpkg"

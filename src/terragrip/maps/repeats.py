@@ -5,11 +5,9 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-import numpy.typing as npt
 
+from terragrip.arrays import Floats
 from terragrip.maps.cells import Cells
-
-Floats = npt.NDArray[np.float64]
 
 LEAST_REPEATS = 100
 """Pairs of passes over one cell that a share needs."""

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
+from terragrip.arrays import Floats
 from terragrip.document import read_json
 from terragrip.maps.columns import Columns
 from terragrip.maps.places import Places
@@ -17,7 +18,6 @@ from terragrip.maps.places import Places
 if TYPE_CHECKING:
     from terragrip.estimation import Estimates
 
-Floats = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
 
 

@@ -11,8 +11,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-import numpy.typing as npt
 
+from terragrip.arrays import Bools, Floats
 from terragrip.estimation.rims import DRIVE
 from terragrip.physics.adhesion import CURVES
 from terragrip.units import STANDARD_GRAVITY
@@ -23,8 +23,6 @@ if TYPE_CHECKING:
     from terragrip.soil.library import SoilLibrary
     from terragrip.vehicle import Vehicle
 
-Floats = npt.NDArray[np.float64]
-Flags = npt.NDArray[np.bool_]
 
 QUANTITIES: Mapping[str, str] = {
     "adhesion": "adhesion at the reference slip, driven wheels [-]",
@@ -59,7 +57,7 @@ class Reading:
     random: Floats
     x_constant: Floats
     x_random: Floats
-    good: Flags
+    good: Bools
     turns: bool = False
 
 
@@ -117,7 +115,7 @@ def _reading(
     y: Floats,
     constant: Floats,
     std: Floats,
-    counted: Flags,
+    counted: Bools,
     x: tuple[Floats, Floats, Floats] | None = None,
 ) -> Reading:
     """`std` and the third of `x` (value, constant SD, SD) are whole SDs; the constant part is subtracted from them."""

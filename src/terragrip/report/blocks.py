@@ -10,7 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from terragrip.report.runs import FloatArray, Run
+from terragrip.arrays import Floats
+from terragrip.report.runs import Run
 
 LENGTH = 30.0
 """Seconds of a piece: longer than an implement, a bump or the filter's memory have an effect, so that pieces count as independent."""
@@ -33,13 +34,13 @@ class Blocks:
 
     run: str
     label: NDArray[np.object_]
-    start: FloatArray
-    seconds: FloatArray
-    metres: FloatArray
-    slip: FloatArray
-    adhesion: FloatArray
-    resistance: FloatArray
-    bands: FloatArray
+    start: Floats
+    seconds: Floats
+    metres: Floats
+    slip: Floats
+    adhesion: Floats
+    resistance: Floats
+    bands: Floats
     began: datetime | None
     slip_sd: float
     adhesion_sd: float
@@ -56,7 +57,7 @@ class Share:
     slip: tuple[float, float]
     adhesion: tuple[float, float]
     resistance: float
-    bands: FloatArray
+    bands: Floats
 
 
 def blocks_of(run: Run, labels: NDArray[np.object_] | None = None) -> Blocks:
@@ -69,10 +70,10 @@ def blocks_of(run: Run, labels: NDArray[np.object_] | None = None) -> Blocks:
     piece = np.cumsum(change) - 1
     count = int(piece[-1]) + 1 if len(piece) else 0
 
-    def total(values: FloatArray) -> FloatArray:
+    def total(values: Floats) -> Floats:
         return np.asarray(np.bincount(piece, weights=values, minlength=count), dtype=np.float64)
 
-    def mean(values: FloatArray) -> FloatArray:
+    def mean(values: Floats) -> Floats:
         known = np.isfinite(values)
         with np.errstate(invalid="ignore", divide="ignore"):
             return total(np.where(known, values, 0.0) * step) / total(known * step)
@@ -108,7 +109,7 @@ def shares(every: Sequence[Blocks], order: Sequence[str] | None = None) -> list[
 def share_of(label: str, chosen: Sequence[tuple[Blocks, NDArray[np.bool_]]]) -> Share:
     """Totals and means of the chosen pieces."""
 
-    def joined(name: str) -> FloatArray:
+    def joined(name: str) -> Floats:
         return np.concatenate([getattr(one, name)[rows] for one, rows in chosen])
 
     seconds = joined("seconds")
@@ -126,7 +127,7 @@ def share_of(label: str, chosen: Sequence[tuple[Blocks, NDArray[np.bool_]]]) -> 
     )  # fmt: skip
 
 
-def wheel_mean(run: Run, quantity: str) -> FloatArray:
+def wheel_mean(run: Run, quantity: str) -> Floats:
     """The mean of a quantity over the wheels of a run (n,), without stuck rows and those of a large SD of slip; NaN where none is left."""
     columns = [f"{quantity}_{wheel}" for wheel in run.wheels if f"{quantity}_{wheel}" in run.estimates]
     if not columns:
@@ -138,7 +139,7 @@ def wheel_mean(run: Run, quantity: str) -> FloatArray:
     return np.where(count > 0, np.where(known, values, 0.0).sum(axis=0) / np.maximum(count, 1), np.nan)
 
 
-def _steps(time: FloatArray) -> FloatArray:
+def _steps(time: Floats) -> Floats:
     """Seconds that each row stands for (n,): none across a hole in the log."""
     if len(time) < 2:
         return np.zeros(len(time))
@@ -148,7 +149,7 @@ def _steps(time: FloatArray) -> FloatArray:
     return np.append(step, usual)
 
 
-def _mean(values: FloatArray, weights: FloatArray) -> tuple[float, float]:
+def _mean(values: Floats, weights: Floats) -> tuple[float, float]:
     """Weighted mean of pieces, and its 95 % half width by their scatter (Student's t); NaN where they are fewer than FEWEST."""
     known = np.isfinite(values) & (weights > 0)
     if not known.any():

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from terragrip.arrays import Floats
 from terragrip.physics.efficiency import tractive_efficiency
 from terragrip.report.style import (
     BLUE,
@@ -29,7 +29,6 @@ if TYPE_CHECKING:
     from terragrip.soil.learn import LearnedSoil
     from terragrip.soil.library import Soil
 
-Array = NDArray[np.float64]
 
 SLIPS = np.linspace(0.0, 0.65, 131)
 """Slips that curves are drawn at: the bins' range and a little more."""
@@ -169,7 +168,7 @@ def _draw_fit(plot: Axes, shown: SoilCurves) -> dict[str, Any]:
     if shown.learned.curve.has_band:
         low, high = shown.learned.curve.band(SLIPS)
         named["95 % of the fit"] = plot.fill_between(SLIPS, low, high, color=BLUE, alpha=0.22, linewidth=0)
-    lines: list[tuple[str, Array | None, dict[str, Any]]] = [
+    lines: list[tuple[str, Floats | None, dict[str, Any]]] = [
         (
             "fit to the bins" + (" by pull" if counts is not paper else ""),
             counts.predict(SLIPS),
@@ -207,11 +206,11 @@ def _draw_bins(plot: Axes, curve: AdhesionCurve, marker: str, color: str, size: 
     )
 
 
-def _value(soil: Soil | None) -> Array | None:
+def _value(soil: Soil | None) -> Floats | None:
     return None if soil is None else soil.value(SLIPS)
 
 
-def _efficiency(soil: Soil, slip: Array, tire_resistance: float) -> Array:
+def _efficiency(soil: Soil, slip: Floats, tire_resistance: float) -> Floats:
     eta = tractive_efficiency(soil.value(slip), _resistance(soil), tire_resistance, slip)
     return np.asarray(eta, dtype=float)
 

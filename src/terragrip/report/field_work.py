@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from terragrip.arrays import Floats
 from terragrip.physics.geodesy import metres_of
-from terragrip.report.runs import FloatArray, Run, label_stretches
+from terragrip.report.runs import Run, label_stretches
 
 STANDING, HEADLAND, WORK, ROAD = "standing", "headland", "work", "road"
 PARTS = (WORK, HEADLAND, ROAD, STANDING)
@@ -55,7 +56,7 @@ def parts_of(run: Run) -> NDArray[np.object_] | None:
     return what[nearest]
 
 
-def _motion(x: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray]:
+def _motion(x: Floats, y: Floats) -> tuple[Floats, Floats]:
     """Speed [m/s] and turn rate [rad/s, absolute] (n,) of positions a second apart, over WINDOW; a heading stays while it stands."""
     half = int(WINDOW // 2)
     index = np.arange(len(x))
@@ -72,7 +73,7 @@ def _motion(x: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray]:
     return speed, np.abs(heading[behind] - heading[before]) / seconds
 
 
-def _median(values: FloatArray, weights: FloatArray) -> float:
+def _median(values: Floats, weights: Floats) -> float:
     order = np.argsort(values)
     total = np.cumsum(weights[order])
     return float(values[order][int(np.searchsorted(total, 0.5 * total[-1]))])

@@ -8,9 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
+from terragrip.arrays import Floats
 from terragrip.estimation.consistency import coverage, nis_consistency
 from terragrip.report.page import Table, number, percent
-from terragrip.report.runs import FloatArray, Run
+from terragrip.report.runs import Run
 from terragrip.report.style import BLUE, GREEN, INK, ORANGE, new_figure, styled, to_svg
 
 LEVELS = (0.5, 0.6, 0.7, 0.8, 0.9, 0.95, 0.99)
@@ -91,19 +92,19 @@ def coverage_table(coverages: Sequence[Coverage]) -> Table:
     )
 
 
-def nis_by_channels(run: Run) -> tuple[FloatArray, FloatArray]:
+def nis_by_channels(run: Run) -> tuple[Floats, Floats]:
     """NIS and number of channels of the rows of `run` that took any."""
     nis, channels = run.estimated("nis"), run.estimated("channels")
     rows = np.isfinite(nis) & (channels > 0)
     return nis[rows], channels[rows]
 
 
-def _chi_square_density(x: ArrayLike, degrees: int) -> FloatArray:
+def _chi_square_density(x: ArrayLike, degrees: int) -> Floats:
     """Of `x` (n,) above 0; scipy.stats, which has it, would take half a second to load."""
     from scipy.special import gammaln
 
     values, half = np.asarray(x, dtype=np.float64), degrees / 2
-    density: FloatArray = np.exp((half - 1) * np.log(values) - values / 2 - gammaln(half) - half * np.log(2))
+    density: Floats = np.exp((half - 1) * np.log(values) - values / 2 - gammaln(half) - half * np.log(2))
     return density
 
 
@@ -157,7 +158,7 @@ def nis_table(runs: Sequence[Run]) -> Table:
     )
 
 
-def _triples(run: Run, columns: Sequence[str]) -> tuple[FloatArray, FloatArray, FloatArray]:
+def _triples(run: Run, columns: Sequence[str]) -> tuple[Floats, Floats, Floats]:
     """Truth, estimate and SD of `columns` of `run`, moving and finite rows, one after the other."""
     truth, estimate, std = [], [], []
     for name in columns:

@@ -11,8 +11,9 @@ from typing import Any
 
 import numpy as np
 
+from terragrip.arrays import Bools, Floats
 from terragrip.report.page import Table, number
-from terragrip.report.runs import BoolArray, FloatArray, Run, label_stretches
+from terragrip.report.runs import Run, label_stretches
 from terragrip.report.style import INK, new_figure, soil_color, styled, to_svg
 
 LEAST_ROWS = 100
@@ -52,12 +53,12 @@ def section_crosses(run: Run, quantity: str) -> list[Cross]:
 
 def soil_crosses(runs: Sequence[Run], quantity: str) -> list[Cross]:
     """A cross per soil over all `runs` together, one for each source."""
-    pool: dict[tuple[str, str], list[tuple[FloatArray, FloatArray]]] = {}
+    pool: dict[tuple[str, str], list[tuple[Floats, Floats]]] = {}
     for run in runs:
         counted = run.moving & ~run.stuck
         for source, slip, mu in _sources(run, quantity):
             for soil in run.soils:
-                rows: BoolArray = counted & (run.soil == soil)
+                rows: Bools = counted & (run.soil == soil)
                 pool.setdefault((soil, source), []).append((slip[rows], mu[rows]))
     crosses = [
         _cross(soil, source, np.concatenate([s for s, _ in parts]), np.concatenate([m for _, m in parts]))
@@ -139,7 +140,7 @@ def _apart(estimated: Cross | None, other: Cross | None) -> str:
     return number(estimated.traction - other.traction) if estimated and other else "–"
 
 
-def _sources(run: Run, quantity: str) -> list[tuple[str, FloatArray, FloatArray]]:
+def _sources(run: Run, quantity: str) -> list[tuple[str, Floats, Floats]]:
     """(source, slip, traction) one for each source. Estimates alone hold no measured slip: the sensor's traction then stands at the
     estimated one."""
     wheel = run.shown_wheel
@@ -153,7 +154,7 @@ def _sources(run: Run, quantity: str) -> list[tuple[str, FloatArray, FloatArray]
     return [(source, slip, mu) for source, slip, mu in result if slip is not None and mu is not None]
 
 
-def _cross(soil: str, source: str, slip: FloatArray, mu: FloatArray) -> Cross:
+def _cross(soil: str, source: str, slip: Floats, mu: Floats) -> Cross:
     """Mean and SD, slip and adhesion each over its own finite rows: their sensors may run at other rates."""
     s, m = slip[np.isfinite(slip)], mu[np.isfinite(mu)]
     if min(len(s), len(m)) == 0:

@@ -8,10 +8,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from terragrip.arrays import Floats
 from terragrip.physics.geodesy import metres_of
 from terragrip.report.field_work import PARTS
 from terragrip.report.page import Picture, Section, names
-from terragrip.report.runs import FloatArray, Run
+from terragrip.report.runs import Run
 from terragrip.report.style import INK, MUTED, new_figure, soil_color, styled, to_svg
 
 if TYPE_CHECKING:
@@ -51,7 +52,7 @@ def section(runs: Sequence[Run], labels: Sequence[NDArray[np.object_] | None] | 
     return Section("path", TITLE, (), (picture,))
 
 
-def _colours(placed: Sequence[tuple[Run, NDArray[np.object_], tuple[FloatArray, FloatArray]]]) -> str:
+def _colours(placed: Sequence[tuple[Run, NDArray[np.object_], tuple[Floats, Floats]]]) -> str:
     """What the colours mean, in a sentence."""
     every = {str(name) for _, own, _ in placed for name in own if name}
     if every & set(PARTS):
@@ -61,7 +62,7 @@ def _colours(placed: Sequence[tuple[Run, NDArray[np.object_], tuple[FloatArray, 
     return "Colours: the label under the vehicle, grey where there is none or a transition."
 
 
-def positions(run: Run) -> tuple[FloatArray, FloatArray] | None:
+def positions(run: Run) -> tuple[Floats, Floats] | None:
     """East and north [m] of each row (n,), between fixes straight; None with fewer than two."""
     if not {"latitude", "longitude"} <= set(run.estimates.columns):
         return None
@@ -72,7 +73,7 @@ def positions(run: Run) -> tuple[FloatArray, FloatArray] | None:
     return tuple(np.interp(run.time, run.time[fixed], values[fixed]) for values in (east, north))  # type: ignore[return-value]
 
 
-def draw(placed: Sequence[tuple[Run, NDArray[np.object_], tuple[FloatArray, FloatArray]]]) -> str:
+def draw(placed: Sequence[tuple[Run, NDArray[np.object_], tuple[Floats, Floats]]]) -> str:
     """An SVG: a map for each run."""
     every = tuple(dict.fromkeys(str(name) for _, own, _ in placed for name in own if name))
     wide = 9.6 / len(placed)
@@ -94,7 +95,7 @@ def draw(placed: Sequence[tuple[Run, NDArray[np.object_], tuple[FloatArray, Floa
 
 
 def _draw_one(
-    plot: Axes, own: NDArray[np.object_], east: FloatArray, north: FloatArray, every: tuple[str, ...]
+    plot: Axes, own: NDArray[np.object_], east: Floats, north: Floats, every: tuple[str, ...]
 ) -> None:
     step = max(1, len(east) // POINTS)
     x, y, names_ = east[::step], north[::step], own[::step]

@@ -6,10 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from terragrip.arrays import Floats
 from terragrip.errors import InputError
 from terragrip.estimation.consistency import Whiteness, whiteness
 from terragrip.report.page import Picture, Section, Table, number
-from terragrip.report.runs import FloatArray, Run
+from terragrip.report.runs import Run
 from terragrip.report.style import INK, MEASURED, TRUE, new_figure, styled, to_svg
 
 STEP = 0.1
@@ -23,7 +24,7 @@ class Residual:
 
     source: str
     what: str
-    values: FloatArray
+    values: Floats
     white: Whiteness | None
 
 
@@ -110,7 +111,7 @@ def draw_residuals(shown: list[Residual]) -> str:
         return to_svg(figure)
 
 
-def _white(time: FloatArray, values: FloatArray) -> Whiteness | None:
+def _white(time: Floats, values: Floats) -> Whiteness | None:
     """Whiteness of the residual every STEP seconds; stretches are joined, so a few lags cross a gap."""
     _, first = np.unique(np.floor(time / STEP + 1e-9), return_index=True)
     try:

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from terragrip.arrays import Bools, Floats
 from terragrip.errors import InputError
 from terragrip.estimation.estimates import wheels_with
 from terragrip.units import STANDARD_GRAVITY
@@ -20,8 +21,6 @@ if TYPE_CHECKING:
     from terragrip.ground.events import Event
     from terragrip.vehicle import Vehicle
 
-FloatArray = NDArray[np.float64]
-BoolArray = NDArray[np.bool_]
 
 LEAST_SENSOR_LOAD = 0.1
 """A reference sensor's ratio counts where it carries at least this share of its median load: a wheel in the
@@ -69,7 +68,7 @@ class Run:
                 )
 
     @cached_property
-    def time(self) -> FloatArray:
+    def time(self) -> Floats:
         """Time of each row [s]."""
         return self.estimates["time"].to_numpy(dtype=np.float64)
 
@@ -109,17 +108,17 @@ class Run:
         """The wheel to draw: the one with the sensor, else the last (rear right by custom)."""
         return self.sensor_wheel or self.wheels[-1]
 
-    def estimated(self, name: str) -> FloatArray:
+    def estimated(self, name: str) -> Floats:
         """An estimated column as (n,) floats."""
         return self.estimates[name].to_numpy(dtype=np.float64)
 
-    def true(self, name: str) -> FloatArray | None:
+    def true(self, name: str) -> Floats | None:
         """The true column `true_<name>`, or None without a truth."""
         if self.truth is None or f"true_{name}" not in self.truth:
             return None
         return self.truth[f"true_{name}"].to_numpy(dtype=np.float64)
 
-    def measured_ratio(self) -> FloatArray | None:
+    def measured_ratio(self) -> Floats | None:
         """F_x/F_z of the reference sensor (paper eq. 4), (n,), NaN where it has no sample or no load.
 
         The sensor sits on the axle: it reads the net force (no soil resistance in it) over a load without
@@ -134,7 +133,7 @@ class Run:
         with np.errstate(divide="ignore", invalid="ignore"):
             return np.where(load > LEAST_SENSOR_LOAD * typical, force / load, np.nan)
 
-    def sensor_ratio(self) -> FloatArray | None:
+    def sensor_ratio(self) -> Floats | None:
         """What the reference sensor reads if the estimates are right: :func:`axle_ratio`, (n,).
 
         None without a sensor or the mass of its wheel. Loads are the axle's estimated one, shared alike by its wheels; without an
@@ -151,7 +150,7 @@ class Run:
         force = self._everywhere("acceleration_x") if measured else np.zeros(len(load))
         return axle_ratio(self.estimated(f"net_traction_{wheel}"), load, force, mass)
 
-    def true_sensor_ratio(self) -> FloatArray | None:
+    def true_sensor_ratio(self) -> Floats | None:
         """The same of a simulation's true net traction, load and motion, (n,): without the gradient under that one wheel."""
         wheel, mass = self.sensor_wheel, self._wheel_mass
         if mass is None:
@@ -169,7 +168,7 @@ class Run:
             return None
         return self.vehicle.wheel_data[self.vehicle.wheels.index(self.sensor_wheel)].mass
 
-    def measured_slip(self) -> FloatArray | None:
+    def measured_slip(self) -> Floats | None:
         """Slip of the shown wheel from the recorded speeds (paper eq. 6), (n,), NaN where no ground speed is.
 
         The hub of a wheel off the middle runs at v - y times the yaw rate, of a steered one faster. Wheel speed and yaw rate are
@@ -189,7 +188,7 @@ class Run:
         turning = self._everywhere(f"wheel_speed_{self.shown_wheel}")
         return slip(turning, hub, float(self.vehicle.wheel_radius[wheel]))
 
-    def _everywhere(self, channel: str) -> FloatArray:
+    def _everywhere(self, channel: str) -> Floats:
         """A recorded channel (n,), linear between its samples."""
         values = self._measured[channel].to_numpy(dtype=np.float64)
         known = np.isfinite(values)
@@ -222,14 +221,14 @@ class Run:
         return tuple(dict.fromkeys(label for label in self.soil if label))
 
     @cached_property
-    def stuck(self) -> BoolArray:
+    def stuck(self) -> Bools:
         """Where the vehicle is stuck: by the simulation's truth, else by the events of the estimates."""
         if self.truth is not None and "stuck" in self.truth:
             return self.truth["stuck"].to_numpy(dtype=np.bool_)
         return self._during(STUCK)
 
     @cached_property
-    def outlier(self) -> BoolArray:
+    def outlier(self) -> Bools:
         """The longest stuck spell and AFTER_STUCK seconds after it: what the paper cuts out of `multi2` by hand."""
         result = np.zeros(len(self.time), dtype=np.bool_)
         spells = stretches(self.stuck)
@@ -239,7 +238,7 @@ class Run:
         return result
 
     @cached_property
-    def flagged(self) -> BoolArray:
+    def flagged(self) -> Bools:
         """Rows that the product itself flags, without a look at truth or sensor: inside an event of FLAGGED, and from
         BEFORE_STUCK before to AFTER_STUCK after one of STUCK, the same for all."""
         result = self._during(FLAGGED)
@@ -248,7 +247,7 @@ class Run:
             result |= (self.time >= start) & (self.time <= end)
         return result
 
-    def _during(self, kinds: tuple[str, ...]) -> BoolArray:
+    def _during(self, kinds: tuple[str, ...]) -> Bools:
         """Rows inside an event of `kinds`, by the estimates' column or by `events`."""
         result = np.zeros(len(self.time), dtype=np.bool_)
         if "event" in self.estimates:
@@ -259,18 +258,18 @@ class Run:
         return result
 
     @cached_property
-    def moving(self) -> BoolArray:
+    def moving(self) -> Bools:
         """Rows with an estimate of slip: the others stand still or follow a gap."""
         return np.isfinite(self.estimated(f"slip_{self.shown_wheel}"))
 
     @cached_property
-    def pushed(self) -> BoolArray:
+    def pushed(self) -> Bools:
         """Where, by a simulation's truth, the operator pushes: a force from outside that no sensor of the log tells."""
         assist = self.true("assist_force")
         return np.zeros(len(self.time), dtype=np.bool_) if assist is None else np.abs(assist) > LEAST_PUSH
 
     @cached_property
-    def judged(self) -> BoolArray:
+    def judged(self) -> Bools:
         """Rows in which estimates are held against the truth: it moves by itself, neither stuck nor pushed."""
         return self.moving & ~self.stuck & ~self.pushed
 
@@ -280,9 +279,7 @@ class Run:
         return self.estimates if self.recording is None else self.recording
 
 
-def axle_ratio(
-    net_traction: FloatArray, load: FloatArray, specific_force: FloatArray, mass: float
-) -> FloatArray:
+def axle_ratio(net_traction: Floats, load: Floats, specific_force: Floats, mass: float) -> Floats:
     """F_x/F_z in the axle of a wheel of `mass` [kg] (n,): (κ F_z - m_w a)/(F_z - m_w g) (physics.md 2, paper eq. 1).
 
     `net_traction` κ, `load` F_z [N] and `specific_force` dv/dt + g sinθ [m/s²] are (n,); NaN where the load is the wheel's own.
@@ -292,7 +289,7 @@ def axle_ratio(
         return np.where(carried > 0, (net_traction * load - mass * specific_force) / carried, np.nan)
 
 
-def stretches(mask: BoolArray) -> list[tuple[int, int]]:
+def stretches(mask: Bools) -> list[tuple[int, int]]:
     """First and last row of each unbroken stretch of True in `mask` (n,)."""
     edges = np.diff(np.concatenate(([0], mask.astype(np.int8), [0])))
     return list(

@@ -8,10 +8,11 @@ from typing import Any
 
 import numpy as np
 
+from terragrip.arrays import Floats
 from terragrip.errors import InputError
 from terragrip.estimation.consistency import Agreement, agreement, coverage, mean_absolute_error
 from terragrip.report.page import Table, number, percent
-from terragrip.report.runs import AFTER_STUCK, BEFORE_STUCK, FLAGGED, FloatArray, Run
+from terragrip.report.runs import AFTER_STUCK, BEFORE_STUCK, FLAGGED, Run
 
 PAPER_R2_WHOLE, PAPER_R2_WITHOUT_STUCK, PAPER_NRMSE = 0.445, 0.848, 0.09
 """The paper's figures for its field run `multi2`: R² whole, R² and NRMSE without 245-255 s."""
@@ -238,19 +239,19 @@ def _figures(c: Comparison | None) -> list[str]:
     ]
 
 
-def _parts(run: Run, reference: FloatArray, estimate: FloatArray) -> list[Agreement | None]:
+def _parts(run: Run, reference: Floats, estimate: Floats) -> list[Agreement | None]:
     """Agreement over the rows of each of PARTS."""
     every = np.ones(len(estimate), dtype=np.bool_)
     return [_agreement(reference, estimate, rows) for rows in (every, ~run.outlier, ~run.stuck, ~run.flagged)]
 
 
-def _agreement(reference: FloatArray, estimate: FloatArray, rows: Any) -> Agreement | None:
+def _agreement(reference: Floats, estimate: Floats, rows: Any) -> Agreement | None:
     try:
         return agreement(reference, estimate, rows)
     except InputError:
         return None
 
 
-def _present(values: FloatArray | None) -> FloatArray:
+def _present(values: Floats | None) -> Floats:
     assert values is not None
     return values

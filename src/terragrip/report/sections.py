@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from terragrip.arrays import Floats
 from terragrip.report.intervals import (
     Coverage,
     coverage_table,
@@ -16,7 +17,7 @@ from terragrip.report.intervals import (
 )
 from terragrip.report.operating_points import cross_table, draw_crosses, section_crosses, soil_crosses
 from terragrip.report.page import Picture, Section, Table, names, number
-from terragrip.report.runs import FloatArray, Run, stretches
+from terragrip.report.runs import Run, stretches
 from terragrip.report.scores import Comparison, TruthScore, method_tables, sensor_table, truth_table
 from terragrip.report.timeline import Lane, timeline
 
@@ -223,7 +224,7 @@ def calibrated(calibration: Calibration) -> Section:
 
 
 def _lane(
-    run: Run, column: str, label: str, measured: FloatArray | None = None, *, never_stuck: bool = False
+    run: Run, column: str, label: str, measured: Floats | None = None, *, never_stuck: bool = False
 ) -> Lane:
     """A lane of one estimated column, its axis wide enough for nearly all that it shows.
 

@@ -6,10 +6,11 @@ from typing import Any
 
 import numpy as np
 
+from terragrip.arrays import Floats
 from terragrip.estimation.rims import DRIVE, calibrated_scale
 from terragrip.physics.geodesy import metres_of
 from terragrip.report.page import Picture, Section, Table, names, number
-from terragrip.report.runs import FloatArray, Run
+from terragrip.report.runs import Run
 from terragrip.report.style import ESTIMATED, INK, new_figure, styled, to_svg
 from terragrip.report.timeline import Lane, timeline
 
@@ -159,7 +160,7 @@ def place(run: Run) -> Section:
     return Section(f"slip-map-{run.name}", title, (), (picture,))
 
 
-def _rows(run: Run, wheel: str) -> tuple[FloatArray, FloatArray]:
+def _rows(run: Run, wheel: str) -> tuple[Floats, Floats]:
     """Slip (n,) and the way [m] (n,) of the rows that know it."""
     slip, std = run.estimated(f"slip_{wheel}"), run.estimated(f"slip_{wheel}_std")
     way = np.diff(run.estimated("distance"), prepend=run.estimated("distance")[0])
@@ -167,7 +168,7 @@ def _rows(run: Run, wheel: str) -> tuple[FloatArray, FloatArray]:
     return slip[rows], way[rows]
 
 
-def _weighted(values: FloatArray, weights: FloatArray, share: float) -> float:
+def _weighted(values: Floats, weights: Floats, share: float) -> float:
     """The value under which a share of the weights lies."""
     order = np.argsort(values)
     total = np.cumsum(weights[order])

@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from terragrip.report.runs import BoolArray, FloatArray, Run, label_stretches, stretches
+from terragrip.arrays import Bools, Floats
+from terragrip.report.runs import Run, label_stretches, stretches
 from terragrip.report.style import (
     ESTIMATED,
     INK,
@@ -35,10 +36,10 @@ class Lane:
     """One quantity of a run, ready to draw: (n,) each, None where there is none. `reference`: what `truth` is called."""
 
     label: str
-    estimate: FloatArray
-    std: FloatArray | None = None
-    measured: FloatArray | None = None
-    truth: FloatArray | None = None
+    estimate: Floats
+    std: Floats | None = None
+    measured: Floats | None = None
+    truth: Floats | None = None
     limits: tuple[float, float] | None = None
     reference: str = "truth"
 
@@ -79,7 +80,7 @@ def timeline(run: Run, lanes: list[Lane], window: tuple[float, float] | None = N
         return to_svg(figure)
 
 
-def soil_strip(plot: Axes, time: FloatArray, soil: NDArray[np.object_], soils: tuple[str, ...]) -> bool:
+def soil_strip(plot: Axes, time: Floats, soil: NDArray[np.object_], soils: tuple[str, ...]) -> bool:
     """A strip of soils above `plot`, grey on a transition; whether every stretch had room for its name."""
     if not len(time) or not any(soil):
         return True
@@ -99,7 +100,7 @@ def soil_strip(plot: Axes, time: FloatArray, soil: NDArray[np.object_], soils: t
     return roomy
 
 
-def slots(time: FloatArray, values: FloatArray, columns: int = COLUMNS) -> tuple[FloatArray, FloatArray]:
+def slots(time: Floats, values: Floats, columns: int = COLUMNS) -> tuple[Floats, Floats]:
     """At most 2 x `columns` points that draw like all of them: each slot's extremes, in order of time.
 
     A slot without a finite value becomes one NaN, so that a gap stays a gap; a lone missing sample does not
@@ -119,7 +120,7 @@ def slots(time: FloatArray, values: FloatArray, columns: int = COLUMNS) -> tuple
     return _with_gaps(time[keep], values[keep])
 
 
-def _with_gaps(time: FloatArray, values: FloatArray) -> tuple[FloatArray, FloatArray]:
+def _with_gaps(time: Floats, values: Floats) -> tuple[Floats, Floats]:
     """Put a NaN where the step in time is far beyond the usual one (over 1 s and ten times the median)."""
     if len(time) < 3:
         return time, values
@@ -129,7 +130,7 @@ def _with_gaps(time: FloatArray, values: FloatArray) -> tuple[FloatArray, FloatA
     return np.insert(time, breaks, middle), np.insert(values, breaks, np.nan)
 
 
-def _draw_lane(plot: Axes, time: FloatArray, lane: Lane, rows: BoolArray) -> None:
+def _draw_lane(plot: Axes, time: Floats, lane: Lane, rows: Bools) -> None:
     if lane.measured is not None:
         plot.plot(
             *slots(time, lane.measured[rows]),
@@ -153,12 +154,12 @@ def _draw_lane(plot: Axes, time: FloatArray, lane: Lane, rows: BoolArray) -> Non
         plot.set_ylim(*lane.limits)
 
 
-def _thin(time: FloatArray, values: FloatArray) -> tuple[FloatArray, FloatArray]:
+def _thin(time: Floats, values: Floats) -> tuple[Floats, Floats]:
     """Every k-th row, for bands that vary slowly."""
     step = max(1, len(time) // COLUMNS)
     return time[::step], values[::step]
 
 
-def _shade(plot: Axes, run: Run, rows: BoolArray) -> None:
+def _shade(plot: Axes, run: Run, rows: Bools) -> None:
     for first, last in stretches(run.stuck & rows):
         plot.axvspan(float(run.time[first]), float(run.time[last]), color=INK, alpha=0.10, linewidth=0)

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from terragrip.arrays import Floats
 from terragrip.recording.window_means import window_means
 from terragrip.report.page import Picture, Section, Table, number, percent
-from terragrip.report.runs import FloatArray, Run
+from terragrip.report.runs import Run
 from terragrip.report.style import BLUE, GREEN, ORANGE, PURPLE, SKY, VERMILLION, new_figure, styled, to_svg
 
 _LOOKS = ((BLUE, "-"), (ORANGE, "--"), (GREEN, "-."), (PURPLE, ":"), (VERMILLION, "-"), (SKY, "--"))
@@ -69,12 +70,12 @@ def _table(run: Run) -> Table:
     return Table(f"Mean ± SD over time of each wheel of {run.name}.", head, tuple(rows))
 
 
-def _known(run: Run, quantity: str, wheel: str) -> FloatArray:
+def _known(run: Run, quantity: str, wheel: str) -> Floats:
     rows = ~run.stuck & (run.estimated(f"slip_{wheel}_std") < _UNSURE)
     return np.where(rows, run.estimated(f"{quantity}_{wheel}"), np.nan)
 
 
-def _means(time: FloatArray, values: FloatArray) -> tuple[FloatArray, FloatArray]:
+def _means(time: Floats, values: Floats) -> tuple[Floats, Floats]:
     """Means of equal slots of time, NaN where a slot knows nothing."""
     slots = min(SLOTS, max(len(time) // 4, 1))
     edges = np.linspace(time[0], time[-1], slots + 1)
@@ -82,9 +83,9 @@ def _means(time: FloatArray, values: FloatArray) -> tuple[FloatArray, FloatArray
     return (edges[:-1] + edges[1:]) / 2, window_means(values, place, slots)
 
 
-def _mean(values: FloatArray) -> float:
+def _mean(values: Floats) -> float:
     return float(np.nanmean(values)) if np.isfinite(values).any() else float("nan")
 
 
-def _std(values: FloatArray) -> float:
+def _std(values: Floats) -> float:
     return float(np.nanstd(values)) if np.isfinite(values).any() else float("nan")

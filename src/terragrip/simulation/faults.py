@@ -6,15 +6,14 @@ from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
-import numpy.typing as npt
 
+from terragrip.arrays import Bools, Floats
 from terragrip.errors import InputError, nearest
 from terragrip.simulation.fields import stream
 from terragrip.simulation.scenario_sensors import Fault
 from terragrip.simulation.sensors import Series
 
-Floats = npt.NDArray[np.float64]
-Rows = npt.NDArray[np.bool_]
+Rows = Bools
 
 MARGIN = 0.05  # share of the run at either end where no fault is placed by chance
 

@@ -5,9 +5,8 @@ from __future__ import annotations
 import zlib
 
 import numpy as np
-import numpy.typing as npt
 
-Floats = npt.NDArray[np.float64]
+from terragrip.arrays import Bools, Floats
 
 FEATURES = 160
 ENVELOPE = 0.08  # m: a tyre smooths bumps shorter than about its contact length
@@ -46,7 +45,7 @@ class Field:
         return np.outer(east, self._wave[0]) + np.outer(north, self._wave[1]) + self._phase
 
 
-def on_grid(field: Field, east: Floats, north: Floats, mask: npt.NDArray[np.bool_], stride: int) -> Floats:
+def on_grid(field: Field, east: Floats, north: Floats, mask: Bools, stride: int) -> Floats:
     """Field values (n,) where ``mask``, 0 elsewhere; computed at every ``stride``-th point and interpolated."""
     n = len(east)
     nodes = np.unique(np.r_[np.arange(0, n, stride), n - 1])

@@ -6,16 +6,14 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from terragrip.arrays import Floats
 from terragrip.errors import InputError
 from terragrip.physics.loads import load_levers, wheel_shares
 from terragrip.simulation.scenario import Scenario
 from terragrip.simulation.terrain import CURVE_INTERVALS, Terrain
 from terragrip.units import STANDARD_GRAVITY
 from terragrip.vehicle import Vehicle
-
-Floats = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True)

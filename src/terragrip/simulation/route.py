@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from terragrip.arrays import Bools, Floats
 from terragrip.simulation.scenario import Plot, Route
 
-Floats = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int32]
 
 EARTH_RADIUS = 6378137.0  # m, WGS 84 equatorial
@@ -52,7 +52,7 @@ class Soils:
         return np.where(self.blend < 0.5, self.start, self.end).astype(np.int32)
 
     @property
-    def border(self) -> npt.NDArray[np.bool_]:
+    def border(self) -> Bools:
         """Where one soil runs into another (n,)."""
         return self.start != self.end
 
@@ -119,7 +119,7 @@ def soils_along(route: Route, names: tuple[str, ...], path: Path, offset: float,
     return _ramped(ids, path.x, route.border)
 
 
-def inside(plot: Plot, east: Floats, north: Floats) -> npt.NDArray[np.bool_]:
+def inside(plot: Plot, east: Floats, north: Floats) -> Bools:
     """Whether points lie in a plot's polygon (crossing number)."""
     out = np.zeros(len(east), dtype=bool)
     corners = plot.corners

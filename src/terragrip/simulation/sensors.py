@@ -7,16 +7,14 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from terragrip.arrays import Bools, Floats
 from terragrip.errors import InputError
 from terragrip.simulation.fields import stream
 from terragrip.simulation.route import geographic
 from terragrip.simulation.scenario import Scenario
 from terragrip.simulation.scenario_sensors import Sensor, Sensors
 from terragrip.simulation.trace import Trace
-
-Floats = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -173,7 +171,7 @@ def _drift(rng: np.random.Generator, sensor: Sensor, count: int) -> Floats:
     return np.asarray(lfilter([1.0], [1.0, -keep], drive, zi=[keep * start])[0])
 
 
-def _lost(rng: np.random.Generator, sensor: Sensor, count: int) -> npt.NDArray[np.bool_]:
+def _lost(rng: np.random.Generator, sensor: Sensor, count: int) -> Bools:
     """Samples lost (count,): spells of geometric length, their share as the sensor says."""
     lost = np.zeros(count, dtype=bool)
     if sensor.dropout <= 0:

@@ -5,15 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
+from terragrip.arrays import Floats
 from terragrip.physics.adhesion import CURVES
 from terragrip.simulation.fields import Field, clods, on_grid, roughness, stream
 from terragrip.simulation.route import Path, Soils, lay, soils_along
 from terragrip.simulation.scenario import Scenario, Soil, Tool
 from terragrip.vehicle import Vehicle
-
-Floats = npt.NDArray[np.float64]
 
 SPACING = 0.02  # m, on wheels of WHEEL_RADIUS
 WHEEL_RADIUS = 0.2  # m: lengths of what a tyre feels grow with its radius

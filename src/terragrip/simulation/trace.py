@@ -6,13 +6,12 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-import numpy.typing as npt
 
+from terragrip.arrays import Floats, Ints
 from terragrip.simulation.terrain import Terrain
 from terragrip.units import STANDARD_GRAVITY
 from terragrip.vehicle import Vehicle
 
-Floats = npt.NDArray[np.float64]
 SCALARS = (
     "time", "position", "speed", "acceleration", "drawbar", "slope", "gradient_force", "assist", "body_pitch",
     "body_pitch_rate", "heave_acceleration", "curvature", "driver_mode", "command", "tool1_position", "tool1_speed",
@@ -100,7 +99,7 @@ class Trace:
         places["center"] = x + vehicle.center_of_gravity_to_rear
         return places | {f"tool{k + 1}": self[f"tool{k + 1}_position"] for k in range(self.tool_count)}
 
-    def cell(self, position: Floats) -> npt.NDArray[np.intp]:
+    def cell(self, position: Floats) -> Ints:
         """Nearest grid point of the ground (n,)."""
         path = self.terrain.path
         return np.clip(np.rint((position - path.x[0]) / path.spacing), 0, len(path.x) - 1).astype(np.intp)

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
+from terragrip.arrays import Bools, Floats
 from terragrip.physics.efficiency import net_traction, tractive_efficiency
 from terragrip.physics.slip import slip
 from terragrip.simulation.trace import Trace
@@ -15,8 +16,6 @@ from terragrip.units import STANDARD_GRAVITY
 if TYPE_CHECKING:
     import pandas as pd
 
-Floats = npt.NDArray[np.float64]
-Flags = npt.NDArray[np.bool_]
 
 STANDSTILL_SPEED = 0.03  # m/s, of hub and rim
 STUCK_SPEED = 0.1  # of the rim speed: below it the machine is stuck, wheels turning
@@ -98,7 +97,7 @@ def soil_labels(trace: Trace) -> dict[str, npt.NDArray[np.generic]]:
     return columns
 
 
-def stuck(trace: Trace) -> Flags:
+def stuck(trace: Trace) -> Bools:
     """Where the wheels turn and the machine does not move (n,), with hysteresis."""
     rim = np.abs(trace["wheel_speed"] * trace.radius).mean(axis=1)
     travel = np.abs(trace["speed"])
@@ -110,7 +109,7 @@ def stuck(trace: Trace) -> Flags:
     return state[last] == 1
 
 
-def _turning_for(trace: Trace, rim: Floats, least: float) -> Flags:
+def _turning_for(trace: Trace, rim: Floats, least: float) -> Bools:
     """Where the wheels have turned for ``least`` s already: a start from rest is no immobilisation."""
     turning = rim > 0.1
     since = np.maximum.accumulate(np.where(~turning, trace["time"], -np.inf))

@@ -11,9 +11,8 @@ from dataclasses import asdict, dataclass, field
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from terragrip.arrays import Bools, Floats
 from terragrip.physics.adhesion import CURVES, PROTOTYPE
-
-Array = NDArray[np.float64]
 
 BY_SLIP, BY_PULL = "slip", "pull"
 
@@ -58,7 +57,7 @@ class BinSettings:
         return f"{self.metres:g} m of way" if self.by == BY_PULL else f"{self.minimum} samples"
 
     @property
-    def edges(self) -> Array:
+    def edges(self) -> Floats:
         """Edges of the bins, shape (bins + 1,)."""
         count = round((self.upper - self.lower) / self.width)
         return np.asarray(self.lower + self.width * np.arange(count + 1), dtype=float)
@@ -83,27 +82,27 @@ class Bins:
     """
 
     settings: BinSettings
-    slip: Array
-    mean: Array
-    std: Array
+    slip: Floats
+    mean: Floats
+    std: Floats
     count: NDArray[np.int64]
-    cluster_count: Array = field(repr=False)
-    cluster_sum: Array = field(repr=False)
-    cluster_slip: Array = field(repr=False)
+    cluster_count: Floats = field(repr=False)
+    cluster_sum: Floats = field(repr=False)
+    cluster_slip: Floats = field(repr=False)
     left_out: int = 0
     reference: float | None = None
 
     @property
-    def used(self) -> NDArray[np.bool_]:
+    def used(self) -> Bools:
         """The bins with enough data."""
         return np.asarray(np.isfinite(self.mean))
 
     @property
-    def weight(self) -> Array:
+    def weight(self) -> Floats:
         """Samples (by slip) or metres (by pull) of each bin."""
         return np.asarray(self.cluster_count.sum(axis=0))
 
-    def drawn(self, times: Array, least: float | None = None) -> tuple[Array, Array, NDArray[np.bool_]]:
+    def drawn(self, times: Floats, least: float | None = None) -> tuple[Floats, Floats, Bools]:
         """Slip, mean and enough, each (draws, bins), with every cluster counted `times` (draws, clusters).
 
         `enough`: the bin is used and the draw has `least` of it (default: the settings'); elsewhere slip and mean are meaningless.
@@ -129,7 +128,7 @@ class Bins:
         ]
 
 
-def height_of(slip: ArrayLike) -> Array:
+def height_of(slip: ArrayLike) -> Floats:
     """The prototype curve of scale 1 at slips of any shape: the scale that slips are averaged on by pull."""
     return CURVES["exponential"].value(slip, {**PROTOTYPE, "a": 1.0})
 
@@ -138,7 +137,7 @@ _SLIPS = np.linspace(0.0, 0.6, 6001)
 _HEIGHTS = height_of(_SLIPS)
 
 
-def slip_of(height: ArrayLike) -> Array:
+def slip_of(height: ArrayLike) -> Floats:
     """The slip at which the prototype curve of scale 1 has `height` (any shape), odd; heights above its maximum give 0.6."""
     h = np.asarray(height, dtype=float)
     return np.asarray(np.sign(h) * np.interp(np.abs(h), _HEIGHTS, _SLIPS))
@@ -168,7 +167,7 @@ def bin_pairs(
     clusters = int(compact.max()) + 1 if compact.size else 1
     flat = compact * bins + index[inside].astype(np.int64)
 
-    def sums(values: Array | None) -> Array:
+    def sums(values: Floats | None) -> Floats:
         return (
             np.bincount(flat, weights=values, minlength=clusters * bins).astype(float).reshape(clusters, bins)
         )

@@ -13,13 +13,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from terragrip.arrays import Bools, Floats
 from terragrip.errors import InputError
 
 if TYPE_CHECKING:
     from terragrip.estimation import Estimates
     from terragrip.vehicle import Vehicle
 
-Array = NDArray[np.float64]
 
 PERIOD = 0.5
 """Seconds of a block: several times the filter's own memory of noise, and short beside a border's crossing."""
@@ -47,38 +47,38 @@ class Blocks:
     """
 
     number: NDArray[np.int64]
-    start: Array
-    end: Array
+    start: Floats
+    end: Floats
     rows: NDArray[np.int64]
     usable: NDArray[np.int64]
     streak: NDArray[np.int64]
-    travelled: Array
-    resistance: Array
-    resistance_variance: Array
-    adhesion: Array
-    adhesion_variance: Array
-    roughness: Array
-    curve_a: Array
-    slip: Array
-    slip_sd: Array
-    slip_variance: Array
-    share: Array
+    travelled: Floats
+    resistance: Floats
+    resistance_variance: Floats
+    adhesion: Floats
+    adhesion_variance: Floats
+    roughness: Floats
+    curve_a: Floats
+    slip: Floats
+    slip_sd: Floats
+    slip_variance: Floats
+    share: Floats
 
     def __len__(self) -> int:
         return len(self.number)
 
     @property
-    def known(self) -> NDArray[np.bool_]:
+    def known(self) -> Bools:
         """The blocks that identify the ground, (blocks,): the estimates have settled since the vehicle stood or spun."""
         return (self.streak > SETTLING) & np.isfinite(self.resistance) & np.isfinite(self.mean_adhesion)
 
     @property
-    def mean_adhesion(self) -> Array:
+    def mean_adhesion(self) -> Floats:
         """mu, the wheels' mean by load (blocks,)."""
         return np.asarray((self.adhesion * self.share).sum(axis=1))
 
     @property
-    def mean_slip(self) -> Array:
+    def mean_slip(self) -> Floats:
         """Slip, the wheels' mean by load (blocks,)."""
         return np.asarray((self.slip * self.share).sum(axis=1))
 
@@ -87,7 +87,7 @@ class Blocks:
         return Blocks(**{one.name: getattr(self, one.name)[rows] for one in fields(self)})
 
 
-def wheel_loads(columns: Mapping[str, Any], axle_of: Mapping[str, str]) -> dict[str, Array]:
+def wheel_loads(columns: Mapping[str, Any], axle_of: Mapping[str, str]) -> dict[str, Floats]:
     """The columns that weight the wheels: the load of each wheel's axle; ones where the table has none."""
     rows = len(np.asarray(columns["time"]))
     return {
@@ -149,17 +149,17 @@ def blocks_of(
     good &= np.isfinite(adhesion).all(axis=1) & np.isfinite(resistance[:, 0])
     usable = np.add.reduceat(good.astype(np.int64), begin)
 
-    def variance(*names: str) -> Array:
+    def variance(*names: str) -> Floats:
         return mean(
             np.column_stack([np.asarray(columns.get(n, np.zeros(time.size)), dtype=float) for n in names])
             ** 2
         )
 
-    def mean(values: Array) -> Array:
+    def mean(values: Floats) -> Floats:
         total = np.add.reduceat(np.where(good[:, None], values, 0.0), begin, axis=0)
         return np.asarray(np.where(usable[:, None] > 0, total / np.maximum(usable, 1)[:, None], np.nan))
 
-    def spread(values: Array, level: Array) -> Array:
+    def spread(values: Floats, level: Floats) -> Floats:
         off = np.where(good[:, None], values - np.repeat(level, size, axis=0), 0.0)
         square = np.add.reduceat(off**2, begin, axis=0) / np.maximum(usable - 1, 1)[:, None]
         return np.asarray(np.where(usable[:, None] >= LEAST_ROWS, np.sqrt(square), np.nan))
@@ -199,9 +199,7 @@ def driven_wheels(vehicle: Vehicle) -> dict[str, str]:
     return result or dict(zip(vehicle.wheels, names, strict=True))
 
 
-def estimates_blocks(
-    estimates: Estimates, rows: NDArray[np.bool_] | None = None, file: str | None = None
-) -> Blocks:
+def estimates_blocks(estimates: Estimates, rows: Bools | None = None, file: str | None = None) -> Blocks:
     """The blocks of a table of estimates; with `rows` (rows,), the others count as unusable.
 
     Raises InputError as `blocks_of`, and where the table has no vehicle.
@@ -218,9 +216,7 @@ def estimates_blocks(
     return blocks_of(columns, driven_wheels(estimates.vehicle), file=file)
 
 
-def _streak(
-    number: NDArray[np.int64], good: NDArray[np.bool_], before: tuple[int, int] | None
-) -> NDArray[np.int64]:
+def _streak(number: NDArray[np.int64], good: Bools, before: tuple[int, int] | None) -> NDArray[np.int64]:
     """The number of consecutive good blocks up to and including each block, (blocks,); a skipped number ends a streak."""
     last, run = before or (int(number[0]) - 1, 0)
     follows = number == np.concatenate(([last], number[:-1])) + 1
@@ -231,5 +227,5 @@ def _streak(
     return out
 
 
-def _matrix(columns: Mapping[str, Any], name: str, wheels: Sequence[str]) -> Array:
+def _matrix(columns: Mapping[str, Any], name: str, wheels: Sequence[str]) -> Floats:
     return np.column_stack([np.asarray(columns[name.format(w)], dtype=float) for w in wheels])

@@ -8,12 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from terragrip.arrays import Floats
 from terragrip.errors import InputError
 from terragrip.physics.adhesion import CURVES
 from terragrip.soil.bins import BY_PULL, Bins
 from terragrip.soil.least_squares import INTERCEPT, solve, starts
-
-Array = NDArray[np.float64]
 
 FORMS: Mapping[str, tuple[str, bool]] = {
     "exponential": ("exponential", False),
@@ -93,7 +92,7 @@ def compare_forms(
     return FormVerdict(asked, tuple(scores), follows, None if follows else best.form, sentence)
 
 
-Split = tuple[Array, Array, Array, Array, Array, Array]
+Split = tuple[Floats, Floats, Floats, Floats, Floats, Floats]
 
 
 def _run_folds(bins: Bins, folds: int) -> list[Split]:
@@ -106,7 +105,7 @@ def _run_folds(bins: Bins, folds: int) -> list[Split]:
 
 
 def _split(bins: Bins, train: NDArray[np.int64], test: NDArray[np.int64]) -> Split:
-    parts: list[Array] = []
+    parts: list[Floats] = []
     least, by_pull = bins.settings.least, bins.settings.by == BY_PULL
     # by pull a bin is as wide as its minimum requires: a fold keeps less than that of it
     for rows, needed in (

@@ -9,8 +9,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from terragrip.arrays import Floats
 from terragrip.errors import InputError
 from terragrip.files import refuse_missing, unreadable
 from terragrip.soil.bins import BinSettings
@@ -19,16 +19,14 @@ from terragrip.soil.learn import explaining
 from terragrip.soil.library import Soil, SoilLibrary
 from terragrip.text import to_text
 
-Array = NDArray[np.float64]
-
 
 @dataclass(frozen=True)
 class DigitisedCurve:
     """Points of one curve: slip (n,) as a fraction, value (n,) [-], the curve's name, notes on assumptions."""
 
     name: str
-    slip: Array
-    value: Array
+    slip: Floats
+    value: Floats
     notes: tuple[str, ...] = ()
 
 
@@ -80,7 +78,7 @@ def _plain(cell: str) -> float | None:
         return None
 
 
-def _numbers(body: list[list[str]], column: int, first: int, file: str) -> Array:
+def _numbers(body: list[list[str]], column: int, first: int, file: str) -> Floats:
     out = []
     for i, row in enumerate(body):
         cell = row[column] if column < len(row) else ""
@@ -102,7 +100,7 @@ def _title(head: list[list[str]], column: int) -> str:
     return f"curve {column // 2 + 1}"
 
 
-def _curve(slip: Array, value: Array, name: str, file: str) -> DigitisedCurve:
+def _curve(slip: Floats, value: Floats, name: str, file: str) -> DigitisedCurve:
     good = np.isfinite(slip) & np.isfinite(value)
     slip, value = slip[good], value[good]
     if slip.size < 2:

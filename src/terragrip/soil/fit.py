@@ -7,8 +7,9 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from terragrip.arrays import Floats
 from terragrip.errors import InputError
 from terragrip.physics.adhesion import CURVES, CurveModel, effective_parameters
 from terragrip.soil.bins import BY_SLIP, Bins, BinSettings, bin_pairs
@@ -20,7 +21,6 @@ if TYPE_CHECKING:
 
     from terragrip.soil.library import SoilLibrary
 
-Array = NDArray[np.float64]
 FREE = "free"
 AT_BOUND = 1e-3
 """Share of a parameter's range that counts as its end."""
@@ -69,7 +69,7 @@ class AdhesionCurve:
         self.model, self.fixed, self.intercept, self.weights = model, fixed, intercept, weights
         self.bins, self.bootstrap, self.seed = bins or BinSettings(), bootstrap, seed
         self.common_sd, self.bounds = common_sd, dict(bounds or {})
-        self.written_band: tuple[Array, Array, Array] | None = None  # slip, low, high of a stored fit
+        self.written_band: tuple[Floats, Floats, Floats] | None = None  # slip, low, high of a stored fit
 
     def fit(self, slip: ArrayLike, adhesion: ArrayLike, run: ArrayLike | None = None) -> AdhesionCurve:
         """Fit to pairs, each of shape (n,); `run` (n,) are integer or string labels of samples that are not independent.
@@ -114,13 +114,13 @@ class AdhesionCurve:
         self.notes_: list[str] = (
             [] if self.identifiability_.identifiable else [self.identifiability_.sentence]
         )
-        self.samples_: Array | None = None
+        self.samples_: Floats | None = None
         self.interval_: dict[str, tuple[float, float]] = {}
         if self.bootstrap:
             self._resample(curve, free, held, best)
         return self
 
-    def predict(self, slip: ArrayLike) -> Array:
+    def predict(self, slip: ArrayLike) -> Floats:
         """mu (or kappa, with an intercept) at the slips, same shape."""
         return CURVES[self.model].value(slip, self._of_model(), self.parameters_.get(INTERCEPT, 0.0))
 
@@ -133,7 +133,7 @@ class AdhesionCurve:
             or (len(self.free_) == 1 and self.free_[0] in self.interval_)
         )
 
-    def band(self, slip: ArrayLike, level: float = 0.95) -> tuple[Array, Array]:
+    def band(self, slip: ArrayLike, level: float = 0.95) -> tuple[Floats, Floats]:
         """Pointwise interval of the curve at slips (n,), from the bootstrap. For a stored fit it is the 95 % interval, between the
         slips of its band, or between the curves at the ends of the one free parameter's interval. Raises ValueError if none is known."""
         if not self.has_band:
@@ -239,7 +239,7 @@ class AdhesionCurve:
             own[name] = replace(own[name], lower=float(lower), upper=float(upper))
         return replace(curve, parameters=tuple(own.values()))
 
-    def _bin_weights(self, bins: Bins) -> Array:
+    def _bin_weights(self, bins: Bins) -> Floats:
         if self.weights is None:
             return bins.used.astype(float)
         with np.errstate(invalid="ignore", divide="ignore"):
@@ -247,7 +247,7 @@ class AdhesionCurve:
         return np.where(bins.used, weight / np.nanmax(np.where(bins.used, weight, np.nan)), 0.0)
 
     def _resample(
-        self, curve: CurveModel, free: Sequence[str], held: Mapping[str, float], best: Array
+        self, curve: CurveModel, free: Sequence[str], held: Mapping[str, float], best: Floats
     ) -> None:
         """Intervals from drawing clusters with replacement, widened by t and n/(n-1) for few clusters."""
         bins = self.bins_

@@ -6,11 +6,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from terragrip.arrays import Floats
 from terragrip.physics.adhesion import CurveModel, effective_parameters
-
-Array = NDArray[np.float64]
 
 LIMIT = 1e4
 """Condition number (columns scaled to unit change of each parameter's own size) beyond which parameters are not distinguished."""
@@ -42,7 +40,7 @@ class Identifiability:
 
 
 def judge(
-    model: CurveModel, parameters: Mapping[str, float], free: Sequence[str], slip: Array, r2: float
+    model: CurveModel, parameters: Mapping[str, float], free: Sequence[str], slip: Floats, r2: float
 ) -> Identifiability:
     """Badge of a fit of `free` parameters on bins at `slip` (bins,), all other parameters fixed; `r2` of the fit on them."""
     names = [name for name in free if name != "intercept"]
@@ -69,7 +67,7 @@ def judge(
     return Identifiability(condition, False, effective, twin, difference, sentence)
 
 
-def _sensitivity(model: CurveModel, parameters: Mapping[str, float], name: str, slip: Array) -> Array:
+def _sensitivity(model: CurveModel, parameters: Mapping[str, float], name: str, slip: Floats) -> Floats:
     """d curve/d ln|parameter|; a parameter at 0 is moved by a hundredth of 1."""
     size = max(abs(parameters[name]), 1e-2)
     h = 1e-5 * size
@@ -78,7 +76,7 @@ def _sensitivity(model: CurveModel, parameters: Mapping[str, float], name: str, 
 
 
 def _twin(
-    model: CurveModel, parameters: Mapping[str, float], names: Sequence[str], direction: Array, slip: Array
+    model: CurveModel, parameters: Mapping[str, float], names: Sequence[str], direction: Floats, slip: Floats
 ) -> tuple[dict[str, float], float]:
     """Walk along the flattest direction in ln(parameter), refitting nothing else, as far as the curve moves by 1e-4 at most."""
     bounds = {p.name: (p.lower, p.upper) for p in model.parameters}

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from terragrip.arrays import Floats
 from terragrip.errors import InputError
 from terragrip.html import html_notes
 from terragrip.soil.bins import BY_PULL, BY_SLIP, PAPER_BINS, Bins, BinSettings, bin_pairs
@@ -24,7 +25,6 @@ if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.figure import Figure
 
-Array = NDArray[np.float64]
 
 STRETCH = 10.0
 """Metres of one run that count as one draw of the bootstrap where there are too few runs."""
@@ -45,14 +45,14 @@ class RunPairs:
 
     run: str
     soil: str
-    slip: Array
-    adhesion: Array
-    slip_std: Array
-    pull: Array
+    slip: Floats
+    adhesion: Floats
+    slip_std: Floats
+    pull: Floats
     stretch: NDArray[np.int64]
-    metres: Array
-    resistance: Array
-    speed: Array
+    metres: Floats
+    resistance: Floats
+    speed: Floats
 
 
 @dataclass(frozen=True)
@@ -223,7 +223,7 @@ def scales_apart(learned: LearnedSoil) -> str:
     )
 
 
-def _joined(parts: Sequence[RunPairs], name: str) -> Array:
+def _joined(parts: Sequence[RunPairs], name: str) -> Floats:
     return np.concatenate([getattr(part, name) for part in parts])
 
 

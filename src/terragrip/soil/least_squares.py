@@ -5,11 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from terragrip.arrays import Floats
 from terragrip.physics.adhesion import CurveModel
 
-Array = NDArray[np.float64]
 INTERCEPT = "intercept"
 
 
@@ -17,12 +16,12 @@ def solve(
     model: CurveModel,
     free: Sequence[str],
     fixed: Mapping[str, float],
-    slip: Array,
-    means: Array,
-    weights: Array,
-    start: Array,
+    slip: Floats,
+    means: Floats,
+    weights: Floats,
+    start: Floats,
     iterations: int = 60,
-) -> tuple[Array, Array]:
+) -> tuple[Floats, Floats]:
     """Parameters (sets, free) that minimise sum_j w_j (means_j - curve(slip_j))^2, and that sum (sets,).
 
     slip, means, weights: (sets, bins), weight 0 where a bin is missing; start: (sets, free). `free` may name "intercept".
@@ -35,7 +34,7 @@ def solve(
     target = np.where(weights > 0, means, 0.0) * root
     where = np.where(weights > 0, slip, 0.1)
 
-    def curve(x: Array) -> Array:
+    def curve(x: Floats) -> Floats:
         given = {name: x[:, i, None] for i, name in enumerate(free)}
         intercept = given.pop(INTERCEPT, fixed.get(INTERCEPT, 0.0))
         rest = {name: value for name, value in fixed.items() if name != INTERCEPT}
@@ -68,7 +67,7 @@ def solve(
     return x, cost
 
 
-def _jacobian(curve, x: Array, now: Array, lower: Array, upper: Array) -> Array:  # type: ignore[no-untyped-def]
+def _jacobian(curve, x: Floats, now: Floats, lower: Floats, upper: Floats) -> Floats:  # type: ignore[no-untyped-def]
     """Forward differences, backward at an upper bound: (sets, bins, free)."""
     columns = []
     for i in range(x.shape[1]):
@@ -80,7 +79,7 @@ def _jacobian(curve, x: Array, now: Array, lower: Array, upper: Array) -> Array:
     return np.stack(columns, axis=-1)
 
 
-def starts(model: CurveModel, free: Sequence[str], means: Array) -> Array:
+def starts(model: CurveModel, free: Sequence[str], means: Floats) -> Floats:
     """Start points (starts, free): the model's own, its heights scaled to the data, and its rates halved and tripled."""
     level = float(np.nanmax(np.abs(means))) or 0.1
     scaled = {"a", "A", "c1", "D", "b"}

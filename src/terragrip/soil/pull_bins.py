@@ -16,12 +16,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from terragrip.arrays import Floats
 from terragrip.physics.adhesion import PROTOTYPE
 from terragrip.soil.bins import BY_PULL, Bins, BinSettings, height_of, slip_of
-
-Array = NDArray[np.float64]
 
 _WIDEST = 0.1
 _ROUNDS = 30
@@ -60,7 +59,7 @@ def bin_by_pull(
     edges, runs = height_of(chosen.edges), min(chosen.runs, clusters)
     cells = edges.size - 1
 
-    def sums(values: Array) -> Array:
+    def sums(values: Floats) -> Floats:
         result = np.bincount(flat, weights=values[inside], minlength=clusters * cells)
         return result.astype(float).reshape(clusters, cells)
 
@@ -99,7 +98,7 @@ def bin_by_pull(
     )  # fmt: skip
 
 
-def _unbiased(slip: Array, noise: Array) -> Array:
+def _unbiased(slip: Floats, noise: Floats) -> Floats:
     """The prototype's height (n,), corrected at positive slips for the effect of normal errors of SD `noise` (n,)."""
     share, slow, fast = PROTOTYPE["p"], PROTOTYPE["alpha_1"], PROTOTYPE["alpha_2"]
     sd = np.clip(np.nan_to_num(noise), 0.0, _WIDEST)
@@ -109,14 +108,14 @@ def _unbiased(slip: Array, noise: Array) -> Array:
     return np.asarray(np.where(slip > 0, freed, height_of(slip)))
 
 
-def _start(mu: Array, height: Array, dx: Array, lowest: float) -> float:
+def _start(mu: Floats, height: Floats, dx: Floats, lowest: float) -> float:
     """A first scale: of all pairs above the bins' lowest slip, by metres."""
     counts = height > lowest
     below = float((height * dx)[counts].sum())
     return float((mu * dx)[counts].sum()) / below if below > 0 else 1.0
 
 
-def _joined(way: Array, metres: float, runs: int) -> list[list[int]]:
+def _joined(way: Floats, metres: float, runs: int) -> list[list[int]]:
     """Neighbouring cells joined, from the lowest up, until each group has `metres` from `runs` clusters; way: (clusters, cells)."""
     groups: list[list[int]] = []
     open_ = []
@@ -131,7 +130,7 @@ def _joined(way: Array, metres: float, runs: int) -> list[list[int]]:
     return groups
 
 
-def _grouped(values: Array, groups: Sequence[Sequence[int]]) -> Array:
+def _grouped(values: Floats, groups: Sequence[Sequence[int]]) -> Floats:
     """Columns summed by group: (clusters, cells) to (clusters, groups)."""
     return np.asarray(
         np.stack([values[:, g].sum(axis=1) for g in groups], axis=1) if groups else values[:, :0]

@@ -11,8 +11,8 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from terragrip.arrays import Floats
 from terragrip.errors import InputError
 from terragrip.physics.adhesion import CURVES
 from terragrip.soil.blocks import Blocks
@@ -21,7 +21,6 @@ from terragrip.soil.library import Soil
 if TYPE_CHECKING:
     from terragrip.estimation import Estimates
 
-Array = NDArray[np.float64]
 
 LEAST_BLOCKS = 20
 """Fewest blocks (10 s) that a signature is learned from."""
@@ -39,11 +38,11 @@ class Signature:
     `made_by`: method of the estimates, since methods smooth differently. `blocks`, `runs`: the amount of data.
     """
 
-    level: Array
-    level_sd: Array
+    level: Floats
+    level_sd: Floats
     level_correlation: float
-    roughness: Array
-    roughness_covariance: Array
+    roughness: Floats
+    roughness_covariance: Floats
     made_by: str
     blocks: int
     runs: int
@@ -92,7 +91,7 @@ def signature_in(soil: Soil, file: str | os.PathLike[str] | None = None) -> Sign
     return None if data is None else Signature.from_dict(data, f"soils.{soil.name}.signature", file)
 
 
-def curve_error(soil: Soil, blocks: Blocks) -> tuple[Array, Array, Array]:
+def curve_error(soil: Soil, blocks: Blocks) -> tuple[Floats, Floats, Floats]:
     """Relative error of mu about the soil's curve, its variance according to the estimates, and its scale, (blocks,) each.
 
     error = mean over wheels, by load, of mu - f(s), over scale = |f(s)| + `OFFSET`. Errors of the wheels are assumed alike; that of slip
@@ -142,7 +141,7 @@ def learn_signature(soil: Soil, runs: Sequence[Blocks], made_by: str = "") -> Si
     )
 
 
-def _correlation(pairs: Array) -> float:
+def _correlation(pairs: Floats) -> float:
     """Correlation of two columns, within 0.9 either way; 0 where one is constant."""
     if (pairs.std(axis=0) == 0).any():
         return 0.0
@@ -151,7 +150,7 @@ def _correlation(pairs: Array) -> float:
     )
 
 
-def _ground(values: Array, noise: Array) -> tuple[Array, Array]:
+def _ground(values: Floats, noise: Floats) -> tuple[Floats, Floats]:
     """Mean and SD of the ground under values (blocks, 2) whose own variances are known.
 
     The SD for which the squares, over their whole variance, have the mean 1 (Paule and Mandel 1982), by bisection; at least `LEAST_SD`.

@@ -11,13 +11,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from terragrip.arrays import Floats
 from terragrip.errors import InputError
 from terragrip.soil.bins import bin_pairs
 from terragrip.soil.fit import AdhesionCurve
-
-Array = NDArray[np.float64]
 
 LEVELS = (0.5, 1.0, 1.5, 2.0)
 REPEATS = 8
@@ -57,7 +56,7 @@ def correct_slip_noise(
         raise InputError("no pair has a slip deviation", hint="give estimates written by this terragrip")
     s, mu, sd = columns[:, :: max(columns.shape[1] // SAMPLES, 1)]
 
-    def again(noisy: Array) -> dict[str, float]:
+    def again(noisy: Floats) -> dict[str, float]:
         return (
             curve.unfitted(bootstrap=0).fit_bins(bin_pairs(noisy, mu, None, curve.bins_.settings)).parameters_
         )
@@ -83,8 +82,8 @@ def shifted(
     curve: AdhesionCurve,
     corrected: Mapping[str, float],
     plain: Mapping[str, float],
-    slip: Array,
-    slip_std: Array,
+    slip: Floats,
+    slip_std: Floats,
     advice: str,
 ) -> SlipNoise:
     """The effect of noise on the free parameters of `curve`, in numbers and words; slip and its SD of all pairs (n,); `advice` if large."""

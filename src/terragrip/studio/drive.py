@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
+from terragrip.arrays import Floats
 from terragrip.errors import InputError
 from terragrip.estimation.rims import DRIVE, supposed_radius
 
@@ -19,7 +20,6 @@ if TYPE_CHECKING:
     from terragrip.studio.folder import Item
     from terragrip.studio.state import Studio
 
-Floats = npt.NDArray[np.float64]
 
 SPAN = 0.5
 """Seconds before and after a sample that `why` compares."""

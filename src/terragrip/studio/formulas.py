@@ -15,11 +15,10 @@ from functools import lru_cache, reduce
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from terragrip.arrays import Floats
 from terragrip.errors import InputError
 
-Floats = npt.NDArray[np.float64]
 Lookup = Callable[[str], Floats]
 
 LONGEST = 500

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 import numpy.typing as npt
 
+from terragrip.arrays import Floats
 from terragrip.errors import InputError, nearest
 from terragrip.studio.formulas import evaluate, names
 from terragrip.studio.tables import Extremes, are_long, buckets, extremes
@@ -17,7 +18,6 @@ if TYPE_CHECKING:
     from terragrip.estimation import Estimates
     from terragrip.recording import Recording
 
-Floats = npt.NDArray[np.float64]
 
 LEVEL = 1.959964
 """Standard deviations of a 95 % interval."""

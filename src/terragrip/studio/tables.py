@@ -12,7 +12,8 @@ from typing import Any, Generic, TypeVar
 import numpy as np
 import numpy.typing as npt
 
-Floats = npt.NDArray[np.float64]
+from terragrip.arrays import Floats, Ints
+
 T = TypeVar("T")
 
 KEPT = 4
@@ -44,7 +45,7 @@ class Tables(Generic[T]):
             return self._held[key]
 
 
-def buckets(time: Floats, start: float, end: float, width: int) -> npt.NDArray[np.intp]:
+def buckets(time: Floats, start: float, end: float, width: int) -> Ints:
     """Row numbers where each of at most `width` buckets of equal time begins, and one past the last row; shape (buckets + 1,).
 
     Covers the rows with start <= time <= end and one on either side, so that a line reaches the edges. Long buckets begin at a multiple
@@ -67,7 +68,7 @@ def are_long(rows: int, width: int) -> bool:
     return rows > LONG * BLOCK * width
 
 
-def extremes(values: Floats, starts: npt.NDArray[np.intp]) -> tuple[Floats, Floats]:
+def extremes(values: Floats, starts: Ints) -> tuple[Floats, Floats]:
     """Smallest and largest value of each bucket, shape (buckets,) each; NaN where a bucket holds nothing else."""
     part = values[starts[0] : starts[-1]]
     places = starts[:-1] - starts[0]
@@ -80,7 +81,7 @@ class Extremes:
     def __init__(self, values: Floats) -> None:
         self._low, self._high = extremes(values, np.append(np.arange(0, len(values), BLOCK), len(values)))
 
-    def of(self, values: Callable[[slice], Floats], starts: npt.NDArray[np.intp]) -> tuple[Floats, Floats]:
+    def of(self, values: Callable[[slice], Floats], starts: Ints) -> tuple[Floats, Floats]:
         """As `extremes`, of buckets that begin at multiples of `BLOCK` but for the first; ``values`` gives rows of the column."""
         edges = starts // BLOCK
         edges[0] = -(-starts[0] // BLOCK)

@@ -7,15 +7,13 @@ intervals get, which hangs on the machine and its sensors, and is ready in milli
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 
+from terragrip.arrays import Bools, Floats
 from terragrip.physics.adhesion import CURVES
 from terragrip.physics.loads import GRAVITY, axle_loads
 from terragrip.recording import Recording
 from terragrip.vehicle import Vehicle
 from terragrip.vehicle_maker.fields import Signals
-
-Floats = npt.NDArray[np.float64]
 
 RATE = 10.0  # rows a second
 LIGHT = 50.0  # s without load, first
@@ -66,7 +64,7 @@ def drive(
     return Recording(time, columns)
 
 
-def _driven_axles(vehicle: Vehicle) -> npt.NDArray[np.bool_]:
+def _driven_axles(vehicle: Vehicle) -> Bools:
     return np.array([axle.driven for axle in vehicle.axles.values()])
 
 

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-Floats = npt.NDArray[np.float64]
+from terragrip.arrays import Bools, Floats
+
 Bytes = npt.NDArray[np.uint8]
 
 
@@ -104,7 +105,7 @@ def decode(
             raws[field.name] = raw_of(field, wide)
         return raws[field.name]
 
-    def present(field: Field) -> npt.NDArray[np.bool_]:
+    def present(field: Field) -> Bools:
         there = lengths > field.last_byte
         if field.selector is not None:
             parent = by_name[field.selector]

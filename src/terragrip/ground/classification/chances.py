@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 
-Floats = npt.NDArray[np.float64]
+from terragrip.arrays import Floats
 
 _DOUBT = 0.01  # added to a probability before its logarithm: no part of an expert is ever sure
 

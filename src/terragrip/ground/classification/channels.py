@@ -8,16 +8,14 @@ from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
+from terragrip.arrays import Floats
 from terragrip.errors import InputError
 from terragrip.recording import Recording, fresh_samples
 from terragrip.recording.checks import check_time, place, refuse_infinite
 from terragrip.recording.columns import columns_of, numbers, seconds
 from terragrip.recording.held import held_period
 from terragrip.recording.schema import TIME
-
-Floats = npt.NDArray[np.float64]
 
 # A motor current stands in for the torque: what is learnt does not depend on the gain between them.
 CURRENT = ("motor_current_",)

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, Self
 import numpy as np
 import numpy.typing as npt
 
+from terragrip.arrays import Floats
 from terragrip.errors import InputError
 from terragrip.ground.classification.channels import held_channels, shortest_period, signals_of, tables_of
 from terragrip.ground.classification.comparable import not_comparable, rates_apart, without
@@ -20,8 +21,6 @@ from terragrip.ground.classification.training_set import collect, layout_of
 
 if TYPE_CHECKING:
     import pandas as pd
-
-Floats = npt.NDArray[np.float64]
 
 
 class GroundClassifier:

@@ -5,10 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
-Floats = npt.NDArray[np.float64]
-Singles = npt.NDArray[np.float32]
+from terragrip.arrays import Floats, Ints, Singles
 
 _SHRINKAGE = 0.1
 _KEPT = 400  # windows of each ground
@@ -23,7 +21,7 @@ class Discriminants:
     points: Singles
 
     @classmethod
-    def fit(cls, points: Floats, codes: npt.NDArray[np.intp]) -> Discriminants:
+    def fit(cls, points: Floats, codes: Ints) -> Discriminants:
         """Fit to standardised ``points`` (n, features) with class ``codes`` (n,) 0..K-1, every class weighing the same."""
         from scipy.linalg import eigh
 

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from typing import Any, cast
 
 import numpy as np
-import numpy.typing as npt
 
+from terragrip.arrays import Bools, Floats, Ints
 from terragrip.ground.classification.chances import softmax
 from terragrip.ground.classification.discriminants import Discriminants
 from terragrip.ground.classification.forest import Forest
@@ -19,8 +19,7 @@ from terragrip.ground.classification.novelty import Strangeness
 from terragrip.ground.classification.roles import roles_of
 from terragrip.ground.classification.standardization import Standardization
 
-Floats = npt.NDArray[np.float64]
-Codes = npt.NDArray[np.intp]
+Codes = Ints
 
 _OFFSET = 0.5  # SD beforehand, in log odds: classes weigh the same, so offsets are small
 
@@ -48,7 +47,7 @@ class Parts:
     law: MotionLaw | None
 
     @classmethod
-    def fit(cls, names: tuple[str, ...], windows: Examples, rows: npt.NDArray[np.bool_], seed: int) -> Parts:
+    def fit(cls, names: tuple[str, ...], windows: Examples, rows: Bools, seed: int) -> Parts:
         """Fit all parts to some ``rows`` (n,) of the windows, whose features have these names."""
         roles, features, codes = roles_of(names), windows.features[rows], windows.codes[rows]
         own = features[:, roles.machine]

@@ -8,6 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
+from terragrip.arrays import Bools, Floats, Ints
 from terragrip.errors import InputError
 from terragrip.ground.classification.channels import BODY
 from terragrip.ground.classification.expert import Examples, Expert, train
@@ -21,8 +22,6 @@ from terragrip.ground.classification.features import (
 from terragrip.ground.classification.roles import roles_of
 from terragrip.ground.classification.standardization import centre_of, scale_about
 from terragrip.ground.classification.training_set import TrainingSet, measured_families
-
-Floats = npt.NDArray[np.float64]
 
 FEWEST_WINDOWS = 10  # a class
 
@@ -67,9 +66,9 @@ def train_experts(
 
 def _trained(
     training: TrainingSet,
-    folds: npt.NDArray[np.intp],
+    folds: Ints,
     sets: Sequence[frozenset[str]],
-    measured: dict[str, npt.NDArray[np.bool_]],
+    measured: dict[str, Bools],
     seed: int,
 ) -> list[Expert]:
     """The experts that hold out the windows of one of ``folds`` (n,) at a time."""
@@ -103,7 +102,7 @@ def _candidates(names: Sequence[str], families: frozenset[str]) -> list[str]:
     return [n for n in names if families_needed(n) <= families and (single or not of_one_wheel(n))]
 
 
-def _on_every_ground(features: Floats, codes: npt.NDArray[np.intp]) -> npt.NDArray[np.bool_]:
+def _on_every_ground(features: Floats, codes: Ints) -> Bools:
     """Which ``features`` (n, features) are measured in nearly all windows of every class.
 
     One that some ground lacks would mark that ground by its absence.
@@ -114,7 +113,7 @@ def _on_every_ground(features: Floats, codes: npt.NDArray[np.intp]) -> npt.NDArr
 
 
 def _nothing_to_learn(
-    training: TrainingSet, classes: npt.NDArray[np.generic], measured: dict[str, npt.NDArray[np.bool_]]
+    training: TrainingSet, classes: npt.NDArray[np.generic], measured: dict[str, Bools]
 ) -> InputError:
     """Why there is no expert."""
     windows = {f: np.bincount(training.codes[rows], minlength=len(classes)) for f, rows in measured.items()}
@@ -135,7 +134,7 @@ def _nothing_to_learn(
     return InputError(problem, place="recordings", hint=hint)
 
 
-def _sensor_sets(training: TrainingSet, measured: dict[str, npt.NDArray[np.bool_]]) -> list[frozenset[str]]:
+def _sensor_sets(training: TrainingSet, measured: dict[str, Bools]) -> list[frozenset[str]]:
     """Sets of sensors that a recording is likely to hold: all, those of every ground, all but one kind, one alone."""
     there = frozenset(f for f, rows in measured.items() if rows.any())
     everywhere = frozenset(
@@ -155,7 +154,7 @@ def _sensor_sets(training: TrainingSet, measured: dict[str, npt.NDArray[np.bool_
     return list(dict.fromkeys(s for s in sets if s))
 
 
-def _can_be_held_out(codes: npt.NDArray[np.intp], folds: npt.NDArray[np.intp], classes: int) -> bool:
+def _can_be_held_out(codes: Ints, folds: Ints, classes: int) -> bool:
     """Whether every class has windows enough, also with any one fold held out."""
     there = np.unique(folds)
     if len(there) < 2 or np.bincount(codes, minlength=classes).min() < FEWEST_WINDOWS:

@@ -11,8 +11,8 @@ from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
-import numpy.typing as npt
 
+from terragrip.arrays import Floats
 from terragrip.ground.classification.channels import (
     FAMILIES,
     SAME_RATE,
@@ -42,8 +42,6 @@ from terragrip.ground.classification.wheel_features import (
     sides,
 )
 from terragrip.ground.classification.windows import samples_in
-
-Floats = npt.NDArray[np.float64]
 
 SPEED, TORQUE, GROUND, TURN, ACCELERATION = FAMILIES
 _BLOCK = 2000  # windows at a time bound the memory of a long drive

@@ -7,12 +7,12 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from terragrip.arrays import Floats, Ints, Singles
 from terragrip.ground.classification.chances import doubting_log
 from terragrip.ground.classification.kernel_machine import learner
 from terragrip.ground.classification.standardization import centre_of
 
-Floats = npt.NDArray[np.float64]
-Codes = npt.NDArray[np.intp]
+Codes = Ints
 
 _TREES = 100
 _LEAF = 2  # windows
@@ -26,13 +26,13 @@ class Forest:
     and ``right`` (nodes,); ``share`` (nodes, classes) of each class in a leaf, every class weighing the same.
     """
 
-    centre: npt.NDArray[np.float32]
+    centre: Singles
     roots: npt.NDArray[np.int32]
     feature: npt.NDArray[np.int32]
-    threshold: npt.NDArray[np.float32]
+    threshold: Singles
     left: npt.NDArray[np.int32]
     right: npt.NDArray[np.int32]
-    share: npt.NDArray[np.float32]
+    share: Singles
 
     @classmethod
     def fit(cls, features: Floats, codes: Codes, seed: int) -> Forest:
@@ -90,12 +90,12 @@ class Forest:
             raise ValueError("a root is no node")
 
 
-def _filled(features: Floats, centre: npt.NDArray[np.float32]) -> npt.NDArray[np.float32]:
+def _filled(features: Floats, centre: Singles) -> Singles:
     single = features.astype(np.float32)
     return np.where(np.isfinite(single), single, centre)
 
 
-def _rounded_down(threshold: Floats) -> npt.NDArray[np.float32]:
+def _rounded_down(threshold: Floats) -> Singles:
     """Single precision that single-precision features compare with as with the double."""
     single = threshold.astype(np.float32)
     return np.where(single > threshold, np.nextafter(single, np.float32(-np.inf)), single)

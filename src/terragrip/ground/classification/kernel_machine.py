@@ -12,11 +12,9 @@ from itertools import combinations
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from terragrip.arrays import Floats, Ints, Singles
 from terragrip.errors import missing_package
-
-Floats = npt.NDArray[np.float64]
 
 PENALTY = 4.0
 WIDTH = 0.4  # of the kernel, over the number of features: standardised features lie about sqrt(2 n) apart
@@ -31,14 +29,14 @@ class KernelMachine:
     order of `itertools.combinations`, positive for the first class.
     """
 
-    support: npt.NDArray[np.float32]
-    weights: npt.NDArray[np.float32]
+    support: Singles
+    weights: Singles
     offsets: Floats
     width: float
     classes: int
 
     @classmethod
-    def fit(cls, points: Floats, codes: npt.NDArray[np.intp]) -> KernelMachine:
+    def fit(cls, points: Floats, codes: Ints) -> KernelMachine:
         """Fit to ``points`` (n, features) with class ``codes`` (n,) 0..K-1, K >= 2, every class weighing the same.
 
         Raises InputError if scikit-learn is missing.

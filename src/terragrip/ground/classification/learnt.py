@@ -9,6 +9,7 @@ from functools import cached_property
 import numpy as np
 import numpy.typing as npt
 
+from terragrip.arrays import Floats
 from terragrip.ground.classification.channels import Columns, Signals, signals_of
 from terragrip.ground.classification.comparable import without
 from terragrip.ground.classification.expert import Expert
@@ -16,8 +17,6 @@ from terragrip.ground.classification.features import Layout, features_of
 from terragrip.ground.classification.neighbours import nearby_mean, smoothed
 from terragrip.ground.classification.training_set import PRESENT, matrix, measured_families
 from terragrip.ground.classification.windows import window_starts
-
-Floats = npt.NDArray[np.float64]
 
 _WHOLE = 0.9  # share of a family's own features that makes it measured as it was in training
 

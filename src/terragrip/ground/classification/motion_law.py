@@ -5,13 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
+from terragrip.arrays import Floats, Ints, Singles
 from terragrip.ground.classification.chances import doubting_log, softmax
 from terragrip.ground.classification.standardization import centre_of, scale_about, scaled
-
-Floats = npt.NDArray[np.float64]
-Singles = npt.NDArray[np.float32]
 
 _RIDGE = 30.0  # windows: a law stays near that of all grounds where it has few
 _FLOOR = 0.05  # of a feature's variance
@@ -35,7 +32,7 @@ class MotionLaw:
     laws: Singles
 
     @classmethod
-    def fit(cls, motion: Floats, effects: Floats, codes: npt.NDArray[np.intp]) -> MotionLaw:
+    def fit(cls, motion: Floats, effects: Floats, codes: Ints) -> MotionLaw:
         """Fit to ``motion`` (n, m) and ``effects`` (n, e), NaN = not measured, with class ``codes`` (n,) 0..K-1."""
         features = np.hstack([motion, effects])
         centre = centre_of(features)

@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 
+from terragrip.arrays import Floats
 from terragrip.ground.classification.chances import softmax
-
-Floats = npt.NDArray[np.float64]
 
 
 def nearby_mean(values: Floats, starts: Floats, reach: float) -> Floats:

@@ -5,11 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
+from terragrip.arrays import Floats, Ints
 from terragrip.ground.classification.neighbours import nearby_mean
-
-Floats = npt.NDArray[np.float64]
 
 LEVELS: Floats = np.r_[0.0, np.geomspace(1e-4, 1.0, 400)]
 SPANS: Floats = np.array([0.0, 2.0, 5.0, 10.0, 20.0, 60.0])
@@ -25,7 +23,7 @@ class Strangeness:
     levels: Floats
 
     @classmethod
-    def fit(cls, odd: Floats, weight: Floats, groups: npt.NDArray[np.intp], starts: Floats) -> Strangeness:
+    def fit(cls, odd: Floats, weight: Floats, groups: Ints, starts: Floats) -> Strangeness:
         """Learn from the oddness (kinds, n) of held-out windows, what each weighs (n,), its recording (n,) and start (n,) [s]."""
         mean = odd @ weight
         spread = np.sqrt((odd - mean[:, None]) ** 2 @ weight)
@@ -50,7 +48,7 @@ class Strangeness:
         return np.where(np.isnan(strange), np.nan, share)
 
 
-def _averaged(strange: Floats, groups: npt.NDArray[np.intp], starts: Floats, span: float) -> Floats:
+def _averaged(strange: Floats, groups: Ints, starts: Floats, span: float) -> Floats:
     if not span:
         return strange
     result = np.empty(len(strange))

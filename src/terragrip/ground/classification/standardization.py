@@ -5,9 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
-Floats = npt.NDArray[np.float64]
+from terragrip.arrays import Bools, Floats, Ints
 
 _LIMIT = 3.5  # standard deviations: what lies further out says no more
 _TRUST = 0.5  # power of the ratio of variances
@@ -22,9 +21,7 @@ class Standardization:
     weight: Floats
 
     @classmethod
-    def fit(
-        cls, features: Floats, codes: npt.NDArray[np.intp], groups: npt.NDArray[np.intp]
-    ) -> Standardization:
+    def fit(cls, features: Floats, codes: Ints, groups: Ints) -> Standardization:
         """Learn from ``features`` (n, features; NaN = not measured), class codes (n,) and recording numbers (n,).
 
         A feature that differs from run to run on one ground as much as between grounds tells little about a run
@@ -69,11 +66,11 @@ def scaled(features: Floats, centre: Floats, scale: Floats) -> Floats:
     return np.where(np.isfinite(points), points, 0.0)
 
 
-def _count(measured: npt.NDArray[np.bool_]) -> npt.NDArray[np.intp]:
+def _count(measured: Bools) -> Ints:
     return np.maximum(measured.sum(axis=0), 1)
 
 
-def _variances(points: Floats, means: Floats, of_run: npt.NDArray[np.intp], size: Floats) -> Floats:
+def _variances(points: Floats, means: Floats, of_run: Ints, size: Floats) -> Floats:
     squares = np.zeros_like(means)
     np.add.at(squares, of_run, (points - means[of_run]) ** 2)
     return squares / size

@@ -7,15 +7,14 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
-import numpy.typing as npt
 
+from terragrip.arrays import Bools, Floats, Ints
 from terragrip.ground.classification.channels import BODY, FAMILIES, Signals, shortest_period
 from terragrip.ground.classification.features import Layout, families_needed, features_of, of_one_wheel
 from terragrip.ground.classification.wheel_features import Table
 from terragrip.ground.classification.windows import window_starts
 
-Floats = npt.NDArray[np.float64]
-Codes = npt.NDArray[np.intp]
+Codes = Ints
 
 _FOLDS = 5
 _FINEST, _COARSEST = 1 / 8, 1 / 2  # of a window: the step between training windows
@@ -105,9 +104,7 @@ def matrix(table: Table, names: Sequence[str], rows: int) -> Floats:
     return np.array([table.get(name, missing) for name in names]).T if len(names) else np.empty((rows, 0))
 
 
-def measured_families(
-    names: Sequence[str], features: Floats, least: float = PRESENT
-) -> dict[str, npt.NDArray[np.bool_]]:
+def measured_families(names: Sequence[str], features: Floats, least: float = PRESENT) -> dict[str, Bools]:
     """Which windows (n,) each sensor family was measured in: by the ``least`` share of its own features."""
     known = np.isfinite(features)
     return {f: known[:, columns].mean(axis=1) >= least for f, columns in _own_columns(tuple(names)).items()}

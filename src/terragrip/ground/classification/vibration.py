@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 
-Floats = npt.NDArray[np.float64]
+from terragrip.arrays import Floats
 
 BANDS = 32  # at most; fewer where a window holds fewer samples
 _SEGMENT = 0.375  # of a window: four overlapping segments average the spectrum's noise out

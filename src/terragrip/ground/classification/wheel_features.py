@@ -5,11 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-import numpy.typing as npt
 
+from terragrip.arrays import Floats
 from terragrip.ground.classification.vibration import likeness, moments
 
-Floats = npt.NDArray[np.float64]
 Table = dict[str, Floats]
 
 ONE_WHEEL = "at "

@@ -5,11 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-import numpy.typing as npt
 
+from terragrip.arrays import Floats
 from terragrip.ground.classification.channels import Channel
-
-Floats = npt.NDArray[np.float64]
 
 _MEASURED = 0.8  # share of a window's samples that must lie near a measured one
 _NEAR = 1.5  # periods
