@@ -102,17 +102,22 @@ def free_port() -> int:
 
 def serve(place: Path, port: int) -> list[subprocess.Popen[bytes]]:
     """A scheduler of Dask and a worker, each in a process of its own."""
-    worker = ["worker", f"tcp://127.0.0.1:{port}", "--nthreads", "1", "--no-nanny"]
-    scheduler = ["scheduler", "--host", "127.0.0.1", "--port", str(port)]
-    return [
-        subprocess.Popen(
-            [sys.executable, "-m", "dask", *words, "--no-dashboard"],
-            stdout=subprocess.DEVNULL,
-            stderr=subprocess.DEVNULL,
-            env=environment(place),
-        )
-        for words in (scheduler, worker)
-    ]
+    scheduler = _dask(place, "scheduler", "--host", "127.0.0.1", "--port", str(port))
+    return [scheduler, serve_worker(place, port)]
+
+
+def serve_worker(place: Path, port: int) -> subprocess.Popen[bytes]:
+    """A worker that nobody restarts."""
+    return _dask(place, "worker", f"tcp://127.0.0.1:{port}", "--nthreads", "1", "--no-nanny")
+
+
+def _dask(place: Path, *words: str) -> subprocess.Popen[bytes]:
+    return subprocess.Popen(
+        [sys.executable, "-m", "dask", *words, "--no-dashboard"],
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+        env=environment(place),
+    )
 
 
 @pytest.fixture(scope="session")

@@ -5,9 +5,11 @@ After each fault every healthy log is in the data set once, whole, and every oth
 
 from __future__ import annotations
 
+import json
 import os
 import signal
 import subprocess
+import threading
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -17,7 +19,8 @@ import psutil
 import pytest
 import scipy.io
 
-from small_fleet import environment, fleet, free_port, serve, start, whole, write_log
+from small_fleet import call, environment, fleet, free_port, serve, serve_worker, start, whole, write_log
+from terragrip.cli import main
 
 PATIENCE = 600.0
 
@@ -116,6 +119,72 @@ def test_a_scheduler_that_is_lost_and_restarted(place: Path, started: list[subpr
     output, errors = process.communicate(timeout=PATIENCE)
     assert (process.returncode, errors) == (0, "")
     assert "0 failed" in output
+    rows, reasons = whole(place / "out")
+    assert (len(rows), reasons) == (7, {})
+
+
+class Killer(threading.Thread):
+    """Kills the processes below this one that are at work as soon as there are some; before that it calls ``prepare``."""
+
+    def __init__(self, place: Path, prepare: Callable[[], None] = lambda: None) -> None:
+        super().__init__(daemon=True)
+        self._place, self._prepare = place, prepare
+        self.start()
+
+    def run(self) -> None:
+        until(lambda: at_work(self._place, os.getpid()))
+        self._prepare()
+        for one in at_work(self._place, os.getpid()):
+            one.kill()
+
+
+def test_a_scheduler_whose_workers_are_all_lost_is_one_line(
+    place: Path,
+    started: list[subprocess.Popen[bytes]],
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    write_log(place / "logs/a/long.csv", 7, seconds=1500.0)
+    port = free_port()
+    started += serve(place, port)
+    monkeypatch.setattr("terragrip.fleet.cluster.PATIENCE", 3.0)
+    Killer(place)
+    words = call(place, "--scheduler", f"tcp://127.0.0.1:{port}", "--quiet")
+    assert main(words) == 2
+    errors = capsys.readouterr().err
+    assert errors.count("\n") == 1
+    assert f"tcp://127.0.0.1:{port} has had no worker for 3 s" in errors
+    assert "long.csv" in errors
+    assert "what is done is kept" in errors
+    rows, reasons = whole(place / "out")
+    assert "long.csv" in reasons
+    assert "memory" in reasons["long.csv"]
+
+    # the next call, with a worker again, tries that log last, and does all
+    started.append(serve_worker(place, port))
+    assert main(words) == 0
+    rows, reasons = whole(place / "out")
+    assert (len(rows), reasons) == (7, {})
+    notes = sorted((place / "out/state/logs").iterdir(), key=lambda path: path.stat().st_mtime_ns)
+    assert json.loads(notes[-1].read_text())["log"] == "long.csv"
+
+
+def test_a_worker_here_that_dask_gives_up_is_started_anew(place: Path) -> None:
+    """The only worker is killed, and its nanny does not bring it back."""
+    import dask
+    from distributed import Nanny
+
+    write_log(place / "logs/a/long.csv", 7, seconds=1500.0)
+
+    def abandon() -> None:
+        for nanny in Nanny._instances:
+            nanny.close_gracefully()
+
+    killer = Killer(place, abandon)
+    scratch = str(place / "scratch")
+    with dask.config.set({"distributed.deploy.lost-worker-timeout": "1 s", "temporary-directory": scratch}):
+        assert main(call(place, "--workers", 1, "--quiet")) == 0
+    assert not killer.is_alive()
     rows, reasons = whole(place / "out")
     assert (len(rows), reasons) == (7, {})
 

@@ -6,7 +6,7 @@ import logging
 import os
 import re
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Container, Iterator, Mapping, Sequence
 from concurrent.futures import CancelledError
 from contextlib import contextmanager
 from importlib.util import find_spec
@@ -22,10 +22,13 @@ BATCH_BYTES, BATCH_LOGS = 8_000_000, 16
 SHARES = 8
 """but in at least so many batches a worker, so that all end at about one time."""
 PATIENCE = 60.0
-"""Seconds that a lost scheduler is waited for."""
+"""Seconds that a lost scheduler is waited for, and a scheduler that lost all its workers."""
 REACH = 10.0
 """Seconds in which a scheduler must answer at the start."""
+_MEMORY = "most likely it needs more memory than a worker has; give more with --memory, or fewer --workers"
 _LOOK = 0.05
+_COUNT = 1.0
+"""Seconds between two counts of the workers: each asks the scheduler."""
 
 _CONFIG = {
     # A worker that nears its memory is ended and its log named; spilling and pausing would only hold the others up.
@@ -97,7 +100,11 @@ def workers_at(scheduler: str | None, workers: int, memory: str | None) -> Itera
             dashboard_address=":0",  # the port that is free, without a word
             silence_logs=logging.CRITICAL,
         ) as cluster:
-            pool = Pool(lambda: distributed.Client(cluster, set_as_default=False), "this machine")  # type: ignore[no-untyped-call]
+            pool = Pool(
+                lambda: distributed.Client(cluster, set_as_default=False),  # type: ignore[no-untyped-call]
+                "this machine",
+                lambda: cluster.scale(workers),
+            )
             try:
                 pool.connect(REACH)
                 yield pool
@@ -146,11 +153,17 @@ def _bytes(text: str) -> int:
 
 
 class Pool:
-    """A connection to workers that is made anew when it breaks."""
+    """A connection to workers that is made anew when it breaks.
 
-    def __init__(self, connect: Callable[[], Any], address: str) -> None:
-        self._make, self._address = connect, address
+    ``connect`` makes it, to the scheduler at ``address``. ``refill`` starts the workers that are missing (None: they are not ours).
+    """
+
+    def __init__(
+        self, connect: Callable[[], Any], address: str, refill: Callable[[], None] | None = None
+    ) -> None:
+        self._make, self._address, self._refill = connect, address, refill
         self._client: Any = None
+        self._counted = self._staffed = 0.0
 
     def connect(self, patience: float) -> None:
         """Connect, trying for ``patience`` seconds. Raises InputError where nobody answers, or no worker comes."""
@@ -177,6 +190,7 @@ class Pool:
                 place="--scheduler",
                 hint="start some with `dask worker ADDRESS`",
             ) from None
+        self._staffed = time.monotonic()
 
     def close(self) -> None:
         """Leave the workers; a local cluster's end with it."""
@@ -189,22 +203,36 @@ class Pool:
         """How many workers there are now."""
         return max(1, len(self._client.scheduler_info(n_workers=-1)["workers"]))
 
-    def run(self, logs: Sequence[FleetLog], settings: Settings, store: Store) -> Iterator[Outcome]:
+    def run(
+        self, logs: Sequence[FleetLog], settings: Settings, store: Store, failed: Container[str] = ()
+    ) -> Iterator[Outcome]:
         """One outcome a log, as they come.
 
-        Logs of a batch whose worker was lost twice are run again at the end, one at a time: who is then lost twice is the one.
+        Logs of a batch whose worker was lost twice are run again at the end, one at a time: who is then lost twice is the one. Logs whose
+        name is in ``failed`` come after the others, each a batch of its own: the one that took the last worker takes no other log with it.
+
+        Raises InputError where the scheduler, or every worker, is lost and does not come back within `PATIENCE`; before that the logs
+        that the last worker had are among the outcomes.
         """
         suspects: list[FleetLog] = []
-        yield from self._all(batches_of(logs, self.count), settings, store, suspects)
-        for log in suspects:
-            alone: list[FleetLog] = []
-            yield from self._all([[log]], settings, store, alone)
-            if alone:
-                yield Outcome(
-                    log.name,
-                    reason="its worker was lost twice while it alone was estimated: most likely it needs more memory than a worker "
-                    "has; give more with --memory, or fewer --workers",
-                )
+        first = batches_of([log for log in logs if log.name not in failed], self.count)
+        try:
+            for batches in (first, [[log] for log in logs if log.name in failed]):
+                yield from self._all(batches, settings, store, suspects)
+            while suspects:
+                alone: list[FleetLog] = []
+                yield from self._all([suspects[:1]], settings, store, alone)
+                name = suspects.pop(0).name
+                if alone:
+                    yield Outcome(
+                        name, reason=f"its worker was lost twice while it alone was estimated: {_MEMORY}"
+                    )
+        except _NoWorkersError as error:
+            names = sorted({log.name for log in (*suspects, *error.logs)})
+            others = f" or {len(names) - 1} others" if len(names) > 1 else ""
+            for name in names:
+                yield Outcome(name, reason=f"no worker came back after this log{others}: {_MEMORY}")
+            raise self._without_workers(names) from None
 
     def _all(
         self, batches: list[list[FleetLog]], settings: Settings, store: Store, suspects: list[FleetLog]
@@ -227,7 +255,37 @@ class Pool:
                 left = list(open_batches.values())
                 self.connect(PATIENCE)
                 open_batches = self._submit(left, settings, store)
+            if not self._has_workers():
+                raise _NoWorkersError(_lost_with(self._client, open_batches))
             time.sleep(_LOOK)
+
+    def _has_workers(self) -> bool:
+        """Whether there was a worker within the last `PATIENCE`; starts those of this machine that Dask gave up."""
+        now = time.monotonic()
+        if now - self._counted < _COUNT:
+            return True
+        self._counted = now
+        if self._client.scheduler_info(n_workers=1)["workers"]:
+            self._staffed = now
+        if self._refill is not None:
+            self._refill()
+        return now - self._staffed < PATIENCE
+
+    def _without_workers(self, names: Sequence[str]) -> InputError:
+        """Of logs that the last workers had."""
+        listed = ", ".join(names[:3]) + (f" and {len(names) - 3} more" if len(names) > 3 else "")
+        after = f", the last was lost with {listed}" if names else ""
+        if self._refill is None:
+            return InputError(
+                f"the scheduler at {self._address} has had no worker for {PATIENCE:.0f} s{after}",
+                place="--scheduler",
+                hint="start workers, with more memory, and run again: what is done is kept",
+            )
+        return InputError(
+            f"no worker of this machine came back within {PATIENCE:.0f} s{after}",
+            place="--workers",
+            hint="give more --memory or fewer --workers and run again: what is done is kept",
+        )
 
     def _submit(
         self, batches: list[list[FleetLog]], settings: Settings, store: Store
@@ -237,6 +295,28 @@ class Pool:
             submit(estimate_logs, batch, settings, store, pure=False, priority=-number): batch
             for number, batch in enumerate(batches)
         }
+
+
+class _NoWorkersError(Exception):
+    """No worker came back; ``logs``: those that the lost workers had."""
+
+    def __init__(self, logs: list[FleetLog]) -> None:
+        super().__init__()
+        self.logs = logs
+
+
+def _lost_with(client: Any, open_batches: Mapping[Any, list[FleetLog]]) -> list[FleetLog]:
+    """Logs of the batches that a worker had when it was lost; none where the scheduler does not say."""
+
+    # A function within one travels by its code: a scheduler elsewhere need not have Terragrip.
+    def suspicious(dask_scheduler: Any) -> set[str]:
+        return {key for key, task in dask_scheduler.tasks.items() if task.suspicious}
+
+    try:
+        keys = client.run_on_scheduler(suspicious)
+    except (OSError, ValueError):
+        return []
+    return [log for future, batch in open_batches.items() if future.key in keys for log in batch]
 
 
 def _outcomes_of(future: Any, batch: list[FleetLog], suspects: list[FleetLog]) -> list[Outcome]:

@@ -86,14 +86,20 @@ def run_fleet(
         # Who has no workers leaves no folder behind.
         with workers_at(scheduler, workers or default_workers(), memory) as pool, store.alone():
             before, failed = known_notes(store)
-            for outcome in pool.run(logs, settings, store):
-                outcomes.append(outcome)
-                if outcome.note is None:
-                    emit(logger, "fleet_log_failed", log=outcome.log, reason=outcome.reason)
-                if progress:
-                    progress(len(outcomes), len(logs) + 1)
+            stopped: InputError | None = None
+            try:
+                for outcome in pool.run(logs, settings, store, failed):
+                    outcomes.append(outcome)
+                    if outcome.note is None:
+                        emit(logger, "fleet_log_failed", log=outcome.log, reason=outcome.reason)
+                    if progress:
+                        progress(len(outcomes), len(logs) + 1)
+            except InputError as error:  # who has no workers left still has the tables of what is done
+                stopped = error
             notes, reasons = settled(store, before, failed, outcomes)
             _write(store, notes, reasons)
+            if stopped is not None:
+                raise stopped
     except OSError as error:
         raise InputError(
             f"cannot be read or written ({error})", file=output, hint="run again: what was estimated is kept"
