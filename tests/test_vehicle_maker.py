@@ -201,7 +201,7 @@ def test_a_tank_is_asked_for_and_its_filling_acts_where_it_is(
 
     monkeypatch.setattr("sys.stdin.isatty", lambda: True)
     monkeypatch.setattr(
-        typer, "prompt", lambda text, **_: "tractor-4wd" if "number" in text else prompt(text)
+        typer, "prompt", lambda text, **_: "tractor-4wd" if text == "number or name" else prompt(text)
     )
     by_hand, by_options = tmp_path / "asked.yaml", tmp_path / "options.yaml"
     assert main(["new", "vehicle", "--signals", "torque", "-o", str(by_hand), "--quiet"]) == 0
@@ -221,3 +221,53 @@ def test_without_a_tank_the_file_has_none_and_no_height_stands_alone() -> None:
     assert not any(field.name.startswith("payload") for field in fields(class_named("rover"), "torque"))
     with pytest.raises(InputError, match="give payload_x too"):
         make("tractor-4wd", "torque", {"payload_z": 1.2})
+
+
+def test_where_torques_are_measured_decides_on_bearings_and_the_gear_ratio(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    known = {"mass": 200.0, "wheel_radius": 0.2}
+    unsaid, wheel, motor = (make("six-wheel", "torque", known, torque_at=at) for at in ("", "wheel", "motor"))
+    assert wheel.vehicle.bearing_resistance == 0
+    assert motor.vehicle.bearing_resistance == unsaid.vehicle.bearing_resistance > 0
+    assert (
+        wheel.vehicle.uncertainty.tire_rolling_resistance < motor.vehicle.uncertainty.tire_rolling_resistance
+    )
+    assert "scale: RATIO" in motor.to_yaml()
+    assert "scale: RATIO" not in wheel.to_yaml() + unsaid.to_yaml()
+    with pytest.raises(InputError, match=r"--torque-at: .*say wheel or motor"):
+        make("rover", "torque", torque_at="gearbox")
+    with pytest.raises(InputError, match="leave it out"):
+        make("rover", "wheel-speeds", torque_at="motor")
+    out = tmp_path / "v.yaml"
+    assert main(["new", "vehicle", "--class", "rover", "--torque-at", "motor", "-o", str(out)]) == 0
+    assert "give each 'scale: RATIO'" in capsys.readouterr().out
+
+
+def test_on_a_terminal_it_asks_where_torques_are_measured(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    asked: list[str] = []
+
+    def prompt(text: str, **_: object) -> str:
+        asked.append(text)
+        return ["six-wheel", "torque", "wheel"][len(asked) - 1] if len(asked) < 4 else ""
+
+    monkeypatch.setattr("sys.stdin.isatty", lambda: True)
+    monkeypatch.setattr(typer, "prompt", prompt)
+    out = tmp_path / "v.yaml"
+    assert main(["new", "vehicle", "-o", str(out), "--quiet"]) == 0
+    assert not [text for text in asked if "bearing" in text]
+    assert tg.Vehicle.load(out).bearing_resistance == 0
+
+
+def test_who_does_not_know_where_torques_are_measured_presses_enter(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    answers = iter(["six-wheel", "torque"])
+    monkeypatch.setattr("sys.stdin.isatty", lambda: True)
+    monkeypatch.setattr(typer, "prompt", lambda *_, **__: next(answers, ""))
+    asked, unsaid = tmp_path / "asked.yaml", tmp_path / "unsaid.yaml"
+    assert main(["new", "vehicle", "-o", str(asked), "--quiet"]) == 0
+    assert main(["new", "vehicle", "--class", "six-wheel", "-o", str(unsaid), "--quiet"]) == 0
+    assert asked.read_text() == unsaid.read_text()

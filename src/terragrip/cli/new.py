@@ -49,6 +49,12 @@ def vehicle(
             help="What its log measures: torque (default), wheel-speeds or bus-speed (docs/vehicle.md).",
         ),
     ] = None,
+    torque_at: Annotated[
+        str,
+        typer.Option(
+            metavar="WHERE", help="Where its torques are measured: motor or wheel (behind the gears)."
+        ),
+    ] = "",
     name: Annotated[str, typer.Option(metavar="TEXT", help="The machine's name.")] = "",
     mass: Annotated[
         str | None, typer.Option(metavar="VALUE", help="Mass, ready to work, e.g. '6.2 t'.")
@@ -138,7 +144,7 @@ def vehicle(
         "drawbar_offset": drawbar_offset,
         "slope": slope,
     }
-    from terragrip.vehicle_maker import make
+    from terragrip.vehicle_maker import TORQUE_AT, make
 
     if output.exists():  # it may be one that the user has worked on
         raise InputError("exists already", file=output, place="--output", hint="name a new file")
@@ -151,8 +157,10 @@ def vehicle(
                 hint="name one of those of 'terragrip new vehicle --list', or run it on a terminal to be asked",
             )
         machine, signals = _ask_kind(signals)
-        given = _ask_values(machine, signals, given)
-    made = make(machine, signals or "torque", given, name=name)  # type: ignore[arg-type]  # make checks it
+        if signals == "torque" and not torque_at:
+            torque_at = _choice("Where are its drive torques measured?", TORQUE_AT, or_unknown=True)
+        given = _ask_values(machine, signals, given, torque_at)
+    made = make(machine, signals or "torque", given, name=name, torque_at=torque_at)  # type: ignore[arg-type]  # make checks it
     made.save(output)
     if not quiet:
         print(_said(made))
@@ -168,21 +176,29 @@ def _ask_kind(signals: str | None) -> tuple[str, str]:
     return machine, signals or _choice("What does its log measure, beside the ground speed?", SIGNALS)
 
 
-def _choice(question: str, choices: dict[str, str]) -> str:
+def _choice(question: str, choices: dict[str, str], *, or_unknown: bool = False) -> str:
+    """The name of the choice that the user makes; with ``or_unknown`` an empty answer is one, ""."""
     typer.echo(question)
     names = list(choices)
     for number, (name, title) in enumerate(choices.items(), 1):
         typer.echo(f"  {number}  {name}: {title}")
     while True:
-        answer = typer.prompt("number or name").strip()
-        if answer in choices:
+        if or_unknown:
+            answer = typer.prompt(
+                "number or name, or Enter where it is not known", default="", show_default=False
+            ).strip()
+        else:
+            answer = typer.prompt("number or name").strip()
+        if answer in choices or (or_unknown and not answer):
             return str(answer)
         if answer.isdigit() and 1 <= int(answer) <= len(names):
             return names[int(answer) - 1]
         typer.echo(f"  {answer} is none of them")
 
 
-def _ask_values(machine: str, signals: str, given: dict[str, str | None]) -> dict[str, str | None]:
+def _ask_values(
+    machine: str, signals: str, given: dict[str, str | None], torque_at: str
+) -> dict[str, str | None]:
     """What the options left open, from the terminal; an empty answer is "not known"."""
     from terragrip.units import quantity
     from terragrip.vehicle_maker import class_named, fields, make, read_values
@@ -197,6 +213,8 @@ def _ask_values(machine: str, signals: str, given: dict[str, str | None]) -> dic
         )
     for field in asked:
         if field.name in known or (field.name == "payload_z" and "payload_x" not in known):
+            continue
+        if field.name == "bearing_resistance" and torque_at == "wheel":
             continue
         numbers = {
             name: quantity(value, one.unit)
@@ -235,6 +253,8 @@ def _said(made: Made) -> str:
         for f in fields(made.machine, made.signals, made.known)
         if f.needed and f.name not in made.known
     ]
+    if made.torque_at == "motor":
+        lines.append("Torques at the motor: give each 'scale: RATIO', the gear ratio, in the log's profile.")
     if lacking:
         lines.append(f"Find out first: {', '.join(lacking)}. Then 'terragrip calibrate' on a log.")
     elif made.signals == "bus-speed":

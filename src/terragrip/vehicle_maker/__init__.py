@@ -9,11 +9,12 @@ made.save("tractor.yaml")
 from terragrip.vehicle_maker.classes import MachineClass, Typical, class_named, classes
 from terragrip.vehicle_maker.costs import QUANTITIES, Cost, cost_table, interval_costs
 from terragrip.vehicle_maker.fields import SIGNALS, Field, Signals, fields, read_values
-from terragrip.vehicle_maker.maker import Made, make
+from terragrip.vehicle_maker.maker import TORQUE_AT, Made, make
 
 __all__ = [
     "QUANTITIES",
     "SIGNALS",
+    "TORQUE_AT",
     "Cost",
     "Field",
     "MachineClass",

@@ -22,7 +22,11 @@ WORK = 0.15
 PUSH = 0.03
 """Acceleration over gravity that loads and inertias are judged by (R)."""
 
-
+TORQUE_AT = {
+    "wheel": "behind the gears, so that it has no part of their losses",
+    "motor": "a current or torque of the motor: the gear ratio counts, and the gears' losses are in it",
+}
+"""Where a log's drive torques are measured."""
 _COUNTS = {
     "bus-speed": "of the numbers here none counts, and the log itself gives the zero of slip.",
     "wheel-speeds": "of the numbers here only the radii count, and in turns the track. The rest is typical.",
@@ -32,19 +36,24 @@ _COUNTS = {
 @dataclass(frozen=True)
 class Made:
     """A vehicle that was made: ``vehicle``, its ``machine`` class, the ``signals`` of its log, the ``known`` numbers [SI], and the fields
-    that are ``assumed``: typical of the class, their spread considered."""
+    that are ``assumed``: typical of the class, their spread considered; ``torque_at``: a name of `TORQUE_AT`, "" where it is not known."""
 
     vehicle: Vehicle
     machine: MachineClass
     signals: Signals
     known: Mapping[str, float]
     assumed: tuple[Field, ...]
+    torque_at: str = ""
 
     def to_yaml(self) -> str:
         """The vehicle file, with a head that says what is assumed and from where."""
         lines = [f"# {self.machine.title}; known by {SIGNALS[self.signals]}."]
         if self.signals != "torque":
             lines.append(f"# Slip alone: {_COUNTS[self.signals]}")
+        if self.torque_at == "motor":
+            lines.append(
+                "# Torques at the motor: the log's profile multiplies them by the gear ratio, 'scale: RATIO'."
+            )
         if self.assumed:
             lines.append(
                 "# Not known, typical of the class; the standard deviations are considered under 'uncertainty':"
@@ -66,20 +75,34 @@ def make(
     known: Mapping[str, object] | None = None,
     *,
     name: str = "",
+    torque_at: str = "",
 ) -> Made:
     """A vehicle of a class from what is known of it.
 
     ``machine``: the name of a class (`classes`). ``known``: numbers [SI] or texts with a unit by the names of `fields`; None, or a name
-    left out, is not known. ``name`` of the vehicle. Raises InputError on a class, name or value that there is not.
+    left out, is not known. ``name`` of the vehicle. ``torque_at``: a name of `TORQUE_AT`, "" where it is not known; at the wheel no
+    bearing resistance counts. Raises InputError on a class, name or value that there is not.
     """
     chosen = machine if isinstance(machine, MachineClass) else class_named(machine)
     if signals not in SIGNALS:
         raise InputError(f"no signals {signals!r}", place="--signals", hint=f"say {', '.join(SIGNALS)}")
+    if torque_at and signals != "torque":
+        raise InputError(f"does not count for a log of {signals}", place="--torque-at", hint="leave it out")
+    if torque_at and torque_at not in TORQUE_AT:
+        hint = f"say {' or '.join(TORQUE_AT)}"
+        raise InputError(f"no torque is measured at {torque_at!r}", place="--torque-at", hint=hint)
     values = read_values(chosen, signals, known or {})
+    if torque_at == "wheel":
+        values.setdefault("bearing_resistance", 0.0)
     asked = fields(chosen, signals, values)
     assumed = tuple(field for field in asked if field.typical and field.name not in values)
     return Made(
-        vehicle_of(chosen, signals, values, [f.name for f in assumed], name), chosen, signals, values, assumed
+        vehicle_of(chosen, signals, values, [f.name for f in assumed], name),
+        chosen,
+        signals,
+        values,
+        assumed,
+        torque_at,
     )
 
 
