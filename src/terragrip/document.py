@@ -13,7 +13,7 @@ import yaml
 from pydantic import BaseModel, ConfigDict, ValidationError, model_validator
 from pydantic_core import PydanticCustomError
 
-from terragrip.errors import InputError, nearest
+from terragrip.errors import InputError, suggestion
 from terragrip.files import refuse_missing, unreadable
 from terragrip.units import UnitError
 
@@ -52,8 +52,7 @@ class Part(BaseModel):
         known = [info.alias or name for name, info in cls.model_fields.items()]
         for key in data:
             if key not in known:
-                close = nearest(str(key), known)
-                hint = f"did you mean {close!r}?" if close else f"known keys are {', '.join(known)}"
+                hint = suggestion(str(key), known, f"known keys are {', '.join(known)}")
                 raise PydanticCustomError("unknown_key", "unknown key", {"key": str(key), "hint": hint})
         return data
 

@@ -99,5 +99,11 @@ def nearest(name: str, known: Iterable[str]) -> str | None:
     return plain[match[0]] if match else None
 
 
+def suggestion(name: str, known: Iterable[str], otherwise: str | None = None) -> str | None:
+    """The hint for an unknown name: the nearest of those known, else ``otherwise``."""
+    close = nearest(name, known)
+    return f"did you mean {close}?" if close else otherwise
+
+
 def _plain(name: str) -> str:
     return "".join(name.casefold().split()).replace("_", "")

@@ -11,7 +11,7 @@ from contextlib import contextmanager, suppress
 from functools import cache
 from pathlib import Path
 
-from terragrip.errors import InputError, nearest
+from terragrip.errors import InputError, suggestion
 
 UNFINISHED = ".unfinished-"
 """How the name of a file begins that is still being written, or was left by a process that was killed meanwhile."""
@@ -155,14 +155,14 @@ def refuse_missing(path: str | os.PathLike[str], *, suffixes: tuple[str, ...] = 
             raise InputError("is not a regular file", file=path, hint="name a file on disk")
         if not target.parent.is_dir():
             raise InputError("no such file", file=path, hint=f"there is no folder {target.parent}")
-        close = nearest(target.name, (p.name for p in target.parent.iterdir() if p.is_file()))
+        beside = [p.name for p in target.parent.iterdir() if p.is_file()]
     except InputError:
         raise
     except (OSError, ValueError) as error:  # no permission; a name too long or with a NUL
         raise InputError(
             f"cannot be opened ({error})", file=path, hint="check the path and its permissions"
         ) from error
-    raise InputError("no such file", file=path, hint=f"did you mean {close}?" if close else "check the path")
+    raise InputError("no such file", file=path, hint=suggestion(target.name, beside, "check the path"))
 
 
 def sha256(path: str | os.PathLike[str]) -> str:

@@ -246,8 +246,8 @@ def test_pitch_and_roll_from_a_quaternion() -> None:
 @pytest.mark.parametrize(
     ("old", "new", "place", "problem", "hint"),
     [
-        ("from: kmh", "fron: kmh", "channels.ground_speed.fron (line 7)", "unknown key", "did you mean 'from'?"),
-        ("ground_speed:", "groundspeed:", "channels.groundspeed (line 7)", "no such channel", "'ground_speed'"),
+        ("from: kmh", "fron: kmh", "channels.ground_speed.fron (line 7)", "unknown key", "did you mean from?"),
+        ("ground_speed:", "groundspeed:", "channels.groundspeed (line 7)", "no such channel", "mean ground_speed"),
         ("unit: km/h", "unit: kg", "channels.ground_speed (line 7)", "measures a mass, where a speed", "m/s"),
         ("unit: km/h", "unit: mph/", "channels.ground_speed (line 7)", "is not a unit", "N m"),
         ("channels:\n", "channels:\n  time: stamp\n", "channels.time (line 4)", "time is no channel", "beside channels"),

@@ -111,7 +111,7 @@ def test_faults_by_count_lie_in_different_places(pair):
 def test_unknown_channel_is_refused_with_the_nearest(quiet):
     scenario = quiet(sensors=SENSORS, faults=[{"kind": "loss", "channel": "ground_sped"}])
     with pytest.raises(
-        InputError, match=r"faults.0.channel: no channel 'ground_sped' on board; did you mean 'ground_speed'"
+        InputError, match=r"faults.0.channel: no channel 'ground_sped' on board; did you mean ground_speed"
     ):
         simulate(scenario)
 

@@ -74,14 +74,14 @@ def test_use_merges_and_extends_inherits(file):
 @pytest.mark.parametrize(
     ("change", "complaint"),
     [
-        ("duration: 10 s\nspede: 3", r"drive.yaml: spede \(line \d+\): unknown key; did you mean 'speed'"),
+        ("duration: 10 s\nspede: 3", r"drive.yaml: spede \(line \d+\): unknown key; did you mean speed"),
         ("duration: -3", r"duration \(line 6\): -3 is impossible; it must be at least 0.1"),
         ("duration: 10 kg", r"duration \(line 6\): .*measures a mass"),
         ("duration: 10\ntools: [plough]", r"the key stands twice"),
         ("duration: 10\nvehicle: tractor", r"vehicle: nothing called 'tractor' in the library's vehicles"),
         (
             "duration: 10\nextends: acuracy-clean",
-            r"extends: no scenario 'acuracy-clean'; did you mean 'accuracy-clean'",
+            r"extends: no scenario 'acuracy-clean'; did you mean accuracy-clean",
         ),
         (
             "duration: 10\nsoils: {mud: {curve: {name: magic}, resistance: 0.2}}",
@@ -128,7 +128,7 @@ def test_impossible_scenarios_are_refused(file, old, new, complaint):
 
 
 def test_unknown_names(tmp_path):
-    with pytest.raises(InputError, match=r"no scenario 'multi3'; did you mean 'multi[12]'"):
+    with pytest.raises(InputError, match=r"no scenario 'multi3'; did you mean multi[12]"):
         Scenario.load("multi3")
     with pytest.raises(InputError, match="no such file"):
         Scenario.load(tmp_path / "none.yaml")

@@ -10,7 +10,7 @@ import typer
 from terragrip.cli.options import Quiet
 from terragrip.cli.output import check_file, check_folder, files_in
 from terragrip.cli.progress import progress
-from terragrip.errors import InputError, nearest
+from terragrip.errors import InputError, suggestion
 from terragrip.note_pages import with_page
 
 if TYPE_CHECKING:
@@ -95,8 +95,7 @@ def _signals(given: list[str] | None) -> tuple[str, ...]:
 
     for name in given or ():
         if name not in SIGNALS:
-            near = nearest(name, SIGNALS)
-            hint = f"did you mean {near}?" if near else f"choose one of {', '.join(SIGNALS)}"
+            hint = suggestion(name, SIGNALS, f"choose one of {', '.join(SIGNALS)}")
             raise InputError(f"there is no signal {name!r}", place="--signal", hint=hint)
     return tuple(dict.fromkeys(given)) if given else GROUND
 

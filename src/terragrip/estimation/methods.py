@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from terragrip.errors import InputError, nearest
+from terragrip.errors import InputError, suggestion
 
 # Values of tg_engine, tg_policy and tg_method in kernel/include/terragrip.h.
 EXACT, UNSCENTED = 0, 1
@@ -73,8 +73,5 @@ def method_named(name: str, *, smooth: bool = False) -> Method:
             hint = "use another method, or leave out smooth"
             raise InputError(f"the method {name} cannot smooth", hint=hint)
         return METHODS[name]
-    near = nearest(name, METHODS)
-    raise InputError(
-        f"there is no method {name!r}",
-        hint=f"did you mean {near}?" if near else f"choose one of {', '.join(METHODS)}",
-    )
+    near = suggestion(name, METHODS, f"choose one of {', '.join(METHODS)}")
+    raise InputError(f"there is no method {name!r}", hint=near)

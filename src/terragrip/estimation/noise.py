@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from terragrip.errors import InputError, nearest
+from terragrip.errors import InputError, suggestion
 from terragrip.physics.loads import GRAVITY
 
 if TYPE_CHECKING:
@@ -92,10 +92,8 @@ def _check(given: Mapping[str, float], channels: tuple[str, ...]) -> None:
     known = {*channels, *(sensor_of(name) for name in channels)}
     for name, value in given.items():
         if name not in known:
-            near = nearest(name, known)
-            raise InputError(
-                f"there is no sensor {name!r}", hint=f"did you mean {near}?" if near else "name a channel"
-            )
+            hint = suggestion(name, known, "name a channel")
+            raise InputError(f"there is no sensor {name!r}", hint=hint)
         if not (np.isfinite(value) and value > 0):
             raise InputError(
                 f"the noise of {name} is {value!r}", hint="give a positive standard deviation in SI"

@@ -32,7 +32,7 @@ from typing import Any, ClassVar, Self
 from pydantic import Field, field_validator, model_validator
 
 from terragrip.document import Fault, Part, read_yaml, validate
-from terragrip.errors import InputError, nearest
+from terragrip.errors import InputError, suggestion
 from terragrip.formats.conversion import convert
 from terragrip.formats.payload import Payload
 from terragrip.formats.profile_parts import Rows, Source, TimeSource, as_pattern, rate_unit
@@ -76,8 +76,7 @@ class Profile(Part):
             return validate(cls, read_yaml(own))
         name = os.fspath(path)
         if not Path(path).exists() and Path(path).parent == Path() and not Path(path).suffix:
-            close = nearest(name, SHIPPED)
-            hint = f"did you mean {close!r}?" if close else f"those are {', '.join(SHIPPED)}"
+            hint = suggestion(name, SHIPPED, f"those are {', '.join(SHIPPED)}")
             raise InputError(f"{name!r} is no file, and no profile that comes with Terragrip", hint=hint)
         result = validate(cls, read_yaml(path))
         here = Path(path).parent
@@ -115,15 +114,9 @@ class Profile(Part):
                     ("channels", name),
                 )
             if name not in LABELS and not is_channel(name):
-                close = nearest(
-                    name, (*CHANNELS, *LABELS, *(f"{q}_fl" for q in (*WHEEL_CHANNELS, *AXLE_CHANNELS)))
-                )
-                hint = (
-                    f"did you mean {close!r}?"
-                    if close
-                    else "the names are in architecture.md, contracts, e.g. wheel_speed_fl"
-                )
-                raise Fault("no such channel", hint, ("channels", name))
+                known = (*CHANNELS, *LABELS, *(f"{q}_fl" for q in (*WHEEL_CHANNELS, *AXLE_CHANNELS)))
+                names = "the names are in architecture.md, contracts, e.g. wheel_speed_fl"
+                raise Fault("no such channel", suggestion(name, known) or names, ("channels", name))
             for one in source.chain:
                 _check_unit(name, one)
         return self

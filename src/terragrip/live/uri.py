@@ -6,7 +6,7 @@ from collections.abc import Collection
 from dataclasses import dataclass, field
 from urllib.parse import parse_qsl, unquote, urlsplit
 
-from terragrip.errors import InputError, nearest
+from terragrip.errors import InputError, suggestion
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,8 +41,7 @@ class Uri:
                 hint="set TERRAGRIP_USERNAME and TERRAGRIP_PASSWORD, or TERRAGRIP_CREDENTIALS=FILE of mode 0600",
             )  # fmt: skip
         if not colon or scheme not in schemes:
-            near = nearest(scheme, schemes)
-            hint = f"did you mean {near}:?" if near else f"give one of {', '.join(f'{s}:' for s in schemes)}"
+            hint = suggestion(scheme, schemes, f"give one of {', '.join(f'{s}:' for s in schemes)}")
             raise InputError(
                 f"{head[:20]!r} names no {role} that Terragrip knows", place=f"--{role}", hint=hint
             )
@@ -54,9 +53,8 @@ class Uri:
         options = dict(parse_qsl(rest.partition("?")[2], keep_blank_values=True))
         for name in options:
             if name not in schemes[scheme]:
-                near = nearest(name, schemes[scheme])
                 known = ", ".join(sorted(schemes[scheme])) or "none"
-                hint = f"did you mean {near}?" if near else f"its options are: {known}"
+                hint = suggestion(name, schemes[scheme], f"its options are: {known}")
                 raise InputError(f"{scheme}: has no option {name!r}", place=f"--{role} {text}", hint=hint)
         return cls(text, scheme, parts.hostname or "", port, unquote(path), options)
 

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from terragrip.arrays import Bools, Floats
-from terragrip.errors import InputError, nearest
+from terragrip.errors import InputError, suggestion
 from terragrip.simulation.fields import stream
 from terragrip.simulation.scenario_sensors import Fault
 from terragrip.simulation.sensors import Series
@@ -23,11 +23,10 @@ def apply(faults: tuple[Fault, ...], series: list[Series], duration: float, seed
     for k, fault in enumerate(faults):
         known = [name for one in series for name in (one.sensor, *one.values)]
         if fault.channel is not None and fault.channel not in known:
-            close = nearest(fault.channel, known)
             raise InputError(
                 f"no channel {fault.channel!r} on board",
                 place=f"faults.{k}.channel",
-                hint=f"did you mean {close!r}?" if close else f"channels are {', '.join(known)}",
+                hint=suggestion(fault.channel, known, f"channels are {', '.join(known)}"),
             )
         rng = stream(seed, f"fault {k} {fault.kind}")
         windows = _windows(fault, duration, rng)

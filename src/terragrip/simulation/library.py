@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from terragrip.document import Document, read_yaml
-from terragrip.errors import InputError, nearest
+from terragrip.errors import InputError, suggestion
 
 Tree = dict[str, Any]
 _VEHICLE = "innok-heros-444"
@@ -45,12 +45,8 @@ def scenario_document(path_or_name: str | os.PathLike[str]) -> Document:
     result = _by_name(name)
     if result is None:
         if not name.endswith((".yaml", ".yml")) and not Path(name).exists():
-            close = nearest(name, scenario_names())
-            hint = (
-                f"did you mean {close!r}?"
-                if close
-                else "give a file, or a name that `terragrip simulate --list` shows"
-            )
+            otherwise = "give a file, or a name that `terragrip simulate --list` shows"
+            hint = suggestion(name, scenario_names(), otherwise)
             raise InputError(f"no scenario {name!r}", hint=hint)
         result = read_yaml(path_or_name)
     tree = resolve({"name": Path(name).stem, **result.data}, result.file)
@@ -79,11 +75,9 @@ def _extended(tree: Tree, file: str | None, depth: int) -> Tree:
         return own
     result = _by_name(str(parent))
     if result is None or depth > _DEPTH:
-        close = nearest(str(parent), scenario_names())
         problem = f"no scenario {parent!r}" if result is None else "extends itself"
-        raise InputError(
-            problem, file=file, place="extends", hint=f"did you mean {close!r}?" if close else None
-        )
+        hint = suggestion(str(parent), scenario_names())
+        raise InputError(problem, file=file, place="extends", hint=hint)
     inherited = {key: value for key, value in result.data.items() if key not in ("name", "description")}
     return _merged(_extended(inherited, result.file, depth + 1), own)
 
@@ -105,8 +99,7 @@ def _entry(section: str, value: Any, file: str | None, place: str) -> Any:
         return value
     name, entries = str(value["use"]), _library(section)
     if name not in entries:
-        close = nearest(name, entries)
-        hint = f"did you mean {close!r}?" if close else f"known are {', '.join(entries)}"
+        hint = suggestion(name, entries, f"known are {', '.join(entries)}")
         raise InputError(
             f"nothing called {name!r} in the library's {section}", file=file, place=place, hint=hint
         )

@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from terragrip.arrays import Floats
-from terragrip.errors import InputError, nearest
+from terragrip.errors import InputError, suggestion
 from terragrip.studio.formulas import evaluate, names
 from terragrip.studio.tables import Extremes, are_long, buckets, extremes
 
@@ -167,12 +167,11 @@ class Shown:
             return known[name]
         if f"axis:{name}" in PLACES:
             return self.along(PLACES[f"axis:{name}"])
-        like = nearest(name, [*known, "time", "elapsed", "distance"])
         absent = "" if recording is not None else "the recording is not in this folder"
         raise InputError(
             f"{name} is no column of this run",
             place="formula",
-            hint=f"did you mean {like}?" if like else absent,
+            hint=suggestion(name, [*known, "time", "elapsed", "distance"], absent),
         )
 
     def _values(self, recording: Recording | None, name: str) -> Callable[[slice], Floats]:

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from terragrip.document import read_yaml
-from terragrip.errors import InputError, nearest
+from terragrip.errors import InputError, suggestion
 
 _LONE = 0.3  # relative SD where one machine alone says what is typical (ours)
 _LEAST = 0.05  # relative SD that a handful of machines cannot show a smaller one than (ours)
@@ -114,7 +114,6 @@ def class_named(name: str) -> MachineClass:
     """The class of a name; raises InputError if there is none."""
     known = {one.name: one for one in classes()}
     if name not in known:
-        close = nearest(name, known)
-        hint = f"did you mean {close}?" if close else f"classes are {', '.join(known)}"
+        hint = suggestion(name, known, f"classes are {', '.join(known)}")
         raise InputError(f"no class of machine {name!r}", place="--class", hint=hint)
     return known[name]

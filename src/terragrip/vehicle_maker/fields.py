@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Literal
 
-from terragrip.errors import InputError, nearest
+from terragrip.errors import InputError, suggestion
 from terragrip.units import UnitError, quantity
 from terragrip.vehicle_maker.classes import MachineClass, Typical
 
@@ -150,8 +150,7 @@ def read_values(machine: MachineClass, signals: Signals, given: Mapping[str, obj
         if value is None:
             continue
         if name not in asked:
-            close = nearest(name, asked)
-            hint = f"did you mean {close}?" if close else f"asked for are {', '.join(asked) or 'none'}"
+            hint = suggestion(name, asked, f"asked for are {', '.join(asked) or 'none'}")
             raise InputError(
                 f"a {machine.name} known by its {signals} has no use for it", place=name, hint=hint
             )

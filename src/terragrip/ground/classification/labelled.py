@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from terragrip.errors import InputError, nearest
+from terragrip.errors import InputError, suggestion
 from terragrip.listing import listed
 
 Columns = Mapping[str, npt.NDArray[Any]]
@@ -94,6 +94,5 @@ def _named(name: str, logs: Sequence[Path], path: str | os.PathLike[str], place:
         return same[0]
     if same:
         raise InputError(f"{len(same)} logs are named {name}", file=path, place=place, hint="write its path")
-    near = nearest(name, [log.name for log in logs])
-    hint = f"did you mean {near}?" if near else "name one of the logs given"
+    hint = suggestion(name, [log.name for log in logs], "name one of the logs given")
     raise InputError(f"{name!r} names no run", file=path, place=place, hint=hint)

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from terragrip.errors import InputError, nearest
+from terragrip.errors import InputError, suggestion
 from terragrip.listing import listed, profile_in
 from terragrip.live.topics import is_name
 
@@ -64,8 +64,7 @@ class Roster:
         vehicle, profile = self._rows.get(name, (None, None))
         vehicle, profile = vehicle or self._vehicle, profile or self._profile
         if vehicle is None:
-            near = nearest(name, self._rows)
-            hint = f"did you mean {near}?" if near else "add its row, or give --vehicle for all others"
+            hint = suggestion(name, self._rows, "add its row, or give --vehicle for all others")
             raise InputError(f"names no vehicle file for {name}", file=self._index, hint=hint)
         return Entry(self._vehicle_of(vehicle), None if profile is None else self._profile_of(profile))
 

@@ -8,7 +8,7 @@ from collections.abc import AsyncGenerator, Mapping
 from contextlib import aclosing
 from urllib.parse import parse_qs, urlsplit
 
-from terragrip.errors import InputError, nearest
+from terragrip.errors import InputError, suggestion
 from terragrip.live.broadcast import Broadcast
 from terragrip.live.message import Message
 from terragrip.live.vehicle_run import VehicleRun
@@ -38,11 +38,8 @@ class ManyStreams:
         name = asked.pop("vehicle", [next(iter(self._runs))])[0]
         run = self._runs.get(name)
         if run is None:
-            near = nearest(name, self._runs)
-            raise InputError(
-                f"no vehicle {name[:40]!r} sends",
-                hint=f"did you mean {near}?" if near else "look at /health/ready",
-            )
+            hint = suggestion(name, self._runs, "look at /health/ready")
+            raise InputError(f"no vehicle {name[:40]!r} sends", hint=hint)
         broadcast = self._broadcasts.get(name)
         if broadcast is None or broadcast.columns != run.core.columns:
             broadcast = self._broadcasts[name] = Broadcast(run.core.vehicle.name or name, run.core.columns)
