@@ -90,7 +90,7 @@ def test_the_dbc_knows_every_event():
 
 
 def test_an_unknown_interface_is_refused(vehicle):
-    with pytest.raises(InputError, match="no interface 'socketcam'"):
+    with pytest.raises(InputError, match="interface is 'socketcam'"):
         Service(vehicle, ["udp://127.0.0.1:9870"], ["can:can0?interface=socketcam"])
 
 

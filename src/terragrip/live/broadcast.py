@@ -13,7 +13,6 @@ import struct
 from collections.abc import AsyncGenerator, Sequence
 
 from terragrip import __version__
-from terragrip.errors import InputError
 from terragrip.estimation.engine import EVENTS
 from terragrip.estimation.estimates import wheels_with
 from terragrip.live.message import ESTIMATE, Message
@@ -45,9 +44,7 @@ class Broadcast:
     async def subscribe(self, request: str = "/") -> AsyncGenerator[str | bytes]:
         """The frames for a client that asked for ``/?format=binary&rate=20&columns=slip_*``; raises InputError on any other."""
         uri = Uri.parse(f"studio://127.0.0.1{request}", {"studio": OPTIONS}, "sink")
-        binary = uri.options.get("format", "json") == "binary"
-        if uri.options.get("format", "json") not in ("json", "binary"):
-            raise InputError(f"has no format {uri.options['format']!r}", place=request, hint="json or binary")
+        binary = uri.choice("format", ("json", "binary")) == "binary"
         client = Outbox(uri)
         every = list(self.columns)
         columns = every if client.columns is None else [n for n in every if client.columns.wants(n)]

@@ -19,13 +19,9 @@ INTERFACES = ("socketcan", "vector", "virtual", "pcan", "kvaser", "slcan", "ixxa
 def check(uri: Uri) -> str:
     """The interface's name; raises InputError on a missing channel or an unknown interface."""
     _python_can()
-    interface = uri.options.get("interface", "socketcan")
     if not uri.path:
         raise InputError("names no channel", place=uri.text, hint="write can:can0")
-    if interface not in INTERFACES:
-        raise InputError(
-            f"there is no interface {interface!r}", place=uri.text, hint=f"one of {', '.join(INTERFACES)}"
-        )
+    interface = uri.choice("interface", INTERFACES)
     if interface == "udp_multicast" and find_spec("msgpack") is None:
         raise missing_package("msgpack", "live", "use udp_multicast", place=uri.text)
     return interface

@@ -235,7 +235,4 @@ def _tls(uri: Uri) -> ssl.SSLContext:
 
 def quality(uri: Uri) -> int:
     """The quality of service asked for; raises InputError unless it is 0, 1 or 2."""
-    text = uri.options.get("qos", "0")
-    if text not in ("0", "1", "2"):
-        raise InputError(f"qos is {text!r}", place=uri.text, hint="give 0, 1 or 2")
-    return int(text)
+    return int(uri.choice("qos", ("0", "1", "2")))

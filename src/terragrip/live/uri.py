@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field
 from urllib.parse import parse_qsl, unquote, urlsplit
 
@@ -75,6 +75,14 @@ class Uri:
         if not 0.0 < value < float("inf"):
             raise InputError(f"{option} is {text!r}", place=self.text, hint="give a positive number")
         return value
+
+    def choice(self, option: str, known: Sequence[str]) -> str:
+        """An option that is one of those ``known``, by default the first; raises InputError if it is none."""
+        text = self.options.get(option, known[0])
+        if text not in known:
+            hint = f"give {', '.join(known[:-1])} or {known[-1]}"
+            raise InputError(f"{option} is {text!r}", place=self.text, hint=hint)
+        return text
 
     def is_loopback(self) -> bool:
         """Whether the host can be reached from this machine only."""

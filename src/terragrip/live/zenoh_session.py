@@ -45,9 +45,7 @@ def config(uri: Uri) -> Any:
                 place=uri.text,
                 hint="listen on tcp/127.0.0.1:7447, or connect to a router",
             )
-    scout = uri.options.get("scout", "0")
-    if scout not in ("0", "1"):
-        raise InputError(f"scout is {scout!r}", place=uri.text, hint="give 0 or 1")
+    scout = uri.choice("scout", ("0", "1"))
     try:
         result.insert_json5("mode", '"peer"')
         result.insert_json5("scouting/multicast/enabled", "true" if scout == "1" else "false")

@@ -57,26 +57,14 @@ class ManyMonitor:
         """Everything counted, as Prometheus reads it (docs/live.md)."""
         page, vehicles = Metrics(), self._vehicles
         unready = self.unready()
-        page.add("gauge", "terragrip_live_vehicles", "Vehicles that are estimated.", len(vehicles.runs))
-        page.add(
-            "gauge",
-            "terragrip_live_vehicles_refused",
-            "Vehicles that send and are not.",
-            len(vehicles.refusals),
-        )
-        page.add(
-            "counter",
-            "terragrip_live_vehicle_failures_total",
-            "Vehicles closed after a failure.",
-            vehicles.failures,
-        )
-        page.add(
-            "counter",
-            "terragrip_live_unnamed_messages_total",
-            "Messages whose topic names no vehicle.",
-            vehicles.unnamed,
-        )
-        page.add("gauge", "terragrip_live_memory_bytes", "Memory of the process.", held_now())
+        for kind, family, text, value in (
+            ("gauge", "vehicles", "Vehicles that are estimated.", len(vehicles.runs)),
+            ("gauge", "vehicles_refused", "Vehicles that send and are not.", len(vehicles.refusals)),
+            ("counter", "vehicle_failures_total", "Vehicles closed after a failure.", vehicles.failures),
+            ("counter", "unnamed_messages_total", "Messages whose topic names no vehicle.", vehicles.unnamed),
+            ("gauge", "memory_bytes", "Memory of the process.", held_now()),
+        ):
+            page.add(kind, f"terragrip_live_{family}", text, value)
         listed = vehicles.runs.keys() | unready.keys()
         ready = [({"vehicle": name}, int(name not in unready)) for name in sorted(listed)]
         page.add("gauge", "terragrip_live_ready", "1 where /health/ready/VEHICLE says so.", ready)

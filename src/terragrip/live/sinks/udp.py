@@ -22,14 +22,10 @@ class UdpSink:
 
     def __init__(self, uri: Uri, *_: object) -> None:
         self.uri = uri
-        self.packed = uri.options.get("format", "json") == "doubles"
+        self.packed = uri.choice("format", ("json", "doubles")) == "doubles"
         self.port = uri.port or 0
         if not self.port or not uri.host:
             raise InputError("names no host and port", place=uri.text, hint="write udp://127.0.0.1:9871")
-        if uri.options.get("format", "json") not in ("json", "doubles"):
-            raise InputError(
-                f"has no format {uri.options['format']!r}", place=uri.text, hint="json or doubles"
-            )
 
     async def run(self, outbox: Outbox) -> None:
         """Send messages; raises Lost where the system does not let us."""
