@@ -1,4 +1,4 @@
-"""Standard deviations of cells limited by the differences of repeated passes (decision 0151)."""
+"""Standard deviations of cells limited by the differences of repeated passes (docs/maps.md)."""
 
 from __future__ import annotations
 

@@ -31,7 +31,7 @@ _LONGEST = 20_000_000  # points; a record over ten days
 
 
 _CERTAIN = 2.0  # standard deviations by which an offset must exceed the explained one
-_SURE = 4.0  # the same, for an automatic correction: runs without a late sensor reach 2.7 (decision 0152)
+_SURE = 4.0  # the same, for an automatic correction: runs without a late sensor reach 2.7 (docs/formats.md)
 STIFFNESS = (
     2.0  # K on soft soil: the slope of ASABE D497's gross traction ratio at 15 % slip, Bn = 20, is 1.85
 )
