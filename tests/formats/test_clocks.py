@@ -237,3 +237,20 @@ def test_right_clocks_stay_and_wrong_ones_are_set_right(tmp_path: Path, seed: in
     assert note.endswith("and was set right.")
     fresh = np.isfinite(late["ground_speed"])
     assert np.abs(late.time[fresh][0]) < 0.1
+
+
+@pytest.mark.parametrize(("unit", "tick"), [("ms", 1e3), ("us", 1e6), ("ns", 1e9)])
+def test_a_column_named_time_that_counts_ticks_since_1970_is_proposed_in_its_unit(
+    tmp_path: Path, unit: str, tick: float
+) -> None:
+    log = tmp_path / "log.csv"
+    frame = table(TIME, speed_at(TIME), 5 * speed_at(TIME))
+    frame["time"] = [round((EPOCH + t) * tick) for t in TIME]
+    frame.to_csv(log, index=False)
+    with pytest.raises(tg.InputError, match=f"since 1970 in {unit}"):
+        tg.read(log)
+    seen = inspect(log)
+    assert seen.time is not None and seen.time.unit == unit
+    assert seen.time.duration == pytest.approx(TIME[-1] - TIME[0])
+    (tmp_path / "p.yaml").write_text(seen.profile)
+    assert tg.read(log, tmp_path / "p.yaml").time[-1] == pytest.approx(TIME[-1] - TIME[0])

@@ -75,6 +75,9 @@ def test_a_log_without_a_clock_has_none(tmp_path: Path) -> None:
 
 def test_stamps_in_a_wrong_unit_are_no_clock(tmp_path: Path) -> None:
     frame(SINCE_1970 // 1_000_000).to_csv(tmp_path / "log.csv", index=False)
+    with pytest.raises(tg.InputError, match="since 1970 in ms"):
+        tg.read(tmp_path / "log.csv", profile(unit="s"))
+    frame(SINCE_1970 // 1_000_000_00).to_csv(tmp_path / "log.csv", index=False)  # in tenths of a second
     recording = tg.read(tmp_path / "log.csv", profile(unit="s"))
     assert recording.clock_zero is None
     assert isinstance(recording.to_pandas().index, pd.RangeIndex)

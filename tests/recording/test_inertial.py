@@ -49,6 +49,15 @@ def test_sensors_of_one_instant_are_left_alone(kind: families.Kind, seed: int, r
     assert lag_notes(later(log, INERTIAL, 0.05), vehicle) == [], "filters and tyres"
 
 
+@pytest.mark.parametrize("factor", [30.0, 1e3, 1e6])
+def test_rows_that_are_too_far_apart_show_no_lag(factor: float) -> None:
+    """A log every few seconds, or with milliseconds for seconds: what is too coarse to compare is left out."""
+    log, vehicle = drive(*MACHINES[0])
+    slow = Recording.from_frame({**log.channels, "time": factor * log.time})
+    assert any("time may not be in seconds" in note for note in unit_warnings(slow, vehicle)) == (factor > 30)
+    assert not lag_notes(slow, vehicle)
+
+
 @pytest.mark.parametrize(("kind", "seed", "rate"), MACHINES)
 @pytest.mark.parametrize("seconds", [0.5, -0.4])
 def test_an_inertial_sensor_that_is_late_or_early_is_named(

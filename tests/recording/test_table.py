@@ -130,6 +130,11 @@ def _as_object(name: str, row: int, cell: object) -> Callable[[Columns], Columns
         (lambda c: spoilt(c, "time", 16, 0.15), "column time, row 17 (time 0.15 s): time repeats"),
         (lambda c: spoilt(c, "time", 16, np.nan), "column time, row 17: time is not a finite number"),
         (lambda c: spoilt(c, "time", 5999, np.inf), "column time, row 6000: time is not a finite number"),
+        (
+            lambda c: {**c, "time": 1.7e12 + 1e3 * c["time"]},
+            "column time: is 1.7e+12 s, past the year 5000: since 1970 in ms?; write 'time: {from: time, unit: ms, zero: first}'",
+        ),
+        (lambda c: {**c, "time": 1.7e15 + 1e6 * c["time"]}, "column time: is 1.7e+15 s, past the year 5000: since 1970 in us?"),
         (lambda c: spoilt(c, "drawbar_force", 16, -np.inf), "column drawbar_force, row 17 (time 0.16 s): is infinite"),
         (lambda c: {**c, "ground_speed": np.full(6000, np.nan)}, "column ground_speed: holds no value"),
         (lambda c: {**c, "drawbar_force": np.full(6000, np.nan)}, "column drawbar_force: holds no value"),

@@ -9,11 +9,11 @@ import numpy as np
 from terragrip.arrays import Floats
 from terragrip.formats.candidates import kind_of
 from terragrip.formats.vocabulary import GENERAL, Vocabulary
+from terragrip.recording.clock import clock_unit
 from terragrip.recording.columns import SINCE_1970
 from terragrip.recording.schema import TIME
 from terragrip.units import factor_to
 
-_EPOCH = ((1e17, "ns"), (1e14, "us"), (1e11, "ms"))
 _PLAUSIBLE = (1e-6, 3600.0)  # s between samples
 
 
@@ -45,9 +45,9 @@ def _score(column: str, values: Floats, stated: str | None, vocabulary: Vocabula
     words = set(name.words)
     known = values[np.isfinite(values)]
     if column == TIME:
-        return (6.0 if _forward(known) > 0.9 and len(known) == len(values) else 3.0), stated if kind_of(
-            stated
-        ) == "time" and stated else "s"
+        own = clock_unit(float(np.max(np.abs(known), initial=0.0))) or "s"
+        unit = stated if stated is not None and kind_of(stated) == "time" else own
+        return 6.0 if _forward(known) > 0.9 and len(known) == len(values) else 3.0, unit
     unit = next(
         (u for u in (stated, name.unit, _unit_word(name.words, vocabulary)) if u and kind_of(u) == "time"),
         None,
@@ -64,7 +64,7 @@ def _score(column: str, values: Floats, stated: str | None, vocabulary: Vocabula
     if forward < 0.5 and (level < 0.95 or known[-1] <= known[0]):
         return 0.0, "s"
     size = float(np.max(np.abs(known)))
-    since = next((u for limit, u in _EPOCH if size > limit), None)
+    since = clock_unit(size)
     unit = unit or since or "s"
     step = float(np.median(np.diff(known)[np.diff(known) > 0])) * factor_to(unit, "s")
     if not _PLAUSIBLE[0] <= step <= _PLAUSIBLE[1]:

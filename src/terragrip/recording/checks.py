@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from terragrip.errors import InputError, nearest
+from terragrip.recording.clock import clock_unit
 from terragrip.recording.schema import LABELS, TIME, is_channel
 
 if TYPE_CHECKING:
@@ -113,10 +114,16 @@ def refuse_other_mass(vehicle: Vehicle, channels: Mapping[str, Floats], source: 
 def check_time(time: Floats, source: str | None, *, first_row: int = 0, after: float | None = None) -> None:
     """Raise InputError unless there is a row and time is finite and increases.
 
-    For a block of a longer table: the number of rows before it, and the time of the last of them.
+    For a block of a longer table: the number of rows before it, and the time of the last of them. Raises InputError too where the
+    last stamp is of a year that no clock shows.
     """
     if len(time) == 0:
         raise InputError("the table is empty", file=source, hint="give a log with at least one row")
+    unit = clock_unit(float(time[-1]))
+    if unit is not None:
+        problem = f"is {time[-1]:.4g} s, past the year 5000: since 1970 in {unit}?"
+        hint = f"write 'time: {{from: time, unit: {unit}, zero: first}}' in a profile"
+        raise InputError(problem, file=source, place=f"column {TIME}", hint=hint, page="formats#in-a-profile")
     before = time[0] - 1.0 if after is None else after
     with np.errstate(invalid="ignore"):
         forward = np.diff(time, prepend=before) > 0

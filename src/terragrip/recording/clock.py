@@ -15,6 +15,7 @@ Floats = npt.NDArray[np.float64]
 
 LATEST = 7.25e9
 """s since 1970, in 2199: what is beyond is a clock in another unit."""
+_UNITS = ((1e17, "ns"), (1e14, "us"), (1e11, "ms"))  # and the least stamp of each since 1970
 
 
 def clock_index(time: Floats, start: datetime) -> pd.DatetimeIndex:
@@ -33,3 +34,8 @@ def clock_times(time: Floats, start: datetime) -> npt.NDArray[np.datetime64]:
 def clock_text(when: float) -> str:
     """A time [s since 1970] in ISO 8601, UTC, to the microsecond."""
     return datetime.fromtimestamp(when, UTC).isoformat()
+
+
+def clock_unit(stamp: float) -> str | None:
+    """The unit of a stamp that counts from 1970 and is too large for seconds; None where seconds will do."""
+    return next((unit for least, unit in _UNITS if least < stamp < np.inf), None)

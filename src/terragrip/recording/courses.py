@@ -18,10 +18,13 @@ _SLOW = 6.0  # s: slower changes do not show a lag
 
 
 def points_of(time: Floats, most: float = MOST_TIME) -> tuple[Floats, float] | None:
-    """Points (m,) [s] and their distance, as fine as the rows (n,) and no finer than `STEP`; None where the log is short."""
+    """Points (m,) [s] and their distance, as fine as the rows (n,) and no finer than `STEP`; None where the log is short, or its rows
+    too far apart to show what changes within seconds."""
     if time[-1] - time[0] < LEAST_TIME:
         return None
     step = max(STEP, float(np.median(np.diff(time))))
+    if 2 * step >= _SLOW:
+        return None
     points = np.arange(time[0], min(time[-1], time[0] + most), step)
     return points, step
 

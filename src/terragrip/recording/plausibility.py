@@ -44,6 +44,7 @@ _OUTRUN = 1.5  # straight line over distance driven: above, that distance is too
 _TOO_SLOW, _LONG_WAY = 1.15, 20.0  # the same, over windows of so many metres
 _TOO_FAST = 1.3  # ground speed over the positions' speed, which noise can only increase
 _WAY_WINDOW = 10.0  # s
+_SPARSE, _DENSE = 5.0, 1e-4  # s between samples: no log of a drive has more, or less
 
 
 def unit_warnings(recording: Recording, vehicle: Vehicle | None) -> list[str]:
@@ -52,7 +53,7 @@ def unit_warnings(recording: Recording, vehicle: Vehicle | None) -> list[str]:
 
     The speeds are compared where both are well above standstill, by the median of their ratio.
     """
-    track, angles = track_of(recording), _angle_warnings(recording)
+    track, angles, times = track_of(recording), _angle_warnings(recording), _time_warnings(recording)
     recording = averaged(recording, _FINEST)
     known = vehicle if vehicle is not None and vehicle.knows_wheels else None
     shown = None if known is None else _shown_turn(recording, track)
@@ -72,7 +73,7 @@ def unit_warnings(recording: Recording, vehicle: Vehicle | None) -> list[str]:
         *moved,
         *(torque_warnings(recording, known, means) if known is not None and not moved else ()),
         *(inertial_warnings(recording, known) if known is not None else ()),
-        *_time_warnings(recording),
+        *times,
     ]
     if notes or known is None:
         return notes
@@ -338,9 +339,12 @@ def _time_warnings(recording: Recording) -> list[str]:
         return []
     step = np.diff(recording.time)
     spacing = float(np.median(step[:: max(1, len(step) // _ENOUGH)]))
-    if spacing >= 5.0:
-        return [f"The samples are {spacing:.3g} s apart: time may not be in seconds."]
-    return []
+    mean = float(recording.time[-1] - recording.time[0]) / len(
+        step
+    )  # instants of two clocks may be close by chance
+    if spacing < _SPARSE and mean > _DENSE:
+        return []
+    return [f"The samples are {max(spacing, mean):.3g} s apart: time may not be in seconds."]
 
 
 def _typical_size(recording: Recording, name: str) -> float | None:
