@@ -250,7 +250,8 @@ def test_a_column_named_time_that_counts_ticks_since_1970_is_proposed_in_its_uni
     with pytest.raises(tg.InputError, match=f"since 1970 in {unit}"):
         tg.read(log)
     seen = inspect(log)
-    assert seen.time is not None and seen.time.unit == unit
+    assert seen.time is not None
+    assert seen.time.unit == unit
     assert seen.time.duration == pytest.approx(TIME[-1] - TIME[0])
     (tmp_path / "p.yaml").write_text(seen.profile)
     assert tg.read(log, tmp_path / "p.yaml").time[-1] == pytest.approx(TIME[-1] - TIME[0])

@@ -305,3 +305,44 @@ def test_texts_that_are_no_times_stay_texts(tmp_path: Path) -> None:
     columns = read_table(path).columns
     assert columns["remark"].tolist() == ["12:00:00", "later"]
     assert columns["day"].dtype == object
+
+
+THOUSANDS = {
+    "a comma, quoted": ('"1,234"', ",", "0.5", "'1,234' may be 1234 or 1.234"),
+    "a comma": ("1,234", ";", "0.5", "'1,234' may be 1234 or 1.234"),
+    "a point": ("-1.234", ";", "0,5", "'-1.234' may be -1234 or -1.234"),
+    "a comma and a fraction": ('"1,234.5"', ",", "0.5", "'1,234.5' is not a number"),
+    "an apostrophe": ("1'234", ",", "0.5", '"1\'234" is not a number'),
+}
+
+
+@pytest.mark.parametrize("written", THOUSANDS)
+def test_thousands_are_no_fractions(tmp_path: Path, written: str) -> None:
+    """1,234 N m must not become 1.234 N m: the row is named, with what to write."""
+    high, separator, speed, problem = THOUSANDS[written]
+    log = tmp_path / "log.csv"
+    names = ("time", "ground_speed", "wheel_speed_l", "wheel_speed_r", "drawbar_force")
+    rows = [[str(k), speed, speed, speed, "970" if k % 2 else high] for k in range(20)]
+    log.write_text("\n".join(separator.join(row) for row in (names, *rows)) + "\n")
+    with pytest.raises(InputError) as caught:
+        read(log)
+    assert f"column drawbar_force, row 1: {problem}" in str(caught.value)
+    assert "write numbers without a sign between thousands" in str(caught.value)
+    foreign = {name: f"x_{name}" for name in names[1:]}
+    log.write_text("\n".join(separator.join(row) for row in (("time", *foreign.values()), *rows)) + "\n")
+    with pytest.raises(InputError, match="row 1"):
+        read(log, Profile.from_dict({"channels": foreign}))
+
+
+def test_three_decimals_behind_a_comma_are_a_fraction(tmp_path: Path) -> None:
+    log = tmp_path / "log.csv"
+    rows = "".join(f"{k};1,2{k:02d};12,3{k:02d};12,4{k:02d}\n" for k in range(20))
+    log.write_text("time;ground_speed;wheel_speed_l;wheel_speed_r\n" + rows)
+    assert read(log).channels["ground_speed"][3] == pytest.approx(1.203)
+
+
+def test_a_cell_of_blanks_is_empty(tmp_path: Path) -> None:
+    log = tmp_path / "log.csv"
+    rows = "".join(f"{k},{'   ' if k == 4 else 1.5},2,2\n" for k in range(20))
+    log.write_text("time,ground_speed,wheel_speed_l,wheel_speed_r\n" + rows)
+    assert np.flatnonzero(np.isnan(read(log).channels["ground_speed"])).tolist() == [4]

@@ -13,6 +13,7 @@ from terragrip.formats.dialect import Dialect, split
 from terragrip.formats.table import from_arrow
 from terragrip.formats.written_times import times_of
 from terragrip.recording.schema import LABELS, TIME, is_channel
+from terragrip.thousands import complaint, is_grouped
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -69,7 +70,10 @@ def parse(
         table = _arrow(body, dialect, chosen, types)
     except (pa.ArrowInvalid, pa.ArrowKeyError) as error:
         texts = _arrow_of_texts(body, dialect, chosen, error, source, first)
-        return {names[k]: _numbers_of_texts(names[k], texts.column(_field(k)), source, first) for k in chosen}
+        return {
+            names[k]: _numbers_of_texts(names[k], texts.column(_field(k)), dialect, source, first)
+            for k in chosen
+        }
     result = {names[k]: from_arrow(names[k], table.column(_field(k)), source) for k in chosen}
     return {name: _as_times(name, column) for name, column in result.items()}
 
@@ -141,23 +145,44 @@ def _ragged(body: bytes, dialect: Dialect, error: Exception, source: str, first:
     return InputError(problem, file=source, hint="look for unbalanced quotes")
 
 
-def _numbers_of_texts(name: str, column: pa.ChunkedArray, source: str, first: int) -> npt.NDArray[Any]:
+def _numbers_of_texts(
+    name: str, column: pa.ChunkedArray, dialect: Dialect, source: str, first: int
+) -> npt.NDArray[Any]:
     """Texts as numbers; a schema column raises InputError at the first that is none, another stays text."""
-    cells = column.to_pylist()
-    times = times_of(cells) if name == TIME or not (is_channel(name) or name in LABELS) else None
+    cells = [cell.strip() or None if cell is not None else None for cell in column.to_pylist()]
+    is_own = is_channel(name) or name == TIME
+    times = times_of(cells) if name == TIME or not (is_own or name in LABELS) else None
     if times is not None:
         return times
     result = np.full(len(cells), np.nan)
+    doubtful = _doubtful(cells, dialect.decimal)
     for row, cell in enumerate(cells):
-        if cell is None:
-            continue
-        try:
-            result[row] = float(cell.replace(",", "."))
-        except ValueError:
-            if name in LABELS or not (is_channel(name) or name == TIME):
-                return np.array(cells, dtype=object)
-            shown = repr(cell) if len(cell) <= 30 else repr(cell[:27] + "...")
-            place = f"column {name}, row {first + row + 1}"
-            hint = "leave the cell empty or give a number"
-            raise InputError(f"{shown} is not a number", file=source, place=place, hint=hint) from None
+        number = None if row == doubtful else _number(cell)
+        if number is not None:
+            result[row] = number
+        elif cell is not None and is_own:
+            raise _no_number(cell, f"column {name}, row {first + row + 1}", source)
+        else:
+            return np.array(cells, dtype=object)
     return result
+
+
+def _number(cell: str | None) -> float | None:
+    """The number in a cell by either decimal sign, NaN in an empty one; None where there is another text."""
+    try:
+        return np.nan if cell is None else float(cell.replace(",", "."))
+    except ValueError:
+        return None
+
+
+def _doubtful(cells: list[str | None], decimal: str) -> int | None:
+    """The first cell of a column in which a sign, other than the table's ``decimal``, may stand between thousands; None if in none."""
+    other = "," if decimal == "." else "."
+    signed = [row for row, cell in enumerate(cells) if cell is not None and other in cell]
+    return signed[0] if signed and all(is_grouped(str(cells[row]), other) for row in signed) else None
+
+
+def _no_number(cell: str, place: str, source: str) -> InputError:
+    shown = repr(cell) if len(cell) <= 30 else repr(cell[:27] + "...")
+    problem, hint = complaint(cell) or (f"{shown} is not a number", "leave the cell empty or give a number")
+    return InputError(problem, file=source, place=place, hint=hint)

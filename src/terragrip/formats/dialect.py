@@ -7,10 +7,11 @@ import io
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass
-from itertools import islice
+from itertools import islice, zip_longest
 
 from terragrip.errors import InputError
 from terragrip.text import HEAD
+from terragrip.thousands import has_thousands
 from terragrip.units import is_common
 
 _SEPARATORS = (",", ";", "\t", "|")
@@ -130,13 +131,20 @@ def _best(lines: list[str]) -> tuple[str, str]:
                 best, chosen = score, (separator, decimal)
     # One column has no separator: a comma in its numbers is the decimal sign.
     if best[0] <= 0:
-        return ";", "," if any("," in line for line in lines[1:]) else "."
+        chosen = ";", "," if any("," in line for line in lines[1:]) else "."
     # Quoted numbers may hold a decimal comma between commas.
-    if chosen[0] == ",":
-        cells = [cell for line in lines[1:20] for cell in split(line, ",")]
-        if any("," in cell and _is_number(cell, ",") for cell in cells):
-            return ",", ","
+    if chosen == (",", ".") or chosen[1] == ",":
+        return chosen[0], "," if _has_decimal_commas(lines[1:], chosen[0]) else "."
     return chosen
+
+
+def _has_decimal_commas(lines: list[str], separator: str) -> bool:
+    """Whether some column of the rows has commas in its numbers that cannot all be between thousands."""
+    columns = zip_longest(*(split(line, separator) for line in lines), fillvalue="")
+    return any(
+        any("," in cell and _is_number(cell, ",") for cell in column) and not has_thousands(column, ",")
+        for column in columns
+    )
 
 
 def _is_number(cell: str, decimal: str) -> bool:

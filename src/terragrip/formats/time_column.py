@@ -46,8 +46,8 @@ def _score(column: str, values: Floats, stated: str | None, vocabulary: Vocabula
     known = values[np.isfinite(values)]
     if column == TIME:
         own = clock_unit(float(np.max(np.abs(known), initial=0.0))) or "s"
-        unit = stated if stated is not None and kind_of(stated) == "time" else own
-        return 6.0 if _forward(known) > 0.9 and len(known) == len(values) else 3.0, unit
+        own = stated if stated is not None and kind_of(stated) == "time" else own
+        return 6.0 if _forward(known) > 0.9 and len(known) == len(values) else 3.0, own
     unit = next(
         (u for u in (stated, name.unit, _unit_word(name.words, vocabulary)) if u and kind_of(u) == "time"),
         None,

@@ -11,6 +11,7 @@ import numpy.typing as npt
 from terragrip.errors import InputError
 from terragrip.recording.checks import place
 from terragrip.recording.schema import TIME
+from terragrip.thousands import complaint, has_thousands
 
 Floats = npt.NDArray[np.float64]
 
@@ -56,6 +57,7 @@ def numbers(name: str, column: npt.NDArray[Any], time: Floats | None, source: st
     if column.dtype.kind in "fiub":
         return column.astype(np.float64, copy=False)
     if column.dtype.kind in "OUST":
+        _refuse_thousands(name, column, time, source)
         try:
             return column.astype(np.float64)
         except (TypeError, ValueError, OverflowError):
@@ -148,6 +150,16 @@ def _array(name: str, values: Any, source: str | None) -> npt.NDArray[Any]:
     return array
 
 
+def _refuse_thousands(name: str, column: npt.NDArray[Any], time: Floats | None, source: str | None) -> None:
+    """Raise InputError where the points in a column of texts may stand between thousands."""
+    cells = {row: cell.strip() for row, cell in enumerate(column.tolist()) if isinstance(cell, str)}
+    if not has_thousands(list(cells.values()), "."):
+        return
+    row, cell = next((row, cell) for row, cell in cells.items() if "." in cell)
+    problem, hint = complaint(cell) or ("", "")
+    raise InputError(problem, file=source, place=place(name, row, time), hint=hint)
+
+
 def _cell_by_cell(name: str, column: npt.NDArray[Any], time: Floats | None, source: str | None) -> Floats:
     """Convert a column of mixed objects; missing cells become NaN."""
     result = np.full(len(column), np.nan)
@@ -159,10 +171,6 @@ def _cell_by_cell(name: str, column: npt.NDArray[Any], time: Floats | None, sour
             result[row] = float(cell)
         except (TypeError, ValueError, OverflowError):
             text = repr(cell) if len(repr(cell)) <= 30 else repr(cell)[:27] + "..."
-            raise InputError(
-                f"{text} is not a number",
-                file=source,
-                place=place(name, row, time),
-                hint="give numbers in SI",
-            ) from None
+            problem, hint = complaint(str(cell)) or (f"{text} is not a number", "give numbers in SI")
+            raise InputError(problem, file=source, place=place(name, row, time), hint=hint) from None
     return result

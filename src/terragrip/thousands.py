@@ -1,0 +1,37 @@
+"""Numbers written with a sign between thousands: ``1,234`` must not become 1.234."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+
+SIGNS = ",.' \u2019\u00a0\u202f"
+"""What stands between thousands, somewhere."""
+_GROUPED = re.compile(rf"[+-]?[1-9]\d{{0,2}}(?P<sign>[{SIGNS}])\d{{3}}(?:(?P=sign)\d{{3}})*(?:[.,]\d+)?")
+
+
+def is_grouped(cell: str, sign: str) -> bool:
+    """Whether a number may be written with ``sign`` between thousands: ``1,234``, ``12'345.6``."""
+    match = _GROUPED.fullmatch(cell)
+    return match is not None and match["sign"] == sign
+
+
+def has_thousands(cells: Sequence[str], sign: str) -> bool:
+    """Whether the numbers of a column may be written with ``sign`` between thousands: each that has it does, and there are whole
+    numbers without it, or with two of it."""
+    signed = [cell for cell in cells if sign in cell]
+    if not signed or not all(is_grouped(cell, sign) for cell in signed):
+        return False
+    whole = any(re.fullmatch(r"[+-]?\d+", cell) for cell in cells if sign not in cell)
+    return whole or any(cell.count(sign) > 1 for cell in signed)
+
+
+def complaint(cell: str) -> tuple[str, str] | None:
+    """What is wrong with a cell that may have a sign between thousands, and what to write; None where it has none."""
+    sign = next((sign for sign in SIGNS if is_grouped(cell, sign)), None)
+    if sign is None:
+        return None
+    problem = f"{cell!r} is not a number"
+    if sign in ",." and len(re.findall("[.,]", cell)) == 1:
+        problem = f"{cell!r} may be {cell.replace(sign, '')} or {cell.replace(sign, '.')}"
+    return problem, "write numbers without a sign between thousands"
