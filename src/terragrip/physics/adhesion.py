@@ -12,10 +12,11 @@ from types import MappingProxyType
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-Array = NDArray[np.float64]
-Function = Callable[[Array, Mapping[str, Array]], Array]
+from terragrip.arrays import Floats
+
+Function = Callable[[Floats, Mapping[str, Floats]], Floats]
 
 PROTOTYPE: Mapping[str, float] = MappingProxyType({"p": 0.52, "alpha_1": 0.01, "alpha_2": -11.36})
 """Shape of the paper's prototype curve (eq. 8, fitted by its authors to Wuensche 2005)."""
@@ -48,14 +49,14 @@ class CurveModel:
     positive_slope: Function
     source: str
     fixed: frozenset[str] = frozenset()
-    native_intercept: Callable[[Mapping[str, Array]], Array] | None = None
+    native_intercept: Callable[[Mapping[str, Floats]], Floats] | None = None
 
     @property
     def names(self) -> tuple[str, ...]:
         """Parameter names in the printed order."""
         return tuple(parameter.name for parameter in self.parameters)
 
-    def complete(self, parameters: Mapping[str, ArrayLike]) -> dict[str, Array]:
+    def complete(self, parameters: Mapping[str, ArrayLike]) -> dict[str, Floats]:
         """All parameters as arrays: those given, the rest at their start values. ValueError on a name that is not the model's."""
         unknown = sorted(set(parameters) - set(self.names))
         if unknown:
@@ -66,7 +67,7 @@ class CurveModel:
 
     def value(
         self, slip: ArrayLike, parameters: Mapping[str, ArrayLike], intercept: ArrayLike = 0.0
-    ) -> Array:
+    ) -> Floats:
         """mu(s) (or kappa(s) with intercept = -rho) [-]; slip of any shape in [-1, 1], odd extension; NaN stays NaN."""
         s = np.asarray(slip, dtype=float)
         full = self.complete(parameters)
@@ -75,7 +76,7 @@ class CurveModel:
             np.sign(s) * self.positive(np.abs(s), full) + native + np.asarray(intercept, dtype=float)
         )
 
-    def slope(self, slip: ArrayLike, parameters: Mapping[str, ArrayLike]) -> Array:
+    def slope(self, slip: ArrayLike, parameters: Mapping[str, ArrayLike]) -> Floats:
         """dmu/ds [-], even in slip."""
         return np.asarray(
             self.positive_slope(np.abs(np.asarray(slip, dtype=float)), self.complete(parameters))
@@ -87,7 +88,7 @@ class CurveModel:
         return _largest(grid, self.value(grid, parameters))
 
 
-def _largest(grid: Array, values: Array) -> tuple[float, float]:
+def _largest(grid: Floats, values: Floats) -> tuple[float, float]:
     i = int(np.nanargmax(values))
     if i in (0, len(grid) - 1):
         return float(grid[i]), float(values[i])
@@ -111,13 +112,13 @@ def efficiency_peak(
     return _largest(grid, eta) if eta.max() > 0 else (float("nan"), 0.0)
 
 
-def _exponential(s: Array, q: Mapping[str, Array]) -> Array:
+def _exponential(s: Floats, q: Mapping[str, Floats]) -> Floats:
     return np.asarray(
         q["a"] * (1 - q["p"] * np.exp(q["alpha_1"] * s) - (1 - q["p"]) * np.exp(q["alpha_2"] * s))
     )
 
 
-def _exponential_slope(s: Array, q: Mapping[str, Array]) -> Array:
+def _exponential_slope(s: Floats, q: Mapping[str, Floats]) -> Floats:
     first = q["p"] * q["alpha_1"] * np.exp(q["alpha_1"] * s)
     return np.asarray(-q["a"] * (first + (1 - q["p"]) * q["alpha_2"] * np.exp(q["alpha_2"] * s)))
 
@@ -125,40 +126,40 @@ def _exponential_slope(s: Array, q: Mapping[str, Array]) -> Array:
 def _saturating(first: str, rate: str, fall: str) -> tuple[Function, Function]:
     """A(1 - e^{-k s}) - d s under the parameter names of one author or another."""
 
-    def value(s: Array, q: Mapping[str, Array]) -> Array:
+    def value(s: Floats, q: Mapping[str, Floats]) -> Floats:
         return np.asarray(-q[first] * np.expm1(-q[rate] * s) - q[fall] * s)
 
-    def slope(s: Array, q: Mapping[str, Array]) -> Array:
+    def slope(s: Floats, q: Mapping[str, Floats]) -> Floats:
         return np.asarray(q[first] * q[rate] * np.exp(-q[rate] * s) - q[fall])
 
     return value, slope
 
 
-def _pacejka(s: Array, q: Mapping[str, Array]) -> Array:
+def _pacejka(s: Floats, q: Mapping[str, Floats]) -> Floats:
     x = q["B"] * s
     return np.asarray(q["D"] * np.sin(q["C"] * np.arctan(x - q["E"] * (x - np.arctan(x)))))
 
 
-def _pacejka_slope(s: Array, q: Mapping[str, Array]) -> Array:
+def _pacejka_slope(s: Floats, q: Mapping[str, Floats]) -> Floats:
     x = q["B"] * s
     inner = x - q["E"] * (x - np.arctan(x))
     inner_slope = q["B"] * (1 - q["E"] * (1 - 1 / (1 + x**2)))
     return np.asarray(q["D"] * np.cos(q["C"] * np.arctan(inner)) * q["C"] / (1 + inner**2) * inner_slope)
 
 
-def _brixius(s: Array, q: Mapping[str, Array]) -> Array:
+def _brixius(s: Floats, q: Mapping[str, Floats]) -> Floats:
     return np.asarray(0.88 * np.expm1(-0.1 * q["mobility"]) * np.expm1(-7.5 * s))
 
 
-def _brixius_slope(s: Array, q: Mapping[str, Array]) -> Array:
+def _brixius_slope(s: Floats, q: Mapping[str, Floats]) -> Floats:
     return np.asarray(-0.88 * np.expm1(-0.1 * q["mobility"]) * 7.5 * np.exp(-7.5 * s))
 
 
-def _wismer_luth(s: Array, q: Mapping[str, Array]) -> Array:
+def _wismer_luth(s: Floats, q: Mapping[str, Floats]) -> Floats:
     return np.asarray(-0.75 * np.expm1(-0.3 * q["wheel_numeric"] * s))
 
 
-def _wismer_luth_slope(s: Array, q: Mapping[str, Array]) -> Array:
+def _wismer_luth_slope(s: Floats, q: Mapping[str, Floats]) -> Floats:
     return np.asarray(0.225 * q["wheel_numeric"] * np.exp(-0.3 * q["wheel_numeric"] * s))
 
 
@@ -178,13 +179,13 @@ def brixius_mobility_number(
     return cone_index * width * diameter / load * shape
 
 
-def brixius_resistance(mobility: ArrayLike, slip: ArrayLike = 0.0) -> Array:
+def brixius_resistance(mobility: ArrayLike, slip: ArrayLike = 0.0) -> Floats:
     """Soil part of Brixius' motion resistance in the paper's split: rho_s = 1/Bn + 0.5 s/sqrt(Bn) (the 0.04 is rho_t)."""
     n = np.asarray(mobility, dtype=float)
     return np.asarray(1 / n + 0.5 * np.abs(np.asarray(slip, dtype=float)) / np.sqrt(n))
 
 
-def wismer_luth_resistance(wheel_numeric: ArrayLike) -> Array:
+def wismer_luth_resistance(wheel_numeric: ArrayLike) -> Floats:
     """Wismer and Luth's motion resistance ratio 1.2/Cn + 0.04, so that value - resistance is their net traction ratio."""
     return np.asarray(1.2 / np.asarray(wheel_numeric, dtype=float) + 0.04)
 

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 
-Floats = npt.NDArray[np.float64]
+from terragrip.arrays import Floats
 
 
 def metres_of(latitude: Floats, longitude: Floats) -> tuple[Floats, Floats]:

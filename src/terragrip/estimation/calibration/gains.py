@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
+from terragrip.arrays import Bools, Floats, Ints
 from terragrip.estimation.calibration.plausible import turns_unseen
 from terragrip.estimation.calibration.result import Evidence, Quantity, Unknown
 from terragrip.estimation.calibration.sharing import SharedGains, Sharing, fit_shared_gains
@@ -16,9 +16,6 @@ from terragrip.estimation.calibration.zeros import Spell, evidence
 from terragrip.physics.slip import slip
 from terragrip.recording import Recording
 from terragrip.vehicle import Vehicle
-
-Floats = npt.NDArray[np.float64]
-Ints = npt.NDArray[np.intp]
 
 WINDOW = 0.5
 """Window length [s]: a third of a metre of track."""
@@ -203,7 +200,7 @@ def _soil_codes(table: Windows) -> Ints:
     return np.unique(np.array(names, dtype=str), return_inverse=True)[1].astype(np.intp)
 
 
-def _near_border(table: Windows) -> npt.NDArray[np.bool_]:
+def _near_border(table: Windows) -> Bools:
     """Windows (n,) in which not all wheels may be on the soil of the label: within a wheelbase of a border."""
     near = np.zeros(len(table), dtype=bool)
     for index in np.unique(table.recording):

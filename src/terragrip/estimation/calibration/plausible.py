@@ -5,15 +5,13 @@ from __future__ import annotations
 from collections.abc import Collection, Sequence
 
 import numpy as np
-import numpy.typing as npt
 
+from terragrip.arrays import Bools, Floats
 from terragrip.estimation.calibration.result import Quantity, Unknown
 from terragrip.estimation.calibration.windows import Windows, windows
 from terragrip.recording import Recording
 from terragrip.recording.track import track_of
 from terragrip.vehicle import Vehicle
-
-Floats = npt.NDArray[np.float64]
 
 UNSTATED_GAIN = 0.1
 """Relative SD of a torque channel's gain where the vehicle states none: that of motor currents and of strain gauges on a shaft."""
@@ -87,7 +85,7 @@ def turned_unseen(logs: Sequence[Recording], vehicle: Vehicle, known: Collection
     return [Unknown("angular_velocity_z", why)]
 
 
-def turns_unseen(table: Windows, vehicle: Vehicle) -> npt.NDArray[np.bool_]:
+def turns_unseen(table: Windows, vehicle: Vehicle) -> Bools:
     """Windows (n,) in which the wheels' speeds show a turn, and no yaw rate is known."""
     rim = table.wheel_speed * vehicle.wheel_radius
     shown = np.zeros(len(table), dtype=bool)

@@ -22,8 +22,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
+from terragrip.arrays import Bools, Floats, Ints
 from terragrip.estimation.calibration.result import Evidence, Unknown
 from terragrip.estimation.calibration.sharing import block_covariance, effective_blocks
 from terragrip.estimation.calibration.windows import Windows
@@ -32,9 +32,6 @@ from terragrip.physics.loads import GRAVITY
 from terragrip.physics.motion import algebraic_adhesion
 from terragrip.physics.slip import slip
 from terragrip.vehicle import Vehicle
-
-Floats = npt.NDArray[np.float64]
-Bools = npt.NDArray[np.bool_]
 
 WINDOW = 2.0
 """Window length [s]: long enough that the noise of a speed sensor is small beside slip."""
@@ -73,7 +70,7 @@ class Rolling:
 
 
 def rolling_radii(
-    windows: Windows, vehicle: Vehicle, block: npt.NDArray[np.intp], sources: Sequence[str]
+    windows: Windows, vehicle: Vehicle, block: Ints, sources: Sequence[str]
 ) -> Rolling | Unknown:
     """Rolling radius of every wheel from the zero-pull windows, with its slip there corrected.
 
@@ -167,10 +164,10 @@ def _fit(
     windows: Windows,
     vehicle: Vehicle,
     adhesion: Floats,
-    code: npt.NDArray[np.intp],
+    code: Ints,
     most: Floats,
     used: Bools,
-    block: npt.NDArray[np.intp],
+    block: Ints,
 ) -> tuple[Floats, Floats, Floats, float]:
     """Least squares for the radii over the file's, ln C_j and ln A_j; the variance is over blocks of track.
 

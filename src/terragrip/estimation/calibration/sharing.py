@@ -20,13 +20,9 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-import numpy.typing as npt
 
+from terragrip.arrays import Bools, Floats, Ints
 from terragrip.physics.adhesion import PROTOTYPE
-
-Floats = npt.NDArray[np.float64]
-Ints = npt.NDArray[np.intp]
-Bools = npt.NDArray[np.bool_]
 
 _ROUNDS = 60
 _CLOSE = 1e-8  # change of every ln k

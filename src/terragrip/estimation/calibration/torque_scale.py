@@ -23,8 +23,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
+from terragrip.arrays import Bools, Floats
 from terragrip.errors import InputError
 from terragrip.estimation.calibration.plausible import turns_unseen
 from terragrip.estimation.calibration.result import Evidence, Quantity
@@ -34,9 +34,6 @@ from terragrip.physics.loads import GRAVITY
 from terragrip.physics.slip import slip
 from terragrip.recording import Recording, without_held
 from terragrip.vehicle import Vehicle
-
-Floats = npt.NDArray[np.float64]
-Bools = npt.NDArray[np.bool_]
 
 _SHORTEST = 1.0  # s
 _HOLDS = 2.0  # a window spans so many updates of the slowest torque channel

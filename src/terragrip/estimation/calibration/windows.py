@@ -12,13 +12,11 @@ from dataclasses import dataclass, fields
 import numpy as np
 import numpy.typing as npt
 
+from terragrip.arrays import Bools, Floats, Ints
 from terragrip.physics.loads import GRAVITY, axle_loads, wheel_shares
 from terragrip.recording import Recording
 from terragrip.recording.window_means import window_means
 from terragrip.vehicle import Vehicle
-
-Floats = npt.NDArray[np.float64]
-Ints = npt.NDArray[np.intp]
 
 _BLOCK_COUNT = 40  # stretches of track wanted,
 _SHORTEST_BLOCK, _LONGEST_BLOCK = 4.0, 20.0  # m, and their lengths
@@ -62,7 +60,7 @@ class Windows:
     def __len__(self) -> int:
         return len(self.start)
 
-    def select(self, rows: npt.NDArray[np.bool_]) -> Windows:
+    def select(self, rows: Bools) -> Windows:
         """The windows of a mask (n,)."""
         values = {f.name: getattr(self, f.name) for f in fields(self)}
         return Windows(**{name: v if name == "length" else v[rows] for name, v in values.items()})

@@ -10,14 +10,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
+from terragrip.arrays import Bools, Floats, Ints
 from terragrip.estimation.calibration.result import Evidence, Quantity, Unknown
 from terragrip.estimation.calibration.windows import Windows
 from terragrip.physics.loads import GRAVITY
 from terragrip.vehicle import Vehicle
-
-Floats = npt.NDArray[np.float64]
 
 WINDOW = 0.5
 """Window length [s] in which standstill is looked for."""
@@ -58,7 +56,7 @@ def standstills(windows: Windows, vehicle: Vehicle) -> list[Spell]:
     return [Spell(s.first + (not begins[s.first]), s.last) for s in stops]
 
 
-def spells(wanted: npt.NDArray[np.bool_], recording: npt.NDArray[np.intp], least: int) -> list[Spell]:
+def spells(wanted: Bools, recording: Ints, least: int) -> list[Spell]:
     """Runs of at least ``least`` wanted windows (n,) within one recording."""
     edge = np.flatnonzero(np.diff(wanted.astype(int)) | np.diff(recording)) + 1
     starts, ends = np.r_[0, edge], np.r_[edge, len(wanted)]
