@@ -2,33 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
-from importlib import import_module
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Protocol
 
 from terragrip.live.outbox import Outbox
-from terragrip.live.sources import packages_of
-from terragrip.live.uri import Uri
+from terragrip.live.uri import Links, Uri, opened
 
 if TYPE_CHECKING:
     from terragrip.vehicle import Vehicle
 
-_HOMES: dict[str, str] = {
-    "udp": "udp.UdpSink", "mqtt": "mqtt.MqttSink", "mqtts": "mqtt.MqttSink", "zenoh": "zenoh.ZenohSink",
-    "foxglove": "foxglove.FoxgloveSink", "studio": "studio.StudioSink", "can": "can.CanSink", "ros2": "ros2.Ros2Sink",
-}  # fmt: skip
-"""Module and class of each scheme; the class is called with the URI, the vehicle and the estimates' columns."""
 _ALL = ("rate", "columns")
-OPTIONS: dict[str, Collection[str]] = {
-    "udp": (*_ALL, "format"),
-    "mqtt": (*_ALL, "qos", "client"),
-    "mqtts": (*_ALL, "qos", "client", "ca"),
-    "zenoh": (*_ALL, "connect", "listen", "scout"),
-    "foxglove": (*_ALL, "mcap"),
-    "studio": _ALL,
-    "can": (*_ALL, "interface", "bitrate"),
-    "ros2": (*_ALL, "domain", "connect", "listen", "scout"),
+_LINKS: Links = {
+    "udp": ("udp.UdpSink", (*_ALL, "format")),
+    "mqtt": ("mqtt.MqttSink", (*_ALL, "qos", "client")),
+    "mqtts": ("mqtt.MqttSink", (*_ALL, "qos", "client", "ca")),
+    "zenoh": ("zenoh.ZenohSink", (*_ALL, "connect", "listen", "scout")),
+    "foxglove": ("foxglove.FoxgloveSink", (*_ALL, "mcap")),
+    "studio": ("studio.StudioSink", _ALL),
+    "can": ("can.CanSink", (*_ALL, "interface", "bitrate")),
+    "ros2": ("ros2.Ros2Sink", (*_ALL, "domain", "connect", "listen", "scout")),
 }
+"""Of each scheme the module and class, which is called with the URI, the vehicle and the estimates' columns, and the URI's options."""
 
 
 class Sink(Protocol):
@@ -42,8 +36,4 @@ def open_sink(text: str, vehicle: Vehicle | None, columns: Sequence[str]) -> tup
     """The sink of a URI for estimates of these columns; ``vehicle`` None: of many. Raises InputError if it names none, or the package
     it needs is missing.
     """
-    uri = Uri.parse(text, OPTIONS, "sink")
-    with packages_of(uri):
-        module, name = _HOMES[uri.scheme].split(".")
-        sink: Sink = getattr(import_module(f"{__name__}.{module}"), name)(uri, vehicle, columns)
-    return uri, sink
+    return opened(text, _LINKS, "sink", __name__, vehicle, columns)
