@@ -23,14 +23,9 @@ if TYPE_CHECKING:
 class Options:
     """What the command line says besides sources, sinks and vehicle.
 
-    method: the estimator's.
-    window: s that a row waits for what is due (`terragrip.live.reorder`).
-    held: update periods [s] of channels that a source repeats between updates.
-    noise: SDs [SI] by channel, as estimates of a log hold them; they win over the vehicle file's.
-    learn: tell noise and held channels that are not given from the rows as they come.
     ground: report ground changes while driving; library: and which of these soils it is.
     setpoint: slip and ground speed wanted [m/s] of the set-point to publish beside the estimates; None: none is.
-    driveline: what an earlier log showed of a machine with engine torque (``about["driveline"]`` of its estimates).
+    All others are those of a run's `Settings`.
 
     Raises InputError on an unknown method.
     """

@@ -16,16 +16,8 @@ from terragrip.live.record import ROWS, SECONDS, Recorder
 class Pipeline:
     """`process`, `tick`, `note` and `flush` as `Core` has them, their inputs and outputs kept in a record.
 
-    A record that cannot be written ends with an event, not the run; ``failure`` then tells why.
-
-    Parameters
-    ----------
-    core: one that has processed nothing yet; a record's own takes its place, which must be of the same vehicle, settings
-        and library.
-    folder: of the record, which goes on from its end where it holds one; None: none is kept.
-    rows, seconds: when a segment of it is closed. thread: that its work for the disk is done in; None: one of its own.
-
-    Raises InputError if the folder cannot be used, is in use, or holds the record of another vehicle or other settings.
+    A record that cannot be written ends with an event, not the run; ``failure`` then tells why. Arguments and errors are those of
+    `Recorder`; ``folder`` None: no record is kept.
     """
 
     def __init__(

@@ -38,14 +38,12 @@ class VehicleRun:
 
     Parameters
     ----------
-    core: one that has processed nothing yet; a record's own takes its place.
     inbox: where the feeds put samples. decoders: of each of the core's sources; profile: theirs.
     outboxes: of the sinks that everything published goes to, besides ``listeners``.
-    record: folder of the record; None: none is kept.
     setpoint: that is published beside the estimates; None: none is.
     is_real_time: samples come when they come, and silence means something.
-    name: of the vehicle, where many are served. thread, segment: of the record, and s after which a
-        segment of it is closed (`Recorder`). predict: s of silence that predictions go on for.
+    name: of the vehicle, where many are served. predict: s of silence that predictions go on for.
+    core, record, thread, segment: a `Recorder`'s core, folder (None: no record is kept), thread and seconds.
 
     Raises InputError where the record cannot be used.
     """
