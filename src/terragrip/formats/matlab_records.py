@@ -2,7 +2,7 @@
 
 A series in such a Dataset is a struct that says how to read it: ``DataR2`` and ``TimeR2`` are numbers of records, ``CompressedTime``
 is start, step and count of a regular clock, ``SignalAttributes`` tells class and dimension of a sample. Record k is
-``/#sigstream#/k`` with ``#data#`` (bytes), ``#length#`` (samples) and ``#sampleSize#`` (bytes of one). Decision 0107 says what this
+``/#sigstream#/k`` with ``#data#`` (bytes), ``#length#`` (samples) and ``#sampleSize#`` (bytes of one). docs/formats.md says what this
 rests on.
 """
 
