@@ -18,6 +18,7 @@ from terragrip.formats.evidence import (
 from terragrip.formats.judgement import Guess
 from terragrip.formats.rims import Ranked, Rims, Way, surest
 from terragrip.units import factor_to
+from terragrip.vehicle import Vehicle
 
 _KNOWN = ("Terragrip", "a signal")
 _SIDEWAYS = 15.0  # m/s^2, the 90 % quantile
@@ -26,8 +27,10 @@ _SIDEWAYS = 15.0  # m/s^2, the 90 % quantile
 class Agreement:
     """The columns of one log, their evidence, and the guesses that these leave standing."""
 
-    def __init__(self, columns: Mapping[str, Column], evidence: Evidence) -> None:
-        self._columns, self._evidence = columns, evidence
+    def __init__(
+        self, columns: Mapping[str, Column], evidence: Evidence, vehicle: Vehicle | None = None
+    ) -> None:
+        self._columns, self._evidence, self._vehicle = columns, evidence, vehicle
 
     def refine(self, ranked: Ranked) -> None:
         """Hold the guesses against each other, in the order in which one helps the next."""
@@ -38,7 +41,9 @@ class Agreement:
         self._prefer_ground(ranked)
         self._accelerations(ranked)
         self._turning(ranked)
-        Rims(self._evidence).judge(ranked, self._ground(ranked), path, self._turns_of_body(ranked))
+        Rims(self._evidence, self._vehicle).judge(
+            ranked, self._ground(ranked), path, self._turns_of_body(ranked)
+        )
         for channel in [c for c, guesses in ranked.items() if not guesses]:
             del ranked[channel]
 

@@ -143,6 +143,17 @@ class Evidence:
 
     def run_over(self, name: str, path: Path) -> tuple[float, float] | None:
         """The integral of a column's size over a path's pieces, divided by their length, and that length [m]; None of short paths."""
+        pieces = self.pieces_over(name, path)
+        if pieces is None:
+            return None
+        run, lengths, durations = (float(one.sum()) for one in pieces)
+        # Of a receiver that stands still, the path is its noise.
+        if lengths < max(2.0, _SLOWEST * durations) or not run > 0:
+            return None
+        return run / lengths, lengths
+
+    def pieces_over(self, name: str, path: Path) -> tuple[Floats, Floats, Floats] | None:
+        """Of a path's pieces within a column's time the integrals of its size, their lengths [m] and how long they last [s]; else None."""
         result = self.series(name)
         begins, ends, lengths = path
         if result is None or not len(lengths):
@@ -151,12 +162,7 @@ class Evidence:
         total = np.concatenate(([0.0], np.cumsum(0.5 * np.abs(values[1:] + values[:-1]) * np.diff(time))))
         inside = (begins >= time[0]) & (ends <= time[-1])
         run = np.interp(ends, time, total) - np.interp(begins, time, total)
-        driven = float(lengths[inside].sum())
-        duration = float((ends - begins)[inside].sum())
-        # Of a receiver that stands still, the path is its noise.
-        if driven < max(2.0, _SLOWEST * duration) or not float(run[inside].sum()) > 0:
-            return None
-        return float(run[inside].sum()) / driven, driven
+        return run[inside], lengths[inside], (ends - begins)[inside]
 
     def against_path(self, name: str, path: Path, source: str) -> Finding | None:
         """A speed column against a path: its integral over the pieces divided by their lengths tells the unit."""

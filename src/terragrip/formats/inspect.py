@@ -146,7 +146,7 @@ def inspect(
         log = _as_table(recording, log)
     seen = Seen.of(log, whole=every == 1)
     numbers = seen.numbers()
-    proposals = seen.proposals(GENERAL)
+    proposals = seen.proposals(GENERAL, machine)
     quiet = silent(numbers, proposals, seen.units)
     warnings += [*quiet, *(note for note in seen.repeats.notes() if recording is None)]
     stamp, base = seen.stamp, seen.base
@@ -240,11 +240,11 @@ class Seen:
             if c.dtype.kind in "fiub" and n != own
         }
 
-    def proposals(self, vocabulary: Vocabulary) -> dict[str, Proposal]:
-        """What each channel may be made of, by a vocabulary."""
+    def proposals(self, vocabulary: Vocabulary, vehicle: Vehicle | None = None) -> dict[str, Proposal]:
+        """What each channel may be made of, by a vocabulary, and by the radii of a vehicle."""
         numbers = self.numbers()
         clocks = {name: clock for name in numbers if (clock := self.clock_of(name)) is not None}
-        return propose(numbers, self.texts(), self.units, clocks, vocabulary)
+        return propose(numbers, self.texts(), self.units, clocks, vocabulary, vehicle)
 
     def texts(self) -> dict[str, npt.NDArray[Any]]:
         """The text columns."""

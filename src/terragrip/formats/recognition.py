@@ -18,9 +18,11 @@ from terragrip.formats.agreement import Agreement
 from terragrip.formats.candidates import Column, candidates_of, columns_of, kind_of
 from terragrip.formats.evidence import Evidence
 from terragrip.formats.judgement import Guess, Judge
+from terragrip.formats.rim_units import radius_of
 from terragrip.formats.vocabulary import GENERAL, Vocabulary
 from terragrip.recording.schema import LABELS, unit_of
 from terragrip.units import factor_to
+from terragrip.vehicle import Vehicle
 
 Texts = Mapping[str, npt.NDArray[Any]]
 
@@ -64,11 +66,12 @@ def propose(
     units: Mapping[str, str],
     clocks: Mapping[str, Floats] | None = None,
     vocabulary: Vocabulary = GENERAL,
+    vehicle: Vehicle | None = None,
 ) -> dict[str, Proposal]:
     """A `Proposal` for each channel that some column may be, by channel.
 
     ``numbers`` are the columns (n,), ``texts`` the text columns, ``units`` those that the log states, ``clocks`` the instants [s] of
-    each column (n,), without which nothing is held against time.
+    each column (n,), without which nothing is held against time. The radii of a ``vehicle`` tell the unit of wheel speeds.
     """
     constants = _constants(texts) if isinstance(texts, Mapping) else {}
     columns = columns_of(tuple(numbers), constants, units, vocabulary)
@@ -82,9 +85,11 @@ def propose(
                 continue
             if (guess := judge.of(candidate)) is not None:
                 ranked.setdefault(candidate.channel, []).append(guess)
-    Agreement(columns, evidence).refine(ranked)
+    Agreement(columns, evidence, vehicle).refine(ranked)
     chosen = _assigned(ranked)
-    proposals = {channel: _proposal(channel, guess, ranked[channel]) for channel, guess in chosen.items()}
+    proposals = {
+        channel: _proposal(channel, guess, ranked[channel], vehicle) for channel, guess in chosen.items()
+    }
     _add_derived(proposals, numbers, columns, plane)
     for name in texts:
         if name in LABELS or vocabulary.read(name).has("soil"):
@@ -126,7 +131,7 @@ def _assigned(ranked: Mapping[str, list[Guess]]) -> dict[str, Guess]:
     return chosen
 
 
-def _proposal(channel: str, guess: Guess, ranked: list[Guess]) -> Proposal:
+def _proposal(channel: str, guess: Guess, ranked: list[Guess], vehicle: Vehicle | None) -> Proposal:
     others = sorted((g for g in ranked if g is not guess), key=lambda g: -g.confidence)
     doubt = guess.doubt or guess.unit_doubt
     if not doubt and guess.confidence < SURE:
@@ -143,8 +148,13 @@ def _proposal(channel: str, guess: Guess, ranked: list[Guess]) -> Proposal:
         side = " times the gear ratio" if guess.column.name.has("motor") else ""
         give = f"a current: the scale in N m per A{side} is yours to give"
     elif channel.startswith("wheel_speed_") and kind == "speed" and unit is not None:
-        entry |= {"scale": float(f"{factor_to(unit, 'm/s'):.6g}"), "unit": "rad/s"}
-        give = f"a rim speed in {unit}: divide the scale by the wheel's radius in m"
+        radius = radius_of(vehicle, channel.removeprefix("wheel_speed_"))
+        entry |= {"scale": float(f"{factor_to(unit, 'm/s') / (radius or 1.0):.6g}"), "unit": "rad/s"}
+        give = (
+            f"a rim speed in {unit}: divide the scale by the wheel's radius in m"
+            if radius is None
+            else f"a rim speed in {unit}, by the vehicle's radius of {radius:.4g} m"
+        )
     elif unit and target and (unit != target or guess.column.stated not in (None, unit)):
         entry["unit"] = unit
     if guess.column.name.has("motor") and not give and channel.startswith(("wheel_speed_", "drive_torque_")):
@@ -159,7 +169,7 @@ def _proposal(channel: str, guess: Guess, ranked: list[Guess]) -> Proposal:
         give,
         round(guess.confidence, 2),
         guess.evidence,
-        tuple(_proposal(channel, g, []) for g in others[:3]),
+        tuple(_proposal(channel, g, [], vehicle) for g in others[:3]),
         unit or None,
     )
 

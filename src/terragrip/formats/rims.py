@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from terragrip.formats.candidates import kind_of
 from terragrip.formats.evidence import (
     RADII,
     SPEED_UNITS,
@@ -18,7 +19,9 @@ from terragrip.formats.evidence import (
     slope_of,
 )
 from terragrip.formats.judgement import Guess
+from terragrip.formats.rim_units import POSSIBLE, lightest_share, radius_of, rim_unit, speeds_of
 from terragrip.units import factor_to
+from terragrip.vehicle import Vehicle
 
 Ranked = dict[str, list[Guess]]
 Way = tuple[str, Path | float]
@@ -43,16 +46,30 @@ def surest(ranked: Mapping[str, list[Guess]], channel: str) -> Guess | None:
 class Rims:
     """Judges the guesses of wheel speeds of one log."""
 
-    def __init__(self, evidence: Evidence) -> None:
+    def __init__(self, evidence: Evidence, vehicle: Vehicle | None = None) -> None:
         self._evidence = evidence
+        self._vehicle = vehicle
 
     def judge(
         self, ranked: Ranked, ground: Ground | None, paths: list[Way], turns: list[tuple[str, Series]]
     ) -> None:
-        """Judge by the radius that follows from the ground speed or the path, by the others, and by the track."""
+        """Judge by the vehicle's radius or the one that follows from the ground speed or the path, by the others, and by the track."""
         channels = [c for c in ranked if c.startswith("wheel_speed_")]
+        alike = self._without_unit(ranked, channels)
+        by_radius = (
+            rim_unit(self._evidence, self._vehicle, alike, ground, paths)
+            if self._vehicle is not None and alike
+            else None
+        )
         for channel in channels:
-            ranked[channel] = [self._against_way(g, ground, paths) for g in ranked[channel]]
+            wheel = channel.removeprefix("wheel_speed_")
+            radius = radius_of(self._vehicle, wheel)
+            ranked[channel] = [
+                by_radius.judge(g, radius)
+                if by_radius is not None and radius is not None and g.column.column == alike.get(wheel)
+                else self._against_way(g, ground, paths)
+                for g in ranked[channel]
+            ]
         self._as_the_others(ranked, channels)
         for left, right in (("l", "r"), ("fl", "fr"), ("rl", "rr")):
             self._track(ranked, f"wheel_speed_{left}", f"wheel_speed_{right}", turns)
@@ -62,13 +79,35 @@ class Rims:
                 for g in ranked.get("wheel_based_speed", [])
             ]
 
+    def _without_unit(self, ranked: Ranked, channels: list[str]) -> dict[str, str]:
+        """Of wheels whose radius is known, the columns that give no unit of their own."""
+        best = {c.removeprefix("wheel_speed_"): surest(ranked, c) for c in channels}
+        return {
+            wheel: guess.column.column
+            for wheel, guess in best.items()
+            if guess is not None
+            and guess.column.unit is None
+            and radius_of(self._vehicle, wheel) is not None
+            and not guess.column.name.has("motor")
+        }
+
     def _against_way(self, guess: Guess, ground: Ground | None, paths: list[Way]) -> Guess:
         result = None
-        if ground is not None and (ratio := self._evidence.ratio(ground[0], guess.column.column)) is not None:
+        if guess.column.unit is None and not guess.column.name.has("motor"):
+            result = self._metres(guess.column.column, ground, paths)
+        elif (
+            ground is not None and (ratio := self._evidence.ratio(ground[0], guess.column.column)) is not None
+        ):
             result = ratio[0] * ground[1], ground[0]
         elif ground is None:
             result = self._by_path(guess, paths)
         return guess if result is None else guess.with_finding(self._rim(guess, *result))
+
+    def _metres(self, column: str, ground: Ground | None, paths: list[Way]) -> tuple[float, str] | None:
+        """Metres of ground for one count of wheel speed over a second, and by what; None where the two do not go together."""
+        pair = speeds_of(self._evidence, [column], ground, paths)
+        share = None if pair is None else lightest_share(pair[1], pair[2][0])
+        return None if pair is None or share is None else (share, pair[0])
 
     def _by_path(self, guess: Guess, paths: list[Way]) -> tuple[float, str] | None:
         """Metres driven for one count of wheel speed over a second, by positions."""
@@ -98,6 +137,13 @@ class Rims:
                 return Finding(0.5 < share < 1.6, f"{ground} is {share:.3g} times the rim speed")
             factor = factor_to(guess.column.unit, "rad/s")
             radius = metres / factor
+            known = radius_of(self._vehicle, guess.channel.removeprefix("wheel_speed_"))
+            if known is not None:
+                share = radius / known
+                return Finding(
+                    0.5 < share < POSSIBLE[1],
+                    f"by a radius of {known:.3g} m {ground} is {share:.3g} of the rim speed",
+                )
             sentence = f"a radius of {radius:.3g} m follows from {ground}"
             if radius < _SMALL and factor == 1.0 and self._evidence.size(guess.column.column) > _FAST:
                 return Finding(False, f"{sentence}: rpm?")
@@ -140,7 +186,7 @@ class Rims:
         first, second = surest(ranked, left), surest(ranked, right)
         if first is None or second is None or first.unit is None or first.unit != second.unit:
             return
-        kind = first.column.kind or "rotation"
+        kind = kind_of(first.unit) or ""
         series = self._evidence.series(second.column.column)
         other = None if series is None else self._evidence.at(first.column.column, series[0])
         if series is None or other is None or kind not in _TRACKS or first.column.name.has("motor"):
