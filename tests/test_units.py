@@ -21,6 +21,8 @@ _PINT_NAMES = {
     "rev": "turn",
     "1": "",
     "°": "degree",
+    "Grad": "degree",
+    "kp": "kgf",
 }
 _DIMENSIONS = ("[mass]", "[length]", "[time]", "[current]")
 
@@ -46,6 +48,13 @@ def test_table_agrees_with_pint(symbol: str) -> None:
         ("80kPa", "Pa", 8e4),
         ("-.5e1 m s**-2", "m/s^2", -5.0),
         ("1 g", "m/s^2", 9.80665),
+        ("2 kg", "N", 19.6133),
+        ("1 lbs", "N", 4.4482216152605),
+        ("1 lb-ft", "N m", 1.3558179483314),
+        ("1 ft.lb", "N m", 1.3558179483314),
+        ("1 kg m", "N m", 9.80665),
+        ("90 Grad", "rad", 1.57079632679),
+        ("10 kn", "m/s", 5.14444444444),
         ("2 %", "1", 0.02),
         ("1.5", "kg", 1.5),
         ("3 slug", "kg", 43.7817088116191),  # beyond the table: pint
@@ -65,6 +74,11 @@ def test_quantity(text: str, si_unit: str, expected: float) -> None:
         ("heavy", "kg", "not a number with a unit"),
         ("0,2 m", "m", "not a number with a unit"),
         ("5 Hz", "rad/s", "ambiguous"),
+        ("5 1/s", "rad/s", "ambiguous"),
+        ("5 s^-1", "rad/s", "ambiguous"),
+        ("5 grad", "rad", "ambiguous"),
+        ("5 kg", "m", "measures a mass"),
+        ("5 kg", "N m", "measures a mass"),
         ("1e400 m", "m", "not a finite number"),
         (float("nan"), "m", "not a finite number"),
         (10**400, "m", "not a finite number"),

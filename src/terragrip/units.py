@@ -17,7 +17,7 @@ STANDARD_GRAVITY = 9.80665  # m/s², exact by definition (CGPM 1901)
 _ONE: Dimension = (0, 0, 0, 0)
 _BASE: dict[str, tuple[float, Dimension]] = {
     "kg": (1.0, (1, 0, 0, 0)), "g": (1e-3, (1, 0, 0, 0)), "t": (1e3, (1, 0, 0, 0)),
-    "lb": (0.45359237, (1, 0, 0, 0)),
+    "lb": (0.45359237, (1, 0, 0, 0)), "lbs": (0.45359237, (1, 0, 0, 0)),
     "m": (1.0, (0, 1, 0, 0)), "km": (1e3, (0, 1, 0, 0)),
     "cm": (1e-2, (0, 1, 0, 0)), "mm": (1e-3, (0, 1, 0, 0)),
     "l": (1e-3, (0, 3, 0, 0)), "L": (1e-3, (0, 3, 0, 0)),
@@ -30,18 +30,20 @@ _BASE: dict[str, tuple[float, Dimension]] = {
     "A": (1.0, (0, 0, 0, 1)), "mA": (1e-3, (0, 0, 0, 1)),
     "V": (1.0, (1, 2, -3, -1)),
     "N": (1.0, (1, 1, -2, 0)), "kN": (1e3, (1, 1, -2, 0)), "daN": (10.0, (1, 1, -2, 0)),
-    "kgf": (STANDARD_GRAVITY, (1, 1, -2, 0)), "lbf": (0.45359237 * STANDARD_GRAVITY, (1, 1, -2, 0)),
+    "kgf": (STANDARD_GRAVITY, (1, 1, -2, 0)), "kp": (STANDARD_GRAVITY, (1, 1, -2, 0)),
+    "lbf": (0.45359237 * STANDARD_GRAVITY, (1, 1, -2, 0)),
     "Nm": (1.0, (1, 2, -2, 0)), "kNm": (1e3, (1, 2, -2, 0)), "J": (1.0, (1, 2, -2, 0)),
     "W": (1.0, (1, 2, -3, 0)), "kW": (1e3, (1, 2, -3, 0)),
     "Pa": (1.0, (1, -1, -2, 0)), "kPa": (1e3, (1, -1, -2, 0)), "MPa": (1e6, (1, -1, -2, 0)),
     "hPa": (1e2, (1, -1, -2, 0)), "bar": (1e5, (1, -1, -2, 0)), "mbar": (1e2, (1, -1, -2, 0)),
     "psi": (0.45359237 * STANDARD_GRAVITY / 0.0254**2, (1, -1, -2, 0)),
     "rad": (1.0, _ONE), "mrad": (1e-3, _ONE), "deg": (math.pi / 180, _ONE), "degree": (math.pi / 180, _ONE),
-    "degrees": (math.pi / 180, _ONE), "°": (math.pi / 180, _ONE), "rev": (2 * math.pi, _ONE),
+    "degrees": (math.pi / 180, _ONE), "°": (math.pi / 180, _ONE), "Grad": (math.pi / 180, _ONE), "rev": (2 * math.pi, _ONE),
     "turn": (2 * math.pi, _ONE), "%": (1e-2, _ONE), "percent": (1e-2, _ONE), "1": (1.0, _ONE),
-    "rpm": (2 * math.pi / 60, (0, 0, -1, 0)),
+    "rpm": (2 * math.pi / 60, (0, 0, -1, 0)), "rps": (2 * math.pi, (0, 0, -1, 0)),
     "kmh": (1 / 3.6, (0, 1, -1, 0)), "kph": (1 / 3.6, (0, 1, -1, 0)), "kmph": (1 / 3.6, (0, 1, -1, 0)), "mph": (0.44704, (0, 1, -1, 0)),
-    "knot": (1852 / 3600, (0, 1, -1, 0)), "knots": (1852 / 3600, (0, 1, -1, 0)),
+    "knot": (1852 / 3600, (0, 1, -1, 0)), "knots": (1852 / 3600, (0, 1, -1, 0)), "kn": (1852 / 3600, (0, 1, -1, 0)),
+    "kt": (1852 / 3600, (0, 1, -1, 0)), "kts": (1852 / 3600, (0, 1, -1, 0)),
     "g_0": (STANDARD_GRAVITY, (0, 1, -2, 0)), "g0": (STANDARD_GRAVITY, (0, 1, -2, 0)),
 }  # fmt: skip
 _SUPERSCRIPTS = str.maketrans(
@@ -52,6 +54,9 @@ _TURNS_A_MINUTE = re.compile(
     re.IGNORECASE,
 )
 """What speeds of rotation are written in beside rad/s: 1/min is a turn a minute (DIN 1301-2), not a radian; U, tr, giri are turns."""
+_OF_TURNS = re.compile(r"\s*(?:[kM]?(?:Hz|hertz)|1\s*/\s*s(?:ec)?|s\s*\^?\s*-\s*1|s\s*⁻¹)\s*")
+"""What could be radians or turns a second: DIN 1301-2 writes speeds of rotation in turns as 1/s."""
+_GRAVITY = (0, 1, -2, 0)
 _POWER = re.compile(r"(?<=[a-z°])(-[1-4]|[234])(?![\d.])")
 """``m/s2``, ``m s-1``: an exponent without its sign of a power."""
 _TOKEN = re.compile(r"\s*(?:(\*\*|\^)\s*\(?([+-]?\d+)\)?|([*/])|([A-Za-z%°µ][A-Za-z0-9_%°µ]*|1))")
@@ -86,6 +91,10 @@ class Unit:
         """What is measured in it, for a message."""
         return _KINDS.get(self.dimension, "another quantity")
 
+    def weighs(self, other: Unit) -> bool:
+        """Whether it is one of mass where the ``other`` is one of force."""
+        return tuple(a + b for a, b in zip(self.dimension, _GRAVITY, strict=True)) == other.dimension
+
 
 def parse_unit(text: str) -> Unit:
     """Read a unit such as ``"kg m^2"``, ``"N s/rad"`` or ``"km/h"``; raises UnitError if there is none such.
@@ -101,18 +110,27 @@ def is_common(text: str) -> bool:
     return _from_table(text) is not None
 
 
+def may_be_turns(text: str) -> bool:
+    """Whether ``text`` leaves open radians or turns a second: Hz, 1/s."""
+    return _OF_TURNS.fullmatch(text) is not None
+
+
 def factor_to(text: str, si_unit: str) -> float:
     """Factor that takes a number in unit ``text`` to ``si_unit``; raises UnitError if they are unlike.
 
-    ``g`` stands for standard gravity where an acceleration is asked for. Hz is refused for an angular
-    velocity: it could mean rad/s or revolutions per second.
+    ``g`` stands for standard gravity where an acceleration is asked for, and a mass for its weight where a force is: kg, lb ft. Hz
+    and 1/s are refused for an angular velocity, since they could mean rad/s or revolutions per second, and grad for an angle.
     """
     target = parse_unit(si_unit)
-    if text.strip() == "g" and target.dimension == (0, 1, -2, 0):
+    if text.strip() == "g" and target.dimension == _GRAVITY:
         return STANDARD_GRAVITY
-    if target.dimension == (0, 0, -1, 0) and re.fullmatch(r"\s*[kM]?(Hz|hertz)\s*", text):
+    if "rad" in si_unit and may_be_turns(text):
         raise UnitError(f"{text.strip()!r} is ambiguous for an angular velocity", "write rad/s, deg/s or rpm")
+    if text.strip().partition("/")[0] == "grad":
+        raise UnitError(f"{text.strip()!r} is ambiguous", "write deg, or gon")
     unit = parse_unit(text)
+    if target.kind in ("a force", "a torque") and unit.weighs(target):
+        return unit.factor * STANDARD_GRAVITY / target.factor
     if unit.dimension != target.dimension:
         raise UnitError(
             f"{text.strip()!r} measures {unit.kind}, where {target.kind} is needed",

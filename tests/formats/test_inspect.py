@@ -196,3 +196,35 @@ def test_a_speed_that_says_nothing_is_named_and_a_shaft_is_no_ground(tmp_path: P
         for w in inspection.warnings
     )
     assert any("nor a drive train's (wheel_based_speed)" in sentence for sentence in inspection.missing)
+
+
+@pytest.mark.parametrize("unit", ["Hz", "1/s"])
+def test_a_unit_of_turns_or_radians_is_left_open(tmp_path: Path, unit: str) -> None:
+    """Hz in the row of units of a wheel's speed: read as none, so that the line asks; estimate then says what to write."""
+    time = np.arange(0, 60, 0.1)
+    speed = 1.5 + 0.3 * np.sin(time / 5)
+    log = tmp_path / "log.csv"
+    rows = "".join(f"{t:.1f},{v:.4f},{v / 0.2:.4f},{v / 0.2:.4f}\n" for t, v in zip(time, speed, strict=True))
+    log.write_text(f"time,ground_speed,wheel_speed_l,wheel_speed_r\ns,m/s,{unit},{unit}\n" + rows)
+    seen = inspect(log)
+    assert any("ambiguous" in warning for warning in seen.warnings)
+    assert {"wheel_speed_l", "wheel_speed_r"} <= seen.proposals.keys()
+    with pytest.raises(InputError, match=f"column wheel_speed_l: '{unit}' is ambiguous"):
+        read(log)
+
+
+def test_a_torque_in_pound_feet_and_a_pull_in_kilograms_are_proposed(tmp_path: Path) -> None:
+    time = np.arange(0, 60, 0.1)
+    speed = 1.5 + 0.3 * np.sin(time / 5)
+    log = tmp_path / "log.csv"
+    rows = "".join(
+        f"{t:.1f},{v:.4f},{v / 0.2:.4f},{v / 0.2:.4f},{5 * v:.3f},{5 * v:.3f},{8 * v:.3f}\n"
+        for t, v in zip(time, speed, strict=True)
+    )
+    names = "Wheel Speed L [rad/s],Wheel Speed R [rad/s],Torque L [lb-ft],Torque R [lb-ft],Drawbar Pull [kg]"
+    log.write_text(f"Time [s],Ground Speed [m/s],{names}\n" + rows)
+    profile = tmp_path / "p.yaml"
+    profile.write_text(inspect(log).profile)
+    channels = read(log, profile).channels
+    assert channels["drive_torque_l"][0] == pytest.approx(5 * speed[0] * 1.35582, rel=1e-3)
+    assert channels["drawbar_force"][0] == pytest.approx(8 * speed[0] * 9.80665, rel=1e-3)

@@ -10,12 +10,12 @@ from functools import cache
 from terragrip.formats.profile import Profile
 from terragrip.formats.vocabulary import Name, Vocabulary
 from terragrip.recording.schema import CHANNELS, is_channel, split_channel, unit_of
-from terragrip.units import UnitError, factor_to, parse_unit
+from terragrip.units import UnitError, factor_to, may_be_turns, parse_unit
 
 _KINDS = {
     (0, 1, -1, 0): "speed", (0, 0, -1, 0): "rotation", (1, 2, -2, 0): "torque", (0, 0, 0, 1): "current", (1, 1, -2, 0): "force",
     (0, 1, -2, 0): "acceleration", (0, 1, 0, 0): "length", (0, 0, 0, 0): "angle", (0, 0, 1, 0): "time",
-    (1, 0, 0, 0): "mass",
+    (1, 0, 0, 0): "mass", (1, 1, 0, 0): "torque",  # lb ft, kg m
 }  # fmt: skip
 _MISSPELT = re.compile(r"ms(\^?-?2|²|\^?-1|⁻[¹²])")  # m/s^2 or m/s, which read as powers of milliseconds
 ON_THE_BUS = "a signal of J1939, ISO 11783 or NMEA 2000"
@@ -82,7 +82,8 @@ def columns_of(
         ):
             name = replace(name, wheel="")
         stated = units.get(column)
-        readable = None if stated is not None and _MISSPELT.fullmatch(stated) else stated
+        open_ = stated is not None and (_MISSPELT.fullmatch(stated) or may_be_turns(stated))
+        readable = None if open_ else stated  # the sizes tell
         if readable and name.unit and kind_of(readable) != kind_of(name.unit):
             name = replace(
                 name, concepts=name.concepts | vocabulary.concepts_of(name.words[-1])
@@ -247,6 +248,8 @@ def _fits(kind: str, channel: str) -> bool:
         return kind in ("rotation", "speed")
     if channel.startswith("drive_torque_"):
         return kind in ("torque", "current")
+    if target == "force":
+        return kind in ("force", "mass")
     return kind == target
 
 
