@@ -282,7 +282,7 @@ def _made_up_table(cases: list[Case]) -> list[str]:
     lines = []
     for held in (False, True):
         chosen = [c for c in cases if made_up_loggers.is_held_out(c.file) == held]
-        title = "made up, looked at once" if held else "made up, looked at while mending"
+        title = "made up, looked at once" if held else "made up, looked at while repairing"
         lines += _total(f"{len(chosen)} headers {title}", chosen)
     return lines
 

@@ -1,7 +1,7 @@
 """Sixteen logs as loggers of other makes would write them, of one simulated drive: the headers are made up by us, the truth is known.
 
 Columns, what they hold and which channel they are stand in made_up_loggers.csv: one row a column, ``value = factor * signal + offset``.
-Ten loggers were looked at while the rules of `inspect` were mended, six (``held`` = 1) once afterwards.
+Ten loggers were looked at while the rules of `inspect` were repaired, six (``held`` = 1) once afterwards.
 """
 
 from __future__ import annotations

@@ -333,7 +333,7 @@ def test_the_efforts_of_a_joint_state_are_torques_and_a_profile_that_fits_says_w
 
 @pytest.mark.parametrize(
     ("name", "channel"),
-    [  # in the manner of other people's loggers, some from public code, some made up; the rules were mended by them
+    [  # in the manner of other people's loggers, some from public code, some made up; the rules were repaired by them
         ("WhlSpdFrntLft", "wheel_speed_fl"),
         ("Drehzahl Rad vorne links", "wheel_speed_fl"),
         ("nRadHR", "wheel_speed_rr"),

@@ -60,7 +60,7 @@ def refuse_impossible(estimates: Estimates, fixes: Ints, file: str | None = None
             "positions move too far in one direction and not in the other, against the wheels and the ground speed",
             file=file,
             place=place,
-            hint="latitude and longitude look swapped: mend the profile",
+            hint="latitude and longitude look swapped: correct the profile",
         )
     if given > APART:
         degrees = 180 / np.pi

@@ -8,7 +8,7 @@ import { color, onTheme } from "../ui/theme";
 import { AXES, type Axis, type Layer } from "./along";
 import { beyond, extent, levels, limits } from "./axes";
 import { draw } from "./buckets";
-import { hearKeys, hearPointers, hearUpright, zoomed, type Range } from "./gestures";
+import { listenToKeys, listenToPointers, listenToUpright, zoomed, type Range } from "./gestures";
 import { pick, spans } from "./marks";
 import { Readout } from "./readout";
 import { Rows, type Drawn } from "./rows";
@@ -66,7 +66,7 @@ export class Charts {
       this.later();
     });
     this.watcher.observe(this.element);
-    hearKeys(this.element, this);
+    listenToKeys(this.element, this);
   }
 
   /** The first run, whose soils, events and picked sample are marked. */
@@ -247,8 +247,8 @@ export class Charts {
       box.classList.toggle("fixed", panel.key in this.uprights);
       this.element.append(box);
       const plot = new uPlot(this.options(panel, box.clientWidth || 700, i === panels.length - 1), NO_ROWS, box);
-      this.hear(plot);
-      if (!panel.log) hearUpright(plot.root, plot.over, now, setShown);
+      this.listen(plot);
+      if (!panel.log) listenToUpright(plot.root, plot.over, now, setShown);
       return { panel, plot, box, readout, drawn: [] };
     });
     void this.fetch();
@@ -318,8 +318,8 @@ export class Charts {
     };
   }
 
-  private hear(plot: uPlot): void {
-    hearPointers(plot.over, this);
+  private listen(plot: uPlot): void {
+    listenToPointers(plot.over, this);
     plot.over.addEventListener("dblclick", () => this.zoom(this.whole));
     plot.over.addEventListener("click", (event) => this.onPick?.(this.timeAt(plot, event.offsetX)));
   }

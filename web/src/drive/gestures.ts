@@ -32,7 +32,7 @@ export interface Moved {
 }
 
 /** Ctrl or shift with the wheel zooms, a sideways wheel pans; one finger pans, two zoom. `over` is a chart's drawing area. */
-export function hearPointers(over: HTMLElement, moved: Moved): void {
+export function listenToPointers(over: HTMLElement, moved: Moved): void {
   over.addEventListener(
     "wheel",
     (event) => {
@@ -67,7 +67,7 @@ export function hearPointers(over: HTMLElement, moved: Moved): void {
 }
 
 /** The wheel on an upright axis (with alt also over the chart) zooms it, a drag along it moves it, a double click lets it follow. */
-export function hearUpright(root: HTMLElement, over: HTMLElement, now: () => Range, set: (range: Range | null) => void): void {
+export function listenToUpright(root: HTMLElement, over: HTMLElement, now: () => Range, set: (range: Range | null) => void): void {
   const place = (event: MouseEvent): { share: number; axis: boolean } => {
     const box = over.getBoundingClientRect();
     return { share: 1 - (event.clientY - box.top) / box.height, axis: event.clientX < box.left && event.clientY <= box.bottom };
@@ -101,7 +101,7 @@ export function hearUpright(root: HTMLElement, over: HTMLElement, now: () => Ran
 }
 
 /** Arrows pan by a tenth, + and - zoom, Home shows all. */
-export function hearKeys(element: HTMLElement, moved: Moved): void {
+export function listenToKeys(element: HTMLElement, moved: Moved): void {
   element.tabIndex = 0;
   element.addEventListener("keydown", (event) => {
     if (event.ctrlKey || event.altKey || event.metaKey) return;

@@ -78,7 +78,7 @@ export class Alarms {
     if (now - this.rang < EVERY && !(pitch === 440 && !this.isSilent)) return;
     this.rang = now;
     this.rings++;
-    this.told();
+    this.showMuted();
     if (!this.set.sound || !this.audio || this.audio.state !== "running") return;
     const tone = this.audio.createOscillator();
     const volume = this.audio.createGain();
@@ -91,13 +91,13 @@ export class Alarms {
 
   private async open(): Promise<void> {
     this.audio ??= new AudioContext();
-    this.audio.onstatechange = () => this.told();
-    this.told();
+    this.audio.onstatechange = () => this.showMuted();
+    this.showMuted();
     await this.audio.resume(); // waits for a click where the browser wants one
   }
 
   /** A browser is mute until someone has clicked the page: that is said, so that nobody relies on it. */
-  private told(): void {
+  private showMuted(): void {
     this.mute.textContent = this.set.sound && this.audio?.state !== "running" ? "No sound yet: click or tap anywhere." : "";
     if (this.mute.textContent) addEventListener("pointerdown", () => void this.audio?.resume(), { once: true });
   }
@@ -118,7 +118,7 @@ export class Alarms {
       this.set.sound = sound.checked;
       this.keep();
       if (sound.checked) void this.open();
-      else this.told();
+      else this.showMuted();
     });
     fill(
       this.settings,

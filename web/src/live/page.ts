@@ -126,9 +126,9 @@ export const page: Page = (main, { notices, query }) => {
   function freshness(): void {
     const { limit, silent, played, unmeasured, waiting, isOld, predicted } = ageOf(feed, delay, Number(speed.value), traces.held !== null);
     const connected = feed.state === "connected";
-    const heard = connected && !isOld && !waiting;
-    state.className = `state ${heard ? "done" : feed.state === "lost" || (connected && isOld && traces.held === null) ? "failed" : ""}`;
-    state.textContent = { connecting: "connecting …", connected: heard ? "connected" : waiting ? "connected, no rows yet" : traces.held !== null ? "paused" : "no measurements", lost: `connection lost: ${why}`, ended: "the run has ended" }[feed.state];
+    const isCurrent = connected && !isOld && !waiting;
+    state.className = `state ${isCurrent ? "done" : feed.state === "lost" || (connected && isOld && traces.held === null) ? "failed" : ""}`;
+    state.textContent = { connecting: "connecting …", connected: isCurrent ? "connected" : waiting ? "connected, no rows yet" : traces.held !== null ? "paused" : "no measurements", lost: `connection lost: ${why}`, ended: "the run has ended" }[feed.state];
     main.classList.toggle("stale", isOld);
     main.classList.toggle("predicted", predicted);
     traces.late = connected && traces.held === null && silent > limit ? silent * played : 0;

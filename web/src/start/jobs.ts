@@ -47,14 +47,14 @@ export class JobList {
     private listed: (job: Job) => boolean = () => true,
   ) {
     this.element.append(h("h2", {}, "Work"), this.list);
-    this.leave = notices.on((notice) => this.hear(notice));
+    this.leave = notices.on((notice) => this.update(notice));
     void tried(async () => {
       for (const job of await get<Job[]>("jobs")) if (!this.jobs.has(job.id)) this.jobs.set(job.id, job);
       this.draw();
     });
   }
 
-  private hear(notice: Notice): void {
+  private update(notice: Notice): void {
     if (notice.kind !== "job") return;
     const { job } = notice;
     const before = this.jobs.get(job.id)?.state;

@@ -84,7 +84,7 @@ def spectral_shape(energies: Floats, edges: Floats) -> dict[str, Floats]:
 
 
 def unsteadiness(values: Floats, parts: int = 5) -> Floats:
-    """Spread (windows,) of the log energy over the parts of a window: high on ground that comes in jolts.
+    """Spread (windows,) of the log energy over the parts of a window: high on ground that comes in bumps.
 
     ``values`` (windows, axes, samples).
     """
