@@ -377,6 +377,7 @@ typedef struct {
     tg_real offset[36], gain[36];   /* calibration: value = (raw - offset) / gain */
     tg_real noise[36];              /* SD of each channel after calibration */
     tg_real held_period[36];        /* s; > 0: the channel repeats its last value between updates this far apart */
+    tg_real ground_speed_delay;     /* s, SD: while the speed changes, its sensor is off by so much of that */
     tg_uncertainty uncertainty;
     tg_real prior_adhesion, prior_adhesion_std;     /* before the first sample */
     tg_real prior_resistance, prior_resistance_std;

@@ -204,6 +204,7 @@ static void report(tg_estimator *e, const tg_drive *drive, tg_estimate *out)
     e->scene.unseen_grade = tgi_unseen_grade(e);
     e->scene.slow_speed = tgi_slow_variance(e);
     e->scene.disputed = tgi_disputed_variance(e, drive);
+    e->scene.late = tgi_late_variance(e, drive);
     tgi_traction(&e->settings, e->warped.now, &e->belief, (const tg_real(*)[TG_ROWS])e->consider.s, &e->scene, o);
     o[TG_OUT_NIS] = e->belief.nis;
     o[TG_OUT_CHANNELS] = (tg_real)e->belief.channels;

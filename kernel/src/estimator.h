@@ -53,7 +53,8 @@ typedef struct { /* what a row's values need beside the belief; all reals, so th
     tg_real weight; /* N, on level ground, with what hangs on the hitch */
     tg_real unseen_load; /* relative variance of a wheel's load */
     tg_real slow_speed; /* variance of the ground speed's slow error, see slow_speed.c, */
-    tg_real disputed;   /* and of what its sensor and the forces disagree on, and of its samples' age */
+    tg_real disputed;   /* of what its sensor and the forces disagree on, and of its samples' age, */
+    tg_real late;       /* and of its delay */
     tg_real anew; /* the filter was started anew: nothing links this row to the one before */
 } tgi_scene;
 
@@ -291,6 +292,7 @@ void tgi_rest_reading(tg_estimator *e, const tg_row *row);
 void tgi_rest_over(tg_estimator *e);
 void tgi_watch_innovation(tg_estimator *e, const tg_row *row, const tg_step *step);
 tg_real tgi_disputed_variance(const tg_estimator *e, const tg_drive *drive);
+tg_real tgi_late_variance(const tg_estimator *e, const tg_drive *drive);
 tg_real tgi_slow_variance(const tg_estimator *e);
 
 /* restarts.c */

@@ -31,6 +31,12 @@ static void add_wheel(side_view *side, tg_real slip, tg_real deviation, tg_real 
     side->count++;
 }
 
+/* An SD without what the ground speed's delay makes of it: the warning is not to wait for that, nor to call a vehicle slow for it. */
+static tg_real in_time(tg_real deviation, const tgi_scene *scene, tg_real speed)
+{
+    return speed > 0 ? tgi_sqrt(tgi_max(tgi_square(deviation) - scene->late / tgi_square(speed), 0)) : deviation;
+}
+
 /* What the powered wheels do (of none: all). Slip and fastest rim are the worst wheel's of each side, their mean: of a diagonal that spins
  * while the other holds they are the spinning one's, in a turn the sides cancel. */
 static tgi_view view_of(const tg_estimator *e, const tg_real *o)
@@ -45,8 +51,9 @@ static tgi_view view_of(const tg_estimator *e, const tg_real *o)
         if (!e->constants.watched[i]) continue;
         const int32_t end = end_of(e, i), where = e->constants.side[i];
         const tg_real rim = s->rolling_radius[i] * o[TG_OUT_WHEEL_SPEED + i], mu = o[TG_OUT_ADHESION + i];
-        if (where <= 0) add_wheel(&side[0], o[TG_OUT_SLIP + i], o[TG_OUT_SLIP_STD + i], rim);
-        if (where >= 0) add_wheel(&side[1], o[TG_OUT_SLIP + i], o[TG_OUT_SLIP_STD + i], rim);
+        const tg_real deviation = in_time(o[TG_OUT_SLIP_STD + i], &e->scene, tgi_max(tgi_fabs(rim), tgi_fabs(o[TG_OUT_GROUND_SPEED])));
+        if (where <= 0) add_wheel(&side[0], o[TG_OUT_SLIP + i], deviation, rim);
+        if (where >= 0) add_wheel(&side[1], o[TG_OUT_SLIP + i], deviation, rim);
         l.rim += rim;
         adhesion += mu;
         l.adhesion_deviation += tgi_square(o[TG_OUT_ADHESION_STD + i]);
@@ -70,7 +77,7 @@ static tgi_view view_of(const tg_estimator *e, const tg_real *o)
     l.resistance = o[TG_OUT_SOIL_RESISTANCE];
     if (e->settings.method == TG_SPEEDS) l.leading = l.trailing = l.adhesion_deviation = 0; /* no torque, no adhesion: slip and speeds speak alone */
     l.travel = (tg_real)e->direction * o[TG_OUT_GROUND_SPEED];
-    l.travel_deviation = o[TG_OUT_GROUND_SPEED_STD];
+    l.travel_deviation = in_time(o[TG_OUT_GROUND_SPEED_STD], &e->scene, 1);
     if (l.slip < (tg_real)-0.2) l.slip = (tg_real)-0.2;
     return l;
 }

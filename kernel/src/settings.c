@@ -156,7 +156,7 @@ static tg_status check_numbers(const tg_settings *s)
     const tg_uncertainty *u = &s->uncertainty;
     const tg_real spreads[] = {u->drive_torque_gain, u->drive_torque_gain_common, u->drive_torque_offset, u->drawbar_gain, u->drawbar_offset, u->slope,
                                u->tire_rolling_resistance, u->vertical_load, u->wheel_radius, u->acceleration_bias, u->mass, u->hitch_load_gain,
-                               u->hitch_load_offset, s->payload_height,
+                               u->hitch_load_offset, s->ground_speed_delay, s->payload_height,
                                s->slope_spread, s->standstill_speed, s->dead_band, s->outlier_weight, s->load_filter, s->center_of_gravity_height,
                                s->hitch_height, s->watch.sure, s->watch.ahead, s->watch.most, s->watch.high_slip,
                                s->watch.stuck_duration, s->watch.stuck_travel, s->watch.free_travel, s->watch.push, s->watch.thrust,

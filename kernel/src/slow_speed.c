@@ -53,14 +53,25 @@ void tgi_watch_innovation(tg_estimator *e, const tg_row *row, const tg_step *ste
     s->expected = variance;
 }
 
+/* m/s^2 of the ground speed, by the forces. */
+static tg_real rate_of(const tg_estimator *e, const tg_drive *drive)
+{
+    return (tg_real)e->direction * (e->balance.value - e->settings.machine.gravity * drive->sine);
+}
+
+/* What a sensor's delay makes of the ground speed. */
+tg_real tgi_late_variance(const tg_estimator *e, const tg_drive *drive)
+{
+    return tgi_square(e->settings.ground_speed_delay * rate_of(e, drive));
+}
+
 /* What the filter has not followed of a disagreement between its forces and the sensor, either of which may be right: the mean product of
  * neighbouring innovations, less what chance makes of it; and, while the speed changes, the age of a sample. */
 tg_real tgi_disputed_variance(const tg_estimator *e, const tg_drive *drive)
 {
     const tgi_slow_speed *const s = &e->slow_speed;
-    const tg_real rate = (tg_real)e->direction * (e->balance.value - e->settings.machine.gravity * drive->sine);
     const tg_real longest = e->settings.tuned.longest_walk, interval = e->ground.interval < longest ? e->ground.interval : longest;
-    const tg_real aged = tgi_square(TG_SAMPLE_AGE * interval * rate);
+    const tg_real aged = tgi_square(TG_SAMPLE_AGE * interval * rate_of(e, drive));
     if (!(s->alike > 0)) return aged;
     return aged + tgi_max(s->alike - e->settings.tuned.alike_sure * s->expected / tgi_sqrt(s->pairs), 0);
 }

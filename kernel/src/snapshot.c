@@ -3,7 +3,7 @@
 #include "fields.h"
 #include <limits.h>
 
-#define TG_SNAPSHOT_VERSION 15u
+#define TG_SNAPSHOT_VERSION 16u
 
 typedef struct {
     char magic[8];

@@ -302,6 +302,7 @@ void tgi_speeds_update(tg_estimator *e, tg_row *row, tg_estimate *out)
     memcpy(out->value + TG_OUT_CHANNEL_NIS, row->channel_nis, sizeof row->channel_nis);
     out->value[TG_OUT_CHANNELS] = (tg_real)e->belief.channels;
     const int32_t open = is_blind(s, n);
+    e->scene.late = tgi_square(e->settings.ground_speed_delay * s->x[1]);
     tgi_watch_over(e, row, 0, !open, gap || open, dt, out->value);
     const int32_t watched = tgi_watched(e);
     out->event = (gap && !first) || open    ? TG_EVENT_GAP

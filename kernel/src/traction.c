@@ -45,7 +45,7 @@ TG_INLINE void gather(const tg_belief *b, const tg_real (*S)[TG_ROWS], const int
 TG_INLINE void roughen(tgi_moments *c, const tg_real *x, const tgi_scene *scene, const int n)
 {
     c->rr += scene->roughness + scene->unseen_grade;
-    c->vv += scene->slow_speed + scene->disputed;
+    c->vv += scene->slow_speed + scene->disputed + scene->late;
     for (int i = 0; i < n; i++) c->mm[i] += tgi_rough_adhesion(scene, x[i]);
 }
 

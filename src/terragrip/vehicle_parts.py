@@ -71,6 +71,7 @@ _Torque = Annotated[float, *quantity_of("N m", 0, 1e6)]
 _SignedTorque = Annotated[float, *quantity_of("N m", -1e6, 1e6)]
 _Force = Annotated[float, *quantity_of("N", 0, 1e6)]
 _SignedForce = Annotated[float, *quantity_of("N", -1e6, 1e6)]
+_Delay = Annotated[float, *quantity_of("s", 0, 10, likely=("ms",))]
 _Acceleration = Annotated[float, *quantity_of("m/s^2", 0, 10)]
 _SignedAcceleration = Annotated[float, *quantity_of("m/s^2", -10, 10)]
 _Gain = Annotated[float, *quantity_of("1", 0.01, 100)]
@@ -214,10 +215,11 @@ class Driveline(Part):
 
 
 class Sensors(Part):
-    """Standard deviations of the sensors' white noise; absent: estimated from the log."""
+    """Standard deviations of the sensors' white noise, and of the ground speed's delay; absent: estimated from the log."""
 
     wheel_speed: _WheelSpeedSD | None = None
     ground_speed: _SpeedSD | None = None
+    ground_speed_delay: _Delay | None = None
     drive_torque: _TorqueSD | None = None
     drawbar_force: _ForceSD | None = None
     acceleration: _AccelerationSD | None = None

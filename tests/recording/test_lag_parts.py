@@ -220,8 +220,9 @@ def test_a_lag_within_a_log_counts_where_a_vehicle_does_not_explain_it(late: flo
     time = np.arange(0.0, 300.0, STEP)
     wheel = 2.0 * wander(time)
     lag = lag_within(time, {"ground_speed": wander(time - late), "wheel_speed_l": wheel})
-    assert (lag is not None) is certain
-    if lag is not None:
+    assert lag is not None
+    assert lag.is_of_the_clock is certain
+    if certain:
         explained = lag.explained[1]
         assert lag.seconds == pytest.approx(late, abs=1e-3)
         assert lag.of_the_clock == pytest.approx(late - explained / 2, abs=1e-3)

@@ -12,11 +12,13 @@ from terragrip.estimation.estimates import Estimates
 from terragrip.estimation.estimator import TractionEstimator
 from terragrip.estimation.forward import carried_channels, flag_before_gaps, run
 from terragrip.estimation.methods import DEFAULT, method_named
+from terragrip.estimation.noise import DELAY
 from terragrip.estimation.provenance import notes_of
 from terragrip.estimation.rims import speeds_alone
 from terragrip.estimation.slip_only import slip_reference_in
 from terragrip.estimation.turning import turn_in
 from terragrip.recording import LogBlocks, Recording, survey_of
+from terragrip.recording.alignment import aligned
 
 if TYPE_CHECKING:
     import os
@@ -69,7 +71,7 @@ def estimate(
     ------
     InputError: the recording or the vehicle is unusable, there is no such method, or `algebraic` is used with ``smooth``.
     """
-    log = recording if isinstance(recording, Recording) else Recording.from_frame(recording)
+    log = recording if isinstance(recording, Recording) else next(aligned([Recording.from_frame(recording)]))
     options = RunOptions(method, smooth, sensors, held, gap, standstill_speed)
     (result,) = estimated(LogBlocks.of(log), vehicle, options, progress=progress)
     return result
@@ -116,11 +118,16 @@ def estimated(
     # One stretch of light work may determine the zero of slip, and a sample of the rows can miss it.
     reference = slip_reference_in(log.whole(), vehicle) if alone else None
     track, said = turn_in(log, known.sample, vehicle)
+    sensors = dict(options.sensors or {})
+    if (
+        vehicle.sensors.ground_speed_delay is None
+    ):  # of consecutive rows, which a sample of them does not hold
+        sensors = {DELAY: 0.0 if known.lag is None else known.lag.delay} | sensors
     estimator = TractionEstimator.for_recording(
         known.sample,
         vehicle,
         options.method,
-        sensors=options.sensors,
+        sensors=sensors,
         held=options.held,
         gap=options.gap,
         standstill_speed=options.standstill_speed,

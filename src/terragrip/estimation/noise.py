@@ -14,6 +14,9 @@ if TYPE_CHECKING:
     from terragrip.recording import Recording
     from terragrip.vehicle import Vehicle
 
+DELAY = "ground_speed_delay"
+"""The name among the sensors' SDs of that of the ground speed's delay [s]; 0 where nothing tells it."""
+
 _SENSOR_OF = {
     "acceleration_x": "acceleration",
     "acceleration_y": "acceleration",
@@ -25,7 +28,7 @@ _SENSOR_OF = {
 def channel_noise(
     vehicle: Vehicle, channels: tuple[str, ...], sensors: Mapping[str, float] | None = None
 ) -> tuple[dict[str, float], tuple[str, ...]]:
-    """SD of every channel in ``channels``, SI, and the channels that had to be guessed.
+    """SD of every channel in ``channels`` and of the ground speed's delay, SI, and the channels that had to be guessed.
 
     ``sensors`` (by channel, ``ground_speed``, or by sensor, ``wheel_speed`` for all wheels) overrides the
     vehicle file, which overrides a guess from the vehicle's size. Raises InputError on a name that is neither, or an
@@ -42,6 +45,8 @@ def channel_noise(
             value = guesses[sensor]
             guessed.append(name)
         result[name] = float(value)
+    late = given.get(DELAY, vehicle.sensors.ground_speed_delay)
+    result[DELAY] = late or 0.0
     return result, tuple(guessed)
 
 
@@ -89,12 +94,12 @@ def sensor_of(channel: str) -> str:
 
 
 def _check(given: Mapping[str, float], channels: tuple[str, ...]) -> None:
-    known = {*channels, *(sensor_of(name) for name in channels)}
+    known = {*channels, *(sensor_of(name) for name in channels), DELAY}
     for name, value in given.items():
         if name not in known:
             hint = suggestion(name, known, "name a channel")
             raise InputError(f"there is no sensor {name!r}", hint=hint)
-        if not (np.isfinite(value) and value > 0):
+        if not (np.isfinite(value) and (value > 0 or (name == DELAY and value == 0))):
             raise InputError(
                 f"the noise of {name} is {value!r}", hint="give a positive standard deviation in SI"
             )

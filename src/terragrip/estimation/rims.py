@@ -12,6 +12,7 @@ from terragrip._kernel import ffi, lib
 from terragrip.errors import InputError
 from terragrip.estimation.engine import OF_FORCES, SIGNS
 from terragrip.estimation.methods import SLIP_ONLY
+from terragrip.estimation.noise import DELAY
 from terragrip.estimation.settings import WITHOUT_TORQUE, Thresholds, put_axles, wheel_radii
 from terragrip.estimation.zero_slip import UNTOLD, Zero
 from terragrip.physics.loads import GRAVITY
@@ -177,6 +178,7 @@ def speed_settings(
     for name, slot in slots_in(rims).items():
         settings.held_period[slot] = held.get(name, 0.0)
     settings.uncertainty.wheel_radius = max((rim.spread for rim in rims), default=0.0)
+    settings.ground_speed_delay = noise[DELAY]
     settings.dead_band = dead_band
     settings.watch.warn *= WITHOUT_TORQUE
     thresholds.put(settings)

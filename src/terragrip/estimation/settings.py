@@ -13,6 +13,7 @@ from terragrip._kernel import ffi, lib
 from terragrip.arrays import Floats
 from terragrip.errors import InputError
 from terragrip.estimation.methods import Method
+from terragrip.estimation.noise import DELAY
 from terragrip.physics.loads import GRAVITY, load_levers, wheel_shares
 from terragrip.physics.radius import biderman_deflection, hadekel_deflection, loaded_radius, rolling_radius
 from terragrip.recording.checks import require_hitch
@@ -107,6 +108,7 @@ def settings_of(
     for name, slot in sample_slots(vehicle).items():
         settings.noise[slot] = noise.get(name, 0.0)
         settings.held_period[slot] = held.get(name, 0.0)
+    settings.ground_speed_delay = noise.get(DELAY, 0.0)
     thresholds.put(settings)
     return settings
 

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
+from itertools import chain
 
 import numpy as np
 import numpy.typing as npt
 
 from terragrip.recording.held import held_period
-from terragrip.recording.lag import Lag, is_copy, lag_within
-from terragrip.recording.survey import ROWS
+from terragrip.recording.lag import Lag, is_copy, lag_within, measured
+from terragrip.recording.noise import white_noise
+from terragrip.recording.survey import ROWS, first_speeds
 from terragrip.recording.table import Recording
 
 Floats = npt.NDArray[np.float64]
@@ -29,15 +31,13 @@ def aligned(blocks: Iterable[Recording]) -> Iterator[Recording]:
         ahead.append(block)
         if sum(map(len, ahead)) >= ROWS:
             break
-    shift = _Shift.of(ahead) if ahead else None
-    if shift is None:
-        yield from ahead
-        yield from source
+    time, columns = first_speeds(ahead)
+    lag = lag_within(time, columns)
+    if lag is None or not lag.is_to_set_right:
+        notes = [_doubt(lag)] if lag is not None and lag.is_of_the_clock else []
+        yield from (block.with_notes(*notes) if notes else block for block in chain(ahead, source))
         return
-    if not shift.lag.is_to_set_right:
-        yield from (block.with_notes(_doubt(shift.lag)) for block in ahead)
-        yield from (block.with_notes(_doubt(shift.lag)) for block in source)
-        return
+    shift = _Shift.by(lag, time, columns)
     tail: list[Recording] = []
     while ahead or (ahead := [more for more in (next(source, None),) if more is not None]):
         end = ahead[0].time[-1] + shift.reach
@@ -50,35 +50,32 @@ def aligned(blocks: Iterable[Recording]) -> Iterator[Recording]:
 
 @dataclass(frozen=True)
 class _Shift:
-    """The shift and its channels: their names, the longest gap [s] for interpolation, whether they are held."""
+    """The shift and its channels: their names, the longest gap [s] for interpolation, whether they are held.
+
+    ``noise``: of the channels as measured, where it is known. On a line between two samples noise is smaller by up to a half and
+    shared with the neighbours, so that it averages out as that of the samples does, but no longer shows.
+    """
 
     lag: Lag
     names: tuple[str, ...]
     longest: float
     held: bool
+    noise: dict[str, float]
 
     @classmethod
-    def of(cls, blocks: list[Recording]) -> _Shift | None:
-        """The lag in the first rows of a log, None if none is certain."""
-        asked = [
-            n
-            for n in blocks[0].channels
-            if n == "ground_speed" or n.startswith(("wheel_speed_", "wheel_based"))
-        ]
-        time = np.concatenate([b.time for b in blocks])[:ROWS]
-        columns = {n: np.concatenate([b.channels[n] for b in blocks])[:ROWS] for n in asked}
-        lag = lag_within(time, columns)
-        if lag is None:
-            return None
+    def by(cls, lag: Lag, time: Floats, columns: dict[str, Floats]) -> _Shift:
+        """The shift by a lag, with what the first rows of a log say of its channels."""
         ground = columns["ground_speed"]
         when, kept = time[np.isfinite(ground)], ground[np.isfinite(ground)]
         late = [
             n
-            for n in asked
+            for n in columns
             if n == "ground_speed" or (n != "wheel_based_speed" and is_copy(columns[n], ground))
         ]
         longest = max(_LONGEST, 3 * float(np.median(np.diff(when))))
-        return cls(lag, tuple(late), longest, held_period(when, kept) is not None)
+        samples = {n: s for n in late if (s := measured(time, columns[n])) is not None}
+        known = {n: sd for n, s in samples.items() if (sd := white_noise(*s)) is not None}
+        return cls(lag, tuple(late), longest, held_period(when, kept) is not None, known)
 
     @property
     def reach(self) -> float:
@@ -94,7 +91,8 @@ class _Shift:
             rows = np.flatnonzero(np.isfinite(block.channels[name]))
             channels[name] = np.full(len(block), np.nan)
             channels[name][rows] = self._at(block.time[rows] + self.lag.of_the_clock, time, values)
-        return replace(block, channels=channels).with_notes(_sentence(self.lag))
+        noise = {**self.noise, **block.noise}
+        return replace(block, channels=channels, noise=noise).with_notes(_sentence(self.lag))
 
     def _at(self, when: Floats, time: Floats, values: Floats) -> Floats:
         """A channel (n,) of instants ``time`` at others; NaN outside, and in gaps."""

@@ -31,11 +31,13 @@ _LONGEST = 20_000_000  # points; a record over ten days
 
 
 _CERTAIN = 2.0  # standard deviations by which an offset must exceed the explained one
-_SURE = 4.0  # the same, for an automatic correction: runs without a late sensor reach 2.7 (docs/formats.md)
+_SURE = 4.0  # the same, for an automatic correction: runs without a late sensor reach 3.4 (docs/formats.md)
+_SHARP = 0.03  # s, a standard deviation up to which _CERTAIN is enough for it: on ground that gives way it is larger
 STIFFNESS = (
     2.0  # K on soft soil: the slope of ASABE D497's gross traction ratio at 15 % slip, Bn = 20, is 1.85
 )
 _WITHIN = 5.0  # s, the largest lag searched between channels of one file
+_USUAL = 0.1  # s, SD of a receiver's delay before a log tells anything of it (ours): receivers filter
 
 
 @dataclass(frozen=True)
@@ -65,15 +67,26 @@ class Lag:
     @property
     def is_to_set_right(self) -> bool:
         """Whether it is certain enough for an automatic correction: on yielding soil a ground speed is late, too, by more
-        than firm ground explains.
+        than firm ground explains, but not always by as much.
         """
         least, most = self.explained
-        return max(least - self.seconds, self.seconds - most) > _SURE * self.std
+        enough = _CERTAIN if self.std <= _SHARP else _SURE
+        return max(least - self.seconds, self.seconds - most) > enough * self.std
 
     @property
     def of_the_clock(self) -> float:
         """The part [s] to correct: the vehicle's own lag is anywhere within the explained one, half of it on average."""
         return self.seconds - 0.5 * sum(self.explained)
+
+    @property
+    def delay(self) -> float:
+        """SD [s] of the sensor's own delay: what was found, a vehicle's own lag being anywhere within the explained one, and
+        what is usual.
+        """
+        least, most = self.explained
+        variance = self.std**2 + (most - least) ** 2 / 12
+        weight = _USUAL**2 / (_USUAL**2 + variance)
+        return float(np.hypot(weight * self.of_the_clock, np.sqrt(weight * variance)))
 
     @property
     def why_not(self) -> str:
@@ -130,7 +143,7 @@ def lag_between(first: Speed, second: Speed, *, reach: float | None = None) -> L
 
 
 def lag_within(time: Floats, columns: Mapping[str, npt.NDArray[Any]]) -> Lag | None:
-    """The lag of one file's ground speed behind its wheel speeds (n,), if it is certain and larger than a vehicle's dynamics explain.
+    """The lag of one file's ground speed behind its wheel speeds (n,), if they tell one; it need not be certain.
 
     The file cannot show which of the two sensors is late; slip needs only that both are of one instant.
     """
@@ -143,8 +156,7 @@ def lag_within(time: Floats, columns: Mapping[str, npt.NDArray[Any]]) -> Lag | N
         }
     wheels = wheels_of(time, part)
     ground = speed_of(time, {"ground_speed": part["ground_speed"]}) if "ground_speed" in part else None
-    lag = None if wheels is None or ground is None else lag_between(wheels, ground, reach=_WITHIN)
-    return lag if lag is not None and lag.is_of_the_clock else None
+    return None if wheels is None or ground is None else lag_between(wheels, ground, reach=_WITHIN)
 
 
 def is_copy(turning: npt.NDArray[Any], ground: npt.NDArray[Any]) -> bool:

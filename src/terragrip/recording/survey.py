@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Self
 
 import numpy as np
+import numpy.typing as npt
 
 from terragrip.errors import InputError
 from terragrip.recording.chunks import CHUNK, CHUNKS, sampled_rows
+from terragrip.recording.lag import Lag, lag_within
 from terragrip.recording.table import Recording
+
+Floats = npt.NDArray[np.float64]
 
 ROWS = 200_000
 """Rows of a block, where a recording is cut into blocks."""
@@ -47,12 +51,13 @@ class Survey:
     """The result of one pass over a log: the number of its ``rows``, and a ``sample`` of them spread over the whole log.
 
     ``sample`` has the channels with a value anywhere in the log, and all remarks of its reader (notes, noise).
-    ``empty``: the channels without any value.
+    ``empty``: the channels without any value; ``lag``: that of the ground speed in its first rows, None: they tell none.
     """
 
     rows: int
     sample: Recording
     empty: tuple[str, ...]
+    lag: Lag | None = None
 
     def without_empty(self, block: Recording) -> Recording:
         """A block of the log without the channels that have no value anywhere."""
@@ -69,6 +74,7 @@ def survey_of(log: LogBlocks, progress: Progress | None = None) -> Survey:
     kept: dict[int, list[Recording]] = {}
     holding: set[str] = set()
     rows, every, last = 0, 1, None
+    beginning: list[Recording] = []
     for last in log.blocks():
         holding |= {n for n, v in last.channels.items() if n not in holding and not np.isnan(v).all()}
         end = rows + len(last)
@@ -81,6 +87,8 @@ def survey_of(log: LogBlocks, progress: Progress | None = None) -> Survey:
             if len(kept) > CHUNKS:
                 every *= 2
                 kept = {k: parts for k, parts in kept.items() if k % every == 0}
+        if rows < ROWS:
+            beginning.append(_speeds_of(last))
         rows = end
         if progress is not None:
             progress(rows)
@@ -92,8 +100,27 @@ def survey_of(log: LogBlocks, progress: Progress | None = None) -> Survey:
         sample = _joined([part for number in sorted(kept) for part in kept[number]], last)
     empty = tuple(name for name in sample.channels if name not in holding)
     notes = [f"{name} holds no value and is left out." for name in empty]
-    result = Survey(rows, sample, empty)
+    result = Survey(rows, sample, empty, lag_within(*first_speeds(beginning)))
     return replace(result, sample=result.without_empty(sample).with_notes(*notes))
+
+
+def first_speeds(blocks: Sequence[Recording]) -> tuple[Floats, dict[str, Floats]]:
+    """Time and speeds of the first `ROWS` rows of consecutive blocks."""
+    if not blocks:
+        return np.empty(0), {}
+    parts = [_speeds_of(block) for block in blocks]
+    names = [name for name in parts[0].channels if all(name in part.channels for part in parts)]
+    time = np.concatenate([part.time for part in parts])[:ROWS]
+    return time, {n: np.concatenate([part.channels[n] for part in parts])[:ROWS] for n in names}
+
+
+def _speeds_of(block: Recording) -> Recording:
+    """A block's speeds alone."""
+    wanted = ("wheel_speed_", "wheel_based")
+    return Recording(
+        block.time,
+        {n: v for n, v in block.channels.items() if n == "ground_speed" or n.startswith(wanted)},
+    )
 
 
 def _copied(block: Recording, rows: slice) -> Recording:
