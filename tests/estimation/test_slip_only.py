@@ -160,6 +160,17 @@ def test_a_dead_band_leaves_slip_open() -> None:
     assert "do not see, so slip is left open there" in sentence
 
 
+def test_a_stop_while_no_ground_speed_comes_is_no_dead_band() -> None:
+    """The receiver is silent while the machine stops: its speed before and after says nothing of the stop (simulated)."""
+    draws, time = np.random.default_rng(1000), np.arange(0, 200, 0.1)
+    speed = 1.5 * np.clip(np.abs(time % 50 - 25) - 5, 0, 4) / 4
+    ground = speed + 0.02 * draws.standard_normal(len(time))
+    ground[np.abs(time % 50 - 25) < 8] = np.nan
+    log = tg.Recording.from_frame({"time": time, "ground_speed": ground, "wheel_based_speed": speed / 0.95})
+    estimates = tg.estimate(log, robot())
+    assert not any("do not see" in note for note in estimates.notes)
+
+
 def test_some_torques_missing_is_an_error_not_slip() -> None:
     log = speeds_of(0.1)
     with pytest.raises(InputError, match="drive_torque_fr: is missing, but the wheel fr is driven"):

@@ -16,6 +16,7 @@ from terragrip.recording import Recording
 from terragrip.vehicle import Vehicle
 
 _MOVING = 0.1  # m/s
+_APART = 2.0  # s between ground speeds
 _BLIND = 5  # rows with rims at rest while the vehicle moves
 _WIDEST = 0.5  # m/s: a wider dead band is a missing speed
 WHAT_IS_MISSING = (
@@ -101,8 +102,12 @@ def _dead_band(log: Recording, rims: Sequence[Rim]) -> tuple[float, int]:
     known = np.isfinite(ground)
     if not still.any() or known.sum() < 2:
         return 0.0, 0
-    speed = np.abs(np.interp(log.time[still], log.time[known], ground[known]))
-    moving = speed[speed > _MOVING]
+    # By the slower of the speeds before and after, which must be close: a stop may lie between them.
+    when, speed, at = log.time[known], np.abs(ground[known]), log.time[still]
+    before = np.clip(np.searchsorted(when, at, side="right") - 1, 0, len(when) - 1)
+    after = np.clip(np.searchsorted(when, at), 0, len(when) - 1)
+    slower = np.minimum(speed[before], speed[after])
+    moving = slower[(slower > _MOVING) & (when[after] - when[before] < _APART)]
     if len(moving) < _BLIND:
         return 0.0, 0
     return min(float(np.quantile(moving, 0.9)), _WIDEST), len(moving)
