@@ -10,7 +10,7 @@ import pytest
 import scipy.io
 
 from terragrip.errors import InputError
-from terragrip.formats import read_table
+from terragrip.formats import inspect, read_table
 from test_matlab_exports import write_hdf5
 
 TIME = np.arange(200) / 20
@@ -92,3 +92,35 @@ def test_plain_arrays_that_matlab_wrote(shared: Callable[[str], Path]) -> None:
     assert "struct" not in text.partition(":")[2].partition(";")[0]
     with pytest.raises(InputError, match="holds no numeric column"):
         read_table(shared("data/ingest_samples/matlab") / "test_string_v7.mat")
+
+
+def test_a_vector_of_another_length_than_time_is_named(tmp_path: Path) -> None:
+    """Left out in silence, the pull of a log is a vehicle that tows nothing."""
+    time = np.arange(50) / 10
+    content = {"t": time, "v": 1 + time, "gains": np.ones(3)}
+    scipy.io.savemat(tmp_path / "log.mat", {**content, "drawbar_force": np.ones(51)})
+    table = read_table(tmp_path / "log.mat")
+    assert "drawbar_force" not in table.columns
+    assert any("(50), and left out: drawbar_force (51)." in note for note in table.notes)
+    scipy.io.savemat(tmp_path / "log.mat", {"t": time, "v": np.ones(51)})
+    with pytest.raises(InputError, match=r"time vector beside them \(50\), and left out: v \(51\)"):
+        read_table(tmp_path / "log.mat")
+
+
+@pytest.mark.parametrize("word", ["Unit", "units", "DataUnits"])
+def test_the_unit_of_a_struct_with_time_and_data_is_used(tmp_path: Path, word: str) -> None:
+    series = {"Time": np.arange(50) / 10, "Data": np.full(50, 7.2), word: "km/h"}
+    scipy.io.savemat(tmp_path / "log.mat", {"ground_speed": series})
+    assert read_table(tmp_path / "log.mat").units == {"ground_speed": "km/h"}
+
+
+def test_our_own_names_in_a_struct_are_proposed(tmp_path: Path) -> None:
+    time = np.arange(300) / 10
+    speed = 1 + 0.3 * np.sin(time)
+    names = ("wheel_speed_l", "wheel_speed_r", "drive_torque_l", "drive_torque_r", "drawbar_force")
+    content = {"time": time, "ground_speed": speed, **dict.fromkeys(names, 5 * speed)}
+    scipy.io.savemat(tmp_path / "log.mat", {"log": {"run": content}})
+    proposals = inspect(tmp_path / "log.mat").proposals
+    assert {name: proposals[name].entry["from"] for name in names} == {
+        name: f"log.run.{name}" for name in names
+    }

@@ -114,7 +114,15 @@ def candidates_of(column: Column) -> list[Candidate]:
     any_name = split_channel(own) is not None and own not in CHANNELS
     if is_channel(own) and not (any_name and (column.name.unit or column.name.has("command", "statistic"))):
         return [Candidate(own, own, 1.0, "Terragrip's own name")]
-    standard = _on_the_bus().get(re.split(r"[./]", own)[-1])
+    last = re.split(r"[./]", own)[-1]  # of a struct or a message
+    if (
+        last != own
+        and "_" in last
+        and is_channel(last)
+        and not column.name.has("command", "statistic", "odometry")
+    ):
+        return [Candidate(last, own, 1.0, "Terragrip's own name")]
+    standard = _on_the_bus().get(last)
     if standard is not None:
         return [Candidate(standard, own, 0.95, ON_THE_BUS)]
     if column.name.has("command", "statistic", "change", "other"):

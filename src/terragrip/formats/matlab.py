@@ -108,9 +108,9 @@ def _finished(tree: Mapping[str, Any], path: str, wanted: Wanted | None) -> Sign
     walk(tree, "", contents, 0)
     notes = [*_notes(contents), *contents.notes]
     if not contents.signals and not contents.loose:
-        problem = "holds no numeric column"
-        if notes:
-            problem += f"; {notes[0].rstrip('.')}"
+        problem = "; ".join(["holds no numeric column", *(note.rstrip(".") for note in notes[:1])])
+        if contents.odd:
+            problem = notes[0].rstrip(".")
         raise InputError(problem, file=path, hint="save arrays or structs with a time vector beside them")
     if not contents.signals:
         return _table_of(contents.loose, path, wanted, notes)
@@ -139,6 +139,12 @@ def _finished(tree: Mapping[str, Any], path: str, wanted: Wanted | None) -> Sign
 
 def _notes(contents: Contents) -> list[str]:
     notes = []
+    if contents.odd:
+        odd = _some([f"{name} ({own})" for name, (own, _) in contents.odd.items()])
+        longs = sorted({length for _, length in contents.odd.values()})
+        notes.append(
+            f"Of another length than the time vector beside them ({', '.join(map(str, longs[:3]))}), and left out: {odd}."
+        )
     records = [name for name, kind in contents.opaque.items() if kind == IN_RECORDS]
     if records:
         notes.append(

@@ -20,6 +20,7 @@ from terragrip.units import is_common
 _TIMES = ("time", "t", "tout", "timestamp", "time_s", "t_s", "time_ms", "t_ms", "time_us", "time_ns")
 _SCALES = {"ms": 1e-3, "us": 1e-6, "ns": 1e-9}
 _DATA = ("data", "values")
+_UNITS = ("unit", "units", "dataunits")
 _NAMES = ("name", "label", "signalname", "blockname")
 _WIDEST = 32  # columns of a matrix that are signals
 _DEEPEST = 12
@@ -29,7 +30,8 @@ _DATENUM_1970 = 719_529.0
 
 @dataclass
 class Contents:
-    """Signals by name, with what their clock and column are read from; ``opaque`` objects with their class; vectors without a clock.
+    """Signals by name, with what their clock and column are read from; ``opaque`` objects with their class; ``loose`` vectors without
+    a clock; ``odd`` ones of another length than their clock, with both lengths.
 
     ``notes`` say which of several vectors was taken for time.
     """
@@ -39,6 +41,7 @@ class Contents:
     units: dict[str, str] = field(default_factory=dict)
     opaque: dict[str, str] = field(default_factory=dict)
     loose: dict[str, Any] = field(default_factory=dict)
+    odd: dict[str, tuple[int, int]] = field(default_factory=dict)
     notes: list[str] = field(default_factory=list)
 
 
@@ -69,9 +72,15 @@ def _walk_struct(struct: Mapping[str, Any], name: str, contents: Contents, depth
         ):
             return
         for key, part in struct.items():
-            if key != clock_name and _is_numeric(part) and length in part.shape[:2]:
+            if key == clock_name or not _is_numeric(part):
+                continue
+            if length not in part.shape[:2]:
+                if _is_vector(part) and max(part.shape) > length / 2:  # shorter ones are parameters
+                    contents.odd[_joined(name, key)] = max(part.shape), length
+            else:
                 plain = key.lower() in _DATA and name
-                unit = struct[lower["unit"]] if plain and "unit" in lower else None
+                stated = next((lower[word] for word in _UNITS if word in lower), None)
+                unit = struct[stated] if plain and stated is not None else None
                 _add(contents, name if plain else _joined(name, key), clock, part, length, unit)
     for key, part in struct.items():
         if _is_numeric(part):
