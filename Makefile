@@ -196,7 +196,7 @@ beside-long:
 	@$(MAKE) $(AT_ONCE) kernel-sanitized pytest-long fuzz
 
 pytest-long: $(VENV)/package $(VENV)/dev studio ## the Python tests marked long, but for the kills: what shorter tests show too
-	$(PYTEST) $(WORKERS) -m long --ignore tests/test_kills.py
+	$(PYTEST) $(WORKERS) -m long --deselect tests/test_kills.py
 
 kills: $(VENV)/package $(VENV)/dev ## kill -9 a hundred times during estimate, soils, a fit saved and an upload
 	TERRAGRIP_KILLS=$(KILLS) $(BIN)/python -m pytest tests/test_kills.py -m long -q -n $(WORKERS) -rP

@@ -241,13 +241,15 @@ def _words(columns: Iterable[str]) -> frozenset[str]:
     result: set[str] = set()
     for column in columns:
         for word in words_of(column):
-            result |= {word, *GENERAL.known_in(word)} if not _is_cut(word) else {word}
+            result |= {word, *_whole(word)}
     return frozenset(result)
 
 
-def _is_cut(word: str) -> bool:
-    """Whether a word is read as one cut short: it shows the rule of cutting, not the whole word."""
-    return all(len(known) > len(word) for known in GENERAL.known_in(word))
+@cache
+def _whole(word: str) -> frozenset[str]:
+    """What a word is read by; nothing of one cut short, which shows the rule of cutting, not the whole word."""
+    read = GENERAL.known_in(word)
+    return frozenset() if all(len(known) > len(word) for known in read) else read
 
 
 @cache

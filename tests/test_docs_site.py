@@ -20,12 +20,10 @@ from terragrip.cli.entry import app  # noqa: E402
 from terragrip.recording.schema import AXLE_CHANNELS, CHANNELS, WHEEL_CHANNELS  # noqa: E402
 
 
-@pytest.fixture(scope="module")
-def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The built site; a link that leads nowhere or a page without a place in the contents ends the build."""
-    folder = tmp_path_factory.mktemp("docs")
+def made(folder: Path, *words: str) -> Path:
+    """The site, built; a link that leads nowhere or a page without a place in the contents ends the build."""
     done = subprocess.run(
-        [sys.executable, str(ROOT / "docs/site/make.py"), "-o", str(folder / "html")],
+        [sys.executable, str(ROOT / "docs/site/make.py"), "-o", str(folder / "html"), *words],
         capture_output=True,
         text=True,
         check=False,
@@ -34,7 +32,13 @@ def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder / "html"
 
 
-def test_the_site_is_whole_loads_nothing_from_elsewhere_and_finds_words(site: Path) -> None:
+def test_every_link_leads_somewhere_and_every_page_has_its_place(tmp_path: Path) -> None:
+    made(tmp_path, "--check")
+
+
+@pytest.mark.long
+def test_the_site_is_whole_loads_nothing_from_elsewhere_and_finds_words(tmp_path: Path) -> None:
+    site = made(tmp_path)
     pages = {path.stem for path in (ROOT / "docs").glob("*.md")}
     assert pages <= {path.stem for path in site.glob("*.html")}
     loaded = re.compile(

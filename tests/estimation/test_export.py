@@ -25,15 +25,15 @@ TURN = "The rate of turn is that of the positions."
 
 
 def log(*, clock: bool = True, places: bool = True) -> Any:
-    """60 s at 50 Hz; a position every tenth row; a soil whose name needs quoting."""
-    recording = drive(60.0, rate=50.0, imu=True).recording
+    """30 s at 50 Hz; a position every tenth row; a soil whose name needs quoting."""
+    recording = drive(30.0, rate=50.0, imu=True).recording
     time = recording.time
     fixed = np.where(np.arange(len(time)) % 10 == 0, 1.0, np.nan)
     if places:
         recording = recording.with_channels(
             latitude=fixed * (51 + 1e-9 * time), longitude=fixed * (13 + 8.5e-6 * time)
         )
-    soil = np.where(time < 30, "fine", 'wé"t, 50 %').astype(object)
+    soil = np.where(time < 15, "fine", 'wé"t, 50 %').astype(object)
     return replace(recording, labels={"soil": soil}, start=START if clock else None, notes=(NOTE,))
 
 
@@ -49,7 +49,7 @@ def estimates() -> Estimates:
 @pytest.fixture
 def written(estimates: Estimates, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Any:
     """Writes a suffix by the command, in blocks."""
-    monkeypatch.setattr("terragrip.estimation.converting.ROWS", 700)
+    monkeypatch.setattr("terragrip.estimation.converting.ROWS", 350)
     estimates.write(tmp_path / "e.parquet")
 
     def write(suffix: str) -> Path:
@@ -99,7 +99,7 @@ def test_an_excel_workbook(written, estimates):
     table[["event", "soil"]] = table[["event", "soil"]].fillna("")
     same(table, estimates, rtol=1e-15)  # a workbook holds 16 digits
     assert table["clock (UTC)"][0] == pd.Timestamp("2019-06-12 08:00:00.250")
-    assert table["clock (UTC)"].iloc[-1] == pd.Timestamp("2019-06-12 08:01:00.230")
+    assert table["clock (UTC)"].iloc[-1] == pd.Timestamp("2019-06-12 08:00:30.230")
     meaning = {row[0]: row[1:] for row in book["columns"].iter_rows(values_only=True)}
     assert meaning["ground_speed_std"][0] == "m/s"
     said = list(book["about"].iter_rows(values_only=True))
@@ -160,7 +160,7 @@ def test_geojson_as_gdal_and_json_read_it(written, estimates):
     geopandas = pytest.importorskip("geopandas", reason="needs terragrip[geo]")
     path, rows = written(".geojson"), placed_rows(estimates)
     frame = geopandas.read_file(path)
-    assert len(frame) == len(rows) == 300
+    assert len(frame) == len(rows) == 150
     np.testing.assert_array_equal(frame.geometry.y, estimates["latitude"][rows])
     np.testing.assert_array_equal(frame.geometry.x, estimates["longitude"][rows])
     same(frame, estimates, rows)
@@ -212,7 +212,7 @@ def test_mcap_opens_as_foxglove_wants_it(written, estimates):
     stamps = [when for _, when, _ in rows]
     np.testing.assert_allclose(np.array(stamps) / 1e9, START + estimates.time, rtol=0, atol=1e-6)
     fixes = by_topic["/terragrip/position"]
-    assert len(fixes) == 300
+    assert len(fixes) == 150
     name, when, fix = fixes[7]
     assert name == "foxglove.LocationFix"
     assert fix["timestamp"]["sec"] * 10**9 + fix["timestamp"]["nsec"] == when
@@ -259,7 +259,7 @@ def test_pandas_has_clock_units_and_notes(estimates):
     table = estimates.to_pandas()
     assert table.index[0] == pd.Timestamp("2019-06-12 08:00:00.250", tz="UTC")
     assert table.index.name == "clock"
-    assert table.loc["2019-06-12 08:00:30":"2019-06-12 08:00:31", "time"].between(29.7, 31.8).all()
+    assert table.loc["2019-06-12 08:00:20":"2019-06-12 08:00:21", "time"].between(19.7, 21.8).all()
     assert table.attrs["units"]["wheel_speed_fl"] == "rad/s"
     assert table.attrs["notes"] == [NOTE, TURN]
     assert table.attrs["vehicle"]["mass"] == 139.0
@@ -299,12 +299,12 @@ def test_no_place_is_refused_before_the_work(tmp_path, capsys, monkeypatch):
 def test_more_rows_than_a_file_takes_are_refused_before_the_work(
     estimates, tmp_path, capsys, monkeypatch, suffix, limit
 ):
-    monkeypatch.setattr(f"terragrip.estimation.export.{limit}", 2000 if "ROWS" in limit else 100_000)
+    monkeypatch.setattr(f"terragrip.estimation.export.{limit}", 1000 if "ROWS" in limit else 100_000)
     estimates.write(tmp_path / "e.parquet")
     monkeypatch.setattr("terragrip.estimation.converting.write_parts", None)  # none is written
     assert main(["convert", str(tmp_path / "e.parquet"), "-o", str(tmp_path / f"x{suffix}")]) == 2
     (line,) = capsys.readouterr().err.splitlines()
-    assert "3000 rows are more than the " in line
+    assert "1500 rows are more than the " in line
     assert ".parquet" in line
     assert [p.name for p in tmp_path.iterdir()] == ["e.parquet"]
 

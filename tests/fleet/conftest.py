@@ -7,6 +7,6 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parent))
 
-from small_fleet import place, scheduler
+from small_fleet import place, scheduler, started
 
-__all__ = ["place", "scheduler"]
+__all__ = ["place", "scheduler", "started"]

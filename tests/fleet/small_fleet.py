@@ -13,6 +13,9 @@ import numpy as np
 import pandas as pd
 import pytest
 
+PATIENCE = 600.0
+"""How long [s] a busy machine may need; no test passes or fails by what it waits less."""
+
 VEHICLE = """\
 name: {name}
 mass: 100 kg
@@ -90,7 +93,7 @@ def start(place: Path, *words: object, env: dict[str, str] | None = None) -> sub
 def fleet(place: Path, *words: object, env: dict[str, str] | None = None) -> tuple[int, str, str]:
     """Exit code, output and errors."""
     process = start(place, *words, env=env)
-    output, errors = process.communicate(timeout=600)
+    output, errors = process.communicate(timeout=PATIENCE)
     return process.returncode, output, errors
 
 
@@ -100,24 +103,40 @@ def free_port() -> int:
         return int(one.getsockname()[1])
 
 
-def serve(place: Path, port: int) -> list[subprocess.Popen[bytes]]:
-    """A scheduler of Dask and a worker, each in a process of its own."""
-    scheduler = _dask(place, "scheduler", "--host", "127.0.0.1", "--port", str(port))
-    return [scheduler, serve_worker(place, port)]
+def serve(place: Path, port: int, **variables: str) -> list[subprocess.Popen[bytes]]:
+    """A scheduler of Dask and a worker, each in a process of its own, once they are there; ``variables`` are of their environment."""
+    scheduler = _dask(place, variables, "scheduler", "--host", "127.0.0.1", "--port", str(port))
+    return [scheduler, serve_worker(place, port, **variables)]
 
 
-def serve_worker(place: Path, port: int) -> subprocess.Popen[bytes]:
-    """A worker that nobody restarts."""
-    return _dask(place, "worker", f"tcp://127.0.0.1:{port}", "--nthreads", "1", "--no-nanny")
+def serve_worker(place: Path, port: int, **variables: str) -> subprocess.Popen[bytes]:
+    """A worker that nobody restarts, once it is there: a busy machine needs more than the ten seconds for which a call looks for it."""
+    from distributed import Client
+
+    address = f"tcp://127.0.0.1:{port}"
+    worker = _dask(place, variables, "worker", address, "--nthreads", "1", "--no-nanny")
+    with Client(address, timeout=PATIENCE, set_as_default=False) as client:
+        client.wait_for_workers(1, timeout=PATIENCE)
+    return worker
 
 
-def _dask(place: Path, *words: str) -> subprocess.Popen[bytes]:
+def _dask(place: Path, variables: dict[str, str], *words: str) -> subprocess.Popen[bytes]:
     return subprocess.Popen(
         [sys.executable, "-m", "dask", *words, "--no-dashboard"],
         stdout=subprocess.DEVNULL,
         stderr=subprocess.DEVNULL,
-        env=environment(place),
+        env=environment(place) | variables,
     )
+
+
+@pytest.fixture
+def started() -> Iterator[list[subprocess.Popen[bytes]]]:
+    """Processes that end with the test."""
+    processes: list[subprocess.Popen[bytes]] = []
+    yield processes
+    for process in processes:
+        process.kill()
+        process.wait()
 
 
 @pytest.fixture(scope="session")

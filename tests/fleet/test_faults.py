@@ -11,7 +11,7 @@ import signal
 import subprocess
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -19,10 +19,19 @@ import psutil
 import pytest
 import scipy.io
 
-from small_fleet import call, environment, fleet, free_port, serve, serve_worker, start, whole, write_log
+from small_fleet import (
+    PATIENCE,
+    call,
+    environment,
+    fleet,
+    free_port,
+    serve,
+    serve_worker,
+    start,
+    whole,
+    write_log,
+)
 from terragrip.cli import main
-
-PATIENCE = 600.0
 
 
 def until(condition: Callable[[], object]) -> None:
@@ -62,10 +71,10 @@ def test_a_worker_that_is_killed_in_mid_task(place: Path) -> None:
 
 
 def test_a_log_that_needs_more_memory_than_a_worker_has(place: Path) -> None:
-    rows = 12_000_000  # 0.4 GB of numbers in a file of few
+    rows = 12_000_000  # 0.4 GB of numbers in a file of 0.1 MB: steps of time are quickly compressed
     ones = np.ones(rows, dtype=np.uint8)
     channels = dict.fromkeys(("ground_speed", "wheel_speed_l", "wheel_speed_r"), ones)
-    time_column = np.arange(rows, dtype=np.int32)
+    time_column = np.repeat(np.arange(rows // 1000, dtype=np.int32), 1000)
     scipy.io.savemat(place / "logs/a/bomb.mat", {"time": time_column, **channels}, do_compression=True)
     code, output, errors = fleet(
         place, place / "logs/**/*.*", "--vehicle", place / "Heros.yaml", "--workers", 2, "--memory", "420MB"
@@ -94,16 +103,6 @@ def test_a_call_that_is_killed_goes_on(place: Path) -> None:
     assert f"{7 - done} estimated, {done} unchanged, 0 failed" in output
     rows, reasons = whole(place / "out")
     assert (len(rows), reasons) == (7, {})
-
-
-@pytest.fixture
-def started() -> Iterator[list[subprocess.Popen[bytes]]]:
-    """Processes that end with the test."""
-    processes: list[subprocess.Popen[bytes]] = []
-    yield processes
-    for process in processes:
-        process.kill()
-        process.wait()
 
 
 def test_a_scheduler_that_is_lost_and_restarted(place: Path, started: list[subprocess.Popen[bytes]]) -> None:

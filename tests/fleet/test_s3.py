@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import subprocess
 import threading
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -12,7 +13,8 @@ import pandas as pd
 import pytest
 
 import terragrip as tg
-from small_fleet import environment, fleet, free_port, whole
+from small_fleet import call, environment, fleet, free_port, serve, whole
+from terragrip.cli import main
 
 pytest.importorskip("s3fs", reason="NOT TESTED: s3fs is not installed")
 pytest.importorskip("moto", reason="NOT TESTED: moto is not installed")
@@ -63,9 +65,15 @@ def moody() -> Iterator[tuple[Moody, dict[str, str]]]:
 
 
 def test_logs_and_data_set_on_s3(
-    place: Path, moody: tuple[Moody, dict[str, str]], monkeypatch: pytest.MonkeyPatch
+    place: Path,
+    moody: tuple[Moody, dict[str, str]],
+    started: list[subprocess.Popen[bytes]],
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
     store, said = moody
+    port = free_port()
+    started += serve(place, port, **said)
     for name, value in said.items():
         monkeypatch.setenv(name, value)
     s3 = boto3.client("s3")
@@ -74,9 +82,10 @@ def test_logs_and_data_set_on_s3(
         s3.upload_file(str(path), BUCKET, f"logs/{path.name}")
     words = (f"s3://{BUCKET}/logs/*.csv", "--vehicle", place / "Heros.yaml", "-o", f"s3://{BUCKET}/out")
     for estimated in (6, 0):
-        code, output, errors = fleet(place, *words, "--workers", 1, env=environment(place))
-        assert (code, errors) == (0, "")
-        assert f"{estimated} estimated, {6 - estimated} unchanged, 0 failed" in output
+        assert main(call(place, *words, "--scheduler", f"tcp://127.0.0.1:{port}")) == 0
+        printed = capsys.readouterr()
+        assert printed.err == ""
+        assert f"{estimated} estimated, {6 - estimated} unchanged, 0 failed" in printed.out
     # what the store holds, as any other folder
     for one in s3.list_objects_v2(Bucket=BUCKET, Prefix="out/")["Contents"]:
         local = place / one["Key"]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from kernel_curve import OnlineCurve
@@ -65,6 +65,7 @@ class Reference:
         return np.hypot(np.sqrt(self.P), self.column)
 
 
+@settings(max_examples=40)  # each of 150 steps
 @given(seed=st.integers(0, 10_000), pairs=st.integers(1, 8))
 def test_kernel_agrees_with_numpy(seed, pairs):
     rng = np.random.default_rng(seed)
