@@ -154,7 +154,7 @@ def test_a_scheduler_whose_workers_are_all_lost_is_one_line(
     assert errors.count("\n") == 1
     assert f"tcp://127.0.0.1:{port} has had no worker for 3 s" in errors
     assert "long.csv" in errors
-    assert "what is done is kept" in errors
+    assert "finished logs are kept" in errors
     rows, reasons = whole(place / "out")
     assert "long.csv" in reasons
     assert "memory" in reasons["long.csv"]

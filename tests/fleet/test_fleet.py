@@ -22,7 +22,7 @@ from terragrip.estimation import Estimates
 from terragrip.files import lock
 from terragrip.fleet.logs import FleetLog
 from terragrip.fleet.run import FleetResult
-from terragrip.fleet.task import Outcome, _tried
+from terragrip.fleet.task import Outcome, _attempt
 from terragrip.ground.analysis import analyse
 
 Ran = Callable[..., tuple[int, str, str]]
@@ -216,7 +216,7 @@ def test_two_logs_of_one_name(place: Path, refused: Refused, ran: Ran) -> None:
         ("log,vehicle\ndrive9.csv,Heros.yaml\n", "no log is drive9.csv; did you mean drive"),
         ("log,machine\ndrive0.csv,Heros.yaml\n", "unknown column 'machine'"),
         ("log,vehicle\ndrive0.csv,Heroes.yaml\n", "did you mean Heros.yaml"),
-        ("log,vehicle\ndrive0.csv,Heros.yaml\ndrive0.csv,Thorvald.yaml\n", "stands here twice"),
+        ("log,vehicle\ndrive0.csv,Heros.yaml\ndrive0.csv,Thorvald.yaml\n", "is listed twice"),
     ],
 )
 def test_an_index_that_does_not_fit(place: Path, refused: Refused, table: str, said: str) -> None:
@@ -229,7 +229,9 @@ def test_two_vehicles_of_one_name(place: Path, refused: Refused) -> None:
     (place / "Thorvald.yaml").write_text(VEHICLE.format(name="Heros").replace("100 kg", "120 kg"))
     index = place / "index.csv"
     index.write_text("log,vehicle\ndrive0.csv,Thorvald.yaml\n")
-    assert "has its name 'Heros'" in refused("--index", index, "--vehicle", place / "Heros.yaml")
+    assert "has the name 'Heros' of another vehicle" in refused(
+        "--index", index, "--vehicle", place / "Heros.yaml"
+    )
 
 
 @pytest.mark.parametrize(
@@ -254,7 +256,7 @@ def test_a_full_disk_is_no_success(place: Path, ran: Ran, monkeypatch: pytest.Mo
     monkeypatch.setattr("terragrip.fleet.run.run_fleet", lambda *_, **__: done)
     code, _, errors = ran()
     assert (code, errors.count("\n")) == (2, 1)
-    assert "1 of 6 logs found no space left" in errors
+    assert "no space was left on the disk for 1 of 6 logs" in errors
 
 
 @pytest.mark.parametrize(
@@ -277,7 +279,7 @@ def test_a_full_disk_is_known_by_its_number_and_not_by_a_text(error: Exception, 
         raise error
 
     for step in (wrapped, plain):
-        outcome = _tried(log, step)
+        outcome = _attempt(log, step)
         assert isinstance(outcome, Outcome)
         assert outcome.disk_full is full
 
@@ -353,7 +355,7 @@ def test_a_scheduler_that_does_not_answer(place: Path) -> None:
 
 def test_a_store_that_cannot_be_reached(place: Path, refused: Refused) -> None:
     assert "cannot be reached" in refused("nosuchstore://bucket/*.csv")
-    assert "no store" in refused("-o", "nosuchstore://bucket/out")
+    assert "is not a store" in refused("-o", "nosuchstore://bucket/out")
     (place / "file").write_text("")
     assert "is a file, and a folder is needed" in refused("-o", place / "file")
 
@@ -371,7 +373,7 @@ def test_a_second_call_on_one_folder_is_refused_while_the_first_works(place: Pat
     assert held is not None
     code, _, errors = ran()
     assert (code, errors) == (
-        2, f"terragrip: {out}: --output: another terragrip fleet works on it; wait for its end, or name another folder\n",
+        2, f"terragrip: {out}: --output: another terragrip fleet is using it; wait until it ends, or name another folder\n",
     )  # fmt: skip
     os.close(held)
     assert ran()[0] == 0

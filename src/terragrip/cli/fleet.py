@@ -24,19 +24,19 @@ def command(
     patterns: Annotated[
         list[str],
         typer.Argument(
-            metavar="PATTERN", help="Logs, folders or patterns ('DIR/**/*.mcap'), also of a store (s3://...)."
+            metavar="PATTERN", help="Logs, folders or patterns ('DIR/**/*.mcap'), also in a store (s3://...)."
         ),
     ],
     output: Annotated[
         str,
         typer.Option(
-            "--output", "-o", metavar="OUT", help="Folder of the data set, also of a store (s3://...)."
+            "--output", "-o", metavar="OUT", help="Folder of the data set, also in a store (s3://...)."
         ),
     ],
     vehicle: Annotated[
         Path | None,
         typer.Option(
-            "--vehicle", metavar="FILE", help="The vehicle file (YAML) of every log that --index gives none."
+            "--vehicle", metavar="FILE", help="The vehicle file (YAML) of every log without one in --index."
         ),
     ] = None,
     profile: ProfileFile = None,
@@ -45,33 +45,36 @@ def command(
         typer.Option(
             "--index",
             metavar="TABLE",
-            help="A CSV with the columns log, vehicle, profile, name: a row a log; all but log may be empty.",
+            help="A CSV with the columns log, vehicle, profile, name and a row per log; all but log may be empty.",
         ),
     ] = None,
     dbc: DbcFiles = None,
     method: Annotated[str, typer.Option(metavar="NAME", help=f"One of {', '.join(METHODS)}.")] = DEFAULT,
-    smooth: Annotated[bool, typer.Option("--smooth", help="Run each log backwards too.")] = False,
+    smooth: Annotated[bool, typer.Option("--smooth", help="Also smooth each log backwards.")] = False,
     scheduler: Annotated[
         str | None,
         typer.Option(
-            metavar="ADDRESS", help="A Dask scheduler (tcp://host:8786); else workers on this machine."
+            metavar="ADDRESS", help="A Dask scheduler (tcp://host:8786) in place of workers on this machine."
         ),
     ] = None,
     workers: Annotated[
         int | None,
-        typer.Option(metavar="COUNT", min=1, help="Workers on this machine; as many as processors."),
+        typer.Option(metavar="COUNT", min=1, help="Workers on this machine; by default one per processor."),
     ] = None,
     memory: Annotated[
         str | None,
-        typer.Option(metavar="AMOUNT", help="Most memory of a worker here, e.g. 2GB; its share by default."),
+        typer.Option(
+            metavar="AMOUNT",
+            help="Memory limit of each worker on this machine, e.g. 2GB; by default an equal share.",
+        ),
     ] = None,
     maps: Annotated[
-        bool, typer.Option("--map", help="Map each log that has positions, too: OUT/cells.")
+        bool, typer.Option("--map", help="Also map each log that has positions: OUT/cells.")
     ] = False,
     ground: Annotated[
         bool,
         typer.Option(
-            "--ground", help="Find each log's sections of ground and its events, with reasons, too."
+            "--ground", help="Also find each log's sections of ground and its events, with reasons."
         ),
     ] = False,
     metrics: Annotated[
@@ -83,7 +86,7 @@ def command(
 ) -> None:
     """Estimate any number of logs into one data set.
 
-    A second call does only what is new or changed. Every log ends in the data set or, with its reason, in failures.parquet.
+    A second call estimates only what is new or changed. Every log ends up in the data set or, with the reason, in failures.parquet.
     """
     import time
 
@@ -100,7 +103,7 @@ def command(
     method_named(method, smooth=smooth)
     if scheduler is not None and (workers or memory):
         raise InputError(
-            "is for workers on this machine",
+            "applies to workers on this machine only",
             place="--workers" if workers else "--memory",
             hint="leave it out with --scheduler",
         )
@@ -131,17 +134,17 @@ def command(
         _write_metrics(metrics, done, time.monotonic() - began)
     if done.unwritten:
         raise InputError(
-            f"{done.unwritten} of {len(logs)} logs found no space left on the disk",
+            f"no space was left on the disk for {done.unwritten} of {len(logs)} logs",
             file=output,
             place="--output",
-            hint="free space and run again: what was estimated is kept",
+            hint="free space and run again; finished logs are kept",
         )
     if not (quiet or as_json):
         print("\n".join(_lines(done, output)))
 
 
 def _write_metrics(path: Path, done: FleetResult, seconds: float) -> None:
-    """For the node exporter's textfile collector: it shows the last call's, so that all are gauges."""
+    """For the node exporter's textfile collector. It shows the last call only, so all metrics are gauges."""
     import time
 
     from terragrip.files import replacing
@@ -150,27 +153,31 @@ def _write_metrics(path: Path, done: FleetResult, seconds: float) -> None:
     page = Metrics()
     states = {"estimated": done.estimated, "unchanged": done.unchanged, "failed": len(done.failed)}
     logs = [({"state": state}, number) for state, number in {**states, "kept": done.kept}.items()]
-    page.add("gauge", "terragrip_fleet_logs", "Logs of the last call by what became of them.", logs)
+    page.add("gauge", "terragrip_fleet_logs", "Logs of the last call by outcome.", logs)
     page.add("gauge", "terragrip_fleet_rows", "Rows estimated by it.", done.rows)
     page.add(
         "gauge",
         "terragrip_fleet_filter_restarts",
-        "Rows of these at which the filter began anew.",
+        "Filter restarts in these rows.",
         done.restarts,
     )
     for name, text, values in (
-        ("nis", "NIS over what is expected (1: right about its noise), over the logs estimated.", done.nis),
-        ("log_seconds", "What a log took a worker, over the logs estimated.", done.seconds),
+        (
+            "nis",
+            "NIS over its expected value (1: the noise settings are right), over the logs estimated.",
+            done.nis,
+        ),
+        ("log_seconds", "Worker time of a log, over the logs estimated.", done.seconds),
     ):
         page.add("gauge", f"terragrip_fleet_{name}", text, _quantiles(values))
-    page.add("gauge", "terragrip_fleet_duration_seconds", "How long it took.", seconds)
-    page.add("gauge", "terragrip_fleet_ended_timestamp_seconds", "When it ended.", time.time())
+    page.add("gauge", "terragrip_fleet_duration_seconds", "Duration of the last call.", seconds)
+    page.add("gauge", "terragrip_fleet_ended_timestamp_seconds", "End of the last call.", time.time())
     with replacing(path) as temporary:
         temporary.write_text(str(page), encoding="utf-8")
 
 
 def _quantiles(values: Sequence[float]) -> list[tuple[dict[str, str], float]]:
-    """Least, median, 90 % and most over logs; none where there is no log."""
+    """Minimum, median, 90 % quantile and maximum over logs; empty without logs."""
     import numpy as np
 
     if not values:
@@ -179,10 +186,10 @@ def _quantiles(values: Sequence[float]) -> list[tuple[dict[str, str], float]]:
 
 
 def _lines(done: FleetResult, output: str) -> list[str]:
-    said = [f"Logs: {done.estimated} estimated, {done.unchanged} unchanged, {len(done.failed)} failed."]
-    said += [f"  {log}: {reason}" for log, reason in list(done.failed.items())[:10]]
+    lines = [f"Logs: {done.estimated} estimated, {done.unchanged} unchanged, {len(done.failed)} failed."]
+    lines += [f"  {log}: {reason}" for log, reason in list(done.failed.items())[:10]]
     if len(done.failed) > 10:
-        said.append(f"  and {len(done.failed) - 10} more in failures.parquet")
+        lines.append(f"  and {len(done.failed) - 10} more in failures.parquet")
     if done.kept:
-        said.append(f"{done.kept} logs of earlier calls are kept beside them.")
-    return [*said, f"Written to {output}; read {output}/report.html"]
+        lines.append(f"{done.kept} logs of earlier calls are kept.")
+    return [*lines, f"Written to {output}; read {output}/report.html"]

@@ -1,1 +1,1 @@
-"""Fleets: any number of logs on Dask, into one data set that grows by what is new (docs/fleet.md)."""
+"""Fleets: estimate any number of logs on Dask into one data set; later calls add what is new (docs/fleet.md)."""

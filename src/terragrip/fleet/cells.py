@@ -1,4 +1,4 @@
-"""A log's map as a table of cells, for the maps of a fleet."""
+"""A log's map as a table of cells, for a fleet's data set."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 
 def require_maps() -> None:
-    """Raise InputError where what maps need is not installed."""
+    """Raise InputError if the packages that maps need are not installed."""
     if find_spec("pyproj") is None:
         raise InputError(
             "the Python package 'pyproj' is needed", place="--map", hint="pip install 'terragrip[geo]'"
@@ -22,10 +22,10 @@ def require_maps() -> None:
 
 
 def cells_of_log(path: str | os.PathLike[str], log: str) -> pa.Table | None:
-    """The cells of a file of estimates (docs/maps.md), None where it has no positions.
+    """The map cells of a file of estimates (docs/maps.md); None if it has no positions.
 
-    Columns: ``log``, ``epsg`` of the grid, ``cell`` [m], ``east``, ``north`` of a cell's middle [m], and those of
-    `terragrip.maps.layers.cell_table`. Raises InputError where positions contradict the motion.
+    Columns: ``log``, ``epsg`` of the grid, ``cell`` [m], ``east`` and ``north`` of the cell's centre [m], and those of
+    `terragrip.maps.layers.cell_table`. Raises InputError if the positions contradict the motion.
     """
     import pyarrow as pa
 
@@ -48,5 +48,5 @@ def cells_of_log(path: str | os.PathLike[str], log: str) -> pa.Table | None:
         "east": (table["column"] + 0.5) * made.cell,
         "north": (table["row"] + 0.5) * made.cell,
     }
-    # null, not NaN, where a cell does not hold a quantity: sums pass over it
+    # null rather than NaN where a cell lacks a quantity: sums skip it
     return pa.table({name: pa.array(values, from_pandas=True) for name, values in {**where, **table}.items()})

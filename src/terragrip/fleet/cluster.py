@@ -1,4 +1,4 @@
-"""Batches of logs on Dask workers, of this machine or of a scheduler elsewhere; lost workers and schedulers are no loss of logs."""
+"""Run batches of logs on Dask workers, local or of a remote scheduler. Losing workers or the scheduler loses no log."""
 
 from __future__ import annotations
 
@@ -18,28 +18,29 @@ from terragrip.fleet.store import Store
 from terragrip.fleet.task import Outcome, Settings, estimate_logs
 
 BATCH_BYTES, BATCH_LOGS = 8_000_000, 16
-"""Small logs go together up to so many bytes and logs,"""
-SHARES = 8
-"""but in at least so many batches a worker, so that all end at about one time."""
+"""The most bytes and logs of a batch."""
+BATCHES_PER_WORKER = 8
+"""The fewest batches per worker, so that all workers finish at about the same time."""
 PATIENCE = 60.0
-"""Seconds that a lost scheduler is waited for, and a scheduler that lost all its workers."""
-REACH = 10.0
-"""Seconds in which a scheduler must answer at the start."""
-_MEMORY = "most likely it needs more memory than a worker has; give more with --memory, or fewer --workers"
-_LOOK = 0.05
+"""How long to wait for a lost scheduler, or for a worker once all are lost [s]."""
+CONNECT_TIMEOUT = 10.0
+"""How long a scheduler may take to answer at the start [s]."""
+_MEMORY = "most likely it needs more memory than a worker has; raise --memory or use fewer --workers"
+_POLL = 0.05
+"""Time between two looks at the results [s]."""
 _COUNT = 1.0
-"""Seconds between two counts of the workers: each asks the scheduler."""
+"""Time between two counts of the workers [s]; each count is a request to the scheduler."""
 
 _CONFIG = {
-    # A worker that nears its memory is ended and its log named; spilling and pausing would only hold the others up.
+    # A worker that nears its memory limit is terminated and its log reported; spilling and pausing would only delay the others.
     "distributed.worker.memory.target": False,
     "distributed.worker.memory.spill": False,
     "distributed.worker.memory.pause": False,
     "distributed.worker.memory.terminate": 0.95,
     "distributed.scheduler.allowed-failures": 1,
     "distributed.admin.tick.limit": "60 s",
-    # What Dask does beside the work, on the workers' processors (decision 0140): it looks at every thread's stack each 10 ms, at the event
-    # loop each 20 ms, and has malloc give each freed 64 kB back to the system.
+    # Dask's own overhead on the workers' processors (decision 0140): by default it samples every thread's stack each 10 ms, checks the
+    # event loop each 20 ms, and makes malloc return every freed 64 kB to the system.
     "distributed.worker.profile.enabled": False,
     "distributed.admin.tick.interval": "500 ms",
     "distributed.admin.system-monitor.interval": "10 s",
@@ -51,26 +52,27 @@ _CONFIG = {
 
 
 def batches_of(logs: Sequence[FleetLog], workers: int) -> list[list[FleetLog]]:
-    """Largest first, small ones together."""
-    share = sum(log.size for log in logs) / max(1, SHARES * workers)
-    most = min(BATCH_BYTES, share)
-    count = max(1, min(BATCH_LOGS, len(logs) // max(1, SHARES * workers)))
+    """Batches of logs, the largest first, small ones grouped."""
+    share = sum(log.size for log in logs) / max(1, BATCHES_PER_WORKER * workers)
+    limit = min(BATCH_BYTES, share)
+    count = max(1, min(BATCH_LOGS, len(logs) // max(1, BATCHES_PER_WORKER * workers)))
     batches: list[list[FleetLog]] = []
-    held = 0
+    size = 0
     for log in sorted(logs, key=lambda one: (-one.size, one.name)):
-        if not batches or len(batches[-1]) >= count or held + log.size > most:
+        if not batches or len(batches[-1]) >= count or size + log.size > limit:
             batches.append([])
-            held = 0
+            size = 0
         batches[-1].append(log)
-        held += log.size
+        size += log.size
     return batches
 
 
 @contextmanager
 def workers_at(scheduler: str | None, workers: int, memory: str | None) -> Iterator[Pool]:
-    """Workers of an existing ``scheduler``, or else so many of this machine, each with ``memory`` ("2 GB"; None: its share).
+    """The workers of an existing ``scheduler``; without one, ``workers`` processes on this machine, each with ``memory`` ("2 GB"; None: an
+    equal share).
 
-    Raises InputError where Dask is not installed, or the scheduler does not answer or has no worker.
+    Raises InputError if Dask is not installed, or if the scheduler does not answer or has no worker.
     """
     try:
         import dask
@@ -79,7 +81,7 @@ def workers_at(scheduler: str | None, workers: int, memory: str | None) -> Itera
         raise InputError(
             "Dask is not installed", hint="pip install 'terragrip[fleet]'", page="install"
         ) from None
-    # A lost worker or scheduler shows in the failures or in one line, not by Dask's log.
+    # Lost workers and schedulers are reported in the failures or in one line, not in Dask's log.
     for name in [*logging.root.manager.loggerDict]:
         if name.split(".")[0] in ("distributed", "tornado", "asyncio"):
             logging.getLogger(name).setLevel(logging.CRITICAL + 1)
@@ -87,7 +89,7 @@ def workers_at(scheduler: str | None, workers: int, memory: str | None) -> Itera
         if scheduler is not None:
             pool = Pool(lambda: _client(scheduler), scheduler)
             try:
-                pool.connect(REACH)
+                pool.connect(CONNECT_TIMEOUT)
                 yield pool
             finally:
                 pool.close()
@@ -97,7 +99,7 @@ def workers_at(scheduler: str | None, workers: int, memory: str | None) -> Itera
             n_workers=workers,
             threads_per_worker=1,
             memory_limit=limit,
-            dashboard_address=":0",  # the port that is free, without a word
+            dashboard_address=":0",  # any free port, without a warning
             silence_logs=logging.CRITICAL,
         ) as cluster:
             pool = Pool(
@@ -106,19 +108,22 @@ def workers_at(scheduler: str | None, workers: int, memory: str | None) -> Itera
                 lambda: cluster.scale(workers),
             )
             try:
-                pool.connect(REACH)
+                pool.connect(CONNECT_TIMEOUT)
                 yield pool
             finally:
                 pool.close()
 
 
 def check_address(address: str) -> None:
-    """Refuse what Dask cannot connect to: it would leave a client half made, which complains with a traceback when it goes."""
+    """Refuse an address that Dask cannot connect to; its half-built client would print a traceback when it is collected.
+
+    Raises InputError.
+    """
     written = re.fullmatch(r"(?:([a-z]+)://)?[^\s:/]+:\d{1,5}|(?:([a-z]+)://)?\[[^\s\]]+\]:\d{1,5}", address)
     scheme = (written[1] or written[2] or "tcp") if written else None
     if scheme not in ("tcp", "tls", "ws", "wss"):
         raise InputError(
-            f"{address!r} is no address of a scheduler",
+            f"{address!r} is not the address of a scheduler",
             place="--scheduler",
             hint="write e.g. tcp://host:8786",
         )
@@ -130,7 +135,7 @@ def check_address(address: str) -> None:
         raise InputError(
             f"{address} needs certificates",
             place="--scheduler",
-            hint="name them in Dask's configuration, e.g. DASK_DISTRIBUTED__COMM__TLS__CA_FILE=ca.pem and those of client",
+            hint="name them in Dask's configuration, e.g. DASK_DISTRIBUTED__COMM__TLS__CA_FILE=ca.pem, and the client's",
         )
 
 
@@ -148,41 +153,41 @@ def _bytes(text: str) -> int:
     except ValueError:
         amount = 0
     if amount < 1_000_000:
-        raise InputError(f"{text!r} is no amount of memory", place="--memory", hint="write e.g. 2GB")
+        raise InputError(f"{text!r} is not an amount of memory", place="--memory", hint="write e.g. 2GB")
     return amount
 
 
 class Pool:
-    """A connection to workers that is made anew when it breaks.
+    """A connection to the workers, re-established when it breaks.
 
-    ``connect`` makes it, to the scheduler at ``address``. ``refill`` starts the workers that are missing (None: they are not ours).
+    ``connect`` returns a client of the scheduler at ``address``. ``refill`` restarts missing workers (None: they are not ours to start).
     """
 
     def __init__(
         self, connect: Callable[[], Any], address: str, refill: Callable[[], None] | None = None
     ) -> None:
-        self._make, self._address, self._refill = connect, address, refill
+        self._new_client, self._address, self._refill = connect, address, refill
         self._client: Any = None
-        self._counted = self._staffed = 0.0
+        self._counted = self._last_staffed = 0.0
 
     def connect(self, patience: float) -> None:
-        """Connect, trying for ``patience`` seconds. Raises InputError where nobody answers, or no worker comes."""
+        """Connect, retrying for ``patience`` seconds. Raises InputError if no scheduler answers or no worker appears."""
         self.close()
         end = time.monotonic() + patience
         while True:
             try:
-                self._client = self._make()
+                self._client = self._new_client()
                 break
             except (OSError, ValueError) as error:
                 if isinstance(error, ValueError) or time.monotonic() > end:
                     raise InputError(
                         f"no scheduler answers at {self._address}",
                         place="--scheduler",
-                        hint="start one with `dask scheduler`, or leave --scheduler out; what is done is kept",
+                        hint="start one with `dask scheduler`, or leave --scheduler out; finished logs are kept",
                     ) from None
                 time.sleep(0.5)
         try:
-            self._client.wait_for_workers(1, timeout=max(patience, REACH))
+            self._client.wait_for_workers(1, timeout=max(patience, CONNECT_TIMEOUT))
         except TimeoutError:
             self.close()
             raise InputError(
@@ -190,29 +195,30 @@ class Pool:
                 place="--scheduler",
                 hint="start some with `dask worker ADDRESS`",
             ) from None
-        self._staffed = time.monotonic()
+        self._last_staffed = time.monotonic()
 
     def close(self) -> None:
-        """Leave the workers; a local cluster's end with it."""
+        """Disconnect; the workers of a local cluster stop with it."""
         client, self._client = self._client, None
         if client is not None:
             client.close(timeout=2)
 
     @property
     def count(self) -> int:
-        """How many workers there are now."""
+        """The current number of workers, at least 1."""
         return max(1, len(self._client.scheduler_info(n_workers=-1)["workers"]))
 
     def run(
         self, logs: Sequence[FleetLog], settings: Settings, store: Store, failed: Container[str] = ()
     ) -> Iterator[Outcome]:
-        """One outcome a log, as they come.
+        """One outcome per log, in the order in which they finish.
 
-        Logs of a batch whose worker was lost twice are run again at the end, one at a time: who is then lost twice is the one. Logs whose
-        name is in ``failed`` come after the others, each a batch of its own: the one that took the last worker takes no other log with it.
+        If a batch loses its worker twice, its logs are run again at the end, one at a time; a log that then loses its worker twice is the
+        cause. Logs whose name is in ``failed`` run after all others, each in a batch of its own, so that one which kills the last worker
+        takes no other log down.
 
-        Raises InputError where the scheduler, or every worker, is lost and does not come back within `PATIENCE`; before that the logs
-        that the last worker had are among the outcomes.
+        Raises InputError if the scheduler or all workers are lost and do not return within `PATIENCE`, after yielding a failure for each
+        log that the lost workers held.
         """
         suspects: list[FleetLog] = []
         first = batches_of([log for log in logs if log.name not in failed], self.count)
@@ -225,19 +231,22 @@ class Pool:
                 name = suspects.pop(0).name
                 if alone:
                     yield Outcome(
-                        name, reason=f"its worker was lost twice while it alone was estimated: {_MEMORY}"
+                        name, reason=f"its worker was lost twice while estimating it alone: {_MEMORY}"
                     )
         except _NoWorkersError as error:
             names = sorted({log.name for log in (*suspects, *error.logs)})
-            others = f" or {len(names) - 1} others" if len(names) > 1 else ""
+            others = f" or one of {len(names) - 1} others" if len(names) > 1 else ""
             for name in names:
-                yield Outcome(name, reason=f"no worker came back after this log{others}: {_MEMORY}")
+                yield Outcome(
+                    name,
+                    reason=f"no worker came back after the last was lost, with this log{others}: {_MEMORY}",
+                )
             raise self._without_workers(names) from None
 
     def _all(
         self, batches: list[list[FleetLog]], settings: Settings, store: Store, suspects: list[FleetLog]
     ) -> Iterator[Outcome]:
-        """Outcomes of batches; logs whose worker was lost twice are put to ``suspects``."""
+        """The outcomes of batches. Logs whose batch lost its worker twice are appended to ``suspects`` instead."""
         open_batches = self._submit(batches, settings, store)
         while open_batches:
             lost = self._client.status != "running"
@@ -246,7 +255,7 @@ class Pool:
                     continue
                 try:
                     outcomes = _outcomes_of(future, batch, suspects)
-                except (CancelledError, OSError):  # the scheduler went, and its results with it
+                except (CancelledError, OSError):  # the scheduler is lost, and its results with it
                     lost = True
                     break
                 del open_batches[future]
@@ -257,34 +266,34 @@ class Pool:
                 open_batches = self._submit(left, settings, store)
             if not self._has_workers():
                 raise _NoWorkersError(_lost_with(self._client, open_batches))
-            time.sleep(_LOOK)
+            time.sleep(_POLL)
 
     def _has_workers(self) -> bool:
-        """Whether there was a worker within the last `PATIENCE`; starts those of this machine that Dask gave up."""
+        """Whether there was a worker within the last `PATIENCE`; also restarts local workers that Dask gave up on."""
         now = time.monotonic()
         if now - self._counted < _COUNT:
             return True
         self._counted = now
         if self._client.scheduler_info(n_workers=1)["workers"]:
-            self._staffed = now
+            self._last_staffed = now
         if self._refill is not None:
             self._refill()
-        return now - self._staffed < PATIENCE
+        return now - self._last_staffed < PATIENCE
 
     def _without_workers(self, names: Sequence[str]) -> InputError:
-        """Of logs that the last workers had."""
+        """The error for a pool without workers; ``names``: the logs that the last ones held."""
         listed = ", ".join(names[:3]) + (f" and {len(names) - 3} more" if len(names) > 3 else "")
-        after = f", the last was lost with {listed}" if names else ""
+        after = f"; the last one was lost with {listed}" if names else ""
         if self._refill is None:
             return InputError(
                 f"the scheduler at {self._address} has had no worker for {PATIENCE:.0f} s{after}",
                 place="--scheduler",
-                hint="start workers, with more memory, and run again: what is done is kept",
+                hint="start workers with more memory and run again; finished logs are kept",
             )
         return InputError(
             f"no worker of this machine came back within {PATIENCE:.0f} s{after}",
             place="--workers",
-            hint="give more --memory or fewer --workers and run again: what is done is kept",
+            hint="raise --memory or use fewer --workers and run again; finished logs are kept",
         )
 
     def _submit(
@@ -298,7 +307,7 @@ class Pool:
 
 
 class _NoWorkersError(Exception):
-    """No worker came back; ``logs``: those that the lost workers had."""
+    """No worker came back; ``logs`` are those that the lost workers held."""
 
     def __init__(self, logs: list[FleetLog]) -> None:
         super().__init__()
@@ -306,9 +315,9 @@ class _NoWorkersError(Exception):
 
 
 def _lost_with(client: Any, open_batches: Mapping[Any, list[FleetLog]]) -> list[FleetLog]:
-    """Logs of the batches that a worker had when it was lost; none where the scheduler does not say."""
+    """The logs of batches that were on a worker when it was lost; empty if the scheduler cannot be asked."""
 
-    # A function within one travels by its code: a scheduler elsewhere need not have Terragrip.
+    # A nested function is pickled by value, so a remote scheduler need not have Terragrip installed.
     def suspicious(dask_scheduler: Any) -> set[str]:
         return {key for key, task in dask_scheduler.tasks.items() if task.suspicious}
 
@@ -320,7 +329,7 @@ def _lost_with(client: Any, open_batches: Mapping[Any, list[FleetLog]]) -> list[
 
 
 def _outcomes_of(future: Any, batch: list[FleetLog], suspects: list[FleetLog]) -> list[Outcome]:
-    """Of a batch that is no longer pending. Raises CancelledError or OSError where its scheduler was lost."""
+    """The outcomes of a batch that is no longer pending. Raises CancelledError or OSError if its scheduler was lost."""
     from distributed import KilledWorker
 
     if future.status != "error":
@@ -335,5 +344,5 @@ def _outcomes_of(future: Any, batch: list[FleetLog], suspects: list[FleetLog]) -
 
 
 def default_workers() -> int:
-    """As many as this process may use processors."""
+    """The number of processors that this process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1

@@ -1,4 +1,4 @@
-"""Adhesion curves of a fleet: pooled over all machines, and of each machine alone."""
+"""Adhesion curves of a fleet: pooled over all machines, and per machine."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ from terragrip.soil.estimates import GatheredRuns
 from terragrip.soil.learn import Campaign
 
 MOST_ROWS = 500_000
-"""Rows of all logs that curves are learned from; of more, every second, third and so on is taken."""
+"""The most rows that curves are learned from; of more, every second, third ... row is used."""
 
 
 @dataclass(frozen=True)
 class FleetCurves:
-    """``pooled`` over all machines; ``each``: of every machine of several, on its own logs. ``tire_resistance``: the machines' mean."""
+    """``pooled``: over all machines. ``each``: per machine, empty if there is only one. ``tire_resistance``: the mean over machines."""
 
     pooled: Campaign
     each: Mapping[str, Campaign]
@@ -29,7 +29,7 @@ class FleetCurves:
 def learn_curves(
     store: Store, notes: Sequence[Mapping[str, Any]], progress: Callable[[int, int], None] | None = None
 ) -> FleetCurves:
-    """Learn every labelled soil, from the rows that each log left for it (`LogTally`)."""
+    """Learn every labelled soil from the samples that the logs left (`LogTally`). Raises InputError if a sample is damaged."""
     sampled = [note for note in notes if note["sample"]]
     by_machine: dict[str, GatheredRuns] = {}
     tires: dict[str, float] = {}
@@ -38,7 +38,7 @@ def learn_curves(
     for number, note in enumerate(sampled, 1):
         machine = str(note["summary"]["vehicle"])
         estimates = _sample(store, note).select(slice(None, None, every))
-        # five rows a second tell no roughness: signatures are for `terragrip soils`
+        # five rows a second do not resolve roughness: signatures need `terragrip soils`
         by_machine.setdefault(machine, GatheredRuns()).add(estimates, note["log"], signatures=False)
         tires[machine] = float(estimates.vehicle.tire_rolling_resistance or 0.0)
         if progress:
@@ -62,7 +62,7 @@ def _sample(store: Store, note: Mapping[str, Any]) -> Estimates:
     content = store.read(name)
     try:
         if content is not None:
-            # not read_table, which looks for a data set around it first: twice the time
+            # read_table would first look for a data set around it, which takes twice the time
             return Estimates.from_arrow(
                 pq.ParquetFile(pa.BufferReader(content)).read(), f"{store.url}/{name}"
             )

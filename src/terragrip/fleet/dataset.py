@@ -1,4 +1,4 @@
-"""A fleet's tables: which logs are in the data set, which failed, and no file of a log that counts twice."""
+"""A fleet's tables: which logs are in the data set and which failed, each log once."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ Note = dict[str, Any]
 
 
 def known_notes(store: Store) -> tuple[dict[str, Note], dict[str, str]]:
-    """What earlier calls left: the note of each log of the summary by the log's name, and the reasons of those that failed.
+    """What earlier calls left: the notes of estimated logs and the reasons of failed ones, by the log's name.
 
-    Raises InputError where there are tables that are none of a fleet's.
+    Raises InputError if the folder holds tables that are not a fleet's.
     """
     keys = {row["key"] for row in _read(store, SUMMARY)}
     by_name: dict[str, Note] = {}
-    # A call that was cut off may have left two notes of a log: the one that no summary tells of yet is the newer.
+    # An interrupted call may have left two notes of a log; the one that is not in the summary yet is newer.
     for note in sorted(map(json.loads, store.read_all(NOTES)), key=lambda one: one["key"] not in keys):
         old = by_name.get(note["log"])
         if old is not None:
@@ -36,9 +36,10 @@ def known_notes(store: Store) -> tuple[dict[str, Note], dict[str, str]]:
 def settled(
     store: Store, before: Mapping[str, Note], failed: Mapping[str, str], outcomes: Sequence[Outcome]
 ) -> tuple[list[Note], dict[str, str]]:
-    """The logs that the data set holds from now on, and the failures; files that are of neither any more are removed.
+    """The notes and failures after a call; files that are no longer referenced are removed.
 
-    Logs of earlier calls that this one did not name stay. Of a log that is estimated anew otherwise, or fails now, the old estimates go.
+    Logs of earlier calls that this one did not name are kept. If a log was estimated differently or failed now, its old estimates are
+    removed.
     """
     notes, reasons = dict(before), dict(failed)
     for one in outcomes:
@@ -66,7 +67,7 @@ def _files(note: Note) -> set[str]:
 
 
 def write_tables(store: Store, notes: Sequence[Note], reasons: Mapping[str, str]) -> None:
-    """Write summary, soils and failures, each whole or not at all. Raises OSError where the store refuses."""
+    """Write summary, soils and failures, each whole or not at all. Raises OSError if the store refuses."""
     import pyarrow as pa
 
     means = [(name, pa.float64()) for name in ("moving_time", "moving_distance", *MEANS)]
@@ -101,7 +102,7 @@ def write_tables(store: Store, notes: Sequence[Note], reasons: Mapping[str, str]
 
 
 def soil_rows(notes: Sequence[Note]) -> list[dict[str, Any]]:
-    """A row a log and label of the ground."""
+    """One row per log and soil label."""
     return [
         {"log": n["log"], "vehicle": n["summary"]["vehicle"], "day": n["summary"]["day"], **row}
         for n in notes
@@ -111,8 +112,8 @@ def soil_rows(notes: Sequence[Note]) -> list[dict[str, Any]]:
 
 def write_text(store: Store, name: str, text: str) -> None:
     """Write a text file, whole or not at all."""
-    with store.bench() as bench:
-        local = bench / "text"
+    with store.staging() as staging:
+        local = staging / "text"
         local.write_text(text, encoding="utf-8")
         store.put(local, name)
 
@@ -120,8 +121,8 @@ def write_text(store: Store, name: str, text: str) -> None:
 def _write(store: Store, name: str, table: Any) -> None:
     import pyarrow.parquet as pq
 
-    with store.bench() as bench:
-        local = bench / "table.parquet"
+    with store.staging() as staging:
+        local = staging / "table.parquet"
         pq.write_table(table, local)
         store.put(local, name)
 
@@ -139,7 +140,7 @@ def _read(store: Store, name: str) -> list[dict[str, Any]]:
             raise pa.ArrowInvalid("other columns")
     except pa.ArrowException as error:
         raise InputError(
-            f"is no table of a fleet ({error})",
+            f"is not a table of a fleet ({error})",
             file=f"{store.url}/{name}",
             hint="name another folder with -o",
         ) from error

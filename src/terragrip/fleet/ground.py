@@ -1,4 +1,4 @@
-"""A log's ground as tables, for the data set of a fleet: its sections, and its events with their reasons."""
+"""A log's sections of ground and its events with their reasons, as tables for a fleet's data set."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ if TYPE_CHECKING:
 
 
 def ground_of_log(path: str | os.PathLike[str], log: str) -> dict[str, pa.Table]:
-    """Of a file of estimates its ``sections`` and its ``events``, as `terragrip ground` finds them without a library.
+    """The ``sections`` and ``events`` of a file of estimates, as `terragrip ground` finds them without a soil library.
 
-    A row has the ``log``, the values of a `terragrip.ground.sections.Section` or `terragrip.ground.events.Event` but for those by wheel
-    or soil, and ``seconds``, how long it lasts. A log without sections or events lacks that table. Raises InputError where the
-    estimates do not tell the ground.
+    A row holds the ``log``, the fields of a `terragrip.ground.sections.Section` or `terragrip.ground.events.Event` except those by wheel
+    or soil, and its duration ``seconds``. Without sections or events that table is missing. Raises InputError if the estimates do not
+    suffice to find sections.
     """
     ground, _ = analyse(Estimates.read(path), run=log)
     tables = {"sections": _table(ground.sections, log), "events": _table(ground.events, log)}

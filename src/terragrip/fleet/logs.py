@@ -1,4 +1,4 @@
-"""Which logs a fleet has, and the vehicle and profile of each: by a pattern, and by an index table."""
+"""The logs of a fleet with their vehicles and profiles, from patterns and an index table."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ if TYPE_CHECKING:
     from terragrip.vehicle import Vehicle
 
 COLUMNS = ("log", "vehicle", "profile", "name")
-"""Of an index table."""
+"""Columns of an index table."""
 
 
 @dataclass(frozen=True)
 class FleetLog:
-    """One log: its ``name`` in the data set, where it is, its size [bytes], its machine and how it is read."""
+    """One log: its ``name`` in the data set, its path or address, its size [bytes], its machine, vehicle and profile."""
 
     name: str
     url: str
@@ -40,9 +40,9 @@ class _Entry:
 
 
 def matching(pattern: str) -> list[tuple[str, int]]:
-    """Files of a store that a pattern with an address matches, with their sizes.
+    """The files of a store that match a pattern, with their sizes [bytes].
 
-    Raises InputError where the store cannot be reached, or nothing matches.
+    Raises InputError if the store cannot be reached or nothing matches.
     """
     try:
         from fsspec.core import url_to_fs
@@ -50,11 +50,11 @@ def matching(pattern: str) -> list[tuple[str, int]]:
         system, path = url_to_fs(pattern)
         found = system.glob(path, detail=True)
     except Exception as error:
-        # each store has its own errors; whatever it says is the reason
+        # each store has its own exceptions
         raise InputError(
             f"cannot be reached ({str(error) or type(error).__name__})",
             file=pattern,
-            hint="check the address, the network and the access",
+            hint="check the address, the network and your access rights",
         ) from error
     files = [
         (system.unstrip_protocol(p), int(i.get("size") or 0)) for p, i in found.items() if i["type"] == "file"
@@ -65,9 +65,9 @@ def matching(pattern: str) -> list[tuple[str, int]]:
 
 
 def on_disk(paths: Iterable[Path], output: str) -> list[tuple[str, int]]:
-    """Logs of this machine with their sizes; without folders that are no bag, and without what lies in ``output``.
+    """Local logs with their sizes [bytes], without folders that are not bags and without anything in ``output``.
 
-    Raises InputError where none is left.
+    Raises InputError if none is left, or a path does not exist.
     """
     from terragrip.formats.registry import is_bag
 
@@ -96,13 +96,13 @@ def fleet_logs(
 ) -> list[FleetLog]:
     """The logs with their vehicles and profiles, in the order of ``files``.
 
-    ``index``: a CSV with the columns `log` (a path from the table's folder, an address, or a file's name), `vehicle`, `profile` and `name`;
-    what a row leaves out is ``vehicle``, ``profile`` and the file's name.
+    ``index``: a CSV with the columns `log` (a path relative to the table, an address, or a file name), `vehicle`, `profile` and `name`.
+    Empty cells default to ``vehicle``, ``profile`` and the file's name.
 
     Raises
     ------
-    InputError: two logs have one name; a log has no vehicle; a row of the index names no log; two vehicle files hold one name; a vehicle or
-        profile cannot be used.
+    InputError: two logs share a name; a log has no vehicle; a row of the index matches no log; two different vehicles share a name; a
+        vehicle or profile file is invalid.
     """
     entries = {} if index is None else _entries(index, [url for url, _ in files])
     machines, profiles = _Machines(), _Profiles()
@@ -113,19 +113,19 @@ def fleet_logs(
         path = entry.vehicle or vehicle
         if path is None:
             raise InputError(
-                f"names no vehicle for {url}" if index else "no vehicle is named",
+                f"names no vehicle for {url}" if index else "no vehicle is given",
                 file=index,
                 place=None if index else "--vehicle",
-                hint="add its row, or give --vehicle for all others"
+                hint="add a row for it, or give --vehicle for all others"
                 if index
-                else "name a vehicle file, or an --index",
+                else "give a vehicle file, or an --index",
             )
         name = entry.name or os.path.basename(url.rstrip("/"))
         if name in names:
             raise InputError(
-                f"has the name of {names[name]}",
+                f"has the same name as {names[name]}",
                 file=url,
-                hint="rename one, or give names in the column `name` of an --index",
+                hint="rename one, or set names in the column `name` of an --index",
             )
         names[name] = url
         machine, loaded = machines.of(path)
@@ -134,7 +134,7 @@ def fleet_logs(
 
 
 def _entries(index: Path, urls: Sequence[str]) -> dict[str, _Entry]:
-    """The index's rows by the address of their log; rows of logs that exist and were not asked for are left out."""
+    """The index's rows by the address of their log, without rows of existing logs that the patterns did not match."""
     known = set(urls)
     by_name: dict[str, list[str]] = {}
     for url in urls:
@@ -150,17 +150,17 @@ def _entries(index: Path, urls: Sequence[str]) -> dict[str, _Entry]:
             if not is_remote(whole) and os.path.exists(whole):
                 continue
             close = nearest(given, by_name)
-            hint = f"did you mean {close}?" if close else "write its path from the table's folder"
+            hint = f"did you mean {close}?" if close else "write its path relative to the table"
             raise InputError(f"no log is {given}", file=index, place=place, hint=hint)
         if whole in entries:
-            raise InputError(f"{given} stands here twice", file=index, place=place, hint="keep one row")
+            raise InputError(f"{given} is listed twice", file=index, place=place, hint="keep one row")
         vehicle = index.parent / row["vehicle"] if row.get("vehicle") else None
         entries[whole] = _Entry(vehicle, profile_in(index, row.get("profile", "")), row.get("name", ""))
     return entries
 
 
 class _Machines:
-    """Vehicles by their files, each loaded once."""
+    """Vehicles by file, each loaded once."""
 
     def __init__(self) -> None:
         self._loaded: dict[Path, tuple[str, Vehicle]] = {}
@@ -175,17 +175,17 @@ class _Machines:
             other = self._files.setdefault(name, path)
             if other != path and self._loaded[other][1] != vehicle:
                 raise InputError(
-                    f"another vehicle than {other} has its name {name!r}",
+                    f"has the name {name!r} of another vehicle, {other}",
                     file=path,
                     place="name",
-                    hint="give each its own",
+                    hint="give each its own name",
                 )
             self._loaded[path] = (name, vehicle)
         return self._loaded[path]
 
 
 class _Profiles:
-    """Profiles by their files, each loaded once."""
+    """Profiles by file, each loaded once."""
 
     def __init__(self) -> None:
         self._loaded: dict[Path, Profile] = {}

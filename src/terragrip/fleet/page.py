@@ -1,4 +1,4 @@
-"""The fleet's report: one page, by vehicle, by soil and by day, the pooled curves, and what failed."""
+"""The fleet's report: one page with tables by vehicle, soil and day, the pooled curves, and the failures."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ Row = dict[str, Any]
 
 DIGGING = ("immobilization", "stuck")
 MOST = 60
-"""Rows of a table of the page; the Parquet tables hold all."""
+"""The most rows of a table on the page; the Parquet tables hold all."""
 SLIPS = np.linspace(0.0, 0.6, 121)
 
 
 def report_of(notes: Sequence[Row], reasons: Mapping[str, str], curves: FleetCurves) -> str:
-    """The report as one HTML document that loads nothing. Raises InputError without matplotlib or Jinja2."""
+    """The report as one self-contained HTML document. Raises InputError if matplotlib or Jinja2 is missing."""
     rows = [{"log": note["log"], **note["summary"]} for note in notes]
     soils = soil_rows(notes)
     sections = (
@@ -38,11 +38,11 @@ def report_of(notes: Sequence[Row], reasons: Mapping[str, str], curves: FleetCur
 
 def _lead(rows: Sequence[Row], reasons: Mapping[str, str]) -> str:
     machines, days = {row["vehicle"] for row in rows}, {row["day"] for row in rows if row["day"]}
-    said = f"{len(rows)} logs of {len(machines)} vehicle{'s' * (len(machines) != 1)}"
-    said += f" on {len(days)} day{'s' * (len(days) != 1)}" if days else ""
-    said += f", {min(days)} to {max(days)} (UTC)" if len(days) > 1 else ""
+    text = f"{len(rows)} logs of {len(machines)} vehicle{'s' * (len(machines) != 1)}"
+    text += f" on {len(days)} day{'s' * (len(days) != 1)}" if days else ""
+    text += f", {min(days)} to {max(days)} (UTC)" if len(days) > 1 else ""
     return (
-        f"{said}. {len(reasons)} could not be estimated." if reasons else f"{said}. Every log was estimated."
+        f"{text}. {len(reasons)} could not be estimated." if reasons else f"{text}. Every log was estimated."
     )
 
 
@@ -73,7 +73,7 @@ def _by_day(rows: Sequence[Row]) -> Section:
     header = ("day", "logs", "vehicles", "moving, h", "km", *_MEANS, "stuck")
     listed = [
         (
-            str(name or "not said"), str(len(group)), str(len({row["vehicle"] for row in group})), _hours(group),
+            str(name or "unknown"), str(len(group)), str(len({row["vehicle"] for row in group})), _hours(group),
             _kilometres(group), *_means(group), str(_stuck(group)),
         )
         for name, group in groups.items()
@@ -88,7 +88,7 @@ def _by_day(rows: Sequence[Row]) -> Section:
 
 def _by_soil(rows: Sequence[Row], curves: FleetCurves) -> Section:
     if not rows:
-        return Section("soils", "By soil", omitted="No log has a column soil that names its ground.")
+        return Section("soils", "By soil", omitted="No log has a column soil that labels its ground.")
     learned = curves.pooled.soils
     header = ("soil", "logs", "vehicles", "moving, h", "km", *_MEANS, "best slip")
     listed = []
@@ -99,8 +99,8 @@ def _by_soil(rows: Sequence[Row], curves: FleetCurves) -> Section:
         listed.append((name, str(len(group)), machines, _hours(group), km, *_means(group), percent(best)))
     caption = (
         "By the logs' own labels. Best slip: where the pooled curve's tractive efficiency is largest, at the soil's mean resistance"
-        f" and the vehicles' mean tire resistance {number(curves.tire_resistance)}. It has no interval here, since machines differ: "
-        "'terragrip advise' with soils.json gives that of one machine."
+        f" and the vehicles' mean tire resistance {number(curves.tire_resistance)}. No interval is given here, since machines differ: "
+        "'terragrip advise' with soils.json gives one for a single machine."
     )
     return Section("soils", "By soil", content=(Table(caption, header, tuple(listed)),))
 
@@ -172,7 +172,7 @@ def _failures(reasons: Mapping[str, str]) -> Section:
     more = (
         f"The first {MOST} of {len(reasons)}; failures.parquet has all."
         if len(reasons) > MOST
-        else "Every one."
+        else "All of them."
     )
     return Section("failures", "Logs that failed", content=(Table(more, ("log", "reason"), listed),))
 
@@ -185,17 +185,17 @@ _MEANS = ("speed, m/s", "slip", "resistance", "adhesion", "efficiency")
 
 
 def _means(rows: Sequence[Row]) -> tuple[str, ...]:
-    """Cells of `_MEANS`."""
+    """The cells of the columns `_MEANS`."""
     speed, *rest = (
         weighted(rows, name) for name in ("ground_speed", "slip", "soil_resistance", "adhesion", "efficiency")
     )
     slip, resistance, adhesion, efficiency = rest
     return (
-        _with(*speed, 2), _share(*slip), _with(*resistance, 3), _with(*adhesion, 3), _share(*efficiency),
+        _with_spread(*speed, 2), _share(*slip), _with_spread(*resistance, 3), _with_spread(*adhesion, 3), _share(*efficiency),
     )  # fmt: skip
 
 
-def _with(mean: float, spread: float, digits: int) -> str:
+def _with_spread(mean: float, spread: float, digits: int) -> str:
     return number(mean, digits) + (f" ± {number(spread, digits)}" if np.isfinite(spread) else "")
 
 

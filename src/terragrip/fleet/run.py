@@ -1,4 +1,4 @@
-"""A fleet from its logs to its data set."""
+"""Estimate a fleet's logs into its data set."""
 
 from __future__ import annotations
 
@@ -25,10 +25,9 @@ SOILS, REPORT = "soils.json", "report.html"
 
 @dataclass(frozen=True)
 class FleetResult:
-    """What a call did: logs estimated now, those that an earlier call had estimated alike, and of this call's logs the failures with
-    their reasons, of which ``unwritten`` found no space on the disk; ``kept``: logs of earlier calls that this one did not name; ``rows``
-    and ``restarts`` of the filter in the logs estimated now, and of each of these its ``nis`` over what is expected and the ``seconds``
-    that it took a worker."""
+    """What a call did. ``estimated``: logs estimated now; ``unchanged``: logs whose estimates from an earlier call still hold; ``failed``:
+    reasons by log, ``unwritten`` of them for lack of disk space; ``kept``: logs of earlier calls that this one did not name. Of the logs
+    estimated now: ``rows``, ``restarts`` of the filter, and of each log ``nis`` over its expected value and the ``seconds`` of a worker."""
 
     estimated: int
     unchanged: int
@@ -55,22 +54,22 @@ def run_fleet(
     ground: bool = False,
     progress: Callable[[int, int], None] | None = None,
 ) -> FleetResult:
-    """Estimate logs into a data set (docs/fleet.md); what it holds already by the same log, vehicle, profile, method and version stays.
+    """Estimate logs into a data set (docs/fleet.md). Logs that it already holds with the same settings are left as they are.
 
     Parameters
     ----------
-    logs: of `fleet_logs`.
-    output: a folder, or an address of a store that fsspec knows.
+    logs: from `fleet_logs`.
+    output: a folder, or the address of a store that fsspec knows.
     method, smooth, dbc: as for :func:`terragrip.from_log.estimate_file`.
-    scheduler: address of a Dask scheduler; None: ``workers`` processes here, each with ``memory`` ("2GB"; None: its share).
-    maps: map each log with positions, too (`terragrip.fleet.cells`).
-    ground: find each log's sections and events, too (`terragrip.fleet.ground`).
-    progress: called with logs done and logs in all.
+    scheduler: address of a Dask scheduler; None: ``workers`` processes on this machine, each with ``memory`` ("2GB"; None: an equal share).
+    maps: also map each log that has positions (`terragrip.fleet.cells`).
+    ground: also find each log's sections and events (`terragrip.fleet.ground`).
+    progress: called with the number of finished logs and of all.
 
     Raises
     ------
-    InputError: the output cannot be read or written, another call works on it, or the scheduler cannot be reached. A log that cannot be
-        estimated raises nothing: it stands among the failures.
+    InputError: the output cannot be read or written, another call is using it, or the scheduler or all its workers are lost (the tables
+        are written before). A log that cannot be estimated raises nothing; it is listed among the failures.
     """
     from terragrip import __version__
 
@@ -83,8 +82,8 @@ def run_fleet(
     outcomes: list[Outcome] = []
     emit(logger, "fleet_started", logs=len(logs))
     try:
-        # Who has no workers leaves no folder behind.
-        with workers_at(scheduler, workers or default_workers(), memory) as pool, store.alone():
+        # A call without workers leaves no folder behind.
+        with workers_at(scheduler, workers or default_workers(), memory) as pool, store.locked():
             before, failed = known_notes(store)
             stopped: InputError | None = None
             try:
@@ -94,7 +93,7 @@ def run_fleet(
                         emit(logger, "fleet_log_failed", log=outcome.log, reason=outcome.reason)
                     if progress:
                         progress(len(outcomes), len(logs) + 1)
-            except InputError as error:  # who has no workers left still has the tables of what is done
+            except InputError as error:  # the workers are gone; still write the tables of what is done
                 stopped = error
             notes, reasons = settled(store, before, failed, outcomes)
             _write(store, notes, reasons)
@@ -102,7 +101,7 @@ def run_fleet(
                 raise stopped
     except OSError as error:
         raise InputError(
-            f"cannot be read or written ({error})", file=output, hint="run again: what was estimated is kept"
+            f"cannot be read or written ({error})", file=output, hint="run again; finished logs are kept"
         ) from error
     named = {one.log for one in outcomes}
     fresh = [one.note["summary"] for one in outcomes if one.fresh and one.note is not None]
@@ -123,7 +122,7 @@ def run_fleet(
 
 
 def _write(store: Store, notes: Sequence[Note], reasons: Mapping[str, str]) -> None:
-    """The tables, the report and the curves of all logs. Raises OSError where the store refuses."""
+    """Write the tables, the report and the curves of all logs. Raises OSError if the store refuses."""
     curves = learn_curves(store, notes)
     write_tables(store, notes, reasons)
     write_text(store, REPORT, report_of(notes, reasons, curves))

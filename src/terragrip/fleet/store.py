@@ -1,4 +1,4 @@
-"""Where a fleet's files are: a folder, or any store that fsspec knows, by its address."""
+"""Where a fleet's files are kept: a folder, or any store that fsspec can address."""
 
 from __future__ import annotations
 
@@ -19,41 +19,41 @@ from terragrip.files import lock, sync, sync_folder
 
 Result = TypeVar("Result")
 
-WAITS = (0.2, 0.5, 1.0, 2.0, 4.0)
-"""Seconds between the tries of a store that refuses."""
+RETRY_DELAYS = (0.2, 0.5, 1.0, 2.0, 4.0)
+"""Delays before repeating an operation that the store refused [s]."""
 TEMPORARY, LOCK = ".tmp", ".lock"
-_WHOLE = frozenset({"s3", "s3a", "gs", "gcs", "abfs", "az", "adl", "memory"})
-"""Stores that show an object only when all of it is there; elsewhere a file is written beside and renamed."""
-_FINAL = (FileNotFoundError, PermissionError, IsADirectoryError, NotADirectoryError, MemoryError)
+_ATOMIC = frozenset({"s3", "s3a", "gs", "gcs", "abfs", "az", "adl", "memory"})
+"""Stores in which an object appears only when complete; in others a file is written under a temporary name and renamed."""
+_NOT_RETRIED = (FileNotFoundError, PermissionError, IsADirectoryError, NotADirectoryError, MemoryError)
 
 
 def is_remote(path: str) -> bool:
-    """Whether a path is an address (`s3://bucket/x`), not a place on this machine."""
+    """Whether a path is the address of a store (`s3://bucket/x`) rather than a path on this machine."""
     return "://" in path
 
 
 def safe_name(text: str) -> str:
-    """A text as the name of one file or folder, on any store and to readers of Hive partitions."""
+    """A text encoded as a single file or folder name, valid in any store and in Hive partitions."""
     return quote(text, safe=" ()+,@") or "_"
 
 
 @dataclass(frozen=True)
 class Store:
-    """A folder by its address; names within it are relative, with `/`. Travels to workers."""
+    """A folder or store by its address; names within it are relative, with `/`. It can be pickled to workers."""
 
     url: str
 
     @classmethod
     def at(cls, url: str) -> Store:
-        """The store of a path or an address. Raises InputError where fsspec does not know its kind, or lacks its package."""
+        """The store at a path or address. Raises InputError if fsspec does not know its protocol or lacks its package."""
         store = cls(url if is_remote(url) else os.path.abspath(url))
         try:
             _ = store._place
         except (ImportError, ValueError) as error:
             raise InputError(
-                f"is no store that can be reached ({error})",
+                f"is not a store that fsspec can open ({error})",
                 file=url,
-                hint="name a folder, or install what fsspec needs for it",
+                hint="name a folder, or install the package that fsspec needs",
             ) from None
         return store
 
@@ -72,14 +72,14 @@ class Store:
 
     @property
     def is_local(self) -> bool:
-        """Whether it is a folder of this machine."""
+        """Whether it is a folder on this machine."""
         return not is_remote(self.url)
 
     @contextmanager
-    def alone(self) -> Iterator[None]:
-        """Keep other calls on this machine from a folder; the lock goes with the process. A store elsewhere has no lock.
+    def locked(self) -> Iterator[None]:
+        """Lock the folder against other calls on this machine; the lock ends with the process. A remote store has no lock.
 
-        Raises InputError where the store cannot be written, or another call works on the folder; OSError where the lock cannot be made.
+        Raises InputError if the store cannot be written or another call is using the folder, OSError if the lock cannot be created.
         """
         self.check()
         if not self.is_local:
@@ -88,10 +88,10 @@ class Store:
         held = lock(Path(self.url) / LOCK)
         if held is None:
             raise InputError(
-                "another terragrip fleet works on it",
+                "another terragrip fleet is using it",
                 file=self.url,
                 place="--output",
-                hint="wait for its end, or name another folder",
+                hint="wait until it ends, or name another folder",
             )
         try:
             yield
@@ -102,9 +102,9 @@ class Store:
         return f"{self._place[1]}/{name}"
 
     @contextmanager
-    def bench(self, scratch: str | None = None) -> Iterator[Path]:
-        """A folder for files that are made to be `put`: within a local store, so that a rename puts them, else in ``scratch`` (None: the
-        system's). It goes with what is left in it. Raises OSError where it cannot be made.
+    def staging(self, scratch: str | None = None) -> Iterator[Path]:
+        """A temporary folder for files to `put`: within a local store, so that storing is a rename; otherwise in ``scratch`` (None: the
+        system's temporary folder). Raises OSError if it cannot be created.
         """
         if self.is_local:
             scratch = os.path.join(self.url, TEMPORARY)
@@ -113,14 +113,14 @@ class Store:
             yield Path(folder)
 
     def put(self, local: Path, name: str) -> None:
-        """Move a file of a `bench` to ``name``: whole or not at all. Raises OSError where the store keeps refusing."""
+        """Move a file of a `staging` folder to ``name``, whole or not at all. Raises OSError if the store keeps refusing."""
         system, protocol = self._place[0], self._place[0].protocol
-        whole = bool({protocol} & _WHOLE if isinstance(protocol, str) else _WHOLE.intersection(protocol))
+        atomic = bool({protocol} & _ATOMIC if isinstance(protocol, str) else _ATOMIC.intersection(protocol))
         target = self._path(name)
 
         def copy() -> None:
             system.makedirs(os.path.dirname(target), exist_ok=True)
-            if whole:
+            if atomic:
                 system.put_file(os.fspath(local), target)
                 return
             beside = self._path(f"{TEMPORARY}/{secrets.token_hex(8)}")
@@ -129,17 +129,17 @@ class Store:
             system.mv(beside, target)
 
         if not self.is_local:
-            patiently(copy)
+            retried(copy)
             local.unlink()
             return
         folder = Path(target).parent
-        patiently(lambda: folder.mkdir(parents=True, exist_ok=True))
-        patiently(lambda: sync(local))
-        patiently(lambda: os.replace(local, target))
-        patiently(lambda: sync_folder(folder))
+        retried(lambda: folder.mkdir(parents=True, exist_ok=True))
+        retried(lambda: sync(local))
+        retried(lambda: os.replace(local, target))
+        retried(lambda: sync_folder(folder))
 
     def read(self, name: str) -> bytes | None:
-        """The content of a file; None where there is none."""
+        """The content of a file; None if there is none."""
 
         def content() -> bytes | None:
             try:
@@ -147,31 +147,31 @@ class Store:
             except FileNotFoundError:
                 return None
 
-        return patiently(content)
+        return retried(content)
 
     def remove(self, name: str) -> None:
-        """Remove a file or a folder with all in it; nothing where there is none."""
+        """Remove a file, or a folder and its content; does nothing if there is none."""
         system = self._place[0]
 
-        def gone() -> None:
+        def delete() -> None:
             if system.exists(self._path(name)):
                 system.rm(self._path(name), recursive=True)
 
-        patiently(gone)
+        retried(delete)
 
     def read_all(self, folder: str) -> list[bytes]:
-        """The content of all files right in a folder, in the order of their names."""
+        """The content of every file directly in a folder, in order of name."""
         system = self._place[0]
         system.invalidate_cache()
         if not system.exists(self._path(folder)):
             return []
-        paths = sorted(patiently(lambda: system.ls(self._path(folder), detail=False)))
-        content = patiently(lambda: system.cat(paths)) if paths else {}
-        # of one path some stores give its content alone
+        paths = sorted(retried(lambda: system.ls(self._path(folder), detail=False)))
+        content = retried(lambda: system.cat(paths)) if paths else {}
+        # for a single path some stores return its content alone
         return [content] if isinstance(content, bytes) else [content[path] for path in content]
 
     def check(self) -> None:
-        """Try to write and to remove. Raises InputError where it cannot be, in one try."""
+        """Write and remove a file, without retrying. Raises InputError if that fails."""
         system, name = self._place[0], self._path(f"{TEMPORARY}/{secrets.token_hex(8)}")
         try:
             if self.is_local and os.path.exists(self.url) and not os.path.isdir(self.url):
@@ -184,20 +184,20 @@ class Store:
         except InputError:
             raise
         except Exception as error:
-            # each store has its own errors (botocore's are no OSError): whatever it says is the reason
+            # each store has its own exceptions (botocore's are no OSError)
             raise InputError(
-                f"cannot be written ({_said(error)})",
+                f"cannot be written ({_message(error)})",
                 file=self.url,
                 place="--output",
-                hint="choose another place, or give access to it",
+                hint="choose another place, or allow access to it",
             ) from error
 
 
 @contextmanager
 def fetched(url: str, folder: Path) -> Iterator[Path]:
-    """A log on this machine: itself, or for as long as it is needed a copy in ``folder`` of one of a store.
+    """A log as a local file: itself, or a temporary copy in ``folder`` of one in a store.
 
-    Raises OSError, also where there is none.
+    Raises OSError, also if there is no such log.
     """
     if not is_remote(url):
         yield Path(url)
@@ -207,23 +207,23 @@ def fetched(url: str, folder: Path) -> Iterator[Path]:
     system, path = url_to_fs(url)
     with TemporaryDirectory(dir=folder) as own:
         local = Path(own) / os.path.basename(path)
-        patiently(lambda: system.get_file(path, os.fspath(local)))
+        retried(lambda: system.get_file(path, os.fspath(local)))
         yield local
 
 
-def patiently(function: Callable[[], Result]) -> Result:
-    """What a store answers, asked again after each of `WAITS` while it refuses. Raises the OSError that it ends with."""
-    for wait in (*WAITS, None):
+def retried(function: Callable[[], Result]) -> Result:
+    """The result of an operation on a store, retried after each of `RETRY_DELAYS`. Raises the last failure as an OSError."""
+    for delay in (*RETRY_DELAYS, None):
         try:
             return function()
-        except _FINAL:
+        except _NOT_RETRIED:
             raise
-        except Exception as error:  # each store has its own errors (botocore's are no OSError)
-            if wait is None:
-                raise error if isinstance(error, OSError) else OSError(_said(error)) from error
-            time.sleep(wait)
+        except Exception as error:  # each store has its own exceptions (botocore's are no OSError)
+            if delay is None:
+                raise error if isinstance(error, OSError) else OSError(_message(error)) from error
+            time.sleep(delay)
     raise AssertionError("not reached")
 
 
-def _said(error: Exception) -> str:
+def _message(error: Exception) -> str:
     return getattr(error, "strerror", None) or str(error) or type(error).__name__

@@ -1,4 +1,4 @@
-"""The numbers of one log for the fleet's tables, and the rows that soils are learned from, block by block."""
+"""A log's numbers for the fleet's tables and its sample for the soil curves, accumulated block by block."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 PERIOD = 0.2
-"""Seconds between the rows that soils are learned from: estimates of neighbouring rows tell the same."""
+"""Interval between the rows that soils are learned from [s]; neighbouring rows carry the same information."""
 MEANS = ("ground_speed", "slip", "adhesion", "soil_resistance", "net_traction", "efficiency")
-"""Of which a log has a mean over its time without an event; of wheels' columns, over the wheels."""
+"""Quantities averaged over a log's time without an event; wheel columns are also averaged over the wheels."""
 COUNTED = tuple(name for name in EVENTS if name)
 
 
 class LogTally:
-    """Adds up the blocks of one log."""
+    """Accumulates the blocks of one log."""
 
     def __init__(self) -> None:
         self.rows = 0
@@ -34,15 +34,15 @@ class LogTally:
         self.notes: dict[str, None] = {}
         self.starts = dict.fromkeys(COUNTED, 0)
         self._sums: dict[str, dict[str, Array]] = {}
-        self._first = self._last = self._way = 0.0
+        self._first = self._last = self._distance = 0.0
         self._code = 0
         self._sampled = -np.inf
         self._samples: list[Estimates] = []
         self._nis = self._channels = 0.0
 
     def add(self, block: Estimates) -> None:
-        """Count a block that follows the ones before it."""
-        time, way = block.time, block["distance"] if "distance" in block else np.zeros(len(block))
+        """Add the next block."""
+        time, distance = block.time, block["distance"] if "distance" in block else np.zeros(len(block))
         if not self.rows:
             self._first, self._last, self.about = float(time[0]), float(time[0]), block.about
         self.notes.update(dict.fromkeys(block.notes))
@@ -52,34 +52,33 @@ class LogTally:
             if EVENTS[code]:
                 self.starts[EVENTS[code]] += 1
         if "nis" in block and "channels" in block:
-            moves = (
-                block.event_codes != STANDSTILL
-            )  # as the summary of one log: at rest it is quieter than its noise
+            # As in the summary of one log: at standstill, NIS is far below its expected value.
+            moves = block.event_codes != STANDSTILL
             self._nis += float(np.nansum(block["nis"][moves]))
             self._channels += float(np.nansum(block["channels"][moves]))
-        self._add_means(block, way)
+        self._add_means(block, distance)
         self._sample(block)
         self._code, self._last = int(block.event_codes[-1]), float(time[-1])
-        self._way = float(np.nanmax(way, initial=self._way))
+        self._distance = float(np.nanmax(distance, initial=self._distance))
 
-    def _add_means(self, block: Estimates, way: Array) -> None:
-        """Each row stands for the time since the row before it, at most for as long as a gap is none."""
+    def _add_means(self, block: Estimates, distance: Array) -> None:
+        """Weight each row by the time since the previous one, limited to the gap threshold."""
         longest = block.about.get("settings", {}).get("gap") or 1.0
-        lasts = np.clip(np.diff(block.time, prepend=self._last), 0.0, longest)
-        metres = np.diff(way, prepend=self._way)
+        durations = np.clip(np.diff(block.time, prepend=self._last), 0.0, longest)
+        metres = np.diff(distance, prepend=self._distance)
         usable = block.event_codes == 0
         soil = block.labels.get("soil", np.full(len(block), "", dtype=object))
         columns = {name: _mean_of(block, name) for name in MEANS}
         for label in dict.fromkeys(soil.tolist()):
             rows = usable & (soil == label)
             sums = self._sums.setdefault(str(label), {name: np.zeros(2) for name in ("moving", *MEANS)})
-            sums["moving"] += (lasts[rows].sum(), metres[rows].sum())
+            sums["moving"] += (durations[rows].sum(), metres[rows].sum())
             for name, values in columns.items():
                 known = rows & np.isfinite(values)
-                sums[name] += ((values * lasts)[known].sum(), lasts[known].sum())
+                sums[name] += ((values * durations)[known].sum(), durations[known].sum())
 
     def _sample(self, block: Estimates) -> None:
-        """Keep a row a `PERIOD` of a log with labels and adhesion."""
+        """Keep one row per `PERIOD` if the log has soil labels and adhesion."""
         if "soil" not in block.labels or not block.has_adhesion:
             return
         count = np.floor(block.time / PERIOD)
@@ -94,13 +93,13 @@ class LogTally:
 
     @property
     def sample(self) -> list[Estimates]:
-        """A table of estimates, in parts, with some of the rows and of the columns; empty where nothing is labelled."""
+        """Some of the rows and columns of the estimates, in parts; empty if no row is labelled."""
         labelled = any((part.labels["soil"] != "").any() for part in self._samples)
         return self._samples if labelled else []
 
     def row(self) -> dict[str, Any]:
-        """The log's numbers: times [s], metres, means over its time without an event, NIS over what is expected (1: the filter is right
-        about its noise), how often each event began.
+        """The log's numbers: times [s], distances [m], means over its time without an event, NIS over its expected value (1: the noise
+        settings are right), and how often each event began.
         """
         whole = {
             name: sum((one[name] for one in self._sums.values()), np.zeros(2)) for name in ("moving", *MEANS)
@@ -110,7 +109,7 @@ class LogTally:
             "start": channels.get("start"),
             "rows": self.rows,
             "duration": self._last - self._first,
-            "distance": self._way,
+            "distance": self._distance,
             **_means(whole),
             "nis": self._nis / self._channels if self._channels else None,
             **{f"{name}_events": count for name, count in self.starts.items()},
@@ -119,7 +118,7 @@ class LogTally:
         }
 
     def soil_rows(self) -> list[dict[str, Any]]:
-        """The same means by label of the ground, a row a label; empty where there are no labels."""
+        """The same means, one row per soil label; empty if there are none."""
         return [{"soil": name, **_means(sums)} for name, sums in sorted(self._sums.items()) if name]
 
 
@@ -129,7 +128,7 @@ def _means(sums: dict[str, Array]) -> dict[str, Any]:
 
 
 def _mean_of(block: Estimates, name: str) -> Array:
-    """A column, or the mean over the wheels that have it; NaN where there is none."""
+    """A column, or its mean over the wheels that have it; NaN if there is none."""
     if name in block.columns:
         return block.columns[name]
     each = [block.columns[f"{name}_{wheel}"] for wheel in wheels_with(name, block.columns)]
@@ -137,7 +136,7 @@ def _mean_of(block: Estimates, name: str) -> Array:
 
 
 def weighted(rows: Iterable[dict[str, Any]], name: str) -> tuple[float, float]:
-    """Mean of a column over rows by their moving time, and the SD between them (NaN under two)."""
+    """Mean of a column over rows weighted by moving time, and the standard deviation between rows (NaN for fewer than two)."""
     pairs = [
         (one[name], one["moving_time"]) for one in rows if one[name] is not None and one["moving_time"] > 0
     ]

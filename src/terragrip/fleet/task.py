@@ -1,4 +1,4 @@
-"""What a worker does with logs: each into its files of the data set, or a reason why not."""
+"""What a worker does: estimate each log into its files of the data set, or report why it cannot."""
 
 from __future__ import annotations
 
@@ -25,15 +25,15 @@ if TYPE_CHECKING:
 Result = TypeVar("Result")
 
 NO_DAY = "__HIVE_DEFAULT_PARTITION__"
-"""The partition of logs that do not say when they were written: null to readers of Hive partitions."""
+"""The day partition of logs without a clock; readers of Hive partitions see null."""
 NOTES, SAMPLES, ESTIMATES = "state/logs", "state/samples", "estimates"
-"""Folders of a data set."""
+"""Folders within a data set."""
 
 
 @dataclass(frozen=True)
 class Settings:
-    """What all logs of a call share. ``version``: of the Terragrip that was called; workers must have the same. ``maps``: each log with
-    positions is mapped, too; ``ground``: its sections and events are found, too."""
+    """What all logs of a call share. ``version``: the caller's Terragrip version, which workers must match. ``maps``: also map each log
+    that has positions. ``ground``: also find each log's sections and events."""
 
     method: str
     smooth: bool
@@ -45,8 +45,8 @@ class Settings:
 
 @dataclass(frozen=True)
 class Outcome:
-    """What became of a log: its ``note`` (`make_note`), or the ``reason`` why it has none; ``disk_full``: its estimates found no space.
-    ``fresh``: it was estimated by this call, in ``seconds``, reading and writing included.
+    """The result of a log: its ``note`` (`make_note`), or the ``reason`` why it failed. ``disk_full``: its estimates did not fit on the
+    disk. ``fresh``: this call estimated it, in ``seconds`` including reading and writing.
     """
 
     log: str
@@ -58,9 +58,9 @@ class Outcome:
 
 
 @dataclass(frozen=True)
-class _Made:
-    """A log that is estimated but not yet put: its ``files`` on the worker with their names in the store, in the order in which they are
-    put, and how long it has taken [s].
+class _Staged:
+    """A log that is estimated but not yet stored: its local ``files`` with their names in the store, in the order of storing, and the
+    ``seconds`` spent so far.
     """
 
     log: str
@@ -70,25 +70,25 @@ class _Made:
 
 
 def estimate_logs(logs: Sequence[FleetLog], settings: Settings, store: Store) -> list[Outcome]:
-    """One outcome a log. A log that cannot be estimated does not stop the others. Raises nothing that a log can cause.
+    """One outcome per log. A log that cannot be estimated does not stop the others, and raises nothing.
 
-    A log's files are put to the store while the next one is estimated.
+    A log's files are stored while the next one is estimated.
     """
     outcomes: list[Future[Outcome]] = []
-    with store.bench(_scratch()) as bench, ThreadPoolExecutor(1) as putting:
+    with store.staging(_scratch()) as staging, ThreadPoolExecutor(1) as storing:
         for number, log in enumerate(logs):
-            made = _tried(log, _estimated, log, settings, store, bench, number)
+            staged = _attempt(log, _estimated, log, settings, store, staging, number)
             if outcomes:
-                outcomes[-1].result()  # the disk holds no more than two logs
-            outcomes.append(putting.submit(_tried, log, _put, made, store))
+                outcomes[-1].result()  # so that the disk holds at most two logs
+            outcomes.append(storing.submit(_attempt, log, _put, staged, store))
         return [one.result() for one in outcomes]
 
 
-def _tried(log: FleetLog, step: Callable[..., Result], *given: Any) -> Result | Outcome:
-    """What a step makes of its log, or the reason why it cannot."""
+def _attempt(log: FleetLog, step: Callable[..., Result], *given: Any) -> Result | Outcome:
+    """The result of a step for its log, or a failure with the reason."""
     try:
         return step(*given)
-    except Exception as error:  # noqa: BLE001 - whatever it is, it is this log's reason and no other's
+    except Exception as error:  # noqa: BLE001 - whatever it is, only this log fails
         full = system_error(error) in (errno.ENOSPC, errno.EDQUOT)
         return Outcome(log.name, reason=_in_one_line(_reason(error)), disk_full=full)
 
@@ -97,9 +97,9 @@ def _reason(error: Exception) -> str:
     if isinstance(error, InputError):
         return str(error)
     if isinstance(error, MemoryError):
-        return "not enough memory; give --memory, or use a shorter log"
+        return "not enough memory; raise --memory or split the log"
     if isinstance(error, OSError):
-        return f"could not be read, or its estimates not be written ({error})"
+        return f"the log could not be read or its estimates could not be written ({error})"
     return f"a defect of Terragrip ({type(error).__name__}: {error})"
 
 
@@ -107,7 +107,9 @@ def _in_one_line(text: str) -> str:
     return " ".join(text.split())
 
 
-def _estimated(log: FleetLog, settings: Settings, store: Store, bench: Path, number: int) -> Outcome | _Made:
+def _estimated(
+    log: FleetLog, settings: Settings, store: Store, staging: Path, number: int
+) -> Outcome | _Staged:
     import pyarrow as pa
     import pyarrow.parquet as pq
 
@@ -121,13 +123,13 @@ def _estimated(log: FleetLog, settings: Settings, store: Store, bench: Path, num
             hint="install one version on all workers",
         )
     began = time.monotonic()
-    with fetched(log.url, bench) as source:
+    with fetched(log.url, staging) as source:
         key = key_of(log, source, settings)
         known = store.read(f"{NOTES}/{key}.json")
         if known is not None:
             return Outcome(log.name, json.loads(known))
         local, thin, note_file = (
-            bench / f"{number}{end}" for end in (".parquet", "-sample.parquet", ".json")
+            staging / f"{number}{end}" for end in (".parquet", "-sample.parquet", ".json")
         )
         tally = LogTally()
         estimate_file(
@@ -146,21 +148,21 @@ def _estimated(log: FleetLog, settings: Settings, store: Store, bench: Path, num
     note = make_note(log, key, settings, tally, extra)
     files = [(local, note["file"])]
     for name, table in extra.tables.items():
-        one = bench / f"{number}-{name}.parquet"
+        one = staging / f"{number}-{name}.parquet"
         pq.write_table(table, one)
         files.insert(0, (one, note["extra"][name]))
     if tally.sample:
         pq.write_table(pa.concat_tables([part.to_arrow() for part in tally.sample]), thin)
         files.insert(0, (thin, f"{SAMPLES}/{key}.parquet"))
     note_file.write_text(json.dumps(note), encoding="utf-8")
-    # Last of all: only what has a note belongs to the data set.
+    # The note comes last: only a log with a note belongs to the data set.
     files.append((note_file, f"{NOTES}/{key}.json"))
-    return _Made(log.name, note, tuple(files), time.monotonic() - began)
+    return _Staged(log.name, note, tuple(files), time.monotonic() - began)
 
 
 @dataclass(frozen=True)
 class Extra:
-    """What a call may ask for beside a log's estimates: ``tables`` by the folder that they go into, and why a log has none of a kind."""
+    """Optional results beside a log's estimates: ``tables`` by folder, and the reasons for those that are missing."""
 
     tables: Mapping[str, pa.Table]
     no_map: str = ""
@@ -168,7 +170,7 @@ class Extra:
 
     @classmethod
     def of(cls, estimates: Path, log: str, settings: Settings) -> Extra:
-        """Of a file of estimates."""
+        """The optional results of a file of estimates."""
         tables: dict[str, pa.Table] = {}
         no_map = no_ground = ""
         if settings.maps:
@@ -191,17 +193,17 @@ class Extra:
         return cls(tables, no_map, no_ground)
 
 
-def _put(made: Outcome | _Made, store: Store) -> Outcome:
-    if isinstance(made, Outcome):
-        return made
+def _put(staged: Outcome | _Staged, store: Store) -> Outcome:
+    if isinstance(staged, Outcome):
+        return staged
     began = time.monotonic()
-    for local, name in made.files:
+    for local, name in staged.files:
         store.put(local, name)
-    return Outcome(made.log, made.note, fresh=True, seconds=made.seconds + time.monotonic() - began)
+    return Outcome(staged.log, staged.note, fresh=True, seconds=staged.seconds + time.monotonic() - began)
 
 
 def make_note(log: FleetLog, key: str, settings: Settings, tally: LogTally, extra: Extra) -> dict[str, Any]:
-    """What the data set keeps of a log beside its estimates, ready for JSON: its row of the summary, those of its soils, its files."""
+    """What the data set keeps about a log, ready for JSON: its row of the summary, its rows by soil, its files."""
     row = tally.row()
     day = str(row["start"])[:10] if row["start"] else None
     place = f"vehicle={safe_name(log.machine)}/day={day or NO_DAY}/{safe_name(log.name)}.parquet"
@@ -228,7 +230,7 @@ def make_note(log: FleetLog, key: str, settings: Settings, tally: LogTally, extr
 
 
 def key_of(log: FleetLog, source: Path, settings: Settings) -> str:
-    """SHA-256 of all that the log's estimates depend on: content and name of the log, vehicle, profile, DBC, method and version."""
+    """SHA-256 over everything that the log's estimates depend on: its content and name, vehicle, profile, DBC, method and version."""
     parts = {
         "name": log.name,
         "log": _content(source),
@@ -245,7 +247,7 @@ def key_of(log: FleetLog, source: Path, settings: Settings) -> str:
 
 
 def _content(path: Path) -> str:
-    """Of a file, or of a folder's files by their names."""
+    """SHA-256 of a file, or of a folder's files with their names."""
     from terragrip.files import sha256
 
     if not path.is_dir():
@@ -256,7 +258,7 @@ def _content(path: Path) -> str:
 
 
 def _scratch() -> str | None:
-    """The worker's own folder, which goes when it does; None: the system's, outside a worker."""
+    """The worker's own folder, removed when it stops; outside a worker None, the system's temporary folder."""
     from distributed import get_worker
 
     try:
