@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import polars as pl
+import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
@@ -378,6 +379,60 @@ def test_a_second_call_on_one_folder_is_refused_while_the_first_works(place: Pat
     os.close(held)
     assert ran()[0] == 0
     assert len(whole(out)[0]) == 6
+
+
+@pytest.mark.parametrize("content", ['{"log": "dr', "[1, 2]", '{"log": "drive1.csv"}'])
+def test_a_damaged_note_is_one_line_and_loses_nothing(place: Path, ran: Ran, content: str) -> None:
+    out = place / "out"
+    assert ran()[0] == 0
+    (note,) = [one for one in (out / "state/logs").iterdir() if "drive1.csv" in one.read_text()]
+    note.write_text(content)
+    before = written(out)
+    code, _, errors = ran()
+    assert (code, errors.count("\n")) == (2, 1)
+    assert f"{note}: is damaged; remove it" in errors
+    assert written(out) == before
+    note.unlink()
+    assert "1 estimated, 5 unchanged, 0 failed" in ran()[1]
+    assert len(whole(out)[0]) == 6
+
+
+def test_estimates_that_are_gone_or_cut_short_are_made_anew(place: Path, ran: Ran) -> None:
+    out = place / "out"
+    assert ran()[0] == 0
+    files = sorted((out / "estimates").rglob("*.parquet"))
+    files[0].unlink()
+    files[1].write_bytes(files[1].read_bytes()[:200])
+    assert "2 estimated, 4 unchanged, 0 failed" in ran()[1]
+    assert len(whole(out)[0]) == 6
+
+
+def test_a_log_with_estimates_is_no_failure(place: Path, ran: Ran) -> None:
+    """A worker may have stored a log's note just before it was lost."""
+    assert ran()[0] == 0
+    table = pa.table({"log": ["drive0.csv"], "reason": ["its worker was lost"]})
+    pq.write_table(table, place / "out/failures.parquet")
+    assert ran(place / "logs/b/*.csv", "--vehicle", place / "Heros.yaml")[0] == 0
+    rows, reasons = whole(place / "out")
+    assert (len(rows), reasons) == (6, {})
+
+
+def test_what_every_log_would_fail_by_is_refused_and_loses_nothing(
+    place: Path, ran: Ran, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assert ran()[0] == 0
+    before = written(place / "out")
+    (place / "bad.dbc").write_text("no DBC")
+    mistakes = (("--dbc", place / "no.dbc"), ("--dbc", place / "bad.dbc"), ("--metrics", place / "no/m.prom"))
+    for words in mistakes:
+        code, _, errors = ran(*words)
+        assert (code, errors.count("\n")) == (2, 1)
+        assert str(words[1]) in errors
+    monkeypatch.setattr("terragrip.__version__", "0.0.1")
+    code, _, errors = ran()
+    assert (code, errors.count("\n")) == (2, 1)
+    assert "and 0.0.1 here; install the same version" in errors
+    assert written(place / "out") == before
 
 
 def test_a_store_that_cannot_be_read_is_one_line(place: Path, ran: Ran) -> None:

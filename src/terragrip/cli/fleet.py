@@ -10,6 +10,7 @@ import typer
 from terragrip.cli.drives import logs_in
 from terragrip.cli.log import LogForm, LogFormat, log_to_stderr
 from terragrip.cli.options import DbcFiles, ProfileFile, Quiet
+from terragrip.cli.output import check_file
 from terragrip.cli.progress import progress
 from terragrip.errors import InputError
 from terragrip.estimation.methods import DEFAULT, METHODS
@@ -101,6 +102,8 @@ def command(
     if as_json:
         log_to_stderr(log_format)
     method_named(method, smooth=smooth)
+    if metrics is not None:
+        check_file(metrics, option="--metrics")
     if scheduler is not None and (workers or memory):
         raise InputError(
             "applies to workers on this machine only",

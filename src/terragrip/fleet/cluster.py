@@ -72,7 +72,8 @@ def workers_at(scheduler: str | None, workers: int, memory: str | None) -> Itera
     """The workers of an existing ``scheduler``; without one, ``workers`` processes on this machine, each with ``memory`` ("2 GB"; None: an
     equal share).
 
-    Raises InputError if Dask is not installed, or if the scheduler does not answer or has no worker.
+    Raises InputError if Dask is not installed, if the scheduler does not answer or has no worker, or if a worker has another version of
+    Terragrip.
     """
     try:
         import dask
@@ -90,6 +91,7 @@ def workers_at(scheduler: str | None, workers: int, memory: str | None) -> Itera
             pool = Pool(lambda: _client(scheduler), scheduler)
             try:
                 pool.connect(CONNECT_TIMEOUT)
+                pool.check_versions()
                 yield pool
             finally:
                 pool.close()
@@ -202,6 +204,26 @@ class Pool:
         client, self._client = self._client, None
         if client is not None:
             client.close(timeout=2)
+
+    def check_versions(self) -> None:
+        """Raise InputError if a worker has another version of Terragrip: every log on it would fail and lose its earlier estimates."""
+        from terragrip import __version__
+
+        # A nested function is pickled by value, so a worker need not have Terragrip installed.
+        def version() -> str:
+            try:
+                from terragrip import __version__
+            except ImportError:
+                return "missing"
+            return __version__
+
+        for worker, found in self._client.run(version).items():
+            if found != __version__:
+                raise InputError(
+                    f"Terragrip is {found} on the worker {worker} and {__version__} here",
+                    place="--scheduler",
+                    hint="install the same version on all workers",
+                )
 
     @property
     def count(self) -> int:

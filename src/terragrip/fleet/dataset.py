@@ -20,17 +20,34 @@ Note = dict[str, Any]
 def known_notes(store: Store) -> tuple[dict[str, Note], dict[str, str]]:
     """What earlier calls left: the notes of estimated logs and the reasons of failed ones, by the log's name.
 
-    Raises InputError if the folder holds tables that are not a fleet's.
+    Raises InputError if the folder holds tables that are not a fleet's, or a damaged note.
     """
     keys = {row["key"] for row in _read(store, SUMMARY)}
     by_name: dict[str, Note] = {}
     # An interrupted call may have left two notes of a log; the one that is not in the summary yet is newer.
-    for note in sorted(map(json.loads, store.read_all(NOTES)), key=lambda one: one["key"] not in keys):
+    notes = [_note(store, name, content) for name, content in store.read_all(NOTES).items()]
+    for note in sorted(notes, key=lambda one: one["key"] not in keys):
         old = by_name.get(note["log"])
         if old is not None:
             _drop(store, old, keep=note)
         by_name[note["log"]] = note
-    return by_name, {row["log"]: row["reason"] for row in _read(store, FAILURES)}
+    failed = {row["log"]: row["reason"] for row in _read(store, FAILURES)}
+    return by_name, {log: reason for log, reason in failed.items() if log not in by_name}
+
+
+def _note(store: Store, name: str, content: bytes) -> Note:
+    try:
+        note: Note = json.loads(content)
+        if {"log", "key", "file", "sample", "summary", "soils"} <= note.keys():
+            return note
+    except (ValueError, AttributeError):
+        pass
+    # Not skipped: its log would silently leave the tables.
+    raise InputError(
+        "is damaged",
+        file=f"{store.url}/{name}",
+        hint="remove it and run again: its log is then estimated anew",
+    )
 
 
 def settled(
@@ -142,6 +159,6 @@ def _read(store: Store, name: str) -> list[dict[str, Any]]:
         raise InputError(
             f"is not a table of a fleet ({error})",
             file=f"{store.url}/{name}",
-            hint="name another folder with -o",
+            hint="remove it and run again, which rebuilds it, or name another folder with -o",
         ) from error
     return rows

@@ -17,6 +17,7 @@ from terragrip.fleet.logs import FleetLog
 from terragrip.fleet.page import report_of
 from terragrip.fleet.store import TEMPORARY, Store
 from terragrip.fleet.task import Outcome, Settings
+from terragrip.formats.can.catalog import catalog
 from terragrip.log_events import emit
 
 logger = logging.getLogger("terragrip.fleet")
@@ -68,13 +69,16 @@ def run_fleet(
 
     Raises
     ------
-    InputError: the output cannot be read or written, another call is using it, or the scheduler or all its workers are lost (the tables
-        are written before). A log that cannot be estimated raises nothing; it is listed among the failures.
+    InputError: a DBC file cannot be read; the output cannot be read or written; another call is using it; a worker has another version
+        of Terragrip; the scheduler or all its workers are lost (the tables are written before). A log that cannot
+        be estimated raises nothing; it is listed among the failures.
     """
     from terragrip import __version__
 
     if scheduler is not None:
         check_address(scheduler)
+    for file in {*map(str, dbc), *(file for log in logs if log.profile for file in log.profile.dbc)}:
+        catalog([file])  # a damaged one would fail every log, and its earlier estimates would go
     store = Store.at(output)
     settings = Settings(
         method, smooth, tuple(str(path.absolute()) for path in dbc), __version__, maps, ground

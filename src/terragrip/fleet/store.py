@@ -159,16 +159,28 @@ class Store:
 
         retried(delete)
 
-    def read_all(self, folder: str) -> list[bytes]:
-        """The content of every file directly in a folder, in order of name."""
+    def read_all(self, folder: str) -> dict[str, bytes]:
+        """The content of every file directly in a folder by its name within the store, in order of name."""
         system = self._place[0]
         system.invalidate_cache()
         if not system.exists(self._path(folder)):
-            return []
+            return {}
         paths = sorted(retried(lambda: system.ls(self._path(folder), detail=False)))
         content = retried(lambda: system.cat(paths)) if paths else {}
         # for a single path some stores return its content alone
-        return [content] if isinstance(content, bytes) else [content[path] for path in content]
+        content = {paths[0]: content} if isinstance(content, bytes) else content
+        return {f"{folder}/{os.path.basename(path)}": content[path] for path in content}
+
+    def size(self, name: str) -> int | None:
+        """The size of a file [bytes]; None if there is none."""
+
+        def size() -> int | None:
+            try:
+                return int(self._place[0].info(self._path(name))["size"])
+            except FileNotFoundError:
+                return None
+
+        return retried(size)
 
     def check(self) -> None:
         """Write and remove a file, without retrying. Raises InputError if that fails."""

@@ -126,8 +126,8 @@ def _estimated(
     with fetched(log.url, staging) as source:
         key = key_of(log, source, settings)
         known = store.read(f"{NOTES}/{key}.json")
-        if known is not None:
-            return Outcome(log.name, json.loads(known))
+        if known is not None and _is_whole(note := json.loads(known), store):
+            return Outcome(log.name, note)
         local, thin, note_file = (
             staging / f"{number}{end}" for end in (".parquet", "-sample.parquet", ".json")
         )
@@ -154,10 +154,19 @@ def _estimated(
     if tally.sample:
         pq.write_table(pa.concat_tables([part.to_arrow() for part in tally.sample]), thin)
         files.insert(0, (thin, f"{SAMPLES}/{key}.parquet"))
+    note["bytes"] = {name: one.stat().st_size for one, name in files}
     note_file.write_text(json.dumps(note), encoding="utf-8")
     # The note comes last: only a log with a note belongs to the data set.
     files.append((note_file, f"{NOTES}/{key}.json"))
     return _Staged(log.name, note, tuple(files), time.monotonic() - began)
+
+
+def _is_whole(note: Mapping[str, Any], store: Store) -> bool:
+    """Whether the files of a log still have the sizes that its note states."""
+    sizes = note.get("bytes", {note["file"]: None})  # notes of older versions have none
+    return all(
+        (there := store.size(name)) is not None and size in (None, there) for name, size in sizes.items()
+    )
 
 
 @dataclass(frozen=True)
