@@ -10,6 +10,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from terragrip.cli import main
 from terragrip.errors import InputError
 from terragrip.formats import Profile, inspect, read
 from terragrip.formats.recognition import propose
@@ -228,3 +229,35 @@ def test_a_torque_in_pound_feet_and_a_pull_in_kilograms_are_proposed(tmp_path: P
     channels = read(log, profile).channels
     assert channels["drive_torque_l"][0] == pytest.approx(5 * speed[0] * 1.35582, rel=1e-3)
     assert channels["drawbar_force"][0] == pytest.approx(8 * speed[0] * 9.80665, rel=1e-3)
+
+
+@pytest.mark.parametrize("torque", [True, False])
+@pytest.mark.parametrize(
+    ("old", "new", "why"),
+    [
+        ("[l, r]", "[fl, fr]", "the vehicle has no wheel l; its wheels are fl, fr"),
+        ("wheel: {radius: 0.2 m, inertia: 0.1 kg m^2}\n", "", "has no wheel data"),
+        ("100 kg\n", "100 kg\n", ""),
+    ],
+)
+def test_a_vehicle_that_does_not_fit_is_not_called_ready(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], torque: bool, old: str, new: str, why: str
+) -> None:
+    time = np.arange(0.0, 20.0, 0.1)
+    table = {"time": time, "ground_speed": 1.0 + 0.3 * np.sin(time)}
+    for wheel in "lr":
+        table[f"wheel_speed_{wheel}"] = 5.2 * table["ground_speed"]
+        table |= {f"drive_torque_{wheel}": 5.0 + np.sin(time)} if torque else {}
+    pd.DataFrame(table).to_csv(tmp_path / "log.csv", index=False)
+    vehicle = "mass: 100 kg\naxles: {only: {mass: 100 kg, wheels: [l, r]}}\nwheel: {radius: 0.2 m, inertia: 0.1 kg m^2}\n"
+    (tmp_path / "v.yaml").write_text(vehicle.replace(old, new))
+    words = [str(tmp_path / "log.csv"), "--vehicle", str(tmp_path / "v.yaml")]
+    assert main(["inspect", *words]) == 0
+    output = capsys.readouterr().out
+    assert ("can be estimated as it is read" in output) == (why == "")
+    assert ("With this vehicle the log cannot be estimated" in output) == (why != "")
+    assert why in output
+    # estimate says the same
+    out = ["-o", str(tmp_path / "e.parquet"), "--quiet"]
+    assert main(["estimate", *words, *out]) == (2 if why else 0)
+    assert why in capsys.readouterr().err

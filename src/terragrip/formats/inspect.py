@@ -91,6 +91,7 @@ class Inspection:
     ready: bool  # the log can be estimated as it is, or with the profile that was given
     fitting: tuple[str, ...]  # profiles that come with Terragrip and fit
     nearly: tuple[str, ...]  # sentences on those that nearly do, and by which names
+    unfit: str  # why the log cannot be estimated with the vehicle that was given; empty if it can
     refused: str  # why nothing can be estimated from this log, whatever the profile; empty if something can
     profile: str  # a proposed profile, YAML
 
@@ -136,12 +137,8 @@ def inspect(
         warnings += [] if fits.names else [f"Without a profile: {_cause(error)}"]
     if recording is not None:
         warnings += unit_warnings(recording, machine)
-    if recording is not None and machine is not None:
-        try:
-            if has_torque(recording.channels):
-                recording.check_against(machine)
-        except InputError as error:
-            warnings.append(_cause(error))
+    unfit = "" if recording is None or machine is None else _unfit(recording, machine)
+    warnings += [unfit] * bool(unfit)
     if recording is not None and profile is not None:
         log = _as_table(recording, log)
     seen = Seen.of(log, whole=every == 1)
@@ -170,6 +167,7 @@ def inspect(
         ready=ready,
         fitting=fits.names,
         nearly=fits.nearly,
+        unfit=unfit,
         refused="" if ready or fits.names else refusal(present, quiet),
         profile=profile_text(
             os.path.basename(str(log.source)), stamp, proposals, since_1970=seen.since_1970, dbc=databases
@@ -259,6 +257,21 @@ def _size(path: str | os.PathLike[str]) -> int:
         return os.path.getsize(path)
     except OSError:
         return 0
+
+
+def _unfit(recording: Recording, vehicle: Vehicle) -> str:
+    """Why a recording cannot be estimated with a vehicle; empty if it can."""
+    try:
+        if has_torque(recording.channels):
+            recording.check_against(vehicle)
+        for wheel in recording.wheels:
+            if wheel not in vehicle.wheels:
+                return f"column wheel_speed_{wheel}: the vehicle has no wheel {wheel}; its wheels are {', '.join(vehicle.wheels)}"
+        if recording.wheels:
+            _ = vehicle.wheel_data
+    except InputError as error:
+        return _cause(error)
+    return ""
 
 
 def _recording(log: LogTable | SignalLog, profile: Profile | None) -> Recording:

@@ -35,7 +35,9 @@ def text_of(inspection: Inspection) -> str:
         parts.append("\n".join(inspection.nearly))
     if inspection.refused:
         parts.append(f"{inspection.file} {inspection.refused}.")
-    if inspection.ready:
+    if inspection.ready and inspection.unfit:
+        parts.append(f"With this vehicle the log cannot be estimated: {inspection.unfit}.")
+    elif inspection.ready:
         parts.append("The log can be estimated as it is read here.")
     else:
         parts.append("Proposed profile (save it, check it, pass it with --profile)\n\n" + inspection.profile)
@@ -52,7 +54,7 @@ def summary_of(inspections: Sequence[Inspection]) -> str:
         ) or "as one" * ("wheel_based_speed" in one.recognised)
         ground = ", ".join(one.recognised.get("ground_speed", ()))
         state = (
-            "ready"
+            ("not this vehicle's" if one.unfit else "ready")
             if one.ready
             else " or ".join(one.fitting) or ("no wheels" if one.refused else "needs a profile")
         )
