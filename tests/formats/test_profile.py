@@ -81,6 +81,15 @@ def test_delay_moves_a_channel_earlier_on_the_union_of_instants(foreign: pd.Data
     np.testing.assert_allclose(recording.time[~measured], np.arange(200) * 0.05)
 
 
+def test_a_label_lasts_through_the_rows_that_a_delay_makes(foreign: pd.DataFrame) -> None:
+    """Left empty there, half of a drive had no soil: its curve was learned from the other half."""
+    recording = apply(foreign, drive_torque_l={"from": "amps", "delay": "20 ms"}, soil={"from": "mode"})
+    assert len(recording) == 400
+    assert list(recording["soil"][:2]) == ["", foreign["mode"].iloc[0]]
+    assert list(recording["soil"][2::2]) == list(foreign["mode"].iloc[:199])
+    assert list(recording["soil"][1::2]) == list(foreign["mode"])
+
+
 def test_a_delay_of_whole_rows_makes_no_rows_of_rounding_errors(foreign: pd.DataFrame) -> None:
     recording = apply(foreign, drive_torque_l={"from": "amps", "delay": 0.15}, soil={"from": "mode"})
     assert len(recording) == 203

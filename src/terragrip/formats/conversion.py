@@ -95,7 +95,8 @@ def converted(profile: Profile, log: LogTable, *, partial: bool = False) -> Part
 def _shifted(
     time: Floats, channels: dict[str, Column], delays: dict[str, float]
 ) -> tuple[Floats, dict[str, Column]]:
-    """Channels (n,) that were stamped ``delays`` [s] late, on the union of their instants: NaN, or an empty text, where not measured."""
+    """Channels (n,) that were stamped ``delays`` [s] late, on the union of their instants: NaN where not measured; a text lasts until
+    the next."""
     late = sorted(set(delays.values()))
     if late in ([], [0.0]):
         return time, channels
@@ -104,8 +105,13 @@ def _shifted(
     instants, rows = union([time - delay for delay in late], tolerance)
     place, result = dict(zip(late, rows, strict=True)), {}
     for name, values in channels.items():
-        result[name] = np.full(len(instants), "" if values.dtype.kind == "O" else np.nan, values.dtype)
-        result[name][place[delays[name]]] = values
+        if values.dtype.kind == "O":
+            since = np.zeros(len(instants), dtype=np.intp)
+            since[place[delays[name]]] = np.arange(1, len(values) + 1)
+            result[name] = np.r_[np.array([""], dtype=object), values][np.maximum.accumulate(since)]
+        else:
+            result[name] = np.full(len(instants), np.nan, values.dtype)
+            result[name][place[delays[name]]] = values
     return instants, result
 
 
