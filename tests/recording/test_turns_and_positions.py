@@ -192,3 +192,15 @@ def test_poor_positions_of_a_slow_robot_are_no_wrong_unit() -> None:
     assert np.median(track.speed) > 0.4
     assert np.isnan(track.turn).all()
     assert unit_warnings(log, None) == []
+
+
+@pytest.mark.parametrize("value", [0.0, -0.02])
+def test_a_gyroscope_that_never_changes_is_named_where_the_wheels_turn(value: float) -> None:
+    """Turns on the spot had a slip of .99 each, surely: the hubs were taken to stand still."""
+    columns = field()
+    columns["angular_velocity_z"] = np.full(len(columns["time"]), value)
+    assert "its sensor is dead" in " ".join(unit_warnings(Recording.from_frame(columns), machine()))
+    straight = {n: v for n, v in columns.items() if n not in ("latitude", "longitude")}
+    pace = straight["wheel_speed_fl"]
+    straight |= dict.fromkeys((f"wheel_speed_{w}" for w in ("fl", "fr", "rl", "rr")), pace)
+    assert unit_warnings(Recording.from_frame(straight), machine()) == []

@@ -13,7 +13,7 @@ from terragrip.recording.mechanics import RATIOS, means_of, motion_warnings
 from terragrip.recording.sides import exchanged_torques, side_warnings
 from terragrip.recording.torques import torque_warnings
 from terragrip.recording.track import Track, track_of
-from terragrip.recording.turns import SURE, agreement, exchange_warnings, filled, straight_rows
+from terragrip.recording.turns import SURE, agreement, exchange_warnings, filled, straight_rows, windows
 from terragrip.recording.window_means import averaged
 
 if TYPE_CHECKING:
@@ -44,6 +44,10 @@ _OUTRUN = 1.5  # straight line over distance driven: above, that distance is too
 _TOO_SLOW, _LONG_WAY = 1.15, 20.0  # the same, over windows of so many metres
 _TOO_FAST = 1.3  # ground speed over the positions' speed, which noise can only increase
 _WAY_WINDOW = 10.0  # s
+_UNLIKE, _OFTEN = (
+    0.1,
+    0.1,
+)  # of the rims' pace from side to side, and of the driving: a turn, and much turning
 _SPARSE, _DENSE = 5.0, 1e-4  # s between samples: no log of a drive has more, or less
 
 
@@ -192,6 +196,11 @@ def _turn_warnings(recording: Recording, vehicle: Vehicle | None, track: Track |
     yaw = recording.channels.get("angular_velocity_z")
     if yaw is None:
         return [] if vehicle is None or track is None else _mirrored(recording, vehicle, track)
+    if vehicle is not None and _is_dead(recording, yaw, vehicle):
+        return [
+            "angular_velocity_z never changes while the wheels' speeds turn: its sensor is dead, and the slips of both sides are wrong in "
+            "turns. Leave it out of the profile."
+        ]
     text: dict[str, float] = {}
     if track is not None:
         text["the positions"] = agreement(recording.time, yaw, track.at("turn", recording.time))
@@ -220,6 +229,22 @@ def _turn_warnings(recording: Recording, vehicle: Vehicle | None, track: Track |
         f"angular_velocity_z is of the wrong sign: {' and '.join(against)} turn the other way. Left is positive: write 'sign: -1' for "
         f"it in the profile.{or_else}"
     ]
+
+
+def _is_dead(recording: Recording, yaw: Floats, vehicle: Vehicle) -> bool:
+    """Whether a rate of turn (n,) is one value throughout while the rims differ from side to side in much of the driving."""
+    if len(np.unique(yaw[np.isfinite(yaw)])) != 1 or not vehicle.knows_wheels:
+        return False
+    radius = dict(zip(vehicle.wheels, vehicle.wheel_radius, strict=True))
+    speeds = {w: recording.channels.get(f"wheel_speed_{w}") for w in vehicle.wheels}
+    rims = [radius[w] * np.abs(filled(recording.time, v)) for w, v in speeds.items() if v is not None]
+    if not rims:
+        return False
+    apart, pace = windows(
+        recording.time, np.array([_wheel_turn(recording, vehicle, rims=True), np.mean(rims, axis=0)])
+    )
+    moving = pace > 0.3 * _high(pace) if len(pace) else np.zeros(0, dtype=bool)
+    return bool(moving.any()) and float(np.mean(np.abs(apart[moving]) > _UNLIKE * pace[moving])) > _OFTEN
 
 
 def _mirrored(recording: Recording, vehicle: Vehicle, track: Track) -> list[str]:
