@@ -397,6 +397,43 @@ def test_a_damaged_note_is_one_line_and_loses_nothing(place: Path, ran: Ran, con
     assert len(whole(out)[0]) == 6
 
 
+def test_logs_of_earlier_calls_do_not_leave_the_tables_in_silence(place: Path, ran: Ran) -> None:
+    """Their notes are gone, and this call does not name them."""
+    out = place / "out"
+    assert ran()[0] == 0
+    before = {path: path.read_bytes() for path in out.glob("[!.]*.*")}
+    for note in (out / "state/logs").iterdir():
+        note.unlink()
+    some = (place / "logs/b/*.csv", "--vehicle", place / "Heros.yaml")
+    code, _, errors = ran(*some)
+    assert (code, errors.count("\n")) == (2, 1)
+    assert "state/logs: lacks the notes of drive0.csv and 2 others" in errors
+    assert {path: path.read_bytes() for path in out.glob("[!.]*.*")} == before
+    assert "6 estimated, 0 unchanged, 0 failed" in ran()[1]
+    assert len(whole(out)[0]) == 6
+
+
+@pytest.mark.parametrize("name", ["soils.json", "report.html", "soils.parquet"])
+def test_a_file_that_is_not_the_fleets_is_not_overwritten(place: Path, ran: Ran, name: str) -> None:
+    out = place / "out"
+    out.mkdir()
+    (out / name).write_text("a season's work")
+    code, _, errors = ran()
+    assert (code, errors.count("\n")) == (2, 1)
+    assert f"{name}: exists already, and is not a fleet's" in errors
+    assert (out / name).read_text() == "a season's work"
+    assert not (out / "state/logs").exists()
+
+
+def test_a_fleet_of_which_every_log_failed_goes_on(place: Path, ran: Ran) -> None:
+    (place / "logs/a/broken.csv").write_text("nothing of use\n")
+    words = (place / "logs/a/broken.csv", "--vehicle", place / "Heros.yaml")
+    for _ in range(2):
+        code, said, _ = ran(*words)
+        assert code == 0
+        assert "0 estimated, 0 unchanged, 1 failed" in said
+
+
 def test_estimates_that_are_gone_or_cut_short_are_made_anew(place: Path, ran: Ran) -> None:
     out = place / "out"
     assert ran()[0] == 0
@@ -423,7 +460,12 @@ def test_what_every_log_would_fail_by_is_refused_and_loses_nothing(
     assert ran()[0] == 0
     before = written(place / "out")
     (place / "bad.dbc").write_text("no DBC")
-    mistakes = (("--dbc", place / "no.dbc"), ("--dbc", place / "bad.dbc"), ("--metrics", place / "no/m.prom"))
+    mistakes = (
+        ("--dbc", place / "no.dbc"),
+        ("--dbc", place / "bad.dbc"),
+        ("--metrics", place / "no/m.prom"),
+        ("--metrics", place / "logs/a/drive0.csv"),
+    )
     for words in mistakes:
         code, _, errors = ran(*words)
         assert (code, errors.count("\n")) == (2, 1)

@@ -103,7 +103,9 @@ def command(
         log_to_stderr(log_format)
     method_named(method, smooth=smooth)
     if metrics is not None:
-        check_file(metrics, option="--metrics")
+        check_file(
+            metrics, suffixes=(".prom",), option="--metrics"
+        )  # it is overwritten: no log, no vehicle file
     if scheduler is not None and (workers or memory):
         raise InputError(
             "applies to workers on this machine only",

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import io
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from typing import Any
 
 from terragrip.errors import InputError
@@ -13,16 +13,19 @@ from terragrip.fleet.tally import COUNTED, MEANS
 from terragrip.fleet.task import NOTES, SAMPLES, Outcome
 
 SUMMARY, FAILURES, BY_SOIL = "summary.parquet", "failures.parquet", "soils.parquet"
+SOILS, REPORT = "soils.json", "report.html"
 
 Note = dict[str, Any]
 
 
-def known_notes(store: Store) -> tuple[dict[str, Note], dict[str, str]]:
+def known_notes(store: Store, named: Collection[str] = ()) -> tuple[dict[str, Note], dict[str, str]]:
     """What earlier calls left: the notes of estimated logs and the reasons of failed ones, by the log's name.
 
-    Raises InputError if the folder holds tables that are not a fleet's, or a damaged note.
+    ``named``: the logs of this call. Raises InputError if the folder holds tables that are not a fleet's, a damaged note, or no note of a
+    log of the summary that this call does not name.
     """
-    keys = {row["key"] for row in _read(store, SUMMARY)}
+    summary = _read(store, SUMMARY)
+    keys = {row["key"] for row in summary}
     by_name: dict[str, Note] = {}
     # An interrupted call may have left two notes of a log; the one that is not in the summary yet is newer.
     notes = [_note(store, name, content) for name, content in store.read_all(NOTES).items()]
@@ -31,8 +34,32 @@ def known_notes(store: Store) -> tuple[dict[str, Note], dict[str, str]]:
         if old is not None:
             _drop(store, old, keep=note)
         by_name[note["log"]] = note
+    # Their rows would silently leave the tables.
+    lost = sorted({row["log"] for row in summary} - by_name.keys() - set(named))
+    if lost:
+        others = f" and {len(lost) - 1} others" if len(lost) > 1 else ""
+        raise InputError(
+            f"lacks the notes of {lost[0]}{others}",
+            file=f"{store.url}/{NOTES}",
+            hint=f"restore them, or name these logs too, or remove {SUMMARY}",
+        )
+    if not by_name:
+        _refuse_foreign(store)
     failed = {row["log"]: row["reason"] for row in _read(store, FAILURES)}
     return by_name, {log: reason for log, reason in failed.items() if log not in by_name}
+
+
+def _refuse_foreign(store: Store) -> None:
+    """Raise InputError if a folder without a fleet holds a file that the first call would overwrite, such as a learned soils.json."""
+    if any(store.size(name) is not None for name in (SUMMARY, FAILURES)):
+        return
+    for name in (SOILS, REPORT, BY_SOIL):
+        if store.size(name) is not None:
+            raise InputError(
+                "exists already, and is not a fleet's",
+                file=f"{store.url}/{name}",
+                hint="name another folder with -o",
+            )
 
 
 def _note(store: Store, name: str, content: bytes) -> Note:

@@ -12,7 +12,7 @@ from terragrip.errors import InputError
 from terragrip.estimation.methods import DEFAULT
 from terragrip.fleet.cluster import check_address, default_workers, workers_at
 from terragrip.fleet.curves import learn_curves
-from terragrip.fleet.dataset import Note, known_notes, settled, write_tables, write_text
+from terragrip.fleet.dataset import REPORT, SOILS, Note, known_notes, settled, write_tables, write_text
 from terragrip.fleet.logs import FleetLog
 from terragrip.fleet.page import report_of
 from terragrip.fleet.store import TEMPORARY, Store
@@ -21,7 +21,6 @@ from terragrip.formats.can.catalog import catalog
 from terragrip.log_events import emit
 
 logger = logging.getLogger("terragrip.fleet")
-SOILS, REPORT = "soils.json", "report.html"
 
 
 @dataclass(frozen=True)
@@ -88,7 +87,7 @@ def run_fleet(
     try:
         # A call without workers leaves no folder behind.
         with workers_at(scheduler, workers or default_workers(), memory) as pool, store.locked():
-            before, failed = known_notes(store)
+            before, failed = known_notes(store, [log.name for log in logs])
             stopped: InputError | None = None
             try:
                 for outcome in pool.run(logs, settings, store, failed):
