@@ -139,7 +139,7 @@ def test_a_second_call_does_what_is_new_or_changed_and_no_more(place: Path, ran:
     (place / "Heros.yaml").write_text(VEHICLE.format(name="Heros 2"))
     code, said, _ = ran()
     assert "6 estimated, 0 unchanged, 0 failed" in said
-    assert "1 logs of earlier calls are kept" in said
+    assert "1 log of earlier calls is kept." in said
     rows, _ = whole(place / "out")
     assert len(rows) == 7
     vehicles = pd.read_parquet(place / "out/summary.parquet").set_index("log")["vehicle"]

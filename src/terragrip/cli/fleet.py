@@ -196,5 +196,6 @@ def _lines(done: FleetResult, output: str) -> list[str]:
     if len(done.failed) > 10:
         lines.append(f"  and {len(done.failed) - 10} more in failures.parquet")
     if done.kept:
-        lines.append(f"{done.kept} logs of earlier calls are kept.")
+        kept = "1 log of earlier calls is" if done.kept == 1 else f"{done.kept} logs of earlier calls are"
+        lines.append(f"{kept} kept.")
     return [*lines, f"Written to {output}; read {output}/report.html"]
