@@ -34,6 +34,8 @@ PAGES = (
     ("write 'sign: -1'", "formats#in-a-profile"),
     ("time may not be in seconds", "formats#in-a-profile"),
     ("angular_velocity_z turns with", "formats#in-a-profile"),
+    ("a sensor that is dead", "formats#what-the-motion-contradicts"),
+    ("while other speeds change", "formats#what-the-motion-contradicts"),
     ("its sensor is dead", "formats#what-the-motion-contradicts"),
     ("Columns that are not used", "formats#in-a-profile"),
     ("the vehicle is taken to tow nothing", "vehicle#signals-that-are-missing"),

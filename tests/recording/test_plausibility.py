@@ -58,7 +58,10 @@ def test_slip_is_no_wrong_unit(columns: Columns, vehicle: Vehicle, slip: float) 
 
 
 def test_standstill_and_backward_say_nothing(columns: Columns, vehicle: Vehicle) -> None:
-    assert unit_warnings(scaled(columns, "ground_speed", 0.0), vehicle) == []
+    still = {n: 0 * v if "speed" in n else v for n, v in columns.items()}
+    assert unit_warnings(Recording.from_frame(still), vehicle) == []
+    (note,) = unit_warnings(scaled(columns, "ground_speed", 0.0), vehicle)
+    assert "ground_speed (0) never changes while the wheels turn" in note
     backward = {n: -v if "speed" in n else v for n, v in columns.items()}
     assert unit_warnings(Recording.from_frame(backward), vehicle) == []
 

@@ -8,6 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from terragrip.recording.axles import axle_warnings
+from terragrip.recording.frozen import frozen_warnings
 from terragrip.recording.inertial import inertial_warnings
 from terragrip.recording.mechanics import RATIOS, means_of, motion_warnings
 from terragrip.recording.sides import exchanged_torques, side_warnings
@@ -58,6 +59,7 @@ def unit_warnings(recording: Recording, vehicle: Vehicle | None) -> list[str]:
     The speeds are compared where both are well above standstill, by the median of their ratio.
     """
     track, angles, times = track_of(recording), _angle_warnings(recording), _time_warnings(recording)
+    frozen = frozen_warnings(recording)
     recording = averaged(recording, _FINEST)
     known = vehicle if vehicle is not None and vehicle.knows_wheels else None
     shown = None if known is None else _shown_turn(recording, track)
@@ -77,6 +79,7 @@ def unit_warnings(recording: Recording, vehicle: Vehicle | None) -> list[str]:
         *moved,
         *(torque_warnings(recording, known, means) if known is not None and not moved else ()),
         *(inertial_warnings(recording, known) if known is not None else ()),
+        *frozen,
         *times,
     ]
     if notes or known is None:

@@ -1,0 +1,72 @@
+"""Speeds and accelerations that keep one value are named; what is held between samples, or stands, is left alone."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from terragrip.recording import Recording
+from terragrip.recording.frozen import frozen_warnings
+
+RATE = 10
+TIME = np.arange(0, 200, 1 / RATE)
+
+
+def log(**changed: np.ndarray | float) -> Recording:
+    """A drive between 1 and 2 m/s with a stop, slip of 5 %, noise (simulated)."""
+    draws = np.random.default_rng(1000)
+    speed = (1.5 + 0.5 * np.sin(TIME / 6)) * np.clip(np.abs(TIME - 100) - 10, 0, 3) / 3
+    columns = {"time": TIME, "ground_speed": np.round(speed + 0.01 * draws.standard_normal(len(TIME)), 3)}
+    for wheel in ("l", "r"):
+        rims = speed / 0.95 / 0.4
+        columns[f"wheel_speed_{wheel}"] = np.round(rims + 0.01 * draws.standard_normal(len(TIME)), 3)
+    columns["acceleration_x"] = np.gradient(speed, TIME) + 0.1 * draws.standard_normal(len(TIME))
+    full = {name: np.broadcast_to(np.asarray(v, dtype=np.float64), TIME.shape) for name, v in changed.items()}
+    return Recording.from_frame(columns | full)
+
+
+def repeated(name: str, start: float, end: float, value: float | None = None) -> Recording:
+    values = log().channels[name].copy()
+    rows = (start <= TIME) & (end >= TIME)
+    values[rows] = values[rows][0] if value is None else value
+    return log(**{name: values})
+
+
+def test_a_drive_says_nothing() -> None:
+    assert frozen_warnings(log()) == []
+
+
+@pytest.mark.parametrize("name", ["ground_speed", "wheel_speed_l"])
+def test_a_speed_that_is_repeated_for_long_is_named(name: str) -> None:
+    (note,) = frozen_warnings(repeated(name, 20.0, 40.0))
+    assert note.startswith(f"{name} repeats")
+    assert "from 20 to 40 s while other speeds change" in note
+    assert frozen_warnings(repeated(name, 20.0, 24.0)) == [], "4 s"
+
+
+def test_a_speed_that_is_held_between_its_samples_is_left_alone() -> None:
+    """A receiver of 1 Hz in rows of 10 Hz, of one digit: it repeats values by nature."""
+    ground = np.round(log().channels["ground_speed"][(np.arange(len(TIME)) // RATE) * RATE], 1)
+    assert frozen_warnings(log(ground_speed=ground)) == []
+
+
+def test_a_ground_speed_of_0_may_be_a_vehicle_that_is_stuck() -> None:
+    assert frozen_warnings(repeated("ground_speed", 20.0, 40.0, 0.0)) == []
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "beginning"),
+    [
+        ("ground_speed", 0.0, "ground_speed (0) never changes while the wheels turn"),
+        ("ground_speed", 1.2, "ground_speed (1.2) never changes while the wheels turn"),
+        ("acceleration_x", 0.0, "acceleration_x (0) never changes while the speed does"),
+    ],
+)
+def test_a_channel_of_one_value_is_named(name: str, value: float, beginning: str) -> None:
+    (note,) = frozen_warnings(log(**{name: value}))
+    assert note.startswith(beginning)
+
+
+def test_a_steady_drive_has_no_acceleration() -> None:
+    steady = {"ground_speed": 1.2, "wheel_speed_l": 3.0, "wheel_speed_r": 3.0, "acceleration_x": 0.0}
+    assert frozen_warnings(log(**steady)) == []
