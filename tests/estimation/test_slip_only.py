@@ -171,6 +171,17 @@ def test_a_stop_while_no_ground_speed_comes_is_no_dead_band() -> None:
     assert not any("do not see" in note for note in estimates.notes)
 
 
+def test_rims_that_read_0_at_a_driving_speed_are_no_dead_band() -> None:
+    """Single positions that jump by metres make a speed at rest; nothing slow is hidden from the wheels (simulated)."""
+    draws, time = np.random.default_rng(1000), np.arange(0, 200, 0.1)
+    rim = np.where(time % 50 < 25, 1.0, 0.0)
+    ground = np.where(rim > 0, 0.95, np.abs(0.8 + 0.4 * draws.standard_normal(len(time))))
+    log = tg.Recording.from_frame({"time": time, "ground_speed": ground, "wheel_based_speed": rim})
+    notes = " ".join(tg.estimate(log, robot()).notes)
+    assert "a ground speed that is wrong at rest" in notes
+    assert "do not see" not in notes
+
+
 def test_some_torques_missing_is_an_error_not_slip() -> None:
     log = speeds_of(0.1)
     with pytest.raises(InputError, match="drive_torque_fr: is missing, but the wheel fr is driven"):

@@ -145,6 +145,8 @@ def test_an_empty_library_and_none_name_nothing():
         ground = analyse(drive(10, [("grass", GRASS, 30), ("fine", FINE, 30)]), library)[0]
         assert set(ground.timeline.soil) == {"unknown"}
         assert len(ground.changes) == 1
+        assert ("The library holds no soil, so none is named." in ground.notes) == (library is not None)
+        assert not any("No soil of the library fits" in note for note in ground.notes)
 
 
 def test_a_damaged_signature_is_named(library):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -64,6 +65,16 @@ def test_without_labels_there_is_no_confusion_but_a_sentence() -> None:
     section = ground_sections.recognised([ground([""] * 9, ["fine"] * 9)])
     assert not only(section, Table)
     assert any("no confusion matrix" in text for text in section.prose)
+
+
+def test_without_a_library_no_share_of_right_soils_is_told() -> None:
+    """All is unknown there, and "right in 0.0 % of the time" was said of it."""
+    drive = ground(["fine"] * 9, ["unknown"] * 9)
+    unnamed = replace(drive.timeline, names=("unknown",), probabilities=np.ones((9, 1)))
+    section = ground_sections.recognised([replace(drive, soils=(), timeline=unnamed)])
+    assert not only(section, Table)
+    assert any("No soil is named" in text for text in section.prose)
+    assert not any("right in" in text for text in section.prose)
 
 
 def test_sections_carry_their_means_and_what_they_were_taken_for() -> None:

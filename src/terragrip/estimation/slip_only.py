@@ -57,10 +57,13 @@ def slip_reference_in(log: Recording, vehicle: Vehicle) -> SlipReference:
         notes.append("wheel_based_speed is not used: the wheels have speeds of their own.")
     band, rows = _dead_band(log, rims)
     if rows:
-        notes.append(
-            f"The rims read 0 in {rows} rows while the vehicle moves, at up to {band:.2g} m/s: what is slower they do not see, so slip "
-            "is left open there (event gap)."
-        )
+        why = f"while the vehicle moves, at up to {band:.2g} m/s: what is slower they do not see, so slip is left open there (event gap)."
+        if band == _WIDEST:
+            why = (
+                f"where ground_speed says {band:.2g} m/s and more: wheel speeds that are missing, or a ground speed that is wrong at rest. "
+                "Slip is left open where the rims are slower (event gap)."
+            )
+        notes.append(f"The rims read 0 in {rows} rows {why}")
     notes += _against_travel(log, rims)
     return SlipReference(tuple(rims), zero, band, tuple(notes))
 

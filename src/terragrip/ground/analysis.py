@@ -69,7 +69,7 @@ def analyse(
         sections,
         events(estimates),
         timeline,
-        _notes(emissions, timeline, len(stretches) - len(sections), library is not None),
+        _notes(emissions, timeline, len(stretches) - len(sections), library),
         {"recording": estimates.about.get("recording", {}), "online": chosen.online},
     )
     return ground, with_columns(estimates, blocks, timeline, chosen.online)
@@ -135,9 +135,13 @@ def _stretches(estimates: Estimates, changes: Sequence[Change], timeline: Timeli
     return result
 
 
-def _notes(emissions: Emissions, timeline: Timeline, short: int, library: bool) -> tuple[str, ...]:
+def _notes(
+    emissions: Emissions, timeline: Timeline, short: int, library: SoilLibrary | None
+) -> tuple[str, ...]:
     notes = list(emissions.notes)
     known = timeline.known
+    if library is not None and not library:
+        notes.append("The library holds no soil, so none is named.")
     if not known.any():
         notes.append(
             "No stretch of the drive tells of the ground: it stands, spins, is flagged or lacks values throughout."

@@ -57,13 +57,18 @@ def recognised(grounds: Sequence[Ground], simulated: bool = False) -> Section:
             f"Probabilities of soils over time in {ground.run}",
         )
         content.append(picture)
-    matrix = confusion([ground.timeline for ground in with_time])
+    named = [ground.timeline for ground in with_time if set(ground.timeline.names) - {"unknown"}]
+    matrix = confusion(named)
     prose = [
         note if len(with_time) == 1 else f"{ground.run}: {note}" for ground in shown for note in ground.notes
     ]
     if matrix is not None:
         prose.insert(0, matrix[1])
         content.append(matrix[0])
+    elif not named:
+        prose.append(
+            "No soil is named: the ground was searched without a library of soils, or with an empty one."
+        )
     else:
         prose.append("There is no confusion matrix: the recordings do not name their soils.")
     return Section("ground", title, tuple(prose), tuple(content))
