@@ -202,13 +202,16 @@ def test_the_error_of_the_scale_is_a_jackknife_over_stretches(n: int, blocks: in
 def test_a_slope_that_nothing_tells_is_three_tenths_of_it_over_the_force(vehicle: Vehicle) -> None:
     rows, weight = balance(slope_known=False), np.ones(200)
     per_radian = 0.3 * 140 * GRAVITY / np.std(rows.force)
-    assert torque_scale._unseen_slope(stating(vehicle, slope=0.02), rows, weight) == pytest.approx(
-        0.02 * per_radian
-    )
-    assert torque_scale._unseen_slope(stating(vehicle), rows, weight) == pytest.approx(
-        np.radians(0.5) * per_radian
-    )
-    assert torque_scale._unseen_slope(vehicle, balance(), weight) == 0.0
+
+    def spread(machine: Vehicle, of: Any = rows, left: float = 0.0) -> float:
+        return torque_scale._unseen_slope(machine, of, weight, np.full(200, left * 140 * GRAVITY))
+
+    assert spread(stating(vehicle, slope=0.02)) == pytest.approx(0.02 * per_radian)
+    assert spread(stating(vehicle)) == pytest.approx(np.radians(0.5) * per_radian)
+    assert spread(vehicle, balance()) == 0.0
+    # On hills that nobody stated, what the balance leaves says how steep they are.
+    assert spread(stating(vehicle, slope=0.02), left=0.06) == pytest.approx(0.06 * per_radian)
+    assert spread(stating(vehicle, slope=0.0), left=0.06) == 0.0  # stated as level
 
 
 def test_the_bars_gain_counts_where_there_is_one(vehicle: Vehicle) -> None:
@@ -273,7 +276,7 @@ def test_rows_of_shared_curves(vehicle: Vehicle) -> None:
     data = table(wheel_acceleration=0.5 * np.ones((N, 4)))
     driven = np.array([0, 1, 3])
     rows = gains._rows(
-        data, stating(vehicle, wheel_radius=0.01), np.array([0.1, 0.0, 0.2, 0.3]), np.arange(N), driven
+        data, stating(vehicle, wheel_radius=0.01), np.array([0.1, 0.0, 0.2, 0.3]), np.arange(N), driven, 0.007
     )
     np.testing.assert_allclose(
         rows.known, 0.15 * 0.5 + 0.2 * (0.02 * LOAD + 2.0 / 0.18)[driven] * np.ones((N, 1))
@@ -281,8 +284,8 @@ def test_rows_of_shared_curves(vehicle: Vehicle) -> None:
     np.testing.assert_allclose(rows.leverage, 0.2 * LOAD[driven] * np.ones((N, 1)))
     np.testing.assert_allclose(rows.slip, 0.1)
     np.testing.assert_allclose(rows.offset_std, [0.1, 1e-3, 0.3])
-    assert rows.radius_std == 0.01
-    assert gains._rows(data, stating(vehicle), np.zeros(4), np.arange(N), driven).radius_std == 0.003
+    assert (rows.radius_std, rows.slip_std) == (0.01, 0.007)
+    assert gains._rows(data, stating(vehicle), np.zeros(4), np.arange(N), driven, 0.0).radius_std == 0.003
 
 
 def test_constant_errors_of_channels_shift_loads_and_so_gains(vehicle: Vehicle) -> None:

@@ -57,10 +57,12 @@ def relative_gains(
     offset_std: Floats,
     errors: ChannelErrors,
     sources: Sequence[str],
+    common_radius_std: float = 0.0,
 ) -> RelativeGains | list[Unknown]:
     """Torque gains of the driven wheels relative to their (geometric) mean.
 
-    ``logs`` must have their zeros taken off; ``offset_std`` (w,) N m of the torque zeros.
+    ``logs`` must have their zeros taken off; ``offset_std`` (w,) N m of the torque zeros; ``common_radius_std`` is the relative error that
+    all radii may share: it moves all slips alike, and with them how steep their curve looks.
     """
     key = "drive_torque_gain"
     common = Unknown(
@@ -77,7 +79,7 @@ def relative_gains(
     )
     if len(table) == 0 or len(np.unique(blocks)) < _MIN_BLOCKS:
         return [few, common]
-    rows = _rows(table, vehicle, offset_std, blocks, driven)
+    rows = _rows(table, vehicle, offset_std, blocks, driven, common_radius_std)
     fit = fit_shared_gains(rows)
     if fit is None or fit.blocks < _MIN_BLOCKS:
         return [few, common]
@@ -174,7 +176,9 @@ def _driving(table: Windows, vehicle: Vehicle) -> Windows:
     return table.select(known & moving & whole & on_curve & seen & ~_near_border(table))
 
 
-def _rows(table: Windows, vehicle: Vehicle, offset_std: Floats, blocks: Ints, driven: Ints) -> Sharing:
+def _rows(
+    table: Windows, vehicle: Vehicle, offset_std: Floats, blocks: Ints, driven: Ints, radius_std: float
+) -> Sharing:
     radius = vehicle.wheel_radius
     spin = vehicle.wheel_inertia * table.wheel_acceleration
     rolling = vehicle.tire_rolling_resistance * table.load + vehicle.bearing_resistance * table.wheel_speed
@@ -187,6 +191,7 @@ def _rows(table: Windows, vehicle: Vehicle, offset_std: Floats, blocks: Ints, dr
         block=blocks,
         radius_std=vehicle.uncertainty.wheel_radius or _RADIUS,
         offset_std=np.maximum(offset_std[driven], _LEAST_OFFSET),
+        slip_std=radius_std,
     )
 
 

@@ -108,6 +108,7 @@ def calibrate(
         _offset_errors(quantities, vehicle),
         _channel_errors(quantities, vehicle, logs),
         sources,
+        _common_radius(rolling, vehicle),
     )
     shared: list[Quantity] = []
     if isinstance(gains, RelativeGains):
@@ -230,6 +231,13 @@ def _channel_errors(
         lateral=float(lateral),
         drawbar=float(errors.get("drawbar_offset", stated.drawbar_offset or 0.0)),
     )
+
+
+def _common_radius(rolling: Rolling | Unknown, vehicle: Vehicle) -> float:
+    """Relative error that the radii of all driven wheels may share."""
+    stated = vehicle.uncertainty.wheel_radius
+    prior = _UNSTATED_RADIUS if stated is None else stated
+    return float(np.mean(rolling.std[vehicle.driven])) if isinstance(rolling, Rolling) else prior
 
 
 def _useful(quantities: list[Quantity], vehicle: Vehicle, unknown: list[Unknown]) -> list[Quantity]:

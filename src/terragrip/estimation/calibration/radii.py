@@ -49,6 +49,7 @@ _STEEPNESS = (
 )  # prior of ln C: mean and standard deviation (C is 2 on grass, 8 on hard soil)
 _LEVEL = (0.6, 0.6)  # prior of A: mean, and standard deviation of ln A
 _LEAST_PULL = 0.15
+_DELAY = 0.1  # s, SD of the ground speed's delay: while a machine speeds up it pulls more, so a delay would pass for slip
 _ROUNDS = 50
 _TORQUE_ZERO = 0.02  # prior of a torque zero, over r F, where the vehicle states none
 _ROLLING = 0.15  # adhesion and rolling resistance at zero pull: what a gain error acts on
@@ -169,7 +170,7 @@ def _fit(
     used: Bools,
     block: Ints,
 ) -> tuple[Floats, Floats, Floats, float]:
-    """Least squares for the radii over the file's, ln C_j and ln A_j; the variance is over blocks of track.
+    """Least squares for the radii over the file's, ln C_j, ln A_j and the ground speed's delay; the variance is over blocks of track.
 
     Returns the scale (w,), the variance (w,) of its logarithm, C (soils,), and how many blocks the radii rest on.
     """
@@ -182,22 +183,27 @@ def _fit(
     pull = np.where(used, adhesion, 0.0)
     (steep, steep_spread), (_, level_spread) = _STEEPNESS, _LEVEL
     level_mean = np.log(np.maximum(_LEVEL[0], 1.2 * most))
-    center = np.r_[np.zeros(count), np.full(soils, steep), level_mean]
-    prior = np.r_[np.zeros(count), np.full(soils, steep_spread**-2.0), np.full(soils, level_spread**-2.0)]
+    center = np.r_[np.zeros(count), np.full(soils, steep), level_mean, 0.0]
+    prior = np.r_[
+        np.zeros(count), np.full(soils, steep_spread**-2.0), np.full(soils, level_spread**-2.0), _DELAY**-2.0
+    ]
+    rates = np.mean(windows.wheel_acceleration * vehicle.wheel_radius, axis=1)[:, None]
+    by_delay = np.where(used & np.isfinite(rates), -rates / np.where(used, windows.hub_speed, 1.0), 0.0)
     values = center.copy()
     for _ in range(_ROUNDS):
         steepness = np.exp(values[count : count + soils])[code][:, None]
-        level = np.exp(values[count + soils :])[code][:, None]
+        level = np.exp(values[count + soils : -1])[code][:, None]
         share = np.clip(pull / level, -0.95, 0.95)
         slip = -level / steepness * np.log1p(-share)
         bend = -level / steepness * (np.log1p(-share) + share / (1 - share))  # d slip / d ln A
-        jacobian = np.zeros((*ratio.shape, count + 2 * soils))
+        jacobian = np.zeros((*ratio.shape, len(values)))
         jacobian[:, np.arange(w), group] = 1.0
+        jacobian[:, :, -1] = by_delay
         for j in range(soils):
             own = code[:, None] == j
             jacobian[:, :, count + j] = np.where(own, slip / (1 - slip), 0.0)
             jacobian[:, :, count + soils + j] = np.where(own, -bend / (1 - slip), 0.0)
-        residual = ratio - values[group] - np.log1p(-np.minimum(slip, 0.9))
+        residual = ratio - values[group] - values[-1] * by_delay - np.log1p(-np.minimum(slip, 0.9))
         noise = 1.4826 * float(np.median(np.abs(residual[used])))
         spreads = np.hypot(max(noise, 1e-6), 0.1 * slip)  # local adhesion shifts slip in proportion
         scaled = np.where(used, residual / spreads, 0.0)

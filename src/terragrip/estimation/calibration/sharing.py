@@ -7,7 +7,8 @@ its gain. Model of the mean torque of wheel i over window n (physics.md 1, avera
 
 m_n is the adhesion that all wheels have at the window's mean slip s_n, an unknown of its own in every window: so neither the noise of
 ground speed, nor the curve's form, nor what the soil does to all wheels alike enters the gains. The curve is needed only
-for its steepness d_n, which carries the wheels' small differences of slip. Unknown are ln k_i (mean 0: a gain common to all
+for its steepness d_n, which carries the wheels' small differences of slip
+(:mod:`~terragrip.estimation.calibration.steepness`). Unknown are ln k_i (mean 0: a gain common to all
 wheels cannot be distinguished from m_n) and, with their priors, the relative radii e_i and the offsets o_i. Weighted least squares
 with Huber weights; (R), our own construction.
 
@@ -17,12 +18,12 @@ over blocks of track.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from terragrip.arrays import Bools, Floats, Ints
-from terragrip.physics.adhesion import PROTOTYPE
+from terragrip.estimation.calibration.steepness import steepness_of
 
 _ROUNDS = 60
 _CLOSE = 1e-8  # change of every ln k
@@ -30,7 +31,8 @@ _HUBER = 2.5  # robust standard deviations
 _LOCAL = 0.1  # relative difference of local adhesion between wheels, for the weights: to start with,
 _LEAST_LOCAL = 0.01  # and at least
 _LEAST_WINDOWS = 30
-_STEEPNESS = np.geomspace(2.0, 60.0, 60)  # of the curves 1 - exp(-k s)
+_MOST_STRETCH = 0.8
+_UNLIKELY = 0.02  # a form that is less likely is not tried
 
 
 @dataclass(frozen=True)
@@ -38,7 +40,8 @@ class Sharing:
     """Rows that share curves: a row a window, a column a wheel (n, w), no NaN.
 
     ``torque`` N m; ``known`` the part B without adhesion, N m; ``leverage`` r F, N m; ``slip``; ``soil`` (n,) and
-    ``block`` (n,) integer labels from 0. ``radius_std`` of each wheel's relative radius, ``offset_std`` (w,) N m: the priors.
+    ``block`` (n,) integer labels from 0. ``radius_std`` of each wheel's relative radius, ``offset_std`` (w,) N m: the priors; ``slip_std``
+    of an error that all slips share.
     """
 
     torque: Floats
@@ -49,6 +52,7 @@ class Sharing:
     block: Ints
     radius_std: float
     offset_std: Floats
+    slip_std: float = 0.0
 
     def select(self, rows: Bools) -> Sharing:
         """The windows of a mask (n,)."""
@@ -82,8 +86,21 @@ def fit_shared_gains(data: Sharing) -> SharedGains | None:
     """Estimate the relative gains; None where there are too few windows."""
     if len(data.torque) < _LEAST_WINDOWS:
         return None
+    fit, problem = _fitted(data)
+    error = min(problem.steepness_std, _MOST_STRETCH)
+    others = [(0.5, _fitted(data, stretch=1 + sign * error)[0]) for sign in (-1.0, 1.0)]
+    others += [(p, _fitted(data, form=form)[0]) for form, p in enumerate(problem.chance) if p > _UNLIKELY]
+    added = np.zeros_like(fit.covariance)
+    for chance, other in others:
+        change = np.r_[other.log_gain - fit.log_gain, other.radius - fit.radius]
+        added += chance * np.outer(change, change)
+    return replace(fit, covariance=fit.covariance + added)
+
+
+def _fitted(data: Sharing, *, stretch: float = 1.0, form: int | None = None) -> tuple[SharedGains, _Problem]:
+    """The gains where the curves are steeper by a factor than they look, or of another form than fits best."""
     w = data.torque.shape[1]
-    problem = _Problem.of(data)
+    problem = replace(_Problem.of(data), stretch=stretch, form=form)
     values = problem.solve(np.zeros(3 * w), 1.0)
     problem = problem.refined(values)
     values = problem.solve(values, 1.0)
@@ -96,7 +113,7 @@ def fit_shared_gains(data: Sharing) -> SharedGains | None:
     apart = np.eye(w) - 1 / w
     center = np.block([[np.eye(w), np.zeros((w, w))], [np.zeros((w, w)), apart]])
     covariance = problem.covariance(values, scale, data.block)[: 2 * w, : 2 * w]
-    return SharedGains(
+    found = SharedGains(
         log_gain=values[:w],
         radius=apart @ values[w : 2 * w],
         covariance=center @ covariance @ center,
@@ -104,6 +121,7 @@ def fit_shared_gains(data: Sharing) -> SharedGains | None:
         blocks=len(np.unique(data.block)),
         load_sensitivity=center @ problem.load_sensitivity(values, scale),
     )
+    return found, problem
 
 
 @dataclass(frozen=True)
@@ -124,6 +142,10 @@ class _Problem:
     torque_noise: float
     steepness: Floats  # (n,) d_n
     local: Floats  # (n,) relative difference of local adhesion between wheels
+    stretch: float = 1.0  # factor on what the levels show of the steepness
+    form: int | None = None  # the curves' form; None: that which fits best
+    steepness_std: float = 0.0  # how well the steepness is known, relative,
+    chance: Floats = field(default_factory=lambda: np.ones(1))  # and how likely each form is
 
     @classmethod
     def of(cls, data: Sharing) -> _Problem:
@@ -148,18 +170,12 @@ class _Problem:
         return replace(self, local=local)._with_steepness(values)
 
     def _with_steepness(self, values: Floats) -> _Problem:
-        """d_n of curves A (1 - exp(-k s)), an amplitude a soil, one k for all: the best of a grid."""
+        """d_n of the curves as the levels show them."""
         level, _, _ = self._levels(values)
-        slip, soil = self.data.slip.mean(axis=1), self.data.soil
-        size = np.abs(slip)
-        best, result = np.inf, np.zeros(len(slip))
-        for k in _STEEPNESS if np.ptp(size) > 0.02 else [-PROTOTYPE["alpha_2"]]:
-            form = np.sign(slip) * -np.expm1(-k * size)
-            amplitude = np.bincount(soil, form * level) / np.maximum(np.bincount(soil, form**2), 1e-12)
-            loss = float(np.sum(np.abs(level - amplitude[soil] * form)))
-            if loss < best:
-                best, result = loss, np.maximum(amplitude[soil], 0.0) * k * np.exp(-k * size)
-        return replace(self, steepness=result)
+        data = self.data
+        curves = steepness_of(level, data.slip.mean(axis=1), data.soil, data.slip_std, data.block, self.form)
+        steepness = self.stretch * curves.steepness
+        return replace(self, steepness=steepness, steepness_std=curves.relative_std, chance=curves.chance)
 
     def _levels(self, values: Floats) -> tuple[Floats, Floats, Floats]:
         """m_n (n,), the residual torque (n, w) and its spread (n, w) at the unknowns' values."""

@@ -102,7 +102,7 @@ def identify_torque_scale(recordings: Recording | Sequence[Recording], vehicle: 
         )
     considered = np.hypot(
         _SLIP_RESISTANCE * vehicle.mass * GRAVITY * _partial_slope(rows.slip, rows, weight),
-        np.hypot(_drawbar_gain(table, vehicle), _unseen_slope(vehicle, rows, weight)),
+        np.hypot(_drawbar_gain(table, vehicle), _unseen_slope(vehicle, rows, weight, residual)),
     )
     sentence = "torques over radius against drawbar force and mass times acceleration and slope; it goes with the mass"
     by_grade = _with_grade(vehicle, rows, weight)
@@ -215,12 +215,15 @@ def _partial_slope(values: Floats, rows: _Balance, weight: Floats) -> float:
     return float(np.sum(weight * value * (y1 + y2) / 2) / np.sum(weight * y1 * y2))
 
 
-def _unseen_slope(vehicle: Vehicle, rows: _Balance, weight: Floats) -> float:
-    """Relative SD of K by a slope that neither pitch nor accelerometer tells."""
-    if rows.slope_known:
-        return 0.0
+def _unseen_slope(vehicle: Vehicle, rows: _Balance, weight: Floats, residual: Floats) -> float:
+    """Relative SD of K by a slope that neither pitch nor accelerometer tells: of what the vehicle states, or of what the balance leaves,
+    since on hills that is mostly slope.
+    """
     stated = vehicle.uncertainty.slope
+    if rows.slope_known or stated == 0.0:
+        return 0.0
     slope = vehicle.mass * GRAVITY * (_SLOPE if stated is None else stated)
+    slope = max(slope, float(np.sqrt(np.mean(weight * residual**2))))
     force = _centered(rows.force[:, None], rows.nuisance, weight)[:, 0]
     return _WITH_PUSH * slope / max(float(np.sqrt(np.mean(weight * force**2))), 1e-12)
 

@@ -1,0 +1,88 @@
+"""How steep the adhesion curves are that wheels share, from slip over adhesion.
+
+A window's slip has the ground speed's noise, its adhesion little, so slip is regressed on adhesion: the other way round noise would
+flatten the curve (as in :mod:`~terragrip.estimation.calibration.radii`). With m = A (1 - exp(-C s/A))::
+
+    s_n = s_0 + x_j f(m_n),   f(m) = -A ln(1 - m/A),   x_j = 1/C_j of soil j,   dm/ds = C_j (1 - m/A)
+
+s_0 is what an error of all radii adds to every slip: without it light work on firm ground would look as flat as mud. (R), our own
+construction.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from terragrip.arrays import Floats, Ints
+
+_PRIOR = (0.2, 0.15)  # x: mean and SD; C is 2 on grass, 8 on hard soil, 30 on asphalt
+_LEAST, _MOST = 0.025, 1.0  # x
+_ROOM = np.array([1.02, 1.04, 1.06, 1.1, 1.3, 1.6, 2.0, 3.0, 5.0])  # A over the largest level of a soil
+_TOP = 0.98  # quantile that stands for the largest
+_LEAST_LEVEL = 0.05
+_ROUNDS = 10
+_HUBER = 2.0
+
+
+@dataclass(frozen=True)
+class Steepness:
+    """``steepness`` (n,) dm/ds at each window; ``relative_std``: of an error that all share; ``chance``: how likely each form is."""
+
+    steepness: Floats
+    relative_std: float
+    chance: Floats
+
+
+def steepness_of(
+    level: Floats, slip: Floats, soil: Ints, slip_std: float, block: Ints, form: int | None = None
+) -> Steepness:
+    """The curves' steepness at levels (n,) of slips (n,); ``soil`` and ``block`` (n,) labels from 0.
+
+    ``slip_std``: of an error that all slips share. Neighbouring windows repeat each other, so a stretch of track counts as one.
+    ``form``: the place in `_ROOM` of the one to take; None: the one that fits best.
+    """
+    size, signed = np.abs(level), np.where(level < 0, -slip, slip)
+    soils = int(soil.max()) + 1
+    top = np.array([np.quantile(size[soil == j], _TOP) if np.any(soil == j) else 0.0 for j in range(soils)])
+    repeats = len(level) / len(np.unique(block))
+    forms, losses = [], []
+    for room in _ROOM:
+        ceiling = (room * np.maximum(top, _LEAST_LEVEL))[soil]
+        share = np.minimum(size / ceiling, 0.98)
+        loss, inverse, deviation = _regressed(
+            -ceiling * np.log1p(-share), signed, soil, np.sign(level), slip_std, repeats
+        )
+        forms.append(((1 - share) / inverse[soil], deviation))
+        losses.append(loss)
+    fits = len(np.unique(block)) * np.log(np.maximum(losses, 1e-9))
+    chance = np.exp(np.min(fits) - fits)
+    steepness, deviation = forms[int(np.argmax(chance)) if form is None else form]
+    return Steepness(steepness, deviation, chance / chance.sum())
+
+
+def _regressed(
+    form: Floats, slip: Floats, soil: Ints, sign: Floats, slip_std: float, repeats: float
+) -> tuple[float, Floats, float]:
+    """The robust loss, x_j (soils,), and the relative SD of their mean."""
+    soils = int(soil.max()) + 1
+    design = np.zeros((len(slip), soils + 1))
+    design[np.arange(len(slip)), soil] = form
+    design[:, -1] = sign
+    center = np.r_[np.full(soils, _PRIOR[0]), 0.0]
+    precision = np.r_[np.full(soils, _PRIOR[1] ** -2.0), max(slip_std, 1e-6) ** -2.0]
+    values, weight, noise = center.copy(), np.ones(len(slip)), 0.0
+    covariance = np.diag(1 / precision)
+    for _ in range(_ROUNDS):
+        rest = slip - design @ values
+        noise = max(1.4826 * float(np.median(np.abs(rest))), 1e-4)
+        weight = np.minimum(1.0, _HUBER * noise / np.maximum(np.abs(rest), 1e-12)) / (noise**2 * repeats)
+        normal = design.T @ (weight[:, None] * design) + np.diag(precision)
+        covariance = np.linalg.inv(normal)
+        values = covariance @ (design.T @ (weight * slip) + precision * center)
+    inverse = np.clip(values[:-1], _LEAST, _MOST)
+    counts = np.bincount(soil, minlength=soils) / len(soil)
+    mean = float(counts @ inverse)
+    loss = float(np.mean(np.abs(slip - design[:, :-1] @ inverse - sign * values[-1])))
+    return loss, inverse, float(np.sqrt(counts @ covariance[:-1, :-1] @ counts)) / mean
