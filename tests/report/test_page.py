@@ -195,3 +195,14 @@ def test_numbers_are_printed_for_readers() -> None:
     assert percent(0.951) == "95.1 %"
     assert soil_color("hard") != soil_color("fine")
     assert soil_color("clay", ("clay", "loam")) != soil_color("loam", ("clay", "loam"))
+
+
+def test_a_sentence_in_a_tables_first_column_is_wrapped() -> None:
+    """On one line it pushed the other columns, and its own end, off the page."""
+    row = (
+        "slip is known to 3 points only, too little to advise by: drive 40 s without load on a road",
+        "all",
+    )
+    page = Page("x", "y", (Section("a", "A", (), (Table("t", ("missing", "for"), (row,)),)),))
+    assert '<th scope="row" class="prose">slip is known' in render(page)
+    assert re.search(r"th\.prose[^}]*white-space: normal", render(page))

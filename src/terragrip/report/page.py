@@ -37,7 +37,7 @@ class Table:
     @property
     def prose(self) -> frozenset[int]:
         """The columns, counted from 0, that hold sentences: they are read from the left, figures stand to the right."""
-        columns = range(1, len(self.header))
+        columns = range(len(self.header))
         return frozenset(i for i in columns if any(len(row[i]) > SENTENCE for row in self.rows))
 
 
