@@ -51,7 +51,7 @@ def put(service: ManyService, name: str, *sent) -> None:
 
 
 async def rows_of(service: ManyService, name: str, count: int) -> None:
-    await until(lambda: name in service.vehicles.runs and service.vehicles.runs[name].core.rows >= count, 60)
+    await until(lambda: name in service.vehicles.runs and service.vehicles.runs[name].core.rows >= count)
 
 
 def assert_as_one(folder, alone) -> None:
@@ -98,12 +98,11 @@ async def test_each_has_the_digits_of_a_service_of_its_own(tmp_path, vehicle, ev
                     client.publish(f"field/{name}/sample", json.dumps(one[k]))
                 await asyncio.sleep(0.003)
             for name, service in alone.items():
-                await until(lambda s=service: s.core.rows >= 579, 30)
+                await until(lambda s=service: s.core.rows >= 579)
                 await rows_of(many, name, 579)
             last = {name: one[-1]["time"] for name, one in sent.items()}
             await until(
-                lambda: {t.split("/")[1] for t, d in got if d["time"] == last[t.split("/")[1]]} == set(logs),
-                30,
+                lambda: {t.split("/")[1] for t, d in got if d["time"] == last[t.split("/")[1]]} == set(logs)
             )
     for name in logs:
         assert_as_one(tmp_path / "many" / name, tmp_path / f"alone-{name}")
@@ -167,7 +166,7 @@ async def test_a_bad_vehicle_harms_no_other(tmp_path, vehicle, listed, monkeypat
             await asyncio.sleep(0.001)
         for name in "ab":
             await rows_of(service, name, 400)
-        await until(lambda: alone.core.rows == 400, 30)
+        await until(lambda: alone.core.rows == 400)
         # It is opened and fails again and again, as long as messages of it wait.
         await until(lambda: "a defect in two lines" in service.monitor.unready().get("broken", ""))
         unready = service.monitor.unready()

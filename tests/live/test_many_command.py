@@ -19,10 +19,13 @@ from terragrip.estimation import TractionEstimator
 from terragrip.live import read_record
 from test_cli import COMMAND
 
+PATIENCE = 300.0
+"""How long [s] a busy machine may need; no test passes or fails by what it waits less."""
+
 
 @pytest.mark.asyncio
 async def test_killed_and_started_again_each_goes_on(tmp_path, vehicle, port):
-    """Two kills among the samples of three vehicles: every estimate heard 0.3 s before a kill is kept, and all are those of one run."""
+    """Two kills among the samples of three vehicles: every estimate heard a second before a kill is kept, and all are those of one run."""
     vehicle.save(tmp_path / "robot.yaml")
     (tmp_path / "index.csv").write_text("name;vehicle\na;robot.yaml\nb;robot.yaml\nc;robot.yaml\n")
     sent = {n: messages(drive(9.0, rate=50.0, seed=k).recording, 450) for k, n in enumerate("abc")}
@@ -50,7 +53,7 @@ async def test_killed_and_started_again_each_goes_on(tmp_path, vehicle, port):
 
             for part in range(3):
                 process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
-                async with asyncio.timeout(60):
+                async with asyncio.timeout(PATIENCE):
                     while not reached(150 * part):  # a sample that it has already is doubled, and dropped
                         await publish(150 * part)
                         await asyncio.sleep(0.1)
@@ -59,7 +62,7 @@ async def test_killed_and_started_again_each_goes_on(tmp_path, vehicle, port):
                         await asyncio.sleep(0.002)
                     while not reached(150 * part + 149):
                         await asyncio.sleep(0.02)
-                await asyncio.sleep(0.3)
+                await asyncio.sleep(1.0)
                 process.send_signal(signal.SIGKILL if part < 2 else signal.SIGINT)
                 out, err = await asyncio.to_thread(process.communicate)
     assert process.returncode == 0, err
@@ -124,13 +127,13 @@ async def test_log_lines_bear_the_vehicle(tmp_path, vehicle, port):
                 lines.append(json.loads(line))
 
         reading = asyncio.create_task(read())
-        async with listening(port) as (client, _), asyncio.timeout(60):
+        async with listening(port) as (client, _), asyncio.timeout(PATIENCE):
             while not any(line["event"] == "unreadable" for line in lines):
                 client.publish("t7/s", b"no json")
                 await asyncio.sleep(0.05)
         process.send_signal(signal.SIGINT)
-        await asyncio.wait_for(reading, 30)
-        process.wait(10)
+        await asyncio.wait_for(reading, PATIENCE)
+        process.wait(PATIENCE)
         process.stdout.close()
         process.stderr.close()
     by_event = {line["event"]: line for line in lines}
