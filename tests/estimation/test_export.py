@@ -222,6 +222,15 @@ def test_mcap_opens_as_foxglove_wants_it(written, estimates):
     assert metadata["terragrip"]["notes"] == f"{NOTE}\n{TURN}"
 
 
+@pytest.mark.parametrize(("last", "is_one"), [(9.2e9, True), (9.3e9, False), (-1.0, False)])
+def test_a_stamp_of_an_mcap_is_of_64_bits(estimates, tmp_path, capsys, last, is_one):
+    late = replace(estimates, time=estimates.time + (last - START - estimates.time[-1]))
+    late.write(tmp_path / "e.parquet")
+    code = main(["convert", str(tmp_path / "e.parquet"), "-o", str(tmp_path / "x.mcap"), "-q"])
+    assert code == (0 if is_one else 2)
+    assert ("cannot be a message's stamp" in capsys.readouterr().err) is not is_one
+
+
 def obeys(data: Any, schema: Any) -> None:
     """The part of JSON schema that these schemas use."""
     kinds = {"object": dict, "array": list, "string": str, "integer": int, "number": (int, float)}

@@ -188,6 +188,11 @@ def test_of_a_block_rows_and_time_count_from_the_table() -> None:
             check_time(np.array(time), None, first_row=10, after=after)
 
 
+def test_the_last_stamp_may_be_of_a_year_that_no_clock_shows() -> None:
+    with pytest.raises(InputError, match=r"is 1\.7e\+12 s, past the year 5000: since 1970 in ms\?"):
+        check_time(np.array([1.7e9, 1.7e12]), None)
+
+
 def test_what_is_missing_and_what_is_not_used_is_said() -> None:
     with pytest.raises(InputError, match=r"column ground_speed: is missing.*nearest column is 'groundspeed'"):
         require_columns(("time", "groundspeed", "wheel_speed_l"), None)
